@@ -1,0 +1,36 @@
+"""Run the benchmarks named on the command line, or all of them, and print figure beside bar."""
+
+import argparse
+import os
+import platform
+import sys
+from importlib import import_module
+from pathlib import Path
+
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(name, "1")
+
+
+def main() -> int:
+    """Each module ``bench_<part>`` has ``bars()``, a generator of ``Bar``."""
+    available = sorted(p.stem.removeprefix("bench_") for p in Path(__file__).parent.glob("bench_*.py"))
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("part", nargs="*", metavar="part", help="any of: " + ", ".join(available))
+    parser.add_argument("--strict", action="store_true", help="exit code 1 where a bar is missed; 0 without it")
+    args = parser.parse_args()
+    parts = args.part or available
+    if unknown := set(parts) - set(available):
+        parser.error(f"no benchmark {', '.join(sorted(unknown))}; there are {', '.join(available)}")
+    print(f"Python {platform.python_version()}, {os.cpu_count()} cores, one BLAS thread. CPU s = user + system.")
+    missed = 0
+    for part in parts:
+        print(f"\n{part}\n{'-' * len(part)}", flush=True)
+        for bar in import_module(f"benchmarks.bench_{part}").bars():
+            print(bar, flush=True)
+            missed += bar.met is False
+    print(f"\n{missed} bar(s) missed." if missed else "\nNo bar missed.")
+    return 1 if args.strict and missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

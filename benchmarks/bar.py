@@ -1,0 +1,52 @@
+"""One measured figure beside its bar."""
+
+import resource
+import time
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Bar:
+    """``figure`` was measured, ``limit`` is the bar; ``sense`` is "<=" or ">=", or "" where only printed."""
+
+    name: str
+    figure: float
+    limit: float | None = None
+    unit: str = ""
+    sense: str = "<="
+    n: str = ""
+    note: str = ""
+
+    @property
+    def met(self) -> bool | None:
+        if self.limit is None or not self.sense:
+            return None
+        return self.figure <= self.limit if self.sense == "<=" else self.figure >= self.limit
+
+    def __str__(self) -> str:
+        verdict = {True: "met", False: "MISSED", None: ""}[self.met]
+        bar = "" if self.limit is None else f"{self.sense} {self.limit:g}"
+        return f"{self.name:<64} {self.figure:>11.4g} {bar:>12} {self.unit:<10} {verdict:<7}{self.n} {self.note}"
+
+
+class Stopwatch:
+    """CPU seconds (user + system, this process and its finished children) and wall seconds."""
+
+    cpu = 0.0
+    wall = 0.0
+
+
+@contextmanager
+def stopwatch():
+    """``with stopwatch() as watch: ...`` then ``watch.cpu`` and ``watch.wall``."""
+
+    def cpu():
+        usage = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+        return sum(u.ru_utime + u.ru_stime for u in usage)
+
+    watch, cpu0, wall0 = Stopwatch(), cpu(), time.perf_counter()
+    try:
+        yield watch
+    finally:
+        watch.cpu, watch.wall = cpu() - cpu0, time.perf_counter() - wall0

@@ -1,0 +1,146 @@
+"""Bars of the diagnosis: the recorded oscillator, what campaigns can tell, single cases of a track, cost.
+
+The whole development set takes hours of one core; by default three of its cases run. TURNOUT_MISMATCH_CASES names
+others, TURNOUT_MISMATCH_CASES=all runs every one.
+"""
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.bar import Bar, stopwatch
+from turnout import physics
+from turnout.mismatch import diagnose
+from turnout.mismatch.distinguish import distinguishability
+from turnout.mismatch.lumped import OscillatorCase
+from turnout.mismatch.track import TrackCase
+from turnout.mismatch.track.planned import measured_campaign, small_plan
+from turnout.mismatch.track.planned_case import PlannedCase
+from turnout.mismatch.verify import fit_percent, predict_reserved
+
+EFFECTS = {
+    "hanging_sleeper": (physics.HangingSleeper(39, 5e-4), {"place": 23.4}),
+    "local_ballast": (physics.LocalBallast(36, 0.3), {"place": 21.6}),
+    "local_pad": (physics.LocalPad(40, 3.0), {"place": 24.0}),
+    "attached_resonator": (physics.AttachedResonator(38, 25.0, 180.0), {"place": 22.8}),
+    "pad_temperature": (physics.PadTemperature(0.012), {}),
+    "pad_preload": (physics.PadPreload(5e3), {}),
+    "zener_pad": (physics.ZenerPad(0.8), {}),
+    "rail_shear": (physics.RailShear(3.0), {}),
+    "ballast_inertia": (physics.BallastInertia(200.0, 2e4), {}),
+    "sleeper_mode": (physics.SleeperMode(0.3, 250.0), {}),
+    "surface_dip": (physics.SurfaceDip(23.1, 6e-4, 0.5), {"place": 23.1}),
+    "unsprung_mass": (physics.UnsprungMass(1.5, "heavy"), {"train": "heavy"}),
+    "sensor_gain": (physics.SensorGain("S3", 1.3), {"sensor": "S3"}),
+    "mount_resonance": (physics.MountResonance("S1", 1 / 350.0, 8.0), {"sensor": "S1"}),
+    "time_offset": (physics.TimeOffset("S4", 1.5e-3), {"sensor": "S4"}),
+    "sensor_position": (physics.SensorPosition("S3", 0.4), {"sensor": "S3"}),
+    "clipping": (physics.Clipping("S3", 2.0), {"sensor": "S3"}),
+    "hum": (physics.Hum("S2", 0.5, 0.3), {"sensor": "S2"}),
+}
+DEVELOPMENT = [(f"control {k}", None, {}) for k in range(12)]
+DEVELOPMENT += [(name, *entry) for name, entry in EFFECTS.items()]
+DEFAULT = ("control 0", "pad_temperature", "hanging_sleeper")
+
+
+def bars():
+    """Yield every bar."""
+    yield from silverbox()
+    yield from planned()
+    yield from development()
+
+
+def silverbox():
+    """The recorded oscillator, told nothing, and with the right law taken away."""
+    shared = Path(os.environ.get("TURNOUT_SHARED_DATA", Path(__file__).parents[2] / "shared" / "data"))
+    path = shared / "nonlinear_silverbox" / "SNLS80mV.csv"
+    if not path.is_file():
+        return
+    u, y = np.genfromtxt(path, delimiter=",", skip_header=1)[:, :2].T
+    parts = [slice(40650 + k * 8692, 40650 + (k + 1) * 8692) for k in range(10)]
+    sines = [(f"multisine {k}", f"multisine {k}", u[p], y[p]) for k, p in enumerate(parts)]
+    reserved = [sines[8], sines[9], ("arrow", "arrow", u[:40000], y[:40000])]
+
+    def case(**options):
+        return OscillatorCase(sines[:8], reserved, 1e7 / 2**14, (60.0, 30.0), (0.1, 0.1), (1.0, 1.0), **options)
+
+    told_nothing = case()
+    with stopwatch() as watch:
+        found = diagnose(told_nothing)
+    fits = [fit_percent([o], [p]) for o, p in zip(reserved_of(told_nothing), predicted(told_nothing, found))]
+    yield Bar("Silverbox: cubic law chosen of ten (1 yes)", float(found.names == ("cubic_spring",)), 1.0, sense=">=")
+    yield Bar("Silverbox: multisines never used", min(fits[:2]), 98.0, "%", ">=", "n=2")
+    yield Bar("Silverbox: arrow, beyond the range", fits[2], 96.0, "%", ">=", "n=1", f"{watch.cpu:.1f} CPU s")
+    without = diagnose(case(without=("cubic_spring",))).verdict.answer
+    yield Bar("Silverbox without the cubic law: unknown (1 yes)", float(without == "unknown"), 1.0, sense=">=")
+
+
+def reserved_of(case):
+    """Observations that only the verification reads."""
+    return case.reserved
+
+
+def predicted(case, found):
+    """Their predictions by the fitted model."""
+    return predict_reserved(case, found.fit, case.reserved)
+
+
+def planned():
+    """Nats lost when an effect is explained by nuisances alone."""
+
+    def seen(plan, family):
+        matrix = distinguishability(PlannedCase(plan, families=(family,)))
+        return float(matrix.seen[0])
+
+    one, two = small_plan((30.0,), passages=False), small_plan((5.0, 30.0), passages=False)
+    rolling = replace(small_plan((15.0,), speeds=(40.0,)), blows=())
+    yield Bar("pad temperature from one temperature", seen(one, "pad_temperature"), 5.0, "nats")
+    yield Bar("pad temperature from two", seen(two, "pad_temperature"), 1000.0, "nats", ">=")
+    yield Bar("frequency-dependent pads from passages alone", seen(rolling, "zener_pad"), 5.0, "nats")
+    yield Bar("the same from blows", seen(one, "zener_pad"), 1000.0, "nats", ">=")
+
+
+def development():
+    """Cases made with our own simulator: necessary, not sufficient."""
+    wanted = os.environ.get("TURNOUT_MISMATCH_CASES", ",".join(DEFAULT)).split(",")
+    chosen = [(k, *c) for k, c in enumerate(DEVELOPMENT) if wanted == ["all"] or c[0] in wanted]
+    right, alarms, controls, covered, cost = 0, 0, 0, 0, []
+    for k, name, term, where in chosen:
+        campaign = measured_campaign(small_plan(), (term,) if term else (), 500 + k)
+        with stopwatch() as watch:
+            found = diagnose(TrackCase(campaign))
+        cost.append(watch.cpu)
+        if term is None:
+            controls += 1
+            alarms += found.verdict.answer != "none"
+            continue
+        named = found.names[:1] == (name,)
+        right += named and located(found, where)
+        covered += named and inside(found, term)
+    n = len(chosen) - controls
+    yield Bar("development: false alarms", float(alarms), 0.0, sense="<=", n=f"n={controls}")
+    if n:
+        yield Bar("development: named and placed right", 100.0 * right / n, 95.0, "%", ">=", f"n={n}")
+        yield Bar(
+            "development: inside the 95 % interval, of those named", 100.0 * covered / max(right, 1), 90.0, "%", ">="
+        )
+    yield Bar("development: cost of a small case, worst", max(cost), 60.0, "CPU s", n=f"n={len(cost)}")
+
+
+def located(found, where):
+    """Place within one bay, sensor and train as they are."""
+    said = found.fit.candidates[0].where
+    for key, value in where.items():
+        if key == "place" and abs(said.get("place", np.inf) - value) > 0.6:
+            return False
+        if key != "place" and said.get(key) != value:
+            return False
+    return True
+
+
+def inside(found, term):
+    """The first parameter within 1.96 standard errors."""
+    first = found.fit.candidates[0].parameters[0].name
+    return abs(found.fit.psi[0] - getattr(term, first)) <= 1.96 * found.fit.psi_se[0]

@@ -1,0 +1,88 @@
+"""The whole hammer chain against the floor: CPU time from raw files to registry over that of only reading them."""
+
+import shutil
+import tempfile
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.bar import Bar, stopwatch
+from turnout.chains.hammer import hammer_unit
+from turnout.config import load_configuration, with_raw
+from turnout.demo.hammer import hammer_test
+from turnout.demo.make import EXTENSION
+from turnout.demo.scenario import SECTIONS
+from turnout.fleet.batches import UnitResult, read_results, write_batch
+from turnout.fleet.scan import scan, unit_id
+from turnout.published.response import paper_response
+from turnout.readers import read
+from turnout.readers.writing import write
+from turnout.registry.register import register
+
+DAY = date(2024, 5, 13)
+FORMATS = ("uff58b", "hdf5", "tdms", "mat", "csv")
+AIMED = ("uff58b", "hdf5", "tdms")
+
+
+def bars():
+    """One turnout, one campaign: 8 sections, 3 tests, 10 impacts each, in every format."""
+    for file_format in FORMATS:
+        folder = Path(tempfile.mkdtemp())
+        try:
+            yield from _of_format(file_format, folder)
+        finally:
+            shutil.rmtree(folder)
+
+
+def _of_format(file_format, folder):
+    raw = folder / "raw"
+    _write(raw, file_format)
+    turnout = with_raw(load_configuration("config").turnout("tommerup_s1"), raw)
+    units = scan(turnout, raw).units
+    floor, whole = [], []
+    for attempt in range(4):
+        with stopwatch() as reading:
+            for unit in units:
+                for path, _, _ in unit.files:
+                    read(path, raw, turnout.hammer.descriptions[unit.section])
+        with stopwatch() as chain:
+            results = [_result(unit, turnout, raw) for unit in units]
+        with stopwatch() as registering:
+            batch = write_batch(folder / f"work{attempt}", results)
+            register([batch], folder / f"registry{attempt}", read=read_results)
+        if attempt:
+            floor.append(reading.cpu)
+            whole.append(chain.cpu + registering.cpu)
+    limit, sense = (5.0, "<=") if file_format in AIMED else (None, "")
+    note = f"{min(whole):.2f} s over {min(floor):.3f} s"
+    yield Bar(
+        f"raw {file_format} to registry over only reading",
+        min(whole) / min(floor),
+        limit,
+        "x",
+        sense,
+        "n=24 files",
+        note,
+    )
+    if file_format == "hdf5":
+        yield Bar("one turnout, 8 x 30 impacts, files to rows", min(whole), 2.0, "CPU s", "<=", "min of 3")
+
+
+def _write(raw, file_format):
+    folder = raw / "tommerup_s1" / "hammer" / DAY.isoformat()
+    folder.mkdir(parents=True)
+    for section in SECTIONS:
+        rng = np.random.default_rng(len(section))
+        for test in (1, 2, 3):
+            recordings, _ = hammer_test(paper_response(section, 1.0, 1.0), 12.0, DAY, test, rng)
+            write(recordings, folder / f"{section}_{test}.{EXTENSION[file_format]}", file_format, single=True)
+    notes = (
+        "campaign,started_at_utc,rail_temperature_c,hammer_id,tip,operator\n2024-05-13,2024-05-13T09:00:00,12.0,,,\n"
+    )
+    (raw / "tommerup_s1" / "campaigns.csv").write_text(notes)
+
+
+def _result(unit, turnout, raw):
+    tables = hammer_unit(unit, turnout, raw, algo="bench")
+    return UnitResult(unit_id(unit), unit.turnout, unit.kind, "key", "bench", "ok", tables)

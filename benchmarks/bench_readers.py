@@ -1,0 +1,132 @@
+"""Readers: CPU time of ``read`` over CPU time of the bare library call on the same file, MB/s, and B11.
+
+A hammer file of 10 records, 2 channels, 1 s at 51,200 Hz in double precision: 16.4 MB of samples. Text formats get a
+tenth of it. ``read`` also hashes the file, converts units, checks every sample and every count.
+"""
+
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import lvm_read
+import nptdms
+import numpy as np
+import pyarrow.csv
+import pyarrow.parquet
+import pymatreader
+import pyuff
+import soundfile
+
+from benchmarks.bar import Bar, stopwatch
+from turnout.readers import read
+from turnout.readers.writing import write
+from turnout.records import Channel, RawChannel, RawDescription, Recording
+
+RATE = 51200.0
+TEXT = ("uff58", "csv", "lvm")
+BARRED = ("uff58b", "hdf5", "tdms")  # pipeline over floor below 5 needs reading well below it
+REPEATS = 5
+
+
+def _recordings(n_record, n_sample):
+    rng = np.random.default_rng(1)
+    channels = (Channel("force", "force"), Channel("rail", "acceleration"))
+    return [Recording(rng.normal(size=(2, n_sample)) * [[2e3], [30.0]], RATE, channels) for _ in range(n_record)]
+
+
+def _description():
+    rail = RawChannel("rail", "a1", "acceleration", unit="V", sensitivity=35.3, sensitivity_unit="mV/g")
+    force = RawChannel("force", "h", "force", unit="V", sensitivity=0.23, sensitivity_unit="mV/N", sign=-1)
+    return RawDescription((force, rail), rate=RATE)
+
+
+def _npz(path):
+    with np.load(path) as archive:
+        return [archive[name] for name in archive.files]
+
+
+def _hdf5(path):
+    with h5py.File(path) as file:
+        return [channel[()] for record in file.values() for channel in record.values()]
+
+
+def _rcmdx(path):
+    samples = []
+    with h5py.File(path) as file:
+        file.visititems(lambda _, item: samples.append(item[()]) if isinstance(item, h5py.Dataset) else None)
+    return samples
+
+
+def _tdms(path):
+    tdms = nptdms.TdmsFile.read(path)
+    return [channel[:] for group in tdms.groups() for channel in group.channels()]
+
+
+BARE = {
+    "uff58": lambda path: pyuff.UFF(str(path)).read_sets(),
+    "uff58b": lambda path: pyuff.UFF(str(path)).read_sets(),
+    "tdms": _tdms,
+    "hdf5": _hdf5,
+    "rcmdx": _rcmdx,
+    "mat": pymatreader.read_mat,
+    "mat73": pymatreader.read_mat,
+    "wav": lambda path: soundfile.read(path),
+    "csv": lambda path: pyarrow.csv.read_csv(path, pyarrow.csv.ReadOptions(use_threads=False, skip_rows=4)).to_pandas(),
+    "lvm": lambda path: lvm_read.read(path, read_from_pickle=False, dump_file=False),
+    "npz": _npz,
+    "parquet": lambda path: pyarrow.parquet.read_table(path, use_threads=False),
+}
+
+
+def _best(call, *arguments):
+    """CPU seconds of the fastest of some rounds of calls, after one call to warm up."""
+    with stopwatch() as watch:
+        call(*arguments)
+    calls = max(1, int(0.1 / max(watch.cpu, 1e-3)))
+    times = []
+    for _ in range(REPEATS):
+        with stopwatch() as watch:
+            for _ in range(calls):
+                call(*arguments)
+        times.append(watch.cpu / calls)
+    return min(times)
+
+
+def bars():
+    """Speed per format, then the vendor files of B11."""
+    description = _description()
+    with tempfile.TemporaryDirectory() as folder:
+        for format, bare in BARE.items():
+            n_record = 1 if format == "wav" else 10
+            n_sample = int((0.1 if format in TEXT else 10 / n_record) * RATE)
+            path = write(_recordings(n_record, n_sample), Path(folder) / f"a.{format}", format, description)
+            promised = replace(description, format=format, n_records=n_record, n_samples=n_sample)
+            result = read(path.name, folder, promised)
+            assert not result.errors and len(result.recordings) == n_record
+            ours, floor = _best(read, path.name, folder, promised), _best(bare, path)
+            megabytes = path.stat().st_size / 1e6
+            note = f"{megabytes / ours:.0f} MB/s; library {megabytes / floor:.0f} MB/s"
+            limit = 5.0 if format in BARRED else None
+            yield Bar(f"read over bare library, {format}", ours / floor, limit, "times", n=f"n={REPEATS}", note=note)
+            path.unlink()
+    yield from _vendors()
+
+
+def _vendors():
+    """B11: every set of pyuff's problem files, as pyuff reads it where pyuff gives all of it."""
+    from turnout.readers.uff_sets import sets_of
+
+    folder = Path(__file__).resolve().parents[2] / "shared" / "data" / "uff58_reader_samples"
+    files = sorted(folder.glob("*.uff"))
+    if not files:
+        yield Bar("B11: vendor files of UFF 58 and 58b that read", 0, None, "files", note="not on this machine")
+        return
+    equal = 0
+    for path in files:
+        theirs = pyuff.UFF(str(path)).read_sets()
+        theirs = theirs if isinstance(theirs, list) else [theirs]
+        ours = sets_of(path.read_bytes())
+        pairs = [(a.data, b["data"]) for a, b in zip(ours, theirs, strict=True) if b["type"] == 58]
+        equal += all(np.array_equal(a, b) for a, b in pairs)
+    yield Bar("B11: vendor files of UFF 58 and 58b that read", equal, len(files), "files", ">=", n=f"n={len(files)}")

@@ -1,0 +1,140 @@
+"""Hit quality, windows and gate of the hammer test, and what they cost."""
+
+from functools import cache
+
+import numpy as np
+
+from benchmarks import hammer_blows as blows
+from benchmarks.bar import Bar, stopwatch
+from turnout.config.settings.receptance import ReceptanceSettings
+from turnout.receptance import find_impacts, receptance_of
+from turnout.records import Recording
+from turnout.signal.coherence import coherence_limits, lower_coherence_limit
+from turnout.signal.pulses import force_pulse
+from turnout.signal.windows import correct_poles
+
+N_TEST = 400
+
+
+def bars():
+    """Definitions: second hits of 5-30 % after 4-50 ms, tips of 0.1-3 ms in four pulse families, 12-bit loggers."""
+    yield from hit_quality()
+    yield from windows_and_gate()
+    yield from speed()
+
+
+@cache
+def rates(fault, tips=(1e-4, 3e-3), noise=(1e-3, 1e-2), reason=None):
+    """(share of faulty blows named, share of sound blows with any finding, numbers of both)."""
+    rng = np.random.default_rng(17)
+    named = faulty = alarms = sound = 0
+    for _ in range(N_TEST):
+        impacts = find_impacts(blows.test_of(rng, fault, tips=tips, noise=noise), "hammer", "rail")
+        good = impacts if fault is None else impacts[:-1]
+        alarms += sum(bool(i.rejections or i.notes) for i in good)
+        sound += len(good)
+        if fault is not None:
+            faulty += 1
+            named += reason in {r.reason for r in (*impacts[-1].rejections, *impacts[-1].notes)}
+    return named / max(faulty, 1), alarms / sound, faulty, sound
+
+
+def hit_quality():
+    found, alarms, n, m = rates(blows.second_hit, reason="double_hit")
+    yield Bar("B6 second hits found", found, 0.99, sense=">=", n=f"n {n}")
+    yield Bar("B6 findings on sound blows of the same tests", alarms, 0.01, n=f"n {m}")
+    for name in ("hard_clip", "analog_clip", "soft_clip"):
+        fault = getattr(blows, name)
+        found, alarms, n, m = rates(fault, reason="overload")
+        yield Bar(f"B6 {name.replace('_', ' ')} found, tips 0.1-3 ms", found, 0.95, sense=">=", n=f"n {n}")
+        short, _, n, _ = rates(fault, (1e-4, 3e-4), reason="overload")
+        yield Bar("   of these tips 0.1-0.3 ms, 2 to 6 samples", short, sense="", n=f"n {n}")
+        yield Bar("   findings on sound blows of the same tests", alarms, 0.01, n=f"n {m}")
+    _, alarms, _, m = rates(None, noise=(0.0, 0.0))
+    yield Bar("B6 findings on quiet 12-bit channels without noise", alarms, 0.01, n=f"n {m}")
+    rng, clipped = np.random.default_rng(3), []
+    for _ in range(100):
+        recordings = blows.test_of(rng, None, tips=(5e-4, 3e-3))
+        samples = recordings[-1].samples.copy()
+        limit = rng.uniform(0.5, 0.9) * np.max(np.abs(samples[1]))
+        samples[1] = np.clip(samples[1], -limit, limit)
+        last = find_impacts([*recordings[:-1], Recording(samples, blows.RATE, blows.CHANNELS)], "hammer", "rail")[-1]
+        clipped.append("overload" in {r.reason for r in last.rejections})
+    yield Bar("   hard clip of the response at 50-90 % found", float(np.mean(clipped)), sense="", n="n 100")
+
+
+def windowed(settings, noise=0.0):
+    """A 150 Hz mode of 0.3 % in a record of 0.2 s: 59 % of it is left at the end."""
+    pole, residue = -0.003 * 2 * np.pi * 150 + 2j * np.pi * 150, 0.7 - 0.4j
+    t = np.arange(4000) / blows.RATE
+    response = np.real(residue * np.exp(pole * t))
+    rng, recordings = np.random.default_rng(2), []
+    for k in range(10):
+        force = rng.uniform(800, 1200) * force_pulse("half-sine", t - 5e-3, 1.5e-3)
+        answer = np.convolve(force, response)[:4000]
+        answer += noise * np.max(answer) * rng.standard_normal(4000)
+        recordings.append(Recording(np.stack([force, answer]), blows.RATE, blows.CHANNELS, record=k))
+    return receptance_of(find_impacts(recordings, "hammer", "rail", settings), settings), pole, residue
+
+
+def fitted(result, decay):
+    """Pole and residue of one mode by linear least squares on the lines around it."""
+    near = (result.frequency > 100) & (result.frequency < 200)
+    f = result.frequency[near]
+    h = result.h1[near] * (2j * np.pi * f + decay) ** 2
+    q = np.exp(-2j * np.pi * f / blows.RATE)
+    rows = np.stack([np.ones_like(q), q, -q * h, -(q**2) * h], axis=1)
+    both = np.concatenate([rows.real, rows.imag]), np.concatenate([h.real, h.imag])
+    b0, b1, a1, a2 = np.linalg.lstsq(*both, rcond=None)[0]
+    z = next(r for r in np.roots([1.0, a1, a2]) if r.imag > 0)
+    return np.log(z) * blows.RATE, 2.0 * (b0 * z + b1) / (z - np.conj(z))
+
+
+def windows_and_gate():
+    decay = 60.0
+    result, pole, residue = windowed(ReceptanceSettings(exponential_window=decay))
+    seen, amplitude = fitted(result, decay)
+    s = correct_poles(seen, decay)
+    zeta, truth = -s.real / abs(s), -pole.real / abs(pole)
+    yield Bar("B7 exponential window: error of damping", 100 * abs(zeta / truth - 1), 0.1, "%")
+    yield Bar("B7 exponential window: error of amplitude", 100 * abs(amplitude / residue - 1), 0.1, "%")
+    raw = -seen.real / abs(seen)
+    yield Bar("   the same damping left uncorrected", 100 * abs(raw / truth - 1), unit="%", sense="")
+    yield Bar("B7 lowest line (0 Hz masked)", result.frequency[0], 5.0, "Hz", ">=", note="one line spacing")
+    rng = np.random.default_rng(4)
+    impacts = find_impacts(blows.test_of(rng, None, tips=(1e-3, 2e-3), noise=(3e-3, 1e-2)), "hammer", "rail")
+    r = receptance_of(impacts)
+    h1, hv, h2 = np.abs(r.h1), np.abs(r.hv), np.abs(r.h2)
+    inside = np.mean((h1 <= hv * (1 + 1e-9)) & (hv <= h2 * (1 + 1e-9)))
+    yield Bar("B7 lines with |H1| <= |Hv| <= |H2|", float(inside), 1.0, sense=">=", n=f"n_d {r.n}")
+    yield from coverage()
+
+
+def coverage(n=10, draws=40_000):
+    """Limits of the coherence on drawn Gaussian records."""
+    rng, worst, lower = np.random.default_rng(5), [], []
+    for true in (0.5, 0.8, 0.95):
+        x, e = (rng.standard_normal((2, draws, n, 2)) @ [1.0, 1j]).reshape(2, draws, n)
+        y = np.sqrt(true) * x + np.sqrt(1 - true) * e
+        power = np.mean(np.abs(x) ** 2, axis=1) * np.mean(np.abs(y) ** 2, axis=1)
+        z = np.abs(np.mean(x.conj() * y, axis=1)) ** 2 / power
+        low, high = coherence_limits(z, n)
+        worst.append(abs(np.mean((low <= true) & (true <= high)) - 0.95))
+        lower.append(np.mean(lower_coherence_limit(z, n) >= 0.8))
+        if true == 0.8:
+            yield Bar(
+                "   true coherence 0.8 passes the gate on the lower limit", float(lower[-1]), 0.055, n=f"n {draws}"
+            )
+            yield Bar("   and the paper's plain > 0.8", float(np.mean(z > 0.8)), sense="", n=f"n {draws}")
+    yield Bar("B7 coverage of the 95 % limits, worst deviation", float(max(worst)), 0.005, n=f"n {3 * draws}")
+
+
+def speed():
+    rng = np.random.default_rng(6)
+    sections = [blows.test_of(rng, None, n_blow=30, tips=(1e-3, 2e-3)) for _ in range(8)]
+    with stopwatch() as finding:
+        found = [find_impacts(recordings, "hammer", "rail") for recordings in sections]
+    yield Bar("B5 part: 8 x 30 impacts of 4,000 samples found and judged", finding.cpu, 1.0, "CPU s")
+    with stopwatch() as averaging:
+        lines = sum(receptance_of(impacts).frequency.size for impacts in found)
+    yield Bar("B5 part: receptance with all limits", averaging.cpu, 0.3, "CPU s", n=f"{lines} lines")

@@ -1,0 +1,82 @@
+"""Pages of a network: 3,500 turnouts of eight sections, twelve campaigns each."""
+
+import shutil
+import tempfile
+from pathlib import Path
+
+import duckdb
+
+from benchmarks import bench_pipeline
+from benchmarks.bar import Bar, stopwatch
+from turnout.config import load_configuration, with_raw
+from turnout.fleet.batches import read_results, write_batch
+from turnout.fleet.scan import scan
+from turnout.fleet.tables import configuration_rows
+from turnout.registry.database import open_registry
+from turnout.registry.register import register
+from turnout.report.write import write_pages
+
+N_TURNOUT, N_CAMPAIGN, N_WRITTEN = 3_500, 12, 200
+PLAIN = ("turnouts", "sections", "events", "quarantine_open")
+DATED = ("modes_current", "models_current", "impacts_current", "receptances_current")
+EMPTY = ("passages_current", "passage_scores")
+
+
+def bars():
+    """CPU time of all pages, from ``N_WRITTEN`` of them and the fleet's page of all."""
+    folder = Path(tempfile.mkdtemp())
+    try:
+        connection = _network(folder)
+        with stopwatch() as nothing:
+            write_pages(connection, folder / "pages", turnouts=[], progress=False)
+        some = [f"t{k:05d}" for k in range(0, N_TURNOUT, N_TURNOUT // N_WRITTEN)][:N_WRITTEN]
+        with stopwatch() as watch:
+            write_pages(connection, folder / "pages", turnouts=some, progress=False)
+        per_page = (watch.cpu - nothing.cpu) / len(some)
+        index = (folder / "pages" / "index.html").stat().st_size / 1e6
+        page = sum(p.stat().st_size for p in (folder / "pages" / "turnouts").iterdir()) / len(some) / 1e3
+        yield Bar(
+            "pages of 3,500 turnouts x 8 sections", nothing.cpu + N_TURNOUT * per_page, 120.0, "CPU s", n="n=200 pages"
+        )
+        yield Bar("fleet page alone", nothing.cpu, None, "CPU s", "")
+        yield Bar("fleet page", index, 5.0, "MB")
+        yield Bar("a turnout's page", page, None, "kB", "")
+    finally:
+        shutil.rmtree(folder)
+
+
+def _network(folder):
+    """In-memory database with the registry's views as tables, one turnout repeated."""
+    bench_pipeline._write(folder / "raw", "hdf5")
+    configuration = load_configuration("config")
+    turnout = with_raw(configuration.turnout("tommerup_s1"), folder / "raw")
+    results = [bench_pipeline._result(u, turnout, folder / "raw") for u in scan(turnout, folder / "raw").units]
+    batch = write_batch(folder / "work", results)
+    tables = configuration_rows(configuration, folder / "raw", [])
+    register([batch], folder / "registry", read=read_results, tables=tables)
+    open_registry(folder / "registry").close()
+    connection = duckdb.connect()
+    connection.execute(f"attach '{folder}/registry/registry.duckdb' as r (read_only)")
+    for name in EMPTY:
+        connection.execute(f"create table {name} as select * from r.{name} limit 0")
+    for name in (*PLAIN, *DATED):
+        times = N_CAMPAIGN if name in DATED and name != "receptances_current" else 1
+        connection.execute(_repeat(connection, name, times))
+    return connection
+
+
+def _repeat(connection, name, times):
+    """SQL that makes table ``name``: the one turnout's rows under every turnout's id, ``times`` campaigns back."""
+    columns = [d[0] for d in connection.execute(f"select * from r.{name} limit 0").description]
+    other = {
+        "turnout_id": "printf('t%05d', k)",
+        "section_id": "replace(section_id, turnout_id, printf('t%05d', k))",
+        "model_id": "printf('%s-%d-%d', model_id, k, j)",
+        "campaign_id": "printf('t%05d/%s', k, measured_at_utc)" if "measured_at_utc" in columns else "campaign_id",
+        "measured_at_utc": "measured_at_utc - to_days(cast(30 * j as integer))",
+    }
+    chosen = ", ".join(f"{other[c]} as {c}" if c in other else c for c in columns)
+    return (
+        f"create table {name} as select {chosen} from r.{name}, range({N_TURNOUT}) a(k), range({times}) b(j) "
+        "where turnout_id = 'tommerup_s1'"
+    )

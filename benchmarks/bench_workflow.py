@@ -1,0 +1,179 @@
+"""W1-W4: what the workflow itself costs over a network, and what survives damage and kills.
+
+The raw files are tiny and the chain only reads them, so that orchestration is what is measured.
+TURNOUT_BENCH_SHARE (default 1) scales the number of turnouts of W1 and W2 for a quick look.
+"""
+
+import os
+import random
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from benchmarks.bar import Bar, stopwatch
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "workflow"))
+import toy_fleet as toy
+
+SHARE = float(os.environ.get("TURNOUT_BENCH_SHARE", "1"))
+N_TURNOUT, N_SECTION, N_TEST, SHARDS = int(3500 * SHARE), 8, 5, 64
+N_KILL, N_DAMAGE_TURNOUT = 20, 125
+
+
+def bars():
+    """Each figure is of a cold process of its own."""
+    folder = Path(tempfile.mkdtemp(prefix="turnout-bench-"))
+    try:
+        yield from network(folder / "network")
+        yield from damage_and_kills(folder)
+        yield from same_rows(folder)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def network(folder):
+    """W1 and W2 on a network of 3,500 turnouts x 8 sections, five files each."""
+    make_network(folder)
+    n_file = sum(len(files) for _, _, files in os.walk(folder / "raw")) - N_TURNOUT
+    said, watch, _ = measured(folder)
+    n = f"{N_TURNOUT} turnouts, {n_file} files, {SHARDS} shards"
+    processed = count(said, "processed")
+    yield Bar("W2 first run of all: units processed", processed, N_TURNOUT * N_SECTION, "units", ">=", n)
+    note = "starts, imports, scan, hashing all files, register; the chain does nothing"
+    yield Bar("W2 first run of all: orchestration", watch.cpu, 420.0, "CPU s", "<=", f"{jobs(said)} hammer jobs", note)
+    said, watch, peak = measured(folder)
+    assert "Nothing to be done" in said, said
+    note = f"{watch.cpu:.2f} CPU s; load of the machine {os.getloadavg()[0]:.1f}"
+    yield Bar("W1 nothing new: wall", watch.wall, 5.0, "s", "<=", n, note)
+    yield Bar("W1 nothing new: memory of the process", peak, 300.0, "MB", "<=", n)
+    yield Bar("W1 nothing new: CPU", watch.cpu, None, "CPU s", "", n)
+
+    turnout = "T00042" if N_TURNOUT > 42 else "T00001"
+    day = folder / "raw" / turnout / "hammer" / "2024-01-01"
+    (day / "A3_9.npz").write_bytes(toy.raw_bytes(1, folder))
+    said, watch, _ = measured(folder)
+    yield Bar("W2 one new file: units processed", count(said, "processed"), 1, "units", "<=")
+    yield Bar("W2 one new file: hammer jobs", jobs(said), 1, "jobs", "<=")
+    yield Bar("W2 one new file: wall", watch.wall, 15.0, "s", "<=", "", f"{watch.cpu:.2f} CPU s")
+
+    toy.add_raw(folder, "T99999", N_SECTION)
+    with open(folder / "config/turnouts.tsv", "a") as table:
+        table.write("T99999\ttoy\tline 1\n")
+    said, watch, _ = measured(folder)
+    yield Bar("W2 one new turnout row: units processed", count(said, "processed"), N_SECTION, "units", "<=")
+    yield Bar("W2 one new turnout row: wall", watch.wall, 15.0, "s", "<=", "", f"{watch.cpu:.2f} CPU s")
+
+    some = [f"T{i:05d}" for i in range(0, N_TURNOUT, max(1, N_TURNOUT // 200))][:200]
+    for name in some:
+        toy.add_raw(folder, name, N_SECTION, n_campaign=1, first=1)
+    said, watch, _ = measured(folder)
+    off = abs(count(said, "processed") - N_SECTION * len(some))
+    yield Bar(f"W2 {len(some)} turnouts with a new campaign: units off", off, 0, "units", "<=")
+    yield Bar("W2 orchestration of these", watch.cpu, 420.0, "CPU s", "<=", f"{jobs(said)} hammer jobs")
+
+
+def make_network(folder):
+    """Many turnouts fast: the bytes of a file are made once per section and test, its name tells them apart."""
+    toy.make(folder, n_turnout=1, n_section=N_SECTION)
+    shutil.rmtree(folder / "raw")
+    ids = [f"T{i:05d}" for i in range(N_TURNOUT)]
+    lines = ["turnout\tlayout\tline", *(f"{t}\ttoy\tline {i % 20}" for i, t in enumerate(ids))]
+    (folder / "config/turnouts.tsv").write_text("\n".join(lines) + "\n")
+    (folder / "raw").mkdir()
+    content = toy.raw_bytes(7, folder)
+    notes = toy.campaigns_csv(["2024-01-01"])
+    for turnout in ids:
+        day = folder / "raw" / turnout / "hammer" / "2024-01-01"
+        day.mkdir(parents=True)
+        (folder / "raw" / turnout / "campaigns.csv").write_text(notes)
+        for section in toy.labels(N_SECTION):
+            for test in range(1, N_TEST + 1):
+                (day / f"{section}_{test}.npz").write_bytes(content + f"{turnout}{section}{test}".encode())
+
+
+def measured(folder):
+    """Run the workflow; what it said, CPU and wall seconds, peak memory of its largest process [MB]."""
+    with stopwatch() as watch, open(folder / "said", "w") as out:
+        run = subprocess.Popen(
+            toy.command(shards=SHARDS, chain="toy_fleet:nothing"), cwd=folder, env=toy.environment(), stdout=out,
+            stderr=subprocess.STDOUT,
+        )  # fmt: skip
+        _, status, usage = os.wait4(run.pid, 0)
+        run.returncode = os.waitstatus_to_exitcode(status)
+    said = (folder / "said").read_text()
+    assert run.returncode == 0, said[-3000:]
+    return said, watch, usage.ru_maxrss / 1024
+
+
+def count(said, word):
+    """Sum over the shards of one number of their summary lines."""
+    return sum(int(n) for n in re.findall(rf"^hammer \d+of\d+:.*?(\d+) {word}", said, re.M))
+
+
+def jobs(said):
+    return len(re.findall(r"^(?:local)?rule hammer:", said, re.M))
+
+
+def damage_and_kills(folder):
+    """W3: one per cent damaged in ten ways; killed twenty times; the registry as if nothing had happened."""
+    fleet = toy.make(folder / "fleet", n_turnout=N_DAMAGE_TURNOUT, n_section=8)
+    files = sorted((fleet / "raw").glob("*/hammer/*/*.npz"))
+    kinds = toy.damages(fleet)
+    broken = dict(zip(files[17 :: len(files) // len(kinds)], kinds))
+    expected = {(str(f.relative_to(fleet / "raw")), kinds[k][1]) for f, k in broken.items()}
+    for path, kind in broken.items():
+        path.write_bytes(kinds[kind][0])
+    toy.run(fleet, shards=4)
+    undisturbed = toy.data_files(fleet)
+    found = quarantined(fleet)
+    n = f"{len(files)} files, {len(broken)} damaged in {len(kinds)} ways"
+    yield Bar("W3 damaged files without their reason in quarantine", len(expected - found), 0, "files", "<=", n)
+    yield Bar("W3 sound files in quarantine", len(found - expected), 0, "files", "<=", n)
+    lost = len(files) - len(toy.rows(fleet)["recordings"]) - sum(not kinds[k][2] for k in broken.values())
+    yield Bar("W3 sound recordings that are not in the registry", abs(lost), 0, "files", "<=", n)
+
+    toy.forget(fleet)
+    (fleet / "config/config.yaml").write_text("fleet: {checkpoint_units: 10}\n")
+    moments, n_dead = random.Random(20171001), 0
+    for _ in range(N_KILL):
+        n_dead += killed(fleet, moments.uniform(0.5, 6.0))
+    toy.run(fleet, "--rerun-incomplete", shards=4)
+    differs = int(toy.data_files(fleet) != undisturbed)
+    note = f"{n_dead} of {N_KILL} kills met a run that was not finished"
+    yield Bar("W3 registry differs after 20 kills -9 and a last run", differs, 0, "", "<=", n, note)
+
+
+def quarantined(folder):
+    import duckdb
+
+    with duckdb.connect(str(folder / "results/registry/registry.duckdb"), read_only=True) as con:
+        return set(con.sql("select distinct path, reason_code from quarantine").fetchall())
+
+
+def killed(folder, seconds):
+    """Start the unattended run, kill it and all its jobs; True where it had not ended before."""
+    profile = str(toy.REPOSITORY / "profiles/default")
+    command = [sys.executable, "-m", "turnout.cli", "nightly", "--profile", profile, "--", *toy.command(shards=4)[3:]]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    run = subprocess.Popen(command, cwd=folder, env=toy.environment(), start_new_session=True, **quiet)
+    time.sleep(seconds)
+    alive = run.poll() is None
+    toy.kill(run)
+    return alive
+
+
+def same_rows(folder):
+    """W4: shards and cores change no byte of the registry's data files."""
+    fleet = folder / "fleet"
+    (fleet / "config/config.yaml").write_text("")
+    found = {}
+    for shards, cores in ((1, 1), (1, 2), (7, 2), (64, 2)):
+        toy.forget(fleet)
+        toy.run(fleet, shards=shards, cores=cores)
+        found[shards, cores] = tuple(toy.data_files(fleet))
+    n = "shards x cores " + ", ".join(f"{s}x{c}" for s, c in found)
+    yield Bar("W4 different registries", len(set(found.values())), 1, "", "<=", n)

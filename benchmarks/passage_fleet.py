@@ -1,0 +1,115 @@
+"""Simulated passages over the turnout of the demonstration, with what a measuring system would not know."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from turnout.passage.findings import PassageSensor
+from turnout.records import Channel, Recording
+from turnout.simulate import Sensor, car, load_track, load_vehicle, prepare_passage, simulate_passage
+from turnout.simulate.vehicle import coupled
+
+RATE = 20000.0
+# Places [m] of twelve sensors of the train's track; two of the other one feel it faintly.
+MAIN = (-20.0, -12.0, -6.0, 3.6, 8.4, 13.8, 19.2, 24.6, 26.4, 31.2, 36.0, 40.2)
+CROSSTALK = 0.05
+
+
+@dataclass
+class Run:
+    """One simulated train: ``samples`` (12, n) without noise, and the truth about it."""
+
+    samples: np.ndarray
+    type: str
+    speed: float
+    direction: str
+    route: str
+    offsets: np.ndarray
+    axle_load: float
+
+
+def vehicles(load):
+    """Type -> vehicle: four types of the templates."""
+    return {
+        "IC3": load_vehicle("ic3", load),
+        "IC3 double": load_vehicle("ic3", load, units=2),
+        "intercity": load_vehicle("intercity", load),
+        "freight": load_vehicle("freight", load),
+    }
+
+
+def strangers():
+    """Trains that no template describes."""
+    short = car("stranger", half_base=1.05, half_pivot=6.4, length=17.6, overhang=1.35)
+    long = car("stranger", half_base=1.40, half_pivot=9.9, length=27.1, overhang=2.25)
+    mixed = [short, long, short]
+    return [coupled("stranger", [short] * 4), coupled("stranger", [long] * 3), coupled("stranger", mixed)]
+
+
+def simulate(vehicle, name, speed_kmh, direction, route, prepared, track, seed=1):
+    """Run one train at 0 noise."""
+    sensors = [Sensor(f"m{i}", x) for i, x in enumerate(MAIN)]
+    recording = simulate_passage(
+        track,
+        vehicle,
+        speed_kmh / 3.6,
+        sensors,
+        direction,
+        route,
+        seed=seed,
+        rate=RATE,
+        prepared=prepared,
+        lead=1.2,
+        tail=1.2,
+    )
+    load = float(np.mean(2.0 * vehicle.static_loads)) / 9806.65
+    return Run(
+        recording.samples.astype(np.float32), name, speed_kmh / 3.6, direction, route, vehicle.wheel_places, load
+    )
+
+
+def fleet(speeds, loads=(0.0, 1.0)):
+    """Runs of the four types: ``speeds`` maps a type to speeds [km/h]; direction and route take turns."""
+    track = load_track("tommerup", seed=1)
+    prepared = prepare_passage(track, rate=RATE)
+    k = 0
+    for load in loads:
+        for name, vehicle in vehicles(load).items():
+            for speed in speeds[name]:
+                direction, route = ("facing", "trailing")[k % 2], ("main", "diverging")[k % 4 == 3]
+                k += 1
+                yield simulate(vehicle, name, speed, direction, route, prepared, track)
+
+
+def stranger_runs(speeds=(60.0, 110.0)):
+    """Runs of the trains without template."""
+    track = load_track("tommerup", seed=1)
+    prepared = prepare_passage(track, rate=RATE)
+    for vehicle in strangers():
+        for speed in speeds:
+            yield simulate(vehicle, "unknown", speed, "facing", "main", prepared, track)
+
+
+def heard(run: Run, rows, noise, rng, beside=True):
+    """(Recording, sensors): the sensors ``rows`` with white noise [m/s²], and two sensors of the other track.
+
+    A sensor before the toe feels every train; one behind it only those of its own track, the others faintly.
+    """
+    samples = run.samples[list(rows)].astype(float)
+    names = [f"m{i}" for i in rows]
+    places = [MAIN[i] for i in rows]
+    here, other = run.route, "diverging" if run.route == "main" else "main"
+    tracks = ["both" if x < 4.0 else here for x in places]
+    if beside:
+        faint = CROSSTALK * run.samples[[9, 10]].astype(float)
+        samples, names, places = np.vstack([samples, faint]), [*names, "o1", "o2"], [*places, MAIN[9], MAIN[10]]
+        tracks = [*tracks, other, other]
+    samples = samples + noise * rng.standard_normal(samples.shape)
+    channels = tuple(Channel(n, "acceleration", x) for n, x in zip(names, places))
+    sensors = [PassageSensor(n, n, x, t) for n, x, t in zip(names, places, tracks)]
+    return Recording(samples, RATE, channels, "passage"), sensors
+
+
+def scaled(run: Run, factor) -> Run:
+    """The same run with all accelerations multiplied."""
+    return replace(run, samples=run.samples * factor)

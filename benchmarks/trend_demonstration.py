@@ -1,0 +1,124 @@
+"""What the demonstration fleet shows of its one true drift, and how soon anyone could have known: a paragraph.
+
+``python -m benchmarks.trend_demonstration . docs/trends.md`` writes it between the marks in the page. The first
+folder is that in which ``turnout demo`` was run: results/registry is read, and truth/, which no job reads.
+"""
+
+import json
+import sys
+from datetime import date, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+
+from turnout.config.settings.trend import TrendSettings
+from turnout.demo.scenario import Change
+from turnout.registry.database import open_registry
+from turnout.trend.cusum import cusum
+
+MARKS = "<!-- demonstration: generated, do not edit -->", "<!-- end of demonstration -->"
+QUESTION = """
+select c.measured_at_utc, c.state, b.sd_pct, b.phi, b.guard, b.allowance, b.threshold_down, s.state, s.since_at_utc,
+    s.since_earliest_utc, s.since_latest_utc, s.change_kind, s.change_pct, s.change_low_pct, s.change_high_pct,
+    (select min(a.raised_at_utc) from alarms a where a.section_id = c.section_id and a.band = c.band
+        and a.direction = 'down' and a.raised_at_utc >= ?) as raised,
+    (select min(w.rank) from worklist w where w.section_id = c.section_id and w.band = c.band) as place,
+    (select count(*) from worklist w where w.state = 'inspect this week') as n_inspect
+from charts c
+join baselines b using (turnout_id, section_id, band, source, epoch)
+join chart_status s using (turnout_id, section_id, band, source)
+where c.section_id = ? and c.band = ? and c.source = 'hammer' and c.state <> 'wrong_time'
+order by c.measured_at_utc
+"""
+
+
+def drifts(truth: Path):
+    """(section id, band, change) of every true drift that no event explains."""
+    for path in sorted(Path(truth).glob("*.json")):
+        told = json.loads(path.read_text(encoding="utf-8"))
+        for said in told.get("changes", []) if isinstance(told, dict) else []:
+            if said["per_year"] and not said["event"]:
+                change = Change(**said | {"since": date.fromisoformat(said["since"]), "until": None})
+                yield f"{told['turnout']}/{change.section}", change.component, change
+
+
+def chances(times, change, spread, phi, guard, allowance, threshold, n=20_000, seed=1):
+    """Share of simulated charts that are in alarm by each campaign since the onset, and the true frequency [%].
+
+    The chart's own spread, memory, guard and threshold; frequency goes as the root of the stiffness.
+    """
+    share = TrendSettings().single_share
+    truth = np.array([100.0 * (np.sqrt(change.factor(t.date())) - 1.0) for t in times])
+    rng = np.random.default_rng(seed)
+    noise = rng.standard_normal((n, len(times)))
+    for i in range(1, len(times)):
+        noise[:, i] = phi * noise[:, i - 1] + np.sqrt(1 - phi**2) * noise[:, i]
+    widening = np.sqrt((1 + phi) / (1 - phi))
+    z = (truth[None] + spread * noise) / (spread * guard * widening)
+    k = np.full(z.shape, allowance)
+    z = np.maximum(z, -(share * threshold + allowance))
+    _, opened, _ = cusum(z, k, np.full(n, threshold), np.ones(z.shape, bool), np.zeros(z.shape, bool))
+    return np.maximum.accumulate(opened, axis=1).mean(axis=0), truth
+
+
+def paragraph(folder) -> str:
+    """The paragraph of the page, every figure from the registry or computed from its chart."""
+    parts = []
+    with open_registry(Path(folder) / "results" / "registry") as con:
+        for section, band, change in drifts(Path(folder) / "truth"):
+            since = datetime.combine(change.since, datetime.min.time())
+            rows = con.execute(QUESTION, [since - timedelta(days=1), section, band]).fetchall()
+            if rows:
+                parts.append(_words(section, band, change, since, rows))
+    return "\n".join(parts)
+
+
+def _words(section, band, change, since, rows) -> str:
+    times = [row[0] for row in rows]
+    spread, phi, guard, allowance, threshold, state = rows[-1][2:8]
+    first, early, late, kind, size, low, high, raised, place, n_inspect = rows[-1][8:]
+    after = [t for t in times if t >= since]
+    known, truth = chances(after, change, spread, phi, guard, allowance, threshold)
+    half, most = (int(np.argmax(known >= p)) + 1 if known.max() >= p else None for p in (0.5, 0.95))
+    spacing = float(np.median(np.diff(times)) / timedelta(days=1))
+    said = [
+        f"On the demonstration fleet ({len(times)} campaigns of this chart, {spacing:.0f} days apart; raw files "
+        f"through the whole pipeline) the stiffness of the {band} at `{section}` falls by "
+        f"{-100 * change.per_year:.0f} % a year from {change.since}; its frequency has lost {-truth[-1]:.1f} % by the "
+        f"newest campaign, {times[-1]:%Y-%m-%d}.",
+        f"It is number {place} of the list, and {n_inspect} place{' is' if n_inspect == 1 else 's are'} to inspect."
+        if place
+        else f"It is not on the list (state {state}).",
+    ]
+    if raised:
+        count = sum(since <= t <= raised for t in times)
+        said.append(f"The alarm came with campaign number {count} after the onset, on {raised:%Y-%m-%d}.")
+    soon = f"half of such charts are in alarm by campaign {half}" if half else "fewer than half are in alarm today"
+    sure = f"95 % by campaign {most}" if most else "95 % not yet"
+    said.append(
+        f"With this chart's spread of {spread:.2f} % a campaign ({phi:.2f} memory) {soon} after the onset and {sure}; "
+        f"one campaign alone may never raise one: nobody could have known before the second."
+    )
+    if first:
+        held = early <= since <= late
+        inside = low <= truth[-1] <= high
+        said.append(
+            f"The change is called a {kind} since {first:%Y-%m-%d}, 95 % between {early:%Y-%m-%d} and {late:%Y-%m-%d} "
+            f"({'which holds' if held else 'which misses'} the true day), and its size {size:+.1f} % ({low:+.1f} to "
+            f"{high:+.1f}), which {'holds' if inside else 'misses'} the true one."
+        )
+    return " ".join(said)
+
+
+def write(page: Path, text: str) -> None:
+    """Put the paragraph between the marks of the page."""
+    before, rest = page.read_text(encoding="utf-8").split(MARKS[0])
+    after = rest.split(MARKS[1])[1]
+    page.write_text(f"{before}{MARKS[0]}\n{text}\n{MARKS[1]}{after}", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    found = paragraph(sys.argv[1])
+    print(found)
+    if len(sys.argv) > 2:
+        write(Path(sys.argv[2]), found)

@@ -1,0 +1,29 @@
+"""One nightly update in a process of its own: CPU seconds and peak memory as JSON."""
+
+import json
+import resource
+import sys
+import time
+
+
+def main(registry, state) -> None:
+    """Update the registry, then ask for the worklist; both are on the clock, the imports too."""
+    from pathlib import Path
+
+    from turnout.config.settings.trend import TrendSettings
+    from turnout.registry.database import open_registry
+    from turnout.trend.nightly import update
+
+    known = json.loads(Path(state).read_text()) if Path(state).exists() else None
+    done = update(registry, TrendSettings(), known)
+    updated = time.process_time()
+    with open_registry(registry) as con:
+        n = len(con.execute("select * from worklist").fetchall())
+    Path(state).write_text(json.dumps(done.digests))
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e9
+    print(json.dumps({"cpu": time.process_time(), "worklist": time.process_time() - updated, "peak": peak,
+                      "rows": done.rows, "written": done.written, "n": n}))  # fmt: skip
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,67 @@
+"""The slow way: plain loops, pandas and statsmodels, for what the views of the registry say."""
+
+import numpy as np
+import pandas as pd
+import statsmodels.api as sm
+
+KEYS = ["turnout_id", "section_id", "band", "source"]
+
+
+def cusum_by_loop(charts, baselines) -> pd.Series:
+    """The sum for a loss of stiffness of every campaign, one after the other, as Page wrote it."""
+    joined = charts.merge(baselines[[*KEYS, "epoch", "allowance", "threshold_down"]], on=[*KEYS, "epoch"])
+    sums = {}
+    for chart, cells in joined.sort_values("measured_at_utc").groupby([*KEYS, "epoch"]):
+        total = 0.0
+        for cell in cells.itertuples(index=False):
+            if cell.state in ("ok", "alarm_down", "alarm_up") and np.isfinite(cell.z):
+                fall = min(-cell.z, 0.75 * cell.threshold_down + cell.allowance)
+                total = max(0.0, total + fall - cell.allowance)
+            sums[(*chart[:4], cell.measured_at_utc)] = total
+    index = pd.MultiIndex.from_tuples(sums, names=[*KEYS, "measured_at_utc"])
+    return pd.Series(list(sums.values()), index)
+
+
+def residuals_by_pandas(modes, charts, baselines) -> pd.Series:
+    """Frequency less level, temperature and the median of the other settled sections, one campaign at a time.
+
+    Level, slope and siblings are learned here anew from ``modes``: of ``baselines`` only f0, the reference temperature
+    and the flag of the siblings are taken, of ``charts`` which campaigns the baseline holds.
+    """
+    cells = charts[charts["section_id"] != "*"].merge(modes, on=[*KEYS, "measured_at_utc"], suffixes=("", "_mode"))
+    cells = cells.merge(baselines[[*KEYS, "epoch", "with_siblings", "complete"]], on=[*KEYS, "epoch"])
+    centred = []
+    for _, chart in cells.groupby(KEYS):
+        base = chart["state"] == "baseline"
+        f0 = chart.loc[base, "frequency_hz"].mean()
+        percent = 100.0 * (chart["frequency_hz"] / f0 - 1.0)
+        fit = sm.OLS(percent[base], sm.add_constant(chart.loc[base, "rail_temperature_c_mode"])).fit()
+        left = percent - fit.predict(sm.add_constant(chart["rail_temperature_c_mode"]))
+        centred.append(chart.assign(centred=left))
+    cells = pd.concat(centred)
+    median = []
+    for _, campaign in cells.groupby(["turnout_id", "band", "source", "measured_at_utc"]):
+        settled = campaign["complete"] & (campaign["state"] != "learning")
+        for i in range(len(campaign)):
+            others = np.delete(campaign["centred"].to_numpy(), i)[np.delete(settled.to_numpy(), i)]
+            use = campaign["with_siblings"].iloc[i] and len(others) >= 3
+            median.append((campaign.index[i], np.median(others) if use else np.nan))
+    cells = cells.reset_index(drop=True) if cells.index.has_duplicates else cells
+    cells["median"] = pd.Series(dict(median))
+    against = cells["centred"] - cells["median"]
+    shift = against[cells["state"] == "baseline"].groupby([cells[k] for k in KEYS]).mean()
+    beside = against - pd.Series(shift.reindex(pd.MultiIndex.from_frame(cells[KEYS])).to_numpy(), cells.index)
+    return beside.fillna(cells["centred"]).set_axis(pd.MultiIndex.from_frame(cells[[*KEYS, "measured_at_utc"]]))
+
+
+def slopes_by_statsmodels(modes, days) -> pd.Series:
+    """Slope [%/a] of each chart on time and temperature together over the last days."""
+    newest = modes["measured_at_utc"].max()
+    recent = modes[modes["measured_at_utc"] > newest - pd.Timedelta(days=days)]
+    found = {}
+    for chart, rows in recent.groupby(KEYS, observed=True):
+        years = (rows["measured_at_utc"] - newest) / pd.Timedelta(days=365.25)
+        columns = np.column_stack([np.ones(len(rows)), years, rows["rail_temperature_c"]])
+        fit = sm.OLS(rows["frequency_hz"].to_numpy(), columns).fit()
+        found[chart] = 100.0 * fit.params[1] / rows["frequency_hz"].mean()
+    return pd.Series(list(found.values()), pd.MultiIndex.from_tuples(found, names=KEYS))

@@ -1,0 +1,23 @@
+"""Hammer tests: the units of one shard, from raw files to rows."""
+
+STAGES.append("hammer")
+
+
+rule hammer:
+    input:
+        plan="work/plan/{shard}.json",
+    output:
+        state=update("work/hammer/{shard}.json"),
+    log:
+        "logs/hammer/{shard}.log",
+    benchmark:
+        "logs/benchmarks/hammer/{shard}.tsv"
+    threads: shard_threads()
+    resources:
+        mem_mb=1000,
+        runtime=120,
+    params:
+        **stage_params("hammer", "turnout.chains.hammer:hammer_unit"),
+        kind="hammer",
+    script:
+        "../scripts/stage.py"

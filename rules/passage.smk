@@ -1,0 +1,25 @@
+"""Train passages: the files of one shard, from raw files to rows, with the models that the hammer stage left."""
+
+STAGES.append("passage")
+
+
+rule passage:
+    input:
+        plan="work/plan/{shard}.json",
+        hammer="work/hammer/{shard}.json",
+    output:
+        state=update("work/passage/{shard}.json"),
+    log:
+        "logs/passage/{shard}.log",
+    benchmark:
+        "logs/benchmarks/passage/{shard}.tsv"
+    threads: shard_threads()
+    resources:
+        mem_mb=2000,
+        runtime=240,
+    params:
+        **stage_params("passage", "turnout.chains.passage:passage_unit"),
+        kind="passage",
+        context="turnout.chains.passage_context:passage_context",
+    script:
+        "../scripts/stage.py"

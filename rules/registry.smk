@@ -1,0 +1,46 @@
+"""The registry: one job takes in what all shards have computed, then the run is judged."""
+
+TARGETS += ["results/registry/_generation.json", "work/verdict.json"]
+
+
+rule register:
+    input:
+        states=shard_states,
+        plans=expand("work/plan/{shard}.json", shard=RUN.shards),
+    output:
+        update("results/registry/_generation.json"),
+    log:
+        "logs/register.log",
+    benchmark:
+        "logs/benchmarks/register.tsv"
+    resources:
+        mem_mb=4000,
+        runtime=60,
+    params:
+        code=fingerprint("turnout.registry.register"),
+        stages=STAGES,
+        shards=RUN.every_shard,
+        configuration=RUN.fleet_hash,
+        job=RUN.job,
+    script:
+        "../scripts/register.py"
+
+
+rule verdict:
+    input:
+        "results/registry/_generation.json",
+        states=shard_states,
+    output:
+        update("work/verdict.json"),
+    log:
+        "logs/verdict.log",
+    benchmark:
+        "logs/benchmarks/verdict.tsv"
+    retries: 0
+    resources:
+        mem_mb=500,
+        runtime=10,
+    params:
+        job=RUN.job,
+    script:
+        "../scripts/verdict.py"

@@ -1,0 +1,23 @@
+"""Pages: one for the fleet, one for each turnout, after the trends."""
+
+TARGETS += ["results/pages/index.html"]
+
+
+rule report:
+    input:
+        generation="results/registry/_generation.json",
+        trend="work/trend.json",
+    output:
+        "results/pages/index.html",
+    log:
+        "logs/report.log",
+    benchmark:
+        "logs/benchmarks/report.tsv"
+    resources:
+        mem_mb=4000,
+        runtime=60,
+    params:
+        code=fingerprint("turnout.report.job"),
+        turnouts=RUN.job["only"],
+    script:
+        "../scripts/report.py"

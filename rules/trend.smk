@@ -1,0 +1,28 @@
+"""Trends: after every registration all charts anew, then the list of the next morning."""
+
+from pathlib import Path
+
+TARGETS += ["work/trend.json", "results/worklist.csv"]
+ACKNOWLEDGED = Path(RUN.job["configuration"]) / "acknowledgements.csv"
+
+
+rule trend:
+    input:
+        registry="results/registry/_generation.json",
+        acknowledged=[str(ACKNOWLEDGED)] if ACKNOWLEDGED.exists() else [],
+    output:
+        state=update("work/trend.json"),
+        worklist="results/worklist.csv",
+    log:
+        "logs/trend.log",
+    benchmark:
+        "logs/benchmarks/trend.tsv"
+    resources:
+        mem_mb=4000,
+        runtime=60,
+    params:
+        code=fingerprint("turnout.trend.nightly"),
+        configuration=RUN.fleet_hash,
+        job=RUN.job,
+    script:
+        "../scripts/trend_update.py"

@@ -1,0 +1,5 @@
+"""Rule of any stage: the plan of one shard in, its new units computed, its state out."""
+
+from turnout.fleet.job import stage_job
+
+stage_job(snakemake.input.plan, snakemake.output.state, snakemake.log[0], snakemake.params, snakemake.threads)

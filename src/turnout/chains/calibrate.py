@@ -1,0 +1,82 @@
+"""Calibrate a section of a simulated turnout to hammer tests, or to resonances and dampings."""
+
+from pathlib import Path
+
+import numpy as np
+
+from turnout.config.load import load_configuration
+from turnout.config.settings.identify import IdentifySettings
+from turnout.config.settings.receptance import ReceptanceSettings
+from turnout.errors import ConfigError, SimulationError
+from turnout.identify import identify
+from turnout.readers import read
+from turnout.receptance import find_impacts, receptance_of
+from turnout.records import RawChannel, RawDescription
+from turnout.simulate import load_track
+from turnout.simulate.calibrate import Measured, calibrate
+from turnout.simulate.calibrate_modes import fit_modes
+from turnout.simulate.hammer import located
+
+BAND = (60.0, 800.0)
+UNDESCRIBED = RawDescription(
+    (
+        RawChannel("hammer", "hammer", "force"),
+        RawChannel("acc_1", "acc_1", "acceleration"),
+        RawChannel("acc_2", "acc_2", "acceleration", mounting="rail head mid-span"),
+    )
+)
+
+
+def calibrate_to_files(track_name, section, files, turnout_id=None, config="config", seed=0):
+    """``Calibration`` of ``section`` to the hammer tests in ``files``, all of that section.
+
+    The receptance is H1 of all accepted impacts; its random error is that of its coherence,
+    :math:`\\sigma = |H| \\sqrt{(1-\\gamma^2) / 2n\\gamma^2}` (Bendat and Piersol, eq. 9.90), lines 60-800 Hz.
+    """
+    track = load_track(track_name, seed=seed)
+    place, _ = located(track, section)
+    description, force, responses = _channels(section, turnout_id, config)
+    recordings = [r for f in files for r in read(Path(f).name, Path(f).parent, description).recordings]
+    settings, measured = ReceptanceSettings(), []
+    for name in responses:
+        channel = recordings[0].channels[recordings[0].index(name)]
+        at = channel.position
+        if at is None:
+            at = place + (0.3 if "mid-span" in channel.mounting else 0.0)
+        impacts = [i for i in find_impacts(recordings, force, name, settings) if i.accepted]
+        if len(impacts) < settings.minimum_impacts:
+            raise SimulationError(f"calibration of {section}: {len(impacts)} sound impacts in channel {name!r}.")
+        measured.append(_measured(receptance_of(impacts, settings), place, at))
+    return calibrate(track, section, measured)
+
+
+def calibrate_to_modes(track_name, section, wanted, seed=0, evaluations=14):
+    """``ModeFit`` of ``section`` to ``wanted`` {band: (frequency [Hz], damping)} as the program identifies them."""
+    return fit_modes(load_track(track_name, seed=seed), section, wanted, identified_modes, evaluations=evaluations)
+
+
+def identified_modes(recordings, force="hammer", response="acc_1"):
+    """Band -> (frequency [Hz], damping) of a hammer test, as the hammer chain identifies it."""
+    impacts = [i for i in find_impacts(recordings, force, response, ReceptanceSettings()) if i.accepted]
+    if not impacts:
+        return {}
+    model = identify([i.decay for i in impacts], recordings[0].rate, IdentifySettings())
+    return {mode.band: (mode.frequency, mode.damping) for mode in model.modes if mode.band in ("ballast", "railpad")}
+
+
+def _channels(section, turnout_id, config):
+    if turnout_id is None:
+        return UNDESCRIBED, "hammer", ("acc_1", "acc_2")
+    turnout = load_configuration(config).turnout(turnout_id)
+    hammer = turnout.hammer
+    if hammer is None:
+        raise ConfigError(turnout.layout, "hammer", "nothing about hammer tests", "Add them to the layout")
+    names = (hammer.response[section], hammer.validation[section])
+    return hammer.descriptions[section], hammer.force[section], tuple(n for n in names if n)
+
+
+def _measured(receptance, excited, at):
+    inside = (receptance.frequency >= BAND[0]) & (receptance.frequency <= BAND[1])
+    h, coherence = receptance.h1[inside], np.clip(receptance.coherence[inside], 1e-3, 1.0 - 1e-6)
+    sd = np.abs(h) * np.sqrt((1.0 - coherence) / (2.0 * receptance.n * coherence))
+    return Measured(receptance.frequency[inside], h, sd, excited, at)

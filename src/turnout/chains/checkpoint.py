@@ -1,0 +1,54 @@
+"""Fits of an interrupted diagnosis, kept on disk until it is done."""
+
+import hashlib
+import pickle
+from collections.abc import MutableMapping
+
+
+class Checkpoint(MutableMapping):
+    """A mapping whose values live in files below ``folder``; files of another ``version`` are not seen.
+
+    Values are written whole or not at all. They hold no work of others: only what this program wrote is read.
+    """
+
+    def __init__(self, folder, name, version=()):
+        digest = hashlib.sha256(repr(tuple(version)).encode()).hexdigest()[:12]
+        self.folder = folder / f"{name}-{digest}"
+        self.seen = {}
+
+    def _path(self, key):
+        return self.folder / (hashlib.sha256(key.encode()).hexdigest()[:24] + ".fit")
+
+    def __getitem__(self, key):
+        if key not in self.seen:
+            try:
+                self.seen[key] = pickle.loads(self._path(key).read_bytes())
+            except (FileNotFoundError, EOFError, pickle.UnpicklingError):
+                raise KeyError(key) from None
+        return self.seen[key]
+
+    def __setitem__(self, key, value):
+        self.seen[key] = value
+        self.folder.mkdir(parents=True, exist_ok=True)
+        path = self._path(key)
+        unfinished = path.with_suffix(".tmp")
+        unfinished.write_bytes(pickle.dumps(value))
+        unfinished.replace(path)
+
+    def __delitem__(self, key):
+        del self.seen[key]
+        self._path(key).unlink(missing_ok=True)
+
+    def __iter__(self):
+        return iter(self.seen)
+
+    def __len__(self):
+        return len(self.seen)
+
+    def done(self):
+        """Forget everything."""
+        if self.folder.is_dir():
+            for path in self.folder.iterdir():
+                path.unlink()
+            self.folder.rmdir()
+        self.seen.clear()

@@ -1,0 +1,42 @@
+"""The distinguishability of effects under a planned campaign, and the cheapest addition to it."""
+
+from dataclasses import replace
+
+from turnout.mismatch.distinguish import cheapest_addition, distinguishability
+from turnout.mismatch.track.planned import Plan, Train
+from turnout.mismatch.track.planned_case import PlannedCase
+from turnout.simulate import Sensor, load_track, load_vehicle
+
+# Effort of one more of each, in hours of two people on site.
+COST = {"a second rail temperature": 8.0, "hammer tests at the sensors": 4.0, "a second speed": 1.0}
+
+
+def planned_matrix(track, sensors, blows, temperatures, trains, speeds, families=None):
+    """(Distinguishability, advice) of a plan: places [m], temperatures [°C], vehicle files, speeds [km/h]."""
+    turnout = load_track(track)
+    points = tuple((x, t) for x in blows for t in temperatures)
+    vehicles = {name: load_vehicle(name) for name in trains}
+    rolling = tuple(Train(v, n, s / 3.6, t) for n, v in vehicles.items() for s in speeds for t in temperatures)
+    seats = tuple(Sensor(f"S{k + 1}", x) for k, x in enumerate(sensors))
+    plan = Plan(turnout, seats, points, rolling)
+    matrix = _matrix(plan, families)
+    wider = {name: (COST[name], _matrix(p, families)) for name, p in _additions(plan, sensors, temperatures)}
+    name, resolved, _ = cheapest_addition(matrix, wider)
+    if not resolved:
+        return matrix, "No single addition tells more pairs apart."
+    return matrix, f"Most would be added by {name}: {resolved} more pairs told apart."
+
+
+def _matrix(plan, families):
+    return distinguishability(PlannedCase(plan, families=families))
+
+
+def _additions(plan, sensors, temperatures):
+    other = max(temperatures) + 15.0
+    again = tuple((x, other) for x, t in plan.blows if t == temperatures[0])
+    warm = tuple(replace(t, temperature=other) for t in plan.trains if t.temperature == temperatures[0])
+    yield "a second rail temperature", replace(plan, blows=plan.blows + again, trains=plan.trains + warm)
+    yield "hammer tests at the sensors", replace(plan, blows=plan.blows + tuple((x, temperatures[0]) for x in sensors))
+    if plan.trains:
+        slower = tuple(replace(t, speed=0.7 * t.speed) for t in plan.trains)
+        yield "a second speed", replace(plan, trains=plan.trains + slower)

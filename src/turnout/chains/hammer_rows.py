@@ -1,0 +1,169 @@
+"""Impacts, receptance and model of one section and campaign as rows of the registry."""
+
+import json
+
+import numpy as np
+
+from turnout.records import Impact, ModalModel, Mode, Receptance
+
+SHOWN = (20.0, 1600.0)
+SHOWN_LINES = 240
+SHOWN_DECAY = 0.04
+# Poles far outside the track's two resonances come and go with the noise; nobody asks why they were not used.
+WORTH_SAYING = (30.0, 1000.0)
+
+
+def impact_row(impact: Impact, base: dict, test: int, recording_id: str) -> dict:
+    """Row of ``impacts``; ``base`` holds turnout_id, section_id, campaign_id."""
+    first = impact.rejections[0] if impact.rejections else None
+    words = "; ".join(r.detail or r.reason for r in (*impact.rejections, *impact.notes))
+    return {
+        **base,
+        "impact_id": f"{recording_id}:{impact.record}",
+        "recording_id": recording_id,
+        "test": test,
+        "record": impact.record,
+        "status": "accepted" if impact.accepted else "rejected",
+        "reason": first.reason if first else None,
+        "measured_value": first.value if first else None,
+        "limit_value": first.limit if first else None,
+        "detail": words or None,
+        "peak_n": impact.peak,
+        "contact_ms": 1e3 * impact.contact,
+        "impulse_ns": impact.impulse,
+        "noise_ms2": impact.noise_acceleration,
+        "band_edge_hz": impact.band_edge,
+    }
+
+
+def model_row(model: ModalModel, base: dict, identity: dict, counts: tuple[int, int], coherence_minimum) -> dict:
+    """Row of ``models``; ``identity`` holds model_id, measured_at_utc, code_version and config_hash.
+
+    ``counts`` are the accepted and the rejected impacts.
+    """
+    first = model.rejections[0] if model.rejections else None
+    return {
+        **base,
+        **identity,
+        "method": model.method,
+        "status": model.status,
+        "reason": first.reason if first else None,
+        "measured_value": first.value if first else None,
+        "limit_value": first.limit if first else None,
+        "detail": _model_words(model),
+        "model_order": model.order,
+        "sampling_rate_hz": model.rate,
+        "a_matrix": np.ravel(model.a),
+        "b_vector": np.ravel(model.b),
+        "c_vector": np.ravel(model.c),
+        "n_impacts_used": counts[0],
+        "n_impacts_rejected": counts[1],
+        "coherence_minimum": coherence_minimum,
+        "hammer_fit_pct": model.fit,
+        "hammer_fit_null_pct": model.diagnostics.get("fit_null"),
+    }
+
+
+def mode_row(mode: Mode, base: dict, identity: dict, temperature) -> dict:
+    """Row of ``modes``."""
+    return {
+        "model_id": identity["model_id"],
+        "band": mode.band,
+        "turnout_id": base["turnout_id"],
+        "section_id": base["section_id"],
+        "measured_at_utc": identity["measured_at_utc"],
+        "frequency_hz": mode.frequency,
+        "frequency_se_hz": mode.frequency_se,
+        "frequency_sd_hz": mode.frequency_sd,
+        "damping_ratio": mode.damping,
+        "damping_se": mode.damping_se,
+        "rail_temperature_c": temperature,
+        "n_impacts": mode.n,
+        "source": "hammer",
+    }
+
+
+def impact_mode_row(entry, base: dict, identity: dict, impact_id: str) -> dict:
+    """Row of ``impact_modes``: one entry of ``ModalModel.per_impact``."""
+    return {
+        "model_id": identity["model_id"],
+        "impact_id": impact_id,
+        "band": entry["band"],
+        "section_id": base["section_id"],
+        "measured_at_utc": identity["measured_at_utc"],
+        "frequency_hz": entry["frequency"],
+        "frequency_se_hz": entry["frequency_se"],
+        "damping_ratio": entry["damping"],
+        "damping_se": entry["damping_se"],
+    }
+
+
+def receptance_row(receptance: Receptance, model: ModalModel, decay, base: dict, identity: dict) -> dict:
+    """Row of ``receptances``: what a person wants to see, at a resolution that can be drawn."""
+    lines = shown_lines(receptance.frequency)
+    measured, predicted = shown_decay(model, decay)
+    return {
+        **base,
+        "model_id": identity["model_id"],
+        "measured_at_utc": identity["measured_at_utc"],
+        "n_impacts": receptance.n,
+        "gate": receptance.gate,
+        "valid_to_hz": receptance.valid_to,
+        "frequency_hz": receptance.frequency[lines].astype(np.float32),
+        "h1_real_m_n": receptance.h1.real[lines].astype(np.float32),
+        "h1_imag_m_n": receptance.h1.imag[lines].astype(np.float32),
+        "h2_abs_m_n": np.abs(receptance.h2[lines]).astype(np.float32),
+        "hv_abs_m_n": np.abs(receptance.hv[lines]).astype(np.float32),
+        "coherence": receptance.coherence[lines].astype(np.float32),
+        "coherence_low": receptance.coherence_low[lines].astype(np.float32),
+        "coherence_high": receptance.coherence_high[lines].astype(np.float32),
+        "passed": receptance.passed[lines],
+        "decay_rate_hz": model.rate,
+        "decay_ms2": measured,
+        "decay_model_ms2": predicted,
+        "stabilisation_json": json.dumps([_pole(p) for p in model.stabilisation]),
+    }
+
+
+def shown_lines(frequency):
+    """Indices of at most ``SHOWN_LINES`` lines, evenly spread over the logarithm of ``SHOWN``.
+
+    >>> frequency = np.arange(1.0, 4000.0)
+    >>> lines = shown_lines(frequency)
+    >>> frequency[lines[0]], frequency[lines[-1]], len(lines) <= SHOWN_LINES
+    (np.float64(20.0), np.float64(1600.0), True)
+    """
+    wanted = np.geomspace(*SHOWN, SHOWN_LINES)
+    nearest = np.searchsorted(0.5 * (frequency[1:] + frequency[:-1]), wanted)
+    return np.unique(nearest)
+
+
+def shown_decay(model: ModalModel, decay):
+    """The first part of a decay and the model's decay fitted to it by its initial state (float32 arrays)."""
+    if decay is None or not model.order:
+        return None, None
+    n = min(len(decay), int(SHOWN_DECAY * model.rate))
+    basis = np.empty((n, model.order))
+    row = np.array(model.c, dtype=float)
+    for k in range(n):
+        basis[k] = row
+        row = row @ model.a
+    state, *_ = np.linalg.lstsq(basis, decay[:n], rcond=None)
+    return decay[:n].astype(np.float32), (basis @ state).astype(np.float32)
+
+
+def _pole(pole):
+    return {
+        "order": int(pole["order"]),
+        "frequency": round(float(pole["frequency"]), 2),
+        "damping": round(float(pole["damping"]), 4),
+        "status": pole["status"],
+    }
+
+
+def _model_words(model):
+    near = [m for m in model.rejected_modes if WORTH_SAYING[0] <= m["frequency"] <= WORTH_SAYING[1]]
+    dropped = [f"{m['frequency']:.0f} Hz not used: {m['reason']}" for m in near]
+    reasons = [r.detail or r.reason for r in model.rejections]
+    bias = model.diagnostics.get("bias_words")
+    return "; ".join([*reasons, *dropped, *([bias] if bias else [])]) or None

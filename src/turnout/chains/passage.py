@@ -1,0 +1,166 @@
+"""One passage file: raw file in, rows of the registry out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
+
+from turnout.chains.passage_rows import finding_rows, fit_row, passage_row
+from turnout.chains.raw_rows import quarantine_row, read_or_quarantine, recording_row
+from turnout.config.turnout import PassageConfig, TurnoutConfig
+from turnout.errors import ReadError
+from turnout.passage.analyse import analyse
+from turnout.passage.channel_fit import fit_channel
+from turnout.passage.findings import PassageSensor
+from turnout.passage.load import axle_load
+from turnout.passage.train_data import listed_for, listed_trains
+from turnout.records import ModalModel, Unit
+from turnout.registry.ids import content_id
+
+
+@dataclass(frozen=True)
+class SectionModel:
+    """An identified model of a section that passages are fitted with."""
+
+    model_id: str
+    measured_at: datetime
+    model: ModalModel
+
+
+@dataclass(frozen=True)
+class PassageContext:
+    """What passages of a turnout need beside their files.
+
+    ``models`` maps a section's label to its accepted models in order of time, ``patterns`` are those of known
+    trains, ``clusters`` the current ``Clusters`` or None, ``loads`` maps a channel to its ``LoadCalibration``.
+    """
+
+    models: dict[str, tuple[SectionModel, ...]] = field(default_factory=dict)
+    patterns: tuple = ()
+    clusters: object = None
+    loads: dict = field(default_factory=dict)
+
+
+def passage_unit(
+    unit: Unit, turnout: TurnoutConfig, raw_root, context: PassageContext | None = None, algo: str = ""
+) -> dict[str, list[dict]]:
+    """Rows by table (recordings, passages, passage_fits, quarantine) for one passage file.
+
+    A file that cannot be read, or that holds no train, is a quarantine row; a channel that is clipped, dead,
+    swapped or lost is one too, and the passage is used as far as it is sound.
+
+    Parameters
+    ----------
+    unit : Unit
+        One passage file.
+    turnout : TurnoutConfig
+        With its rows of trains.csv.
+    raw_root : path
+        Folder that the path starts from.
+    context : PassageContext or None
+        Without one no model is fitted and every train is of unknown type.
+    algo : str
+        Version of the code.
+    """
+    context = context or PassageContext()
+    base = {"turnout_id": unit.turnout}
+    rows: dict[str, list[dict]] = {"recordings": [], "passages": [], "passage_fits": [], "quarantine": []}
+    description = _described(turnout).description
+    for path, size, _ in unit.files:
+        result = read_or_quarantine(path, raw_root, description, base, rows["quarantine"], "passage")
+        if result is None:
+            continue
+        recording_id = result.sha256[:32]
+        for recording in result.recordings:
+            started_at = recording.started_at or _time_in(unit.label)
+            if started_at is None:
+                remedy = "Put the time in its name as YYYYMMDDTHHMMSSZ, or record it in the file"
+                error = ReadError(path, f"record {recording.record}", "has no time", remedy, "wrong_time")
+                rows["quarantine"].append(
+                    quarantine_row(error, base, "passage", "passage", recording.record, recording_id)
+                )
+                continue
+            _one_train(recording, started_at, recording_id, path, turnout, context, rows)
+        first = rows["passages"][0]["passage_id"] if rows["passages"] else None
+        rows["recordings"].append(recording_row(result, path, size, description, base, "passage", passage_id=first))
+    return rows
+
+
+def sensors_of(turnout: TurnoutConfig) -> tuple[PassageSensor, ...]:
+    """The acceleration sensors of a turnout's passages."""
+    found, passages = [], _described(turnout)
+    for channel in passages.description.channels:
+        if channel.quantity == "acceleration":
+            section = turnout.section(passages.sections[channel.name])
+            position = channel.position if channel.position is not None else section.position
+            found.append(PassageSensor(channel.name, section.label, float(position), section.track))
+    return tuple(found)
+
+
+def model_at(models, moment: datetime) -> SectionModel | None:
+    """The latest model identified at or before ``moment``, the first one where all are later, None without any."""
+    before = [m for m in models if m.measured_at <= moment]
+    return before[-1] if before else models[0] if models else None
+
+
+def _described(turnout: TurnoutConfig) -> PassageConfig:
+    """What the configuration says about passages; ValueError for a turnout that has none."""
+    if turnout.passages is None:
+        raise ValueError(f"{turnout.id} has no passages in its configuration")
+    return turnout.passages
+
+
+def _one_train(recording, started_at, recording_id, path, turnout, context, rows):
+    """Rows of the train in one record."""
+    settings = turnout.settings["passage"]
+    sensors = sensors_of(turnout)
+    if not sensors:
+        return
+    passage = analyse(recording, sensors, context.patterns, settings)
+    base = {"turnout_id": turnout.id}
+    first = float(passage.times[0]) if passage.n_axle else 0.0
+    passed_at = started_at + timedelta(seconds=round(first, 3))
+    passage_id = content_id("passage", recording_id, str(recording.record))
+    rows["quarantine"] += finding_rows(passage, base, path, recording.record, recording_id)
+    listed, _ = listed_trains(turnout.trains)
+    match = listed_for(passed_at, passage.n_axle, listed, settings.train_data_tolerance) if passage.n_axle else None
+    load = axle_load(recording, passage, context.loads, settings) if passage.n_axle else None
+    identity = {**base, "passage_id": passage_id, "recording_id": recording_id, "passed_at_utc": passed_at}
+    row = passage_row(passage, identity, match, load, recording.conditions)
+    if context.clusters is not None and passage.n_axle:
+        row["cluster_id"] = context.clusters.assign(row["train_type"], row["speed_kmh"], row["axle_load_t"])
+    rows["passages"].append(row)
+    if passage.n_axle:
+        rows["passage_fits"] += _fit_rows(recording, passage, sensors, turnout, context, identity, settings)
+
+
+def _fit_rows(recording, passage, sensors, turnout, context, identity, settings):
+    """One row per sensor that heard the train and whose section has a model."""
+    unsound = {r.detail.split(":")[0] for r in passage.findings if r.reason in ("clipped", "sensor_lost")}
+    found = []
+    for sensor in sensors:
+        if sensor.name not in passage.at_sensor:
+            continue
+        section_model = model_at(context.models.get(sensor.section, ()), identity["passed_at_utc"])
+        if section_model is None:
+            continue
+        times = passage.at_sensor[sensor.name]
+        until = next((r.value for r in passage.findings if r.reason == "sensor_lost" and sensor.name in r.detail), None)
+        if until is not None:
+            times = times[times + settings.score_window < until]
+        clipped = sensor.name in unsound and until is None
+        fit = None
+        if not clipped and len(times) >= 2:
+            samples = recording.signal(sensor.name)
+            fit = fit_channel(samples, recording.rate, times, passage.motion.speed, section_model.model, settings)
+        found.append(fit_row(fit, sensor, section_model.model_id, turnout, identity))
+    return found
+
+
+def _time_in(label: str) -> datetime | None:
+    """Time of a unit from its file name, YYYYMMDDTHHMMSSZ."""
+    stem = label.rsplit("/", 1)[-1].split(".")[0]
+    try:
+        return datetime.strptime(stem, "%Y%m%dT%H%M%SZ")
+    except ValueError:
+        return None

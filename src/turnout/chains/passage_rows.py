@@ -1,0 +1,142 @@
+"""A passage and its fits as rows of the registry."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from turnout.chains.raw_rows import quarantine_row
+from turnout.errors import ReadError
+from turnout.passage.train_type import UNKNOWN
+
+KMH = 3.6
+NEWTON_PER_TONNE = 9806.65
+REMEDIES = {
+    "no_train": "Delete the file, or look why the logger was triggered",
+    "clipped": "Raise the range of the channel",
+    "dead_channel": "Look at the sensor and its cable",
+    "not_finite": "Export the file again without gaps",
+    "sensor_lost": "Look at the sensor and its cable",
+    "channels_swapped": "Exchange the two channels in the layout, or at the logger",
+    "clock_drift": "Synchronise the loggers, or correct the sensor's position in the layout",
+    "two_trains": "Nothing: the passage is used as far as it is sound",
+    "train_cut_off": "Let the logger start earlier or run longer",
+}
+
+
+def finding_rows(passage, base, path, record, recording_id) -> list[dict]:
+    """Rows of ``quarantine`` for what is not used: the whole record, or single channels of it."""
+    rows: list[dict] = []
+    for finding in passage.findings:
+        whole = finding.reason in ("no_train", "two_trains", "train_cut_off")
+        if whole and passage.status != "rejected":
+            continue
+        place = f"record {record}" if whole else f"record {record}, {finding.detail.split(':')[0]}"
+        remedy = REMEDIES.get(finding.reason, "Look at the recording")
+        error = ReadError(path, place, finding.detail or finding.reason, remedy, finding.reason)
+        row = quarantine_row(error, base, "passage", "passage", record, recording_id)
+        row |= {"measured_value": _plain(finding.value), "threshold": _plain(finding.limit)}
+        row["quarantine_id"] = row["quarantine_id"][:-4] + f"{len(rows):04x}"
+        rows.append(row)
+    return rows
+
+
+def passage_row(passage, identity, listed, load, conditions) -> dict:
+    """Row of ``passages``: what the recording says, what the train data say, and where they differ."""
+    speed, type_ = passage.speed, passage.type
+    row = {
+        **identity,
+        "status": passage.status,
+        "reason": passage.reason,
+        "n_axles": passage.n_axle,
+        "direction": passage.direction,
+        "track": passage.track,
+        "rail_temperature_c": conditions.get("rail_temperature"),
+        "axle_load_source": "unavailable",
+    }
+    words = [f.detail or f.reason for f in passage.findings]
+    if speed is not None:
+        row |= {
+            "speed_kmh": KMH * float(speed.speed),
+            "speed_se_kmh": KMH * float(speed.se),
+            "acceleration_ms2": float(np.clip(speed.acceleration, -5, 5)),
+            "speed_source": "recording",
+            "axle_times_s": np.asarray(passage.times, dtype=float),
+            "train_type": type_.type,
+            "train_type_probability": float(type_.probability),
+            "train_type_source": "recording",
+        }
+    if load is not None:
+        row |= {"axle_load_t": load.mean, "axle_load_se_t": load.se, "axle_load_source": "recording"}
+    if listed is not None and speed is not None:
+        words += _listed(row, listed)
+    row["detail"] = "; ".join(words) or None
+    return row
+
+
+def _listed(row, listed) -> list[str]:
+    """Enter what the train data say, and return where they differ from the recording."""
+    words = []
+    if listed.speed is not None:
+        row |= {"speed_listed_kmh": listed.speed, "speed_source": "both"}
+        off = abs(listed.speed - row["speed_kmh"])
+        if off > max(3.0 * row["speed_se_kmh"], 0.02 * listed.speed):
+            words.append(f"speed {row['speed_kmh']:.1f} km/h here, {listed.speed:g} in the train data")
+    if listed.train_type is not None:
+        row["train_type_listed"] = listed.train_type
+        if row["train_type"] == UNKNOWN:
+            row |= {"train_type": listed.train_type, "train_type_source": "timetable"}
+        else:
+            row["train_type_source"] = "both"
+            if row["train_type"] != listed.train_type:
+                words.append(f"type {row['train_type']} here, {listed.train_type} in the train data")
+    if listed.axle_load is not None:
+        row["axle_load_listed_t"] = listed.axle_load
+        if row["axle_load_source"] == "unavailable":
+            row |= {"axle_load_t": listed.axle_load, "axle_load_source": "timetable"}
+        else:
+            row["axle_load_source"] = "both"
+            if abs(row["axle_load_t"] - listed.axle_load) > 3.0 * row["axle_load_se_t"]:
+                words.append(f"axle load {row['axle_load_t']:.1f} t here, {listed.axle_load:g} in the train data")
+    if listed.track is not None:
+        if row["track"] == "unknown":
+            row["track"] = listed.track
+        elif row["track"] != listed.track:
+            words.append(f"track {row['track']} here, {listed.track} in the train data")
+    return words
+
+
+def fit_row(fit, sensor, model_id, turnout, identity) -> dict:
+    """Row of ``passage_fits``; ``fit`` None where the channel is not sound enough to be fitted."""
+    row = {
+        "passage_id": identity["passage_id"],
+        "section_id": turnout.section_id(sensor.section),
+        "channel": sensor.name,
+        "model_id": model_id,
+        "turnout_id": turnout.id,
+        "passed_at_utc": identity["passed_at_utc"],
+        "status": fit.status if fit else "rejected",
+        "n_wheels": len(fit.times) if fit else 0,
+    }
+    if fit is None or fit.scores is None:
+        return row
+    null = fit.null
+    row |= {
+        "fit_pct": _plain(fit.scores.fit),
+        "forecast_pct": _plain(fit.scores.forecast),
+        "leave_one_out_pct": _plain(fit.scores.leave_one_out),
+        "parameters_per_s": _plain(fit.parameters_per_second),
+        "chi_squared_failed_share": fit.test.failed_share,
+        "peak_ms2": _plain(fit.peak),
+    }
+    if null is not None:
+        row |= {
+            "fit_null_pct": _plain(null.fit),
+            "forecast_null_pct": _plain(null.forecast),
+            "leave_one_out_null_pct": _plain(null.leave_one_out),
+        }
+    return row
+
+
+def _plain(value):
+    """A float, None where it is not finite."""
+    return float(value) if value is not None and np.isfinite(value) else None

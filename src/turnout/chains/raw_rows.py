@@ -1,0 +1,67 @@
+"""A raw file on its way in: its row, or the quarantine rows that say why it or a part of it is not used."""
+
+from typing import cast
+
+from turnout.errors import ReadError
+from turnout.readers import read
+from turnout.registry.ids import content_id
+
+
+def read_or_quarantine(path, raw_root, description, base, quarantine, kind, known=None):
+    """ReadResult of one file, or None; a quarantine row for the file or for each damaged record.
+
+    ``known`` maps the files that were read before to their ids: the same bytes are not used twice.
+    """
+    try:
+        result = read(path, raw_root, description)
+    except ReadError as error:
+        quarantine.append(quarantine_row(error, base, kind, "read"))
+        return None
+    for damage in cast("tuple[ReadError, ...]", result.errors):
+        record = getattr(damage, "record", None)
+        quarantine.append(quarantine_row(damage, base, kind, "read", record, result.sha256[:32]))
+    for other, recording_id in (known or {}).items():
+        if recording_id == result.sha256[:32]:
+            twice = ReadError(path, "the file", f"same bytes as {other}", "Delete one of them", reason="duplicate")
+            quarantine.append(quarantine_row(twice, base, kind, "read", None, recording_id))
+            return None
+    return result if result.recordings else None
+
+
+def quarantine_row(error: ReadError, base, kind, stage, record=None, recording_id=None) -> dict:
+    """Row of ``quarantine``: what the error says, in columns."""
+    return {
+        "quarantine_id": content_id("quarantine", error.path, str(record), stage, error.reason, error.found),
+        "turnout_id": base["turnout_id"],
+        "section_id": base.get("section_id"),
+        "kind": kind,
+        "path": error.path,
+        "record": record,
+        "recording_id": recording_id,
+        "stage": stage,
+        "reason_code": error.reason,
+        "place": error.where,
+        "found": error.found,
+        "remedy": error.remedy,
+    }
+
+
+def recording_row(result, path, size, description, base, kind, **more) -> dict:
+    """Row of ``recordings``."""
+    first = result.recordings[0]
+    return {
+        "recording_id": result.sha256[:32],
+        "turnout_id": base["turnout_id"],
+        "section_id": base.get("section_id"),
+        "campaign_id": base.get("campaign_id"),
+        "kind": kind,
+        "path": path,
+        "file_format": description.format if description.format != "auto" else path.rsplit(".", 1)[-1].lower(),
+        "file_bytes": size,
+        "sampling_rate_hz": first.rate,
+        "n_channels": len(first.channels),
+        "n_records": len(result.recordings),
+        "n_samples": first.n_sample,
+        "expected_n_samples": description.n_samples,
+        **more,
+    }

@@ -1,0 +1,193 @@
+"""Simulated hammer tests and passages as raw files, with the channels a turnout's configuration promises."""
+
+import json
+from dataclasses import asdict, replace
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+
+from turnout.config.load import load_configuration
+from turnout.config.settings.simulate import SimulateSettings
+from turnout.errors import SimulationError
+from turnout.readers.writing import write
+from turnout.simulate import Hammer, Sensor, load_track, load_vehicle, simulate_hammer, simulate_passage
+from turnout.simulate.hammer import hammer_sensors, located
+
+ENDINGS = {"uff58": "uff", "uff58b": "uff", "hdf5": "h5", "mat73": "mat", "rcmdx": "rcmdx"}
+NOISE = {"acceleration": 0.05, "force": 2.0, "velocity": 1e-6, "displacement": 1e-9}
+
+
+def write_hammer(request):
+    """Simulate the tests of a request and write them; yields (path, what it holds).
+
+    ``request`` holds the options of `turnout simulate hammer`: track, section, tests, blows, turnout, config, raw,
+    out, format, at, temperature, truth, seed.
+    """
+    turnout, settings = _turnout(request)
+    track = load_track(request["track"], seed=request["seed"])
+    section = _place(request["section"])
+    place, _ = located(track, section)
+    description = None
+    if turnout is not None:
+        description = turnout.hammer.descriptions[str(section)]
+    hammer, sensors = _hammer_channels(description, place)
+    rate = description.rate if description and description.rate else settings.rate
+    for test in range(1, request["tests"] + 1):
+        recordings = simulate_hammer(
+            track,
+            section,
+            hammer,
+            sensors,
+            request["blows"],
+            seed=1000 * request["seed"] + test,
+            rate=rate,
+            substeps=settings.substeps,
+            duration=settings.hammer_duration,
+            pretrigger=settings.hammer_pretrigger,
+            half_length=settings.hammer_half_length,
+            scheme=settings.scheme,
+            started_at=_time(request),
+            conditions=_noted(request),
+        )
+        day = _time(request).date().isoformat()
+        name = f"hammer/{day}/{section}_{test}.{_ending(request['format'])}"
+        path = _write(request, turnout, name, recordings, description)
+        peak = max(float(r.samples[0].max()) for r in recordings)
+        yield path, f"{len(recordings)} blows at {place:.2f} m, highest force {peak / 1e3:.1f} kN"
+
+
+def write_passage(request):
+    """Simulate the passage of a request and write it; yields (path, what it holds)."""
+    turnout, settings = _turnout(request)
+    track = load_track(request["track"], seed=request["seed"])
+    vehicle = load_vehicle(request["vehicle"], request["load"], units=request["units"])
+    description = turnout.passages.description if turnout is not None and turnout.passages else None
+    sensors = _passage_sensors(description, track)
+    rate = description.rate if description and description.rate else settings.rate
+    recording, truth = simulate_passage(
+        track,
+        vehicle,
+        request["speed"] / 3.6,
+        sensors,
+        request["direction"],
+        request["route"],
+        seed=request["seed"],
+        rate=rate,
+        substeps=settings.substeps,
+        lead=settings.lead,
+        tail=settings.tail,
+        entry=settings.entry,
+        scheme=settings.scheme,
+        started_at=_time(request),
+        conditions=_noted(request),
+        truth=True,
+    )
+    name = f"passages/{_time(request):%Y%m%dT%H%M%SZ}.{_ending(request['format'])}"
+    path = _write(request, turnout, name, [recording], description)
+    if request.get("truth"):
+        _write_truth(Path(request["truth"]) / Path(path).with_suffix(".json").name, recording, truth)
+    if request.get("truth_file"):
+        _write_truth(Path(request["truth_file"]), recording, truth)
+    peak = truth.force.max()
+    yield path, f"{len(vehicle.wheels)} axles, {recording.duration:.2f} s, highest wheel force {peak / 1e3:.0f} kN"
+
+
+COMMON = {"turnout": None, "config": "config", "raw": "raw", "format": "hdf5", "truth": None, "temperature": None}
+
+
+def hammer_request(track, out, wildcards):
+    """The request of rule simulate_hammer."""
+    request = COMMON | {"track": track, "out": out, "section": wildcards.location, "seed": int(wildcards.seed)}
+    return request | {"tests": 1, "blows": 10, "at": "2024-05-13T09:00:00"}
+
+
+def passage_request(files, out, wildcards):
+    """The request of rule simulate_passage."""
+    request = COMMON | {"track": files.track, "vehicle": files.vehicle, "out": out.recording, "truth_file": out.truth}
+    request |= {"speed": float(wildcards.speed), "route": wildcards.route, "direction": wildcards.direction}
+    return request | {"load": 0.5, "units": 1, "seed": int(wildcards.seed), "at": "2024-05-13T09:00:00"}
+
+
+def _turnout(request):
+    if not request.get("turnout"):
+        return None, SimulateSettings()
+    turnout = load_configuration(request["config"]).turnout(request["turnout"])
+    return turnout, turnout.settings.get("simulate", SimulateSettings())
+
+
+def _place(section):
+    try:
+        return float(section)
+    except ValueError:
+        return section
+
+
+def _time(request):
+    try:
+        return datetime.fromisoformat(request["at"])
+    except ValueError:
+        raise SimulationError(f"--at {request['at']!r} is not a time; write it as 2024-05-13T09:00:00.") from None
+
+
+def _noted(request):
+    temperature = request.get("temperature")
+    return {} if temperature is None else {"rail_temperature": temperature}
+
+
+def _ending(format_name):
+    return ENDINGS.get(format_name, format_name)
+
+
+def _sensor(channel, place):
+    """Sensor of a configured channel; ``place`` where the configuration gives none."""
+    return Sensor(
+        channel.name,
+        place if channel.position is None else channel.position,
+        channel.mounting or "rail head",
+        channel.quantity,
+        noise=NOISE.get(channel.quantity, 0.0),
+        limit=channel.limit,
+        resolution=channel.resolution,
+        serial=channel.serial,
+    )
+
+
+def _hammer_channels(description, place):
+    if description is None:
+        return Hammer(), hammer_sensors(place)
+    force = next((c for c in description.channels if c.quantity == "force"), None)
+    if force is None:
+        raise SimulationError("the turnout's hammer channels have none of quantity 'force'.")
+    others = [c for c in description.channels if c.quantity in ("acceleration", "velocity", "displacement")]
+    sensors = []
+    for channel in others:
+        sensor = _sensor(channel, place + (0.3 if "mid-span" in channel.mounting else 0.0))
+        sensors.append(sensor)
+    return Hammer(force=_sensor(force, place)), tuple(sensors)
+
+
+def _passage_sensors(description, track):
+    if description is None:
+        places = sorted({(place, name) for name, (place, _) in track.locations.items()})
+        return tuple(Sensor(name, place, "rail web", noise=0.05, limit=5000.0) for place, name in places)
+    return tuple(_sensor(c, c.position) for c in description.channels if c.quantity != "temperature")
+
+
+def _write(request, turnout, name, recordings, description):
+    folder = Path(request["raw"]) / (turnout.raw if turnout is not None else "simulated")
+    path = Path(request["out"]) if request.get("out") else folder / name
+    if path.parent != Path():
+        path.parent.mkdir(parents=True, exist_ok=True)
+    return write([replace(r, source="") for r in recordings], path, request["format"], description)
+
+
+def _write_truth(path, recording, truth):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    content = {
+        "conditions": {k: v for k, v in recording.conditions.items()},
+        "peak_force_n": truth.force.max(axis=1).round(1).tolist(),
+        "contact_lost": bool(np.any(truth.force <= 0.0)),
+        "channels": [asdict(c) for c in recording.channels],
+    }
+    path.write_text(json.dumps(content, indent=1, default=str) + "\n", encoding="utf-8")

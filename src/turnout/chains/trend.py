@@ -1,0 +1,43 @@
+"""Stage trend: from the registry as it stands to charts, alarms, states and the worklist."""
+
+import json
+import logging
+from pathlib import Path
+
+from turnout.config import load_configuration
+from turnout.fleet.atomic import write_text
+from turnout.registry.database import open_registry
+from turnout.trend.nightly import update
+
+
+def trend_job(generation, state, worklist, configuration) -> dict:
+    """Bring the derived tables of a registry up to date and write the worklist.
+
+    Parameters
+    ----------
+    generation : path
+        ``_generation.json`` of the registry.
+    state : path
+        What the last update wrote, JSON; a new one is put in its place. It may be missing.
+    worklist : path
+        The list as CSV.
+    configuration : path
+        Folder of the configuration: settings of the trend, acknowledgements.csv. A row of that file that cannot be
+        used is a warning in the log and in ``state``; the others count.
+    """
+    registry, state = Path(generation).parent, Path(state)
+    before = json.loads(state.read_text(encoding="utf-8")) if state.exists() else {}
+    read = load_configuration(configuration)
+    warnings = [str(warning) for warning in read.warnings]
+    for warning in warnings:
+        logging.getLogger("turnout.trend").warning("does not count: %s", warning)
+    said = [dict(row) for row in read.acknowledgements]
+    done = update(registry, read.settings["trend"], before.get("digests"), acknowledgements=said)
+    with open_registry(registry) as con:
+        rows = con.execute("select * from worklist").df()
+    write_text(worklist, rows.to_csv(index=False, lineterminator="\n"))
+    newest = done.newest.isoformat() if done.newest else None
+    now = {"rows": done.rows, "generation": done.generation, "newest": newest, "digests": done.digests}
+    now |= {"warnings": warnings} if warnings else {}
+    write_text(state, json.dumps(now, indent=1, sort_keys=True) + "\n")
+    return now

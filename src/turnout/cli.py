@@ -1,0 +1,46 @@
+"""The command line: ``turnout <command>``."""
+
+import argparse
+import sys
+from importlib import import_module
+
+from turnout import __version__
+from turnout.commands import COMMANDS
+from turnout.errors import TurnoutError
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Parser with one subcommand per module of ``turnout.commands``."""
+    parser = argparse.ArgumentParser(
+        prog="turnout",
+        description="Watch railway switches and crossings from hammer tests and train passages.",
+    )
+    parser.add_argument("--version", action="version", version=__version__)
+    subparsers = parser.add_subparsers(dest="command", metavar="command", required=True)
+    for name in COMMANDS:
+        module = import_module(f"turnout.commands.{name}")
+        sub = subparsers.add_parser(
+            name.replace("_", "-"),
+            help=module.HELP,
+            description=module.__doc__,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        module.add_arguments(sub)
+        sub.set_defaults(run=module.run)
+    return parser
+
+
+def main(argv=None) -> int:
+    """Run one command; a fault of the user's input is one message and exit code 2."""
+    args = build_parser().parse_args(argv)
+    try:
+        return args.run(args) or 0
+    except TurnoutError as error:
+        print(f"turnout {args.command}: {error}", file=sys.stderr)
+        return 2
+    except BrokenPipeError:
+        return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

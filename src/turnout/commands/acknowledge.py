@@ -1,0 +1,47 @@
+"""Say that an alarm has been seen, or silence a chart until a date. The reason stays in the record.
+
+  turnout acknowledge tommerup_s1/A7 --band ballast --by "M. Jensen" --reason "tamping ordered for week 14"
+  turnout acknowledge tommerup_s1 --suppress-until 2026-05-01 --by "M. Jensen" --reason "track works"
+
+An acknowledged alarm moves from "inspect this week" to "plan"; an alarm raised later is a new one. A suppressed
+chart is off the list until the date. Both are lines of config/acknowledgements.csv and count from the next run.
+"""
+
+import argparse
+
+HELP = "say that an alarm has been seen, or silence it until a date"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Place, person, reason and date of an acknowledgement."""
+    parser.add_argument("place", help="turnout, or turnout/section")
+    parser.add_argument("--band", default="", help="ballast or railpad; both if not given")
+    parser.add_argument("--by", required=True, help="who says so")
+    parser.add_argument("--reason", required=True, help="why")
+    parser.add_argument("--suppress-until", metavar="DATE", default="", help="silence it until then, YYYY-MM-DD")
+    parser.add_argument("--at", default="", help="when it was said, UTC; now if not given")
+    parser.add_argument("--configuration", default="config", help="folder of the configuration (%(default)s)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Append the line to acknowledgements.csv; ConfigError where turnout, section or date do not stand."""
+    from datetime import UTC, datetime
+    from pathlib import Path
+
+    from turnout.config import load_configuration
+    from turnout.config.acknowledgements import acknowledgement, append_acknowledgement, faults
+    from turnout.errors import ConfigError, ConfigErrors
+
+    turnout, _, label = args.place.partition("/")
+    read = load_configuration(args.configuration)
+    at = args.at or datetime.now(UTC).replace(tzinfo=None).isoformat(timespec="minutes")
+    action = "suppress" if args.suppress_until else "acknowledge"
+    cells = dict(turnout=turnout, section=label, band=args.band, action=action, by=args.by, at=at)
+    cells |= dict(until=args.suppress_until, reason=args.reason)
+    if wrong := list(faults(cells, read.ids, read.variants)):
+        raise ConfigErrors([ConfigError("acknowledge", column, *said) for column, *said in wrong])
+    row = acknowledgement(cells)
+    path = Path(args.configuration) / "acknowledgements.csv"
+    append_acknowledgement(path, row)
+    print(f"{path}: {action} {args.place} {args.band or 'both resonances'}. It counts from the next run.")
+    return 0

@@ -1,0 +1,49 @@
+"""Add a turnout: one row of turnouts.tsv. The whole configuration is checked before it stays.
+
+turnout add tommerup_s3 tommerup --raw line_7/T00043 --name "Tommerup, switch 3" --km 13.1
+"""
+
+import argparse
+
+HELP = "add a turnout"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """One option per column of turnouts.tsv."""
+    from turnout.config.table import ROW
+
+    parser.add_argument("turnout", help=ROW["turnout"].meaning)
+    parser.add_argument("layout", help=ROW["layout"].meaning)
+    for column, key in list(ROW.items())[2:]:
+        unit = f" [{key.unit}]" if key.unit else ""
+        parser.add_argument("--" + column.replace("_", "-"), dest=column, metavar="…", help=key.meaning + unit)
+    parser.add_argument("--configuration", default="config", help="folder of the configuration (%(default)s)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Append the row, check the whole configuration, and take the row back where it is unsound."""
+    from pathlib import Path
+
+    from turnout.config import load_configuration
+    from turnout.config.table import ROW, append_row
+    from turnout.errors import ConfigErrors
+    from turnout.readers.formats import FORMATS
+    from turnout.readers.units import to_si
+
+    path = Path(args.configuration) / "turnouts.tsv"
+    before = path.read_bytes() if path.exists() else None
+    append_row(path, {column: getattr(args, column) for column in ROW})
+    try:
+        turnout = load_configuration(args.configuration, FORMATS, to_si).turnout(args.turnout)
+    except ConfigErrors:
+        if before is None:
+            path.unlink()
+        else:
+            path.write_bytes(before)
+        raise
+    labels = ", ".join(s.label for s in turnout.sections)
+    print(f"{path}: added {turnout.id} with the sections {labels}.")
+    for kind, what in (("hammer tests", turnout.hammer), ("passages", turnout.passages)):
+        if what:
+            print(f"Its {kind} are looked for as <raw root>/{turnout.raw}/{what.files}")
+    return 0

@@ -1,0 +1,88 @@
+"""Prove the diagnosis on recordings in which an effect is concealed; everything again on your own machine.
+
+  turnout blind make --out proof --truth proof-truth           campaigns, and truths under seal
+  turnout blind diagnose --out proof --truth proof-truth       the tool reads the campaigns and cannot read the truth
+  turnout blind reveal --out proof --truth proof-truth         opens the envelopes, verifies every hash
+  turnout blind score --out proof                              every figure with its interval
+
+--fast makes 40 cases instead of 235. --effects FOLDER adds effects of your own, one file each. Print commit.json's
+hash (make does) and publish it before anybody diagnoses.
+"""
+
+HELP = "prove the diagnosis on concealed effects: make, diagnose, reveal, score"
+
+
+def add_arguments(parser):
+    """Options of the command."""
+    steps = parser.add_subparsers(dest="step", metavar="step", required=True)
+    make = steps.add_parser("make", help="make a set and seal its truth")
+    make.add_argument("--seed", type=int, help="the same seed gives the same recordings (default: drawn)")
+    make.add_argument("--fast", action="store_true", help="the fast tier of 40 cases")
+    make.add_argument("--effects", action="append", default=[], help="folder with effects of your own")
+    make.add_argument("--only", help="kinds to keep beside the controls, by commas")
+    make.add_argument("--limit", type=int, help="the first so many cases of the shuffled set")
+    make.add_argument("--workers", type=int, default=1, help="processes (default 1)")
+    diagnose = steps.add_parser("diagnose", help="let the tool diagnose every case, the truth out of its reach")
+    diagnose.add_argument("--command", help="command of the tool; {python}, {case}, {folder}, {out} are filled in")
+    diagnose.add_argument("--cases", help="only these, by commas")
+    diagnose.add_argument("--timeout", type=float, default=1800.0, help="seconds of the clock per case (default 1800)")
+    diagnose.add_argument("--workers", type=int, default=1, help="cases at a time (default 1)")
+    reveal = steps.add_parser("reveal", help="open the envelopes and verify every hash")
+    score = steps.add_parser("score", help="print every figure with its interval")
+    score.add_argument("--names", help="JSON file {effect: [names of the tool that are right]} to add")
+    score.add_argument("--report", help="file to write the report to, as Markdown")
+    for sub in (make, diagnose, reveal, score):
+        sub.add_argument("--out", required=True, help="folder of the set")
+        if sub is not score:
+            sub.add_argument("--truth", help="folder of the truth (default: --out with -truth behind it)")
+
+
+def run(args):
+    """Take the step."""
+    return {"make": _make, "diagnose": _diagnose, "reveal": _reveal, "score": _score}[args.step](args)
+
+
+def _truth(args):
+    return args.truth or args.out.rstrip("/") + "-truth"
+
+
+def _make(args):
+    from tqdm import tqdm
+
+    from turnout_blind.make import make_set
+
+    only = args.only.split(",") if args.only else None
+    sha = make_set(
+        args.out, _truth(args), args.seed, not args.fast, args.effects, only, args.limit, args.workers,
+        lambda cases: tqdm(cases, desc="cases", unit="case"),
+    )  # fmt: skip
+    print(f"sealed: SHA-256 of commit.json is {sha}; the truth lies in {_truth(args)}")
+
+
+def _diagnose(args):
+    from turnout_blind.diagnose import COMMAND, diagnose_set
+
+    only = args.cases.split(",") if args.cases else None
+    held = diagnose_set(args.out, _truth(args), args.command or COMMAND, only, args.timeout, args.workers)
+    failed = sum(run["status"] != "answered" for run in held["cases"].values())
+    print(f"{len(held['cases'])} cases diagnosed, {failed} without an answer; truth hidden by {held['isolation']}")
+
+
+def _reveal(args):
+    from turnout_blind.reveal import reveal
+
+    truths = reveal(args.out, _truth(args))
+    print(f"{len(truths)} envelopes opened, every hash verified: {args.out}/revealed")
+
+
+def _score(args):
+    import json
+    from pathlib import Path
+
+    from turnout_blind.score.report import report_of
+
+    names = json.loads(Path(args.names).read_text()) if args.names else None
+    text = report_of(args.out, names)
+    if args.report:
+        Path(args.report).write_text(text, encoding="utf-8")
+    print(text)

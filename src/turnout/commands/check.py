@@ -1,0 +1,56 @@
+"""Check the configuration and, where the raw files are at hand, their names.
+
+Every error is one line: file, line, column, what stands there, what to write instead.
+"""
+
+import argparse
+
+HELP = "check configuration and file names"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Folders of configuration and raw files."""
+    parser.add_argument("--configuration", default="config", help="folder of the configuration (%(default)s)")
+    parser.add_argument("--raw", help="raw root (raw, where it is there)")
+    parser.add_argument("--formats", action="store_true", help="list the raw formats")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print what is sound and each problem; exit code 1 where a raw file is left out or unsound."""
+    from pathlib import Path
+
+    from turnout.config import load_configuration
+    from turnout.config.load import read_notes
+    from turnout.errors import ConfigError
+    from turnout.fleet.scan import scan
+    from turnout.readers.formats import FORMATS
+    from turnout.readers.units import to_si
+
+    if args.formats:
+        print("\n".join(f"{name:<10} {' '.join(f.extensions):<24} {f.meaning}" for name, f in FORMATS.items()))
+        return 0
+    configuration = load_configuration(args.configuration, FORMATS, to_si)
+    layouts = {row.values["layout"] for row in configuration.rows.values()}
+    n_events = len(configuration.events)
+    n_said = len(configuration.acknowledgements)
+    counts = f"{len(configuration.ids)} turnouts, {len(layouts)} layouts, {n_events} events, {n_said} acknowledgements"
+    print(f"{args.configuration}: {counts}, {'sound' if not configuration.warnings else 'with faults'}.")
+    for warning in configuration.warnings:
+        print(f"  does not count: {warning}")
+    raw = Path(args.raw or "raw")
+    if not raw.is_dir() and args.raw:
+        raise ConfigError(args.raw, "--raw", "no such folder", "Write the folder that holds those of the turnouts")
+    if not raw.is_dir():
+        print(f"{raw}: no such folder, file names not checked.")
+        return 1 if configuration.warnings else 0
+    n_units = n_files = 0
+    problems = []
+    for turnout in map(configuration.turnout, configuration.ids):
+        found = scan(turnout, raw)
+        n_units += len(found.units)
+        n_files += sum(len(u.files) for u in found.units)
+        problems += found.problems + read_notes(turnout, raw)[1]
+    print(f"{raw}: {n_files} files in {n_units} units, {len(problems)} left out or unsound.")
+    for problem in problems:
+        print(f"  {problem}")
+    return 1 if problems or configuration.warnings else 0

@@ -1,0 +1,59 @@
+"""Show the merged configuration of a turnout with the file each value comes from, or make the generated files.
+
+turnout config show tommerup_s1
+turnout config show tommerup_s1 --only receptance
+turnout config generate            config.yaml, JSON schemas for editors, the tables of docs/configuration.md
+turnout config generate --check    say what is out of date, change nothing
+"""
+
+import argparse
+
+HELP = "show or generate configuration"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The actions ``show`` and ``generate`` with their options."""
+    actions = parser.add_subparsers(dest="action", metavar="show|generate", required=True)
+    show = actions.add_parser("show", help="every value of a turnout and the file it comes from")
+    show.add_argument("turnout")
+    show.add_argument("--only", metavar="WORD", default="", help="only keys that contain this word")
+    generate = actions.add_parser("generate", help="make config.yaml, the JSON schemas and the docs table")
+    generate.add_argument("--check", action="store_true", help="change nothing; exit code 1 where one is out of date")
+    generate.add_argument("--defaults", action="store_true", help="do not keep values changed in config.yaml")
+    generate.add_argument("--docs", default="docs", help="folder of the documentation (%(default)s)")
+    for sub in (show, generate):
+        sub.add_argument("--configuration", default="config", help="folder of the configuration (%(default)s)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Show values with their sources, or write (with --check compare) the generated files."""
+    return _show(args) if args.action == "show" else _generate(args)
+
+
+def _show(args) -> int:
+    from turnout.config import load_configuration
+    from turnout.config.show import sources
+
+    configuration = load_configuration(args.configuration)
+    configuration.turnout(args.turnout)
+    for key, value, source in sources(configuration, args.turnout):
+        if args.only in key:
+            print(f"{key:<44} {value!s:<28} {source}")
+    return 0
+
+
+def _generate(args) -> int:
+    from pathlib import Path
+
+    from turnout.config.generate import generated
+    from turnout.fleet.atomic import write_if_changed
+
+    stale = 0
+    for path, text in generated(Path(args.configuration), Path(args.docs), args.defaults).items():
+        if args.check:
+            differs = not path.exists() or path.read_text(encoding="utf-8") != text
+            print(f"{path}: out of date" if differs else f"{path}: up to date")
+            stale += differs
+        else:
+            print(f"{path}: {'written' if write_if_changed(path, text) else 'unchanged'}")
+    return 1 if stale else 0

@@ -1,0 +1,37 @@
+"""Before measuring: which effects a planned campaign can tell apart, and what would add most.
+
+turnout distinguish --track tommerup --sensors 23.4 26.4 --blows 24.6 --temperatures 5 25
+turnout distinguish --track tommerup --sensors 23.4 26.4 --trains ic3 --speeds 160 100
+
+A figure is the log evidence in nats that is lost when the effect of the row is explained by that of the column, at the
+column's best strength and with all nuisances free; "none" is the base model. Below 5 nats they cannot be told apart.
+"""
+
+HELP = "which effects a planned campaign can tell apart"
+
+
+def add_arguments(parser):
+    """Options of the command."""
+    parser.add_argument("--track", default="tommerup", help="file in config/tracks (%(default)s)")
+    parser.add_argument("--sensors", nargs="+", type=float, required=True, metavar="M", help="places on the rail [m]")
+    parser.add_argument("--blows", nargs="*", type=float, default=(), metavar="M", help="places of the hammer [m]")
+    parser.add_argument("--temperatures", nargs="+", type=float, default=(15.0,), metavar="C", help="of the rail [°C]")
+    parser.add_argument("--trains", nargs="*", default=(), help="files in config/vehicles")
+    parser.add_argument("--speeds", nargs="+", type=float, default=(160.0,), metavar="KMH", help="[km/h]")
+    parser.add_argument("--families", nargs="+", help="only these effects")
+
+
+def run(args):
+    """Print the matrix, what is confused, and the addition that would resolve most."""
+    from turnout.chains.distinguish import planned_matrix
+
+    matrix, advice = planned_matrix(
+        args.track, args.sensors, args.blows, args.temperatures, args.trains, args.speeds, args.families
+    )
+    print(matrix)
+    for name in matrix.names:
+        confused = matrix.confused(name)
+        if confused:
+            print(f"{name} cannot be told from {', '.join(confused)}")
+    print(advice)
+    return 0

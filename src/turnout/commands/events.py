@@ -1,0 +1,90 @@
+"""List maintenance, or enter it: tamping, exchanged pads, another sensor, another method.
+
+  turnout events                                      all that is entered
+  turnout events --effect                             did the work help, and for how long
+  turnout events tommerup_s1/A7 tamping 2026-04-02 --note "machine 09-3X"
+
+An event that resets a resonance starts a new epoch of its charts: they learn the new level before they alarm
+again. Which resonance a kind resets is the program's choice unless --resets says otherwise.
+"""
+
+import argparse
+
+HELP = "list maintenance, or enter it"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What to enter, or what to list."""
+    parser.add_argument("place", nargs="?", help="turnout, or turnout/section")
+    parser.add_argument("kind", nargs="?", help="tamping, pad_exchange, sensor_change ...")
+    parser.add_argument("date", nargs="?", help="YYYY-MM-DD or YYYY-MM-DDTHH:MM, UTC")
+    parser.add_argument("--resets", default="", help="'ballast', 'railpad', 'ballast railpad' or 'none'")
+    parser.add_argument("--note", default="", help="free text")
+    parser.add_argument("--effect", action="store_true", help="what the entered work did, from the registry")
+    parser.add_argument("--registry", default="results/registry", help="folder of the registry (%(default)s)")
+    parser.add_argument("--configuration", default="config", help="folder of the configuration (%(default)s)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """List events, enter one, or tell the effect of maintenance; ConfigError for half an event."""
+    from turnout.config import load_configuration
+    from turnout.errors import ConfigError
+
+    if args.effect:
+        return _effect(args.registry)
+    if not args.place:
+        for e in load_configuration(args.configuration).events:
+            where = f"{e.turnout}/{e.section}" if e.section else e.turnout
+            resets = " and ".join(e.resets) or "nothing"
+            print(f"{e.at:%Y-%m-%d}  {where:<28} {e.kind:<16} resets {resets}  {e.note}")
+        return 0
+    if not (args.kind and args.date):
+        raise ConfigError("events", "arguments", "a place without kind and date", "Write: PLACE KIND DATE")
+    return _enter(args)
+
+
+def _enter(args) -> int:
+    """Append the line and read the configuration again; a line that is refused is taken back."""
+    import csv
+    import io
+    from pathlib import Path
+
+    from turnout.config import load_configuration
+    from turnout.errors import TurnoutError
+
+    path = Path(args.configuration) / "events.csv"
+    before = path.read_text(encoding="utf-8-sig") if path.exists() else "turnout,section,date,kind,resets,note\n"
+    turnout, _, label = args.place.partition("/")
+    header = [title.strip() for title in before.splitlines()[0].split(",")]
+    given = dict(turnout=turnout, section=label, date=args.date, kind=args.kind, resets=args.resets, note=args.note)
+    line = io.StringIO()
+    csv.writer(line, lineterminator="\n").writerow([given.get(title, "") for title in header])
+    path.write_text(before + ("" if before.endswith("\n") else "\n") + line.getvalue(), encoding="utf-8")
+    try:
+        load_configuration(args.configuration)
+    except TurnoutError:
+        path.write_text(before, encoding="utf-8")
+        raise
+    print(f"{path}: {args.kind} at {args.place}, {args.date}. It counts from the next run.")
+    return 0
+
+
+def _effect(registry) -> int:
+    from turnout.registry.database import open_registry
+
+    with open_registry(registry) as con:
+        rows = con.execute(
+            "select event_at_utc, turnout_id, section_id, band, kinds, verdict, gain_pct, gain_low_pct, gain_high_pct, "
+            "n_before, n_after, held_until_utc, last_measured_at_utc from maintenance_effect "
+            "order by event_at_utc, turnout_id, section_id, band"
+        ).fetchall()
+    for at, turnout, section, band, kinds, verdict, gain, low, high, before, after, held, last in rows:
+        where = f"{turnout}, whole turnout" if section == "*" else section
+        held = f"half of it lost by {held:%Y-%m-%d}" if held else f"holds until {last:%Y-%m-%d}, the newest campaign"
+        print(
+            f"{at:%Y-%m-%d} {where} {band}, {kinds}: {verdict}, {gain:+.1f} % ({low:+.1f} to {high:+.1f}, 95 %; "
+            f"{before} and {after} campaigns)" + (f"; {held}" if verdict == "stiffer" else "")
+        )
+    if not rows:
+        print("No event has campaigns on both sides yet.")
+    return 0

@@ -1,0 +1,66 @@
+"""Hand tables and views on to other tools: Parquet or CSV files, or Delta Lake tables.
+
+turnout export out                            every table as one Parquet file
+turnout export out --format csv --only worklist chart_states
+turnout export lake --format delta --only modes charts needs the extra: pip install 'turnout[lakehouse]'
+"""
+
+import argparse
+
+HELP = "write tables and views as Parquet, CSV or Delta Lake"
+USUAL = ("turnouts", "sections", "events", "campaigns", "modes_current", "charts", "baselines", "alarms",
+         "chart_states", "worklist")  # fmt: skip
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Folder, names and format."""
+    parser.add_argument("folder", help="where to write; made where it does not exist")
+    parser.add_argument("--only", nargs="+", metavar="NAME", help=f"tables and views; usually {', '.join(USUAL)}")
+    parser.add_argument("--format", choices=("parquet", "csv", "delta"), default="parquet", help="(%(default)s)")
+    parser.add_argument("--registry", default="results/registry", help="folder of the registry (%(default)s)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write each table or view and print its number of rows; RegistryError for an unknown name."""
+    from pathlib import Path
+
+    import duckdb
+
+    from turnout.errors import RegistryError
+    from turnout.registry.database import open_registry
+
+    folder = Path(args.folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RegistryError(f"{folder} cannot be made: {error.strerror}. Name another folder.") from None
+    with open_registry(args.registry) as con:
+        for name in args.only or USUAL:
+            try:
+                n = _write(con, name, folder, args.format)
+            except duckdb.CatalogException:
+                raise RegistryError(f"no table or view {name!r}. 'turnout query --list' names them.") from None
+            print(f"{folder / name}: {n} rows")
+    return 0
+
+
+def _write(con, name, folder, form) -> int:
+    """One table or view; a Delta table is replaced by a new version, the others by a new file."""
+    quoted = '"' + name.replace('"', '""') + '"'
+    if form == "delta":
+        return _delta(con, quoted, folder / name)
+    path = str(folder / f"{name}.{form}").replace("'", "''")
+    options = "format parquet, compression zstd" if form == "parquet" else "format csv, header"
+    return con.execute(f"copy (select * from {quoted}) to '{path}' ({options})").fetchall()[0][0]
+
+
+def _delta(con, quoted, path) -> int:
+    from turnout.errors import RegistryError
+
+    try:
+        from deltalake import write_deltalake
+    except ImportError:
+        raise RegistryError("Delta Lake needs a package: pip install 'turnout[lakehouse]'.") from None
+    rows = con.execute(f"select * from {quoted}").to_arrow_table()
+    write_deltalake(str(path), rows, mode="overwrite")
+    return rows.num_rows

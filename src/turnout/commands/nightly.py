@@ -1,0 +1,29 @@
+"""Run the whole workflow unattended: one run at a time, remains of a killed one cleared, one line at the end.
+
+  0 2 * * *   cd /srv/turnouts && turnout nightly --limit-hours 6 >> logs/nightly.log 2>&1
+  turnout nightly --profile profiles/slurm
+  turnout nightly -- --config accept_vanished=true
+
+The exit code is 0 only where every job ran and the results may be trusted; the registry is published either way.
+"""
+
+import argparse
+
+HELP = "run the whole workflow unattended"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Profile, limit of time [h] and options of Snakemake."""
+    parser.add_argument("--profile", default="profiles/default", help="folder of the profile (%(default)s)")
+    parser.add_argument("--limit-hours", type=float, default=None, help="end a run that takes longer")
+    parser.add_argument("options", nargs="*", help="handed on to Snakemake, after --")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the workflow once, print its one line, and return its exit code."""
+    from turnout.fleet.nightly import nightly
+
+    limit = None if args.limit_hours is None else 3600.0 * args.limit_hours
+    night = nightly(args.options, args.profile, limit)
+    print(night)
+    return night.code

@@ -1,0 +1,106 @@
+"""Look at one passage file: axles, speed, type, and what the model of each section foretells.
+
+Nothing is written. The models are those that the last run identified (--work); without them, or with --no-fit, only
+the train is described.
+"""
+
+import argparse
+
+HELP = "analyse one passage file and say what is in it"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The recording, its turnout, and where its models lie."""
+    parser.add_argument("file", help="passage recording, in any format that is read")
+    parser.add_argument("--turnout", required=True, help="id of the turnout, for its sensors and models")
+    parser.add_argument("--configuration", default="config", help="folder of the configuration (%(default)s)")
+    parser.add_argument("--work", default="work", help="folder of the last run (%(default)s)")
+    parser.add_argument("--no-fit", action="store_true", help="only find the train, fit no model")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the train of each record and, unless told otherwise, the fit at each sensor."""
+    from pathlib import Path
+
+    from turnout.chains.passage import sensors_of
+    from turnout.chains.passage_context import passage_context
+    from turnout.config import load_configuration
+    from turnout.errors import ConfigError
+    from turnout.passage.analyse import analyse
+    from turnout.readers import read
+
+    turnout = load_configuration(args.configuration).turnout(args.turnout)
+    if turnout.passages is None:
+        raise ConfigError(turnout.layout, "passages", "nothing about passages", "Add them to the layout")
+    path = Path(args.file)
+    result = read(path.name, path.parent, turnout.passages.description)
+    for error in result.errors:
+        print(f"Not used: {error}")
+    settings = turnout.settings["passage"]
+    _, context = passage_context(turnout.id, args.work, settings)
+    for recording in result.recordings:
+        passage = analyse(recording, sensors_of(turnout), context.patterns, settings)
+        print("\n".join(_train(recording, passage)))
+        if passage.n_axle and not args.no_fit:
+            print("\n".join(_fits(recording, passage, turnout, context, settings)))
+    return 0
+
+
+def _train(recording, passage) -> list[str]:
+    """The train in words."""
+    words = [f"{recording.source}, record {recording.record}: {recording.duration:.1f} s, {passage.status}"]
+    words += [f"  {f.reason}: {f.detail}" for f in passage.findings]
+    if not passage.n_axle:
+        return words
+    speed, type_ = passage.speed, passage.type
+    words.append(f"  axles      {passage.n_axle}, the clearest cut between them and the rest is {passage.contrast:.1f}")
+    words.append(f"  speed      {3.6 * speed.speed:.1f} ± {3.6 * speed.se:.1f} km/h from {speed.source}")
+    words.append(f"  change     {speed.acceleration:+.2f} ± {speed.acceleration_se:.2f} m/s²")
+    if speed.disagreement is not None and abs(speed.disagreement) > 3:
+        words.append(f"  sensors and axle spacing differ by {abs(speed.disagreement):.1f} standard errors")
+    words.append(f"  direction  {passage.direction}, track {passage.track}")
+    words.append(f"  type       {type_.type}, probability {type_.probability:.3f}")
+    if type_.residual is not None:
+        row = " ".join(v.name for v in type_.vehicles)
+        words.append(f"             axle spacings differ by {100 * type_.residual:.1f} cm rms from {row}")
+    spacing = ", ".join(f"{d:.2f}" for d in passage.offsets[:12])
+    words.append(f"  axles at   {spacing}{' ...' if passage.n_axle > 12 else ''} m behind the first")
+    return words
+
+
+def _fits(recording, passage, turnout, context, settings) -> list[str]:
+    """A line per sensor: each score beside its null."""
+    from datetime import datetime
+
+    from turnout.chains.passage import model_at, sensors_of
+    from turnout.passage.channel_fit import fit_channel
+
+    words = ["  sensor      fit / null   forecast / null  left out / null   not along b  peak m/s²  status"]
+    for sensor in sensors_of(turnout):
+        models = context.models.get(sensor.section, ())
+        model = model_at(models, recording.started_at or datetime.max)
+        if sensor.name not in passage.at_sensor or model is None:
+            why = "does not hear the train" if models else "no model of its section"
+            words.append(f"  {sensor.name:<10}{why}")
+            continue
+        samples, times = recording.signal(sensor.name), passage.at_sensor[sensor.name]
+        fit = fit_channel(samples, recording.rate, times, passage.motion.speed, model.model, settings)
+        if fit.scores is None:
+            words.append(f"  {sensor.name:<10}{fit.detail}")
+            continue
+        s, null = fit.scores, fit.null
+        words.append(
+            f"  {sensor.name:<10}{s.fit:6.1f} /{null.fit:5.1f} {s.forecast:9.1f} /{null.forecast:6.1f} "
+            f"{s.leave_one_out:9.1f} /{null.leave_one_out:6.1f} {fit.test.failed_share:12.0%} {fit.peak:11.1f}"
+            f"  {fit.status}"
+        )
+    words.append(f"  {fit_rate(settings)}")
+    return words
+
+
+def fit_rate(settings) -> str:
+    """What the scores rest on."""
+    return (
+        f"band {settings.band_low:g}-{settings.band_high:g} Hz, two numbers per wheel, "
+        f"null: {settings.null_models} random models, 95 % quantile"
+    )

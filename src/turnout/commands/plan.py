@@ -1,0 +1,105 @@
+"""Say what a run would find: units per stage, which are new or changed, and which files were left out. Changes nothing.
+
+A unit is new where it was never computed, changed where one of its files, its settings, what was noted beside it or
+the code of its stage is another than it was computed from. A file that was only touched counts as changed here; the run
+then compares its content and computes nothing.
+"""
+
+import argparse
+
+HELP = "say what is new, without computing"
+STAGES = {
+    "hammer": ("turnout.chains.hammer", None),
+    "passage": ("turnout.chains.passage", "turnout.chains.passage_context:passage_context"),
+}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Folders of configuration, raw files and results, the turnouts asked about, and the number of shards."""
+    parser.add_argument("--configuration", default="config", help="folder of the configuration (%(default)s)")
+    parser.add_argument("--raw", help="raw root (raw)")
+    parser.add_argument("--work", default="work", help="folder of the results of earlier runs (%(default)s)")
+    parser.add_argument("--shards", type=int, help="number of shards of those runs, instead of that in config.yaml")
+    parser.add_argument("--turnout", action="append", help="only this turnout; may be given again")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the new and changed units and the files left out, with the count of units."""
+    from pathlib import Path
+
+    from turnout.config import load_configuration
+    from turnout.errors import ConfigError
+
+    configuration = load_configuration(args.configuration)
+    shards = configuration.settings["fleet"].shards if args.shards is None else args.shards
+    if shards < 1:
+        raise ConfigError("--shards", "number", str(shards), "Write the number of shards of the runs, 1 or more")
+    if args.raw and not Path(args.raw).is_dir():
+        raise ConfigError(args.raw, "--raw", "no such folder", "Write the folder that holds those of the turnouts")
+    counts = dict.fromkeys(("all", "new", "changed"), 0)
+    known = _Known(Path(args.work), shards)
+    for turnout in map(configuration.turnout, args.turnout or configuration.ids):
+        _say(turnout, Path(args.raw or "raw"), known, counts)
+    print(f"{counts['all']} units, {counts['new']} never computed, {counts['changed']} changed since.")
+    return 0
+
+
+def _say(turnout, raw, known, counts) -> None:
+    """Print what is new of one turnout and what was left out, and count."""
+    from turnout.config.load import read_notes
+    from turnout.fleet.notes import notes_of
+    from turnout.fleet.plan import Planned
+    from turnout.fleet.scan import scan, unit_id
+
+    found = scan(turnout, raw)
+    noted, wrong = read_notes(turnout, raw)
+    for unit, note in zip(found.units, notes_of(noted, found.units)):
+        word = known.judged(Planned(unit, note))
+        counts["all"] += 1
+        if word:
+            counts[word] += 1
+            print(f"{word:<8} {unit_id(unit)}: {len(unit.files)} files")
+    for problem in (*found.problems, *wrong):
+        print(f"left out {problem}")
+
+
+class _Known:
+    """What earlier runs computed, read when a shard is first asked for."""
+
+    def __init__(self, work, shards) -> None:
+        self.work, self.shards = work, shards
+        self.states: dict = {}
+        self.tokens: dict = {}
+        self.algo: dict[str, str] = {}
+
+    def judged(self, planned) -> str:
+        """ "new", "changed", or "" where its result stands."""
+        from dataclasses import replace
+
+        from turnout.fingerprint import fingerprint
+        from turnout.fleet.keys import stamp_of
+        from turnout.fleet.scan import unit_id
+        from turnout.fleet.shards import shard_of
+        from turnout.fleet.state import load_state
+
+        unit = planned.unit
+        module, _ = STAGES[unit.kind]
+        path = self.work / unit.kind / f"{shard_of(unit.turnout, self.shards)}.json"
+        if path not in self.states:
+            self.states[path] = load_state(path).units
+        before = self.states[path].get(unit_id(unit))
+        if before is None:
+            return "new"
+        if unit.kind not in self.algo:
+            self.algo[unit.kind] = fingerprint(module)
+        planned = replace(planned, note=planned.note + self._token(unit))
+        return "" if (before.stamp, before.algo) == (stamp_of(planned), self.algo[unit.kind]) else "changed"
+
+    def _token(self, unit) -> str:
+        """What a stage takes from another one for this turnout: the passages the models of the hammer tests."""
+        from turnout.fleet.shard import named
+
+        context = STAGES[unit.kind][1]
+        if context and (unit.kind, unit.turnout) not in self.tokens:
+            self.tokens[unit.kind, unit.turnout] = named(context)(unit.turnout, work=self.work)[0]
+        return self.tokens.get((unit.kind, unit.turnout), "")

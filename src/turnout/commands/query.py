@@ -1,0 +1,108 @@
+"""Ask the registry in SQL.
+
+  turnout query "from resonance_drift(365)"
+  turnout query "select * from section_trend('tommerup_s1/A7', 'ballast')" --csv trend.csv
+  turnout query --list
+
+docs/registry.md lists every table, view and macro with its columns and units.
+"""
+
+import argparse
+import csv
+import sys
+from decimal import Decimal
+
+HELP = "ask the registry in SQL"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The query, where the registry lies and how to show the answer."""
+    parser.add_argument("sql", nargs="?", help="a query; '-' reads it from standard input")
+    parser.add_argument("--registry", default="results/registry", help="folder of the registry (%(default)s)")
+    parser.add_argument("--csv", metavar="FILE", help="write comma-separated values there, '-' = standard output")
+    parser.add_argument("--rows", type=int, default=60, help="rows shown at most (%(default)s)")
+    parser.add_argument("--list", action="store_true", help="name the tables, views and macros")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print or write the rows of a query; RegistryError with the words of DuckDB where it fails."""
+    import duckdb
+
+    from turnout.errors import RegistryError
+    from turnout.registry.database import open_registry
+    from turnout.registry.listing import listing
+
+    if args.list or not args.sql:
+        print(listing())
+        return 0
+    sql = sys.stdin.read() if args.sql == "-" else args.sql
+    with open_registry(args.registry) as connection:
+        try:
+            result = connection.sql(sql)
+            if result is None:
+                return 0
+            if args.csv:
+                _write_csv(result, args.csv)
+            else:
+                print(shown(result, args.rows))
+        except duckdb.Error as error:
+            raise RegistryError(f"{error}\n'turnout query --list' names the tables, views and macros") from None
+    return 0
+
+
+def _write_csv(result, path):
+    with opened(path) as stream:
+        writer = csv.writer(stream)
+        writer.writerow(result.columns)
+        writer.writerows(result.fetchall())
+
+
+def opened(path):
+    """The file at ``path`` to write to, standard output for "-"; RegistryError where it cannot be written."""
+    from turnout.errors import RegistryError
+
+    if path == "-":
+        return _Standard()
+    try:
+        return open(path, "w", newline="", encoding="utf-8")
+    except OSError as error:
+        remedy = "Write a file in a folder that is there"
+        raise RegistryError(f"{path} cannot be written: {error.strerror}. {remedy}.") from None
+
+
+class _Standard:
+    """Standard output as a context that does not close it."""
+
+    def __enter__(self):
+        return sys.stdout
+
+    def __exit__(self, *_):
+        return False
+
+
+def shown(result, limit: int = 60) -> str:
+    """Aligned columns, numbers to the right, NULL as an empty place, and how many rows there are."""
+    rows = result.limit(limit + 1).fetchall()
+    more, rows = len(rows) > limit, rows[:limit]
+    text = [[_cell(value) for value in row] for row in rows]
+    widths = [max(len(name), *(len(row[i]) for row in text), 0) for i, name in enumerate(result.columns)]
+    right = [
+        all(isinstance(row[i], (int, float, Decimal)) or row[i] is None for row in rows) for i in range(len(widths))
+    ]
+
+    def line(cells):
+        return "  ".join(c.rjust(w) if r else c.ljust(w) for c, w, r in zip(cells, widths, right)).rstrip()
+
+    total = result.count("*").fetchall()[0][0] if more else len(rows)
+    count = f"({len(rows)} of {total} rows)" if more else f"({total} row{'s' if total != 1 else ''})"
+    return "\n".join([line(result.columns), line(["-" * w for w in widths]), *map(line, text), count])
+
+
+def _cell(value) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, list) and len(value) > 6:
+        return f"[{', '.join(_cell(v) for v in value[:3])} ... {len(value)}]"
+    return " ".join(str(value).split())

@@ -1,0 +1,73 @@
+"""Run the pipeline on recordings that nobody here made, and compare with what their makers say of them.
+
+Fetches three source distributions by package name, checks their sha256, and takes the recordings out:
+a five-hit hammer test (hit 0 overloaded, hit 2 double, by its authors' word), the frequency responses of two
+beams with published modes, and vendors' UFF files. Everything lies below real/.
+"""
+
+HELP = "run everything on recordings made by others"
+
+
+def add_arguments(parser):
+    """Options of the command."""
+    parser.add_argument("--folder", default="real", help="where everything goes (default real)")
+    parser.add_argument("--cores", type=int, default=2, help="processors to use (default 2)")
+
+
+def run(args):
+    """Fetch, run, compare."""
+    from pathlib import Path
+
+    from turnout.demo.others import fetch_all
+    from turnout.demo.pipeline import run_pipeline
+
+    folder = Path(args.folder)
+    fetch_all(folder / "raw")
+    examples = Path("examples/recordings_of_others").resolve()
+    code = run_pipeline(args.cores, "--directory", str(folder), "--config", f"configuration={examples}")
+    if code:
+        return code
+    _tell_hits(folder)
+    _tell_modes(folder)
+    _tell_uff(folder)
+    print(f"\nPages: {folder}/results/pages/index.html")
+    return 0
+
+
+def _tell_hits(folder):
+    from turnout.demo.published_modes import HITS
+    from turnout.registry.database import open_registry
+
+    print("\nFive-hit hammer test of pyFRF 1.1.4")
+    print(f"{'hit':>4}  {'its makers say':<24} {'found':<10} why")
+    with open_registry(folder / "results" / "registry") as connection:
+        rows = connection.execute("select record, status, detail from impacts_current order by record").fetchall()
+    for record, status, detail in rows:
+        print(f"{record:>4}  {HITS[record]:<24} {status:<10} {detail or ''}")
+
+
+def _tell_modes(folder):
+    from turnout.demo.published_modes import beam_modes
+
+    for name, rows in beam_modes(folder / "raw"):
+        print(f"\nModes of the {name}: found without being told how many, nor where")
+        print(f"{'published [Hz]':>15} {'found [Hz]':>22} {'published damping':>19} {'found damping [%]':>20} {'n':>4}")
+        for f, damping, mode in rows:
+            said = "not published" if f is None else f"{f:.1f}"
+            zeta = "" if damping is None else f"{damping:.2f} %"
+            if mode is None:
+                print(f"{said:>15} {'not found':>22} {zeta:>19}")
+                continue
+            at, d = mode.frequency, mode.damping
+            frequency = f"{at.mean:.2f} ± {(at.high - at.low) / 2:.2f}"
+            ratio = f"{100 * d.mean:.3f} ± {50 * (d.high - d.low):.3f}"
+            print(f"{said:>15} {frequency:>22} {zeta:>19} {ratio:>20} {at.n:>4}")
+    print("± is the 95 % t interval of the mean over n responses.")
+
+
+def _tell_uff(folder):
+    from turnout.demo.published_modes import uff_contents
+
+    print("\nVendors' UFF files")
+    for path in sorted((folder / "raw" / "uff").glob("*.uff")):
+        print(f"   {path.name:<48} {uff_contents(path)}")

@@ -1,0 +1,94 @@
+"""Look after the registry.
+
+check      compare every live file with the list: size, hash, row count, types
+compact    merge the many files of a table and year into one
+vacuum     delete what killed runs left behind
+relocate   make registry.duckdb again, after the folder was moved
+rebuild    write all files under the present columns, after an update that changed them
+describe   tables, views and macros with their columns, units and meanings
+"""
+
+import argparse
+
+HELP = "check, compact, move or describe the registry"
+ACTIONS = ("check", "compact", "vacuum", "relocate", "rebuild", "describe")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The action, the folder and the options of single actions."""
+    parser.add_argument("action", choices=ACTIONS)
+    parser.add_argument("name", nargs="?", help="describe: only this table, view or macro")
+    parser.add_argument("--registry", default="results/registry", help="folder of the registry (%(default)s)")
+    parser.add_argument("--quick", action="store_true", help="check: do not read the files whole")
+    parser.add_argument("--at-least", type=int, default=2, metavar="N", help="compact: only where N files lie (2)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Do the action; exit code 1 where the check finds a problem."""
+    return {"check": _check, "compact": _compact, "vacuum": _vacuum, "relocate": _relocate}.get(
+        args.action, _describe if args.action == "describe" else _rebuild
+    )(args)
+
+
+def _check(args) -> int:
+    from turnout.registry.inspection import check
+
+    problems = check(_existing(args), hashes=not args.quick)
+    print("\n".join(problems) or "The registry holds what its list says.")
+    return 1 if problems else 0
+
+
+def _compact(args) -> int:
+    from turnout.registry.compaction import compact
+
+    return _say(compact(_existing(args), args.at_least), "merged")
+
+
+def _rebuild(args) -> int:
+    from turnout.registry.compaction import rebuild
+
+    return _say(rebuild(_existing(args)), "written anew")
+
+
+def _say(done, verb) -> int:
+    for folder, (files, rows) in sorted(done.items()):
+        print(f"{folder}: {files} files with {rows} rows {verb}")
+    if not done:
+        print("Nothing to do.")
+    return 0
+
+
+def _vacuum(args) -> int:
+    from turnout.registry.inspection import vacuum
+
+    gone = vacuum(_existing(args))
+    print("\n".join(gone) or "Nothing to delete.")
+    return 0
+
+
+def _relocate(args) -> int:
+    from turnout.registry.database import rebuild_database
+
+    folder = _existing(args)
+    generation = rebuild_database(folder)
+    print(f"{folder.resolve() / 'registry.duckdb'}: views over {len(generation.files)} files")
+    return 0
+
+
+def _describe(args) -> int:
+    from turnout.registry.listing import describe
+
+    print(describe(args.name))
+    return 0
+
+
+def _existing(args):
+    from pathlib import Path
+
+    from turnout.errors import RegistryError
+    from turnout.registry.generation import FILE
+
+    folder = Path(args.registry)
+    if not (folder / FILE).exists():
+        raise RegistryError(f"{folder}: there is no registry here. Run the pipeline, or give --registry")
+    return folder

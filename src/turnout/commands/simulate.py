@@ -1,0 +1,56 @@
+"""Simulate a hammer test or a train passage and leave the raw file a measuring system would have left.
+
+  turnout simulate hammer  --track tommerup --section A7 --tests 3
+  turnout simulate passage --track tommerup --vehicle ic3 --speed 160 --turnout tommerup_s1
+  turnout simulate figures --out docs/gallery
+
+With --turnout the channels are those of the turnout's configuration and the file goes to its raw folder, where the
+pipeline finds it; what is true of it goes to a file of the same name below --truth.
+"""
+
+HELP = "simulate a hammer test or a train passage"
+
+
+def add_arguments(parser):
+    """Options of the command."""
+    kinds = parser.add_subparsers(dest="kind", metavar="kind", required=True)
+    hammer = kinds.add_parser("hammer", help="blows of a hammer at one section")
+    hammer.add_argument("--section", required=True, help="location of the track file, or a place in metres")
+    hammer.add_argument("--tests", type=int, default=1, help="tests, one file each (default 1)")
+    hammer.add_argument("--blows", type=int, default=10, help="blows per test (default 10)")
+    passage = kinds.add_parser("passage", help="one train over the turnout")
+    passage.add_argument("--vehicle", default="ic3", help="file in config/vehicles, or its path (default ic3)")
+    passage.add_argument("--speed", type=float, default=160.0, help="km/h (default 160)")
+    passage.add_argument("--load", type=float, default=0.5, help="share of the payload, 0 to 1 (default 0.5)")
+    passage.add_argument("--units", type=int, default=1, help="coupled units (default 1)")
+    passage.add_argument("--route", default="main", help="route of the track file (default main)")
+    passage.add_argument("--direction", choices=("facing", "trailing"), default="facing")
+    for sub in (hammer, passage):
+        sub.add_argument("--track", default="tommerup", help="file in config/tracks, or its path (default tommerup)")
+        sub.add_argument("--turnout", help="id in config/turnouts.tsv")
+        sub.add_argument("--config", default="config", help="configuration folder (default config)")
+        sub.add_argument("--raw", default="raw", help="folder of raw files (default raw)")
+        sub.add_argument("--truth", help="folder for what is true; the pipeline does not read it")
+        sub.add_argument("--out", help="file to write instead of a place below --raw")
+        sub.add_argument("--format", default="hdf5", help="format of the file (default hdf5)")
+        sub.add_argument("--at", default="2024-05-13T09:00:00", help="UTC time of the first sample")
+        sub.add_argument("--temperature", type=float, help="rail temperature to note [°C]")
+        sub.add_argument("--seed", type=int, default=0)
+    figures = kinds.add_parser("figures", help="the figures of docs/simulation.md")
+    figures.add_argument("--out", default="docs/gallery", help="folder (default docs/gallery)")
+
+
+def run(args):
+    """Simulate and write."""
+    if args.kind == "figures":
+        from turnout.report.simulation_figures import draw_all
+
+        for path in draw_all(args.out):
+            print(path)
+        return 0
+    from turnout.chains.simulate import write_hammer, write_passage
+
+    write = write_hammer if args.kind == "hammer" else write_passage
+    for path, note in write(vars(args)):
+        print(f"{path}: {note}")
+    return 0

@@ -1,0 +1,114 @@
+"""config/acknowledgements.csv: who has seen an alarm, or silences it until a date, and why."""
+
+import csv
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from datetime import datetime
+from pathlib import Path
+
+from turnout.config.document import Place
+from turnout.config.events import wrong_place, wrong_time
+from turnout.config.keys import suggestion
+from turnout.config.table import TOO_MANY, read_csv
+from turnout.errors import ConfigError
+
+COLUMNS = ("turnout", "section", "band", "action", "by", "at", "until", "reason")
+ACTIONS = ("acknowledge", "suppress")
+BANDS = ("ballast", "railpad")
+
+
+def read_acknowledgements(
+    path: Path, name: str = "acknowledgements.csv", known=None, variants: Mapping | None = None
+) -> tuple[list[dict], list[ConfigError]]:
+    """Sound rows as rows of the table ``acknowledgements``, and every error of the others.
+
+    No file means that nobody has said anything. Empty ``section`` or ``band`` mean all of the turnout; section "*"
+    is its median. ``known`` and ``variants`` are the turnouts and their configuration; None: places are not checked.
+    """
+    if not Path(path).exists():
+        return [], []
+    rows: list[dict] = []
+    errors: list[ConfigError] = []
+    try:
+        for line, cells in read_csv(path, COLUMNS[:6]):
+            found = list(faults(cells, known, variants or {}))
+            errors += [cells.place(name, line, column).error(*said) for column, *said in found]
+            if not found:
+                rows.append(acknowledgement(cells))
+    except (ValueError, UnicodeDecodeError) as error:
+        errors.append(Place(name, 1, 1).error(str(error), f"Write the header {','.join(COLUMNS)} in UTF-8"))
+    return rows, errors
+
+
+def faults(cells: Mapping, known, variants) -> Iterator[tuple[str, str, str]]:
+    """(column, what was found, what to write) of everything in a row that cannot be used."""
+    said = {column: cells.get(column, "") for column in COLUMNS}
+    if TOO_MANY in cells:
+        yield TOO_MANY, "more cells than columns", "Put a text with commas in double quotes"
+        return
+    if not said["turnout"]:
+        yield "turnout", "turnout is empty", "Write the id of the turnout"
+    else:
+        yield from wrong_place(said | {"section": said["section"].removesuffix("*")}, known, variants)
+    if said["action"] not in ACTIONS:
+        yield "action", f"action is {said['action']!r}", suggestion(said["action"], ACTIONS)
+    if said["band"] and said["band"] not in BANDS:
+        yield "band", f"band is {said['band']!r}", suggestion(said["band"], BANDS)
+    for column in ("by", "reason"):
+        if not said[column]:
+            yield column, f"{column} is empty", "Write who and why: it stays in the record"
+    times = ["at"] + ["until"] * bool(said["until"])
+    wrong = {column: fault for column in times if (fault := wrong_time(said[column]))}
+    for column, (more, remedy) in wrong.items():
+        yield column, f"{column} is {said[column]!r}{more}", remedy
+    if said["until"] and not wrong and _time(said["until"]) <= _time(said["at"]):
+        yield (
+            "until",
+            f"until {said['until']} is not after at {said['at']}",
+            "Write the day on which it is to speak again",
+        )
+
+
+def acknowledgement(cells: Mapping) -> dict:
+    """The row of the table ``acknowledgements`` of a sound row of the file."""
+    said = {column: cells.get(column, "") for column in COLUMNS}
+    section = said["section"]
+    if section and section != "*" and "/" not in section:
+        section = f"{said['turnout']}/{section}"
+    row = {
+        "turnout_id": said["turnout"],
+        "section_id": section or None,
+        "band": said["band"] or None,
+        "action": said["action"],
+        "by_whom": said["by"],
+        "at_utc": _time(said["at"]),
+        "until_utc": _time(said["until"]) if said["until"] else None,
+        "reason": said["reason"],
+    }
+    return {"acknowledgement_id": _id(row)} | row
+
+
+def _time(text: str) -> datetime:
+    return datetime.fromisoformat(text.removesuffix("Z"))
+
+
+def append_acknowledgement(path: Path, row: dict) -> None:
+    """Add a row at the end of the file; a new file gets the header. ``row`` is what ``acknowledgement`` gives."""
+    path = Path(path)
+    new = not path.exists()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    ended = new or path.read_text(encoding="utf-8-sig").endswith("\n")
+    cells = [row["turnout_id"], row["section_id"], row["band"], row["action"], row["by_whom"]]
+    cells += [row[k].isoformat(timespec="minutes") if row[k] else "" for k in ("at_utc", "until_utc")]
+    with open(path, "a", encoding="utf-8", newline="") as stream:
+        stream.write("" if ended else "\n")
+        writer = csv.writer(stream, lineterminator="\n")
+        if new:
+            writer.writerow(COLUMNS)
+        writer.writerow([cell or "" for cell in [*cells, row["reason"]]])
+
+
+def _id(row: dict) -> str:
+    text = json.dumps([row[k] for k in sorted(row)], default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:32]

@@ -1,0 +1,97 @@
+"""From the merged tree of names and values to the records of one turnout."""
+
+import hashlib
+import json
+from dataclasses import asdict
+
+from turnout.config.document import Branch, merge, plain
+from turnout.config.frozen import Frozen
+from turnout.config.settings import parts
+from turnout.config.settings_keys import filled
+from turnout.config.turnout import HammerConfig, PassageConfig, Section
+from turnout.records import RawChannel, RawDescription
+
+# What the units of one kind use of a turnout's configuration: parts of the settings and branches of the layout.
+USED = {
+    "hammer": (("receptance", "identify"), ("sections", "hammer")),
+    "passage": (("passage",), ("sections", "passages")),
+}
+
+
+def digest(value) -> str:
+    """32 hex characters that change when ``value`` (dicts, tuples, numbers, text) does."""
+    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()[:32]
+
+
+def hashes(values: dict) -> dict[str, str]:
+    """``config_hash`` under "" and the hash of what each kind of unit uses; defaults count like written values."""
+    branches = {k: v for k, v in values.items() if k not in ("description", "settings")}
+    # how the run is cut up changes no result
+    filled_in = {name: asdict(s) for name, s in settings(values["settings"]).items() if name != "fleet"}
+    found = {"": digest([filled_in, branches])}
+    for kind, (used, names) in USED.items():
+        found[kind] = digest([{p: filled_in.get(p) for p in used}, {b: branches.get(b) for b in names}])
+    return found
+
+
+def settings(values: dict) -> Frozen:
+    """Settings of every part."""
+    return Frozen({name: filled(cls, values.get(name, {})) for name, cls in parts().items()})
+
+
+def sections(values: dict) -> tuple[Section, ...]:
+    """Sections in the order of the layout."""
+    keys = ("panel", "track", "position", "pad", "sleeper")
+    return tuple(
+        Section(label, **{k: section[k] for k in keys if section.get(k) is not None})
+        for label, section in values.items()
+    )
+
+
+def hammer(tree: Branch) -> HammerConfig | None:
+    """Hammer tests, section by section: what ``hammer`` says, changed by what the section's ``hammer`` says."""
+    if "hammer" not in tree:
+        return None
+    descriptions: dict[str, RawDescription] = {}
+    roles: dict[str, dict] = {"force": {}, "response": {}, "validation": {}}
+    for label, section in tree["sections"].items():
+        own = plain(merge(tree["hammer"], section["hammer"]) if "hammer" in section else tree["hammer"])
+        position = float(section["position"].value)
+        descriptions[label] = description(own, "hammer", {name: position for name in own["channels"]})
+        for role, names in roles.items():
+            names[label] = own.get(role)
+    frozen = {role: Frozen(names) for role, names in roles.items()}
+    return HammerConfig(plain(tree["hammer"])["files"], Frozen(descriptions), **frozen)
+
+
+def passages(tree: Branch) -> PassageConfig | None:
+    """Passage recordings with the section of every channel."""
+    if "passages" not in tree:
+        return None
+    own = plain(tree["passages"])
+    watched = {name: channel["section"] for name, channel in own["channels"].items()}
+    positions = {name: float(tree["sections"][label]["position"].value) for name, label in watched.items()}
+    return PassageConfig(own["files"], description(own, "passage", positions), Frozen(watched))
+
+
+def description(values: dict, kind: str, positions: dict[str, float]) -> RawDescription:
+    """What the files of one kind must hold; a sensor sits at ``positions`` plus its offset."""
+    channels = []
+    for name, channel in values["channels"].items():
+        given = {k: _real(k, v) for k, v in channel.items() if k not in ("offset", "section") and v is not None}
+        position = None if channel["quantity"] == "force" else positions[name] + channel.get("offset", 0.0)
+        channels.append(RawChannel(name=name, position=position, **given))
+    return RawDescription(
+        channels=tuple(channels),
+        kind=kind,
+        format=values.get("format", "auto"),
+        rate=_real("rate", values.get("rate")),
+        n_records=values.get("records"),
+        n_samples=values.get("samples"),
+        time_zone=values.get("time_zone", "UTC"),
+    )
+
+
+def _real(name: str, value):
+    """Physical values as float, whatever way they were written."""
+    return float(value) if name in ("rate", "sensitivity", "limit", "resolution") and value is not None else value

@@ -1,0 +1,130 @@
+"""A YAML file whose every value knows where it stands, so that an error can say which line to change."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from turnout.errors import ConfigError
+
+
+@dataclass(frozen=True)
+class Place:
+    """File, line and column, counted from 1; line 0 stands for a value built into the program."""
+
+    path: str
+    line: int = 0
+    column: int = 0
+
+    def __str__(self):
+        return f"line {self.line}, column {self.column}"
+
+    def error(self, found: str, remedy: str) -> ConfigError:
+        """A ``ConfigError`` that points here."""
+        return ConfigError(self.path, str(self), found, remedy)
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """One value: text, number, flag, None, or a tuple of these."""
+
+    value: object
+    place: Place
+
+
+class Branch(dict):
+    """A mapping from names to ``Leaf`` or ``Branch``; ``place`` is where it starts, ``key_places`` its names."""
+
+    def __init__(self, place: Place):
+        super().__init__()
+        self.place = place
+        self.key_places: dict[str, Place] = {}
+
+    def put(self, name: str, value, place: Place) -> None:
+        """Add a key whose name stands at ``place``."""
+        self[name] = value
+        self.key_places[name] = place
+
+
+def load(path: Path, name: str | None = None) -> Branch:
+    """The mapping in the YAML file ``path``; errors call the file ``name``; ConfigError where it is no YAML."""
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import MarkedYAMLError
+
+    name = name or str(path)
+    yaml = YAML(typ="safe", pure=True)
+    try:
+        node = yaml.compose(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        found = f"cannot be read: {error.strerror}"
+        raise ConfigError(name, "line 1", found, "Put a file of that name there, or take it away") from None
+    except UnicodeDecodeError as error:
+        raise ConfigError(name, f"byte {error.start}", "a byte that is not UTF-8", "Save the file as UTF-8") from None
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        place = Place(name, mark.line + 1, mark.column + 1) if mark else Place(name, 1, 1)
+        raise place.error(str(error.problem), "Correct the YAML syntax there") from None
+    if node is None:
+        return Branch(Place(name, 1, 1))
+    tree = _tree(node, name, yaml.constructor)
+    if not isinstance(tree, Branch):
+        raise tree.place.error(f"{tree.value!r} where names with values are expected", "Write 'name: value' lines")
+    return tree
+
+
+def merge(*branches: Branch) -> Branch:
+    """Later branches win leaf by leaf; a list is one leaf and is replaced whole."""
+    merged = Branch(branches[0].place)
+    for branch in branches:
+        for name, value in branch.items():
+            old = merged.get(name)
+            if isinstance(value, Branch):
+                value = merge(old, value) if isinstance(old, Branch) else merge(value)
+            merged.put(name, value, branch.key_places[name])
+    return merged
+
+
+def plain(tree):
+    """The values alone: dict, tuple, text, numbers."""
+    return {k: plain(v) for k, v in tree.items()} if isinstance(tree, Branch) else tree.value
+
+
+def leaves(tree: Branch, prefix: str = "") -> Iterator[tuple[str, Leaf]]:
+    """``("hammer.rate", leaf)`` for every value, in order."""
+    for name, value in tree.items():
+        if isinstance(value, Branch):
+            yield from leaves(value, f"{prefix}{name}.")
+        else:
+            yield prefix + name, value
+
+
+def _tree(node, path, constructor):
+    place = Place(path, node.start_mark.line + 1, node.start_mark.column + 1)
+    if node.id == "mapping":
+        branch = Branch(place)
+        for key, value in node.value:
+            key_place = Place(path, key.start_mark.line + 1, key.start_mark.column + 1)
+            name = str(key.value)
+            if name in branch:
+                first = branch.key_places[name].line
+                raise key_place.error(f"{name!r} for the second time, first in line {first}", "Keep one of them")
+            branch.put(name, _tree(value, path, constructor), key_place)
+        return branch
+    if node.id == "sequence":
+        return Leaf(tuple(_scalar(item, path, constructor) for item in node.value), place)
+    return Leaf(_scalar(node, path, constructor), place)
+
+
+def _scalar(node, path, constructor):
+    from ruamel.yaml.error import MarkedYAMLError
+
+    if node.id != "scalar":
+        place = Place(path, node.start_mark.line + 1, node.start_mark.column + 1)
+        raise place.error(f"a {node.id} inside a list", "Write plain values in lists")
+    if node.tag.endswith((":timestamp", ":str")):
+        return node.value
+    try:
+        return constructor.construct_object(node)
+    except (MarkedYAMLError, ValueError):
+        place = Place(path, node.start_mark.line + 1, node.start_mark.column + 1)
+        found = f"{node.value!r} with the tag {node.tag!r}, which is none of a configuration"
+        raise place.error(found, "Write a plain value without a tag") from None

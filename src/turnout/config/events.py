@@ -1,0 +1,108 @@
+"""config/events.csv: maintenance that starts a new epoch of a resonance."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from turnout.config.document import Place
+from turnout.config.keys import suggestion
+from turnout.config.table import TOO_MANY, read_csv
+from turnout.errors import ConfigError
+
+# Which resonance is another one afterwards, where the row does not say.
+RESETS = {
+    "tamping": ("ballast",),
+    "pad_exchange": ("railpad",),
+    "rail_change": ("ballast", "railpad"),
+    "grinding": (),
+    "ballast_cleaning": ("ballast",),
+    "sleeper_change": ("ballast", "railpad"),
+    "sensor_change": ("ballast", "railpad"),
+    "method_change": ("ballast", "railpad"),
+    "other": (),
+}
+COLUMNS = ("turnout", "section", "date", "kind", "resets", "note")
+
+
+@dataclass(frozen=True)
+class Event:
+    """``section`` is None for the whole turnout; ``resets`` holds "ballast" and "railpad"; ``at`` is UTC."""
+
+    turnout: str
+    section: str | None
+    at: datetime
+    kind: str
+    resets: tuple[str, ...]
+    note: str = ""
+
+
+def read_events(path: Path, name: str, known, variants) -> tuple[list[Event], list[ConfigError]]:
+    """Events in order of time, and every error of the rows that cannot be used; no file means no events.
+
+    ``known`` are the ids of the turnouts, None where turnouts.tsv itself is wrong: then no event is accused.
+    """
+    if not path.exists():
+        return [], []
+    events: list[Event] = []
+    errors: list[ConfigError] = []
+    try:
+        for line, cells in read_csv(path, COLUMNS[:4]):
+            found = list(_wrong(cells, known, variants))
+            errors += [cells.place(name, line, column).error(*said) for column, *said in found]
+            if not found:
+                events.append(_event(cells))
+    except (ValueError, UnicodeDecodeError) as error:
+        errors.append(Place(name, 1, 1).error(str(error), f"Write the header {','.join(COLUMNS)} in UTF-8"))
+    return sorted(events, key=lambda e: (e.at, e.turnout, e.section or "", e.kind)), errors
+
+
+def _wrong(cells, known, variants) -> Iterator[tuple[str, str, str]]:
+    """(column, what was found, what to write) of everything in a row that cannot be used."""
+    if TOO_MANY in cells:
+        yield TOO_MANY, "more cells than columns", "Put a text with commas in double quotes"
+        return
+    yield from wrong_place(cells, known, variants)
+    if wrong := wrong_time(cells["date"]):
+        yield "date", f"date is {cells['date']!r}{wrong[0]}", wrong[1]
+    if cells["kind"] not in RESETS:
+        yield "kind", f"kind is {cells['kind']!r}", suggestion(cells["kind"], RESETS)
+    if unknown := set(_words(cells)) - {"ballast", "railpad"}:
+        yield "resets", f"resets is {cells['resets']!r}", suggestion(min(unknown), ("ballast", "railpad", "none"))
+
+
+def wrong_place(cells, known, variants) -> Iterator[tuple[str, str, str]]:
+    """What is wrong with ``turnout`` and ``section`` of a row; ``known`` None (turnouts.tsv is wrong) accuses none."""
+    turnout, label = cells["turnout"], cells["section"].removeprefix(f"{cells['turnout']}/")
+    if known is not None and turnout not in known:
+        yield "turnout", f"turnout {turnout!r} has no row in turnouts.tsv", suggestion(turnout, known)
+    elif label and turnout in variants:
+        labels = variants[turnout].tree["sections"]
+        if label not in labels:
+            yield "section", f"turnout {turnout!r} has no section {label!r}", suggestion(label, labels)
+
+
+def wrong_time(text: str) -> tuple[str, str] | None:
+    """What is wrong with a time in UTC, and what to write; None where nothing is.
+
+    >>> wrong_time("2026-04-02") is None, wrong_time("2.4.2026")
+    (True, ('', 'Write YYYY-MM-DD or YYYY-MM-DDTHH:MM in UTC'))
+    """
+    try:
+        time = datetime.fromisoformat(text.removesuffix("Z"))
+    except ValueError:
+        return "", "Write YYYY-MM-DD or YYYY-MM-DDTHH:MM in UTC"
+    return (", with a time zone", "Write the time in UTC, without a zone") if time.tzinfo else None
+
+
+def _words(cells) -> tuple[str, ...]:
+    return tuple(sorted(word for word in cells.get("resets", "").replace("+", " ").split() if word != "none"))
+
+
+def _event(cells) -> Event:
+    """The event of a sound row."""
+    turnout, kind = cells["turnout"], cells["kind"]
+    label = cells["section"].removeprefix(f"{turnout}/") or None
+    resets = _words(cells) if cells.get("resets") else RESETS[kind]
+    at = datetime.fromisoformat(cells["date"].removesuffix("Z"))
+    return Event(turnout, label, at, kind, resets, cells.get("note", ""))

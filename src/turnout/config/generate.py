@@ -1,0 +1,171 @@
+"""Files made from the settings and the keys of a layout: config.yaml, JSON schemas, the table in the docs."""
+
+import json
+import textwrap
+from dataclasses import fields
+from pathlib import Path
+
+from turnout.config.document import load, plain
+from turnout.config.events import COLUMNS as EVENT_COLUMNS
+from turnout.config.events import RESETS
+from turnout.config.keys import Each, Group, Key
+from turnout.config.layout_keys import layout_keys
+from turnout.config.pattern import FIELDS
+from turnout.config.settings import parts
+from turnout.config.settings_keys import default_of, settings_keys
+from turnout.config.table import ROW
+
+WIDTH = 112
+HEAD = """\
+# Method settings. Every key is optional: a default holds for what is left out.
+# Values may be changed here, for one layout ('settings:' in its file) or one turnout (in its override).
+# The comments are made by `turnout config generate`, which keeps changed values; `turnout check` checks them.
+"""
+JSON_TYPE = {"text": "string", "number": "number", "integer": "integer", "flag": "boolean"}
+
+
+def generated(folder: Path, docs: Path, defaults: bool = False) -> dict[Path, str]:
+    """Text of every generated file; values changed in config.yaml are kept unless ``defaults`` is set."""
+    path = Path(folder) / "config.yaml"
+    present = plain(load(path)) if path.exists() and not defaults else {}
+    layout, override = layout_keys(), layout_keys()
+    return {
+        path: config_yaml(present),
+        Path(folder) / "schema" / "config.json": schema(settings_keys(), "config/config.yaml", whole=False),
+        Path(folder) / "schema" / "layout.json": schema(layout, "config/layouts/<name>.yaml", whole=True),
+        Path(folder) / "schema" / "override.json": schema(override, "config/overrides/<id>.yaml", whole=False),
+        Path(docs) / "configuration.md": _docs(Path(docs) / "configuration.md"),
+    }
+
+
+def config_yaml(present: dict) -> str:
+    r"""config.yaml with each key's reason, unit and limits above it.
+
+    >>> "\n  # 1 to 4096: one job" in config_yaml({}), "\n  shards: 64\n" in config_yaml({"fleet": {"shards": 64}})
+    (True, True)
+    """
+    lines = [HEAD]
+    for name, cls in parts().items():
+        lines.append(f"\n{name}:  # {(cls.__doc__ or name).strip().splitlines()[0]}")
+        keys = settings_keys()[name].spec
+        for field in fields(cls):
+            key, default = keys[field.name], default_of(field)
+            value = present.get(name, {}).get(field.name, default)
+            changed = "" if value == default else f"default {_yaml(default)}; "
+            lines += textwrap.wrap(changed + said(key), WIDTH, initial_indent="  # ", subsequent_indent="  # ")
+            lines.append(f"  {field.name}: {_yaml(value)}")
+    return "\n".join(lines).replace("\n\n\n", "\n\n") + "\n"
+
+
+def said(key: Key) -> str:
+    """Unit, limits and reason of a key in words.
+
+    >>> said(Key("number", "the paper's gate", minimum=0.0, maximum=1.0))
+    "0 to 1: the paper's gate"
+    """
+    unit = "" if key.unit in ("", "-", "1") else f"[{key.unit}]"
+    limits = ""
+    if key.choices:
+        limits = " or ".join(map(str, key.choices))
+    elif key.above is not None:
+        limits = f"above {key.above:g}"
+    elif key.minimum is not None and key.maximum is not None:
+        limits = f"{key.minimum:g} to {key.maximum:g}"
+    elif key.minimum is not None:
+        limits = f"at least {key.minimum:g}"
+    elif key.maximum is not None:
+        limits = f"at most {key.maximum:g}"
+    head = " ".join(part for part in (limits, unit) if part)
+    return f"{head}: {key.meaning}" if head else key.meaning
+
+
+def schema(keys: dict, title: str, whole: bool) -> str:
+    """JSON schema for editors; the program itself checks with the same keys and says more."""
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title}
+    return json.dumps(head | _object(keys, whole), indent=1, ensure_ascii=False) + "\n"
+
+
+def _object(keys: dict, whole: bool) -> dict:
+    found = {"type": "object", "additionalProperties": False}
+    found["properties"] = {name: _property(rule, whole) for name, rule in keys.items()}
+    if whole and (required := [name for name, rule in keys.items() if rule.required]):
+        found["required"] = required
+    return found
+
+
+def _property(rule, whole: bool) -> dict:
+    if isinstance(rule, Group):
+        return {"description": rule.meaning} | _object(rule.spec, whole and not rule.fragment)
+    if isinstance(rule, Each):
+        names = {f"^{rule.pattern}$": _object(rule.spec, whole)}
+        return {
+            "description": rule.meaning,
+            "type": "object",
+            "additionalProperties": False,
+            "patternProperties": names,
+        }
+    types: list[str] = ["string", "integer"] if rule.kind == "name_or_index" else [JSON_TYPE[rule.kind]]
+    if rule.many:
+        return {"description": said(rule), "type": "array", "items": {"type": types[0]}}
+    types += ["null"] if rule.nullable else []
+    found: dict = {"description": said(rule), "type": types if len(types) > 1 else types[0]}
+    if rule.choices:
+        found["enum"] = [*rule.choices, None] if rule.nullable else [*rule.choices]
+    if rule.pattern:
+        found["pattern"] = f"^{rule.pattern}$"
+    limits = {"minimum": rule.minimum, "maximum": rule.maximum, "exclusiveMinimum": rule.above}
+    return found | {k: v for k, v in limits.items() if v is not None}
+
+
+MARK = "<!-- below: made by `turnout config generate` -->"
+
+
+def _docs(path: Path) -> str:
+    """What stands above the mark is kept."""
+    above = path.read_text(encoding="utf-8").partition(MARK)[0] if path.exists() else "# Configuration\n\n"
+    return f"{above}{MARK}\n\n{tables()}"
+
+
+def tables() -> str:
+    """Every column and key as Markdown."""
+    blocks = ["## Columns of config/turnouts.tsv\n", _table(_flat(ROW))]
+    blocks += ["## Columns of config/events.csv\n", f"`{','.join(EVENT_COLUMNS)}`. `kind` and what it resets:\n"]
+    blocks.append("\n".join(f"- `{kind}`: {' and '.join(what) or 'nothing'}" for kind, what in RESETS.items()) + "\n")
+    blocks += ["## Fields of a file pattern\n"]
+    blocks += [f"- `{kind}`: " + ", ".join(f"`{{{name}}}`" for name in names) for kind, names in FIELDS.items()]
+    blocks += ["\n`{section}` in `hammer` is a label of the layout; `*` is anything but a slash.\n"]
+    layout = {name: rule for name, rule in layout_keys().items() if name != "settings"}
+    blocks += ["## Keys of config/layouts/*.yaml and config/overrides/*.yaml\n", _table(_flat(layout))]
+    for name, group in settings_keys().items():
+        blocks += [f"## Settings: {name}\n", group.meaning + "\n", _table(_flat(group.spec, f"{name}."), True)]
+    return "\n".join(blocks)
+
+
+def _flat(keys: dict, prefix: str = "") -> list[tuple[str, Key]]:
+    found = []
+    for name, rule in keys.items():
+        if isinstance(rule, Key):
+            found.append((prefix + name, rule))
+        else:
+            inner = f"{prefix}{name}." + ("<name>." if isinstance(rule, Each) else "")
+            found += _flat(rule.spec, inner)
+    return found
+
+
+def _table(keys: list[tuple[str, Key]], with_default: bool = False) -> str:
+    lines = [f"| key | {'default' if with_default else 'needed'} | meaning |", "|---|---|---|"]
+    for name, key in keys:
+        middle = f"`{_yaml(key.default)}`" if with_default else ("yes" if key.required else "")
+        words = said(key).replace("|", "\\|").replace("<", "&lt;")
+        lines.append(f"| `{name}` | {middle} | {words} |")
+    return "\n".join(lines) + "\n"
+
+
+def _yaml(value) -> str:
+    """A value as it is written in YAML."""
+    if isinstance(value, tuple):
+        return "[" + ", ".join(_yaml(v) for v in value) + "]"
+    if isinstance(value, str):
+        plain_word = value.replace("_", "").replace("-", "").isalpha() and value not in ("true", "false", "null")
+        return value if plain_word else json.dumps(value, ensure_ascii=False)
+    return json.dumps(value)

@@ -1,0 +1,197 @@
+"""All configuration of a fleet, read and checked once."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from turnout.config import build
+from turnout.config.acknowledgements import read_acknowledgements
+from turnout.config.document import Branch, Place, load, merge, plain
+from turnout.config.events import Event, read_events
+from turnout.config.frozen import Frozen
+from turnout.config.keys import check, suggestion
+from turnout.config.layout_keys import layout_keys
+from turnout.config.meaning import check_meaning
+from turnout.config.raw_notes import Campaigns, read_campaigns, read_trains
+from turnout.config.settings_keys import settings_keys
+from turnout.config.table import Row, read_table
+from turnout.config.turnout import TurnoutConfig
+from turnout.config.variant import FROM_ROW, OF_SECTIONS, Variant, with_row
+from turnout.errors import ConfigError, ConfigErrors, ReadError
+
+ABOUT = {"lat_deg": "latitude", "lon_deg": "longitude"}
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """The fleet: ``settings`` without any turnout's changes, ``rows`` by id, ``events`` in order of time.
+
+    ``acknowledgements`` are rows of the table of that name; ``warnings`` their rows that do not count. They stop
+    nothing: somebody's slip while silencing an alarm must not hide the alarms of the others.
+    """
+
+    folder: Path
+    settings: Mapping[str, Any]
+    rows: Mapping[str, Row]
+    events: tuple[Event, ...]
+    variants: Mapping[str, Variant] = field(repr=False)
+    acknowledgements: tuple[dict, ...] = ()
+    warnings: tuple[ConfigError, ...] = ()
+
+    @property
+    def ids(self) -> tuple[str, ...]:
+        """All turnouts, in the order of turnouts.tsv."""
+        return tuple(self.rows)
+
+    def hash_of(self, turnout: str, kind: str = "") -> str:
+        """Configuration hash of one turnout: the whole, or what units of ``kind`` use."""
+        return self.variants[turnout].hashes[kind]
+
+    def turnout(self, turnout: str) -> TurnoutConfig:
+        """The merged configuration of one turnout; ConfigError for an id that has no row."""
+        if turnout not in self.rows:
+            place = Place(str(self.folder / "turnouts.tsv"), 1, 1)
+            raise place.error(f"no turnout {turnout!r}", suggestion(turnout, self.rows))
+        row, about = self.rows[turnout], {}
+        for column in ("name", "line", "km", "lat_deg", "lon_deg", "external_id", "id_scheme"):
+            if column in row.values:
+                about[ABOUT.get(column, column)] = row.values[column]
+        parts = self.variants[turnout].parts
+        return TurnoutConfig(id=row.id, layout=row.values["layout"], raw=row.raw, **about, **parts)
+
+
+def with_raw(turnout: TurnoutConfig, raw_root: Path) -> TurnoutConfig:
+    """The same turnout with the campaigns and trains noted in its raw folder; unsound rows are left out."""
+    return read_notes(turnout, raw_root)[0]
+
+
+def read_notes(turnout: TurnoutConfig, raw_root: Path) -> tuple[TurnoutConfig, list[ReadError]]:
+    """The same turnout with the notes of its raw folder, and an error for each row that cannot be used."""
+    folder = Path(raw_root) / turnout.raw
+    campaigns, wrong = read_campaigns(folder / "campaigns.csv", f"{turnout.raw}/campaigns.csv")
+    trains, bad = read_trains(folder / "trains.csv", f"{turnout.raw}/trains.csv")
+    return replace(turnout, campaigns=Campaigns(campaigns), trains=trains), wrong + bad
+
+
+def load_configuration(folder: Path | str = "config", formats=None, to_si=None) -> Configuration:
+    """Read and check config.yaml, turnouts.tsv, layouts/, overrides/, events.csv and acknowledgements.csv.
+
+    Raises ConfigErrors with every error found: file, line, column, what stands there, what to write instead.
+    ``formats`` are the names of the readers, ``to_si`` their conversion of units; without them neither the
+    formats nor the units of channels are checked.
+    """
+    reading = _Reading(Path(folder), formats, to_si)
+    settings = reading.document(reading.folder / "config.yaml", settings_keys())
+    rows, errors = read_table(reading.folder / "turnouts.tsv", reading.name("turnouts.tsv"))
+    reading.errors += errors
+    variants = reading.variants(rows, settings)
+    known = None if errors else {row.id for row in rows}
+    events, errors = read_events(reading.folder / "events.csv", reading.name("events.csv"), known, variants)
+    reading.errors += errors
+    if reading.errors:
+        raise ConfigErrors(list({str(e): e for e in reading.errors}.values()))
+    said = "acknowledgements.csv"
+    spoken, warnings = read_acknowledgements(reading.folder / said, reading.name(said), known, variants)
+    by_id = {row.id: row for row in rows}
+    base = build.settings(plain(settings))
+    return Configuration(
+        reading.folder, base, Frozen(by_id), tuple(events), Frozen(variants), tuple(spoken), tuple(warnings)
+    )
+
+
+class _Reading:
+    """One pass over the configuration, collecting errors."""
+
+    def __init__(self, folder: Path, formats, to_si):
+        self.folder, self.formats, self.to_si = folder, formats, to_si
+        self.errors: list[ConfigError] = []
+        self.layouts: dict[str, Branch | None] = {}
+        self.shared: dict[tuple, Variant] = {}
+
+    def name(self, *parts: str) -> str:
+        """How errors call a file: its path with the name of the configuration folder in front."""
+        return "/".join((self.folder.name, *parts))
+
+    def document(self, path: Path, spec: dict, whole: bool = False) -> Branch:
+        """Checked YAML file; an absent one is empty, an unsound one adds errors and is empty."""
+        name = self.name(path.relative_to(self.folder).as_posix())
+        empty = Branch(Place(name, 1, 1))
+        if not path.exists():
+            return empty
+        try:
+            tree = load(path, name)
+        except ConfigError as error:
+            self.errors.append(error)
+            return empty
+        if found := list(check(spec, tree, whole)):
+            self.errors += found
+            return empty
+        return tree
+
+    def layout(self, row: Row, settings: Branch) -> Branch | None:
+        """Layout of a row over the settings of config.yaml; None where it cannot be used."""
+        name = row.values["layout"]
+        if name not in self.layouts:
+            self.layouts[name] = self._layout(name, row, settings)
+        elif self.layouts[name] is None and not (self.folder / "layouts" / f"{name}.yaml").exists():
+            self._unknown(name, row)
+        return self.layouts[name]
+
+    def _layout(self, name: str, row: Row, settings: Branch) -> Branch | None:
+        path = self.folder / "layouts" / f"{name}.yaml"
+        if not path.exists():
+            self._unknown(name, row)
+            return None
+        tree = self.document(path, layout_keys(), whole=True)
+        if not tree:
+            return None
+        base = Branch(settings.place)
+        base.put("settings", settings, settings.place)
+        tree = merge(base, tree)
+        return None if self._wrong(tree) else tree
+
+    def _unknown(self, name: str, row: Row) -> None:
+        there = [p.stem for p in (self.folder / "layouts").glob("*.yaml")]
+        self.errors.append(row.place("layout").error(f"no layout {name!r}", suggestion(name, there)))
+
+    def _wrong(self, tree: Branch) -> bool:
+        found = list(check_meaning(tree, self.to_si)) + list(self._formats(tree))
+        self.errors += found
+        return bool(found)
+
+    def _formats(self, tree: Branch):
+        for kind in ("hammer", "passages"):
+            leaf = tree.get(kind, {}).get("format")
+            if leaf and self.formats is not None and leaf.value not in (allowed := ("auto", *self.formats)):
+                yield leaf.place.error(f"format is {leaf.value!r}", suggestion(leaf.value, allowed))
+
+    def variants(self, rows: list[Row], settings: Branch) -> dict[str, Variant]:
+        """Merged configuration of every row; rows that differ in nothing technical share one."""
+        overrides = {p.stem: p for p in sorted((self.folder / "overrides").glob("*.yaml"))}
+        found = {}
+        for row in rows:
+            layout = self.layout(row, settings)
+            override = overrides.pop(row.id, None)
+            if layout is not None:
+                found[row.id] = self._variant(row, layout, override)
+        for stem, path in overrides.items():
+            place = Place(self.name("overrides", path.name), 1, 1)
+            self.errors.append(place.error(f"an override without a turnout {stem!r}", suggestion(stem, found)))
+        return found
+
+    def _variant(self, row: Row, layout: Branch, override: Path | None) -> Variant:
+        key = (row.values["layout"], *(row.values.get(c) for c in (*FROM_ROW, *OF_SECTIONS)))
+        if key not in self.shared:
+            tree = with_row(layout, row)
+            if tree is not layout:
+                self._wrong(tree)
+            self.shared[key] = Variant(tree)
+        if override is None:
+            return self.shared[key]
+        tree = merge(self.shared[key].tree, self.document(override, layout_keys()))
+        before = len(self.errors)
+        self.errors += check(layout_keys(), tree)
+        if len(self.errors) == before:
+            self._wrong(tree)
+        return Variant(tree)

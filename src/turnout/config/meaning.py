@@ -1,0 +1,80 @@
+"""Errors that no single key shows: names that point nowhere, units that do not fit, patterns that cannot match."""
+
+from collections.abc import Callable, Iterator
+from zoneinfo import available_timezones
+
+from turnout.config.document import Branch, merge
+from turnout.config.keys import suggestion
+from turnout.config.pattern import compiled
+from turnout.errors import ConfigError
+
+
+def check_meaning(tree: Branch, to_si: Callable | None = None) -> Iterator[ConfigError]:
+    """Every such error of a merged layout whose keys are sound.
+
+    ``to_si(quantity, unit, sensitivity, sensitivity_unit)`` raises ValueError for units that cannot be
+    converted; without it units are not checked.
+    """
+    labels = tuple(tree["sections"])
+    if "hammer" in tree:
+        yield from _files(tree["hammer"], "hammer", labels)
+        yield from _hammer(tree["hammer"], to_si)
+        for section in tree["sections"].values():
+            if "hammer" in section:
+                yield from _hammer(merge(tree["hammer"], section["hammer"]), to_si)
+    if "passages" in tree:
+        yield from _files(tree["passages"], "passages", labels)
+        yield from _channels(tree["passages"], to_si)
+        for channel in tree["passages"]["channels"].values():
+            leaf = channel["section"]
+            if leaf.value not in labels:
+                yield leaf.place.error(f"no section {leaf.value!r}", suggestion(leaf.value, labels))
+
+
+def _hammer(tree: Branch, to_si) -> Iterator[ConfigError]:
+    channels = tree["channels"]
+    for role in ("force", "response", "validation"):
+        leaf = tree.get(role)
+        if leaf is None or leaf.value is None:
+            continue
+        if leaf.value not in channels:
+            yield leaf.place.error(f"{role} is {leaf.value!r}, no channel", suggestion(leaf.value, channels))
+        elif (channels[leaf.value]["quantity"].value == "force") != (role == "force"):
+            found = channels[leaf.value]["quantity"].value
+            yield leaf.place.error(f"{role} is {leaf.value!r}, which measures {found}", "Name another channel")
+    yield from _channels(tree, to_si)
+
+
+def _channels(tree: Branch, to_si) -> Iterator[ConfigError]:
+    if zone := tree.get("time_zone"):
+        if zone.value not in available_timezones():
+            yield zone.place.error(f"time_zone is {zone.value!r}", "Write an IANA name such as Europe/Copenhagen")
+    sources: dict[str | int, str] = {}
+    for name, channel in tree["channels"].items():
+        if to_si:
+            yield from _units(name, channel, to_si)
+        source = channel["source"]
+        if source.value in sources:
+            found = f"channel {name} reads {source.value!r}, as {sources[source.value]} does"
+            yield source.place.error(found, "Give each channel its own source")
+        sources[source.value] = name
+
+
+def _units(name: str, channel: Branch, to_si: Callable) -> Iterator[ConfigError]:
+    given = {k: channel[k].value for k in ("unit", "sensitivity", "sensitivity_unit") if k in channel}
+    if given.get("unit") is None:
+        return
+    try:
+        to_si(channel["quantity"].value, given["unit"], given.get("sensitivity"), given.get("sensitivity_unit", ""))
+    except ValueError as error:
+        found = f"unit {given['unit']!r} for the {channel['quantity'].value} of channel {name}: {error}"
+        yield channel["unit"].place.error(found, "Correct unit, sensitivity or sensitivity_unit")
+
+
+def _files(tree: Branch, kind: str, labels: tuple[str, ...]) -> Iterator[ConfigError]:
+    leaf = tree["files"]
+    try:
+        compiled(leaf.value, kind, labels)
+    except ValueError as error:
+        example = "hammer/{campaign}/{section}_{test}.{ext}" if kind == "hammer" else "passages/{time}.{ext}"
+        yield leaf.place.error(f"files is {leaf.value!r}: {error}", f"Write a pattern like {example}")

@@ -1,0 +1,187 @@
+"""Parameter sets of the simulation: YAML files in which every number carries its unit and its source."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError
+
+from turnout.errors import ConfigError
+
+# Unit: (SI unit, factor)
+UNITS = {
+    "-": ("-", 1.0),
+    "%": ("-", 0.01),
+    "dB": ("dB", 1.0),
+    "m": ("m", 1.0),
+    "mm": ("m", 1e-3),
+    "µm": ("m", 1e-6),
+    "kg": ("kg", 1.0),
+    "t": ("kg", 1e3),
+    "kg/m": ("kg/m", 1.0),
+    "kg m²": ("kg m²", 1.0),
+    "t m²": ("kg m²", 1e3),
+    "kg/m³": ("kg/m³", 1.0),
+    "Pa": ("Pa", 1.0),
+    "GPa": ("Pa", 1e9),
+    "m⁴": ("m⁴", 1.0),
+    "cm⁴": ("m⁴", 1e-8),
+    "m²": ("m²", 1.0),
+    "cm²": ("m²", 1e-4),
+    "N": ("N", 1.0),
+    "kN": ("N", 1e3),
+    "N/m": ("N/m", 1.0),
+    "MN/m": ("N/m", 1e6),
+    "N s/m": ("N s/m", 1.0),
+    "kN s/m": ("N s/m", 1e3),
+    "N s/m²": ("N s/m²", 1.0),
+    "N/m^1.5": ("N/m^1.5", 1.0),
+    "GN/m^1.5": ("N/m^1.5", 1e9),
+    "s/m": ("s/m", 1.0),
+    "m/s": ("m/s", 1.0),
+    "km/h": ("m/s", 1.0 / 3.6),
+    "s": ("s", 1.0),
+    "ms": ("s", 1e-3),
+    "1/s": ("1/s", 1.0),
+    "Hz": ("Hz", 1.0),
+    "rad": ("rad", 1.0),
+    "mrad": ("rad", 1e-3),
+    "1/K": ("1/K", 1.0),
+    "°C": ("°C", 1.0),
+}
+KEYS = {"value", "unit", "source", "prior", "note"}
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number in its SI unit with its source; ``prior`` is its relative standard deviation, None if measured."""
+
+    value: float
+    unit: str
+    source: str
+    prior: float | None = None
+
+    def __float__(self):
+        return self.value
+
+
+class ParameterSet(Mapping):
+    """A mapping of a parameter file that knows its place, so that errors can name it.
+
+    >>> node = ParameterSet({"mass": Number(1500.0, "kg", "data sheet")}, "car.yaml", "bogie")
+    >>> node.number("mass", "kg"), node.number("length", "m", default=2.5)
+    (1500.0, 2.5)
+    """
+
+    def __init__(self, content, path, place):
+        self.content, self.path, self.place = content, str(path), place
+
+    def __getitem__(self, key):
+        if key not in self.content:
+            raise ConfigError(self.path, self.place, f"the key {key!r} is missing", f"Give {key!r} there")
+        return self.content[key]
+
+    def __iter__(self):
+        return iter(self.content)
+
+    def __contains__(self, key):
+        return key in self.content
+
+    def __len__(self):
+        return len(self.content)
+
+    def get(self, key, default=None):
+        """Value of ``key``, or ``default`` where it is not given."""
+        return self.content.get(key, default)
+
+    def number(self, key, unit, default=None):
+        """Value of ``key`` in the SI unit ``unit``; ``default`` where it is not given and a default exists."""
+        if key not in self.content and default is not None:
+            return default
+        found = self[key]
+        if not isinstance(found, Number):
+            raise ConfigError(
+                self.path, f"{self.place}.{key}", f"{found!r} has no unit and source", "Write value, unit and source"
+            )
+        if found.unit != unit:
+            raise ConfigError(
+                self.path, f"{self.place}.{key}", f"the unit {found.unit!r} is not one of {unit!r}", "Correct the unit"
+            )
+        return found.value
+
+    def only(self, *allowed):
+        """Refuse keys that are not in ``allowed``."""
+        for key in self.content:
+            if key not in allowed:
+                raise ConfigError(
+                    self.path, self.place, f"unknown key {key!r}", f"Use one of {', '.join(sorted(allowed))}"
+                )
+        return self
+
+    def numbers(self):
+        """(place, Number) of every number below here."""
+        for key, value in self.content.items():
+            yield from _numbers(value, f"{self.place}.{key}" if self.place else str(key))
+
+
+def _numbers(value, place):
+    if isinstance(value, Number):
+        yield place, value
+    elif isinstance(value, ParameterSet):
+        yield from value.numbers()
+    elif isinstance(value, list):
+        for k, item in enumerate(value):
+            yield from _numbers(item, f"{place}[{k}]")
+
+
+def read_parameters(path):
+    """The parameter set in a YAML file.
+
+    A number is ``{value: 120, unit: MN/m, source: ...}``; ``source`` is text or a key of the file's ``sources``
+    table; where the source begins with "estimate" a ``prior`` is required: its relative standard deviation.
+    """
+    path = Path(path)
+    try:
+        content = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ConfigError(path, "the file", "does not exist", "Give the path of a parameter file") from None
+    except MarkedYAMLError as error:
+        mark = error.problem_mark
+        place = f"line {mark.line + 1}, column {mark.column + 1}" if mark else "the file"
+        raise ConfigError(path, place, str(error.problem), "Correct the YAML") from None
+    if not isinstance(content, dict):
+        raise ConfigError(path, "the file", "is not a mapping", "Write 'key: value' lines")
+    sources = content.pop("sources", {})
+    return _parse(content, path, "", sources)
+
+
+def _parse(value, path, place, sources):
+    if isinstance(value, list):
+        return [_parse(item, path, f"{place}[{k}]", sources) for k, item in enumerate(value)]
+    if not isinstance(value, dict):
+        return value
+    if "value" in value:
+        return _parse_number(value, path, place, sources)
+    return ParameterSet(
+        {k: _parse(v, path, f"{place}.{k}" if place else str(k), sources) for k, v in value.items()}, path, place
+    )
+
+
+def _parse_number(entry, path, place, sources):
+    for key in ("unit", "source"):
+        if key not in entry:
+            raise ConfigError(path, place, f"a number without {key}", f"Give its {key}")
+    if unknown := set(entry) - KEYS:
+        raise ConfigError(path, place, f"unknown key {min(unknown)!r}", f"Use {', '.join(sorted(KEYS))}")
+    if entry["unit"] not in UNITS:
+        raise ConfigError(path, place, f"unknown unit {entry['unit']!r}", f"Use one of {', '.join(UNITS)}")
+    source = sources.get(entry["source"], entry["source"])
+    prior = entry.get("prior")
+    if str(source).startswith("estimate") and prior is None:
+        raise ConfigError(path, place, "an estimate without a prior", "Give its relative standard deviation as prior")
+    unit, factor = UNITS[entry["unit"]]
+    try:
+        return Number(factor * float(entry["value"]), unit, str(source), None if prior is None else float(prior))
+    except (TypeError, ValueError):
+        raise ConfigError(path, place, f"{entry['value']!r} is not a number", "Write a number") from None

@@ -1,0 +1,19 @@
+"""Method settings: one dataclass per part, each field with unit, limits and the reason of its default."""
+
+import pkgutil
+from functools import cache
+from importlib import import_module
+
+
+@cache
+def parts() -> dict[str, type]:
+    """Settings class of every part: module ``<part>.py`` of this folder holds the class ``<Part>Settings``.
+
+    >>> parts()["fleet"].__name__
+    'FleetSettings'
+    """
+    found = {}
+    for module in sorted(m.name for m in pkgutil.iter_modules(__path__) if m.name != "setting"):
+        name = "".join(word.capitalize() for word in module.split("_")) + "Settings"
+        found[module] = getattr(import_module(f"{__name__}.{module}"), name)
+    return found

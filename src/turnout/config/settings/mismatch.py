@@ -1,0 +1,49 @@
+"""Settings of the diagnosis of mismatches."""
+
+from dataclasses import dataclass
+
+from turnout.config.settings.setting import setting
+
+
+@dataclass(frozen=True)
+class MismatchSettings:
+    """Settings of ``turnout.mismatch``: when a difference counts, and when it may carry a name."""
+
+    enabled: bool = setting(False, why="a diagnosis takes minutes per turnout: opt in, the nightly run stays quick")
+    materiality: float = setting(
+        0.06, "-", "share of the local amplitude below which a difference is nobody's business", 0.0, 0.5
+    )
+    pair_tolerance: float = setting(
+        0.03, "-", "share of a receptance that gain and slope of a hammer test may be off", 0.0, 0.5
+    )
+    control_level: float = setting(
+        1.6, "-", "weighted mean square above which a fit has not reached the level of controls", 1.0, 100.0
+    )
+    threshold: float = setting(
+        12.0, "nats", "held-out gain that no control exceeded, with a reserve of half; see docs/mismatch.md", 0.0
+    )
+    margin: float = setting(6.0, "nats", "runner-up within this of the best: 'a or b'", 0.0)
+    explained: float = setting(0.5, "-", "share of the excess that a name must explain", 0.0, 1.0)
+    leftover: float = setting(
+        4.0, "-", "mean square left over the level of controls above which even the best name is refused", 1.0
+    )
+    withdrawn_ratio: float = setting(
+        2.0, "-", "mean square on reserved over calibration recordings that withdraws a name", 1.0
+    )
+    structure_left: float = setting(
+        0.4, "-", "share of what is left that a free law of the state still explains: shape unresolved", 0.0, 1.0
+    )
+    temperature: float = setting(4.0, "-", "softens scores into probabilities; fitted on the calibration set", 0.1)
+    unknown_offset: float = setting(
+        -12.0, "nats", "score of 'unknown' relative to the best's shortfall; fitted on the calibration set"
+    )
+    permutations: int = setting(499, why="smallest p value is 1 / (permutations + 1)", minimum=99)
+    false_discovery_rate: float = setting(0.05, "-", "of the frames named, expected share of wrong ones", 0.001, 0.5)
+    base_iterations: int = setting(15, why="Gauss-Newton steps of the base fit", minimum=1, maximum=100)
+    joint_starts: int = setting(1, why="places of a family that are tried from all their starts", minimum=1, maximum=20)
+    refits: int = setting(6, why="families refitted jointly where a prediction is dear", minimum=2, maximum=50)
+    iterations: int = setting(6, why="Gauss-Newton steps of a joint refit", minimum=1, maximum=50)
+    effects: int = setting(2, why="effects sought one after the other", minimum=1, maximum=3)
+    numerics_share: float = setting(
+        0.333, "-", "own numerical error over mismatch above which no cause is named", 0.01, 1.0
+    )

@@ -1,0 +1,111 @@
+"""Settings of the hammer test: impacts, their quality, and the averaged receptance."""
+
+from dataclasses import dataclass
+
+from turnout.config.settings.setting import setting
+
+
+@dataclass(frozen=True)
+class ReceptanceSettings:
+    """How blows are found and judged, and how receptance and coherence are averaged.
+
+    >>> ReceptanceSettings().gate
+    'limit'
+    """
+
+    trigger: float = setting(
+        10.0, "sd", "a blow must exceed this many standard deviations of the force noise; 4,000 samples reach 4",
+        minimum=4.0, maximum=1000.0,
+    )  # fmt: skip
+    weakest_blow: float = setting(
+        0.05, "1", "in a record with many blows, less than this share of a usual peak is the hammer being handled",
+        minimum=0.01, maximum=0.5,
+    )  # fmt: skip
+    contact_level: float = setting(
+        0.02, "1", "contact is where the force exceeds this share of its peak", minimum=0.005, maximum=0.2
+    )
+    decay_gap: float = setting(
+        2e-4, "s", "the decay starts this long after the last contact: 4 samples at 20 kHz", minimum=0.0, maximum=0.01
+    )
+    separation: float = setting(
+        0.3, "s", "contacts closer than this belong to one blow; a hand needs longer to strike again",
+        minimum=0.06, maximum=5.0,
+    )  # fmt: skip
+    pre_trigger: float = setting(
+        0.05, "s", "at most this much of the record before a blow is kept, for its noise", minimum=1e-3, maximum=1.0
+    )
+    window: float = setting(
+        1.0, "s", "at most this much of the record after a blow is kept", minimum=0.02, maximum=60.0
+    )
+    double_hit: str = setting(
+        "move", "", "'move' starts the decay after the last contact if enough of it is left, 'reject' never uses it",
+        choices=("move", "reject"),
+    )  # fmt: skip
+    double_hit_level: float = setting(
+        0.02, "1", "a second contact counts from this share of the peak on", minimum=0.005, maximum=0.5
+    )
+    double_hit_prominence: float = setting(
+        0.015, "1", "and if it stands out from its surroundings by this share", minimum=0.004, maximum=0.5
+    )
+    double_hit_remaining: float = setting(
+        0.5, "1", "after a second contact this share of the decay's amplitude must be left to use it",
+        minimum=0.0, maximum=1.0,
+    )  # fmt: skip
+    minimum_decay: float = setting(
+        0.02, "s", "a shorter decay holds less than two periods of the ballast resonance", minimum=1e-3, maximum=5.0
+    )
+    weak: float = setting(
+        0.4, "1", "a peak below this share of the test's median is weak: its noise counts 2.5 times",
+        minimum=0.05, maximum=0.9,
+    )  # fmt: skip
+    out_of_range: float = setting(
+        3.0, "1", "no hand strikes this many times the test's median: the channel overflowed", minimum=1.5, maximum=50.0
+    )
+    deviation: float = setting(
+        5.0, "sd", "and both must lie this far from the median in robust standard deviations", minimum=3.0, maximum=20.0
+    )
+    noise: float = setting(
+        0.15,
+        "1",
+        "rms before the blow over the largest sample: 20 dB reads 0.09, from 15 dB on the decay is noise",
+        minimum=0.01,
+        maximum=1.0,
+    )
+    noise_over_median: float = setting(
+        4.0, "1", "a blow this many times noisier than its test's median, and above 2 %, is dropped",
+        minimum=1.5, maximum=100.0,
+    )  # fmt: skip
+    cut_off: float = setting(
+        0.01, "1", "amplitude left at the end of the record over the peak: more leaks into other lines",
+        minimum=1e-4, maximum=1.0,
+    )  # fmt: skip
+    agreement_low: float = setting(20.0, "Hz", "blows are compared from here", minimum=0.0, maximum=1e5)
+    agreement_high: float = setting(800.0, "Hz", "to here, or to the hammer's band edge", minimum=1.0, maximum=1e5)
+    agreement_gap: float = setting(
+        0.05, "1", "an odd blow's median pairwise coherence lies this far below the others'", minimum=0.005, maximum=0.9
+    )
+    agreement_factor: float = setting(
+        8.0, "1", "and its incoherence is this many times theirs; half the force makes four", minimum=2.0, maximum=100.0
+    )
+    gain: float = setting(
+        0.02, "1", "a response this far off what the test's mean predicts is odd, if the test is steadier than that",
+        minimum=0.005, maximum=1.0,
+    )  # fmt: skip
+    minimum_impacts: int = setting(
+        3, "", "with fewer accepted blows the limits of the coherence say nothing", minimum=2, maximum=100
+    )
+    force_window: bool = setting(False, "", "set the force to zero after the contact: for noisy force channels")
+    exponential_window: float = setting(
+        0.0, "1/s", "decay rate of an exponential window on both channels; 0 for none", minimum=0.0, maximum=1000.0
+    )
+    highest_frequency: float = setting(
+        2000.0, "Hz", "lines above are not kept: the paper uses 0 ... 800 Hz", minimum=10.0, maximum=1e5
+    )
+    gate: str = setting(
+        "limit", "", "'limit' compares the lower one-sided 95 % limit, 'paper' the estimate itself",
+        choices=("limit", "paper"),
+    )  # fmt: skip
+    gate_level: float = setting(0.8, "1", "the paper's required coherence", minimum=0.0, maximum=0.999)
+    gate_share: float = setting(
+        0.5, "1", "a band is usable if this share of its lines passes the gate", minimum=0.0, maximum=1.0
+    )

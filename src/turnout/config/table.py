@@ -1,0 +1,217 @@
+"""config/turnouts.tsv: one row per turnout, read with the place of every cell."""
+
+import csv
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from turnout.config.document import Place
+from turnout.config.keys import Key, problem, suggestion
+from turnout.errors import ConfigError
+
+TOO_MANY = "cells beyond the header"
+ID = r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}"
+ROW = {
+    "turnout": Key("text", "id: letters, digits, _ and -", required=True, pattern=ID),
+    "layout": Key("text", "file in config/layouts/ without .yaml", required=True),
+    "raw": Key("text", "folder of its raw files below the raw root; empty: its id"),
+    "name": Key("text", "name for people"),
+    "line": Key("text", "railway line"),
+    "km": Key("number", "place along the line", unit="km", minimum=0, maximum=100000),
+    "lat_deg": Key("number", "latitude, WGS 84", unit="°", minimum=-90, maximum=90),
+    "lon_deg": Key("number", "longitude, WGS 84", unit="°", minimum=-180, maximum=180),
+    "external_id": Key("text", "the owner's id"),
+    "id_scheme": Key("text", "scheme of external_id: railML, RINF, the owner's own"),
+    "hammer_rate_hz": Key("number", "samples per second of its hammer tests", unit="Hz", above=0),
+    "hammer_format": Key("text", "reader of its hammer tests"),
+    "passage_rate_hz": Key("number", "samples per second of its passages", unit="Hz", above=0),
+    "passage_format": Key("text", "reader of its passages"),
+    "pad_type": Key("text", "railpad of all its sections"),
+    "sleeper_type": Key("text", "sleeper of all its sections"),
+}
+
+
+@dataclass(frozen=True)
+class Row:
+    """``values`` of the cells that are not empty, numbers as float; ``line`` counted from 1."""
+
+    values: dict[str, Any]
+    line: int
+    cells: tuple[str, ...]
+    header: tuple[str, ...]
+    path: str
+
+    @property
+    def id(self) -> str:
+        """The id of the turnout."""
+        return self.values["turnout"]
+
+    @property
+    def raw(self) -> str:
+        """Its folder below the raw root; its id where the column is empty."""
+        return self.values.get("raw", self.id)
+
+    def place(self, column: str) -> Place:
+        """Where the cell of ``column`` starts."""
+        if column not in self.header:
+            return Place(self.path, self.line, 1)
+        before = self.cells[: self.header.index(column)]
+        return Place(self.path, self.line, 1 + sum(len(cell) + 1 for cell in before))
+
+
+def read_table(path: Path, name: str) -> tuple[list[Row], list[ConfigError]]:
+    """Sound rows of turnouts.tsv and the errors of the others."""
+    try:
+        lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
+    except FileNotFoundError:
+        return [], [ConfigError(name, "line 1", "no such file", "Run 'turnout add ID LAYOUT' to begin one")]
+    except UnicodeDecodeError as error:
+        return [], [ConfigError(name, f"byte {error.start}", "a byte that is not UTF-8", "Save the file as UTF-8")]
+    numbered = [(n, line) for n, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
+    if not numbered:
+        return [], [ConfigError(name, "line 1", "an empty table", "Write a header: turnout<tab>layout<tab>...")]
+    header = tuple(cell.strip() for cell in numbered[0][1].split("\t"))
+    if errors := list(_header_errors(header, name, numbered[0][0])):
+        return [], errors
+    rows: list[Row] = []
+    seen: dict[str, int] = {}
+    folders: dict[str, str] = {}
+    for line, text in numbered[1:]:
+        row, found = _row(text, line, header, name)
+        errors += found
+        if found:
+            continue
+        if row.id in seen:
+            remedy = f"Give it another id, or remove one of the lines {seen[row.id]} and {line}"
+            errors.append(row.place("turnout").error(f"turnout {row.id!r} for the second time", remedy))
+        elif row.raw in folders:
+            said = f"raw folder {row.raw!r} is also that of turnout {folders[row.raw]!r}"
+            errors.append(row.place("raw").error(said, "Give each turnout its own folder"))
+        else:
+            seen[row.id], folders[row.raw] = line, row.id
+            rows.append(row)
+    return rows, errors
+
+
+def _header_errors(header, name, line) -> Iterator[ConfigError]:
+    column = 1
+    if len(header) == 1 and len(header[0].split()) > 1:
+        yield Place(name, line, 1).error("blanks between the columns", "Put tabs between the columns")
+        return
+    for i, title in enumerate(header):
+        place = Place(name, line, column)
+        if title not in ROW:
+            yield place.error(f"unknown column {title!r}", suggestion(title, ROW))
+        elif title in header[:i]:
+            yield place.error(f"column {title!r} for the second time", "Keep one of them")
+        column += len(title) + 1
+    for title, key in ROW.items():
+        if key.required and title not in header:
+            yield Place(name, line, 1).error(f"no column {title!r}", f"Add it: {key.meaning}")
+
+
+def _row(text, line, header, name) -> tuple[Row, list[ConfigError]]:
+    cells = tuple(text.split("\t"))
+    row = Row({}, line, cells, header, name)
+    if len(cells) > len(header):
+        place = Place(name, line, 1 + sum(len(c) + 1 for c in cells[: len(header)]))
+        return row, [place.error(f"{len(cells)} cells under {len(header)} columns", "Remove what is too much")]
+    errors = []
+    for title, cell in zip(header, cells):
+        cell = cell.strip()
+        if not cell:
+            continue
+        value, key = cell, ROW[title]
+        if key.kind == "number":
+            try:
+                value = float(cell)
+            except ValueError:
+                value = cell
+        if found := problem(key, value):
+            errors.append(row.place(title).error(f"{title} is {found[0]}", found[1]))
+        row.values[title] = value
+    for title, key in ROW.items():
+        if key.required and title not in row.values:
+            errors.append(row.place(title).error(f"{title} is empty", f"Write {key.meaning}"))
+    if not errors and leads_out(row.raw):
+        said = f"raw is {row.raw!r}, outside the raw root"
+        errors.append(row.place("raw").error(said, "Write a folder below the raw root, without '..'"))
+    return row, errors
+
+
+def leads_out(path: str) -> bool:
+    """Whether a relative path leaves the folder it starts from.
+
+    >>> leads_out("line_7/T00042"), leads_out("../other"), leads_out("/data")
+    (False, True, True)
+    """
+    return PurePosixPath(path).is_absolute() or ".." in PurePosixPath(path).parts or "\\" in path
+
+
+def append_row(path: Path, values: dict[str, str]) -> str:
+    """Add one row, in the columns the table has; a new table gets all columns. Returns the line written."""
+    if not path.exists():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("\t".join(ROW) + "\n", encoding="utf-8")
+    text = path.read_text(encoding="utf-8-sig")
+    header = next(line for line in text.splitlines() if line.strip() and not line.startswith("#")).split("\t")
+    header = [title.strip() for title in header]
+    if missing := [title for title, value in values.items() if value and title not in header]:
+        place = Place(str(path), 1, 1)
+        raise place.error(f"no column {missing[0]!r}", "Add it to the header, or leave the value out")
+    cells = [re.sub(r"\s+", " ", str(values.get(title) or "")).strip() for title in header]
+    line = "\t".join(cells)
+    with path.open("a", encoding="utf-8", newline="") as stream:
+        stream.write(("" if text.endswith("\n") or not text else "\n") + line + "\n")
+    return line
+
+
+class Cells(dict):
+    """One row of a CSV: text by column; ``starts`` are the columns of the line at which its cells begin."""
+
+    starts: dict[str, int]
+
+    def place(self, name: str, line: int, column: str) -> Place:
+        """Where the cell of ``column`` starts; the start of the line where it has no such cell."""
+        return Place(name, line, self.starts.get(column, 1))
+
+
+def read_csv(path: Path, needed: tuple[str, ...]) -> Iterator[tuple[int, Cells]]:
+    """``(line number, {column: text})`` of a CSV with a header; ValueError where a needed column is missing.
+
+    Cells beyond the header stand under ``TOO_MANY``.
+    """
+    with open(path, encoding="utf-8-sig", newline="") as stream:
+        lines = stream.read().splitlines(keepends=True)
+    seen = [""]
+
+    def remembered() -> Iterator[str]:
+        for text in lines:
+            seen[0] = text
+            yield text
+
+    reader = csv.DictReader(remembered(), restkey=TOO_MANY, restval="")
+    titles = reader.fieldnames = [t.strip() for t in reader.fieldnames or ()]
+    for title in needed:
+        if title not in titles:
+            raise ValueError(f"no column {title!r}; the header has {', '.join(titles) or 'nothing'}")
+    for found in reader:
+        cells = Cells({k: v if k == TOO_MANY else v.strip() for k, v in found.items()})
+        cells.starts = dict(zip([*titles, TOO_MANY], _starts(seen[0])))
+        yield reader.line_num, cells
+
+
+def _starts(line: str) -> Iterator[int]:
+    """Columns, from 1, at which the cells of a line of CSV begin.
+
+    >>> list(_starts('a,"b,c",d'))
+    [1, 3, 9]
+    """
+    quoted = False
+    yield 1
+    for column, letter in enumerate(line, 1):
+        quoted ^= letter == '"'
+        if letter == "," and not quoted:
+            yield column + 1

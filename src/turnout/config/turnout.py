@@ -1,0 +1,100 @@
+"""Everything the program knows about one turnout before it opens a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import Any
+
+from turnout.config.frozen import Frozen
+from turnout.records import RawDescription
+
+
+@dataclass(frozen=True)
+class Section:
+    """One monitored place: ``label`` as in the layout, ``position`` along the turnout [m]."""
+
+    label: str
+    panel: str
+    track: str
+    position: float
+    pad: str = ""
+    sleeper: str = ""
+
+
+@dataclass(frozen=True)
+class HammerConfig:
+    """Hammer tests: pattern of the ``files`` and, per section label, the channels and what a file must hold.
+
+    ``force``, ``response`` and ``validation`` (None: there is none) name channels of the description.
+    """
+
+    files: str
+    descriptions: Mapping[str, RawDescription]
+    force: Mapping[str, str]
+    response: Mapping[str, str]
+    validation: Mapping[str, str | None]
+
+
+@dataclass(frozen=True)
+class PassageConfig:
+    """Passage recordings: pattern of the ``files``, their ``description``, and the section each channel watches."""
+
+    files: str
+    description: RawDescription
+    sections: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """One row of campaigns.csv: ``rail_temperature`` [°C] is None where it was not noted."""
+
+    date: str
+    started_at: datetime
+    rail_temperature: float | None = None
+    hammer_id: str = ""
+    tip: str = ""
+    operator: str = ""
+    noted: bool = True
+
+
+@dataclass(frozen=True)
+class TurnoutConfig:
+    """Merged configuration of one turnout: defaults < layout < row of turnouts.tsv < override.
+
+    ``settings`` maps a part ("receptance", "identify" ...) to its settings. ``config_hash`` changes when
+    anything does that can change a result; ``hashes`` the same for what one kind of unit uses ("hammer",
+    "passage"). ``campaigns`` (by date) and ``trains`` (rows of trains.csv as text) come from the raw folder
+    and are empty until ``turnout.config.with_raw`` has filled them in.
+    """
+
+    id: str
+    layout: str
+    raw: str
+    sections: tuple[Section, ...]
+    hammer: HammerConfig | None
+    passages: PassageConfig | None
+    settings: Mapping[str, Any]
+    config_hash: str
+    hashes: Mapping[str, str]
+    name: str = ""
+    line: str = ""
+    km: float | None = None
+    latitude: float | None = None
+    longitude: float | None = None
+    external_id: str = ""
+    id_scheme: str = ""
+    campaigns: Mapping[str, Campaign] = field(default_factory=Frozen)
+    trains: tuple[Mapping[str, str], ...] = ()
+
+    def section(self, label: str) -> Section:
+        """The section called ``label``; KeyError lists the labels there are."""
+        for section in self.sections:
+            if section.label == label:
+                return section
+        raise KeyError(f"turnout {self.id} has no section {label!r}; it has {[s.label for s in self.sections]}")
+
+    def section_id(self, label: str) -> str:
+        """Id of a section in the registry."""
+        return f"{self.id}/{label}"

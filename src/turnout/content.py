@@ -1,0 +1,18 @@
+"""Content of a file as a number that no other content has."""
+
+import hashlib
+import os
+
+
+def sha256_of(path: os.PathLike | str) -> str:
+    """sha256 of a file's bytes, 64 hexadecimal digits; OSError where it is gone or may not be read.
+
+    Examples
+    --------
+    FIPS 180-4: the sha256 of nothing.
+
+    >>> sha256_of(os.devnull)[:16]
+    'e3b0c44298fc1c14'
+    """
+    with open(path, "rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()

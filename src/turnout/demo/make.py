@@ -1,0 +1,143 @@
+"""Write the raw files of the demonstration fleet, and its truth where the pipeline does not read."""
+
+import csv
+import json
+import os
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict
+from datetime import datetime, time
+from pathlib import Path
+from zlib import crc32
+
+import numpy as np
+from tqdm import tqdm
+
+from turnout.config import load_configuration
+from turnout.demo import faults
+from turnout.demo.hammer import hammer_test
+from turnout.demo.passages import make_passage, make_passages
+from turnout.demo.scenario import FLEET, SECTIONS, campaign_days, gap_under, rail_temperature, stiffness_factors
+from turnout.demo.simulated_response import simulated_response
+from turnout.readers.writing import write
+
+EXTENSION = {"uff58b": "uff", "tdms": "tdms", "hdf5": "h5", "mat": "mat", "csv": "csv"}
+MISSING_TEMPERATURE = ("tommerup_s1", 7)
+# (turnout, campaign, section, test) -> what befalls the file.
+FILE_FAULTS = {
+    ("tommerup_s1", 3, "SP", 2): "cut_off",
+    ("tommerup_s2", 6, "OT", 1): "dead_channel",
+    ("aarup_n4", 4, "A9", 3): "swapped_sign",
+    ("aarup_n4", 8, "ASM", 1): "not_a_number",
+}
+
+
+def make_fleet(raw, truth, seed=1, n_campaign=24, n_passage=12, turnouts=None, workers=None, progress=True):
+    """Write raw files below ``raw`` and one truth file per turnout below ``truth``.
+
+    Parameters
+    ----------
+    raw, truth : path
+        Folders, made where they do not exist.
+    seed : int
+        The same seed gives the same samples.
+    n_campaign : int
+        Campaigns per turnout, six and a half weeks apart: 24 are three years.
+    n_passage : int
+        Train passages per turnout, in the weeks before the last campaign.
+    turnouts : iterable of str, optional
+        Only these; all by default.
+    workers : int, optional
+        Processes; as many as there are processors by default.
+
+    Returns
+    -------
+    int
+        Number of raw files written.
+    """
+    chosen = [s for s in FLEET if turnouts is None or s.turnout in set(turnouts)]
+    days = campaign_days(n_campaign)
+    jobs, trains = [], []
+    for scenario in chosen:
+        weather = np.random.default_rng([seed, crc32(scenario.turnout.encode())])
+        temperatures = [rail_temperature(day, weather) for day in days]
+        _write_campaigns(Path(raw), scenario, days, temperatures)
+        _write_truth(Path(truth), scenario, days, temperatures, seed)
+        jobs += [
+            (str(raw), str(truth), scenario, seed, number, section, day, temperature)
+            for number, (day, temperature) in enumerate(zip(days, temperatures))
+            for section in SECTIONS
+        ]
+        if n_passage:
+            layout = load_configuration("config").turnout(scenario.turnout)
+            trains += make_passages(raw, scenario, layout, seed, n_passage, days[-1])
+    with ProcessPoolExecutor(workers or os.cpu_count()) as pool:
+        counts = pool.map(_make_tests, jobs, chunksize=4)
+        total = sum(tqdm(counts, total=len(jobs), desc="hammer tests", unit="section", disable=not progress))
+        passed = pool.map(make_passage, trains)
+        told = list(tqdm(passed, total=len(trains), desc="passages", unit="train", disable=not progress))
+    for scenario in chosen if trains else ():
+        own = [t for job, t in zip(trains, told) if job[1].turnout == scenario.turnout]
+        (Path(truth) / f"{scenario.turnout}_passages.json").write_text(json.dumps(own, indent=1))
+    return total + len(told)
+
+
+def _make_tests(job):
+    """Three test files of one section and campaign; returns their number."""
+    raw, truth, scenario, seed, number, section, day, temperature = job
+    rng = np.random.default_rng([seed, crc32(f"{scenario.turnout}/{section}".encode()), number])
+    ballast, railpad = stiffness_factors(scenario, section, day, temperature)
+    hangs = gap_under(scenario, section, day) > 0.0
+    response = simulated_response(section, ballast * scenario.stiffness, railpad * scenario.stiffness, hangs)
+    known = None if (scenario.turnout, number) == MISSING_TEMPERATURE else temperature
+    odd = scenario.odd_campaign and scenario.odd_campaign[0] == number
+    file_format = scenario.odd_campaign[1] if odd else scenario.format
+    folder = Path(raw) / scenario.turnout / "hammer" / day.isoformat()
+    folder.mkdir(parents=True, exist_ok=True)
+    blows = []
+    for test in (1, 2, 3):
+        recordings, befallen = hammer_test(response, known, day, test, rng)
+        fault = FILE_FAULTS.get((scenario.turnout, number, section, test), "")
+        if fault and fault != "cut_off":
+            recordings = [getattr(faults, fault)(r) for r in recordings]
+        path = folder / f"{section}_{test}.{EXTENSION[file_format]}"
+        write(recordings, path, file_format, single=True)
+        if fault == "cut_off":
+            faults.cut_off(path)
+        blows += [asdict(b) | {"file_fault": fault} for b in befallen if b.fault or fault]
+    if blows:
+        name = f"{scenario.turnout}_{day.isoformat()}_{section}.json"
+        (Path(truth) / "blows").mkdir(parents=True, exist_ok=True)
+        (Path(truth) / "blows" / name).write_text(json.dumps(blows))
+    return 3
+
+
+def _write_campaigns(raw, scenario, days, temperatures):
+    folder = raw / scenario.turnout
+    folder.mkdir(parents=True, exist_ok=True)
+    with open(folder / "campaigns.csv", "w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["campaign", "started_at_utc", "rail_temperature_c", "hammer_id", "tip", "operator"])
+        for number, (day, temperature) in enumerate(zip(days, temperatures)):
+            missing = (scenario.turnout, number) == MISSING_TEMPERATURE
+            start = datetime.combine(day, time(9, 0)).isoformat()
+            shown = "" if missing else f"{temperature:.1f}"
+            writer.writerow([day.isoformat(), start, shown, "086D50-1", "plastic", "survey crew"])
+
+
+def _write_truth(truth, scenario, days, temperatures, seed):
+    truth.mkdir(parents=True, exist_ok=True)
+    sections = {
+        section: [stiffness_factors(scenario, section, day, t) for day, t in zip(days, temperatures)]
+        for section in SECTIONS
+    }
+    content = {
+        "turnout": scenario.turnout,
+        "seed": seed,
+        "days": [d.isoformat() for d in days],
+        "rail_temperature_c": temperatures,
+        "stiffness_factors_ballast_railpad": sections,
+        "gaps_m": {s: [gap_under(scenario, s, day) for day in days] for s in {g.section for g in scenario.gaps}},
+        "changes": [asdict(c) | {"since": c.since.isoformat(), "until": None} for c in scenario.changes],
+        "file_faults": [[*k, v] for k, v in FILE_FAULTS.items() if k[0] == scenario.turnout],
+    }
+    (truth / f"{scenario.turnout}.json").write_text(json.dumps(content, indent=1))

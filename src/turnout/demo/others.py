@@ -1,0 +1,100 @@
+"""Recordings that others made and published under the MIT licence, fetched by package name and checked by sha256."""
+
+import subprocess
+import sys
+import tarfile
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from turnout.content import sha256_of
+from turnout.errors import TurnoutError
+
+SDYPY_FILE = "frf/sdypy_beam.npy"
+SDYPY_SHA256 = "2830c43170834e4b7ea46f87309d65be873cc3df430e44a11b4c7bca6fe2fb9d"
+
+
+@dataclass(frozen=True)
+class Source:
+    """A source distribution: ``members`` maps files inside it to where they go below the raw folder."""
+
+    package: str
+    version: str
+    file: str
+    sha256: str
+    members: tuple[tuple[str, str], ...]
+
+
+SOURCES = (
+    Source(
+        "pyFRF", "1.1.4", "pyfrf-1.1.4.tar.gz",
+        "bc7f0423318d11c8d1c7db2428739b5067796c238150879a314db6b4c7e0f98e",
+        (("data/impact2_response0.lvm", "pyfrf_beam/hammer/2019-03-11/BEAM_1.lvm"),),
+    ),
+    Source(
+        "sdypy-EMA", "0.27.3", "sdypy_ema-0.27.3.tar.gz",
+        "4054d70dfb1264ccf760f745c596fa5daaf32606e26e5243ae359bba9670371f",
+        (("data/acc_data.npy", SDYPY_FILE),),
+    ),
+    Source(
+        "pyuff", "2.4.2", "pyuff-2.4.2.tar.gz",
+        "7fc801385e60704fc77a04b8662fa2a5b06bce8df1b410e3d489dd5daab44146",
+        (
+            ("data/beam.uff", "frf/beam.uff"),
+            ("data/Sample_UFF58_ascii.uff", "uff/Sample_UFF58_ascii.uff"),
+            ("data/Sample_UFF58b_bin.uff", "uff/Sample_UFF58b_bin.uff"),
+            ("data/binary8byte.uff", "uff/binary8byte.uff"),
+            ("data/non_ascii_header.uff", "uff/non_ascii_header.uff"),
+            ("data/dataset_milestone_in_header.uff", "uff/dataset_milestone_in_header.uff"),
+            ("data/time-history-not-all-columns-filled.uff", "uff/time-history-not-all-columns-filled.uff"),
+        ),
+    ),
+)  # fmt: skip
+CAMPAIGNS = "campaign,started_at_utc,rail_temperature_c,hammer_id,tip,operator\n2019-03-11,2019-03-11T00:00:00,,,,\n"
+
+
+def fetch_all(raw, say=print):
+    """Put every file of ``SOURCES`` below ``raw``; what is there already stays.
+
+    TurnoutError says which package could not be fetched, or whose bytes are not the ones expected.
+    """
+    raw = Path(raw)
+    for source in SOURCES:
+        if all((raw / target).exists() for _, target in source.members):
+            continue
+        say(f"fetching {source.package} {source.version} (its source distribution carries recordings)")
+        with tempfile.TemporaryDirectory() as folder:
+            archive = _download(source, Path(folder))
+            _extract(archive, source, raw)
+    notes = raw / "pyfrf_beam" / "campaigns.csv"
+    notes.write_text(CAMPAIGNS)
+
+
+def _download(source, folder):
+    command = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps"]
+    command += ["--no-binary", ":all:", "--dest", str(folder), f"{source.package}=={source.version}"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    archive = folder / source.file
+    if done.returncode or not archive.exists():
+        last = (done.stderr.strip().splitlines() or ["pip said nothing"])[-1]
+        raise TurnoutError(f"{source.package} {source.version} could not be fetched: {last}. Is there a network?")
+    found = sha256_of(archive)
+    if found != source.sha256:
+        raise TurnoutError(
+            f"{source.file} has sha256 {found}, expected {source.sha256}: not the file that was published. Not used."
+        )
+    return archive
+
+
+def _extract(archive, source, raw):
+    root = source.file.removesuffix(".tar.gz")
+    with tarfile.open(archive) as tar:
+        for member, target in source.members:
+            path = raw / target
+            path.parent.mkdir(parents=True, exist_ok=True)
+            temporary = path.with_name(path.name + ".tmp")
+            content = tar.extractfile(f"{root}/{member}")
+            if content is None:
+                raise TurnoutError(f"{source.file} holds no file {member}: not the archive that was published")
+            temporary.write_bytes(content.read())
+            temporary.replace(path)

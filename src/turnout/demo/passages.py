@@ -1,0 +1,121 @@
+"""Train passages of the demonstration fleet: several trains, speeds and loads over the simulated turnout."""
+
+import csv
+from dataclasses import replace
+from datetime import datetime, timedelta
+from functools import lru_cache
+from pathlib import Path
+from zlib import crc32
+
+import numpy as np
+
+from turnout.demo.scenario import gap_under, rail_temperature, stiffness_factors
+from turnout.physics.hanging_sleeper import HangingSleeper
+from turnout.readers.writing import write
+from turnout.simulate.parameters import load_track, load_vehicle
+from turnout.simulate.passage import simulate_passage
+from turnout.simulate.sensor import Sensor
+
+# (vehicle, name in the train data, lowest and highest speed [km/h], share of the traffic)
+TRAFFIC = (
+    ("ic3", "IC3", 100.0, 170.0, 0.5),
+    ("intercity", "intercity", 110.0, 180.0, 0.25),
+    ("freight", "freight", 60.0, 100.0, 0.15),
+    ("locomotive", "locomotive", 60.0, 120.0, 0.10),
+)
+DIVERGING_SHARE, DIVERGING_SPEED = 0.2, 60.0
+# A sensor on the other track hears what comes through the bearers.
+NEIGHBOUR_GAIN = 0.02
+NOISE, LIMIT = 0.3, 5_000.0
+
+
+def make_passages(raw, scenario, turnout, seed, n_passage, last_day):
+    """Jobs for ``make_passage``, one per train of the weeks before ``last_day``, and trains.csv of the turnout."""
+    rng = np.random.default_rng([seed, 77, crc32(scenario.turnout.encode())])
+    places = {s.label: (s.position, s.track) for s in turnout.sections}
+    jobs, listed = [], []
+    start = datetime.combine(last_day, datetime.min.time()) - timedelta(days=20)
+    for k in range(n_passage):
+        moment = start + timedelta(days=20 * k / n_passage, hours=float(rng.uniform(6, 20)))
+        moment = moment.replace(microsecond=0)
+        vehicle, name, low, high, _ = TRAFFIC[rng.choice(len(TRAFFIC), p=[t[-1] for t in TRAFFIC])]
+        route = "diverging" if rng.uniform() < DIVERGING_SHARE else "main"
+        speed = float(rng.uniform(low, high) if route == "main" else rng.uniform(40.0, DIVERGING_SPEED))
+        load, direction = float(rng.uniform(0.0, 1.0)), str(rng.choice(["facing", "trailing"]))
+        temperature = rail_temperature(moment.date(), rng)
+        truth = {
+            "started_at_utc": moment.isoformat(), "vehicle": name, "speed_kmh": speed, "load_share": load,
+            "track": route, "direction": direction, "rail_temperature_c": temperature,
+        }  # fmt: skip
+        jobs.append((str(raw), scenario, places, vehicle, truth, [seed, k]))
+        # the train data know most trains, and their speed to some km/h
+        if rng.uniform() < 0.7:
+            said = {"passed_at_utc": (moment + timedelta(seconds=int(rng.integers(-20, 20)))).isoformat()}
+            listed.append(said | {"train_type": name, "speed_kmh": f"{speed * rng.normal(1.0, 0.02):.0f}"})
+    folder = Path(raw) / scenario.turnout
+    (folder / "passages").mkdir(parents=True, exist_ok=True)
+    with open(folder / "trains.csv", "w", newline="") as file:
+        writer = csv.DictWriter(file, ["passed_at_utc", "train_type", "speed_kmh"], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(listed)
+    return jobs
+
+
+def make_passage(job):
+    """Simulate one passage and write its file; returns what is true of it."""
+    raw, scenario, places, vehicle, truth, seed = job
+    moment = datetime.fromisoformat(truth["started_at_utc"])
+    track = _track_of(scenario, moment.date(), round(truth["rail_temperature_c"]))
+    sensors = [_sensor(label, place, side, truth["track"]) for label, (place, side) in places.items()]
+    recording = simulate_passage(
+        track,
+        _vehicle(vehicle, round(truth["load_share"], 1)),
+        truth["speed_kmh"] / 3.6,
+        sensors,
+        terms=_terms_of(scenario, track, truth["track"], moment.date()),
+        direction=truth["direction"],
+        route=truth["track"],
+        seed=crc32(repr(seed).encode()),
+        started_at=moment,
+        conditions={"rail_temperature": round(truth["rail_temperature_c"], 1)},
+    )
+    told = {k: v for k, v in recording.conditions.items() if k == "rail_temperature"}
+    name = moment.strftime("%Y%m%dT%H%M%SZ.h5")
+    write([replace(recording, conditions=told)], Path(raw) / scenario.turnout / "passages" / name, "hdf5", single=True)
+    loads = recording.conditions["axle_loads"]
+    return truth | {"file": name, "n_axles": len(loads), "axle_load_t": float(np.mean(loads)) / 9.81e3}
+
+
+def _sensor(label, place, side, route):
+    gain = 1.0 if side in ("both", route) else NEIGHBOUR_GAIN
+    return Sensor(label, place, "rail web", gain=gain, noise=NOISE, limit=LIMIT, resolution=LIMIT / 2**15)
+
+
+def _terms_of(scenario, turnout, route, day):
+    """The hanging sleepers of that day on the route taken."""
+    track, found = turnout.track_of(route), []
+    for section in sorted({g.section for g in scenario.gaps}):
+        gap = gap_under(scenario, section, day)
+        place, own = turnout.locations[section]
+        if gap > 0.0 and own in (route, None):
+            found.append(HangingSleeper(track.nearest_support(place), gap))
+    return tuple(found)
+
+
+@lru_cache(maxsize=32)
+def _vehicle(name, load):
+    return load_vehicle(name, load)
+
+
+@lru_cache(maxsize=4)
+def _track_of(scenario, day, temperature):
+    """The turnout with every section's stiffness of that day, on both routes."""
+    turnout = load_track("tommerup")
+
+    def changed(track):
+        factors = np.array([stiffness_factors(scenario, section, day, temperature) for section in track.section])
+        ballast, pad = factors.T * scenario.stiffness
+        return track.with_(ballast_stiffness=ballast * track.ballast_stiffness, pad_stiffness=pad * track.pad_stiffness)
+
+    tracks = {route: changed(track) for route, track in turnout.tracks.items()}
+    return replace(turnout, track=changed(turnout.track), tracks=tracks)

@@ -1,0 +1,63 @@
+"""What the makers of the recordings of others say about them, and what is found here, side by side."""
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+
+from turnout.content import sha256_of
+from turnout.demo.others import SDYPY_FILE, SDYPY_SHA256
+from turnout.errors import TurnoutError
+from turnout.identify.frf_modes import modes_of_frf
+from turnout.readers.uff import read_frf
+from turnout.readers.uff_sets import sets_of
+
+# (frequency [Hz], damping [%]) of the seven modes in the makers' own showcase; None where they print no damping.
+SDYPY_BEAM = (
+    (177.0, 0.86), (477.4, 0.20), (933.1, 0.15), (1535.5, 0.20), (2286.9, 0.28), (3162.4, 0.18), (4181.2, 0.15),
+)  # fmt: skip
+# peaks of the three curves in the file; nobody published a table of its modes
+UFF_BEAM = tuple((f, None) for f in (52.6, 144.6, 283.1, 468.3, 698.5, 973.0, 1293.0))
+FUNCTIONS = {0: "general functions", 1: "time responses", 2: "auto-spectra", 4: "frequency responses", 6: "coherences"}
+HITS = {0: "overloaded on purpose", 1: "good", 2: "double impact", 3: "good", 4: "good"}
+
+
+def beam_modes(raw):
+    """Pairs of a name and rows (published, found) for the two files of frequency responses below ``raw``."""
+    path = Path(raw) / SDYPY_FILE
+    if sha256_of(path) != SDYPY_SHA256:
+        # it is a pickle, and a pickle of unknown origin can do anything
+        raise TurnoutError(f"{path} is not the published file. Delete it and run again")
+    frequency, responses = np.load(path, allow_pickle=True)
+    responses = np.asarray(responses, complex).reshape(-1, len(frequency))
+    yield "beam of sdypy-EMA 0.27.3", _rows(np.asarray(frequency, float), responses, SDYPY_BEAM, 4500.0)
+    uff = read_frf("frf/beam.uff", raw)
+    yield "beam.uff of pyuff 2.4.2 (peaks read off its curves)", _rows(uff.frequency, uff.frf, UFF_BEAM, 1400.0)
+
+
+def _rows(frequency, responses, published, highest):
+    """Every published mode with the found mode next to it, then what was found and not published."""
+    found = list(modes_of_frf(frequency, responses, highest=highest).modes)
+    rows = []
+    for f, damping in published:
+        nearest = min(found, key=lambda m: abs(m.frequency.mean - f), default=None)
+        if nearest is not None and abs(nearest.frequency.mean - f) > 0.02 * f:
+            nearest = None
+        rows.append((f, damping, nearest))
+        if nearest in found:
+            found.remove(nearest)
+    return rows + [(None, None, mode) for mode in found]
+
+
+def uff_contents(path):
+    """In words, what a vendor's UFF file holds: sets by kind, samples, damage."""
+    sets = [s for s in sets_of(Path(path).read_bytes()) if s.kind in ("58", "58b")]
+    damaged = [s.damage for s in sets if s.damage]
+    names = [
+        FUNCTIONS.get(s.func_type, f"functions of type {s.func_type}") + f" ({s.kind})" for s in sets if not s.damage
+    ]
+    kinds = Counter(names)
+    lengths = sorted({len(s.data) for s in sets if not s.damage})
+    words = ", ".join(f"{n} {kind}" for kind, n in kinds.items())
+    span = f"; {' to '.join(dict.fromkeys(str(n) for n in (lengths[0], lengths[-1])))} values" if lengths else ""
+    return f"{words or 'no sound set'}{span}" + (f"; damaged: {damaged}" if damaged else "")

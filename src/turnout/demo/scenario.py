@@ -1,0 +1,125 @@
+"""What happens to the demonstration fleet: campaigns, weather, maintenance, and the drift that is to be found."""
+
+from dataclasses import dataclass
+from datetime import date, timedelta
+
+import numpy as np
+
+MILLIMETRE = 1e-3
+SECTIONS = ("OT", "SP", "CLP", "A7", "A8", "A9", "ASM", "ASD")
+FIRST_CAMPAIGN = date(2023, 9, 12)
+
+
+@dataclass(frozen=True)
+class Change:
+    """Stiffness of one section from a day on: a step, then a drift, as factors of the healthy value.
+
+    ``component`` is "ballast" or "railpad"; ``step`` the factor at ``since``; ``per_year`` the relative
+    change of stiffness per year after it. ``event`` is the maintenance that did it, "" where nobody knows.
+    """
+
+    section: str
+    component: str
+    since: date
+    step: float = 1.0
+    per_year: float = 0.0
+    event: str = ""
+    until: date | None = None
+
+    def factor(self, day):
+        """Factor of the stiffness on ``day``."""
+        if day < self.since or (self.until is not None and day >= self.until):
+            return 1.0
+        years = (day - self.since).days / 365.25
+        return self.step * (1.0 + self.per_year) ** years
+
+
+@dataclass(frozen=True)
+class Gap:
+    """A sleeper that comes to hang above its ballast: ``gap`` [m] on the day it shows, ``per_year`` [m] more after."""
+
+    section: str
+    since: date
+    gap: float
+    per_year: float
+
+    def on(self, day):
+        """Gap [m] on ``day``.
+
+        >>> Gap("A7", date(2025, 1, 1), 0.4e-3, 1.0e-3).on(date(2024, 1, 1))
+        0.0
+        """
+        if day < self.since:
+            return 0.0
+        return self.gap + self.per_year * (day - self.since).days / 365.25
+
+
+@dataclass(frozen=True)
+class TurnoutScenario:
+    """One turnout of the fleet: how its files look and what happens to it."""
+
+    turnout: str
+    format: str
+    changes: tuple[Change, ...] = ()
+    gaps: tuple[Gap, ...] = ()
+    events: tuple[tuple[date, str, str], ...] = ()
+    odd_campaign: tuple[int, str] | None = None
+    stiffness: float = 1.0
+
+
+FLEET = (
+    TurnoutScenario("tommerup_s1", "uff58b", odd_campaign=(5, "mat"), events=((date(2025, 4, 2), "A8", "grinding"),)),
+    TurnoutScenario(
+        "tommerup_s2",
+        "tdms",
+        changes=(Change("A8", "ballast", since=date(2025, 5, 1), per_year=-0.15),),
+        stiffness=1.06,
+    ),
+    TurnoutScenario(
+        "aarup_n4",
+        "hdf5",
+        changes=(Change("CLP", "railpad", since=date(2025, 3, 18), step=1.12, event="pad_exchange"),),
+        gaps=(Gap("ASM", since=date(2025, 8, 20), gap=0.3 * MILLIMETRE, per_year=1.0 * MILLIMETRE),),
+        events=((date(2025, 3, 18), "CLP", "pad_exchange"), (date(2024, 11, 5), "", "sensor_change")),
+        odd_campaign=(9, "csv"),
+        stiffness=0.95,
+    ),
+)
+
+
+def campaign_days(n_campaign, weeks_between=6.5):
+    """Days of the campaigns: every few weeks, never exactly, the same for the same number.
+
+    >>> campaign_days(3, weeks_between=6)[0].isoformat()
+    '2023-09-12'
+    """
+    shifts = np.random.default_rng(20231).integers(-4, 5, size=n_campaign)
+    shifts[0] = 0
+    return [FIRST_CAMPAIGN + timedelta(weeks=weeks_between * k) + timedelta(days=int(s)) for k, s in enumerate(shifts)]
+
+
+def rail_temperature(day, rng):
+    """Rail temperature [°C] at the hour of the test: a Danish year and its weather."""
+    season = np.sin(2 * np.pi * (day.timetuple().tm_yday - 110) / 365.25)
+    return float(11.0 + 11.0 * season + rng.normal(0.0, 4.0))
+
+
+def gap_under(scenario, section, day):
+    """Gap [m] under the sleeper of a section's sensor, 0 where it lies on its ballast."""
+    return max((g.on(day) for g in scenario.gaps if g.section == section), default=0.0)
+
+
+def stiffness_factors(scenario, section, day, temperature):
+    """(ballast, railpad) stiffness relative to the healthy section at 15 °C.
+
+    The pad softens by 0.3 % per kelvin (static stiffness of EPDM pads falls by up to half between -20 and
+    60 °C, Othman et al. 2022); frozen ballast stiffens by up to 6 % below 0 °C.
+    """
+    ballast, railpad = 1.0 - 0.004 * min(0.0, max(temperature, -15.0)), 1.0 - 0.003 * (temperature - 15.0)
+    for change in scenario.changes:
+        if change.section == section:
+            if change.component == "ballast":
+                ballast *= change.factor(day)
+            else:
+                railpad *= change.factor(day)
+    return ballast, railpad

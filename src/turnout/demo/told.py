@@ -1,0 +1,59 @@
+"""What a run found, in a few lines, and what to ask next."""
+
+import os
+import sys
+from pathlib import Path
+
+from turnout.registry.database import open_registry
+
+QUESTIONS = (
+    (
+        "How did a resonance move?",
+        "select measured_at_utc, frequency_hz, frequency_se_hz from section_trend('tommerup_s2/A8', 'ballast')",
+    ),
+    ("Which turnouts need a look tomorrow?", "select * from worklist"),
+    ("What was not used, and why?", "select reason, count(*) as n from impacts_current group by all order by n desc"),
+)
+COUNTS = """
+    select
+        (select count(*) from recordings_current) as recordings,
+        (select count(*) from impacts_current) as impacts,
+        (select count(*) from impacts_current where status = 'rejected') as rejected,
+        (select count(*) from models_current where status <> 'rejected') as models,
+        (select count(*) from models_current where status = 'rejected') as models_rejected,
+        (select count(*) from quarantine_open) as quarantined,
+        (select count(*) from passages_current) as passages
+"""
+REASONS = """
+    select path, reason_code, min_by(found, coalesce(record, -1)), count(*) from quarantine_open
+    group by all order by path limit 8
+"""
+WORK = "select coalesce(section_id, turnout_id), band, state, sentence from worklist order by rank limit 5"
+
+
+def tell(registry, pages, say=print):
+    """Print counts, quarantine, tomorrow's list, where the pages lie, and three questions to try."""
+    with open_registry(registry) as connection:
+        counts = dict(zip((d[0] for d in connection.execute(COUNTS).description), connection.fetchall()[0]))
+        say(
+            "   {recordings} recordings, {impacts} impacts of which {rejected} were rejected, {passages} passages\n"
+            "   {models} models of a section and campaign, {models_rejected} rejected; "
+            "{quarantined} rows in quarantine:".format(**counts)
+        )
+        for path, reason, found, n in connection.execute(REASONS).fetchall():
+            say(f"      {path}: {reason}, {found}" + (f" ({n} such records)" if n > 1 else ""))
+        rows = connection.execute(WORK).fetchall()
+    say("\n   Tomorrow's list, its first rows:" if rows else "\n   Tomorrow's list is empty.")
+    for section, band, state, sentence in rows:
+        say(f"      {section} {band}: {state}. {sentence}")
+    say(f"\n   Pages: {Path(pages).resolve() / 'index.html'}")
+    say(f"   Registry: {registry}/registry.duckdb, for any tool that speaks DuckDB. Three questions to try:")
+    for question, sql in QUESTIONS:
+        say(f'\n   {question}\n      {_command()} query "{sql}"')
+
+
+def _command():
+    """How the reader calls this program: by name where it is on the path, else by its place."""
+    beside = Path(sys.executable).parent / "turnout"
+    on_path = str(beside.parent) in os.environ.get("PATH", "").split(os.pathsep)
+    return "turnout" if on_path else os.path.relpath(beside)

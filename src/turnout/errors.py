@@ -1,0 +1,107 @@
+"""What can go wrong, said so that a track engineer knows what to do next."""
+
+
+class TurnoutError(Exception):
+    """Anything this program raises on purpose."""
+
+
+class ReadError(TurnoutError):
+    """A recording is not what its format or its configuration promises.
+
+    Parameters
+    ----------
+    path : str
+        The file, relative to the raw root where there is one.
+    where : str
+        The place in it: record, channel, byte or line.
+    found : str
+        What stands there.
+    remedy : str
+        What to do, a sentence without its full stop.
+    reason : str
+        One of ``REASONS``: the code of the quarantine row.
+
+    Examples
+    --------
+    >>> error = ReadError("A7_1.uff", "record 7 of 30", "ends after 1312 of 4096 samples",
+    ...                   "Copy the file again", reason="truncated")
+    >>> print(error)
+    A7_1.uff, record 7 of 30: ends after 1312 of 4096 samples. Copy the file again.
+    """
+
+    def __init__(self, path, where, found, remedy, reason="unreadable"):
+        super().__init__(f"{path}, {where}: {found}. {remedy}.")
+        if reason not in REASONS:
+            raise ValueError(f"reason {reason!r} is not in turnout.errors.REASONS")
+        self.path, self.where, self.found, self.remedy, self.reason = str(path), where, found, remedy, reason
+
+
+class ConfigError(TurnoutError):
+    """A configuration file says something that cannot be used.
+
+    ``place`` is "line 12, column 5" or the key; ``remedy`` says what to write instead.
+    """
+
+    def __init__(self, path, place, found, remedy):
+        super().__init__(f"{path}, {place}: {found}. {remedy}.")
+        self.path, self.place, self.found, self.remedy = str(path), place, found, remedy
+
+
+class ConfigErrors(TurnoutError):
+    """Every configuration error found in one pass; ``errors`` is the list."""
+
+    def __init__(self, errors):
+        super().__init__("\n".join(str(e) for e in errors))
+        self.errors = list(errors)
+
+
+class SimulationError(TurnoutError):
+    """A simulation cannot go on: says time, place and value."""
+
+
+class RegistryError(TurnoutError):
+    """The registry refuses rows or cannot be used: says table, row, column, value."""
+
+
+# The closed list of reasons for a quarantine row or a rejected impact, and what each one means.
+REASONS = {
+    "unreadable": "the file is not of its format",
+    "empty": "the file has no bytes or no records",
+    "truncated": "fewer samples or records than configured or declared",
+    "wrong_length": "more samples or records than configured",
+    "vanished": "the file was there when planned and is gone",
+    "name_unknown": "the file's name follows no pattern of the layout",
+    "nothing_found": "no file of the turnout matches a pattern of the layout",
+    "outside_root": "the path leads outside the raw root",
+    "wrong_rate": "the sampling rate is not the configured one",
+    "channel_missing": "a configured channel is not in the file",
+    "channel_unknown": "the file has a channel that the configuration does not name",
+    "unit_unknown": "a unit that cannot be converted to the configured one",
+    "not_finite": "NaN or infinity in the samples",
+    "dead_channel": "a channel is constant or below its noise floor",
+    "sign_reversed": "the force is negative at contact: the sign is reversed",
+    "clock_backwards": "the time stamps run backwards",
+    "duplicate": "the same bytes as another file of the campaign",
+    "wrong_time": "the time of the recording contradicts its campaign",
+    "double_hit": "the hammer touched the rail twice",
+    "overload": "a channel left its range",
+    "weak": "the blow is much weaker than the others of its test",
+    "noisy": "the level before the blow is too high",
+    "late": "the blow is not where the trigger promises, or too little decay is left",
+    "cut_off": "the record ends before the vibration has died away",
+    "odd_one_out": "the response disagrees with all other impacts of the test",
+    "no_impact": "no blow found in the record",
+    "too_few_impacts": "too few accepted impacts for a coherence",
+    "low_coherence": "the lower confidence limit of the coherence fails the gate over a mode's band",
+    "not_identified": "no stable mode in the band",
+    "no_train": "no axle found",
+    "train_cut_off": "the train is cut off at an end of the recording",
+    "two_trains": "two trains at the same time",
+    "axles_uncertain": "the number of axles of an unknown train is not certain",
+    "clipped": "a channel is clipped in the passage",
+    "channels_swapped": "channels arrive in the wrong order",
+    "clock_drift": "the loggers' clocks drift apart",
+    "sensor_lost": "a sensor fell silent during the recording",
+    "simulation_failed": "the simulation could not be completed",
+    "internal_error": "a fault of this program, with its traceback",
+}

@@ -1,0 +1,104 @@
+"""A hash of the code a result was computed with, blind to comments, docstrings and layout."""
+
+import ast
+import hashlib
+from functools import cache
+from pathlib import Path
+
+PACKAGE = "turnout"
+ROOT = Path(__file__).parent
+
+
+def fingerprint(*modules: str) -> str:
+    """16 hex characters over the syntax trees of ``modules`` and of all they import from this package.
+
+    Imports inside functions count, a package counts where it is itself imported from, and
+    ``import_module(f"turnout.readers.{name}")`` counts as every module of ``turnout.readers``. Data files of the
+    package (CSV, SQL) that lie beside an imported module count by their bytes. ValueError for a module that does
+    not exist.
+
+    >>> fingerprint("turnout.errors") == fingerprint("turnout.errors")
+    True
+    >>> fingerprint("turnout.errors") == fingerprint("turnout.records")
+    False
+    """
+    found = closure(*modules)
+    text = "\n".join(f"{name} {_tree(name)[0]}" for name in sorted(found))
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def closure(*modules: str) -> frozenset[str]:
+    """Names of ``modules`` and of every module of this package that they import, directly or not."""
+    found, waiting = set(), list(modules)
+    for name in modules:
+        if _file(name) is None:
+            raise ValueError(f"no module {name} in the package {PACKAGE}")
+    while waiting:
+        name = waiting.pop()
+        if name not in found and _file(name):
+            found.add(name)
+            waiting += _tree(name)[1]
+    return frozenset(found)
+
+
+def forget() -> None:
+    """Read the source files again: they changed while this process ran."""
+    _file.cache_clear()
+    _tree.cache_clear()
+
+
+@cache
+def _file(name: str) -> Path | None:
+    if name.partition(".")[0] != PACKAGE:
+        return None
+    path = ROOT.joinpath(*name.split(".")[1:])
+    if path.is_dir():
+        return path / "__init__.py" if (path / "__init__.py").exists() else None
+    return path.with_suffix(".py") if path.with_suffix(".py").exists() else None
+
+
+@cache
+def _tree(name: str) -> tuple[str, tuple[str, ...]]:
+    """Hash of one module without its words, and the names it may import."""
+    path = _file(name)
+    if path is None:
+        raise ValueError(f"no module {name} in the package {PACKAGE}")
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    imported = _imports(tree, name, path.name == "__init__.py")
+    for node in ast.walk(tree):
+        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)) and _has_docstring(node):
+            node.body = node.body[1:] or [ast.Pass()]
+    digest = hashlib.sha256(ast.dump(tree).encode())
+    for data in sorted(p for p in path.parent.iterdir() if p.suffix in (".csv", ".sql")):
+        digest.update(data.name.encode() + data.read_bytes())
+    return digest.hexdigest(), tuple(imported)
+
+
+def _has_docstring(node) -> bool:
+    first = node.body[0] if node.body else None
+    return isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant) and isinstance(first.value.value, str)
+
+
+def _imports(tree: ast.Module, name: str, is_package: bool) -> list[str]:
+    found = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = node.module or ""
+            if node.level:
+                parents = name.split(".") if is_package else name.split(".")[:-1]
+                base = ".".join(parents[: len(parents) - node.level + 1] + ([base] if base else []))
+            found += [base, *(f"{base}.{alias.name}" for alias in node.names)]
+        elif isinstance(node, ast.JoinedStr):
+            found += _family(node)
+    return found
+
+
+def _family(node: ast.JoinedStr) -> list[str]:
+    """All modules that a name like f"turnout.readers.{format}" may stand for."""
+    start = node.values[0].value if node.values and isinstance(node.values[0], ast.Constant) else ""
+    if not (isinstance(start, str) and start.startswith(PACKAGE + ".") and start.endswith(".")):
+        return []
+    folder = ROOT.joinpath(*start.rstrip(".").split(".")[1:])
+    return [start + p.stem for p in sorted(folder.glob("*.py")) if p.stem != "__init__"]

@@ -1,0 +1,40 @@
+"""Write a file so that a reader sees the old one or the new one, never a part."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+
+def write_atomic(path: os.PathLike, write: Callable) -> None:
+    """Call ``write(stream)`` on a temporary file beside ``path``, flush it to the disk, then put it in place."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        with open(temporary, "wb") as stream:
+            write(stream)
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_text(path: os.PathLike, text: str) -> None:
+    """Atomic write of UTF-8 text."""
+    write_atomic(path, lambda stream: stream.write(text.encode()))
+
+
+def write_if_changed(path: os.PathLike, text: str) -> bool:
+    """Write ``text`` unless the file already says so; the file's time then tells when its content changed.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_if_changed(f"{folder}/plan", "a"), write_if_changed(f"{folder}/plan", "a")
+    (True, False)
+    """
+    path = Path(path)
+    if path.exists() and path.read_text(encoding="utf-8") == text:
+        return False
+    write_text(path, text)
+    return True

@@ -1,0 +1,146 @@
+"""The file in which a shard job leaves its results: one row per unit, never changed once written.
+
+A batch is ``work/<stage>/<shard>/batch-<hash of its content>.parquet`` with the columns
+
+========= ====== ==================================================================================
+unit      string "<turnout>/<kind>/<label>", unique in the batch; rows are sorted by it
+turnout   string turnout of the unit
+kind      string "hammer" or "passage"
+key       string what the result was computed from: configuration, files, campaign
+algo      string version of the code that computed it
+status    string "ok", "partly" (some rows in quarantine), "quarantined" (nothing else), "internal_error"
+rows      string JSON object {table of columns.csv: [row, ...]} without ``run_id``
+========= ====== ==================================================================================
+
+Values inside ``rows``: times are ISO 8601 in naive UTC, numbers that are not finite are null, numpy arrays are
+packed with their type and come back as numpy arrays. Only batches that a state file names count: a batch
+without one was left by a killed job.
+"""
+
+import base64
+import hashlib
+import json
+import math
+import os
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from datetime import date, datetime
+from pathlib import Path
+
+import numpy as np
+
+from turnout.fleet.atomic import write_atomic
+
+COLUMNS = ("unit", "turnout", "kind", "key", "algo", "status", "rows")
+
+
+@dataclass(frozen=True)
+class UnitResult:
+    """What one unit gave: ``tables`` maps a table of columns.csv to its rows, ``run_id`` left out."""
+
+    unit: str
+    turnout: str
+    kind: str
+    key: str
+    algo: str
+    status: str
+    tables: dict[str, list[dict]]
+
+
+def write_batch(folder: Path, results: Iterable[UnitResult]) -> Path:
+    """Write one batch into ``folder``, named by its content; the same results give the same file name."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    rows = [[*_header(r), encode(r.tables)] for r in sorted(results, key=lambda r: r.unit)]
+    digest = hashlib.sha256(json.dumps(rows).encode()).hexdigest()[:24]
+    path = Path(folder) / f"batch-{digest}.parquet"
+    table = pa.Table.from_arrays([_strings(values) for values in zip(*rows)], names=list(COLUMNS))
+    write_atomic(path, lambda stream: pq.write_table(table, stream, compression="zstd", row_group_size=64))
+    return path
+
+
+def read_results(path: os.PathLike) -> Iterator[UnitResult]:
+    """Results of one batch, sorted by unit."""
+    import pyarrow.parquet as pq
+
+    for group in pq.ParquetFile(path).iter_batches(batch_size=64):
+        for row in group.to_pylist():
+            yield UnitResult(**{**{c: row[c] for c in COLUMNS[:-1]}, "tables": decode(row["rows"])})
+
+
+def read_batch(path: os.PathLike) -> Iterator[tuple[str, str, list[dict]]]:
+    """``(unit, table, rows)`` of one batch, sorted by unit; ``rows`` as in columns.csv without ``run_id``.
+
+    >>> import tempfile
+    >>> rows = {"recordings": [{"recording_id": "ab", "n_records": 10}], "quarantine": []}
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     result = UnitResult("t1/hammer/A7/2024-05-13", "t1", "hammer", "k", "1", "ok", rows)
+    ...     list(read_batch(write_batch(Path(folder), [result])))
+    [('t1/hammer/A7/2024-05-13', 'recordings', [{'n_records': 10, 'recording_id': 'ab'}])]
+    """
+    for result in read_results(path):
+        for table, rows in result.tables.items():
+            if rows:
+                yield result.unit, table, rows
+
+
+def read_column(path: os.PathLike, *names: str) -> list[tuple]:
+    """Only the columns ``names`` of a batch, for all its units; cheap, ``rows`` is not touched."""
+    import pyarrow.parquet as pq
+
+    groups = pq.ParquetFile(path).iter_batches(columns=list(names))
+    return [tuple(row[n] for n in names) for group in groups for row in group.to_pylist()]
+
+
+def encode(tables: dict[str, list[dict]]) -> str:
+    """JSON of the rows of one unit; equal rows give equal text.
+
+    >>> encode({"modes": [{"frequency_hz": np.float64(69.1), "damping_ratio": float("nan")}]})
+    '{"modes":[{"damping_ratio":null,"frequency_hz":69.1}]}'
+    """
+    return json.dumps(_plain(tables), sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+
+
+def decode(text: str) -> dict[str, list[dict]]:
+    """Rows from the JSON of ``encode``; packed arrays come back as numpy arrays."""
+    return json.loads(text, object_hook=_unpack)
+
+
+def _strings(values: Iterable[str]):
+    """Arrow strings; ``pa.array`` would import pandas, which takes as long as all the rest of a small job."""
+    import pyarrow as pa
+
+    encoded = [value.encode() for value in values]
+    offsets = np.concatenate([[0], np.cumsum([len(e) for e in encoded])]).astype(np.int64)
+    return pa.LargeStringArray.from_buffers(len(encoded), pa.py_buffer(offsets), pa.py_buffer(b"".join(encoded)))
+
+
+def _header(result: UnitResult) -> tuple[str, ...]:
+    return tuple(getattr(result, name) for name in COLUMNS[:-1])
+
+
+def _plain(value):
+    """``value`` in JSON's own types."""
+    if isinstance(value, dict):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, np.ndarray):
+        little = value.astype(value.dtype.newbyteorder("<"))
+        return {"__array__": value.dtype.str.lstrip("<=|>"), "data": base64.b64encode(little.tobytes()).decode()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, (datetime, date)):
+        return value.isoformat()
+    if value is None or isinstance(value, (bool, int, str)):
+        return value
+    raise TypeError(f"a row holds a {type(value).__name__}: {value!r}")
+
+
+def _unpack(pairs: dict):
+    if "__array__" in pairs:
+        return np.frombuffer(base64.b64decode(pairs["data"]), dtype=pairs["__array__"])
+    return pairs

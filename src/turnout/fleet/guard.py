@@ -1,0 +1,84 @@
+"""One unit, computed so that nothing it meets stops the fleet."""
+
+import errno
+import logging
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+
+from turnout.config import TurnoutConfig
+from turnout.errors import ReadError
+from turnout.fleet.batches import UnitResult, encode
+from turnout.fleet.scan import unit_id
+from turnout.records import Unit
+from turnout.registry.ids import content_id
+
+LOG = logging.getLogger("turnout.fleet")
+# A full disk or a lost mount is nobody's result: the job fails, and is tried again.
+MACHINE = {errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ESTALE}
+
+
+def guarded(
+    compute: Callable, unit: Unit, turnout: TurnoutConfig, raw_root: Path, key: str, algo: str, strict: bool, **more
+) -> UnitResult:
+    """Result of ``compute(unit, turnout, raw_root, algo=algo)``.
+
+    A ReadError becomes a quarantine row. Any other exception is a fault of the program: a quarantine row with
+    reason internal_error, and its traceback in the log; with ``strict`` it is raised. Faults of the machine
+    (disk full, out of memory) are always raised.
+    """
+    try:
+        tables = compute(unit, turnout, raw_root, algo=algo, **more)
+        encode(tables)
+    except ReadError as error:
+        tables = {
+            "quarantine": [quarantine_row(unit, error.path, error.reason, error.where, error.found, error.remedy)]
+        }
+    except MemoryError:
+        raise
+    except Exception as error:
+        if strict or (isinstance(error, OSError) and error.errno in MACHINE):
+            raise
+        LOG.error("%s: internal error\n%s", unit_id(unit), traceback.format_exc())
+        tables = {"quarantine": [_fault(unit, error)]}
+    return UnitResult(unit_id(unit), unit.turnout, unit.kind, key, algo, status_of(tables), tables)
+
+
+def status_of(tables: dict[str, list[dict]]) -> str:
+    """ "ok", "partly", "quarantined" or "internal_error", from the rows of a unit.
+
+    >>> status_of({"quarantine": [{"reason_code": "truncated"}], "recordings": [{}]})
+    'partly'
+    """
+    reasons = {row.get("reason_code") for row in tables.get("quarantine", ())}
+    if "internal_error" in reasons:
+        return "internal_error"
+    if not reasons:
+        return "ok"
+    return "partly" if any(rows for table, rows in tables.items() if table != "quarantine") else "quarantined"
+
+
+def quarantine_row(unit: Unit, path: str, reason: str, where: str, found: str, remedy: str) -> dict:
+    """Row of ``quarantine`` for a unit as a whole."""
+    return {
+        "quarantine_id": content_id("quarantine", path, "None", unit.kind, reason, found),
+        "turnout_id": unit.turnout,
+        "section_id": f"{unit.turnout}/{unit.section}" if unit.section else None,
+        "kind": unit.kind,
+        "path": path,
+        "stage": unit.kind,
+        "reason_code": reason,
+        "place": where,
+        "found": found,
+        "remedy": remedy,
+    }
+
+
+def _fault(unit: Unit, error: Exception) -> dict:
+    """Where in the program it happened, without the machine's paths, so that the row is the same everywhere."""
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename != __file__]
+    trace = " < ".join(f"{Path(f.filename).name}:{f.lineno} {f.name}" for f in reversed(frames[-6:]))
+    found = f"{type(error).__name__}: {error}"[:500]
+    remedy = "Report it with the log of the run; the unit is tried again when its files or the program change"
+    path = unit.files[0][0] if unit.files else unit.turnout
+    return quarantine_row(unit, path, "internal_error", trace, found, remedy)

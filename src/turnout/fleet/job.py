@@ -1,0 +1,75 @@
+"""The jobs of the workflow: what a script hands over from Snakemake, and what it says when it is done."""
+
+import logging
+import os
+import sys
+from pathlib import Path
+
+from turnout import __version__
+from turnout.config import load_configuration
+from turnout.errors import TurnoutError
+from turnout.fleet.batches import read_results
+from turnout.fleet.shard import Stage, Summary, run_shard
+from turnout.fleet.state import batch_paths
+from turnout.fleet.tables import configuration_rows
+from turnout.fleet.verdict import Verdict, verdict
+
+
+def stage_job(plan, state, log, params, threads: int) -> Summary:
+    """Run one stage of one shard; ``params`` holds kind, chain, algo, job and, where needed, context."""
+    _log_to(log)
+    stage = Stage(params.kind, params.chain, params.algo, params.get("context"))
+    job = params.job
+    configuration = load_configuration(job["configuration"])
+    summary = run_shard(
+        Path(plan), Path(state), stage, configuration, Path(job["raw"]),
+        threads=threads, only=job["only"] or None, strict=job["strict"],
+    )  # fmt: skip
+    _say(summary)
+    return summary
+
+
+def verdict_job(states, output, log, params) -> Verdict:
+    """Judge the run; SystemExit with 1 where it is not sound."""
+    _log_to(log)
+    try:
+        found = verdict([Path(s) for s in states], load_configuration(params.job["configuration"]), Path(output))
+    except TurnoutError as error:
+        _say(error)
+        raise SystemExit(1) from None
+    _say(found)
+    return found
+
+
+def register_job(register, generation, log, params) -> None:
+    """Hand every shard's batches to ``register``, those of shards that take no part in this run, too."""
+    _log_to(log)
+    configuration = load_configuration(params.job["configuration"])
+    plans = [Path("work/plan") / f"{shard}.json" for shard in params.shards]
+    states = [Path("work") / stage / f"{shard}.json" for stage in params.stages for shard in params.shards]
+    tables = configuration_rows(configuration, Path(params.job["raw"]), plans)
+    done = register(
+        batch_paths(states), Path(generation).parent, read=read_results, tables=tables,
+        config_hash=params.configuration, code_version=__version__,
+    )  # fmt: skip
+    os.utime(generation)
+    for batch, fault in done.faults.items():
+        logging.getLogger("turnout.fleet").warning("%s: %s", batch, fault)
+    _say(f"register: {done.n_units} units, {sum(done.rows.values())} rows, {done.n_refused} refused")
+
+
+def _log_to(log) -> None:
+    """Messages go to the job's log file and, from warnings on, to the screen."""
+    Path(str(log)).parent.mkdir(parents=True, exist_ok=True)
+    form = logging.Formatter("%(levelname)s %(message)s")
+    to_file, to_screen = logging.FileHandler(str(log), mode="w", encoding="utf-8"), logging.StreamHandler(sys.stderr)
+    to_screen.setLevel(logging.WARNING)
+    for handler in (to_file, to_screen):
+        handler.setFormatter(form)
+        logging.getLogger("turnout").addHandler(handler)
+    logging.getLogger("turnout").setLevel(logging.INFO)
+
+
+def _say(what) -> None:
+    logging.getLogger("turnout.fleet").info("%s", what)
+    print(what, file=sys.stderr, flush=True)

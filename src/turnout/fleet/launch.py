@@ -1,0 +1,87 @@
+"""What the workflow needs to know before its first job: options, shards, plan files."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from turnout.config import Configuration, load_configuration
+from turnout.config.keys import suggestion
+from turnout.errors import ConfigError
+from turnout.fleet.plan import write_plans
+from turnout.fleet.shards import shard_names
+from turnout.fleet.tables import fleet_hash
+
+OPTIONS = {
+    "configuration": "folder with config.yaml, turnouts.tsv, layouts/",
+    "raw": "raw root",
+    "turnouts": "ids, with commas between them: only these are computed",
+    "shards": "number of shards, instead of that in config.yaml",
+    "strict": "true: raise faults of the program instead of noting them",
+    "accept_vanished": "true: many known files are gone on purpose",
+    "chains": "for each stage module:function, instead of the program's own",
+}
+PLANS = "work/plan"
+
+
+@dataclass(frozen=True)
+class Launch:
+    """``shards`` take part in this run, ``every_shard`` names all; ``job`` is what a stage job is told."""
+
+    shards: list[str]
+    every_shard: list[str]
+    turnouts: tuple[str, ...] | None
+    fleet_hash: str
+    job: dict = field(default_factory=dict)
+    chains: Mapping[str, str] = field(default_factory=dict)
+
+    def threads(self, cores: int | None) -> int:
+        """Processes per job when ``cores`` are shared among the shards."""
+        return max(1, (cores or 1) // len(self.shards))
+
+
+def launch(options: Mapping, scan: bool, formats=None, to_si=None) -> Launch:
+    """Read the configuration, and where ``scan`` is set bring the plan files up to date.
+
+    ``options`` are those of ``snakemake --config``; ConfigErrors where they or the configuration are unsound.
+    """
+    for name in options:
+        if name not in OPTIONS:
+            raise ConfigError("--config", "option", f"unknown option {name!r}", suggestion(name, OPTIONS))
+    configuration = load_configuration(options.get("configuration", "config"), formats, to_si)
+    turnouts = _turnouts(options.get("turnouts"), configuration)
+    shards = _number(options.get("shards", configuration.settings["fleet"].shards))
+    job: dict = {
+        "configuration": str(options.get("configuration", "config")),
+        "raw": str(options.get("raw", "raw")),
+        "only": list(turnouts) if turnouts else [],
+        "strict": _flag(options, "strict"),
+    }
+    if scan:
+        raw, accept = Path(job["raw"]), _flag(options, "accept_vanished")
+        write_plans(configuration, raw, Path(PLANS), shards, turnouts, accept)
+    names = shard_names(shards, turnouts)
+    chains = dict(options.get("chains") or {})
+    return Launch(names, shard_names(shards), turnouts, fleet_hash(configuration), job, chains)
+
+
+def _turnouts(said, configuration: Configuration) -> tuple[str, ...] | None:
+    if said is None or said == "":
+        return None
+    ids = [str(t).strip() for t in (said if isinstance(said, list) else str(said).split(","))]
+    for turnout in ids:
+        configuration.turnout(turnout)
+    return tuple(sorted(set(ids)))
+
+
+def _number(said) -> int:
+    if not isinstance(said, int) or not 1 <= said <= 4096:
+        raise ConfigError("--config", "shards", repr(said), "Write a whole number from 1 to 4096")
+    return said
+
+
+def _flag(options: Mapping, name: str) -> bool:
+    """An option that is true or false; Snakemake hands some spellings on as text."""
+    said = str(options.get(name, False)).lower()
+    if said not in ("true", "false"):
+        raise ConfigError("--config", name, repr(options[name]), "Write true or false")
+    return said == "true"

@@ -1,0 +1,104 @@
+"""One unattended run: nothing beside it, remains of a killed one cleared away, one line at the end."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from filelock import FileLock, Timeout
+
+from turnout.errors import TurnoutError
+from turnout.fleet.plan import read_plan
+from turnout.fleet.scan import unit_id
+from turnout.fleet.state import load_state
+
+JOB_NAMES = "turnouts"
+TOO_LATE = 124
+
+
+@dataclass(frozen=True)
+class Night:
+    """What a run did; ``code`` is 0 only where all went well."""
+
+    code: int
+    units: int
+    processed: int
+    quarantined: int
+    vanished: int
+
+    def __str__(self):
+        said = {0: "sound", TOO_LATE: "stopped at the time limit"}.get(self.code, f"failed with exit code {self.code}")
+        return (
+            f"{said}: {self.units} units known, {self.processed} processed, "
+            f"{self.quarantined} of these with rows in quarantine, {self.vanished} vanished"
+        )
+
+
+def nightly(options: Sequence[str], profile: str, limit: float | None = None, work: Path = Path("work")) -> Night:
+    """Run the workflow once, with ``options`` handed on to Snakemake.
+
+    ``profile`` is a folder of profiles/; ``limit`` [s] ends a run that hangs. TurnoutError where another run is
+    still going on.
+    """
+    work.mkdir(exist_ok=True)
+    lock = FileLock(work / ".nightly.lock")
+    try:
+        with lock.acquire(timeout=0):
+            _clear(options, Path(profile).name)
+            before = _batches(work)
+            code = _snakemake([*options, "--workflow-profile", profile, "--rerun-incomplete"], limit)
+            return _night(code, before, work)
+    except Timeout:
+        found = f"{work / '.nightly.lock'} is held: another nightly run is going on"
+        raise TurnoutError(f"{found}. Wait for it, or end it.") from None
+
+
+def _clear(options: Sequence[str], profile: str) -> None:
+    """Release Snakemake's lock, drop its backups, and cancel what a killed run left in the queue."""
+    shutil.rmtree(Path(".snakemake") / "backups", ignore_errors=True)
+    shutil.rmtree(Path(".snakemake") / "locks", ignore_errors=True)
+    if profile == "slurm" and shutil.which("scancel"):
+        queue = subprocess.run(["squeue", "--me", "-h", "-o", "%i %j"], capture_output=True, text=True, check=False)
+        left = [line.split()[0] for line in queue.stdout.splitlines() if line.split()[1].startswith(JOB_NAMES)]
+        if left:
+            subprocess.run(["scancel", *left], check=False)
+
+
+def _snakemake(options: Sequence[str], limit: float | None) -> int:
+    """Exit code of Snakemake in a process group of its own, so that the limit ends its jobs, too."""
+    process = subprocess.Popen([sys.executable, "-m", "snakemake", *options], start_new_session=True)
+    try:
+        return process.wait(limit)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGTERM)
+        try:
+            process.wait(60)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+        return TOO_LATE
+
+
+def _states(work: Path) -> list[Path]:
+    return sorted(p for p in work.glob("*/*of*.json") if p.parent.name != "plan")
+
+
+def _batches(work: Path) -> set[tuple[Path, str]]:
+    return {(path, batch) for path in _states(work) for batch in load_state(path).batches}
+
+
+def _night(code: int, before: set, work: Path) -> Night:
+    planned = {unit_id(p.unit) for plan in sorted((work / "plan").glob("*.json")) for p in read_plan(plan)}
+    units = processed = quarantined = vanished = 0
+    for path in _states(work):
+        for name, known in load_state(path).units.items():
+            units += 1
+            vanished += name not in planned
+            if (path, known.batch) not in before:
+                processed += 1
+                quarantined += known.status not in ("ok", "vanished")
+    return Night(code, units, processed, quarantined, vanished)

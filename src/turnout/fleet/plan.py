@@ -1,0 +1,118 @@
+"""One plan file per shard: every unit of its turnouts, what it is computed from, and what was left out."""
+
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from turnout.config import Configuration, TurnoutConfig
+from turnout.config.load import read_notes
+from turnout.errors import ConfigError, ReadError
+from turnout.fleet.atomic import write_if_changed
+from turnout.fleet.notes import notes_of
+from turnout.fleet.scan import scan
+from turnout.fleet.shards import shard_names, shard_of
+from turnout.records import Unit
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A unit and the digest of what was noted about it beside its files (campaign, trains)."""
+
+    unit: Unit
+    note: str = ""
+
+
+def write_plans(
+    configuration: Configuration,
+    raw_root: Path,
+    folder: Path,
+    shards: int,
+    turnouts: Iterable[str] | None = None,
+    accept_vanished: bool = False,
+) -> list[str]:
+    """Scan the raw folders and write ``folder``/<shard>.json where the content changed; names of the shards.
+
+    ``turnouts`` limits the scan to their shards. Nothing in a plan changes without meaning: no time of scan, no
+    absolute path. ConfigError where so many known files are gone that a disk must be missing.
+    """
+    for turnout in turnouts or ():
+        configuration.turnout(turnout)
+    names = shard_names(shards, turnouts)
+    members: dict[str, list[str]] = {name: [] for name in names}
+    for turnout in sorted(configuration.ids):
+        members.get(shard_of(turnout, shards), []).append(turnout)
+    texts, gone, known = {}, [], 0
+    for name in names:
+        path = Path(folder) / f"{name}.json"
+        entries = [_entry(configuration.turnout(t), Path(raw_root)) for t in members[name]]
+        texts[path] = _text(name, entries)
+        before = path.read_text(encoding="utf-8") if path.exists() else ""
+        if before and before != texts[path]:
+            files = _paths(json.loads(before)["turnouts"])
+            gone += sorted(files - _paths(entries))
+            known += len(files)
+        elif before:
+            known += sum(len(u[5]) for e in entries for u in e["units"])
+    if not accept_vanished:
+        _refuse_if_gone(configuration.settings["fleet"], Path(raw_root), gone, known)
+    for path, text in texts.items():
+        write_if_changed(path, text)
+    return names
+
+
+def read_plan(path: Path) -> Iterator[Planned]:
+    """Units of a plan file."""
+    for entry in json.loads(Path(path).read_text(encoding="utf-8"))["turnouts"]:
+        for kind, label, section, campaign, note, files in entry["units"]:
+            files = tuple((f"{entry['raw']}/{name}", size, time) for name, size, time in files)
+            unit = Unit(entry["turnout"], kind, label, files, entry["hashes"][kind], section, campaign)
+            yield Planned(unit, note)
+
+
+def read_problems(path: Path) -> Iterator[tuple[str, dict]]:
+    """``(turnout, problem)`` of a plan file; a problem has path, where, found, remedy, reason."""
+    for entry in json.loads(Path(path).read_text(encoding="utf-8"))["turnouts"]:
+        for problem in entry["problems"]:
+            yield entry["turnout"], dict(zip(("path", "where", "found", "remedy", "reason"), problem))
+
+
+def _entry(turnout: TurnoutConfig, raw_root: Path) -> dict:
+    """What the plan says of one turnout."""
+    scanned = scan(turnout, raw_root)
+    turnout, errors = read_notes(turnout, raw_root)
+    notes, start = notes_of(turnout, scanned.units), len(turnout.raw) + 1
+    return {
+        "turnout": turnout.id,
+        "raw": turnout.raw,
+        "hashes": dict(turnout.hashes),
+        "units": [
+            [u.kind, u.label, u.section, u.campaign, note, [[p[start:], size, time] for p, size, time in u.files]]
+            for u, note in zip(scanned.units, notes)
+        ],
+        "problems": [_problem(e) for e in (*scanned.problems, *errors)],
+    }
+
+
+def _problem(error: ReadError) -> list[str]:
+    return [error.path, error.where, error.found, error.remedy, error.reason]
+
+
+def _text(shard: str, entries: list[dict]) -> str:
+    """One line per turnout, so that two plans can be compared by eye."""
+    lines = ",\n".join(json.dumps(e, ensure_ascii=False, separators=(",", ":")) for e in entries)
+    return f'{{"shard":"{shard}","turnouts":[\n{lines}\n]}}\n'
+
+
+def _paths(entries: list[dict]) -> set[str]:
+    return {f"{e['raw']}/{f[0]}" for e in entries for u in e["units"] for f in u[5]}
+
+
+def _refuse_if_gone(settings, raw_root: Path, gone: list[str], known: int) -> None:
+    if len(gone) > max(settings.vanished_files, settings.vanished_share * known):
+        found = f"{len(gone)} known files are gone, first {gone[0]}"
+        remedy = (
+            "Nothing was changed. Mount the disk again; if they are meant to be gone, run once with "
+            "--config accept_vanished=true"
+        )
+        raise ConfigError(str(raw_root), "raw root", found, remedy)

@@ -1,0 +1,148 @@
+"""The raw folder of one turnout: which files make which unit, and which files no pattern knows."""
+
+import os
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from datetime import datetime
+from operator import attrgetter
+from pathlib import Path
+
+from turnout.config import TurnoutConfig
+from turnout.config.pattern import compiled
+from turnout.errors import ReadError
+from turnout.records import Unit
+
+NOTES = ("campaigns.csv", "trains.csv")
+# Names that upload programs give to files they have not finished, and notes for people.
+UNFINISHED = (".tmp", ".part", ".partial", ".crdownload", ".filepart")
+FOR_PEOPLE = ("README", "README.txt", "README.md", "Thumbs.db", "desktop.ini")
+
+_name = attrgetter("name")
+
+
+@dataclass
+class Scan:
+    """``units`` sorted by kind and label; ``problems`` say what was left out and why."""
+
+    units: list[Unit] = field(default_factory=list)
+    problems: list[ReadError] = field(default_factory=list)
+
+
+def scan(turnout: TurnoutConfig, raw_root: Path) -> Scan:
+    """Units of one turnout from the names in its raw folder; no file is opened."""
+    found, names = Scan(), _names(turnout)
+    by_unit: dict[tuple, list] = {}
+    matched, unmatched = set(), []
+    root = os.path.join(raw_root, turnout.raw)
+    files: list[tuple[str, os.DirEntry]] = []
+    _collect(root, "", os.path.realpath(raw_root), turnout.raw, files, found.problems)
+    for inside, entry in files:
+        for kind, expression in names:
+            if match := expression.fullmatch(inside):
+                matched.add(kind)
+                if wrong := _no_time(match):
+                    found.problems.append(ReadError(f"{turnout.raw}/{inside}", "file name", *wrong, "name_unknown"))
+                    break
+                by_unit.setdefault(_label(kind, match, inside, turnout), []).append((inside, entry))
+                break
+        else:
+            unmatched.append(inside)
+    for (kind, label, section, campaign), files in sorted(by_unit.items(), key=lambda item: item[0][:2]):
+        entries = tuple(sorted(e for e in [_stat(turnout.raw, *file) for file in files] if e[1] >= 0))
+        if entries:
+            found.units.append(Unit(turnout.id, kind, label, entries, turnout.hashes[kind], section, campaign))
+    found.problems += _strangers(turnout, unmatched, matched, names)
+    return found
+
+
+def unit_id(unit: Unit) -> str:
+    """Name of a unit in batches and state files.
+
+    >>> unit_id(Unit("t1", "hammer", "A7/2024-05-13", (), ""))
+    't1/hammer/A7/2024-05-13'
+    """
+    return f"{unit.turnout}/{unit.kind}/{unit.label}"
+
+
+def _names(turnout: TurnoutConfig) -> list[tuple]:
+    names = []
+    if turnout.hammer:
+        names.append(("hammer", compiled(turnout.hammer.files, "hammer", tuple(s.label for s in turnout.sections))))
+    if turnout.passages:
+        names.append(("passage", compiled(turnout.passages.files, "passages")))
+    return names
+
+
+def _label(kind, match, inside, turnout) -> tuple:
+    """Kind, label, section and campaign of the unit that a file belongs to."""
+    if kind == "hammer":
+        section, campaign = match["section"], match["campaign"]
+        return kind, f"{section}/{campaign}", section, campaign
+    fixed = turnout.passages.files.partition("{")[0]
+    return kind, inside.removeprefix(fixed), None, None
+
+
+def _no_time(match) -> tuple[str, str] | None:
+    """What is wrong with the day or time in a name, and what to do; None where it is in the calendar.
+
+    >>> import re
+    >>> _no_time(re.fullmatch("(?P<campaign>.*)", "2024-13-45"))[0]
+    "'2024-13-45' is no day of the calendar"
+    """
+    for group, form, said in (("campaign", "%Y-%m-%d", "day"), ("time", "%Y%m%dT%H%M%SZ", "time")):
+        text = match.groupdict().get(group)
+        if text is None:
+            continue
+        try:
+            datetime.strptime(text, form)
+        except ValueError:
+            return f"{text!r} is no {said} of the calendar", "Rename it after the day on which it was measured, in UTC"
+    return None
+
+
+def _collect(folder: str, inside: str, root: str, raw: str, files: list, problems: list) -> None:
+    """Append ``(path below the turnout's folder, entry)`` of every file, depth first, sorted."""
+    try:
+        with os.scandir(folder) as listing:
+            entries = sorted(listing, key=_name)
+    except (FileNotFoundError, NotADirectoryError):
+        return
+    except PermissionError as error:
+        problems.append(ReadError(f"{raw}/{inside}", "folder", str(error.strerror), "Allow reading it"))
+        return
+    for entry in entries:
+        name = entry.name
+        if name.startswith(".") or name.endswith(UNFINISHED) or (not inside and name in (*NOTES, *FOR_PEOPLE)):
+            continue
+        if entry.is_symlink() and not _within(os.path.realpath(entry.path), root):
+            said = "leads out of the raw root", "Put the file itself below the raw root", "outside_root"
+            problems.append(ReadError(f"{raw}/{inside}{name}", "link", *said))
+        elif entry.is_dir():
+            _collect(entry.path, f"{inside}{name}/", root, raw, files, problems)
+        else:
+            files.append((inside + name, entry))
+
+
+def _within(path: str, root: str) -> bool:
+    return path == root or path.startswith(root + os.sep)
+
+
+def _stat(raw: str, inside: str, entry: os.DirEntry) -> tuple[str, int, int]:
+    """(path below the raw root, size, time of change [ns]); size -1 for a file that went away meanwhile."""
+    try:
+        status = entry.stat()
+    except FileNotFoundError:
+        return f"{raw}/{inside}", -1, 0
+    return f"{raw}/{inside}", status.st_size, status.st_mtime_ns
+
+
+def _strangers(turnout, unmatched: list[str], matched: set, names: Iterable) -> Iterator[ReadError]:
+    patterns = {"hammer": turnout.hammer, "passage": turnout.passages}
+    said = " or ".join(repr(patterns[kind].files) for kind, _ in names)
+    for inside in unmatched:
+        remedy = f"Rename it after {said}, or add its section to the layout {turnout.layout!r}"
+        found = "its name follows no pattern of the layout"
+        yield ReadError(f"{turnout.raw}/{inside}", "file name", found, remedy, "name_unknown")
+    if not matched:
+        remedy = f"Put files named like {said} there, or correct 'raw' in turnouts.tsv or 'files' in the layout"
+        yield ReadError(turnout.raw, "folder", "no file matches a pattern of the layout", remedy, "nothing_found")

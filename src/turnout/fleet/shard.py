@@ -1,0 +1,211 @@
+"""One stage of one shard: compute the units whose key changed, keep the results of all others."""
+
+import os
+import sys
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+
+from filelock import FileLock
+
+from turnout.config import Configuration, TurnoutConfig, with_raw
+from turnout.errors import ConfigError
+from turnout.fleet.batches import UnitResult, write_batch
+from turnout.fleet.guard import guarded
+from turnout.fleet.keys import key_of, stamp_of
+from turnout.fleet.plan import Planned, read_plan
+from turnout.fleet.pool import in_order
+from turnout.fleet.progress import Progress
+from turnout.fleet.scan import unit_id
+from turnout.fleet.state import Known, batch_folder, load_state, remove_orphans
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a shard job did; ``stale`` units wait for a new plan because the configuration changed after it."""
+
+    shard: str
+    known: int = 0
+    processed: int = 0
+    quarantined: int = 0
+    internal_errors: int = 0
+    vanished: int = 0
+    stale: int = 0
+
+    def __str__(self):
+        said = f"{self.shard}: {self.known} known, {self.processed} processed, {self.quarantined} quarantined"
+        more = {"internal errors": self.internal_errors, "vanished": self.vanished, "waiting for a plan": self.stale}
+        return said + "".join(f", {n} {what}" for what, n in more.items() if n)
+
+
+@dataclass(frozen=True)
+class Stage:
+    """What a stage computes: units of ``kind`` by ``compute(unit, turnout, raw_root, algo=...)``.
+
+    ``algo`` is the version of its code, part of every key. ``context(turnout_id)``, where given, returns
+    (token, value): the token enters the key, the value is passed on as ``context=``. Both may be named,
+    "package.module:function", and are then imported when there is something to compute.
+    """
+
+    kind: str
+    compute: Callable | str
+    algo: str
+    context: Callable[[str], tuple[str, object]] | str | None = None
+
+
+def named(function: Callable | str) -> Callable:
+    """The function that "package.module:name" names; a module of one's own lies in the folder of the run."""
+    if callable(function):
+        return function
+    module, _, name = function.partition(":")
+    if module.partition(".")[0] != "turnout" and os.getcwd() not in sys.path:
+        sys.path.append(os.getcwd())
+    return getattr(import_module(module), name)
+
+
+def run_shard(
+    plan: Path,
+    state: Path,
+    stage: Stage,
+    configuration: Configuration,
+    raw_root: Path,
+    *,
+    threads: int = 1,
+    only: Sequence[str] | None = None,
+    strict: bool = False,
+) -> Summary:
+    """Bring the results of one shard up to its plan.
+
+    Parameters
+    ----------
+    plan, state : path
+        work/plan/<shard>.json, read after the lock is held, and work/<stage>/<shard>.json, whose batches lie in
+        work/<stage>/<shard>/. Results count once the state file names their batch; it is written in one step,
+        at every checkpoint and at the end, so a kill at any time loses a checkpoint's work and nothing else.
+    stage : Stage
+        What is computed.
+    threads : int
+        Processes; the results do not depend on it.
+    only : sequence of str, optional
+        Turnouts to compute; the others of the shard stay as they are.
+    strict : bool
+        Raise faults of the program instead of noting them.
+    """
+    state.parent.mkdir(parents=True, exist_ok=True)
+    with FileLock(state.parent / f".{state.stem}.lock"):
+        run = _Run(Path(state), stage, configuration, Path(raw_root), threads, strict)
+        return run.bring_up(list(read_plan(plan)), only)
+
+
+class _Run:
+    """One call of ``run_shard``."""
+
+    def __init__(self, path: Path, stage: Stage, configuration: Configuration, raw_root: Path, threads, strict):
+        self.path, self.folder = path, batch_folder(path)
+        self.stage, self.configuration, self.raw_root = stage, configuration, raw_root
+        self.threads, self.strict = threads, strict
+        self.limits = configuration.settings["fleet"]
+        self.state = load_state(path)
+        self.waiting: list[tuple[UnitResult, str]] = []
+        self.saved_at = time.monotonic()
+
+    def bring_up(self, planned: list[Planned], only: Sequence[str] | None) -> Summary:
+        """Compute what is missing, write batches and state."""
+        remove_orphans(self.state, self.folder)
+        wanted = {unit_id(p.unit): p for p in planned if p.unit.kind == self.stage.kind}
+        todo, stale = self._todo(wanted, only)
+        name = f"{self.stage.kind} {self.path.stem}"
+        if todo:
+            # before processes are forked: each of them would import it anew
+            self.compute = named(self.stage.compute)
+        progress, bad, faults = Progress(name, len(todo)), 0, 0
+        for result, stamp in in_order(self._compute, todo, self.threads):
+            progress.step(result.status != "ok")
+            bad += result.status != "ok"
+            faults += result.status == "internal_error"
+            self._keep(result, stamp)
+        progress.close()
+        vanished = self._withdraw_vanished(wanted)
+        self._checkpoint()
+        return Summary(name, len(wanted), len(todo), bad, faults, vanished, stale)
+
+    def _todo(self, wanted: dict[str, Planned], only) -> tuple[list[tuple], int]:
+        """(planned, turnout, stamp, context) of every unit to compute, sorted; and how many wait for a plan."""
+        todo, stale, turnouts = [], 0, {}
+        for name in sorted(wanted):
+            planned = wanted[name]
+            turnout = planned.unit.turnout
+            if only is not None and turnout not in only:
+                continue
+            if turnout not in turnouts:
+                turnouts[turnout] = self._context(turnout)
+            token, value = turnouts[turnout]
+            planned = replace(planned, note=planned.note + token)
+            stamp, known = stamp_of(planned), self.state.units.get(name)
+            if known and (known.stamp, known.algo) == (stamp, self.stage.algo):
+                continue
+            config = self._turnout(planned, turnouts)
+            if config is None:
+                stale += 1
+            elif not self._same_content(name, planned, stamp, known):
+                todo.append((planned, config, stamp, value))
+        return todo, stale
+
+    def _context(self, turnout: str) -> tuple[str, object]:
+        return named(self.stage.context)(turnout) if self.stage.context else ("", None)
+
+    def _turnout(self, planned: Planned, cache: dict) -> TurnoutConfig | None:
+        """Configuration with the notes of the raw folder; None where it is not the one of the plan any more."""
+        unit = planned.unit
+        if (unit.turnout, "config") not in cache:
+            try:
+                config = self.configuration.turnout(unit.turnout)
+                cache[unit.turnout, "config"] = with_raw(config, self.raw_root)
+            except ConfigError:
+                cache[unit.turnout, "config"] = None
+        config = cache[unit.turnout, "config"]
+        return config if config and config.hashes[unit.kind] == unit.config_hash else None
+
+    def _same_content(self, name: str, planned: Planned, stamp: str, known: Known | None) -> bool:
+        """Whether only times changed; the state then notes the new ones."""
+        if known is None or known.algo != self.stage.algo or known.key != key_of(planned, self.raw_root):
+            return False
+        self.state.units[name] = replace(known, stamp=stamp)
+        return True
+
+    def _compute(self, task: tuple) -> tuple[UnitResult, str]:
+        planned, turnout, stamp, value = task
+        more = {"context": value} if self.stage.context else {}
+        key = key_of(planned, self.raw_root)
+        call = partial(guarded, self.compute, planned.unit, turnout, self.raw_root, key)
+        return call(self.stage.algo, self.strict, **more), stamp
+
+    def _keep(self, result: UnitResult, stamp: str) -> None:
+        self.waiting.append((result, stamp))
+        late = time.monotonic() - self.saved_at >= self.limits.checkpoint_time
+        if late or len(self.waiting) >= self.limits.checkpoint_units:
+            self._checkpoint()
+
+    def _withdraw_vanished(self, wanted: Iterable[str]) -> int:
+        """Count units whose files are all gone. Their rows stay; of a unit that only ever was in quarantine
+        nothing is left to repair: an empty result takes its rows out of the list of open ones."""
+        gone = [name for name in self.state.units if name not in wanted]
+        for name in gone:
+            known = self.state.units[name]
+            if known.status == "quarantined":
+                turnout, kind, _ = name.split("/", 2)
+                self.waiting.append((UnitResult(name, turnout, kind, "vanished", known.algo, "vanished", {}), ""))
+        return len(gone)
+
+    def _checkpoint(self) -> None:
+        if self.waiting:
+            batch = write_batch(self.folder, [result for result, _ in self.waiting]).name
+            self.state.batches = [b for b in self.state.batches if b != batch] + [batch]
+            for result, stamp in self.waiting:
+                self.state.units[result.unit] = Known(stamp, result.key, result.algo, result.status, batch)
+            self.waiting.clear()
+        self.state.save(self.path)
+        self.saved_at = time.monotonic()

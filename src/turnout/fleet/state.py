@@ -1,0 +1,66 @@
+"""What a shard has computed: per unit the key of its result and the batch that holds it."""
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from turnout.errors import TurnoutError
+from turnout.fleet.atomic import write_text
+
+
+@dataclass(frozen=True)
+class Known:
+    """``stamp``: names, sizes and times it was computed from; ``key``: the same by content; ``batch``: file name."""
+
+    stamp: str
+    key: str
+    algo: str
+    status: str
+    batch: str
+
+
+@dataclass
+class State:
+    """State of one shard; ``batches`` in the order in which they were written."""
+
+    units: dict[str, Known] = field(default_factory=dict)
+    batches: list[str] = field(default_factory=list)
+
+    def save(self, path: Path) -> None:
+        """Write it in one step: the results of a batch count from now on."""
+        units = {u: [k.stamp, k.key, k.algo, k.status, k.batch] for u, k in sorted(self.units.items())}
+        lines = ",\n".join(f"{json.dumps(u, ensure_ascii=False)}:{json.dumps(v)}" for u, v in units.items())
+        write_text(path, f'{{"batches":{json.dumps(self.batches)},"units":{{\n{lines}\n}}}}\n')
+
+
+def load_state(path: Path) -> State:
+    """State in ``path``, empty where there is none; TurnoutError where somebody else changed the file."""
+    try:
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
+        units = {unit: Known(*values) for unit, values in content["units"].items()}
+        return State(units, list(content["batches"]))
+    except FileNotFoundError:
+        return State()
+    except (ValueError, KeyError, TypeError) as error:
+        raise TurnoutError(f"{path}: not a state file ({error}). Delete it: its shard is then computed anew.") from None
+
+
+def batch_folder(state: Path) -> Path:
+    """Folder of the batches of a state file: work/hammer/00of01.json -> work/hammer/00of01."""
+    return Path(state).with_suffix("")
+
+
+def batch_paths(states: Iterable[Path]) -> list[Path]:
+    """Batch files that the ``states`` name, shard by shard in the order in which they were written."""
+    return [batch_folder(Path(s)) / name for s in states for name in load_state(Path(s)).batches]
+
+
+def remove_orphans(state: State, folder: Path) -> int:
+    """Delete batches that ``state`` does not name, and temporary files: a killed job left them. Returns how many."""
+    named, count = set(state.batches), 0
+    for path in [*folder.glob("batch-*.parquet"), *folder.glob(".*.tmp")]:
+        if path.name not in named:
+            path.unlink(missing_ok=True)
+            count += 1
+    return count

@@ -1,0 +1,113 @@
+"""Rows of the registry that come from no recording: turnouts, sections, events, campaigns, files left out."""
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+
+from turnout.config import Configuration, Event, TurnoutConfig, with_raw
+from turnout.fleet.plan import read_plan, read_problems
+from turnout.registry.ids import content_id
+
+
+def configuration_rows(configuration: Configuration, raw_root: Path, plans: Iterable[Path]) -> dict[str, list[dict]]:
+    """Rows by table, sorted; a campaign that campaigns.csv does not know but has files is a row, too."""
+    plans = [p for p in plans if Path(p).exists()]
+    measured: dict[str, set[str]] = {}
+    for plan in plans:
+        for planned in read_plan(plan):
+            if planned.unit.campaign:
+                measured.setdefault(planned.unit.turnout, set()).add(planned.unit.campaign)
+    turnouts = [configuration.turnout(t) for t in sorted(configuration.ids)]
+    return {
+        "turnouts": [_turnout(t) for t in turnouts],
+        "sections": [_section(t, s) for t in turnouts for s in t.sections],
+        "events": [_event(e) for e in configuration.events],
+        "campaigns": [r for t in turnouts for r in _campaigns(with_raw(t, raw_root), measured.get(t.id, set()))],
+        "quarantine": [row for plan in plans for row in _left_out(plan)],
+    }
+
+
+def _turnout(turnout: TurnoutConfig) -> dict:
+    return {
+        "turnout_id": turnout.id,
+        "name": turnout.name or None,
+        "line": turnout.line or None,
+        "km": turnout.km,
+        "layout": turnout.layout,
+        "lat_deg": turnout.latitude,
+        "lon_deg": turnout.longitude,
+        "external_id": turnout.external_id or None,
+        "id_scheme": turnout.id_scheme or None,
+        "config_hash": turnout.config_hash,
+    }
+
+
+def _section(turnout: TurnoutConfig, section) -> dict:
+    return {
+        "section_id": turnout.section_id(section.label),
+        "turnout_id": turnout.id,
+        "label": section.label,
+        "panel": section.panel,
+        "track": section.track,
+        "position_m": section.position,
+        "pad_type": section.pad or None,
+        "sleeper_type": section.sleeper or None,
+    }
+
+
+def _event(event: Event) -> dict:
+    return {
+        "event_id": content_id("event", event.turnout, event.section, event.at, event.kind, event.note),
+        "turnout_id": event.turnout,
+        "section_id": f"{event.turnout}/{event.section}" if event.section else None,
+        "event_at_utc": event.at.isoformat(),
+        "kind": event.kind,
+        "resets_ballast": "ballast" in event.resets,
+        "resets_railpad": "railpad" in event.resets,
+        "note": event.note or None,
+    }
+
+
+def _campaigns(turnout: TurnoutConfig, measured: set[str]) -> list[dict]:
+    rows = []
+    for date in sorted({*turnout.campaigns, *measured}):
+        campaign = turnout.campaigns[date]
+        rows.append(
+            {
+                "campaign_id": f"{turnout.id}/{date}",
+                "turnout_id": turnout.id,
+                "started_at_utc": campaign.started_at.isoformat(),
+                "hammer_id": campaign.hammer_id or None,
+                "tip": campaign.tip or None,
+                "operator": campaign.operator or None,
+                "rail_temperature_c": campaign.rail_temperature,
+            }
+        )
+    return rows
+
+
+def _left_out(plan: Path) -> list[dict]:
+    rows = []
+    for turnout, problem in read_problems(plan):
+        rows.append(
+            {
+                "quarantine_id": content_id("quarantine", problem["path"], "plan", problem["reason"], problem["where"]),
+                "turnout_id": turnout,
+                "kind": "configuration",
+                "path": problem["path"],
+                "stage": "plan",
+                "reason_code": problem["reason"],
+                "place": problem["where"],
+                "found": problem["found"],
+                "remedy": problem["remedy"],
+            }
+        )
+    return rows
+
+
+def fleet_hash(configuration: Configuration) -> str:
+    """Changes when a turnout, its configuration or an event does."""
+    hashes = [
+        [t, configuration.hash_of(t), json.dumps(configuration.rows[t].values)] for t in sorted(configuration.ids)
+    ]
+    return content_id(hashes, [_event(e)["event_id"] for e in configuration.events])

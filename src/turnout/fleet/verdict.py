@@ -1,0 +1,75 @@
+"""Whether the results that came since the last sound run may be trusted: the breaker, after the registry is out."""
+
+import json
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from turnout.config import Configuration
+from turnout.errors import TurnoutError
+from turnout.fleet.atomic import write_text
+from turnout.fleet.batches import read_column
+from turnout.fleet.state import batch_paths
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Units that are new since the last sound run; ``complaints`` is empty for a sound one."""
+
+    units: int
+    quarantined: int
+    internal_errors: int
+    complaints: tuple[str, ...]
+    judged: tuple[str, ...]
+
+    def __str__(self):
+        said = f"{self.units} units computed, {self.quarantined} with rows in quarantine"
+        faults = f", {self.internal_errors} internal errors" if self.internal_errors else ""
+        return said + faults + "".join(f"\n{c}" for c in self.complaints)
+
+
+def judge(states: Iterable[Path], configuration: Configuration, judged: Iterable[str] = ()) -> Verdict:
+    """Judge all batches that ``states`` name, those ``judged`` before left out.
+
+    Complaints: an internal error anywhere; and over the fleet or over one line a share of units in quarantine
+    above ``quarantine_share``, where there are at least ``quarantine_units`` of them.
+    """
+    limits, before = configuration.settings["fleet"], set(judged)
+    status, names, lines = {}, [], {}
+    for path in batch_paths(states):
+        name = f"{path.parent.parent.name}/{path.parent.name}/{path.name}"
+        names.append(name)
+        if name not in before:
+            for unit, turnout, found in read_column(path, "unit", "turnout", "status"):
+                status[unit] = found
+                row = configuration.rows.get(turnout)
+                lines[unit] = str(row.values.get("line", "")) if row else ""
+    faults = sorted(unit for unit, found in status.items() if found == "internal_error")
+    bad = [unit for unit, found in status.items() if found in ("partly", "quarantined")]
+    complaints = []
+    if faults:
+        first = f"{len(faults)} internal errors, first in {faults[0]}"
+        complaints.append(
+            f"{first}: query the quarantine table for reason_code 'internal_error', report it with the log"
+        )
+    total, wrong = Counter(lines.values()), Counter(lines[unit] for unit in bad)
+    groups = [("the fleet", len(status), len(bad))]
+    groups += [(f"line {line!r}", total[line], wrong[line]) for line in sorted(total) if line and len(total) > 1]
+    for name, n, n_bad in groups:
+        if n >= limits.quarantine_units and n_bad > limits.quarantine_share * n:
+            share = f"{n_bad} of {n} new units of {name} have rows in quarantine, {100 * n_bad / n:.0f} %"
+            complaints.append(f"{share}, above the limit of {100 * limits.quarantine_share:.0f} %")
+    return Verdict(len(status), len(bad), len(faults), tuple(complaints), tuple(names))
+
+
+def verdict(states: Iterable[Path], configuration: Configuration, output: Path) -> Verdict:
+    """Judge what is new since ``output`` was last written, and write it; TurnoutError, nothing written, if unsound."""
+    output = Path(output)
+    judged = json.loads(output.read_text(encoding="utf-8"))["judged"] if output.exists() else ()
+    found = judge(states, configuration, judged)
+    if found.complaints:
+        raise TurnoutError(f"the registry is up to date, but {found}")
+    content = {"units": found.units, "quarantined": found.quarantined, "judged": found.judged}
+    write_text(output, json.dumps(content, indent=1) + "\n")
+    return found

@@ -1,0 +1,78 @@
+"""What the decays hold besides modes: a slow drift of the zero and hum of the mains or the traction current."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from turnout.identify.linearise import drift_columns, linearise
+from turnout.identify.mixed import degrees_of_freedom
+from turnout.identify.significance import columns_chi_squared
+
+PROBABILITY = 1e-3
+NEAR_HARMONIC = 0.06
+HARMONICS = 5
+
+
+@dataclass(frozen=True)
+class Background:
+    """A polynomial of ``drift_degree`` (-1: none) and sines at the ``hum`` frequencies [Hz], free in each decay."""
+
+    drift_degree: int = -1
+    hum: tuple[float, ...] = ()
+
+    def columns(self, n: int, rate: float) -> np.ndarray:
+        """(n_column, n) columns of the model: cosine and sine of each hum, then the polynomials."""
+        phase = 2.0 * np.pi * np.array(self.hum)[:, None] * np.arange(n) / rate
+        scale = np.sqrt(2.0 / n)
+        return np.vstack([scale * np.cos(phase), scale * np.sin(phase), drift_columns(n, self.drift_degree)])
+
+
+def highest_drift(n: int, rate: float, settings) -> int:
+    """Highest degree of a drift that stays below the ballast band, at most ``settings.drift_maximum``.
+
+    A polynomial of degree d over a record of length T holds frequencies up to (d + 1) / (2 T).
+    """
+    return min(settings.drift_maximum, int(2.0 * settings.ballast_low * n / rate) - 1)
+
+
+def hum_frequencies(table, n: int, rate: float, settings) -> tuple[float, ...]:
+    """Harmonics of ``settings.hum_sources`` at which an undamped pole reappears over orders and starts. [Hz]
+
+    Undamped: it decays, or grows, by less than half over the ``n`` samples. ``table`` is a Stabilisation.
+    """
+    found: list[float] = []
+    for source in settings.hum_sources:
+        for harmonic in source * np.arange(1, HARMONICS + 1):
+            near = np.abs(table.frequency / harmonic - 1.0) < NEAR_HARMONIC
+            steady = np.abs(table.damping) * 2.0 * np.pi * table.frequency * n / rate < np.log(2.0)
+            seen = np.unique(table.start[near & steady] * 1000 + table.order[near & steady])
+            if len(seen) >= settings.presence_minimum * table.n_cell and not np.any(
+                np.abs(np.array(found) / harmonic - 1.0) < NEAR_HARMONIC
+            ):
+                found.append(float(harmonic))
+    return tuple(found)
+
+
+def needed_background(theta, decays, rate, most: Background) -> Background:
+    """The part of ``most`` that is significant beside the modes ``theta`` (n_decay, n_mode, 2).
+
+    Hum by hum, then from no drift upwards: the lowest degree above which nothing is significant.
+    """
+    n_decay, n = decays.shape
+    n_mode = theta.shape[1]
+
+    def probability(background, columns):
+        at = linearise(theta, decays, rate, background.columns(n, rate))
+        drift = at.gram.shape[-1] - 2 * n_mode
+        sigma2 = at.rss.sum() / degrees_of_freedom(decays, n_mode, drift)
+        index = 2 * n_mode + np.asarray(columns)
+        return chi2.sf(columns_chi_squared(at, sigma2, index), n_decay * len(index))
+
+    n_hum = len(most.hum)
+    hum = tuple(h for i, h in enumerate(most.hum) if probability(most, [i, n_hum + i]) < PROBABILITY)
+    most, n_hum = Background(most.drift_degree, hum), len(hum)
+    for lowest in range(most.drift_degree + 1):
+        if probability(most, range(2 * n_hum + lowest, 2 * n_hum + most.drift_degree + 1)) > PROBABILITY:
+            return Background(lowest - 1, hum)
+    return most

@@ -1,0 +1,123 @@
+"""Least-squares fit of modes to frequency responses in a narrow band, residues projected out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnout.identify.poles import continuous_pole
+
+LOCAL_TERMS = 3
+SINGLE_CONTRAST = 30.0
+
+
+@dataclass(frozen=True)
+class FrfFit:
+    """Fit of a band: ``theta`` (n_mode, 2) ln f [Hz] and zeta; ``information`` (n_frf, p, p), ``score`` (n_frf, p).
+
+    ``residue`` (n_mode, n_frf) complex and ``residual`` (n_frf, n_line) complex; everything is over the noise of
+    each response, ``noise`` (n_frf,) its standard deviation per real part.
+    """
+
+    theta: np.ndarray
+    information: np.ndarray
+    score: np.ndarray
+    residue: np.ndarray
+    residual: np.ndarray
+    noise: np.ndarray
+
+    @property
+    def error(self) -> np.ndarray:
+        """(n_mode, 2) standard errors of ln f and zeta from the residual."""
+        own = np.linalg.pinv(self.information.sum(axis=0), hermitian=True)
+        return np.sqrt(np.maximum(np.diag(own), 1e-300)).reshape(-1, 2)
+
+    @property
+    def contrast(self) -> np.ndarray:
+        """(n_mode,) height of each resonance over the residual. [dB]"""
+        decay_rate = 2.0 * np.pi * np.exp(self.theta[:, 0]) * np.abs(self.theta[:, 1])
+        height = np.sqrt(np.mean(np.abs(self.residue) ** 2, axis=1)) / np.maximum(decay_rate, 1e-300)
+        left = np.sqrt(np.mean(np.abs(self.residual) ** 2))
+        return 20.0 * np.log10(np.maximum(height, 1e-300) / max(left, 1e-300))
+
+    @property
+    def cost(self) -> float:
+        """Sum of squared residuals over the variance of the noise, what the fit makes small. [-]"""
+        return float(np.sum(np.abs(self.residual) ** 2 / self.noise[:, None] ** 2))
+
+
+def linearise_frf(theta, frequency, frf, noise) -> FrfFit:
+    r"""Local model :math:`\sum_m R_m / (i\omega - s_m) + p_0 + p_1 \omega + p_2 \omega^2` around given modes.
+
+    The polynomial stands for all modes outside of the band and for the conjugate poles.
+
+    ``theta`` (n_mode, 2), ``frequency`` (n_line,) [Hz], ``frf`` (n_frf, n_line), ``noise`` (n_frf,).
+    """
+    n_mode = len(theta)
+    omega = 2.0 * np.pi * frequency
+    s = continuous_pole(np.exp(theta[:, 0]), theta[:, 1])
+    middle, width = omega.mean(), np.ptp(omega) / 2.0
+    pole_part = 1.0 / (1j * omega[:, None] - s)
+    scale = np.abs(s.real)
+    basis = np.hstack([pole_part * scale, ((omega[:, None] - middle) / width) ** np.arange(LOCAL_TERMS)])
+    q, r = np.linalg.qr(basis)
+    projection = q.conj().T @ frf.T
+    coefficient = np.linalg.solve(r, projection)
+    residual = frf.T - q @ projection
+    damped = np.sqrt(1.0 - theta[:, 1] ** 2)
+    magnitude = 2.0 * np.pi * np.exp(theta[:, 0])
+    slope = np.stack([s, magnitude * (-1.0 - 1j * theta[:, 1] / damped)], axis=1)
+    columns = (pole_part**2 * scale)[:, :, None] * slope
+    columns = columns.reshape(len(omega), 2 * n_mode)
+    columns = columns - q @ (q.conj().T @ columns)
+    jacobian = columns[:, :, None] * np.repeat(coefficient[:n_mode], 2, axis=0)
+    weight = noise**-2.0
+    information = np.einsum("kpi,kqi,i->ipq", jacobian.conj(), jacobian, weight).real
+    score = np.einsum("kpi,ki,i->ip", jacobian.conj(), residual, weight).real
+    return FrfFit(theta, information, score, coefficient[:n_mode] * scale[:, None], residual.T, noise)
+
+
+def fit_frf(theta, frequency, frf, iterations: int = 25) -> FrfFit:
+    """Gauss-Newton from ``theta`` with halved steps, each response weighted by its own residual."""
+    noise = np.full(len(frf), np.sqrt(np.mean(np.abs(frf) ** 2)))
+    fit = linearise_frf(np.asarray(theta, float), frequency, frf, noise)
+    for _ in range(iterations):
+        freedom = max(1, 2 * len(frequency) - 2 * (len(fit.theta) + LOCAL_TERMS))
+        noise = np.sqrt(np.sum(np.abs(fit.residual) ** 2, axis=1) / freedom)
+        fit = linearise_frf(fit.theta, frequency, frf, np.maximum(noise, 1e-12 * np.abs(frf).max()))
+        information = fit.information.sum(axis=0)
+        step = np.linalg.lstsq(information, fit.score.sum(axis=0), rcond=1e-14)[0].reshape(-1, 2)
+        limit = np.stack([fit.theta[:, 1], 0.5 * fit.theta[:, 1]], axis=1)
+        step = np.clip(step, -limit, limit)
+        better = None
+        for _ in range(6):
+            trial = linearise_frf(fit.theta + step, frequency, frf, fit.noise)
+            if trial.cost <= fit.cost:
+                better = trial
+                break
+            step = 0.5 * step
+        if better is None:
+            return fit
+        settled = step.ravel() @ information @ step.ravel() < 1e-6
+        fit = better
+        if settled:
+            return fit
+    return fit
+
+
+def fit_each(start, frequency, frf, near) -> list[FrfFit]:
+    """Each response fitted alone from the modes of their common fit, with as few modes as it takes.
+
+    Poles that differ between responses look like close poles to a common fit: the mode nearest to the peak
+    (``near``: its frequency and half-power width [Hz]) is tried alone first, and kept alone where it stands
+    ``SINGLE_CONTRAST`` over the residual.
+    """
+    nearest = int(np.argmin(np.abs(np.exp(start[:, 0]) - near[0])))
+    alone = [_fit_alone(start[[nearest]], frequency, response) for response in frf]
+    if len(start) == 1 or np.median([fit.contrast[0] for fit in alone]) >= SINGLE_CONTRAST:
+        return alone
+    common = fit_frf(start, frequency, frf)
+    return [_fit_alone(common.theta, frequency, response) for response in frf]
+
+
+def _fit_alone(theta, frequency, response):
+    return fit_frf(theta, frequency, response[None])

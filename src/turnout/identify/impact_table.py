@@ -1,0 +1,67 @@
+"""Modes of single blows, and the campaign value with interval that they add up to."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnout.identify.summary import summarise
+from turnout.records import Mode
+
+
+@dataclass(frozen=True)
+class ImpactEstimates:
+    """One mode in several blows: ``impact`` (n,) numbers, ``estimate`` and ``error`` (n, 2) of ln f [Hz] and zeta.
+
+    ``strength`` (n,) is the norm of each decay; ``bound`` (2,) the Cramér-Rao bound, None where unknown.
+    """
+
+    band: str
+    impact: np.ndarray
+    estimate: np.ndarray
+    error: np.ndarray
+    strength: np.ndarray
+    energy: float | None = None
+    bound: np.ndarray | None = None
+
+    def rows(self) -> list[dict]:
+        """The table ``per_impact`` of a modal model."""
+        frequency = np.exp(self.estimate[:, 0])
+        return [
+            {
+                "impact": int(self.impact[i]),
+                "band": self.band,
+                "frequency": float(frequency[i]),
+                "damping": float(self.estimate[i, 1]),
+                "frequency_se": float(frequency[i] * self.error[i, 0]),
+                "damping_se": float(self.error[i, 1]),
+            }
+            for i in range(len(self.impact))
+        ]
+
+    def mode(self, confidence: float) -> Mode:
+        """Random-effects mean over the blows; the frequency is summarised in its logarithm.
+
+        Weights follow the strength of each blow. Its stated error would not do: a noisy blow's error follows its
+        own estimate, and weighing by it would favour one side.
+        """
+        error = np.median(self.error * self.strength[:, None], axis=0) / self.strength[:, None]
+        log_f = summarise(self.estimate[:, 0], error[:, 0], confidence)
+        zeta = summarise(self.estimate[:, 1], error[:, 1], confidence)
+        f = float(np.exp(log_f.mean))
+        return Mode(
+            band=self.band,
+            frequency=f,
+            damping=zeta.mean,
+            frequency_se=f * log_f.se,
+            damping_se=zeta.se,
+            frequency_sd=f * log_f.spread,
+            damping_sd=zeta.spread,
+            frequency_low=float(np.exp(log_f.low)),
+            frequency_high=float(np.exp(log_f.high)),
+            damping_low=zeta.low,
+            damping_high=zeta.high,
+            frequency_crb=None if self.bound is None else f * float(self.bound[0]),
+            damping_crb=None if self.bound is None else float(self.bound[1]),
+            energy=self.energy,
+            n=log_f.n,
+        )

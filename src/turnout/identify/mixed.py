@@ -1,0 +1,176 @@
+"""Modes of each blow and their mean, estimated together: maximum likelihood with a spread between blows."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnout.identify.linearise import Linearisation, linearise
+
+LARGEST_STEP = np.array([0.2, 0.15])
+LOWEST_DAMPING, HIGHEST_DAMPING = 1e-5, 0.95
+
+
+@dataclass(frozen=True)
+class MixedFit:
+    """Common modes, modes of each blow, and what they are worth.
+
+    ``mean`` (n_mode, 2) of ln f and zeta; ``theta`` (n_decay, n_mode, 2) the modes of each blow drawn towards
+    the mean as far as their noise asks; ``free`` the same undrawn, linearised there, with ``covariance``
+    (n_decay, p, p) from the noise alone; ``spread`` (p,) the variance between blows; ``sigma2`` that of the
+    noise; ``converged`` False if the iteration was stopped.
+    """
+
+    mean: np.ndarray
+    theta: np.ndarray
+    free: np.ndarray
+    covariance: np.ndarray
+    spread: np.ndarray
+    sigma2: float
+    at: Linearisation
+    converged: bool
+
+    @property
+    def inside(self) -> np.ndarray:
+        """(n_mode, 2) mean of the drawn modes: unlike ``mean`` always underdamped, a safe start."""
+        return self.theta.mean(axis=0)
+
+    @property
+    def rss(self) -> float:
+        """Sum of squared residuals over all decays."""
+        return float(self.at.rss.sum())
+
+
+def degrees_of_freedom(decays, n_mode: int, n_drift: int) -> int:
+    """Samples less amplitudes, drift and (shared) poles; at least one."""
+    return max(1, decays.size - len(decays) * (2 * n_mode + n_drift) - 2 * n_mode)
+
+
+def between_variance(value, variance):
+    r"""Variance between estimates beyond their own, by the moments of their weighted spread; per last axis.
+
+    .. math:: \tau^2 = \max\left(0, \frac{Q - (n-1)}{\sum w - \sum w^2 / \sum w}\right), \quad w = 1/s^2
+
+    ``value`` and ``variance`` are (n, ...); the result (...). 0 for a single estimate.
+
+    References
+    ----------
+    DerSimonian and Laird 1986.
+
+    >>> print(between_variance(np.array([1.0, 3.0]), np.array([0.5, 0.5])))
+    1.5
+    """
+    n = len(value)
+    if n < 2:
+        return np.zeros(np.shape(value)[1:])
+    weight = 1.0 / variance
+    total = weight.sum(axis=0)
+    mean = (weight * value).sum(axis=0) / total
+    q = (weight * (value - mean) ** 2).sum(axis=0)
+    return np.maximum(0.0, (q - (n - 1)) / (total - (weight**2).sum(axis=0) / total))
+
+
+def fit_common(start, decays, rate, drift, iterations=12, tolerance=1e-3):
+    """Shared modes by Gauss-Newton with halved steps; returns (n_mode, 2) of ln f and zeta, and whether it settled."""
+    n_decay, n_mode = len(decays), len(start)
+    mean = np.array(start, dtype=float)
+    dof = degrees_of_freedom(decays, n_mode, len(drift))
+
+    def at(theta):
+        return linearise(np.broadcast_to(theta, (n_decay, n_mode, 2)), decays, rate, drift)
+
+    here = at(mean)
+    for _ in range(iterations):
+        information = here.information.sum(axis=0)
+        step = _solve(information, here.score.sum(axis=0)).reshape(n_mode, 2)
+        scale = min(1.0, *(LARGEST_STEP / np.maximum(np.abs(step).max(axis=0), 1e-300)))
+        sigma2 = here.rss.sum() / dof
+        size = np.sqrt(max(0.0, step.ravel() @ information @ step.ravel()) / max(sigma2, 1e-300))
+        for _ in range(8):
+            trial = mean + scale * step
+            trial[:, 1] = np.clip(trial[:, 1], LOWEST_DAMPING, HIGHEST_DAMPING)
+            there = at(trial)
+            if there.rss.sum() <= here.rss.sum():
+                break
+            scale *= 0.4
+        else:
+            return mean, True
+        settled = np.max(np.abs(trial - mean)) < 1e-12 or size < tolerance
+        mean, here = trial, there
+        if settled:
+            return mean, True
+    return mean, False
+
+
+def fit_mixed(start, decays, rate, drift, theta=None, iterations=12, tolerance=0.01) -> MixedFit:
+    r"""Modes of every blow, drawn towards their common mean by the spread that the data show.
+
+    .. math:: z_i = \theta_i + (J^T J)^{-1} J^T r, \quad
+              \mu = \left(\sum W_i\right)^{-1} \sum W_i z_i, \quad
+              \theta_i \leftarrow \mu + T W_i (z_i - \mu), \quad W_i = (\sigma^2 (J^T J)^{-1} + T)^{-1}
+
+    With no spread (T = 0) this is maximum likelihood with shared poles, with a large one every blow is fitted
+    alone; in between, linearising at the drawn modes keeps the bias of a single noisy blow out of the mean.
+
+    Parameters
+    ----------
+    start : (n_mode, 2) array of float
+        ln of the frequency in Hz, damping ratio.
+    decays : (n_decay, n) array of float
+    rate : float
+        [Hz]
+    drift : (n_drift, n) array of float
+    theta : (n_decay, n_mode, 2) array of float, optional
+        Modes of each decay from an earlier fit; ``start`` is then not used.
+
+    References
+    ----------
+    Lindstrom and Bates 1990, Nonlinear mixed effects models for repeated measures data.
+    """
+    settled = True
+    if theta is None:
+        mean, settled = fit_common(start, decays, rate, drift)
+        theta = np.repeat(mean[None], len(decays), axis=0)
+    n_decay, n_mode = theta.shape[:2]
+    dof = degrees_of_freedom(decays, n_mode, len(drift))
+    for count in range(1, iterations + 1):
+        at = linearise(theta, decays, rate, drift)
+        sigma2 = max(at.rss.sum() / dof, 1e-300)
+        inverse = _inverse(at.information)
+        free = theta.reshape(n_decay, -1) + np.einsum("ijk,ik->ij", inverse, at.score)
+        covariance = sigma2 * inverse
+        own = np.einsum("ijj->ij", covariance)
+        spread = between_variance(free, own)
+        weight = _inverse(covariance + np.diag(spread))
+        centre = np.linalg.solve(weight.sum(axis=0), np.einsum("ijk,ik->j", weight, free))
+        drawn = centre + spread * np.einsum("ijk,ik->ij", weight, free - centre)
+        drawn = _inside(drawn.reshape(theta.shape), theta)
+        change = np.max(np.abs((drawn - theta).reshape(n_decay, -1)) / np.sqrt(own + spread))
+        result = MixedFit(
+            centre.reshape(n_mode, 2), theta, free.reshape(theta.shape), covariance, spread, sigma2, at, settled
+        )
+        theta = drawn
+        if change < tolerance and count > 1:
+            return result
+    return result if n_decay == 1 else MixedFit(**{**result.__dict__, "converged": False})
+
+
+def _inside(theta, before):
+    """The new modes, moved no further than a safe step and kept underdamped."""
+    theta = before + np.clip(theta - before, -LARGEST_STEP, LARGEST_STEP)
+    theta[..., 1] = np.clip(theta[..., 1], LOWEST_DAMPING, HIGHEST_DAMPING)
+    return theta
+
+
+def _scaled(matrix):
+    diagonal = np.sqrt(np.maximum(np.einsum("...jj->...j", matrix), 1e-300))
+    return diagonal, matrix / (diagonal[..., :, None] * diagonal[..., None, :])
+
+
+def _inverse(matrix):
+    diagonal, scaled = _scaled(matrix)
+    size = matrix.shape[-1]
+    return np.linalg.inv(scaled + 1e-12 * np.eye(size)) / (diagonal[..., :, None] * diagonal[..., None, :])
+
+
+def _solve(matrix, vector):
+    return _inverse(matrix) @ vector

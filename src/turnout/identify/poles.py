@@ -1,0 +1,66 @@
+"""Poles of a sampled system and the frequency and damping they stand for."""
+
+import numpy as np
+
+
+def modal_parameters(pole, rate):
+    r"""Undamped natural frequency and damping ratio of discrete poles.
+
+    .. math:: s = f_s \ln z, \quad f_n = |s| / 2\pi, \quad \zeta = -\mathrm{Re}(s) / |s|
+
+    Parameters
+    ----------
+    pole : array of complex
+        Eigenvalues z of the state matrix, any shape.
+    rate : float
+        Sampling rate. [Hz]
+
+    Returns
+    -------
+    frequency, damping : arrays of float
+        Undamped natural frequency [Hz] and damping ratio, same shape.
+
+    References
+    ----------
+    Barkhordari et al., eq. 16, which calls the frequency in Hz an angular one.
+
+    Examples
+    --------
+    An undamped pole a quarter turn per sample is at a quarter of the sampling rate.
+
+    >>> frequency, damping = modal_parameters(1j, 20e3)
+    >>> print(f"{frequency:.0f} Hz, {abs(damping):.0f}")
+    5000 Hz, 0
+    """
+    s = np.log(np.asarray(pole, dtype=complex)) * rate
+    magnitude = np.abs(s)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        damping = np.where(magnitude > 0.0, -s.real / magnitude, np.nan)
+    return magnitude / (2.0 * np.pi), damping
+
+
+def continuous_pole(frequency, damping):
+    r"""Pole in the upper half plane of an underdamped mode. [1/s]
+
+    .. math:: s = 2\pi f_n (-\zeta + i\sqrt{1-\zeta^2})
+
+    ``frequency`` [Hz] and ``damping`` (below 1, else ValueError) of any matching shape.
+
+    >>> s = continuous_pole(1.0 / (2.0 * np.pi), 0.6)
+    >>> print(f"{s:.1f}")
+    -0.6+0.8j
+    """
+    damping = np.asarray(damping, dtype=float)
+    if np.any(np.abs(damping) >= 1.0):
+        raise ValueError(f"need damping ratios below 1, the highest is {np.max(np.abs(damping)):.3g}")
+    return 2.0 * np.pi * np.asarray(frequency) * (-damping + 1j * np.sqrt(1.0 - damping**2))
+
+
+def discrete_pole(frequency, damping, rate):
+    r"""Pole of the sampled mode, :math:`z = \exp(s / f_s)`; the inverse of :func:`modal_parameters`.
+
+    >>> f, zeta = modal_parameters(discrete_pole(99.45, 0.2912, 20e3), 20e3)
+    >>> print(f"{f:.2f} Hz, {zeta:.4f}")
+    99.45 Hz, 0.2912
+    """
+    return np.exp(continuous_pole(frequency, damping) / rate)

@@ -1,0 +1,143 @@
+"""Tests that a mode must pass: it reappears, it is significant, it is one mode and a property of the place."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from turnout.identify.linearise import linearise
+from turnout.identify.mixed import MixedFit, degrees_of_freedom, fit_mixed
+from turnout.identify.significance import common_probability, mode_chi_squared, share_of_blows
+
+HOPELESS = 0.01
+LISTED_PRESENCE = 0.2
+
+
+def rejection(candidate, reason, value, limit) -> dict:
+    """A row of ``rejected_modes``."""
+    return {
+        "frequency": float(candidate.frequency),
+        "damping": float(candidate.damping),
+        "energy": float(candidate.energy),
+        "emac": float(candidate.emac),
+        "reason": reason,
+        "value": float(value),
+        "limit": float(limit),
+    }
+
+
+def reappearing(found, rate, settings):
+    """Candidates that are there in enough orders and starts, and above the lowest frequency a record can show."""
+    lowest = 0.5 / settings.duration
+    listed = 1.5 * max(high for _, _, high in settings.bands())
+    kept, rejected = [], []
+    for c in found:
+        if c.frequency < lowest or c.frequency > 0.45 * rate:
+            continue
+        if c.presence >= settings.presence_minimum:
+            kept.append(c)
+        elif c.presence > LISTED_PRESENCE and c.frequency < listed:
+            rejected.append(rejection(c, "does not reappear over orders", c.presence, settings.presence_minimum))
+    kept.sort(key=lambda c: -c.energy)
+    most = settings.order_maximum // 2 + 2
+    for c in kept[most:]:
+        rejected.append(rejection(c, "weaker than enough others", c.energy, kept[most - 1].energy))
+    return kept[:most], rejected
+
+
+def start_of(kept) -> np.ndarray:
+    """(n_mode, 2) ln f and zeta of candidates."""
+    return np.array([[np.log(c.frequency), c.damping] for c in kept]).reshape(-1, 2)
+
+
+def screen(kept, decays, rate, columns, settings, rejected):
+    """Drop what is not significant where the realisation put it: first all that is hopeless, then one by one."""
+    limit = settings.false_mode_probability
+    while kept:
+        theta = np.broadcast_to(start_of(kept), (len(decays), len(kept), 2))
+        at = linearise(theta, decays, rate, columns)
+        sigma2 = at.rss.sum() / degrees_of_freedom(decays, len(kept), len(columns))
+        probability = common_probability(mode_chi_squared(at, sigma2))
+        out = set(np.flatnonzero(probability > HOPELESS).tolist()) or {int(np.argmax(probability))}
+        out = {m for m in out if probability[m] > limit}
+        if not out:
+            break
+        rejected += [rejection(kept[m], "not significant", probability[m], limit) for m in sorted(out)]
+        kept = [c for m, c in enumerate(kept) if m not in out]
+    return kept
+
+
+def fit_and_prune(
+    kept, decays, rate, columns, settings, rejected, before: MixedFit | None = None, heaviest: float | None = None
+):
+    """Maximum likelihood with all modes, dropping the worst that fails a test until none does: (fit, kept)."""
+    if not kept:
+        return None, kept
+    theta = None if before is None else before.theta
+    fit = fit_mixed(start_of(kept), decays, rate, columns, theta=theta)
+    while True:
+        failures = mode_failures(fit, settings, heaviest)
+        if failures:
+            worst, (reason, value, limit) = failures[0]
+            smaller = None
+        else:
+            worst, smaller, probability = _needless_twin(fit, decays, rate, columns, settings)
+            if worst is None:
+                return fit, kept
+            reason, value, limit = "splits a stronger mode", probability, settings.false_mode_probability
+        moved = replace(kept[worst], frequency=np.exp(fit.mean[worst, 0]), damping=fit.mean[worst, 1])
+        rejected.append(rejection(moved, reason, value, limit))
+        kept = kept[:worst] + kept[worst + 1 :]
+        if not kept:
+            return None, kept
+        fit = smaller or fit_mixed(np.delete(fit.inside, worst, axis=0), decays, rate, columns)
+
+
+def _needless_twin(fit, decays, rate, columns, settings):
+    """A mode that overlaps a stronger one and without which the decays fit as well: (index, fit without, p).
+
+    Poles that differ between blows look like two poles to a realisation of all blows, never to a fit of each.
+    """
+    statistic = mode_chi_squared(fit.at, fit.sigma2).sum(axis=0)
+    for weak in np.argsort(statistic):
+        gap = np.abs(fit.mean[:, 0] - fit.mean[weak, 0])
+        overlaps = (gap < fit.mean[:, 1] + fit.mean[weak, 1]) & (statistic > statistic[weak])
+        if not overlaps.any():
+            continue
+        without = fit_mixed(np.delete(fit.inside, weak, axis=0), decays, rate, columns)
+        probability = float(chi2.sf((without.rss - fit.rss) / fit.sigma2, 4 * len(decays)))
+        if probability > settings.false_mode_probability:
+            return int(weak), without, probability
+    return None, None, 1.0
+
+
+def mode_failures(fit: MixedFit, settings, heaviest=None) -> list[tuple[int, tuple[str, float, float]]]:
+    """Every mode that fails a test, as (index, (reason, value, limit)), the weakest first.
+
+    With ``heaviest`` only what a pole needs to stay in a fit is asked: it shows, and is damped less than that.
+    """
+    n_mode = len(fit.mean)
+    statistic = mode_chi_squared(fit.at, fit.sigma2)
+    weight = 1.0 / (np.einsum("ijj->ij", fit.covariance) + fit.spread)
+    se = np.sqrt(1.0 / weight.sum(axis=0)).reshape(n_mode, 2)
+    spread = np.sqrt(fit.spread).reshape(n_mode, 2)
+    probability, share = common_probability(statistic), share_of_blows(statistic)
+    failures = []
+    for m in range(n_mode):
+        damping = fit.mean[m, 1]
+        shows = (
+            ("not significant", probability[m], settings.false_mode_probability, True),
+            ("shows in too few impacts", share[m], settings.impact_share, False),
+            ("damping too high", damping, heaviest or settings.damping_maximum, True),
+            ("damping not above zero", damping, 1e-4, False),
+        )
+        known = (
+            ("frequency too uncertain", se[m, 0], settings.frequency_se_maximum, True),
+            ("damping too uncertain", se[m, 1] / abs(damping), settings.damping_se_maximum, True),
+            ("differs between impacts", spread[m, 0], settings.spread_maximum, True),
+        )
+        for reason, value, limit, upper in shows if heaviest else shows + known:
+            if (value > limit) if upper else (value < limit):
+                failures.append((m, (reason, float(value), limit)))
+                break
+    return sorted(failures, key=lambda item: statistic[:, item[0]].sum())

@@ -1,0 +1,158 @@
+"""Poles of a test over model orders and start samples, and those that reappear."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnout.identify.poles import continuous_pole, modal_parameters
+from turnout.identify.subspace import subspaces
+
+GROWTH = 1.002  # a hum may look as if it grew by this much per sample
+
+
+@dataclass(frozen=True)
+class Stabilisation:
+    """One row per pole: (n_pole,) ``start`` [samples], ``order``, ``frequency`` [Hz], ``damping`` and two indicators.
+
+    ``energy`` is the share of the mode in the energy of all decays from the start sample on, ``emac`` its extended
+    modal amplitude coherence, 0 to 1: whether the mode does after one decay time what its pole says.
+    """
+
+    start: np.ndarray
+    order: np.ndarray
+    frequency: np.ndarray
+    damping: np.ndarray
+    energy: np.ndarray
+    emac: np.ndarray
+    n_cell: int
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A pole that reappears: medians of ``frequency`` [Hz], ``damping``, ``energy``, ``emac``; ``presence`` 0 to 1."""
+
+    frequency: float
+    damping: float
+    energy: float
+    emac: float
+    presence: float
+    members: np.ndarray
+
+
+def stabilisation(decays, rate, rows, order_maximum, starts=(0,)) -> Stabilisation:
+    r"""Oscillating poles of all decays together, for every even order up to ``order_maximum`` and every start.
+
+    All orders come from one decomposition for each start; see :func:`turnout.identify.subspace.subspaces`.
+
+    Parameters
+    ----------
+    decays : (n_decay, n) array of float
+    rate : float
+        [Hz]
+    rows, order_maximum : int
+    starts : sequence of int
+        Leading samples left out.
+    """
+    total = float(np.sum(decays**2))
+    columns = []
+    for start, space in zip(starts, subspaces(decays, rows, order_maximum, starts), strict=True):
+        state = space.u.T @ decays[:, start + space.index].T
+        for order in range(2, order_maximum + 1, 2):
+            z, v = np.linalg.eig(space.state_matrix(order))
+            amplitude = 2.0 * (space.u[0, :order] @ v)[:, None] * np.linalg.solve(v, state[:order])
+            keep = (z.imag > 1e-9) & (np.abs(z) < GROWTH)
+            energy = _energy(amplitude[keep], z[keep], decays.shape[1] - start) / total
+            frequency, damping = modal_parameters(z[keep], rate)
+            emac = amplitude_coherence(space.u[:, :order] @ v[:, keep], z[keep], space.index)
+            cell = (np.full(len(energy), start), np.full(len(energy), order))
+            columns.append((*cell, frequency, damping, energy, emac))
+    cells = len(starts) * (order_maximum // 2)
+    starts_of, orders_of, frequency, damping, energy, emac = (np.concatenate(c) for c in zip(*columns, strict=True))
+    return Stabilisation(starts_of, orders_of, frequency, damping, energy, emac, cells)
+
+
+def amplitude_coherence(shape, z, index) -> np.ndarray:
+    r"""Extended modal amplitude coherence of each mode after one decay time, 0 to 1.
+
+    .. math:: \mathrm{EMAC} = \min(|r|, |r|^{-1}) \, \max\left(0, 1 - \frac{|\arg r|}{\pi/4}\right), \quad
+              r = \frac{\phi_k}{\phi_0 z^k}
+
+    Parameters
+    ----------
+    shape : (n_row, n_mode) array of complex
+        Observability of each mode along the rows of the Hankel matrix.
+    z : (n_mode,) array of complex
+    index : (n_row,) array of int
+        Samples that the rows begin at.
+
+    References
+    ----------
+    Pappa, Elliott and Schenk 1993, Consistent-mode indicator for the eigensystem realization algorithm.
+
+    Examples
+    --------
+    A mode that turns 0.1 rad too far in one decay time (of ten samples) loses 0.1 / (pi / 4).
+
+    >>> z = np.array([np.exp(-0.1 + 0.5j)])
+    >>> shape = (z * np.exp(0.01j)) ** np.arange(30)[:, None]
+    >>> print(f"{amplitude_coherence(shape, z, np.arange(30))[0]:.3f}")
+    0.873
+    """
+    decay = np.maximum(-np.log(np.abs(z)), 1e-9)
+    row = np.minimum(np.searchsorted(index, 1.0 / decay), len(index) - 1)
+    mode = np.arange(len(z))
+    ratio = shape[row, mode] / (shape[0, mode] * z ** index[row])
+    size = np.abs(ratio)
+    turned = np.clip(1.0 - np.abs(np.angle(ratio)) / (np.pi / 4.0), 0.0, None)
+    return np.minimum(size, 1.0 / np.maximum(size, 1e-300)) * turned
+
+
+def _energy(amplitude, z, n):
+    """Energy of each pole over ``n`` samples, all decays together."""
+    square = np.minimum(np.abs(z) ** 2, 1.0 - 1e-12)
+    return (np.abs(amplitude) ** 2).sum(axis=1) * (1.0 - square**n) / (2.0 * (1.0 - square))
+
+
+def candidates(table: Stabilisation, tolerance: float, damping_maximum: float) -> list[Candidate]:
+    """Groups of poles that reappear over orders and starts, most energetic first.
+
+    Two poles are one mode if they lie closer than ``tolerance`` times their magnitude. ``presence`` counts the
+    cells of orders and starts, from the lowest order on at which the group appears.
+    """
+    plausible = (table.damping > 0.0) & (table.damping < damping_maximum)
+    pole = np.full(len(table.frequency), np.nan, dtype=complex)
+    pole[plausible] = continuous_pole(table.frequency[plausible], table.damping[plausible])
+    free = plausible.copy()
+    highest, lowest = (table.order.max(), table.order.min()) if len(table.order) else (0, 0)
+    n_start = len(np.unique(table.start))
+    found = []
+    while free.any():
+        near = _fullest_neighbourhood(pole, free, tolerance, table)
+        free &= ~near
+        orders = table.order[near]
+        possible = n_start * ((highest - max(orders.min(), lowest)) // 2 + 1)
+        seen = len(np.unique(table.start[near] * 1000 + orders))
+        presence = seen / max(possible, n_start * 3)
+        found.append(
+            Candidate(
+                float(np.median(table.frequency[near])),
+                float(np.median(table.damping[near])),
+                float(np.median(table.energy[near])),
+                float(np.median(table.emac[near])),
+                float(min(1.0, presence)),
+                near,
+            )
+        )
+    return sorted(found, key=lambda c: -c.energy)
+
+
+def _fullest_neighbourhood(pole, free, tolerance, table):
+    """Free poles near the one that has most of them about it; ties go to the most energetic."""
+    index = np.flatnonzero(free)
+    distance = np.abs(pole[index, None] - pole[None, index])
+    near = distance < tolerance * np.minimum(np.abs(pole[index, None]), np.abs(pole[None, index]))
+    count = near.sum(axis=1)
+    best = np.lexsort((-table.energy[index], -count))[0]
+    mask = np.zeros(len(pole), dtype=bool)
+    mask[index[near[best]]] = True
+    return mask

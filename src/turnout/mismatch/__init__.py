@@ -1,0 +1,8 @@
+"""Where simulation and recording differ: locate, name, model, verify. The engine knows no track."""
+
+from turnout.mismatch.case import Candidate, Case, Nuisance, Observation
+from turnout.mismatch.diagnose import Diagnosis, diagnose
+from turnout.mismatch.joint import Fit, fit_jointly
+from turnout.mismatch.verdict import Verdict
+
+__all__ = ["Candidate", "Case", "Diagnosis", "Fit", "Nuisance", "Observation", "Verdict", "diagnose", "fit_jointly"]

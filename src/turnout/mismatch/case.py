@@ -1,0 +1,149 @@
+"""A case: conditions, inputs and outputs, a simulator, terms, nuisances. The engine knows nothing else."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Nuisance:
+    """A number of the base model that is not exactly known, free under a normal prior.
+
+    ``mean`` and ``sd`` of the prior in ``unit``; ``owner`` is the observation it belongs to, None where shared;
+    ``trust`` the largest step in prior standard deviations: undamped steps diverged on voids.
+    """
+
+    name: str
+    unit: str
+    mean: float
+    sd: float
+    owner: str | None = None
+    bounds: tuple[float, float] = (-np.inf, np.inf)
+    meaning: str = ""
+    trust: float = 0.7
+
+
+@dataclass(frozen=True)
+class Observation:
+    """One recording under one condition, as a vector the simulator can predict.
+
+    ``data``, ``sigma`` (n,) in the same unit: noise and materiality floor; ``effective`` share of the samples
+    that are independent, 0 to 1. Folds leave out a ``condition``; ``kind`` shares one noise scale. ``cells`` (n,)
+    numbers the time-frequency cell of each sample, -1 for none; ``labels`` frame -> (n_cell,) level of each cell.
+    """
+
+    name: str
+    condition: str
+    data: np.ndarray
+    sigma: np.ndarray
+    effective: float = 1.0
+    kind: str = "response"
+    covariates: Mapping[str, float] = field(default_factory=dict)
+    cells: np.ndarray | None = None
+    labels: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+    def __post_init__(self):
+        data = np.asarray(self.data, dtype=float)
+        sigma = np.broadcast_to(np.asarray(self.sigma, dtype=float), data.shape)
+        if data.ndim != 1 or not np.all(np.isfinite(data)):
+            raise ValueError(f"observation {self.name!r}: data must be one row of finite numbers")
+        if not np.all(sigma > 0.0) or not 0.0 < self.effective <= 1.0:
+            raise ValueError(f"observation {self.name!r}: sigma must be above 0 and effective in 0 to 1")
+        object.__setattr__(self, "data", data)
+        object.__setattr__(self, "sigma", sigma)
+
+    @property
+    def n_effective(self):
+        """Number of independent samples."""
+        return self.effective * self.data.size
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One effect at one place: ``make(psi)`` gives the term for parameter values ``psi`` (dict).
+
+    ``family`` is the name that a verdict may give, ``where`` the place scanned, ``frame`` what it is fixed to,
+    ``scanned`` how many places the family has; ``starts`` are parameter sets that do not depend on the base fit;
+    with ``start_from_base`` off the nuisances, too, start from their priors.
+    ``parameters`` have name, unit, neutral, bounds and prior as ``turnout.physics.Parameter``.
+    """
+
+    family: str
+    parameters: tuple
+    make: Callable[[Mapping[str, float]], object]
+    starts: tuple[tuple[float, ...], ...]
+    where: Mapping[str, object] = field(default_factory=dict)
+    frame: str = ""
+    scanned: int = 1
+    start_from_base: bool = True
+
+    @property
+    def key(self):
+        """Family and place in one word."""
+        place = ",".join(f"{k}={v}" for k, v in sorted(self.where.items()))
+        return f"{self.family}[{place}]" if place else self.family
+
+    @property
+    def neutral(self):
+        """(n_parameter,) values at which the term vanishes."""
+        return np.array([p.neutral for p in self.parameters])
+
+    def term(self, values):
+        """The term with parameters (n_parameter,)."""
+        return self.make({p.name: float(v) for p, v in zip(self.parameters, values)})
+
+
+class Case:
+    """Base of all cases: give it observations, nuisances, candidates and override ``predict``.
+
+    ``reserved`` are observations that nothing but the final verification reads. ``frozen_jacobian`` tells the
+    engine that a prediction is dear: the nuisances' derivatives are then kept and updated by Broyden's formula.
+    """
+
+    observations: tuple[Observation, ...] = ()
+    reserved: tuple[Observation, ...] = ()
+    nuisances: tuple[Nuisance, ...] = ()
+    candidates: tuple[Candidate, ...] = ()
+    frozen_jacobian = False
+
+    def predict(self, values, terms, observations):
+        """List of (n,) predictions, one per observation; ``values`` are nuisances, ``terms`` the effects."""
+        raise NotImplementedError
+
+    def nuisance_jacobian(self, values, terms, observations, base):
+        """List of (n, n_nuisance) derivatives; by forward differences unless a case knows better.
+
+        Nuisances owned by different observations are moved together: one prediction serves them all.
+        """
+        groups, seen = {}, {}
+        for k, nuisance in enumerate(self.nuisances):
+            if nuisance.owner is None:
+                groups[nuisance.name] = [k]
+            else:
+                rank = seen[nuisance.owner] = seen.get(nuisance.owner, -1) + 1
+                groups.setdefault(("own", rank), []).append(k)
+        found = [np.zeros((o.data.size, len(self.nuisances))) for o in observations]
+        for members in groups.values():
+            moved = dict(values)
+            for k in members:
+                moved[self.nuisances[k].name] += 0.1 * self.nuisances[k].sd
+            predicted = self.predict(moved, terms, observations)
+            for k in members:
+                nuisance = self.nuisances[k]
+                for o, new, old, jacobian in zip(observations, predicted, base, found):
+                    if nuisance.owner in (None, o.name):
+                        jacobian[:, k] = (new - old) / (0.1 * nuisance.sd)
+        return found
+
+    def screen(self, fit):
+        """Linear columns for the candidates, key -> list of (n,) per observation; {}: predict each at its start."""
+        return {}
+
+    def latent(self, fit):
+        """Covariates of the latent force: name -> (n,), with "force"; None where the case has no such view."""
+        return None
+
+    def numerical_error(self, fit):
+        """Own numerical error of each observation's prediction, list of (n,), or None where it is exact."""
+        return None

@@ -1,0 +1,119 @@
+"""A diagnosis as a row of the registry, its sentence and its recommendation."""
+
+import json
+
+CHECKS = {
+    "hanging_sleeper": "Look under this sleeper while a train passes; tamp it",
+    "local_ballast": "Compare the ballast of this sleeper with its neighbours'; tamp or drain",
+    "local_pad": "Take out the pad of this sleeper",
+    "surface_dip": "Measure the running surface there with a straightedge; weld or grind",
+    "wheel_flat": "Send the wheelset to the lathe; the track needs nothing",
+    "unsprung_mass": "Check the vehicle file of this train",
+    "sensor_gain": "Calibrate this sensor, swap it with its neighbour",
+    "mount_resonance": "Fasten this sensor again and strike the rail beside it",
+    "time_offset": "Check the clock of this channel",
+    "sensor_position": "Measure where this sensor sits",
+    "clipping": "Raise the range of this channel",
+    "hum": "Check the shield and the ground of this channel",
+}
+SEPARATES = {
+    "pad_temperature": "a hammer test at another rail temperature, 15 K away",
+    "pad_preload": "a hammer test beside a standing train, or passages of another axle load",
+    "zener_pad": "a hammer test with a hard tip up to 1.2 kHz",
+    "hanging_sleeper": "passages of a lighter and a heavier train, and a hammer test on this sleeper",
+    "local_ballast": "passages of a lighter and a heavier train",
+    "local_pad": "a hammer test at this sleeper and at its neighbours",
+    "surface_dip": "passages at another speed",
+    "wheel_flat": "another passage of this train",
+    "mount_resonance": "a hammer test beside this sensor",
+    "time_offset": "passages at another speed",
+    "sensor_position": "passages at another speed",
+    "attached_resonator": "a hammer test above and beside this place",
+}
+ELSE = "hammer tests at the points between, and a train of another load and speed"
+
+
+def sentence(diagnosis):
+    """The verdict in words for an engineer of the track."""
+    verdict = diagnosis.verdict
+    if verdict.answer == "none":
+        return "Simulation and recordings agree as well as those of sound turnouts do."
+    if verdict.answer == "numerics":
+        return f"The simulation is not fine enough to be compared: {verdict.reason}."
+    if verdict.answer == "unknown":
+        return f"Something is missing {place_in_words(diagnosis)} that no candidate explains: {verdict.reason}."
+    words = [f"What the model left out: {t.sentence()}." for t in diagnosis.fit.terms]
+    if verdict.answer == "a_or_b":
+        other = verdict.names[1].replace("_", " ")
+        return f"{words[0]} Or {other}: these recordings cannot tell them apart."
+    return " ".join(words)
+
+
+def place_in_words(diagnosis):
+    """Where the residual is concentrated, from the frame attribution."""
+    found = [f for f in diagnosis.frames if f.q < 0.05]
+    if not found:
+        return "at no place, sensor or train in particular"
+    return ", ".join(f"at {f.frame} {f.level} ({f.effect:+.1f} dB, q = {f.q:.3f})" for f in found[:2])
+
+
+def recommendation(diagnosis):
+    """What to check on site, and the measurement that would tell more."""
+    verdict = diagnosis.verdict
+    if verdict.answer == "named":
+        return CHECKS.get(verdict.names[0], "Look at the place; repeat the measurement after the work")
+    if verdict.answer == "a_or_b":
+        return f"Measure {SEPARATES.get(verdict.names[0], SEPARATES.get(verdict.names[1], ELSE))}"
+    return f"Measure {ELSE}" if verdict.answer == "unknown" else ""
+
+
+def finding_row(diagnosis, identity):
+    """Row of ``mismatch_findings``; ``identity`` holds finding_id, turnout_id, section_id, found_at_utc, result_id."""
+    verdict, check = diagnosis.verdict, diagnosis.verification
+    term = next(iter(diagnosis.fit.candidates), None) if verdict.answer in ("named", "a_or_b") else None
+    where = term.where if term else {}
+    frame = diagnosis.frames[0] if diagnosis.frames and diagnosis.frames[0].q < 0.05 else None
+    return {
+        **identity,
+        "verdict": verdict.answer,
+        "grade": verdict.grade or None,
+        "term": verdict.names[0] if verdict.names else None,
+        "rival_term": verdict.names[1] if len(verdict.names) > 1 else None,
+        "locked_to": term.frame if term else (frame.frame if frame else None),
+        "position_m": where.get("place"),
+        "position_se_m": _se(diagnosis, "shift"),
+        "channel": where.get("sensor") or (str(frame.level) if frame and frame.frame == "sensor" else None),
+        "band_low_hz": None,
+        "band_high_hz": None,
+        "probability": round(verdict.probability, 4),
+        "p_value": frame.q if frame else None,
+        "fit_before_pct": _finite(check.before),
+        "fit_after_pct": _finite(check.after),
+        "fit_rival_pct": _finite(check.rival),
+        "fit_decoy_pct": _finite(check.decoy),
+        "n_held_out": check.n,
+        "parameters_json": json.dumps(parameters(diagnosis), sort_keys=True) if term else None,
+        "sentence": sentence(diagnosis),
+        "next_measurement": recommendation(diagnosis) or None,
+    }
+
+
+def parameters(diagnosis):
+    """Name, value, standard error and unit of each parameter of the terms found."""
+    fitted = [(c, p) for c in diagnosis.fit.candidates for p in c.parameters]
+    values = zip(fitted, diagnosis.fit.psi, diagnosis.fit.psi_se)
+    return [
+        {"term": c.family, "name": p.name, "value": float(f"{v:.6g}"), "se": float(f"{se:.3g}"), "unit": p.unit}
+        for (c, p), v, se in values
+    ]
+
+
+def _se(diagnosis, name):
+    for entry in parameters(diagnosis):
+        if entry["name"] == name:
+            return entry["se"]
+    return None
+
+
+def _finite(value):
+    return None if value is None or value != value else round(float(value), 2)

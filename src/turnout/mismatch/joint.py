@@ -1,0 +1,273 @@
+"""The joint fit: nuisances and the parameters of a term together, damped, within a trust region."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from turnout.errors import SimulationError
+
+TRUST_TERM = 0.35  # largest step of a term's parameter as a share of its bounds
+DONE = 0.05  # nats; a smaller gain ends the iteration
+STALL = 2e-3  # of minus twice the log posterior per sample; a smaller gain asks for a new Jacobian
+
+
+@dataclass(frozen=True)
+class Fit:
+    """``values`` of nuisances, ``psi`` (n_term,) of the terms; ``residuals`` and ``jacobian`` lists by observation.
+
+    ``scale`` noise scale by kind, at least 1; ``cost`` minus twice the log posterior up to a constant;
+    ``covariance`` of nuisances and psi; ``level`` weighted mean square by kind, in units of ``sigma``.
+    """
+
+    values: dict
+    candidates: tuple
+    psi: np.ndarray
+    predictions: list
+    residuals: list
+    jacobian: list
+    scale: dict
+    level: dict
+    cost: float
+    covariance: np.ndarray
+    evaluations: int
+
+    @property
+    def terms(self):
+        """The terms with their fitted parameters."""
+        return terms_of(self.candidates, self.psi)
+
+    def with_candidates(self, candidates):
+        """The same fit with these candidates, which carry functions and are not kept on disk."""
+        return replace(self, candidates=tuple(candidates))
+
+    @property
+    def psi_se(self):
+        """(n_term,) standard errors of the terms' parameters."""
+        return np.sqrt(np.maximum(np.diag(self.covariance)[len(self.values) :], 0.0))
+
+    @property
+    def chi2(self):
+        """Weighted mean square over all observations' effective samples."""
+        return float(sum(self.level.values()) / max(len(self.level), 1))
+
+
+def terms_of(candidates, psi):
+    """Terms of several candidates from their stacked parameters."""
+    terms, first = [], 0
+    for candidate in candidates:
+        last = first + len(candidate.parameters)
+        terms.append(candidate.term(psi[first:last]))
+        first = last
+    return tuple(terms)
+
+
+class Joint:
+    """Least squares of a case with some candidates in it; holds what does not change between steps."""
+
+    def __init__(self, case, candidates=(), observations=None, iterations=6):
+        self.case, self.candidates = case, tuple(candidates)
+        self.observations = tuple(case.observations if observations is None else observations)
+        self.parameters = [p for c in self.candidates for p in c.parameters]
+        self.iterations, self.evaluations = iterations, 0
+        self.size = sum(o.n_effective for o in self.observations)
+        priors = [(n.mean, n.sd) for n in case.nuisances] + [_prior(p) for p in self.parameters]
+        self.mean, self.sd = (np.array(v, dtype=float) for v in zip(*priors)) if priors else (np.zeros(0),) * 2
+        bounds = [n.bounds for n in case.nuisances] + [p.bounds for p in self.parameters]
+        self.low, self.high = np.array(bounds, dtype=float).T if bounds else (np.zeros(0),) * 2
+        self.n = len(case.nuisances)
+        self.reach = np.array([n.trust * n.sd for n in case.nuisances] + [_reach(p) for p in self.parameters])
+
+    def split(self, theta):
+        """Nuisances by name, and the rest."""
+        return {n.name: float(v) for n, v in zip(self.case.nuisances, theta)}, np.asarray(theta[self.n :])
+
+    def predict(self, theta):
+        """Predictions at ``theta``."""
+        values, psi = self.split(theta)
+        self.evaluations += 1
+        return self.case.predict(values, terms_of(self.candidates, psi), self.observations)
+
+    def tried(self, theta):
+        """Predictions at ``theta``, None where the simulation cannot go there."""
+        try:
+            return self.predict(theta)
+        except SimulationError:
+            return None
+
+    def residuals(self, predictions):
+        """Data minus prediction."""
+        return [o.data - p for o, p in zip(self.observations, predictions)]
+
+    def level(self, residuals):
+        """Mean square of residuals in units of sigma, by kind."""
+        total, count = {}, {}
+        for o, r in zip(self.observations, residuals):
+            total[o.kind] = total.get(o.kind, 0.0) + o.effective * float(np.sum((r / o.sigma) ** 2))
+            count[o.kind] = count.get(o.kind, 0.0) + o.n_effective
+        return {kind: total[kind] / count[kind] for kind in total}
+
+    def cost(self, theta, residuals):
+        """Minus twice the log posterior with the noise scale at its best value, never below 1."""
+        level, value = self.level(residuals), 0.0
+        for kind, mean_square in level.items():
+            n = sum(o.n_effective for o in self.observations if o.kind == kind)
+            scale = max(1.0, mean_square)
+            value += n * (np.log(scale) + mean_square / scale)
+        return value + float(np.sum(((theta - self.mean) / self.sd) ** 2))
+
+    def whitened(self, jacobian, residuals, scale):
+        """Stacked weighted Jacobian (n, p) and residual (n,)."""
+        rows, right = [], []
+        for o, j, r in zip(self.observations, jacobian, residuals):
+            weight = np.sqrt(o.effective / scale[o.kind]) / o.sigma
+            rows.append(j * weight[:, None])
+            right.append(r * weight)
+        return np.concatenate(rows), np.concatenate(right)
+
+    def jacobian(self, theta, predictions, keep=None):
+        """Derivatives at ``theta``; the nuisances' from ``keep`` where given."""
+        values, psi = self.split(theta)
+        terms = terms_of(self.candidates, psi)
+        if keep is None:
+            base = self.case.nuisance_jacobian(values, terms, self.observations, predictions)
+        else:
+            base = [j[:, : self.n] for j in keep]
+        columns = [self._column(theta, k, predictions) for k in range(self.n, theta.size)]
+        return [np.column_stack([j, *(c[i] for c in columns)]) if columns else np.array(j) for i, j in enumerate(base)]
+
+    def _column(self, theta, k, predictions):
+        p = self.parameters[k - self.n]
+        step = 0.02 * min(p.bounds[1] - p.bounds[0], 10.0 * self.sd[k], max(abs(theta[k] - p.neutral), 0.1 * _reach(p)))
+        step = -step if theta[k] + step > p.bounds[1] else step
+        moved = np.array(theta)
+        moved[k] += step
+        return [(new - old) / step for new, old in zip(self.predict(moved), predictions)]
+
+
+def _prior(p):
+    low, high = p.bounds
+    return p.prior if p.prior else (0.5 * (low + high), 0.6 * (high - low))
+
+
+def _reach(p):
+    return TRUST_TERM * (p.bounds[1] - p.bounds[0])
+
+
+def fit_jointly(case, candidates=(), start=None, values=None, keep=None, observations=None, iterations=6):
+    r"""Maximum of the posterior of nuisances and term parameters together.
+
+    .. math:: \min_{\eta,\psi} \sum_k n_k \left[\ln s_k^2 + \overline{r^2}_k / s_k^2\right]
+              + \sum (\eta - \mu)^2 / \sigma_\eta^2, \quad s_k \ge 1
+
+    Damped Gauss-Newton: a step is cut to 0.7 prior standard deviations of any nuisance and halved until the cost
+    falls. ``start`` (n_term,) of psi; ``values`` of the nuisances; ``keep`` a Jacobian whose nuisance columns are
+    used instead of new ones and then updated by Broyden's rank-one formula.
+    """
+    joint = Joint(case, candidates, observations, iterations)
+    psi = np.array([p.neutral for p in joint.parameters]) if start is None else np.asarray(start, dtype=float)
+    names = [n.name for n in case.nuisances]
+    first = [values[name] for name in names] if values else [n.mean for n in case.nuisances]
+    theta = np.concatenate([first, psi])
+    predictions = joint.predict(theta)
+    residuals = joint.residuals(predictions)
+    cost, jacobian = joint.cost(theta, residuals), None
+    if theta.size:
+        jacobian = joint.jacobian(theta, predictions, keep)
+        theta, predictions, residuals, jacobian, cost = _iterate(
+            joint, theta, predictions, residuals, jacobian, cost, case.frozen_jacobian, keep is not None
+        )
+        if case.frozen_jacobian and keep is None:  # others start from it: exact again at the optimum
+            jacobian = joint.jacobian(theta, predictions)
+    return _finished(joint, theta, predictions, residuals, jacobian, cost)
+
+
+def _iterate(joint, theta, predictions, residuals, jacobian, cost, frozen, given):
+    """Steps until nothing is gained; a kept Jacobian is made anew, once per stall, unless it was ``given``."""
+    fresh = True
+    for _ in range(joint.iterations):
+        found = _shorter(joint, theta, _step(joint, theta, residuals, jacobian), cost)
+        gain = cost - found[3] if found else 0.0
+        if found:
+            tried, new = found[0], found[1]
+            if frozen:
+                moved = tried - theta
+                jacobian = _broyden(jacobian, moved / joint.sd**2, moved, predictions, new)
+            theta, predictions, residuals, cost = found
+        if frozen and (gain < STALL * joint.size or not found):
+            if gain < 2.0 * DONE and (fresh or given):
+                break
+            if given and gain < 2.0 * STALL:
+                break
+            if not fresh and not given:
+                jacobian, fresh = joint.jacobian(theta, predictions), True
+                continue
+        elif gain < 2.0 * DONE:
+            break
+        if not frozen:
+            jacobian = joint.jacobian(theta, predictions)
+        fresh = not frozen
+    return theta, predictions, residuals, jacobian, cost
+
+
+def _shorter(joint, theta, step, cost):
+    """The step, halved until the cost falls; None where it does not."""
+    for halving in range(5):
+        tried = np.clip(theta + step * 0.5**halving, joint.low, joint.high)
+        new = joint.tried(tried)
+        if new is None:
+            continue
+        residuals = joint.residuals(new)
+        new_cost = joint.cost(tried, residuals)
+        if new_cost < cost:
+            return tried, new, residuals, new_cost
+    return None
+
+
+def _step(joint, theta, residuals, jacobian):
+    """Damped step; the noise scale is the one the step itself will leave, else a bad start would trust its priors."""
+    parts = {}
+    for o, j, r in zip(joint.observations, jacobian, residuals):
+        weight = np.sqrt(o.effective) / o.sigma
+        rows, right = j * (weight[:, None] * joint.sd), r * weight
+        old = parts.get(o.kind, (0.0, 0.0, 0.0, 0.0))
+        new = rows.T @ rows, rows.T @ right, float(right @ right), o.n_effective
+        parts[o.kind] = tuple(a + b for a, b in zip(old, new))
+    pull = (joint.mean - theta) / joint.sd
+    step, left = np.zeros(theta.size), {kind: p[2] for kind, p in parts.items()}
+    for _ in range(5):
+        scale = {kind: max(1.0, left[kind] / parts[kind][3]) for kind in parts}
+        normal = np.eye(theta.size) + sum(p[0] / scale[k] for k, p in parts.items())
+        step = np.linalg.solve(normal, pull + sum(p[1] / scale[k] for k, p in parts.items()))
+        left = {k: max(0.0, p[2] - 2.0 * step @ p[1] + step @ p[0] @ step) for k, p in parts.items()}
+    right = pull + sum(p[1] / scale[k] for k, p in parts.items())
+    reach, damping = joint.reach / joint.sd, np.zeros(theta.size)
+    for _ in range(12):  # damp those alone that would leave their trust region: the others move on
+        excess = np.maximum(np.abs(step) / reach - 1.0, 0.0)
+        if excess.max(initial=0.0) < 0.05:
+            break
+        damping += (np.diag(normal) + damping) * excess
+        step = np.linalg.solve(normal + np.diag(damping), right)
+    return joint.sd * np.clip(step, -reach, reach)
+
+
+def _broyden(jacobian, weight, moved, old, new):
+    """Rank-one update that makes the Jacobian say what the last step did, distances in prior deviations."""
+    size = float(weight @ moved)
+    return [j + np.outer(b - a - j @ moved, weight) / size for j, a, b in zip(jacobian, old, new)]
+
+
+def _finished(joint, theta, predictions, residuals, jacobian, cost):
+    level = joint.level(residuals)
+    scale = {kind: max(1.0, v) for kind, v in level.items()}
+    covariance = np.zeros((theta.size, theta.size))
+    if theta.size:
+        rows, _ = joint.whitened(jacobian, residuals, scale)
+        scaled = rows * joint.sd
+        covariance = np.linalg.inv(scaled.T @ scaled + np.eye(theta.size)) * np.outer(joint.sd, joint.sd)
+    else:
+        jacobian = [np.zeros((o.data.size, 0)) for o in joint.observations]
+    values, psi = joint.split(theta)
+    return Fit(
+        values, joint.candidates, psi, predictions, residuals, jacobian, scale, level, cost, covariance,
+        joint.evaluations,
+    )  # fmt: skip

@@ -1,0 +1,71 @@
+"""The force that is missing, without a law: against displacement, velocity, position, time and temperature."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+LEVELS = 24  # pieces of the free law; each needs at least 20 samples
+
+
+@dataclass(frozen=True)
+class Latent:
+    """``r2`` covariate -> share of the force's variance a free law of it explains on samples not used for it;
+    ``curves`` covariate -> (centres, mean force, its standard error); ``unit`` of the force."""
+
+    r2: dict
+    curves: dict
+    unit: str = "N"
+
+    @property
+    def best(self):
+        """Covariate that explains most, "" where none explains anything."""
+        name = max(self.r2, key=self.r2.get, default="")
+        return name if name and self.r2[name] > 0.0 else ""
+
+
+def latent_law(force, covariates, unit="N", blocks=10):
+    r"""Free law of a missing force for each covariate, judged on left-out blocks of time.
+
+    A piecewise constant law over equally filled classes; :math:`R^2 = 1 - \overline{(f - \hat f_{-b})^2} /
+    \overline{(f - \bar f)^2}` with law and mean from the other blocks.
+
+    >>> x = np.sin(np.arange(4000) * 0.1)
+    >>> law = latent_law(x**3, {"displacement": x, "time": np.arange(4000.0)})
+    >>> law.best, law.r2["displacement"] > 0.95, law.r2["time"] < 0.3
+    ('displacement', True, True)
+    """
+    force = np.asarray(force, dtype=float)
+    block = np.arange(force.size) * blocks // force.size
+    r2, curves = {}, {}
+    for name, x in covariates.items():
+        x = np.asarray(x, dtype=float)
+        good = np.isfinite(x) & np.isfinite(force)
+        levels = int(min(LEVELS, np.unique(x[good]).size, good.sum() // 20))
+        if levels < 2:
+            continue
+        edges = np.quantile(x[good], np.linspace(0.0, 1.0, levels + 1)[1:-1])
+        code = np.searchsorted(edges, x[good], side="right")
+        r2[name] = _left_out(force[good], code, block[good], levels)
+        curves[name] = _curve(force[good], x[good], code, levels)
+    return Latent(r2, curves, unit)
+
+
+def _left_out(force, code, block, levels):
+    """Sums by block make every left-out mean a subtraction."""
+    n_block = int(block.max()) + 1
+    flat = block * levels + code
+    count = np.bincount(flat, minlength=n_block * levels).reshape(n_block, levels)
+    total = np.bincount(flat, force, minlength=n_block * levels).reshape(n_block, levels)
+    count_out, total_out = count.sum(0) - count, total.sum(0) - total
+    overall = total_out.sum(1) / np.maximum(count_out.sum(1), 1)
+    law = np.where(count_out > 0, total_out / np.maximum(count_out, 1), overall[:, None])
+    missed = np.sum((force - law[block, code]) ** 2)
+    spread = np.sum((force - overall[block]) ** 2)
+    return float(1.0 - missed / spread) if spread > 0.0 else 0.0
+
+
+def _curve(force, x, code, levels):
+    count = np.maximum(np.bincount(code, minlength=levels), 1)
+    centre, mean = np.bincount(code, x, levels) / count, np.bincount(code, force, levels) / count
+    square = np.bincount(code, force**2, levels) / count
+    return centre, mean, np.sqrt(np.maximum(square - mean**2, 0.0) / count)

@@ -1,0 +1,62 @@
+"""What was measured at one turnout, and the models it is held against."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from turnout.errors import SimulationError
+from turnout.records import Recording
+from turnout.simulate.sensor import Sensor
+
+
+@dataclass(frozen=True)
+class HammerTest:
+    """Blows at one place [m]: ``force`` is the hammer's channel, all accelerations are responses. ``conditions``
+    such as rail_temperature [°C]; ``condition`` is the fold it belongs to, by default its place and visit."""
+
+    name: str
+    place: float
+    recordings: tuple[Recording, ...]
+    force: str = "hammer"
+    visit: str = ""
+    conditions: Mapping = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Passage:
+    """One train: ``vehicle`` of ``turnout.simulate``, ``speed`` [m/s] as noted, ``train`` its type or number."""
+
+    name: str
+    recording: Recording
+    vehicle: object
+    speed: float
+    train: str = ""
+    direction: str = "facing"
+    route: str = "main"
+    conditions: Mapping = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """``turnout`` a TurnoutTrack; ``sensors`` by name with place and mounting; ``reserved`` names of tests and
+    passages that only the verification reads."""
+
+    turnout: object
+    sensors: tuple[Sensor, ...]
+    hammer: tuple[HammerTest, ...] = ()
+    passages: tuple[Passage, ...] = ()
+    reserved: tuple[str, ...] = ()
+
+    def __post_init__(self):
+        if not self.hammer and not self.passages:
+            raise SimulationError("nothing to diagnose: neither a hammer test nor a passage was given.")
+        names = [item.name for item in (*self.hammer, *self.passages)]
+        if len(set(names)) < len(names):
+            twice = next(n for n in names if names.count(n) > 1)
+            raise SimulationError(f"the name {twice!r} stands for two recordings; give each its own.")
+        for name in self.reserved:
+            if name not in names:
+                raise SimulationError(f"reserved {name!r} is no recording; there are {', '.join(names)}.")
+
+    def places(self):
+        """Places of sensors and blows [m]."""
+        return [s.place for s in self.sensors] + [t.place for t in self.hammer]

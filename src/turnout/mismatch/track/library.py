@@ -1,0 +1,104 @@
+"""Candidates of a turnout: every term of the catalogue at every place it could be."""
+
+import numpy as np
+
+from turnout import physics
+from turnout.mismatch.case import Candidate
+
+DIP_STEP = 0.6  # places of a dip scanned [m]; its own shift covers what lies between
+
+
+def library(case, families=None):
+    """All candidates of a case, or those of some ``families``."""
+    found = [*_supports(case), *_whole_track(case), *_sensors(case), *_surface(case), *_wheels(case)]
+    return tuple(c for c in found if families is None or c.family in families)
+
+
+def _candidate(term, make, starts, where=None, scanned=1, base=True, parameters=None):
+    chosen = tuple(p for p in term.parameters if parameters is None or p.name in parameters)
+    frame = getattr(term, "frame", "place")
+    return Candidate(term.name, chosen, make, starts, where or {}, frame, scanned, base)
+
+
+def _supports(case):
+    """One place per support of the zone."""
+    places, n = case.track().support, len(case.zone.supports)
+    for j in case.zone.supports:
+        where = {"sleeper": j, "place": round(float(places[j]), 3)}
+        yield _candidate(physics.HangingSleeper, lambda p, j=j: physics.HangingSleeper(j, **p),
+                         ((4e-4,), (1.5e-3,)), where, n, base=False)  # fmt: skip
+        for term in (physics.LocalBallast, physics.LocalPad):
+            yield _candidate(term, lambda p, j=j, t=term: t(j, **p), ((0.4,), (2.5,)), where, n)
+        yield _candidate(physics.AttachedResonator, lambda p, j=j: physics.AttachedResonator(j, **p),
+                         ((15.0, 120.0, 0.03), (15.0, 350.0, 0.03)), where, n)  # fmt: skip
+        if case.rollings:  # for a blow of one strength friction is a damper: it takes trains to call it by its name
+            yield _candidate(physics.DryFriction, lambda p, j=j: physics.DryFriction(j, **p), ((1500.0,),), where, n)
+        if case.rollings and case.zone.first < j < case.zone.last:
+            yield _candidate(physics.BallastHardening, lambda p, j=j: physics.BallastHardening(j - 1, j + 1, **p),
+                             ((3.0,),), where, n)  # fmt: skip
+
+
+def _whole_track(case):
+    yield _candidate(physics.PadTemperature, lambda p: physics.PadTemperature(**p), ((0.01,),))
+    if case.rollings:
+        yield _candidate(physics.PadPreload, lambda p: physics.PadPreload(**p), ((3e3,),))
+    yield _candidate(physics.ZenerPad, lambda p: physics.ZenerPad(**p), ((0.7,),))
+    yield _candidate(physics.RailShear, lambda p: physics.RailShear(**p), ((2.0,), (-1.5,)))
+    yield _candidate(physics.BallastInertia, lambda p: physics.BallastInertia(**p), ((120.0, 0.0),))
+    yield _candidate(physics.SleeperMode, lambda p: physics.SleeperMode(**p), ((0.25, 180.0), (0.25, 400.0)))
+
+
+def _sensors(case):
+    n = len(case.campaign.sensors)
+    for sensor in case.campaign.sensors:
+        name = sensor.name
+        where = {"sensor": name}
+
+        def per(term, starts, name=name, where=where, **more):
+            return _candidate(term, lambda p: term(name, **p), starts, where, n, **more)
+
+        yield per(physics.SensorGain, ((0.8,), (1.25,)))
+        yield per(physics.MountResonance, ((1 / 300.0, 8.0), (1 / 600.0, 8.0)))
+        yield per(physics.TimeOffset, ((1e-3,), (-1e-3,)))
+        yield per(physics.SensorPosition, ((0.3,), (-0.3,)))
+        yield per(physics.LowPass, ((1 / 500.0,),))
+        yield per(physics.HighPass, ((12.0,),))
+        if case.rollings:
+            yield per(physics.ClockDrift, ((1e-3,), (-1e-3,)))
+            peak = case.peak(name)
+            if peak > 0.0:
+                yield per(physics.Clipping, ((0.6 * peak,),))
+                yield per(physics.Hum, ((0.1 * peak, 0.0),))
+
+
+def _surface(case):
+    if not case.rollings:
+        return
+    places = [s.place for s in case.campaign.sensors]
+    grid = np.arange(min(places) - 1.8, max(places) + 1.81, DIP_STEP)
+    for x in grid:
+        where = {"place": round(float(x), 3)}
+        starts = ((6e-4, 0.5, 0.5, 0.0), (-4e-4, 0.5, 0.5, 0.0))
+        yield _candidate(physics.SurfaceDip, lambda p, x=float(x): physics.SurfaceDip(x, **p), starts, where, grid.size)
+    for length in (0.3, 0.6):
+        low, high = min(places) - 3.0, max(places) + 3.0
+        yield _candidate(physics.RailCorrugation,
+                         lambda p, a=low, b=high: physics.RailCorrugation(a, b, **p),
+                         ((3e-5, 0.0, length),), {"wavelength": length}, 4)  # fmt: skip
+
+
+def _wheels(case):
+    if not case.rollings:
+        return
+    yield _candidate(physics.ContactStiffness, lambda p: physics.ContactStiffness(**p), ((0.5,),))
+    flats = getattr(case, "flats", None) or {}
+    for train in case.trains:
+        where = {"train": train}
+        yield _candidate(physics.UnsprungMass, lambda p, t=train: physics.UnsprungMass(train=t, **p),
+                         ((1.4,), (0.7,)), where, len(case.trains))  # fmt: skip
+    for (train, wheel), (phases, radius, scanned) in flats.items():
+        yield _candidate(
+            physics.WheelFlat,
+            lambda p, w=wheel, r=radius, t=train, f=phases: physics.WheelFlat(w, radius=r, train=t, phases=f, **p),
+            ((0.05,), (0.09,)), {"train": train, "axle": wheel + 1}, scanned,
+        )  # fmt: skip

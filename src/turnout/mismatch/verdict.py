@@ -1,0 +1,122 @@
+"""The one answer: none, named, a or b, unknown, numerics - with its probability and what it rests on."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+VERDICTS = ("none", "named", "a_or_b", "unknown", "numerics")
+
+
+@dataclass(frozen=True)
+class Score:
+    """A candidate after its joint refit: ``gain`` in held-out log density over the base model less the log of the
+    places scanned [nats], ``worst`` the least gain of a fold, ``explained`` share of the excess, ``fit``."""
+
+    candidate: object
+    gain: float
+    worst: float
+    explained: float
+    fit: object
+    by_condition: dict = field(default_factory=dict)
+
+    @property
+    def family(self):
+        return self.candidate.family
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """``answer`` of ``VERDICTS``; ``names`` the families (two for a or b); ``grade`` "A" or "B"; ``probability``
+    of the answer; ``posterior`` over families, "none" and "unknown"; ``scores`` best of each family; ``reason``."""
+
+    answer: str
+    names: tuple[str, ...] = ()
+    grade: str = ""
+    probability: float = 0.0
+    posterior: dict = field(default_factory=dict)
+    scores: tuple = ()
+    reason: str = ""
+
+
+def posterior(scores, excess, settings):
+    r"""Probabilities by a softmax of score over temperature, over families, "none" and "unknown".
+
+    Half of the prior is on "none", a tenth on "unknown", the rest spread over the families. "none" scores 0.
+    "unknown" scores what a perfect explanation could gain at most, cut at the threshold, with an offset of its own,
+    and gains by what the best candidate leaves unexplained. ``excess`` is the base model's weighted mean square over
+    the level of controls, 1 meaning none.
+
+    >>> from turnout.config.settings.mismatch import MismatchSettings
+    >>> p = posterior([], 1.0, MismatchSettings())
+    >>> max(p, key=p.get)
+    'none'
+    """
+    best = {}
+    for score in scores:
+        best[score.family] = max(best.get(score.family, -np.inf), score.gain)
+    explained = max((s.explained for s in scores), default=0.0)
+    unexplained = 1.0 - min(1.0, max(0.0, explained))
+    unknown = settings.unknown_offset
+    if excess > 1.0:
+        unknown += 2.0 * settings.threshold * np.log(excess) * (0.2 + unexplained) / settings.explained
+    top = max([0.0, unknown, *best.values()])
+    logits = {"none": 0.0, "unknown": min(unknown, max([0.0, *best.values()]) + settings.threshold), **best}
+    prior = {"none": 0.5, "unknown": 0.1, **dict.fromkeys(best, 0.4 / max(1, len(best)))}
+    scaled = {n: prior[n] * np.exp(max(-700.0, (v - top) / settings.temperature)) for n, v in logits.items()}
+    total = sum(scaled.values())
+    return {name: float(v / total) for name, v in scaled.items()}
+
+
+def _withdraw(probabilities):
+    """A test beyond the score has refused the best name: "unknown" changes places with what stood above it."""
+    top = max(probabilities, key=probabilities.get)
+    probabilities[top], probabilities["unknown"] = probabilities["unknown"], probabilities[top]
+
+
+def judge(scores, excess, settings, consistent=True, structure=0.0):
+    """Verdict from scored candidates.
+
+    Parameters
+    ----------
+    scores : list of Score
+        Best of each family, any order.
+    excess : float
+        Weighted mean square of the base model over the level of controls.
+    consistent : bool
+        The best candidate predicts reserved conditions about as well as those it was fitted to.
+    structure : float
+        Share of the residual of the best candidate that a free law of the state still explains.
+    """
+    ranked = sorted(scores, key=lambda s: -s.gain)
+    probabilities = posterior(scores, excess, settings)
+
+    def verdict(answer, names=(), grade="", reason=""):
+        if answer == "unknown":
+            _withdraw(probabilities)
+        sure = probabilities.get(names[0] if answer == "named" else answer, 0.0)
+        if answer == "a_or_b":
+            sure = sum(probabilities.get(name, 0.0) for name in names)
+        return Verdict(answer, tuple(names), grade, float(sure), probabilities, tuple(ranked), reason)
+
+    found = [s for s in ranked if s.gain > settings.threshold]
+    if not found:
+        if excess > 1.0:
+            return verdict("unknown", reason="above the level of controls, and no candidate helps")
+        return verdict("none", reason="nothing above the thresholds")
+    best = found[0]
+    if excess > 1.0 and best.explained < settings.explained:
+        return verdict("unknown", reason=f"the best candidate explains {best.explained:.0%} of the excess")
+    left = max(best.fit.level.values()) / settings.control_level
+    if left > settings.leftover:
+        return verdict("unknown", reason=f"{best.family} leaves {left:.0f} times the level of controls")
+    if not consistent:
+        return verdict("unknown", reason=f"{best.family} does not hold on conditions it was not fitted to")
+    if structure > settings.structure_left and best.fit.chi2 > settings.control_level:
+        return verdict("unknown", reason=f"a free law still explains {structure:.0%} of what {best.family} leaves")
+    if best.worst < -max(settings.threshold, 0.1 * best.gain):
+        return verdict("unknown", reason=f"{best.family} makes one condition worse by {-best.worst:.0f} nats")
+    rivals = [s for s in found[1:] if best.gain - s.gain < settings.margin]
+    if rivals:
+        return verdict("a_or_b", (best.family, rivals[0].family), reason="within the margin of each other")
+    grade = "A" if max(best.fit.level.values()) <= settings.control_level else "B"
+    return verdict("named", (best.family,), grade)

@@ -1,0 +1,71 @@
+"""Verification on recordings never used: before, named, best rival and a decoy of as many parameters."""
+
+import numpy as np
+
+from turnout.mismatch.joint import Joint
+
+FITTED_STEPS = 3
+
+
+def fit_percent(observations, predictions, centre=True):
+    r"""Share of the recordings that is predicted, :math:`100 (1 - \|y - \hat y\| / \|y - \bar y\|)` in units of sigma.
+
+    >>> from turnout.mismatch.case import Observation
+    >>> y = np.array([1.0, -1.0, 1.0, -1.0])
+    >>> fit_percent([Observation("a", "a", y, 1.0)], [0.9 * y])
+    90.0
+    """
+    missed = total = 0.0
+    for o, p in zip(observations, predictions):
+        middle = float(np.mean(o.data)) if centre else 0.0
+        missed += o.effective * float(np.sum(((o.data - p) / o.sigma) ** 2))
+        total += o.effective * float(np.sum(((o.data - middle) / o.sigma) ** 2))
+    return round(100.0 * (1.0 - float(np.sqrt(missed / total))), 4)
+
+
+def predict_reserved(case, fit, observations):
+    """Predictions of ``observations`` by the fitted model; only nuisances they own themselves are fitted to them.
+
+    Any model gets that same freedom (a passage's own speed, time and load), so that models stay comparable.
+    """
+    joint = Joint(case, fit.candidates, observations)
+    theta = np.concatenate([[fit.values[n.name] for n in case.nuisances], fit.psi])
+    owners = {o.name for o in observations}
+    own = np.array([n.owner in owners for n in case.nuisances] + [False] * fit.psi.size, dtype=bool)
+    predictions = joint.predict(theta)
+    if not own.any():
+        return predictions
+    residuals = joint.residuals(predictions)
+    cost = joint.cost(theta, residuals)
+    for _ in range(FITTED_STEPS):
+        values, _ = joint.split(theta)
+        jacobian = case.nuisance_jacobian(values, fit.terms, observations, predictions)
+        scale = {kind: max(1.0, v) for kind, v in joint.level(residuals).items()}
+        rows, right = joint.whitened([j[:, own[: joint.n]] for j in jacobian], residuals, scale)
+        scaled = rows * joint.sd[own]
+        pull = (joint.mean[own] - theta[own]) / joint.sd[own]
+        step = np.linalg.solve(scaled.T @ scaled + np.eye(int(own.sum())), scaled.T @ right + pull)
+        tried = theta.copy()
+        tried[own] += joint.sd[own] * np.clip(step, -1.0, 1.0)
+        new = joint.predict(tried)
+        new_cost = joint.cost(tried, joint.residuals(new))
+        if new_cost >= cost:
+            break
+        theta, predictions, residuals, cost = tried, new, joint.residuals(new), new_cost
+    return predictions
+
+
+def decoy(observations, predictions, reserved, reserved_predictions, n):
+    """Predictions of ``reserved`` by the base model with a filter of ``n`` free taps behind it.
+
+    The taps (on the prediction delayed and advanced) are fitted to ``observations``: what any n free numbers gain.
+    """
+
+    def columns(p):
+        shifts = [s for k in range(1, n + 1) for s in (k, -k)][:n]
+        return np.column_stack([np.roll(p, s) for s in shifts])
+
+    rows = np.concatenate([columns(p) / o.sigma[:, None] for o, p in zip(observations, predictions)])
+    right = np.concatenate([(o.data - p) / o.sigma for o, p in zip(observations, predictions)])
+    taps = np.linalg.lstsq(rows, right, rcond=None)[0]
+    return [p + columns(p) @ taps for p in reserved_predictions]

@@ -1,0 +1,200 @@
+r"""What one wheel leaves at a sensor: the model's free decay from an impact between two samples, filtered."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import fft, signal
+
+from turnout.records import ModalModel
+
+# Impacts are sought at the middles of this many parts of the interval between two samples.
+FRACTIONS = (np.arange(16) + 0.5) / 16
+
+
+@dataclass(frozen=True)
+class WheelBasis:
+    r"""Columns that span every response of a model to a jump of its state, after a causal filter.
+
+    .. math:: y_k = c A^{k+\varphi} w = \sum_m 2\,\mathrm{Re}\,(cV)_m (V^{-1}w)_m \lambda_m^{\varphi}\lambda_m^k
+
+    ``columns`` is (n_column, n_sample): real and imaginary part of the filtered powers of each pole; column
+    sample 0 is the first sample at or after the impact, which lies the fraction ``phi`` of a sample before it.
+
+    Examples
+    --------
+    One real pole 0.5 unfiltered, the impact a whole sample before the first: half is left.
+
+    >>> model = ModalModel(np.array([[0.5]]), np.ones(1), np.ones(1), 1.0, ())
+    >>> basis = wheel_basis(model, None, 1.0, longest=99.0)
+    >>> np.round(basis.response(1.0)[:3], 6).tolist()
+    [0.5, 0.25, 0.125]
+    """
+
+    poles: np.ndarray
+    observed: np.ndarray
+    into_modes: np.ndarray
+    direction: np.ndarray
+    columns: np.ndarray
+    rate: float
+
+    @property
+    def n_column(self) -> int:
+        return self.columns.shape[0]
+
+    @property
+    def n_sample(self) -> int:
+        return self.columns.shape[1]
+
+    def coefficients(self, phi, jump=None) -> np.ndarray:
+        """(..., n_column) weights of the columns for a jump (n_state,), default b, ``phi`` samples early."""
+        jump = self.direction if jump is None else jump
+        weight = self.observed * (self.into_modes @ jump)
+        weight = weight * self.poles ** np.asarray(phi, dtype=float)[..., None]
+        return self._real(weight)
+
+    def slopes(self, phi) -> np.ndarray:
+        """(..., n_column) derivative of ``coefficients`` by ``phi``. [1/sample]"""
+        weight = self.observed * (self.into_modes @ self.direction) * np.log(self.poles)
+        return self._real(weight * self.poles ** np.asarray(phi, dtype=float)[..., None])
+
+    def _real(self, weight) -> np.ndarray:
+        oscillates = self.poles.imag > 0
+        parts = [np.where(oscillates, 2.0, 1.0) * weight.real, -2.0 * weight.imag]
+        stacked = np.stack(parts, axis=-1).reshape(*weight.shape[:-1], -1)
+        keep = np.stack([np.ones_like(oscillates), oscillates], axis=-1).ravel()
+        return stacked[..., keep]
+
+    def turned(self, weights, phi) -> np.ndarray:
+        """(n, n_column) column weights after the impacts move ``phi`` (n,) samples earlier."""
+        oscillates = self.poles.imag > 0
+        place = np.concatenate([[0], np.cumsum(1 + oscillates)[:-1]])
+        weights = np.asarray(weights, dtype=float)
+        real = weights[:, place]
+        imaginary = np.where(oscillates, -weights[:, np.minimum(place + 1, weights.shape[1] - 1)], 0.0)
+        scale = np.where(oscillates, 2.0, 1.0)
+        return self._real((real + 1j * imaginary) / scale * self.poles ** np.asarray(phi, float)[:, None])
+
+    def response(self, phi, jump=None) -> np.ndarray:
+        """(n_sample,) filtered response to one jump."""
+        return self.coefficients(phi, jump) @ self.columns
+
+    @cached_property
+    def gram(self) -> np.ndarray:
+        """(n_column, n_column) inner products of the columns."""
+        return self.columns @ self.columns.T
+
+    @cached_property
+    def unit_weights(self) -> np.ndarray:
+        """(n_fraction, n_column) weights of a response of unit norm for impacts at ``FRACTIONS``."""
+        theta = self.coefficients(FRACTIONS)
+        return theta / np.sqrt(np.einsum("qp,pr,qr->q", theta, self.gram, theta))[:, None]
+
+    def correlated(self, rows, n_lag: int) -> np.ndarray:
+        """(n_row, n_lag, n_column) inner products of the columns with each row (n_row, n) from every lag on."""
+        size = fft.next_fast_len(rows.shape[1], real=True)
+        if size not in self._spectra:
+            self._spectra[size] = fft.rfft(self.columns, size).conj()
+        product = fft.irfft(fft.rfft(rows, size)[:, None, :] * self._spectra[size], size)
+        return product[:, :, :n_lag].transpose(0, 2, 1)
+
+    @cached_property
+    def _spectra(self) -> dict:
+        return {}
+
+    def unit_weights_of(self, seen) -> np.ndarray:
+        """(n, n_fraction, n_column) the same where only the first ``seen`` (n,) samples of a response count."""
+        key = tuple(int(k) for k in seen)
+        if key not in self._seen:
+            products = self.columns[:, None, :] * self.columns[None, :, :]
+            grams = np.cumsum(products, axis=2)[:, :, np.clip(np.asarray(seen) - 1, 0, self.n_sample - 1)]
+            theta = self.coefficients(FRACTIONS)
+            square = np.einsum("qp,prn,qr->nq", theta, grams, theta)
+            self._seen[key] = theta / np.sqrt(np.maximum(square, 1e-300))[..., None]
+        return self._seen[key]
+
+    @cached_property
+    def _seen(self) -> dict:
+        return {}
+
+    @cached_property
+    def ring(self) -> int:
+        """Samples after which the columns stay below 2 % of their peak."""
+        level = np.abs(self.columns).max(axis=0)
+        return int(np.flatnonzero(level > 0.02 * level.max())[-1]) + 1
+
+    @cached_property
+    def whitening(self) -> np.ndarray:
+        """(n_column, n_column) upper triangular: its product with column weights has the norm of the response."""
+        gram = self.gram + 1e-12 * np.trace(self.gram) * np.eye(self.n_column)
+        return np.linalg.cholesky(gram).T
+
+    def lagged_gram(self, lag: int) -> np.ndarray:
+        """(n_column, n_column) inner products of the columns of a wheel with those of one ``lag`` samples later."""
+        if lag >= self.n_sample:
+            return np.zeros((self.n_column, self.n_column))
+        return self.columns[:, lag:] @ self.columns[:, : self.n_sample - lag].T
+
+    def cut(self, n: int) -> WheelBasis:
+        """The same columns, only their first ``n`` samples."""
+        if n >= self.n_sample:
+            return self
+        if n not in self._cuts:
+            columns = self.columns[:, :n].copy()
+            parts = (self.poles, self.observed, self.into_modes, self.direction)
+            self._cuts[n] = WheelBasis(*parts, columns, self.rate)
+        return self._cuts[n]
+
+    @cached_property
+    def _cuts(self) -> dict:
+        return {}
+
+
+def band_pass(low: float, high: float, order: int, rate: float) -> np.ndarray:
+    """(n_section, 6) second-order sections of the causal Butterworth band-pass for data and model alike."""
+    high = min(high, 0.45 * rate)
+    if not 0 < low < high:
+        raise ValueError(f"no band between {low} Hz and {high} Hz at {rate} samples per second")
+    return signal.butter(order, [low, high], btype="bandpass", fs=rate, output="sos")
+
+
+def filtered(samples, through) -> np.ndarray:
+    """Samples (..., n) behind ``through``: second-order sections (n, 6), taps (n,) or None for nothing."""
+    if through is None:
+        return np.asarray(samples, dtype=float)
+    if np.ndim(through) == 2:
+        return signal.sosfilt(through, samples, axis=-1)
+    return signal.lfilter(through, [1.0], samples, axis=-1)
+
+
+def settling(poles, through, tolerance: float, longest: int) -> int:
+    """Samples after which the slowest of the poles, model or filter, has fallen to ``tolerance``."""
+    inner = signal.sos2zpk(through)[1] if np.ndim(through) == 2 else np.zeros(0)
+    radii = np.concatenate([np.abs(poles), np.abs(inner), [0.0]])
+    slowest = min(radii.max(), 1 - 1e-6)
+    return int(min(longest, max(8, np.ceil(np.log(tolerance) / np.log(slowest)))))
+
+
+def wheel_basis(model: ModalModel, through, rate: float, tolerance=1e-4, longest=0.25) -> WheelBasis:
+    """Basis of ``model`` at the sampling ``rate`` of the passage [Hz], behind the filter ``through`` (``filtered``).
+
+    A model identified at another rate is carried over by A^(ratio): its poles in 1/s stay the same. ``tolerance``
+    is the remaining amplitude at which columns end, ``longest`` [s] their limit. ValueError for an unstable model.
+    """
+    poles, vectors = np.linalg.eig(np.asarray(model.a, dtype=float))
+    if np.abs(poles).max() >= 1.0:
+        raise ValueError(f"the model is unstable: |eigenvalue| {np.abs(poles).max():.6f}")
+    order = np.lexsort((poles.real, np.abs(np.angle(poles))))
+    poles, vectors = poles[order].astype(complex), vectors[:, order]
+    inverse = np.linalg.inv(vectors)
+    keep = poles.imag >= 0
+    poles, observed, inverse = poles[keep], (np.asarray(model.c) @ vectors)[keep], inverse[keep]
+    poles = poles ** (model.rate / rate)
+    n = settling(poles, through, tolerance, int(longest * rate))
+    powers = poles[:, None] ** np.arange(n)
+    parts = np.stack([powers.real, powers.imag], axis=1).reshape(-1, n)
+    used = np.stack([np.ones(len(poles), bool), poles.imag > 0], axis=-1).ravel()
+    columns = filtered(parts[used], through)
+    return WheelBasis(poles, observed.astype(complex), inverse, np.asarray(model.b, float), columns, rate)

@@ -1,0 +1,176 @@
+"""The identified model of a section against one sensor's record of a passage, with everything that judges it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+
+from turnout.passage.basis import band_pass, filtered, wheel_basis
+from turnout.passage.direction import DirectionTest, direction_test
+from turnout.passage.nulls import NullBand, null_bases, null_scores
+from turnout.passage.scores import Scores, common_delay, leave_one_out_null, score
+from turnout.passage.timing import ImpactTimes, impact_times
+from turnout.passage.wheels import joint_fit
+from turnout.passage.whiten import whitener
+from turnout.records import ModalModel
+
+ACCEPTED, NULL, NOT_AN_IMPULSE, REJECTED = "accepted", "null_explains", "not_an_impulse", "rejected"
+LEAD = 0.25  # s kept before the first wheel: the band-pass settles in it
+
+
+@dataclass(frozen=True)
+class ChannelFit:
+    """Fit of one model at one sensor.
+
+    ``times`` (n_wheel,) [s] of the impacts with ``times_se`` and ``ambiguous`` flags; ``amplitudes`` (n_wheel,)
+    along b with ``amplitudes_se`` [m/s² per unit of b c]; ``test`` the chi-squared test per wheel; ``scores`` of the
+    model, ``null`` band of random models, ``others`` the scores of other sections' models by name; ``ceiling`` the
+    fit that noise alone would leave [%]; ``peak`` [m/s²] of the band-passed acceleration; ``parameters_per_second``.
+    """
+
+    status: str
+    detail: str = ""
+    times: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    times_se: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    ambiguous: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
+    amplitudes: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    amplitudes_se: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    test: DirectionTest | None = None
+    scores: Scores | None = None
+    null: NullBand | None = None
+    others: dict = field(default_factory=dict)
+    ceiling: float = float("nan")
+    peak: float = float("nan")
+    parameters_per_second: float = float("nan")
+
+    @property
+    def skill(self) -> float:
+        """How far the forecast reaches from its null (0) to what the noise allows (1)."""
+        if self.null is None or self.scores is None:
+            return float("nan")
+        return (self.scores.forecast - self.null.forecast) / (self.ceiling - self.null.forecast)
+
+
+def fit_channel(samples, rate: float, axle_times, speed: float, model: ModalModel, settings, others=None, nulls=True):
+    """Fit ``model`` to one sensor.
+
+    Parameters
+    ----------
+    samples : (n_sample,) array of float
+        Acceleration of the whole recording. [m/s²]
+    rate : float
+        [Hz]
+    axle_times : (n_wheel,) array of float
+        When the axles pass this sensor; those without a whole window in the recording are left out. [s]
+    speed : float
+        [m/s]
+    model : ModalModel
+        Of the sensor's section.
+    settings : PassageSettings
+    others : mapping or None
+        Name -> ModalModel of other sections, scored beside it.
+    nulls : bool
+        Also score random models. Without them "null_explains" cannot be said.
+
+    Returns
+    -------
+    ChannelFit
+    """
+    part, expected = _cut(samples, rate, axle_times, settings)
+    if expected.size < 2:
+        return ChannelFit(REJECTED, "fewer than two wheels with a whole window in the recording")
+    through = band_pass(settings.band_low, settings.band_high, settings.filter_order, rate)
+    data = filtered(part, through)
+    quiet = _quiet(samples, rate, axle_times, speed)
+    basis = wheel_basis(model, through, rate)
+    late = common_delay(data, expected, basis, settings)
+    times, test = _impacts(part, expected + late, quiet, speed, model, rate, settings)
+    scores = score(data, expected, basis, settings)
+    null = NullBand.of(null_scores(data, expected, _bases(model.order, rate, settings), settings)) if nulls else None
+    beside = {
+        name: score(data, expected, wheel_basis(m, through, rate), settings) for name, m in (others or {}).items()
+    }
+    found = joint_fit(data, times.times, basis)
+    offset = _offset(samples, rate, axle_times)
+    noise = float(np.std(filtered(quiet, through)[int(0.02 * rate) :])) if quiet.size > 0.1 * rate else float("nan")
+    window = np.concatenate([data[int(t) : int(t + settings.score_window * rate)] for t in expected + late])
+    status, detail = _judged(scores, null, test, settings)
+    return ChannelFit(
+        status,
+        detail,
+        times.times / rate + offset,
+        times.standard_errors / rate,
+        times.ambiguous,
+        found.amplitudes[:, 0],
+        found.standard_errors(noise)[:, 0] if np.isfinite(noise) else np.full(expected.size, np.nan),
+        test,
+        scores,
+        null,
+        beside,
+        100.0 * (1.0 - noise / max(float(np.std(window)), 1e-300)),
+        float(np.max(np.abs(window))),
+        scores.n_parameter / (scores.n_value / rate),
+    )
+
+
+def _offset(samples, rate, axle_times) -> float:
+    """Start of the part that is looked at. [s]"""
+    return max(int((np.min(axle_times) - LEAD) * rate), 0) / rate
+
+
+def _cut(samples, rate, axle_times, settings):
+    """The part of the record with the train in it, and the axle times in its samples."""
+    start = round(_offset(samples, rate, axle_times) * rate)
+    stop = min(int((np.max(axle_times) + settings.score_window + 0.2) * rate), len(samples))
+    expected = np.sort(np.asarray(axle_times, dtype=float)) * rate - start
+    room = settings.time_search * rate
+    inside = (expected > room + 2) & (expected < stop - start - settings.score_window * rate)
+    return np.asarray(samples[start:stop], dtype=float), expected[inside]
+
+
+def _quiet(samples, rate, axle_times, speed):
+    """Record far from any wheel (15 m, half a second at least): before the train or after it, the longer part."""
+    away = max(15.0 / speed, 0.5) * rate
+    before = samples[: max(int(np.min(axle_times) * rate - away), 0)]
+    after = samples[int(np.max(axle_times) * rate + away) :]
+    return before if before.size >= after.size else after
+
+
+def _impacts(part, expected, quiet, speed, model, rate, settings) -> tuple[ImpactTimes, DirectionTest]:
+    """Impact times and the test of the jump's direction, both on whitened data."""
+    taps, noise = whitener(quiet[: int(rate)] if quiet.size > 0.1 * rate else np.diff(part[: int(rate)]))
+    basis = wheel_basis(model, taps, rate)
+    white = filtered(part, taps)
+    spread = max(min(settings.place_error / speed, settings.time_search) * rate, 1.0)
+    half = settings.time_search * rate
+    times = impact_times(white, expected, basis, half, noise, spread, settings.ambiguity_odds)
+    return times, direction_test(white, np.sort(times.times), basis, noise, settings.chi_squared_level)
+
+
+def _judged(scores, null, test, settings) -> tuple[str, str]:
+    """Status and why: first whether the load is an impulse, then whether the null explains the score."""
+    if test.failed_share > settings.not_an_impulse_share:
+        return NOT_AN_IMPULSE, f"the jump of {test.failed_share:.0%} of the wheels is not along b"
+    if null is not None and not (scores.fit > null.fit and scores.forecast > null.forecast):
+        return (
+            NULL,
+            f"fit {scores.fit:.1f} against {null.fit:.1f}, forecast {scores.forecast:.1f} against {null.forecast:.1f}",
+        )
+    if null is None:
+        return ACCEPTED, "without null band"
+    return ACCEPTED, ""
+
+
+@lru_cache(maxsize=8)
+def _bases(order, rate, settings):
+    through = band_pass(settings.band_low, settings.band_high, settings.filter_order, rate)
+    return null_bases(order, through, rate, settings)
+
+
+def leave_one_out_limit(model: ModalModel, settings) -> float:
+    """Score that one free number reaches on noise, for the model's slowest mode. [%]"""
+    poles = np.linalg.eigvals(model.a)
+    decay_time = -1.0 / (np.log(np.abs(poles).max()) * model.rate)
+    return leave_one_out_null(settings.band_high - settings.band_low, decay_time)

@@ -1,0 +1,149 @@
+"""Clusters of like passages: found from the data, numbered so that a cluster keeps its name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import optimize, stats
+
+FLOOR = np.array([0.01, 0.02])  # least standard deviations: ln(speed), ln(load)
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """``id`` "<type>/<number>", ``mean`` and ``covariance`` of (ln speed [km/h], ln axle load [t]), ``weight``.
+
+    Where the loads of a type are not known, ``mean`` holds the logarithm of the speed alone.
+    """
+
+    id: str
+    type: str
+    mean: np.ndarray
+    covariance: np.ndarray
+    weight: float
+    n: int
+
+
+@dataclass(frozen=True)
+class Clusters:
+    """A fitted set. New passages are assigned to it; it changes only when it is fitted again."""
+
+    version: int
+    clusters: tuple[Cluster, ...]
+
+    def assign(self, train_type, speed_kmh, axle_load_t, level: float = 1e-4) -> str | None:
+        """Id of the cluster that a passage most likely belongs to; None where it lies outside all of its type.
+
+        Outside: further from every cluster than a share ``level`` of its members would be.
+        """
+        if train_type is None or speed_kmh is None:
+            return None
+        best, found = -np.inf, None
+        for cluster in self.clusters:
+            if cluster.type != train_type:
+                continue
+            point = np.log([speed_kmh] if axle_load_t is None else [speed_kmh, axle_load_t])
+            d = min(len(point), len(cluster.mean))
+            away = point[:d] - cluster.mean[:d]
+            covariance = cluster.covariance[:d, :d]
+            square = float(away @ np.linalg.solve(covariance, away))
+            if stats.chi2.sf(square, d) < level:
+                continue
+            log = np.log(cluster.weight) - 0.5 * square - 0.5 * np.linalg.slogdet(covariance)[1]
+            if log > best:
+                best, found = log, cluster.id
+        return found
+
+    def document(self) -> dict:
+        """As plain values, for a JSON file."""
+        return {
+            "version": self.version,
+            "clusters": [
+                {**vars(c), "mean": c.mean.tolist(), "covariance": c.covariance.tolist()} for c in self.clusters
+            ],
+        }
+
+    @classmethod
+    def of(cls, document: Mapping) -> Clusters:
+        """From ``document()``."""
+        made = [
+            Cluster(**{**c, "mean": np.array(c["mean"]), "covariance": np.array(c["covariance"])})
+            for c in document["clusters"]
+        ]
+        return cls(int(document["version"]), tuple(made))
+
+
+def fit_clusters(passages: Sequence[Mapping], settings, previous: Clusters | None = None) -> Clusters:
+    """Gaussian mixtures over (ln speed, ln load) for every train type, their number by BIC.
+
+    Parameters
+    ----------
+    passages : sequence of mappings
+        With train_type, speed_kmh, axle_load_t (may be None).
+    settings : PassageSettings
+    previous : Clusters or None
+        A cluster nearest to one of these keeps its id; new ones get numbers that were never used.
+
+    Returns
+    -------
+    Clusters
+        Version one above ``previous``.
+    """
+    found = []
+    groups: dict[str, list] = {}
+    for p in passages:
+        if p["train_type"] and p["train_type"] != "unknown" and p["speed_kmh"]:
+            groups.setdefault(p["train_type"], []).append((p["speed_kmh"], p["axle_load_t"]))
+    for type_ in sorted(groups):
+        rows = groups[type_]
+        loaded = [r for r in rows if r[1] is not None]
+        points = np.log([r for r in loaded]) if len(loaded) > 0.5 * len(rows) else np.log([[r[0]] for r in rows])
+        old = [c for c in (previous.clusters if previous else ()) if c.type == type_]
+        found += _named(type_, _mixture(points, settings), len(points), old)
+    return Clusters((previous.version if previous else 0) + 1, tuple(found))
+
+
+def _mixture(points, settings):
+    """(weight, mean, covariance) of the mixture with the lowest BIC, largest weight first."""
+    from sklearn.mixture import GaussianMixture
+
+    order = np.lexsort(points.T)
+    points = points[order]  # the result must not depend on the order of the passages
+    d = points.shape[1]
+    floor = FLOOR[:d]
+    scaled = points / floor
+    best, lowest, worse = None, np.inf, 0
+    for k in range(1, min(settings.cluster_maximum, max(len(points) // (5 * d), 1)) + 1):
+        mixture = GaussianMixture(k, n_init=3, random_state=settings.cluster_seed, reg_covar=1.0).fit(scaled)
+        bic = mixture.bic(scaled)
+        if bic < lowest:
+            best, lowest, worse = mixture, bic, 0
+        else:
+            worse += 1
+            if worse == 3:
+                break
+    parts = zip(best.weights_, best.means_ * floor, best.covariances_ * np.outer(floor, floor))
+    return sorted(parts, key=lambda p: (-p[0], tuple(p[1])))
+
+
+def _named(type_, parts, n, old):
+    """Clusters with ids: those of the nearest old ones where they are nearer than two of their deviations."""
+    ids = {}
+    if old and len(old[0].mean) == len(parts[0][1]):
+        distance = np.array(
+            [[np.sqrt((m - c.mean) @ np.linalg.solve(c.covariance, m - c.mean)) for c in old] for _, m, _ in parts]
+        )
+        for i, j in zip(*optimize.linear_sum_assignment(np.minimum(distance, 1e6))):
+            if distance[i, j] < 2.0:
+                ids[i] = old[j].id
+    used = [int(c.id.rsplit("/", 1)[1]) for c in old]
+    fresh = max(used, default=0) + 1
+    made = []
+    for i, (weight, mean, covariance) in enumerate(parts):
+        if i not in ids:
+            ids[i] = f"{type_}/{fresh}"
+            fresh += 1
+        made.append(Cluster(ids[i], type_, mean, covariance, float(weight), round(weight * n)))
+    return sorted(made, key=lambda c: int(c.id.rsplit("/", 1)[1]))

@@ -1,0 +1,119 @@
+"""Passages cut out of a continuous record, block by block, in bounded memory."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import signal
+
+BAND = (120.0, 400.0)  # Hz, where wheels are loud on any rail
+BIN = 0.05  # s
+LOUD = 6.0  # times the quiet power
+MEMORY = 120.0  # s over which the quiet power is remembered
+
+
+@dataclass(frozen=True)
+class Piece:
+    """``samples`` (n_channel, n) from sample ``start`` of the record on; ``whole`` is False where a passage was longer
+    than may be kept, and was cut."""
+
+    start: int
+    samples: np.ndarray
+    whole: bool = True
+
+
+def cut_passages(blocks: Iterable[np.ndarray], rate: float, settings) -> Iterator[Piece]:
+    """Pieces of a continuous record, one per passage, each with ``settings.margin`` seconds on either side.
+
+    A passage is what is louder than six times the quiet power, mean over the channels, with no quiet of more than
+    ``settings.gap`` seconds in it. The quiet power is the lower fifth of the last two minutes. No more than
+    ``settings.longest`` seconds and a block are held, whatever the record's length; what is held is float32.
+
+    Parameters
+    ----------
+    blocks : iterable of (n_channel, n) arrays
+        Consecutive parts of the record, of any length. [m/s²]
+    rate : float
+        [Hz]
+    """
+    state = _Cutter(rate, settings)
+    for block in blocks:
+        yield from state.feed(np.atleast_2d(block))
+    yield from state.end()
+
+
+@dataclass
+class _Cutter:
+    """What is remembered between blocks."""
+
+    rate: float
+    settings: object
+    sections: np.ndarray = None
+    memory: np.ndarray = None
+    kept: deque = field(default_factory=deque)
+    kept_from: int = 0
+    seen: int = 0
+    rest: np.ndarray = None
+    quiet: deque = field(default_factory=lambda: deque(maxlen=int(MEMORY / BIN)))
+    first: int | None = None
+    last: int = 0
+
+    def feed(self, block):
+        """Pieces that end in this block."""
+        if self.sections is None:
+            self.sections = signal.butter(2, BAND, btype="bandpass", fs=self.rate, output="sos")
+            self.memory = np.zeros((len(self.sections), block.shape[0], 2))
+            self.rest = np.zeros((block.shape[0], 0))
+        passed, self.memory = signal.sosfilt(self.sections, block, axis=1, zi=self.memory)
+        self.kept.append(block.astype(np.float32))
+        self.seen += block.shape[1]
+        per_bin = int(BIN * self.rate)
+        passed = np.concatenate([self.rest, passed], axis=1)
+        n = passed.shape[1] // per_bin
+        begin = self.seen - passed.shape[1]
+        self.rest = passed[:, n * per_bin :].copy()
+        powers = np.square(passed[:, : n * per_bin]).reshape(passed.shape[0], n, per_bin).mean(axis=2)
+        levels = np.log(np.maximum(powers, 1e-30)).mean(axis=0)
+        self.quiet.extend(levels)
+        loud = levels > np.quantile(self.quiet, 0.2) + np.log(LOUD)
+        for k in range(n):
+            yield from self._step(begin + k * per_bin, per_bin, bool(loud[k]))
+        self._forget()
+
+    def end(self):
+        """The piece that the record's end cuts off, if there is one."""
+        if self.first is not None:
+            yield self._piece(self.first, self.seen, True)
+
+    def _step(self, place, per_bin, loud):
+        margin = int(self.settings.margin * self.rate)
+        if loud:
+            if self.first is None:
+                self.first = max(place - margin, 0)
+            self.last = place + per_bin
+        if self.first is None:
+            return
+        if loud and self.last - self.first > self.settings.longest * self.rate:
+            yield self._piece(self.first, self.last, False)
+            self.first = None
+        elif not loud and place - self.last > self.settings.gap * self.rate:
+            yield self._piece(self.first, self.last + margin, True)
+            self.first = None
+
+    def _piece(self, start, stop, whole):
+        start, parts, place = max(start, self.kept_from), [], self.kept_from
+        for block in self.kept:
+            inside = slice(max(start - place, 0), max(min(stop - place, block.shape[1]), 0))
+            parts.append(block[:, inside])
+            place += block.shape[1]
+        return Piece(start, np.concatenate(parts, axis=1), whole)
+
+    def _forget(self):
+        """Drop blocks that no coming piece can need."""
+        margin = int((self.settings.margin + BIN) * self.rate)
+        needed = self.first if self.first is not None else self.seen - margin - self.rest.shape[1]
+        while self.kept and self.kept_from + self.kept[0].shape[1] <= needed:
+            self.kept_from += self.kept.popleft().shape[1]

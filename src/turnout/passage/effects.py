@@ -1,0 +1,102 @@
+r"""What train type, speed and axle load each do to a score, the others held fixed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+NEEDED = ("train_type", "speed_kmh", "axle_load_t")
+
+
+@dataclass(frozen=True)
+class Effect:
+    """``change`` of the score [points] per ``per`` of ``factor``, with standard error and 95 % interval.
+
+    ``adjusted``: the other factors held fixed; otherwise what groups show when compared as they are. ``n`` passages.
+    """
+
+    factor: str
+    per: str
+    change: float
+    se: float
+    low: float
+    high: float
+    n: int
+    adjusted: bool
+
+
+def effects(rows: Sequence[Mapping], score: str = "fit_pct") -> tuple[Effect, ...]:
+    r"""Raw and adjusted effects of axle load, speed and type on a score of one section.
+
+    .. math:: y = \mu_{type} + \beta_v (v - \bar v) + \beta_P (P - \bar P) + e
+
+    Least squares with standard errors that allow a variance of its own for every passage (HC3). A factor that the
+    others determine, as where every type has its own load, has no adjusted effect and none is given.
+
+    Parameters
+    ----------
+    rows : sequence of mappings
+        With train_type, speed_kmh, axle_load_t and the score; rows without any of them are left out.
+    score : str
+        Name of the score.
+    """
+    used = [r for r in rows if all(r.get(k) is not None for k in (*NEEDED, score))]
+    if len(used) < 8:
+        return ()
+    y = np.array([r[score] for r in used], dtype=float)
+    speed = np.array([r["speed_kmh"] for r in used], dtype=float)
+    load = np.array([r["axle_load_t"] for r in used], dtype=float)
+    types = sorted({r["train_type"] for r in used})
+    is_type = np.array([[r["train_type"] == t for t in types] for r in used], dtype=float)
+    slopes = {("axle load", "tonne"): load - load.mean(), ("speed", "10 km/h"): (speed - speed.mean()) / 10}
+    found = []
+    for (factor, per), x in slopes.items():
+        found += _effect(y, np.column_stack([np.ones(len(y)), x]), [1], factor, [per], False)
+    found += _types(y, is_type, types, np.zeros((len(y), 0)), False)
+    whole = np.column_stack([is_type, *slopes.values()])
+    n_type = len(types)
+    for k, (factor, per) in enumerate(slopes):
+        found += _effect(y, whole, [n_type + k], factor, [per], True)
+    found += _types(y, is_type, types, np.column_stack(list(slopes.values())), True)
+    return tuple(found)
+
+
+def _types(y, is_type, types, beside, adjusted):
+    """Each further type against the most frequent one."""
+    reference = int(np.argmax(is_type.sum(axis=0)))
+    others = [k for k in range(len(types)) if k != reference]
+    design = np.column_stack([np.ones(len(y)), is_type[:, others], beside])
+    names = [f"{types[k]} instead of {types[reference]}" for k in others]
+    return _effect(y, design, list(range(1, 1 + len(others))), "train type", names, adjusted)
+
+
+def _effect(y, design, columns, factor, names, adjusted):
+    """Effects of some columns of a design; those that the other columns determine to 99 % are left out."""
+    found = []
+    n, p = design.shape
+    if n <= p + 2:
+        return found
+    inverse = np.linalg.pinv(design.T @ design)
+    solution = inverse @ design.T @ y
+    leverage = np.clip(np.einsum("ij,jk,ik->i", design, inverse, design), 0, 0.999)
+    weight = ((y - design @ solution) / (1 - leverage)) ** 2
+    covariance = inverse @ (design * weight[:, None]).T @ design @ inverse
+    t = stats.t.ppf(0.975, n - p)
+    for column, name in zip(columns, names):
+        if _determined(design, column):
+            continue
+        change, se = float(solution[column]), float(np.sqrt(covariance[column, column]))
+        found.append(Effect(factor, name, change, se, change - t * se, change + t * se, n, adjusted))
+    return found
+
+
+def _determined(design, column) -> bool:
+    """Do the other columns explain this one to 99 % of its variance?"""
+    others = np.delete(design, column, axis=1)
+    x = design[:, column]
+    rest = x - others @ np.linalg.lstsq(others, x, rcond=None)[0]
+    spread = np.sum((x - x.mean()) ** 2)
+    return bool(spread == 0 or np.sum(rest**2) < 0.01 * spread)

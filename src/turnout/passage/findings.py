@@ -1,0 +1,79 @@
+"""What is found out about one passage."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from turnout.passage.motion import Motion
+from turnout.passage.train_type import TypeFinding
+from turnout.records import Rejection
+
+
+@dataclass(frozen=True)
+class PassageSensor:
+    """A channel of a passage: ``name``, the ``section`` it watches, its ``position`` [m], and which trains it feels:
+    ``track`` is "main", "diverging" or "both"."""
+
+    name: str
+    section: str
+    position: float
+    track: str = "both"
+
+
+@dataclass(frozen=True)
+class SpeedFinding:
+    """``speed`` [m/s] at the turnout's origin with ``se``, ``acceleration`` [m/s²] with ``acceleration_se``.
+
+    ``source`` says what it rests on: "sensors", "axle spacing", "both" or "bogie" (a guess from an unknown train's
+    bogies). ``disagreement`` is the difference of sensors and axle spacing in standard errors, None without both.
+    """
+
+    speed: float
+    se: float
+    acceleration: float
+    acceleration_se: float
+    source: str
+    disagreement: float | None = None
+
+
+@dataclass(frozen=True)
+class Passage:
+    """One train found in a recording.
+
+    ``offsets`` (n_axle,) [m] behind the first axle, ``times`` (n_axle,) [s] when they pass the turnout's origin.
+    ``at_sensor`` maps a channel to (n_axle,) [s]; only channels that heard the train. ``heard`` names them.
+    ``status`` "accepted", "partly" or "rejected" with ``findings``; ``contrast`` of the axle count.
+    """
+
+    status: str
+    findings: tuple[Rejection, ...]
+    motion: Motion | None = None
+    speed: SpeedFinding | None = None
+    offsets: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    direction: str = "unknown"
+    track: str = "unknown"
+    type: TypeFinding | None = None
+    at_sensor: dict = field(default_factory=dict)
+    contrast: float = 0.0
+    begin: float | None = None
+    end: float | None = None
+    drifting: dict = field(default_factory=dict)
+
+    @property
+    def n_axle(self) -> int:
+        return len(self.offsets)
+
+    @property
+    def times(self) -> np.ndarray:
+        return self.motion.time(self.offsets) if self.motion else np.zeros(0)
+
+    @property
+    def heard(self) -> tuple[str, ...]:
+        return tuple(self.at_sensor)
+
+    @property
+    def reason(self) -> str | None:
+        """Code of the first finding."""
+        return self.findings[0].reason if self.findings else None

@@ -1,0 +1,105 @@
+"""From samples to what axles are sought in, and which sensors hear the train."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy import ndimage
+
+from turnout.passage.envelope import levels
+from turnout.passage.stack import Listening
+
+QUIET_BLOCK = 0.05  # s
+
+
+def listen(samples, rate: float, positions, step: float) -> Listening | None:
+    """``Listening`` of the channels (n_sensor, n_sample), None where nothing is louder than the quiet parts."""
+    found = levels(samples, rate, step)
+    per_bin = max(round(step * rate), 1)
+    n = found.n_bin
+    slow = samples[:, : n * per_bin].reshape(samples.shape[0], n, per_bin).mean(axis=2)
+    slow = slow - np.median(slow, axis=1, keepdims=True)
+    active = heard_bins(found.values.mean(axis=0), step)
+    if not active.any():
+        return None
+    bins = np.flatnonzero(active)
+    return Listening(found, slow, np.asarray(positions, float), bins[0] * step, (bins[-1] + 1) * step)
+
+
+def heard_bins(level, step: float, times: float = 8.0) -> np.ndarray:
+    """(n_bin,) bool: the level (n_bin,) over 50 ms is above a seventh of its range.
+
+    All False where that range is less than ``times`` the scatter of neighbouring blocks, or less than half a neper:
+    then nothing but noise was recorded.
+    """
+    width = max(round(QUIET_BLOCK / step), 1)
+    smooth = ndimage.uniform_filter1d(level, width)
+    blocks = smooth[width // 2 :: width]
+    low, high = np.quantile(blocks, 0.05), blocks.max()
+    calm = np.sort(blocks)[: max(len(blocks) // 3, 2)]
+    scatter = np.median(np.abs(np.diff(blocks[np.isin(blocks, calm)]))) / 0.954 if len(calm) > 3 else 0.0
+    if high - low < max(times * scatter, 0.5):
+        return np.zeros(len(level), dtype=bool)
+    return smooth > low + (high - low) / 7.0
+
+
+def narrowed(listening: Listening, rows) -> Listening:
+    """Only the sensors ``rows``, with the begin and end of what they hear."""
+    part = listening.only(rows)
+    bins = np.flatnonzero(heard_bins(part.levels.values.mean(axis=0), part.levels.step))
+    if bins.size == 0:
+        return part
+    return replace(part, begin=bins[0] * part.levels.step, end=(bins[-1] + 1) * part.levels.step)
+
+
+def loudness(listening: Listening) -> np.ndarray:
+    """(n_sensor,) level over 50 ms that a tenth of the passage exceeds; 0 where a sensor hears nothing but noise."""
+    step = listening.levels.step
+    width = max(round(QUIET_BLOCK / step), 1)
+    part = slice(int(listening.begin / step), max(int(listening.end / step), 1))
+    smooth = ndimage.uniform_filter1d(listening.levels.values, width, axis=1)
+    loud = np.quantile(smooth[:, part], 0.9, axis=1) - np.quantile(smooth, 0.05, axis=1)
+    heard = np.array([heard_bins(row, step).any() for row in listening.levels.values])
+    return np.where(heard, loud, 0.0)
+
+
+def hearing(listening: Listening) -> np.ndarray:
+    """Rows of the sensors that hear the train: not only noise, and not much fainter than most.
+
+    A tenth of the amplitude of the best third is the neighbouring track's train, not a less sensitive sensor.
+    """
+    loud = loudness(listening) > 0.1
+    if not loud.any():
+        return np.flatnonzero(loud)
+    power = listening.levels.loud
+    return np.flatnonzero(loud & (power >= 0.01 * np.quantile(power[loud], 0.7)))
+
+
+def track_taken(listening: Listening, tracks) -> tuple[str, float]:
+    """("main" | "diverging" | "unknown", difference): which of the sensors of one track only are the louder.
+
+    ``difference`` is in nepers of power; twice the amplitude, 1.4 nepers, is asked for. With sensors of one track
+    only, that track is taken if they are not much fainter than the sensors that feel both; if they hear nothing, the
+    other one is.
+    """
+    tracks, heard = np.asarray(tracks), loudness(listening) > 0.1
+    power = np.where(heard, np.log(np.maximum(listening.levels.loud, 1e-300)), -np.inf)
+    mean = {name: power[tracks == name].max() for name in ("main", "diverging", "both") if np.any(tracks == name)}
+    if "main" in mean and "diverging" in mean:
+        difference = _difference(mean["main"], mean["diverging"])
+        if abs(difference) < 1.4:
+            return "unknown", difference
+        return ("main" if difference > 0 else "diverging"), difference
+    only = next((name for name in ("main", "diverging") if name in mean), None)
+    if only is None:
+        return "unknown", 0.0
+    difference = _difference(mean[only], mean.get("both", mean[only]))
+    if difference < -3.0:
+        return ("diverging" if only == "main" else "main"), difference
+    return only, difference
+
+
+def _difference(first, second) -> float:
+    """Of two logarithms, either of which may be that of silence."""
+    return 0.0 if first == second else float(np.clip(first - second, -20.0, 20.0))

@@ -1,0 +1,128 @@
+r"""Axle load from the quasi-static part: the rail's moving deflection, calibrated on trains of known weight."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import signal
+
+from turnout.passage.axles import GRID, along_train
+
+STEP = 0.001  # s
+TRUSTED = (0.12, 0.9)  # cycles per metre that are compared: longer ones drown in drift, shorter ones in vibration
+
+
+@dataclass(frozen=True)
+class LoadCalibration:
+    r"""Amplitude per load of one channel: :math:`\ln(A / P) = \ln k + \gamma \ln(v / v_0)`.
+
+    ``log_gain`` and ``exponent`` (near 2: acceleration is v² w'') with their ``covariance`` (2, 2), ``scatter`` of one
+    train about it (relative), ``n`` trains, ``speed`` v_0 [m/s] and the range of speeds ``slowest``, ``fastest``.
+    """
+
+    log_gain: float
+    exponent: float
+    covariance: np.ndarray
+    scatter: float
+    n: int
+    speed: float
+    slowest: float
+    fastest: float
+
+
+@dataclass(frozen=True)
+class LoadFinding:
+    """Mean axle load with standard error [t], and ``per_axle`` (n_axle,) [t] relative to it, rougher."""
+
+    mean: float
+    se: float
+    per_axle: np.ndarray
+
+
+def quasi_static(samples, rate: float, passage, position: float) -> np.ndarray:
+    r"""(n_axle,) amplitude of each axle in the slow acceleration at one sensor, positive for a load. [m/s²]
+
+    Least squares of :math:`\sum_j A_j \kappa(s - d_j)`, κ the curvature of a rail on an elastic foundation with
+    wavenumber 1.1 per metre, both data and κ limited to ``TRUSTED`` wavelengths along the train.
+    """
+    per_bin = max(round(STEP * rate), 1)
+    n = len(samples) // per_bin
+    slow = np.asarray(samples[: n * per_bin], float).reshape(n, per_bin).mean(axis=1)
+    start, stop = passage.offsets[0] - 12.0, passage.offsets[-1] + 12.0
+    row = along_train((slow - np.median(slow))[None], per_bin / rate, [position], passage.motion, start, stop)[0]
+    sections = signal.butter(3, TRUSTED, btype="bandpass", fs=1.0 / GRID, output="sos")
+    place = np.arange(len(row)) * GRID + start
+    kx = 1.1 * np.abs(place[:, None] - passage.offsets)
+    columns = np.exp(-kx) * (np.cos(kx) - np.sin(kx))
+    columns = signal.sosfiltfilt(sections, columns, axis=0)
+    return np.linalg.lstsq(columns, signal.sosfiltfilt(sections, row), rcond=None)[0]
+
+
+def calibrate(amplitudes, loads, speeds, fewest: int = 5) -> LoadCalibration | None:
+    """Calibration of one channel from trains of known mean axle load; None from fewer than ``fewest`` trains.
+
+    Parameters
+    ----------
+    amplitudes : (n_train,) array of float
+        Mean amplitude of each train at the channel, sign of the sensor included. [m/s²]
+    loads : (n_train,) array of float
+        [t]
+    speeds : (n_train,) array of float
+        [m/s]
+    """
+    amplitudes, loads, speeds = (np.asarray(x, dtype=float) for x in (amplitudes, loads, speeds))
+    amplitudes = np.abs(amplitudes)
+    good = (amplitudes > 0) & (loads > 0)
+    if good.sum() < max(fewest, 3):
+        return None
+    reference = float(np.exp(np.mean(np.log(speeds[good]))))
+    relative = np.log(speeds[good] / reference)
+    target = np.log(amplitudes[good] / loads[good])
+    # acceleration goes with v²; trains of one speed cannot say otherwise
+    prior = np.array([[0.0, 0.0], [0.0, 1 / 0.3**2]])
+    scatter = 0.05
+    design = np.column_stack([np.ones(good.sum()), relative])
+    for _ in range(5):
+        normal = design.T @ design / scatter**2 + prior
+        solution = np.linalg.solve(normal, design.T @ target / scatter**2 + prior @ [0.0, 2.0])
+        residual = target - design @ solution
+        scatter = max(float(np.sqrt(np.sum(residual**2) / max(good.sum() - 2, 1))), 1e-3)
+    low, high = speeds[good].min(), speeds[good].max()
+    covariance = np.linalg.inv(normal)
+    return LoadCalibration(
+        float(solution[0]), float(solution[1]), covariance, scatter, int(good.sum()), reference, float(low), float(high)
+    )
+
+
+def axle_load(recording, passage, calibrations, settings) -> LoadFinding | None:
+    """Mean axle load from all calibrated channels; None ("unavailable") where its error would exceed the setting.
+
+    A calibration is used between 0.8 times its slowest and 1.25 times its fastest train.
+    """
+    logs, errors, shapes = [], [], []
+    known = {c.name: c for c in recording.channels}
+    for name in passage.at_sensor:
+        found = calibrations.get(name)
+        speed = passage.motion.speed
+        if found is None or not 0.8 * found.slowest <= speed <= 1.25 * found.fastest:
+            continue
+        amplitudes = quasi_static(recording.signal(name), recording.rate, passage, known[name].position)
+        mean = abs(float(np.mean(amplitudes)))
+        if mean == 0:
+            continue
+        where = np.array([1.0, np.log(speed / found.speed)])
+        logs.append(np.log(mean) - where @ [found.log_gain, found.exponent])
+        errors.append(np.sqrt(where @ found.covariance @ where + found.scatter**2))
+        shapes.append(amplitudes / np.mean(amplitudes))
+    if not logs:
+        return None
+    weight = np.array(errors) ** -2
+    log = float(np.sum(weight * logs) / weight.sum())
+    # the scatter between channels says whether their errors are independent: they share the train and its speed
+    between = float(np.sqrt(np.sum(weight * (np.array(logs) - log) ** 2) / weight.sum())) if len(logs) > 1 else 0.0
+    relative = float(np.hypot(1 / np.sqrt(weight.sum()), between / np.sqrt(len(logs))))
+    if relative > settings.load_relative_error_maximum:
+        return None
+    mean = float(np.exp(log))
+    return LoadFinding(mean, relative * mean, mean * np.mean(shapes, axis=0))

@@ -1,0 +1,99 @@
+"""Sensors that do not hear the train where they are said to be: swapped channels, drifting or offset clocks."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from turnout.passage.axles import GRID, along_train
+from turnout.passage.slowness import coarser, pair_likeness, slowness_grid, stacked
+from turnout.records import Rejection
+
+SEEN = 0.7  # m: a sensor hears a wheel within this of its own place
+POOR, GOOD = 0.85, 0.95  # of the likeness that free shifts reach: below nothing fits, above everything does
+WIDTH = 0.02  # s
+
+
+def wrong_channels(heard, used, settings):
+    """Findings and (n_sensor,) bool of the sensors to keep: which channels make all others disagree.
+
+    Asked only where no speed brings the sensors' levels together nearly as well as shifts of their own would. Then
+    every exchange of two channels is tried, and every sensor is left out once: what helps decisively is named. Fewer
+    than four sensors cannot say which one is wrong.
+    """
+    n = len(used)
+    keep = np.ones(n, dtype=bool)
+    if n < 4:
+        return [], keep
+    positions = heard.positions
+    values, step = coarser(heard.levels.values, heard.levels.step, 0.005)
+    pairs = pair_likeness(values, step, WIDTH)
+    slowness = slowness_grid(settings)
+    free = np.mean([p.max() for p in pairs.values()])
+    best = stacked(pairs, step, positions, slowness).max()
+    if best >= POOR * free:
+        return [], keep
+    tried = []
+    for i, j in pairs:
+        changed = positions.astype(float).copy()
+        changed[[i, j]] = changed[[j, i]]
+        tried.append((stacked(pairs, step, changed, slowness).max(), (i, j)))
+    for i in range(n):
+        changed = positions.astype(float).copy()
+        changed[i] = np.nan
+        tried.append((stacked(pairs, step, changed, slowness).max(), (i,)))
+    likeness, wrong = max(tried)
+    if likeness < GOOD * free:
+        return [], keep
+    keep[list(wrong)] = False
+    if len(wrong) == 2:
+        text = f"{used[wrong[0]].name} and {used[wrong[1]].name}: each hears the train in the other's place"
+        return [Rejection("channels_swapped", float(best / free), POOR, text)], keep
+    text = f"{used[wrong[0]].name}: hears the train at another time than its place says"
+    return [Rejection("clock_drift", float(best / free), POOR, text)], keep
+
+
+def wrong_places(heard, motion, used):
+    """Findings and (n_sensor,) bool of the sensors to keep: small offsets, once the motion is known.
+
+    Each sensor's level along the train is compared with the median of the others, in the first and in the second
+    half: a shift that changes is a drifting clock, a constant one a clock or a position in the configuration that is
+    off. Fewer than four sensors cannot say which one is wrong.
+    """
+    n = len(used)
+    keep = np.ones(n, dtype=bool)
+    if n < 4:
+        return [], keep
+    shifts = _shifts(heard, motion)
+    shifts = shifts - np.median(shifts, axis=0)
+    whole = shifts.mean(axis=1)
+    bad = np.flatnonzero(np.abs(whole) > SEEN)
+    if bad.size == 0 or bad.size > n // 2:
+        return [], keep
+    findings = []
+    for i in bad:
+        word = "drifts" if abs(shifts[i, 1] - shifts[i, 0]) > 0.25 else "is off"
+        text = f"{used[i].name}: its clock {word}, {whole[i] / motion.speed * 1e3:.0f} ms against the others"
+        findings.append(Rejection("clock_drift", float(whole[i]), SEEN, text))
+        keep[i] = False
+    return findings, keep
+
+
+def _shifts(heard, motion, reach: float = 20.0):
+    """(n_sensor, 2) shift [m] of each sensor against the others, in the first and second half of the train."""
+    ways = motion.way(np.array([heard.begin, heard.end]))
+    middle = motion.direction * np.mean(heard.positions)
+    start, stop = ways[0] - middle - 30.0, ways[1] - middle + 30.0
+    values = along_train(heard.levels.values, heard.levels.step, heard.positions, motion, start, stop)
+    values = values - values.mean(axis=1, keepdims=True)
+    n, out = values.shape[1], np.zeros((len(values), 2))
+    lags = np.arange(-int(reach / GRID), int(reach / GRID) + 1)
+    for k, part in enumerate((slice(0, n // 2), slice(n // 2, n))):
+        rows = values[:, part]
+        size = 2 ** int(np.ceil(np.log2(2 * rows.shape[1])))
+        spectra = np.fft.rfft(rows, size, axis=1)
+        for i in range(len(rows)):
+            # the median of the others: a second wrong sensor must not pull it
+            others = np.median(np.delete(rows, i, axis=0), axis=0)
+            likeness = np.fft.irfft(spectra[i] * np.fft.rfft(others, size).conj(), size)
+            out[i, k] = lags[np.argmax(likeness[lags])] * GRID
+    return out

@@ -1,0 +1,54 @@
+"""A second train at the same time: what moves past the sensors at another speed or the other way."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import ndimage
+
+from turnout.passage.axles import GRID, along_train
+from turnout.passage.slowness import scan_slowness
+from turnout.records import Rejection
+
+LIKE = 0.25  # least correlation of what is left, among the sensors
+LEFT = 0.12  # least share of the level that is left
+
+
+def second_train(heard, passage, settings):
+    """Finding "two_trains" where what the known motion leaves over moves coherently in another way.
+
+    What all sensors have in common along the known train is taken off each of them: the lower median, so that a
+    second train, elsewhere along the first one at every sensor, stays. Needs three sensors; with fewer nothing can be
+    said and nothing is.
+    """
+    if len(heard.positions) < 3:
+        return []
+    rest = without_train(heard, passage.motion)
+    left = rest.sum() / max(np.clip(heard.levels.values, 0, None).sum(), 1e-12)
+    scan = scan_slowness(rest, heard.levels.step, heard.positions, settings)
+    own = passage.motion.direction / passage.motion.speed
+    other = np.abs(scan.slowness - own) > 0.15 * abs(own)
+    same = scan.likeness[~other].max(initial=0.0)
+    best = int(np.argmax(np.where(other, scan.likeness, -np.inf)))
+    strength = float(scan.likeness[best])
+    if left < LEFT or strength < LIKE or strength < 1.2 * same:
+        return []
+    speed = 3.6 / scan.slowness[best]
+    way = "facing" if speed > 0 else "trailing"
+    return [Rejection("two_trains", strength, LIKE, f"another train at about {abs(speed):.0f} km/h, {way}")]
+
+
+def without_train(heard, motion) -> np.ndarray:
+    """(n_sensor, n_bin) levels above what the sensors share along the train, smoothed over 20 ms, never below 0."""
+    step, positions = heard.levels.step, heard.positions
+    values = ndimage.uniform_filter1d(heard.levels.values, max(round(0.02 / step), 1), axis=1)
+    ways = [motion.way(t) - motion.direction * x for t in (heard.begin, heard.end) for x in positions]
+    start, stop = min(ways) - 15.0, max(ways) + 15.0
+    rows = np.sort(along_train(values, step, positions, motion, start, stop), axis=0)
+    shared = rows[(len(rows) - 1) // 2]
+    place = start + np.arange(shared.size) * GRID
+    centres = (np.arange(values.shape[1]) + 0.5) * step
+    rest = [
+        row - np.interp(motion.way(centres) - motion.direction * x, place, shared, left=0.0, right=0.0)
+        for row, x in zip(values, positions)
+    ]
+    return np.clip(rest, 0.0, None)

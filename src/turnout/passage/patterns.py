@@ -1,0 +1,140 @@
+"""Trains as rows of vehicles, each with its axles: what an axle pattern is compared with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """``length`` over couplers and the place of each axle from the front coupler. [m]"""
+
+    name: str
+    length: float
+    axles: tuple[float, ...]
+
+    def __post_init__(self):
+        if not self.axles or sorted(self.axles) != list(self.axles):
+            raise ValueError(f"vehicle {self.name}: axles must be in order, got {self.axles}")
+        if self.axles[0] < 0 or self.axles[-1] > self.length:
+            raise ValueError(f"vehicle {self.name}: axles {self.axles} reach beyond its length {self.length}")
+
+    @property
+    def rear(self) -> float:
+        """Rear overhang. [m]"""
+        return self.length - self.axles[-1]
+
+    def reversed(self) -> Vehicle:
+        """Running the other way round; itself where it is symmetric to a millimetre."""
+        turned = tuple(round(self.length - x, 4) for x in reversed(self.axles))
+        if np.allclose(turned, self.axles, atol=1e-3):
+            return self
+        name = self.name.removesuffix("'") if self.name.endswith("'") else self.name + "'"
+        return Vehicle(name, self.length, turned)
+
+    @classmethod
+    def of(cls, name: str, values: Mapping) -> Vehicle:
+        """From a mapping: ``length`` with ``axles``, or ``length``, ``pivots`` and ``wheelbase`` of two bogies.
+
+        >>> Vehicle.of("coach", {"length": 26.4, "pivots": 19.0, "wheelbase": 2.5}).axles
+        (2.45, 4.95, 21.45, 23.95)
+        """
+        length = float(values["length"])
+        if "axles" in values:
+            return cls(name, length, tuple(float(x) for x in values["axles"]))
+        pivots, base = float(values["pivots"]), float(values["wheelbase"])
+        front = (length - pivots - base) / 2
+        return cls(name, length, tuple(round(front + x, 4) for x in (0.0, base, pivots, pivots + base)))
+
+
+@dataclass(frozen=True)
+class Group:
+    """``minimum`` to ``maximum`` vehicles in a row, each one of ``vehicles``."""
+
+    vehicles: tuple[Vehicle, ...]
+    minimum: int = 1
+    maximum: int = 1
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """One way a ``type`` of train may be made up: groups one after the other, front first."""
+
+    type: str
+    groups: tuple[Group, ...]
+
+    def reversed(self) -> Pattern:
+        """The same train running the other way."""
+        groups = tuple(
+            Group(tuple(v.reversed() for v in g.vehicles), g.minimum, g.maximum) for g in reversed(self.groups)
+        )
+        return Pattern(self.type, groups)
+
+    def only_row(self):
+        """(0.0, vehicles, 0.0) where there is nothing to choose, else None."""
+        if any(len(g.vehicles) > 1 or g.minimum != g.maximum for g in self.groups):
+            return None
+        return 0.0, tuple(v for g in self.groups for v in g.vehicles * g.minimum), 0.0
+
+    def lengths(self) -> tuple[float, float]:
+        """Least and largest length over couplers. [m]"""
+        lengths = [[v.length for v in g.vehicles] for g in self.groups]
+        low = sum(min(x) * g.minimum for x, g in zip(lengths, self.groups))
+        return low, sum(max(x) * g.maximum for x, g in zip(lengths, self.groups))
+
+    def axle_counts(self) -> tuple[int, int]:
+        """Least and largest number of axles."""
+        counts = [[len(v.axles) for v in g.vehicles] for g in self.groups]
+        low = sum(min(c) * g.minimum for c, g in zip(counts, self.groups))
+        return low, sum(max(c) * g.maximum for c, g in zip(counts, self.groups))
+
+
+def offsets(vehicles) -> np.ndarray:
+    """(n_axle,) metres behind the first axle of a row of vehicles.
+
+    >>> wagon = Vehicle("wagon", 10.0, (2.0, 8.0))
+    >>> offsets([wagon, wagon]).tolist()
+    [0.0, 6.0, 10.0, 16.0]
+    """
+    front = np.concatenate([[0.0], np.cumsum([v.length for v in vehicles])])
+    places = np.concatenate([start + np.asarray(v.axles) for start, v in zip(front, vehicles)])
+    return places - places[0]
+
+
+def read_patterns(document: Mapping) -> tuple[Pattern, ...]:
+    """Patterns of all train types of a document with ``vehicles`` and ``trains``; both directions of running.
+
+    A train is ``units``: a list whose items name a vehicle, or say ``any: [names]`` with ``count: [least, most]``;
+    a name ending in ``'`` is the vehicle turned round. ``coupled`` is the largest number of whole units in a train,
+    ``type`` what it is called where that is not its own name.
+    KeyError names a vehicle that is not described.
+    """
+    vehicles = {name: Vehicle.of(name, values) for name, values in document["vehicles"].items()}
+    patterns: list[Pattern] = []
+    for name, values in document["trains"].items():
+        type_ = values.get("type", name)
+        groups = tuple(_group(item, vehicles, name) for item in values["units"])
+        turned = Pattern(type_, groups).reversed().groups
+        for n in range(1, int(values.get("coupled", 1)) + 1):
+            made = {Pattern(type_, groups * n), Pattern(type_, turned * n)}
+            if values.get("mixed", False) and n == 2:
+                made |= {Pattern(type_, groups + turned), Pattern(type_, turned + groups)}
+            patterns += sorted(made, key=repr)
+    return tuple(patterns)
+
+
+def _group(item, vehicles, type_) -> Group:
+    if isinstance(item, str):
+        item = {"any": [item]}
+    names = item["any"] if isinstance(item["any"], list) else [item["any"]]
+    found = []
+    for name in names:
+        base = str(name).removesuffix("'")
+        if base not in vehicles:
+            raise KeyError(f"train {type_}: no vehicle {base!r}; there are {sorted(vehicles)}")
+        found.append(vehicles[base].reversed() if str(name).endswith("'") else vehicles[base])
+    least, most = item.get("count", (1, 1))
+    return Group(tuple(found), int(least), int(most))

@@ -1,0 +1,60 @@
+"""The row of vehicles of a pattern that comes closest to a row of axles, by dynamic programming."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from turnout.passage.patterns import Pattern
+
+UNREACHED = (np.inf,)
+
+
+def best_row(spacing, pattern: Pattern, tolerance: float):
+    """(cost [nat], row of vehicles, its choices): axle spacings closest to ``spacing`` (n_axle - 1,) [m].
+
+    Cost is half the squared deviation in units of ``tolerance`` [m], summed over the spacings, plus the logarithm of
+    the number of vehicles that stood to choice; ``choices`` is the sum of these. None where the pattern cannot have
+    this number of axles, or where no row comes near.
+    """
+    n_axle = len(spacing) + 1
+    low, high = pattern.axle_counts()
+    if not low <= n_axle <= high:
+        return None
+    limit = 20.0 + 4.0 * n_axle  # beyond it the chi-squared test fails whatever follows
+    # state: axles used, group, vehicles used of the group, last vehicle -> (cost, row, choices)
+    layers = [{} for _ in range(n_axle + 1)]
+    layers[0][(0, 0, None)] = (0.0, (), 0.0)
+    for used in range(n_axle):
+        for (g, count, _), (cost, row, free) in layers[used].items():
+            for group, taken in _next(pattern, g, count):
+                choices = pattern.groups[group].vehicles
+                for vehicle in choices:
+                    stop = used + len(vehicle.axles)
+                    if stop > n_axle:
+                        continue
+                    expected = np.diff(vehicle.axles)
+                    if row:
+                        expected = np.concatenate([[row[-1].rear + vehicle.axles[0]], expected])
+                    seen = spacing[stop - 1 - len(expected) : stop - 1]
+                    total = cost + 0.5 * float(np.sum(((seen - expected) / tolerance) ** 2)) + np.log(len(choices))
+                    key = (group, taken, vehicle.name)
+                    if total < limit and total < layers[stop].get(key, UNREACHED)[0]:
+                        layers[stop][key] = (total, (*row, vehicle), free + np.log(len(choices)))
+    ends = [v for (g, count, _), v in layers[n_axle].items() if _may_end(pattern, g, count)]
+    return min(ends, key=lambda v: v[0], default=None)
+
+
+def _next(pattern, g, count):
+    """Groups that the next vehicle may come from, with how many of it are then used."""
+    if count < pattern.groups[g].maximum:
+        yield g, count + 1
+    if count >= pattern.groups[g].minimum:
+        for later in range(g + 1, len(pattern.groups)):
+            yield later, 1
+            if pattern.groups[later].minimum > 0:
+                return
+
+
+def _may_end(pattern, g, count):
+    rest = pattern.groups[g + 1 :]
+    return count >= pattern.groups[g].minimum and all(group.minimum == 0 for group in rest)

@@ -1,0 +1,104 @@
+"""Speed and direction from the levels of two or more sensors, before any axle is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import fft, ndimage
+
+KMH = 3.6
+
+
+@dataclass(frozen=True)
+class Scan:
+    """Likeness of all sensors after shifting them by distance times slowness, over signed slowness. [s/m]
+
+    ``likeness`` (n,) is the mean correlation coefficient over pairs of sensors, weighted by distance up to 3 m.
+    """
+
+    slowness: np.ndarray
+    likeness: np.ndarray
+
+    def peaks(self, n: int = 3, apart: float = 0.04) -> list[tuple[float, float]]:
+        """The ``n`` best (slowness, likeness), at least ``apart`` (relative) from each other."""
+        found, left = [], self.likeness.copy()
+        for _ in range(n):
+            k = int(np.argmax(left))
+            if not np.isfinite(left[k]):
+                break
+            found.append((self._refined(k), float(self.likeness[k])))
+            left[np.abs(self.slowness - self.slowness[k]) < apart * abs(self.slowness[k])] = -np.inf
+        return found
+
+    def _refined(self, k: int) -> float:
+        if not 0 < k < len(self.slowness) - 1:
+            return float(self.slowness[k])
+        low, mid, high = self.likeness[k - 1 : k + 2]
+        curve = low - 2 * mid + high
+        shift = 0.5 * (low - high) / curve if curve < 0 else 0.0
+        step = 0.5 * (self.slowness[k + 1] - self.slowness[k - 1])
+        return float(self.slowness[k] + np.clip(shift, -1, 1) * step)
+
+
+def slowness_grid(settings, relative: float = 0.008) -> np.ndarray:
+    """Signed slownesses between the slowest and fastest train, ``relative`` apart. [s/m]"""
+    slow, fast = KMH / settings.speed_minimum, KMH / settings.speed_maximum
+    one = np.geomspace(fast, slow, int(np.log(slow / fast) / relative) + 2)
+    return np.concatenate([-one[::-1], one])
+
+
+def scan_slowness(values, step: float, positions, settings) -> Scan:
+    """Slant stack of levels (n_sensor, n_bin) of sensors at ``positions`` [m], bogies unresolved: no false maxima."""
+    slowness, positions = slowness_grid(settings), np.asarray(positions, dtype=float)
+    # as wide as the grid is coarse at the slow end, where a passage lasts long
+    width = np.clip(0.008 * np.ptp(positions) * KMH / 20.0, 0.02, 0.1)
+    values, step = coarser(values, step, 0.005)
+    return Scan(slowness, stacked(pair_likeness(values, step, width), step, positions, slowness))
+
+
+def refine_slowness(pairs, step: float, positions, near: float, reach: float = 0.03) -> tuple[float, float]:
+    """Best slowness within ``reach`` (relative) of ``near`` and its likeness, from ``pair_likeness`` of fine levels."""
+    positions = np.asarray(positions, dtype=float)
+    span = max(np.ptp(positions), 0.1)
+    n = int(np.clip(2 * reach * abs(near) * span / (0.5 * step), 21, 601)) | 1
+    slowness = near * np.linspace(1 - reach, 1 + reach, n)
+    return Scan(slowness, stacked(pairs, step, positions, slowness)).peaks(1)[0]
+
+
+def coarser(values, step: float, wanted: float):
+    """(levels, step) averaged over as many bins as fit into ``wanted`` [s]."""
+    values, k = np.atleast_2d(values), max(int(wanted / step + 1e-9), 1)
+    n = values.shape[1] // k
+    return values[:, : n * k].reshape(len(values), n, k).mean(axis=2), k * step
+
+
+def pair_likeness(values, step, width) -> dict:
+    """(i, j) -> (n_lag,) correlation coefficient of sensors i and j over the lag [bins], negative ones at the end."""
+    smooth = ndimage.uniform_filter1d(np.atleast_2d(values), max(round(width / step), 1), axis=1)
+    n = fft.next_fast_len(2 * smooth.shape[1], real=True)
+    centred = smooth - smooth.mean(axis=1, keepdims=True)
+    centred /= np.maximum(np.linalg.norm(centred, axis=1, keepdims=True), 1e-12)
+    spectra = fft.rfft(centred, n, axis=1)
+    found = {}
+    for i in range(len(spectra) - 1):
+        for j, row in enumerate(fft.irfft(spectra[i + 1 :] * spectra[i].conj(), n, axis=1), i + 1):
+            found[i, j] = row
+    return found
+
+
+def stacked(pairs, step, positions, slowness) -> np.ndarray:
+    """(n,) mean correlation coefficient of the pairs after the shifts of each slowness, weighted by distance to 3 m."""
+    total, weight = np.zeros(len(slowness)), 0.0
+    for (i, j), likeness in pairs.items():
+        distance = positions[j] - positions[i]
+        if not abs(distance) >= 0.05:
+            continue
+        n = likeness.size
+        lag = slowness * distance / step
+        whole = np.floor(lag).astype(int)
+        part = lag - whole
+        w = min(abs(distance), 3.0)
+        total += w * ((1 - part) * likeness[whole % n] + part * likeness[(whole + 1) % n])
+        weight += w
+    return total / weight if weight else np.full(len(slowness), -np.inf)

@@ -1,0 +1,181 @@
+r"""When each wheel struck, between two samples, and whether the interval is certain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnout.passage.basis import FRACTIONS, WheelBasis
+from turnout.passage.wheels import joint_fit, onsets
+
+
+@dataclass(frozen=True)
+class ImpactTimes:
+    """Times of the wheels with what is known about them.
+
+    ``times`` (n_wheel,) [samples], ``standard_errors`` (n_wheel,) [samples] over all intervals, ``odds``
+    (n_wheel,) of the best interval between samples against all others together, ``ambiguous`` (n_wheel,) bool:
+    odds below those asked for, the time may lie in another interval.
+    """
+
+    times: np.ndarray
+    standard_errors: np.ndarray
+    odds: np.ndarray
+    ambiguous: np.ndarray
+
+
+def gather(data, first, length: int) -> np.ndarray:
+    """(n_wheel, length) samples from each ``first`` on; zero outside the recording."""
+    index = np.asarray(first)[:, None] + np.arange(length)
+    inside = (index >= 0) & (index < len(data))
+    return np.where(inside, np.asarray(data)[np.clip(index, 0, len(data) - 1)], 0.0)
+
+
+def explained(own, basis: WheelBasis, allowed, seen=None) -> np.ndarray:
+    r"""(n_wheel, n_lag, n_fraction) drop of the residual's sum of squares by one wheel at n - phi.
+
+    .. math:: P_n(\varphi) = (b_n^T\theta(\varphi))^2 / \theta^T G \theta
+
+    ``own`` (n_wheel, n_lag - 1 + n_sample) is the data around each wheel, b_n their inner products with the columns.
+    Wheels press one way: the sign of all amplitudes is the one that explains more, and times that need the other one
+    are -inf, like those that ``allowed`` (n_wheel, n_lag, n_fraction) forbids. Without that rule half a period of a
+    slow mode is as good as none.
+    """
+    n_lag = allowed.shape[1]
+    inner = basis.correlated(own, n_lag)
+    if seen is None:
+        signed = inner @ basis.unit_weights.T
+    else:
+        signed = np.einsum("jlp,lqp->jlq", inner, basis.unit_weights_of(seen))
+    signed = np.where(allowed, signed, 0.0)
+    up, down = signed.max(axis=(1, 2), initial=0.0), signed.min(axis=(1, 2), initial=0.0)
+    sign = 1.0 if np.sum(up**2) >= np.sum(down**2) else -1.0
+    signed *= sign
+    # a wheel without any time of that sign keeps its place, with nothing explained
+    signed[signed <= 0.0] = -np.inf
+    power = np.where(np.isfinite(signed), signed, 0.0) ** 2
+    return np.where(allowed & (np.isfinite(signed) | (power.max(axis=(1, 2), keepdims=True) == 0)), power, -np.inf)
+
+
+def best_times(own, first, expected, basis: WheelBasis, half: float, seen=None) -> np.ndarray:
+    """(n_wheel,) times within ``half`` of ``expected`` that explain most of the rows ``own`` from ``first`` on."""
+    n_lag = own.shape[1] - basis.n_sample + 1
+    power = explained(own, basis, _allowed(first, expected, half, n_lag), seen)
+    lag, fraction = np.unravel_index(power.reshape(len(first), -1).argmax(axis=1), power.shape[1:])
+    return _polished(power, lag, fraction, first)
+
+
+def _allowed(first, expected, half, n_lag):
+    return np.abs(np.arange(n_lag)[:, None] - FRACTIONS - (expected - first)[:, None, None]) <= half + 0.5
+
+
+def search_times(data, expected, basis: WheelBasis, half: float, length: int = 300, sweeps: int = 3) -> np.ndarray:
+    """(n_wheel,) impact times within ``half`` of ``expected`` that explain most. [samples]
+
+    One amplitude along b per wheel; the neighbours are taken off with the joint fit of the sweep before, unless
+    no response reaches the next wheel. Only the first ``length`` samples of a response are compared.
+    """
+    power, first = _power(data, expected, basis, half, length, sweeps)
+    lag, fraction = np.unravel_index(power.reshape(len(first), -1).argmax(axis=1), power.shape[1:])
+    return _polished(power, lag, fraction, first)
+
+
+def impact_times(data, expected, basis: WheelBasis, half: float, noise: float, spread: float, odds: float = 100.0):
+    r"""Impact times with their errors and a flag where the interval between samples is not certain.
+
+    .. math:: p(n,\varphi) \propto \exp\{P_n(\varphi)/2\sigma^2 - (t-t_0)^2/2s^2\}, \qquad t = n - \varphi
+
+    Parameters
+    ----------
+    data : (n_sample,) array of float
+        Behind the filter of ``basis``; its noise must be white. [m/s²]
+    expected : (n_wheel,) array of float
+        Prior mean: speed and axle spacing say where the wheel should be. [samples]
+    half : float
+        Range searched on either side. [samples]
+    noise : float
+        Standard deviation of the noise. [m/s²]
+    spread : float
+        Standard deviation of the prior. [samples]
+    odds : float
+        A time is ambiguous unless its interval beats all others together by these odds.
+
+    Returns
+    -------
+    ImpactTimes
+    """
+    if not noise > 0 or not spread > 0:
+        raise ValueError(f"noise and spread must be above 0, got {noise} and {spread}")
+    expected = np.asarray(expected, dtype=float)
+    power, first = _power(data, expected, basis, half, basis.n_sample, 3)
+    grid = (first - expected)[:, None, None] + np.arange(power.shape[1])[:, None] - FRACTIONS
+    level = power / (2 * noise**2) - 0.5 * (grid / spread) ** 2
+    lag, fraction = np.unravel_index(level.reshape(len(first), -1).argmax(axis=1), level.shape[1:])
+    times = _polished(power, lag, fraction, first)
+    weight = np.exp(level - level.max(axis=(1, 2), keepdims=True))
+    weight /= weight.sum(axis=(1, 2), keepdims=True)
+    share = weight[np.arange(len(lag)), lag].sum(axis=-1)
+    rest = np.maximum(1.0 - share, 1e-300)
+    away = (grid + expected[:, None, None] - times[:, None, None]) ** 2
+    between = np.sum(weight * away, axis=(1, 2))
+    inside = _curvature_error(power, lag, fraction, noise)
+    error = np.sqrt(between * rest + inside**2)
+    return ImpactTimes(times, error, share / rest, share / rest < odds)
+
+
+def _power(data, expected, basis, half, length, sweeps):
+    """Explained power of every wheel and (n_wheel,) the sample of lag 0."""
+    expected = np.asarray(expected, dtype=float)
+    short = basis.cut(min(length, basis.n_sample))
+    reach = int(np.ceil(half)) + 1
+    first, n_lag = np.round(expected).astype(int) - reach, 2 * reach + 1
+    span = n_lag - 1 + short.n_sample
+    allowed = _allowed(first, expected, half, n_lag)
+    own = gather(data, first, span)
+    power = explained(own, short, allowed)
+    overlap = np.diff(expected).min(initial=np.inf) < basis.ring
+    for _ in range(sweeps - 1 if overlap else 0):
+        lag, fraction = np.unravel_index(power.reshape(len(first), -1).argmax(axis=1), power.shape[1:])
+        own = _without_neighbours(data, _polished(power, lag, fraction, first), basis, first, span)
+        power = explained(own, short, allowed)
+    return power, first
+
+
+def _without_neighbours(data, times, basis, first, span):
+    """Data around each wheel, all other wheels' responses taken off."""
+    order = np.argsort(times, kind="stable")
+    fit = joint_fit(data, times[order], basis)
+    amplitude = np.empty(len(times))
+    amplitude[order] = fit.amplitudes[:, 0]
+    own = gather(data - fit.prediction, first, span)
+    onset, phi = onsets(times)
+    for row, start, weight in zip(own, onset - first, amplitude[:, None] * basis.coefficients(phi)):
+        n = min(span - start, basis.n_sample)
+        row[start : start + n] += weight @ basis.columns[:, :n]
+    return own
+
+
+def _neighbours(power, lag, fraction):
+    """Best fraction kept off the ends of its interval, and the power there and on both sides."""
+    wheel = np.arange(len(lag))
+    inner = np.clip(fraction, 1, len(FRACTIONS) - 2)
+    return inner, [power[wheel, lag, inner + step] for step in (-1, 0, 1)]
+
+
+def _polished(power, lag, fraction, first):
+    """Parabola through the best fraction and its neighbours in the same interval: n - phi."""
+    inner, (low, mid, high) = _neighbours(power, lag, fraction)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shift = np.nan_to_num(0.5 * (low - high) / (low - 2 * mid + high))
+        shift = np.where(low - 2 * mid + high < 0, shift, np.sign(high - low) * 1.5)
+    phi = FRACTIONS[inner] + np.clip(shift, -1.5, 1.5) / len(FRACTIONS)
+    return first + lag - np.clip(np.nan_to_num(phi), 0.0, 1.0 - 1e-9)
+
+
+def _curvature_error(power, lag, fraction, noise):
+    """(n_wheel,) standard error within the interval from the curvature of the log-likelihood. [samples]"""
+    _, (low, mid, high) = _neighbours(power, lag, fraction)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        curvature = -(low - 2 * mid + high) * len(FRACTIONS) ** 2 / (2 * noise**2)
+        return np.where(curvature > 12.0, 1 / np.sqrt(np.maximum(curvature, 1e-300)), 1 / np.sqrt(12.0))

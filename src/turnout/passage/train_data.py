@@ -1,0 +1,78 @@
+"""What a timetable or the train data say about a passage, beside what the recording says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+
+@dataclass(frozen=True)
+class Listed:
+    """One row of trains.csv; None where it says nothing. ``speed`` [km/h], ``axle_load`` [t]."""
+
+    passed_at: datetime
+    train_type: str | None = None
+    speed: float | None = None
+    axle_load: float | None = None
+    track: str | None = None
+    n_axles: int | None = None
+
+
+def listed_trains(rows: Sequence[Mapping[str, str]]) -> tuple[tuple[Listed, ...], tuple[str, ...]]:
+    """Sound rows in order of time, and a sentence for each row that cannot be used.
+
+    Columns: passed_at_utc (needed), train_type, speed_kmh, axle_load_t, track, n_axles.
+
+    >>> rows = [{"passed_at_utc": "2024-05-13T10:00:00Z", "speed_kmh": "160"}, {"passed_at_utc": "noon"}]
+    >>> found, wrong = listed_trains(rows)
+    >>> found[0].speed, wrong
+    (160.0, ("row 2: passed_at_utc 'noon' is not a time like 2024-05-13T10:00:00",))
+    """
+    found, wrong = [], []
+    for k, row in enumerate(rows, 1):
+        try:
+            found.append(_listed(row))
+        except ValueError as error:
+            wrong.append(f"row {k}: {error}")
+    return tuple(sorted(found, key=lambda t: (t.passed_at, t.train_type or ""))), tuple(wrong)
+
+
+def _listed(row) -> Listed:
+    text = row.get("passed_at_utc") or ""
+    try:
+        moment = datetime.fromisoformat(text.removesuffix("Z"))
+    except ValueError:
+        raise ValueError(f"passed_at_utc {text!r} is not a time like 2024-05-13T10:00:00") from None
+    if moment.tzinfo is not None:
+        raise ValueError(f"passed_at_utc {text!r} has a time zone, write UTC without one")
+    numbers = {}
+    for column, name, low, high in (("speed_kmh", "speed", 1, 400), ("axle_load_t", "axle_load", 0.1, 60)):
+        numbers[name] = _number(row.get(column), column, low, high)
+    n_axles = _number(row.get("n_axles"), "n_axles", 1, 2000)
+    track = row.get("track") or None
+    if track not in (None, "main", "diverging"):
+        raise ValueError(f"track {track!r} is neither main nor diverging")
+    return Listed(moment, row.get("train_type") or None, track=track, n_axles=n_axles and int(n_axles), **numbers)
+
+
+def _number(text, column, low, high):
+    if not text:
+        return None
+    value = float(text)
+    if not low <= value <= high:
+        raise ValueError(f"{column} {text!r} is not between {low} and {high}")
+    return value
+
+
+def listed_for(moment: datetime, n_axles: int, trains: Sequence[Listed], tolerance: float) -> Listed | None:
+    """The train that the data list nearest to ``moment``, within ``tolerance`` [s].
+
+    None where the nearest has another number of axles, or where a second one is nearly as near and as likely.
+    """
+    near = [(abs((t.passed_at - moment).total_seconds()), t) for t in trains]
+    near = sorted((x for x in near if x[0] <= tolerance), key=lambda x: x[0])
+    fitting = [x for x in near if x[1].n_axles in (None, n_axles)]
+    if not fitting or (len(fitting) > 1 and fitting[1][0] < 2.0 * fitting[0][0] + 5.0):
+        return None
+    return fitting[0][1]

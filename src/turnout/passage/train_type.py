@@ -1,0 +1,209 @@
+r"""Train type by axle pattern: posterior probability over templates and "unknown"."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from turnout.passage.patterns import Vehicle, offsets
+from turnout.passage.row_of_vehicles import best_row
+
+UNKNOWN = "unknown"
+# Spacings of a train without template: inside bogies 1.8 to 3.2 m, between them up to 22 m.
+BOGIE, BOGIE_SPREAD, LONG_FROM, LONGEST = 2.4, 0.4, 3.4, 22.0
+
+
+@dataclass(frozen=True)
+class TypeFinding:
+    """``type`` is a name or "unknown", ``probability`` its posterior; ``probabilities`` those of every candidate.
+
+    ``vehicles`` and ``offsets`` (n_axle,) [m] belong to the best template even where it was not accepted, then
+    ``residual`` [m], the rms deviation of the axle spacings, says why. ``speed`` [m/s] at the first axle,
+    ``speed_se``, ``acceleration`` [m/s²] and ``acceleration_se`` follow from the template's distances.
+    """
+
+    type: str
+    probability: float
+    probabilities: dict[str, float]
+    vehicles: tuple[Vehicle, ...] = ()
+    offsets: np.ndarray | None = None
+    residual: float | None = None
+    speed: float | None = None
+    speed_se: float | None = None
+    acceleration: float | None = None
+    acceleration_se: float | None = None
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    type: str
+    evidence: float
+    p_value: float
+    vehicles: tuple
+    offsets: np.ndarray
+    residual: float
+    motion: tuple
+
+
+def axle_times_to_motion(times, places, sigma: float, limit: float):
+    r"""Speed and acceleration at the first axle from times and known distances, with their covariance.
+
+    .. math:: d = u_0 + v t + \tfrac12 a t^2
+
+    Most trains pass a turnout at a steady speed: the acceleration is 0 ± 0.02 m/s² with prior probability 0.8, else
+    0 ± ``limit`` / 4. Both fits are weighted by what the times say; the covariance holds the doubt between them.
+    ``sigma`` [m] is the error of one axle's place. Returns ((v, a), covariance (2, 2)).
+    """
+    t = np.asarray(times, dtype=float) - times[0]
+    design = np.column_stack([np.ones_like(t), t, 0.5 * t**2]) / sigma
+    target = np.asarray(places, dtype=float) / sigma
+    fits = []
+    for share, width in ((0.8, 0.02), (0.2, limit / 4)):
+        normal = design.T @ design + np.diag([0.0, 0.0, width**-2])
+        covariance = np.linalg.pinv(normal)
+        solution = covariance @ design.T @ target
+        misfit = np.sum((target - design @ solution) ** 2) + (solution[2] / width) ** 2
+        log = np.log(share / width) - 0.5 * misfit - 0.5 * np.linalg.slogdet(normal)[1]
+        fits.append((log, solution[1:], covariance[1:, 1:]))
+    weight = np.exp(np.array([f[0] for f in fits]) - max(f[0] for f in fits))
+    weight /= weight.sum()
+    mean = sum(w * f[1] for w, f in zip(weight, fits))
+    doubt = sum(w * (f[2] + np.outer(f[1] - mean, f[1] - mean)) for w, f in zip(weight, fits))
+    return mean, doubt
+
+
+def find_type(times, patterns, settings, speed=None, speed_se=None, place_se: float = 0.03) -> TypeFinding:
+    """Which template the axle ``times`` (n_axle,) [s] fit, at any speed, or at ``speed`` ± ``speed_se`` [m/s].
+
+    ``place_se`` [m] is the error of one axle's place along the rail. A type is named if its posterior probability
+    reaches ``settings.type_probability`` and its deviations pass a chi-squared test at 0.001; else "unknown".
+    """
+    times = np.asarray(times, dtype=float)
+    if len(times) < 3:
+        return TypeFinding(UNKNOWN, 1.0, {UNKNOWN: 1.0})
+    sigma = float(np.sqrt(2 * place_se**2 + settings.type_tolerance**2))
+    found: dict[str, _Candidate] = {}
+    for pattern in patterns:
+        candidate = _fit_pattern(times, pattern, settings, speed, speed_se, sigma)
+        if candidate and candidate.evidence > getattr(found.get(candidate.type), "evidence", -np.inf):
+            found[candidate.type] = candidate
+    return _decide(times, found, len({p.type for p in patterns}), settings, speed, sigma)
+
+
+def _decide(times, found, n_type, settings, speed, sigma):
+    log = {name: c.evidence + np.log((1 - settings.unknown_prior) / max(n_type, 1)) for name, c in found.items()}
+    best = max(found.values(), key=lambda c: c.evidence, default=None)
+    v = speed or (best.motion[0][0] if best else BOGIE / np.min(np.diff(times)))
+    log[UNKNOWN] = np.log(settings.unknown_prior) + unknown_evidence(v * np.diff(times))
+    top = max(log.values())
+    weight = {name: float(np.exp(value - top)) for name, value in log.items()}
+    total = sum(weight.values())
+    posterior = {name: w / total for name, w in sorted(weight.items())}
+    if best is None:
+        return TypeFinding(UNKNOWN, posterior[UNKNOWN], posterior)
+    (v, a), covariance = best.motion
+    accepted = posterior[best.type] >= settings.type_probability and best.p_value >= 1e-3
+    return TypeFinding(
+        best.type if accepted else UNKNOWN,
+        posterior[best.type] if accepted else max(posterior[UNKNOWN], 1.0 - posterior[best.type]),
+        posterior,
+        best.vehicles,
+        best.offsets,
+        best.residual,
+        float(v),
+        float(np.sqrt(covariance[0, 0])),
+        float(a),
+        float(np.sqrt(covariance[1, 1])),
+    )
+
+
+def unknown_evidence(spacing) -> float:
+    """Log density of axle spacings [m] of a train that has no template.
+
+    Short spacings (in a bogie) and long ones follow each other as a chain: a long one nearly always comes after a
+    short one. That is what tells bogies from axles where the speed is not known.
+    """
+    short = np.asarray(spacing) < LONG_FROM
+    density = np.where(short, 0.95 * stats.norm.pdf(spacing, BOGIE, BOGIE_SPREAD) + 0.01, 1 / (LONGEST - LONG_FROM))
+    density = np.where(np.asarray(spacing) > 1.5 * LONGEST, 1e-4, density)
+    follows = np.where(short[:-1], np.where(short[1:], 0.05, 0.95), np.where(short[1:], 0.85, 0.15))
+    # three short ones in a row are four axles at bogie distance: no vehicle has them
+    runs = np.sum(short[:-2] & short[1:-1] & short[2:])
+    first = np.log(0.9 if short[0] else 0.1) + runs * np.log(0.01)
+    return float(np.sum(np.log(density)) + np.sum(np.log(follows)) + first)
+
+
+def _fit_pattern(times, pattern, settings, speed, speed_se, sigma):
+    """Best row of one pattern: coarse over speed and acceleration, then twice sharp."""
+    low, high = pattern.axle_counts()
+    if not low <= len(times) <= high:
+        return None
+    past = times - times[0]
+    row = pattern.only_row()
+    if speed is not None and not _plausible(times, pattern, row, settings, speed, speed_se or 0.0):
+        return None
+    if row is None:
+        starts = _starts(times, pattern, settings, speed, speed_se)
+        rows = [best_row(np.diff(v * past + 0.5 * a * past**2), pattern, 5.0 * sigma) for v, a in starts]
+        row = min((r for r in rows if r), key=lambda r: r[0], default=None)
+        for _ in range(3 if row else 0):
+            (v, a), _ = axle_times_to_motion(times, offsets(row[1]), sigma, settings.acceleration_limit)
+            sharp = best_row(np.diff(v * past + 0.5 * a * past**2), pattern, 2.0 * sigma)
+            if sharp is None or sharp[1] == row[1]:
+                break
+            row = sharp
+    return _candidate(times, pattern.type, row, settings, speed, speed_se, sigma) if row else None
+
+
+def _plausible(times, pattern, row, settings, speed, speed_se):
+    """Cheap refusal: length of a fixed row, or first wheelbase of a free one, out of reach of the known speed."""
+    lasted = times[-1] - times[0]
+    slack = 4 * speed_se * lasted + 0.5 * settings.acceleration_limit * lasted**2 + 1.0
+    if row is not None:
+        return abs(offsets(row[1])[-1] - speed * lasted) < slack
+    leading = {v.axles[1] - v.axles[0] for g in pattern.groups for v in g.vehicles if len(v.axles) > 1}
+    gap = times[1] - times[0]
+    return any(abs(speed * gap - base) < 4 * speed_se * gap + 0.1 * base + 0.2 for base in leading)
+
+
+def _candidate(times, type_, row, settings, speed, speed_se, sigma):
+    """Motion, deviations and evidence of one row of vehicles."""
+    _, vehicles, choices = row
+    places = offsets(vehicles)
+    limit = settings.acceleration_limit
+    (v, a), covariance = axle_times_to_motion(times, places, sigma / np.sqrt(2), limit)
+    if not settings.speed_minimum / 3.6 <= v <= settings.speed_maximum / 3.6 or abs(a) > limit:
+        return None
+    past = times - times[0]
+    residual = np.diff(v * past + 0.5 * a * past**2) - np.diff(places)
+    square = float(np.sum((residual / sigma) ** 2))
+    freedom = max(len(residual) - 2, 1)
+    if speed is not None and speed_se:
+        square += float((v - speed) ** 2 / (speed_se**2 + covariance[0, 0]))
+        freedom += 1
+    evidence = -0.5 * square - len(residual) * np.log(sigma * np.sqrt(2 * np.pi)) - choices
+    rms = float(np.sqrt(np.mean(residual**2)))
+    # the error of the motion follows the scatter that is seen, as far as a few axles can tell it
+    covariance = covariance * min(1.0, max((rms / sigma) ** 2 * len(times) / freedom, 0.1))
+    p_value = float(stats.chi2.sf(square, freedom))
+    return _Candidate(type_, evidence, p_value, vehicles, places, rms, ((v, a), covariance))
+
+
+def _starts(times, pattern, settings, speed, speed_se):
+    """Speeds and accelerations to start from: fine enough for the coarse tolerance over the whole train."""
+    spacing = np.diff(times)
+    if speed is not None:
+        n = int(np.ceil(2.0 * (speed_se or 0.0) / (0.02 * speed)))
+        speeds = speed * (1 + 0.02 * np.arange(-min(n, 12), min(n, 12) + 1))
+    else:
+        leading = [v for g in pattern.groups for v in g.vehicles if len(v.axles) > 1]
+        bases = sorted({round(float(np.diff(v.axles)[0]), 2) for v in leading})
+        speeds = np.array([base / spacing[0] * f for base in bases for f in (0.985, 1.0, 1.015)])
+    for v in speeds:
+        step = 0.03 * v / max(times[-1] - times[0], 1e-3)
+        n = int(np.floor(min(settings.acceleration_limit, 1.0) / step))
+        for k in range(-min(n, 40), min(n, 40) + 1):
+            # the mean speed stays v: a train that gains speed starts slower
+            yield v - 0.5 * k * step * (times[-1] - times[0]), k * step

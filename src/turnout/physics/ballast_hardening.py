@@ -1,0 +1,49 @@
+"""Ballast that stiffens with deflection."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnout.physics.term import Parameter, PhysicsTerm
+from turnout.simulate.law import Port, TableLaw
+
+UNIT = 1e-3  # deflection at which the parameter is the share added [m]
+WAY = np.linspace(-3e-3, 3e-3, 121)
+
+
+@dataclass(frozen=True)
+class BallastHardening(PhysicsTerm):
+    r"""Cubic spring under some sleepers, :math:`F = h k_b y (y / 1\,\mathrm{mm})^2`; a hammer's µm do not see it."""
+
+    first: int
+    last: int
+    hardening: float
+
+    name = "ballast_hardening"
+    left_out = "ballast under sleepers {first} to {last} stiffens by {hardening:.2f} at a deflection of 1 mm"
+    kind = "port"
+    frame = "amplitude"
+    parameters = (
+        Parameter("hardening", "-", 0.0, (-0.1, 20.0), "share of stiffness added at 1 mm",
+                  "Wu and Thompson 1999, The effects of local preload on the foundation stiffness of railway track"),
+    )  # fmt: skip
+
+    @classmethod
+    def example(cls):
+        """Three times as stiff at 1 mm."""
+        return cls(19, 21, 3.0)
+
+    def ports(self, track):
+        """One port per sleeper."""
+        self.check()
+        if self.hardening == 0.0 or track.layers == 1:
+            return ()
+        shape = WAY * (WAY / UNIT) ** 2
+        return tuple(
+            Port(
+                ((("sleeper", j), 1.0),),
+                TableLaw(tuple(WAY), tuple(self.hardening * track.ballast_stiffness[j] * shape), (0.0,) * WAY.size),
+                label=f"hardening under sleeper {j}",
+            )
+            for j in range(self.first, self.last + 1)
+        )

@@ -1,0 +1,40 @@
+"""Ballast that moves with the sleepers and radiates into the ground."""
+
+from dataclasses import dataclass
+
+from turnout.physics.term import Parameter, PhysicsTerm
+from turnout.simulate.link import Link
+
+SOURCE = "Wolf 1994, Foundation vibration analysis using simple physical models: cones"
+
+
+@dataclass(frozen=True)
+class BallastInertia(PhysicsTerm):
+    r"""A cone of ground under every sleeper: :math:`\Delta K(\omega) = i\omega c - \omega^2 m`."""
+
+    mass: float
+    damping: float = 0.0
+
+    name = "ballast_inertia"
+    left_out = "{mass:.0f} kg of ballast move with every half sleeper and {damping:.0f} N s/m radiate"
+    kind = "matrix"
+    frame = "condition"
+    parameters = (
+        Parameter("mass", "kg", 0.0, (0.0, 600.0), "ballast that moves with half a sleeper", SOURCE),
+        Parameter("damping", "N s/m", 0.0, (-3e4, 3e5), "radiation beyond the base model's damping", SOURCE),
+    )
+
+    @classmethod
+    def example(cls):
+        """200 kg and 30 kN s/m."""
+        return cls(200.0, 3e4)
+
+    def links(self, track):
+        """Mass and damper on every sleeper."""
+        self.check()
+        if track.layers == 1 or (self.mass == 0.0 and self.damping == 0.0):
+            return []
+        return [
+            Link(((("sleeper", j), 1.0),), damping=self.damping, mass=self.mass, tag="ballast_inertia")
+            for j in range(track.support.size)
+        ]

@@ -1,0 +1,31 @@
+"""A contact softer or stiffer than Hertz's for the nominal profiles."""
+
+from dataclasses import dataclass, replace
+
+from turnout.physics.term import Parameter, PhysicsTerm
+
+
+@dataclass(frozen=True)
+class ContactStiffness(PhysicsTerm):
+    r"""The contact's constant is :math:`r k_H`: worn, conformal or sharp profiles."""
+
+    factor: float
+
+    name = "contact_stiffness"
+    left_out = "the wheel-rail contact has {factor:.2f} times its stiffness"
+    kind = "vehicle"
+    frame = "train"
+    parameters = (
+        Parameter("factor", "-", 1.0, (0.1, 5.0), "contact constant over that of nominal profiles",
+                  "Thompson 2009, Railway noise and vibration, ch. 3"),
+    )  # fmt: skip
+
+    @classmethod
+    def example(cls):
+        """Half as stiff."""
+        return cls(0.5)
+
+    def vehicle(self, vehicle):
+        """The vehicle with another contact law."""
+        self.check()
+        return vehicle.with_(contact=replace(vehicle.contact, stiffness=self.factor * vehicle.contact.stiffness))

@@ -1,0 +1,57 @@
+"""A sleeper that hangs above its ballast."""
+
+from dataclasses import dataclass
+
+from turnout.physics.term import Parameter, PhysicsTerm
+from turnout.simulate.law import Port, TableLaw
+
+ONSET = 1e-5  # way over which the ballast's damping comes and goes [m]
+
+
+@dataclass(frozen=True)
+class HangingSleeper(PhysicsTerm):
+    r"""Withhold the ballast reaction while one sleeper moves within its gap.
+
+    .. math:: F = k_b \, \mathrm{clip}(y, -g, g) + c_b \dot y \, [|y| < g]
+
+    The base simulation has :math:`-k_b y - c_b \dot y` under every sleeper; this gives it back within the gap.
+    y is the sleeper's position below where it hangs unloaded. A hammer's blow moves it by micrometres both ways:
+    there it is a free sleeper. A lift by more than the gap is left to the base.
+    """
+
+    sleeper: int
+    gap: float
+
+    name = "hanging_sleeper"
+    left_out = "sleeper {sleeper} hangs {gap:.4f} m above its ballast"
+    kind = "port"
+    parameters = (
+        Parameter(
+            "gap",
+            unit="m",
+            neutral=0.0,
+            bounds=(0.0, 5e-3),
+            meaning="clearance when unloaded",
+            source="Lundqvist and Dahlberg 2005, Load impact on railway track due to unsupported sleepers",
+        ),
+    )
+
+    @classmethod
+    def example(cls):
+        """0.3 mm under sleeper 20."""
+        return cls(20, 3e-4)
+
+    def ports(self, track):
+        """One port at the sleeper; none where the gap is closed."""
+        self.check()
+        if self.gap == 0.0:
+            return ()
+        k, c = track.ballast_stiffness[self.sleeper], track.ballast_damping[self.sleeper]
+        onset = min(ONSET, 0.5 * self.gap)
+        way = (-self.gap - onset, -self.gap, -self.gap + onset, self.gap - onset, self.gap, self.gap + onset)
+        withheld = tuple(-k * min(max(y, -self.gap), self.gap) for y in way)
+        if onset == self.gap - onset:  # the two middle places are one
+            way, withheld = (*way[:2], 0.0, *way[4:]), (*withheld[:2], 0.0, *withheld[4:])
+        viscous = (0.0, -0.5 * c, *(-c,) * (len(way) - 4), -0.5 * c, 0.0)
+        law = TableLaw(way, withheld, viscous)
+        return (Port(((("sleeper", self.sleeper), 1.0),), law, label=f"gap under sleeper {self.sleeper}"),)

@@ -1,0 +1,44 @@
+"""Mains or traction current in a channel."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnout.physics.term import Parameter, PhysicsTerm
+
+
+@dataclass(frozen=True)
+class Hum(PhysicsTerm):
+    r"""A line at the mains' frequency, :math:`a \sin 2\pi f t + b \cos 2\pi f t`, before, with and after the train."""
+
+    channel_name: str
+    sine: float
+    cosine: float = 0.0
+    frequency: float = 50.0
+
+    name = "hum"
+    left_out = "channel {channel_name} hums at {frequency:.1f} Hz with an amplitude of {amplitude:.3g} m/s²"
+    kind = "channel"
+    frame = "clock"
+    parameters = (
+        Parameter("sine", "m/s²", 0.0, (-50.0, 50.0), "part in phase with the record's start",
+                  "EN 50163:2004, supply voltages of traction systems: 50 Hz and 16.7 Hz"),
+        Parameter("cosine", "m/s²", 0.0, (-50.0, 50.0), "part a quarter period ahead", "EN 50163:2004"),
+    )  # fmt: skip
+
+    @classmethod
+    def example(cls):
+        """Of 1 m/s² at 50 Hz."""
+        return cls("A", 0.8, 0.6)
+
+    def sentence(self):
+        """What was left out, in words."""
+        return self.left_out.format(**vars(self), amplitude=float(np.hypot(self.sine, self.cosine)))
+
+    def channel(self, signal, rate, sensor):
+        """The signal with the line on it."""
+        self.check()
+        if sensor.name != self.channel_name:
+            return signal
+        phase = 2.0 * np.pi * self.frequency * np.arange(np.size(signal)) / rate
+        return signal + self.sine * np.sin(phase) + self.cosine * np.cos(phase)

@@ -1,0 +1,34 @@
+"""Ballast under one sleeper that is softer or stiffer than the rest."""
+
+from dataclasses import dataclass, replace
+
+from turnout.physics.term import Parameter, PhysicsTerm
+
+
+@dataclass(frozen=True)
+class LocalBallast(PhysicsTerm):
+    r"""Ballast stiffness and damping of one sleeper are :math:`r` times those of the base; linear, unlike a gap."""
+
+    sleeper: int
+    factor: float
+
+    name = "local_ballast"
+    left_out = "the ballast under sleeper {sleeper} has {factor:.2f} times its stiffness"
+    kind = "matrix"
+    frame = "place"
+    parameters = (
+        Parameter("factor", "-", 1.0, (0.05, 8.0), "ballast stiffness over that of the base model",
+                  "Oscarsson 2002, Dynamic train-track interaction: variability attributable to scatter in properties"),
+    )  # fmt: skip
+
+    @classmethod
+    def example(cls):
+        """A third of the stiffness under sleeper 20."""
+        return cls(20, 0.3)
+
+    def links(self, track):
+        """What is added to the ballast's spring and damper."""
+        self.check()
+        found = [link for link in track.support_links(self.sleeper) if link.tag == "ballast"]
+        more = self.factor - 1.0
+        return [replace(k, stiffness=more * k.stiffness, damping=more * k.damping, tag="local_ballast") for k in found]

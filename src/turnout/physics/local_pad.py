@@ -1,0 +1,34 @@
+"""A worn, missing or stiff pad on one sleeper."""
+
+from dataclasses import dataclass, replace
+
+from turnout.physics.term import Parameter, PhysicsTerm
+
+
+@dataclass(frozen=True)
+class LocalPad(PhysicsTerm):
+    r"""Pad stiffness and damping of one support are :math:`r` times those of the base."""
+
+    sleeper: int
+    factor: float
+
+    name = "local_pad"
+    left_out = "the pad on sleeper {sleeper} has {factor:.2f} times its stiffness"
+    kind = "matrix"
+    frame = "place"
+    parameters = (
+        Parameter("factor", "-", 1.0, (0.05, 8.0), "pad stiffness over that of the base model",
+                  "Oregui et al. 2016, Sensitivity analysis of railpad parameters on vertical railway track dynamics"),
+    )  # fmt: skip
+
+    @classmethod
+    def example(cls):
+        """A worn pad with three times the stiffness on sleeper 20."""
+        return cls(20, 3.0)
+
+    def links(self, track):
+        """What is added to the pad's spring and damper."""
+        self.check()
+        found = [link for link in track.support_links(self.sleeper) if link.tag == "pad"]
+        more = self.factor - 1.0
+        return [replace(k, stiffness=more * k.stiffness, damping=more * k.damping, tag="local_pad") for k in found]

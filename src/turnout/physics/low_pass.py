@@ -1,0 +1,37 @@
+"""A channel that loses its high end: a too short or too low anti-alias filter."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnout.physics.term import Parameter
+from turnout.physics.transfer import TransferTerm
+
+
+@dataclass(frozen=True)
+class LowPass(TransferTerm):
+    r"""Second-order Butterworth low-pass :math:`T = 1 / (1 + \sqrt2\, i f T_c - (f T_c)^2)`, :math:`T_c = 1/f_c`."""
+
+    channel_name: str
+    period: float
+
+    name = "low_pass"
+    left_out = "channel {channel_name} loses what lies above {corner:.0f} Hz"
+    parameters = (
+        Parameter("period", "s", 0.0, (0.0, 1 / 200.0), "one over the frequency of 3 dB loss",
+                  "Butterworth 1930, On the theory of filter amplifiers"),
+    )  # fmt: skip
+
+    @classmethod
+    def example(cls):
+        """At 600 Hz."""
+        return cls("A", 1 / 600.0)
+
+    def sentence(self):
+        """What was left out, in words."""
+        return self.left_out.format(**vars(self), corner=1.0 / self.period if self.period else np.inf)
+
+    def transfer(self, frequency):
+        """The filter's response."""
+        ratio = np.asarray(frequency, dtype=float) * self.period
+        return 1.0 / (1.0 + 1j * np.sqrt(2.0) * ratio - ratio**2)

@@ -1,0 +1,51 @@
+"""Pads that stiffen under the train's weight."""
+
+from dataclasses import dataclass, replace
+
+from turnout.physics.term import Parameter, PhysicsTerm
+
+SEAT_SHARE = 0.45  # of a wheel load on the support below it, 60 kg/m rail on 0.6 m
+
+
+@dataclass(frozen=True)
+class PadPreload(PhysicsTerm):
+    r"""All pads as they are under a train: :math:`k_p = k_{p0} + b F`, F the mean seat load; a hammer finds F = 0.
+
+    The tangent at the train's mean load stands for the law: supports between bogies are made as stiff as those
+    under them.
+    """
+
+    slope: float
+    load: float = 25e3
+
+    name = "pad_preload"
+    left_out = "pads stiffen by {slope:.0f} N/m per newton of seat load"
+    kind = "matrix"
+    frame = "condition"
+    parameters = (
+        Parameter("slope", "N/m per N", 0.0, (-3e3, 2e4), "growth of pad stiffness with load",
+                  "Wu and Thompson 1999, The effects of local preload on the foundation stiffness of railway track"),
+    )  # fmt: skip
+
+    @classmethod
+    def example(cls):
+        """100 MN/m under 25 kN."""
+        return cls(4e3)
+
+    def under(self, conditions):
+        """At the load of a recording: no axle loads, as in a hammer test, is no load."""
+        loads = conditions.get("axle_loads", ())
+        mean = sum(loads) / len(loads) / 2.0 if len(loads) else 0.0
+        return replace(self, load=SEAT_SHARE * mean)
+
+    def links(self, track):
+        """What is added to every pad."""
+        self.check()
+        more = self.slope * self.load
+        if more == 0.0:
+            return []
+        pads = [k for j in range(track.support.size) for k in track.support_links(j) if k.tag == "pad"]
+        return [
+            replace(k, stiffness=max(more, -0.9 * k.stiffness), damping=0.0, loss_factor=0.0, tag="pad_preload")
+            for k in pads
+        ]

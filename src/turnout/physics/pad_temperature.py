@@ -1,0 +1,42 @@
+"""Pads that soften when warm."""
+
+from dataclasses import dataclass, replace
+
+from turnout.physics.term import Parameter, PhysicsTerm
+
+REFERENCE = 15.0  # °C, at which the base model's pads hold
+
+
+@dataclass(frozen=True)
+class PadTemperature(PhysicsTerm):
+    r"""All pads: :math:`k_p(T) = k_{p0} [1 - \alpha (T - 15\,°C)]`. At one temperature nothing tells it from k_p."""
+
+    coefficient: float
+    temperature: float = 30.0
+
+    name = "pad_temperature"
+    left_out = "pads lose a share of {coefficient:.4f} of their stiffness per kelvin"
+    kind = "matrix"
+    frame = "condition"
+    parameters = (
+        Parameter("coefficient", "1/K", 0.0, (-0.01, 0.04), "relative loss of stiffness per kelvin",
+                  "Othman 2022, Extrica 22293: rail pads lose up to 53 % when warm"),
+    )  # fmt: skip
+
+    @classmethod
+    def example(cls):
+        """1 % per kelvin at 30 °C."""
+        return cls(0.01)
+
+    def under(self, conditions):
+        """At the rail temperature of a recording; unknown temperature counts as the reference."""
+        return replace(self, temperature=float(conditions.get("rail_temperature", REFERENCE)))
+
+    def links(self, track):
+        """What is added to every pad."""
+        self.check()
+        more = max(-self.coefficient * (self.temperature - REFERENCE), -0.95)
+        if more == 0.0:
+            return []
+        pads = [k for j in range(track.support.size) for k in track.support_links(j) if k.tag == "pad"]
+        return [replace(k, stiffness=more * k.stiffness, damping=0.0, tag="pad_temperature") for k in pads]

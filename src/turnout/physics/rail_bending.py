@@ -1,0 +1,40 @@
+"""A stretch of rail with another bending stiffness and mass: crossing, blade, worn or wrong profile."""
+
+from dataclasses import dataclass, replace
+
+from turnout.physics.term import Parameter, PhysicsTerm
+from turnout.simulate.track import RailStretch
+
+
+@dataclass(frozen=True)
+class RailBending(PhysicsTerm):
+    r"""Between two places the rail has :math:`r\,EI`, and :math:`\sqrt r` times its mass, as profiles scale."""
+
+    start: float
+    end: float
+    factor: float
+
+    name = "rail_bending"
+    left_out = "the rail from {start:.1f} to {end:.1f} m has {factor:.2f} times its bending stiffness"
+    kind = "matrix"
+    frame = "place"
+    parameters = (
+        Parameter("factor", "-", 1.0, (0.3, 5.0), "bending stiffness over that of the base",
+                  "Esveld 2001, Modern railway track: EI grows about as the square of a profile's mass"),
+    )  # fmt: skip
+
+    @classmethod
+    def example(cls):
+        """A crossing of twice the stiffness over 4 m."""
+        return cls(10.0, 14.0, 2.0)
+
+    def rail(self, track):
+        """The track with one stretch more."""
+        self.check()
+        if self.factor == 1.0:
+            return track
+        base = track.rail_between(0.5 * (self.start + self.end))
+        mass = self.factor**0.5
+        other = replace(base, bending_stiffness=self.factor * base.bending_stiffness, mass=mass * base.mass,
+                        rotary_inertia=self.factor * base.rotary_inertia)  # fmt: skip
+        return replace(track, stretches=(*track.stretches, RailStretch(self.start, self.end, other)))

@@ -1,0 +1,63 @@
+"""Waves on a stretch of rail."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnout.physics.term import Parameter, PhysicsTerm
+
+SOURCE = "Grassie 2009, Rail corrugation: characteristics, causes and treatments"
+
+
+@dataclass(frozen=True)
+class Waves:
+    """Two waves a quarter apart between two places, faded over one wavelength; see ``RailCorrugation``."""
+
+    start: float
+    end: float
+    sine: float
+    cosine: float
+    wavelength: float
+
+    def __call__(self, x, wheel=0):
+        x = np.asarray(x, dtype=float)
+        fade = np.clip(np.minimum(x - self.start, self.end - x) / self.wavelength, 0.0, 1.0)
+        way = 2.0 * np.pi * (x - self.start) / self.wavelength
+        return fade * fade * (3.0 - 2.0 * fade) * (self.sine * np.sin(way) + self.cosine * np.cos(way))
+
+
+@dataclass(frozen=True)
+class RailCorrugation(PhysicsTerm):
+    r"""Every wheel meets a wave :math:`a \sin 2\pi x/\lambda + b \cos 2\pi x/\lambda`: a line at v/λ."""
+
+    start: float
+    end: float
+    sine: float
+    cosine: float = 0.0
+    wavelength: float = 0.3
+
+    name = "rail_corrugation"
+    left_out = "corrugation of {wavelength:.3f} m and {amplitude:.2e} m from {start:.1f} to {end:.1f} m"
+    kind = "path"
+    frame = "wavelength"
+    parameters = (
+        Parameter("sine", "m", 0.0, (-3e-4, 3e-4), "amplitude in phase with the start", SOURCE),
+        Parameter("cosine", "m", 0.0, (-3e-4, 3e-4), "amplitude a quarter wave ahead", SOURCE),
+        Parameter("wavelength", "m", 0.3, (0.02, 1.5), "length of a wave", SOURCE),
+    )
+
+    @classmethod
+    def example(cls):
+        """50 µm over 0.3 m."""
+        return cls(8.0, 16.0, 5e-5)
+
+    def sentence(self):
+        """What was left out, in words."""
+        return self.left_out.format(**vars(self), amplitude=float(np.hypot(self.sine, self.cosine)))
+
+    def paths(self, track, vehicle):
+        """The waves."""
+        self.check()
+        if self.sine == 0.0 and self.cosine == 0.0:
+            return ()
+        return (Waves(self.start, self.end, self.sine, self.cosine, self.wavelength),)

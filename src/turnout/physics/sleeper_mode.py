@@ -1,0 +1,46 @@
+"""Sleepers that bend: the first mode of every sleeper beside its rigid motion."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnout.physics.term import Parameter, PhysicsTerm
+from turnout.simulate.link import Link
+
+SOURCE = "Grassie and Cox 1984, The dynamic response of railway track with flexible sleepers"
+
+
+@dataclass(frozen=True)
+class SleeperMode(PhysicsTerm):
+    r"""A modal mass :math:`\mu m_s` on a spring on each rail seat, resonant at the sleeper's bending frequency."""
+
+    share: float
+    frequency: float = 180.0
+    damping: float = 0.03
+
+    name = "sleeper_mode"
+    left_out = "sleepers bend at {frequency:.0f} Hz with a share of {share:.2f} of their mass"
+    kind = "matrix"
+    frame = "frequency"
+    parameters = (
+        Parameter("share", "-", 0.0, (0.0, 1.5), "modal mass over half the sleeper's mass", SOURCE),
+        Parameter("frequency", "Hz", 180.0, (80.0, 800.0), "resonance with the rail seats held", SOURCE),
+    )
+
+    @classmethod
+    def example(cls):
+        """A quarter of the mass at 180 Hz."""
+        return cls(0.25, 200.0)
+
+    def links(self, track):
+        """A further degree of freedom for every sleeper."""
+        self.check()
+        if self.share == 0.0 or track.layers == 1:
+            return []
+        found, omega = [], 2.0 * np.pi * self.frequency
+        for j in range(track.support.size):
+            mass, own = self.share * track.sleeper_mass[j], ("sleeper_mode", j)
+            spring = ((("sleeper", j), 1.0), (own, -1.0))
+            found.append(Link(spring, mass * omega**2, 2.0 * self.damping * omega * mass, tag="sleeper_mode"))
+            found.append(Link(((own, 1.0),), mass=mass, tag="sleeper_mode"))
+        return found

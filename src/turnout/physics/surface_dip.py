@@ -1,0 +1,55 @@
+"""A dip in the running surface: crossing nose, joint, weld, squat."""
+
+from dataclasses import dataclass
+
+from turnout.physics.term import Parameter, PhysicsTerm
+from turnout.simulate.wheel_path import Cosine, Kink
+
+SOURCE = "Jenkins et al. 1974, The effect of track and vehicle parameters on wheel/rail vertical dynamic forces"
+
+
+@dataclass(frozen=True)
+class SurfaceDip(PhysicsTerm):
+    r"""Every wheel falls by :math:`d` over a length L, :math:`p = d[(1-s)\cos^2(\pi x/L) + s\,(1 - 2|x|/L)^2]`.
+
+    ``sharpness`` s goes from a smooth cosine (0) to a kink (1), so that the shape is not forced on the data.
+    """
+
+    place: float
+    depth: float
+    length: float = 0.6
+    sharpness: float = 0.5
+    shift: float = 0.0
+
+    name = "surface_dip"
+    left_out = "the running surface dips by {depth:.5f} m over {length:.2f} m near {place:.2f} m"
+    kind = "path"
+    frame = "place"
+    parameters = (
+        Parameter("depth", "m", 0.0, (-3e-3, 6e-3), "depth of the dip, negative a bump", SOURCE, (0.0, 1e-3)),
+        Parameter("length", "m", 0.6, (0.1, 2.0), "length of the dip", SOURCE),
+        Parameter("sharpness", "-", 0.5, (0.0, 1.0), "share of a kink in its shape", SOURCE),
+        Parameter("shift", "m", 0.0, (-0.5, 0.5), "place beyond the one scanned", SOURCE),
+    )
+
+    @classmethod
+    def example(cls):
+        """1 mm over 0.5 m at 12 m."""
+        return cls(12.0, 1e-3, 0.5)
+
+    @property
+    def where(self):
+        """Deepest place [m]."""
+        return self.place + self.shift
+
+    def sentence(self):
+        """What was left out, in words."""
+        return self.left_out.format(**{**vars(self), "place": self.where})
+
+    def paths(self, track, vehicle):
+        """A cosine and a kink of the same length."""
+        self.check()
+        if self.depth == 0.0:
+            return ()
+        smooth = Cosine(self.where, (1.0 - self.sharpness) * self.depth, self.length)
+        return smooth, Kink(self.where, self.sharpness * self.depth, self.length)

@@ -1,0 +1,26 @@
+"""Effects in a measuring channel that are linear: one transfer function serves recordings and receptances."""
+
+import numpy as np
+
+from turnout.physics.term import PhysicsTerm
+
+
+class TransferTerm(PhysicsTerm):
+    """A term of one channel, named by its field ``channel_name``, with ``transfer(frequency)`` complex (n,)."""
+
+    kind = "channel"
+    frame = "sensor"
+
+    def transfer(self, frequency):
+        """(n,) complex factor on the spectrum at ``frequency`` [Hz]."""
+        raise NotImplementedError
+
+    def channel(self, signal, rate, sensor):
+        """The signal with the transfer applied, padded so that nothing wraps round."""
+        self.check()
+        if sensor.name != self.channel_name:
+            return signal
+        signal = np.asarray(signal, dtype=float)
+        n = signal.size + max(2048, signal.size // 8)
+        frequency = np.fft.rfftfreq(n, 1.0 / rate)
+        return np.fft.irfft(np.fft.rfft(signal, n) * self.transfer(frequency), n)[: signal.size]

@@ -1,0 +1,51 @@
+"""A flat on one wheel."""
+
+from dataclasses import dataclass, replace
+
+from turnout.physics.term import Parameter, PhysicsTerm
+from turnout.simulate.wheel_path import WheelFlat as FlatPath
+
+SOURCE = "Newton and Clark 1979, An investigation into the dynamic effects on the track of wheelflats"
+
+
+@dataclass(frozen=True)
+class WheelFlat(PhysicsTerm):
+    r"""One wheel drops by :math:`l^2/16R` once a turn; the phase differs from passage to passage.
+
+    ``train`` names the trains that carry it ("" all), ``phases`` the rolling way to the first flat by recording.
+    """
+
+    wheel: int
+    length: float
+    radius: float = 0.43
+    phase: float = 0.0
+    train: str = ""
+    phases: tuple = ()
+
+    name = "wheel_flat"
+    left_out = "wheel {number} of {who} has a flat of {length:.3f} m"
+    kind = "path"
+    frame = "wheel"
+    parameters = (Parameter("length", "m", 0.0, (0.0, 0.15), "length of the flat along the tread", SOURCE),)
+
+    @classmethod
+    def example(cls):
+        """50 mm on the first wheel."""
+        return cls(0, 0.05)
+
+    def sentence(self):
+        """What was left out, in words."""
+        return self.left_out.format(length=self.length, number=self.wheel + 1, who=self.train or "every train")
+
+    def under(self, conditions):
+        """With the phase of a recording; no flat in another train."""
+        if self.train and conditions.get("train", self.train) != self.train:
+            return replace(self, length=0.0)
+        return replace(self, phase=dict(self.phases).get(conditions.get("name"), self.phase))
+
+    def paths(self, track, vehicle):
+        """The path of that wheel alone."""
+        self.check()
+        if self.length == 0.0:
+            return ()
+        return (FlatPath(self.wheel, self.length, self.radius, self.phase),)

@@ -1,0 +1,131 @@
+"""When a record began and how fast it was sampled: what the file says against what was promised."""
+
+from datetime import UTC
+from math import isfinite
+from zoneinfo import ZoneInfo
+
+import numpy as np
+
+from turnout.errors import ReadError
+
+STAMP = "%Y-%m-%d %H:%M:%S.%f"
+
+
+def started_at(moment, time_zone):
+    """Naive UTC of a file's start time; a time stamp without a zone is in ``time_zone`` (IANA name).
+
+    >>> from datetime import datetime
+    >>> started_at(datetime(2024, 5, 13, 12, 0), "Europe/Zurich")
+    datetime.datetime(2024, 5, 13, 10, 0)
+    """
+    if moment is None:
+        return None
+    if moment.tzinfo is None:
+        moment = moment.replace(tzinfo=ZoneInfo(time_zone))
+    try:
+        return moment.astimezone(UTC).replace(tzinfo=None)
+    except OverflowError:  # a damaged stamp in the year 1 or 9999
+        return None
+
+
+def rate_of_time(time):
+    r"""Sampling rate of a time column, and the relative precision its digits allow.
+
+    .. math:: f_s = \frac{n - 1}{t_{n-1} - t_0}, \quad
+        \mathrm{tolerance} = 2 \max_k \frac{|t_k - t_0 - k / f_s|}{t_{n-1} - t_0}
+
+    Parameters
+    ----------
+    time : (n,) array of float
+        Increasing. [s]
+
+    Returns
+    -------
+    rate : float
+        [Hz]
+    tolerance : float
+    gap : int or None
+        Sample after which time jumps by more than half a step (samples are missing), None where it is even.
+
+    Examples
+    --------
+    >>> rate, tolerance, gap = rate_of_time(np.array([0.0, 0.01, 0.02, 0.05, 0.06]))
+    >>> gap
+    2
+    """
+    time = np.asarray(time, dtype=float)
+    span = time[-1] - time[0]
+    steps = np.diff(time)
+    step = float(np.median(steps))
+    jumps = np.abs(steps - step) > 0.5 * step
+    if jumps.any():
+        return 1.0 / step, 1e-9, int(np.argmax(jumps))
+    rate = (time.size - 1) / span
+    deviation = np.abs(time - time[0] - np.arange(time.size) / rate).max()
+    return float(rate), float(max(2 * deviation / span, 1e-9)), None
+
+
+def check_time(time, where, source):
+    """ReadError where a time column runs backwards, is not finite, or jumps over missing samples."""
+    if not np.isfinite(time).all():
+        found = f"the time of sample {int(np.argmin(np.isfinite(time)))} is not a number"
+        raise source.error(where, found, reason="not_finite")
+    steps = np.diff(time)
+    if (steps <= 0).any():
+        k = int(np.argmax(steps <= 0))
+        found = (
+            f"the clock runs backwards or stands still: sample {k} at {time[k]:.9g} s, the next at {time[k + 1]:.9g} s"
+        )
+        remedy = "Check the logger's clock and export the record again"
+        raise source.error(where, found, remedy, reason="clock_backwards")
+    rate, _, gap = rate_of_time(time)
+    if gap is not None:
+        raise source.error(
+            where,
+            f"time jumps from {time[gap]:.9g} s to {time[gap + 1]:.9g} s at {rate:.6g} Hz: samples are missing",
+            "Copy the file again from the logger; if the gap is there too, the logger lost samples",
+            reason="truncated",
+        )
+
+
+def settled_rate(record, promised, where, source):
+    """The promised rate if the file's agrees with it to the file's precision, the file's where none is promised.
+
+    A rate that was printed with few digits (UFF58: 1/51200 s as 1.95312E-05) becomes the whole number of Hz
+    that prints the same, where there is just one.
+    """
+    rate, tolerance = record.rate, record.rate_tolerance
+    if rate is None and record.time is not None and len(record.time) > 2:
+        rate, tolerance, _ = rate_of_time(record.time)
+    if rate is None:
+        if promised is None:
+            remedy = "Give the rate in the layout (fs_hz in turnouts.tsv)"
+            raise source.error(
+                where, "neither the file nor the layout says the sampling rate", remedy, reason="wrong_rate"
+            )
+        return float(promised)
+    if not isfinite(rate) or rate <= 0:
+        raise source.error(where, f"the sampling rate is {rate!r} Hz", reason="wrong_rate")
+    if promised is not None:
+        if abs(rate - promised) > tolerance * promised:
+            remedy = "Correct the rate in the layout, or find out why the logger was set differently"
+            found = f"sampled at {rate:.9g} Hz instead of {promised:.9g} Hz"
+            raise source.error(where, found, remedy, reason="wrong_rate")
+        return float(promised)
+    whole = round(rate)
+    unique = rate * tolerance < 0.5
+    return float(whole) if unique and abs(rate - whole) <= rate * tolerance else float(rate)
+
+
+def check_order(starts, source):
+    """{record: ReadError} for each record that began before the one in front of it."""
+    errors: dict[int, ReadError] = {}
+    latest = None
+    for record, start in starts:
+        if latest is not None and start is not None and start < latest:
+            found = f"it began at {start:{STAMP}}, before the record in front of it ({latest:{STAMP}})"
+            remedy = "Check the logger's clock and the time zone in the layout"
+            errors[record] = source.error(f"record {record + 1}", found, remedy, reason="clock_backwards")
+        elif start is not None:
+            latest = start
+    return errors

@@ -1,0 +1,129 @@
+"""The stage that all formats share: raw records and what the layout promises -> recordings in SI units."""
+
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+
+from turnout.errors import ReadError
+from turnout.readers.channels import mappings
+from turnout.readers.clock import check_order, check_time, settled_rate, started_at
+from turnout.readers.raw import COPY_AGAIN
+from turnout.records import RawDescription, Recording
+
+TOO_SHORT = 2  # samples; one sample has neither rate nor spread
+
+
+def describe(raw, description: RawDescription, source):
+    """(recordings, errors) of a raw file; a damaged record costs that record only.
+
+    In a passage, a channel that is dead or not finite costs that channel only: the recording goes without it and
+    the error says so. A hammer test needs all its channels.
+    """
+    if not raw.records and not raw.expected:
+        raise source.error("the file", "it holds no record", COPY_AGAIN, reason="empty")
+    recordings, errors = [], []
+    starts = [
+        (k, started_at(record.started_at, description.time_zone))
+        for k, record in enumerate(raw.records)
+        if not isinstance(record, ReadError)
+    ]
+    backwards = check_order(starts, source)
+    for k, record in enumerate(raw.records):
+        try:
+            if isinstance(record, ReadError):
+                raise record
+            if k in backwards:
+                raise backwards[k]
+            recording, lost = _recording(record, k, len(raw.records), description, source)
+            recordings.append(replace(recording, started_at=dict(starts)[k]))
+            errors.extend(lost)
+        except ReadError as error:
+            errors.append(error)
+    errors.extend(_count_errors(raw, description, source))
+    return tuple(recordings), tuple(errors)
+
+
+def _count_errors(raw, description, source):
+    """What the layout, or the file itself, promises about the number of records, and does not keep."""
+    there = len(raw.records)
+    promises = (("the layout", description.n_records), ("its own header", raw.expected))
+    for who, promised in promises:
+        if promised is not None and there < promised:
+            found = f"it holds {there} of the {promised} records that {who} promises"
+            yield source.error(f"record {there + 1} of {promised}", found, COPY_AGAIN, reason="truncated")
+            return
+    if description.n_records is not None and there > description.n_records:
+        found = f"it holds {there} records, {there - description.n_records} more than the layout promises"
+        remedy = "Correct n_records in the layout, or find out whether two tests share one file"
+        yield source.error(f"record {description.n_records + 1}", found, remedy, reason="wrong_length")
+
+
+def _recording(record, k, n_record, description, source):
+    """(Recording, errors of its lost channels) of raw record ``k``; ReadError where it cannot be used."""
+    where = f"record {k + 1} of {n_record}"
+    n_sample = _sample_count(record, where, description.n_samples, source)
+    if record.time is not None:
+        check_time(record.time, where, source)
+    rate = settled_rate(record, description.rate, where, source)
+    mapped = mappings(record, description.channels, where, source)
+    if not mapped:
+        raise source.error(where, "the layout wants none of its channels", "Name channels in the layout")
+    samples = np.empty((len(mapped), n_sample))
+    for row, m in zip(samples, mapped):
+        np.multiply(record.samples[m.index], m.scale, out=row)
+        if m.offset:
+            row += m.offset
+    faults = {i: e for i, m in enumerate(mapped) if (e := _fault(samples[i], m.channel, where, source)) is not None}
+    if faults and (description.kind != "passage" or len(faults) == len(mapped)):
+        raise next(iter(faults.values()))
+    kept = [i for i in range(len(mapped)) if i not in faults]
+    recording = Recording(
+        samples=samples if not faults else samples[kept],
+        rate=rate,
+        channels=tuple(mapped[i].channel for i in kept),
+        kind=description.kind,
+        source=source.name,
+        record=k,
+        conditions=MappingProxyType(dict(record.conditions)),
+    )
+    return recording, list(faults.values())
+
+
+def _sample_count(record, where, promised, source):
+    lengths = {name: len(x) for name, x in zip(record.names, record.samples)}
+    shortest = min(lengths.values(), default=0)
+    longest = max(lengths.values(), default=0)
+    if shortest != longest:
+        short = next(name for name, n in lengths.items() if n == shortest)
+        found = f"channel {short!r} ends after {shortest} samples, others after {longest}"
+        raise source.error(where, found, COPY_AGAIN, reason="truncated")
+    if promised is not None and shortest < promised:
+        found = f"ends after {shortest} of {promised} samples"
+        raise source.error(where, found, COPY_AGAIN, reason="truncated")
+    if promised is not None and shortest > promised:
+        found = f"it has {shortest} samples instead of {promised}"
+        remedy = "Correct n_samples in the layout, or find out why the logger was set differently"
+        raise source.error(where, found, remedy, reason="wrong_length")
+    if shortest < TOO_SHORT:
+        raise source.error(
+            where, f"it has {shortest} samples", COPY_AGAIN, reason="empty" if not shortest else "truncated"
+        )
+    return shortest
+
+
+def _fault(row, channel, where, source):
+    """ReadError of a channel with NaN, infinity, or no movement at all; None for a sound one."""
+    place = f"{where}, channel {channel.name!r}"
+    with np.errstate(over="ignore", invalid="ignore"):
+        suspect = not np.isfinite(row.sum())
+    if suspect and not (finite := np.isfinite(row)).all():
+        found = (
+            f"{np.count_nonzero(~finite)} of {row.size} samples are not finite, the first is sample {np.argmin(finite)}"
+        )
+        return source.error(place, found, "Export the record again from the logger", reason="not_finite")
+    constant = row[0] == row[-1] and row.min() == row.max()
+    if constant and channel.quantity != "temperature":
+        found = f"all {row.size} samples are {row[0]:.6g}: the channel is dead"
+        return source.error(place, found, "Check sensor, cable and channel map", reason="dead_channel")
+    return None

@@ -1,0 +1,66 @@
+"""The raw formats: name -> module, extensions and the bytes that give a format away.
+
+A new format is one file with ``read_raw(source) -> RawFile`` and one line here.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+
+from turnout.readers.raw import Source
+
+HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+
+
+@dataclass(frozen=True)
+class Format:
+    """``extensions`` with dot, lower case; ``signature(head)`` is True where the first bytes are proof."""
+
+    module: str
+    extensions: tuple[str, ...]
+    signature: Callable[[bytes], bool] = lambda head: False
+    meaning: str = ""
+
+    def read_raw(self, source: Source):
+        """The file's records as they stand (the module is imported only now: h5py alone costs 0.1 s)."""
+        return import_module(f"turnout.readers.{self.module}").read_raw(source)
+
+
+def _is_hdf5(head):
+    return any(head[at : at + 8] == HDF5_SIGNATURE for at in (0, 512, 1024, 2048))
+
+
+FORMATS = {
+    "uff58": Format(
+        "uff", (".uff", ".unv", ".uf", ".58"), lambda h: h.lstrip()[:2] == b"-1", "Universal File Format 58, 58b"
+    ),
+    "uff58b": Format("uff", (), meaning="Universal File Format 58b, binary"),
+    "tdms": Format("tdms", (".tdms",), lambda h: h[:4] == b"TDSm", "National Instruments TDMS"),
+    "mat73": Format("mat", (), lambda h: h[:10] == b"MATLAB 7.3", "MATLAB from version 7.3"),
+    "mat": Format("mat", (".mat",), lambda h: h[:10] == b"MATLAB 5.0", "MATLAB version 5"),
+    "rcmdx": Format("rcmdx", (".rcmdx",), lambda h: _is_hdf5(h) and b"RCMDX" in h, "RCM-DX, railways' exchange format"),
+    "hdf5": Format("hdf5", (".h5", ".hdf5", ".hdf", ".he5"), _is_hdf5, "HDF5"),
+    "wav": Format("wav", (".wav", ".rf64", ".flac"), lambda h: h[:4] in (b"RIFF", b"RF64", b"fLaC"), "WAV, FLAC"),
+    "lvm": Format("lvm", (".lvm",), lambda h: h[:19] == b"LabVIEW Measurement", "LabVIEW measurement file"),
+    "npz": Format("npz", (".npz",), lambda h: h[:4] == b"PK\x03\x04", "NumPy archive"),
+    "parquet": Format("parquet", (".parquet", ".pq"), lambda h: h[:4] == b"PAR1", "Apache Parquet"),
+    "csv": Format("csv", (".csv", ".txt", ".tsv", ".asc", ".dat"), meaning="text with separated columns"),
+}
+
+
+def detect(source: Source) -> Format:
+    """The format of a file: by its first bytes where they tell, otherwise by its extension; ReadError if neither."""
+    head = source.head
+    extension = source.path.suffix.lower()
+    for entry in FORMATS.values():
+        if entry.signature(head) and not (entry.module == "hdf5" and extension == ".rcmdx"):
+            return entry
+    for entry in FORMATS.values():
+        if extension in entry.extensions:
+            return entry
+    known = ", ".join(FORMATS)
+    raise source.error(
+        "byte 0",
+        f"neither its first bytes ({head[:8]!r}) nor its extension {extension!r} tells a known format",
+        f"Set the format in the layout to one of {known}",
+    )

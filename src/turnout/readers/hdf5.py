@@ -1,0 +1,60 @@
+"""HDF5: groups and datasets as named variables, attributes beside them, read as ``turnout.readers.variables`` says.
+
+What ``turnout.readers.writing`` leaves: attributes ``rate``, ``n_records`` and conditions at the root, a group
+``record_000`` ... per record with ``started_at``, in it one dataset per channel with its ``unit`` and a Fletcher-32
+checksum, so that a damaged record costs that record only.
+"""
+
+import h5py
+import numpy as np
+
+from turnout.errors import ReadError
+from turnout.readers.raw import RawFile
+from turnout.readers.variables import RATE, STEP, raw_file
+
+UNIT = ("unit", "units", "Unit", "Units")
+
+
+def read_raw(source) -> RawFile:
+    """Records of an HDF5 file."""
+    with source.parsed_by("HDF5"), h5py.File(source.path, "r") as file:
+        variables = _variables(file, source)
+    return raw_file(variables, source)
+
+
+def _variables(group, source):
+    """Members and attributes of a group in one dictionary; a dataset that cannot be read is its ReadError."""
+    variables = {name: _attribute(value) for name, value in group.attrs.items()}
+    units = {}
+    for name, member in group.items():
+        if isinstance(member, h5py.Group):
+            variables[name] = _variables(member, source)
+            continue
+        try:
+            with source.parsed_by("HDF5", f"dataset {member.name!r}"):
+                variables[name] = _values(member)
+        except ReadError as error:
+            variables[name] = error
+            continue
+        for key, value in member.attrs.items():
+            if key in UNIT and isinstance(value := _attribute(value), str):
+                units[name] = value
+            elif key.lower() in (*RATE, *STEP, "channels", "channel_names", "units"):
+                variables.setdefault(key, _attribute(value))
+    if units and not any(key.lower() == "units" for key in variables):
+        variables["units"] = units
+    return variables
+
+
+def _values(dataset):
+    if h5py.check_string_dtype(dataset.dtype) is not None:
+        return dataset.asstr()[()]
+    return dataset[()]
+
+
+def _attribute(value):
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "replace").strip()
+    if isinstance(value, np.ndarray) and value.size == 1:
+        return _attribute(value.reshape(-1)[0])
+    return value

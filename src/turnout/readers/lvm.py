@@ -1,0 +1,135 @@
+"""LabVIEW measurement files (.lvm): each segment is a record.
+
+Read by ourselves: lvm_read turns a number it cannot read into NaN, takes a segment that ends early for a whole one, and
+needs some 2 µs per number. Layout: National Instruments, "Specification for the LabVIEW Measurement File".
+"""
+
+import numpy as np
+import pyarrow as pa
+from pyarrow import csv
+
+from turnout.errors import ReadError
+from turnout.readers.raw import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, number_or_text
+from turnout.readers.stamps import moment
+from turnout.readers.variables import Facts
+
+END_OF_HEADER = b"***End_of_Header***"
+SEPARATORS = {"Tab": "\t", "Comma": ",", "Semicolon": ";"}
+
+
+def read_raw(source) -> RawFile:
+    """Records of an LVM file; the file's head may promise their number (``Records``)."""
+    lines = source.data[: source.data.find(END_OF_HEADER)].decode("latin-1").splitlines()
+    head = _pairs(lines, _separator(lines))
+    if END_OF_HEADER not in source.data:
+        raise source.error("the header", "it has no end", COPY_AGAIN, reason="truncated")
+    separator = _separator(lines)
+    starts = _segments(source.data)
+    if not starts:
+        raise source.error("the file", "no segment of samples follows its header", COPY_AGAIN, reason="empty")
+    edges = [*starts, len(source.data)]
+    records = []
+    for k, start in enumerate(starts):
+        try:
+            records.append(_record(source, start, edges[k + 1], head, separator, k, len(starts)))
+        except ReadError as error:
+            records.append(error)
+    return RawFile(tuple(records), Facts(head, source).count(("records",)))
+
+
+def _separator(lines):
+    named = next((line for line in lines if line.startswith("Separator")), "Separator\tTab")
+    return SEPARATORS.get(named[10:].strip().strip(",;"), "\t")
+
+
+def _pairs(lines, separator):
+    pairs = (line.split(separator) for line in lines)
+    return {cells[0].strip(): cells[1].strip() for cells in pairs if len(cells) > 1 and cells[0].strip()}
+
+
+def _segments(data):
+    """Offsets of the lines "Channels ..." that open the segments."""
+    found, at = [], data.find(END_OF_HEADER)
+    while (at := data.find(b"\nChannels", at)) >= 0:
+        found.append(at + 1)
+        at += 1
+    return found
+
+
+def _record(source, start, stop, head, separator, k, n):
+    """One segment: its header of one column per channel, then rows of X_Value, the channels and a comment."""
+    where = f"record {k + 1} of {n}"
+    end = source.data.find(END_OF_HEADER, start, stop)
+    first = source.data.find(b"\n", source.data.find(b"\nX_Value", max(end, start), stop) + 1, stop) + 1
+    if end < 0 or first == 0 or b"\nX_Value" not in source.data[end:stop]:
+        raise source.error(where, "its header has no end", COPY_AGAIN, reason="truncated")
+    text = source.data[start:end].decode("utf-8", "replace").splitlines()
+    fields = {cells[0].strip(): [c.strip() for c in cells[1:]] for cells in (line.split(separator) for line in text)}
+    point = head.get("Decimal_Separator", ".")
+    x_line = source.data[source.data.find(b"\nX_Value", end) + 1 : first].decode("utf-8", "replace")
+    names = [name for name in x_line.rstrip("\r\n").split(separator)[1:] if name and name != "Comment"]
+    with source.parsed_by("the header", where):
+        count = int(fields["Channels"][0])
+        samples = [int(s) for s in fields.get("Samples", [])[:count]]
+        step = float(fields["Delta_X"][0].replace(point, ".")) if fields.get("Delta_X") else 0.0
+    if len(names) != count:
+        raise source.error(where, f"it names {len(names)} of {count} channels", COPY_AGAIN, reason="truncated")
+    with_x = 0 if head.get("X_Columns") == "No" else 1 if head.get("X_Columns", "One") == "One" else count
+    columns = _columns(source, source.data[first:stop], separator, point, count, with_x, where)
+    for name, promised, column in zip(names, samples, columns):
+        if len(column) != promised:
+            place = f"{where}, channel {name!r}"
+            found = f"ends after {len(column)} of {promised} samples"
+            raise source.error(place, found, COPY_AGAIN, reason="truncated")
+    units = fields.get("Y_Unit_Label", [])
+    date = f"{_at(fields, 'Date') or head.get('Date', '')}".replace("/", "-")
+    clock = (_at(fields, "Time") or head.get("Time", "")).replace(",", ".")
+    return RawRecord(
+        names=tuple(names),
+        samples=columns,
+        rate=1.0 / step if step > 0 else None,
+        units=tuple(units[:count]) if len(units) >= count else ("",) * count,
+        started_at=moment(f"{date}T{clock[:15]}"),
+        conditions={name: number_or_text(head[name]) for name in CONDITIONS if name in head},
+    )
+
+
+def _at(fields, name):
+    return next(iter(fields.get(name, [])), "")
+
+
+def _columns(source, body, separator, point, count, with_x, where):
+    """One array per channel: the rows up to the blank line that ends a segment."""
+    body = body.replace(b"\r", b"")
+    for blank in (b"\n\n", b"\n" + separator.encode() + b"\n"):
+        body = body.partition(blank)[0] + b"\n" if blank in body else body
+    if not body.strip():
+        return [np.empty(0)] * count
+    if not body.endswith(b"\n"):
+        found = "its last line has no line break: the last number may be cut"
+        raise source.error(where, found, COPY_AGAIN, reason="truncated")
+    wanted = [1 + 2 * i for i in range(count)] if with_x > 1 else [1 + i for i in range(count)]
+    width = wanted[-1] + 1
+    mark = separator.encode()
+    with source.parsed_by("pyarrow", where):
+        try:
+            table = _table(body, width, separator, point, wanted)
+        except pa.ArrowInvalid:  # a comment behind the channels: only some rows have one
+            rows = [line.split(mark)[:width] for line in body.splitlines()]
+            table = _table(b"\n".join(map(mark.join, rows)) + b"\n", width, separator, point, wanted)
+    return [column.to_numpy(zero_copy_only=False) for column in table.columns]
+
+
+def _table(body, width, separator, point, wanted):
+    names = [str(i) for i in range(width)]
+    return csv.read_csv(
+        pa.py_buffer(body),
+        read_options=csv.ReadOptions(use_threads=False, column_names=names, block_size=1 << 24),
+        parse_options=csv.ParseOptions(delimiter=separator),
+        convert_options=csv.ConvertOptions(
+            column_types={names[i]: pa.float64() for i in wanted},
+            decimal_point=point,
+            include_columns=[names[i] for i in wanted],
+            null_values=["", "NaN"],
+        ),
+    )

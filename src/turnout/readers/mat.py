@@ -1,0 +1,39 @@
+"""MATLAB files, version 5 and 7.3: named variables, read as ``turnout.readers.variables`` says.
+
+pymatreader turns structures into dictionaries and gives both versions alike, except that 7.3 arrays come with their
+axes reversed; the channels' count and the longer axis tell which is which.
+"""
+
+import warnings
+
+import numpy as np
+import pymatreader
+
+from turnout.readers.raw import RawFile
+from turnout.readers.variables import raw_file
+
+LEAST = 128  # bytes of the header of version 5
+
+
+def read_raw(source) -> RawFile:
+    """Records of a MATLAB file."""
+    if source.size < LEAST:
+        raise source.error("the header", f"the file ends after {source.size} bytes", reason="truncated")
+    with source.parsed_by("pymatreader"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # objects and tables it cannot read are no samples
+        read = pymatreader.read_mat(source.path)
+    return raw_file(_plain({k: v for k, v in read.items() if not k.startswith("__")}), source)
+
+
+def _plain(value):
+    """Dictionaries and arrays throughout; a structure array becomes numbered records."""
+    if isinstance(value, dict):
+        members = {name: _plain(v) for name, v in value.items()}
+        return {name: v for name, v in members.items() if v is not None}
+    if isinstance(value, list):
+        if value and all(isinstance(v, dict) for v in value):
+            return {f"record_{i:03d}": _plain(v) for i, v in enumerate(value)}
+        if value and all(isinstance(v, np.ndarray) and v.ndim == 2 for v in value):
+            return {f"record_{i:03d}": v for i, v in enumerate(value)}
+        return value if all(isinstance(v, str) for v in value) else np.asarray(value, dtype=object)
+    return value

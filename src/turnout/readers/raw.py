@@ -1,0 +1,119 @@
+"""What a reader of one format hands over: the numbers as they stand in the file, nothing converted."""
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from datetime import datetime
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from turnout.content import sha256_of
+from turnout.errors import ReadError, TurnoutError
+from turnout.records import NOTHING
+
+COPY_AGAIN = "Copy the file again from the logger"
+# What may stand beside the samples in any format, and reaches Recording.conditions.
+CONDITIONS = (
+    "rail_temperature",
+    "air_temperature",
+    "train_type",
+    "train_id",
+    "speed",
+    "track",
+    "direction",
+    "hammer_id",
+    "tip",
+    "operator",
+)
+
+
+def number_or_text(text: str) -> float | str:
+    """A condition as a float where it is one, else as it stands.
+
+    >>> number_or_text("12.5"), number_or_text("main")
+    (12.5, 'main')
+    """
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+@dataclass(frozen=True)
+class Source:
+    """One file: where it lies, the name that messages use, its size and first bytes. ``data`` is read when asked for.
+
+    Formats whose library reads from the path leave ``data`` alone: a large block of fresh memory costs as much as the
+    reading.
+    """
+
+    path: Path
+    name: str
+    size: int
+    head: bytes
+
+    @cached_property
+    def data(self) -> bytes:
+        """All bytes of the file."""
+        return self.path.read_bytes()
+
+    def sha256(self) -> str:
+        """Of the file's bytes, in hexadecimal."""
+        if "data" in self.__dict__:
+            return hashlib.sha256(self.data).hexdigest()
+        return sha256_of(self.path)
+
+    def error(self, where, found, remedy=COPY_AGAIN, reason="unreadable") -> ReadError:
+        """The ReadError of this file at ``where``."""
+        return ReadError(self.name, where, found, remedy, reason=reason)
+
+    @contextmanager
+    def parsed_by(self, library, where="the file", reason="unreadable"):
+        """Turn whatever ``library`` raises on damaged bytes into a ReadError; for the library's call alone."""
+        try:
+            yield
+        except TurnoutError:
+            raise
+        except Exception as error:
+            said = " ".join(str(error).split())[:200] or type(error).__name__
+            raise self.error(where, f"{library} cannot read it ({said})", reason=reason) from error
+
+
+@dataclass(frozen=True)
+class RawRecord:
+    """One stretch of simultaneous samples, as it stands in the file.
+
+    ``samples`` holds one (n_sample,) array per name, in ``units`` ("" where the file does not say).
+    ``rate`` [Hz] is None where the file does not say; ``rate_tolerance`` is the relative precision with which
+    its format can state it. ``started_at`` is aware where the format says the zone, naive where it does not.
+    ``time`` [s] is the file's own time column, ``aliases`` are further names by which a channel may be asked for.
+    """
+
+    names: tuple[str, ...]
+    samples: Sequence[np.ndarray]
+    rate: float | None = None
+    units: tuple[str, ...] = ()
+    rate_tolerance: float = 1e-9
+    started_at: datetime | None = None
+    conditions: Mapping = field(default_factory=lambda: NOTHING)
+    time: np.ndarray | None = None
+    aliases: tuple[tuple[str, ...], ...] = ()
+
+    def __post_init__(self):
+        object.__setattr__(self, "units", tuple(self.units) or ("",) * len(self.names))
+        if not len(self.names) == len(self.samples) == len(self.units):
+            raise ValueError(f"{len(self.names)} names, {len(self.samples)} channels, {len(self.units)} units")
+
+
+@dataclass(frozen=True)
+class RawFile:
+    """All records of a file in their order, a damaged one as its ReadError.
+
+    ``expected`` is how many the file itself promises, None where it does not say.
+    """
+
+    records: tuple[RawRecord | ReadError, ...]
+    expected: int | None = None

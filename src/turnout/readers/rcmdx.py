@@ -1,0 +1,110 @@
+"""RCM-DX, the rail condition monitoring data exchange format (HDF5 below a root RCMDX), versions 1 and 2.
+
+Each data source with a frequency is a record; one that samples by distance or on events is not. Found by the attribute
+``Element`` (SESSION, DATASOURCE, CHANNEL) wherever the tree has them, because releases moved them. Time stamps are
+nanoseconds since 1970 UTC, one per sample, and must agree with ``CommonTriggerFrequency``.
+
+Layout: OpenRail Association, RCM-DX Specification 2.0.
+"""
+
+from datetime import UTC, datetime, timedelta
+
+import h5py
+import numpy as np
+
+from turnout.errors import ReadError
+from turnout.readers.clock import rate_of_time
+from turnout.readers.raw import CONDITIONS, COPY_AGAIN, RawFile, RawRecord
+from turnout.readers.variables import Facts
+
+FREQUENCY = ("CommonTriggerFrequency", "CommonTriggerFreq", "CommonTriggerFrequence", "TriggerValue")
+NOTED = {*CONDITIONS, "RecordCount"}
+SINGLE_PRECISION = 2.0**-23  # the frequency is a 32 bit float
+
+
+def read_raw(source) -> RawFile:
+    """Records of an RCM-DX file, in the order of its sessions."""
+    with source.parsed_by("HDF5"), h5py.File(source.path, "r") as file:
+        if "RCMDX" not in file:
+            raise source.error("the root", "there is no group RCMDX", "Set the format in the layout to hdf5")
+        found: list[tuple[h5py.Group, dict]] = []
+        _data_sources(file["RCMDX"], {}, found)
+        records = []
+        for group, notes in found:
+            try:
+                with source.parsed_by("HDF5", f"data source {group.name!r}"):
+                    record = _record(group, notes, source)
+            except ReadError as error:
+                record = error
+            if record is not None:
+                records.append((group.name, record))
+    records.sort(key=lambda named: named[0])  # sessions are named by their date
+    notes = found[0][1] if found else {}
+    return RawFile(tuple(record for _, record in records), Facts(notes, source).count(("recordcount",)))
+
+
+EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+
+
+def _data_sources(group, notes, found):
+    """Every group that holds time stamps and channels, with what the groups around it note."""
+    notes = {**notes, **{k: group.attrs[k] for k in NOTED.intersection(group.attrs)}}
+    if isinstance(group.get("timestamp"), h5py.Dataset) and any(_is_channel(m) for m in group.values()):
+        found.append((group, notes))
+        return
+    for member in group.values():
+        if isinstance(member, h5py.Group):
+            _data_sources(member, notes, found)
+
+
+def _is_channel(member):
+    return isinstance(member, h5py.Group) and isinstance(member.get("data"), h5py.Dataset)
+
+
+def _text(value):
+    return (value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)).strip()
+
+
+def _record(group, notes, source):
+    """The record of one data source; None where it is not sampled in time."""
+    channels = {name: member for name, member in group.items() if _is_channel(member)}
+    modes = {_text(c.attrs.get("TriggerMode", "TIME")).upper() for c in channels.values()}
+    if modes != {"TIME"}:
+        return None
+    where = f"data source {group.name!r}"
+    stamps = group["timestamp"][()]
+    data = [c["data"] for c in channels.values()]
+    samples = [d[()] for d in data]
+    for name, x in zip(channels, samples):
+        if len(x) != len(stamps):
+            found = f"{len(x)} samples and {len(stamps)} time stamps"
+            raise source.error(f"{where}, channel {name!r}", found, COPY_AGAIN, reason="truncated")
+    if len(stamps) < 2:
+        raise source.error(where, f"it has {len(stamps)} samples", COPY_AGAIN, reason="empty")
+    rates = {float(c.attrs[k]) for c in channels.values() for k in set(FREQUENCY).intersection(c.attrs)} - {0.0}
+    if len(rates) > 1:
+        raise source.error(where, f"its channels name different frequencies: {sorted(rates)} Hz", reason="wrong_rate")
+    time = (stamps - stamps[0]) * 1e-9
+    rate, tolerance = rates.pop() if rates else None, SINGLE_PRECISION
+    if rate is not None and (np.diff(time) > 0).all():
+        measured, precision, _ = rate_of_time(time)
+        if abs(measured - rate) > (precision + 1e-4) * rate:
+            found = f"its time stamps are {measured:.6g} Hz apart, its frequency says {rate:.6g} Hz"
+            raise source.error(where, found, COPY_AGAIN, reason="wrong_rate")
+    names = tuple(name.rpartition(".")[2] for name in channels)
+    names = names if len(set(names)) == len(names) else tuple(channels)
+    return RawRecord(
+        names=names,
+        samples=samples,
+        rate=rate,
+        rate_tolerance=tolerance,
+        units=tuple(_text(d.attrs.get("Unit", "")) for d in data),
+        started_at=EPOCH + timedelta(microseconds=int(stamps[0]) // 1000),
+        conditions={name: _plain(notes[name]) for name in CONDITIONS if name in notes},
+        time=time,
+        aliases=tuple((name,) for name in channels),
+    )
+
+
+def _plain(value):
+    return value.item() if isinstance(value, np.generic) else _text(value)

@@ -1,0 +1,96 @@
+"""National Instruments TDMS: each group with samples is a record.
+
+npTDMS gives what it finds of a cut-off file in silence. The lead-ins of the segments say how long the file must be, and
+``wf_samples`` how long a channel; both are compared.
+"""
+
+import struct
+
+import nptdms
+
+from turnout.errors import ReadError
+from turnout.readers.raw import COPY_AGAIN, RawFile, RawRecord
+from turnout.readers.stamps import moment
+from turnout.readers.variables import COUNT, START, Facts, natural
+
+nptdms.log.log_manager.set_level("ERROR")  # what it warns of on the console is found by cut_off and becomes a reason
+LEAD_IN = 28  # bytes: tag, mask, version, offset of the next segment, offset of the raw data
+UNFINISHED = 0xFFFFFFFFFFFFFFFF
+
+
+def read_raw(source) -> RawFile:
+    """Records of a TDMS file, in the natural order of the groups' names."""
+    with source.path.open("rb") as file:  # not the path: npTDMS would believe an index file beside it
+        cut = cut_off(file, source.size)
+        with source.parsed_by("npTDMS", reason="truncated" if cut else "unreadable"):
+            file.seek(0)
+            tdms = nptdms.TdmsFile.read(file)
+    groups = sorted((g for g in tdms.groups() if any(len(c) for c in g.channels())), key=lambda g: natural(g.name))
+    names = {channel.name for group in groups for channel in group.channels()}
+    damaged = _damaged(tdms) if cut else set()
+    records = [_record(g, k, len(groups), names, damaged, tdms.properties, source) for k, g in enumerate(groups)]
+    if cut and not any(isinstance(r, ReadError) for r in records):
+        records.append(source.error(f"record {len(records) + 1}", cut, COPY_AGAIN, reason="truncated"))
+    return RawFile(tuple(records), Facts(tdms.properties, source).count(COUNT))
+
+
+def cut_off(file, size: int) -> str:
+    """In words, where a file of ``size`` bytes ends before its last segment does; "" for a whole one."""
+    at = 0
+    while at < size:
+        file.seek(at)
+        lead_in = file.read(LEAD_IN)
+        if len(lead_in) < LEAD_IN:
+            return f"it ends within the lead-in of a segment, at byte {size}"
+        ahead = struct.unpack_from("<Q", lead_in, 12)[0]
+        if lead_in[:4] != b"TDSm":
+            return f"there is no segment at byte {at}"
+        if ahead == UNFINISHED:
+            return f"the segment at byte {at} was never finished by the logger"
+        at += LEAD_IN + ahead
+    return "" if at == size else f"it ends at byte {size} of {at}"
+
+
+def _damaged(tdms):
+    """Paths of the channels that the last, incomplete segment holds."""
+    statuses = tdms.file_status.channel_statuses or {}
+    return {path for path, status in statuses.items() if status.read_length < status.expected_length}
+
+
+def _record(group, *context):
+    """One group as a record, or the error that stands for it."""
+    try:
+        return _sound_record(group, *context)
+    except ReadError as error:
+        return error
+
+
+def _sound_record(group, k, n, names, damaged, properties, source):
+    where = f"record {k + 1} of {n} (group {group.name!r})"
+    channels = group.channels()
+    if missing := names - {c.name for c in channels}:
+        found = f"it lacks the channel {min(missing)!r} that other groups have"
+        raise source.error(where, found, COPY_AGAIN, reason="truncated")
+    for channel in channels:
+        promised = Facts(channel.properties, source).number(("wf_samples",))
+        if channel.path in damaged or (promised and len(channel) != promised):
+            found = f"ends after {len(channel)}{f' of {promised:g}' if promised else ''} samples"
+            place = f"{where}, channel {channel.name!r}"
+            raise source.error(place, found, COPY_AGAIN, reason="truncated")
+    steps = {Facts(c.properties, source).number(("wf_increment",)) for c in channels}
+    if len(steps) > 1:
+        found = f"its channels have different steps: {sorted(s or 0 for s in steps)} s"
+        raise source.error(where, found, "Record all channels of a group at one rate", reason="wrong_rate")
+    step = steps.pop()
+    with source.parsed_by("npTDMS", where):
+        samples = [c[:] for c in channels]
+    facts = Facts({**properties, **group.properties, **channels[0].properties}, source)
+    return RawRecord(
+        names=tuple(c.name for c in channels),
+        samples=samples,
+        rate=1.0 / step if step else facts.rate(),
+        units=tuple(str(c.properties.get("unit_string", "") or "") for c in channels),
+        started_at=moment(facts.one(("wf_start_time", *START), 0, 1)),
+        conditions=facts.conditions(0, 1),
+        aliases=tuple((f"{group.name}/{c.name}",) for c in channels),
+    )

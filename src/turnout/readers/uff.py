@@ -1,0 +1,213 @@
+"""Universal File Format 58 and 58b: time responses as records, frequency responses through ``read_frf``."""
+
+import gzip
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnout.readers.places import load
+from turnout.readers.raw import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, number_or_text
+from turnout.readers.stamps import uff_moment
+from turnout.readers.uff_sets import UffSet, says_si, sets_of
+
+TIME_RESPONSE, FREQUENCY_RESPONSE, TIME_AXIS = 1, 4, 17
+# Specific data type (records 9 and 10) where there is no label and dataset 164 declares SI.
+SI_OF_TYPE = {8: "m", 9: "N", 11: "m/s", 12: "m/s²", 13: "N", 15: "Pa"}
+DIRECTIONS = {0: "", 1: "+X", 2: "+Y", 3: "+Z", -1: "-X", -2: "-Y", -3: "-Z", 4: "+RX", 5: "+RY", 6: "+RZ"}
+
+
+@dataclass(frozen=True)
+class FrequencyResponses:
+    """Frequency response functions of a file: ``frequency`` (n_frequency,) [Hz], ``frf`` (n_function, n_frequency)
+    complex in ``units``, and between which degrees of freedom ("12 +Z")."""
+
+    frequency: np.ndarray
+    frf: np.ndarray
+    units: tuple[str, ...]
+    responses: tuple[str, ...]
+    references: tuple[str, ...]
+    names: tuple[str, ...]
+
+
+def read_raw(source) -> RawFile:
+    """Records of all time responses in the file.
+
+    A channel is called by ID line 1; the response entity, the ordinate's label and the degree of freedom ("12 +Z")
+    serve as well. The version or sequence number (record 6, field 3) says which record a set is of; where all sets
+    carry the same, records are found by the order of the channels.
+    """
+    everything = sets_of(source.data)
+    sets = [s for s in everything if s.kind in ("", "58", "58b")]
+    wanted = [s for s in sets if s.damage or _is_time(s)]
+    if not wanted or not any(s.kind for s in wanted):
+        found = wanted[0].damage if wanted else f"it holds {len(sets)} functions and no time response"
+        raise source.error(f"byte {wanted[0].offset if wanted else 0}", found, COPY_AGAIN)
+    return RawFile(tuple(_records(wanted, says_si(source.data, everything), source)))
+
+
+def _is_time(one: UffSet):
+    return one.func_type == TIME_RESPONSE or (one.func_type == 0 and one.labels and one.labels[0][0] == TIME_AXIS)
+
+
+def _records(sets, si, source):
+    """RawRecord or ReadError per record, in order."""
+    nameless = [s for s in sets if not s.labels]
+    named = [s for s in sets if s.labels]
+    keys = [_names_of(s) for s in named]
+    per_key = Counter(keys)
+    channels = list(dict.fromkeys(keys))
+    numbers = [s.sequence for s in named]
+    if len(set(zip(keys, numbers))) == len(named) and len(set(numbers)) > 1:
+        span = range(min(numbers), max(numbers) + 1)
+        whole = len(span) <= len(set(numbers)) + len(nameless)  # else the numbers have gaps of their own
+        groups: dict[int, dict] = {n: {} for n in (span if whole else sorted(set(numbers)))}
+        for key, number, one in zip(keys, numbers, named):
+            groups[number][key] = one
+        ordered = list(groups.values())
+    elif nameless and len(named) > len(channels) and nameless[0].offset < named[-1].offset:
+        found = "a set without readable header stands between others, and no sequence numbers say which belong together"
+        raise source.error(f"byte {nameless[0].offset}", f"{nameless[0].damage}; {found}")
+    else:
+        interleaved = all(key == channels[i % len(channels)] for i, key in enumerate(keys))
+        if (
+            not interleaved
+            and len(set(per_key.values())) > 1
+            and sum(keys[i] != keys[i - 1] for i in range(1, len(keys))) > len(channels)
+        ):
+            raise source.error("the sets", "channels come in no regular order and carry no sequence numbers")
+        seen: Counter[tuple] = Counter()
+        ordered = [{} for _ in range(max(per_key.values(), default=0))]
+        for key, one in zip(keys, named):
+            ordered[seen[key]][key] = one
+            seen[key] += 1
+    n = len(ordered)
+    for k, group in enumerate(ordered):
+        yield _record(group, channels, k, n, si, source)
+    for one in nameless:
+        yield source.error(f"record {n + 1}, byte {one.offset}", one.damage, COPY_AGAIN, reason="truncated")
+
+
+def _names_of(one: UffSet):
+    """What identifies a set's channel: all its names together."""
+    return (one.ids[0] if one.ids[0] not in ("", "NONE") else "", *one.response, one.labels[1][1], one.labels[1][2])
+
+
+def _record(group, channels, k, n, si, source):
+    """One record out of the sets of its channels, or the error that stands for it."""
+    for key in channels:
+        one = group.get(key)
+        if one is None:
+            found = f"channel {_call(key)!r} is missing from this record"
+            return source.error(f"record {k + 1} of {n}", found, COPY_AGAIN, reason="truncated")
+        if one.damage:
+            place = f"record {k + 1} of {n}, channel {_call(key)!r}, byte {one.offset}"
+            return source.error(place, one.damage, COPY_AGAIN, reason="truncated")
+    sets = [group[key] for key in channels]
+    first = sets[0]
+    steps = {(s.step, s.start) for s in sets}
+    if len({s.step for s in sets}) > 1:
+        found = f"its channels have different steps: {sorted(step for step, _ in steps)} s"
+        return source.error(
+            f"record {k + 1} of {n}", found, "Export channels of one rate to one file", reason="wrong_rate"
+        )
+    names, aliases = _distinct(channels)
+    return RawRecord(
+        names=names,
+        samples=[s.data for s in sets],
+        rate=1.0 / first.step if first.x is None and first.step > 0 else None,
+        rate_tolerance=_precision(first.step_text),
+        units=tuple(_unit(s.labels[1], si) for s in sets),
+        started_at=uff_moment(first.ids[2]),
+        conditions=_conditions(first.ids[3]),
+        time=first.x,
+        aliases=aliases,
+    )
+
+
+def _call(key):
+    """The name of a channel: ID line 1, or the first of its other names that says something."""
+    return next(
+        (part for part in (key[0], key[1], key[4]) if part and part != "NONE"),
+        f"{key[2]} {DIRECTIONS.get(key[3], key[3])}",
+    )
+
+
+def _distinct(channels):
+    """(names, aliases): the first kind of name that differs for all channels."""
+    dofs = [_dof(("", *key[2:4])) for key in channels]
+    kinds = [[key[i] for key in channels] for i in (0, 1, 4)] + [dofs]
+    clear = [names for names in kinds if len(set(names)) == len(names) and not {"", "NONE"} & set(names)]
+    names = clear[0] if clear else [_call(key) for key in channels]
+    aliases = tuple(tuple(a for a in (key[0], key[1], key[4], dof) if a) for key, dof in zip(channels, dofs))
+    return tuple(names), aliases
+
+
+def _unit(axis, si):
+    """Unit of an ordinate: its label, else that of its data type where the file declares SI."""
+    kind, _, label = axis
+    blank = label.upper() in ("", "NONE", "UNKNOWN")
+    return (SI_OF_TYPE.get(kind, "") if si else "") if blank else label
+
+
+def _precision(text):
+    """Relative size of one unit in the last printed digit: "1.95312E-05" -> 5.1e-6.
+
+    One unit, not half of it: some exporters cut digits off instead of rounding.
+    """
+    mantissa = text.upper().replace("D", "E").partition("E")[0].lstrip("+-")
+    digits = mantissa.replace(".", "").lstrip("0")
+    return 1.0 / float(digits) if digits.isdigit() else 1e-5
+
+
+def _conditions(text):
+    """ID line 4 as "rail_temperature=12.3; track=main"; anything else there is left alone."""
+    pairs = dict(part.strip().split("=", 1) for part in text.split(";") if part.count("=") == 1)
+    return {name: number_or_text(value) for name, value in pairs.items() if name in CONDITIONS}
+
+
+def read_frf(path, root=".") -> FrequencyResponses:
+    """Frequency response functions (function type 4) of a Universal File, plain or gzipped.
+
+    ReadError where one is damaged or their frequencies differ.
+
+    ``units`` are the ordinate's label over that of its denominator where the file has both.
+    """
+    source = load(path, root)
+    data = source.data
+    if data[:2] == b"\x1f\x8b":
+        with source.parsed_by("gzip"):
+            data = gzip.decompress(data)
+    everything = sets_of(data)
+    si = says_si(data, everything)
+    functions = [s for s in everything if s.kind in ("58", "58b")]
+    sets = [s for s in functions if s.damage or s.func_type == FREQUENCY_RESPONSE]
+    for one in sets:
+        if one.damage:
+            raise source.error(f"byte {one.offset}", one.damage, COPY_AGAIN, reason="truncated")
+    if not sets:
+        raise source.error("the file", "it holds no frequency response (function type 4)", "Export frequency responses")
+    axes = [s.x if s.x is not None else s.start + s.step * np.arange(len(s.data)) for s in sets]
+    if any(len(axis) != len(axes[0]) or not np.allclose(axis, axes[0], rtol=1e-6) for axis in axes):
+        raise source.error(
+            "the file", "its frequency responses have different frequencies", "Export them to one file each"
+        )
+    return FrequencyResponses(
+        frequency=axes[0],
+        frf=np.vstack([s.data for s in sets]),
+        units=tuple(_frf_unit(s, si) for s in sets),
+        responses=tuple(_dof(s.response) for s in sets),
+        references=tuple(_dof(s.reference) for s in sets),
+        names=tuple(s.ids[0] for s in sets),
+    )
+
+
+def _frf_unit(one, si):
+    top, bottom = (_unit(axis, si) for axis in one.labels[1:3])
+    return top if not bottom or "/N" in top else f"({top})/({bottom})"
+
+
+def _dof(dof):
+    name, node, direction = dof
+    name = "" if name == "NONE" else name
+    return f"{name} {node} {DIRECTIONS.get(direction, direction)}".strip()

@@ -1,0 +1,162 @@
+"""Units that stand in raw files and in layouts, and what turns them into SI."""
+
+import math
+import re
+from dataclasses import dataclass
+
+STANDARD_GRAVITY = 9.80665
+IGNORED = "ignored"  # quantity of a channel that is in the file and not wanted
+
+# dimension -> {spelling: (scale, offset)} with SI = scale * number + offset
+UNITS = {
+    "voltage": {"V": (1.0, 0.0), "mV": (1e-3, 0.0), "µV": (1e-6, 0.0), "kV": (1e3, 0.0)},
+    "count": {"count": (1.0, 0.0)},
+    "force": {"N": (1.0, 0.0), "mN": (1e-3, 0.0), "kN": (1e3, 0.0), "lbf": (4.4482216152605, 0.0)},
+    "acceleration": {
+        "m/s²": (1.0, 0.0),
+        "mm/s²": (1e-3, 0.0),
+        "km/s²": (1e3, 0.0),
+        "g": (STANDARD_GRAVITY, 0.0),
+        "mg": (1e-3 * STANDARD_GRAVITY, 0.0),
+    },
+    "velocity": {"m/s": (1.0, 0.0), "mm/s": (1e-3, 0.0), "km/h": (1 / 3.6, 0.0)},
+    "displacement": {"m": (1.0, 0.0), "mm": (1e-3, 0.0), "µm": (1e-6, 0.0)},
+    "strain": {"m/m": (1.0, 0.0), "µm/m": (1e-6, 0.0), "%": (1e-2, 0.0)},
+    "pressure": {"Pa": (1.0, 0.0), "kPa": (1e3, 0.0)},
+    "temperature": {"°C": (1.0, 0.0), "K": (1.0, -273.15), "°F": (5 / 9, -160 / 9)},
+}
+SPELLINGS = {
+    "V": "Volt Volts volt volts v",
+    "mV": "Millivolt Millivolts millivolts",
+    "µV": "uV microvolts",
+    "count": "counts Counts COUNT LSB lsb",
+    "N": "Newton Newtons newton newtons",
+    "kN": "Kilonewton kilonewton",
+    "lbf": "lb_f lbs",
+    "m/s²": "m/s^2 m/s**2 m/s2 m/s/s ms-2 m*s^-2 m·s⁻² MeterPerSecondSquared (m/s²) (m/s^2) (m/s2)",
+    "mm/s²": "mm/s^2 mm/s2",
+    "g": "gn g_n G gravity",
+    "m/s": "MeterPerSecond MetersPerSecond",
+    "km/h": "kph KilometerPerHour",
+    "m": "meter Meter metre",
+    "mm": "millimeter Millimeter millimetre",
+    "µm": "um micrometer Micrometer",
+    "m/m": "strain -",
+    "µm/m": "um/m µstrain ustrain microstrain ue µε",
+    "°C": "degC deg_C Celsius celsius DegreeCelsius C",
+    "K": "Kelvin kelvin",
+    "°F": "degF Fahrenheit",
+}
+SI = {
+    "force": "N",
+    "acceleration": "m/s²",
+    "velocity": "m/s",
+    "displacement": "m",
+    "strain": "m/m",
+    "pressure": "Pa",
+    "temperature": "°C",
+}
+_CANONICAL = {name: name for units in UNITS.values() for name in units}
+_CANONICAL |= {other: name for name, others in SPELLINGS.items() for other in others.split()}
+_NUMBER = re.compile(r"^([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.+)$")
+
+
+@dataclass(frozen=True)
+class Conversion:
+    """SI = ``scale`` * number + ``offset``, of ``dimension`` (a key of ``UNITS``)."""
+
+    dimension: str
+    scale: float
+    offset: float = 0.0
+
+
+def conversion(unit: str) -> Conversion:
+    """What one number in ``unit`` is in SI; a leading factor says what one step or full scale is worth.
+
+    ValueError for a unit that the table does not hold. "µ" may be either of its two code points.
+
+    Examples
+    --------
+    >>> conversion("kN").scale
+    1000.0
+    >>> conversion("0.5 mV").scale
+    0.0005
+    >>> round(conversion("°F").scale * 32 + conversion("°F").offset, 9)
+    0.0
+    """
+    text = unit.strip().strip("[]").replace("\u03bc", "µ").strip()
+    factor = 1.0
+    if (match := _NUMBER.match(text)) and text not in _CANONICAL:
+        factor, text = float(match[1]), match[2].strip()
+    name = _CANONICAL.get(text)
+    if name is None or not math.isfinite(factor) or factor == 0:
+        raise ValueError(f"the unit {unit!r} is not known; known are {', '.join(sorted(set(_CANONICAL.values())))}")
+    dimension = next(d for d, units in UNITS.items() if name in units)
+    scale, offset = UNITS[dimension][name]
+    return Conversion(dimension, factor * scale, offset)
+
+
+def to_si(quantity: str, unit: str, sensitivity: float | None = None, sensitivity_unit: str = "") -> Conversion:
+    r"""Conversion from raw numbers in ``unit`` to the SI unit of ``quantity``.
+
+    .. math:: x = \frac{u}{S}, \quad [S] = \mathrm{mV/N},\ \mathrm{mV/g},\ \mathrm{count/N} \ldots
+        \qquad x = u S, \quad [S] = \mathrm{N/V},\ \mathrm{N/count} \ldots
+
+    Parameters
+    ----------
+    quantity : str
+        A key of ``SI``.
+    unit : str
+        Unit of the raw numbers, electrical or already physical; with an optional factor ("0.305 mV" where one
+        step of the converter is 0.305 mV, "10 V" where 1.0 is a full scale of 10 V).
+    sensitivity : float or None
+        Needed for electrical units, not used where the numbers are physical already.
+    sensitivity_unit : str
+        As above.
+
+    Raises
+    ------
+    ValueError
+        For a unit that cannot become the SI unit of ``quantity``.
+
+    Examples
+    --------
+    A hammer of 0.23 mV/N: 1 V is 4347.8 N.
+
+    >>> round(to_si("force", "V", 0.23, "mV/N").scale, 1)
+    4347.8
+    """
+    if quantity == IGNORED:
+        return Conversion(IGNORED, 1.0)
+    if quantity not in SI:
+        raise ValueError(f"the quantity {quantity!r} is not known; known are {', '.join(SI)}")
+    raw = conversion(unit)
+    if raw.dimension == quantity:
+        return raw
+    if sensitivity is None:
+        raise ValueError(f"{unit!r} is no unit of {quantity} and no sensitivity is given")
+    if not math.isfinite(sensitivity) or sensitivity <= 0:
+        raise ValueError(f"the sensitivity must be above 0, not {sensitivity!r}; use the sign to turn a channel around")
+    top, bottom = _fraction(sensitivity_unit)
+    ratio = sensitivity * top.scale / bottom.scale
+    if (top.dimension, bottom.dimension) == (raw.dimension, quantity):
+        return Conversion(quantity, raw.scale / ratio)
+    if (top.dimension, bottom.dimension) == (quantity, raw.dimension):
+        return Conversion(quantity, raw.scale * ratio)
+    raise ValueError(f"a sensitivity in {sensitivity_unit!r} does not lead from {unit!r} to {SI[quantity]!r}")
+
+
+def _fraction(unit):
+    """Both sides of a sensitivity's unit: "mV/(m/s²)" -> voltage, acceleration; "m/s²/V" -> acceleration, voltage."""
+    text = unit.strip()
+    for top, _, bottom in (text.partition("/"), text.rpartition("/")):
+        try:
+            return conversion(_bare(top)), conversion(_bare(bottom))
+        except ValueError:
+            continue
+    raise ValueError(f"the sensitivity's unit {unit!r} is not of the form mV/N, mV/(m/s²), N/count")
+
+
+def _bare(text):
+    text = text.strip()
+    return text[1:-1] if text.startswith("(") and text.endswith(")") else text

@@ -1,0 +1,218 @@
+r"""Records in named variables: how npz, MATLAB and HDF5 files are laid out, ours and those of others.
+
+What is recognised (names without regard to case, except ``t``):
+
+* sampling rate [Hz]: ``rate``, ``fs``, ``sample_rate``, ``sampling_rate``, ``sampling_frequency`` ..., or the step
+  [s]: ``dt``, ``delta_t`` ..., or a vector ``time`` or ``t`` [s];
+* ``channels`` (or ``channel_names``, ``names``, ``labels``) and ``units``, one per channel;
+* ``started_at`` (or ``start_time`` ...): ISO 8601 text, seconds since 1970 UTC, or a MATLAB datenum, one per file or
+  per record;
+* ``n_records``: how many records the file promises; conditions under their own names (``rail_temperature`` ...);
+* samples, the first of these that fits:
+
+  1. ``record_000``, ``record_001`` ... : one matrix or one group of variables each;
+  2. a structure or group that holds the rest, or several, each a record;
+  3. one array: (record, channel, sample), or (channel, sample) or (sample, channel), whichever has the channels'
+     count along its channel axis, with the longer axis for the samples;
+  4. vectors of equal length, each a channel named like its variable.
+"""
+
+import re
+from collections.abc import Mapping
+
+import numpy as np
+
+from turnout.errors import ReadError
+from turnout.readers.raw import CONDITIONS, RawFile, RawRecord
+from turnout.readers.stamps import moment
+
+RATE = ("rate", "fs", "f_s", "rate_hz", "fs_hz", "sample_rate", "samplerate", "sampling_rate", "sampling_frequency")
+STEP = ("dt", "delta_t", "sample_interval", "wf_increment")
+TIME = ("time", "t", "time_s")
+NAMES = ("channels", "channel_names", "names", "labels")
+UNITS = ("units", "unit", "channel_units")
+START = ("started_at", "start_time", "starttime", "wf_start_time")
+COUNT = ("n_records", "n_record")
+NUMBERED = re.compile(r"^(?:record|rec|segment|impact|hit)[_ ]?(\d+)$", re.IGNORECASE)
+
+
+class Facts:
+    """What a group of variables says about its samples; what it leaves open is asked of the group around it."""
+
+    def __init__(self, variables: Mapping, source, around: "Facts | None" = None):
+        self.lower = {(k if k == "t" else k.lower()): v for k, v in variables.items() if k != "T"}
+        self.around, self.source = around, source
+
+    def get(self, names):
+        """The first variable of ``names``, here or further out; a damaged one is raised."""
+        for name in names:
+            if (value := self.lower.get(name)) is not None:
+                if isinstance(value, ReadError):
+                    raise value
+                return value
+        return self.around.get(names) if self.around else None
+
+    def one(self, names, k, n):
+        """As ``get``, but entry ``k`` where there is one per record."""
+        value = self.get(names)
+        if isinstance(value, (list, tuple)) or (isinstance(value, np.ndarray) and value.ndim):
+            value = np.ravel(np.asarray(value))
+            value = value[k if value.size == n else 0] if value.size else None
+        return value.item() if isinstance(value, np.generic) and value.dtype.kind != "M" else value
+
+    def number(self, names, k=0, n=1):
+        """As ``one``, but a float; ReadError where it is none."""
+        value = self.one(names, k, n)
+        try:
+            return None if value is None else float(value)
+        except (TypeError, ValueError) as error:
+            raise self.source.error(f"variable {names[0]!r}", f"{value!r} is no number") from error
+
+    def count(self, names, k=0, n=1):
+        """As ``number``, but a whole one above 0."""
+        value = self.number(names, k, n)
+        if value is None or (1 <= value < 2**53 and value == int(value)):
+            return None if value is None else int(value)
+        raise self.source.error(f"variable {names[0]!r}", f"{value!r} is no whole number above 0")
+
+    def rate(self):
+        """[Hz] or None."""
+        rate = self.number(RATE)
+        if rate is None and (step := self.number(STEP)):
+            return 1.0 / step
+        return rate
+
+    def conditions(self, k, n):
+        """What was noted beside the samples."""
+        noted = {name: self.one((name,), k, n) for name in CONDITIONS}
+        return {name: value for name, value in noted.items() if value is not None}
+
+
+def texts(value) -> list[str]:
+    """A list of text out of whatever a library makes of one."""
+    if value is None:
+        return []
+    if isinstance(value, (str, bytes)):
+        value = [value]
+    return [
+        v.decode("utf-8", "replace") if isinstance(v, bytes) else str(v).strip() for v in np.ravel(np.asarray(value))
+    ]
+
+
+def raw_file(variables: Mapping, source, around: Facts | None = None) -> RawFile:
+    """All records that ``variables`` hold; a value may be a ReadError where it is damaged."""
+    facts = Facts(variables, source, around)
+    expected = facts.count(COUNT)
+    numbered = {int(m[1]): name for name in variables if (m := NUMBERED.match(name))}
+    inner = [name for name, value in variables.items() if isinstance(value, Mapping)]
+    if numbered:
+        first, last = min(numbered), max(numbered)
+        parts = [(variables.get(numbered.get(k, "")), f"record {k - first + 1}") for k in range(first, last + 1)]
+    elif inner and not _vectors(variables) and not _matrices(variables):
+        if len(inner) == 1:
+            return raw_file(variables[inner[0]], source, facts)
+        parts = [(variables[name], f"group {name!r}") for name in sorted(inner, key=natural)]
+    else:
+        return RawFile(tuple(_whole(variables, facts, source)), expected)
+    records = [_part(value, k, len(parts), where, facts, source) for k, (value, where) in enumerate(parts)]
+    return RawFile(tuple(records), expected)
+
+
+def natural(name):
+    """Key that sorts "record_2" before "record_10"."""
+    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name)]
+
+
+def _part(value, k, n, where, facts, source):
+    """One numbered record, or the error that stands in its place."""
+    try:
+        if value is None:
+            found = "this record is missing between its neighbours"
+            raise source.error(where, found, reason="truncated")
+        if isinstance(value, ReadError):
+            raise value
+        if not isinstance(value, Mapping):
+            return _record(value, facts, k, n, where, source)
+        if damaged := [v for v in value.values() if isinstance(v, ReadError)]:
+            raise damaged[0]
+        (record,) = _whole(value, Facts(value, source, facts), source, k, n)
+        return record
+    except ReadError as error:
+        return error
+    except ValueError as error:  # more than one record inside a numbered one
+        return source.error(where, f"it is no single record ({error})", "Check how the file was exported")
+
+
+def _whole(variables, facts, source, k=0, n=1):
+    """The records of variables that hold samples themselves."""
+    if damaged := [v for v in variables.values() if isinstance(v, ReadError)]:
+        raise damaged[0]
+    matrices = _matrices(variables)
+    if len(matrices) > 1:
+        candidates = ", ".join(repr(name) for name in matrices)
+        raise source.error(
+            "the file", f"several arrays could be the samples: {candidates}", "Export one array or one per record"
+        )
+    for name, array in matrices.items():
+        blocks = array if array.ndim == 3 else array[None]
+        if array.ndim == 3 and len(names := texts(facts.get(NAMES))) and array.shape[1] != len(names):
+            raise source.error(f"variable {name!r}", f"{array.shape} samples do not match {len(names)} channels")
+        if array.ndim == 3 and array.shape[0] > array.shape[2]:  # MATLAB: (sample, channel, record)
+            blocks = array.transpose(2, 1, 0)
+        count = (k, n) if array.ndim == 2 else (0, len(blocks))
+        return [_record(b, facts, count[0] + i, count[1], f"variable {name!r}", source) for i, b in enumerate(blocks)]
+    vectors = _vectors(variables)
+    if not vectors:
+        return []
+    noted = facts.get(UNITS)
+    units = [noted.get(v, "") for v in vectors] if isinstance(noted, Mapping) else texts(noted)
+    units = units if len(units) == len(vectors) else [units[0] if len(units) == 1 else ""] * len(vectors)
+    return [_settled(tuple(vectors), list(vectors.values()), units, facts, k, n)]
+
+
+def _matrices(variables):
+    """Arrays of samples in two or three dimensions."""
+    arrays = {name: v for name, v in variables.items() if isinstance(v, np.ndarray) and v.dtype.kind in "fiu"}
+    return {name: v for name, v in arrays.items() if v.ndim in (2, 3) and min(v.shape) >= 1 and max(v.shape) > 1}
+
+
+def _vectors(variables):
+    """Vectors that can be channels; those much shorter than the longest are notes, not samples."""
+    known = {*RATE, *STEP, *TIME, *NAMES, *UNITS, *START, *COUNT, *CONDITIONS}
+    found = {
+        name: v
+        for name, v in variables.items()
+        if isinstance(v, np.ndarray) and v.ndim == 1 and v.dtype.kind in "fiu" and v.size > 1
+        if name.lower() not in known
+    }
+    longest = max((v.size for v in found.values()), default=0)
+    return {name: v for name, v in found.items() if 2 * v.size > longest}
+
+
+def _record(block, facts, k, n, where, source):
+    """The record of a matrix (channel, sample) or (sample, channel)."""
+    block = np.atleast_2d(block)
+    names, units = texts(facts.get(NAMES)), texts(facts.get(UNITS))
+    if block.ndim != 2 or block.dtype.kind not in "fiu":
+        raise source.error(where, f"{block.dtype} of shape {block.shape} is no matrix of samples")
+    rows = len(names) or min(block.shape)
+    if rows not in block.shape or (block.shape[0] == block.shape[1] and block.shape[0] > 1):
+        raise source.error(where, f"{block.shape} samples do not match {rows} channels", "Correct the list of channels")
+    block = block if block.shape[0] == rows else block.T
+    names = names or [str(i) for i in range(rows)]
+    units = units if len(units) == rows else [units[0] if len(units) == 1 else ""] * rows
+    return _settled(names, list(block), units, facts, k, n)
+
+
+def _settled(names, samples, units, facts, k, n):
+    time = facts.get(TIME)
+    time = np.asarray(time, dtype=float) if isinstance(time, np.ndarray) and time.size == len(samples[0]) else None
+    return RawRecord(
+        names=tuple(names),
+        samples=samples,
+        rate=facts.rate(),
+        units=tuple(units),
+        started_at=moment(facts.one(START, k, n)),
+        conditions=facts.conditions(k, n),
+        time=time,
+    )

@@ -1,0 +1,85 @@
+"""WAV, RF64 and FLAC: one continuous record.
+
+libsndfile reads a cut file without a word and makes its header agree; the chunk sizes in the file's own header say how
+long it was. Whole numbers (16, 24 bit) come as parts of full scale, -1 to 1: give the layout ``unit: 10 V`` where full
+scale is 10 V. What a comment in JSON says (``channels``, ``units``, ``started_at``, conditions) is used.
+"""
+
+import json
+import struct
+
+import soundfile
+
+from turnout.readers.raw import COPY_AGAIN, RawFile, RawRecord
+from turnout.readers.stamps import moment
+from turnout.readers.variables import NAMES, START, UNITS, Facts, texts
+
+OPEN_END = 0xFFFFFFFF
+
+
+def read_raw(source) -> RawFile:
+    """The record of an audio file."""
+    with source.path.open("rb", buffering=0) as raw:  # libsndfile shares its position
+        if cut := cut_off(raw, source.size):
+            raise source.error("the header", cut, COPY_AGAIN, reason="truncated")
+        raw.seek(0)
+        with source.parsed_by("libsndfile"), soundfile.SoundFile(raw.fileno(), closefd=False) as file:
+            samples = file.read(dtype="float64", always_2d=True)
+            rate, frames, comment = file.samplerate, file.frames, file.comment
+    if len(samples) != frames:
+        found = f"ends after {len(samples)} of {frames} samples"
+        raise source.error("record 1 of 1", found, COPY_AGAIN, reason="truncated")
+    facts = Facts(_notes(comment), source)
+    n = samples.shape[1]
+    names, units = texts(facts.get(NAMES)), texts(facts.get(UNITS))
+    record = RawRecord(
+        names=tuple(names) if len(names) == n else tuple(str(i) for i in range(n)),
+        samples=list(samples.T),
+        rate=facts.rate() or float(rate),
+        units=tuple(units) if len(units) == n else ("",) * n,
+        started_at=moment(facts.one(START, 0, 1)),
+        conditions=facts.conditions(0, 1),
+        aliases=tuple((str(i),) for i in range(n)),
+    )
+    return RawFile((record,))
+
+
+def cut_off(file, size: int) -> str:
+    """In words, where a RIFF file of ``size`` bytes ends before its chunks do; "" for a whole one or another format."""
+    head = file.read(36)
+    if head[:4] not in (b"RIFF", b"RF64"):
+        return ""
+    if len(head) < 12:
+        return f"the file ends after {size} bytes, before its samples"
+    long_sizes = _long_sizes(head)
+    position, samples_seen = 12, False
+    while position + 8 <= size:
+        file.seek(position)
+        tag, length = struct.unpack("<4sI", file.read(8))
+        length = long_sizes.get(tag, length) if length == OPEN_END else length
+        if tag == b"data" and length in (0, OPEN_END):
+            return "the chunk of samples was never finished by the logger"
+        if position + 8 + length > size:
+            return f"its chunk {tag.decode('latin-1')!r} ends after {size - position - 8} of {length} bytes"
+        samples_seen = samples_seen or tag == b"data"
+        position += 8 + length + length % 2
+    if not samples_seen:
+        return f"the file ends after {size} bytes, before its samples"
+    whole = 8 + long_sizes.get(b"RIFF", struct.unpack_from("<I", head, 4)[0])
+    return f"it ends after {size} of {whole} bytes" if whole > size + 1 else ""
+
+
+def _long_sizes(head):
+    """Sizes above 4 GiB, from the chunk ds64 of an RF64 file."""
+    if head[:4] != b"RF64" or head[12:16] != b"ds64" or len(head) < 36:
+        return {}
+    riff, samples = struct.unpack_from("<QQ", head, 20)
+    return {b"RIFF": riff, b"data": samples}
+
+
+def _notes(comment):
+    try:
+        notes = json.loads(comment) if comment else {}
+    except ValueError:
+        return {}
+    return notes if isinstance(notes, dict) else {}

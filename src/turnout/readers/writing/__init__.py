@@ -1,0 +1,66 @@
+"""Recordings -> raw files in every format that ``turnout.readers`` reads: for tests, demonstrations and exchange.
+
+What is written is what a logger would have left: with a ``RawDescription`` the numbers are turned back into its units
+through its sensitivities and signs, so that ``read(write(x)) == x``.
+"""
+
+from collections.abc import Sequence
+from importlib import import_module
+from pathlib import Path
+
+from turnout.readers.writing.raw_numbers import raw_records
+from turnout.records import RawDescription, Recording
+
+WRITERS = {
+    "uff58": ("uff", {"binary": False}),
+    "uff58b": ("uff", {"binary": True}),
+    "tdms": ("tdms", {}),
+    "hdf5": ("hdf5", {}),
+    "rcmdx": ("rcmdx", {}),
+    "mat": ("mat", {}),
+    "mat73": ("mat73", {}),
+    "wav": ("wav", {}),
+    "csv": ("csv", {}),
+    "lvm": ("lvm", {}),
+    "npz": ("npz", {}),
+    "parquet": ("parquet", {}),
+}
+
+
+def write(
+    recordings: Sequence[Recording],
+    path,
+    format: str,
+    description: RawDescription | None = None,
+    *,
+    single: bool = False,
+    **options,
+) -> Path:
+    """Write recordings (one per record, same channels) to ``path`` and return it.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        In SI. WAV holds just one.
+    path : path-like
+        Overwritten where it exists; its folder must be there.
+    format : str
+        A key of ``WRITERS``.
+    description : RawDescription or None
+        Units, sensitivities, signs and names to write in; None: SI under the channels' own names, times in UTC.
+    single : bool
+        Store the numbers in 4 bytes instead of 8.
+    **options
+        Of the format's writer: ``decimal_comma`` (csv), ``subtype`` and ``full_scale`` (wav), ``station`` (rcmdx).
+
+    Raises
+    ------
+    ValueError
+        For an unknown format, no recordings, or recordings that one file cannot hold.
+    """
+    if format not in WRITERS:
+        raise ValueError(f"no writer for the format {format!r}; there are {', '.join(WRITERS)}")
+    module, fixed = WRITERS[format]
+    records = raw_records(recordings, description, "float32" if single else "float64")
+    import_module(f"turnout.readers.writing.{module}").write_raw(records, Path(path), **fixed, **options)
+    return Path(path)

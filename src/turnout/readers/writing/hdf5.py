@@ -1,0 +1,20 @@
+"""HDF5: a group per record, a checksummed dataset per channel; the layout of ``turnout.readers.hdf5``."""
+
+import h5py
+
+from turnout.readers.writing.raw_numbers import attributes, fixed_text, iso, noted
+
+
+def write_raw(records, path):
+    """Attributes ``rate`` and ``n_records`` at the root; ``started_at`` and conditions at each record."""
+    with h5py.File(path, "w", libver=("v110", "latest")) as file:
+        file.attrs["rate"] = records[0].rate
+        file.attrs["n_records"] = len(records)
+        for k, record in enumerate(records):
+            group = file.create_group(f"record_{k:03d}", track_order=True)
+            group.attrs.update(attributes(noted(record.conditions)))
+            if record.started_at is not None:
+                group.attrs["started_at"] = fixed_text(iso(record.started_at))
+            for name, unit, samples in zip(record.names, record.units, record.samples):
+                dataset = group.create_dataset(name, data=samples, chunks=(len(samples),), fletcher32=True)
+                dataset.attrs["unit"] = fixed_text(unit)

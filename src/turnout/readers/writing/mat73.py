@@ -1,0 +1,38 @@
+"""MATLAB version 7.3: HDF5 with MATLAB's header, classes and reversed axes."""
+
+import h5py
+import numpy as np
+
+from turnout.readers.writing.named import variables
+
+HEADER = b"MATLAB 7.3 MAT-file, Platform: GLNXA64, Created on: Mon Jan 01 00:00:00 2024 HDF5 schema 1.00 ."
+
+
+def write_raw(records, path):
+    """``record_000`` ... as (sample, channel) matrices, and named variables beside them; text in cell arrays."""
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, value in variables(records).items():
+            cells = isinstance(value, list) and isinstance(value[0], str)
+            (_cell if cells else _double)(file, name, value)
+        for k, record in enumerate(records):
+            _double(file, f"record_{k:03d}", np.vstack(record.samples))
+    with path.open("r+b") as file:
+        file.write(HEADER.ljust(116) + bytes(8) + b"\x00\x02IM")
+
+
+def _double(file, name, value):
+    value = np.atleast_2d(np.asarray(value))
+    dataset = file.create_dataset(name, data=value, chunks=value.shape, fletcher32=True)
+    dataset.attrs["MATLAB_class"] = np.bytes_("single" if value.dtype == np.float32 else "double")
+
+
+def _cell(file, name, texts):
+    references = file.require_group("#refs#")
+    cell = file.create_dataset(name, (len(texts), 1), dtype=h5py.ref_dtype)
+    cell.attrs["MATLAB_class"] = np.bytes_("cell")
+    for i, text in enumerate(texts):
+        letters = np.array([ord(c) for c in text], dtype="uint16")[:, None]
+        one = references.create_dataset(f"{name}_{i}", data=letters)
+        one.attrs["MATLAB_class"] = np.bytes_("char")
+        one.attrs["MATLAB_int_decode"] = np.int32(2)
+        cell[i, 0] = one.ref

@@ -1,0 +1,71 @@
+"""SI samples back to the numbers that a raw file holds: the inverse of ``turnout.readers.channels``."""
+
+from datetime import UTC
+from zoneinfo import ZoneInfo
+
+import h5py
+import numpy as np
+
+from turnout.readers.raw import RawRecord
+from turnout.readers.units import IGNORED, SI, to_si
+
+
+def raw_records(recordings, description, dtype):
+    """One RawRecord per recording, in the units, names, signs and order of ``description`` (None: SI as it is)."""
+    if not recordings:
+        raise ValueError("there is no recording to write")
+    first = recordings[0]
+    if any(r.channels != first.channels or r.rate != first.rate for r in recordings):
+        raise ValueError("recordings of one file must have the same channels and rate")
+    return [_raw(recording, description, dtype) for recording in recordings]
+
+
+def _raw(recording, description, dtype):
+    if description is None:
+        columns = [(c.name, SI[c.quantity], x) for c, x in zip(recording.channels, recording.samples)]
+        zone = "UTC"
+    else:
+        wanted = [c for c in description.channels if c.quantity != IGNORED]
+        wanted.sort(key=lambda c: c.source if isinstance(c.source, int) else 0)
+        columns = [_column(recording, channel) for channel in wanted]
+        zone = description.time_zone
+    start = recording.started_at
+    return RawRecord(
+        names=tuple(name for name, _, _ in columns),
+        samples=[np.asarray(x, dtype=dtype) for _, _, x in columns],
+        rate=recording.rate,
+        units=tuple(unit for _, unit, _ in columns),
+        started_at=None if start is None else start.replace(tzinfo=UTC).astimezone(ZoneInfo(zone)),
+        conditions=dict(recording.conditions),
+    )
+
+
+def _column(recording, channel):
+    """(name, unit, raw numbers) of one channel of the description."""
+    unit = (channel.unit or SI[channel.quantity]).removesuffix("!")
+    convert = to_si(channel.quantity, unit, channel.sensitivity, channel.sensitivity_unit)
+    samples = (recording.signal(channel.name) * (-1 if channel.sign < 0 else 1) - convert.offset) / convert.scale
+    label = "count" if unit[:1].isdigit() else unit
+    return (channel.source if isinstance(channel.source, str) else channel.name), label, samples
+
+
+def iso(moment):
+    """ISO 8601 with the zone's offset, "" for None."""
+    return "" if moment is None else moment.isoformat()
+
+
+def noted(conditions):
+    """Conditions as plain numbers and text."""
+    return {k: float(v) if isinstance(v, (int, float, np.number)) else str(v) for k, v in conditions.items()}
+
+
+def fixed_text(text):
+    """Text for an HDF5 attribute, of fixed length: variable length goes through the global heap, and the HDF5 library
+    can loop for ever over a damaged one."""
+    data = text.encode("utf-8") or b" "
+    return np.array(data, dtype=h5py.string_dtype("utf-8", len(data)))
+
+
+def attributes(values):
+    """A dictionary of numbers and text as HDF5 attributes."""
+    return {key: fixed_text(value) if isinstance(value, str) else value for key, value in values.items()}

@@ -1,0 +1,55 @@
+"""RCM-DX 2.0: a session per record, a measuring system, one data source, a channel group per channel.
+
+Without SECTION, POSITION and TOPOLOGY, which are of a vehicle under way, and without the search tree ``timeindex``.
+"""
+
+from datetime import UTC, datetime, timedelta
+
+import h5py
+import numpy as np
+
+from turnout.readers.writing.raw_numbers import attributes, noted
+
+EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+CHANNEL = {
+    "Element": "CHANNEL",
+    "TriggerMode": "TIME",
+    "CommonTriggerDistance": np.float32(0),
+    "ChannelBasis": "ABSOLUTE",
+    "ChannelType": "MEASURED",
+    "Neighbor": "",
+    "PositionOffset": np.float32(0),
+}
+
+
+def write_raw(records, path, station="TURNOUT"):
+    """Sessions are named by their first time stamp, so records need start times; those without are set 1 min apart."""
+    with h5py.File(path, "w") as file:
+        root = file.create_group("RCMDX")
+        root.attrs.update({"Major": np.int16(2), "Minor": np.int16(0), "RecordCount": np.int32(len(records))})
+        platform = root.create_group(station)
+        platform.attrs.update(attributes({"Name": station, "VehicleNumber": "", "Element": "PLATFORM"}))
+        for k, record in enumerate(records):
+            start = record.started_at or EPOCH + timedelta(minutes=k)
+            _session(platform, record, start.astimezone(UTC), station)
+
+
+def _session(platform, record, start, station):
+    first = int((start - EPOCH) / timedelta(microseconds=1)) * 1000
+    n = len(record.samples[0])
+    stamps = first + np.round(np.arange(n) * (1e9 / record.rate)).astype("int64")
+    name = start.strftime("%Y%m%d_%H%M%S.") + f"{start.microsecond // 1000:03d}"
+    session = platform.create_group(name)
+    times = {"StartTime": stamps[0], "EndTime": stamps[-1]}
+    session.attrs.update(attributes({"Element": "SESSION", **times, **noted(record.conditions)}))
+    system = session.create_group(f"{station}.VIBRATION")
+    known = {"Element": "MEASURINGSYSTEM", "Family": "VIBRATION", "Revision": "1", "InstanceVersion": "1"}
+    system.attrs.update(attributes(known))
+    source = system.create_group(f"{system.name.rpartition('/')[2]}.SAMPLES", track_order=True)
+    source.attrs.update(attributes({"Element": "DATASOURCE"}))
+    source.create_dataset("timestamp", data=stamps, chunks=stamps.shape, compression="gzip", fletcher32=True)
+    for channel, unit, samples in zip(record.names, record.units, record.samples):
+        group = source.create_group(f"{station}.VIBRATION.SAMPLES.{channel}")
+        group.attrs.update(attributes({**CHANNEL, "CommonTriggerFrequency": np.float32(record.rate)}))
+        data = group.create_dataset("data", data=samples, chunks=samples.shape, fletcher32=True)
+        data.attrs.update(attributes({"Unit": unit}))

@@ -1,0 +1,53 @@
+"""Universal File Format 58 (ASCII) and 58b (binary): one set per record and channel, numbered in record 6, field 3."""
+
+import numpy as np
+
+from turnout.readers.writing.raw_numbers import noted
+
+DATA_TYPES = {"N": 13, "m/s²": 12, "g": 12, "m/s": 11, "m": 8, "Pa": 15}
+
+
+def write_raw(records, path, binary):
+    """Write the sets record by record; ASCII has 6 or 13 digits, as the format lays down."""
+    with path.open("wb") as file:
+        for k, record in enumerate(records):
+            for i in range(len(record.names)):
+                file.write(_set(record, i, k, binary))
+
+
+def _set(record, i, k, binary):
+    samples = record.samples[i]
+    double = samples.dtype == np.float64
+    numbers = samples.astype("<f8" if double else "<f4").tobytes() if binary else _text(samples, double)
+    return _head(record, i, k, binary, double, len(numbers)) + numbers + b"    -1\n"
+
+
+def _head(record, i, k, binary, double, n_bytes):
+    """The opening delimiter and records 1 to 11."""
+    name, unit = record.names[i], record.units[i]
+    start = "NONE" if record.started_at is None else record.started_at.strftime("%d-%b-%y %H:%M:%S")
+    notes = "; ".join(f"{key}={value}" for key, value in noted(record.conditions).items()) or "NONE"
+    first = f"    58b     1     2          11{n_bytes:12d}     0     0           0           0" if binary else "    58"
+    lines = [
+        "    -1",
+        f"{first:<80}",
+        f"{name:<80.80}",
+        f"{'NONE':<80}",
+        f"{start:<80}",
+        f"{notes:<80.80}",
+        f"{'NONE':<80}",
+        f"{1:5d}{0:10d}{k + 1:5d}{0:10d} {name:<10.10}{i + 1:10d}{0:4d} {'NONE':<10}{0:10d}{0:4d}",
+        f"{4 if double else 2:10d}{len(record.samples[i]):10d}{1:10d}{0.0:13.5e}{1 / record.rate:13.5e}{0.0:13.5e}",
+        f"{17:10d}{0:5d}{0:5d}{0:5d} {'time':<20} {'s':<20}",
+        f"{DATA_TYPES.get(unit, 0):10d}{0:5d}{0:5d}{0:5d} {name:<20.20} {unit:<20.20}",
+        f"{0:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'NONE':<20}",
+        f"{0:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'NONE':<20}",
+    ]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _text(samples, double):
+    """6E13.5 or 4E20.12."""
+    one, per_line = ("%20.12e", 4) if double else ("%13.5e", 6)
+    lines = [samples[a : a + per_line] for a in range(0, len(samples), per_line)]
+    return "".join((one * len(line) + "\n") % tuple(line) for line in lines).encode()

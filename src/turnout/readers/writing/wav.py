@@ -1,0 +1,32 @@
+"""WAV: one continuous record; names, units and start time go into the comment as JSON."""
+
+import json
+
+import numpy as np
+import soundfile
+
+from turnout.readers.writing.raw_numbers import iso, noted
+
+
+def write_raw(records, path, subtype=None, full_scale=1.0):
+    """``subtype`` PCM_16 or PCM_24 stores numbers as parts of ``full_scale`` (in the channels' unit)."""
+    if len(records) != 1:
+        raise ValueError(f"a WAV file holds one record, not {len(records)}: write one file per record")
+    (record,) = records
+    samples = np.column_stack(record.samples)
+    subtype = subtype or ("FLOAT" if samples.dtype == np.float32 else "DOUBLE")
+    if subtype.startswith("PCM"):
+        samples = samples / full_scale
+        if (worst := float(np.abs(samples).max())) > 1.0:
+            raise ValueError(f"a sample is {worst:.3g} of full scale: raise full_scale")
+        bits = int(subtype.removeprefix("PCM_"))  # rounded here: libsndfile cuts off
+        steps = np.clip(np.rint(samples * 2.0 ** (bits - 1)), -(2.0 ** (bits - 1)), 2.0 ** (bits - 1) - 1)
+        samples = steps.astype("int32") << (32 - bits)
+    rate = round(record.rate)
+    notes = {"channels": record.names, "started_at": iso(record.started_at), **noted(record.conditions)}
+    notes["units"] = record.units if full_scale == 1.0 else ["count"] * len(record.names)
+    if rate != record.rate:
+        notes["rate"] = record.rate
+    with soundfile.SoundFile(path, "w", rate, samples.shape[1], subtype, format="WAV") as file:
+        file.comment = json.dumps(notes)
+        file.write(samples)

@@ -1,0 +1,164 @@
+"""Which blow of a test disagrees with all the others: pairwise and leave-one-out coherence."""
+
+import numpy as np
+from scipy.fft import next_fast_len, rfft, rfftfreq
+
+from turnout.receptance.cut import MAD_TO_SD
+from turnout.records import Rejection
+
+FEWEST_BLOWS = 5
+# Between two samples a short pulse hides a fifth of its peak.
+AT_THE_TOP = 0.8
+
+
+def pairwise_coherence(force: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
+    r"""Median over frequency of the coherence of every two blows.
+
+    .. math:: \gamma^2_{ij} = \frac{|F_i^* A_i + F_j^* A_j|^2}{(|F_i|^2 + |F_j|^2)(|A_i|^2 + |A_j|^2)}
+
+    Parameters
+    ----------
+    force, acceleration : (n_blow, n_frequency) array of complex
+        Spectra at the compared lines. [N s], [m/s]
+
+    Returns
+    -------
+    (n_blow, n_blow) array of float
+        1 on the diagonal.
+
+    Examples
+    --------
+    Two blows on one linear structure agree, a third with its sign reversed agrees with none of equal force.
+
+    >>> f = np.array([[1.0, 2.0, 1.0], [2.0, 1.0, 1.0], [2.0, 1.0, 1.0]], dtype=complex)
+    >>> print(pairwise_coherence(f, f * 3j * np.array([[1], [1], [-1]])).round(2)[0])
+    [1.   1.   0.36]
+    """
+    cross = force.conj() * acceleration
+    ff, aa = np.abs(force) ** 2, np.abs(acceleration) ** 2
+    n = force.shape[0]
+    result = np.ones((n, n))
+    for i in range(n - 1):
+        above = np.abs(cross[i] + cross[i + 1 :]) ** 2
+        below = (ff[i] + ff[i + 1 :]) * (aa[i] + aa[i + 1 :])
+        result[i, i + 1 :] = result[i + 1 :, i] = np.median(above / np.where(below > 0.0, below, np.inf), axis=1)
+    return result
+
+
+def response_gain(force: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
+    r"""Response of each blow over what the test's mean power ratio predicts from its force.
+
+    .. math:: g_i^2 = \frac{\sum_f |A_i|^2}{\sum_f |F_i|^2 W}, \quad
+        W(f) = \frac{\sum_j |A_j|^2}{\sum_j |F_j|^2}, \quad g_i \leftarrow g_i / \mathrm{median}(g)
+
+    Powers and no phases: a resonance that lies a little elsewhere in one blow must not look like a change of size.
+
+    Parameters
+    ----------
+    force, acceleration : (n_blow, n_frequency) array of complex
+        [N s], [m/s]
+
+    Returns
+    -------
+    (n_blow,) array of float
+        1 for a blow that agrees; above 1 the force that was recorded is too small for what it did.
+
+    Examples
+    --------
+    >>> f = np.outer([1.0, 2.0, 3.0, 1.0, 2.0], [1.0 + 1j, 2.0])
+    >>> a = 3j * f
+    >>> f[4] *= 0.8
+    >>> print(response_gain(f, a).round(2))
+    [1.   1.   1.   1.   1.25]
+    """
+    ff, aa = np.abs(force) ** 2, np.abs(acceleration) ** 2
+    total = np.sum(ff, axis=0)
+    below = ff @ (np.sum(aa, axis=0) / np.where(total > 0.0, total, np.inf))
+    gain = np.sqrt(np.sum(aa, axis=1) / np.where(below > 0.0, below, np.inf))
+    middle = np.median(gain)
+    return gain / middle if middle > 0.0 else np.ones_like(gain)
+
+
+def judge_agreement(cuts, settings):
+    """Reject blows that the others of the test contradict, first in shape (coherence), then in size (gain)."""
+    cuts = [c for c in cuts if not c.rejections]
+    if len(cuts) < 3:
+        return
+    force, acceleration = _spectra(cuts, settings)
+    _judge_coherence(cuts, force, acceleration, settings)
+    left = [k for k, c in enumerate(cuts) if not c.rejections]
+    _judge_gain([cuts[k] for k in left], force[left], acceleration[left], settings)
+
+
+def _judge_coherence(cuts, force, acceleration, settings):
+    """One at a time, the blow that agrees with no other although these agree among themselves.
+
+    The worst blow is odd if its median pairwise coherence lies ``agreement_gap`` below the others' median, and its
+    incoherence is ``agreement_factor`` times theirs. The coherence of the test with and without it goes into
+    the detail. Of two blows that disagree none can be called odd.
+    """
+    pairs = pairwise_coherence(force, acceleration)
+    left = list(range(len(cuts)))
+    while len(left) >= 3:
+        inside = pairs[np.ix_(left, left)]
+        np.fill_diagonal(inside, np.nan)
+        own = np.nanmedian(inside, axis=1)
+        worst = int(np.argmin(own))
+        others = float(np.median(np.delete(own, worst)))
+        limit = min(others - settings.agreement_gap, 1.0 - settings.agreement_factor * (1.0 - others))
+        if own[worst] >= limit:
+            return
+        odd = left.pop(worst)
+        detail = (
+            f"coherence with each other blow {own[worst]:.3f}, among those {others:.3f}; of the whole test "
+            f"{_test_coherence(force, acceleration, [*left, odd]):.3f} with it, "
+            f"{_test_coherence(force, acceleration, left):.3f} without"
+        )
+        common = np.sum(force[left].conj() * acceleration[left], axis=0)
+        if np.sum((force[odd].conj() * acceleration[odd] * common.conj()).real) < 0.0:
+            detail += "; its response has the opposite sign"
+        cuts[odd].rejections.append(Rejection("odd_one_out", float(own[worst]), float(limit), detail))
+
+
+def _judge_gain(cuts, force, acceleration, settings):
+    """A response too large or too small for its force, in a test of enough blows to know the spread.
+
+    A force too small for its response, and yet at the top of the test, is what a hammer channel at the end of its range
+    records; a pulse of a few samples shows it in no other way. Any other gain is only noted: it leaves poles alone.
+    """
+    n = len(cuts)
+    if n < FEWEST_BLOWS:
+        return
+    gain = response_gain(force, acceleration)
+    # The median deviation of few blows is itself uncertain by about 1/sqrt(n).
+    spread = MAD_TO_SD * float(np.median(np.abs(gain - 1.0))) * (1.0 + 1.2 / np.sqrt(n))
+    limit = max(settings.gain, settings.deviation * spread)
+    peak = np.array([abs(c.contact.peak) for c in cuts])
+    for k, cut in enumerate(cuts):
+        if abs(gain[k] - 1.0) > limit:
+            clipped = gain[k] > 1.0 and peak[k] > AT_THE_TOP * np.max(np.delete(peak, k))
+            detail = f"the response is {gain[k]:.3f} of what the other blows predict from the force"
+            bound = 1.0 + (limit if gain[k] > 1.0 else -limit)
+            finding = Rejection("overload" if clipped else "odd_one_out", float(gain[k]), float(bound), detail)
+            (cut.rejections if clipped else cut.notes).append(finding)
+
+
+def _spectra(cuts, settings):
+    n_fft = next_fast_len(max(c.force.size for c in cuts), real=True)
+    rate = cuts[0].rate
+    frequency = rfftfreq(n_fft, 1.0 / rate)
+    high = min(settings.agreement_high, float(np.median([c.band_edge for c in cuts])))
+    keep = np.flatnonzero((frequency >= settings.agreement_low) & (frequency <= high))
+    keep = keep[:: max(1, keep.size // 400)]
+    stacked = np.zeros((2, len(cuts), n_fft))
+    for k, cut in enumerate(cuts):
+        stacked[0, k, : cut.force.size], stacked[1, k, : cut.force.size] = cut.force, cut.acceleration
+    spectra = rfft(stacked)[:, :, keep]
+    return spectra[0], spectra[1]
+
+
+def _test_coherence(force, acceleration, blows):
+    f, a = force[blows], acceleration[blows]
+    cross = np.abs(np.sum(f.conj() * a, axis=0)) ** 2
+    power = np.sum(np.abs(f) ** 2, axis=0) * np.sum(np.abs(a) ** 2, axis=0)
+    return float(np.median(cross / np.where(power > 0.0, power, np.inf)))

@@ -1,0 +1,116 @@
+"""Receptance of one section, averaged over its accepted impacts, with what can be trusted of it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.fft import next_fast_len
+
+from turnout.config.settings.receptance import ReceptanceSettings
+from turnout.receptance import estimators
+from turnout.records import Impact, Receptance
+from turnout.signal.coherence import coherence_limits, lower_coherence_limit
+from turnout.signal.spectra import cross_spectra
+from turnout.signal.windows import exponential_window, force_window
+
+
+def receptance_of(impacts: Sequence[Impact], settings: ReceptanceSettings | None = None) -> Receptance:
+    r"""Average the accepted impacts into receptance and coherence.
+
+    .. math:: H_{1,d} = \frac{G_{Fa}}{(i\omega + a)^2\, G_{FF}}, \qquad
+        H_{2,d} = \frac{G_{aa}}{(i\omega + a)^2\, G_{aF}}, \qquad a = 0 \text{ without exponential window}
+
+    Parameters
+    ----------
+    impacts : sequence of Impact
+        Those with rejections are left out. Records of unequal length are padded with zeros: an accepted decay has
+        died away at its end.
+    settings : ReceptanceSettings, optional
+
+    Returns
+    -------
+    Receptance
+        Frequencies above 0 Hz (a hammer test shows no static receptance) up to ``highest_frequency``. With fewer
+        than ``minimum_impacts`` nothing passes the gate; without any impact the arrays are empty.
+
+    Raises
+    ------
+    ValueError
+        Impacts of different sampling rates.
+
+    References
+    ----------
+    Barkhordari et al., eqs. 1-3.
+
+    Examples
+    --------
+    A free mass of 4 kg moves by F / (m w²) against the force:
+
+    >>> from turnout.records import Impact
+    >>> f = np.zeros(1000); f[10:40] = np.sin(np.pi * np.arange(30) / 30)
+    >>> blow = Impact(f, f / 4.0, 1000.0, 10, 39, 40, 1.0, 0.03, 0.019, 0.0, 0.0, 40.0)
+    >>> result = receptance_of([blow, blow, blow])
+    >>> print((result.h1 * (2 * np.pi * result.frequency) ** 2).real[:3].round(9), result.n)
+    [-0.25 -0.25 -0.25] 3
+    """
+    settings = settings or ReceptanceSettings()
+    used = [i for i in impacts if i.accepted]
+    if not used:
+        return _nothing(settings)
+    rate = used[0].rate
+    if any(i.rate != rate for i in used):
+        raise ValueError(f"impacts of one section need one sampling rate, got {sorted({i.rate for i in used})} Hz")
+    force, acceleration = _records(used, settings)
+    n_fft = next_fast_len(force.shape[1], real=True)
+    frequency, g_ff, g_aa, g_fa = cross_spectra(force, acceleration, rate, n_fft)
+    keep = (frequency > 0.0) & (frequency <= min(settings.highest_frequency, rate / 2))
+    frequency, g_ff, g_aa, g_fa = frequency[keep], g_ff[keep], g_aa[keep], g_fa[keep]
+    to_displacement = 1.0 / (2j * np.pi * frequency + settings.exponential_window) ** 2
+    n = len(used)
+    estimate = estimators.coherence(g_ff, g_aa, g_fa)
+    low, high = coherence_limits(estimate, n)
+    level = lower_coherence_limit(estimate, n)
+    compared = level if settings.gate == "limit" else estimate
+    return Receptance(
+        frequency=frequency,
+        h1=to_displacement * estimators.h1(g_ff, g_fa),
+        h2=to_displacement * estimators.h2(g_aa, g_fa),
+        hv=to_displacement * estimators.hv(g_ff, g_aa, g_fa, _noise_ratio(used)),
+        coherence=estimate,
+        coherence_low=low,
+        coherence_high=high,
+        gate_level=level,
+        passed=(compared >= settings.gate_level) & (n >= settings.minimum_impacts),
+        n=n,
+        valid_to=float(np.median([i.band_edge for i in used])),
+        gate=settings.gate,
+    )
+
+
+def _records(impacts, settings):
+    """(n_impact, n_sample) force and acceleration, windowed and padded to the longest."""
+    n_sample = max(i.force.size for i in impacts)
+    force, acceleration = np.zeros((2, len(impacts), n_sample))
+    for k, impact in enumerate(impacts):
+        n = impact.force.size
+        force[k, :n], acceleration[k, :n] = impact.force, impact.acceleration
+        if settings.force_window:
+            force[k, :n] *= force_window(n, impact.contact_end + 1, round(settings.decay_gap * impact.rate))
+        if settings.exponential_window:
+            window = exponential_window(n, impact.onset, settings.exponential_window, impact.rate)
+            force[k, :n] *= window
+            acceleration[k, :n] *= window
+    return force, acceleration
+
+
+def _noise_ratio(impacts):
+    """Noise of the acceleration over noise of the force; one alone known to be 0 leaves it to the other."""
+    force = float(np.sqrt(np.mean([i.noise_force**2 for i in impacts])))
+    acceleration = float(np.sqrt(np.mean([i.noise_acceleration**2 for i in impacts])))
+    return acceleration / force if force > 0.0 else np.inf
+
+
+def _nothing(settings):
+    real, cplx = np.empty(0), np.empty(0, dtype=complex)
+    return Receptance(
+        real, cplx, cplx, cplx, real, real, real, real, np.empty(0, dtype=bool), 0, float("nan"), settings.gate
+    )

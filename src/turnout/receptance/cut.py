@@ -1,0 +1,109 @@
+"""Blows cut out of recordings, one window each, whether a record holds one blow or many."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from turnout.records import Recording, Rejection
+
+MAD_TO_SD = 1.4826
+
+
+@dataclass
+class Cut:
+    """One window of a recording around one blow, on its way to becoming an ``Impact``.
+
+    ``force`` [N] has its zero line taken off and ``polarity`` (+1, -1) says where the blow points; ``first`` and
+    ``last`` are the first and last sample above the trigger, counted from the start of the window.
+    """
+
+    force: np.ndarray
+    acceleration: np.ndarray
+    rate: float
+    first: int
+    last: int
+    polarity: int
+    force_noise: float
+    recording: Recording
+    channels: tuple
+    record: int = 0
+    rejections: list = field(default_factory=list)
+    notes: list = field(default_factory=list)
+    contact: object = None
+
+
+def cut_blows(recordings, force, response, settings):
+    """Every blow of a test, in order; a recording without one gives one cut that says so.
+
+    The number ``record`` is the recording's own where each record of its file holds one blow, else the blow's
+    number within the file.
+    """
+    per_recording = [_cut_one(r, force, response, settings) for r in recordings]
+    crowded = {r.source for r, cuts in zip(recordings, per_recording) if len(cuts) > 1}
+    count: dict[str, int] = {}
+    for recording, cuts in zip(recordings, per_recording):
+        for cut in cuts:
+            number = count.get(recording.source, 0)
+            count[recording.source] = number + 1
+            cut.record = number if recording.source in crowded else recording.record
+    return [cut for cuts in per_recording for cut in cuts]
+
+
+def _cut_one(recording, force, response, settings):
+    pulled, answered = recording.index(force), recording.index(response)
+    channels = recording.channels[pulled], recording.channels[answered]
+    f, a = recording.samples[pulled], recording.samples[answered]
+    finite = np.isfinite(f) & np.isfinite(a)
+    if not finite.all():
+        f, a = np.where(np.isfinite(f), f, 0.0), np.where(np.isfinite(a), a, 0.0)
+    whole = Cut(f, a, recording.rate, 0, 0, 1, 0.0, recording, channels)
+    if f.size == 0 or np.ptp(f) == 0.0:
+        whole.rejections.append(_nothing(finite, Rejection("dead_channel", 0.0, None, f"{force} is constant")))
+        return [whole]
+    f = f - np.median(f[finite])
+    noise = MAD_TO_SD * float(np.median(np.abs(f[finite])))
+    blows, level = _find(f, noise, recording.rate, settings)
+    if not blows:
+        whole.rejections.append(_nothing(finite, Rejection("no_impact", float(np.max(np.abs(f))), level, (
+            f"the force reaches {np.max(np.abs(f)):.3g} N, a blow would exceed {level:.3g} N"))))  # fmt: skip
+        return [whole]
+    before = int(settings.pre_trigger * recording.rate)
+    after = int(settings.window * recording.rate)
+    starts = [max(0, first - before) for first, _ in blows]
+    cuts = []
+    for k, (first, last) in enumerate(blows):
+        start = starts[k] if k == 0 else max(starts[k], blows[k - 1][1] + 1)
+        end = min(f.size, first + after, starts[k + 1] if k + 1 < len(blows) else f.size)
+        end = max(end, min(last + 1, f.size))
+        part = slice(start, end)
+        polarity = 1 if f[first : last + 1].max() >= -f[first : last + 1].min() else -1
+        cut = Cut(f[part], a[part], recording.rate, first - start, last - start, polarity, noise, recording, channels)
+        if not finite[part].all():
+            cut.rejections.append(_nothing(finite[part], None, start))
+        cuts.append(cut)
+    return cuts
+
+
+def _nothing(finite, otherwise, start=0):
+    bad = np.flatnonzero(~finite)
+    if bad.size == 0:
+        return otherwise
+    return Rejection("not_finite", float(bad.size), 0.0, f"{bad.size} samples from {start + bad[0]} on are no numbers")
+
+
+def _find(f, noise, rate, settings):
+    """(first, last) sample above the trigger for each blow, and the trigger [N].
+
+    A usual peak is the upper quartile of all candidates', so that neither handling noise nor one overflow shifts
+    the trigger.
+    """
+    size = np.abs(f)
+    level = max(settings.trigger * noise, settings.contact_level * size.max() / 4, np.finfo(float).tiny)
+    above = np.flatnonzero(size > level)
+    if size.max() <= settings.trigger * noise or above.size == 0:
+        return [], settings.trigger * noise
+    breaks = np.flatnonzero(np.diff(above) > settings.separation * rate) + 1
+    groups = np.split(above, breaks)
+    peaks = np.array([size[g].max() for g in groups])
+    usual = np.quantile(peaks, 0.75)
+    return [(int(g[0]), int(g[-1])) for g, p in zip(groups, peaks) if p >= settings.weakest_blow * usual], level

@@ -1,0 +1,88 @@
+"""The free decay after a blow: where it starts, where it ends, and whether enough of it was recorded."""
+
+import numpy as np
+
+from turnout.receptance.double_hit import further_contacts
+from turnout.records import Rejection
+
+# The end of a record is judged over a period of the slowest mode.
+TAIL = 0.01
+
+
+def judge_second_contact(cut, settings):
+    """Note or reject a double hit; keep what free decay there is on one side of the second contact.
+
+    A double hit is a valid input of a linear system, but no free decay. Under ``move``
+
+    - a second contact after the vibration has died away costs nothing: the record is cut before it;
+    - otherwise the decay starts behind the last contact, if its amplitude there is at least
+      ``double_hit_remaining`` of the one behind the main contact;
+    - in a damped track that leaves too little, and the blow is rejected.
+    """
+    further, level = further_contacts(cut, cut.contact, settings)
+    if not further:
+        return
+    largest = max(further, key=lambda c: c.share)
+    delay = 1e3 * (largest.top - cut.contact.top) / cut.rate
+    words = (
+        f"further contacts: {len(further)}, the largest {largest.share:.3f} of the first and {delay:+.1f} ms from it"
+    )
+    last = max(cut.contact.end, *(c.end for c in further))
+    remaining = _remaining(cut, last + 1 + round(settings.decay_gap * cut.rate), settings)
+    end = min(c.onset for c in further) - round(settings.decay_gap * cut.rate)
+    if settings.double_hit == "move" and _died_away(cut, end, settings):
+        cut.force, cut.acceleration = cut.force[:end], cut.acceleration[:end]
+        cut.notes.append(Rejection("double_hit", largest.share, level, f"{words}; the record is cut before it"))
+        return
+    cut.contact_end = last
+    words = f"{words}, {remaining:.2f} of the decay is left"
+    if settings.double_hit == "move" and remaining >= settings.double_hit_remaining:
+        cut.notes.append(Rejection("double_hit", largest.share, level, f"{words}; it starts after the last contact"))
+    else:
+        cut.rejections.append(Rejection("double_hit", largest.share, level, words))
+
+
+def judge_decay(cut, settings):
+    """Set the start of the decay; reject one that is too short or has not died away at its end.
+
+    An exponential window counts as dying away: it ends the leakage that the check is there for.
+    """
+    cut.decay_start = cut.contact_end + 1 + round(settings.decay_gap * cut.rate)
+    left = max(0.0, (cut.force.size - cut.decay_start) / cut.rate)
+    if left < settings.minimum_decay:
+        detail = f"{1e3 * left:.1f} ms of decay are left, {1e3 * settings.minimum_decay:.1f} ms are needed"
+        cut.rejections.append(Rejection("late", left, settings.minimum_decay, detail))
+        return
+    share, limit = _left_at(cut, cut.force.size, settings)
+    if share > limit:
+        detail = f"the record ends while the vibration still has {share:.3f} of its peak"
+        cut.rejections.append(Rejection("cut_off", share, limit, detail))
+
+
+def _left_at(cut, end, settings):
+    """Amplitude just before sample ``end`` over the peak, and how much of that may be left."""
+    tail = cut.acceleration[max(0, end - max(round(TAIL * cut.rate), end // 20)) : end]
+    window = np.exp(-settings.exponential_window * (end - cut.contact.onset) / cut.rate)
+    top = np.max(np.abs(cut.acceleration))
+    noise = 3.0 * np.sqrt(2.0) * cut.contact.noise_acceleration
+    if top == 0.0:
+        return 0.0, settings.cut_off
+    return float(window * np.sqrt(2.0) * np.std(tail) / top), float(max(settings.cut_off, window * noise / top))
+
+
+def _died_away(cut, end, settings):
+    """Whether the vibration is over by sample ``end``, at least two shortest decays behind the main contact."""
+    if end < cut.contact.end + 1 + 2 * round(settings.minimum_decay * cut.rate):
+        return False
+    share, limit = _left_at(cut, end, settings)
+    return share <= limit
+
+
+def _remaining(cut, start, settings):
+    """Amplitude of the decay from ``start`` on over that after the main contact; 0 if too short."""
+    n = round(settings.minimum_decay * cut.rate)
+    clean = cut.contact.end + 1 + round(settings.decay_gap * cut.rate)
+    if cut.force.size - start < n:
+        return 0.0
+    full = np.max(np.abs(cut.acceleration[clean : clean + n]), initial=0.0)
+    return float(np.max(np.abs(cut.acceleration[start : start + n])) / full) if full > 0.0 else 0.0

@@ -1,0 +1,116 @@
+"""All blows of a hammer test, each with its measurements and the reasons not to use it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from turnout.config.settings.receptance import ReceptanceSettings
+from turnout.receptance.against_median import judge_against_median
+from turnout.receptance.agreement import judge_agreement
+from turnout.receptance.band_edge import band_edges
+from turnout.receptance.contact import measure_contact
+from turnout.receptance.cut import cut_blows
+from turnout.receptance.decay import judge_decay, judge_second_contact
+from turnout.receptance.flat_top import judge_tops
+from turnout.receptance.overload import overload
+from turnout.records import Impact, Recording, Rejection
+
+
+def find_impacts(
+    recordings: Sequence[Recording], force: str, response: str, settings: ReceptanceSettings | None = None
+) -> tuple[Impact, ...]:
+    """Find and judge the blows of one hammer test.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        All recordings of the test together, each with one blow or with many; the blows are judged against
+        each other, so do not pass them one by one.
+    force, response : str
+        Names of the hammer's and the accelerometer's channel; KeyError if a recording has no such channel.
+    settings : ReceptanceSettings, optional
+
+    Returns
+    -------
+    tuple of Impact
+        In the order of the recordings. One that is not used has ``rejections``; a recording without blow gives one
+        Impact with the reason "no_impact", "dead_channel" or "not_finite".
+
+    Examples
+    --------
+    A half-sine of 500 N and 2 ms has an impulse of 2/pi N s; its first and last 13 µs lie below 2 %.
+
+    >>> from turnout.records import Channel, Recording
+    >>> rng, t = np.random.default_rng(1), np.arange(2000) / 10_000.0
+    >>> f = 500.0 * np.sin(np.pi * (t - 0.01) / 2e-3) * ((t > 0.01) & (t < 0.012))
+    >>> a = np.exp(-80.0 * (t - 0.01)) * np.sin(900.0 * (t - 0.01)) * (t > 0.01)
+    >>> channels = Channel("hammer", "force"), Channel("rail", "acceleration")
+    >>> noise = rng.normal(size=(2, 2000)) * [[0.1], [1e-3]]
+    >>> blow, = find_impacts([Recording(np.stack([f, a]) + noise, 10_000.0, channels)], "hammer", "rail")
+    >>> print(f"{blow.peak:.0f} N for {1e3 * blow.contact:.1f} ms, {blow.impulse:.2f} N s", blow.accepted)
+    500 N for 1.9 ms, 0.64 N s True
+    """
+    settings = settings or ReceptanceSettings()
+    cuts = cut_blows(recordings, force, response, settings)
+    sound = [c for c in cuts if not c.rejections]
+    for cut in sound:
+        _measure(cut, settings)
+    pulses = [c.force[c.contact.onset : c.contact.end + 1] for c in sound]
+    for cut, edge in zip(sound, _edges(sound, pulses)):
+        cut.band_edge = edge
+    judge_against_median(sound, settings)
+    judge_tops(sound, settings.deviation)
+    for rate in sorted({c.rate for c in sound}):
+        judge_agreement([c for c in sound if c.rate == rate], settings)
+    return tuple(_impact(c) for c in cuts)
+
+
+def _edges(cuts, pulses):
+    edges = np.empty(len(cuts))
+    for rate in {c.rate for c in cuts}:
+        rows = [k for k, c in enumerate(cuts) if c.rate == rate]
+        edges[rows] = band_edges([pulses[k] for k in rows], rate)
+    return edges
+
+
+def _measure(cut, settings):
+    """Zero lines, contact, further contacts, start of the decay, and what one blow alone can be rejected for."""
+    contact = measure_contact(cut, settings.contact_level)
+    if contact.zero_acceleration:
+        cut.acceleration = cut.acceleration - _significant_zero(cut, contact)
+    if np.ptp(cut.acceleration) == 0.0:
+        cut.rejections.append(Rejection("dead_channel", 0.0, None, f"{cut.channels[1].name} is constant"))
+    if cut.polarity < 0:
+        cut.rejections.append(Rejection("sign_reversed", contact.peak, 0.0, (
+            f"{cut.channels[0].name} reads {contact.peak:.4g} N at contact: a hammer can only push")))  # fmt: skip
+    cut.contact, cut.contact_end = contact, contact.end
+    if (found := overload(cut, contact)) is not None:
+        cut.rejections.append(found)
+    judge_second_contact(cut, settings)
+    judge_decay(cut, settings)
+
+
+def _significant_zero(cut, contact):
+    """Mean before the blow if it is no chance finding; a zero line that is right must not be disturbed."""
+    ahead = max(1, min(cut.first, contact.onset))
+    significant = abs(contact.zero_acceleration) > 4.0 * contact.noise_acceleration / np.sqrt(ahead)
+    return contact.zero_acceleration if significant else 0.0
+
+
+def _impact(cut):
+    c = cut.contact
+    common = dict(
+        force=cut.force, acceleration=cut.acceleration, rate=cut.rate, source=cut.recording.source, record=cut.record,
+        rejections=tuple(cut.rejections), notes=tuple(cut.notes),
+    )  # fmt: skip
+    if c is None:
+        nan = float("nan")
+        return Impact(
+            onset=0, contact_end=0, decay_start=0, peak=nan, contact=nan, impulse=nan, noise_force=nan,
+            noise_acceleration=nan, band_edge=nan, **common,
+        )  # fmt: skip
+    return Impact(
+        onset=c.onset, contact_end=cut.contact_end, decay_start=cut.decay_start, peak=c.peak,
+        contact=(c.end - c.onset + 1) / cut.rate, impulse=c.impulse, noise_force=c.noise_force,
+        noise_acceleration=c.noise_acceleration, band_edge=float(cut.band_edge), **common,
+    )  # fmt: skip

@@ -1,0 +1,24 @@
+"""The nouns that the parts of the program exchange. SI units throughout; times are naive UTC."""
+
+from turnout.records.impact import Impact
+from turnout.records.modal import ModalModel, Mode
+from turnout.records.raw import RawChannel, RawDescription
+from turnout.records.receptance import Receptance
+from turnout.records.recording import NOTHING, Channel, ReadResult, Recording
+from turnout.records.rejection import Rejection
+from turnout.records.unit import Unit
+
+__all__ = [
+    "NOTHING",
+    "Channel",
+    "Impact",
+    "ModalModel",
+    "Mode",
+    "RawChannel",
+    "RawDescription",
+    "ReadResult",
+    "Receptance",
+    "Recording",
+    "Rejection",
+    "Unit",
+]

@@ -1,0 +1,94 @@
+"""Results of many work batches as one stream sorted by unit, whatever way the batches were cut."""
+
+import heapq
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import groupby
+from os import PathLike, fspath
+from pathlib import Path
+
+import pyarrow as pa
+
+from turnout.registry.ids import content_id
+from turnout.registry.intake import Arrival
+
+CHUNK = 1024
+
+
+def token(path) -> str:
+    """Name under which a consumed batch is remembered: batches are named by their content and never change."""
+    path = Path(path)
+    return f"{path.name}:{path.stat().st_size}"
+
+
+def fresh(tokens: Sequence[str], consumed: Sequence[str]) -> list[int]:
+    """Places of the batches that are new, or newer than they were: in the order of writing, the last word counts.
+
+    A configuration that is taken back gives an old batch again, at the end of the list.
+
+    >>> fresh(["a", "b", "c"], ["a", "c"]), fresh(["b", "a"], ["a", "b"])
+    ([1], [1])
+    """
+    places = {name: i for i, name in enumerate(consumed)}
+    last, new = -1, []
+    for i, name in enumerate(tokens):
+        if places.get(name, -1) > last:
+            last = places[name]
+        else:
+            new.append(i)
+    return new
+
+
+def merged(paths: Sequence[PathLike], read: Callable, faults: dict[str, str]) -> Iterator[Arrival]:
+    """Units of all batches sorted by name; of a unit that several batches hold, the one of the last batch.
+
+    ``read(path)`` yields objects with unit, turnout, kind, key, algo and tables, sorted by unit. What cannot be
+    read is noted in ``faults`` under the batch's path, and the other batches go on.
+    """
+    streams = [_guarded(path, read, -i, faults) for i, path in enumerate(paths)]
+    in_order = heapq.merge(*streams, key=lambda entry: entry[:2])
+    for index, (_, group) in enumerate(groupby(in_order, key=lambda entry: entry[0])):
+        _, _, result = next(group)
+        yield Arrival(
+            index=index, unit=result.unit, turnout=result.turnout, kind=result.kind,
+            key=result.key, algo=result.algo, tables=_with_method(result.tables),
+        )  # fmt: skip
+
+
+def of_tables(tables: Mapping[str, list[dict]], first_index: int) -> list[Arrival]:
+    """Rows that come from no recording, each table as a unit of its own: configuration, alarms, findings."""
+    return [
+        Arrival(
+            index=first_index + i, unit=f"registry/{'configuration'}/{table}", turnout="registry",
+            kind="configuration", key=content_id(table, tables[table]), algo="", tables={table: tables[table]},
+        )
+        for i, table in enumerate(sorted(tables))
+    ]  # fmt: skip
+
+
+def chunks(arrivals: Iterable[Arrival], size: int = CHUNK) -> Iterator[list[Arrival]]:
+    """Lists of at most ``size`` units, so that a whole network never lies in memory at once."""
+    chunk: list[Arrival] = []
+    for arrival in arrivals:
+        chunk.append(arrival)
+        if len(chunk) == size:
+            yield chunk
+            chunk = []
+    if chunk:
+        yield chunk
+
+
+def _guarded(path, read, rank, faults):
+    try:
+        for result in read(path):
+            yield result.unit, rank, result
+    except (OSError, pa.ArrowException, ValueError, KeyError, TypeError) as error:
+        faults[fspath(path)] = f"{type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
+
+
+def _with_method(tables):
+    """Modes say by which method their model was made, so that charts need not look it up."""
+    methods = {m.get("model_id"): m.get("method") for m in tables.get("models", ())}
+    for mode in tables.get("modes", ()):
+        if isinstance(mode, dict) and mode.get("method") is None and mode.get("model_id") in methods:
+            mode["method"] = methods[mode["model_id"]]
+    return tables

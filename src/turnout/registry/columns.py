@@ -1,0 +1,193 @@
+"""The tables of the registry as ``columns.csv`` describes them: DDL, checks, comments, Arrow types."""
+
+import csv
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+import pyarrow as pa
+
+ARROW = {
+    "varchar": pa.string(),
+    "double": pa.float64(),
+    "float": pa.float32(),
+    "integer": pa.int32(),
+    "bigint": pa.int64(),
+    "boolean": pa.bool_(),
+    "timestamp": pa.timestamp("us"),
+}
+# Computed from the others after every run, all charts at once.
+DERIVED_TABLES = ("charts", "baselines", "chart_status", "alarms")
+# Rewritten whole, from configuration, by hand or by computation; the others grow by one file per run and year.
+WHOLE_TABLES = ("turnouts", "sections", "events", "campaigns", "acknowledgements", *DERIVED_TABLES)
+# In every row of a result, filled in by the register.
+FILLED_BY_REGISTER = ("run_id", "result_id")
+# Sorted by place, then kind of resonance, then time: one chart lies in one stretch of the file.
+SORT_FIRST = ("turnout_id", "section_id", "channel", "band", "method")
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column: its SQL type, its unit, the range and the values it may take."""
+
+    table: str
+    name: str
+    type: str
+    unit: str
+    key: bool
+    required: bool
+    minimum: float | None
+    maximum: float | None
+    decimals: int | None
+    allowed: tuple[str, ...]
+    meaning: str
+
+    @property
+    def is_list(self) -> bool:
+        """Whether a value is a list of numbers or texts."""
+        return self.type.endswith("[]")
+
+    @property
+    def arrow(self) -> pa.DataType:
+        """The same type in Arrow."""
+        kind = ARROW[self.type.removesuffix("[]")]
+        return pa.list_(kind) if self.is_list else kind
+
+    @property
+    def check(self) -> str | None:
+        """SQL condition that every value but NULL fulfils; every double has one, because NaN > 1 is true in SQL.
+
+        >>> column("modes", "damping_ratio").check
+        '"damping_ratio" between 1e-06 and 0.999'
+        """
+        quoted = f'"{self.name}"'
+        if self.allowed:
+            return f"{quoted} in ({', '.join(literal(a) for a in self.allowed)})"
+        if self.is_list:
+            finite = f"list_count({quoted}) = len({quoted})"
+            if self.type in ("double[]", "float[]"):
+                finite += f" and isfinite(list_sum({quoted}))"
+            return f"(len({quoted}) = 0 or ({finite}))"
+        if self.minimum is not None and self.maximum is not None:
+            return f"{quoted} between {self.minimum!r} and {self.maximum!r}"
+        if self.minimum is not None and self.type in ("integer", "bigint"):
+            return f"{quoted} >= {int(self.minimum)}"
+        return f"isfinite({quoted})" if self.type in ("double", "float", "timestamp") else None
+
+    @property
+    def rounded(self) -> str:
+        """SQL expression of the value at the resolution that is kept."""
+        if self.decimals is None or self.is_list:
+            return f'"{self.name}"'
+        return f'round("{self.name}", {self.decimals})'
+
+    @property
+    def rule(self) -> str:
+        """What the check asks, in words."""
+        if self.allowed:
+            return "one of " + ", ".join(self.allowed)
+        if self.is_list:
+            return "every element finite and none empty"
+        if self.minimum is not None and self.maximum is not None:
+            return f"between {self.minimum:g} and {self.maximum:g} {self.unit}".rstrip()
+        return f"at least {self.minimum:g}" if self.minimum is not None else "finite"
+
+    @property
+    def ddl(self) -> str:
+        """Line of CREATE TABLE: name, type, and what every value fulfils."""
+        parts = [f'"{self.name}" {self.type}']
+        if self.required or self.key:
+            parts.append("not null")
+        if self.check:
+            parts.append(f"check ({self.check})")
+        return " ".join(parts)
+
+
+def literal(text: str) -> str:
+    """SQL string literal.
+
+    >>> literal("o'clock")
+    "'o''clock'"
+    """
+    return "'" + str(text).replace("'", "''") + "'"
+
+
+@cache
+def tables() -> dict[str, tuple[Column, ...]]:
+    """Every table of the registry with its columns, in the order of ``columns.csv``."""
+    found: dict[str, list[Column]] = {}
+    text = (files("turnout.registry") / "columns.csv").read_text(encoding="utf-8")
+    for row in csv.DictReader(text.splitlines()):
+        number = {k: float(row[k]) if row[k] else None for k in ("minimum", "maximum", "decimals")}
+        found.setdefault(row["table"], []).append(
+            Column(
+                table=row["table"],
+                name=row["column"],
+                type=row["type"],
+                unit=row["unit"],
+                key=row["key"] == "key",
+                required=row["required"] == "yes",
+                minimum=number["minimum"],
+                maximum=number["maximum"],
+                decimals=None if number["decimals"] is None else int(number["decimals"]),
+                allowed=tuple(row["allowed"].split("|")) if row["allowed"] else (),
+                meaning=row["meaning"],
+            )
+        )
+    return {table: tuple(columns) for table, columns in found.items()}
+
+
+def column(table: str, name: str) -> Column:
+    """The column ``name`` of ``table``; KeyError where there is none."""
+    return next((c for c in tables()[table] if c.name == name), None) or _no_column(table, name)
+
+
+def _no_column(table, name):
+    raise KeyError(f"{table} has no column {name!r}; it has {', '.join(c.name for c in tables()[table])}")
+
+
+@cache
+def names(table: str) -> tuple[str, ...]:
+    """Names of the columns of ``table``."""
+    return tuple(c.name for c in tables()[table])
+
+
+@cache
+def key(table: str) -> tuple[str, ...]:
+    """The columns that identify a row."""
+    return tuple(c.name for c in tables()[table] if c.key)
+
+
+@cache
+def time_column(table: str) -> str | None:
+    """The time of a row: its first column that is a required timestamp."""
+    return next((c.name for c in tables()[table] if c.type == "timestamp" and c.required), None)
+
+
+@cache
+def sort_order(table: str) -> tuple[str, ...]:
+    """Columns by which the rows of a file lie sorted; total, because it ends with the key.
+
+    >>> sort_order("modes")
+    ('"turnout_id"', '"section_id"', '"band"', '"method"', '"measured_at_utc"', '"model_id"')
+    """
+    time = time_column(table)
+    if "channel" in key(table):  # all sensors of a passage together: its id and time repeat and cost nothing
+        return ('"turnout_id"', f'"{time}"', *(f'"{k}"' for k in key(table)))
+    order = [f'"{c}"' for c in SORT_FIRST if c in names(table)] + ([f'"{time}"'] if time else [])
+    return tuple(order + [f'"{k}"' for k in key(table) if f'"{k}"' not in order])
+
+
+@cache
+def arrow_schema(table: str) -> pa.Schema:
+    """Arrow types of the table, with unit and meaning as field metadata."""
+    return pa.schema(
+        [pa.field(c.name, c.arrow, metadata={"unit": c.unit, "meaning": c.meaning}) for c in tables()[table]]
+    )
+
+
+def create_table(table: str, name: str, extra: str = "") -> str:
+    """CREATE TABLE with NOT NULL, CHECK and PRIMARY KEY; ``extra`` is more columns, ", x integer"."""
+    body = ", ".join(c.ddl for c in tables()[table])
+    keys = ", ".join(f'"{k}"' for k in key(table))
+    return f"create table {name} ({body}{extra}, primary key ({keys}))"

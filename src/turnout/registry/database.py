@@ -1,0 +1,139 @@
+"""``registry.duckdb``: views over the live files, macros and comments, and no data of its own."""
+
+import csv
+import os
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+import duckdb
+
+from turnout.errors import RegistryError
+from turnout.registry.columns import literal, tables
+from turnout.registry.generation import Generation, load, sync_folder
+from turnout.registry.parquet import read_live
+from turnout.registry.settled import LARGE, create_parts
+from turnout.registry.staging import connect
+from turnout.registry.view_files import reasons_sql, view_files
+
+DATABASE = "registry.duckdb"
+# Every DuckDB since 1.2 opens it; a file in the newest format could not be read by tools that embed an older one.
+STORAGE_VERSION = "v1.2.0"
+OFFLINE: dict[str, str | bool | int | float | list[str]] = {
+    "autoinstall_known_extensions": False,
+    "autoload_known_extensions": False,
+}
+
+
+def open_registry(path, read_only: bool = True) -> duckdb.DuckDBPyConnection:
+    """DuckDB connection to a registry, given its folder or its ``registry.duckdb``. Loads no extension.
+
+    Read-only unless told otherwise: the next registration replaces the file, and what was written into it is gone.
+    RegistryError when there is none, or when it cannot be opened.
+    """
+    path = Path(path)
+    file = path / DATABASE if path.is_dir() else path
+    if not file.exists():
+        raise RegistryError(
+            f"{file}: there is no registry here. Run the pipeline, or give the folder that holds {DATABASE}."
+        )
+    try:
+        connection = duckdb.connect(str(file), read_only=read_only, config=OFFLINE)
+        connection.execute("set enable_progress_bar = false")
+        return connection
+    except duckdb.Error as error:
+        raise RegistryError(f"{file}: cannot be opened: {str(error).splitlines()[0]}") from error
+
+
+def build_database(registry_dir: Path, generation: Generation) -> None:
+    """Make ``registry.duckdb`` for a generation beside the old one and replace it in one step.
+
+    The views hold absolute paths: relative ones would break for whoever opens it from another folder.
+    """
+    root = Path(registry_dir).resolve()
+    beside = root / f".registry.{os.getpid()}.tmp"
+    beside.unlink(missing_ok=True)
+    con = connect()
+    try:
+        con.execute(f"attach {literal(str(beside))} as registry (storage_version '{STORAGE_VERSION}')")
+        con.execute("use registry")
+        _create_views(con, root, generation)
+        con.execute("use memory")
+        con.execute("detach registry")
+        os.replace(beside, root / DATABASE)
+        sync_folder(root)
+    except (duckdb.IOException, OSError) as error:
+        raise RegistryError(
+            f"cannot write {DATABASE}: {str(error).splitlines()[0]}. The new rows are in; make room, then "
+            "'turnout registry relocate' makes the file again."
+        ) from error
+    finally:
+        con.close()
+        for leftover in (beside, Path(f"{beside}.wal")):
+            leftover.unlink(missing_ok=True)
+
+
+def is_behind(registry_dir: Path, generation: Generation) -> bool:
+    """Whether ``registry.duckdb`` is missing, of another generation, or made for another folder."""
+    file = Path(registry_dir) / DATABASE
+    if not file.exists():
+        return True
+    try:
+        with duckdb.connect(str(file), read_only=True, config=OFFLINE) as con:
+            row = con.execute("select generation, folder from registry_info").fetchall()[0]
+    except duckdb.Error:
+        return True
+    return row != (generation.number, str(Path(registry_dir).resolve()))
+
+
+def rebuild_database(registry_dir: Path) -> Generation:
+    """Make ``registry.duckdb`` again from the generation file, for instance after the folder was moved."""
+    generation = load(Path(registry_dir))
+    build_database(Path(registry_dir), generation)
+    return generation
+
+
+def _create_views(con, root: Path, generation: Generation) -> None:
+    for table in tables():
+        con.execute(f'create view "{table}" as {read_live(con, root, table, generation.of(table))}')
+    for table in LARGE:
+        create_parts(con, root, table, generation.of(table))
+    newest = f"timestamp {literal(generation.newest)}" if generation.newest else "null::timestamp"
+    con.execute(f"create macro newest_measurement() as {newest}")
+    con.execute(
+        f"create view registry_info as select {generation.number}::bigint as generation, "
+        f"{literal(str(root))} as folder, {newest} as newest_measurement_at_utc, "
+        f"{len(generation.files)}::bigint as n_files, {sum(f.bytes for f in generation.files)}::bigint as n_bytes"
+    )
+    con.execute(reasons_sql())
+    for name, sql in view_files().items():
+        try:
+            con.execute(sql)
+        except duckdb.Error as error:
+            raise RegistryError(f"views/{name}.sql: {error}") from error
+    _comment(con)
+
+
+def _comment(con) -> None:
+    """Comments on columns, with the unit, for tools that show them; those of macros stand in the documentation."""
+    present = {
+        (view, column)
+        for view, column in con.execute(
+            "select table_name, column_name from duckdb_columns() where database_name = 'registry'"
+        ).fetchall()
+    }
+    described = [(c.table, c.name, c.unit, c.meaning) for t in tables().values() for c in t]
+    described += [(v["view"], v["column"], v["unit"], v["meaning"]) for v in view_columns()]
+    con.execute("begin")
+    for view, column, unit, meaning in described:
+        if (view, column) in present:
+            text = literal(f"{meaning} [{unit}]" if unit else meaning)
+            con.execute(f'comment on column "{view}"."{column}" is {text}')
+    con.execute("commit")
+
+
+@cache
+def view_columns() -> tuple[dict[str, str], ...]:
+    """Rows of ``view_columns.csv``: view, parameters, column, type, unit, meaning."""
+    text = (files("turnout.registry") / "view_columns.csv").read_text(encoding="utf-8")
+    return tuple(csv.DictReader(text.splitlines()))

@@ -1,0 +1,130 @@
+"""Tables computed from the registry itself, for all charts at once: written whole, checked, published."""
+
+from collections.abc import Collection, Mapping
+from os import PathLike
+from pathlib import Path
+
+import duckdb
+import pandas as pd
+import pyarrow as pa
+
+from turnout.errors import RegistryError
+from turnout.registry.columns import WHOLE_TABLES, key, tables, time_column
+from turnout.registry.database import build_database, is_behind
+from turnout.registry.generation import (
+    DataFile,
+    Generation,
+    commit,
+    delete_files,
+    due_for_deletion,
+    load,
+    schema_of,
+)
+from turnout.registry.lock import locked
+from turnout.registry.parquet import write_sorted
+from turnout.registry.staging import connect
+
+BY_YEAR = ("charts",)
+
+
+def publish(
+    registry_dir: PathLike,
+    frames: Mapping[str, pd.DataFrame | pa.Table],
+    patience: float = 600.0,
+    keep: Mapping[str, Collection[int]] | None = None,
+) -> Generation:
+    """Replace derived tables (charts, baselines, chart_status, alarms) by the rows of ``frames``, in one step.
+
+    NaN becomes NULL, values are rounded to the resolution of ``columns.csv``, a column that a frame lacks is NULL.
+    The same rows give the same files; a table, or a year of it, that did not change is not published again.
+
+    Parameters
+    ----------
+    registry_dir : path
+        An existing registry, or a folder to make one in.
+    frames : mapping of table to DataFrame or Arrow table
+        All rows of each table, but for the years in ``keep``.
+    keep : mapping of table to years, optional
+        Years of a table kept by year whose live files stay as they are.
+
+    Raises
+    ------
+    RegistryError
+        A row breaks a rule of ``columns.csv`` (table, row, column and value are named), a column is unknown,
+        the registry is locked or the disk is full: nothing was changed.
+    """
+    root = Path(registry_dir)
+    with locked(root, patience):
+        before, con = load(root), connect(temp_directory=str(root / ".spill"))
+        number = before.number + 1
+        files = list(before.files)
+        for table in sorted(frames):
+            _enter(con, table, frames[table])
+            kept = (keep or {}).get(table, ())
+            files = [f for f in files if f.table != table or f.year in kept] + _written(con, root, table)
+        live = {f.path for f in files}
+        gone = [(f.path, number) for f in before.files if f.path not in live]
+        files.sort(key=lambda f: f.path)
+        if files == before.files:
+            if is_behind(root, before):
+                build_database(root, before)
+            return before
+        schemas = before.schemas | {f.schema: schema_of(f.table) for f in files if f.table in frames}
+        now = Generation(number, files, [*before.retired, *gone], schemas, before.consumed)
+        due = due_for_deletion(now)
+        commit(root, now)
+        build_database(root, now)
+        delete_files(root, due)
+        return now
+
+
+def _enter(con: duckdb.DuckDBPyConnection, table: str, frame) -> None:
+    """The rows as view ``new_<table>``, typed and rounded; RegistryError at the first bad one."""
+    if table not in WHOLE_TABLES:
+        raise RegistryError(f"{table} is not a table that is replaced whole; those are {', '.join(WHOLE_TABLES)}.")
+    present = list(frame.columns if isinstance(frame, pd.DataFrame) else frame.column_names)
+    if unknown := sorted(set(present) - {c.name for c in tables()[table]}):
+        raise RegistryError(f"{table}, column {unknown[0]}: columns.csv does not know it.")
+    con.register(f"came_{table}", frame)
+    parts = []
+    for c in tables()[table]:
+        value = f'"{c.name}"::{c.type}' if c.name in present else f"null::{c.type}"
+        if c.type in ("double", "float"):
+            value = f"nullif({value}, 'nan'::{c.type})"
+            value = value if c.decimals is None else f"round({value}, {c.decimals})"
+        parts.append(f'{value} as "{c.name}"')
+    con.execute(f"create view new_{table} as select {', '.join(parts)} from came_{table}")
+    _refuse_bad(con, table)
+
+
+def _refuse_bad(con, table) -> None:
+    rules = [(c, f'"{c.name}" is not null') for c in tables()[table] if c.required or c.key]
+    rules += [(c, f"coalesce({c.check}, true)") for c in tables()[table] if c.check]
+    counted = ", ".join(f"count(*) filter (not ({rule}))" for _, rule in rules)
+    try:
+        counts = con.execute(f"select {counted} from new_{table}").fetchall()[0]
+    except duckdb.ConversionException as error:
+        raise RegistryError(f"{table}: {str(error).splitlines()[0]}") from None
+    for (column, rule), count in zip(rules, counts):
+        if count:
+            keys = ", ".join(f'"{k}"' for k in key(table))
+            row = con.execute(f'select {keys}, "{column.name}" from new_{table} where not ({rule}) limit 1').fetchall()
+            *where, value = row[0]
+            asked = "given" if value is None else column.rule
+            raise RegistryError(
+                f"{table}, row {' '.join(map(str, where))}, column {column.name}: {value}, must be {asked} "
+                f"({count} rows). Nothing was changed."
+            )
+
+
+def _written(con, root: Path, table: str) -> list[DataFile]:
+    if table not in BY_YEAR:
+        written = write_sorted(con, root, table, None, f"select * from new_{table}", "all", True)
+        return [written] if written else []
+    year = f"year({time_column(table)})"
+    years = con.execute(f"select distinct {year} from new_{table} order by 1").fetchall()
+    each = (
+        write_sorted(con, root, table, y, f"select * from new_{table} where {year} = {y}", "all", True)
+        for (y,) in years
+    )
+    return [w for w in each if w]

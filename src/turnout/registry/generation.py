@@ -1,0 +1,151 @@
+"""The list of live files: what it does not name does not exist. Readers never glob."""
+
+import hashlib
+import json
+import os
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+from turnout.errors import RegistryError
+from turnout.registry.columns import tables
+
+FILE = "_generation.json"
+FORMAT = 1
+KEPT_GENERATIONS = 2
+
+
+@dataclass(frozen=True)
+class DataFile:
+    """One live Parquet file: its path in the registry, its table, year and row count, its hash, its schema.
+
+    ``newest`` is the time of its newest measurement, ``dead`` how many of its rows are superseded (large tables only).
+    """
+
+    path: str
+    table: str
+    year: int | None
+    rows: int
+    bytes: int
+    sha256: str
+    schema: str
+    newest: str | None = None
+    dead: int = 0
+
+
+@dataclass
+class Generation:
+    """State of the registry after one commit.
+
+    ``files`` are live; ``retired`` are (path, generation that dropped it), deleted two generations later, so
+    that a reader who opened the registry before still finds them; ``schemas`` says which columns a schema hash
+    stands for; ``consumed`` are the work batches that were taken in by the newest commit and may still be offered.
+    """
+
+    number: int = 0
+    files: list[DataFile] = field(default_factory=list)
+    retired: list[tuple[str, int]] = field(default_factory=list)
+    schemas: dict[str, dict[str, str]] = field(default_factory=dict)
+    consumed: list[str] = field(default_factory=list)
+
+    def of(self, table: str, years=None) -> list[DataFile]:
+        """Live files of one table, all years or those given, sorted by path."""
+        return [f for f in self.files if f.table == table and (years is None or f.year in years)]
+
+    @property
+    def newest(self) -> str | None:
+        """Time of the newest measurement, ISO."""
+        return max((f.newest for f in self.files if f.newest), default=None)
+
+    def to_json(self) -> str:
+        """Text of the generation file; equal generations give equal bytes."""
+        return json.dumps({"format": FORMAT} | asdict(self), indent=1, sort_keys=True) + "\n"
+
+
+def load(registry_dir: Path) -> Generation:
+    """The generation file, or generation 0 where there is none yet.
+
+    Raises RegistryError when it is not readable: it is written in one step, so somebody else touched it.
+    """
+    path = Path(registry_dir) / FILE
+    try:
+        raw = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return Generation()
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise RegistryError(f"{path}: not a generation file ({error}). Put it back from a backup.") from None
+    if raw.pop("format", None) != FORMAT:
+        raise RegistryError(f"{path}: written by another version of the program. Install that version.")
+    files = [DataFile(**f) for f in raw.pop("files")]
+    return Generation(files=files, retired=[(p, n) for p, n in raw.pop("retired")], **raw)
+
+
+def schema_hash(table: str) -> str:
+    """Name of the present schema of a table: hash of its columns and types."""
+    text = json.dumps([[c.name, c.type] for c in tables()[table]])
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def schema_of(table: str) -> dict[str, str]:
+    """Types of the present columns of a table by their names, in order."""
+    return {c.name: c.type for c in tables()[table]}
+
+
+def check_schemas(generation: Generation) -> None:
+    """Refuse a registry whose files hold another type under a name that ``columns.csv`` knows.
+
+    DuckDB would turn both into text in silence. A column added since is no trouble: it is NULL in old rows.
+    """
+    for name, held in sorted(generation.schemas.items()):
+        table, _, _ = name.partition(":")
+        now = schema_of(table) if table in tables() else {}
+        for column, kind in held.items():
+            if column in now and now[column] != kind:
+                raise RegistryError(
+                    f"{table}, column {column}: files hold {kind}, columns.csv says {now[column]}. "
+                    "Rename the new column, or rebuild the registry from the work batches."
+                )
+
+
+def commit(registry_dir: Path, generation: Generation) -> None:
+    """Publish the generation: one replace, after which the new files count and the retired ones do not."""
+    write_durably(Path(registry_dir) / FILE, generation.to_json().encode())
+
+
+def write_durably(path: Path, content: bytes) -> None:
+    """Write beside, fsync, replace, fsync the folder: whole or not at all, also after a power cut."""
+    beside = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        with open(beside, "wb") as stream:
+            stream.write(content)
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.replace(beside, path)
+    finally:
+        beside.unlink(missing_ok=True)
+    sync_folder(path.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Wait until the names in ``folder`` are on the disk, so that they outlive a power cut."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def due_for_deletion(generation: Generation) -> list[str]:
+    """Take out of ``retired``, and return, what no reader of the last two generations can still want."""
+    live = {f.path for f in generation.files}
+    # a small table that changed and changed back has its old path, by content, live or retired a second time
+    dropped = dict(sorted(generation.retired, key=lambda entry: entry[1]))
+    waiting = {path: n for path, n in dropped.items() if path not in live}
+    last = generation.number - KEPT_GENERATIONS
+    generation.retired = sorted((path, n) for path, n in waiting.items() if n > last)
+    return sorted(path for path, n in waiting.items() if n <= last)
+
+
+def delete_files(registry_dir: Path, paths: list[str]) -> None:
+    """Delete files of the registry; one that is gone already is no error."""
+    for path in paths:
+        (Path(registry_dir) / path).unlink(missing_ok=True)

@@ -1,0 +1,79 @@
+"""Does the registry hold what its list says, and what lies beside the list."""
+
+import re
+from os import PathLike
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from turnout.content import sha256_of
+from turnout.registry.columns import tables
+from turnout.registry.database import DATABASE, is_behind
+from turnout.registry.generation import DataFile, Generation, load
+from turnout.registry.lock import locked
+
+_SCHEMA = re.compile(r"_schema-[0-9a-f]{12}\.parquet")
+
+
+def check(registry_dir: PathLike, hashes: bool = True) -> list[str]:
+    """What is wrong with a registry, one sentence each; empty when all is well.
+
+    Compares every live file with the list: size, hash, row count, types. ``hashes=False`` skips reading them whole.
+    """
+    root = Path(registry_dir)
+    generation = load(root)
+    problems = [p for file in generation.files for p in _check_file(root, file, hashes)]
+    if is_behind(root, generation):
+        problems.append(f"{DATABASE} is not of generation {generation.number}: run 'turnout registry relocate'.")
+    lost = orphans(root, generation)
+    if lost:
+        problems.append(f"{len(lost)} files are on no list, the first {lost[0]}: run 'turnout registry vacuum'.")
+    return problems
+
+
+def vacuum(registry_dir: PathLike, patience: float = 600.0) -> list[str]:
+    """Delete what killed runs left behind: files on no list. Returns their paths."""
+    root = Path(registry_dir)
+    with locked(root, patience):
+        lost = orphans(root, load(root))
+        for path in lost:
+            (root / path).unlink(missing_ok=True)
+    return lost
+
+
+def orphans(root: Path, generation: Generation) -> list[str]:
+    """Files below the tables' folders, and unfinished ones, that neither live nor wait for their deletion."""
+    kept = {f.path for f in generation.files} | {path for path, _ in generation.retired}
+    found = [p for table in tables() for p in (root / table).rglob("*") if p.is_file()]
+    found += list(root.glob(".*.tmp"))
+    paths = (p.relative_to(root).as_posix() for p in found if not _SCHEMA.fullmatch(p.name))
+    return sorted(set(paths) - kept)
+
+
+def _check_file(root: Path, file: DataFile, hashes: bool) -> list[str]:
+    path = root / file.path
+    if not path.exists():
+        return [f"{file.path}: is gone. Put it back from a backup."]
+    if path.stat().st_size != file.bytes:
+        return [f"{file.path}: {path.stat().st_size} bytes, the list says {file.bytes}. Put it back from a backup."]
+    try:
+        parquet = pq.ParquetFile(path)
+    except (pa.ArrowException, OSError) as error:
+        return [f"{file.path}: not a Parquet file ({str(error).splitlines()[0]}). Put it back from a backup."]
+    problems = []
+    if parquet.metadata.num_rows != file.rows:
+        problems.append(f"{file.path}: {parquet.metadata.num_rows} rows, the list says {file.rows}.")
+    held = {f.name: f.type for f in parquet.schema_arrow}
+    for column in tables().get(file.table, ()):
+        if column.name in held and not _same(held[column.name], column.arrow):
+            problems.append(f"{file.path}, column {column.name}: {held[column.name]}, columns.csv says {column.type}.")
+    if hashes and sha256_of(path) != file.sha256:
+        problems.append(f"{file.path}: its hash differs from the list. Put it back from a backup.")
+    return problems
+
+
+def _same(held: pa.DataType, wanted: pa.DataType) -> bool:
+    if pa.types.is_list(held) and pa.types.is_list(wanted):
+        return held.value_type == wanted.value_type
+    return held == wanted

@@ -1,0 +1,186 @@
+"""Rows of many units as typed columns; what does not fit a column's type is refused by name, never guessed."""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from operator import itemgetter
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+
+from turnout.registry.columns import FILLED_BY_REGISTER, Column, names, tables
+from turnout.registry.ids import content_id
+
+UNDATED = 0
+_DATE = re.compile(r"(?<!\d)(\d{4})(?:-\d\d-\d\d|\d{4}T?)")
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A row that may not enter: where it stood, the column and value at fault, and what was asked."""
+
+    unit: int
+    table: str
+    row: int
+    column: str
+    value: str
+    asked: str
+    number: float | None = None
+
+    def __str__(self):
+        return f"{self.table}, row {self.row + 1}, column {self.column}: {self.value}, must be {self.asked}"
+
+
+@dataclass
+class Arrival:
+    """One computed unit on its way in; ``index`` is its place among all units sorted by name."""
+
+    index: int
+    unit: str
+    turnout: str
+    kind: str
+    key: str
+    algo: str
+    tables: dict[str, list[dict]]
+    result_id: str = field(init=False)
+    year: int = field(init=False)
+
+    def __post_init__(self):
+        self.result_id = content_id("result", self.unit, self.key, self.algo)
+        self.year = unit_year(self.unit, self.tables)
+
+    @property
+    def label(self) -> str:
+        """The unit without turnout and kind."""
+        return self.unit.split("/", 2)[-1]
+
+
+def unit_year(unit: str, rows: Mapping[str, list[dict]]) -> int:
+    """Year under which all rows of a unit are filed: that in its name, else of its first time, else ``UNDATED``.
+
+    >>> unit_year("t1/hammer/A7/2024-05-13", {}), unit_year("t1/passage/20260105T101112Z", {}), unit_year("t1/x/y", {})
+    (2024, 2026, 0)
+    """
+    if found := _DATE.search(unit.split("/", 1)[-1]):
+        return int(found[1])
+    times = (str(v) for table in sorted(rows) for row in rows[table] for k, v in row.items() if k.endswith("_at_utc"))
+    return next((int(t[:4]) for t in times if t[:4].isdigit()), UNDATED)
+
+
+def gather(table: str, arrivals: Iterable[Arrival]) -> tuple[pa.Table, list[Refusal]]:
+    """Typed columns of one table over all units, with ``_unit``, ``_row`` and ``_year`` beside them.
+
+    Returns the table of all rows whose values fit their types, and a refusal for every other row: one with a
+    column that ``columns.csv`` does not know, or with a value of another type.
+    """
+    known = frozenset(names(table))
+    units, places, years, rows, refusals = [], [], [], [], []
+    for arrival in arrivals:
+        for place, row in enumerate(arrival.tables.get(table, ())):
+            if not isinstance(row, dict) or not known.issuperset(row):
+                refusals.append(_misshapen(arrival, table, place, row, known))
+                continue
+            units.append(arrival.index)
+            places.append(place)
+            years.append(arrival.year)
+            rows.append(row)
+    columns = [c for c in tables()[table] if c.name not in FILLED_BY_REGISTER]
+    arrays: dict[str, pa.Array] = {}
+    bad: dict[int, Refusal] = {}
+    for column, values in zip(columns, _by_column(rows, [c.name for c in columns])):
+        arrays[column.name], wrong = typed(column, values)
+        for i in wrong:
+            value = repr(values[i])[:200]
+            bad.setdefault(i, Refusal(units[i], table, places[i], column.name, value, f"of type {column.type}"))
+    marks = {"_unit": pa.array(units, pa.int32()), "_row": pa.array(places, pa.int32())}
+    gathered = pa.table(arrays | marks | {"_year": pa.array(years, pa.int32())})
+    if bad:
+        gathered = gathered.filter(pa.array([i not in bad for i in range(len(rows))]))
+    return gathered, refusals + [bad[i] for i in sorted(bad)]
+
+
+def _misshapen(arrival, table, place, row, known) -> Refusal:
+    if not isinstance(row, dict):
+        return Refusal(arrival.index, table, place, "all", repr(row)[:200], "a row")
+    name = min(map(str, row.keys() - known))
+    return Refusal(arrival.index, table, place, name, repr(row.get(name))[:200], "a column of columns.csv")
+
+
+def _by_column(rows: list[dict], wanted: list[str]) -> list[Sequence]:
+    """Values of each column; rows of one maker have the same keys, which is worth knowing: half the time."""
+    if not rows:
+        return [()] * len(wanted)
+    alike = [name for name in wanted if name in rows[0]]
+    try:
+        together = zip(*map(itemgetter(*alike, alike[0]), rows)) if alike else ()
+        fetched: dict[str, Sequence] = dict(zip(alike, together))
+    except KeyError:
+        return [[row.get(name) for row in rows] for name in wanted]
+    fetched |= {name: [row.get(name) for row in rows] for name in wanted if name not in fetched}
+    return [fetched[name] for name in wanted]
+
+
+def typed(column: Column, values: Sequence) -> tuple[pa.Array, list[int]]:
+    """Arrow array of ``values``, None where one does not fit, and the places of those.
+
+    >>> from turnout.registry.columns import column
+    >>> typed(column("modes", "n_impacts"), [30, None, "many"])[1]
+    [2]
+    """
+    try:
+        return _convert(column, values), []
+    except (pa.ArrowException, TypeError, ValueError, OverflowError):
+        pass
+    wrong = []
+    for i, value in enumerate(values):
+        try:
+            _convert(column, [value])
+        except (pa.ArrowException, TypeError, ValueError, OverflowError):
+            wrong.append(i)
+    misfit = set(wrong)
+    return _convert(column, [None if i in misfit else v for i, v in enumerate(values)]), wrong
+
+
+def _convert(column: Column, values: Sequence) -> pa.Array:
+    if column.is_list:
+        return _lists(column, values)
+    if column.type == "timestamp":
+        known = {v: _time(v) for v in set(values)}
+        return pa.array([known[v] for v in values], pa.timestamp("us"))
+    if pa.types.is_floating(column.arrow) or pa.types.is_integer(column.arrow):
+        kinds = set(map(type, values))
+        if not kinds.isdisjoint((bool, str, np.bool_)):
+            raise TypeError("text or truth value where a number belongs")
+        if pa.types.is_integer(column.arrow) and float in kinds:  # pa.array would cut off the fraction in silence
+            return pa.array(values, pa.float64()).cast(column.arrow)
+    return pa.array(values, column.arrow)
+
+
+def _time(value: Any) -> datetime | None:
+    """Naive UTC from ISO text or a datetime; a zone other than UTC is refused."""
+    if value is None:
+        return None
+    time = datetime.fromisoformat(value) if isinstance(value, str) else pd.Timestamp(value).to_pydatetime()
+    if time.utcoffset():
+        raise ValueError("a time in another zone than UTC")
+    return time.replace(tzinfo=None)
+
+
+def _lists(column: Column, values: Sequence) -> pa.Array:
+    """List array from lists or numpy arrays, by way of one flat array."""
+    if any(isinstance(v, (str, bytes, Mapping)) for v in values):
+        raise TypeError("not a list")
+    kind = column.arrow.value_type
+    if any(v is not None and not isinstance(v, np.ndarray) for v in values):
+        return pa.array([v.tolist() if isinstance(v, np.ndarray) else v for v in values], column.arrow)
+    held = [np.ravel(v) for v in values if v is not None]
+    flat = np.concatenate(held) if held else np.zeros(0)
+    lengths = np.array([0 if v is None else np.size(v) for v in values], dtype=np.int64)
+    offsets = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int32)
+    missing = pa.array(np.array([v is None for v in values], dtype=bool), pa.bool_())
+    return pa.ListArray.from_arrays(
+        pa.array(offsets), pa.array(flat.astype(kind.to_pandas_dtype()), kind), mask=missing if len(values) else None
+    )

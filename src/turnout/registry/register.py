@@ -1,0 +1,81 @@
+"""Take work batches into the registry: one sorted Parquet file per table, year and run, then one atomic step."""
+
+import gc
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import contextmanager
+from datetime import datetime
+from os import PathLike, fspath
+from pathlib import Path
+
+from turnout.registry.arrivals import chunks, fresh, merged, of_tables, token
+from turnout.registry.generation import check_schemas, load
+from turnout.registry.lock import locked
+from turnout.registry.registration import Registered, Registration
+
+
+def register(
+    batches: Sequence[PathLike],
+    registry_dir: PathLike,
+    *,
+    read: Callable,
+    tables: Mapping[str, list[dict]] | None = None,
+    config_hash: str | None = None,
+    code_version: str = "",
+    started_at: datetime | None = None,
+    patience: float = 600.0,
+) -> Registered:
+    """Bring the results of work batches, and rows from the configuration, into the registry.
+
+    The same results give byte-identical files, however the batches were cut and however often a run was
+    killed before; only ``runs`` knows the time of day. A row that breaks a rule becomes a quarantine row.
+
+    Parameters
+    ----------
+    batches : sequence of path
+        In the order in which they were written: of a unit in two of them the later counts.
+    registry_dir : path
+        Made where it does not exist.
+    read : callable
+        ``read(path)`` yields results sorted by unit, with unit, turnout, kind, key, algo, tables.
+    tables : mapping of table to rows
+        Rows that come from no recording. turnouts, sections, events, campaigns, acknowledgements are replaced
+        whole; of other tables, what an earlier call gave and this one does not is superseded.
+    config_hash, code_version, started_at
+        Noted in ``runs``.
+    patience : float
+        How long to wait for another run that holds the registry. [s]
+
+    Raises
+    ------
+    RegistryError
+        Locked, disk full, no permission, or made by another version: nothing was changed.
+    """
+    root = Path(registry_dir)
+    with locked(root, patience):
+        before = load(root)
+        check_schemas(before)
+        tokens, count = [token(p) for p in batches], 0
+        faults: dict[str, str] = {}
+        unread = [batches[i] for i in fresh(tokens, before.consumed)]
+        registration = Registration(root, before)
+        with _without_collection():
+            for chunk in chunks(merged(unread, read, faults)):
+                count = chunk[-1].index + 1
+                registration.take(chunk)
+        registration.replace_whole(tables or {})
+        registration.take(of_tables(tables or {}, count))
+        consumed = [t for t, p in zip(tokens, batches) if fspath(p) not in faults]
+        about = {"code_version": code_version, "config_hash": config_hash, "started_at_utc": started_at}
+        return registration.finish(consumed, faults, about)
+
+
+@contextmanager
+def _without_collection():
+    """Rows form no cycles: looking for some in millions of them takes a quarter of the time of a registration."""
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()

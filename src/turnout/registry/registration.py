@@ -1,0 +1,227 @@
+"""One registration: staging tables in memory beside what the registry holds, then files, then one commit."""
+
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pyarrow as pa
+
+from turnout.registry.columns import WHOLE_TABLES, key, literal, tables
+from turnout.registry.database import build_database, is_behind
+from turnout.registry.generation import FILE, Generation, commit, delete_files, due_for_deletion, schema_of
+from turnout.registry.ids import content_id
+from turnout.registry.intake import Arrival, Refusal, gather
+from turnout.registry.parquet import read_live, write_sorted
+from turnout.registry.refusals import identified, quarantine_of
+from turnout.registry.settled import with_dead
+from turnout.registry.staging import admit, connect, create_staging, note_arrivals, refuse_orphans
+from turnout.registry.supersede import last_word, leave_out_known, note_dead, supersede
+
+ONE_FILE = (*WHOLE_TABLES, "runs", "supersedes")
+MADE_HERE = ("quarantine", "results", "runs", "supersedes")
+PENDING = "pending"
+# A section with measurements stays known when the configuration drops it, or never named it: charts, and the events
+# that reset them, are looked up here.
+SECTIONS = """
+with given as (select * exclude (_unit, _row, _year) from new_sections),
+kept as (from given union all by name (from old_sections anti join given using (section_id))),
+measured as (select section_id, turnout_id from new_models union select section_id, turnout_id from new_modes
+    union select section_id, turnout_id from new_passage_fits)
+from kept union all by name
+select section_id, turnout_id, split_part(section_id, '/', -1) as label from measured anti join kept using (section_id)
+"""
+
+
+@dataclass(frozen=True)
+class Registered:
+    """What a call of ``register`` did. ``rows`` by table are new; ``faults`` are batches that could not be read."""
+
+    run_id: str | None
+    generation: int
+    n_units: int = 0
+    rows: Mapping[str, int] = field(default_factory=dict)
+    n_refused: int = 0
+    n_superseded: int = 0
+    faults: Mapping[str, str] = field(default_factory=dict)
+
+
+class Registration:
+    """Takes units in chunks, refuses what breaks a rule, and publishes all at once."""
+
+    def __init__(self, root: Path, before: Generation):
+        self.root, self.before = root, before
+        self.con = connect(temp_directory=str(root / ".spill"))
+        self.result_ids: list[str] = []
+        self.n_refused = self.n_bad = 0
+        self.whole: set[str] = set()
+        self.replaced: set[str] = set()
+        create_staging(self.con)
+        for table in tables():
+            self.con.execute(f"create view old_{table} as {read_live(self.con, root, table, before.of(table))}")
+        note_dead(self.con)
+
+    def take(self, arrivals: list[Arrival]) -> None:
+        """Admit those units of a chunk whose result is not the live one already."""
+        arrivals = self._changed(arrivals)
+        # a whole table that was offered unchanged is not in the staging tables and stays as it is
+        self.replaced |= self.whole & {table for a in arrivals for table in a.tables}
+        if not arrivals:
+            return
+        note_arrivals(self.con, arrivals)
+        by_index = {a.index: a for a in arrivals}
+        quarantine = {a.index: [r for r in a.tables.get("quarantine", ())] for a in arrivals}
+        refusals = [_unknown(a, t) for a in arrivals for t in sorted(a.tables.keys() - tables().keys()) if a.tables[t]]
+        for table in tables():
+            if table not in MADE_HERE and any(table in a.tables for a in arrivals):
+                gathered, untyped = gather(table, arrivals)
+                refusals += untyped + admit(self.con, table, gathered, PENDING)
+        refuse_orphans(self.con, refusals, by_index)
+        for refusal in refusals:
+            quarantine[refusal.unit].append(quarantine_of(refusal, by_index[refusal.unit]))
+        self._admit_quarantine(arrivals, quarantine)
+        for arrival in arrivals:
+            arrival.tables = {"results": [_result_row(arrival)]}
+        admit(self.con, "results", gather("results", arrivals)[0], PENDING)
+        self.n_refused += len(refusals)
+        self.n_bad += sum(bool(rows) for rows in quarantine.values())
+        self.result_ids += [a.result_id for a in arrivals]
+
+    def replace_whole(self, names) -> None:
+        """The small tables of which all rows are given anew."""
+        self.whole |= set(names) & set(WHOLE_TABLES)
+
+    def finish(self, consumed: list[str], faults: dict[str, str], about: dict) -> Registered:
+        """Write the files and publish them; with nothing new, only make good what a killed run left undone."""
+        before = self.before
+        if not self.result_ids:
+            if consumed != before.consumed or not (self.root / FILE).exists():
+                commit(self.root, replace(before, consumed=consumed))
+            if is_behind(self.root, before):
+                build_database(self.root, before)
+            return Registered(None, before.number, faults=faults)
+        number = before.number + 1
+        run_id = self._run_id(number)
+        n_superseded = supersede(self.con, number, run_id)
+        leave_out_known(self.con)
+        self._note_run(run_id, about)
+        now, rows = self._write(run_id, number)
+        if n_superseded:
+            now.files = self._with_dead(now.files)
+        now.consumed = consumed
+        due = due_for_deletion(now)
+        commit(self.root, now)
+        build_database(self.root, now)
+        delete_files(self.root, due)
+        return Registered(run_id, number, len(self.result_ids), rows, self.n_refused, n_superseded, faults)
+
+    def _changed(self, arrivals: list[Arrival]) -> list[Arrival]:
+        asked = pa.table({"result_id": pa.array([a.result_id for a in arrivals], pa.string())})
+        self.con.register("_asked", asked)
+        live = self.con.execute(
+            "select result_id from old_results semi join _asked using (result_id) anti join dead on result_id = old_id"
+        ).fetchall()
+        self.con.unregister("_asked")
+        known = {r for (r,) in live}
+        return [a for a in arrivals if a.result_id not in known]
+
+    def _admit_quarantine(self, arrivals, quarantine) -> None:
+        """Quarantine rows with their ids; one that is itself wrong is replaced by one that says so."""
+        by_index = {a.index: a for a in arrivals}
+        for arrival in arrivals:
+            arrival.tables["quarantine"] = _by_id(quarantine[arrival.index], arrival.unit)
+        gathered, refusals = gather("quarantine", arrivals)
+        refusals += admit(self.con, "quarantine", gathered, PENDING)
+        again: dict[int, list[dict]] = {}
+        for refusal in refusals:
+            again.setdefault(refusal.unit, []).append(quarantine_of(refusal, by_index[refusal.unit]))
+        wrong = [by_index[i] for i in sorted(again)]
+        for arrival in wrong:
+            arrival.tables["quarantine"] = _by_id(again[arrival.index], arrival.unit)
+        admit(self.con, "quarantine", gather("quarantine", wrong)[0], PENDING)
+        self.n_refused += len(refusals)
+
+    def _run_id(self, number: int) -> str:
+        run_id = content_id("run", sorted(self.result_ids))
+        if self.con.execute("select count(*) from old_runs where run_id = ?", [run_id]).fetchall()[0][0]:
+            return content_id(run_id, number)
+        return run_id
+
+    def _note_run(self, run_id, about) -> None:
+        """The only place where the time of day enters the registry."""
+        row = about | {
+            "run_id": run_id, "ended_at_utc": datetime.now(UTC).replace(tzinfo=None), "host": platform.node(),
+            "n_ok": len(self.result_ids) - self.n_bad, "n_quarantined": self.n_bad,
+        }  # fmt: skip
+        row.setdefault("started_at_utc", None)
+        columns = ", ".join(row)
+        marks = ", ".join("?" for _ in row)
+        self.con.execute(f"insert into new_runs ({columns}, _year) values ({marks}, 0)", list(row.values()))
+
+    def _write(self, run_id: str, number: int) -> tuple[Generation, dict[str, int]]:
+        """One file per table and year; the generation that names them."""
+        files, retired = list(self.before.files), list(self.before.retired)
+        rows: dict[str, int] = {}
+        schemas = dict(self.before.schemas)
+        for table in tables():
+            for year, select in self._selects(table):
+                prefix = "all" if table in WHOLE_TABLES else f"batch-{run_id[:12]}"
+                written = write_sorted(self.con, self.root, table, year, _stamped(table, select, run_id), prefix)
+                if table in WHOLE_TABLES:
+                    keep = written.path if written else None
+                    retired += [(f.path, number) for f in files if f.table == table and f.path != keep]
+                    files = [f for f in files if f.table != table]
+                if written:
+                    files.append(written)
+                    rows[table] = rows.get(table, 0) + written.rows
+                    schemas[written.schema] = schema_of(table)
+        files.sort(key=lambda f: f.path)
+        return Generation(number, files, retired, schemas), rows
+
+    def _with_dead(self, files):
+        self.con.execute(f"create temp table superseded as {last_word('old_supersedes', 'new_supersedes')}")
+        return with_dead(self.con, self.root, files)
+
+    def _selects(self, table):
+        """(year, SELECT) of every file that has to be written for a table."""
+        if table == "sections":
+            return [(None, SECTIONS)]
+        if table in WHOLE_TABLES:
+            came = self.con.execute(f"select count(*) from new_{table}").fetchall()[0][0]
+            if table in self.replaced:
+                return [(None, f"select * exclude (_unit, _row, _year) from new_{table}")]
+            keys = ", ".join(key(table))
+            kept = f"select * from old_{table} anti join new_{table} using ({keys})"
+            new = f"select * exclude (_unit, _row, _year) from new_{table}"
+            return [(None, f"{kept} union all by name {new}")] if came else []
+        years = self.con.execute(f"select distinct _year from new_{table} order by 1").fetchall()
+        if table in ONE_FILE:
+            return [(None, f"select * from new_{table}")] if years else []
+        return [(year, f"select * from new_{table} where _year = {year}") for (year,) in years]
+
+
+def _stamped(table, select, run_id):
+    if not any(c.name == "run_id" for c in tables()[table]):
+        return select
+    return f"select * replace ({literal(run_id)} as run_id) from ({select})"
+
+
+def _by_id(rows: list[dict], unit: str) -> list[dict]:
+    known = {row["quarantine_id"]: row for row in (identified(row, unit) for row in rows)}
+    return [known[i] for i in sorted(known)]
+
+
+def _unknown(arrival: Arrival, table: str) -> Refusal:
+    return Refusal(arrival.index, table, 0, "any", f"a table {table!r}", "a table of columns.csv")
+
+
+def _result_row(arrival: Arrival) -> dict:
+    models = arrival.tables.get("models") or [{}]
+    config_hash = models[0].get("config_hash") if isinstance(models[0], dict) else None
+    return {
+        "unit_id": arrival.unit, "turnout_id": arrival.turnout, "kind": arrival.kind, "label": arrival.label,
+        "unit_key": arrival.key, "code_version": arrival.algo,
+        "config_hash": config_hash if isinstance(config_hash, str) else None,
+        "n_rows": sum(len(rows) for rows in arrival.tables.values()),
+    }  # fmt: skip

@@ -1,0 +1,127 @@
+"""The door of the registry: typed tables with CHECK and PRIMARY KEY, for Parquet itself has no constraints."""
+
+from collections.abc import Mapping
+
+import duckdb
+import pyarrow as pa
+
+from turnout.registry.columns import create_table, key, names, tables
+from turnout.registry.intake import Arrival, Refusal
+
+MARKS = ", _unit integer, _row integer, _year integer"
+# Rows of the second kind mean nothing without their row of the first.
+CHILDREN = {
+    "models": ("model_id", ("modes", "impact_modes", "receptances")),
+    "passages": ("passage_id", ("passage_fits",)),
+}
+
+
+def connect(**config) -> duckdb.DuckDBPyConnection:
+    """DuckDB in memory that fetches nothing from anywhere."""
+    settings = {"autoinstall_known_extensions": False, "autoload_known_extensions": False}
+    con = duckdb.connect(":memory:", config=settings | {"memory_limit": "2GB"} | config)
+    con.execute("set enable_progress_bar = false")  # it would stand among what a command prints
+    return con
+
+
+def create_staging(con: duckdb.DuckDBPyConnection) -> None:
+    """The table of units that came, and an empty staging table for each table of the registry."""
+    con.execute("create table came (_unit integer, unit_id varchar, result_id varchar, algo varchar)")
+    for table in tables():
+        con.execute(create_table(table, f"new_{table}", MARKS))
+
+
+def note_arrivals(con: duckdb.DuckDBPyConnection, arrivals: list[Arrival]) -> None:
+    """Enter the units of a chunk, before their rows."""
+    columns = {"_unit": "index", "unit_id": "unit", "result_id": "result_id", "algo": "algo"}
+    came = pa.table({name: pa.array([getattr(a, of) for a in arrivals]) for name, of in columns.items()})
+    con.register("_arrivals", came)
+    con.execute("insert into came select * from _arrivals")
+    con.unregister("_arrivals")
+
+
+def admit(con: duckdb.DuckDBPyConnection, table: str, gathered: pa.Table, run_id: str) -> list[Refusal]:
+    """Insert the sound rows into ``new_<table>`` and return a refusal for each of the others.
+
+    All rows are tried at once; only if the database refuses are the bad ones sought out by name.
+    """
+    if gathered.num_rows == 0:
+        return []
+    con.register("_gathered", gathered)
+    refusals: list[Refusal] = []
+    try:
+        con.execute(f"insert into new_{table} {_select(table, run_id)}")
+    except duckdb.ConstraintException:
+        con.execute(f"create or replace temp table arriving as {_select(table, run_id)}")
+        refusals = _bad_values(con, table) + _second_of_a_key(con, table)
+        con.execute(f"insert into new_{table} select * from arriving")
+        con.execute("drop table arriving")
+    finally:
+        con.unregister("_gathered")
+    return refusals
+
+
+def refuse_orphans(con: duckdb.DuckDBPyConnection, refusals: list[Refusal], arrivals: Mapping[int, Arrival]) -> int:
+    """Take back the rows that belong to a refused model or passage; how many."""
+    taken = 0
+    for refusal in refusals:
+        if refusal.table not in CHILDREN:
+            continue
+        id_column, children = CHILDREN[refusal.table]
+        parent = arrivals[refusal.unit].tables[refusal.table][refusal.row].get(id_column)
+        for child in children:
+            where = f"from new_{child} where _unit = ? and {id_column} is not distinct from ?"
+            taken += con.execute(f"select count(*) {where}", [refusal.unit, parent]).fetchall()[0][0]
+            con.execute(f"delete {where}", [refusal.unit, parent])
+    return taken
+
+
+def _select(table: str, run_id: str) -> str:
+    """Rounded values in the order of the table, with what the register fills in."""
+    filled = {"run_id": f"'{run_id}'", "result_id": "_result_id"}
+    parts = [f'{filled.get(c.name, c.rounded)} as "{c.name}"' for c in tables()[table]]
+    came = "(select _unit, result_id as _result_id from came)"
+    return f"select {', '.join(parts)}, _unit, _row, _year from _gathered join {came} using (_unit)"
+
+
+def _bad_values(con, table) -> list[Refusal]:
+    """Refusals of rows that break a CHECK or lack a value; their rows leave ``arriving``."""
+    refusals = []
+    for column in tables()[table]:
+        rules = ([f'"{column.name}" is null'] if column.required or column.key else []) + (
+            [f"not ({column.check})"] if column.check else []
+        )
+        if not rules:
+            continue
+        where = f"coalesce({' or '.join(rules)}, false)"
+        number = f'"{column.name}"::double' if column.type in ("double", "float", "integer", "bigint") else "null"
+        found = con.execute(
+            f'select _unit, _row, "{column.name}"::varchar, {number} from arriving where {where} order by all'
+        ).fetchall()
+        for unit, row, value, figure in found:
+            asked = "given" if value is None else column.rule
+            refusals.append(
+                Refusal(unit, table, row, column.name, "missing" if value is None else value[:200], asked, figure)
+            )
+        if found:
+            con.execute(f"delete from arriving where {where}")
+    return refusals
+
+
+def _second_of_a_key(con, table) -> list[Refusal]:
+    """Refusals of all rows but the first, in the order of the units, that share one key."""
+    keys = key(table)
+    quoted = ", ".join(f'"{k}"' for k in keys)
+    numbered = f"select _unit, _row, {quoted}, row_number() over (partition by {quoted} order by _unit, _row) as nth"
+    found = con.execute(f"select * exclude nth from ({numbered} from arriving) where nth > 1 order by all").fetchall()
+    for unit, row, *_ in found:
+        con.execute("delete from arriving where _unit = ? and _row = ?", [unit, row])
+    return [
+        Refusal(unit, table, row, "+".join(keys), " ".join(map(str, values)), "unique, and another row has it already")
+        for unit, row, *values in found
+    ]
+
+
+def columns_sql(table: str) -> str:
+    """The columns of a table, quoted, for a SELECT."""
+    return ", ".join(f'"{n}"' for n in names(table))

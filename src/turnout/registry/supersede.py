@@ -1,0 +1,117 @@
+"""What no longer counts: rows stay, and a row of ``supersedes`` says what took their place and why."""
+
+import duckdb
+
+from turnout.registry.staging import CHILDREN
+
+# kind of row: its table, its id, and the SQL that finds its counterpart in the new result of the same unit
+KINDS = {
+    "model": ("models", "model_id", "t.section_id || ' ' || t.method"),
+    "passage": ("passages", "passage_id", "t.passed_at_utc::varchar"),
+    "quarantine": ("quarantine", "quarantine_id", "t.path || coalesce(t.record, -1) || t.stage || t.reason_code"),
+    "finding": ("mismatch_findings", "finding_id", "coalesce(t.section_id, '')"),
+    "result": ("results", "result_id", "t.kind"),
+}
+
+
+def note_dead(con: duckdb.DuckDBPyConnection) -> None:
+    """Table ``dead``: ids of the registry that no longer count."""
+    con.execute(f"create temp table dead as {last_word('old_supersedes')}")
+
+
+def last_word(*relations: str) -> str:
+    """SELECT of the ids that no longer count, by what was said last of each in the ``relations``."""
+    said = " union all ".join(f"select old_id, generation, reason from {r}" for r in relations)
+    return f"select old_id from ({said}) group by old_id having arg_max(reason, generation) <> 'reinstated'"
+
+
+def supersede(con: duckdb.DuckDBPyConnection, generation: int, run_id: str) -> int:
+    """Fill ``new_supersedes`` from what came and what earlier results of the same units left; how many rows."""
+    _note_new_ids(con)
+    _note_prior(con)
+    _note_causes(con)
+    con.execute(
+        """insert into new_supersedes by name
+        with gone as (select p.* from prior p anti join new_ids n on p.kind = n.kind and p.id = n.id
+            where not p.is_dead),
+        heirs as (select kind, unit_id, place, min(id) as id from new_ids group by all)
+        select g.id as old_id, $generation as generation, h.id as new_id, g.kind,
+            case when g.kind = 'quarantine' and h.id is null then 'repaired'
+                else coalesce(c.reason, 'new_data') end as reason,
+            $run as run_id, 0 as _unit, 0 as _row, 0 as _year
+        from gone g left join heirs h on g.kind = h.kind and g.unit_id = h.unit_id and g.place = h.place
+            left join causes c on c.unit_id = g.unit_id
+        union all
+        select distinct p.id, $generation, null, p.kind, 'reinstated', $run, 0, 0, 0
+        from prior p semi join new_ids n on p.kind = n.kind and p.id = n.id where p.is_dead""",
+        {"generation": generation, "run": run_id},
+    )
+    return con.execute("select count(*) from new_supersedes").fetchall()[0][0]
+
+
+def leave_out_known(con: duckdb.DuckDBPyConnection) -> None:
+    """Take out of the staging tables what the registry holds already: same id, same content."""
+    con.execute(
+        "create or replace temp table known_results as "
+        "select result_id from new_results semi join old_results using (result_id)"
+    )
+    for table in ("recordings", "impacts"):
+        con.execute(f"delete from new_{table} where result_id in (from known_results)")
+    for table, id_column in (("results", "result_id"), ("models", "model_id"), ("passages", "passage_id"),
+                             ("quarantine", "quarantine_id"), ("mismatch_findings", "finding_id")):  # fmt: skip
+        con.execute(
+            f"create or replace temp table known as select {id_column} from new_{table} "
+            f"semi join old_{table} using ({id_column})"
+        )
+        for child in CHILDREN.get(table, ("", ()))[1]:
+            con.execute(f"delete from new_{child} where {_known_child(child, id_column)}")
+        con.execute(f"delete from new_{table} where {id_column} in (from known)")
+
+
+def _known_child(child: str, id_column: str) -> str:
+    """A child is known with its parent; a fit only if it was made with the same model, too."""
+    if child != "passage_fits":
+        return f"{id_column} in (from known)"
+    keys = "passage_id, section_id, channel, model_id"
+    return f"({keys}) in (select ({keys}) from old_passage_fits where passage_id in (from known))"
+
+
+def _note_new_ids(con) -> None:
+    """Ids of all that came, before what is already there is taken out of the staging tables."""
+    parts = [
+        f"select '{kind}' as kind, t.{id_column} as id, c.unit_id, {place} as place "
+        f"from new_{table} t join (select _unit, unit_id from came) c using (_unit)"
+        for kind, (table, id_column, place) in KINDS.items()
+    ]
+    con.execute(f"create temp table new_ids as {' union all '.join(parts)}")
+
+
+def _note_prior(con) -> None:
+    """What earlier results of the same units left in the registry, and whether it still counts."""
+    con.execute(
+        "create temp table prior_results as select result_id, unit_id, code_version from old_results "
+        "semi join came using (unit_id)"
+    )
+    parts = [
+        f"select '{kind}' as kind, t.{id_column} as id, p.unit_id, {place} as place, "
+        f"t.{id_column} in (select old_id from dead) as is_dead "
+        f"from old_{table} t join (select result_id, unit_id from prior_results) p using (result_id)"
+        for kind, (table, id_column, place) in KINDS.items()
+    ]
+    con.execute(f"create temp table prior as {' union all '.join(parts)}")
+
+
+def _note_causes(con: duckdb.DuckDBPyConnection) -> None:
+    """Why each unit was computed again: other raw files, else other code, else another configuration."""
+    con.execute(
+        """create temp table causes as
+        with live as (select p.* from prior_results p where p.result_id not in (select old_id from dead)),
+        before as (select l.unit_id, any_value(l.code_version) as algo,
+                list_sort(list(distinct r.recording_id)) as files
+            from live l left join old_recordings r using (result_id) group by l.unit_id),
+        after as (select c.unit_id, any_value(c.algo) as algo, list_sort(list(distinct r.recording_id)) as files
+            from came c left join new_recordings r using (_unit) group by c.unit_id)
+        select unit_id, case when before.files is distinct from after.files then 'new_data'
+            when before.algo is distinct from after.algo then 'new_code' else 'new_configuration' end as reason
+        from before join after using (unit_id)"""
+    )

@@ -1,0 +1,14 @@
+-- One row per section of a turnout and campaign: what was measured and how much of it could be used, newest first.
+-- needs: models_current, modes_current
+create or replace macro campaigns_of(turnout) as table
+select
+    o.campaign_id, o.measured_at_utc, o.section_id, o.status, o.reason, o.n_impacts_used, o.n_impacts_rejected,
+    o.coherence_minimum, o.hammer_fit_pct, o.hammer_fit_null_pct, c.rail_temperature_c,
+    max(m.frequency_hz) filter (m.band = 'ballast') as ballast_hz,
+    max(m.frequency_se_hz) filter (m.band = 'ballast') as ballast_se_hz,
+    max(m.frequency_hz) filter (m.band = 'railpad') as railpad_hz,
+    max(m.frequency_se_hz) filter (m.band = 'railpad') as railpad_se_hz
+from models_current o left join modes_current m using (model_id) left join campaigns c on c.campaign_id = o.campaign_id
+where o.turnout_id = turnout and o.method <> 'paper'
+group by all
+order by o.measured_at_utc desc, o.section_id;

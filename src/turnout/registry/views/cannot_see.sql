@@ -1,0 +1,30 @@
+-- One row per chart that cannot answer at a date, and why: too noisy for the target, learning, never warm or cold
+-- enough, not measured. detectable_pct is the smallest change of frequency that it shows within a year with 90 %;
+-- in stiffness about twice as much (one degree of freedom).
+-- needs: chart_status_at
+create or replace macro cannot_see("asof" := null) as table
+select
+    turnout_id, section_id, band, source,
+    case when state in ('alarm', 'ok') then 'cannot tell' else replace(state, '_', ' ') end as state,
+    case
+        when reason = 'never' then 'not measured by then'
+        when reason = 'too_long_ago' then 'last measured ' || strftime(last_measured_at_utc, '%Y-%m-%d')
+        when reason = 'constant' then 'the value never changes: stuck or copied'
+        when reason = 'no_temperature' then
+            without_temperature || ' of ' || n_campaigns || ' campaigns have no rail temperature'
+        when reason = 'too_few_sections' then 'too few sections are measured in the same campaigns for their median'
+        when reason = 'baseline' then n_baseline || ' campaigns so far; a baseline needs a whole year and at least twelve'
+        when reason = 'after_event' then n_learned || ' of ' || n_needed || ' campaigns since the event'
+        when band = 'amplitude' and coalesce(detectable_pct < 50, false) then
+            printf('smallest change seen within a year: %.1f %% of acceleration; asked for: %.1f %%',
+                detectable_pct, target_pct)
+        when coalesce(detectable_pct < 50, false) then
+            printf('smallest change seen within a year: %.1f %% of frequency (about %.1f %% of stiffness); '
+                || 'asked for: %.1f %% (%.1f %%)',
+                detectable_pct, 100 * (1 - (1 - detectable_pct / 100) ** 2),
+                target_pct, 100 * (1 - (1 - target_pct / 100) ** 2))
+        else 'cannot see any change within a year: the values scatter too much'
+    end as why,
+    detectable_pct, target_pct, n_campaigns, last_measured_at_utc
+from chart_status_at(coalesce("asof", newest_measurement()))
+where state not in ('alarm', 'ok') or detectable_pct is null or detectable_pct > target_pct;

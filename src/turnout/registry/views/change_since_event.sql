@@ -1,0 +1,49 @@
+-- One row per event of a kind and chart it touches: level in the days before and after, on residuals.
+-- Raw frequencies would call every October tamping a success: the summer lies before it, the winter behind.
+-- Windows are half open: [event - days, event) and [event, event + days). change_se_pct holds the scatter of the
+-- campaigns with their memory, and what the error of the temperature slope makes of the difference in temperature.
+create or replace macro change_since_event(kind_of_event, days) as table
+with values_pct as (
+    select
+        c.turnout_id, c.section_id, c.band, c.source, c.measured_at_utc, c.rail_temperature_c, b.n_learned,
+        b.sd_alone_pct * sqrt((1 + b.phi) / (1 - b.phi)) as sd_pct, b.slope_se_pct_per_c,
+        c.residual_pct + b.level_pct as value_pct
+    from charts c
+    join baselines b using (turnout_id, section_id, band, source, epoch)
+    where c.residual_pct is not null and c.section_id <> '*'
+),
+sides as (
+    select
+        e.event_id, e.kind, e.event_at_utc, v.turnout_id, v.section_id, v.band, v.source,
+        v.measured_at_utc >= e.event_at_utc as is_after,
+        v.value_pct, v.rail_temperature_c, v.sd_pct, v.slope_se_pct_per_c, v.n_learned
+    from events e
+    join values_pct v
+        on e.turnout_id = v.turnout_id and coalesce(e.section_id, v.section_id) = v.section_id
+            and v.measured_at_utc >= e.event_at_utc - to_days(days::integer)
+            and v.measured_at_utc < e.event_at_utc + to_days(days::integer)
+    where e.kind = kind_of_event
+),
+counted as (
+    select
+        event_id, kind, event_at_utc, turnout_id, section_id, band, source,
+        count(*) filter (where not is_after) as n_before,
+        count(*) filter (where is_after) as n_after,
+        avg(value_pct) filter (where not is_after) as before_pct,
+        avg(value_pct) filter (where is_after) as after_pct,
+        avg(rail_temperature_c) filter (where is_after) - avg(rail_temperature_c) filter (where not is_after) as dt_c,
+        max(sd_pct) as sd_pct, max(slope_se_pct_per_c) as slope_se_pct_per_c,
+        min(n_learned) filter (where is_after) as n_learned
+    from sides
+    group by all
+)
+select
+    event_id, kind, event_at_utc, turnout_id, section_id, band, source, n_before, n_after, before_pct, after_pct,
+    after_pct - before_pct as change_pct,
+    sqrt(sd_pct ** 2 * (1 / n_before + 1 / least(n_after, n_learned)) + (slope_se_pct_per_c * dt_c) ** 2)
+        as change_se_pct,
+    abs(after_pct - before_pct) > 1.96
+        * sqrt(sd_pct ** 2 * (1 / n_before + 1 / least(n_after, n_learned)) + (slope_se_pct_per_c * dt_c) ** 2)
+        as changed
+from counted
+where n_before > 0 and n_after > 0;

@@ -1,0 +1,40 @@
+-- One row per chart: what it says at the newest measurement, in the words of the worklist.
+-- inspect this week: an open alarm. plan: an acknowledged alarm, or a drift among the discoveries of the fleet
+-- (false-discovery rate 10 %). suppressed: somebody silenced it, with a reason and an end.
+create or replace view chart_states as
+with open_alarms as (
+    select turnout_id, section_id, band, source, max(raised_at_utc) as raised_at_utc
+    from alarms
+    where closed_at_utc is null
+    group by all
+),
+spoken as (
+    select
+        s.turnout_id, s.section_id, s.band, s.source, o.raised_at_utc,
+        max_by(k.by_whom || ': ' || k.reason, k.at_utc) filter (
+            where k.action = 'acknowledge' and k.at_utc >= o.raised_at_utc
+        ) as acknowledged,
+        max_by(k.by_whom || ': ' || k.reason, k.at_utc) filter (
+            where k.action = 'suppress' and coalesce(k.until_utc, timestamp '9999-01-01') > newest_measurement()
+        ) as suppressed
+    from chart_status s
+    left join open_alarms o using (turnout_id, section_id, band, source)
+    left join acknowledgements k
+        on k.turnout_id = s.turnout_id and coalesce(k.section_id, s.section_id) = s.section_id
+            and coalesce(k.band, s.band) = s.band and k.at_utc <= newest_measurement()
+    group by all
+)
+select
+    s.turnout_id, s.section_id, s.band, s.source,
+    case
+        when p.suppressed is not null and s.state in ('alarm', 'ok') then 'suppressed'
+        when s.state = 'alarm' and p.acknowledged is null then 'inspect this week'
+        when s.state = 'alarm' or (s.state = 'ok' and s.forecast is not null) then 'plan'
+        else replace(s.state, '_', ' ')
+    end as state,
+    s.reason, p.raised_at_utc, p.acknowledged, p.suppressed, s.direction, s.statistic_ratio, s.change_kind,
+    s.since_at_utc, s.since_earliest_utc, s.since_latest_utc, s.change_pct, s.change_low_pct, s.change_high_pct,
+    s.n_after, s.detectable_pct, s.target_pct, s.drift_pct_per_year, s.drift_se_pct_per_year, s.drift_q,
+    s.last_measured_at_utc, s.n_campaigns
+from chart_status s
+join spoken p using (turnout_id, section_id, band, source);

@@ -1,0 +1,109 @@
+-- The newest campaign that a chart rests on; newest_measurement() would follow a clock that runs ahead.
+create or replace macro newest_charted() as (select max(last_measured_at_utc) from chart_status);
+
+-- One row per chart: its state at a date and why, from what was measured and entered by then.
+-- At or after the newest campaign these are the rows of chart_status. Before it everything is counted from `charts` up
+-- to the date; spread and thresholds are those of the baseline, which later campaigns do not change. Only the memory
+-- is the fleet's of today.
+-- needs: chart_values
+create or replace macro chart_status_at("asof") as table
+with by_epoch as (
+    select
+        turnout_id, section_id, band, source, epoch, count(*) as n, max(measured_at_utc) as last_at_utc,
+        count(*) filter (state in ('baseline', 'learning')) as n_learned,
+        count(*) filter (state = 'no_temperature') as n_cold
+    from charts
+    where measured_at_utc <= case when "asof" < newest_charted() then "asof" end and state <> 'wrong_time'
+    group by all
+),
+counted as (
+    select
+        turnout_id, section_id, band, source, max(epoch) as epoch,
+        min(epoch) filter (n_learned > 0) as first_epoch,
+        sum(n)::integer as n_campaigns, sum(n_learned)::integer as n_baseline, sum(n_cold)::integer as n_cold,
+        max_by(n_learned, epoch)::integer as n_learned, max(last_at_utc) as last_at_utc
+    from by_epoch
+    group by turnout_id, section_id, band, source
+),
+last_eight as (
+    select turnout_id, section_id, band, source, max_by(frequency_hz, measured_at_utc, 8) as hz
+    from chart_values
+    where measured_at_utc <= case when "asof" < newest_charted() then "asof" end
+    group by turnout_id, section_id, band, source
+),
+pending as (
+    select distinct c.turnout_id, c.section_id, c.band, c.source
+    from counted c
+    join events e
+        on e.turnout_id = c.turnout_id and e.event_at_utc > c.last_at_utc and e.event_at_utc <= "asof"
+            and (e.section_id is null or e.section_id = c.section_id)
+            and ((e.resets_ballast and c.band <> 'railpad') or (e.resets_railpad and c.band <> 'ballast'))
+),
+alarmed as (
+    select distinct turnout_id, section_id, band, source
+    from alarms
+    where raised_at_utc <= "asof" and coalesce(closed_at_utc > "asof", true)
+),
+known as (
+    select
+        s.turnout_id, s.section_id, s.band, s.source, c.last_at_utc, coalesce(c.n_campaigns, 0) as n_campaigns,
+        case when s.complete and s.baseline_until_utc <= "asof" then s.n_baseline else coalesce(c.n_baseline, 0) end
+            as n_baseline, coalesce(c.n_cold, 0) as n_cold, s.n_needed,
+        case when p.turnout_id is null then coalesce(c.n_learned, 0) else 0 end as n_learned,
+        coalesce(s.complete and s.baseline_until_utc <= "asof", false) as complete, p.turnout_id is not null as is_pending,
+        a.turnout_id is not null and p.turnout_id is null as in_alarm,
+        c.epoch > c.first_epoch as is_later, b.detectable_pct, s.target_pct, s.section_id = '*' as is_whole,
+        "asof" - c.last_at_utc > to_microseconds((86400e6 * s.stale_after_days)::bigint) as is_old,
+        s.section_id <> '*' and (
+            coalesce(len(v.hz) >= 8 and list_max(v.hz) - list_min(v.hz) < 0.001, false)
+            or not coalesce(b.sd_pct > 0.1 / b.frequency_hz, b.sd_pct > 0, false)
+        ) as is_stuck
+    from chart_status s
+    left join counted c using (turnout_id, section_id, band, source)
+    left join last_eight v using (turnout_id, section_id, band, source)
+    left join pending p using (turnout_id, section_id, band, source)
+    left join alarmed a using (turnout_id, section_id, band, source)
+    left join baselines b
+        on b.turnout_id = s.turnout_id and b.section_id = s.section_id and b.band = s.band and b.source = s.source
+            and b.epoch = c.epoch
+    where "asof" < newest_charted()
+),
+judged as (
+    select
+        *,
+        case
+            when last_at_utc is null and is_whole then 'too_few_sections'
+            when last_at_utc is null then 'never'
+            when is_old then 'too_long_ago'
+            when complete and is_stuck then 'constant'
+            when in_alarm then 'threshold_crossed'
+            when not complete and 2 * n_cold > n_campaigns then 'no_temperature'
+            when not complete and is_whole and n_baseline = 0 then 'too_few_sections'
+            when not complete then 'baseline'
+            when is_pending or (is_later and n_learned < n_needed) then 'after_event'
+            when not coalesce(detectable_pct <= target_pct, false) then 'too_noisy'
+            else ''
+        end as reason
+    from known
+)
+select
+    turnout_id, section_id, band, source,
+    case reason
+        when 'never' then 'not_measured'
+        when 'too_long_ago' then 'not_measured'
+        when 'threshold_crossed' then 'alarm'
+        when 'baseline' then 'learning'
+        when 'after_event' then 'learning'
+        when '' then 'ok'
+        else 'cannot_tell'
+    end as state,
+    reason, last_at_utc as last_measured_at_utc, n_campaigns, n_baseline, n_learned, n_needed, complete,
+    n_cold as without_temperature,
+    case when complete and reason <> 'after_event' then detectable_pct end as detectable_pct, target_pct
+from judged
+union all by name
+select
+    turnout_id, section_id, band, source, state, reason, last_measured_at_utc, n_campaigns, n_baseline, n_learned,
+    n_needed, complete, without_temperature, detectable_pct, target_pct
+from chart_status
+where coalesce("asof" >= newest_charted(), true);

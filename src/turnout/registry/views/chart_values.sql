@@ -1,0 +1,10 @@
+-- One row per chart and campaign: the values that the charts are made of, with their own error bars.
+-- source hammer: modes of hammer tests, method joint. source passage: passage_values. Never one chart.
+-- needs: modes_current, passage_values
+create or replace view chart_values as
+select
+    turnout_id, section_id, band, source, measured_at_utc, frequency_hz, frequency_se_hz, rail_temperature_c
+from modes_current
+where source = 'hammer' and coalesce(method, 'joint') = 'joint'
+union all
+select * from passage_values;

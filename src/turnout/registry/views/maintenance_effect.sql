@@ -1,0 +1,72 @@
+-- One row per event and chart that it reset: did the work help, by how much, and for how long.
+-- gain_pct: level of the eight campaigns after the event minus that of the eight before. held_until_utc: first
+-- campaign at which the mean of eight has lost half of a gain again; empty = it holds, until last_measured_at_utc.
+create or replace view maintenance_effect as
+with values_pct as (
+    select
+        c.turnout_id, c.section_id, c.band, c.source, c.measured_at_utc, c.epoch,
+        b.epoch_start_utc, b.sd_alone_pct * sqrt((1 + b.phi) / (1 - b.phi)) as sd_pct,
+        c.residual_pct + b.level_pct as value_pct,
+        avg(c.residual_pct + b.level_pct) over eight as mean_of_eight,
+        row_number() over epoch_order as place,
+        row_number() over (
+            partition by c.turnout_id, c.section_id, c.band, c.source, c.epoch order by c.measured_at_utc desc
+        ) as place_from_end
+    from charts c
+    join baselines b using (turnout_id, section_id, band, source, epoch)
+    where c.residual_pct is not null
+    window
+        epoch_order as (
+            partition by c.turnout_id, c.section_id, c.band, c.source, c.epoch order by c.measured_at_utc
+        ),
+        eight as (
+            partition by c.turnout_id, c.section_id, c.band, c.source, c.epoch order by c.measured_at_utc
+            rows between 7 preceding and current row
+        )
+),
+levels as (
+    select
+        turnout_id, section_id, band, source, epoch,
+        any_value(epoch_start_utc) as epoch_start_utc, max(sd_pct) as sd_pct, max(measured_at_utc) as last_at,
+        avg(value_pct) filter (where place <= 8) as first_pct, count(*) filter (where place <= 8) as n_first,
+        avg(value_pct) filter (where place_from_end <= 8) as last_pct,
+        count(*) filter (where place_from_end <= 8) as n_last
+    from values_pct
+    group by all
+),
+pairs as (
+    select
+        l.turnout_id, l.section_id, l.band, l.source, l.epoch, l.epoch_start_utc, l.last_at,
+        b.last_pct as before_pct, l.first_pct as after_pct, b.n_last as n_before, l.n_first as n_after,
+        1.96 * l.sd_pct * sqrt(1 / b.n_last + 1 / l.n_first) as half
+    from levels l
+    join levels b
+        on l.turnout_id = b.turnout_id and l.section_id = b.section_id and l.band = b.band and l.source = b.source
+            and b.epoch = l.epoch - 1
+),
+lost as (
+    select p.turnout_id, p.section_id, p.band, p.source, p.epoch, min(v.measured_at_utc) as held_until_utc
+    from pairs p
+    join values_pct v using (turnout_id, section_id, band, source, epoch)
+    where v.place > 8 and p.after_pct - p.before_pct > p.half
+        and v.mean_of_eight < (p.before_pct + p.after_pct) / 2
+    group by all
+)
+select
+    p.turnout_id, p.section_id, p.band, p.source, p.epoch_start_utc as event_at_utc,
+    (
+        select string_agg(distinct e.kind, ', ' order by e.kind) from events e
+        where e.turnout_id = p.turnout_id and coalesce(e.section_id, p.section_id) = p.section_id
+            and e.event_at_utc = p.epoch_start_utc
+    ) as kinds,
+    n_before, n_after, after_pct - before_pct as gain_pct, after_pct - before_pct - half as gain_low_pct,
+    after_pct - before_pct + half as gain_high_pct,
+    case
+        when after_pct - before_pct > half then 'stiffer'
+        when after_pct - before_pct < -half then 'softer'
+        else 'cannot tell'
+    end as verdict,
+    l.held_until_utc,
+    p.last_at as last_measured_at_utc
+from pairs p
+left join lost l using (turnout_id, section_id, band, source, epoch);

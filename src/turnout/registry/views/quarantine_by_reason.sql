@@ -1,0 +1,6 @@
+-- One row per turnout, kind and reason: how much is in quarantine now.
+-- needs: quarantine_open
+create or replace view quarantine_by_reason as
+select turnout_id, kind, reason_code, reason, count(*) as n, min(path) as first_path
+from quarantine_open
+group by turnout_id, kind, reason_code, reason;

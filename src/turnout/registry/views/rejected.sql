@@ -1,0 +1,26 @@
+-- One row per thing that was not used: impact, model, passage, fit or recording, with its reason and the number behind it.
+-- needs: impacts_current, models_current, passages_current, passage_fits_current, quarantine_open
+create or replace view rejected as
+with everything as (
+    select
+        'impact' as what, impact_id as id, turnout_id, section_id, try_cast(right(campaign_id, 10) as timestamp) as at_utc,
+        reason as reason_code, measured_value, limit_value, detail
+    from impacts_current where status = 'rejected'
+    union all
+    select 'model', model_id, turnout_id, section_id, measured_at_utc, reason, measured_value, limit_value, detail
+    from models_current where status = 'rejected'
+    union all
+    select 'passage', passage_id, turnout_id, null, passed_at_utc, reason, null, null, detail
+    from passages_current where status = 'rejected'
+    union all
+    select
+        'fit', passage_id, turnout_id, section_id, passed_at_utc, status, fit_pct, fit_null_pct, 'sensor ' || channel
+    from passage_fits_current where status <> 'accepted'
+    union all
+    select
+        'recording', quarantine_id, turnout_id, section_id, null, reason_code, measured_value, threshold,
+        path || coalesce(', ' || place, '') || ': ' || coalesce(found, '')
+    from quarantine_open
+)
+select e.*, r.meaning as reason
+from everything e left join reasons r using (reason_code);

@@ -1,0 +1,12 @@
+-- One row per campaign of one section and resonance: its chart, with epochs, oldest first.
+-- needs: epochs
+create or replace macro section_trend(section, resonance) as table
+select
+    m.measured_at_utc, m.frequency_hz, m.frequency_se_hz, m.damping_ratio, m.damping_se, m.n_impacts,
+    m.rail_temperature_c, m.source, coalesce(e.epoch, 0) as epoch, e.event_at_utc as epoch_start_utc,
+    e.kind as epoch_kind, m.model_id
+from modes_current m
+    asof left join (select * from resets r where r.section_id = section and r.band = resonance) e
+    on m.section_id = e.section_id and m.band = e.band and m.measured_at_utc >= e.event_at_utc
+where m.section_id = section and m.band = resonance and m.method is distinct from 'paper'
+order by m.measured_at_utc, m.source;

@@ -1,0 +1,10 @@
+-- One row per id that no longer counts: the last word of supersedes about it.
+create or replace view superseded as
+select
+    old_id,
+    arg_max(new_id, generation) as new_id,
+    arg_max(kind, generation) as kind,
+    arg_max(reason, generation) as reason
+from supersedes
+group by old_id
+having arg_max(reason, generation) <> 'reinstated';

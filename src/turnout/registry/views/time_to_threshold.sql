@@ -1,0 +1,16 @@
+-- One row per flagged chart: when its resonance reaches the limit, as an interval of dates, or why there is none.
+-- 80 % interval; a latest date only where a line beats a curve that settles.
+create or replace view time_to_threshold as
+select
+    turnout_id, section_id, band, source, change_pct, change_low_pct, change_high_pct,
+    forecast_slope_pct_per_year as slope_pct_per_year, forecast_slope_se_pct_per_year as slope_se_pct_per_year,
+    forecast, not_before_utc, not_after_utc,
+    case forecast
+        when 'settling' then 'no date: the values settle'
+        when 'too_short' then 'too early for a date'
+        when 'no_limit' then 'no limit in sight'
+        else 'not before ' || strftime(not_before_utc, '%Y-%m-%d')
+            || coalesce(', by ' || strftime(not_after_utc, '%Y-%m-%d') || ' if it goes on like this', ', no latest date')
+    end as words
+from chart_status
+where forecast is not null;

@@ -1,0 +1,198 @@
+-- One row per thing to do, at most twenty, the most certain first: the list of the morning after `asof`.
+-- asof at or after the newest measurement uses everything; an earlier one uses only what was measured by then
+-- (change and date then come from the sums alone, and a slow drift is not among the plans).
+-- needs: chart_states, cannot_see, chart_status_at
+create or replace macro worklist("asof") as table
+with then_status as (select * from chart_status_at("asof")),
+recent as (
+    select
+        a.alarm_id, a.turnout_id, a.section_id, a.band, a.source, a.direction, a.raised_at_utc, a.began_at_utc,
+        a.threshold, c.residual_pct, c.measured_at_utc,
+        case a.direction when 'down' then c.cusum_down else c.cusum_up end as statistic,
+        b.sd_pct * sqrt((1 + b.phi) / (1 - b.phi)) as sd_pct,
+        row_number() over (partition by a.alarm_id order by c.measured_at_utc desc) as place
+    from alarms a
+    join charts c using (turnout_id, section_id, band, source)
+    join baselines b using (turnout_id, section_id, band, source, epoch)
+    join then_status n on n.turnout_id = a.turnout_id and n.section_id = a.section_id and n.band = a.band
+        and n.source = a.source and n.state = 'alarm'
+    where a.raised_at_utc <= "asof" and coalesce(a.closed_at_utc > "asof", true) and c.measured_at_utc <= "asof"
+        and c.residual_pct is not null and c.measured_at_utc > coalesce(a.began_at_utc, a.raised_at_utc - interval 1 day)
+),
+raised as (
+    select
+        turnout_id, section_id, band, source, max_by(direction, statistic / threshold) as direction,
+        max(raised_at_utc) as raised_at_utc, min(began_at_utc) as began_at_utc,
+        max(statistic / threshold) filter (where place = 1) as ratio,
+        avg(residual_pct) filter (where place <= 8) as change_pct,
+        1.96 * max(sd_pct) / sqrt(count(*) filter (where place <= 8)) as half
+    from recent
+    group by turnout_id, section_id, band, source
+),
+spoken as (
+    select
+        r.*,
+        (
+            select max_by(k.by_whom || ': ' || k.reason, k.at_utc) from acknowledgements k
+            where k.turnout_id = r.turnout_id and coalesce(k.section_id, r.section_id) = r.section_id
+                and coalesce(k.band, r.band) = r.band and k.action = 'acknowledge'
+                and k.at_utc >= r.raised_at_utc and k.at_utc <= "asof"
+        ) as acknowledged
+    from raised r
+),
+alarmed as (
+    select
+        r.turnout_id, r.section_id, r.band, r.source,
+        case when r.acknowledged is null then 'inspect this week' else 'plan' end as state,
+        r.direction, r.raised_at_utc, r.ratio, r.acknowledged,
+        s.change_pct is not null and "asof" >= s.last_measured_at_utc as told,
+        case when told then s.change_pct else r.change_pct end as change_pct,
+        case when told then s.change_low_pct else r.change_pct - r.half end as low_pct,
+        case when told then s.change_high_pct else r.change_pct + r.half end as high_pct,
+        case when told then s.since_at_utc else r.began_at_utc end as since_at_utc,
+        case when told then s.since_earliest_utc end as since_earliest_utc,
+        case when told then s.since_latest_utc end as since_latest_utc,
+        null::varchar as why
+    from spoken r
+    left join chart_states s using (turnout_id, section_id, band, source)
+),
+drifting as (
+    select
+        turnout_id, section_id, band, source, 'plan' as state, direction, null::timestamp as raised_at_utc,
+        statistic_ratio as ratio, null::varchar as acknowledged, change_pct, change_low_pct as low_pct,
+        change_high_pct as high_pct, since_at_utc, since_earliest_utc, since_latest_utc, null::varchar as why
+    from chart_states s
+    where state = 'plan' and "asof" >= newest_charted()
+        and not exists (
+            select 1 from alarmed a
+            where a.turnout_id = s.turnout_id and a.section_id = s.section_id and a.band = s.band
+                and a.source = s.source
+        )
+),
+silent as (
+    select
+        turnout_id, section_id, band, source, state, null::varchar as direction, null::timestamp as raised_at_utc,
+        null::double as ratio, null::varchar as acknowledged, null::double as change_pct, null::double as low_pct,
+        null::double as high_pct, null::timestamp as since_at_utc, null::timestamp as since_earliest_utc,
+        null::timestamp as since_latest_utc, why
+    from cannot_see("asof") c
+    where section_id <> '*' and state in ('learning', 'cannot tell')
+        and not exists (
+            select 1 from alarmed a
+            where a.turnout_id = c.turnout_id and a.section_id = c.section_id and a.band = c.band
+                and a.source = c.source
+        )
+),
+everything as (
+    select * from alarmed union all by name select * from drifting union all by name select * from silent
+),
+heard as (
+    select e.*
+    from everything e
+    where not exists (
+        select 1 from acknowledgements k
+        where k.turnout_id = e.turnout_id and coalesce(k.section_id, e.section_id) = e.section_id
+            and coalesce(k.band, e.band) = e.band and k.action = 'suppress' and k.at_utc <= "asof"
+            and coalesce(k.until_utc, timestamp '9999-01-01') > least("asof", newest_charted())
+    )
+),
+listed as (
+    select
+        *, case when section_id = '*' then 'whole turnout' else split_part(section_id, '/', -1) end as sections
+    from heard
+    where why is null
+    union all by name
+    select
+        turnout_id, case when count(*) = 1 then min(section_id) end as section_id,
+        string_agg(split_part(section_id, '/', -1), ', ' order by section_id) as sections, band, source, state,
+        (case when count(distinct why) = 1 then '' else split_part(min(section_id), '/', -1) || ': ' end)
+            || min_by(why, section_id)
+            || (case when count(distinct why) = 1 then '' else '; the others alike, see cannot_see()' end) as why
+    from heard
+    where why is not null
+    group by turnout_id, band, source, state
+),
+fleet as (
+    select
+        count(*) as n_charts, sum(s.campaigns_per_year * (1 / s.run_length_down + 1 / s.run_length_up)) as alarms_per_year
+    from chart_status s
+    join then_status n using (turnout_id, section_id, band, source)
+    where n.complete
+),
+maintenance as (
+    select
+        h.turnout_id, h.sections, h.band, h.source, h.state,
+        max_by(replace(e.kind, '_', ' ') || ' ' || strftime(e.event_at_utc, '%Y-%m-%d'), e.event_at_utc) as last_work
+    from listed h
+    join events e
+        on e.turnout_id = h.turnout_id and e.event_at_utc <= "asof"
+            and (h.section_id = '*' or e.section_id is null
+                or list_contains(string_split(h.sections, ', '), split_part(e.section_id, '/', -1)))
+    group by all
+)
+select
+    row_number() over importance as rank,
+    h.turnout_id, h.section_id, h.sections, h.band, h.source, h.state, h.direction, h.raised_at_utc, h.since_at_utc,
+    h.since_earliest_utc, h.since_latest_utc, h.change_pct, h.low_pct as change_low_pct,
+    h.high_pct as change_high_pct, h.ratio as statistic_ratio,
+    case
+        when h.why is not null then h.why
+        else (case when h.band = 'amplitude' then 'acceleration under trains, ' else h.band || ' resonance of ' end)
+            || (case when h.section_id = '*' then 'the whole turnout' else split_part(h.section_id, '/', -1) end)
+            || (case when not coalesce(h.told, true) then ', mean of its last campaigns since the sum began to grow,' else '' end)
+            || (case when h.change_pct < 0 then ' fell by ' else ' rose by ' end)
+            || printf('%.1f %% (%.1f to %.1f, 95 %%)', abs(h.change_pct),
+                least(abs(h.low_pct), abs(h.high_pct)) * (case when h.low_pct * h.high_pct < 0 then -1 else 1 end),
+                greatest(abs(h.low_pct), abs(h.high_pct)))
+            || coalesce(', since ' || strftime(h.since_at_utc, '%Y-%m-%d')
+                || coalesce(' (' || strftime(h.since_earliest_utc, '%Y-%m-%d') || ' to '
+                    || strftime(h.since_latest_utc, '%Y-%m-%d') || ')', ''), '')
+            || (case when h.source = 'passage' then '; from passages' else '; from hammer tests' end)
+            || (case when h.band in ('ballast', 'railpad') then '; stiffness changes about twice as much' else '' end)
+            || coalesce('; acknowledged by ' || h.acknowledged, '')
+    end as sentence,
+    case
+        when h.raised_at_utc is not null then
+            'a sound chart does this once in '
+            || printf('%.0f campaigns', case when h.direction = 'up' then s.run_length_up else s.run_length_down end)
+            || coalesce(printf(' (%.0f years)', case when h.direction = 'up' then s.run_length_up else s.run_length_down end
+                / nullif(s.campaigns_per_year, 0)), '')
+            || '; in all ' || f.n_charts || ' charts expect '
+            || case
+                when f.alarms_per_year < 10 then printf('%.1f', f.alarms_per_year)
+                else printf('%.0f', f.alarms_per_year)
+            end || ' such alarms a year'
+        when h.state = 'plan' then
+            printf('one in ten of the drifts reported is expected to be false; this one: adjusted p = %.2g', s.drift_q)
+        else 'no statement'
+    end as false_alarm_words,
+    m.last_work as last_maintenance,
+    case
+        when h.state = 'learning' then 'nothing: measure again as planned'
+        when h.state = 'cannot tell' then 'the measurement: more impacts per campaign, rail temperature, sensor'
+        when h.section_id = '*' then 'what all sections share: thermometer, hammer and method first, then drainage'
+        when h.band = 'ballast' and h.direction = 'down' then 'voids and wet or fouled ballast under these sleepers'
+        when h.band = 'ballast' then 'frost, or tamping that is not in the events'
+        when h.band = 'railpad' and h.direction = 'down' then 'worn, cracked or displaced pads, loose fastenings'
+        when h.band = 'railpad' then 'pads exchanged or hardened; an exchange that is not in the events'
+        when h.band = 'amplitude' then 'running surface, fastenings and voids; the mounting of the sensor'
+        else 'the section'
+    end as look_at,
+    t.name, t.line, t.km
+from listed h
+left join chart_status s
+    on s.turnout_id = h.turnout_id and s.section_id = h.section_id and s.band = h.band and s.source = h.source
+left join maintenance m
+    on m.turnout_id = h.turnout_id and m.sections = h.sections and m.band = h.band and m.source = h.source
+        and m.state = h.state
+left join turnouts t on t.turnout_id = h.turnout_id
+cross join fleet f
+window importance as (
+    order by
+        case h.state when 'inspect this week' then 0 when 'plan' then 1 when 'cannot tell' then 2 else 3 end,
+        h.ratio desc nulls last, h.turnout_id, h.sections, h.band, h.source
+)
+qualify rank <= 20
+order by rank;
+
+create or replace view worklist as select * from worklist(newest_measurement());

@@ -1,0 +1,62 @@
+"""The first page: tomorrow's list, every turnout in one line, and what was not used."""
+
+from collections import Counter
+
+from turnout.errors import REASONS
+from turnout.report.words import badge, day
+
+STATES = {
+    "inspect this week": "inspect",
+    "plan": "plan",
+    "learning": "learning",
+    "cannot tell": "cannot_tell",
+    "not measured": "not_measured",
+    "suppressed": "suppressed",
+    "ok": "ok",
+}
+
+
+def fleet_page(source, template, shared):
+    """HTML of the fleet's page from a FleetSource."""
+    turnouts, worklist, reasons = source.turnouts(), source.worklist(), source.reasons()
+    states: dict[str, dict[str, int]] = {}
+    counts: Counter[str] = Counter()
+    for row in source.states():
+        states.setdefault(row["turnout_id"], {})[row["state"]] = row["n"]
+        counts[row["state"]] += row["n"]
+    return template.render(
+        n_turnouts=len(turnouts),
+        n_sections=sum(t["n_sections"] for t in turnouts),
+        latest=day(max((t["latest"] for t in turnouts if t["latest"]), default=None)),
+        count={key: counts[state] for state, key in STATES.items()},
+        n_quarantined=sum(r["rows"] for r in reasons),
+        worklist=[_work(w) for w in worklist],
+        turnouts=[_line(t, states.get(t["turnout_id"], {})) for t in turnouts],
+        reasons=[r | {"meaning": REASONS.get(r["reason"], "")} for r in reasons],
+        **shared,
+    )
+
+
+def _work(row):
+    return {
+        "turnout_id": row["turnout_id"],
+        "label": row["sections"],
+        "anchor": (row["section_id"] or "").split("/")[-1].replace("*", ""),
+        "band": row["band"],
+        "state": row["state"],
+        "badge": badge(row["state"]),
+        "what": row["sentence"],
+        "how_sure": row["false_alarm_words"],
+        "maintenance": row["last_maintenance"] or "none known",
+        "look_at": row["look_at"],
+    }
+
+
+def _line(turnout, states):
+    place = (turnout["line"], None if turnout["km"] is None else f"{turnout['km']:.3f}")
+    return turnout | {
+        "name": turnout["name"] or "",
+        "place": ", ".join(p for p in place if p),
+        "latest": day(turnout["latest"]),
+        "states": ", ".join(f"{states[s]} {s}" for s in STATES if s in states) or "–",
+    }

@@ -1,0 +1,178 @@
+"""The page of one turnout: where it stands, how its resonances moved, and the evidence behind the latest values."""
+
+from collections import Counter
+
+from turnout.report.panels.decay import decay_panel
+from turnout.report.panels.diagram import diagram
+from turnout.report.panels.history import history_panel
+from turnout.report.panels.impacts import impacts_panel
+from turnout.report.panels.receptance import coherence_panel, receptance_panel
+from turnout.report.panels.scores import scores_panel
+from turnout.report.panels.stabilisation import stabilisation_panel
+from turnout.report.words import badge, day, with_interval
+
+BANDS = ("ballast", "railpad")
+PANELS = {
+    "OT": "open track",
+    "SP": "switch panel",
+    "CLP": "closure panel",
+    "CP": "crossing panel",
+    "AS": "after the crossing",
+}
+
+
+def turnout_page(rows, turnout, template, shared):
+    """HTML of one turnout.
+
+    ``rows`` maps each kind of ``source.ROWS`` to this turnout's rows, ``turnout`` is its row of ``turnouts``,
+    ``template`` the compiled page, ``shared`` what every page shows.
+    """
+    models = {m["section_id"]: m for m in rows["models"]}
+    states = _worst_states(rows["chart_states"])
+    return template.render(
+        turnout=turnout,
+        place=_place(turnout),
+        latest=day(max((m["measured_at_utc"] for m in models.values()), default=None)),
+        diagram=diagram(rows["sections"], states) if rows["sections"] else "",
+        findings=[_finding(w) for w in rows["worklist"]],
+        summary=[_summary(s, models.get(s["section_id"]), _of(rows, "modes", s)) for s in rows["sections"]],
+        sections=[_section(rows, s, models, states) for s in rows["sections"]],
+        trains=[_train(p) for p in rows["passages"]],
+        scores="".join(scores_panel(score, rows["scores"], rows["sections"]) for score in ("fit", "forecast")),
+        findings_of_scores=_score_words(rows["scores"]),
+        quarantine=rows["quarantine"],
+        events=[_event(e) for e in rows["events"]],
+        **shared,
+    )
+
+
+def _of(rows, kind, section):
+    """Rows of one kind that belong to one section."""
+    return [r for r in rows[kind] if r["section_id"] == section["section_id"]]
+
+
+def _finding(work):
+    return {"state": work["state"], "badge": badge(work["state"]), "words": work["sentence"]}
+
+
+def _place(turnout):
+    parts = [
+        f"line {turnout['line']}," if turnout["line"] else "",
+        "" if turnout["km"] is None else f"km {turnout['km']:.3f};",
+    ]
+    return " ".join(p for p in parts if p)
+
+
+def _latest(modes, band, model):
+    """The mode of ``band`` that belongs to the latest model, or None."""
+    return next((m for m in modes if m["band"] == band and model and m["model_id"] == model["model_id"]), None)
+
+
+def _summary(section, model, modes):
+    row = {"label": section["label"], "panel": section["panel"], "n": 0, "when": "–", "status": "not measured"}
+    if model:
+        row |= {"n": model["n_impacts_used"], "when": day(model["measured_at_utc"])}
+        row["status"] = model["status"].replace("_", " ") + (f": {model['reason']}" if model["reason"] else "")
+    for band in BANDS:
+        mode = _latest(modes, band, model) or {}
+        n = mode.get("n_impacts", 0)
+        row[band] = with_interval(mode.get("frequency_hz"), mode.get("frequency_se_hz"), n)
+        row[f"{band}_damping"] = with_interval(mode.get("damping_ratio"), mode.get("damping_se"), n, 4)
+    return row
+
+
+def _section(rows, section, models, states):
+    key = section["section_id"]
+    model, modes = models.get(key), _of(rows, "modes", section)
+    receptance = next(iter(_of(rows, "receptances", section)), None)
+    charts, events = _of(rows, "charts", section), [e for e in rows["events"] if e["section_id"] in (None, key)]
+    history = "".join(
+        history_panel(
+            band,
+            [m for m in modes if m["band"] == band],
+            [c for c in charts if c["band"] == band],
+            events,
+        )
+        for band in BANDS
+    )
+    return {
+        "label": section["label"],
+        "panel": PANELS.get(section["panel"], "panel not configured"),
+        "track": section["track"],
+        "position": f"{section['position_m']:.1f}" if section["position_m"] is not None else "–",
+        "open": states.get(key) in ("inspect this week", "plan"),
+        "when": day(model["measured_at_utc"]) if model else "none",
+        "history": history or "<p>No model yet.</p>",
+        "panels": _panels(rows, section, model, receptance, modes) if model and receptance else "",
+        "detail": model["detail"] if model else "",
+    }
+
+
+def _panels(rows, section, model, receptance, modes):
+    current = [m for m in modes if m["model_id"] == model["model_id"]]
+    return "".join(
+        [
+            receptance_panel(receptance, current),
+            coherence_panel(receptance),
+            decay_panel(receptance, model),
+            stabilisation_panel(receptance, current),
+            impacts_panel(_of(rows, "impacts", section)),
+        ]
+    )
+
+
+def _worst_states(charts):
+    order = ["inspect this week", "plan", "cannot tell", "learning", "not measured", "suppressed", "ok"]
+    worst: dict[str, str] = {}
+    for chart in charts:
+        if chart["state"] in order:
+            known = worst.get(chart["section_id"], "ok")
+            worst[chart["section_id"]] = min(known, chart["state"], key=order.index)
+    return worst
+
+
+def _train(passage):
+    """One passage in words."""
+    speed, error = passage["speed_kmh"], passage["speed_se_kmh"]
+    load, load_error = passage["axle_load_t"], passage["axle_load_se_t"]
+    said = {"speed": passage["speed_listed_kmh"], "type": passage["train_type_listed"]}
+    return {
+        "when": f"{passage['passed_at_utc']:%Y-%m-%d %H:%M}",
+        "type": passage["train_type"] or "unknown",
+        "listed": ", ".join(f"{v:g} km/h" if k == "speed" else v for k, v in said.items() if v) or "–",
+        "axles": passage["n_axles"] or "–",
+        "speed": "–" if speed is None else f"{speed:.1f} ± {'?' if error is None else f'{1.96 * error:.1f}'}",
+        "load": "not available"
+        if load is None
+        else f"{load:.1f} ± {'?' if load_error is None else f'{1.96 * load_error:.1f}'}",
+        "way": f"{passage['direction'] or 'unknown'}, {passage['track'] or 'unknown'}",
+        "status": passage["status"] + (f": {passage['detail']}" if passage["detail"] else ""),
+    }
+
+
+def _with_error(value, standard_error):
+    return f"{value:.1f} ± {'?' if standard_error is None else f'{1.96 * standard_error:.1f}'}"
+
+
+def _score_words(scores):
+    """What the scores are worth: how many of them their null or the test of the impulse explains."""
+    if not scores:
+        return ""
+    counts = Counter(s["status"] for s in scores)
+    n_passage = len({s["passage_id"] for s in scores})
+    return (
+        f"{len(scores)} scores of {n_passage} passages: {counts['accepted']} mean something; "
+        f"{counts['null_explains']} lie inside what random models reach; {counts['not_an_impulse']} fail the test "
+        "that a wheel acts as one impulse at the sensor: no score of theirs says anything about the model."
+    )
+
+
+def _event(event):
+    resets = [band for band in BANDS if event[f"resets_{band}"]]
+    return {
+        "day": day(event["event_at_utc"]),
+        "section": (event["section_id"] or "/all").split("/")[-1],
+        "kind": event["kind"].replace("_", " "),
+        "resets": ", ".join(resets) or "nothing",
+        "note": event["note"] or "",
+    }

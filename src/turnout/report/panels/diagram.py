@@ -1,0 +1,81 @@
+"""The turnout as a line drawing with its measured sections, coloured by state, hatched where nothing can be said."""
+
+from html import escape
+
+STYLE = {
+    "inspect this week": "state-inspect",
+    "plan": "state-plan",
+    "learning": "state-learning",
+    "ok": "state-ok",
+    "cannot tell": "state-unknown",
+    "not measured": "state-unknown",
+    "suppressed": "state-unknown",
+}
+
+
+def diagram(sections, states, width=920, height=200):
+    """``sections`` rows of ``sections``; ``states`` maps section_id to a state of the worklist."""
+    positions = [s["position_m"] or 0.0 for s in sections]
+    low, high = min(positions) - 4.0, max(positions) + 4.0
+    toe = min([s["position_m"] or 0.0 for s in sections if s["panel"] == "SP"] or [low + (high - low) * 0.2])
+
+    def px(metres):
+        return 20 + (width - 40) * (metres - low) / (high - low)
+
+    main, spread = height * 0.36, height * 0.30
+
+    def py(metres, diverging):
+        share = max(0.0, (metres - toe) / (high - toe)) if diverging else 0.0
+        return main + spread * share**1.6
+
+    curve = " ".join(f"L{px(m):.1f} {py(m, True):.1f}" for m in _steps(toe, high))
+    parts = [
+        f'<svg class="diagram" viewBox="0 0 {width} {height}" width="{width}" height="{height}">'
+        '<defs><pattern id="hatch" width="6" height="6" patternUnits="userSpaceOnUse" '
+        'patternTransform="rotate(45)"><rect width="6" height="6" class="hatch-ground"/>'
+        '<path d="M0 0V6" class="hatch-line"/></pattern></defs>'
+        f'<path class="rail" d="M{px(low):.1f} {main}H{px(high):.1f}"/>'
+        f'<path class="rail" d="M{px(toe):.1f} {main} {curve}"/>'
+    ]
+    for section, lift in zip(sections, _lifts(sections, px)):
+        parts.append(_place(section, states, px, py, lift))
+    parts.append(
+        f'<text class="label" x="24" y="{height - 8}">facing direction → , metres from the first sensor</text>'
+    )
+    return "".join(parts) + "</svg>"
+
+
+def _place(section, states, px, py, lift):
+    diverging = section["track"] == "diverging"
+    x, y = px(section["position_m"] or 0.0), py(section["position_m"] or 0.0, diverging)
+    state = states.get(section["section_id"], "not measured")
+    side = 26 + lift if diverging else -24 - lift
+    return (
+        f'<a href="#{escape(section["label"])}"><circle class="{STYLE.get(state, "state-unknown")}" cx="{x:.1f}" '
+        f'cy="{y:.1f}" r="11"><title>{escape(section["label"])}, {escape(section["panel"] or "?")} panel: '
+        f"{escape(state)}</title></circle>"
+        f'<text class="place" x="{x:.1f}" y="{y + side:.1f}" text-anchor="middle">{escape(section["label"])}</text>'
+        f'<text class="tick" x="{x:.1f}" y="{y + side + 11:.1f}" text-anchor="middle">'
+        f"{_metres(section)}</text></a>"
+    )
+
+
+def _metres(section):
+    return "" if section["position_m"] is None else f"{section['position_m']:.0f} m"
+
+
+def _lifts(sections, px, needed=42, height=26):
+    """How far each label must go out of its neighbour's way: every second one of a crowd is lifted."""
+    lifts: list[int] = []
+    last: dict[bool, tuple[float, int]] = {}
+    for section in sections:
+        diverging, x = section["track"] == "diverging", px(section["position_m"] or 0.0)
+        before, lifted = last.get(diverging, (-1e9, 0))
+        lift = height if x - before < needed and not lifted else 0
+        lifts.append(lift)
+        last[diverging] = (x, lift)
+    return lifts
+
+
+def _steps(low, high, n=24):
+    return [low + (high - low) * k / n for k in range(n + 1)]

@@ -1,0 +1,70 @@
+"""One resonance over the years: campaign values with intervals, what was to be expected, events, epochs."""
+
+from datetime import datetime
+
+import numpy as np
+
+from turnout.report.chart import Axis, Chart
+from turnout.report.words import student_quantile
+
+EPOCH = datetime(1970, 1, 1)
+
+
+def history_panel(band, modes, charts, events, width=462):
+    """Frequency over time.
+
+    ``modes`` are rows of ``modes_current`` of one section and band, ``charts`` rows of the trend's chart of
+    the same (may be empty), ``events`` rows of ``events`` that touch the section.
+    """
+    if not modes:
+        return ""
+    time = np.array([_seconds(m["measured_at_utc"]) for m in modes])
+    frequency = np.array([m["frequency_hz"] for m in modes])
+    error = np.array([_half_width(m) for m in modes])
+    low, high = frequency - np.nan_to_num(error), frequency + np.nan_to_num(error)
+    expected = [c for c in charts if c["expected_low_hz"] is not None and c["expected_high_hz"] is not None]
+    lowest = min([low.min(), *(c["expected_low_hz"] for c in expected)])
+    highest = max([high.max(), *(c["expected_high_hz"] for c in expected)])
+    pad, margin = 0.08 * (highest - lowest) + 1e-9, 0.03 * (time.max() - time.min()) + 86400
+    chart = Chart(
+        Axis(time.min() - margin, time.max() + margin, "", "time"),
+        Axis(lowest - pad, highest + pad, f"{band} [Hz]"),
+        f"{band}: {frequency[-1]:.1f} Hz {_interval(error[-1])}, n = {modes[-1]['n_impacts']}; {len(modes)} campaigns",
+        width=width,
+    )
+    if expected:
+        when = [_seconds(c["measured_at_utc"]) for c in expected]
+        lows, highs = [c["expected_low_hz"] for c in expected], [c["expected_high_hz"] for c in expected]
+        chart.band(when, lows, highs, "expected", "expected at this temperature")
+    for row, event in enumerate(events):
+        style = "event" if event[f"resets_{band}"] else "event mild"
+        chart.vertical(_seconds(event["event_at_utc"]), style, event["kind"].replace("_", " "), row % 3)
+    labels = [
+        f"{m['measured_at_utc']:%Y-%m-%d}: {m['frequency_hz']:.2f} Hz {_interval(e)}, damping "
+        f"{m['damping_ratio']:.4f}, n = {m['n_impacts']}, {_temperature(m['rail_temperature_c'])}"
+        for m, e in zip(modes, error)
+    ]
+    alarmed = {c["measured_at_utc"] for c in charts if c["state"].startswith("alarm")}
+    for style, chosen in (("point", False), ("alarm", True)):
+        some = [i for i, m in enumerate(modes) if (m["measured_at_utc"] in alarmed) == chosen]
+        chart.points(time[some], frequency[some], style, 3.0, low[some], high[some], [labels[i] for i in some])
+    return chart.svg()
+
+
+def _seconds(when):
+    return (when - EPOCH).total_seconds()
+
+
+def _half_width(mode):
+    """Half of the 95 % t interval, nan where the campaign has no standard error."""
+    if mode["frequency_se_hz"] is None or mode["n_impacts"] < 2:
+        return np.nan
+    return student_quantile(mode["n_impacts"]) * mode["frequency_se_hz"]
+
+
+def _interval(half):
+    return f"± {half:.2g} (95 %)" if np.isfinite(half) else "± unknown"
+
+
+def _temperature(value):
+    return "no temperature" if value is None else f"{value:.0f} °C"

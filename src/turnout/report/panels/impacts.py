@@ -1,0 +1,23 @@
+"""The impacts of a campaign by peak force: which were used, which were not and why."""
+
+from turnout.report.chart import Axis, Chart
+
+
+def impacts_panel(rows):
+    """``rows`` of ``impacts`` of one section and campaign, in order of test and record."""
+    if not rows:
+        return ""
+    peaks = [abs(r["peak_n"] or 0.0) / 1e3 for r in rows]
+    used = sum(r["status"] == "accepted" for r in rows)
+    chart = Chart(
+        Axis(0.0, len(rows) + 1.0, "impact"),
+        Axis(0.0, 1.15 * max([*peaks, 1e-3]), "peak force [kN]"),
+        f"Impacts: {used} used, {len(rows) - used} rejected",
+        height=190,
+    )
+    for i, (row, peak) in enumerate(zip(rows, peaks), start=1):
+        accepted = row["status"] == "accepted"
+        words = "used" if accepted else f"rejected: {row['reason']}. {row['detail'] or ''}"
+        label = f"test {row['test']}, record {row['record']}: {peak:.1f} kN, {words}"
+        chart.points([i], [peak], "used" if accepted else "rejected", 3.5, labels=[label])
+    return chart.svg()

@@ -1,0 +1,136 @@
+"""Figures of the simulation: receptances, a passage wheel by wheel, two sensors in two bands, decay rates."""
+
+from pathlib import Path
+
+import numpy as np
+
+SPEED = 160.0 / 3.6
+SENSORS = (("A1", 0.6), ("A4", 9.0), ("A7", 24.6), ("nose", 26.7), ("A11", 36.0))
+LOW, HIGH = (0.0, 40.0), (40.0, 1000.0)
+
+
+def draw_all(folder):
+    """Draw every figure into ``folder``; yields the paths, SVG."""
+    import matplotlib
+
+    matplotlib.use("svg")
+    matplotlib.rcParams.update({"svg.hashsalt": "turnout", "font.size": 9, "axes.grid": True, "grid.alpha": 0.3})
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    recording, truth = _passage()
+    yield _save(_receptances(), folder / "simulation_receptance.svg")
+    yield _save(_passage_forces(recording, truth), folder / "simulation_passage.svg")
+    yield _save(_two_sensors(recording), folder / "simulation_two_bands.svg")
+    yield _save(_closed_form(), folder / "simulation_closed_form.svg")
+
+
+def _save(figure, path):
+    import matplotlib.pyplot as plt
+
+    figure.savefig(path, metadata={"Date": None})
+    plt.close(figure)
+    return path
+
+
+def _passage():
+    from turnout.simulate import Sensor, load_track, load_vehicle, simulate_passage
+
+    sensors = [Sensor(name, place, "rail web", noise=0.05) for name, place in SENSORS]
+    return simulate_passage(load_track("tommerup"), load_vehicle("ic3", 0.5), SPEED, sensors, seed=1, truth=True)
+
+
+def _receptances():
+    """Receptance of the track, and what the hammer chain makes of ten simulated blows, at four sections."""
+    import matplotlib.pyplot as plt
+
+    from turnout.config.settings.receptance import ReceptanceSettings
+    from turnout.receptance import find_impacts, receptance_of
+    from turnout.simulate import load_track, simulate_hammer
+    from turnout.simulate.frequency import receptance
+    from turnout.simulate.hammer import located
+    from turnout.simulate.matrices import assemble
+
+    turnout, settings = load_track("tommerup"), ReceptanceSettings()
+    printed = {"OT": (154.6, 611.6), "CLP": (105.9, 407.6), "A7": (99.6, 616.4), "ASD": (131.3, 692.6)}
+    figure, axes = plt.subplots(2, 2, figsize=(8.5, 6.0), sharex=True, layout="constrained")
+    for axis, (name, modes) in zip(axes.flat, printed.items()):
+        place, track = located(turnout, name)
+        blows = simulate_hammer(turnout, name, n_blows=10, duration=0.3)
+        found = receptance_of([i for i in find_impacts(blows, "hammer", "acc_1", settings) if i.accepted], settings)
+        inside = (found.frequency > 30.0) & (found.frequency < 900.0)
+        exact = receptance(assemble(track), found.frequency[inside], place, place)
+        axis.semilogy(found.frequency[inside], np.abs(exact), lw=2.5, color="0.75", label="track, frequency domain")
+        axis.semilogy(found.frequency[inside], np.abs(found.h1[inside]), lw=0.9, color="C0", label="H1 of ten blows")
+        for mode in modes:
+            axis.axvline(mode, color="C3", lw=0.8, ls="--", label="paper, table 3" if mode == modes[0] else None)
+        axis.set_title(name)
+    axes[0, 0].legend()
+    for axis in axes[:, 0]:
+        axis.set_ylabel("|receptance| [m/N]")
+    for axis in axes[1]:
+        axis.set_xlabel("frequency [Hz]")
+    return figure
+
+
+def _passage_forces(recording, truth):
+    """Acceleration at the crossing and the contact force of every wheel over its place."""
+    import matplotlib.pyplot as plt
+
+    figure, (top, bottom) = plt.subplots(2, 1, figsize=(8.5, 6.5), layout="constrained")
+    time = truth.time
+    top.plot(time, recording.signal("nose"), lw=0.5)
+    top.set(xlabel="time [s]", ylabel="acceleration [m/s²]", title="IC3 at 160 km/h, rail at the crossing nose")
+    for wheel in range(truth.force.shape[0]):
+        near = np.abs(truth.wheel_place[wheel] - 26.7) < 1.6
+        bottom.plot(truth.wheel_place[wheel, near], truth.force[wheel, near] / 1e3, lw=0.8, label=f"wheel {wheel + 1}")
+    bottom.set(xlabel="place [m]", ylabel="contact force [kN]", title="every wheel at the crossing (nose at 26.7 m)")
+    bottom.legend(ncol=4)
+    return figure
+
+
+def _two_sensors(recording):
+    """The paper's comparison at A1 and A4: 0-40 and 40-1000 Hz, time and power spectral density."""
+    import matplotlib.pyplot as plt
+    from scipy.signal import butter, sosfiltfilt, welch
+
+    figure, axes = plt.subplots(2, 4, figsize=(13.0, 5.5), layout="constrained")
+    time = np.arange(recording.n_sample) / recording.rate
+    for row, name in enumerate(("A1", "A4")):
+        signal = recording.signal(name)
+        for column, (low, high) in enumerate((LOW, HIGH)):
+            edges, kind = (high, "low") if low == 0.0 else ((low, high), "band")
+            part = sosfiltfilt(butter(4, edges, kind, fs=recording.rate, output="sos"), signal)
+            frequency, density = welch(part, recording.rate, nperseg=16384)
+            inside = (frequency >= max(low, 1.0)) & (frequency <= high)
+            left, right = axes[row, 2 * column], axes[row, 2 * column + 1]
+            left.plot(time, part, lw=0.4)
+            left.set(title=f"{name}, {low:.0f}-{high:.0f} Hz", xlabel="time [s]", ylabel="m/s²")
+            right.semilogy(frequency[inside], density[inside], lw=0.8)
+            right.set(xlabel="frequency [Hz]", ylabel="(m/s²)²/Hz")
+    return figure
+
+
+def _closed_form():
+    """Meshed track against Floquet's solution, and the waves that leave a blow."""
+    import matplotlib.pyplot as plt
+
+    from turnout.simulate import uniform_track
+    from turnout.simulate.frequency import receptance
+    from turnout.simulate.infinite_track import floquet_receptance, propagation
+    from turnout.simulate.matrices import assemble
+
+    track, frequency = uniform_track(96.0), np.arange(20.0, 1301.0, 5.0)
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9.5, 3.8), layout="constrained")
+    for offset, name in ((0.0, "over a sleeper"), (0.3, "mid-span")):
+        exact = np.abs(floquet_receptance(frequency, track, offset))
+        meshed = np.abs(receptance(assemble(track), frequency, 48.0 + offset, 48.0 + offset))
+        left.semilogy(frequency, exact, lw=2.5, color="0.75")
+        left.semilogy(frequency, meshed, lw=0.9, label=f"{name}, 4 elements per bay")
+    left.set(xlabel="frequency [Hz]", ylabel="|receptance| [m/N]", title="grey: infinite track, Floquet")
+    left.legend()
+    kappa = propagation(frequency, track)
+    right.plot(frequency, np.abs(kappa[:, 0].real), label="wavenumber [rad/m]")
+    right.plot(frequency, -8.686 * kappa[:, 0].imag, label="decay [dB/m]")
+    right.set(xlabel="frequency [Hz]", title="less damped wave", ylim=(0.0, 25.0))
+    right.legend()
+    return figure

@@ -1,0 +1,105 @@
+"""What the pages need from the registry: sums for the fleet's page, whole rows for some turnouts at a time."""
+
+from collections import defaultdict
+
+# One row per section of the newest model, whatever it says.
+NEWEST = "qualify row_number() over (partition by section_id order by measured_at_utc desc, model_id) = 1"
+OF_SOME = "turnout_id in (select unnest($turnouts))"
+ROWS = {
+    "sections": f"select * from sections where {OF_SOME} order by position_m, label",
+    "events": f"select * from events where {OF_SOME} order by event_at_utc, event_id",
+    "modes": f"""
+        select * from modes_current where band in ('ballast', 'railpad') and source = 'hammer' and {OF_SOME}
+        order by section_id, band, measured_at_utc""",
+    "models": f"select * from models_current where {OF_SOME} {NEWEST}",
+    "receptances": f"select * from receptances_current where {OF_SOME} {NEWEST}",
+    "impacts": f"""
+        select i.* from impacts_current i
+        join (
+            select section_id, max(campaign_id) as campaign_id from impacts_current where {OF_SOME} group by section_id
+        ) newest using (section_id, campaign_id)
+        order by i.section_id, i.test, i.record""",
+    "passages": f"""
+        select * from passages_current where {OF_SOME}
+        qualify row_number() over (partition by turnout_id order by passed_at_utc desc) <= 15
+        order by passed_at_utc desc""",
+    "scores": f"select * from passage_scores where {OF_SOME}",
+    "quarantine": f"select * from quarantine_open where {OF_SOME} order by path, record",
+    "charts": f"select * from charts where source = 'hammer' and {OF_SOME} order by section_id, band, measured_at_utc",
+    "chart_states": f"select * from chart_states where {OF_SOME}",
+    "worklist": f"select * from worklist where {OF_SOME} order by rank",
+}
+TURNOUTS = f"""
+    with models as (
+        select turnout_id, max(measured_at_utc) as latest, count(*) filter (where status <> 'rejected') as n_models
+        from (select * from models_current {NEWEST}) group by turnout_id
+    ),
+    sections as (select turnout_id, count(*) as n_sections from sections group by turnout_id),
+    rejected as (
+        select turnout_id, count(*) as n_rejected from impacts_current where status = 'rejected' group by turnout_id
+    ),
+    quarantined as (select turnout_id, count(*) as n_quarantined from quarantine_open group by turnout_id)
+    select t.*, m.latest, coalesce(m.n_models, 0) as n_models, coalesce(s.n_sections, 0) as n_sections,
+        coalesce(r.n_rejected, 0) as n_rejected, coalesce(q.n_quarantined, 0) as n_quarantined
+    from turnouts t left join models m using (turnout_id) left join sections s using (turnout_id)
+        left join rejected r using (turnout_id) left join quarantined q using (turnout_id)
+    order by turnout_id
+"""
+REASONS = """
+    select reason, sum(impacts) as impacts, sum(rows) as rows from (
+        select reason, count(*) as impacts, 0 as rows from impacts_current where status = 'rejected' group by reason
+        union all
+        select reason_code, 0, count(*) from quarantine_open group by reason_code
+    ) group by reason order by sum(impacts) + sum(rows) desc, reason
+"""
+TREND_VIEWS = {"charts", "chart_states", "worklist"}
+
+
+class FleetSource:
+    """Rows as dictionaries: ``turnouts()``, ``reasons()``, ``states()``, ``worklist()`` of the fleet, ``of_some``."""
+
+    def __init__(self, connection):
+        self.connection = connection
+        found = connection.execute("select view_name from duckdb_views() where database_name = current_database()")
+        self.there = {row[0] for row in found.fetchall()}
+
+    def turnouts(self):
+        """One row per turnout with its counts."""
+        return self._fetch(TURNOUTS)
+
+    def reasons(self):
+        """How many impacts and quarantine rows each reason has."""
+        return self._fetch(REASONS)
+
+    def states(self):
+        """Charts by turnout and state, none before the first trend."""
+        sql = "select turnout_id, state, count(*) as n from chart_states group by all order by all"
+        return self._fetch(sql) if "chart_states" in self.there else []
+
+    def worklist(self):
+        """Tomorrow's list, empty before the first trend."""
+        return self._fetch("select * from worklist order by rank") if "worklist" in self.there else []
+
+    def of_some(self, turnout_ids):
+        """Rows of every kind of the turnouts named: {kind: {turnout_id: [row, ...]}}."""
+        chosen = {"turnouts": list(turnout_ids)}
+        kinds = [kind for kind in ROWS if kind not in TREND_VIEWS or kind in self.there]
+        rows = {kind: _by_turnout(self._fetch(ROWS[kind], chosen)) for kind in kinds if kind != "receptances"}
+        return rows | {"receptances": _by_turnout(self._arrays(ROWS["receptances"], chosen))}
+
+    def _arrays(self, sql, parameters):
+        """Rows whose lists come as numpy arrays, which is many times faster than as Python lists."""
+        frame = self.connection.execute(sql, parameters).df()
+        return frame.astype(object).where(frame.notna(), None).to_dict("records")
+
+    def _fetch(self, sql, parameters=None):
+        cursor = self.connection.execute(sql, parameters or {})
+        names = [d[0] for d in cursor.description]
+        return [dict(zip(names, row)) for row in cursor.fetchall()]
+
+
+def _by_turnout(rows):
+    grouped = defaultdict(list)
+    for row in rows:
+        grouped[row["turnout_id"]].append(row)
+    return grouped

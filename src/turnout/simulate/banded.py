@@ -1,0 +1,246 @@
+"""Compiled kernels for symmetric banded matrices: factor, solve, product, and the inverse near the diagonal."""
+
+import numpy as np
+
+from turnout.simulate.compiled import kernel
+
+
+@kernel
+def factorise(upper, lower_rows, inverse_pivot):
+    """L D L^T of a symmetric matrix without pivoting; returns the growth max|l| (large: do not trust it).
+
+    ``upper`` (half + 1, n) holds the upper diagonals; ``lower_rows[i, k]`` becomes L[i, i - 1 - k].
+    """
+    half, n = upper.shape[0] - 1, upper.shape[1]
+    growth = 0.0
+    scaled = np.zeros(half + 1, dtype=upper.dtype)
+    for i in range(n):
+        first = max(0, i - half)
+        pivot = upper[0, i]
+        for j in range(first, i):
+            value = upper[i - j, j]
+            for m in range(first, j):
+                value -= scaled[m - first] * lower_rows[j, j - 1 - m]
+            scaled[j - first] = value
+            factor = value * inverse_pivot[j]
+            lower_rows[i, i - 1 - j] = factor
+            pivot -= value * factor
+            growth = max(growth, abs(factor))
+        inverse_pivot[i] = 1.0 / pivot
+    return growth
+
+
+@kernel
+def factorise4(a, lower, upper, inverse_pivot, n):
+    """The same for half bandwidth 4 at most, unrolled: ``a`` (5, n + 4) is used up, ``lower`` has n + 4 rows."""
+    growth = 0.0
+    for i in range(n):
+        inverse = 1.0 / a[0, i]
+        a1, a2, a3, a4 = a[1, i], a[2, i], a[3, i], a[4, i]
+        l1, l2, l3, l4 = a1 * inverse, a2 * inverse, a3 * inverse, a4 * inverse
+        a[0, i + 1] -= l1 * a1
+        a[1, i + 1] -= l1 * a2
+        a[2, i + 1] -= l1 * a3
+        a[3, i + 1] -= l1 * a4
+        a[0, i + 2] -= l2 * a2
+        a[1, i + 2] -= l2 * a3
+        a[2, i + 2] -= l2 * a4
+        a[0, i + 3] -= l3 * a3
+        a[1, i + 3] -= l3 * a4
+        a[0, i + 4] -= l4 * a4
+        inverse_pivot[i] = inverse
+        upper[i, 0], upper[i, 1], upper[i, 2], upper[i, 3] = l1, l2, l3, l4
+        lower[i + 1, 0], lower[i + 2, 1], lower[i + 3, 2], lower[i + 4, 3] = l1, l2, l3, l4
+        size = l1.real**2 + l1.imag**2 + l2.real**2 + l2.imag**2
+        growth = max(growth, size + l3.real**2 + l3.imag**2 + l4.real**2 + l4.imag**2)
+    return np.sqrt(growth)
+
+
+@kernel
+def upper_rows(lower_rows, n, half, width):
+    """Rows of L^T: ``out[i, k]`` is L[i + 1 + k, i]."""
+    out = np.zeros((n, width), dtype=lower_rows.dtype)
+    for k in range(half):
+        for i in range(n - 1 - k):
+            out[i, k] = lower_rows[i + 1 + k, k]
+    return out
+
+
+@kernel
+def solve(lower_rows, upper, inverse_pivot, x, start, n):
+    """Solve in place for ``x[start:start+n]``; unrolled for four or six diagonals."""
+    width = lower_rows.shape[1]
+    part = x[start : start + n]
+    if width == 4:
+        _solve4(lower_rows, upper, inverse_pivot, part, n)
+    elif width == 6:
+        _solve6(lower_rows, upper, inverse_pivot, part, n)
+    else:
+        _solve_any(lower_rows, upper, inverse_pivot, part, n)
+
+
+@kernel
+def _solve4(low, up, inverse_pivot, x, n):
+    a = 0.0 * x[0]
+    b, c, d = a, a, a
+    for i in range(n):
+        s = x[i] - low[i, 3] * d - low[i, 2] * c - low[i, 1] * b - low[i, 0] * a
+        d, c, b, a = c, b, a, s
+        x[i] = s
+    a = 0.0 * x[0]
+    b, c, d = a, a, a
+    for i in range(n - 1, -1, -1):
+        s = x[i] * inverse_pivot[i] - up[i, 3] * d - up[i, 2] * c - up[i, 1] * b - up[i, 0] * a
+        d, c, b, a = c, b, a, s
+        x[i] = s
+
+
+@kernel
+def _solve6(low, up, inverse_pivot, x, n):
+    a = 0.0 * x[0]
+    b, c, d, e, f = a, a, a, a, a
+    for i in range(n):
+        s = x[i] - low[i, 5] * f - low[i, 4] * e - low[i, 3] * d
+        s = s - low[i, 2] * c - low[i, 1] * b - low[i, 0] * a
+        f, e, d, c, b, a = e, d, c, b, a, s
+        x[i] = s
+    a = 0.0 * x[0]
+    b, c, d, e, f = a, a, a, a, a
+    for i in range(n - 1, -1, -1):
+        s = x[i] * inverse_pivot[i] - up[i, 5] * f - up[i, 4] * e - up[i, 3] * d
+        s = s - up[i, 2] * c - up[i, 1] * b - up[i, 0] * a
+        f, e, d, c, b, a = e, d, c, b, a, s
+        x[i] = s
+
+
+@kernel
+def _solve_any(low, up, inverse_pivot, x, n):
+    half = low.shape[1]
+    for i in range(n):
+        s = x[i]
+        for k in range(min(half, i)):
+            s -= low[i, k] * x[i - 1 - k]
+        x[i] = s
+    for i in range(n - 1, -1, -1):
+        s = x[i] * inverse_pivot[i]
+        for k in range(min(half, n - 1 - i)):
+            s -= up[i, k] * x[i + 1 + k]
+        x[i] = s
+
+
+@kernel
+def multiply(diagonals, x, start, out, n):
+    """``out[:n]`` = matrix times ``x[start:start+n]``; ``diagonals`` are all 2 half + 1, see ``all_diagonals``."""
+    count = diagonals.shape[0]
+    near = x[start - count // 2 : start + n + count // 2]  # indices counted from 0 let the loop be vectorised
+    if count == 9:
+        for i in range(n):
+            low = diagonals[0, i] * near[i] + diagonals[1, i] * near[i + 1] + diagonals[2, i] * near[i + 2]
+            mid = diagonals[3, i] * near[i + 3] + diagonals[4, i] * near[i + 4] + diagonals[5, i] * near[i + 5]
+            high = diagonals[6, i] * near[i + 6] + diagonals[7, i] * near[i + 7] + diagonals[8, i] * near[i + 8]
+            out[i] = low + mid + high
+        return
+    for i in range(n):
+        out[i] = 0.0
+    for k in range(count):
+        for i in range(n):
+            out[i] += diagonals[k, i] * near[i + k]
+
+
+@kernel
+def momentum_less_force(mass, stiffness, v, u, by_v, by_u, start, out, n):
+    """``out[start:start+n]`` = by_v M v - by_u K u, with all 9 diagonals in one pass."""
+    near_v, near_u, inner = v[start - 4 : start + n + 4], u[start - 4 : start + n + 4], out[start : start + n]
+    for i in range(n):
+        m = mass[0, i] * near_v[i] + mass[1, i] * near_v[i + 1] + mass[2, i] * near_v[i + 2]
+        m += mass[3, i] * near_v[i + 3] + mass[4, i] * near_v[i + 4] + mass[5, i] * near_v[i + 5]
+        m += mass[6, i] * near_v[i + 6] + mass[7, i] * near_v[i + 7] + mass[8, i] * near_v[i + 8]
+        k = stiffness[0, i] * near_u[i] + stiffness[1, i] * near_u[i + 1] + stiffness[2, i] * near_u[i + 2]
+        k += stiffness[3, i] * near_u[i + 3] + stiffness[4, i] * near_u[i + 4] + stiffness[5, i] * near_u[i + 5]
+        k += stiffness[6, i] * near_u[i + 6] + stiffness[7, i] * near_u[i + 7] + stiffness[8, i] * near_u[i + 8]
+        inner[i] = by_v * m - by_u * k
+
+
+@kernel
+def solve_from_both_ends(low, up, pivot, low_back, up_back, pivot_back, middle, x, start, n):
+    """Solve in place with four diagonals, eliminating from both ends to four rows in the middle.
+
+    Two independent recurrences run side by side, so that neither waits for the other's last product.
+    ``low_back`` ... are the factors of the matrix turned round, ``middle`` (4, 4) the inverse's block there.
+    """
+    part = x[start : start + n]
+    top = (n - 4) // 2
+    bottom = n - 4 - top
+    last = n - 1
+    zero = 0.0 * part[0]
+    a, b, c, d, e, f, g, h = zero, zero, zero, zero, zero, zero, zero, zero
+    for i in range(top):
+        s = part[i] - low[i, 3] * d - low[i, 2] * c - low[i, 1] * b - low[i, 0] * a
+        t = part[last - i] - low_back[i, 3] * h - low_back[i, 2] * g - low_back[i, 1] * f - low_back[i, 0] * e
+        d, c, b, a = c, b, a, s
+        h, g, f, e = g, f, e, t
+        part[i] = s
+        part[last - i] = t
+    for i in range(top, bottom):
+        t = part[last - i] - low_back[i, 3] * h - low_back[i, 2] * g - low_back[i, 1] * f - low_back[i, 0] * e
+        h, g, f, e = g, f, e, t
+        part[last - i] = t
+    r0 = part[top] - low[top, 0] * a - low[top, 1] * b - low[top, 2] * c - low[top, 3] * d
+    r1 = part[top + 1] - low[top + 1, 1] * a - low[top + 1, 2] * b - low[top + 1, 3] * c
+    r2 = part[top + 2] - low[top + 2, 2] * a - low[top + 2, 3] * b
+    r3 = part[top + 3] - low[top + 3, 3] * a
+    r3 = r3 - low_back[bottom, 0] * e - low_back[bottom, 1] * f - low_back[bottom, 2] * g - low_back[bottom, 3] * h
+    r2 = r2 - low_back[bottom + 1, 1] * e - low_back[bottom + 1, 2] * f - low_back[bottom + 1, 3] * g
+    r1 = r1 - low_back[bottom + 2, 2] * e - low_back[bottom + 2, 3] * f
+    r0 = r0 - low_back[bottom + 3, 3] * e
+    a = middle[0, 0] * r0 + middle[0, 1] * r1 + middle[0, 2] * r2 + middle[0, 3] * r3
+    b = middle[1, 0] * r0 + middle[1, 1] * r1 + middle[1, 2] * r2 + middle[1, 3] * r3
+    c = middle[2, 0] * r0 + middle[2, 1] * r1 + middle[2, 2] * r2 + middle[2, 3] * r3
+    d = middle[3, 0] * r0 + middle[3, 1] * r1 + middle[3, 2] * r2 + middle[3, 3] * r3
+    part[top], part[top + 1], part[top + 2], part[top + 3] = a, b, c, d
+    e, f, g, h = d, c, b, a
+    for i in range(bottom - 1, top - 1, -1):
+        t = part[last - i] * pivot_back[i] - up_back[i, 3] * h - up_back[i, 2] * g
+        t = t - up_back[i, 1] * f - up_back[i, 0] * e
+        h, g, f, e = g, f, e, t
+        part[last - i] = t
+    for i in range(top - 1, -1, -1):
+        s = part[i] * pivot[i] - up[i, 3] * d - up[i, 2] * c - up[i, 1] * b - up[i, 0] * a
+        t = part[last - i] * pivot_back[i] - up_back[i, 3] * h - up_back[i, 2] * g
+        t = t - up_back[i, 1] * f - up_back[i, 0] * e
+        d, c, b, a = c, b, a, s
+        h, g, f, e = g, f, e, t
+        part[i] = s
+        part[last - i] = t
+
+
+def all_diagonals(upper, half):
+    """(2 half + 1, n) diagonals of a symmetric matrix: ``out[k, i]`` is A[i, i + k - half]."""
+    n = upper.shape[1]
+    out = np.zeros((2 * half + 1, n))
+    for k in range(upper.shape[0]):
+        out[half + k, : n - k] = upper[k, : n - k]
+        out[half - k, k:] = upper[k, : n - k]
+    return out
+
+
+@kernel
+def inverse_windows(lower_rows, upper, inverse_pivot, reach):
+    """(n, 2 reach + 1) entries of the inverse near its diagonal: ``out[r, k]`` is inverse[r, r - reach + k]."""
+    n = lower_rows.shape[0]
+    out = np.zeros((n, 2 * reach + 1), dtype=lower_rows.dtype)
+    width = lower_rows.shape[1]
+    for r in range(n):
+        row, last = out[r], min(n, r + reach + 1)
+        row[reach] = 1.0
+        for i in range(r + 1, last):
+            s = row[0] * 0.0
+            for k in range(min(width, i - r)):
+                s -= lower_rows[i, k] * row[i - 1 - k - r + reach]
+            row[i - r + reach] = s
+        for i in range(last - 1, max(-1, r - reach - 1), -1):
+            s = row[i - r + reach] * inverse_pivot[i]
+            for k in range(min(width, last - 1 - i)):
+                s -= upper[i, k] * row[i + 1 + k - r + reach]
+            row[i - r + reach] = s
+    return out

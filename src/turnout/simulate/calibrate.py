@@ -1,0 +1,201 @@
+"""Fit pads, ballast and damping of a section to measured receptances, with what the data cannot tell."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from turnout.errors import SimulationError
+from turnout.simulate.calibrate_modes import with_section
+from turnout.simulate.frequency import receptance_gradient
+from turnout.simulate.hammer import located
+from turnout.simulate.matrices import assemble
+from turnout.simulate.turnout_track import stretch_of_track
+
+# Parameter -> (links' tag, what of them, relative sd of the prior, an estimate).
+PARAMETERS = {
+    "pad_stiffness": ("pad", "stiffness", 0.7),
+    "pad_damping": ("pad", "damping", 1.0),
+    "ballast_stiffness": ("ballast", "stiffness", 0.7),
+    "ballast_damping": ("ballast", "damping", 1.0),
+    "sleeper_mass": ("sleeper", "mass", 0.15),
+}
+BANDS = ((40.0, 100.0), (100.0, 200.0), (200.0, 400.0), (400.0, 600.0), (600.0, 800.0))
+INFORMED = 0.5  # a parameter whose posterior sd is above half its prior sd was not told by the data
+CORRELATED = 0.95
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A receptance to be met: ``value`` (n,) complex [m/N] at ``frequency`` [Hz] from a blow at ``excited`` to an
+    accelerometer at ``measured`` [m]; ``sd`` (n,) of real and imaginary part each [m/N]."""
+
+    frequency: np.ndarray
+    value: np.ndarray
+    sd: np.ndarray
+    excited: float
+    measured: float
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """``values`` and ``sd`` (posterior, relative) by parameter; ``covariance`` of their logarithms, in order.
+
+    ``informed`` says of each parameter whether the data narrowed its prior to less than half; ``tied`` pairs whose
+    posterior correlation exceeds 0.95. ``misfit`` maps a band to the relative rms misfit that is left,
+    ``misfit_before`` the same at the start, ``reduced`` is chi-squared per degree of freedom.
+    """
+
+    section: str
+    values: dict
+    sd: dict
+    covariance: np.ndarray
+    informed: dict
+    tied: tuple
+    misfit: dict
+    misfit_before: dict
+    reduced: float
+    n: int
+    turnout: object
+
+    def __str__(self):
+        lines = [f"{self.section}: {self.n} numbers, chi-squared per degree of freedom {self.reduced:.2f}"]
+        for name, value in self.values.items():
+            told = "" if self.informed[name] else "   the data cannot tell: this is the prior"
+            lines.append(f"  {name:<18} {value:12.5g} ± {100 * self.sd[name]:.1f} %{told}")
+        lines += [f"  {a} and {b} are told only together" for a, b in self.tied]
+        for (low, high), left in self.misfit.items():
+            before = self.misfit_before[low, high]
+            lines.append(f"  {low:.0f}-{high:.0f} Hz: misfit {100 * before:.1f} % before, {100 * left:.1f} % after")
+        return "\n".join(lines)
+
+
+def calibrate(turnout, section, measured, location=None, parameters=tuple(PARAMETERS), model_sd=0.03, half_length=24.0):
+    r"""Maximum a posteriori fit of one section's parameters to receptances, all of its supports alike.
+
+    .. math:: \min_q \sum \frac{|H(q) - \hat H|^2}{\sigma^2 + (\epsilon |\hat H|)^2}
+              + \sum_p \Bigl(\frac{\ln q_p - \ln q_{p0}}{s_p}\Bigr)^2
+
+    Parameters
+    ----------
+    turnout : TurnoutTrack
+        Its values are the centre of the priors and the start.
+    section : str
+        Section whose supports are changed.
+    measured : sequence of Measured
+        At least one.
+    location : str or float
+        Middle of the stretch that is modelled; by default the section's name.
+    parameters : sequence of str
+        Keys of ``PARAMETERS``.
+    model_sd : float
+        Relative error ε the model itself is granted, so that thousands of lines do not claim certainty.
+
+    Returns
+    -------
+    Calibration
+        Gauss-Newton covariance at the optimum, in logarithms.
+
+    References
+    ----------
+    Gradient: dH/dp = -u_m^T (dZ/dp) u_e with the symmetric dynamic stiffness Z.
+    """
+    if not measured:
+        raise SimulationError(f"calibration of {section!r}: no receptance given.")
+    if unknown := [name for name in parameters if name not in PARAMETERS]:
+        raise SimulationError(f"calibration cannot fit {unknown[0]!r}; it can fit {', '.join(PARAMETERS)}.")
+    place, track = located(turnout, location if location is not None else section)
+    j = track.nearest_support(place)
+    centre = np.log([max(getattr(track, name)[j], 1.0) for name in parameters])
+    spread = np.array([PARAMETERS[name][2] for name in parameters])
+    weights = [1.0 / np.sqrt(m.sd**2 + (model_sd * np.abs(m.value)) ** 2) for m in measured]
+
+    def model(logs):
+        changed = with_section(turnout, section, **dict(zip(parameters, np.exp(logs))))
+        _, base = located(changed, location if location is not None else section)
+        return _model(stretch_of_track(base, place, half_length), section, parameters, measured)
+
+    cache = {}
+
+    def residual(logs):
+        key = logs.tobytes()
+        if key not in cache:
+            cache.clear()
+            found = model(logs)
+            miss = [w * (h - m.value) for w, (h, _), m in zip(weights, found, measured)]
+            slope = [w[:, None] * g for w, (_, g) in zip(weights, found)]
+            r = np.concatenate([_split(m) for m in miss])
+            jacobian = np.concatenate([_split(s) for s in slope])
+            cache[key] = (
+                np.concatenate([r, (logs - centre) / spread]),
+                np.concatenate([jacobian, np.diag(1.0 / spread)]),
+            )
+        return cache[key]
+
+    best = least_squares(lambda q: residual(q)[0], centre, jac=lambda q: residual(q)[1], method="trf", x_scale=spread)
+    covariance = np.linalg.inv(best.jac.T @ best.jac)
+    before, after = ([h for h, _ in model(q)] for q in (centre, best.x))
+    n = sum(2 * m.value.size for m in measured)
+    reduced = float(np.sum(best.fun[:n] ** 2) / max(1, n - len(parameters)))
+    covariance = covariance * max(1.0, reduced)
+    sd = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(sd, sd)
+    tied = [
+        (parameters[a], parameters[b])
+        for a in range(len(parameters))
+        for b in range(a)
+        if abs(correlation[a, b]) > CORRELATED
+    ]
+    values = dict(zip(parameters, (float(v) for v in np.exp(best.x))))
+    return Calibration(
+        section,
+        values,
+        dict(zip(parameters, (float(s) for s in sd))),
+        covariance,
+        {name: bool(s < INFORMED * p) for name, s, p in zip(parameters, sd, spread)},
+        tuple(tied),
+        _misfit(measured, after),
+        _misfit(measured, before),
+        reduced,
+        n,
+        with_section(turnout, section, **values),
+    )
+
+
+def _split(value):
+    return np.concatenate([value.real, value.imag])
+
+
+def _model(track, section, parameters, measured):
+    """Receptance and its derivative by the logarithm of each parameter, for every measured one."""
+    matrices = assemble(track)
+    inside = {j for j, name in enumerate(track.section) if name == section}
+    groups, values = [], []
+    for name in parameters:
+        tag, kind, _ = PARAMETERS[name]
+        links = [link for link in matrices.links if link.tag == tag and _support_of(link) in inside]
+        groups.append((kind, links))
+        values.append(getattr(links[0], kind) if links else 0.0)
+    found = []
+    for m in measured:
+        h, gradient = receptance_gradient(matrices, m.frequency, m.excited, m.measured, groups)
+        found.append((h, gradient * np.array(values)))
+    return found
+
+
+def _support_of(link):
+    return next(name[1] for name, _ in link.ends if name[0] != "rail") if len(link.ends) > 1 else link.ends[0][0][1]
+
+
+def _misfit(measured, modelled):
+    """Relative rms misfit in each band that has lines."""
+    table = {}
+    for low, high in BANDS:
+        miss = size = 0.0
+        for m, h in zip(measured, modelled):
+            inside = (m.frequency >= low) & (m.frequency < high)
+            miss += np.sum(np.abs(h - m.value)[inside] ** 2)
+            size += np.sum(np.abs(m.value[inside]) ** 2)
+        if size:
+            table[low, high] = float(np.sqrt(miss / size))
+    return table

@@ -1,0 +1,91 @@
+"""Fit pads and ballast of a section so that a simulated hammer test has given resonances and dampings."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from turnout.errors import SimulationError
+from turnout.simulate.hammer import Hammer, located, prepare_hammer, simulate_hammer
+
+FREE = ("pad_stiffness", "pad_damping", "ballast_stiffness", "ballast_damping")
+# Relative accuracy that is asked for: far inside the printed uncertainties, and the prior's pull on what is free.
+FREQUENCY_SD, DAMPING_SD, PRIOR_SD = 0.002, 0.02, 3.0
+BOUNDS = {
+    "pad_stiffness": (20e6, 3e9),
+    "pad_damping": (0.5e3, 300e3),
+    "ballast_stiffness": (5e6, 1e9),
+    "ballast_damping": (1e3, 600e3),
+}
+QUIET = Hammer(velocity_spread=0.05, place_spread=0.0)
+
+
+@dataclass(frozen=True)
+class ModeFit:
+    """``values`` of the section's parameters [SI]; ``found`` and ``wanted`` map band to (frequency, damping)."""
+
+    section: str
+    values: dict
+    wanted: dict
+    found: dict
+    evaluations: int
+
+
+def with_section(turnout, label, **values):
+    """The turnout with parameters of the supports of section ``label`` replaced, on every route that has it."""
+
+    def changed(track):
+        inside = np.array([name == label for name in track.section])
+        if not inside.any():
+            return track
+        return replace(track, **{k: np.where(inside, v, getattr(track, k)) for k, v in values.items()})
+
+    if not any(label in track.section for track in (turnout.track, *turnout.tracks.values())):
+        known = sorted({*turnout.track.section} - {""})
+        raise SimulationError(f"{turnout.name}: no section {label!r}; there are {', '.join(known)}.")
+    tracks = {name: changed(track) for name, track in turnout.tracks.items()}
+    return replace(turnout, track=changed(turnout.track), tracks=tracks)
+
+
+def section_modes(turnout, location, modes_of, blows=2, half_length=20.0):
+    """What ``modes_of`` finds in a simulated test at ``location``: band -> (frequency [Hz], damping)."""
+    prepared = prepare_hammer(turnout, location, half_length=half_length)
+    recordings = simulate_hammer(turnout, location, QUIET, n_blows=blows, duration=0.15, prepared=prepared)
+    return modes_of(recordings)
+
+
+def fit_modes(turnout, location, wanted, modes_of, section=None, evaluations=14):
+    """``ModeFit`` of one section, the rest of the turnout as it is.
+
+    Parameters
+    ----------
+    turnout : TurnoutTrack
+        Start values are those it has.
+    location : str
+        Named location of the hammer test.
+    wanted : dict
+        "ballast" and, where known, "railpad" -> (frequency [Hz], damping ratio).
+    modes_of : callable
+        Recordings -> the same kind of dict; missing bands were not found.
+    section : str
+        Whose supports are changed, by default the one called like the location.
+    """
+    section = section or location
+    place, track = located(turnout, location)
+    j = track.nearest_support(place)
+    start = np.log([getattr(track, name)[j] for name in FREE])
+    low, high = (np.log([BOUNDS[name][k] for name in FREE]) for k in (0, 1))
+
+    def residual(logs):
+        found = section_modes(with_section(turnout, section, **dict(zip(FREE, np.exp(logs)))), location, modes_of)
+        miss = []
+        for band, (frequency, damping) in wanted.items():
+            f, zeta = found.get(band, (3.0 * frequency, 3.0 * damping))
+            miss += [np.log(f / frequency) / FREQUENCY_SD, np.log(zeta / damping) / DAMPING_SD]
+        return np.concatenate([miss, (logs - start) / PRIOR_SD])
+
+    inside = np.clip(start, low + 1e-3, high - 1e-3)
+    best = least_squares(residual, inside, diff_step=0.01, bounds=(low, high), max_nfev=evaluations)
+    values = dict(zip(FREE, (float(v) for v in np.exp(best.x))))
+    found = section_modes(with_section(turnout, section, **values), location, modes_of)
+    return ModeFit(section, values, wanted, found, int(best.nfev))

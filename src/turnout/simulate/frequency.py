@@ -1,0 +1,150 @@
+"""Receptance of a track in the frequency domain, with its gradient by the track's parameters."""
+
+import numpy as np
+
+from turnout.errors import SimulationError
+from turnout.simulate.banded import factorise, factorise4, solve, upper_rows
+from turnout.simulate.compiled import kernel
+from turnout.simulate.matrices import link_vector
+
+GROWTH_LIMIT = 1e6  # factors above this lose six digits: solve with pivoting instead
+
+
+@kernel
+def _solve_lines(mass, damping, stiffness, hysteresis, omega, right, keep, width, out):
+    """Rows ``keep`` for all lines and right-hand sides: ``out[line, k]``; returns the largest growth of a factor."""
+    half, n = mass.shape[0] - 1, mass.shape[1]
+    system = np.zeros((width + 1, n + 4), dtype=np.complex128)
+    lower = np.zeros((n + 4, width), dtype=np.complex128)
+    upper = np.zeros((n, width), dtype=np.complex128)
+    pivot, x = np.zeros(n, dtype=np.complex128), np.zeros(n, dtype=np.complex128)
+    worst = 0.0
+    for line in range(omega.size):
+        w = omega[line]
+        for k in range(half + 1):
+            for i in range(n):
+                real = stiffness[k, i] - w * w * mass[k, i]
+                system[k, i] = complex(real, w * damping[k, i] + hysteresis[k, i])
+        if width == 4:
+            worst = max(worst, factorise4(system, lower, upper, pivot, n))
+            system[:, n:] = 0.0
+        else:
+            worst = max(worst, factorise(system[: half + 1, :n], lower[:n], pivot))
+            upper[:] = upper_rows(lower[:n], n, half, width)
+        for r in range(right.shape[0]):
+            for i in range(n):
+                x[i] = right[r, i]
+            solve(lower[:n], upper, pivot, x, 0, n)
+            for i in range(keep.size):
+                out[line, r, i] = x[keep[i]]
+    return worst
+
+
+def _solve_pivoted(matrices, omega, right):
+    from scipy.linalg import solve_banded
+
+    half, n = matrices.half, matrices.n
+    out = np.zeros((omega.size, right.shape[0], n), dtype=complex)
+    for line, w in enumerate(omega):
+        upper = matrices.stiffness + 1j * (w * matrices.damping + matrices.hysteresis) - w * w * matrices.mass
+        band = np.zeros((2 * half + 1, n), dtype=complex)
+        for k in range(half + 1):
+            band[half - k, k:] = upper[k, : n - k]
+            band[half + k, : n - k] = upper[k, : n - k]
+        out[line] = solve_banded((half, half), band, right.T.astype(complex)).T
+    return out
+
+
+def responses(matrices, frequency, places, rows=None, pivoted=False):
+    """(n_line, n_place, n) complex displacement of all degrees of freedom, or of ``rows``, under unit forces.
+
+    ``places`` are numbers (rail at x [m]) or names of degrees of freedom; ``frequency`` [Hz], 0 allowed.
+    Without pivoting unless a factor grows beyond 1e6 or ``pivoted`` asks for it.
+    """
+    omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequency, dtype=float))
+    if not (np.all(np.isfinite(omega)) and np.all(omega >= 0.0)):
+        raise SimulationError(f"frequencies must not be negative, got {frequency!r}.")
+    right = np.zeros((len(places), matrices.n))
+    for k, place in enumerate(places):
+        np.add.at(right[k], *matrices.weights(place))
+    keep = np.arange(matrices.n) if rows is None else np.asarray(rows, dtype=np.int64)
+    if not pivoted:
+        out = np.zeros((omega.size, len(places), keep.size), dtype=complex)
+        width = 4 if matrices.half <= 4 else 6 if matrices.half <= 6 else matrices.half
+        arrays = matrices.mass, matrices.damping, matrices.stiffness, matrices.hysteresis
+        growth = _solve_lines(*arrays, omega, right, keep, width, out)
+        if growth < GROWTH_LIMIT:
+            return out
+    return _solve_pivoted(matrices, omega, right)[:, :, keep]
+
+
+def receptance(matrices, frequency, excited, measured):
+    r"""Receptance :math:`H = b_m^T (K + iH_s + i\omega C - \omega^2 M)^{-1} b_e` [m/N], (n_frequency,).
+
+    ``excited`` and ``measured`` are places on the rail [m] or names of degrees of freedom. On the rail at the
+    same place the compliance within the element is added, so that the point may lie between nodes.
+
+    References
+    ----------
+    Grassie et al. 1982, The dynamic response of railway track to high frequency vertical excitation.
+
+    Examples
+    --------
+    Far below its resonance a track on pads alone has the static stiffness of a beam on Winkler's foundation,
+    :math:`2\sqrt{2} (EI)^{1/4} (k/L)^{3/4}`, to the one per cent that its supports are discrete:
+
+    >>> from turnout.simulate.matrices import assemble
+    >>> from turnout.simulate.rail import Rail
+    >>> from turnout.simulate.track import uniform_track
+    >>> rail = Rail(6.42e6, 60.21, 2.4e8, beam="euler")
+    >>> track = uniform_track(48.0, rail=rail, layers=1, pad_stiffness=50e6)
+    >>> h = receptance(assemble(track), [1.0], 24.15, 24.15)
+    >>> print(f"{abs(1 / h[0]) / (2 * 2**0.5 * 6.42e6**0.25 * (50e6 / 0.6) ** 0.75):.2f}")
+    1.00
+    """
+    rows, weights = matrices.weights(measured)
+    h = responses(matrices, frequency, [excited], rows)[:, 0] @ weights
+    if not isinstance(excited, tuple) and excited == measured:
+        h = h + matrices.compliance(float(excited))
+    return h
+
+
+def receptance_gradient(matrices, frequency, excited, measured, parameters):
+    r"""Receptance and its derivatives by stiffness, damping or mass of links.
+
+    .. math:: \partial H / \partial p = -u_m^T (\partial Z / \partial p) u_e
+
+    Parameters
+    ----------
+    matrices : TrackMatrices
+        Of the track.
+    frequency : (n,) array of float
+        [Hz]
+    excited, measured : float or tuple
+        Places.
+    parameters : list of (kind, list of Link)
+        ``kind`` is "stiffness", "damping", "mass" or "loss_factor"; the derivative is by a common value that is
+        added to all links of the list.
+
+    Returns
+    -------
+    (n,) complex, (n, n_parameter) complex
+        Receptance [m/N] and its derivatives [m/N per unit of the parameter].
+    """
+    omega = 2.0 * np.pi * np.asarray(frequency, dtype=float)
+    both = responses(matrices, frequency, [excited, measured])
+    rows, weights = matrices.weights(measured)
+    h = both[:, 0][:, rows] @ weights
+    if not isinstance(excited, tuple) and excited == measured:
+        h = h + matrices.compliance(float(excited))
+    gradient = np.zeros((omega.size, len(parameters)), dtype=complex)
+    for k, (kind, links) in enumerate(parameters):
+        factor = {"stiffness": -1.0 + 0.0 * omega, "damping": -1j * omega, "mass": omega**2}.get(kind)
+        for link in links:
+            found, weight = link_vector(link, matrices.index)
+            product = (both[:, 0][:, found] @ weight) * (both[:, 1][:, found] @ weight)
+            by = -1j * link.stiffness if kind == "loss_factor" else factor
+            if kind == "stiffness" and link.loss_factor:
+                by = factor * (1.0 + 1j * link.loss_factor)
+            gradient[:, k] += by * product
+    return h, gradient

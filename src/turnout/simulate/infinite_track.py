@@ -1,0 +1,144 @@
+"""Closed forms of infinite tracks: beam on Winkler's foundation, and Floquet's solution on discrete supports."""
+
+import numpy as np
+from scipy.linalg import expm
+
+from turnout.errors import SimulationError
+
+
+def winkler_receptance(frequency, bending_stiffness, mass, stiffness, damping=0.0):
+    r"""Point receptance of an infinite Euler-Bernoulli beam on an elastic foundation [m/N].
+
+    .. math:: H = \frac{1}{8 EI \beta^3}, \qquad \beta = \Bigl(\frac{k + i\omega c - m\omega^2}{4 EI}\Bigr)^{1/4}
+
+    Parameters
+    ----------
+    frequency : (n,) array of float
+        [Hz]
+    bending_stiffness, mass, stiffness, damping : float
+        EI [N m²], m [kg/m], k [N/m²], c [N s/m²].
+
+    References
+    ----------
+    Knothe and Grassie 1993, Vehicle System Dynamics 22, section 4.
+
+    Examples
+    --------
+    The static deflection under a unit load, 1 / (2 sqrt(2) (EI)^(1/4) k^(3/4)):
+
+    >>> h = winkler_receptance([0.0], 6.42e6, 60.21, 1e8)
+    >>> f"{abs(h[0]):.4e} m/N, {1 / (2 * 2**0.5 * 6.42e6**0.25 * 1e8**0.75):.4e} m/N"
+    '7.0238e-09 m/N, 7.0238e-09 m/N'
+    """
+    omega = 2.0 * np.pi * np.asarray(frequency, dtype=float)
+    net = stiffness + 1j * omega * damping - mass * omega**2
+    beta = (net / (4.0 * bending_stiffness)) ** 0.25  # principal root: Re > 0, waves run outwards and decay
+    return 1.0 / (8.0 * bending_stiffness * beta**3)
+
+
+def support_stiffness(frequency, track, support=0):
+    """(n,) complex dynamic stiffness under the rail of one support of ``track`` [N/m]."""
+    omega = 2.0 * np.pi * np.asarray(frequency, dtype=float)
+
+    def spring(name):
+        k, c = getattr(track, f"{name}_stiffness")[support], getattr(track, f"{name}_damping")[support]
+        loss = getattr(track, f"{name}_loss_factor")[support] if name != "subgrade" else 0.0
+        return k * (1.0 + 1j * loss) + 1j * omega * c
+
+    pad = spring("pad")
+    if track.layers == 1:
+        return pad
+    below = spring("ballast")
+    if track.layers == 3:
+        ground = spring("subgrade") - omega**2 * track.ballast_mass[support]
+        below = below * ground / (below + ground)
+    below = below - omega**2 * track.sleeper_mass[support]
+    return pad * below / (pad + below)
+
+
+def _beam_matrix(omega, rail):
+    """First-order system of the rail's state (w, rotation, moment, shear) along x."""
+    shear = 0.0 if rail.beam == "euler" else 1.0 / rail.shear_stiffness
+    rotary = 0.0 if rail.beam == "euler" else rail.rotary_inertia
+    spin = -(omega**2) * rotary + 1j * omega * rail.damping / rail.mass * rotary
+    push = -(omega**2) * rail.mass + 1j * omega * rail.damping
+    return np.array([[0, 1, 0, shear], [0, 0, 1 / rail.bending_stiffness, 0], [0, spin, 0, -1], [push, 0, 0, 0]])
+
+
+def _bay(omega, rail, spacing, support):
+    """Transfer from right of one support to right of the next, its multipliers and vectors, decaying ones first."""
+    across = expm(_beam_matrix(omega, rail) * spacing)
+    jump = np.eye(4, dtype=complex)
+    jump[3, 0] = support
+    multiplier, vector = np.linalg.eig(jump @ across)
+    order = np.argsort(np.abs(multiplier))
+    return multiplier[order], vector[:, order]
+
+
+def floquet_receptance(frequency, track, offset=0.0, distance=0):
+    """Receptance of the infinite periodic track of which ``track`` has one bay [m/N], (n,).
+
+    Parameters
+    ----------
+    frequency : (n,) array of float
+        Above 0; the track must have damping. [Hz]
+    track : Track
+        Its rail, first support and spacing are used.
+    offset : float
+        Place of the force behind a support [m], from 0 to below the spacing.
+    distance : int
+        Bays from the force to where it is measured, at the same place in the bay.
+
+    References
+    ----------
+    Mead 1970, Free wave propagation in periodically supported, infinite beams, J. Sound Vib. 11; Nordborg 2002.
+    """
+    spacing = float(track.support[1] - track.support[0])
+    if not 0.0 <= offset < spacing:
+        raise SimulationError(f"offset {offset!r} m is not within a bay of {spacing:.3f} m.")
+    stiffness = support_stiffness(frequency, track)
+    found = np.empty(len(frequency), dtype=complex)
+    for line, f in enumerate(np.asarray(frequency, dtype=float)):
+        omega = 2.0 * np.pi * f
+        multiplier, vector = _bay(omega, track.rail, spacing, stiffness[line])
+        to_force = expm(_beam_matrix(omega, track.rail) * offset)
+        right, left = to_force @ vector[:, :2], to_force @ vector[:, 2:]
+        amount = np.linalg.solve(np.column_stack([right, -left]), [0.0, 0.0, 0.0, -1.0])
+        found[line] = right[0] @ (amount[:2] * multiplier[:2] ** distance)
+    return found
+
+
+def propagation(frequency, track):
+    r"""Wavenumbers of the two waves that run away from a force on the infinite periodic track.
+
+    Floquet's multiplier of a bay is :math:`e^{-i\kappa L}`; returns (n, 2) complex κ [rad/m], the less damped
+    wave first; its real part lies in the first Brillouin zone, the decay is -8.686 Im κ [dB/m].
+    """
+    spacing = float(track.support[1] - track.support[0])
+    stiffness = support_stiffness(frequency, track)
+    found = np.empty((len(frequency), 2), dtype=complex)
+    for line, f in enumerate(np.asarray(frequency, dtype=float)):
+        multiplier, _ = _bay(2.0 * np.pi * f, track.rail, spacing, stiffness[line])
+        found[line] = 1j * np.log(multiplier[[1, 0]]) / spacing
+    return found
+
+
+def pinned_pinned_frequency(rail, spacing):
+    r"""First pinned-pinned resonance [Hz]: half a wave of the free rail between two supports.
+
+    Timoshenko: the lower root of :math:`a\omega^4 - b\omega^2 + c = 0` with
+    :math:`a = \rho I m/\kappa GA,\ b = m + mB^2EI/\kappa GA + \rho I B^2,\ c = EI B^4,\ B = \pi/L`;
+    Euler-Bernoulli: :math:`\frac{\pi}{2L^2}\sqrt{EI/m}`.
+
+    >>> from turnout.simulate.rail import Rail
+    >>> rail = Rail(6.4155e6, 60.21, 0.4 * 81e9 * 76.7e-4, 7850 * 3.055e-5)
+    >>> f"{pinned_pinned_frequency(rail, 0.6):.0f} Hz"
+    '1070 Hz'
+    """
+    b_wave = np.pi / spacing
+    if rail.beam == "euler":
+        return float(0.5 * np.pi / spacing**2 * np.sqrt(rail.bending_stiffness / rail.mass))
+    a = rail.rotary_inertia * rail.mass / rail.shear_stiffness
+    b = rail.mass * (1.0 + b_wave**2 * rail.bending_stiffness / rail.shear_stiffness) + rail.rotary_inertia * b_wave**2
+    c = rail.bending_stiffness * b_wave**4
+    return float(np.sqrt(2.0 * c / (b + np.sqrt(b * b - 4.0 * a * c))) / (2.0 * np.pi))

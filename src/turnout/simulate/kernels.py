@@ -1,0 +1,124 @@
+"""Compiled pieces of the port system: laws, paths, the rail under a port, windows of the inverse."""
+
+import numpy as np
+
+from turnout.simulate.compiled import kernel
+from turnout.simulate.law import FRICTION, GAP, LINEAR, POWER
+
+
+@kernel
+def law_force(kind, numbers, i, table, first, last, d, rate):
+    """Force of a law, its numbers in row ``i``, and the force's derivatives by deformation and by rate."""
+    if kind == POWER:
+        if d <= 0.0:
+            return 0.0, 0.0, 0.0
+        k, p, chi = numbers[i, 0], numbers[i, 1], numbers[i, 2]
+        power = np.sqrt(d) if p == 1.5 else d ** (p - 1.0)
+        factor = 1.0 + chi * rate
+        if factor <= 0.0:
+            return 0.0, 0.0, 0.0
+        return k * power * d * factor, p * k * power * factor, k * power * d * chi
+    if kind == GAP:
+        if d <= 0.0:
+            return 0.0, 0.0, 0.0
+        k, c, onset = numbers[i, 0], numbers[i, 1], numbers[i, 2]
+        share = min(1.0, d / onset)
+        force = k * d + c * rate * share
+        if force <= 0.0:
+            return 0.0, 0.0, 0.0
+        return force, k + (c * rate / onset if d < onset else 0.0), c * share
+    if kind == LINEAR:
+        return numbers[i, 2] + numbers[i, 0] * d + numbers[i, 1] * rate, numbers[i, 0], numbers[i, 1]
+    if kind == FRICTION:
+        value = np.tanh(rate / numbers[i, 1])
+        return numbers[i, 0] * value, 0.0, numbers[i, 0] * (1.0 - value * value) / numbers[i, 1]
+    k = first
+    while k < last - 2 and table[0, k + 1] <= d:
+        k += 1
+    width = table[0, k + 1] - table[0, k]
+    slope = (table[1, k + 1] - table[1, k]) / width
+    part = (d - table[0, k]) / width
+    bend = (table[2, k + 1] - table[2, k]) / width if 0.0 < part < 1.0 else 0.0
+    viscous = table[2, k] + (table[2, k + 1] - table[2, k]) * min(1.0, max(0.0, part))
+    return table[1, k] + slope * (d - table[0, k]) + viscous * rate, slope + bend * rate, viscous
+
+
+@kernel
+def path_at(path, which, start, step, x):
+    """Dip of path ``which`` at ``x``; constant beyond the ends of its grid."""
+    place = (x - start) / step
+    k = min(max(int(np.floor(place)), 0), path.shape[1] - 1)
+    r = min(max(place - k, 0.0), 1.0)
+    return ((path[which, k, 0] * r + path[which, k, 1]) * r + path[which, k, 2]) * r + path[which, k, 3]
+
+
+@kernel
+def ramp_at(ramp, stand_in, x):
+    """Share (r, q) of the modelled track and of the stand-in, r² + q² = 1."""
+    if not stand_in:
+        return 1.0, 0.0
+    left = (x - ramp[0]) / (ramp[1] - ramp[0])
+    right = (ramp[3] - x) / (ramp[3] - ramp[2])
+    e = min(left, right)
+    if e >= 1.0:
+        return 1.0, 0.0
+    if e <= 0.0:
+        return 0.0, 1.0
+    angle = 0.5 * np.pi * e * e * e * (10.0 + e * (6.0 * e - 15.0))
+    return np.sin(angle), np.cos(angle)
+
+
+@kernel
+def rail_weights(node, node_row, shear_ratio, flexible, shear_flexible, e, x, share, k, rows, weights):
+    """Fill row ``k`` of rows and weights of the rail at ``x`` in element ``e``; returns its local compliance."""
+    h = node[e + 1] - node[e]
+    s, p = (x - node[e]) / h, shear_ratio[e]
+    f = share / (1.0 + p)
+    q = s * (1.0 - s)
+    rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3] = node_row[e], node_row[e] + 1, node_row[e + 1], node_row[e + 1] + 1
+    weights[k, 0] = f * (1.0 - 3.0 * s * s + 2.0 * s * s * s + p * (1.0 - s))
+    weights[k, 1] = f * h * (s - 2.0 * s * s + s * s * s + 0.5 * p * q)
+    weights[k, 2] = f * (3.0 * s * s - 2.0 * s * s * s + p * s)
+    weights[k, 3] = f * h * (-s * s + s * s * s - 0.5 * p * q)
+    bend = q * q * (q / 3.0 + p * (1.0 - 2.0 * s) ** 2 / (12.0 * (1.0 + p)))
+    return share * share * (q * h * shear_flexible[e] + h * h * h * flexible[e] * bend)
+
+
+@kernel
+def window_product(window, pad, rows, weights, a, b):
+    """b_a^T Z^-1 b_b for two port stages."""
+    total = window[0, 0] * 0.0
+    for i in range(4):
+        weight, row = weights[a, i], rows[a, i]
+        base = pad - row
+        for j in range(4):
+            k = base + rows[b, j]
+            if 0 <= k <= 2 * pad:  # else too far apart to matter; weights of unused places are 0
+                total += weight * weights[b, j] * window[row, k]
+    return total
+
+
+@kernel
+def solve_dense(a, b, n):
+    """Solve in place by elimination with partial pivoting; the matrices have at most a few dozen rows."""
+    for i in range(n):
+        best = i
+        for k in range(i + 1, n):
+            if abs(a[k, i]) > abs(a[best, i]):
+                best = k
+        if best != i:
+            for j in range(n):
+                a[i, j], a[best, j] = a[best, j], a[i, j]
+            b[i], b[best] = b[best], b[i]
+        inverse = 1.0 / a[i, i]
+        for k in range(i + 1, n):
+            f = a[k, i] * inverse
+            if f != 0.0:
+                for j in range(i + 1, n):
+                    a[k, j] -= f * a[i, j]
+                b[k] -= f * b[i]
+    for i in range(n - 1, -1, -1):
+        s = b[i]
+        for j in range(i + 1, n):
+            s -= a[i, j] * b[j]
+        b[i] = s / a[i, i]

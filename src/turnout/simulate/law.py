@@ -1,0 +1,148 @@
+"""Port laws: a scalar force from a scalar deformation and its rate."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnout.errors import SimulationError
+
+POWER, GAP, TABLE, LINEAR, FRICTION = range(5)
+
+
+@dataclass(frozen=True)
+class PowerLaw:
+    r"""Unilateral :math:`F = k d^p (1 + \chi \dot d)`, 0 where d <= 0: Hertz's contact (p = 3/2), a hammer's tip.
+
+    ``stiffness`` k [N/m^p], ``exponent`` p, ``damping`` χ of Hunt and Crossley 1975 [s/m]; never negative.
+
+    >>> hertz = PowerLaw(93e9)
+    >>> f"{hertz.force(66.1e-6, 0.0) / 1e3:.1f} kN at an approach of 66.1 µm"
+    '50.0 kN at an approach of 66.1 µm'
+    """
+
+    stiffness: float
+    exponent: float = 1.5
+    damping: float = 0.0
+    kind = POWER
+
+    def __post_init__(self):
+        if not (self.stiffness > 0.0 and self.exponent >= 1.0 and self.damping >= 0.0):
+            raise SimulationError(
+                f"power law: stiffness {self.stiffness!r}, exponent {self.exponent!r}, "
+                f"damping {self.damping!r} are not those of a contact."
+            )
+
+    @property
+    def numbers(self):
+        return self.stiffness, self.exponent, self.damping
+
+    def force(self, d, rate=0.0):
+        """Force [N] at deformation ``d`` [m] and ``rate`` [m/s]."""
+        d = np.maximum(d, 0.0)
+        return np.maximum(0.0, self.stiffness * d**self.exponent * (1.0 + self.damping * rate))
+
+    def tangent(self, load):
+        r"""Stiffness at a static ``load`` W, :math:`p\,k^{1/p} W^{1-1/p}` [N/m]."""
+        return self.exponent * self.stiffness ** (1 / self.exponent) * load ** (1 - 1 / self.exponent)
+
+    def approach(self, load):
+        """Deformation under a static load [m]."""
+        return (load / self.stiffness) ** (1 / self.exponent)
+
+
+@dataclass(frozen=True)
+class GapLaw:
+    r"""Support that cannot pull: :math:`R = \max(0, k d + c\dot d \min(1, d/d_r))`, 0 where d <= 0."""
+
+    stiffness: float
+    damping: float = 0.0
+    onset: float = 1e-5
+    kind = GAP
+
+    @property
+    def numbers(self):
+        return self.stiffness, self.damping, self.onset
+
+    def force(self, d, rate=0.0):
+        """Force [N]."""
+        d = np.asarray(d, dtype=float)
+        onset = np.clip(d / self.onset, 0.0, 1.0)
+        return np.where(d > 0.0, np.maximum(0.0, self.stiffness * d + self.damping * rate * onset), 0.0)
+
+
+@dataclass(frozen=True)
+class TableLaw:
+    r"""Any law :math:`F = \varphi(d) + \psi(d)\,\dot d` with φ and ψ piecewise linear through ``deformation``.
+
+    ``deformation`` rising (n,) [m], ``elastic`` φ [N], ``viscous`` ψ [N s/m]; outside, φ goes on with the slope
+    of its last piece and ψ stays.
+    """
+
+    deformation: tuple
+    elastic: tuple
+    viscous: tuple
+    kind = TABLE
+    numbers = (0.0, 0.0, 0.0)
+
+    def __post_init__(self):
+        if len(self.deformation) < 2 or np.any(np.diff(self.deformation) <= 0.0):
+            raise SimulationError(f"table law: deformations must rise, got {self.deformation!r}.")
+        if not len(self.deformation) == len(self.elastic) == len(self.viscous):
+            raise SimulationError("table law: deformation, elastic and viscous differ in length.")
+
+    def force(self, d, rate=0.0):
+        """Force [N]."""
+        x, f = np.asarray(self.deformation), np.asarray(self.elastic)
+        d = np.asarray(d, dtype=float)
+        k = np.clip(np.searchsorted(x, d, side="right") - 1, 0, x.size - 2)
+        elastic = f[k] + (f[k + 1] - f[k]) / (x[k + 1] - x[k]) * (d - x[k])
+        return elastic + np.interp(d, x, self.viscous) * rate
+
+
+@dataclass(frozen=True)
+class LinearLaw:
+    r""":math:`F = W + k d + c \dot d` in both directions: a linearised contact about a static load W."""
+
+    stiffness: float
+    damping: float = 0.0
+    preload: float = 0.0
+    kind = LINEAR
+
+    @property
+    def numbers(self):
+        return self.stiffness, self.damping, self.preload
+
+    def force(self, d, rate=0.0):
+        """Force [N]."""
+        return self.preload + self.stiffness * np.asarray(d) + self.damping * np.asarray(rate)
+
+
+@dataclass(frozen=True)
+class FrictionLaw:
+    r"""Dry friction smoothed over a slip rate: :math:`F = F_0 \tanh(\dot d / v_0)`."""
+
+    limit: float
+    slip_rate: float = 1e-3
+    kind = FRICTION
+
+    @property
+    def numbers(self):
+        return self.limit, self.slip_rate, 0.0
+
+    def force(self, d, rate=0.0):
+        """Force [N]."""
+        return self.limit * np.tanh(np.asarray(rate) / self.slip_rate) + 0.0 * np.asarray(d)
+
+
+@dataclass(frozen=True)
+class Port:
+    """One scalar force of the track on itself or on the ground, added by an effect that matrices cannot hold.
+
+    ``ends`` as in ``Link``: the deformation is d = v·u - ``gap`` and the force on the track -v F(d, rate).
+    ``label`` names it in errors and outputs. What it replaces, the term takes away by a link of negative stiffness.
+    """
+
+    ends: tuple
+    law: object
+    gap: float = 0.0
+    label: str = "port"

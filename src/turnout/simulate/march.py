@@ -1,0 +1,199 @@
+"""The time march, compiled: free motion, the small system of all ports, their response, advance, record."""
+
+import numpy as np
+
+from turnout.simulate.banded import momentum_less_force, multiply, solve, solve_from_both_ends
+from turnout.simulate.compiled import inlined, kernel
+from turnout.simulate.port_system import evaluate, flexibility, newton_update, place_ports
+
+ITERATIONS = 30
+CONVERGED, NEWTON, LEFT_TRACK = range(3)
+
+
+@inlined
+def free_motion(track, scheme, bodies, run, motion, step, d, e, e_stand_in, mass_v, stiff_u):
+    """Right-hand sides and solution of the step with all ports free."""
+    pad, n = track.pad, track.n
+    by_v, by_u = scheme.weight * scheme.s, scheme.weight
+    if track.mass.shape[0] == 9:
+        momentum_less_force(track.mass, track.stiffness, motion.v, motion.u, by_v, by_u, pad, d, n)
+    else:
+        multiply(track.mass, motion.v, pad, mass_v, n)
+        multiply(track.stiffness, motion.u, pad, stiff_u, n)
+        inner = d[pad : pad + n]
+        for i in range(n):
+            inner[i] = by_v * mass_v[i] - by_u * stiff_u[i]
+    for k in range(run.known_rows.shape[0]):
+        for a in range(scheme.node.size):
+            f = scheme.tau[a] * run.known_force[k, step, a]
+            for i in range(4):
+                d[pad + run.known_rows[k, i]] += f * run.known_weights[k, i]
+    if track.middle.shape[0] == 4:
+        back = track.lower_back, track.upper_back, track.pivot_back
+        solve_from_both_ends(track.lower, track.upper, track.inverse_pivot, *back, track.middle, d, pad, n)
+    else:
+        solve(track.lower, track.upper, track.inverse_pivot, d, pad, n)
+    for block in range(bodies.block_start.size - 1):
+        start, stop = bodies.block_start[block], bodies.block_start[block + 1]
+        for i in range(start, stop):
+            value = bodies.from_weight[i]
+            for j in range(start, stop):
+                value += bodies.from_velocity[block, i - start, j - start] * motion.w[j]
+                value -= bodies.from_position[block, i - start, j - start] * motion.z[j]
+            e[i] = value
+    for i in range(motion.y.size):
+        momentum = scheme.s * bodies.stand_in_mass[i] * motion.x[i]
+        rest = momentum - bodies.stand_in_stiffness[i] * motion.y[i]
+        e_stand_in[i] = bodies.stand_in_answer[i] * scheme.weight * rest
+
+
+@inlined
+def free_deformation(track, scheme, ports, motion, d, e, e_stand_in, rows, weights, share, dip, d0):
+    """Deformation of every port stage as if no port pushed."""
+    stages, pad, t = scheme.node.size, track.pad, scheme.t
+    u, z, y, bodies_of, wheels = motion.u, motion.z, motion.y, ports.body, ports.wheel
+    for i in range(bodies_of.size):
+        body, wheel = bodies_of[i], wheels[i]
+        for a in range(stages):
+            k = i * stages + a
+            value = -dip[k]
+            for j in range(4):
+                r = pad + rows[k, j]
+                value -= weights[k, j] * (u[r] + scheme.scale * (t[a] * d[r]).real)
+            if body >= 0:
+                value += z[body] + scheme.scale * (t[a] * e[body]).real
+                if share[k] != 0.0:
+                    value -= share[k] * (y[wheel] + scheme.scale * (t[a] * e_stand_in[wheel]).real)
+            d0[k] = value
+
+
+@inlined
+def add_port_forces(track, scheme, bodies, ports, force, rows, weights, share, d, e, e_stand_in):
+    """Add the response to the port forces to the free motion, through windows of the inverse."""
+    stages, tau, window, width = scheme.node.size, scheme.tau, track.window, 2 * track.pad + 1
+    body_of, wheel_of, answer, stand_in_answer = ports.body, ports.wheel, bodies.answer, bodies.stand_in_answer
+    block_of, block_start = bodies.block_of, bodies.block_start
+    for i in range(body_of.size):
+        total, first = 0.0 * tau[0], i * stages
+        same = stages == 2 and rows[first, 0] == rows[first + 1, 0] and rows[first, 3] == rows[first + 1, 3]
+        for a in range(stages):
+            k = first + a
+            amount = tau[a] * force[k]
+            total += amount
+            if share[k] != 0.0:
+                e_stand_in[wheel_of[i]] += amount * share[k] * stand_in_answer[wheel_of[i]]
+            if same and a == 0:
+                continue
+            for j in range(4):
+                c, r = amount * weights[k, j], rows[k, j]
+                if same:
+                    c += tau[0] * force[first] * weights[first, j]
+                if c != 0.0:
+                    add_window(d, window, r, width, c)
+        body = body_of[i]
+        if body >= 0:
+            block = block_of[body]
+            start = block_start[block]
+            for j in range(start, block_start[block + 1]):
+                e[j] -= total * answer[block, j - start, body - start]
+
+
+@inlined
+def add_window(d, window, r, width, c):
+    """``d[r:r+width]`` += c times row ``r`` of the windows."""
+    near, row = d[r : r + width], window[r]
+    for m in range(width):
+        near[m] += c * row[m]
+
+
+@inlined
+def record(track, scheme, run, motion, d, step, out):
+    """Sensors: mean acceleration or velocity, or displacement, of the step that ends now; all stamped mid-step."""
+    for m in range(out.shape[0]):
+        value = 0.0
+        for j in range(4):
+            r = track.pad + run.sensor_rows[m, j]
+            if run.sensor_order[m] == 2:
+                rise = (scheme.carry - 1.0) * motion.v[r]
+                change = (rise + scheme.scale * (scheme.delta * scheme.s * d[r]).real) / scheme.dt
+            elif run.sensor_order[m] == 1:
+                change = scheme.scale * (scheme.delta * d[r]).real / scheme.dt
+            else:
+                change = motion.u[r] + 0.5 * scheme.scale * (scheme.delta * d[r]).real
+            value += run.sensor_weights[m, j] * change
+        out[m, step] = value
+
+
+@inlined
+def advance(scheme, motion, d, e, e_stand_in):
+    """End of the step: u + scale Re(δ D) and R v + scale Re(δ s D) for track, bodies and stand-ins."""
+    by_d, by_s = scheme.delta, scheme.delta * scheme.s
+    for i in range(motion.u.size):
+        motion.u[i] += scheme.scale * (by_d * d[i]).real
+        motion.v[i] = scheme.carry * motion.v[i] + scheme.scale * (by_s * d[i]).real
+    for i in range(motion.z.size):
+        motion.z[i] += scheme.scale * (by_d * e[i]).real
+        motion.w[i] = scheme.carry * motion.w[i] + scheme.scale * (by_s * e[i]).real
+    for i in range(motion.y.size):
+        motion.y[i] += scheme.scale * (by_d * e_stand_in[i]).real
+        motion.x[i] = scheme.carry * motion.x[i] + scheme.scale * (by_s * e_stand_in[i]).real
+
+
+@kernel
+def march(track, scheme, bodies, ports, run, motion, n_step, out, out_force):
+    """March ``n_step`` steps; returns (status, step, port, value, iterations) and leaves ``motion`` at the end."""
+    stages, n_port = scheme.node.size, ports.body.size
+    n = n_port * stages
+    zero = scheme.tau[0] * 0.0
+    d = np.zeros(motion.u.size, dtype=scheme.tau.dtype)
+    e, e_stand_in = np.full(motion.z.size, zero), np.full(motion.y.size, zero)
+    mass_v, stiff_u = np.zeros(track.n), np.zeros(track.n)
+    element, order = np.zeros(n_port, dtype=np.int64), np.arange(n_port)
+    rows, active = np.zeros((n, 4), dtype=np.int64), np.zeros(n, dtype=np.int64)
+    weights, g, matrix = np.zeros((n, 4)), np.zeros((n, n)), np.zeros((n, n))
+    x, local, share, dip, d0, deformed = (np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n))
+    f, by_d, by_rate, change, right = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
+    iterations = 0
+    for step in range(n_step):
+        free_motion(track, scheme, bodies, run, motion, step, d, e, e_stand_in, mass_v, stiff_u)
+        lost = place_ports(track, scheme, ports, run, step, element, x, rows, weights, local, share, dip)
+        if lost >= 0:
+            return LEFT_TRACK, step, lost, x[lost * stages], iterations
+        free_deformation(track, scheme, ports, motion, d, e, e_stand_in, rows, weights, share, dip, d0)
+        flexibility(track, scheme, bodies, ports, rows, weights, local, share, g)
+        for k in range(1, n_port):
+            o, m = order[k], k
+            while m > 0 and x[order[m - 1] * stages] > x[o * stages]:
+                order[m] = order[m - 1]
+                m -= 1
+            order[m] = o
+        converged = n == 0
+        for _ in range(ITERATIONS):
+            if n == 0:
+                break
+            worst, where = evaluate(
+                scheme, ports, n, g, d0, motion.force, motion.deformation, deformed, f, by_d, by_rate
+            )
+            if worst < run.tolerance:
+                converged = True
+                break
+            newton_update(
+                scheme, ports, order, x, run.cut, g, motion.force, f, by_d, by_rate, change, matrix, right, active
+            )
+            iterations += 1
+        if not converged:
+            return NEWTON, step, where, worst, iterations
+        for i in range(n_port):
+            value = scheme.carry * motion.deformation[i]
+            for a in range(stages):
+                value += scheme.end[a] * deformed[i * stages + a]
+            motion.deformation[i] = value
+            if out_force.shape[1] > step:
+                mean = 0.0
+                for a in range(stages):
+                    mean += scheme.quadrature[a] * motion.force[i * stages + a]
+                out_force[i, step] = mean
+        add_port_forces(track, scheme, bodies, ports, motion.force, rows, weights, share, d, e, e_stand_in)
+        record(track, scheme, run, motion, d, step, out)
+        advance(scheme, motion, d, e, e_stand_in)
+    return CONVERGED, n_step, -1, 0.0, iterations

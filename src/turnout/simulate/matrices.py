@@ -1,0 +1,159 @@
+"""Banded mass, damping and stiffness of a track, and the place of every degree of freedom in them."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from turnout.errors import SimulationError
+from turnout.simulate.rail import element_mass, element_stiffness, local_compliance, shape_functions
+
+ORDER = {"sleeper": 0, "ballast": 1}
+
+
+@dataclass(frozen=True)
+class TrackMatrices:
+    """Matrices as upper diagonals, (half + 1, n): ``mass[k, i]`` is M[i, i + k]; ``node`` (n_node,) [m].
+
+    ``index`` maps the name of a degree of freedom to its row; ``node_index`` (n_node,) is the row of a node's
+    deflection, its rotation follows. ``rails`` has the profile of each element, ``links`` all that was added.
+    """
+
+    mass: np.ndarray
+    damping: np.ndarray
+    stiffness: np.ndarray
+    hysteresis: np.ndarray
+    node: np.ndarray
+    node_index: np.ndarray
+    index: dict
+    rails: tuple
+    links: tuple
+
+    @property
+    def n(self):
+        """Degrees of freedom."""
+        return self.mass.shape[1]
+
+    @property
+    def half(self):
+        """Half bandwidth."""
+        return self.mass.shape[0] - 1
+
+    @cached_property
+    def elements(self):
+        """Element table: length, shear ratio, EI, κGA (inf for Euler-Bernoulli), each (n_element,)."""
+        h = np.diff(self.node)
+        p = np.array([float(r.shear_ratio(h_e)) for r, h_e in zip(self.rails, h)])
+        ei = np.array([r.bending_stiffness for r in self.rails])
+        kga = np.array([np.inf if r.beam == "euler" else r.shear_stiffness for r in self.rails])
+        return h, p, ei, kga
+
+    def rail_weights(self, x):
+        """Rows (4,) and weights (4,) that give the rail's deflection at ``x`` [m] between two nodes."""
+        if not self.node[0] <= x <= self.node[-1]:
+            a, b = self.node[[0, -1]]
+            raise SimulationError(f"place {x:.3f} m is outside the track from {a:.3f} m to {b:.3f} m.")
+        e = min(int(np.searchsorted(self.node, x, side="right")) - 1, self.node.size - 2)
+        h, p = self.elements[0][e], self.elements[1][e]
+        i, j = self.node_index[e], self.node_index[e + 1]
+        return np.array([i, i + 1, j, j + 1]), shape_functions((x - self.node[e]) / h, h, p)
+
+    def compliance(self, x):
+        """Compliance within the element at ``x`` [m/N]."""
+        e = min(int(np.searchsorted(self.node, x, side="right")) - 1, self.node.size - 2)
+        h = self.node[e + 1] - self.node[e]
+        return float(local_compliance(*2 * ((x - self.node[e]) / h,), h, self.rails[e]))
+
+    def weights(self, place):
+        """Rows and weights of a place: a number is the rail at x [m], a tuple names a degree of freedom."""
+        if isinstance(place, tuple):
+            if place not in self.index:
+                raise SimulationError(f"the track has no degree of freedom {place!r}.")
+            return np.array([self.index[place]]), np.array([1.0])
+        return self.rail_weights(float(place))
+
+
+def link_vector(link, index):
+    """Rows and weights of a link; a name that the track does not have is a SimulationError."""
+    try:
+        return np.array([index[name] for name, _ in link.ends]), np.array([weight for _, weight in link.ends])
+    except KeyError as error:
+        raise SimulationError(f"link {link.tag!r}: the track has no degree of freedom {error.args[0]!r}.") from None
+
+
+def assemble(track, terms=()):
+    """Matrices of ``track`` with the rails that ``terms`` change and the links that they add."""
+    for term in terms:
+        track = term.rail(track)
+    links = track.links()
+    for term in terms:
+        links.extend(term.links(track))
+    node, node_index, index = _number(track, links)
+    vectors = [link_vector(link, index) for link in links]
+    half = max([1 + int(np.max(np.diff(node_index))), *(int(np.ptp(rows)) for rows, _ in vectors)])
+    n = max(max(index.values()) + 1, int(node_index[-1]) + 2)
+    mass, damping, stiffness, hysteresis = (np.zeros((half + 1, n)) for _ in range(4))
+    rails = tuple(track.rail_between(0.5 * (a + b)) for a, b in pairwise(node))
+    _add_rail(track, rails, node, node_index, mass, damping, stiffness)
+    for link, (rows, weights) in zip(links, vectors):
+        for a, wa in zip(rows, weights):
+            for b, wb in zip(rows, weights):
+                if b >= a:
+                    stiffness[b - a, a] += link.stiffness * wa * wb
+                    damping[b - a, a] += link.damping * wa * wb
+                    mass[b - a, a] += link.mass * wa * wb
+                    hysteresis[b - a, a] += link.loss_factor * link.stiffness * wa * wb
+    return TrackMatrices(mass, damping, stiffness, hysteresis, node, node_index, index, rails, tuple(links))
+
+
+def _number(track, links):
+    """Nodes, their rows and the row of every named degree of freedom, supports' own ones after their node."""
+    per_bay = track.elements_per_bay
+    bays = [np.linspace(a, b, per_bay + 1)[:-1] for a, b in zip(track.support[:-1], track.support[1:])]
+    node = np.append(np.concatenate(bays), track.support[-1])
+    extra = [set() for _ in track.support]
+    for link in links:
+        for name, _ in link.ends:
+            if not 0 <= name[1] < track.support.size:
+                raise SimulationError(f"link {link.tag!r}: support {name[1]} of {track.support.size}.")
+            if name[0] != "rail":
+                extra[name[1]].add(name)
+    index, node_index, row = {}, np.empty(node.size, dtype=np.int64), 0
+    for k in range(node.size):
+        node_index[k], row = row, row + 2
+        j, rest = divmod(k, per_bay)
+        index[("rail", j, rest)] = node_index[k]
+        if rest:
+            if j + 1 < track.support.size:
+                index[("rail", j + 1, rest - per_bay)] = node_index[k]
+            continue
+        index[("rail", j)] = node_index[k]
+        for name in sorted(extra[j], key=lambda n: (ORDER.get(n[0], 2), n[0], n[2:])):
+            index[name], row = row, row + 1
+    return node, node_index, index
+
+
+def _add_rail(track, rails, node, node_index, mass, damping, stiffness):
+    known = {}
+    for e, rail in enumerate(rails):
+        h = node[e + 1] - node[e]
+        key = (rail, round(h, 12))
+        if key not in known:
+            known[key] = element_mass(rail, h), element_stiffness(rail, h)
+        m, k = known[key]
+        rows = (node_index[e], node_index[e] + 1, node_index[e + 1], node_index[e + 1] + 1)
+        rate = rail.damping / rail.mass + _end_rate(track, 0.5 * (node[e] + node[e + 1]))
+        for a in range(4):
+            for b in range(a, 4):
+                mass[rows[b] - rows[a], rows[a]] += m[a, b]
+                stiffness[rows[b] - rows[a], rows[a]] += k[a, b]
+                damping[rows[b] - rows[a], rows[a]] += rate * m[a, b]
+
+
+def _end_rate(track, x):
+    """Damping rate [1/s] of an absorbing end, growing as the square of the way into it."""
+    if not track.end_length:
+        return 0.0
+    depth = max(track.start + track.end_length - x, x - track.end + track.end_length, 0.0)
+    return track.end_damping * (depth / track.end_length) ** 2

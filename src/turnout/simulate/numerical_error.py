@@ -1,0 +1,128 @@
+"""Our own numerical error: repeat a run with half the time step and half the elements, band by band and sensor."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from turnout.simulate.passage import simulate_passage
+from turnout.simulate.track import PER_SUPPORT
+from turnout.simulate.turnout_track import TurnoutTrack
+
+BANDS = ((5.0, 40.0), (40.0, 120.0), (120.0, 300.0), (300.0, 600.0), (600.0, 1000.0))
+
+
+@dataclass(frozen=True)
+class NumericalError:
+    """Per sensor (rows) and band (columns): relative error of waveform and level [dB] by halving step and mesh.
+
+    ``step`` and ``mesh`` are norms of the difference over the norm of the finer run; a scheme of order p leaves
+    1/(2^p - 1) of that difference, so they are upper bounds. ``level_step``, ``level_mesh`` [dB] are changes of
+    the band's power. ``total`` = step + mesh.
+    """
+
+    bands: tuple
+    sensors: tuple
+    step: np.ndarray
+    mesh: np.ndarray
+    level_step: np.ndarray
+    level_mesh: np.ndarray
+
+    @property
+    def total(self):
+        """(n_sensor, n_band) bound of both together."""
+        return self.step + self.mesh
+
+    def allows(self, mismatch):
+        """(n_sensor, n_band) whether causes may be named: error below a third of the relative ``mismatch``."""
+        return self.total < np.asarray(mismatch) / 3.0
+
+    def __str__(self):
+        lines = ["sensor      " + "".join(f"{a:>8.0f}-{b:<6.0f}" for a, b in self.bands) + " Hz"]
+        for name, step, mesh in zip(self.sensors, self.step, self.mesh):
+            lines.append(f"{name:<12}" + "".join(f"{100 * s:>6.2f}+{100 * m:<6.2f}% " for s, m in zip(step, mesh)))
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True)
+class PassageCase:
+    """A passage to be judged: the arguments of ``simulate_passage``, sensors bare of noise."""
+
+    track: object
+    vehicle: object
+    speed: float
+    sensors: tuple
+    options: dict
+
+
+def numerical_error(case, bands=BANDS):
+    """``NumericalError`` of a ``PassageCase``: three runs, the last two with dt/2 and with twice the elements.
+
+    The finer runs keep the recorded rate: two steps are averaged into one sample.
+    """
+    options = dict(case.options)
+    rate, substeps = options.get("rate", 20e3), options.pop("substeps", 1)
+    options["rate"] = rate
+    bare = _bare(case.sensors)
+
+    def samples(track, substeps):
+        return simulate_passage(track, case.vehicle, case.speed, bare, **options, substeps=substeps).samples
+
+    base, finer_step = samples(case.track, substeps), samples(case.track, 2 * substeps)
+    elements = 2 * _base(case.track).elements_per_bay
+    finer_mesh = samples(_with_elements(case.track, elements), substeps)
+    step, level_step = compare(base, finer_step, rate, bands)
+    mesh, level_mesh = compare(base, finer_mesh, rate, bands)
+    return NumericalError(tuple(bands), tuple(s.name for s in bare), step, mesh, level_step, level_mesh)
+
+
+def compare(coarse, fine, rate, bands=BANDS):
+    """Relative waveform difference and level difference [dB] of two (n_sensor, n) recordings in each band."""
+    n = min(coarse.shape[1], fine.shape[1])
+    window = np.hanning(n)
+    a, b = (np.fft.rfft(window * signal[:, :n]) for signal in (coarse, fine))
+    frequency = np.fft.rfftfreq(n, 1.0 / rate)
+    waveform, level = np.zeros((coarse.shape[0], len(bands))), np.zeros((coarse.shape[0], len(bands)))
+    for k, (low, high) in enumerate(bands):
+        inside = (frequency >= low) & (frequency < high)
+        power = np.sum(np.abs(b[:, inside]) ** 2, axis=1)
+        waveform[:, k] = np.sqrt(np.sum(np.abs(a - b)[:, inside] ** 2, axis=1) / power)
+        level[:, k] = 10.0 * np.log10(np.sum(np.abs(a[:, inside]) ** 2, axis=1) / power)
+    return waveform, level
+
+
+def end_error(case, extra=30.0, bands=BANDS):
+    """Relative waveform difference to the same track, longer by ``extra`` [m] of its last supports at both ends."""
+    smooth = replace(case.track, roughness_level=None) if isinstance(case.track, TurnoutTrack) else case.track
+    options = {name: value for name, value in case.options.items() if name not in ("roughness", "prepared")}
+    rate = options.get("rate", 20e3)
+    bare = _bare(case.sensors)
+    tracks = smooth, _lengthened(smooth, extra)
+    runs = [simulate_passage(track, case.vehicle, case.speed, bare, **options) for track in tracks]
+    return compare(runs[0].samples, runs[1].samples, rate, bands)[0]
+
+
+def _bare(sensors):
+    """The sensors without their instruments: what is compared is the track."""
+    return tuple(replace(s, noise=0.0, limit=None, resolution=None, cutoff=None) for s in sensors)
+
+
+def _base(track):
+    return track.track if isinstance(track, TurnoutTrack) else track
+
+
+def _with_elements(track, elements):
+    if isinstance(track, TurnoutTrack):
+        return track.with_track(elements_per_bay=elements)
+    return replace(track, elements_per_bay=elements)
+
+
+def _lengthened(track, extra):
+    if isinstance(track, TurnoutTrack):
+        tracks = {name: _lengthened(one, extra) for name, one in track.tracks.items()}
+        return replace(track, track=_lengthened(track.track, extra), tracks=tracks)
+    spacing = track.support[1] - track.support[0]
+    count = round(extra / spacing)
+    more = spacing * np.arange(1, count + 1)
+    support = np.concatenate([track.start - more[::-1], track.support, track.end + more])
+    values = {name: np.pad(getattr(track, name), count, mode="edge") for name in PER_SUPPORT}
+    return replace(track, support=support, section=(), **values)

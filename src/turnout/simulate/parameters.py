@@ -1,0 +1,45 @@
+"""Tracks and vehicles by name or path: ``config/tracks/<name>.yaml`` and ``config/vehicles/<name>.yaml``."""
+
+from pathlib import Path
+
+from turnout.config.parameter_set import read_parameters
+from turnout.errors import SimulationError
+from turnout.simulate.train import train
+from turnout.simulate.turnout_track import turnout_track
+from turnout.simulate.vehicle import coupled
+
+REPOSITORY = Path(__file__).resolve().parents[3]
+
+
+def load_track(name, seed=0, folder=None):
+    """``TurnoutTrack`` called ``name`` or in the file of that path; ``seed`` draws its scatter along the track."""
+    return turnout_track(read_parameters(_file(name, folder, "tracks")), seed)
+
+
+def load_vehicle(name, load=0.5, folder=None, units=1):
+    """``Vehicle`` called ``name``; ``load`` from 0 (empty) to 1 (full), ``units`` coupled one behind the other.
+
+    A file with ``compose`` is a train of other files' vehicles, front first; a locomotive has no payload.
+    """
+    path = _file(name, folder, "vehicles")
+    parameters = read_parameters(path)
+    if "compose" not in parameters:
+        return train(parameters, load, units)
+    parameters.only("name", "title", "compose", "sources")
+    parts = []
+    for entry in parameters["compose"]:
+        part = load_vehicle(entry["vehicle"], load, folder or path.parent)
+        parts += [part] * int(entry.get("count", 1))
+    made = coupled(str(parameters["name"]), parts * units)
+    return made.with_(conditions={"load_share": float(load), "units": int(units)})
+
+
+def _file(name, folder, kind):
+    if str(name).endswith((".yaml", ".yml")):
+        return Path(name)
+    folders = [Path(folder)] if folder else [Path.cwd() / "config" / kind, REPOSITORY / "config" / kind]
+    for candidate in folders:
+        if (candidate / f"{name}.yaml").is_file():
+            return candidate / f"{name}.yaml"
+    there = sorted({p.stem for f in folders if f.is_dir() for p in f.glob("*.yaml")})
+    raise SimulationError(f"no file config/{kind}/{name}.yaml; there are {', '.join(there) or 'none'}.")

@@ -1,0 +1,182 @@
+"""A train passage: the train in equilibrium rolls over the turnout and is recorded like a measured one."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnout.errors import SimulationError
+from turnout.records import Recording
+from turnout.simulate.prepare import prepare
+from turnout.simulate.run import Drive, run
+from turnout.simulate.sensor import measured, seated
+from turnout.simulate.turnout_track import TurnoutTrack
+from turnout.simulate.wheel_path import check_path
+
+
+@dataclass(frozen=True)
+class PassageTruth:
+    """What no measuring system sees. ``time`` (n,) [s] of the samples, ``force`` (n_wheel, n) [N] mean over the
+    step, ``surface_force`` (n_wheel, n_surface, n), ``wheel_place`` (n_wheel, n) [m], ``port_force`` of terms,
+    ``clean`` (n_channel, n) before the sensors, ``iterations`` of Newton per step."""
+
+    time: np.ndarray
+    force: np.ndarray
+    surface_force: np.ndarray
+    wheel_place: np.ndarray
+    port_force: np.ndarray
+    clean: np.ndarray
+    iterations: float
+
+
+def simulate_passage(
+    track,
+    vehicle,
+    speed,
+    sensors,
+    direction="facing",
+    route="main",
+    roughness=None,
+    terms=(),
+    seed=0,
+    rate=20e3,
+    substeps=1,
+    lead=1.0,
+    tail=1.0,
+    irregularities=(),
+    entry=6.0,
+    scheme="radau",
+    prepared=None,
+    started_at=None,
+    conditions=None,
+    truth=False,
+):
+    """Recording of ``vehicle`` passing the turnout at ``speed`` [m/s].
+
+    Parameters
+    ----------
+    track : TurnoutTrack or Track
+        What is passed. A plain Track is smooth and has one route.
+    vehicle : Vehicle
+        Of ``turnout.simulate.vehicle`` or read from config/vehicles.
+    speed : float
+        Above 0. [m/s]
+    sensors : sequence of Sensor
+        Channels of the recording.
+    direction : str
+        "facing" (towards growing x) or "trailing".
+    route : str
+        Route of the turnout: "main", "diverging".
+    roughness : float or None
+        Level above the limit curve of ISO 3095 [dB]; None: as the turnout says. The rail's roughness follows
+        from ``seed`` alone, the same for all trains of the same seed.
+    terms : sequence of PhysicsTerm
+        Effects added to the base model.
+    seed : int
+        Of roughness and noise.
+    rate, substeps : float, int
+        Samples per second [Hz] and time steps per sample.
+    lead, tail : float
+        Time before the first wheel reaches the first sensor and after the last has left the last one. [s]
+    irregularities : sequence of path parts
+        Further ones of this train: WheelFlat, OutOfRound ...
+    entry : float
+        Length over which wheels roll from their stand-in track onto the modelled one; 0: they must stay on the
+        modelled track all the time. [m]
+    prepared : Prepared
+        Of ``prepare_passage``, shared among trains, speeds and paths; its terms count.
+    truth : bool
+        Also return the PassageTruth.
+
+    Returns
+    -------
+    Recording or (Recording, PassageTruth)
+        Acceleration [m/s²] down positive; sample k is the mean over the time step around (k + 1/2) / rate.
+
+    Errors: SimulationError for a speed of zero, an unknown route, a sensor outside, a wheel that leaves the track.
+
+    Examples
+    --------
+    The rail carries the train: before and after, the mean contact force is the weight.
+
+    >>> from turnout.simulate.track import uniform_track
+    >>> from turnout.simulate.vehicle import car
+    >>> from turnout.simulate.sensor import Sensor
+    >>> sensors = [Sensor("A", 30.0), Sensor("B", 33.0)]
+    >>> recording, truth = simulate_passage(
+    ...     uniform_track(60.0), car(), 40.0, sensors, lead=0.2, tail=0.1, truth=True)
+    >>> f"{truth.force.mean() / 1e3:.1f} kN on each of {truth.force.shape[0]} wheels"
+    '54.0 kN on each of 4 wheels'
+    """
+    if not (np.isfinite(speed) and speed > 0.0):
+        raise SimulationError(f"speed must be above 0 m/s, got {speed!r}.")
+    if direction not in ("facing", "trailing"):
+        raise SimulationError(f"direction {direction!r} is neither 'facing' nor 'trailing'.")
+    turnout = track if isinstance(track, TurnoutTrack) else TurnoutTrack(track, {route: ((),)})
+    turnout.surfaces(route)
+    prepared = prepared or prepare_passage(turnout, terms, rate, substeps, scheme, route)
+    for term in prepared.terms:
+        vehicle = term.vehicle(vehicle)
+    sensors, sign = tuple(sensors), 1 if direction == "facing" else -1
+    if not sensors:
+        raise SimulationError("a passage without sensors records nothing.")
+    probes = [seated(sensor, prepared.terms).probe(prepared.track) for sensor in sensors]
+    drive, duration = _drive(
+        turnout, vehicle, speed, sensors, sign, route, roughness, seed, lead, tail, irregularities, entry
+    )
+    outcome = run(prepared, duration, probes, vehicle, drive, forces=truth)
+    rng = np.random.default_rng([seed, 1])
+    clean = _mean_of(outcome.signals, substeps)
+    channel_terms = [term for term in prepared.terms if term.kind == "channel"]
+    samples = np.array([measured(sensor, row, rate, rng, channel_terms) for sensor, row in zip(sensors, clean)])
+    noted = {
+        "train_type": vehicle.name,
+        "speed": float(speed),
+        "axle_loads": tuple(float(2.0 * load) for load in vehicle.static_loads),
+        "track": route,
+        "direction": direction,
+        **vehicle.conditions,
+        **(conditions or {}),
+    }
+    channels = tuple(sensor.channel() for sensor in sensors)
+    recording = Recording(samples, rate, channels, "passage", "", 0, started_at, noted)
+    if not truth:
+        return recording
+    return recording, _truth(outcome, drive, vehicle, clean, rate, substeps)
+
+
+def prepare_passage(track, terms=(), rate=20e3, substeps=1, scheme="radau", route="main"):
+    """Factorisation of a turnout for passages along ``route`` at this rate, shared among trains, speeds, seeds."""
+    base = track.track_of(route) if isinstance(track, TurnoutTrack) else track
+    return prepare(base, 1.0 / (rate * substeps), scheme, terms)
+
+
+def _drive(turnout, vehicle, speed, sensors, sign, route, level, seed, lead, tail, irregularities, entry):
+    places = sign * np.array([sensor.place for sensor in sensors])
+    length = float(vehicle.wheel_places[-1])
+    start = sign * (places.min() - speed * lead)
+    way = np.ptp(places) + length + speed * (lead + tail)
+    track = turnout.track
+    for parts in turnout.surfaces(route):
+        check_path((*parts, *irregularities), track.start, track.end)
+    rough = turnout.rolling(track.start - 5.0, track.end + 5.0, seed, level)
+    surfaces = tuple((*parts, *rough, *irregularities) for parts in turnout.surfaces(route))
+    return Drive(start, speed, sign, surfaces, entry), way / speed
+
+
+def _mean_of(signals, substeps):
+    n = signals.shape[-1] // substeps
+    return signals[..., : n * substeps].reshape(*signals.shape[:-1], n, substeps).mean(axis=-1)
+
+
+def _truth(outcome, drive, vehicle, clean, rate, substeps):
+    time = (np.arange(clean.shape[1]) + 0.5) / rate
+    place = drive.start + drive.direction * (drive.speed * time - vehicle.wheel_places[:, None])
+    return PassageTruth(
+        time,
+        _mean_of(outcome.force, substeps),
+        _mean_of(outcome.surface_force, substeps),
+        place,
+        _mean_of(outcome.port_force, substeps),
+        clean,
+        outcome.iterations,
+    )

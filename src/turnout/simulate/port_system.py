@@ -1,0 +1,146 @@
+"""The small nonlinear system of a step, compiled: where the ports are, what they do to each other, Newton."""
+
+import numpy as np
+
+from turnout.simulate.compiled import inlined
+from turnout.simulate.kernels import law_force, path_at, rail_weights, ramp_at, solve_dense, window_product
+
+
+@inlined
+def place_ports(track, scheme, ports, run, step, element, x, rows, weights, local, share, dip):
+    """Rows, weights, local compliance, stand-in share and dip of every port and stage; -1 or the lost port."""
+    stages, n_port = scheme.node.size, ports.body.size
+    # Locals, here and below: taking an array out of a tuple counts a reference, too dear inside a loop.
+    body, start, fixed_rows, fixed_weights, gap = ports.body, ports.place, ports.rows, ports.weights, ports.gap
+    node, node_row, shear_ratio = track.node, track.node_row, track.shear_ratio
+    flexible, shear_flexible = track.flexibility, track.shear_flexibility
+    time, path, which, ramp, last = scheme.node, run.path, ports.path, run.ramp, track.node.size - 2
+    first_place, last_place = node[0], node[last + 1]
+    for i in range(n_port):
+        for a in range(stages):
+            k = i * stages + a
+            if body[i] < 0:
+                x[k], local[k], share[k], dip[k] = start[i], 0.0, 0.0, gap[i]
+                for j in range(4):
+                    rows[k, j], weights[k, j] = fixed_rows[i, j], fixed_weights[i, j]
+                continue
+            at = start[i] + run.speed * (step + time[a]) * scheme.dt
+            x[k] = at
+            dip[k] = path_at(path, which[i], run.path_start, run.path_step, at)
+            r, share[k] = ramp_at(ramp, run.stand_in, at)
+            local[k] = 0.0
+            for j in range(4):
+                weights[k, j] = 0.0
+            if r == 0.0:
+                continue
+            if at < first_place or at > last_place:
+                return i
+            e = element[i]
+            while e > 0 and at < node[e]:
+                e -= 1
+            while e < last and at >= node[e + 1]:
+                e += 1
+            element[i] = e
+            local[k] = rail_weights(node, node_row, shear_ratio, flexible, shear_flexible, e, at, r, k, rows, weights)
+    return -1
+
+
+@inlined
+def flexibility(track, scheme, bodies, ports, rows, weights, local, share, g):
+    """Fill ``g``: how much a force at port stage b takes off the deformation of port stage a."""
+    stages, n_port, pad = scheme.node.size, ports.body.size, track.pad
+    body, wheel, window, t, tau = ports.body, ports.wheel, track.window, scheme.t, scheme.tau
+    block_of, block_start, answer = bodies.block_of, bodies.block_start, bodies.answer
+    stand_in_answer = bodies.stand_in_answer
+    for i in range(n_port):
+        for j in range(i, n_port):
+            coupled = 0.0 * tau[0]
+            if body[i] >= 0 and body[j] >= 0 and block_of[body[i]] == block_of[body[j]]:
+                block = block_of[body[i]]
+                coupled += answer[block, body[i] - block_start[block], body[j] - block_start[block]]
+            together = wheel[i] >= 0 and wheel[i] == wheel[j]
+            for a in range(stages):
+                for b in range(stages):
+                    p, q = i * stages + a, j * stages + b
+                    value = coupled
+                    if abs(rows[p, 0] - rows[q, 0]) <= pad + 8:
+                        value += window_product(window, pad, rows, weights, p, q)
+                    if together:
+                        value += share[p] * share[q] * stand_in_answer[wheel[i]]
+                    g[p, q] = scheme.scale * (t[a] * tau[b] * value).real
+                    g[q, p] = scheme.scale * (t[b] * tau[a] * value).real
+                    if a == b and i == j:
+                        g[p, q] += local[p]
+                    elif a == b and together:
+                        both = np.sqrt(local[p] * local[q])
+                        g[p, q] += both
+                        g[q, p] += both
+
+
+@inlined
+def evaluate(scheme, ports, n, g, d0, force, before, d, f, by_d, by_rate):
+    """Deformations and law forces of all port stages; returns the largest residual and where it is."""
+    stages, inverse = scheme.node.size, scheme.inverse
+    kind, numbers, table, table_start = ports.kind, ports.numbers, ports.table, ports.table_start
+    for k in range(n):
+        value = d0[k]
+        for m in range(n):
+            value -= g[k, m] * force[m]
+        d[k] = value
+    worst, where = 0.0, 0
+    for i in range(n // stages):
+        first, last = table_start[i], table_start[i + 1]
+        for a in range(stages):
+            rate = 0.0
+            for b in range(stages):
+                rate += inverse[a, b] * (d[i * stages + b] - before[i]) / scheme.dt
+            k = i * stages + a
+            f[k], by_d[k], by_rate[k] = law_force(kind[i], numbers, i, table, first, last, d[k], rate)
+            residual = abs(force[k] - f[k])
+            if not residual <= worst:
+                worst, where = residual, i
+    return worst, where
+
+
+@inlined
+def newton_update(scheme, ports, order, x, cut, g, force, f, by_d, by_rate, change, matrix, right, active):
+    """One Newton step, cluster by cluster of neighbouring ports; far coupling is left to the iteration."""
+    stages, inverse = scheme.node.size, scheme.inverse
+    n_port = order.size
+    first = 0
+    while first < n_port:
+        last = first + 1
+        while last < n_port and x[order[last] * stages] - x[order[last - 1] * stages] < cut:
+            last += 1
+        n = 0
+        for o in range(first, last):
+            for a in range(stages):
+                k = order[o] * stages + a
+                change[k] = f[k] - force[k]
+                if by_d[k] != 0.0 or by_rate[k] != 0.0:
+                    active[n] = k
+                    n += 1
+        for row in range(n):
+            k = active[row]
+            i, a = k // stages, k % stages
+            right[row] = change[k]
+            for o in range(first, last):
+                for b in range(stages):
+                    m = order[o] * stages + b
+                    value = by_d[k] * g[k, m]
+                    if by_rate[k] != 0.0:
+                        for c in range(stages):
+                            value += by_rate[k] * inverse[a, c] / scheme.dt * g[i * stages + c, m]
+                    if by_d[m] == 0.0 and by_rate[m] == 0.0:
+                        right[row] -= value * change[m]
+                        continue
+                    column = 0
+                    while active[column] != m:
+                        column += 1
+                    matrix[row, column] = value + (1.0 if m == k else 0.0)
+        solve_dense(matrix, right, n)
+        for row in range(n):
+            change[active[row]] = right[row]
+        first = last
+    for k in range(change.size):
+        force[k] += change[k]

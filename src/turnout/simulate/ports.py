@@ -1,0 +1,70 @@
+"""Gather wheels' contacts and terms' ports, in order of place, as the march takes them."""
+
+import numpy as np
+
+from turnout.errors import SimulationError
+from turnout.simulate.law import TABLE
+from turnout.simulate.state import PortArrays
+
+
+def contact_ports(vehicle, surfaces, start, direction):
+    """(place, body row, wheel, surface, law) of each contact: every wheel on every surface of the route."""
+    rows, found = vehicle.wheel_rows, []
+    for wheel, behind in enumerate(vehicle.wheel_places):
+        for surface in range(len(surfaces)):
+            found.append((start - direction * behind, int(rows[wheel]), wheel, surface, vehicle.contact))
+    return found
+
+
+def fixed_ports(prepared):
+    """Ports that the terms of a prepared track add."""
+    return [port for term in prepared.terms for port in term.ports(prepared.track)]
+
+
+def port_arrays(prepared, contacts, fixed, path_of):
+    """``PortArrays`` in order of place and the order itself: contacts first, then fixed ports.
+
+    ``path_of`` (wheel, surface) -> index of the path.
+    """
+    entries = []
+    for place, row, wheel, surface, law in contacts:
+        entries.append((place, row, wheel, path_of[wheel, surface], np.zeros(4, dtype=np.int64), np.zeros(4), 0.0, law))
+    for port in fixed:
+        rows, weights, place = _fixed_entry(prepared, port)
+        entries.append((place, -1, -1, -1, rows, -weights, port.gap, port.law))
+    order = sorted(range(len(entries)), key=lambda k: entries[k][0])
+    entries = [entries[k] for k in order]
+    tables = [_table(e[7]) for e in entries]
+    column = [np.array([e[k] for e in entries]) for k in (0, 1, 2, 3, 6)]
+    arrays = PortArrays(
+        column[1].astype(np.int64),
+        column[2].astype(np.int64),
+        column[3].astype(np.int64),
+        column[0].astype(float),
+        np.array([e[4] for e in entries], dtype=np.int64).reshape(-1, 4),
+        np.array([e[5] for e in entries]).reshape(-1, 4),
+        column[4].astype(float),
+        np.array([e[7].kind for e in entries], dtype=np.int64),
+        np.array([e[7].numbers for e in entries]).reshape(-1, 3).astype(float),
+        np.concatenate([[0], np.cumsum([t.shape[1] for t in tables])]).astype(np.int64),
+        np.ascontiguousarray(np.concatenate([*tables, np.zeros((3, 2))], axis=1)),
+    )
+    return arrays, order
+
+
+def _fixed_entry(prepared, port):
+    if not 1 <= len(port.ends) <= 4:
+        raise SimulationError(f"port {port.label!r}: acts on {len(port.ends)} degrees of freedom, 1 to 4 are possible.")
+    matrices = prepared.matrices
+    rows, weights = np.zeros(4, dtype=np.int64), np.zeros(4)
+    for k, (name, weight) in enumerate(port.ends):
+        if name not in matrices.index:
+            raise SimulationError(f"port {port.label!r}: the track has no degree of freedom {name!r}.")
+        rows[k], weights[k] = matrices.index[name], weight
+    return rows, weights, float(prepared.track.support[port.ends[0][0][1]])
+
+
+def _table(law):
+    if law.kind != TABLE:
+        return np.zeros((3, 0))
+    return np.array([law.deformation, law.elastic, law.viscous], dtype=float)

@@ -1,0 +1,133 @@
+"""Factorise a track once for a time step and scheme; many trains, speeds and paths then share it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnout.errors import SimulationError
+from turnout.simulate.banded import all_diagonals, factorise, inverse_windows, upper_rows
+from turnout.simulate.matrices import assemble
+from turnout.simulate.scheme import scheme as scheme_called
+from turnout.simulate.state import SchemeArrays, TrackArrays
+from turnout.simulate.track import Track
+
+LOOSE = 1e-11  # a pivot this small beside its diagonal is what rounding leaves of 0
+WINDOW_DECAY = 30.0  # exp(-30) = 1e-13: windows of the inverse are exact to rounding
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A track ready to march: ``matrices`` for sensors and statics, ``arrays`` and ``scheme`` for the kernels."""
+
+    track: Track
+    terms: tuple
+    dt: float
+    scheme_name: str
+    matrices: object
+    arrays: TrackArrays
+    scheme: SchemeArrays
+    static: tuple
+
+    def static_response(self, rows, weights):
+        """(n,) static deflection of all degrees of freedom under a unit force with these weights."""
+        lower, upper, inverse_pivot = self.static
+        x = np.zeros(self.matrices.n)
+        np.add.at(x, rows, weights)
+        from turnout.simulate.banded import solve
+
+        solve(lower, upper, inverse_pivot, x, 0, x.size)
+        return x
+
+
+def prepare(track, dt=5e-5, scheme="radau", terms=()):
+    """Assemble and factorise ``track`` with the matrix entries of ``terms`` for steps of ``dt`` [s].
+
+    Errors: SimulationError where the track carries no load (its stiffness is not positive definite).
+    """
+    if not dt > 0.0:
+        raise SimulationError(f"time step must be above 0 s, got {dt!r}.")
+    terms = tuple(terms)
+    matrices = assemble(track, terms)
+    chosen = scheme_called(scheme)
+    s = chosen.rate / dt
+    system = s * s * matrices.mass + s * matrices.damping + matrices.stiffness
+    lower, upper, inverse_pivot = _factors(system)
+    static = _factors(matrices.stiffness)
+    loose = (static[2] <= 0.0) | (1.0 / static[2] < LOOSE * matrices.stiffness[0])
+    if np.any(loose):
+        k = int(np.argmax(loose))
+        raise SimulationError(
+            f"{track.name}: the track carries no load, its stiffness has pivot {1 / static[2][k]:.3g} in row {k}."
+        )
+    reach = _reach(track, matrices, s)
+    window = inverse_windows(lower, upper, inverse_pivot, reach)
+    _, p, ei, kga = matrices.elements
+    arrays = TrackArrays(
+        matrices.n,
+        reach,
+        lower,
+        upper,
+        inverse_pivot,
+        all_diagonals(matrices.mass, max(4, matrices.half)),
+        all_diagonals(matrices.stiffness, max(4, matrices.half)),
+        window,
+        *_from_both_ends(system, window, reach),
+        matrices.node,
+        matrices.node_index,
+        p,
+        1.0 / ei,
+        1.0 / kga,
+    )
+    return Prepared(track, terms, dt, scheme, matrices, arrays, _scheme_arrays(chosen, dt), static)
+
+
+def _factors(system):
+    half, n = system.shape[0] - 1, system.shape[1]
+    width = 4 if half <= 4 else 6 if half <= 6 else half
+    lower, inverse_pivot = np.zeros((n, width), dtype=system.dtype), np.zeros(n, dtype=system.dtype)
+    factorise(np.ascontiguousarray(system), lower, inverse_pivot)
+    return lower, upper_rows(lower, n, half, width), inverse_pivot
+
+
+def _from_both_ends(system, window, reach):
+    """Factors of the matrix turned round and the inverse's block in the middle, for half bandwidth 4 at most."""
+    half, n = system.shape[0] - 1, system.shape[1]
+    if half > 4 or n < 16 or reach < 4:
+        nothing = np.zeros((0, 4), dtype=system.dtype)
+        return nothing, nothing, np.zeros(0, dtype=system.dtype), np.zeros((0, 0), dtype=system.dtype)
+    turned = np.zeros_like(system)
+    for k in range(half + 1):
+        turned[k, : n - k] = system[k, : n - k][::-1]
+    top = (n - 4) // 2
+    middle = np.array([[window[top + i, reach + j - i] for j in range(4)] for i in range(4)])
+    return *_factors(turned), np.ascontiguousarray(middle)
+
+
+def _reach(track, matrices, s):
+    """Half width of the windows: decay of EI w'''' + s² m w = 0 down to rounding, in rows."""
+    rails = {*matrices.rails}
+    decay = min(float(np.min(np.abs(np.roots([r.bending_stiffness, 0, 0, 0, s * s * r.mass]).real))) for r in rails)
+    span = WINDOW_DECAY / decay
+    node = matrices.node
+    rows = [
+        matrices.node_index[min(np.searchsorted(node, x + span), node.size - 1)] - i
+        for x, i in zip(node, matrices.node_index)
+    ]
+    return int(min(max(rows) + matrices.half + 2, matrices.n - 1))
+
+
+def _scheme_arrays(chosen, dt):
+    return SchemeArrays(
+        float(dt),
+        chosen.rate / dt,
+        chosen.t,
+        chosen.tau,
+        chosen.weight,
+        chosen.delta,
+        float(chosen.carry),
+        chosen.node,
+        chosen.quadrature,
+        chosen.inverse,
+        float(chosen.scale),
+        chosen.quadrature @ chosen.inverse,
+    )

@@ -1,0 +1,64 @@
+"""Random roughness of rail and wheel with the spectrum's shape of ISO 3095."""
+
+import numpy as np
+
+from turnout.simulate.wheel_path import Sampled
+
+# Limit curve of ISO 3095:2013 in one-third octave bands from 2 m down to 3.15 mm [dB re 1 µm], the class "well
+# maintained and very smooth" of Directive (EU) 2015/996; between the bands the level is linear in the logarithm.
+WAVELENGTH = 2.0 * 10.0 ** (-0.1 * np.arange(29))
+LONG = (17.1, 17.1, 17.1, 17.1, 17.1, 17.1, 17.1, 17.1, 15.0, 13.0, 11.0, 9.0, 7.0, 4.9, 2.9, 0.9, -1.1, -3.2)
+SHORT = (-5.0, -5.6, -6.2, -6.8, -7.4, -8.0, -8.6, -9.2, -9.8, -10.4, -11.0)
+LIMIT = np.array([*LONG, *SHORT])
+
+
+def level(wavelength, offset=0.0):
+    """One-third octave roughness level [dB re 1 µm] at ``wavelength`` [m], ``offset`` [dB] above the limit curve.
+
+    Constant beyond 2 m and below 3.15 mm, where the standard gives none.
+
+    >>> [round(float(level(w)), 1) for w in (1.0, 0.4, 0.1, 0.01)], round(float(level(0.1, offset=6.0)), 1)
+    ([17.1, 17.1, 4.9, -8.0], 10.9)
+    """
+    return np.interp(np.log(wavelength), np.log(WAVELENGTH[::-1]), LIMIT[::-1]) + offset
+
+
+def roughness(start, end, seed, offset=0.0, shortest=0.02, longest=3.0, step=0.005, fade=3.0):
+    r"""A realisation of roughness between two places, as a path.
+
+    The variance of a one-third octave band is :math:`10^{L/10}` µm²; it is spread evenly over the band.
+
+    Parameters
+    ----------
+    start, end : float
+        Places [m]; it fades in and out over ``fade`` metres.
+    seed : int
+        Seed of numpy's default generator: the same seed gives the same rail.
+    offset : float
+        Level above the limit curve. [dB]
+    shortest, longest : float
+        Wavelengths that are in it [m]. Waves shorter than the contact patch, about 15 mm, do not lift a wheel.
+
+    Returns
+    -------
+    Sampled
+        Dip every ``step`` [m].
+
+    References
+    ----------
+    ISO 3095:2013, limit curve of acoustic rail roughness, as carried by the rail tables of the noise model
+    NoiseModelling; synthesis by random phases, Wiener-Khinchin.
+    """
+    rng = np.random.default_rng(seed)
+    n = int(np.ceil((end - start) / step)) + 1
+    frequency = np.fft.rfftfreq(n, step)
+    inside = (frequency >= 1.0 / longest) & (frequency <= 1.0 / shortest)
+    density = np.zeros(frequency.size)
+    width = (2.0 ** (1 / 6) - 2.0 ** (-1 / 6)) * frequency[inside]
+    density[inside] = 1e-12 * 10.0 ** (level(1.0 / frequency[inside], offset) / 10.0) / width
+    noise = rng.normal(size=frequency.size) + 1j * rng.normal(size=frequency.size)
+    spectrum = noise * np.sqrt(density * n / (4.0 * step))
+    dip = np.fft.irfft(spectrum, n)
+    way = step * np.arange(n)
+    edge = np.clip(np.minimum(way, way[-1] - way) / fade, 0.0, 1.0)
+    return Sampled(start, step, dip * edge * edge * (3.0 - 2.0 * edge))

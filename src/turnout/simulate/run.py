@@ -1,0 +1,213 @@
+"""One run: put a train (or a hammer) on a prepared track, march, and say what happened."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnout.errors import SimulationError
+from turnout.simulate.bodies import stand_in_of, vehicle_arrays
+from turnout.simulate.march import CONVERGED, LEFT_TRACK, march
+from turnout.simulate.port_system import place_ports
+from turnout.simulate.ports import contact_ports, fixed_ports, port_arrays
+from turnout.simulate.state import PortArrays, RunArrays
+from turnout.simulate.statics import equilibrium, resting
+from turnout.simulate.wheel_path import spline_pieces
+
+CLUSTER_CUT = 0.9  # ports closer than this [m] share one Newton system, the others couple by iteration
+
+
+@dataclass(frozen=True)
+class Probe:
+    """What to record: ``place`` is the rail at x [m] or a named degree of freedom; ``order`` 2 acceleration,
+    1 velocity, 0 displacement."""
+
+    place: object
+    order: int = 2
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """``time`` (n_step,) mid-step [s]; ``signals`` (n_probe, n_step); ``force`` (n_wheel, n_step) mean over the
+    step [N], by wheel, front first; ``surface_force`` (n_wheel, n_surface, n_step); ``port_force`` of the terms'
+    ports; ``iterations`` of Newton per step; ``motion`` the state at the end."""
+
+    time: np.ndarray
+    signals: np.ndarray
+    force: np.ndarray
+    surface_force: np.ndarray
+    port_force: np.ndarray
+    iterations: float
+    motion: object
+
+
+@dataclass(frozen=True)
+class Drive:
+    """How a vehicle moves: front wheel at ``start`` [m] at time 0, ``speed`` [m/s], ``direction`` +1 or -1.
+
+    ``surfaces``: for each rail surface a wheel can touch the parts of its path. ``entry`` [m] is the length over
+    which the modelled track takes the wheels over from their stand-ins, 0: all wheels stay on the modelled track.
+    ``thrown`` = (clearance [m], velocity [m/s]) starts a body above the rail instead of in equilibrium.
+    """
+
+    start: float
+    speed: float
+    direction: int = 1
+    surfaces: tuple = ((),)
+    entry: float = 6.0
+    margin: float = 3.0
+    path_step: float = 0.005
+    thrown: tuple | None = None
+
+
+def run(prepared, duration, probes=(), vehicle=None, drive=None, pulses=(), forces=True, tolerance=1e-6, marcher=march):
+    """March for ``duration`` [s].
+
+    Parameters
+    ----------
+    prepared : Prepared
+        The track.
+    probes : sequence of Probe
+        Signals to record.
+    vehicle, drive : Vehicle, Drive or None
+        What runs over the track and how.
+    pulses : sequence of (place, callable)
+        Given forces [N] of time [s], down positive.
+    marcher : callable
+        ``march`` (compiled) or the plain numpy one of ``march_numpy``.
+
+    Returns
+    -------
+    Outcome
+
+    Errors: SimulationError where a wheel leaves the track or Newton's iteration fails, with time, place and value.
+    """
+    n_step = round(duration / prepared.dt)
+    if n_step < 1:
+        raise SimulationError(f"a duration of {duration!r} s is not one step of {prepared.dt!r} s.")
+    contacts = contact_ports(vehicle, drive.surfaces, drive.start, drive.direction) if vehicle else []
+    fixed = fixed_ports(prepared)
+    paths, path_of, path_start = _paths(prepared, vehicle, drive, n_step) if vehicle else (np.zeros((1, 1, 4)), {}, 0.0)
+    ports, order = port_arrays(prepared, contacts, fixed, path_of)
+    use_stand_in = bool(vehicle) and drive.entry > 0.0
+    stand_in = _stand_in(prepared, drive) if use_stand_in else (1.0, 0.0, 1.0)
+    bodies = vehicle_arrays(vehicle or _nobody(), prepared.scheme, stand_in)
+    arrays = _run_arrays(prepared, drive, use_stand_in, paths, path_start, probes, pulses, n_step, tolerance)
+    motion = _initial(prepared, vehicle, drive, ports, arrays, stand_in)
+    signals = np.zeros((len(probes), n_step))
+    kept = np.zeros((len(order), n_step if forces else 0))
+    status, step, port, value, iterations = marcher(
+        prepared.arrays, prepared.scheme, bodies, ports, arrays, motion, n_step, signals, kept
+    )
+    if status != CONVERGED:
+        _fail(status, prepared, step, port, value, ports)
+    by_port = np.zeros((len(order), kept.shape[1]))
+    by_port[order] = kept
+    time = (np.arange(n_step) + 0.5) * prepared.dt
+    shape = (len(vehicle.wheels), len(drive.surfaces)) if vehicle else (0, 1)
+    surface = by_port[: len(contacts)].reshape(*shape, kept.shape[1])
+    return Outcome(time, signals, surface.sum(axis=1), surface, by_port[len(contacts) :], iterations / n_step, motion)
+
+
+def _nobody():
+    from turnout.simulate.vehicle import lone_wheels
+
+    return lone_wheels(1.0)
+
+
+def _fail(status, prepared, step, port, value, ports):
+    time, what = step * prepared.dt, f"wheel {ports.wheel[port]}" if ports.wheel[port] >= 0 else f"port {port}"
+    if status == LEFT_TRACK:
+        a, b = prepared.matrices.node[[0, -1]]
+        raise SimulationError(
+            f"{what} leaves the track at {time:.4f} s: it is at {value:.3f} m, "
+            f"the track goes from {a:.3f} m to {b:.3f} m."
+        )
+    raise SimulationError(
+        f"Newton's iteration did not converge at {time:.6f} s: residual {value:.3g} N at {what}, "
+        f"which started at {ports.place[port]:.3f} m."
+    )
+
+
+def _stand_in(prepared, drive):
+    node = prepared.matrices.node
+    return stand_in_of(prepared, float(node[0]) + drive.margin + drive.entry)
+
+
+def _paths(prepared, vehicle, drive, n_step):
+    """Cubic pieces of every path that differs, and which path each wheel uses on each surface."""
+    way = drive.speed * n_step * prepared.dt
+    length = float(vehicle.wheel_places[-1])
+    ends = (drive.start - drive.direction * length, drive.start + drive.direction * way)
+    low, high = min(ends) - 0.1, max(ends) + 0.1
+    term_parts = [part for term in prepared.terms for part in term.paths(prepared.track, vehicle)]
+    pieces, known, path_of = [], {}, {}
+    for wheel in range(len(vehicle.wheels)):
+        for surface, parts in enumerate(drive.surfaces):
+            mine = [p for p in (*parts, *term_parts) if getattr(p, "wheel", None) in (None, wheel)]
+            own = any(getattr(p, "wheel", None) is not None or getattr(p, "per_wheel", False) for p in mine)
+            key = (surface, wheel if own else None)
+            if key not in known:
+                known[key] = len(pieces)
+                pieces.append(spline_pieces(mine, wheel, low, high, drive.path_step))
+            path_of[wheel, surface] = known[key]
+    return np.array(pieces), path_of, low
+
+
+def _run_arrays(prepared, drive, use_stand_in, paths, path_start, probes, pulses, n_step, tolerance):
+    matrices, scheme = prepared.matrices, prepared.scheme
+    rows, weights = np.zeros((len(probes), 4), dtype=np.int64), np.zeros((len(probes), 4))
+    for k, probe in enumerate(probes):
+        r, w = matrices.weights(probe.place)
+        rows[k, : r.size], weights[k, : r.size] = r, w
+    known_rows, known_weights = np.zeros((len(pulses), 4), dtype=np.int64), np.zeros((len(pulses), 4))
+    known = np.zeros((len(pulses), n_step if len(pulses) else 1, scheme.node.size))
+    for k, (place, pulse) in enumerate(pulses):
+        r, w = matrices.weights(place)
+        known_rows[k, : r.size], known_weights[k, : r.size] = r, w
+        known[k] = pulse((np.arange(n_step)[:, None] + scheme.node) * prepared.dt)
+    ramp = np.zeros(4)
+    if use_stand_in:
+        first, last = matrices.node[0] + drive.margin, matrices.node[-1] - drive.margin
+        ramp = np.array([first, first + drive.entry, last - drive.entry, last])
+    return RunArrays(
+        float(drive.direction * drive.speed) if drive else 0.0,
+        ramp,
+        use_stand_in,
+        float(path_start),
+        float(drive.path_step) if drive else 1.0,
+        paths,
+        known_rows,
+        known_weights,
+        known,
+        rows,
+        weights,
+        np.array([probe.order for probe in probes], dtype=np.int64),
+        float(tolerance),
+        CLUSTER_CUT,
+    )
+
+
+def _initial(prepared, vehicle, drive, ports, arrays, stand_in):
+    if vehicle is None:
+        return resting(prepared, ports)
+    if drive.thrown is not None:
+        motion = resting(prepared, ports, vehicle)
+        clearance, velocity = drive.thrown
+        motion.z[:], motion.w[:] = -clearance, velocity
+        motion.deformation[ports.wheel >= 0] = -clearance
+        return motion
+    return equilibrium(prepared, vehicle, ports, _placed(prepared, ports, arrays), stand_in[2])
+
+
+def _placed(prepared, ports: PortArrays, arrays):
+    """Rows, weights, local compliance, stand-in share and dip of every port at time 0."""
+    n = ports.body.size
+    x, local, share, dip = (np.zeros(n) for _ in range(4))
+    rows, weights = np.zeros((n, 4), dtype=np.int64), np.zeros((n, 4))
+    start = prepared.scheme._replace(node=np.zeros(1))
+    lost = place_ports(
+        prepared.arrays, start, ports, arrays, 0, np.zeros(n, dtype=np.int64), x, rows, weights, local, share, dip
+    )
+    if lost >= 0:
+        _fail(LEFT_TRACK, prepared, 0, lost, x[lost], ports)
+    return rows, weights, local, share, dip

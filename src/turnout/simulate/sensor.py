@@ -1,0 +1,120 @@
+"""The measuring chain: mounting, gain, anti-alias filter, offset, noise, clipping, converter."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnout.errors import SimulationError
+from turnout.records import Channel
+from turnout.simulate.run import Probe
+
+ORDERS = {"acceleration": 2, "velocity": 1, "displacement": 0}
+ALIAS_TAPS = 63
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """One channel of the measuring system. SI units; None switches a stage off.
+
+    ``place`` [m]; ``mounting`` as in ``Channel``: one that begins with "sleeper" sits on the nearest sleeper,
+    all others on the rail (the vertical model does not tell head from web). ``mount_frequency`` [Hz] and
+    ``mount_quality`` of the mounting's resonance, ``gain`` relative, ``cutoff`` of the anti-alias filter as a
+    share of the rate, ``noise`` rms, ``limit`` where it clips and ``resolution`` of the converter in the
+    unit of the quantity, ``delay`` [s].
+    """
+
+    name: str
+    place: float
+    mounting: str = "rail head"
+    quantity: str = "acceleration"
+    mount_frequency: float | None = None
+    mount_quality: float = 10.0
+    gain: float = 1.0
+    cutoff: float | None = 0.4
+    offset: float = 0.0
+    noise: float = 0.0
+    limit: float | None = None
+    resolution: float | None = None
+    delay: float = 0.0
+    serial: str = ""
+
+    def channel(self):
+        """The channel as a recording names it."""
+        return Channel(self.name, self.quantity, self.place, self.mounting, self.serial, self.limit, self.resolution)
+
+    def probe(self, track):
+        """Where the simulation has to look."""
+        if self.quantity not in ORDERS:
+            raise SimulationError(f"sensor {self.name!r}: cannot record {self.quantity!r} on the track.")
+        if not track.start <= self.place <= track.end:
+            raise SimulationError(
+                f"sensor {self.name!r} at {self.place:.3f} m is outside the track, "
+                f"which goes from {track.start:.3f} m to {track.end:.3f} m."
+            )
+        if self.mounting.startswith("sleeper"):
+            return Probe(("sleeper", track.nearest_support(self.place)), ORDERS[self.quantity])
+        return Probe(self.place, ORDERS[self.quantity])
+
+
+def seated(sensor, terms):
+    """The sensor where ``terms`` say it really sits."""
+    for term in terms:
+        sensor = term.sensor(sensor)
+    return sensor
+
+
+def measured(sensor, signal, rate, rng, terms=()):
+    r"""The samples (n,) a ``sensor`` makes of the true ``signal`` (n,) at ``rate`` [Hz].
+
+    Mounting: :math:`1 / (1 - (f/f_0)^2 + i f / (Q f_0))`. The anti-alias filter has linear phase and its delay
+    is taken off, as in a sigma-delta converter. Terms of kind "channel" act before the gain.
+    """
+    for term in terms:
+        signal = term.channel(signal, rate, sensor)
+    signal = sensor.gain * _filtered(sensor, np.asarray(signal, dtype=float), rate) + sensor.offset
+    if sensor.noise:
+        signal = signal + sensor.noise * rng.normal(size=signal.size)
+    if sensor.limit is not None:
+        signal = np.clip(signal, -sensor.limit, sensor.limit)
+    if sensor.resolution:
+        signal = sensor.resolution * np.round(signal / sensor.resolution)
+    return signal
+
+
+def _filtered(sensor, signal, rate):
+    """Mounting, delay and anti-alias filter in one transform, padded so that nothing wraps round."""
+    if not (sensor.mount_frequency or sensor.delay or sensor.cutoff):
+        return signal
+    padded = _fast_length(signal.size + max(4096, signal.size // 8))
+    frequency = np.fft.rfftfreq(padded, 1.0 / rate)
+    transfer = np.ones(frequency.size, dtype=complex)
+    if sensor.mount_frequency:
+        ratio = frequency / sensor.mount_frequency
+        transfer /= 1.0 - ratio**2 + 1j * ratio / sensor.mount_quality
+    if sensor.delay:
+        transfer *= np.exp(-2j * np.pi * frequency * sensor.delay)
+    if sensor.cutoff:
+        transfer *= _anti_alias(sensor.cutoff, frequency / rate)
+    return np.fft.irfft(np.fft.rfft(signal, padded) * transfer, padded)[: signal.size]
+
+
+def _anti_alias(cutoff, frequency):
+    """Amplitude of a windowed-sinc low-pass (Hamming) centred on its own delay; both in shares of the rate."""
+    k = np.arange(-(ALIAS_TAPS // 2), ALIAS_TAPS // 2 + 1)
+    taps = np.sinc(2.0 * cutoff * k) * np.hamming(ALIAS_TAPS)
+    taps /= taps.sum()
+    half = taps[ALIAS_TAPS // 2 + 1 :]
+    cosine = np.full(frequency.size, taps[ALIAS_TAPS // 2])
+    for m, tap in enumerate(half, start=1):
+        cosine += 2.0 * tap * np.cos(2.0 * np.pi * frequency * m)
+    return cosine
+
+
+def _fast_length(n):
+    """Smallest 2^a 3^b 5^c that is at least ``n``."""
+    best = 1 << (n - 1).bit_length()
+    for three in (1, 3, 9, 27):
+        for five in (1, 5, 25):
+            factor = three * five
+            best = min(best, factor << max(0, (-(-n // factor) - 1).bit_length()))
+    return best

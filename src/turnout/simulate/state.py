@@ -1,0 +1,121 @@
+"""Arrays that the march works on, grouped as the compiled code takes them."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class TrackArrays(NamedTuple):
+    """Factorised track; vectors carry ``pad`` zeros at both ends. ``window`` (n, 2 pad + 1) of the inverse.
+
+    ``lower_back`` ... ``middle`` are for the solution from both ends, ``middle`` (0, 0) where it cannot be used.
+    """
+
+    n: int
+    pad: int
+    lower: np.ndarray
+    upper: np.ndarray
+    inverse_pivot: np.ndarray
+    mass: np.ndarray
+    stiffness: np.ndarray
+    window: np.ndarray
+    lower_back: np.ndarray
+    upper_back: np.ndarray
+    pivot_back: np.ndarray
+    middle: np.ndarray
+    node: np.ndarray
+    node_row: np.ndarray
+    shear_ratio: np.ndarray
+    flexibility: np.ndarray
+    shear_flexibility: np.ndarray
+
+
+class SchemeArrays(NamedTuple):
+    """Numbers of the scheme, see ``Scheme``; ``s`` is rate over time step."""
+
+    dt: float
+    s: complex
+    t: np.ndarray
+    tau: np.ndarray
+    weight: complex
+    delta: complex
+    carry: float
+    node: np.ndarray
+    quadrature: np.ndarray
+    inverse: np.ndarray
+    scale: float
+    end: np.ndarray
+
+
+class VehicleArrays(NamedTuple):
+    """Blocks of coupled bodies: E = from_velocity v - from_position z + from_weight; ``answer`` is the inverse.
+
+    ``stand_in_*`` are the scalar oscillators that carry a wheel off the modelled track, (n_wheel,).
+    """
+
+    block_start: np.ndarray
+    block_of: np.ndarray
+    answer: np.ndarray
+    from_velocity: np.ndarray
+    from_position: np.ndarray
+    from_weight: np.ndarray
+    stand_in_mass: np.ndarray
+    stand_in_stiffness: np.ndarray
+    stand_in_answer: np.ndarray
+
+
+class PortArrays(NamedTuple):
+    """Ports in order of their place; ``body`` -1: between track and ground, else a wheel on path ``path``.
+
+    ``place`` [m] at time 0, ``rows``, ``weights`` (n, 4) for fixed ports, ``gap`` [m]; ``kind`` and ``numbers``
+    (n, 3) of the law, ``table_start`` (n + 1,) into the three table columns.
+    """
+
+    body: np.ndarray
+    wheel: np.ndarray
+    path: np.ndarray
+    place: np.ndarray
+    rows: np.ndarray
+    weights: np.ndarray
+    gap: np.ndarray
+    kind: np.ndarray
+    numbers: np.ndarray
+    table_start: np.ndarray
+    table: np.ndarray
+
+
+class RunArrays(NamedTuple):
+    """What is particular to one run. ``ramp`` are the four places where the modelled track fades in and out [m].
+
+    ``path`` (n_path, n_piece, 4) are cubics in steps of ``path_step`` from ``path_start``; ``known_force``
+    (n_known, n_step, n_stage) acts at ``known_rows``; sensors have rows, weights and ``sensor_order``:
+    2 acceleration, 1 velocity, 0 displacement.
+    """
+
+    speed: float
+    ramp: np.ndarray
+    stand_in: bool
+    path_start: float
+    path_step: float
+    path: np.ndarray
+    known_rows: np.ndarray
+    known_weights: np.ndarray
+    known_force: np.ndarray
+    sensor_rows: np.ndarray
+    sensor_weights: np.ndarray
+    sensor_order: np.ndarray
+    tolerance: float
+    cut: float
+
+
+class Motion(NamedTuple):
+    """Padded ``u``, ``v`` of the track, ``z``, ``w`` of the bodies, ``y``, ``x`` of the stand-ins, ``force``."""
+
+    u: np.ndarray
+    v: np.ndarray
+    z: np.ndarray
+    w: np.ndarray
+    y: np.ndarray
+    x: np.ndarray
+    force: np.ndarray
+    deformation: np.ndarray

@@ -1,0 +1,119 @@
+"""Static equilibrium of train and track, the state every march starts from."""
+
+import numpy as np
+
+from turnout.errors import SimulationError
+from turnout.simulate.kernels import law_force
+from turnout.simulate.law import POWER
+from turnout.simulate.state import Motion
+
+
+def resting(prepared, ports, vehicle=None):
+    """Motion of a track at rest without any force; ``vehicle`` hangs free at its own zero."""
+    t, n_port = prepared.arrays, ports.body.size
+    wide = t.n + 2 * t.pad
+    n, wheels = (vehicle.n, len(vehicle.wheels)) if vehicle else (0, 0)
+    stages = prepared.scheme.node.size
+    return Motion(
+        np.zeros(wide),
+        np.zeros(wide),
+        np.zeros(n),
+        np.zeros(n),
+        np.zeros(wheels),
+        np.zeros(wheels),
+        np.zeros(n_port * stages),
+        -ports.gap.copy(),
+    )
+
+
+def equilibrium(prepared, vehicle, ports, placed, stand_in_stiffness, tolerance=1e-7):
+    """Motion in static equilibrium under the weight of ``vehicle``, all velocities 0.
+
+    ``placed`` is (rows, weights, local compliance, stand-in share, dip) of every port at time 0. Newton on all
+    port forces and wheel positions; not reaching 1e-7 N in 50 steps is a SimulationError.
+    """
+    rows, weights, local, share, dip = placed
+    n_port = ports.body.size
+    columns = np.zeros((n_port, prepared.arrays.n))
+    for k in np.flatnonzero(np.any(weights != 0.0, axis=1)):
+        columns[k] = prepared.static_response(rows[k], weights[k])
+    flexibility = np.array([[weights[i] @ columns[j][rows[i]] for j in range(n_port)] for i in range(n_port)])
+    flexibility = flexibility.reshape(n_port, n_port)
+    same = (ports.wheel[:, None] == ports.wheel[None, :]) & (ports.wheel[:, None] >= 0)
+    flexibility += np.where(same, np.outer(share, share) / stand_in_stiffness + np.sqrt(np.outer(local, local)), 0.0)
+    on_level_rail = vehicle.static_loads
+    stiff, load, touches = _condensed(vehicle, ports)
+    force = touches.T @ on_level_rail / np.maximum(touches.sum(0), 1.0)
+    wheel_z = _first_guess(ports, touches, flexibility, force, dip)
+    n = n_port + wheel_z.size
+    for _ in range(50):
+        d = touches.T @ wheel_z - flexibility @ force - dip
+        f, slope = _laws(ports, d)
+        residual = np.concatenate([force - f, stiff @ wheel_z - load + touches @ force])
+        if np.max(np.abs(residual)) < tolerance * max(1.0, np.max(np.abs(load), initial=0.0) / 1e5):
+            return _motion(prepared, vehicle, ports, force, wheel_z, columns, share, stand_in_stiffness, d)
+        jacobian = np.zeros((n, n))
+        jacobian[:n_port, :n_port] = np.eye(n_port) + slope[:, None] * flexibility
+        jacobian[:n_port, n_port:] = -slope[:, None] * touches.T
+        jacobian[n_port:, :n_port], jacobian[n_port:, n_port:] = touches, stiff
+        # Least squares: a wheel whose force does not depend on where it is (a given load) may be anywhere.
+        change = np.linalg.lstsq(jacobian, residual, rcond=1e-15)[0]
+        force, wheel_z = force - change[:n_port], wheel_z - change[n_port:]
+    k = int(np.argmax(np.abs(residual)))
+    raise SimulationError(
+        f"static equilibrium at time 0 s not found: residual {residual[k]:.3g} N at port {k} of {n_port}, "
+        f"{ports.place[min(k, n_port - 1)]:.3f} m."
+    )
+
+
+def _condensed(vehicle, ports):
+    """Stiffness and load of the wheels with the sprung rows eliminated; which port touches which wheel."""
+    _, _, stiffness, weight = vehicle.matrices
+    wheels = vehicle.wheel_rows
+    sprung = np.setdiff1d(np.arange(vehicle.n), wheels)
+    touches = (np.arange(len(wheels))[:, None] == ports.wheel[None, :]).astype(float)
+    inner = np.linalg.solve(
+        stiffness[np.ix_(sprung, sprung)], np.column_stack([stiffness[np.ix_(sprung, wheels)], weight[sprung]])
+    )
+    across = stiffness[np.ix_(wheels, sprung)]
+    stiff = stiffness[np.ix_(wheels, wheels)] - across @ inner[:, :-1]
+    return stiff, weight[wheels] - across @ inner[:, -1], touches
+
+
+def _first_guess(ports, touches, flexibility, force, dip):
+    below = flexibility @ force + dip
+    approach = np.zeros_like(force)
+    for k in np.flatnonzero(ports.wheel >= 0):
+        stiffness, exponent, preload = ports.numbers[k]
+        if ports.kind[k] == POWER:
+            approach[k] = (abs(force[k]) / stiffness) ** (1.0 / exponent)
+        elif stiffness > 0.0:
+            approach[k] = (force[k] - preload) / stiffness
+    with np.errstate(invalid="ignore"):
+        return np.array([np.min((below + approach)[row > 0.0]) for row in touches])
+
+
+def _laws(ports, d):
+    f, slope = np.zeros(d.size), np.zeros(d.size)
+    for k in range(d.size):
+        first, last = ports.table_start[k], ports.table_start[k + 1]
+        f[k], slope[k], _ = law_force(ports.kind[k], ports.numbers, k, ports.table, first, last, d[k], 0.0)
+    return f, slope
+
+
+def _motion(prepared, vehicle, ports, force, wheel_z, columns, share, stand_in_stiffness, d):
+    motion = resting(prepared, ports, vehicle)
+    pad, n = prepared.arrays.pad, prepared.arrays.n
+    motion.u[pad : pad + n] = force @ columns
+    _, _, stiffness, weight = vehicle.matrices
+    wheels = vehicle.wheel_rows
+    sprung = np.setdiff1d(np.arange(vehicle.n), wheels)
+    motion.z[wheels] = wheel_z
+    if sprung.size:
+        right = weight[sprung] - stiffness[np.ix_(sprung, wheels)] @ wheel_z
+        motion.z[sprung] = np.linalg.solve(stiffness[np.ix_(sprung, sprung)], right)
+    for k in np.flatnonzero(ports.wheel >= 0):
+        motion.y[ports.wheel[k]] += share[k] * force[k] / stand_in_stiffness
+    motion.force[:] = np.repeat(force, prepared.scheme.node.size)
+    motion.deformation[:] = d
+    return motion

@@ -1,0 +1,168 @@
+"""A track: one rail on supports, each with its own pad, sleeper and ballast, and what the wheels roll on."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from turnout.errors import SimulationError
+from turnout.simulate.link import Link
+from turnout.simulate.rail import Rail
+
+NOT_NEGATIVE = (
+    "pad_stiffness",
+    "pad_damping",
+    "sleeper_mass",
+    "ballast_stiffness",
+    "ballast_damping",
+    "ballast_mass",
+    "subgrade_stiffness",
+    "subgrade_damping",
+    "pad_loss_factor",
+    "ballast_loss_factor",
+)
+PER_SUPPORT = (*NOT_NEGATIVE, "bay_shear_stiffness", "bay_shear_damping")
+
+
+@dataclass(frozen=True)
+class RailStretch:
+    """Another rail profile between ``start`` and ``end`` [m]: crossing body, switch blade, fishplate joint."""
+
+    start: float
+    end: float
+    rail: Rail
+
+
+@dataclass(frozen=True)
+class Track:
+    """Half a track (one rail, half sleepers), everything per support.
+
+    ``support`` (n,) places of the supports [m], rising. Per support, (n,) or one number for all:
+    ``pad_stiffness`` [N/m], ``pad_damping`` [N s/m], ``sleeper_mass`` of half a sleeper [kg],
+    ``ballast_stiffness``, ``ballast_damping``; with ``layers`` 3 also ``ballast_mass`` [kg],
+    ``subgrade_stiffness``, ``subgrade_damping`` and the shear between neighbouring ballast masses
+    ``bay_shear_stiffness``, ``bay_shear_damping``. Loss factors act in the frequency domain only.
+    ``pad_width`` [m] spreads a pad over three nodes (weights 1/4, 1/2, 1/4); ``layers`` 1 is a rail on pads on
+    rigid ground. ``end_length`` [m] and ``end_damping`` [1/s] make both ends absorb. ``section`` (n,) labels.
+    ``elements_per_bay`` >= 4 keeps the pinned-pinned resonance within 1 %.
+    """
+
+    rail: Rail
+    support: np.ndarray
+    pad_stiffness: np.ndarray
+    pad_damping: np.ndarray
+    sleeper_mass: np.ndarray = 0.0
+    ballast_stiffness: np.ndarray = 0.0
+    ballast_damping: np.ndarray = 0.0
+    ballast_mass: np.ndarray = 0.0
+    subgrade_stiffness: np.ndarray = 0.0
+    subgrade_damping: np.ndarray = 0.0
+    bay_shear_stiffness: np.ndarray = 0.0
+    bay_shear_damping: np.ndarray = 0.0
+    pad_loss_factor: np.ndarray = 0.0
+    ballast_loss_factor: np.ndarray = 0.0
+    layers: int = 2
+    pad_width: float = 0.0
+    elements_per_bay: int = 4
+    stretches: tuple[RailStretch, ...] = ()
+    end_length: float = 0.0
+    end_damping: float = 0.0
+    section: tuple[str, ...] = ()
+    name: str = "track"
+
+    def __post_init__(self):
+        support = np.array(self.support, dtype=float)
+        if support.ndim != 1 or support.size < 3 or not np.all(np.diff(support) > 0.0):
+            raise SimulationError(f"{self.name}: support needs at least 3 rising places, got {support!r}.")
+        object.__setattr__(self, "support", support)
+        for name in PER_SUPPORT:
+            object.__setattr__(self, name, self._pattern(name))
+        for name in NOT_NEGATIVE:
+            if np.any(bad := getattr(self, name) < 0.0):
+                j = int(np.argmax(bad))
+                value, where = getattr(self, name)[j], support[j]
+                raise SimulationError(f"{self.name}: {name} of support {j} at {where:.3f} m is negative: {value!r}.")
+        if self.layers not in (1, 2, 3) or self.elements_per_bay < 1:
+            raise SimulationError(f"{self.name}: {self.layers} layers, {self.elements_per_bay} elements per bay.")
+        needed = {1: (), 2: ("sleeper_mass",), 3: ("sleeper_mass", "ballast_mass")}[self.layers]
+        for name in needed:
+            if np.any(getattr(self, name) <= 0.0):
+                raise SimulationError(f"{self.name}: {self.layers} layers need {name} above 0 at every support.")
+
+    def _pattern(self, name):
+        value = np.asarray(getattr(self, name), dtype=float)
+        n = self.support.size
+        if value.ndim and value.shape != (n,):
+            raise SimulationError(f"{self.name}: {name} has {value.size} values for {n} supports.")
+        if not np.all(np.isfinite(value)):
+            raise SimulationError(f"{self.name}: {name} holds {value[~np.isfinite(value)]!r}.")
+        return np.broadcast_to(value, (n,)).copy()
+
+    @property
+    def start(self):
+        """Place of the first node [m]."""
+        return float(self.support[0])
+
+    @property
+    def end(self):
+        """Place of the last node [m]."""
+        return float(self.support[-1])
+
+    def with_(self, **changes):
+        """The same track with some fields changed."""
+        return replace(self, **changes)
+
+    def nearest_support(self, place):
+        """Index of the support nearest to ``place`` [m]."""
+        return int(np.argmin(np.abs(self.support - place)))
+
+    def rail_between(self, x):
+        """Rail profile at ``x`` [m]; the last stretch that covers it wins."""
+        found = [stretch.rail for stretch in self.stretches if stretch.start <= x < stretch.end]
+        return found[-1] if found else self.rail
+
+    def links(self):
+        """All springs, dampers and masses of the supports as links."""
+        found = []
+        for j in range(self.support.size):
+            found.extend(self.support_links(j))
+        return found
+
+    def support_links(self, j):
+        """Springs, dampers and masses of support ``j``: what a term scales or takes away."""
+        rail = ((("rail", j), 1.0),)
+        if self.pad_width and 0 < j < self.support.size - 1:
+            rail = ((("rail", j, -1), 0.25), (("rail", j), 0.5), (("rail", j, 1), 0.25))
+        pad = (self.pad_stiffness[j], self.pad_damping[j], 0.0, self.pad_loss_factor[j], "pad")
+        if self.layers == 1:
+            return [Link(rail, *pad)]
+        sleeper, ballast = ((("sleeper", j), 1.0),), ((("ballast", j), 1.0),)
+        bed = (self.ballast_stiffness[j], self.ballast_damping[j], 0.0, self.ballast_loss_factor[j], "ballast")
+        links = [
+            Link((*rail, (("sleeper", j), -1.0)), *pad),
+            Link(sleeper, mass=self.sleeper_mass[j], tag="sleeper"),
+        ]
+        if self.layers == 2:
+            return [*links, Link(sleeper, *bed)]
+        links += [Link((*sleeper, (("ballast", j), -1.0)), *bed), Link(ballast, mass=self.ballast_mass[j])]
+        links.append(Link(ballast, self.subgrade_stiffness[j], self.subgrade_damping[j], tag="subgrade"))
+        if j and (self.bay_shear_stiffness[j] or self.bay_shear_damping[j]):
+            ends = (*ballast, (("ballast", j - 1), -1.0))
+            links.append(Link(ends, self.bay_shear_stiffness[j], self.bay_shear_damping[j], tag="bay_shear"))
+        return links
+
+
+def uniform_track(length=96.0, spacing=0.6, rail=None, start=0.0, **values):
+    """A uniform track of ``length`` [m] with supports every ``spacing`` [m].
+
+    Unless given otherwise: 60 kg/m rail, pad 300 MN/m and 30 kN s/m, half sleeper 150 kg, ballast 90 MN/m
+    and 80 kN s/m per rail seat, rail damping 20 N s/m².
+
+    >>> track = uniform_track(length=6.0)
+    >>> track.support.size, float(track.pad_stiffness[3])
+    (11, 300000000.0)
+    """
+    rail = rail or Rail(6.42e6, 60.21, 0.4 * 81e9 * 76.7e-4, 7850 * 3.055e-5, damping=20.0)
+    reference = {"pad_stiffness": 300e6, "pad_damping": 30e3, "sleeper_mass": 150.0}
+    reference |= {"ballast_stiffness": 90e6, "ballast_damping": 80e3}
+    support = start + spacing * np.arange(round(length / spacing) + 1)
+    return Track(rail, support, **(reference | values))

@@ -1,0 +1,108 @@
+"""Trains from parameter sets: cars on bogies of their own or shared ones, wagons on two axles, coupled units."""
+
+import numpy as np
+
+from turnout.errors import SimulationError
+from turnout.simulate.law import PowerLaw
+from turnout.simulate.vehicle import Body, Suspension, Vehicle
+
+CAR_UNITS = {"mass": "kg", "payload": "kg", "inertia": "kg m²"}
+BOGIE_UNITS = {
+    "mass": "kg",
+    "inertia": "kg m²",
+    "base": "m",
+    "wheelset_mass": "kg",
+    "primary_stiffness": "N/m",
+    "primary_damping": "N s/m",
+    "secondary_stiffness": "N/m",
+    "secondary_damping": "N s/m",
+}
+AXLE_UNITS = {"wheelset_mass": "kg", "suspension_stiffness": "N/m", "suspension_damping": "N s/m"}
+KEYS = ("name", "title", "car_types", "bogie_types", "axle_types", "cars", "bogies", "axles", "wheel", "length")
+
+
+def train(parameters, load=0.5, units=1):
+    """Half a train (one rail) from a parameter set whose masses and springs are those of whole vehicles.
+
+    ``cars`` list their type, ``centre`` [m] and what they rest on, ``bogies`` and ``axles`` their type and centre,
+    measured from the unit's front end; a bogie that two cars name is shared (Jacobs), each resting on half of
+    its secondary springs. ``load`` is the share of the payload, ``units`` the number of units coupled.
+    """
+    p = parameters.only(*KEYS)
+    if not 0.0 <= load <= 1.5:
+        raise SimulationError(f"{p['name']}: load {load!r} is not between 0 (empty) and 1.5 (overloaded).")
+    if units < 1:
+        raise SimulationError(f"{p['name']}: {units!r} units.")
+    length = p.number("length", "m")
+    bodies, suspensions, wheels = [], [], []
+    for unit in range(units):
+        _add_unit(p, load, unit * length, bodies, suspensions, wheels)
+    front = min(bodies[w].place for w in wheels)
+    bodies = [Body(b.name, b.mass, b.inertia, b.place - front) for b in bodies]
+    wheel = p["wheel"]
+    contact = PowerLaw(wheel.number("contact", "N/m^1.5"))
+    noted = {"load_share": float(load), "units": int(units)}
+    return Vehicle(
+        str(p["name"]),
+        tuple(bodies),
+        tuple(suspensions),
+        tuple(wheels),
+        contact,
+        radius=wheel.number("radius", "m"),
+        length=units * length,
+        overhang=float(front),
+        conditions=noted,
+    )
+
+
+def _add_unit(p, load, offset, bodies, suspensions, wheels):
+    bogies, axles, cars = p.get("bogies") or [], p.get("axles") or [], p["cars"]
+    carriers = [("bogie", b) for b in bogies] + [("axle", a) for a in axles]
+    names = {str(entry["label"]): k for k, (_, entry) in enumerate(carriers)}
+    users = {label: sum(label in map(str, car["rests_on"]) for car in cars) for label in names}
+    # Bodies in order of place keep a car's rows together, so that uncoupled cars are blocks of their own.
+    order = sorted(range(len(carriers)), key=lambda k: carriers[k][1].number("centre", "m"))
+    placed, at = {}, {}
+    pending = sorted(cars, key=lambda c: c.number("centre", "m"))
+    for entry in pending:
+        kind = p["car_types"][str(entry["type"])]
+        mass = 0.5 * (kind.number("mass", "kg") + load * kind.number("payload", "kg", default=0.0))
+        share = mass / (0.5 * kind.number("mass", "kg"))
+        car_index = len(bodies)
+        centre = offset + entry.number("centre", "m")
+        bodies.append(Body(str(entry["type"]), mass, 0.5 * share * kind.number("inertia", "kg m²"), centre))
+        for label in map(str, entry["rests_on"]):
+            if label not in names:
+                raise SimulationError(f"{p['name']}: a car rests on {label!r}; there are {', '.join(names)}.")
+            k = names[label]
+            if k not in placed:
+                placed[k] = _add_carrier(p, *carriers[k], offset, bodies, suspensions, wheels)
+                at[k] = offset + carriers[k][1].number("centre", "m")
+            index, stiffness, damping = placed[k]
+            n = users[label]
+            suspensions.append(Suspension(car_index, index, at[k] - centre, stiffness / n, damping / n))
+    if len(placed) < len(order):
+        raise SimulationError(f"{p['name']}: a bogie or axle carries no car.")
+    wheels.sort(key=lambda w: bodies[w].place)
+
+
+def _add_carrier(p, kind, entry, offset, bodies, suspensions, wheels):
+    """Add a bogie or axle; returns its body and the half of the springs on top of it."""
+    place = offset + entry.number("centre", "m")
+    if kind == "axle":
+        values = {name: p["axle_types"][str(entry["type"])].number(name, unit) for name, unit in AXLE_UNITS.items()}
+        wheels.append(len(bodies))
+        bodies.append(Body("wheel", 0.5 * values["wheelset_mass"], None, place))
+        return len(bodies) - 1, 0.5 * values["suspension_stiffness"], 0.5 * values["suspension_damping"]
+    table = p["bogie_types"][str(entry["type"])]
+    values = {name: table.number(name, unit) for name, unit in BOGIE_UNITS.items()}
+    bogie = len(bodies)
+    bodies.append(Body("bogie", 0.5 * values["mass"], 0.5 * values["inertia"], place))
+    for side in np.linspace(-0.5, 0.5, int(table.get("axles", 2))):
+        lever = side * values["base"]
+        suspensions.append(
+            Suspension(bogie, len(bodies), lever, 0.5 * values["primary_stiffness"], 0.5 * values["primary_damping"])
+        )
+        wheels.append(len(bodies))
+        bodies.append(Body("wheel", 0.5 * values["wheelset_mass"], None, place + lever))
+    return bogie, 0.5 * values["secondary_stiffness"], 0.5 * values["secondary_damping"]

@@ -1,0 +1,227 @@
+"""Vehicles: car bodies and bogies that bounce and pitch, wheels that bounce, springs and dampers between them."""
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from turnout.errors import SimulationError
+from turnout.simulate.law import PowerLaw
+
+GRAVITY = 9.81
+HERTZ = PowerLaw(93e9)
+
+
+@dataclass(frozen=True)
+class Suspension:
+    """A spring and damper from body ``upper`` at ``lever`` [m] behind its centre down to body ``lower``."""
+
+    upper: int
+    lower: int
+    lever: float
+    stiffness: float
+    damping: float
+    lower_lever: float = 0.0
+
+
+@dataclass(frozen=True)
+class Body:
+    """``mass`` [kg]; ``inertia`` in pitch [kg m²], None for a wheel; centre ``place`` [m] behind the front axle."""
+
+    name: str
+    mass: float
+    inertia: float | None
+    place: float
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """Half a train (one rail). ``wheels`` are the bodies that touch the rail, front first.
+
+    ``contacts`` are the laws of each wheel's contact with the rail, one per rail surface it can touch
+    (a crossing's wing and nose); ``extra_links`` holds (ends, k, c, m) with ends pairs of a row and a weight.
+    ``radius`` of the wheels [m]; ``pressing`` [N] is a force without mass on each wheel.
+    ``length`` over buffers and ``overhang`` from the front end to the first wheel [m], for coupling.
+
+    Errors: SimulationError where a mass is not above 0, a spring negative or a body rests on nothing.
+    """
+
+    name: str
+    bodies: tuple[Body, ...]
+    suspensions: tuple[Suspension, ...]
+    wheels: tuple[int, ...]
+    contact: object = HERTZ
+    radius: float = 0.43
+    gravity: float = GRAVITY
+    extra_links: tuple = ()
+    pressing: float = 0.0
+    length: float = 0.0
+    overhang: float = 0.0
+    conditions: dict = field(default_factory=dict)
+
+    def __post_init__(self):
+        for body in self.bodies:
+            if not body.mass > 0.0 or (body.inertia is not None and not body.inertia > 0.0):
+                raise SimulationError(
+                    f"{self.name}: body {body.name!r} has mass {body.mass!r}, inertia {body.inertia!r}."
+                )
+        for s in self.suspensions:
+            if not (s.stiffness >= 0.0 and s.damping >= 0.0):
+                name = self.bodies[s.upper].name
+                raise SimulationError(
+                    f"{self.name}: suspension of {name!r} has {s.stiffness!r} N/m, {s.damping!r} N s/m."
+                )
+        places = self.wheel_places
+        if not len(places) or np.any(np.diff(places) <= 0.0):
+            raise SimulationError(f"{self.name}: wheels must follow each other, their places are {places!r}.")
+
+    @cached_property
+    def row(self):
+        """Row of each body's bounce; its pitch, where it has one, is the next row."""
+        sizes = [1 if body.inertia is None else 2 for body in self.bodies]
+        return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+
+    @property
+    def n(self):
+        """Degrees of freedom."""
+        return int(self.row[-1])
+
+    @property
+    def wheel_rows(self):
+        """Row of each wheel, (n_wheel,)."""
+        return self.row[list(self.wheels)]
+
+    @property
+    def wheel_places(self):
+        """Distance of each wheel behind the front one [m], (n_wheel,)."""
+        return np.array([self.bodies[i].place for i in self.wheels])
+
+    @cached_property
+    def matrices(self):
+        """Mass, damping, stiffness (n, n) and weight (n,) [N] downwards."""
+        mass, damping, stiffness = (np.zeros((self.n, self.n)) for _ in range(3))
+        weight = np.zeros(self.n)
+        for body, row in zip(self.bodies, self.row):
+            mass[row, row], weight[row] = body.mass, self.gravity * body.mass
+            if body.inertia is not None:
+                mass[row + 1, row + 1] = body.inertia
+        weight[self.wheel_rows] += self.pressing
+        for s in self.suspensions:
+            ends = self._ends(s.upper, s.lever, 1.0) + self._ends(s.lower, s.lower_lever, -1.0)
+            _add(stiffness, ends, s.stiffness)
+            _add(damping, ends, s.damping)
+        for ends, k, c, m in self.extra_links:
+            for matrix, value in ((stiffness, k), (damping, c), (mass, m)):
+                _add(matrix, ends, value)
+        return mass, damping, stiffness, weight
+
+    def _ends(self, body, lever, sign):
+        row = self.row[body]
+        ends = [(row, sign)]
+        if self.bodies[body].inertia is not None and lever:
+            ends.append((row + 1, sign * lever))
+        return ends
+
+    @cached_property
+    def static_loads(self):
+        """Force of each wheel on a level rigid rail [N], (n_wheel,)."""
+        _, _, stiffness, weight = self.matrices
+        wheels = self.wheel_rows
+        sprung = np.setdiff1d(np.arange(self.n), wheels)
+        if not sprung.size:
+            return weight[wheels].copy()
+        if np.linalg.matrix_rank(stiffness[np.ix_(sprung, sprung)]) < sprung.size:
+            raise SimulationError(f"{self.name}: a body rests on nothing, its stiffness matrix is singular.")
+        z = np.linalg.solve(stiffness[np.ix_(sprung, sprung)], weight[sprung])
+        return weight[wheels] - stiffness[np.ix_(wheels, sprung)] @ z
+
+    @cached_property
+    def blocks(self):
+        """First row of each group of coupled rows, with the end; rows of a group follow each other."""
+        _, damping, stiffness, _ = self.matrices
+        mass = self.matrices[0]
+        linked = (stiffness != 0.0) | (damping != 0.0) | (mass != 0.0)
+        starts, reach = [0], 0
+        for i in range(self.n):
+            if i > reach:
+                starts.append(i)
+            reach = max(reach, i, int(np.flatnonzero(linked[i]).max(initial=i)))
+        return np.array([*starts, self.n], dtype=np.int64)
+
+    def with_(self, **changes):
+        """The same vehicle with some fields changed."""
+        return replace(self, **changes)
+
+
+def _add(matrix, ends, value):
+    for a, wa in ends:
+        for b, wb in ends:
+            matrix[a, b] += value * wa * wb
+
+
+def car(
+    name="car",
+    body_mass=16000.0,
+    body_inertia=9e5,
+    bogie_mass=1500.0,
+    bogie_inertia=1500.0,
+    wheel_mass=750.0,
+    primary=(0.6e6, 6e3),
+    secondary=(0.25e6, 12e3),
+    half_base=1.25,
+    half_pivot=8.85,
+    **more,
+):
+    """Half a four-axle car of 10 degrees of freedom; the defaults press each wheel with 53.96 kN.
+
+    >>> [f"{load / 1e3:.2f} kN" for load in car().static_loads]
+    ['53.95 kN', '53.95 kN', '53.95 kN', '53.95 kN']
+    """
+    centre = half_pivot + half_base
+    bodies = [Body("body", body_mass, body_inertia, centre)]
+    suspensions = []
+    for side in (-1.0, 1.0):
+        bogie = len(bodies)
+        place = centre + side * half_pivot
+        bodies.append(Body(f"bogie {bogie}", bogie_mass, bogie_inertia, place))
+        suspensions.append(Suspension(0, bogie, side * half_pivot, *secondary))
+        for axle in (-1.0, 1.0):
+            suspensions.append(Suspension(bogie, len(bodies), axle * half_base, *primary))
+            bodies.append(Body(f"wheel {len(bodies)}", wheel_mass, None, place + axle * half_base))
+    return Vehicle(name, tuple(bodies), tuple(suspensions), (2, 3, 5, 6), **more)
+
+
+def lone_wheels(mass, places=(0.0,), **more):
+    """Wheels of ``mass`` [kg] without suspension at ``places`` [m]; more is passed to ``Vehicle``."""
+    bodies = tuple(Body(f"wheel {k}", mass, None, place) for k, place in enumerate(places))
+    return Vehicle("wheels", bodies, (), tuple(range(len(bodies))), **more)
+
+
+def coupled(name, vehicles):
+    """One train of ``vehicles`` behind each other; contact and wheel radius are those of the first.
+
+    >>> two = coupled("two cars", [car(length=26.0, overhang=1.9)] * 2)
+    >>> [float(p) for p in two.wheel_places[:5]]
+    [0.0, 2.5, 17.7, 20.2, 26.0]
+    """
+    bodies, suspensions, wheels, links, end = [], [], [], [], -vehicles[0].overhang
+    for vehicle in vehicles:
+        shift, first = end + vehicle.overhang, len(bodies)
+        row = int(sum(1 if b.inertia is None else 2 for b in bodies))
+        bodies += [replace(b, place=b.place + shift) for b in vehicle.bodies]
+        suspensions += [replace(s, upper=s.upper + first, lower=s.lower + first) for s in vehicle.suspensions]
+        wheels += [w + first for w in vehicle.wheels]
+        links += [(tuple((r + row, f) for r, f in ends), *rest) for ends, *rest in vehicle.extra_links]
+        end += vehicle.length
+    parts = tuple(bodies), tuple(suspensions), tuple(wheels)
+    lead = vehicles[0]
+    return Vehicle(
+        name,
+        *parts,
+        contact=lead.contact,
+        radius=lead.radius,
+        extra_links=tuple(links),
+        length=end + lead.overhang,
+        overhang=lead.overhang,
+        conditions=dict(lead.conditions),
+    )

@@ -1,0 +1,246 @@
+"""A few campaigns, several sections, many quantities: who changed, when, and how sure is that.
+
+A chart needs a year of campaigns; where there are only a handful, sections and quantities must lend each other
+strength. Every section has one level per quantity, at most one step between two campaigns, and all share a
+temperature slope per quantity.
+"""
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from scipy import stats
+from scipy.special import logsumexp
+
+
+@dataclass(frozen=True)
+class Block:
+    """Quantities measured at one temperature: ``values`` (n_quantity, n_section, n_campaign), logarithms.
+
+    ``temperature`` is (n_section, n_campaign) [°C]. No value may be missing.
+    """
+
+    values: np.ndarray
+    temperature: np.ndarray
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(n_section, n_campaign)."""
+        return self.temperature.shape
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One section: ``split`` is the campaign from which on it differs in the likeliest model, None for no step.
+
+    ``probability`` of no change and of each split; ``p_value`` of any change at all, by permutation. A split is
+    only as good as these two.
+    """
+
+    split: int | None
+    probability: np.ndarray
+    p_value: float
+
+
+def design(splits, temperature, common="temperature") -> np.ndarray:
+    """Columns: a level per section, a step per section that has a split, and what all sections share.
+
+    Parameters
+    ----------
+    splits : sequence of int
+        One per section: 0 for no step, else the campaign from which on the level differs.
+    temperature : (n_section, n_campaign) array of float
+    common : str
+        "temperature", a slope; "campaign", a shift of every campaign but the first; "" for nothing.
+
+    Returns
+    -------
+    (n_section * n_campaign, n_column) array of float
+
+    Examples
+    --------
+    >>> design([0, 1], np.zeros((2, 2)), common="")
+    array([[1., 0., 0.],
+           [1., 0., 0.],
+           [0., 1., 0.],
+           [0., 1., 1.]])
+    """
+    n_section, n_campaign = temperature.shape
+    section = np.repeat(np.arange(n_section), n_campaign)
+    campaign = np.tile(np.arange(n_campaign), n_section)
+    columns = [section == s for s in range(n_section)]
+    columns += [(section == s) & (campaign >= k) for s, k in enumerate(splits) if k]
+    if common == "temperature":
+        columns.append(temperature.ravel() - temperature.mean())
+    elif common == "campaign":
+        columns += [campaign == c for c in range(1, n_campaign)]
+    return np.column_stack(columns).astype(float)
+
+
+def _projector(matrix):
+    """I - H of a regression, from an orthonormal basis of its columns."""
+    basis = np.linalg.svd(matrix, full_matrices=False)
+    kept = basis.U[:, basis.S > 1e-10 * basis.S[0]]
+    return np.eye(len(matrix)) - kept @ kept.T
+
+
+def deviance(blocks, splits, common="temperature") -> float:
+    r"""Minus twice the logarithm of the marginal likelihood of all quantities together, up to a constant.
+
+    .. math:: \ln B = \tfrac12 (n - p) \ln(1 + g) - \tfrac12 n \ln(1 + g (1 - R^2))
+
+    for each quantity and each choice of the sections whose step it shows, n its cells less one level per section,
+    p the columns beyond those levels, R² what they explain, g = n (unit information). A change need not show in
+    every quantity: all choices count alike. To this comes 2 ln(number of splits) for every section that changes,
+    since it might have changed at any.
+
+    References
+    ----------
+    Liang et al., Mixtures of g priors, J. American Statistical Association 103, 2008, eq. 6.
+    """
+    n_section, n_campaign = blocks[0].shape
+    changed = [s for s, k in enumerate(splits) if k]
+    total = 2.0 * len(changed) * np.log(n_campaign - 1.0)
+    for block in blocks:
+        cells = block.values.reshape(len(block.values), -1)
+        found = []
+        for shown in product((False, True), repeat=len(changed)):
+            part = [k if s in changed and shown[changed.index(s)] else 0 for s, k in enumerate(splits)]
+            found.append(_log_factor(cells, design(part, block.temperature, common), n_section))
+        total -= 2.0 * float(np.sum(logsumexp(found, axis=0) - len(changed) * np.log(2.0)))
+    return total
+
+
+def _log_factor(cells, matrix, n_section) -> np.ndarray:
+    """Logarithm of the Bayes factor of a design against levels alone, one per quantity."""
+    n, p = cells.shape[1] - n_section, np.linalg.matrix_rank(matrix) - n_section
+    rss = np.sum((cells @ _projector(matrix)) ** 2, axis=1)
+    base = np.sum((cells @ _projector(matrix[:, :n_section])) ** 2, axis=1)
+    return 0.5 * (n - p) * np.log1p(n) - 0.5 * n * np.log1p(n * rss / base)
+
+
+def find_splits(blocks) -> tuple[int, ...]:
+    """The splits of all sections with the smallest deviance, by improving one section at a time until none improves.
+
+    Started from no change and from each common change, since one section at a time cannot see past a change that
+    most sections share.
+    """
+    n_section, n_campaign = blocks[0].shape
+    best, lowest = None, np.inf
+    for start in range(n_campaign):
+        splits, score = [start] * n_section, deviance(blocks, [start] * n_section)
+        moved = True
+        while moved:
+            moved = False
+            for s in range(n_section):
+                for k in range(n_campaign):
+                    tried = [*splits[:s], k, *splits[s + 1 :]]
+                    if k != splits[s] and (found := deviance(blocks, tried)) < score - 1e-9:
+                        splits, score, moved = tried, found, True
+        if score < lowest:
+            best, lowest = tuple(splits), score
+    return best
+
+
+def independent_quantities(blocks, splits) -> float:
+    r"""How many independent quantities there are, :math:`(\sum \lambda)^2 / \sum \lambda^2` of their correlation.
+
+    Neighbouring frequency bands err together; to count each as a witness of its own would be too sure.
+    """
+    parts = []
+    for block in blocks:
+        cells = block.values.reshape(len(block.values), -1)
+        parts.append(cells @ _projector(design(splits, block.temperature)))
+    residual = np.vstack(parts)
+    residual = residual / np.sqrt(np.sum(residual**2, axis=1, keepdims=True))
+    correlation = residual @ residual.T
+    return float(np.trace(correlation) ** 2 / np.sum(correlation**2))
+
+
+def verdicts(blocks, n_permutation=2000, seed=0) -> list[Verdict]:
+    """For every section: when it changed, with what probability, and the p value of a change.
+
+    The probability weighs the deviances of the section's splits, the others at their best, each block scaled to
+    its number of independent quantities. The p value is that of Freedman and Lane (J. Business Econ. Stat. 1,
+    1983): residual vectors of the model without the section's step are shuffled among cells, all quantities of a
+    cell together, and the best gain over all splits is compared.
+    """
+    best = find_splits(blocks)
+    shares = [independent_quantities([b], best) / len(b.values) for b in blocks]
+    n_section, n_campaign = blocks[0].shape
+    rng = np.random.default_rng(seed)
+    found = []
+    for s in range(n_section):
+        options = [(*best[:s], k, *best[s + 1 :]) for k in range(n_campaign)]
+        score = np.array([sum(w * deviance([b], o) for w, b in zip(shares, blocks)) for o in options])
+        weight = np.exp(-0.5 * (score - score.min()))
+        p_value = _permuted(blocks, options, n_permutation, rng)
+        found.append(Verdict(best[s] or None, weight / weight.sum(), p_value))
+    return found
+
+
+def _permuted(blocks, options, n_permutation, rng) -> float:
+    prepared = []
+    for block in blocks:
+        cells = block.values.reshape(len(block.values), -1)
+        inner = _projector(design(options[0], block.temperature))
+        others = [_projector(design(o, block.temperature)) for o in options[1:]]
+        prepared.append((cells @ inner, cells - cells @ inner, inner, others))
+
+    def gain(order):
+        gains = np.zeros(len(options) - 1)
+        for residual, fitted, inner, others in prepared:
+            cells = fitted + residual[:, order]
+            base = np.log(np.sum((cells @ inner) ** 2, axis=1))
+            gains += [np.sum(base - np.log(np.sum((cells @ other) ** 2, axis=1))) for other in others]
+        return gains.max()
+
+    n_cell = blocks[0].temperature.size
+    seen = gain(np.arange(n_cell))
+    larger = sum(gain(rng.permutation(n_cell)) >= seen - 1e-12 for _ in range(n_permutation))
+    return (1 + larger) / (1 + n_permutation)
+
+
+def steps(block, splits):
+    """Step of every changed section in every quantity, with its standard error and p value, and the slopes.
+
+    Returns
+    -------
+    step, error, p_value : (n_quantity, n_section) arrays of float
+        Logarithm of the factor; nan for a section without a step.
+    slope, slope_error : (n_quantity,) arrays of float
+        [1/°C]
+    """
+    cells = block.values.reshape(len(block.values), -1)
+    matrix = design(splits, block.temperature)
+    inverse = np.linalg.pinv(matrix.T @ matrix)
+    coefficient = cells @ matrix @ inverse
+    freedom = len(matrix) - np.linalg.matrix_rank(matrix)
+    scale = np.sum((cells - coefficient @ matrix.T) ** 2, axis=1) / freedom
+    error = np.sqrt(scale[:, None] * np.diag(inverse)[None])
+    n_section = block.shape[0]
+    table = np.full((3, len(cells), n_section), np.nan)
+    for column, s in enumerate([s for s, k in enumerate(splits) if k], start=n_section):
+        table[0, :, s], table[1, :, s] = coefficient[:, column], error[:, column]
+    with np.errstate(invalid="ignore"):
+        table[2] = 2.0 * stats.t.sf(np.abs(table[0] / table[1]), freedom)
+    return table[0], table[1], table[2], coefficient[:, -1], error[:, -1]
+
+
+def left_out_error(block, splits, common="temperature") -> np.ndarray:
+    """Root mean square error of each quantity in a campaign that was left out of the fit, over all campaigns.
+
+    A section whose level is known from the left-out campaign alone cannot be predicted and is not counted.
+    """
+    matrix = design(splits, block.temperature, common)
+    cells = block.values.reshape(len(block.values), -1)
+    campaign = np.tile(np.arange(block.shape[1]), block.shape[0])
+    squares, count = np.zeros(len(cells)), 0
+    for c in range(block.shape[1]):
+        rest, out = matrix[campaign != c], matrix[campaign == c]
+        coefficient = cells[:, campaign != c] @ np.linalg.pinv(rest).T
+        null = np.eye(matrix.shape[1]) - np.linalg.pinv(rest) @ rest
+        known = np.linalg.norm(out @ null, axis=1) < 1e-8
+        squares += np.sum((cells[:, campaign == c] - coefficient @ out.T)[:, known] ** 2, axis=1)
+        count += int(known.sum())
+    return np.sqrt(squares / count)

@@ -1,0 +1,187 @@
+"""When a flagged chart changed, and by how much, whether it stepped or drifted."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.special import stdtr
+
+from turnout.trend.forecast import YEAR, memory_of_steps
+
+FEWEST = 4
+
+
+@dataclass(frozen=True)
+class Change:
+    """``kind`` "step" or "drift", the likelier; times in days; the change [%] is that at the newest campaign.
+
+    ``since`` is the median of the time of the onset under that kind; the intervals hold both kinds, each with its
+    probability, so that a wrong choice of the kind does not make them narrow.
+    """
+
+    kind: str
+    since: float
+    earliest: float
+    latest: float
+    size: float
+    low: float
+    high: float
+    drift_probability: float
+
+
+@dataclass(frozen=True)
+class Fits:
+    """Least squares of every onset of one kind; (n_onset,) arrays.
+
+    ``onset`` [a before the newest value, negative] stands for a piece ``width`` of time; ``size`` [%] is the change
+    at the newest value, ``weight`` its precision (sum of squares of the regressor), ``rss`` what is left.
+    """
+
+    onset: np.ndarray
+    width: np.ndarray
+    size: np.ndarray
+    weight: np.ndarray
+    rss: np.ndarray
+
+
+def fits(time, values, memory, pieces=4, temperature=None, known=0.0) -> dict[str, Fits]:
+    r"""A level and a change after every onset, by generalised least squares with an AR(1) memory.
+
+    .. math:: y_i = l + b\,T_i + c\, x_i,\quad x_i = [t_i \ge \tau]\ \text{(step)},\quad
+              x_i = \max(0, t_i - \tau) / (t_n - \tau)\ \text{(drift)}
+
+    The values have their temperature taken out already, by a slope that the baseline knows with an error: b is what
+    that error leaves. A summer left in the residual would else shift the onset. The onset lies between two values,
+    at the middle of one of ``pieces`` parts of every gap from the second value on. The precision matrix of an AR(1)
+    is tridiagonal, so every sum over the values after an onset is a running sum: all onsets cost no more than one.
+
+    Parameters
+    ----------
+    time, values : (n,) arrays of float
+        Ascending [d], [%]; n >= 4.
+    memory : float
+        phi at the usual spacing.
+    temperature : (n,) array of float, optional
+        [°C]; without it b = 0.
+    known : float
+        Squared ratio of the scatter to the error of the slope, where the slope comes from other values than these;
+        0 where it comes from these.
+
+    Examples
+    --------
+    >>> t, y = np.arange(6.0), np.array([0.0, 0.0, 0.0, -2.0, -2.0, -2.0])
+    >>> step = fits(t, y, 0.0, pieces=1)["step"]
+    >>> best = np.argmin(step.rss)
+    >>> print(f"{YEAR * step.onset[best]:.1f} {step.size[best]:.1f} {abs(step.rss[best]):.1f}")
+    -2.5 -2.0 0.0
+    """
+    t = (time - time[-1]) / YEAR
+    phi = memory_of_steps(time, memory)
+    share = 1.0 / (1.0 - phi**2)
+    diagonal, beside = np.append(1.0, share), np.append(-phi * share, 0.0)
+    diagonal[:-1] += phi**2 * share
+
+    def weighted(v):
+        found = diagonal * v + beside * np.append(v[1:], 0.0)
+        found[1:] += beside[:-1] * v[:-1]
+        return found
+
+    one, y = weighted(np.ones(t.size)), weighted(values)
+    after = np.append(t[1:], 0.0)
+    terms = (one, t * one, y, t * y, diagonal + 2 * beside, t * diagonal + beside * (t + after))
+    sums = [np.cumsum(v[::-1])[::-1] for v in (*terms, t * t * diagonal + 2 * beside * t * after)]
+    i = np.repeat(np.arange(2, t.size), pieces)
+    width = (t[i] - t[i - 1]) / pieces
+    onset = t[i - 1] + (np.tile(np.arange(pieces), t.size - 2) + 0.5) * width
+    one_0, one_1, y_0, y_1, self_0, self_1, self_2 = (s[i] for s in sums)
+    total, total_y = one.sum(), y.sum()
+    left = max(float(values @ y) - total_y**2 / total, 0.0)
+    warm = np.zeros(t.size) if temperature is None else temperature - (temperature @ one) / total
+    heat = weighted(warm)
+    heat_square, heat_y = float(warm @ heat) + known, float(heat @ values)
+    per_degree = 1.0 / heat_square if float(warm @ heat) > 0.0 else 0.0
+    heat_0, heat_1 = (np.cumsum(v[::-1])[::-1][i] for v in (heat, t * heat))
+    left = max(left - heat_y**2 * per_degree, 0.0)
+
+    def solved(square, level, product, hot):
+        weight = np.maximum(square - level**2 / total - hot**2 * per_degree, 1e-300)
+        moment = product - level * total_y / total - hot * heat_y * per_degree
+        rss = np.maximum(left - moment**2 / weight, 1e-12 * max(left, 1e-300))
+        return Fits(onset, width, moment / weight, weight, rss)
+
+    square = self_2 - 2.0 * onset * self_1 + onset**2 * self_0
+    return {
+        "step": solved(self_0, one_0, y_0, heat_0),
+        "drift": solved(
+            square / onset**2,
+            *((v_1 - onset * v_0) / -onset for v_0, v_1 in ((one_0, one_1), (y_0, y_1), (heat_0, heat_1))),
+        ),
+    }
+
+
+def find_change(time, values, memory, temperature=None, known=0.0, level=0.95) -> Change:
+    r"""Onset and size of one change, averaged over its kind and its onset.
+
+    Step and drift are equally likely beforehand, as is every onset and every size; the scatter is unknown. Then
+    an onset of a kind has the probability
+
+    .. math:: p \propto \Delta\tau\ w_\tau^{-1/2}\ RSS_\tau^{-\nu/2}
+
+    :math:`\nu` values less level, size and temperature slope; and the size given the onset is Student's t about its
+    least-squares value, :math:`\nu - 1` degrees of freedom (one for the onset). Intervals are the central ones of
+    the mixture. ``temperature`` and ``known`` are those of ``fits``.
+
+    References
+    ----------
+    Zellner, An Introduction to Bayesian Inference in Econometrics, 1971, ch. 3; averaging: Hoeting et al.,
+    Bayesian model averaging, Statistical Science 14, 1999, eq. 1.
+
+    Examples
+    --------
+    >>> t = np.arange(40.0) * 7.0
+    >>> found = find_change(t, -0.2 * np.maximum(t / 7.0 - 25.0, 0.0) + 0.01 * np.cos(9.0 * t), 0.0)
+    >>> print(found.kind, f"{found.since / 7.0:.1f} {found.size:.1f}")
+    drift 25.0 -2.8
+    """
+    time, values = np.asarray(time, dtype=float), np.asarray(values, dtype=float)
+    n = values.size
+    if n < FEWEST or np.ptp(values) == 0.0:
+        return Change("step", *(float("nan"),) * 6, 0.5)
+    slope = temperature is not None and n > FEWEST and np.ptp(temperature) > 0.0
+    both = fits(time, values, memory, 4 if n < 150 else 2, temperature if slope else None, known)
+    freedom = n - 2 - (slope and known == 0.0)
+    log_p = [np.log(f.width) - 0.5 * np.log(f.weight) - 0.5 * freedom * np.log(f.rss) for f in both.values()]
+    p = np.exp(np.concatenate(log_p) - max(v.max() for v in log_p))
+    p = np.split(p / p.sum(), 2)
+    step, drift = both["step"], both["drift"]
+    kind = "drift" if p[1].sum() > 0.5 else "step"
+    tail = 0.5 * (1.0 - level)
+    first, last = _quantiles(step, p[0] + p[1], (tail, 1.0 - tail))
+    since = _quantiles(both[kind], p[kind == "drift"], (0.5,))[0]
+    joined = Fits(*(np.concatenate(pair) for pair in zip(vars(step).values(), vars(drift).values())))
+    low, middle, high = _sizes(joined, np.concatenate(p), freedom - 1, (tail, 0.5, 1.0 - tail))
+    since, first, last = (float(time[-1] + YEAR * x) for x in (min(max(since, first), last), first, last))
+    return Change(kind, since, first, last, middle, low, high, float(p[1].sum()))
+
+
+def _quantiles(fit, weight, levels):
+    """Quantiles of the onset, spread evenly over the width of each piece."""
+    running = np.append(0.0, np.cumsum(weight) / weight.sum())
+    edges = np.append(fit.onset[0] - 0.5 * fit.width[0], fit.onset + 0.5 * fit.width)
+    return [float(np.interp(q, running, edges)) for q in levels]
+
+
+def _sizes(fit, p, freedom, levels):
+    """Quantiles of a mixture of Student's t distributions; what weighs less than 1e-6 of the largest is left out."""
+    use = p > 1e-6 * p.max()
+    p, size = p[use] / p[use].sum(), fit.size[use]
+    scale = np.sqrt(fit.rss[use] / freedom / fit.weight[use])
+    reach = 1e3 * scale.max() + np.ptp(size)
+
+    def quantile(q):
+        def short(x):
+            return float(np.sum(p * stdtr(freedom, (x - size) / scale))) - q
+
+        return float(brentq(short, size.min() - reach, size.max() + reach, xtol=1e-9 * reach, maxiter=200))
+
+    return [quantile(q) for q in levels]

@@ -1,0 +1,72 @@
+"""Slope of a residual over time with an honest standard error, and control of false discoveries."""
+
+import numpy as np
+from scipy import stats
+
+
+def slopes(residual, time, mask, memory):
+    r"""Least-squares slope of each chart against time, its standard error widened for the AR(1) memory.
+
+    .. math:: s_b^2 = \frac{\sum r^2}{\nu \sum (t - \bar t)^2} \frac{1 + \phi}{1 - \phi}, \quad
+              \nu = n \frac{1 - \phi}{1 + \phi} - 2
+
+    Parameters
+    ----------
+    residual, time, mask : (n_chart, n_campaign) arrays
+        Residual [%], time [d], campaigns that count.
+    memory : (n_chart,) array of float
+        phi.
+
+    Returns
+    -------
+    slope, error, p_value : (n_chart,) arrays of float
+        [%/a], [%/a], two-sided by Student's t; nan where nu is below 3.
+
+    References
+    ----------
+    Variance of a slope under AR(1): Santer et al., J. Geophys. Res. 105 (2000), eq. 6, effective sample size.
+
+    Examples
+    --------
+    >>> t = np.arange(20.0)[None] * 36.525
+    >>> b, se, p = slopes(0.1 * t / 36.525, t, np.ones((1, 20), bool), np.zeros(1))
+    >>> print(f"{b[0]:.3f}")
+    1.000
+    """
+    mask = mask & np.isfinite(residual)
+    years = np.where(mask, time / 365.25, 0.0)
+    count = mask.sum(axis=1)
+    n = np.maximum(count, 1)
+    x = np.where(mask, years - (years.sum(axis=1) / n)[:, None], 0.0)
+    y = np.where(mask, residual, 0.0)
+    y = np.where(mask, y - (y.sum(axis=1) / n)[:, None], 0.0)
+    sxx = np.sum(x * x, axis=1)
+    shrink = (1.0 - memory) / (1.0 + memory)
+    freedom = count * shrink - 2.0
+    with np.errstate(invalid="ignore", divide="ignore"):
+        slope = np.sum(x * y, axis=1) / sxx
+        rss = np.sum((y - slope[:, None] * x) ** 2, axis=1)
+        error = np.sqrt(rss / (count * shrink - 2.0) / sxx)
+        known = (freedom >= 3.0) & (sxx > 0.0)
+        p_value = 2.0 * stats.t.sf(np.abs(slope / error), np.maximum(freedom, 1.0))
+    return tuple(np.where(known, value, np.nan) for value in (slope, error, p_value))
+
+
+def span(time, mask) -> np.ndarray:
+    """Time from the first to the last campaign of the mask; 0 where there is none. [d]"""
+    last = np.max(np.where(mask, time, -np.inf), axis=1, initial=-np.inf)
+    first = np.min(np.where(mask, time, np.inf), axis=1, initial=np.inf)
+    return np.where(mask.any(axis=1), last - first, 0.0)
+
+
+def discoveries(p_value) -> np.ndarray:
+    """Benjamini and Hochberg's adjusted p values over the charts that have one, nan elsewhere.
+
+    >>> discoveries(np.array([0.01, np.nan, 0.04])).round(3)
+    array([0.02,  nan, 0.04])
+    """
+    adjusted = np.full(p_value.shape, np.nan)
+    known = np.isfinite(p_value)
+    if known.any():
+        adjusted[known] = stats.false_discovery_control(p_value[known])
+    return adjusted

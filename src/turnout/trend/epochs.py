@@ -1,0 +1,96 @@
+"""Epochs: which campaigns of a chart lie between the same two resets."""
+
+import numpy as np
+
+from turnout.trend.panel import days
+
+
+def epochs_of(charts, time, events) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Number the epochs of every chart from the maintenance events.
+
+    An event resets the charts of its band (``resets_ballast``, ``resets_railpad``) in its section, or in the
+    whole turnout where ``section_id`` is empty; the flags alone decide, so a sensor or method change resets as
+    tamping does. A campaign at or after the event is after it. An event before the first campaign changes
+    nothing, two events between the same two campaigns make one epoch, and an event after the last campaign is
+    pending. Bands other than ballast and railpad are reset by either flag.
+
+    Parameters
+    ----------
+    charts : DataFrame
+        ``turnout_id, band, section_id``; section "*" stands for the whole turnout and follows whole events only.
+    time : (n_chart, n_campaign) array of float
+        Campaign times, ascending, nan where there was none. [d]
+    events : DataFrame or None
+        Rows of the table ``events``.
+
+    Returns
+    -------
+    epoch : (n_chart, n_campaign) array of int
+        0 from the first campaign on.
+    pending : (n_chart,) array of bool
+        An event has come after the last campaign.
+    started : (n_chart, n_epoch) array of float
+        Time of the event that started each epoch; nan for the first. [d]
+    """
+    n_chart, n_campaign = time.shape
+    reset = np.full((n_chart, n_campaign + 1), -np.inf)
+    if events is not None and len(events):
+        _mark(reset, charts, time, events)
+    reset[:, 0] = -np.inf
+    marked = np.isfinite(reset[:, :n_campaign])
+    epoch = np.cumsum(marked, axis=1, dtype=np.int16)
+    started = np.full((n_chart, int(epoch.max(initial=0)) + 1), np.nan)
+    where = np.nonzero(marked)
+    started[where[0], epoch[where]] = reset[where]
+    return epoch, np.isfinite(reset[:, n_campaign]), started
+
+
+def _mark(reset, charts, time, events):
+    """Enter each event at the first campaign at or after it; column n_campaign means none yet."""
+    filled = np.where(np.isnan(time), np.inf, time)
+    members = charts.groupby("turnout_id", sort=False, observed=True).indices
+    band = charts["band"].to_numpy()
+    section = charts["section_id"].to_numpy()
+    chosen = {flag: (band == flag) | ~np.isin(band, ["ballast", "railpad"]) for flag in ("ballast", "railpad")}
+    for event, at in zip(events.itertuples(index=False), days(events["event_at_utc"])):
+        hit = members.get(event.turnout_id)
+        if hit is None or np.isnan(at):
+            continue
+        touched = np.zeros(hit.size, dtype=bool)
+        for flag in ("ballast", "railpad"):
+            if _truth(getattr(event, f"resets_{flag}")):
+                touched |= chosen[flag][hit]
+        if isinstance(event.section_id, str) and event.section_id:
+            touched &= section[hit] == event.section_id
+        hit = hit[touched]
+        last = np.sum(np.isfinite(filled[hit]), axis=1)
+        column = np.sum(filled[hit] < at, axis=1)
+        column = np.where(column >= last, reset.shape[1] - 1, column)
+        reset[hit, column] = np.maximum(reset[hit, column], at)
+
+
+def _truth(flag) -> bool:
+    """A flag from a CSV or from the registry: true only when it says so."""
+    return flag is True or str(flag).strip().lower() in ("true", "1", "yes")
+
+
+def by_epoch(values, mask, epoch, n_epoch) -> tuple[np.ndarray, np.ndarray]:
+    """Mean of ``values`` over the masked campaigns of each epoch, and how many there are.
+
+    Returns two (n_chart, n_epoch) arrays; the mean is nan where the epoch has none.
+
+    >>> mean, n = by_epoch(np.array([[1.0, 3.0, 8.0]]), np.array([[True, True, True]]), np.array([[0, 0, 1]]), 2)
+    >>> mean, n
+    (array([[2., 8.]]), array([[2, 1]]))
+    """
+    n_chart = len(values)
+    slot = (np.arange(n_chart)[:, None] * n_epoch + epoch)[mask]
+    count = np.bincount(slot, minlength=n_chart * n_epoch).reshape(n_chart, n_epoch)
+    total = np.bincount(slot, weights=values[mask], minlength=n_chart * n_epoch).reshape(n_chart, n_epoch)
+    with np.errstate(invalid="ignore"):
+        return np.where(count > 0, total / np.maximum(count, 1), np.nan), count
+
+
+def spread_out(per_epoch, epoch) -> np.ndarray:
+    """(n_chart, n_epoch) values laid out over the campaigns, (n_chart, n_campaign)."""
+    return np.take_along_axis(per_epoch, epoch.astype(np.intp), axis=1)

@@ -1,0 +1,127 @@
+"""Charts that raised their hand: since when, how much, how fast, and when the limit is reached."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from turnout.trend.change import find_change
+from turnout.trend.drift import discoveries
+from turnout.trend.forecast import forecast
+from turnout.trend.panel import WHOLE, timestamps
+from turnout.trend.prepared import first_epoch
+
+RECENT = 8
+COLUMNS = {
+    "direction": object,
+    "statistic_ratio": float,
+    "since_at_utc": "datetime64[us]",
+    "since_earliest_utc": "datetime64[us]",
+    "since_latest_utc": "datetime64[us]",
+    "change_kind": object,
+    "change_pct": float,
+    "change_low_pct": float,
+    "change_high_pct": float,
+    "n_after": float,
+    "forecast": object,
+    "forecast_slope_pct_per_year": float,
+    "forecast_slope_se_pct_per_year": float,
+    "not_before_utc": "datetime64[us]",
+    "not_after_utc": "datetime64[us]",
+}
+
+
+@dataclass(frozen=True)
+class Flag:
+    """What is needed to tell the story of one chart: its present epoch, its sums over their limits."""
+
+    time: np.ndarray
+    values: np.ndarray
+    memory: float
+    temperature: np.ndarray | None
+    known: float
+    ratio: dict
+    open: tuple
+
+
+def candidates(charts, status, settings) -> dict[int, Flag]:
+    """Charts that may be flagged, by row of ``status``: an open alarm, or a drift with p below the rate."""
+    p = charts.prepared
+    whole = status["section_id"].to_numpy() == WHOLE
+    drifting = p.baseline.complete & ~whole & (status["drift_p"].to_numpy() <= settings.false_discovery)
+    found = {}
+    for i in np.flatnonzero((status["state"].to_numpy() == "alarm") | drifting):
+        column = np.flatnonzero(np.isfinite(charts.residual[i]) & (p.epoch[i] == p.epoch[i, -1]))
+        ratio = {d: getattr(charts, d)[i, -1] / getattr(charts, f"threshold_{d}")[i] for d in ("down", "up")}
+        opened = tuple(d for d in ("down", "up") if getattr(charts, f"{d}_open")[i, -1])
+        found[int(i)] = Flag(
+            p.time[i, column],
+            charts.residual[i, column],
+            float(charts.memory[i]),
+            *_heat(charts, i, column),
+            ratio,
+            opened,
+        )
+    return found
+
+
+def _heat(charts, i, column):
+    """Temperatures of a section's values, and how well other values than these know its slope (0: none do)."""
+    p = charts.prepared
+    if i >= len(p.panel.charts):
+        return None, 0.0
+    later = p.epoch[i, -1] > first_epoch(p)[i]
+    error = p.baseline.slope_se[i]
+    return p.panel.temperature[i, column], float((p.spread[i] / error) ** 2) if later and error > 0.0 else 0.0
+
+
+def describe_flagged(status, flags, settings) -> pd.DataFrame:
+    """Add to ``chart_status`` the adjusted p value of the drift, and the story of each flagged chart.
+
+    ``flags`` are the ``candidates`` by row of ``status``. Flagged are charts with an open alarm and charts of
+    sections whose drift is among the discoveries at the rate ``settings.false_discovery``; the costly steps run
+    on them alone.
+    """
+    status = status.copy()
+    judged = status["complete"].to_numpy() & (status["section_id"].to_numpy() != WHOLE)
+    status["drift_q"] = discoveries(np.where(judged, status["drift_p"].to_numpy(), np.nan))
+    flagged = ((status["state"] == "alarm") | (status["drift_q"] <= settings.false_discovery)).to_numpy()
+    stories = {i: _story(flag, settings) for i, flag in flags.items() if flagged[i]}
+    for name, kind in COLUMNS.items():
+        column = np.full(len(status), None if kind is object else np.nan, dtype=object if kind is object else float)
+        if "datetime" in str(kind):
+            column = np.full(len(status), np.datetime64("NaT"), dtype="datetime64[us]")
+        for i, story in stories.items():
+            column[i] = story[name]
+        status[name] = column
+    return status
+
+
+def _story(flag, settings):
+    """One flagged chart. The change is looked for in its present epoch only."""
+    time, values = flag.time, flag.values
+    found = find_change(time, values, flag.memory, flag.temperature, flag.known)
+    at = int(np.searchsorted(time, found.since)) if np.isfinite(found.since) else 0
+    if flag.open:
+        direction = max(flag.open, key=flag.ratio.get)
+    else:
+        direction = "down" if values[-RECENT:].mean() < values.mean() else "up"
+    seen = forecast(time[at:], values[at:], flag.memory, settings)
+    now = time[-1] if len(time) else np.nan
+    return dict(
+        direction=direction,
+        statistic_ratio=flag.ratio[direction],
+        change_kind=found.kind,
+        since_at_utc=timestamps([found.since])[0],
+        since_earliest_utc=timestamps([found.earliest])[0],
+        since_latest_utc=timestamps([found.latest])[0],
+        change_pct=found.size,
+        change_low_pct=found.low,
+        change_high_pct=found.high,
+        n_after=float(len(values) - at),
+        forecast=seen.verdict,
+        forecast_slope_pct_per_year=seen.slope,
+        forecast_slope_se_pct_per_year=seen.slope_error,
+        not_before_utc=timestamps([now + 365.25 * seen.not_before])[0],
+        not_after_utc=timestamps([now + 365.25 * seen.not_after])[0],
+    )

@@ -1,0 +1,154 @@
+"""When a resonance reaches its limit: an interval of dates, or none."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+YEAR = 365.25
+SETTLING_YEARS = np.geomspace(0.05, 10.0, 40)
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """``verdict``: line, line_or_settling, settling, no_limit or too_short.
+
+    ``slope`` and ``slope_error`` [%/a] by generalised least squares; ``not_before`` and ``not_after`` [a after
+    the last value] are the ends of the interval of the crossing, nan where there is none. ``not_after`` is given
+    for the verdict line alone; ``preference`` is AIC(line) - AIC(settling).
+    """
+
+    verdict: str
+    slope: float
+    slope_error: float
+    not_before: float
+    not_after: float
+    preference: float
+
+    @property
+    def sentence(self) -> str:
+        if self.verdict == "too_short":
+            return "too early for a date"
+        if self.verdict == "settling":
+            return "no date: the values settle"
+        if self.verdict == "no_limit":
+            return "no limit in sight"
+        if np.isfinite(self.not_after):
+            return f"not before {self.not_before:.1f} years, by {self.not_after:.1f} years if it goes on like this"
+        return f"not before {self.not_before:.1f} years, no latest date"
+
+
+def memory_of_steps(time, memory) -> np.ndarray:
+    """AR(1) coefficient from each value to the next, ``memory`` being that of the median spacing.
+
+    >>> memory_of_steps(np.array([0.0, 1.0, 2.0, 4.0]), 0.5)
+    array([0.5 , 0.5 , 0.25])
+    """
+    step = np.diff(time)
+    usual = np.median(step)
+    phi = memory ** (step / usual) if usual > 0.0 else np.full(step.size, memory)
+    return np.where(step <= 0.0, 0.0, phi)
+
+
+def whitened(design, values, time, memory):
+    r"""Divide the AR(1) memory out of a regression with unequal spacing.
+
+    .. math:: y_i' = \frac{y_i - \phi_i y_{i-1}}{\sqrt{1 - \phi_i^2}}, \quad
+              \phi_i = \phi^{(t_i - t_{i-1}) / \tilde{\Delta t}}
+
+    with the median spacing; the first value stays as it is (Prais and Winsten 1954).
+    """
+    phi = memory_of_steps(time, memory)
+    scale = 1.0 / np.sqrt(1.0 - phi**2)
+    rows = np.vstack([design[:1], (design[1:] - phi[:, None] * design[:-1]) * scale[:, None]])
+    return rows, np.append(values[:1], (values[1:] - phi * values[:-1]) * scale)
+
+
+def line(time, values, memory):
+    """Level at the last value, slope [1/a], their covariance, residual sum of squares and freedom; GLS.
+
+    >>> fit = line(np.arange(5.0) * 365.25, np.array([1.0, 0.0, -1.0, -2.0, -3.0]), 0.3)
+    >>> fit[0].round(6)
+    array([-3., -1.])
+    """
+    years = (time - time[-1]) / YEAR
+    design, y = whitened(np.column_stack([np.ones(years.size), years]), values, time, memory)
+    coefficient, _, _, _ = np.linalg.lstsq(design, y, rcond=None)
+    rss = float(np.sum((y - design @ coefficient) ** 2))
+    freedom = years.size - 2
+    covariance = np.linalg.inv(design.T @ design) * rss / max(freedom, 1)
+    return coefficient, covariance, rss, freedom
+
+
+def settling_rss(time, values, memory) -> float:
+    """Smallest residual sum of squares of a curve that settles, a + c exp(-t / tau), tau over a grid."""
+    years = (time - time[0]) / YEAR
+    best = np.inf
+    for tau in SETTLING_YEARS:
+        design, y = whitened(np.column_stack([np.ones(years.size), np.exp(-years / tau)]), values, time, memory)
+        coefficient, _, _, _ = np.linalg.lstsq(design, y, rcond=None)
+        best = min(best, float(np.sum((y - design @ coefficient) ** 2)))
+    return best
+
+
+def crossing(coefficient, covariance, freedom, limit, level) -> tuple[float, float]:
+    r"""Interval of the time at which a line reaches ``limit`` (Fieller).
+
+    All t >= 0 with :math:`|a + b t - L| \le q\, \mathrm{se}(a + b t)`; (nan, nan) where the line may never get
+    there before the interval opens, (t, nan) where there is no latest time. Student's t quantile.
+
+    References
+    ----------
+    Fieller, Some problems in interval estimation, J. Royal Stat. Soc. B 16, 1954.
+
+    Examples
+    --------
+    A line known almost exactly, 1 %/a from 0 to -5.
+
+    >>> print(*(f"{t:.2f}" for t in crossing(np.array([0.0, -1.0]), np.eye(2) * 1e-12, 50, -5.0, 0.8)))
+    5.00 5.00
+    """
+    q = stats.t.isf((1.0 - level) / 2.0, freedom)
+    a, b = float(coefficient[0]) - limit, float(coefficient[1])
+    square = b * b - q * q * covariance[1, 1]
+    half = a * b - q * q * covariance[0, 1]
+    constant = a * a - q * q * covariance[0, 0]
+    never = (float("nan"), float("nan"))
+    if a <= 0.0 or constant <= 0.0:
+        return 0.0, never[1] if constant <= 0.0 < a else 0.0
+    if square > 0.0 and b >= 0.0:
+        return never
+    root = np.sqrt(max(half * half - square * constant, 0.0))
+    first = float(constant / (root - half))
+    return (first, float((root - half) / square)) if square > 0.0 else (first, never[1])
+
+
+def forecast(time, values, memory, settings) -> Forecast:
+    """When the values reach ``settings.limit_percent``, with the interval of ``settings.interval_level``.
+
+    A line against a settling curve by AIC: where the curve wins there is no date, since a line through a curve
+    that settles promises a date that never comes; where neither wins by 2 there is no latest date.
+
+    Parameters
+    ----------
+    time, values : (n,) arrays of float
+        Ascending [d] and [%] relative to the level before the change.
+    memory : float
+        AR(1) coefficient at the usual spacing.
+    """
+    nan = float("nan")
+    if time.size < 12 or time[-1] - time[0] < settings.drift_days:
+        return Forecast("too_short", nan, nan, nan, nan, nan)
+    coefficient, covariance, rss, freedom = line(time, values, memory)
+    slope, error = float(coefficient[1]), float(np.sqrt(covariance[1, 1]))
+    other = settling_rss(time, values, memory)
+    n = time.size
+    preference = n * np.log(max(rss, 1e-300) / max(other, 1e-300)) - 2.0
+    low, high = crossing(coefficient, covariance, freedom, settings.limit_percent, settings.interval_level)
+    if preference > 0.0:
+        return Forecast("settling", slope, error, nan, nan, preference)
+    if not np.isfinite(low) or low > settings.horizon_years:
+        return Forecast("no_limit", slope, error, nan, nan, preference)
+    if preference > -2.0:
+        return Forecast("line_or_settling", slope, error, low, nan, preference)
+    return Forecast("line", slope, error, low, high, preference)

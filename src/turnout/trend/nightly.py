@@ -1,0 +1,149 @@
+"""After every registration: all charts of the registry anew, in parts that fit into memory."""
+
+import logging
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+
+from turnout.registry.columns import names
+from turnout.registry.database import open_registry
+from turnout.registry.derived import publish
+from turnout.registry.generation import load
+from turnout.trend.chart import finish
+from turnout.trend.evaluation import shared_memory
+from turnout.trend.flagged import candidates, describe_flagged
+from turnout.trend.panel import CHART, DAY, believable, days, lay_out, timestamps
+from turnout.trend.prepared import prepare
+from turnout.trend.rows import arrow_rows
+from turnout.trend.states import chart_status
+from turnout.trend.tables import alarm_rows, baseline_rows, chart_rows
+from turnout.trend.years import digest, split_by_year
+
+CELLS_PER_PART = 2_500_000
+HAMMER = (
+    "select turnout_id, section_id, band, source, measured_at_utc, frequency_hz, frequency_se_hz, rail_temperature_c "
+    "from modes_current where source = 'hammer' and coalesce(method, 'joint') = 'joint'"
+)
+
+
+@dataclass(frozen=True)
+class Updated:
+    """Rows by table, years of ``charts`` written, ``generation`` of the registry, ``digests`` of the years."""
+
+    rows: dict[str, int]
+    written: tuple[int, ...]
+    generation: int
+    newest: datetime | None
+    digests: dict[str, str]
+
+
+def update(registry_dir, settings, digests=None, as_of=None, acknowledgements=None) -> Updated:
+    """Compute every chart of a registry and put charts, baselines, alarms and states in the place of the old ones.
+
+    Parameters
+    ----------
+    registry_dir : path
+    settings : TrendSettings
+    digests : dict, optional
+        Those of the last update: a year of ``charts`` that is still the same is not written again.
+    as_of : time, optional
+        Look back: newer campaigns and later events are as if they had not been. By default everything up to the
+        newest campaign of the fleet whose clock can be believed.
+    acknowledgements : list of dict, optional
+        All rows of the table of that name; None leaves it alone.
+    """
+    with open_registry(registry_dir) as con:
+        events = con.execute("select * from events order by event_at_utc, event_id").df()
+        if as_of is not None:
+            events = events[days(events["event_at_utc"]) <= days([as_of])[0]]
+        parts, newest = _parts(con, settings, as_of)
+        prepared = [prepare(_panel(con, part, newest, settings), events, settings) for part in parts]
+    years, tables = _tables(prepared, settings)
+    rows = {name: table.num_rows for name, table in tables.items()}
+    rows["charts"] = sum(part.num_rows for found in years.values() for part in found)
+    now = {str(year): digest(found, names("charts")) for year, found in years.items()}
+    live = {str(f.year) for f in load(Path(registry_dir)).of("charts")}
+    same = {year for year in now if year in live and (digests or {}).get(year) == now[year]}
+    changed = [part for year, found in sorted(years.items()) if str(year) not in same for part in found]
+    tables["charts"] = (
+        pa.concat_tables(changed, promote_options="permissive") if changed else arrow_rows("charts", pd.DataFrame())
+    )
+    written = tuple(sorted(year for year in years if str(year) not in same))
+    if acknowledgements is not None:
+        tables["acknowledgements"] = arrow_rows("acknowledgements", pd.DataFrame(acknowledgements))
+    years.clear()
+    changed.clear()
+    generation = publish(registry_dir, tables, keep={"charts": {int(year) for year in same}}).number
+    stamp = None if not np.isfinite(newest) else timestamps([newest])[0].item()
+    done = Updated(rows, written, generation, stamp, now)
+    logging.getLogger("turnout.trend").info("%s, years of charts written: %s, newest %s", rows, written, stamp)
+    return done
+
+
+def _tables(prepared, settings):
+    """Rows of ``charts`` by year, in parts, and rows of the other derived tables.
+
+    ``prepared`` is emptied on the way, so that the arrays of a part go when it is done.
+    """
+    frames, years = {name: [] for name in ("chart_status", "baselines", "alarms")}, {}
+    flags, seen = {}, 0
+    memory = shared_memory(prepared)
+    while prepared:
+        done = finish(prepared.pop(0), memory.pop(0), settings)
+        status = chart_status(done, settings)
+        flags |= {seen + i: flag for i, flag in candidates(done, status, settings).items()}
+        seen += len(status)
+        frames["chart_status"].append(status)
+        frames["baselines"].append(baseline_rows(done, settings))
+        frames["alarms"].append(alarm_rows(done, settings))
+        for year, part in split_by_year(arrow_rows("charts", chart_rows(done), single=True)).items():
+            years.setdefault(year, []).append(part)
+    joined = {name: pd.concat(found, ignore_index=True) if found else pd.DataFrame() for name, found in frames.items()}
+    if seen:
+        joined["chart_status"] = describe_flagged(joined["chart_status"], flags, settings)
+    return years, {name: arrow_rows(name, frame) for name, frame in joined.items()}
+
+
+def _parts(con, settings, as_of):
+    """Charts in parts of whole turnouts, and the newest time that counts. [d]"""
+    # What trains say is aggregated once; what hammers say is read part by part.
+    con.execute("create temp table by_trains as select * from passage_values")
+    later = "" if as_of is None else f" where measured_at_utc <= timestamp '{timestamps(days([as_of]))[0]}'"
+    con.execute(f"create temp view charted as select * from ({HAMMER} union all select * from by_trains){later}")
+    charts = con.execute(f"select distinct {', '.join(CHART)} from charted").df()
+    for name in CHART:
+        charts[name] = charts[name].astype(object)
+    charts = charts.sort_values(CHART, ignore_index=True)
+    if as_of is None:
+        found = con.execute("select distinct measured_at_utc from charted").df()
+        _, newest = believable(days(found["measured_at_utc"]), settings)
+    else:
+        newest = days([as_of])[0]
+    if charts.empty:
+        return [], newest
+    rows = con.execute("select turnout_id, count(*) as n from charted group by all order by all").df()
+    share = dict(zip(rows["turnout_id"], rows["n"].cumsum() // CELLS_PER_PART))
+    number = charts["turnout_id"].map(share)
+    return [part.reset_index(drop=True) for _, part in charts.groupby(number, sort=True)], newest
+
+
+def _panel(con, charts, newest, settings):
+    """Rows of the turnouts of one part, their chart as a number."""
+    con.register("_part", charts.assign(chart=np.arange(len(charts), dtype=np.int32)))
+    names = ("frequency_hz", "frequency_se_hz", "rail_temperature_c")
+    rows = con.execute(
+        f"""
+        select p.chart, epoch_us(m.measured_at_utc) as us, {", ".join(f"coalesce(m.{n}, 'nan') as {n}" for n in names)}
+        from charted m join _part p using (turnout_id, band, source, section_id)
+        where m.turnout_id between ? and ?
+        """,
+        [charts["turnout_id"].iloc[0], charts["turnout_id"].iloc[-1]],
+    ).fetchnumpy()
+    con.unregister("_part")
+    time = np.asarray(rows["us"], dtype=float) / (DAY * 1e6)
+    values = (np.asarray(rows[n], dtype=float) for n in names)
+    return lay_out(charts, np.asarray(rows["chart"]), time, *values, newest, settings)

@@ -1,0 +1,194 @@
+"""Rows of modes laid out as charts x campaigns, so that all charts are computed at once."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+DAY = 86400.0
+CHART = ["turnout_id", "band", "source", "section_id"]
+WHOLE = "*"
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Charts x campaigns. A chart is one section, band and source; a campaign is one visit to its turnout.
+
+    Parameters
+    ----------
+    charts : DataFrame
+        ``turnout_id, band, source, section_id``, sorted; ``group`` numbers turnout, band and source (the
+        siblings of a chart share it) and ``visits`` the row of ``time``.
+    time : (n_visits, n_campaign) array of float
+        Start of each campaign, nan where the turnout had fewer. [d since 1970-01-01]
+    frequency, error, temperature : (n_chart, n_campaign) arrays of float
+        Natural frequency and its standard error [Hz], rail temperature [°C]; nan where not known.
+    left_out : DataFrame
+        Rows that cannot stand in a chart, with ``reason``.
+    as_of : float
+        Newest campaign of the fleet whose clock can be believed. [d]
+    """
+
+    charts: pd.DataFrame
+    time: np.ndarray
+    frequency: np.ndarray
+    error: np.ndarray
+    temperature: np.ndarray
+    left_out: pd.DataFrame
+    as_of: float
+
+    @property
+    def chart_time(self) -> np.ndarray:
+        """(n_chart, n_campaign) time of each cell. [d]"""
+        return self.time[self.charts["visits"].to_numpy()]
+
+
+def days(times) -> np.ndarray:
+    """Naive UTC times as days since 1970-01-01; nan for a missing time.
+
+    >>> days(pd.Series(pd.to_datetime(["1970-01-02 12:00"])))
+    array([1.5])
+    """
+    stamps = pd.to_datetime(pd.Series(times)).to_numpy().astype("datetime64[us]")
+    return np.where(np.isnat(stamps), np.nan, stamps.astype("int64") / (DAY * 1e6))
+
+
+def timestamps(day) -> np.ndarray:
+    """Days since 1970-01-01 as datetime64[us], NaT for nan; the inverse of ``days``.
+
+    >>> str(timestamps(np.array([1.5]))[0])
+    '1970-01-02T12:00:00.000000'
+    """
+    day = np.asarray(day, dtype=float)
+    micro = np.round(np.nan_to_num(day) * DAY).astype("int64") * 1_000_000
+    return np.where(np.isfinite(day), micro.view("datetime64[us]"), np.datetime64("NaT"))
+
+
+def believable(time, settings) -> tuple[np.ndarray, float]:
+    """Which times of a fleet a clock can have shown, and the newest of them.
+
+    A time is not believed before ``earliest_year``; nor, with everything after it, where one lone last day of
+    measurement lies more than ``clock_gap_days`` after every other in the fleet.
+
+    >>> from turnout.config.settings.trend import TrendSettings
+    >>> believable(np.array([-3.0, 15000.0, 15007.0, 26000.0]), TrendSettings())
+    (array([False,  True,  True, False]), 15007.0)
+    """
+    earliest = days([pd.Timestamp(settings.earliest_year, 1, 1)])[0]
+    good = np.isfinite(time) & (time >= earliest)
+    dates = np.unique(np.floor(time[good]))
+    if dates.size >= 3 and dates[-1] - dates[-2] > settings.clock_gap_days:
+        good &= time < dates[-1]
+    return good, float(np.max(time, where=good, initial=-np.inf))
+
+
+def panel_of(modes, settings, as_of=None) -> Panel:
+    """Lay rows of the table ``modes`` out as charts x campaigns.
+
+    ``modes`` is a DataFrame with the columns of that table (``source`` may be missing: hammer). Values of one
+    turnout and source within ``campaign_gap_hours`` are one campaign. ``as_of`` is a time after which rows do
+    not count yet (a wrong clock, or a look back). Of two values of one chart in one campaign the later counts.
+    Values from passages come by the week, as the view ``passage_values`` makes them.
+    """
+    rows = modes if "source" in modes else modes.assign(source="hammer")
+    time = days(rows["measured_at_utc"])
+    if as_of is None:
+        _, newest = believable(time, settings)
+    else:
+        newest = days([as_of])[0]
+    charts, chart = _charts(rows)
+
+    def column(name):
+        return rows[name].to_numpy(dtype=float, na_value=np.nan) if name in rows else np.full(len(rows), np.nan)
+
+    values = (column(n) for n in ("frequency_hz", "frequency_se_hz", "rail_temperature_c"))
+    return lay_out(charts, chart, time, *values, newest, settings)
+
+
+def lay_out(charts, chart, time, frequency, error, temperature, newest, settings) -> Panel:
+    """The panel of rows whose chart is known by number.
+
+    ``charts`` has the columns of ``CHART``, sorted by them; ``chart, time, frequency, error, temperature`` are
+    (n_row,) arrays. Rows without a frequency, before ``settings.earliest_year`` or after ``newest`` are left out.
+    """
+    earliest = days([pd.Timestamp(settings.earliest_year, 1, 1)])[0]
+    good = (time >= earliest) & (time <= newest)
+    sound = np.isfinite(frequency) & (frequency > 0.0)
+    use = good & sound
+    out = ~use
+    left_out = charts[CHART].iloc[chart[out]].reset_index(drop=True)
+    left_out["measured_at_utc"] = timestamps(time[out])
+    left_out["reason"] = np.where(good[out], "no_value", "wrong_time")
+    charts = charts.assign(
+        group=charts.groupby(CHART[:3], sort=True, observed=True).ngroup().to_numpy(),
+        visits=charts.groupby(["turnout_id", "source"], sort=True, observed=True).ngroup().to_numpy(),
+    )
+    if not use.all():
+        chart, time = chart[use], time[use]
+        frequency, error, temperature = frequency[use], error[use], temperature[use]
+    visits = charts["visits"].to_numpy()
+    n_visits = int(visits.max()) + 1 if len(visits) else 0
+    column, starts = _campaigns(visits[chart], time, settings.campaign_gap_hours / 24.0, n_visits)
+    order = _later_last(chart, column, starts.shape[1], time)
+    cell = (chart[order], column[order])
+
+    def laid_out(values):
+        matrix = np.full((len(charts), starts.shape[1]), np.nan)
+        matrix[cell] = values[order]
+        return matrix
+
+    return Panel(charts, starts, laid_out(frequency), laid_out(error), laid_out(temperature), left_out, newest)
+
+
+def _later_last(chart, column, n_column, time):
+    """Order in which rows are written into cells: by time only where two rows share a cell."""
+    taken = np.zeros((int(chart.max(initial=-1)) + 1, n_column), dtype=bool)
+    taken[chart, column] = True
+    return slice(None) if np.count_nonzero(taken) == time.size else np.argsort(time, kind="stable")
+
+
+def _charts(rows):
+    """Charts in sorted order and the chart of each row; categories are never expanded to text per row."""
+    codes, names = [], []
+    for name in CHART:
+        column = rows[name]
+        if isinstance(column.dtype, pd.CategoricalDtype):
+            categories = np.asarray(column.cat.categories, dtype=object)
+            rank = np.argsort(np.argsort(categories))
+            codes.append(rank[column.cat.codes.to_numpy()])
+            names.append(np.sort(categories))
+        else:
+            code, unique = pd.factorize(column, sort=True)
+            codes.append(code)
+            names.append(np.asarray(unique, dtype=object))
+    sizes = [max(len(n), 1) for n in names]
+    key = np.ravel_multi_index([np.asarray(c, dtype=np.int64) for c in codes], sizes) if len(rows) else np.zeros(0, int)
+    unique, chart = _unique(key)
+    parts = np.unravel_index(unique, sizes)
+    return pd.DataFrame({n: v[p] for n, v, p in zip(CHART, names, parts)}, columns=CHART), chart
+
+
+def _unique(key):
+    """``np.unique(key, return_inverse=True)`` by hashing: the rows are many, the charts few."""
+    code, unique = pd.factorize(key)
+    order = np.argsort(unique, kind="stable")
+    rank = np.empty_like(order)
+    rank[order] = np.arange(order.size)
+    return np.asarray(unique)[order], rank[code]
+
+
+def _campaigns(visits, time, gap, n_visits):
+    """Number of the campaign of each row within its turnout, and (n_visits, n_campaign) times they started."""
+    if not time.size:
+        return np.zeros(0, dtype=np.int64), np.zeros((n_visits, 0))
+    stamp, row = _unique(visits * 2**40 + np.round((time + 2e6) * DAY).astype(np.int64))
+    visit, moment = stamp >> 40, (stamp & (2**40 - 1)) / DAY - 2e6
+    new_turnout = np.diff(visit, prepend=-1) != 0
+    new = new_turnout | (np.diff(moment, prepend=0.0) > gap)
+    running = np.cumsum(new) - 1
+    first = np.zeros(n_visits, dtype=np.int64)
+    first[visit[new_turnout]] = running[new_turnout]
+    number = running - first[visit]
+    starts = np.full((n_visits, int(number.max()) + 1), np.nan)
+    starts[visit[new], number[new]] = moment[new]
+    return number[row], starts

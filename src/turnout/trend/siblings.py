@@ -1,0 +1,75 @@
+"""Median of the other sections of a turnout, campaign by campaign."""
+
+import numpy as np
+
+
+def blocks(group):
+    """Charts of equally large groups together: yields (n_group, size) arrays of chart numbers.
+
+    ``group`` is sorted. Stacking equal sizes lets numpy work on all turnouts at once.
+    """
+    start = np.flatnonzero(np.diff(group, prepend=-1))
+    size = np.diff(np.append(start, len(group)))
+    for n in np.unique(size):
+        yield start[size == n][:, None] + np.arange(n)
+
+
+def median_of_others(values, mask, group) -> tuple[np.ndarray, np.ndarray]:
+    """Median over the other charts of the group, and how many others there are.
+
+    Parameters
+    ----------
+    values : (n_chart, n_campaign) array of float
+    mask : (n_chart, n_campaign) array of bool
+        Values that may serve as someone's sibling.
+    group : (n_chart,) array of int
+        Sorted number of the group.
+
+    Returns
+    -------
+    median : (n_chart, n_campaign) array of float
+        nan where there is no other.
+    others : (n_chart, n_campaign) array of int
+
+    Examples
+    --------
+    >>> median_of_others(np.array([[1.0], [2.0], [4.0], [9.0]]), np.ones((4, 1), bool), np.zeros(4, int))[0].ravel()
+    array([4., 4., 2., 2.])
+    """
+    median = np.full(values.shape, np.nan)
+    others = np.zeros(values.shape, dtype=np.int16)
+    for block in blocks(group):
+        if block.shape[1] == 1:
+            continue
+        inside = mask[block]
+        ordered = np.where(inside, values[block], np.inf)
+        place = np.argsort(ordered, axis=1, kind="stable")
+        ordered = np.take_along_axis(ordered, place, axis=1)
+        rank = np.empty_like(place)
+        np.put_along_axis(rank, place, np.arange(block.shape[1])[None, :, None], axis=1)
+        left = inside.sum(axis=1, keepdims=True) - inside
+        lower, upper = (left - 1) // 2, left // 2
+        out = np.where(inside, rank, block.shape[1])
+        low = np.take_along_axis(ordered, np.clip(lower + (lower >= out), 0, block.shape[1] - 1), axis=1)
+        high = np.take_along_axis(ordered, np.clip(upper + (upper >= out), 0, block.shape[1] - 1), axis=1)
+        with np.errstate(invalid="ignore"):
+            median[block] = np.where(left > 0, 0.5 * (low + high), np.nan)
+        others[block] = left
+    return median, others
+
+
+def median_of_group(values, mask, group) -> tuple[np.ndarray, np.ndarray]:
+    """Median of each group and how many charts it rests on, (n_group, n_campaign) each."""
+    n_group = int(group[-1]) + 1 if len(group) else 0
+    median = np.full((n_group, values.shape[1]), np.nan)
+    count = np.zeros((n_group, values.shape[1]), dtype=np.int16)
+    for block in blocks(group):
+        inside = mask[block]
+        ordered = np.sort(np.where(inside, values[block], np.inf), axis=1)
+        n = inside.sum(axis=1, keepdims=True)
+        low = np.take_along_axis(ordered, np.maximum((n - 1) // 2, 0), axis=1)
+        high = np.take_along_axis(ordered, np.minimum(n // 2, block.shape[1] - 1), axis=1)
+        with np.errstate(invalid="ignore"):
+            middle = np.where(n > 0, 0.5 * (low + high), np.nan)
+        median[group[block[:, 0]]], count[group[block[:, 0]]] = middle[:, 0], n[:, 0]
+    return median, count

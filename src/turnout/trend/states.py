@@ -1,0 +1,152 @@
+"""What each chart says today: ok, alarm, learning, cannot tell or not measured, and why."""
+
+import numpy as np
+import pandas as pd
+
+from turnout.trend.drift import slopes, span
+from turnout.trend.panel import WHOLE, timestamps
+from turnout.trend.prepared import first_epoch
+from turnout.trend.residuals import RESOLUTION
+from turnout.trend.threshold import detectable_shift
+
+YEAR = 365.25
+
+
+def detectable_change(charts, settings) -> tuple[np.ndarray, np.ndarray]:
+    """Smallest change [%] that each chart shows within a year with the settings' probability, and its campaigns a year.
+
+    It rests on the spread of the baseline, the guard, the fleet's memory and the allowance of the present epoch.
+    """
+    campaigns = campaigns_a_year(charts.prepared)
+    extra = charts.extra[:, -1] if charts.extra.shape[1] else np.zeros(len(charts.allowance))
+    return change_seen(charts, np.arange(len(extra)), charts.allowance + extra, campaigns, settings), campaigns
+
+
+def campaigns_a_year(p) -> np.ndarray:
+    """Usual number of campaigns a year of each chart."""
+    with np.errstate(invalid="ignore"):
+        return np.clip(np.nan_to_num(np.round(YEAR / p.interval)), 0, 366).astype(int)
+
+
+def change_seen(charts, chart, allowance, campaigns, settings) -> np.ndarray:
+    """Detectable change [%] of the charts numbered ``chart`` with their ``allowance`` and ``campaigns`` a year."""
+    p = charts.prepared
+    keys = np.column_stack([charts.threshold_down[chart], np.round(allowance, 2), campaigns])
+    unique, where = np.unique(keys, axis=0, return_inverse=True)
+    shift = [detectable_shift(float(h), float(k), int(n), settings.detectable_probability) for h, k, n in unique]
+    scale = p.spread * charts.guard * charts.widening
+    return np.array(shift)[where.ravel()] * scale[chart]
+
+
+def chart_status(charts, settings) -> pd.DataFrame:
+    """One row per chart: its state today, why, the change it can see, its slope.
+
+    States in the order in which they are decided: ``not_measured`` (too long ago), ``alarm``, ``cannot_tell``
+    (values that never change; too few temperatures), ``learning`` (baseline or level after an event not
+    complete), ``cannot_tell`` (detectable change above the target), ``ok``.
+    """
+    p = charts.prepared
+    n_section = len(p.panel.charts)
+    measured = np.isfinite(np.vstack([p.panel.frequency, charts.residual[n_section:]]))
+    last = np.max(np.where(measured, p.time, -np.inf), axis=1, initial=-np.inf)
+    detectable, campaigns = detectable_change(charts, settings)
+    present = p.epoch == (p.epoch[:, -1:] if p.epoch.shape[1] else 0)
+    mask = present & np.isfinite(charts.residual)
+    slope, error, p_value = slopes(charts.residual, p.time, mask, charts.memory)
+    short = span(p.time, mask) < settings.drift_days
+    status = p.charts.drop(columns=["group", "visits"]).copy()
+    status["last_measured_at_utc"] = timestamps(np.where(np.isfinite(last), last, np.nan))
+    status["n_campaigns"] = measured.sum(axis=1)
+    status["campaigns_per_year"] = campaigns
+    status["n_baseline"] = p.baseline.count
+    status["baseline_until_utc"] = timestamps(baseline_until(p, settings))
+    status["n_learned"] = mask_count(charts, present)
+    status["n_needed"] = charts.learn
+    status["complete"] = p.baseline.complete
+    status["run_length_down"] = settings.run_length_loss
+    status["run_length_up"] = settings.run_length_gain
+    status["without_temperature"] = p.baseline.without_temperature
+    status["detectable_pct"] = detectable
+    status["stale_after_days"] = stale_after(p, settings)
+    status["target_pct"] = settings.target_percent
+    status["drift_pct_per_year"] = np.where(short, np.nan, slope)
+    status["drift_se_pct_per_year"] = np.where(short, np.nan, error)
+    status["drift_p"] = np.where(short, np.nan, p_value)
+    status["state"], status["reason"] = _states(charts, settings, status, last, present)
+    return status
+
+
+def mask_count(charts, present) -> np.ndarray:
+    """Campaigns that have learned the level of the present epoch."""
+    learned = np.sum(charts.learning & present & np.isfinite(charts.residual), axis=1)
+    return np.where(charts.prepared.pending, 0, learned)
+
+
+def baseline_until(p, settings) -> np.ndarray:
+    """Time of the campaign that completed each baseline, nan where it is not; a turnout's needs enough sections. [d]"""
+    n_section = len(p.panel.charts)
+    until = np.max(np.where(p.baseline.inside, p.time, -np.inf), axis=1, initial=-np.inf)
+    until = np.where(p.baseline.complete, until, np.inf)
+    for whole, members in enumerate(_members(p.panel.charts["group"].to_numpy()), start=n_section):
+        ends = np.sort(until[members])
+        until[whole] = ends[settings.siblings_minimum] if len(ends) > settings.siblings_minimum else np.inf
+    return np.where(np.isfinite(until), until, np.nan)
+
+
+def _members(group):
+    """Charts of each group in turn."""
+    return np.split(np.arange(len(group)), np.flatnonzero(np.diff(group)) + 1) if len(group) else []
+
+
+def stale_after(p, settings) -> np.ndarray:
+    """Age at which a chart counts as not measured: the setting, or three of its own intervals. [d]"""
+    return np.maximum(settings.not_measured_days, 3.0 * np.nan_to_num(p.interval))
+
+
+def _states(charts, settings, status, last, present):
+    """The state and the reason of every chart; the first that applies."""
+    p = charts.prepared
+    as_of = p.panel.as_of
+    old = as_of - last > stale_after(p, settings)
+    open_now = _last(charts.down_open) | _last(charts.up_open)
+    stuck = ~np.isfinite(charts.sigma).any(axis=1) | ~(p.spread > 0.0)
+    stuck[: len(p.panel.charts)] |= never_changes(p.panel.frequency)
+    cold = p.baseline.without_temperature > 0.5 * status["n_campaigns"].to_numpy()
+    learned = status["n_learned"].to_numpy()
+    relearn = p.baseline.complete & (p.pending | ((p.epoch[:, -1] > first_epoch(p)) & (learned < charts.learn)))
+    blind = ~(status["detectable_pct"].to_numpy() <= settings.target_percent)
+    whole = status["section_id"].to_numpy() == WHOLE
+    rules = [
+        (~np.isfinite(last) & whole, "cannot_tell", "too_few_sections"),
+        (~np.isfinite(last), "not_measured", "never"),
+        (old, "not_measured", "too_long_ago"),
+        (p.baseline.complete & stuck & ~whole, "cannot_tell", "constant"),
+        (open_now & ~p.pending, "alarm", "threshold_crossed"),
+        (~p.baseline.complete & cold, "cannot_tell", "no_temperature"),
+        (~p.baseline.complete & whole & (p.baseline.count == 0), "cannot_tell", "too_few_sections"),
+        (~p.baseline.complete, "learning", "baseline"),
+        (relearn, "learning", "after_event"),
+        (blind, "cannot_tell", "too_noisy"),
+    ]
+    conditions = [rule[0] for rule in rules]
+    state = np.select(conditions, [np.full(len(last), rule[1], object) for rule in rules], "ok")
+    reason = np.select(conditions, [np.full(len(last), rule[2], object) for rule in rules], "")
+    return state, reason
+
+
+def never_changes(frequency, least=8) -> np.ndarray:
+    """Whether the last ``least`` values of a chart, or all if there are so many, are one and the same.
+
+    >>> never_changes(np.array([[1.0] * 8 + [np.nan], [1.0] * 8 + [2.0]]))
+    array([ True, False])
+    """
+    known = np.isfinite(frequency)
+    behind = np.cumsum(known[:, ::-1], axis=1)[:, ::-1]
+    last = known & (behind <= least)
+    high = np.max(np.where(last, frequency, -np.inf), axis=1, initial=-np.inf)
+    low = np.min(np.where(last, frequency, np.inf), axis=1, initial=np.inf)
+    return (last.sum(axis=1) >= least) & (high - low < RESOLUTION)
+
+
+def _last(values):
+    return values[:, -1] if values.shape[1] else np.zeros(len(values), dtype=values.dtype)

@@ -1,0 +1,180 @@
+"""Finished charts as rows of the tables ``charts``, ``baselines`` and ``alarms``."""
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from turnout.trend.epochs import by_epoch
+from turnout.trend.panel import timestamps
+from turnout.trend.prepared import first_epoch
+from turnout.trend.states import campaigns_a_year, change_seen
+
+KEYS = ["turnout_id", "section_id", "band", "source"]
+STATES = np.array(
+    ["ok", "baseline", "learning", "alarm_down", "alarm_up", "no_temperature", "not_judged", "wrong_time"]
+)
+BAND = float(stats.norm.isf(0.025))
+
+
+def cell_states(charts) -> np.ndarray:
+    """(n_chart, n_campaign) place in ``STATES`` of every campaign of every chart."""
+    p = charts.prepared
+    n_section = len(p.panel.charts)
+    cold = np.zeros(charts.z.shape, dtype=bool)
+    cold[:n_section] = np.isfinite(p.panel.frequency) & ~np.isfinite(p.values)
+    first = p.epoch <= first_epoch(p)[:, None]
+    started = p.baseline.complete[:, None] & ~(charts.learning & first)
+    return np.select(
+        [cold, ~started, charts.learning, ~np.isfinite(charts.z), charts.down_open, charts.up_open],
+        [5, 1, 2, 6, 3, 4],
+        0,
+    ).astype(np.int8)
+
+
+def measured(charts) -> np.ndarray:
+    """Cells that make a row: a frequency was measured, or the turnout's median could be formed."""
+    n_section = len(charts.prepared.panel.charts)
+    return np.isfinite(np.vstack([charts.prepared.panel.frequency, charts.residual[n_section:]]))
+
+
+def chart_rows(charts) -> pd.DataFrame:
+    """Table ``charts``: one row per chart and campaign, in the order of the charts, keys as categories.
+
+    The expected band is that of one campaign at its temperature: 95 % by the guarded spread of the baseline.
+    """
+    p = charts.prepared
+    n_section = len(p.panel.charts)
+    order = p.charts.sort_values(["turnout_id", "section_id", "band", "source"]).index.to_numpy()
+    place, campaign = np.nonzero(measured(charts)[order])
+    chart = order[place]
+    cell = chart * p.time.shape[1] + campaign
+    section = chart < n_section
+    f0 = reference_frequency(p)[chart]
+
+    def of_section(values):
+        """Values of the sections' cells; nan for the whole turnout, whose charts come last."""
+        found = np.take(values.ravel(), np.where(section, cell, 0))
+        return np.where(section, found, np.nan)
+
+    residual = np.take(charts.residual.ravel(), cell)
+    expected = of_section(p.panel.frequency) - f0 * residual / 100.0
+    half = BAND * charts.guard[chart] * np.take(charts.sigma.ravel(), cell) * f0 / 100.0
+    keys = {k: pd.Categorical.from_codes(*_codes(p.charts[k], chart)) for k in KEYS}
+    rows = pd.DataFrame(
+        keys
+        | {
+            "measured_at_utc": timestamps(np.take(p.time.ravel(), cell)),
+            "epoch": np.take(p.epoch.ravel(), cell).astype(np.int32),
+            "rail_temperature_c": of_section(p.panel.temperature),
+            "expected_hz": expected,
+            "expected_low_hz": expected - half,
+            "expected_high_hz": expected + half,
+            "residual_pct": residual,
+            "z": np.take(charts.z.ravel(), cell),
+            "cusum_down": np.take(charts.down.ravel(), cell),
+            "cusum_up": np.take(charts.up.ravel(), cell),
+            "state": pd.Categorical.from_codes(np.take(cell_states(charts).ravel(), cell), STATES),
+        }
+    )
+    return _with_wrong_times(rows, p.panel.left_out)
+
+
+def reference_frequency(p) -> np.ndarray:
+    """f0 of each chart [Hz]; nan for a whole turnout and for amplitudes, which are no frequencies."""
+    return np.where(p.charts["band"] == "amplitude", np.nan, p.baseline.frequency)
+
+
+def _with_wrong_times(rows, left_out):
+    """Campaigns whose clock cannot be believed stay in sight, without a verdict; keys remain categories."""
+    wrong = left_out[(left_out["reason"] == "wrong_time") & left_out["measured_at_utc"].notna()]
+    if wrong.empty:
+        return rows
+    wrong = wrong[[*KEYS, "measured_at_utc"]].drop_duplicates().assign(epoch=np.int32(0), state="wrong_time")
+    for name in (*KEYS, "state"):
+        known = rows[name].cat.categories
+        known = known.append(pd.Index(wrong[name].unique()).difference(known, sort=True))
+        rows[name] = rows[name].cat.set_categories(known)
+        wrong[name] = pd.Categorical(wrong[name], categories=known)
+    both = pd.concat([rows, wrong], ignore_index=True)
+    texts = {name: both[name].astype(object) for name in KEYS[:3]}
+    order = pd.DataFrame(texts).sort_values(KEYS[:3], kind="stable").index
+    return both.loc[order].reset_index(drop=True)
+
+
+def _codes(column, chart):
+    code, unique = pd.factorize(column)
+    return code[chart], pd.Index(unique)
+
+
+def baseline_rows(charts, settings) -> pd.DataFrame:
+    """Table ``baselines``: one row per chart and epoch that has a campaign."""
+    p = charts.prepared
+    _, count = by_epoch(np.zeros(p.time.shape), measured(charts), p.epoch, charts.level.shape[1])
+    chart, epoch = np.nonzero(count)
+    base = p.baseline
+    rows = p.charts.iloc[chart][KEYS].reset_index(drop=True)
+    learned = charts.learned[chart, epoch]
+    later = epoch > first_epoch(p)[chart]
+    allowance = charts.allowance[chart] + np.where(later, 1.0 / np.sqrt(np.maximum(learned, 1)), 0.0)
+    return rows.assign(
+        epoch=epoch.astype(np.int32),
+        epoch_start_utc=timestamps(p.started[chart, epoch]),
+        frequency_hz=reference_frequency(p)[chart],
+        rail_temperature_c=base.reference[chart],
+        slope_pct_per_c=base.slope[chart],
+        slope_se_pct_per_c=base.slope_se[chart],
+        level_pct=charts.level[chart, epoch],
+        sibling_shift_pct=charts.shift[chart, epoch],
+        sd_pct=p.spread[chart],
+        sd_alone_pct=p.spread_alone[chart],
+        phi=charts.memory[chart],
+        guard=charts.guard[chart],
+        allowance=allowance,
+        threshold_down=charts.threshold_down[chart],
+        threshold_up=charts.threshold_up[chart],
+        n_baseline=base.count[chart],
+        n_learned=learned,
+        complete=base.complete[chart],
+        with_siblings=p.with_siblings[chart],
+        detectable_pct=change_seen(charts, chart, allowance, campaigns_a_year(p)[chart], settings),
+    )
+
+
+def alarm_rows(charts, settings) -> pd.DataFrame:
+    """Table ``alarms``: one row per alarm ever raised, open or closed.
+
+    ``began_at_utc`` is the last campaign at which the sum stood at 0: the change came after it. An alarm closes
+    when its sum is back at 0 or an event starts a new epoch.
+    """
+    parts = [_alarms(charts, "down", settings.run_length_loss), _alarms(charts, "up", settings.run_length_gain)]
+    rows = pd.concat(parts, ignore_index=True)
+    return rows.sort_values(["raised_at_utc", *KEYS, "direction"], kind="stable", ignore_index=True)
+
+
+def _alarms(charts, direction, run_length):
+    p = charts.prepared
+    opened = getattr(charts, f"{direction}_open")
+    edge = np.diff(opened.astype(np.int8), axis=1, prepend=0)
+    chart, campaign = np.nonzero(edge > 0)
+    closing = np.where(edge < 0, np.arange(opened.shape[1]), opened.shape[1])
+    next_close = np.minimum.accumulate(closing[:, ::-1], axis=1)[:, ::-1] if closing.size else closing
+    close = next_close[chart, campaign]
+    gone = close < opened.shape[1]
+    held = np.where(gone, close, 0)
+    by_event = gone & (p.epoch[chart, held] > p.epoch[chart, campaign])
+    began = getattr(charts, f"{direction}_began")[chart, campaign]
+    rows = p.charts.iloc[chart][KEYS].reset_index(drop=True)
+    raised = timestamps(p.time[chart, campaign])
+    names = rows["section_id"].where(rows["section_id"] != "*", rows["turnout_id"] + "/*")
+    stamp = np.datetime_as_string(raised, unit="s")
+    return rows.assign(
+        alarm_id=names + ":" + rows["band"] + ":" + rows["source"] + f":{direction}:" + stamp,
+        direction=direction,
+        raised_at_utc=raised,
+        began_at_utc=timestamps(np.where(began >= 0, p.time[chart, np.maximum(began, 0)], np.nan)),
+        statistic=getattr(charts, direction)[chart, campaign],
+        threshold=getattr(charts, f"threshold_{direction}")[chart],
+        run_length=run_length,
+        closed_at_utc=timestamps(np.where(gone, p.time[chart, held], np.nan)),
+        closed_by=np.where(~gone, None, np.where(by_event, "event", "recovered")),
+    )

@@ -1,0 +1,37 @@
+"""The views of the registry over frames in memory, for a look without a registry and for tests."""
+
+import duckdb
+import pyarrow as pa
+
+from turnout.registry.columns import arrow_schema, tables
+from turnout.registry.view_files import view_files
+from turnout.trend.panel import days, timestamps
+from turnout.trend.rows import arrow_rows
+
+NAMES = (
+    "epochs", "resonance_drift",
+    "passage_values", "chart_values", "mode_residuals", "cusum", "change_since_event", "maintenance_effect",
+    "chart_status_at", "cannot_see", "time_to_threshold", "chart_states", "worklist",
+)  # fmt: skip
+
+
+def connect_views(frames, newest, rounded=True) -> duckdb.DuckDBPyConnection:
+    """DuckDB in memory with the trend's views over ``frames``, a mapping of table to DataFrame.
+
+    Tables that are not given are empty; ``modes`` stands for itself and for ``modes_current``. ``newest`` is the
+    time of the newest measurement.
+    """
+    con = duckdb.connect(":memory:", config={"autoinstall_known_extensions": False, "autoload_known_extensions": False})
+    for table in tables():
+        if table in frames:
+            con.register(table, arrow_rows(table, frames[table], rounded))
+        else:
+            con.register(table, pa.Table.from_pylist([], schema=arrow_schema(table)))
+    stamp = timestamps(days([newest]))[0]
+    con.execute(f"create macro newest_measurement() as timestamp '{stamp}'")
+    for table in ("modes", "passages", "passage_fits"):
+        con.execute(f"create view {table}_current as select * from {table}")
+    for name in view_files():
+        if name in NAMES:
+            con.execute(view_files()[name])
+    return con

@@ -1,0 +1,99 @@
+"""What an effect is: a file in ``effects/``, or one of your own in a folder given to `turnout blind make --effects`.
+
+The file defines ``EFFECT``, an ``Effect``. Nothing else has to know of it: the plan gives it cases, the seal hides
+them, the scorer counts every name for it as wrong unless ``docs/blind.md`` or ``--names`` says which one is right.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+
+import numpy as np
+
+LOCKS = ("place", "wheel", "train", "sensor", "wavelength", "frequency", "clock", "condition", "amplitude")
+STRATA = ("single", "outside", "unidentifiable")
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """One concealed effect: ``where`` ({"position", "sleeper", "sensor", "train", "axle"} as far as it has them) and
+    ``parameters``, in SI units."""
+
+    kind: str
+    locked_to: str
+    where: Mapping = field(default_factory=dict)
+    parameters: Mapping = field(default_factory=dict)
+    rung: int = 0
+
+
+@dataclass(frozen=True)
+class Effect:
+    """``draw(rng, site, severity)`` -> (where, parameters); ``act(world, site, where, parameters)`` changes the world.
+
+    ``ladder`` holds severities from hidden to obvious, one per rung. ``site`` are options of ``draw_site`` that the
+    effect needs, such as one temperature. ``stratum`` is one of ``STRATA``, ``locked_to`` one of ``LOCKS``.
+    """
+
+    kind: str
+    locked_to: str
+    ladder: tuple
+    draw: Callable
+    act: Callable
+    stratum: str = "single"
+    site: Mapping = field(default_factory=dict)
+
+    def __post_init__(self):
+        if self.locked_to not in LOCKS or self.stratum not in STRATA:
+            raise ValueError(f"effect {self.kind!r}: locked to {self.locked_to!r} or stratum {self.stratum!r} unknown")
+
+    def concealed(self, rng, site, rung):
+        """A drawn effect at ``rung`` of the ladder, counted from 0."""
+        where, parameters = self.draw(rng, site, self.ladder[rung])
+        return Drawn(self.kind, self.locked_to, where, parameters, rung)
+
+
+def load_effects(*folders):
+    """Effects by kind from the package's folder and ``folders``; ValueError names the file that has none.
+
+    >>> from turnout_blind.effect import load_effects
+    >>> sorted(load_effects())[:3]
+    ['ballast', 'bilinear_clip', 'bottomless_void']
+    """
+    found = {}
+    for folder in (Path(__file__).with_name("effects"), *map(Path, folders)):
+        for path in sorted(folder.glob("*.py")):
+            if path.name.startswith("_"):
+                continue
+            spec = spec_from_file_location(f"turnout_blind_effect_{path.stem}", path)
+            module = module_from_spec(spec)
+            spec.loader.exec_module(module)
+            effect = getattr(module, "EFFECT", None)
+            if not isinstance(effect, Effect):
+                raise ValueError(f"{path}: defines no EFFECT of class turnout_blind.effect.Effect")
+            found[effect.kind] = effect
+    return found
+
+
+def sign(rng):
+    """+1 or -1."""
+    return 1.0 if rng.random() < 0.5 else -1.0
+
+
+def sleeper_near(rng, site):
+    """(index, place) of a sleeper among the sensors, drawn evenly."""
+    low, high = min(site.sensors) - 0.35, max(site.sensors) + 0.35
+    inside = np.flatnonzero((site.world.place > low) & (site.world.place < high))
+    j = int(rng.choice(inside))
+    return {"sleeper": j, "position": float(site.world.place[j])}
+
+
+def any_sensor(rng, site):
+    """{"sensor": name} drawn evenly."""
+    return {"sensor": str(rng.choice(site.names()))}
+
+
+def any_axle(rng, site):
+    """{"train", "axle"} drawn evenly over the trains; axles from 1."""
+    train = str(rng.choice(sorted(site.trains)))
+    return {"train": train, "axle": int(rng.integers(1, site.trains[train].axles().size + 1))}

@@ -1,0 +1,1 @@
+"""Effects that can be concealed, one per file; each defines ``EFFECT``."""

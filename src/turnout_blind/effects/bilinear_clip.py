@@ -1,0 +1,16 @@
+"""Fastenings that hold the rail down hardly at all: pads of three sleepers act in compression, not in uplift."""
+
+from turnout_blind.effect import Effect, sleeper_near
+
+
+def draw(rng, site, lift):
+    """Stiffness in uplift over that in compression."""
+    return sleeper_near(rng, site), {"lift": float(lift)}
+
+
+def act(world, site, where, p):
+    """Piecewise linear pads."""
+    world.lift[where["sleeper"] - 1 : where["sleeper"] + 2] = p["lift"]
+
+
+EFFECT = Effect("bilinear_clip", "place", (0.4, 0.2, 0.1, 0.03), draw, act, "outside")

@@ -1,0 +1,21 @@
+"""All channels of the passages' logger too sensitive alike: heavier trains would show the same."""
+
+from turnout_blind.effect import Effect
+
+
+def draw(rng, site, change):
+    """Common factor."""
+    return {}, {"gain": float(1.0 + change)}
+
+
+def act(world, site, where, p):
+    """Only when trains pass: the hammer tests have a logger of their own."""
+
+    def fault(kind, rng):
+        return lambda x, rate: p["gain"] * x if kind == "passage" else x
+
+    for name in site.names():
+        world.channels.setdefault(name, []).append(fault)
+
+
+EFFECT = Effect("common_gain", "condition", (0.06, 0.09, 0.12, 0.15), draw, act, "unidentifiable")

@@ -1,0 +1,27 @@
+"""Corrugation over a stretch: sharper crests than a sine, its strength swelling along the stretch."""
+
+import numpy as np
+
+from turnout_blind.effect import Effect
+
+
+def draw(rng, site, amplitude):
+    """Wavelength, stretch and phase."""
+    middle = float(rng.uniform(min(site.sensors) + 1.0, max(site.sensors) - 1.0))
+    more = {"wavelength": float(rng.uniform(0.15, 0.6)), "reach": float(rng.uniform(2.5, 5.0))}
+    return {"position": middle}, {"amplitude": float(amplitude), "phase": float(rng.uniform(0.0, 6.28)), **more}
+
+
+def act(world, site, where, p):
+    """A surface more."""
+
+    def dips(x):
+        way = np.asarray(x) - where["position"]
+        turn = 2.0 * np.pi * way / p["wavelength"] + p["phase"]
+        swell = np.cos(0.5 * np.pi * np.clip(way / p["reach"], -1.0, 1.0))
+        return p["amplitude"] * swell * (np.cos(turn) + 0.25 * np.cos(2.0 * turn))
+
+    world.surface.append(dips)
+
+
+EFFECT = Effect("corrugation", "wavelength", tuple(np.geomspace(4e-6, 1.5e-4, 7)), draw, act)

@@ -1,0 +1,18 @@
+"""Wet ballast that loses stiffness while the train is above it and has partly recovered before the next."""
+
+from turnout_blind.effect import Effect, sleeper_near
+
+
+def draw(rng, site, loss):
+    """Share of stiffness lost per second of a record, factor from passage to passage."""
+    return sleeper_near(rng, site), {"loss": float(loss), "factor": float(rng.uniform(0.85, 0.95))}
+
+
+def act(world, site, where, p):
+    """Three sleepers."""
+    for j in range(where["sleeper"] - 1, where["sleeper"] + 2):
+        world.drift[j] = -p["loss"]
+        world.wear_per_passage[j] = (0.0, p["factor"])
+
+
+EFFECT = Effect("drifting_support", "place", (0.08, 0.14, 0.2, 0.26), draw, act, "outside")

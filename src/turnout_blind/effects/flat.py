@@ -1,0 +1,25 @@
+"""A flat on one wheel, its edges rounded by rolling: half again as long as the chord."""
+
+import numpy as np
+
+from turnout_blind.effect import Effect, any_axle
+
+
+def draw(rng, site, length):
+    """Chord of the fresh flat and where on the tread it lies."""
+    return any_axle(rng, site), {"length": float(length), "angle": float(rng.uniform(0.0, 2.0 * np.pi))}
+
+
+def act(world, site, where, p):
+    """Depth l^2 / 16 R, cosine-shaped, once a turn."""
+
+    def tread(x, phase, radius):
+        depth, half = p["length"] ** 2 / (16.0 * radius), 0.75 * p["length"]
+        turned = np.mod(np.asarray(x) / radius + phase + p["angle"] + np.pi, 2.0 * np.pi) - np.pi
+        way = np.clip(turned * radius / half, -1.0, 1.0)
+        return 0.5 * depth * (1.0 + np.cos(np.pi * way))
+
+    world.treads.setdefault((where["train"], where["axle"]), []).append(tread)
+
+
+EFFECT = Effect("flat", "wheel", (0.02, 0.028, 0.036, 0.046, 0.058, 0.072, 0.09), draw, act)

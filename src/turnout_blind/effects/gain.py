@@ -1,0 +1,20 @@
+"""A sensor whose sensitivity is not the one in the file."""
+
+from turnout_blind.effect import Effect, any_sensor
+
+
+def draw(rng, site, change):
+    """Factor on what it shows."""
+    return any_sensor(rng, site), {"gain": float(1.0 + change if rng.random() < 0.5 else 1.0 / (1.0 + change))}
+
+
+def act(world, site, where, p):
+    """In hammer tests and passages alike."""
+
+    def fault(kind, rng):
+        return lambda x, rate: p["gain"] * x
+
+    world.channels.setdefault(where["sensor"], []).append(fault)
+
+
+EFFECT = Effect("gain", "sensor", (0.02, 0.04, 0.07, 0.12, 0.2, 0.32, 0.5), draw, act)

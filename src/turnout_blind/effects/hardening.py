@@ -1,0 +1,18 @@
+"""Ballast that stiffens with the square of its compression's size under five sleepers, as stones interlock."""
+
+import numpy as np
+
+from turnout_blind.effect import Effect, sleeper_near
+
+
+def draw(rng, site, rate):
+    """Relative gain of stiffness per metre."""
+    return sleeper_near(rng, site), {"rate": float(rate)}
+
+
+def act(world, site, where, p):
+    """F = k y (1 + h |y|)."""
+    world.hardening[where["sleeper"] - 2 : where["sleeper"] + 3] = p["rate"]
+
+
+EFFECT = Effect("hardening", "amplitude", tuple(np.geomspace(150.0, 8000.0, 7)), draw, act)

@@ -1,0 +1,31 @@
+"""A train on the other track during some of the passages: ground-borne waves that no wheel of ours explains."""
+
+import numpy as np
+from scipy import signal
+
+from turnout_blind.effect import Effect
+
+
+def draw(rng, site, level):
+    """Which passages, and how strong [m/s²]."""
+    hit = sorted(int(k) for k in rng.choice(len(site.passages), 3, replace=False))
+    return {}, {"level": float(level), "passages": hit, "centre": float(rng.uniform(18.0, 45.0))}
+
+
+def act(world, site, where, p):
+    """Narrow noise that swells and fades, late at far sensors by 250 m/s."""
+
+    def source(time, places, k, rng):
+        if k not in p["passages"]:
+            return np.zeros((len(places), time.size))
+        rate = 1.0 / (time[1] - time[0])
+        band = [0.6 * p["centre"], 1.6 * p["centre"]]
+        noise = signal.sosfilt(signal.butter(3, band, "band", fs=rate, output="sos"), rng.normal(size=time.size))
+        swell = np.exp(-(((time - rng.uniform(1.0, 2.5)) / 0.6) ** 2))
+        wave = p["level"] * noise / np.std(noise) * swell
+        return np.stack([np.interp(time - (x - places[0]) / 250.0, time, wave) for x in places])
+
+    world.passage_noise.append(source)
+
+
+EFFECT = Effect("neighbouring_train", "clock", (0.3, 0.7, 1.5, 3.0), draw, act, "outside")

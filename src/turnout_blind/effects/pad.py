@@ -1,0 +1,17 @@
+"""A worn, missing or wrongly replaced pad at one sleeper."""
+
+from turnout_blind.effect import Effect, sleeper_near
+
+
+def draw(rng, site, ratio):
+    """Factor on stiffness, either way."""
+    return sleeper_near(rng, site), {"factor": float(ratio if rng.random() < 0.6 else 1.0 / ratio)}
+
+
+def act(world, site, where, p):
+    """Stiffness by the factor, damping by its root."""
+    world.pad[where["sleeper"]] *= p["factor"]
+    world.pad_damping[where["sleeper"]] *= p["factor"] ** 0.5
+
+
+EFFECT = Effect("pad", "place", (0.88, 0.75, 0.6, 0.45, 0.33, 0.24, 0.16), draw, act)

@@ -1,0 +1,23 @@
+"""Pads whose stiffness rises with frequency as a power law: four Maxwell branches an octave pair apart stand for it."""
+
+import numpy as np
+
+from turnout_blind.effect import Effect
+
+RATES = 2.0 * np.pi * np.array([25.0, 100.0, 400.0, 1600.0])
+
+
+def draw(rng, site, order):
+    """Order of the power law; stiffness at 25 Hz is that of the pad."""
+    return {}, {"order": float(order)}
+
+
+def act(world, site, where, p):
+    """Branch b brings what the power law gains over its factor of four in frequency; half of the dashpot goes."""
+    knees = 4.0 ** (p["order"] * np.arange(1, RATES.size + 1))
+    world.branch_share = np.diff(np.concatenate([[1.0], knees]))
+    world.branch_rate = RATES.copy()
+    world.pad_damping = world.pad_damping * 0.5
+
+
+EFFECT = Effect("pad_fractional", "condition", (0.01, 0.02, 0.035, 0.055, 0.08, 0.11, 0.15), draw, act)

@@ -1,0 +1,18 @@
+"""A sensor that sits elsewhere than its description says."""
+
+import numpy as np
+
+from turnout_blind.effect import Effect, any_sensor, sign
+
+
+def draw(rng, site, shift):
+    """Shift along the rail."""
+    return any_sensor(rng, site), {"shift": float(shift) * sign(rng)}
+
+
+def act(world, site, where, p):
+    """True place minus described place."""
+    world.sensor_shift[where["sensor"]] = world.sensor_shift.get(where["sensor"], 0.0) + p["shift"]
+
+
+EFFECT = Effect("position", "sensor", tuple(np.geomspace(0.03, 0.6, 7)), draw, act)

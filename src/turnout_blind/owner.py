@@ -1,0 +1,123 @@
+"""The owner's files: layout, track, vehicles and table of turnouts, with nominal values and no effect in them."""
+
+from pathlib import Path
+
+SOURCE = "the owner's register"
+
+
+def write_configuration(folder, turnout, site):
+    """Write config/ of one site below ``folder``, in the project's own formats."""
+    folder = Path(folder)
+    for name in ("layouts", "tracks", "vehicles"):
+        (folder / name).mkdir(parents=True, exist_ok=True)
+    (folder / "config.yaml").write_text("# All settings as the program has them.\n{}\n")
+    (folder / "turnouts.tsv").write_text(f"turnout\tlayout\traw\tname\n{turnout}\tsite\t{turnout}\tSite {turnout}\n")
+    (folder / "layouts" / "site.yaml").write_text(layout(site))
+    (folder / "tracks" / "site.yaml").write_text(track(site))
+    for name, train in site.trains.items():
+        (folder / "vehicles" / f"{name}.yaml").write_text(vehicle(train))
+    (folder / "vehicles" / "axle_patterns.yaml").write_text(patterns(site.trains))
+
+
+def layout(site):
+    """Sections at the sensors, channels of hammer tests and passages."""
+    lines = ["description: four sensors on the rail of one track", "sections:"]
+    for i, place in enumerate(site.sensors, 1):
+        lines += [f"  S{i}:", "    panel: CLP", "    track: main", f"    position: {place:.2f}", "    hammer:"]
+        lines += [f"      response: A{i}", "      channels:"]
+        lines += [f"        A{k}: {{offset: {x - place:.2f}}}" for k, x in enumerate(site.sensors, 1)]
+    lines += ["hammer:", '  files: "hammer/{campaign}/{section}_{test}.{ext}"', "  format: npz", "  rate: 20000"]
+    lines += ["  records: 6", "  samples: 5000", "  time_zone: UTC", "  force: force", "  response: A1", "  channels:"]
+    lines += [
+        "    force: {source: force, quantity: force, unit: N, mounting: hammer, "
+        f"limit: {site.force.full_scale:g}, resolution: {site.force.step:.6g}}}"
+    ]
+    lines += [_channel(c, c.name, "") for c in site.chains]
+    lines += ["passages:", '  files: "passages/{time}.{ext}"', "  format: npz", "  rate: 5000", "  time_zone: UTC"]
+    lines += ["  channels:", *(_channel(c, c.name, f", section: S{c.name[1:]}") for c in site.chains)]
+    return "\n".join(lines) + "\n"
+
+
+def _channel(chain, name, more):
+    return (
+        f"    {name}: {{source: {name}, quantity: acceleration, unit: m/s², mounting: rail web, "
+        f"limit: {chain.full_scale:g}, resolution: {chain.step:.6g}{more}}}"
+    )
+
+
+def _value(value, unit, prior=None):
+    more = "" if prior is None else f", prior: {prior}"
+    return f'{{value: {value:.6g}, unit: "{unit}", source: register{more}}}'
+
+
+def track(site):
+    """Nominal rail and supports; two zones of their own values."""
+    lines = ["name: site", "layers: 2", "elements_per_bay: 4", "sources:", f'  register: "{SOURCE}"']
+    lines += ["extent:", f"  from: {_value(-45.0, 'm')}", f"  to: {_value(57.0, 'm')}"]
+    lines += [f"spacing: {_value(0.6, 'm', 0.03)}", "absorbing_end:"]
+    lines += [f"  length: {_value(9.0, 'm')}", f"  rate: {_value(400.0, '1/s')}"]
+    lines += ["rail:", "  name: 60E1", "  beam: timoshenko"]
+    rail = (("youngs_modulus", 210.0, "GPa"), ("second_moment", 3037.0, "cm⁴"), ("area", 76.7, "cm²"))
+    rail += (("mass", 60.2, "kg/m"), ("shear_modulus", 80.77, "GPa"), ("shear_coefficient", 0.393, "-"))
+    rail += (("density", 7850.0, "kg/m³"), ("damping", 30.0, "N s/m²"))
+    lines += [f"  {name}: {_value(value, unit)}" for name, value, unit in rail]
+    lines += ["support:", *_support(site.nominal[0]), "sections:"]
+    for label, zone, values in zip(("west", "east"), site.zones, site.nominal):
+        lines += [f"  - label: {label}", "    panel: CLP"]
+        lines += [f"    from: {_value(zone[0] - 0.3, 'm')}", f"    to: {_value(zone[1] - 0.3, 'm')}"]
+        lines += ["  " + line for line in _support(values)]
+    lines += ["locations:"]
+    lines += [f"  S{i}: {{place: {_value(x, 'm', 0.02)}}}" for i, x in enumerate(site.sensors, 1)]
+    return "\n".join(lines) + "\nroutes:\n  main: []\n"
+
+
+def _support(v):
+    return [
+        f"  pad_stiffness: {_value(v['pad'] / 1e6, 'MN/m', 0.3)}",
+        f"  pad_damping: {_value(v['pad_damping'] / 1e3, 'kN s/m', 0.5)}",
+        f"  sleeper_mass: {_value(v['mass'], 'kg', 0.05)}",
+        f"  ballast_stiffness: {_value(v['ballast'] / 1e6, 'MN/m', 0.3)}",
+        f"  ballast_damping: {_value(v['ballast_damping'] / 1e3, 'kN s/m', 0.5)}",
+    ]
+
+
+def vehicle(train):
+    """A vehicle file: whole cars, both rails."""
+    c, n = train.cars[0], len(train.cars)
+    lines = [f"name: {train.name}", f"title: {train.name} of {n} cars", "sources:", f'  register: "{SOURCE}"']
+    lines += [f"length: {_value(n * c.length, 'm')}", "wheel:", f"  radius: {_value(train.radius, 'm', 0.03)}"]
+    lines += [f"  contact: {_value(train.contact / 1e9, 'GN/m^1.5', 0.1)}", "car_types:", "  body:"]
+    lines += [
+        f"    mass: {_value(c.body / 1e3, 't', 0.05)}",
+        f"    inertia: {_value(c.body_inertia / 1e3, 't m²', 0.1)}",
+    ]
+    lines += ["bogie_types:", "  bogie:"]
+    bogie = (("mass", c.bogie, "kg"), ("inertia", c.bogie_inertia, "kg m²"), ("base", c.base, "m"))
+    bogie += (("wheelset_mass", c.wheelset, "kg"), ("primary_stiffness", c.primary / 1e6, "MN/m"))
+    bogie += (("primary_damping", c.primary_damping / 1e3, "kN s/m"),)
+    bogie += (("secondary_stiffness", c.secondary / 1e6, "MN/m"),)
+    bogie += (("secondary_damping", c.secondary_damping / 1e3, "kN s/m"),)
+    lines += [f"    {name}: {_value(value, unit, 0.1)}" for name, value, unit in bogie]
+    lines += ["bogies:"]
+    for k in range(n):
+        for side, pivot in ((0, -0.5), (1, 0.5)):
+            centre = k * c.length + 0.5 * c.length + pivot * c.pivots
+            lines.append(f"  - {{label: b{2 * k + side + 1}, type: bogie, centre: {_value(centre, 'm')}}}")
+    lines += ["cars:"]
+    for k in range(n):
+        centre = _value((k + 0.5) * c.length, "m")
+        lines.append(f"  - {{type: body, rests_on: [b{2 * k + 1}, b{2 * k + 2}], centre: {centre}}}")
+    return "\n".join(lines) + "\n"
+
+
+def patterns(trains):
+    """Axle patterns of the trains."""
+    lines = ["vehicles:"]
+    for name, train in trains.items():
+        places = ", ".join(f"{x:.3f}" for x in train.axles())
+        length = sum(c.length for c in train.cars)
+        lines.append(f'  {name}_unit: {{length: {length:.2f}, axles: [{places}], source: "{SOURCE}"}}')
+    lines.append("trains:")
+    for name in trains:
+        lines += [f"  {name}:", f"    units: [{name}_unit]"]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,47 @@
+"""Open the envelopes: verify every seal, then put the truths beside the findings."""
+
+import json
+import shutil
+from pathlib import Path
+
+from turnout_blind.seal import BlindError, digest, read_commit, verify
+
+
+def reveal(out, truth):
+    """Copy the truths to ``out``/revealed after verifying all seals and that findings exist; returns the truths.
+
+    Errors: BlindError where a seal is broken, or where nothing has been diagnosed yet.
+    """
+    out, truth = Path(out), Path(truth)
+    truths = verify(out, truth)
+    record = out / "diagnosis.json"
+    if not record.exists():
+        raise BlindError(record, "line 1", "nothing has been diagnosed yet", "Run turnout blind diagnose first")
+    held = json.loads(record.read_text())
+    if held["commit_sha256"] != digest((out / "commit.json").read_bytes()):
+        raise BlindError(record, "commit_sha256", "diagnosed under another commit", "This set proves nothing")
+    (out / "revealed").mkdir(exist_ok=True)
+    for path in sorted(truth.glob("*.json")):
+        shutil.copyfile(path, out / "revealed" / path.name)
+    return truths
+
+
+def revealed(out):
+    """(truths, rows by case, diagnosis) of a revealed set, seals verified again; rows None where the tool failed."""
+    out = Path(out)
+    if not (out / "revealed").exists():
+        raise BlindError(out, "revealed", "the truth has not been revealed", "Run turnout blind reveal first")
+    truths, record = verify(out, out / "revealed"), out / "diagnosis.json"
+    held = json.loads(record.read_text())
+    if held["commit_sha256"] != digest((out / "commit.json").read_bytes()):
+        raise BlindError(record, "commit_sha256", "diagnosed under another commit", "This set proves nothing")
+    rows = {}
+    for case in read_commit(out)["cases"]:
+        run, path = held["cases"].get(case), out / "findings" / f"{case}.json"
+        rows[case] = None
+        if run and run["status"] == "answered":
+            data = path.read_bytes()
+            if digest(data) != run["rows_sha256"]:
+                raise BlindError(path, "line 1", "not the rows that the tool wrote", "Diagnose a set made anew")
+            rows[case] = json.loads(data)
+    return truths, rows, held

@@ -1,0 +1,68 @@
+"""Random roughness by superposed waves: of a rail along its length, of a wheel round its tread."""
+
+import numpy as np
+
+SHORTEST, LONGEST = 0.02, 3.0  # wavelengths [m]
+TREAD = 8192  # points round a wheel, a third of a millimetre apart
+PATCH = 0.006  # half length of the contact patch [m]: it rides over waves not much longer
+SLOPE = 18.0  # dB per decade of wavelength, as measured spectra of ground rail in service fall
+
+
+def level(wavelength, at_10_cm):
+    """Third-octave level [dB re 1 µm] of waves of ``wavelength`` [m], given that at 10 cm.
+
+    >>> level(0.1, 2.0), level(1.0, 2.0)
+    (2.0, 20.0)
+    """
+    return float(at_10_cm + SLOPE * np.log10(wavelength / 0.1))
+
+
+def patch_share(wavelength):
+    """Share of a wave's variance that lifts a wheel: exp(-(2 pi a / wavelength)^2), Remington's filter in short."""
+    return np.exp(-((2.0 * np.pi * PATCH / np.asarray(wavelength)) ** 2))
+
+
+def rail_roughness(rng, at_10_cm, waves=420):
+    """A function of place [m] giving dips [m]: ``waves`` cosines of random phase, evenly in the logarithm.
+
+    Each third of an octave carries the variance that its level says, so its cosines share it.
+    """
+    edges = np.geomspace(SHORTEST, LONGEST, waves + 1)
+    length = np.exp(rng.uniform(np.log(edges[:-1]), np.log(edges[1:])))
+    share = np.log2(edges[1:] / edges[:-1]) * 3.0
+    variance = 1e-12 * 10.0 ** ((at_10_cm + SLOPE * np.log10(length / 0.1)) / 10.0) * share * patch_share(length)
+    phase = rng.uniform(0.0, 2.0 * np.pi, waves)
+    amplitude, number = np.sqrt(2.0 * variance), 2.0 * np.pi / length
+
+    seen = {}
+
+    def dips(x):
+        key = (x[0], x[-1], x.size)
+        if key not in seen:
+            seen[key] = np.sum(amplitude[:, None] * np.cos(np.outer(number, x) + phase[:, None]), axis=0)
+        return seen[key]
+
+    return dips
+
+
+def wheel_roughness(rng, at_10_cm, radius, orders=130):
+    """A function of place [m] and phase [rad]: harmonics of the circumference, the first three as turned wheels have
+    them (10 to 30 µm), the others at the level of roughness."""
+    order = np.arange(1, orders + 1)
+    length = 2.0 * np.pi * radius / order
+    width = np.log2((order + 0.5) / (order - 0.5)) * 3.0
+    variance = 1e-12 * 10.0 ** ((at_10_cm + SLOPE * np.log10(length / 0.1)) / 10.0) * width * patch_share(length)
+    amplitude = np.sqrt(2.0 * variance) * rng.rayleigh(0.8, orders)
+    amplitude[:3] = rng.uniform(1e-5, 3e-5, 3)
+    turn = rng.uniform(0.0, 2.0 * np.pi, orders)
+
+    angle = np.linspace(0.0, 2.0 * np.pi, TREAD + 1)
+    spectrum = np.zeros(TREAD // 2 + 1, dtype=complex)
+    spectrum[order] = 0.5 * TREAD * amplitude * np.exp(1j * turn)
+    tread = np.fft.irfft(spectrum, TREAD)
+    tread = np.append(tread, tread[0])
+
+    def dips(x, phase):
+        return np.interp(np.mod(np.asarray(x) / radius + phase, 2.0 * np.pi), angle, tread)
+
+    return dips

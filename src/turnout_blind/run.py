@@ -1,0 +1,66 @@
+"""Runs of the march: a given world under blows or under a train; raw rail accelerations at the step's rate."""
+
+import numpy as np
+
+from turnout_blind.grid import lost_compliance, read
+from turnout_blind.march import STEP, Blow, Roll, march
+from turnout_blind.vehicle import cars_of, no_train, wheels_of
+
+PATH_STEP = 5e-3
+RAMP = 4.0  # a wheel takes hold of the rail over this length [m]
+MARGIN = 1.0  # and never comes nearer to the ends of the grid [m]
+STILL = Blow(1, np.zeros(4), 0.0, 0.0, 0.0, np.zeros(0), np.zeros(0))
+REST = Roll(0.0, 0.0, 0.0, 1.0, 2.0, 3.0)
+
+
+def accelerations(velocity, dt):
+    """(n_sensor, n) [m/s²] from velocities half a step behind each whole one; sample k is that of time k dt."""
+    return np.diff(velocity, axis=0, prepend=0.0).T / dt
+
+
+def strike(world, places, at, times, velocities, duration, temperature=None, mass=5.5, tip=1.5e9, loss=0.1, dt=STEP):
+    """(force (n,) [N], accelerations (n_sensor, n) [m/s²], last state) of blows of a hammer ``at`` a place [m].
+
+    ``tip`` is the constant of k d^1.5 (1 + loss d') [N/m^1.5, s/m]; a second time is a bounce.
+    """
+    first, weights = read(world.grid, at)
+    blow = Blow(int(first[0]), weights[0], mass, tip, loss, np.asarray(times, float), np.asarray(velocities, float))
+    cars, wheels = no_train()
+    sensors = read(world.grid, places)
+    out, hammer, _, state = march(
+        round(duration / dt), dt, world.grid.start, world.beam(), world.supports(temperature), world.hung(), cars,
+        wheels, REST, blow, *sensors, 1,
+    )  # fmt: skip
+    return hammer, accelerations(out, dt), state
+
+
+def paths(world, train, roughness, phase):
+    """(n_wheel, m) dips that each wheel meets along the grid [m], from the grid's start on."""
+    x = np.arange(world.grid.start, world.grid.end, PATH_STEP)
+    rail = sum((make(x) for make in world.surface), np.zeros(x.size))
+    made = np.tile(rail, (train.axles().size, 1))
+    for i in range(made.shape[0]):
+        if roughness is not None:
+            made[i] += roughness(i, x)
+        for tread in world.treads.get((train.name, i + 1), ()):
+            made[i] += tread(x, phase, train.radius)
+    return made
+
+
+def roll(world, train, speed, places, duration, lead, temperature=None, roughness=None, phase=0.0, grown=0.0, dt=STEP):
+    """(accelerations (n_sensor, n) [m/s²], wheel forces (n_wheel, m) [N], last state) of a passage.
+
+    The first wheel is at the first of ``places`` [m] after ``lead`` seconds. ``roughness`` is (wheel, places) ->
+    dips; ``phase`` [rad] turns all wheels.
+    """
+    local = lost_compliance(world.grid, world.rail)
+    path = paths(world, train, roughness, phase)
+    wheels = wheels_of(train, path, world.grid.start, PATH_STEP, local, world.wheel_mass.get(train.name, 1.0))
+    low, high = world.grid.start + MARGIN, world.grid.end - MARGIN
+    way = Roll(min(places) - speed * lead, speed, low, low + RAMP, high - RAMP, high)
+    sensors = read(world.grid, places)
+    out, _, force, state = march(
+        round(duration / dt), dt, world.grid.start, world.beam(), world.supports(temperature, grown), world.hung(),
+        cars_of(train), wheels, way, STILL, *sensors, 60,
+    )  # fmt: skip
+    return accelerations(out, dt), force.T, state

@@ -1,0 +1,81 @@
+"""Finding rows as answers: the same words whatever wrote them."""
+
+import json
+import re
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One row of findings. ``names`` are one for "named", two for "a_or_b"; ``parameters`` {name: (value, se)}."""
+
+    verdict: str
+    names: tuple = ()
+    lock: str | None = None
+    position: float | None = None
+    sensor: str | None = None
+    train: str | None = None
+    axle: int | None = None
+    probability: float | None = None
+    before: float | None = None
+    after: float | None = None
+    parameters: dict = field(default_factory=dict)
+
+    @property
+    def silent(self):
+        """Whether it says that nothing is wrong."""
+        return self.verdict == "none"
+
+
+def answers_of(rows):
+    """Answers of a case, in the order of the rows; None where the tool gave no rows.
+
+    >>> rows = [{"verdict": "named", "term": "wheel_flat", "sentence": "a flat on railcar, axle 3",
+    ...          "parameters_json": '[{"name": "length", "value": 0.05, "se": 0.01}]'}]
+    >>> answer = answers_of(rows)[0]
+    >>> answer.names, answer.axle, answer.parameters
+    (('wheel_flat',), 3, {'length': (0.05, 0.01)})
+    """
+    return None if rows is None else [answer for row in rows for answer in _answers(row)]
+
+
+def _answers(row):
+    """The answer of a row, and one for each further term that its parameters say was found with it."""
+    yield _answer(row)
+    terms = [entry.get("term") for entry in _entries(row.get("parameters_json"))[1]]
+    for term in dict.fromkeys(t for t in terms if t and t not in (row.get("term"), row.get("rival_term"))):
+        if row["verdict"] == "named":
+            yield Answer("named", (term,), parameters=_parameters(row["parameters_json"], term)[1])
+
+
+def _answer(row):
+    where, parameters = _parameters(row.get("parameters_json"), row.get("term"))
+    said = row.get("sentence") or ""
+    axle, train = where.get("axle"), where.get("train")
+    if axle is None and (found := re.search(r"(?:axle|wheel)\s+(\d+)(?: of (?!every)(\w+))?", said)):
+        axle, train = int(found.group(1)), train or found.group(2)
+    names = tuple(n for n in (row.get("term"), row.get("rival_term") if row["verdict"] == "a_or_b" else None) if n)
+    return Answer(
+        row["verdict"], names if row["verdict"] in ("named", "a_or_b") else (), row.get("locked_to"),
+        row.get("position_m"), row.get("channel") or where.get("sensor"), train,
+        None if axle is None else int(axle), row.get("probability"), row.get("fit_before_pct"),
+        row.get("fit_after_pct"), parameters,
+    )  # fmt: skip
+
+
+def _parameters(text, term=None):
+    """(where, {name: (value, se)}) of the column, of one term where the entries say whose they are."""
+    where, entries = _entries(text)
+    mine = [r for r in entries if r.get("term") in (None, term)]
+    return where, {r["name"]: (r.get("value"), r.get("se", r.get("standard_error"))) for r in mine}
+
+
+def _entries(text):
+    """(where, entries) of the column: a list of objects, or an object of objects or numbers."""
+    held = json.loads(text) if isinstance(text, str) and text else text or {}
+    where = held.pop("where", {}) if isinstance(held, dict) else {}
+    return where, held if isinstance(held, list) else [{"name": k, **_as_row(v)} for k, v in held.items()]
+
+
+def _as_row(value):
+    return value if isinstance(value, dict) else {"value": value}

@@ -1,0 +1,151 @@
+"""The figures that the proof has to show, each with its n, its interval and its bar."""
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnout_blind.score.intervals import clopper_pearson
+
+
+@dataclass(frozen=True)
+class Share:
+    """``k`` of ``n``; ``bar`` [%] with ``sense`` ">=" or "<=", None where only printed."""
+
+    name: str
+    k: int
+    n: int
+    bar: float | None = None
+    sense: str = ">="
+
+    @property
+    def share(self):
+        """Percent, nan for n = 0."""
+        return 100.0 * self.k / self.n if self.n else float("nan")
+
+    @property
+    def interval(self):
+        """Two-sided 95 % of Clopper and Pearson [%]."""
+        return tuple(100.0 * x for x in clopper_pearson(self.k, self.n))
+
+    @property
+    def met(self):
+        """Whether the bar is met, None without bar or cases."""
+        if self.bar is None or self.n == 0:
+            return None
+        return self.share >= self.bar if self.sense == ">=" else self.share <= self.bar
+
+
+@dataclass(frozen=True)
+class Value:
+    """A figure that is no share: ``value`` from ``n``; nan where nothing was measured."""
+
+    name: str
+    value: float
+    n: int
+    bar: float | None = None
+    sense: str = "<="
+    unit: str = ""
+
+    @property
+    def met(self):
+        """Whether the bar is met, None without bar or cases."""
+        if self.bar is None or self.n == 0:
+            return None
+        return self.value <= self.bar if self.sense == "<=" else self.value >= self.bar
+
+
+def figures(judged, oracle=None):
+    """All figures of ``judged`` cases. ``oracle`` {case: held-out fit with the true effect, same tool} where known."""
+    of = {
+        s: [j for j in judged if j.stratum == s] for s in ("control", "single", "double", "outside", "unidentifiable")
+    }
+    clear = [j for j in of["single"] if j.clear]
+    seen = [j for j in of["outside"] if j.clear]
+    blurred = of["unidentifiable"]
+    found = [_share("controls: false alarms", of["control"], lambda j: j.alarm, 100.0 * 2 / 60, "<=")]
+    found += [
+        _share("not identifiable: 'a or b' with the truth, or none", blurred, _as_it_should, 100.0),
+        _share("not identifiable: a wrong name", blurred, lambda j: bool(j.wrong), 0.0, "<="),
+    ]
+    for what in ("lock", "place", "axle", "sensor"):
+        there = [j for j in clear if what in j.located]
+        found.append(_share(f"where: {what} right (clear singles)", there, lambda j, w=what: j.located[w], 95.0))
+    found += [
+        _share("what: top-1 (clear singles)", clear, lambda j: j.first, 85.0),
+        _share("what: top-2 (clear singles)", clear, lambda j: bool(j.hits[0]), 95.0),
+        _share("what: a wrong name (clear singles)", clear, lambda j: bool(j.wrong)),
+        _share("what: a wrong name (all singles)", of["single"], lambda j: bool(j.wrong)),
+        _share("outside the library: detected (clear)", seen, lambda j: j.alarm),
+        _share("outside the library: lock right (clear)", seen, lambda j: j.located["lock"], 90.0),
+        _share("outside the library: named wrongly", of["outside"], lambda j: bool(j.wrong), 10.0, "<="),
+        _share("two effects: both right", of["double"], lambda j: all(h == "named" for h in j.hits), 60.0),
+        _share("two effects: one right and none wrong", of["double"], _one_right, 90.0),
+        _share("cases without an answer", judged, lambda j: not j.answered, 0.0, "<="),
+    ]
+    return [*found, *_values(judged, oracle or {})]
+
+
+def _share(name, cases, test, bar=None, sense=">="):
+    return Share(name, sum(bool(test(j)) for j in cases), len(cases), bar, sense)
+
+
+def _as_it_should(j):
+    return j.answered and not j.wrong and (not j.alarm or j.hits[0] == "a_or_b")
+
+
+def _one_right(j):
+    return any(h == "named" for h in j.hits) and not j.wrong
+
+
+def _values(judged, oracle):
+    compared = [p for j in judged for p in j.parameters]
+    covered = [c for _, c in compared if c is not None]
+    errors = [100.0 * e for e, _ in compared]
+    yield Share("parameters: inside the 95 % interval", sum(covered), len(covered), 85.0)
+    yield Value("parameters: median error", _median(errors), len(errors), 20.0, "<=", "%")
+    gaps, fell = [], []
+    for j in judged:
+        before, after = j.fits
+        if j.stratum != "single" or not j.clear or before is None or after is None:
+            continue
+        fell.append(after < before - 1.0)
+        if j.case in oracle and oracle[j.case] - before > 1.0:
+            gaps.append(100.0 * (after - before) / (oracle[j.case] - before))
+    yield Value("held-out fit: gap to the oracle closed, median", _median(gaps), len(gaps), 80.0, ">=", "%")
+    yield Share("held-out fit: fell by over a point", sum(fell), len(fell), 0.0, "<=")
+    worst = [abs(stated - share) for stated, share, n in reliability(judged) if n >= 5]
+    n = sum(j.probability is not None for j in judged)
+    yield Value("probability: worst fifth, |stated - seen|", max(worst, default=float("nan")), n if worst else 0, 0.1)
+
+
+def _median(values):
+    return float(np.median(values)) if values else float("nan")
+
+
+def reliability(judged):
+    """(mean stated probability, share right, n) for each fifth of the probabilities that has cases."""
+    stated = [(j.probability, j.probably_right) for j in judged if j.probability is not None]
+    found = []
+    for low in np.arange(5) / 5.0:
+        inside = [(p, r) for p, r in stated if low <= p < low + 0.2 or (low == 0.8 and p == 1.0)]
+        if inside:
+            found.append((float(np.mean([p for p, _ in inside])), float(np.mean([r for _, r in inside])), len(inside)))
+    return found
+
+
+def confusion(judged):
+    """{row: Counter of what was said first}; a double counts under both its kinds, joined."""
+    table = {}
+    for j in judged:
+        table.setdefault(" + ".join(sorted(j.kinds)) or "control", Counter())[j.said] += 1
+    return table
+
+
+def severity(judged):
+    """{kind: [(rung, visible gain [points], what was said)]} of singles, by rung."""
+    table = {}
+    for j in judged:
+        if j.stratum in ("single", "outside"):
+            table.setdefault(j.kinds[0], []).append((j.rungs[0], j.gain, j.said, bool(j.hits[0])))
+    return {kind: sorted(rows) for kind, rows in sorted(table.items())}

@@ -1,0 +1,136 @@
+"""One case held against its truth."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from turnout_blind.score.names import SAME, right_locks, right_names
+
+BAY = 0.6  # a place is right within one bay [m]
+LEVEL = 46.0  # what controls leave unexplained of a passage never used [% of its norm]; roughness, mostly
+CLEAR = 3.0  # points of held-out fit that an effect must cost to be counted as there to be found
+
+
+@dataclass(frozen=True)
+class Judged:
+    """``hits`` per effect: "named", "a_or_b" or ""; ``wrong`` names asserted; the rest as the bars ask."""
+
+    case: str
+    stratum: str
+    kinds: tuple
+    rungs: tuple
+    gain: float
+    answered: bool
+    alarm: bool
+    hits: tuple
+    first: bool
+    wrong: tuple
+    said: str
+    located: dict = field(default_factory=dict)
+    parameters: tuple = ()
+    probability: float | None = None
+    probably_right: bool | None = None
+    fits: tuple = (None, None)
+
+    @property
+    def clear(self):
+        """Whether the effect costs enough fit to be found."""
+        return self.gain > CLEAR
+
+
+def gain_of(visible):
+    """Points of held-out fit that an effect costs which makes up a share ``visible`` of the response [%].
+
+    It adds in squares to what controls leave: sqrt(46^2 + v^2) - 46. 3 points are lost at v = 16.9 %.
+
+    >>> round(gain_of({"hammer_pct": 1.0, "passage_pct": 16.9}), 2)
+    3.01
+    """
+    share = max(visible["hammer_pct"], visible["passage_pct"])
+    return float(np.hypot(LEVEL, share) - LEVEL)
+
+
+def judge(truth, answers, more=None):
+    """``Judged`` of a case from its truth and ``answers`` (None where the tool gave none)."""
+    effects = truth["effects"]
+    kinds = tuple(e["kind"] for e in effects)
+    loud = [a for a in answers or () if not a.silent]
+    right = [right_names(k, more) for k in kinds]
+    hits = tuple(_hit(names, loud) for names in right)
+    allowed = {n for names in right for n in names}
+    wrong = tuple(a.names[0] for a in loud if a.verdict == "named" and a.names[0] not in allowed)
+    first = bool(loud) and loud[0].verdict == "named" and loud[0].names[0] in allowed
+    probability, sound = _probability(truth, answers, loud, allowed)
+    ahead = loud[0] if loud else (answers or [None])[0]
+    return Judged(
+        truth["case"], truth["stratum"], kinds, tuple(e["rung"] for e in effects), gain_of(truth["visible"]),
+        answers is not None, bool(loud), hits, first, wrong, _said(answers, loud), _located(effects, right, loud),
+        tuple(_compared(effects, right, loud)), probability, sound,
+        (None, None) if ahead is None else (ahead.before, ahead.after),
+    )  # fmt: skip
+
+
+def _hit(names, loud):
+    for verdict in ("named", "a_or_b"):
+        if any(a.verdict == verdict and set(a.names) & set(names) for a in loud):
+            return verdict
+    return ""
+
+
+def _said(answers, loud):
+    if answers is None:
+        return "no answer"
+    if not loud:
+        return "none"
+    return loud[0].names[0] if loud[0].verdict == "named" else loud[0].verdict
+
+
+def _probability(truth, answers, loud, allowed):
+    """Stated probability of the first answer, and whether it was right; "none" is where nothing clear was there."""
+    if not answers:
+        return None, None
+    ahead = loud[0] if loud else answers[0]
+    if ahead.probability is None:
+        return None, None
+    if ahead.verdict == "none":
+        hidden = gain_of(truth["visible"]) <= CLEAR
+        return ahead.probability, truth["stratum"] in ("control", "unidentifiable") or hidden
+    if ahead.verdict == "unknown":
+        return ahead.probability, bool(truth["effects"]) and not allowed
+    return ahead.probability, bool(set(ahead.names) & allowed)
+
+
+def _best(names, loud):
+    """The answer that speaks of an effect: one that names it, else the first."""
+    return next((a for a in loud if set(a.names) & set(names)), loud[0] if loud else None)
+
+
+def _located(effects, right, loud):
+    """{"lock", "place", "axle", "sensor"}: True or False for each that the first effect has."""
+    if len(effects) != 1:
+        return {}
+    effect, answer, found = effects[0], _best(right[0], loud), {}
+    where = effect["where"]
+    found["lock"] = answer is not None and answer.lock in right_locks(effect["kind"], effect["locked_to"])
+    if effect["locked_to"] in ("place", "amplitude") and "position" in where:
+        near = answer is not None and answer.position is not None
+        found["place"] = near and abs(answer.position - where["position"]) <= BAY
+    if "axle" in where:
+        same = answer is not None and answer.axle == where["axle"]
+        found["axle"] = same and answer.train in (None, where["train"])
+    if "sensor" in where:
+        found["sensor"] = answer is not None and answer.sensor == where["sensor"]
+    return found
+
+
+def _compared(effects, right, loud):
+    """(relative error, whether the 95 % interval covers, or None without a standard error) per parameter named."""
+    for effect, names in zip(effects, right):
+        answer = next((a for a in loud if a.verdict == "named" and set(a.names) & set(names)), None)
+        for own, theirs in SAME.get(effect["kind"], {}).items():
+            if answer is None or answer.parameters.get(theirs, (None,))[0] is None:
+                continue
+            value, se = answer.parameters[theirs]
+            truth = effect["parameters"][own]
+            covers = None if se is None else abs(value - truth) <= 1.96 * se
+            yield abs(value - truth) / abs(truth), covers

@@ -1,0 +1,101 @@
+"""Seals: SHA-256 of every truth with its nonce and of every file of a set, and their verification."""
+
+import hashlib
+import json
+import secrets
+from pathlib import Path
+
+from turnout.errors import TurnoutError
+
+COMMIT, SET, FORMAT = "commit.json", "set.json", 1
+
+
+class BlindError(TurnoutError):
+    """A blind set is not what its seals say, or cannot be kept blind."""
+
+    def __init__(self, path, where, found, remedy):
+        super().__init__(f"{path}, {where}: {found}. {remedy}.")
+
+
+def digest(data):
+    """SHA-256 of bytes as hex.
+
+    >>> digest(b"abc")[:16]
+    'ba7816bf8f01cfea'
+    """
+    return hashlib.sha256(data).hexdigest()
+
+
+def digest_of_folder(folder, pattern="*"):
+    """SHA-256 over names and contents of all files below ``folder`` that match, in order of name; caches left out."""
+    whole = hashlib.sha256()
+    for path in sorted(Path(folder).rglob(pattern)):
+        if path.is_file() and "__pycache__" not in path.parts:
+            whole.update(f"{path.relative_to(folder).as_posix()}\0{digest(path.read_bytes())}\n".encode())
+    return whole.hexdigest()
+
+
+def write_truth(folder, name, content, nonce=None):
+    """Write ``content`` with a nonce of 16 bytes as ``name``.json; returns the SHA-256 of the file."""
+    data = json.dumps({**content, "nonce": nonce or secrets.token_hex(16)}, indent=1, sort_keys=True).encode() + b"\n"
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    (Path(folder) / f"{name}.json").write_bytes(data)
+    return digest(data)
+
+
+def files_of(case):
+    """{path below the case: SHA-256} of all its files."""
+    return {
+        p.relative_to(case).as_posix(): digest(p.read_bytes()) for p in sorted(Path(case).rglob("*")) if p.is_file()
+    }
+
+
+def commit(out, truths):
+    """Write commit.json: ``truths`` are {case: SHA-256 of its truth, "set": of set.json}; returns its own SHA-256."""
+    out = Path(out)
+    package = Path(__file__).parent
+    cases = {c: {"truth_sha256": truths[c], "files": files_of(out / "cases" / c)} for c in sorted(truths) if c != "set"}
+    content = {
+        "format": FORMAT,
+        "set_sha256": truths["set"],
+        "generator_sha256": digest_of_folder(package, "*.py"),
+        "cases": cases,
+    }
+    data = json.dumps(content, indent=1, sort_keys=True).encode() + b"\n"
+    (out / COMMIT).write_bytes(data)
+    return digest(data)
+
+
+def read_commit(out):
+    """commit.json as a dictionary."""
+    path = Path(out) / COMMIT
+    if not path.exists():
+        raise BlindError(path, "line 1", "no such file", "Make a set first: turnout blind make --out FOLDER")
+    return json.loads(path.read_bytes())
+
+
+def verify(out, truth):
+    """Truths by case; BlindError at the first truth or recording that its seal does not fit."""
+    out, truth, sealed = Path(out), Path(truth), read_commit(out)
+    _fits(truth / SET, sealed["set_sha256"])
+    found = {}
+    for case, seals in sealed["cases"].items():
+        _fits(truth / f"{case}.json", seals["truth_sha256"])
+        there = files_of(out / "cases" / case)
+        if set(there) != set(seals["files"]):
+            odd = sorted(set(there) ^ set(seals["files"]))[0]
+            raise BlindError(
+                out / "cases" / case, odd, "a file that was added or taken away", "Take the sealed set again"
+            )
+        for name, sha in there.items():
+            if sha != seals["files"][name]:
+                raise BlindError(out / "cases" / case, name, "not the sealed content", "Take the sealed set again")
+        found[case] = json.loads((truth / f"{case}.json").read_bytes())
+    return found
+
+
+def _fits(path, sha):
+    if not path.exists():
+        raise BlindError(path, "line 1", "no such truth", "Give the folder of the truth with --truth")
+    if digest(path.read_bytes()) != sha:
+        raise BlindError(path, "line 1", "not the truth that was sealed", "This set proves nothing: make a new one")

@@ -1,0 +1,73 @@
+"""Which cases a set has: controls, singles over the ladder, doubles, outside the library, not identifiable."""
+
+import hashlib
+from dataclasses import dataclass
+
+import numpy as np
+
+FULL = {"control": 60, "single": 1, "double": 20, "outside": 20, "unidentifiable": 16}
+FAST = {"control": 10, "single": 17, "double": 3, "outside": 5, "unidentifiable": 5}
+# Doubles: two of these that do not mask one another, from the upper half of their ladders.
+PAIRS = ("void", "ballast", "pad", "pad_temperature", "rail_shear", "dip", "flat", "unsprung_mass", "gain",
+         "time_offset", "mount_resonance", "position")  # fmt: skip
+MASKING = ({"void", "ballast"}, {"time_offset", "position"}, {"time_offset", "mount_resonance"})
+
+
+@dataclass(frozen=True)
+class CasePlan:
+    """``stratum`` and ``effects`` ((kind, rung), ...) of one case; ``seed`` of its own generator."""
+
+    stratum: str
+    effects: tuple
+    seed: tuple
+
+
+def plan_cases(seed, effects, full=True, only=None):
+    """Plans of a whole set in shuffled order.
+
+    A full set gives every single effect each rung of its ladder; the fast tier one rung each. ``only``: kinds to
+    keep beside the controls.
+
+    >>> from turnout_blind.effect import load_effects
+    >>> plans = plan_cases(7, load_effects(), full=False)
+    >>> len(plans), sum(p.stratum == "control" for p in plans)
+    (40, 10)
+    """
+    rng = np.random.default_rng([seed, 11])
+    kinds = {
+        s: [k for k, e in sorted(effects.items()) if e.stratum == s] for s in ("single", "outside", "unidentifiable")
+    }
+    counts = FULL if full else FAST
+    made = [("control", ())] * counts["control"]
+    if full:
+        made += [("single", ((k, r),)) for k in kinds["single"] for r in range(len(effects[k].ladder))]
+    else:
+        one = [(k, int(rng.integers(2, len(effects[k].ladder)))) for k in kinds["single"]]
+        made += [("single", (e,)) for e in one]
+    for stratum in ("outside", "unidentifiable"):
+        for i in range(counts[stratum]):
+            kind = kinds[stratum][i % len(kinds[stratum])]
+            n = len(effects[kind].ladder)
+            made.append((stratum, ((kind, (i // len(kinds[stratum]) if full else int(rng.integers(n))) % n),)))
+    made += [("double", _pair(rng, effects)) for _ in range(counts["double"])]
+    if only is not None:
+        made = [m for m in made if all(k in only for k, _ in m[1])]
+    order = rng.permutation(len(made))
+    return [CasePlan(*made[i], seed=(seed, 23, k)) for k, i in enumerate(order)]
+
+
+def _pair(rng, effects):
+    there = [k for k in PAIRS if k in effects]
+    while True:
+        two = rng.choice(there, 2, replace=False).tolist()
+        if set(two) not in MASKING:
+            return tuple((k, int(rng.integers(len(effects[k].ladder) // 2 + 1, len(effects[k].ladder)))) for k in two)
+
+
+def case_id(seed, k):
+    """Name of the ``k``-th case: eight hex digits that say nothing.
+
+    >>> len(case_id(1, 0))
+    9
+    """
+    return "T" + hashlib.sha256(f"turnout-blind {seed} {k}".encode()).hexdigest()[:8]

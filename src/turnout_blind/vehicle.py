@@ -1,0 +1,93 @@
+"""Trains: cars of a body on two bogies of two wheelsets, one rail's half of them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnout_blind.march import Cars, Wheels
+
+GRAVITY = 9.81
+
+
+@dataclass(frozen=True)
+class Car:
+    """A whole car, both rails: masses [kg], inertias [kg m²], suspension per axle and per bogie, lengths [m]."""
+
+    body: float
+    body_inertia: float
+    bogie: float
+    bogie_inertia: float
+    wheelset: float
+    primary: float
+    primary_damping: float
+    secondary: float
+    secondary_damping: float
+    base: float
+    pivots: float
+    length: float
+
+    @property
+    def axle_load(self):
+        """Static load of an axle [N]."""
+        return GRAVITY * (0.25 * self.body + 0.5 * self.bogie + self.wheelset)
+
+
+@dataclass(frozen=True)
+class Train:
+    """``name`` of its vehicle file; ``cars`` from the front; wheels of ``radius`` [m] and Hertz ``contact``."""
+
+    name: str
+    cars: tuple
+    radius: float = 0.46
+    contact: float = 9.3e10
+
+    def axles(self):
+        """Places of the axles behind the front end [m]."""
+        found, front = [], 0.0
+        for car in self.cars:
+            for pivot in (-0.5, 0.5):
+                centre = front + 0.5 * car.length + pivot * car.pivots
+                found += [centre - 0.5 * car.base, centre + 0.5 * car.base]
+            front += car.length
+        return np.array(found)
+
+    @property
+    def axle_load(self):
+        """Mean static load of an axle [N]."""
+        return float(np.mean([c.axle_load for c in self.cars]))
+
+
+def cars_of(train):
+    """Arguments of the march: half of every car."""
+
+    def of(make):
+        return np.array([float(make(c)) for c in train.cars])
+
+    return Cars(
+        of(lambda c: 0.5 * c.body), of(lambda c: 0.5 * c.body_inertia), of(lambda c: 0.5 * c.bogie),
+        of(lambda c: 0.5 * c.bogie_inertia), of(lambda c: 0.5 * c.primary), of(lambda c: 0.5 * c.primary_damping),
+        of(lambda c: 0.5 * c.secondary), of(lambda c: 0.5 * c.secondary_damping), of(lambda c: 0.5 * c.base),
+        of(lambda c: 0.5 * c.pivots),
+    )  # fmt: skip
+
+
+def wheels_of(train, path, path_start, path_step, local, factor=1.0):
+    """Arguments of the march: wheels with unsprung mass times ``factor`` and their paths (n_wheel, m) [m]."""
+    mass = np.repeat([0.5 * factor * c.wheelset for c in train.cars], 4)
+    sprung = np.repeat([0.125 * c.body + 0.25 * c.bogie for c in train.cars], 4)
+    axles = train.axles()
+    contact = np.full(mass.size, train.contact)
+    return Wheels(mass, GRAVITY * (mass + sprung), axles - axles[0], contact, local, path, path_start, path_step)
+
+
+def no_train():
+    """Arguments of the march where nothing rolls."""
+    none = np.zeros(0)
+    return Cars(*([none] * 10)), Wheels(none, none, none, none, 0.0, np.zeros((0, 8)), 0.0, 1.0)
+
+
+COACH = Car(32e3, 1.97e6, 2615.0, 1476.0, 1813.0, 2.44e6, 8e3, 0.86e6, 40e3, 2.56, 19.0, 26.4)
+RAILCAR = Car(33e3, 1.2e6, 4400.0, 3800.0, 1500.0, 2.3e6, 20e3, 0.95e6, 48e3, 2.7, 16.6, 23.6)
+LOCOMOTIVE = Car(52e3, 1.15e6, 8600.0, 12e3, 3700.0, 4.6e6, 60e3, 2.6e6, 120e3, 3.0, 9.5, 19.0)
+LOADED_WAGON = Car(64e3, 0.9e6, 2000.0, 1500.0, 1300.0, 6.0e6, 90e3, 30e6, 150e3, 1.8, 10.7, 15.74)
+EMPTY_WAGON = Car(13e3, 0.23e6, 2000.0, 1500.0, 1300.0, 2.6e6, 45e3, 20e6, 100e3, 1.8, 10.7, 15.74)

@@ -1,0 +1,128 @@
+"""What there really is at one site: rail, supports, riders, trains, surfaces. Effects change it."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from turnout_blind.grid import Grid, Rail, spread
+from turnout_blind.march import Beam, Riders, Supports
+
+SPACING = 0.6
+PER_SUPPORT = ("place", "pad", "pad_damping", "mass", "ballast", "ballast_damping")
+
+
+def _none():
+    return np.zeros(0)
+
+
+@dataclass
+class World:
+    """Arrays (n_support,) unless said otherwise; SI units. An effect writes into a ``copy()``.
+
+    ``pad`` is the stiffness at ``reference`` temperature; ``softening`` (a function of kelvin above it) multiplies it.
+    ``surface`` is a list of functions of place [m] giving dips of the rail [m]; ``treads`` maps (train, axle from 1)
+    to functions of place and the phase of the passage; ``riders`` holds (place, mass, stiffness, damping, play, stop);
+    ``channels`` maps a sensor to functions (signal, rate, kind, rng) -> signal; ``passage_noise`` is a list of
+    functions (time, sensor places, k, rng) -> accelerations (n_sensor, n) from another source.
+    """
+
+    grid: Grid
+    rail: Rail
+    place: np.ndarray
+    pad: np.ndarray
+    pad_damping: np.ndarray
+    mass: np.ndarray
+    ballast: np.ndarray
+    ballast_damping: np.ndarray
+    lift: np.ndarray = field(default_factory=_none)
+    gap: np.ndarray = field(default_factory=_none)
+    close: np.ndarray = field(default_factory=_none)
+    hardening: np.ndarray = field(default_factory=_none)
+    drift: np.ndarray = field(default_factory=_none)
+    shear: float = 0.0
+    shear_damping: float = 0.0
+    branch_share: np.ndarray = field(default_factory=_none)
+    branch_rate: np.ndarray = field(default_factory=_none)
+    reference: float = 15.0
+    softening: object = None
+    riders: list = field(default_factory=list)
+    surface: list = field(default_factory=list)
+    treads: dict = field(default_factory=dict)
+    wheel_mass: dict = field(default_factory=dict)
+    wear_per_passage: dict = field(default_factory=dict)
+    channels: dict = field(default_factory=dict)
+    sensor_shift: dict = field(default_factory=dict)
+    passage_noise: list = field(default_factory=list)
+
+    def __post_init__(self):
+        n = self.place.size
+        neutral = {"lift": 1.0, "gap": -1.0, "close": 1e-4, "hardening": 0.0, "drift": 0.0}
+        for name, value in neutral.items():
+            if getattr(self, name).size != n:
+                setattr(self, name, np.full(n, value))
+
+    def copy(self):
+        """A world whose arrays and lists can be changed without changing this one."""
+        held = {}
+        for name, value in self.__dict__.items():
+            if isinstance(value, np.ndarray):
+                held[name] = value.copy()
+            elif isinstance(value, list):
+                held[name] = list(value)
+            elif isinstance(value, dict):
+                held[name] = {k: list(v) if isinstance(v, list) else v for k, v in value.items()}
+        return replace(self, **held)
+
+    def nearest(self, place):
+        """Index of the support nearest to ``place`` [m]."""
+        return int(np.argmin(np.abs(self.place - place)))
+
+    def beam(self):
+        """Arguments of the march for the rail."""
+        g, r = self.grid, self.rail
+        loss = r.damping / r.mass
+        return Beam(g.step, r.bending, r.shear, r.mass, r.rotary, g.rates() + loss, g.rates(0.5)[:-1])
+
+    def supports(self, temperature=None, grown=0.0):
+        """Arguments of the march for pads, sleepers and ballast at a rail ``temperature`` [°C]; ``grown`` passages
+        have worn what wears."""
+        first, weights = spread(self.grid, self.place)
+        soft = 1.0
+        if self.softening is not None and temperature is not None:
+            soft = self.softening(temperature - self.reference)
+        gap, ballast = self.gap.copy(), self.ballast.copy()
+        for j, (gap_more, factor) in self.wear_per_passage.items():
+            gap[j] += gap_more * grown if gap[j] >= 0.0 else 0.0
+            ballast[j] *= factor**grown
+        n = self.place.size
+        return Supports(
+            first, weights, self.pad * soft, self.pad_damping, self.lift, self.mass, ballast,
+            self.ballast_damping, gap, self.close, self.hardening, self.drift,
+            np.full(n, self.shear), np.full(n, self.shear_damping), self.branch_share, self.branch_rate,
+        )  # fmt: skip
+
+    def hung(self):
+        """Arguments of the march for what hangs on the rail."""
+        table = np.array(self.riders, dtype=float).reshape(-1, 6)
+        first, weights = spread(self.grid, table[:, 0])
+        return Riders(first, weights.reshape(-1, 4), *(np.ascontiguousarray(c) for c in table.T[1:]))
+
+
+def uniform_world(
+    length=60.0,
+    step=0.1,
+    pad=3e8,
+    pad_damping=2e4,
+    mass=140.0,
+    ballast=1e8,
+    ballast_damping=6e4,
+    rail=None,
+    sponge=12.0,
+):
+    """A world of equal supports every ``SPACING`` [m] about 0, for the verification of the physics."""
+    rail = rail or Rail()
+    grid = Grid(-0.5 * length, round(length / step) + 1, step, sponge)
+    half = int(0.5 * length / SPACING) - 1
+    place = SPACING * np.arange(-half, half + 1)
+    values = (pad, pad_damping, mass, ballast, ballast_damping)
+    return World(grid, rail, place, *(np.full(place.size, float(v)) for v in values))

@@ -1,0 +1,140 @@
+"""Who may know whom: read from the imports of every file, so that the house keeps its shape."""
+
+import ast
+
+import pytest
+
+LOWEST = {"content", "errors", "records"}
+FLOOR = {"config", "readers", "signal", "registry", "fingerprint"}
+PARTS = {"receptance", "identify", "passage", "simulate"}
+ALLOWED = {
+    "content": set(),
+    "errors": set(),
+    "records": set(),
+    **{room: LOWEST for room in FLOOR},
+    **{room: LOWEST | FLOOR for room in PARTS},
+    "physics": LOWEST | FLOOR | PARTS,
+    "published": LOWEST | FLOOR | {"identify"},
+    "fleet": LOWEST | FLOOR,
+    "trend": LOWEST | FLOOR | PARTS | {"physics"},
+    "mismatch": LOWEST | FLOOR | PARTS | {"physics"},
+    "chains": LOWEST | FLOOR | PARTS | {"physics", "fleet", "trend", "mismatch"},
+}
+ALLOWED["report"] = set(ALLOWED) | {"report"}
+ALLOWED["demo"] = set(ALLOWED) | {"demo"}
+ALLOWED["commands"] = set(ALLOWED) | {"commands"}
+ALLOWED["cli"] = set(ALLOWED)
+OPENS_FILES = LOWEST | {
+    "config",
+    "readers",
+    "registry",
+    "fleet",
+    "chains",
+    "report",
+    "commands",
+    "demo",
+    "published",
+    "fingerprint",
+}
+
+
+def imports_of(path):
+    """Every module imported anywhere in the file, at the top or inside a function."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def room_of(module):
+    """The part of the house that ``turnout.x.y`` lies in."""
+    return module.split(".")[1] if module.startswith("turnout.") else None
+
+
+def sources(repository):
+    package = repository / "src" / "turnout"
+    for path in sorted(package.rglob("*.py")):
+        parts = path.relative_to(package).with_suffix("").parts
+        if parts != ("__init__",):
+            yield parts[0], path
+
+
+def test_each_room_imports_only_what_it_may(repository):
+    wrong = []
+    for room, path in sources(repository):
+        assert room in ALLOWED, f"{path}: no rule for {room!r}; give it a line in ALLOWED"
+        for module in imports_of(path):
+            other = room_of(module)
+            if other in ALLOWED and other != room and other not in ALLOWED[room]:
+                wrong.append(f"{path.relative_to(repository)} imports {module}")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_nothing_in_the_library_imports_snakemake(repository):
+    wrong = [str(p) for _, p in sources(repository) if any(m.split(".")[0] == "snakemake" for m in imports_of(p))]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_only_the_report_imports_a_plotting_library(repository):
+    plotting = {"matplotlib", "plotly", "altair", "seaborn"}
+    wrong = [
+        str(p)
+        for room, p in sources(repository)
+        if room != "report" and any(m.split(".")[0] in plotting for m in imports_of(p))
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+OPENING_CALLS = {"open", "read_text", "write_text", "read_bytes", "write_bytes"}
+
+
+def test_only_the_named_rooms_open_files(repository):
+    wrong = []
+    for room, path in sources(repository):
+        if room in OPENS_FILES or room == "cli":
+            continue
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Call):
+                name = getattr(node.func, "id", getattr(node.func, "attr", ""))
+                if name in OPENING_CALLS:
+                    wrong.append(f"{path.relative_to(repository)}:{node.lineno} calls {name}")
+    assert not wrong, "\n".join(wrong)
+
+
+@pytest.mark.parametrize("folder", ["scripts"])
+def test_scripts_are_thin(repository, folder):
+    for path in sorted((repository / folder).glob("*.py")):
+        lines = [line for line in path.read_text().splitlines() if line.strip()]
+        assert len(lines) <= 25, f"{path} has {len(lines)} lines; a script loads, calls one function, saves"
+
+
+def test_rules_have_no_run_blocks_and_compute_nothing(repository):
+    for path in [repository / "Snakefile", *sorted((repository / "rules").glob("*.smk"))]:
+        text = path.read_text()
+        assert "\n    run:" not in text, f"{path} has a run: block"
+        for line in text.splitlines():
+            words = line.split()
+            if words[:1] in (["import"], ["from"]) and words[1].startswith("turnout"):
+                assert words[1].split(".")[1] in {"config", "fingerprint", "fleet", "readers"}, f"{path}: {line}"
+
+
+def test_ruff_is_clean(repository):
+    import subprocess
+    import sys
+
+    for arguments in (["check"], ["format", "--check"]):
+        done = subprocess.run(
+            [sys.executable, "-m", "ruff", *arguments, "."], cwd=repository, capture_output=True, text=True
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_snakefmt_is_clean(repository):
+    import subprocess
+    import sys
+
+    files = [str(p) for p in [repository / "Snakefile", *sorted((repository / "rules").glob("*.smk"))]]
+    done = subprocess.run([sys.executable, "-m", "snakefmt", "--check", *files], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr

@@ -1,0 +1,149 @@
+"""Effects, plans, roughness and instruments of the blind generator, and its independence of what it tests."""
+
+import ast
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from turnout_blind.effect import LOCKS, load_effects
+from turnout_blind.instrument import Chain, digitised, mounting
+from turnout_blind.roughness import level, patch_share, rail_roughness, wheel_roughness
+from turnout_blind.score.names import RIGHT, SAME
+from turnout_blind.site import draw_site
+from turnout_blind.strata import case_id, plan_cases
+
+EFFECTS = load_effects()
+MAY = {"turnout", "turnout.errors", "turnout.records", "turnout.readers", "turnout.readers.writing"}
+
+
+def test_the_generator_imports_nothing_of_what_it_tests(repository):
+    """Only records, errors and the writers of raw files, in every file, at the top and inside functions."""
+    files = sorted((repository / "src" / "turnout_blind").rglob("*.py"))
+    assert len(files) > 30
+    for path in files:
+        for node in ast.walk(ast.parse(path.read_text())):
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+            if isinstance(node, ast.ImportFrom):
+                assert node.level == 0, path
+                names = [node.module]
+            for name in names:
+                if name.split(".")[0] == "turnout":
+                    assert name in MAY, f"{path} imports {name}"
+
+
+def test_the_tool_imports_nothing_of_the_generator(repository):
+    """But for the command that starts it."""
+    for path in (repository / "src" / "turnout").rglob("*.py"):
+        if path.name != "blind.py":
+            assert "turnout_blind" not in path.read_text(), path
+
+
+def contents(world):
+    """All numbers and callables of a world, to compare."""
+    return {k: v.tobytes() if isinstance(v, np.ndarray) else repr(v) for k, v in world.__dict__.items()}
+
+
+@pytest.mark.parametrize("kind", sorted(EFFECTS))
+def test_an_effect_changes_its_copy_of_the_world_and_nothing_else(kind):
+    effect = EFFECTS[kind]
+    assert len(effect.ladder) == (7 if effect.stratum == "single" else 4)
+    for rung in range(len(effect.ladder)):
+        site = draw_site(np.random.default_rng(rung), **effect.site)
+        before, world = contents(site.world), site.world.copy()
+        drawn = effect.concealed(np.random.default_rng(rung), site, rung)
+        effect.act(world, site, drawn.where, drawn.parameters)
+        assert contents(site.world) == before
+        assert contents(world) != before
+        assert drawn.locked_to in LOCKS
+        if "position" in drawn.where:
+            assert min(site.sensors) - 0.6 < drawn.where["position"] < max(site.sensors) + 0.6
+        if "sleeper" in drawn.where:
+            assert site.world.nearest(drawn.where["position"]) == drawn.where["sleeper"]
+        if "axle" in drawn.where:
+            assert 1 <= drawn.where["axle"] <= site.trains[drawn.where["train"]].axles().size
+
+
+def test_every_kind_has_its_line_in_the_map_of_names():
+    assert set(EFFECTS) == set(RIGHT)
+    for kind, same in SAME.items():
+        site = draw_site(np.random.default_rng(1), **EFFECTS[kind].site)
+        assert set(same) <= set(EFFECTS[kind].concealed(np.random.default_rng(2), site, 3).parameters), kind
+
+
+def test_a_full_set_has_what_the_proof_asks_for():
+    plans = plan_cases(3, EFFECTS)
+    strata = Counter(p.stratum for p in plans)
+    assert len(plans) >= 200
+    assert strata["control"] >= 60
+    assert (strata["double"], strata["outside"], strata["unidentifiable"]) == (20, 20, 16)
+    singles = Counter(p.effects[0][0] for p in plans if p.stratum == "single")
+    assert min(singles.values()) == 7
+    assert len({p.effects[0][0] for p in plans if p.stratum == "outside"}) >= 4
+    rungs = [p.effects[0][1] for p in plans if p.stratum == "single" and p.effects[0][0] == "void"]
+    assert sorted(rungs) == list(range(7))
+    assert len({p.seed for p in plans}) == len(plans)
+
+
+def test_the_order_of_the_cases_says_nothing():
+    """Names sort the cases otherwise than any stratum: ranks of the controls among the names are like any others."""
+    plans = plan_cases(3, EFFECTS)
+    named = sorted(range(len(plans)), key=lambda k: case_id(3, k))
+    ranks = np.array([i for i, k in enumerate(named) if plans[k].stratum == "control"])
+    n, m = len(plans), ranks.size
+    spread = np.sqrt((n + 1) * (n - m) / (12.0 * m))
+    assert abs(ranks.mean() - 0.5 * (n - 1)) < 3.0 * spread
+
+
+def test_an_effect_of_ones_own_is_one_file(tmp_path):
+    (tmp_path / "squeal.py").write_text(
+        "from turnout_blind.effect import Effect\n"
+        "def draw(rng, site, level):\n    return {}, {'level': level}\n"
+        "def act(world, site, where, p):\n    world.surface.append(lambda x: p['level'] * x)\n"
+        "EFFECT = Effect('squeal', 'wheel', (1.0, 2.0), draw, act)\n"
+    )
+    effects = load_effects(tmp_path)
+    assert effects["squeal"].ladder == (1.0, 2.0)
+    plans = plan_cases(3, effects, only={"squeal"})
+    assert Counter(p.stratum for p in plans) == {"control": 60, "single": 2}
+    (tmp_path / "empty.py").write_text("x = 1\n")
+    with pytest.raises(ValueError, match=r"empty\.py: defines no EFFECT"):
+        load_effects(tmp_path)
+
+
+def test_rail_roughness_has_its_level_in_every_octave():
+    """Variance in a third of an octave against 10^(L/10) µm², over realisations; 25 % for 30 of them."""
+    x = np.arange(0.0, 20.0, 5e-3)
+    f = np.fft.rfftfreq(x.size, 5e-3)
+    power = np.zeros(f.size)
+    for seed in range(30):
+        power += np.abs(np.fft.rfft(rail_roughness(np.random.default_rng(seed), 2.0)(x))) ** 2 * 2.0 / x.size**2 / 30
+    for wavelength in (1.0, 0.25, 0.08):
+        low, high = 2.0 ** (-0.5) / wavelength, 2.0**0.5 / wavelength
+        thirds = [wavelength * 2.0 ** (k / 3.0) for k in (-1, 0, 1)]
+        wanted = sum(1e-12 * 10.0 ** (level(w, 2.0) / 10.0) * patch_share(w) for w in thirds)
+        assert power[(f >= low) & (f < high)].sum() == pytest.approx(wanted, rel=0.25)
+
+
+def test_wheel_roughness_repeats_every_turn():
+    dips = wheel_roughness(np.random.default_rng(1), -3.0, 0.43)
+    x = np.linspace(0.0, 2.0, 50)
+    assert dips(x + 2.0 * np.pi * 0.43, 0.3) == pytest.approx(dips(x, 0.3), abs=1e-10)
+    assert not np.allclose(dips(x, 0.3), dips(x, 1.3), atol=1e-6)
+
+
+def test_mounting_is_flat_below_and_peaks_by_its_quality():
+    t = np.arange(60000) / 60000.0
+    for frequency, gain in ((50.0, 1.0), (400.0, 8.0)):
+        shown = mounting(np.sin(2.0 * np.pi * frequency * t), 60000.0, 400.0, 8.0)
+        assert np.abs(shown[40000:]).max() == pytest.approx(gain, rel=0.03)
+
+
+def test_sixteen_bits_and_their_range():
+    chain = Chain("A1", 100.0, mount=0.0, coupling=0.0, noise=0.0, drift=0.0)
+    t = np.arange(60000) / 60000.0
+    shown = digitised(chain, 150.0 * np.sin(2.0 * np.pi * 5.0 * t), 60000.0, 12, np.random.default_rng(0))
+    steps = shown / chain.step
+    assert shown.size == 5000
+    assert np.allclose(steps, np.round(steps))
+    assert (steps.min(), steps.max()) == (-32768, 32767)

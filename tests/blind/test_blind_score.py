@@ -1,0 +1,196 @@
+"""The scorer against tools whose scores are known without it: perfect, silent, random, confidently wrong."""
+
+import json
+
+import numpy as np
+import pytest
+
+from turnout_blind.score.answers import answers_of
+from turnout_blind.score.figures import confusion, figures, reliability
+from turnout_blind.score.intervals import clopper_pearson
+from turnout_blind.score.judged import gain_of, judge
+from turnout_blind.score.names import LOCKS, RIGHT, SAME, right_names
+
+SINGLES = ("void", "dip", "flat", "gain", "pad_temperature")
+WHERE = {
+    "void": {"sleeper": 47, "position": 4.2},
+    "dip": {"position": 6.0},
+    "flat": {"train": "railcar", "axle": 3},
+    "gain": {"sensor": "A2"},
+    "pad_temperature": {},
+    "guard_rail_rattle": {"position": 5.0},
+    "bottomless_void": {"sleeper": 50, "position": 6.0},
+}
+LOCK = {"void": "place", "dip": "place", "flat": "wheel", "gain": "sensor", "pad_temperature": "condition"}
+LOCK |= {"guard_rail_rattle": "place", "bottomless_void": "place"}
+VALUES = {"void": {"gap": 1e-3}, "dip": {"depth": 5e-4}, "flat": {"length": 0.05}, "gain": {"gain": 1.3}}
+VALUES |= {"pad_temperature": {"coefficient": 0.01}, "guard_rail_rattle": {}, "bottomless_void": {"gap": 0.02}}
+
+
+def truth(case, stratum, *kinds, share=60.0):
+    effects = [{"kind": k, "locked_to": LOCK[k], "where": WHERE[k], "parameters": VALUES[k], "rung": 5} for k in kinds]
+    seen = {"hammer_pct": 0.0, "passage_pct": share if kinds else 0.0}
+    return {"case": case, "stratum": stratum, "effects": effects, "visible": seen}
+
+
+def truths():
+    made = [truth(f"c{i}", "control") for i in range(60)]
+    made += [truth(f"s{i}", "single", SINGLES[i % 5]) for i in range(50)]
+    made += [truth(f"d{i}", "double", "void", "gain") for i in range(20)]
+    made += [truth(f"o{i}", "outside", "guard_rail_rattle") for i in range(20)]
+    made += [truth(f"u{i}", "unidentifiable", "bottomless_void") for i in range(16)]
+    return made
+
+
+def row(effect, name, probability=0.95, **more):
+    where, values = effect["where"], effect["parameters"]
+    parameters = [
+        {"name": own, "value": values[o], "se": 0.05 * abs(values[o])}
+        for o, own in SAME.get(effect["kind"], {}).items()
+    ]
+    return {
+        "verdict": "named", "term": name, "rival_term": None, "locked_to": effect["locked_to"],
+        "position_m": where.get("position"), "channel": where.get("sensor"), "probability": probability,
+        "sentence": f"axle {where['axle']} of {where['train']}" if "axle" in where else "",
+        "fit_before_pct": 20.0, "fit_after_pct": 50.0, "parameters_json": json.dumps(parameters), **more,
+    }  # fmt: skip
+
+
+def perfect(t):
+    if t["stratum"] == "control":
+        return [{"verdict": "none", "probability": 0.98}]
+    if t["stratum"] == "outside":
+        e = t["effects"][0]
+        return [row(e, None, verdict="unknown")]
+    if t["stratum"] == "unidentifiable":
+        return [row(t["effects"][0], "local_ballast", verdict="a_or_b", rival_term="hanging_sleeper")]
+    return [row(e, RIGHT[e["kind"]][0]) for e in t["effects"]]
+
+
+def table(tool, **more):
+    judged = [judge(t, answers_of(tool(t))) for t in truths()]
+    return judged, {f.name: f for f in figures(judged, **more)}
+
+
+def test_a_perfect_tool_meets_every_bar():
+    judged, found = table(perfect, oracle={j["case"]: 52.0 for j in truths()})
+    assert [f.name for f in found.values() if f.met is False] == []
+    assert found["what: top-1 (clear singles)"].share == 100.0
+    assert found["where: axle right (clear singles)"].n == 10
+    assert found["parameters: median error"].value == 0.0
+    assert found["held-out fit: gap to the oracle closed, median"].value == pytest.approx(100.0 * 30 / 32)
+    assert found["probability: worst fifth, |stated - seen|"].met
+    assert all(set(counts) <= {"none", "unknown", "a_or_b", "hanging_sleeper", "surface_dip", "wheel_flat",
+                               "sensor_gain", "pad_temperature"} for counts in confusion(judged).values())  # fmt: skip
+
+
+def test_a_silent_tool_raises_no_alarm_and_finds_nothing():
+    _, found = table(lambda t: [{"verdict": "none", "probability": 0.9}])
+    assert found["controls: false alarms"].k == 0
+    assert found["not identifiable: 'a or b' with the truth, or none"].share == 100.0
+    for name in ("what: top-1 (clear singles)", "what: top-2 (clear singles)", "where: lock right (clear singles)",
+                 "two effects: both right", "outside the library: detected (clear)"):  # fmt: skip
+        assert found[name].k == 0
+        assert found[name].n > 0
+    assert found["parameters: median error"].n == 0
+    assert found["parameters: median error"].met is None  # nothing measured is not a bar met
+    # 0.9 said of "none" in 166 cases, right in 60 controls and 16 that nobody can tell: 76/166.
+    assert found["probability: worst fifth, |stated - seen|"].value == pytest.approx(abs(0.9 - 76 / 166))
+
+
+def test_a_tool_that_never_answers_is_not_a_silent_one():
+    _, found = table(lambda t: None)
+    assert found["cases without an answer"].k == 166
+    assert found["not identifiable: 'a or b' with the truth, or none"].k == 0
+    assert found["controls: false alarms"].k == 0
+
+
+def test_a_random_tool_is_right_at_chance():
+    rng = np.random.default_rng(5)
+    names = [RIGHT[k][0] for k in SINGLES]
+
+    def tool(t):
+        e = (t["effects"] or [{"where": {}, "parameters": {}, "kind": "", "locked_to": "place"}])[0]
+        return [row(e, str(rng.choice(names)), 0.2)]
+
+    _, found = table(tool)
+    top = found["what: top-1 (clear singles)"]
+    low, high = clopper_pearson(top.k, top.n, 0.999)
+    assert low < 0.2 < high
+    assert found["controls: false alarms"].share == 100.0
+    assert found["outside the library: named wrongly"].share == 100.0
+
+
+def test_a_confidently_wrong_tool_fails_where_it_should():
+    _, found = table(lambda t: [row(e, "rail_shear", 0.99) for e in t["effects"]] or [{"verdict": "none"}])
+    assert found["what: a wrong name (clear singles)"].share == 100.0
+    assert found["not identifiable: a wrong name"].met is False
+    assert found["two effects: one right and none wrong"].k == 0
+    assert found["probability: worst fifth, |stated - seen|"].value > 0.9
+
+
+def test_a_wrong_place_axle_train_or_sensor_is_seen():
+    def off(t):
+        rows = perfect(t)
+        for r in rows:
+            if r.get("position_m") is not None:
+                r["position_m"] += 0.61
+            r["channel"] = "A4" if r.get("channel") else None
+            if "axle" in r.get("sentence", ""):
+                r["sentence"] = "axle 4 of railcar"
+        return rows
+
+    _, found = table(off)
+    assert found["what: top-1 (clear singles)"].share == 100.0
+    for what in ("place", "axle", "sensor"):
+        assert found[f"where: {what} right (clear singles)"].k == 0
+
+
+def test_one_right_name_and_one_wrong_in_a_double_is_not_well():
+    t = truth("d", "double", "void", "gain")
+    right, wrong = row(t["effects"][0], "hanging_sleeper"), row(t["effects"][1], "time_offset")
+    judged = judge(t, answers_of([right, wrong]))
+    assert judged.hits == ("named", "")
+    assert judged.wrong == ("time_offset",)
+    found = {f.name: f for f in figures([judged])}
+    assert found["two effects: one right and none wrong"].k == 0
+    assert found["two effects: both right"].k == 0
+
+
+def test_parameters_are_compared_with_what_was_concealed():
+    t = truth("s", "single", "void")
+    inside, outside = row(t["effects"][0], "hanging_sleeper"), row(t["effects"][0], "hanging_sleeper")
+    inside["parameters_json"] = '[{"name": "gap", "value": 0.0011, "se": 0.0001}]'
+    outside["parameters_json"] = '{"gap": {"value": 0.0013, "se": 0.0001}, "where": {"sleeper": 47}}'
+    assert judge(t, answers_of([inside])).parameters == ((pytest.approx(0.1), True),)
+    assert judge(t, answers_of([outside])).parameters == ((pytest.approx(0.3), False),)
+
+
+def test_effects_too_small_to_cost_fit_are_not_held_against_the_tool():
+    assert gain_of({"hammer_pct": 0.0, "passage_pct": 5.0}) < 0.3
+    hidden = judge(truth("s", "single", "void", share=5.0), answers_of([{"verdict": "none"}]))
+    found = {f.name: f for f in figures([hidden])}
+    assert found["what: top-1 (clear singles)"].n == 0
+
+
+def test_a_name_of_ones_own_can_be_added():
+    assert right_names("squeal") == ()
+    assert right_names("squeal", {"squeal": ["hum"]}) == ("hum",)
+    assert set(LOCKS) <= set(RIGHT)
+
+
+def test_reliability_holds_probability_one():
+    judged = [judge(truth("c", "control"), answers_of([{"verdict": "none", "probability": p}])) for p in (0.05, 1.0)]
+    assert reliability(judged) == [(0.05, 1.0, 1), (1.0, 1.0, 1)]
+
+
+def test_a_second_term_among_the_parameters_is_an_answer_of_its_own():
+    entries = [
+        {"term": "hanging_sleeper", "name": "gap", "value": 1e-3, "se": 1e-4},
+        {"term": "sensor_gain", "name": "gain", "value": 1.31, "se": 0.01},
+    ]
+    rows = [{"verdict": "named", "term": "hanging_sleeper", "parameters_json": json.dumps(entries)}]
+    judged = judge(truth("d", "double", "void", "gain"), answers_of(rows))
+    assert judged.hits == ("named", "named")
+    assert judged.wrong == ()
+    assert judged.parameters == ((0.0, True), (pytest.approx(0.01 / 1.3), True))

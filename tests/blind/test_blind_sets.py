@@ -1,0 +1,221 @@
+"""A small blind set from end to end: what is written, sealed, hidden, revealed and scored."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from turnout.config.load import load_configuration, with_raw
+from turnout.readers import read
+from turnout_blind.diagnose import diagnose_set
+from turnout_blind.effect import load_effects
+from turnout_blind.isolation import Hidden, method
+from turnout_blind.make import make_set
+from turnout_blind.record import hammer_test
+from turnout_blind.reveal import reveal
+from turnout_blind.score.report import report_of
+from turnout_blind.seal import BlindError, digest, verify
+from turnout_blind.site import draw_site
+
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("blind_set")]
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """(out, truth) of a control and a single, made once; never changed by a test."""
+    folder = tmp_path_factory.mktemp("blind")
+    out, truth = folder / "set", folder / "truth"
+    seed = 19  # whose first two cases in shuffled order are a control and a single
+    make_set(out, truth, seed, only={"pad"}, limit=2)
+    return out, truth
+
+
+@pytest.fixture
+def copy(made, tmp_path, monkeypatch):
+    """A copy of the set that a test may spoil; the tool counts as frozen while others work on its files."""
+    monkeypatch.setattr("turnout_blind.diagnose.digest_of_folder", lambda folder: "frozen")
+    out, truth = tmp_path / "set", tmp_path / "truth"
+    shutil.copytree(made[0], out)
+    shutil.copytree(made[1], truth)
+    return out, truth
+
+
+def cases(out):
+    return sorted((out / "cases").iterdir())
+
+
+def test_a_user_of_the_project_can_read_the_case(made):
+    for case in cases(made[0]):
+        turnout = with_raw(load_configuration(case / "config").turnout(case.name), case / "raw")
+        assert len(turnout.campaigns) == 2
+        assert len(turnout.trains) == 8
+        raw = case / "raw" / case.name
+        passages = sorted(raw.glob("passages/*.npz"))
+        assert len(passages) == 8
+        for path in passages[:2]:
+            result = read(path, case / "raw", turnout.passages.description)
+            assert not result.errors
+            recording = result.recordings[0]
+            assert (recording.rate, recording.n_sample, len(recording.channels)) == (5000.0, 17500, 4)
+            assert 1.0 < np.abs(recording.samples).max() < 1000.0
+            assert "rail_temperature" in recording.conditions
+        tests = sorted(raw.glob("hammer/*/*.npz"))
+        assert len(tests) == 6
+        for path in tests[:2]:
+            result = read(path, case / "raw", turnout.hammer.descriptions[path.stem.split("_")[0]])
+            assert not result.errors
+            assert len(result.recordings) == 6
+            assert all(3e3 < r.signal("force").max() < 22.3e3 for r in result.recordings)
+
+
+def test_names_sizes_and_times_carry_no_label(made):
+    """Two cases differ in nothing that a listing shows but their id and which middle section was not struck."""
+    listings = []
+    for case in cases(made[0]):
+        files = [p for p in sorted(case.rglob("*.npz"))]
+        listings.append(sorted((p.parent.name, p.stat().st_size, p.stat().st_mtime) for p in files))
+    assert listings[0] == listings[1]  # the size of a passage tells the length of its train's name, as trains.csv does
+    words = {k for k in load_effects() if k not in ("pad", "ballast", "position", "gain")}
+    for path in (p for case in cases(made[0]) for p in case.rglob("*") if p.is_file() and p.suffix != ".npz"):
+        assert not [w for w in words if w in path.read_text() or w in path.name], path
+
+
+def test_the_same_seed_gives_the_same_samples():
+    tests = []
+    for _ in range(2):
+        rng = np.random.default_rng([3, 1])
+        site = draw_site(rng)
+        tests.append(hammer_test(site, site.world, 0, site.blows[0], rng, {}))
+    assert all(np.array_equal(a.samples, b.samples) for a, b in zip(*tests))
+
+
+def test_seals_hold_and_break(copy):
+    out, truth = copy
+    assert {t["stratum"] for t in verify(out, truth).values()} == {"control", "single"}
+    case = cases(out)[0]
+    (case / "raw" / "more.txt").write_text("x")
+    with pytest.raises(BlindError, match=r"more\.txt: a file that was added"):
+        verify(out, truth)
+    (case / "raw" / "more.txt").unlink()
+    notes = next(case.rglob("trains.csv"))
+    notes.write_text(notes.read_text().replace("main", "Main", 1))
+    with pytest.raises(BlindError, match=r"trains\.csv: not the sealed content"):
+        verify(out, truth)
+
+
+def test_a_truth_cannot_be_exchanged_after_the_fact(copy):
+    out, truth = copy
+    path = truth / f"{cases(out)[0].name}.json"
+    held = json.loads(path.read_text())
+    path.write_text(json.dumps({**held, "stratum": held["stratum"] + " "}, indent=1, sort_keys=True) + "\n")
+    with pytest.raises(BlindError, match="not the truth that was sealed"):
+        verify(out, truth)
+
+
+def test_nonces_keep_a_truth_from_being_guessed(made):
+    """The seal of a control is not that of the same words without their nonce, nor of another's."""
+    truths = verify(*made)
+    control = next(t for t in truths.values() if t["stratum"] == "control")
+    nonces = {t["nonce"] for t in truths.values()}
+    assert len(nonces) == len(truths)
+    assert all(len(bytes.fromhex(n)) == 16 for n in nonces)
+    bare = {k: v for k, v in control.items() if k != "nonce"}
+    sealed = json.loads((made[0] / "commit.json").read_text())["cases"][control["case"]]["truth_sha256"]
+    assert digest(json.dumps(bare, indent=1, sort_keys=True).encode() + b"\n") != sealed
+
+
+SPY = """
+import json, os, sys
+case, folder, out, truth = sys.argv[1:]
+seen = [f for _, _, files in os.walk(truth) for f in files]
+try:
+    open(os.path.join(truth, case + ".json")).read()
+    seen.append("opened")
+except OSError:
+    pass
+try:
+    import turnout_blind.campaign
+    seen.append("generator")
+except ImportError:
+    pass
+assert os.path.exists(os.path.join(folder, "config", "turnouts.tsv"))
+json.dump([{"verdict": "none", "probability": 0.5, "sentence": " ".join(seen)}], open(out, "w"))
+"""
+
+
+@pytest.mark.skipif(not method(), reason="nothing here can hide a folder from this user")
+def test_the_tool_sees_neither_truth_nor_generator(copy, tmp_path):
+    out, truth = copy
+    spy = tmp_path / "spy.py"
+    spy.write_text(SPY)
+    command = f"{{python}} {spy} {{case}} {{folder}} {{out}} {truth}"
+    held = diagnose_set(out, truth, command, say=lambda line: None)
+    assert not any(held["canary"].values())
+    for path in (out / "findings").glob("*.json"):
+        said = json.loads(path.read_text())[0]["sentence"]
+        assert said == "" if held["isolation"] == "unshare" else "opened" not in said
+    assert (truth / "set.json").exists()  # outside it is there as before
+    assert len(reveal(out, truth)) == 2
+    report = report_of(out)
+    assert "| controls: false alarms | 0.0 % (0) | 0.0 to 97.5 % | 1 | <= 3.33 % | met |" in report
+    spoilt = next((out / "findings").glob("*.json"))
+    spoilt.write_text('[{"verdict": "named"}]')
+    with pytest.raises(BlindError, match="not the rows that the tool wrote"):
+        report_of(out)
+
+
+@pytest.mark.skipif(not method(), reason="nothing here can hide a folder from this user")
+def test_a_tool_that_fails_is_counted_and_not_hidden(copy):
+    out, truth = copy
+    held = diagnose_set(out, truth, "{python} -c 'raise SystemExit(3)'", say=lambda line: None)
+    assert {run["status"] for run in held["cases"].values()} == {"failed"}
+    reveal(out, truth)
+    assert "| cases without an answer | 100.0 % (2)" in report_of(out)
+
+
+@pytest.mark.skipif(not method(), reason="nothing here can hide a folder from this user")
+def test_rows_are_taken_from_what_the_tool_prints(copy):
+    """It prints notes, then its row, in the folder of the case; anything else is a failure with its words kept."""
+    out, truth = copy
+    one, other = (c.name for c in cases(out))
+    code = "import os; print(os.listdir()); print('{{\\n'+chr(34)+'verdict'+chr(34)+': '+chr(34)+'none'+chr(34)+'}}')"
+    held = diagnose_set(out, truth, f'{{python}} -c "print(5); {code}"', [one], say=lambda line: None)
+    assert held["cases"][one]["status"] == "failed"  # a list of Python's is no JSON
+    code = code.split("; ", 2)[2]
+    held = diagnose_set(out, truth, f'{{python}} -c "print(5); {code}"', [other], say=lambda line: None)
+    assert held["cases"][other]["status"] == "answered"
+    assert json.loads((out / "findings" / f"{other}.json").read_text()) == [{"verdict": "none"}]
+
+
+@pytest.mark.skipif(not method(), reason="nothing here can hide a folder from this user")
+def test_a_tool_that_changes_on_the_way_proves_nothing(copy, monkeypatch):
+    states = iter(["one", "another"])
+    monkeypatch.setattr("turnout_blind.diagnose.digest_of_folder", lambda folder: next(states))
+    with pytest.raises(BlindError, match="changed while it diagnosed"):
+        diagnose_set(*copy, "{python} -c 'raise SystemExit(3)'", say=lambda line: None)
+    monkeypatch.setattr("turnout_blind.diagnose.digest_of_folder", lambda folder: "a third")
+    with pytest.raises(BlindError, match="changed since the first case"):
+        diagnose_set(*copy, "{python} -c 'raise SystemExit(3)'", say=lambda line: None)
+
+
+def test_nothing_is_revealed_before_the_tool_has_spoken(copy):
+    with pytest.raises(BlindError, match="nothing has been diagnosed yet"):
+        reveal(*copy)
+
+
+def test_the_truth_may_not_lie_where_the_tool_looks(tmp_path):
+    with pytest.raises(BlindError, match="inside the folder that the tool is given"):
+        make_set(tmp_path / "a", tmp_path / "a" / "truth", 1)
+
+
+@pytest.mark.skipif(not method(), reason="nothing here can hide a folder from this user")
+def test_the_canary_is_found_where_nothing_is_hidden(tmp_path, monkeypatch):
+    """With the hiding switched off, the check itself must cry out."""
+    monkeypatch.setattr("turnout_blind.isolation.hidden_command", lambda command, folders: command)
+    (tmp_path / "truth").mkdir()
+    hidden = Hidden(tmp_path / "truth")
+    hidden.how = "unshare"
+    with pytest.raises(BlindError, match="can be read from inside"):
+        hidden.__enter__()
+    assert not (tmp_path / "truth" / "canary.txt").exists()

@@ -1,0 +1,113 @@
+"""The whole hammer chain against a truth that it never sees: files on disk in, rows out."""
+
+import json
+from datetime import date, datetime
+
+import numpy as np
+import pytest
+
+from turnout.chains.hammer import hammer_unit
+from turnout.config import load_configuration, with_raw
+from turnout.demo.hammer import hammer_test
+from turnout.fleet.scan import scan
+from turnout.published.models import published_model
+from turnout.published.response import paper_response
+from turnout.readers.writing import write
+
+DAY = date(2024, 5, 13)
+EXTENSIONS = {"uff58b": "uff", "tdms": "tdms", "hdf5": "h5"}
+
+
+def lay_out(raw, section="A7", file_format="hdf5", n_test=3, ballast=1.0, railpad=1.0, seed=5, change=None):
+    """Files of one section and campaign of tommerup_s1; returns its unit and configuration, and the blows' truth."""
+    folder = raw / "tommerup_s1" / "hammer" / DAY.isoformat()
+    folder.mkdir(parents=True)
+    rng, truth = np.random.default_rng(seed), []
+    for test in range(1, n_test + 1):
+        recordings, blows = hammer_test(paper_response(section, ballast, railpad), 12.0, DAY, test, rng)
+        if change is not None:
+            recordings = change(test, recordings)
+        write(recordings, folder / f"{section}_{test}.{EXTENSIONS[file_format]}", file_format)
+        truth += blows
+    notes = (
+        "campaign,started_at_utc,rail_temperature_c,hammer_id,tip,operator\n2024-05-13,2024-05-13T09:00:00,12.0,,,\n"
+    )
+    (raw / "tommerup_s1" / "campaigns.csv").write_text(notes)
+    turnout = with_raw(load_configuration("config").turnout("tommerup_s1"), raw)
+    return scan(turnout, raw).units[0], turnout, truth
+
+
+@pytest.fixture(autouse=True)
+def in_repository(repository, monkeypatch):
+    monkeypatch.chdir(repository)
+
+
+@pytest.mark.parametrize("file_format", EXTENSIONS)
+def test_modes_lie_within_five_standard_errors_of_the_truth(tmp_path, file_format):
+    unit, turnout, _ = lay_out(tmp_path, "A7", file_format, ballast=1.21, railpad=0.81)
+    rows = hammer_unit(unit, turnout, tmp_path, algo="1")
+    modes = {m["band"]: m for m in rows["modes"]}
+    model = published_model("CP A7")
+    # the resonance goes with the root of the stiffness: 1.1 and 0.9
+    for band, frequency, factor, damping in zip(model.bands, model.frequency, (1.1, 0.9), model.damping):
+        mode = modes[band]
+        assert abs(mode["frequency_hz"] - factor * frequency) < 5 * mode["frequency_se_hz"]
+        assert abs(mode["damping_ratio"] - damping) < 5 * mode["damping_se"]
+        # poles differ by 0.6 % between blows, so the mean of 30 cannot be known better than 0.1 %
+        assert 0.0005 < mode["frequency_se_hz"] / mode["frequency_hz"] < 0.005
+        assert mode["rail_temperature_c"] == 12.0
+
+
+def test_every_mishap_of_a_blow_is_named_and_no_sound_blow_is_lost(tmp_path):
+    unit, turnout, truth = lay_out(tmp_path, "OT", seed=11)
+    fault = {(b.test, b.record): b.fault for b in truth}
+    assert sum(bool(f) for f in fault.values()) >= 1, "the seed must bring at least one mishap"
+    impacts = hammer_unit(unit, turnout, tmp_path, algo="1")["impacts"]
+    assert len(impacts) == 30
+    for impact in impacts:
+        said = fault[impact["test"], impact["record"]]
+        if said:
+            assert impact["status"] == "rejected" and impact["reason"], (impact, said)
+    sound = [i for i in impacts if not fault[i["test"], i["record"]]]
+    assert np.mean([i["status"] == "accepted" for i in sound]) >= 0.95
+
+
+def test_one_dead_channel_costs_one_file_and_says_what_to_do(tmp_path):
+    from turnout.demo import faults
+
+    def change(test, recordings):
+        return [faults.dead_channel(r) for r in recordings] if test == 2 else recordings
+
+    unit, turnout, _ = lay_out(tmp_path, "CLP", change=change)
+    rows = hammer_unit(unit, turnout, tmp_path, algo="1")
+    assert {q["reason_code"] for q in rows["quarantine"]} == {"dead_channel"}
+    assert all("CLP_2" in q["path"] and q["remedy"] for q in rows["quarantine"])
+    assert rows["models"][0]["status"] == "accepted" and len(rows["impacts"]) == 20
+
+
+def test_a_reversed_force_is_named(tmp_path):
+    from turnout.demo import faults
+
+    unit, turnout, _ = lay_out(tmp_path, "SP", change=lambda _, rs: [faults.swapped_sign(r) for r in rs])
+    rows = hammer_unit(unit, turnout, tmp_path, algo="1")
+    assert rows["models"][0]["status"] == "rejected" and rows["models"][0]["reason"] == "too_few_impacts"
+    assert {i["reason"] for i in rows["impacts"]} == {"sign_reversed"}
+
+
+def test_the_same_files_give_the_same_rows(tmp_path):
+    unit, turnout, _ = lay_out(tmp_path, "A8", n_test=1)
+    first, second = (hammer_unit(unit, turnout, tmp_path, algo="1") for _ in range(2))
+    as_text = [json.dumps(r, default=lambda v: v.tolist() if hasattr(v, "tolist") else str(v)) for r in (first, second)]
+    assert as_text[0] == as_text[1]
+    assert first["models"][0]["measured_at_utc"] == datetime(2024, 5, 13, 9)
+
+
+def test_a_file_copied_under_another_name_counts_once(tmp_path):
+    unit, turnout, _ = lay_out(tmp_path, "A9", n_test=2)
+    folder = tmp_path / "tommerup_s1" / "hammer" / DAY.isoformat()
+    (folder / "A9_3.h5").write_bytes((folder / "A9_1.h5").read_bytes())
+    unit = scan(turnout, tmp_path).units[0]
+    rows = hammer_unit(unit, turnout, tmp_path, algo="1")
+    assert len(unit.files) == 3 and len(rows["impacts"]) == 20
+    assert [q["reason_code"] for q in rows["quarantine"]] == ["duplicate"]
+    assert "A9_1" in rows["quarantine"][0]["found"] and "A9_3" in rows["quarantine"][0]["path"]

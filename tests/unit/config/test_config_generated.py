@@ -1,0 +1,104 @@
+"""The generated files of the repository are those that the settings give, and the program reads them."""
+
+import json
+
+import jsonschema
+import pytest
+from ruamel.yaml import YAML
+
+from turnout.cli import main
+from turnout.config import load_configuration
+from turnout.config.generate import generated
+from turnout.config.settings import parts
+from turnout.readers.formats import FORMATS
+from turnout.readers.units import to_si
+
+
+def test_generated_files_are_up_to_date(repository):
+    for path, text in generated(repository / "config", repository / "docs", defaults=True).items():
+        assert path.read_text(encoding="utf-8") == text, f"{path}: run `turnout config generate --defaults`"
+
+
+def test_the_repository_is_sound(repository):
+    configuration = load_configuration(repository / "config", FORMATS, to_si)
+    assert {"tommerup_s1", "tommerup_s2", "aarup_n4"} <= set(configuration.ids)
+    labels = [s.label for s in configuration.turnout("tommerup_s1").sections]
+    assert labels == ["OT", "SP", "CLP", "A7", "A8", "A9", "ASM", "ASD"]
+
+
+def test_the_written_defaults_are_the_built_in_ones(repository):
+    settings = load_configuration(repository / "config").settings
+    assert dict(settings) == {name: cls() for name, cls in parts().items()}
+
+
+def test_the_schemas_accept_what_the_program_accepts(repository):
+    yaml = YAML(typ="safe", pure=True)
+    for schema, files in (("config", ["config.yaml"]), ("layout", ["layouts/tommerup.yaml"])):
+        validator = jsonschema.Draft202012Validator(
+            json.loads((repository / f"config/schema/{schema}.json").read_text())
+        )
+        for name in files:
+            found = [e.message for e in validator.iter_errors(yaml.load((repository / "config" / name).read_text()))]
+            assert not found
+
+
+@pytest.mark.parametrize("change", [{"secions": {}}, {"hammer": {"rate": -1}}, {"hammer": {"sections": 3}}])
+def test_the_schemas_refuse_what_the_program_refuses(repository, change):
+    schema = json.loads((repository / "config/schema/override.json").read_text())
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(change, schema)
+
+
+def test_a_changed_value_is_kept(tmp_path, repository):
+    (tmp_path / "config.yaml").write_text("fleet: {shards: 64}\n")
+    text = generated(tmp_path, tmp_path)[tmp_path / "config.yaml"]
+    assert "\n  shards: 64\n" in text and "# default 1; 1 to 4096:" in text
+    assert "\n  shards: 1\n" in generated(tmp_path, tmp_path, defaults=True)[tmp_path / "config.yaml"]
+
+
+@pytest.fixture
+def copy(tmp_path, repository, monkeypatch):
+    import shutil
+
+    shutil.copytree(repository / "config", tmp_path / "config")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_add_writes_one_row(copy, capsys):
+    before = (copy / "config/turnouts.tsv").read_text()
+    assert (
+        main(["add", "odense_v7", "tommerup", "--raw", "line_7/v7", "--km", "3.25", "--name", "Odense\tswitch 7"]) == 0
+    )
+    after = (copy / "config/turnouts.tsv").read_text()
+    assert after.startswith(before) and after.count("\n") == before.count("\n") + 1
+    assert load_configuration(copy / "config").turnout("odense_v7").km == 3.25
+    assert "line_7/v7/hammer/{campaign}/{section}_{test}.{ext}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("row", [("tommerup_s1", "tommerup"), ("new", "tomerup"), ("new", "tommerup", "--km", "far")])
+def test_add_leaves_the_table_alone_where_the_row_is_wrong(copy, row, capsys):
+    before = (copy / "config/turnouts.tsv").read_bytes()
+    assert main(["add", *row]) == 2
+    assert (copy / "config/turnouts.tsv").read_bytes() == before
+    assert "config/turnouts.tsv, line" in capsys.readouterr().err
+
+
+def test_check_names_files_that_no_pattern_knows(copy, capsys):
+    folder = copy / "raw/tommerup_s1/hammer/2024-05-13"
+    folder.mkdir(parents=True)
+    for name in ("A7_1.uff", "A77_1.uff", ".hidden.uff", "A8_1.uff.part"):
+        (folder / name).write_bytes(b"")
+    (copy / "raw/tommerup_s2").mkdir()
+    assert main(["check"]) == 1
+    said = capsys.readouterr().out
+    assert "1 files in 1 units, 3 left out or unsound" in said
+    assert "tommerup_s1/hammer/2024-05-13/A77_1.uff, file name: its name follows no pattern of the layout" in said
+    assert "tommerup_s2, folder: no file matches a pattern of the layout" in said
+
+
+def test_show_and_plan_and_formats_speak(copy, capsys):
+    assert main(["config", "show", "aarup_n4", "--only", "sections.A9"]) == 0
+    assert "config/layouts/tommerup.yaml, line" in capsys.readouterr().out
+    assert main(["plan"]) == 0 and main(["check", "--formats"]) == 0
+    assert "uff58" in capsys.readouterr().out

@@ -1,0 +1,222 @@
+"""Every kind of wrong row or key is said with file, line, column, what stands there and what to write instead."""
+
+import pytest
+
+from turnout.config import load_configuration
+from turnout.config.raw_notes import read_campaigns
+from turnout.errors import ConfigErrors
+from turnout.readers.formats import FORMATS
+from turnout.readers.units import to_si
+
+LAYOUT = """\
+sections:
+  A7: {panel: CP, track: main, position: 24.6}
+  A8:
+    panel: CP
+    track: main
+    position: 26.4
+hammer:
+  files: "hammer/{campaign}/{section}_{test}.{ext}"
+  rate: 20000
+  force: force
+  response: rail
+  channels:
+    force: {source: force, quantity: force, unit: V, sensitivity: 0.23, sensitivity_unit: mV/N}
+    rail: {source: rail, quantity: acceleration, unit: m/s²}
+passages:
+  files: "passages/{time}.{ext}"
+  channels:
+    web: {source: 0, quantity: acceleration, section: A8}
+"""
+TABLE = "turnout\tlayout\traw\tkm\thammer_rate_hz\nt1\tmain\t\t1.5\t\nt2\tmain\tline/t2\t\t10000\n"
+
+
+def configuration(folder, layout=LAYOUT, table=TABLE, settings="", override=None, events=None):
+    folder = folder / "config"
+    (folder / "layouts").mkdir(parents=True)
+    (folder / "layouts" / "main.yaml").write_text(layout)
+    (folder / "turnouts.tsv").write_text(table)
+    (folder / "config.yaml").write_text(settings)
+    if override:
+        (folder / "overrides").mkdir()
+        (folder / "overrides" / override[0]).write_text(override[1])
+    if events:
+        (folder / "events.csv").write_text(events)
+    return load_configuration(folder, FORMATS, to_si)
+
+
+def row(text):
+    return {"table": TABLE + text + "\n"}
+
+
+def layout(old, new):
+    assert old in LAYOUT
+    return {"layout": LAYOUT.replace(old, new)}
+
+
+WRONG = {
+    "id with a space": (row("t 3\tmain"), "config/turnouts.tsv, line 4, column 1: turnout is 't 3'. Write text like"),
+    "duplicate id": (row("t1\tmain"), "line 4, column 1: turnout 't1' for the second time. Give it another id"),
+    "no id": (row("\tmain"), "line 4, column 1: turnout is empty. Write id"),
+    "unknown layout": (row("t3\tmian"), "line 4, column 4: no layout 'mian'. Did you mean 'main'?"),
+    "number that is none": (row("t3\tmain\t\t12,4"), "line 4, column 10: km is '12,4'. Write a number from 0 to"),
+    "rate of zero": (row("t3\tmain\t\t\t0"), "line 4, column 11: hammer_rate_hz is 0.0. Write a number above 0 Hz"),
+    "too many cells": (row("t3\tmain\t\t\t\tx"), "line 4, column 12: 6 cells under 5 columns"),
+    "raw folder outside": (row("t3\tmain\t../t3"), "line 4, column 9: raw is '../t3', outside the raw root"),
+    "raw folder absolute": (row("t3\tmain\t/data/t3"), "column 9: raw is '/data/t3', outside the raw root"),
+    "raw folder of another": (row("t3\tmain\tt1"), "line 4, column 9: raw folder 't1' is also that of turnout 't1'"),
+    "unknown column": (
+        {"table": TABLE.replace("km", "kilometre")},
+        "line 1, column 20: unknown column 'kilometre'. Allowed:",
+    ),
+    "column twice": ({"table": TABLE.replace("km", "raw")}, "line 1, column 20: column 'raw' for the second time"),
+    "spaces for tabs": ({"table": "turnout layout\nt1 main\n"}, "Put tabs between the columns"),
+    "unknown key": (
+        layout("    position: 26.4", "    positoin: 26.4"),
+        "config/layouts/main.yaml, line 6, column 5: unknown key 'positoin'. Did you mean 'position'?",
+    ),
+    "missing key": (layout("    track: main\n", ""), "line 4, column 5: 'track' is missing. Add 'track:'"),
+    "key twice": (layout("  rate: 20000", "  rate: 20000\n  rate: 1"), "'rate' for the second time, first in line 9"),
+    "text for a number": (layout("26.4", "26,4"), "line 6, column 15: position is '26,4'. Write a number from"),
+    "unknown panel": (
+        layout("    panel: CP", "    panel: CLB"),
+        "line 4, column 12: panel is 'CLB'. Did you mean 'CLP'?",
+    ),
+    "unknown unit": (layout("unit: V", "unit: furlong"), "line 13, column 51: unit 'furlong' for the force of channel"),
+    "unit of another quantity": (layout("mV/N", "mV/g"), "line 13, column 51: unit 'V' for the force of channel force"),
+    "no sensitivity": (layout("sensitivity: 0.23, ", ""), "line 13, column 51: unit 'V' for the force"),
+    "response that is no channel": (layout("response: rail", "response: rial"), "Did you mean 'rail'?"),
+    "response that is the force": (layout("response: rail", "response: force"), "which measures force"),
+    "source twice": (layout("source: rail", "source: force"), "reads 'force', as force does"),
+    "unknown field": (layout("{section}_", "{sektion}_"), "unknown field {sektion} in the pattern. Did you mean"),
+    "pattern without section": (layout("{section}_", ""), "line 8, column 10: files is"),
+    "unknown section": (layout("section: A8}", "section: A9}"), "line 18, column 55: no section 'A9'"),
+    "unknown time zone": (layout("rate: 20000", "time_zone: Denmark/Odense"), "Write an IANA name"),
+    "unknown format": (layout("rate: 20000", "format: ufo"), "line 9, column 11: format is 'ufo'. Allowed: auto, csv"),
+    "YAML that is none": (layout("    panel: CP", "    panel: [CP"), "Correct the YAML syntax there"),
+    "unknown setting": (
+        {"settings": "receptance:\n  gate_levle: 0.9\n"},
+        "config/config.yaml, line 2, column 3: unknown key 'gate_levle'. Did you mean 'gate_level'?",
+    ),
+    "setting beyond its limits": (
+        {"settings": "receptance: {gate_level: 1.5}"},
+        "line 1, column 26: gate_level is 1.5. Write a number from 0",
+    ),
+    "flag that is none": ({"settings": "receptance: {force_window: 1}"}, "Write true or false"),
+    "override without a turnout": (
+        {"override": ("t9.yaml", "hammer: {rate: 1}")},
+        "config/overrides/t9.yaml, line 1, column 1: an override without a turnout 't9'. Allowed: t1, t2",
+    ),
+    "override of an unknown key": (
+        {"override": ("t1.yaml", "hammer:\n  channels:\n    rail: {sing: -1}\n")},
+        "config/overrides/t1.yaml, line 3, column 12: unknown key 'sing'. Did you mean 'sign'?",
+    ),
+    "override with half a section": (
+        {"override": ("t1.yaml", "sections:\n  B1: {panel: CP, position: 3}\n")},
+        "config/overrides/t1.yaml, line 2, column 7: 'track' is missing",
+    ),
+    "event of no turnout": (
+        {"events": "turnout,section,date,kind\nt7,,2025-01-01,tamping\n"},
+        "turnout 't7' has no row",
+    ),
+    "event of no section": (
+        {"events": "turnout,section,date,kind\nt1,B1,2025-01-01,tamping\n"},
+        "config/events.csv, line 2, column 4: turnout 't1' has no section 'B1'",
+    ),
+    "event on no day": ({"events": "turnout,section,date,kind\nt1,,1.1.2025,tamping\n"}, "Write YYYY-MM-DD"),
+    "event of no kind": ({"events": "turnout,section,date,kind\nt1,,2025-01-01,taming\n"}, "Did you mean 'tamping'?"),
+    "event with a comma": (
+        {"events": "turnout,section,date,kind,resets,note\nt1,,2025-01-01,tamping,,by machine, twice\n"},
+        "more cells than columns. Put a text with commas in double quotes",
+    ),
+}
+
+
+def test_every_error_of_an_event_is_said_at_its_cell(tmp_path):
+    with pytest.raises(ConfigErrors) as caught:
+        configuration(tmp_path, events='turnout,section,date,kind,resets\n"t1",B1,1.1.2025,taming,ballst\n')
+    places = [(e.place, e.found.split(" is ")[0]) for e in caught.value.errors]
+    assert places == [
+        ("line 2, column 6", "turnout 't1' has no section 'B1'"), ("line 2, column 9", "date"),
+        ("line 2, column 18", "kind"), ("line 2, column 25", "resets"),
+    ]  # fmt: skip
+
+
+def test_a_broken_table_of_turnouts_accuses_no_event(tmp_path):
+    with pytest.raises(ConfigErrors) as caught:
+        events = "turnout,section,date,kind\nt1,,2025-01-01,tamping\nt2,,2025-01-01,taming\n"
+        configuration(tmp_path, table="turnout\tlayuot\nt1\tmain\n", events=events)
+    said = [str(e) for e in caught.value.errors]
+    assert not [s for s in said if "has no row" in s] and [s for s in said if "events.csv, line 3" in s]
+
+
+@pytest.mark.parametrize(
+    ("row", "column", "found"),
+    [
+        ("2025-01-10,2025-01-10T10:00,warm", 29, "rail_temperature_c is 'warm'. Write a number from -50 to 80 °C"),
+        ("2025-01-10,2025-01-10T10:00,nan", 29, "rail_temperature_c is 'nan'"),
+        ("10.1.2025,2025-01-10T10:00,3", 1, "campaign is '10.1.2025'. Write its day as YYYY-MM-DD"),
+        ("2025-01-10,ten,3", 12, "started_at_utc is 'ten'. Write YYYY-MM-DD or YYYY-MM-DDTHH:MM in UTC"),
+        ("2025-01-10,2025-03-10T10:00,3", 12, "is not on the campaign's day 2025-01-10"),
+    ],
+)
+def test_a_wrong_campaign_is_said_with_column_value_and_what_to_write(tmp_path, row, column, found):
+    path = tmp_path / "campaigns.csv"
+    path.write_text(f"campaign,started_at_utc,rail_temperature_c\n2025-01-03,2025-01-03T10:00,\n{row}\n", "utf-8")
+    campaigns, errors = read_campaigns(path, "t1/campaigns.csv")
+    assert list(campaigns) == ["2025-01-03"] and len(errors) == 1
+    assert f"t1/campaigns.csv, line 3, column {column}: " in str(errors[0]) and found in str(errors[0])
+
+
+@pytest.mark.parametrize("kind", WRONG)
+def test_it_is_said_where_and_what_to_write(tmp_path, kind):
+    changes, words = WRONG[kind]
+    with pytest.raises(ConfigErrors) as caught:
+        configuration(tmp_path, **changes)
+    assert words in str(caught.value)
+    assert len(caught.value.errors) == 1, str(caught.value)
+
+
+def test_all_errors_come_at_once(tmp_path):
+    with pytest.raises(ConfigErrors) as caught:
+        configuration(
+            tmp_path, layout=LAYOUT.replace("panel: CP", "panle: CP"), table=TABLE + "t1\tmain\n",
+            settings="receptance: {gate: soft}",
+        )  # fmt: skip
+    files = {error.path for error in caught.value.errors}
+    assert files == {"config/layouts/main.yaml", "config/turnouts.tsv", "config/config.yaml"}
+    assert len(caught.value.errors) == 2 + 1 + 1  # the layout's two sections, the row, the setting
+
+
+def test_the_sound_one_is_accepted(tmp_path):
+    assert configuration(tmp_path).ids == ("t1", "t2")
+
+
+def test_a_tag_that_would_make_an_object_is_an_error_with_its_place(tmp_path):
+    with pytest.raises(ConfigErrors) as caught:
+        configuration(tmp_path, layout=LAYOUT.replace("position: 26.4", "position: !!python/object:os.system 1"))
+    assert "line 6, column 15" in str(caught.value) and "without a tag" in str(caught.value)
+
+
+def test_a_folder_in_place_of_an_override_is_an_error(tmp_path):
+    (tmp_path / "config/overrides/t1.yaml").mkdir(parents=True)
+    with pytest.raises(ConfigErrors) as caught:
+        (tmp_path / "config/layouts").mkdir()
+        (tmp_path / "config/layouts/main.yaml").write_text(LAYOUT)
+        (tmp_path / "config/turnouts.tsv").write_text(TABLE)
+        load_configuration(tmp_path / "config", FORMATS, to_si)
+    assert "config/overrides/t1.yaml, line 1: cannot be read: Is a directory" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        (["demo", "--campaigns", "0"], "--campaigns, number: 0"),
+        (["check", "--raw", "nothere"], "nothere, --raw: no such folder"),
+    ],
+)
+def test_a_wrong_option_is_said(repository, monkeypatch, capsys, command, words):
+    from turnout.cli import main
+
+    monkeypatch.chdir(repository)
+    assert main(command) == 2 and words in capsys.readouterr().err

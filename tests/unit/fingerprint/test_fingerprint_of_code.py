@@ -1,0 +1,104 @@
+"""The fingerprint moves with what is computed, and with nothing else."""
+
+import shutil
+
+import pytest
+
+import turnout.fingerprint as fp
+
+CORE = '''"""Words."""
+from turnout.low import g
+
+
+def f(x):
+    """More words."""
+    return g(x) + 1.0  # why
+'''
+FORMATS = """
+from importlib import import_module
+
+
+def read(name):
+    return import_module(f'turnout.formats.{name}')
+"""
+FILES = {
+    "__init__.py": "",
+    "core.py": CORE,
+    "low.py": "def g(x):\n    return 2.0 * x\n",
+    "other.py": "def h(x):\n    return x\n",
+    "late.py": "def f(x):\n    from turnout.low import g\n    return g(x)\n",
+    "formats/__init__.py": FORMATS,
+    "formats/one.py": "A = 1\n",
+    "table/__init__.py": "from pathlib import Path\n",
+    "table/columns.csv": "a,b\n",
+}
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    root = tmp_path / "turnout"
+    for name, text in FILES.items():
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        (root / name).write_text(text)
+    monkeypatch.setattr(fp, "ROOT", root)
+    fp.forget()
+    yield root
+    fp.forget()
+
+
+def moved(package, module, name, old, new):
+    before = fp.fingerprint(module)
+    text = (package / name).read_text()
+    assert old in text
+    (package / name).write_text(text.replace(old, new))
+    fp.forget()
+    return fp.fingerprint(module) != before
+
+
+@pytest.mark.parametrize(
+    "module, name, old, new",
+    [
+        ("turnout.core", "core.py", "1.0", "1.5"),
+        ("turnout.core", "low.py", "2.0", "3.0"),
+        ("turnout.late", "low.py", "2.0", "3.0"),
+        ("turnout.formats", "formats/one.py", "A = 1", "A = 2"),
+        ("turnout.table", "table/columns.csv", "a,b", "a,c"),
+        ("turnout.core", "core.py", "def f(x)", "def f(x, y=0)"),
+    ],
+)
+def test_it_moves(package, module, name, old, new):
+    assert moved(package, module, name, old, new)
+
+
+@pytest.mark.parametrize(
+    "module, name, old, new",
+    [
+        ("turnout.core", "core.py", "# why", "# because"),
+        ("turnout.core", "core.py", "More words.", "Fewer."),
+        ("turnout.core", "core.py", "    return", "\n    return"),
+        ("turnout.core", "other.py", "return x", "return -x"),
+        ("turnout.low", "core.py", "1.0", "1.5"),
+    ],
+)
+def test_it_stays(package, module, name, old, new):
+    assert not moved(package, module, name, old, new)
+
+
+def test_an_unknown_module_is_said(package):
+    with pytest.raises(ValueError, match=r"no module turnout\.nothing"):
+        fp.fingerprint("turnout.nothing")
+
+
+def test_it_is_the_same_wherever_the_package_lies(package, tmp_path, monkeypatch):
+    before = fp.fingerprint("turnout.core")
+    shutil.move(package, tmp_path / "elsewhere")
+    monkeypatch.setattr(fp, "ROOT", tmp_path / "elsewhere")
+    fp.forget()
+    assert fp.fingerprint("turnout.core") == before
+
+
+def test_the_hammer_chain_stands_on_its_parts():
+    fp.forget()
+    found = fp.closure("turnout.chains.hammer")
+    assert {"turnout.receptance", "turnout.identify", "turnout.readers.uff", "turnout.signal.spectra"} <= found
+    assert not {m for m in found if m.startswith(("turnout.report", "turnout.trend", "turnout.fleet", "turnout.cli"))}

@@ -1,0 +1,40 @@
+"""The unattended run: one at a time, and what a killed one left is cleared."""
+
+import sys
+
+import pytest
+from filelock import FileLock
+
+from turnout.errors import TurnoutError
+from turnout.fleet import nightly as module
+from turnout.fleet.nightly import TOO_LATE, Night, nightly
+
+
+def test_two_at_once_are_one_too_many(tmp_path):
+    with FileLock(tmp_path / ".nightly.lock"), pytest.raises(TurnoutError, match="another nightly run is going on"):
+        nightly([], "profiles/default", work=tmp_path)
+
+
+def test_a_run_that_hangs_is_ended_and_said(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    # the interpreter is asked for "-m snakemake"; this one only sleeps
+    (tmp_path / "snakemake.py").write_text("import time\ntime.sleep(60)\n")
+    monkeypatch.setattr(module.sys, "executable", sys.executable)
+    night = nightly([], "profiles/default", limit=1.0, work=tmp_path / "work")
+    assert night.code == TOO_LATE and "stopped at the time limit" in str(night)
+
+
+def test_remains_of_a_killed_run_are_cleared(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "snakemake.py").write_text("")
+    for name in ("backups", "locks"):
+        (tmp_path / ".snakemake" / name).mkdir(parents=True)
+    assert nightly([], "profiles/default", work=tmp_path / "work").code == 0
+    assert list((tmp_path / ".snakemake").iterdir()) == []
+
+
+def test_it_is_said_in_one_line():
+    said = str(Night(1, 100, 7, 2, 3))
+    assert (
+        said == "failed with exit code 1: 100 units known, 7 processed, 2 of these with rows in quarantine, 3 vanished"
+    )

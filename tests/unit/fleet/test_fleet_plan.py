@@ -1,0 +1,225 @@
+"""Scan and plan: every file is in a unit, reported, or known to be unfinished; a plan changes with its meaning."""
+
+import os
+
+import pytest
+
+from turnout.config import load_configuration
+from turnout.errors import ConfigError
+from turnout.fleet.plan import read_plan, read_problems, write_plans
+from turnout.fleet.scan import scan, unit_id
+from turnout.fleet.shards import shard_names, shard_of
+
+LAYOUT = """\
+sections:
+  A: {panel: CP, track: main, position: 1}
+  AS: {panel: AS, track: main, position: 2}
+hammer:
+  files: "hammer/{campaign}/{section}_{test}.{ext}"
+  force: force
+  response: rail
+  channels:
+    force: {source: 0, quantity: force}
+    rail: {source: 1, quantity: acceleration}
+passages:
+  files: "passages/{time}.{ext}"
+  channels:
+    web: {source: 0, quantity: acceleration, section: A}
+"""
+
+
+@pytest.fixture
+def fleet(tmp_path):
+    (tmp_path / "config/layouts").mkdir(parents=True)
+    (tmp_path / "config/layouts/main.yaml").write_text(LAYOUT)
+    (tmp_path / "config/turnouts.tsv").write_text("turnout\tlayout\nt1\tmain\nt2\tmain\n")
+    for name in (
+        "t1/hammer/2024-05-13/A_1.uff", "t1/hammer/2024-05-13/A_2.uff", "t1/hammer/2024-05-13/AS_1.mat",
+        "t1/hammer/2024-06-13/A_1.uff", "t1/passages/20240513T101500Z.tdms", "t1/campaigns.csv", "t1/README.md",
+        "t2/hammer/2024-05-13/A_1.uff",
+    ):  # fmt: skip
+        add(tmp_path, name, b"campaign,started_at_utc\n" if name.endswith(".csv") else b"x")
+    return tmp_path
+
+
+def add(folder, name, content=b"x"):
+    path = folder / "raw" / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(content)
+
+
+def turnout(fleet, name="t1"):
+    return load_configuration(fleet / "config").turnout(name)
+
+
+def plans(fleet, shards=1, **more):
+    return write_plans(load_configuration(fleet / "config"), fleet / "raw", fleet / "work/plan", shards, **more)
+
+
+def test_files_become_units(fleet):
+    found = scan(turnout(fleet), fleet / "raw")
+    assert {unit_id(u): [os.path.basename(f[0]) for f in u.files] for u in found.units} == {
+        "t1/hammer/A/2024-05-13": ["A_1.uff", "A_2.uff"],
+        "t1/hammer/A/2024-06-13": ["A_1.uff"],
+        "t1/hammer/AS/2024-05-13": ["AS_1.mat"],
+        "t1/passage/20240513T101500Z.tdms": ["20240513T101500Z.tdms"],
+    }
+    assert found.problems == []
+    assert found.units[0].files[0][0] == "t1/hammer/2024-05-13/A_1.uff"
+
+
+@pytest.mark.parametrize(
+    "name, reported",
+    [
+        ("t1/hammer/2024-05-13/B_1.uff", True),
+        ("t1/hammer/13-05-2024/A_1.uff", True),
+        ("t1/hammer/2024-05-13/notes/A_1.uff", True),
+        ("t1/passages/yesterday.tdms", True),
+        ("t1/hammer/2024-05-13/.A_3.uff", False),
+        ("t1/hammer/2024-05-13/A_3.uff.part", False),
+        ("t1/.git/config", False),
+    ],
+)
+def test_a_stranger_is_reported_unless_it_is_unfinished_or_hidden(fleet, name, reported):
+    add(fleet, name)
+    found = scan(turnout(fleet), fleet / "raw")
+    assert [(e.path, e.reason) for e in found.problems] == ([(name, "name_unknown")] if reported else [])
+    assert len(found.units) == 4
+
+
+def test_a_link_out_of_the_raw_root_is_not_followed(fleet, tmp_path):
+    (tmp_path / "secret").mkdir()
+    (tmp_path / "secret/A_9.uff").write_bytes(b"x")
+    (fleet / "raw/t1/hammer/2024-05-13/A_9.uff").symlink_to(tmp_path / "secret/A_9.uff")
+    (fleet / "raw/t1/hammer/2024-07-01").symlink_to(tmp_path / "secret")
+    found = scan(turnout(fleet), fleet / "raw")
+    assert [e.reason for e in found.problems] == ["outside_root"] * 2
+    assert len(found.units) == 4
+
+
+def test_an_empty_folder_is_reported(fleet):
+    (fleet / "raw/t2/hammer/2024-05-13/A_1.uff").unlink()
+    plans(fleet)
+    problems = list(read_problems(fleet / "work/plan/00of01.json"))
+    assert [(t, p["reason"]) for t, p in problems] == [("t2", "nothing_found")]
+
+
+@pytest.mark.parametrize(
+    ("name", "found"),
+    [
+        ("t2/hammer/2024-13-45/A_1.uff", "'2024-13-45' is no day of the calendar"),
+        ("t2/hammer/2023-02-29/A_1.uff", "'2023-02-29' is no day of the calendar"),
+        ("t2/passages/20241345T101500Z.tdms", "'20241345T101500Z' is no time of the calendar"),
+    ],
+)
+def test_an_impossible_date_is_a_named_problem(fleet, name, found):
+    before = scan(turnout(fleet, "t2"), fleet / "raw")
+    add(fleet, name)
+    after = scan(turnout(fleet, "t2"), fleet / "raw")
+    assert after.units == before.units
+    (problem,) = after.problems
+    assert (problem.path, problem.reason) == (name, "name_unknown") and found in str(problem)
+
+
+def test_plan_says_what_is_new_and_what_changed(fleet, capsys, monkeypatch):
+    from turnout.cli import main
+    from turnout.fingerprint import fingerprint
+    from turnout.fleet.keys import stamp_of
+    from turnout.fleet.state import Known, State
+
+    plans(fleet, shards=3)
+    folders = ["--configuration", "config", "--raw", "raw", "--work", "elsewhere", "--shards", "3"]
+    monkeypatch.chdir(fleet)
+    algo = fingerprint("turnout.chains.hammer")
+    for plan in (fleet / "work/plan").glob("*.json"):
+        units = {unit_id(p.unit): Known(stamp_of(p), "", algo, "ok", "b") for p in read_plan(plan)}
+        (fleet / "elsewhere/hammer").mkdir(parents=True, exist_ok=True)
+        State({u: k for u, k in units.items() if "/hammer/" in u}).save(fleet / "elsewhere/hammer" / plan.name)
+
+    def said():
+        assert main(["plan", *folders]) == 0
+        return capsys.readouterr().out
+
+    assert "5 units, 1 never computed, 0 changed" in said()  # the passage
+    add(fleet, "t1/hammer/2024-05-13/A_2.uff", b"another content")
+    assert "changed  t1/hammer/A/2024-05-13" in said()
+    layout = fleet / "config/layouts/main.yaml"
+    layout.write_text(layout.read_text().replace("force: {source: 0", "force: {source: 2"))
+    assert "4 changed since" in said()
+    assert main(["plan", *folders[:2], "--raw", "nothere"]) == 2
+    assert "nothere, --raw: no such folder" in capsys.readouterr().err
+
+
+def test_a_plan_says_the_same_as_the_scan(fleet):
+    plans(fleet)
+    planned = [p.unit for p in read_plan(fleet / "work/plan/00of01.json")]
+    assert planned == [u for t in ("t1", "t2") for u in scan(turnout(fleet, t), fleet / "raw").units]
+
+
+def test_a_plan_is_written_only_when_its_content_changes(fleet):
+    path = fleet / "work/plan/00of01.json"
+    plans(fleet)
+    os.utime(path, (1, 1))
+    plans(fleet)
+    assert path.stat().st_mtime == 1
+    add(fleet, "t2/hammer/2024-05-13/A_2.uff")
+    plans(fleet)
+    assert path.stat().st_mtime > 1
+    assert str(fleet) not in path.read_text()
+
+
+def test_only_the_shards_of_the_asked_turnouts_are_scanned(fleet):
+    names = plans(fleet, shards=64, turnouts=["t2"])
+    assert names == [shard_of("t2", 64)]
+    assert sorted(p.name for p in (fleet / "work/plan").iterdir()) == [f"{names[0]}.json"]
+
+
+def test_every_turnout_is_in_one_shard():
+    names = shard_names(7)
+    shares = [sum(shard_of(f"T{i:05d}", 7) == name for i in range(3500)) for name in names]
+    assert sum(shares) == 3500
+    # crc32 spreads ids evenly: 500 +- 5 standard deviations of a binomial with p = 1/7
+    assert max(abs(s - 500) for s in shares) < 5 * (3500 / 7 * 6 / 7) ** 0.5
+
+
+def test_a_corrected_campaign_changes_its_units_only(fleet):
+    header = "campaign,started_at_utc,rail_temperature_c\n"
+    notes = fleet / "raw/t1/campaigns.csv"
+    notes.write_text(header + "2024-05-13,2024-05-13T09:00,\n2024-06-13,2024-06-13T09:00,15\n")
+    plans(fleet)
+    before = {unit_id(p.unit): p.note for p in read_plan(fleet / "work/plan/00of01.json")}
+    notes.write_text(header + "2024-05-13,2024-05-13T09:00,12\n2024-06-13,2024-06-13T09:00,15\n")
+    plans(fleet)
+    after = {unit_id(p.unit): p.note for p in read_plan(fleet / "work/plan/00of01.json")}
+    assert {u for u in before if before[u] != after[u]} == {"t1/hammer/A/2024-05-13", "t1/hammer/AS/2024-05-13"}
+
+
+def test_a_corrected_train_changes_the_passages_of_its_hour_only(fleet):
+    add(fleet, "t1/passages/20240513T201500Z.tdms")
+    trains = fleet / "raw/t1/trains.csv"
+    trains.write_text("passed_at_utc,type\n2024-05-13T10:16:00,IC3\n2024-05-13T20:16:00,IC3\n")
+    plans(fleet)
+    before = {unit_id(p.unit): p.note for p in read_plan(fleet / "work/plan/00of01.json")}
+    trains.write_text("passed_at_utc,type\n2024-05-13T10:16:00,freight\n2024-05-13T20:16:00,IC3\n")
+    plans(fleet)
+    after = {unit_id(p.unit): p.note for p in read_plan(fleet / "work/plan/00of01.json")}
+    assert {u for u in before if before[u] != after[u]} == {"t1/passage/20240513T101500Z.tdms"}
+
+
+def test_a_lost_disk_is_not_taken_for_tidying_up(fleet):
+    for k in range(40):
+        add(fleet, f"t2/passages/202405{1 + k % 28:02d}T{k // 28:02d}0000Z.wav")
+    plans(fleet)
+    text = (fleet / "work/plan/00of01.json").read_text()
+    (fleet / "raw/t2").rename(fleet / "raw/away")
+    with pytest.raises(ConfigError, match=r"41 known files are gone, first t2/hammer"):
+        plans(fleet)
+    assert (fleet / "work/plan/00of01.json").read_text() == text
+    plans(fleet, accept_vanished=True)
+    assert (fleet / "work/plan/00of01.json").read_text() != text
+
+
+def test_a_few_files_may_go(fleet):
+    plans(fleet)
+    (fleet / "raw/t1/hammer/2024-05-13/A_1.uff").unlink()
+    plans(fleet)

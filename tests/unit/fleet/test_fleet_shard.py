@@ -1,0 +1,290 @@
+"""The shard runner: what is computed, what is kept, what a kill or a fault leaves."""
+
+import errno
+import json
+import os
+
+import pytest
+
+from turnout.config import load_configuration
+from turnout.errors import ReadError, TurnoutError
+from turnout.fleet.batches import read_batch, read_column, read_results
+from turnout.fleet.plan import write_plans
+from turnout.fleet.shard import Stage, run_shard
+from turnout.fleet.state import State, batch_paths, load_state
+from turnout.fleet.verdict import judge, verdict
+
+LAYOUT = """\
+sections: {A: {panel: CP, track: main, position: 1}}
+hammer:
+  files: "{campaign}/{section}_{test}.txt"
+  force: force
+  response: rail
+  channels:
+    force: {source: 0, quantity: force}
+    rail: {source: 1, quantity: acceleration}
+"""
+CALLS = []
+
+
+def length(unit, turnout, raw_root, algo=""):
+    """Rows from the length of each file; what a file says may go wrong."""
+    CALLS.append(f"{unit.turnout}/{unit.label}")
+    rows = {"recordings": [], "quarantine": []}
+    for path, *_ in unit.files:
+        text = (raw_root / path).read_text()
+        if text == "damaged":
+            raise ReadError(path, "byte 0", "damage", "Copy it again", reason="unreadable")
+        if text == "bug":
+            raise ZeroDivisionError("in the toy")
+        if text == "full":
+            raise OSError(errno.ENOSPC, "No space left on device")
+        rows["recordings"].append({"path": path, "n_samples": len(text), "kind": "hammer"})
+    return rows
+
+
+class Fleet:
+    """One shard with turnouts t0, t1, ... of one section."""
+
+    def __init__(self, folder, n_turnout=3, settings=""):
+        self.folder, self.raw = folder, folder / "raw"
+        (folder / "config/layouts").mkdir(parents=True)
+        (folder / "config/layouts/main.yaml").write_text(LAYOUT)
+        (folder / "config/config.yaml").write_text(settings)
+        lines = ["turnout\tlayout\tline", *(f"t{i}\tmain\tline {i % 2}" for i in range(n_turnout))]
+        (folder / "config/turnouts.tsv").write_text("\n".join(lines) + "\n")
+        for i in range(n_turnout):
+            self.put(f"t{i}/2024-05-13/A_1.txt", f"turnout {i}")
+        self.state = folder / "work/hammer/00of01.json"
+        self.plan = folder / "work/plan/00of01.json"
+
+    def put(self, name, text):
+        path = self.raw / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+
+    @property
+    def configuration(self):
+        return load_configuration(self.folder / "config")
+
+    def run(self, algo="1", plan=True, stage=None, **more):
+        CALLS.clear()
+        if plan:
+            write_plans(self.configuration, self.raw, self.plan.parent, 1)
+        stage = stage or Stage("hammer", length, algo)
+        return run_shard(self.plan, self.state, stage, self.configuration, self.raw, **more)
+
+    def rows(self):
+        """{unit: tables} as the registry would see it: the later batch counts."""
+        return {r.unit: r.tables for path in batch_paths([self.state]) for r in read_results(path)}
+
+    def lengths(self):
+        return {u: [r["n_samples"] for r in t.get("recordings", [])] for u, t in self.rows().items()}
+
+
+@pytest.fixture
+def fleet(tmp_path):
+    return Fleet(tmp_path)
+
+
+def test_first_run_then_nothing_then_one(fleet):
+    assert str(fleet.run()) == "hammer 00of01: 3 known, 3 processed, 0 quarantined"
+    assert fleet.lengths() == {f"t{i}/hammer/A/2024-05-13": [9] for i in range(3)}
+    assert fleet.run().processed == 0 and CALLS == []
+    fleet.put("t1/2024-05-13/A_2.txt", "new")
+    assert fleet.run().processed == 1 and CALLS == ["t1/A/2024-05-13"]
+    assert fleet.lengths()["t1/hammer/A/2024-05-13"] == [9, 3]
+
+
+def test_touched_is_refreshed_and_rewritten_is_computed(fleet):
+    fleet.run()
+    path = fleet.raw / "t0/2024-05-13/A_1.txt"
+    os.utime(path, (1, 1))
+    assert fleet.run().processed == 0
+    path.write_text("TURNOUT 0")  # as long as before
+    os.utime(path, (2, 2))
+    assert fleet.run().processed == 1
+
+
+def test_new_code_and_new_configuration_compute_again(fleet):
+    fleet.run()
+    assert fleet.run(algo="2").processed == 3
+    layout = fleet.folder / "config/layouts/main.yaml"
+    layout.write_text(layout.read_text().replace("position: 1", "position: 2"))
+    assert fleet.run(algo="2").processed == 3
+
+
+def test_a_configuration_newer_than_the_plan_waits(fleet):
+    write_plans(fleet.configuration, fleet.raw, fleet.plan.parent, 1)
+    layout = fleet.folder / "config/layouts/main.yaml"
+    layout.write_text(layout.read_text().replace("position: 1", "position: 2"))
+    summary = fleet.run(plan=False)
+    assert (summary.processed, summary.stale) == (0, 3)
+    assert fleet.run().processed == 3
+
+
+def test_damage_and_faults_are_rows_and_leave_when_repaired(fleet):
+    fleet.put("t0/2024-05-13/A_1.txt", "damaged")
+    fleet.put("t1/2024-05-13/A_1.txt", "bug")
+    summary = fleet.run()
+    assert (summary.processed, summary.quarantined, summary.internal_errors) == (3, 2, 1)
+    rows = fleet.rows()
+    damaged, fault = (rows[f"t{i}/hammer/A/2024-05-13"]["quarantine"][0] for i in (0, 1))
+    assert (damaged["reason_code"], damaged["place"], damaged["found"]) == ("unreadable", "byte 0", "damage")
+    assert (fault["reason_code"], fault["found"]) == ("internal_error", "ZeroDivisionError: in the toy")
+    assert "length" in fault["place"] and str(fleet.folder) not in json.dumps(fault)
+    assert fleet.run().processed == 0
+    fleet.put("t0/2024-05-13/A_1.txt", "sound again")
+    fleet.run()
+    assert fleet.rows()["t0/hammer/A/2024-05-13"]["quarantine"] == []
+
+
+def test_strict_raises(fleet):
+    fleet.put("t1/2024-05-13/A_1.txt", "bug")
+    with pytest.raises(ZeroDivisionError):
+        fleet.run(strict=True)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_full_disk_fails_the_job_and_keeps_what_was_done(tmp_path, threads):
+    fleet = Fleet(tmp_path, 4, "fleet: {checkpoint_units: 1}\n")
+    fleet.put("t2/2024-05-13/A_1.txt", "full")
+    with pytest.raises(OSError, match="No space left"):
+        fleet.run(threads=threads)
+    fleet.put("t2/2024-05-13/A_1.txt", "room")
+    assert set(fleet.lengths()) == {"t0/hammer/A/2024-05-13", "t1/hammer/A/2024-05-13"}
+    assert fleet.run().processed == 2
+
+
+def test_a_full_disk_while_writing_loses_nothing(fleet, monkeypatch):
+    fleet.run()
+    before = fleet.state.read_bytes()
+    fleet.put("t0/2024-05-13/A_2.txt", "new")
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("turnout.fleet.atomic.os.fsync", full)
+    with pytest.raises(OSError, match="No space left"):
+        fleet.run()
+    monkeypatch.undo()
+    assert fleet.state.read_bytes() == before
+    assert not list(fleet.state.parent.rglob("*.tmp"))
+    assert fleet.run().processed == 1
+
+
+def test_results_do_not_depend_on_checkpoints_or_processes(tmp_path):
+    found = []
+    for k, (settings, threads) in enumerate((("", 1), ("fleet: {checkpoint_units: 2}\n", 1), ("", 3))):
+        fleet = Fleet(tmp_path / str(k), 7, settings)
+        fleet.run(threads=threads)
+        found.append(sorted((r.unit, r.key, r.status, json.dumps(r.tables)) for p in batch_paths([fleet.state])
+                            for r in read_results(p)))  # fmt: skip
+        assert len(load_state(fleet.state).batches) == (4 if settings else 1)
+    assert found[0] == found[1] == found[2]
+
+
+def test_a_kill_between_batch_and_state_leaves_an_orphan_that_is_cleared(fleet, monkeypatch):
+    fleet.run()
+    fleet.put("t0/2024-05-13/A_2.txt", "new")
+    monkeypatch.setattr(State, "save", lambda self, path: os._exit(9))
+    child = os.fork()
+    if child == 0:
+        fleet.run()
+    os.waitpid(child, 0)
+    monkeypatch.undo()
+    folder = fleet.state.with_suffix("")
+    assert len(list(folder.glob("batch-*"))) == 2 and len(load_state(fleet.state).batches) == 1
+    assert fleet.run().processed == 1
+    assert {p.name for p in folder.iterdir()} == set(load_state(fleet.state).batches)
+
+
+def test_vanished_units_keep_their_rows_and_open_quarantine_is_withdrawn(fleet):
+    fleet.put("t0/2024-05-13/A_1.txt", "damaged")
+    fleet.run()
+    for i in (0, 1):
+        (fleet.raw / f"t{i}/2024-05-13/A_1.txt").unlink()
+    assert fleet.run().vanished == 2
+    assert fleet.lengths()["t1/hammer/A/2024-05-13"] == [9]
+    assert fleet.rows()["t0/hammer/A/2024-05-13"] == {}
+    fleet.put("t0/2024-05-13/A_1.txt", "damaged")
+    assert fleet.run().quarantined == 1
+
+
+def test_a_file_that_vanishes_during_the_run_is_a_row_or_an_error_of_its_unit_alone(fleet):
+    write_plans(fleet.configuration, fleet.raw, fleet.plan.parent, 1)
+    (fleet.raw / "t0/2024-05-13/A_1.txt").unlink()
+    summary = fleet.run(plan=False)
+    assert (summary.processed, summary.quarantined) == (3, 1)
+
+
+def test_one_turnout_alone(fleet):
+    assert fleet.run(only=["t1"]).processed == 1 and CALLS == ["t1/A/2024-05-13"]
+    assert fleet.run().processed == 2
+
+
+def test_a_context_is_part_of_the_key_and_handed_on(fleet):
+    seen = []
+
+    def compute(unit, turnout, raw_root, algo, context):
+        seen.append((unit.turnout, context))
+        return {}
+
+    tokens = {"t0": "a", "t1": "a", "t2": "a"}
+    stage = Stage("hammer", compute, "1", lambda turnout: (tokens[turnout], turnout.upper()))
+    fleet.run(stage=stage)
+    assert seen == [("t0", "T0"), ("t1", "T1"), ("t2", "T2")]
+    tokens["t1"] = "b"
+    assert fleet.run(stage=stage).processed == 1
+
+
+def test_a_row_that_cannot_be_written_is_a_fault_of_its_unit(fleet):
+    def compute(unit, turnout, raw_root, algo):
+        return {"recordings": [{"path": object()}]} if unit.turnout == "t1" else {}
+
+    summary = fleet.run(stage=Stage("hammer", compute, "1"))
+    assert (summary.processed, summary.internal_errors) == (3, 1)
+    assert fleet.rows()["t1/hammer/A/2024-05-13"]["quarantine"][0]["found"].startswith(
+        "TypeError: a row holds a object"
+    )
+
+
+def test_a_spoilt_state_file_is_said(fleet):
+    fleet.run()
+    fleet.state.write_text("{")
+    with pytest.raises(TurnoutError, match="not a state file"):
+        fleet.run()
+
+
+def test_a_batch_reads_as_it_was_written(fleet):
+    fleet.run()
+    (path,) = batch_paths([fleet.state])
+    assert [(u, t, len(r)) for u, t, r in read_batch(path)] == [
+        (f"t{i}/hammer/A/2024-05-13", "recordings", 1) for i in range(3)
+    ]
+    assert read_column(path, "turnout", "status") == [("t0", "ok"), ("t1", "ok"), ("t2", "ok")]
+
+
+def test_the_verdict_judges_what_is_new_over_the_fleet_and_each_line(tmp_path):
+    fleet = Fleet(tmp_path, 10, "fleet: {quarantine_units: 5, quarantine_share: 0.3}\n")
+    fleet.run()
+    output = tmp_path / "work/verdict.json"
+    assert verdict([fleet.state], fleet.configuration, output).units == 10
+    for i in (1, 3):  # both of line 1
+        fleet.put(f"t{i}/2024-05-13/A_1.txt", "damaged")
+    fleet.run()
+    judged = json.loads(output.read_text())["judged"]
+    found = judge([fleet.state], fleet.configuration, judged)
+    assert (found.units, found.quarantined, found.complaints) == (2, 2, ())  # too few to judge
+    for i in (5, 7, 9):
+        fleet.put(f"t{i}/2024-05-13/A_1.txt", "good again")
+    fleet.run()
+    with pytest.raises(TurnoutError, match="2 of 5 new units of the fleet have rows in quarantine, 40 %, above"):
+        verdict([fleet.state], fleet.configuration, output)
+    everything = judge([fleet.state], fleet.configuration)
+    assert everything.complaints == (
+        "2 of 5 new units of line 'line 1' have rows in quarantine, 40 %, above the limit of 30 %",
+    )
+    fleet.put("t3/2024-05-13/A_1.txt", "repaired")
+    fleet.run()
+    assert verdict([fleet.state], fleet.configuration, output).quarantined == 1

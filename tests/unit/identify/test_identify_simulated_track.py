@@ -1,0 +1,79 @@
+"""Decays of a simulated track: a rail on many supports, with waves beside the two resonances that are looked for."""
+
+import numpy as np
+import pytest
+from scipy.signal import fftconvolve
+
+from turnout.config.settings.identify import IdentifySettings
+from turnout.demo.hammer import N_SAMPLE, RATE, pulse
+from turnout.demo.simulated_response import simulated_response
+from turnout.identify import identify
+
+SETTINGS = IdentifySettings(null_draws=10)
+START = 100
+
+
+def test_of_ten_blows(section, seed, ballast=1.0, railpad=1.0):
+    """Decays of ten blows with noise of 1 % of the peak, from the end of contact on."""
+    rng = np.random.default_rng(seed)
+    response = simulated_response(section, ballast, railpad)
+    decays = []
+    for _ in range(10):
+        contact = 1.5e-3 * rng.normal(1.0, 0.08)
+        force = pulse(8e3 * rng.normal(1.0, 0.1), contact, (START + rng.uniform()) / RATE)
+        acceleration = fftconvolve(force, response(rng))[:N_SAMPLE] / RATE
+        acceleration += 0.01 * np.abs(acceleration).max() * rng.standard_normal(N_SAMPLE)
+        first = START + int(np.ceil(contact * RATE)) + 5
+        decays.append(acceleration[first : first + 600])
+    return decays
+
+
+test_of_ten_blows.__test__ = False
+
+
+def highest_peak(section, low, high):
+    """Frequency [Hz] of the highest accelerance in a band, from an impulse response of many samples."""
+    response = simulated_response(section, 1.0, 1.0)(_Still())
+    accelerance = np.abs(np.fft.rfft(response, 8 * N_SAMPLE))
+    frequency = np.fft.rfftfreq(8 * N_SAMPLE, 1.0 / RATE)
+    inside = (frequency > low) & (frequency < high)
+    return frequency[inside][np.argmax(accelerance[inside])]
+
+
+class _Still:
+    """A generator that draws no spread."""
+
+    def standard_normal(self):
+        return 0.0
+
+
+@pytest.mark.parametrize("section", ["CLP", "A7", "A9"])
+def test_repeated_tests_find_the_same_modes_or_say_that_they_cannot(section):
+    """Neither drift nor weak modes take the place of the ballast mode in one test and not in the next."""
+    models = [identify(test_of_ten_blows(section, [3, k]), RATE, SETTINGS) for k in range(3)]
+    assert all(m.diagnostics["drift_degree"] < 0 for m in models)
+    for band in ("ballast", "railpad"):
+        found = [m.mode(band) for m in models if m.mode(band) is not None]
+        frequency = np.array([mode.frequency for mode in found])
+        # Another mode would be off by 30 % or more; ten blows know the ballast mode to at most 5 %.
+        assert np.ptp(frequency) < 0.15 * frequency.mean()
+        assert len(found) >= 2
+        for model in models:
+            doubts = [m["reason"] for m in model.rejected_modes if "uncertain" in m["reason"]]
+            assert model.mode(band) is not None or doubts
+
+
+@pytest.mark.parametrize("section", ["A9"])
+def test_the_railpad_mode_is_the_highest_peak_of_its_band(section):
+    """Damping of 5 % moves a peak off its resonance by less than 1 %, the flank of a neighbour by about as much."""
+    mode = identify(test_of_ten_blows(section, 5), RATE, SETTINGS).mode("railpad")
+    assert mode.frequency == pytest.approx(highest_peak(section, 300.0, 800.0), rel=0.02)
+
+
+def test_a_stiffer_ballast_moves_the_ballast_mode_and_not_the_railpad_mode():
+    """A factor of 1.3 on one of two springs in parallel with the rail: at most the root of it, and not nothing."""
+    before = identify(test_of_ten_blows("A8", 7), RATE, SETTINGS)
+    after = identify(test_of_ten_blows("A8", 8, ballast=1.3), RATE, SETTINGS)
+    ratio = after.mode("ballast").frequency / before.mode("ballast").frequency
+    assert 1.04 < ratio < np.sqrt(1.3) + 0.01
+    assert after.mode("railpad").frequency == pytest.approx(before.mode("railpad").frequency, rel=0.02)

@@ -1,0 +1,75 @@
+"""A turnout with hammer tests alone: what can still be said, and what is refused."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from turnout import physics
+from turnout.errors import SimulationError
+from turnout.mismatch import diagnose
+from turnout.mismatch.finding import finding_row
+from turnout.mismatch.track import Campaign, TrackCase
+from turnout.mismatch.track.planned import measured_campaign, small_plan
+from turnout.simulate import uniform_track
+from turnout.simulate.turnout_track import TurnoutTrack
+
+IDENTITY = {"finding_id": "f", "turnout_id": "t", "section_id": None, "found_at_utc": None, "result_id": "r"}
+
+
+@pytest.fixture(scope="module")
+def plan():
+    small = small_plan((5.0, 25.0), passages=False, blows=(21.6, 24.0))
+    turnout = TurnoutTrack(uniform_track(36.0, start=6.0), {"main": ((),)})
+    return replace(small, turnout=turnout, n_blows=3, sensors=small.sensors[:3])
+
+
+def found_in(plan, *terms, seed=3):
+    case = TrackCase(measured_campaign(plan, terms, seed))
+    return case, diagnose(case)
+
+
+@pytest.mark.slow
+def test_nothing_missing_nothing_said(plan):
+    _, found = found_in(plan)
+    assert found.verdict.answer == "none"
+    assert found.verdict.probability > 0.5
+    assert max(found.base.level.values()) < 1.6
+
+
+@pytest.mark.slow
+def test_warm_pads_are_named_from_two_temperatures(plan):
+    _, found = found_in(plan, physics.PadTemperature(0.012))
+    assert found.names[:1] == ("pad_temperature",)
+    assert found.fit.psi[0] == pytest.approx(0.012, abs=0.001)
+    row = finding_row(found, IDENTITY)
+    assert row["term"] == "pad_temperature" and row["position_m"] is None and row["next_measurement"]
+    assert "per kelvin" in row["sentence"]
+    (told,) = json.loads(row["parameters_json"])
+    # the row carries the fit's value, rounded to what its standard error is worth
+    assert told["value"] == pytest.approx(found.fit.psi[0], abs=told["se"])
+
+
+def test_nothing_to_diagnose_is_said():
+    with pytest.raises(SimulationError, match="neither a hammer test nor a passage"):
+        Campaign(TurnoutTrack(uniform_track(12.0)), ())
+
+
+def test_a_reserved_recording_that_is_not_there_is_named(plan):
+    campaign = measured_campaign(replace(plan, blows=plan.blows[:1]), seed=1)
+    with pytest.raises(SimulationError, match="light 9"):
+        replace(campaign, reserved=("light 9",))
+    with pytest.raises(SimulationError, match="stands for two recordings"):
+        replace(campaign, hammer=campaign.hammer * 2)
+    with pytest.raises(SimulationError, match="nothing is left to fit"):
+        TrackCase(replace(campaign, reserved=(campaign.hammer[0].name,)))
+
+
+def test_channels_without_blows_are_left_out_and_said(plan):
+    campaign = measured_campaign(replace(plan, blows=plan.blows[:2]), seed=1)
+    silent = replace(campaign.hammer[0], recordings=campaign.hammer[0].recordings[:1])
+    case = TrackCase(replace(campaign, hammer=(silent, campaign.hammer[1])))
+    assert any("blows 1" in note and "sound blows" in note for note in case.notes)
+    assert {o.name.split(":")[0] for o in case.observations} == {"blows 2"}
+    with pytest.raises(SimulationError, match="nothing to diagnose"):
+        TrackCase(replace(campaign, hammer=(silent,)))

@@ -1,0 +1,47 @@
+"""What can be told apart is decided by the data, and known before they are taken."""
+
+import numpy as np
+import pytest
+
+from turnout.mismatch.distinguish import distinguishability
+from turnout.mismatch.track.planned import small_plan
+from turnout.mismatch.track.planned_case import PlannedCase
+
+FAMILIES = ("pad_temperature", "zener_pad", "local_ballast", "local_pad", "mount_resonance")
+
+
+def of(plan, families=FAMILIES):
+    return distinguishability(PlannedCase(plan, families=families))
+
+
+@pytest.fixture(scope="module")
+def one_warm_day():
+    return of(small_plan((30.0,), passages=False))
+
+
+def test_at_one_temperature_soft_pads_may_be_warm_pads(one_warm_day):
+    """3 nats at one temperature, thousands at two: at one, the common pad stiffness takes it all."""
+    two = of(small_plan((5.0, 30.0), passages=False))
+    assert one_warm_day.seen[one_warm_day.names.index("pad_temperature")] < 5.0
+    assert "none" in one_warm_day.confused("pad_temperature")
+    assert two.seen[two.names.index("pad_temperature")] > 1000.0 and two.confused("pad_temperature") == []
+
+
+def test_an_effect_explains_itself_and_no_explanation_beats_it(one_warm_day):
+    assert np.all(np.diag(one_warm_day.lost) == 0.0)
+    assert np.all(one_warm_day.lost <= one_warm_day.seen[:, None] + 1e-6 * one_warm_day.seen.max())
+
+
+@pytest.mark.slow
+def test_passages_below_160_hz_are_blind_to_frequency_dependent_pads_and_blows_are_not(one_warm_day):
+    from dataclasses import replace
+
+    plan = small_plan((15.0,), speeds=(40.0,))
+    rolling = of(replace(plan, blows=()), (*FAMILIES, "surface_dip"))
+    assert "none" in rolling.confused("zener_pad")
+    assert one_warm_day.seen[one_warm_day.names.index("zener_pad")] > 1000.0
+    ratio = {n: s for n, s in zip(rolling.names, rolling.seen)}
+    blows = {n: s for n, s in zip(one_warm_day.names, one_warm_day.seen)}
+    # 5 nats of expected evidence are what a name needs
+    assert ratio["mount_resonance"] < 5.0 < blows["mount_resonance"]
+    assert ratio["surface_dip"] > 1000.0 and "surface_dip" not in blows  # a hammer does not roll over a dip

@@ -1,0 +1,160 @@
+"""The whole passage chain: a file on disk in, rows of the registry out."""
+
+import csv
+from dataclasses import replace
+from datetime import datetime
+
+import numpy as np
+import pytest
+from benchmarks.passage_truth import IC3, PATTERNS, paper_model, rolling, struck_train
+
+from turnout.chains.passage import PassageContext, SectionModel, passage_unit
+from turnout.config import load_configuration, with_raw
+from turnout.fleet.scan import scan
+from turnout.readers.writing import write
+from turnout.records import Channel
+
+PLACES = {"OT": -12.0, "SP": 3.6, "CLP": 13.8, "A7": 24.6, "A8": 26.4, "A9": 28.2, "ASM": 36.0, "ASD": 36.0}
+LOCATIONS = dict(zip(PLACES, ("OT", "SP", "CLP", "CP A7", "CP A8", "CP A9", "AS main", "AS diverging")))
+DIVERGING = ("A9", "ASD")
+
+
+@pytest.fixture(autouse=True)
+def in_repository(repository, monkeypatch):
+    monkeypatch.chdir(repository)
+
+
+def lay_out(raw, recording, name="20240513T100000Z", trains=""):
+    folder = raw / "tommerup_s1" / "passages"
+    folder.mkdir(parents=True, exist_ok=True)
+    write([recording], folder / f"{name}.h5", "hdf5")
+    if trains:
+        (raw / "tommerup_s1" / "trains.csv").write_text(trains)
+    turnout = with_raw(load_configuration("config").turnout("tommerup_s1"), raw)
+    return scan(turnout, raw).units[0], turnout
+
+
+def on_main(seed=1, speed=44.4):
+    """An IC3 on the main track as the paper's models answer; the diverging sensors hear nothing."""
+    rng = np.random.default_rng(seed)
+    recording, times = struck_train(rng, LOCATIONS.values(), list(PLACES.values()), speed=speed)
+    samples = recording.samples.copy()
+    for i, name in enumerate(PLACES):
+        if name in DIVERGING:
+            samples[i] = 0.003 * rng.standard_normal(samples.shape[1])
+    channels = tuple(Channel(name, "acceleration", x) for name, x in PLACES.items())
+    started = datetime(2024, 5, 13, 10, 0, 0)
+    return replace(recording, samples=samples, channels=channels, started_at=started), times
+
+
+def context(names=("A7",)):
+    models = {
+        name: (SectionModel(f"model-{name}", datetime(2024, 1, 1), paper_model(LOCATIONS[name])),) for name in names
+    }
+    return PassageContext(models, PATTERNS)
+
+
+def allowed(repository):
+    with open(repository / "src/turnout/registry/columns.csv", encoding="utf-8") as file:
+        return {(r["table"], r["column"]): r for r in csv.DictReader(file)}
+
+
+def test_rows_of_a_passage_follow_the_columns_and_tell_the_truth(tmp_path, repository):
+    recording, _ = on_main()
+    unit, turnout = lay_out(tmp_path, recording)
+    rows = passage_unit(unit, turnout, tmp_path, context(PLACES))
+    columns = allowed(repository)
+    for table, made in rows.items():
+        required = {c for (t, c), r in columns.items() if t == table and r["required"] == "yes"}
+        for row in made:
+            assert not set(row) - {c for t, c in columns if t == table}
+            assert required - {"run_id", "result_id"} <= {k for k, v in row.items() if v is not None}
+            for name, value in row.items():
+                choices = columns[table, name]["allowed"]
+                assert not choices or value is None or value in choices.split("|"), (table, name, value)
+    passage = rows["passages"][0]
+    assert (passage["status"], passage["n_axles"], passage["train_type"]) == ("accepted", 8, "IC3")
+    assert (passage["direction"], passage["track"]) == ("facing", "main")
+    assert passage["speed_kmh"] == pytest.approx(3.6 * 44.4, rel=3e-3)
+    assert passage["passed_at_utc"] == datetime(2024, 5, 13, 10, 0, 1, 270000).replace(
+        microsecond=passage["passed_at_utc"].microsecond
+    )
+    fits = {f["channel"]: f for f in rows["passage_fits"]}
+    assert set(fits) == set(PLACES) - set(DIVERGING)
+    assert all(f["status"] == "accepted" for f in fits.values())
+    assert all(f["fit_pct"] > 95 for f in fits.values())
+    assert rows["quarantine"] == []
+
+
+def test_the_same_file_gives_the_same_rows(tmp_path):
+    recording, _ = on_main()
+    unit, turnout = lay_out(tmp_path, recording)
+    first, second = (passage_unit(unit, turnout, tmp_path, context()) for _ in range(2))
+    assert repr(first) == repr(second)
+
+
+def test_the_model_is_the_latest_before_the_passage(tmp_path):
+    recording, _ = on_main()
+    unit, turnout = lay_out(tmp_path, recording)
+    old, new, later = (
+        SectionModel(name, datetime(year, 1, 1), paper_model("CP A7"))
+        for name, year in (("old", 2023), ("new", 2024), ("later", 2025))
+    )
+    rows = passage_unit(unit, turnout, tmp_path, PassageContext({"A7": (old, new, later)}, PATTERNS))
+    assert [f["model_id"] for f in rows["passage_fits"]] == ["new"]
+    rows = passage_unit(unit, turnout, tmp_path, PassageContext({"A7": (later,)}, PATTERNS))
+    assert [f["model_id"] for f in rows["passage_fits"]] == ["later"]
+
+
+def test_train_data_stand_beside_the_recording_and_differences_are_said(tmp_path):
+    recording, _ = on_main()
+    trains = (
+        "passed_at_utc,train_type,speed_kmh,axle_load_t,track,n_axles\n"
+        "2024-05-13T10:00:20Z,IC3,140,12.1,main,8\n2024-05-13T10:00:25Z,freight,80,,main,60\n"
+    )
+    unit, turnout = lay_out(tmp_path, recording, trains=trains)
+    row = passage_unit(unit, turnout, tmp_path, context())["passages"][0]
+    assert row["speed_source"] == "both" and row["speed_listed_kmh"] == 140
+    assert "km/h here, 140 in the train data" in row["detail"]
+    assert row["train_type_source"] == "both" and row["axle_load_source"] == "timetable"
+    assert row["axle_load_t"] == 12.1
+
+
+def test_a_file_without_a_train_is_in_quarantine_and_has_a_rejected_passage(tmp_path):
+    recording, _ = on_main()
+    noise = np.random.default_rng(2).standard_normal(recording.samples.shape)
+    unit, turnout = lay_out(tmp_path, replace(recording, samples=noise))
+    rows = passage_unit(unit, turnout, tmp_path, context())
+    assert rows["passages"][0]["status"] == "rejected" and rows["passages"][0]["reason"] == "no_train"
+    assert [q["reason_code"] for q in rows["quarantine"]] == ["no_train"]
+    assert rows["passage_fits"] == []
+
+
+def test_a_clipped_channel_is_quarantined_by_name_and_the_others_are_fitted(tmp_path):
+    recording, _ = on_main()
+    samples = recording.samples.copy()
+    samples[3] = np.clip(samples[3], -1.0, 1.0)
+    unit, turnout = lay_out(tmp_path, replace(recording, samples=samples))
+    rows = passage_unit(unit, turnout, tmp_path, context(("A7", "SP")))
+    assert [(q["reason_code"], q["place"]) for q in rows["quarantine"]] == [("clipped", "record 0, A7")]
+    fits = {f["channel"]: f["status"] for f in rows["passage_fits"]}
+    assert fits["A7"] == "rejected" and fits["SP"] == "accepted"
+    assert rows["passages"][0]["status"] == "partly"
+
+
+def test_a_rolling_train_is_no_impulse_and_its_scores_are_still_told(tmp_path):
+    rng = np.random.default_rng(3)
+    recording = rolling(rng, IC3, 40.0, list(PLACES.values()))
+    channels = tuple(Channel(name, "acceleration", x) for name, x in PLACES.items())
+    recording = replace(recording, channels=channels, started_at=datetime(2024, 5, 13, 10))
+    unit, turnout = lay_out(tmp_path, recording)
+    rows = passage_unit(unit, turnout, tmp_path, context())
+    assert {f["status"] for f in rows["passage_fits"]} <= {"not_an_impulse", "null_explains"}
+    assert all(f["forecast_null_pct"] is not None for f in rows["passage_fits"])
+
+
+def test_the_time_may_stand_in_the_name_of_the_file(tmp_path):
+    recording, _ = on_main()
+    unit, turnout = lay_out(tmp_path, replace(recording, started_at=None), "20240102T030405Z")
+    row = passage_unit(unit, turnout, tmp_path, context())["passages"][0]
+    assert row["passed_at_utc"].replace(microsecond=0) in (datetime(2024, 1, 2, 3, 4, 6), datetime(2024, 1, 2, 3, 4, 5))

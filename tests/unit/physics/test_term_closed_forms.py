@@ -1,0 +1,214 @@
+"""Each term against a closed form or a published number of its own."""
+
+import numpy as np
+import pytest
+
+from turnout import physics
+from turnout.simulate import car, uniform_track
+from turnout.simulate.frequency import receptance, responses
+from turnout.simulate.matrices import assemble
+from turnout.simulate.sensor import Sensor
+
+TRACK = uniform_track(24.0)
+A = Sensor("A", 12.0)
+F = np.array([30.0, 90.0, 240.0, 600.0])
+
+
+def effect_of_one_link(stiffness, row_a, row_b=None):
+    """Sherman-Morrison: receptance at 12 m after one link of complex stiffness (n,) is added to the base track."""
+    matrices = assemble(TRACK)
+    place, index = 12.0, matrices.index
+    u = responses(matrices, F, [place])[:, 0]
+    reach_u = u[:, index[row_a]] - (u[:, index[row_b]] if row_b else 0.0)
+    own = responses(matrices, F, [row_a])[:, 0]
+    other = responses(matrices, F, [row_b])[:, 0] if row_b else 0.0 * own
+    v = own - other
+    compliance = v[:, index[row_a]] - (v[:, index[row_b]] if row_b else 0.0)
+    base = receptance(matrices, F, place, place)
+    return base - stiffness * reach_u**2 / (1.0 + stiffness * compliance)
+
+
+def with_term(term):
+    return receptance(assemble(TRACK, (term,)), F, 12.0, 12.0)
+
+
+def test_local_ballast_is_a_rank_one_change():
+    omega = 2j * np.pi * F
+    expected = effect_of_one_link(-0.7 * (90e6 + omega * 80e3), ("sleeper", 20))
+    assert np.allclose(with_term(physics.LocalBallast(20, 0.3)), expected, rtol=1e-9)
+
+
+def test_local_pad_is_a_rank_one_change():
+    omega = 2j * np.pi * F
+    expected = effect_of_one_link(2.0 * (300e6 + omega * 30e3), ("rail", 20), ("sleeper", 20))
+    assert np.allclose(with_term(physics.LocalPad(20, 3.0)), expected, rtol=1e-9)
+
+
+def test_a_resonator_on_the_rail_is_den_hartogs_auxiliary_mass():
+    term = physics.AttachedResonator(20, 25.0, 180.0, 0.05)
+    expected = effect_of_one_link(term.dynamic_stiffness(F), ("rail", 20))
+    assert np.allclose(with_term(term), expected, rtol=1e-9)
+
+
+def test_a_zener_pad_on_every_support_is_the_track_with_that_complex_stiffness():
+    term = physics.ZenerPad(0.8)
+    for k, f in enumerate(F):
+        stiffness = term.dynamic_stiffness(TRACK, np.array([f]))[0]
+        same = TRACK.with_(pad_stiffness=stiffness.real, pad_damping=stiffness.imag / (2.0 * np.pi * f))
+        assert np.isclose(with_term(term)[k], receptance(assemble(same), [f], 12.0, 12.0)[0], rtol=1e-9)
+
+
+def test_pads_lose_one_per_cent_a_kelvin():
+    term = physics.PadTemperature(0.01).under({"rail_temperature": 35.0})
+    assert np.allclose(with_term(term), receptance(assemble(TRACK.with_(pad_stiffness=0.8 * 300e6)), F, 12.0, 12.0))
+    assert physics.PadTemperature(0.01).under({}).links(TRACK) == []
+
+
+def test_pads_under_a_train_gain_slope_times_seat_load_and_none_under_a_hammer():
+    loaded = physics.PadPreload(4e3).under({"axle_loads": (100e3, 120e3)})
+    stiff = 300e6 + 4e3 * 0.45 * 55e3
+    assert np.allclose(with_term(loaded), receptance(assemble(TRACK.with_(pad_stiffness=stiff)), F, 12.0, 12.0))
+    assert physics.PadPreload(4e3).under({}).links(TRACK) == []
+
+
+def test_ballast_inertia_is_a_heavier_and_more_damped_sleeper():
+    other = TRACK.with_(sleeper_mass=350.0, ballast_damping=110e3)
+    expected = receptance(assemble(other), F, 12.0, 12.0)
+    assert np.allclose(with_term(physics.BallastInertia(200.0, 30e3)), expected, rtol=1e-9)
+
+
+def test_a_sleeper_mode_far_above_the_band_adds_its_mass():
+    """Below its resonance the modal mass moves with the sleeper: error (f/f0)² with f/f0 = 30/800."""
+    expected = receptance(assemble(TRACK.with_(sleeper_mass=180.0)), F[:1], 12.0, 12.0)
+    assert np.isclose(with_term(physics.SleeperMode(0.2, 800.0))[0], expected[0], rtol=(30.0 / 800.0) ** 2)
+
+
+def test_shear_turns_an_euler_rail_into_timoshenkos_of_the_same_flexibility():
+    rail = TRACK.rail
+    euler = TRACK.with_(rail=type(rail)(rail.bending_stiffness, rail.mass, 1.0, rail.rotary_inertia, 20.0, "euler"))
+    term = physics.RailShear(1e9 / rail.shear_stiffness)
+    expected = receptance(assemble(TRACK), F, 12.0, 12.0)
+    assert np.allclose(receptance(assemble(euler, (term,)), F, 12.0, 12.0), expected, rtol=1e-9)
+
+
+def test_a_stretch_with_four_times_the_stiffness_is_a_softer_spring_by_the_winkler_formula():
+    """Point stiffness of a long beam on springs goes as EI^(1/4) (Hetényi 1946): 4^(1/4) = 1.41 at 1 Hz."""
+    term = physics.RailBending(0.0, 24.0, 4.0)
+    rail = type(TRACK.rail)(6.42e6, 60.21, 1e8, beam="euler")
+    one_layer = uniform_track(24.0, rail=rail, layers=1, pad_stiffness=20e6)
+    h = [abs(receptance(assemble(one_layer, t), [1.0], 12.0, 12.0)[0]) for t in ((), (term,))]
+    assert h[0] / h[1] == pytest.approx(4.0**0.25, rel=0.02)  # discrete supports: 2 %
+
+
+@pytest.mark.parametrize(
+    ("term", "frequency", "expected"),
+    [
+        (physics.SensorGain("A", 1.3), 77.0, 1.3),
+        (physics.MountResonance("A", 1 / 400.0, 12.0), 400.0, -12.0j),  # at resonance -iQ
+        (physics.TimeOffset("A", 1e-3), 250.0, np.exp(-0.5j * np.pi)),  # a quarter period
+        (physics.HighPass("A", 10.0), 10.0, 0.5 + 0.5j),  # 3 dB and 45 degrees ahead
+        (physics.LowPass("A", 1 / 500.0), 500.0, -1j / np.sqrt(2.0)),  # 3 dB and 90 degrees behind
+    ],
+)
+def test_channels_have_the_transfer_of_the_textbook(term, frequency, expected):
+    assert np.isclose(term.transfer(np.array([frequency]))[0], expected, rtol=1e-12)
+    t = np.arange(20000) / 20e3
+    shown = term.channel(np.sin(2.0 * np.pi * frequency * t), 20e3, A)[6000:14000]
+    inside = t[6000:14000]
+    wave = abs(expected) * np.sin(2.0 * np.pi * frequency * inside + np.angle(expected))
+    assert np.max(np.abs(shown - wave)) < 0.02 * abs(expected)  # what has not died out of the start
+    other = np.ones(10)
+    assert term.channel(other, 20e3, Sensor("B", 12.0)) is other
+
+
+def test_a_sine_clipped_at_half_its_peak_keeps_its_fundamental():
+    """First harmonic of a clipped sine: (2/π)(asin c + c sqrt(1 - c²)) with c = 1/2 is 0.6090."""
+    t = np.arange(20000) / 20e3
+    shown = physics.Clipping("A", 0.5).channel(np.sin(2.0 * np.pi * 50.0 * t), 20e3, A)
+    first = 2.0 * np.mean(shown * np.sin(2.0 * np.pi * 50.0 * t))
+    assert first == pytest.approx(2.0 / np.pi * (np.pi / 6.0 + 0.5 * np.sqrt(0.75)), rel=1e-4)
+
+
+def test_a_fast_clock_shows_a_line_at_a_higher_frequency():
+    t = np.arange(40000) / 20e3
+    shown = physics.ClockDrift("A", 5e-3).channel(np.sin(2.0 * np.pi * 200.0 * t), 20e3, A)
+    spectrum = np.abs(np.fft.rfft(shown[:38000] * np.hanning(38000), 1 << 20))
+    assert np.argmax(spectrum) * 20e3 / (1 << 20) == pytest.approx(201.0, abs=0.05)
+
+
+def test_hum_has_the_amplitude_it_says():
+    shown = physics.Hum("A", 3.0, 4.0).channel(np.zeros(20000), 20e3, A)
+    assert np.sqrt(2.0 * np.mean(shown**2)) == pytest.approx(5.0, rel=1e-6)
+    assert "5 m/s²" in physics.Hum("A", 3.0, 4.0).sentence()
+
+
+def test_a_sensor_elsewhere_sits_elsewhere():
+    assert physics.SensorPosition("A", 0.3).sensor(A).place == pytest.approx(12.3)
+
+
+def test_a_hanging_sleeper_is_held_by_nothing_but_pads_within_its_gap():
+    (port,) = physics.HangingSleeper(20, 1e-3).ports(TRACK)
+    for y in (-9e-4, 3e-4, 9e-4):
+        assert -90e6 * y - port.law.force(y) == pytest.approx(0.0, abs=1e-3)
+    assert -90e6 * 1.5e-3 - port.law.force(1.5e-3) == pytest.approx(-90e6 * 0.5e-3)  # k (y - g) beyond it
+
+
+def test_hardening_doubles_the_tangent_at_the_deflection_of_duffings_law():
+    """k(1 + h (y/1mm)²) has the tangent k(1 + 3h) at 1 mm."""
+    (port,) = physics.BallastHardening(20, 20, 1.0).ports(TRACK)
+    slope = (port.law.force(1.005e-3) - port.law.force(0.995e-3)) / 1e-5
+    assert slope / 90e6 == pytest.approx(3.0, rel=0.03)  # pieces of 50 µm
+
+
+def test_friction_takes_the_energy_of_its_describing_function():
+    """A cycle of amplitude V at ω loses 4 F0 V/ω; the equivalent damper loses π c V²/ω."""
+    term = physics.DryFriction(20, 1000.0)
+    (port,) = term.ports(TRACK)
+    phase = np.linspace(0.0, 2.0 * np.pi, 20001)[:-1]
+    velocity = 0.5 * np.cos(phase)
+    lost = np.mean(port.law.force(0.0, velocity) * velocity)
+    assert lost == pytest.approx(term.damping_at(0.5) * 0.5**2 / 2.0, rel=0.01)
+
+
+def test_a_kink_of_5_mrad_is_that_of_jenkins_joint():
+    (_, kink) = physics.SurfaceDip(12.0, 0.3125e-3, 0.5, 1.0).paths(TRACK, car())
+    assert kink.angle == pytest.approx(5e-3)  # 2α = 8 d / L: two parabolas of slope 4 d / L at the joint
+    smooth, sharp = physics.SurfaceDip(12.0, 1e-3, 0.5, 0.3).paths(TRACK, car())
+    assert smooth(12.0) + sharp(12.0) == pytest.approx(1e-3)
+
+
+def test_a_flat_of_50_mm_drops_the_wheel_by_newton_and_clarks_number():
+    (path,) = physics.WheelFlat(2, 0.05, 0.43).paths(TRACK, car())
+    assert path.depth == pytest.approx(0.36e-3, abs=0.5e-5) and path.wheel == 2
+    assert physics.WheelFlat(2, 0.05, train="ICE").under({"train": "freight"}).paths(TRACK, car()) == ()
+
+
+def test_three_waves_around_a_wheel_repeat_every_third_of_a_turn():
+    cosine, sine = physics.OutOfRound(0, 3e-4, 4e-4, 3, 0.43).paths(TRACK, car())
+    x = np.linspace(0.0, 5.0, 1001)
+    wave = cosine(x, 0) + sine(x, 0)
+    assert np.max(wave) == pytest.approx(5e-4, rel=1e-3)
+    assert np.allclose(cosine(x + 2.0 * np.pi * 0.43 / 3.0, 0), cosine(x, 0), atol=1e-12)
+
+
+def test_corrugation_shakes_at_speed_over_wavelength():
+    (path,) = physics.RailCorrugation(0.0, 20.0, 3e-5, 4e-5, 0.25).paths(TRACK, car())
+    t = np.arange(4000) / 10e3
+    spectrum = np.abs(np.fft.rfft(path(2.0 + 40.0 * t) * np.hanning(4000), 1 << 18))
+    assert np.argmax(spectrum) * 10e3 / (1 << 18) == pytest.approx(160.0, abs=0.5)
+
+
+def test_roughness_scales_with_its_amplitude():
+    one, two = (physics.RoughnessLevel(a).paths(TRACK, car())[0](np.linspace(5.0, 19.0, 50)) for a in (1.0, 2.0))
+    assert np.allclose(two, 2.0 * one) and np.std(one) > 0.0
+
+
+def test_a_heavier_wheelset_presses_harder_by_its_weight():
+    heavier = physics.UnsprungMass(1.4).vehicle(car())
+    assert heavier.static_loads - car().static_loads == pytest.approx(0.4 * 750.0 * 9.81, rel=1e-6)
+
+
+def test_half_the_contact_constant_has_the_stiffness_of_hertz():
+    """1.5 k^(2/3) W^(1/3): a factor 0.5 gives 0.63 at 75 kN."""
+    soft, base = physics.ContactStiffness(0.5).vehicle(car()).contact, car().contact
+    assert soft.tangent(75e3) / base.tangent(75e3) == pytest.approx(0.5 ** (2 / 3), rel=1e-9)

@@ -1,0 +1,163 @@
+"""Cut and damaged files: an error, or the very same numbers; never others in silence."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from turnout.errors import REASONS, ReadError
+from turnout.readers import read
+from turnout.readers.writing import WRITERS, write
+
+CHECKSUMMED = ("hdf5", "mat", "mat73", "npz", "parquet")  # formats whose writers leave checksums
+EASY = settings(max_examples=30, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+ANYWHERE = st.floats(min_value=0.0, max_value=1.0, exclude_max=True)
+
+
+@pytest.fixture
+def written(hammer_test, in_si, name_of, tmp_path):
+    """(path, recordings as they are read from the whole file) of a format."""
+
+    def make(format):
+        path = write(hammer_test[:1] if format == "wav" else hammer_test, tmp_path / name_of(format), format)
+        return path, read(path.name, tmp_path, in_si).recordings
+
+    return make
+
+
+def outcome(path, description):
+    try:
+        result = read(path.name, path.parent, description)
+    except ReadError as error:
+        return (), (error,)
+    return result.recordings, result.errors
+
+
+def assert_sound(recordings, whole):
+    """Each recording is one of the whole file's, bit for bit."""
+    for one in recordings:
+        assert any(np.array_equal(one.samples, other.samples) for other in whole)
+
+
+@pytest.mark.parametrize("format", WRITERS)
+def test_a_file_cut_anywhere_says_so_and_keeps_only_sound_records(format, written, in_si):
+    """No counts in the description: every format's own evidence is enough for what our writers leave."""
+    path, whole = written(format)
+    data = path.read_bytes()
+
+    @EASY
+    @given(ANYWHERE)
+    def cut(part):
+        path.write_bytes(data[: int(part * len(data))])
+        recordings, errors = outcome(path, in_si)
+        assert all(e.reason in REASONS and e.path == path.name for e in errors)
+        assert errors or len(recordings) == len(whole)  # whole without its last line break
+        assert_sound(recordings, whole)
+
+    cut()
+
+
+@pytest.mark.parametrize("format", CHECKSUMMED)
+def test_a_flipped_bit_is_found_where_there_are_checksums(format, written, in_si):
+    path, whole = written(format)
+    data = path.read_bytes()
+
+    @EASY
+    @given(ANYWHERE, st.integers(0, 7))
+    def flip(part, bit):
+        damaged = bytearray(data)
+        damaged[int(part * len(data))] ^= 1 << bit
+        path.write_bytes(damaged)
+        recordings, errors = outcome(path, in_si)
+        assert errors or len(recordings) == len(whole)
+        assert_sound(recordings, whole)
+
+    flip()
+
+
+@pytest.mark.parametrize("format", WRITERS)
+def test_any_damage_is_a_reason_and_never_another_exception(format, written, in_si):
+    path, whole = written(format)
+    data = path.read_bytes()
+
+    @EASY
+    @given(ANYWHERE, st.binary(min_size=1, max_size=64))
+    def overwrite(part, other):
+        at = int(part * len(data))
+        path.write_bytes(data[:at] + other + data[at + len(other) :])
+        for error in outcome(path, replace(in_si, n_records=len(whole), n_samples=301))[1]:
+            assert error.reason in REASONS
+
+    overwrite()
+
+
+@pytest.mark.parametrize(
+    ("format", "first", "sound"),
+    [
+        ("uff58b", b"\x00" * 60, 3),
+        ("uff58", b"x" * 60, 3),
+        ("lvm", b"x" * 60, 3),
+        ("npz", b"x" * 60, 3),
+        ("hdf5", b"x" * 60, 3),
+    ],
+)
+def test_a_damaged_record_inside_a_sound_file_costs_that_record_only(format, first, sound, written, in_si):
+    """Sixty bytes in the third of four records: in UFF over the header of its second set."""
+    path, whole = written(format)
+    data = bytearray(path.read_bytes())
+    at = {
+        "uff58b": lambda: data.rfind(b"    -1\n", 0, data.rfind(b"    -1\n", 0, int(0.74 * len(data)))),
+        "uff58": lambda: int(0.7 * len(data)),
+        "lvm": lambda: int(0.6 * len(data)),
+        "npz": lambda: data.find(b"record_002") + 500,
+        "hdf5": lambda: data.find(whole[2].samples[0].tobytes()) + 100,
+    }[format]()
+    data[at : at + 60] = bytes(60)
+    path.write_bytes(data)
+    recordings, errors = outcome(path, replace(in_si, n_records=4, n_samples=301))
+    assert errors
+    assert [r.record for r in recordings] == [0, 1, 3]
+    for one in recordings:
+        np.testing.assert_array_equal(one.samples, whole[one.record].samples)
+
+
+def test_tdms_names_the_segment_that_is_not_finished(written, in_si):
+    path, _ = written("tdms")
+    data = path.read_bytes()
+    path.write_bytes(data[: len(data) - 100])
+    recordings, errors = outcome(path, in_si)
+    assert len(recordings) == 3
+    assert "record 4 of 4 (group 'record_003'), channel" in str(errors[0])
+    assert errors[0].reason == "truncated"
+
+
+def test_wav_says_how_much_of_its_chunk_is_there(written, in_si):
+    """libsndfile itself reads this file without a word."""
+    path, _ = written("wav")
+    data = path.read_bytes()
+    at = data.find(b"data")
+    path.write_bytes(data[: at + 8 + 1000])
+    (error,) = outcome(path, in_si)[1]
+    assert f"the header: its chunk 'data' ends after 1000 of {2 * 8 * 301} bytes. Copy the file again" in str(error)
+    path.write_bytes(data[: at + 4] + b"\xff\xff\xff\xff" + data[at + 8 :])
+    (error,) = outcome(path, in_si)[1]
+    assert "the chunk of samples was never finished by the logger" in str(error)
+
+
+def test_text_without_its_last_line_break_may_have_a_cut_number(written, in_si):
+    for format in ("csv", "lvm"):
+        path, _ = written(format)
+        path.write_bytes(path.read_bytes().rstrip(b"\n")[:-3])
+        (error, *_) = outcome(path, in_si)[1]
+        assert "line has no line break" in str(error) and error.reason == "truncated"
+
+
+def test_uff_says_where_its_set_ends(written, in_si):
+    path, _ = written("uff58b")
+    path.write_bytes(path.read_bytes()[:-1000])
+    recordings, (error,) = outcome(path, in_si)
+    assert len(recordings) == 3
+    assert "A7_1.uff, record 4 of 4, channel 'rail', byte " in str(error)
+    assert "ends after 176 of 301 samples. Copy the file again from the logger." in str(error)

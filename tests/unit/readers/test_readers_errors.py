@@ -1,0 +1,296 @@
+"""Every message: which file, where in it, what was found, what to do."""
+
+import os
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from turnout.errors import ReadError
+from turnout.readers import read
+from turnout.readers.writing import write
+from turnout.records import RawChannel
+
+COPY = "Copy the file again from the logger."
+
+
+def refusal(path, root, description):
+    with pytest.raises(ReadError) as caught:
+        read(path, root, description)
+    return caught.value
+
+
+def only_error(path, root, description, sound):
+    """The single error of a file of which ``sound`` records are whole."""
+    result = read(path, root, description)
+    assert len(result.recordings) == sound
+    (error,) = result.errors
+    return error
+
+
+def archive(folder, **variables):
+    np.savez(folder / "a.npz", **variables)
+    return "a.npz"
+
+
+def saw(n=100):
+    return np.arange(n) % 7 - 3.0
+
+
+def test_a_path_outside_the_root_is_refused(tmp_path, in_si, hammer_test):
+    write(hammer_test, tmp_path / "secret.npz", "npz")
+    root = tmp_path / "raw"
+    root.mkdir()
+    os.symlink(tmp_path / "secret.npz", root / "link.npz")
+    os.symlink(tmp_path, root / "folder")
+    for path in ("../secret.npz", "link.npz", "folder/secret.npz", str(tmp_path / "secret.npz")):
+        error = refusal(path, root, in_si)
+        assert error.reason == "outside_root"
+        remedy = "Put the file under the raw root or correct the turnout's pattern."
+        assert str(error) == f"{path}, the path: it leads outside the raw root. {remedy}"
+
+
+def test_a_link_within_the_root_and_a_linked_root_are_fine(tmp_path, in_si, hammer_test):
+    (tmp_path / "raw").mkdir()
+    write(hammer_test, tmp_path / "raw" / "a.npz", "npz")
+    os.symlink(tmp_path / "raw" / "a.npz", tmp_path / "raw" / "b.npz")
+    os.symlink(tmp_path / "raw", tmp_path / "store")
+    assert len(read("b.npz", tmp_path / "store", in_si).recordings) == 4
+    assert read(tmp_path / "raw" / "a.npz", tmp_path / "raw", in_si).recordings[0].source == "a.npz"
+
+
+def test_a_link_in_a_circle_is_refused(tmp_path, in_si):
+    os.symlink(tmp_path / "b", tmp_path / "a")
+    os.symlink(tmp_path / "a", tmp_path / "b")
+    assert refusal("a", tmp_path, in_si).reason in ("outside_root", "unreadable")
+
+
+def test_a_vanished_file(tmp_path, in_si):
+    error = refusal("A7_1.uff", tmp_path, in_si)
+    assert error.reason == "vanished"
+    found = "there is no such file any more. Start again when the file is back, or plan anew without it."
+    assert str(error) == f"A7_1.uff, the path: {found}"
+
+
+def test_a_folder_is_no_file(tmp_path, in_si):
+    (tmp_path / "A7_1.uff").mkdir()
+    error = refusal("A7_1.uff", tmp_path, in_si)
+    assert error.reason == "unreadable"
+    assert "the file cannot be opened (Is a directory)" in str(error)
+
+
+def test_an_empty_file(tmp_path, in_si):
+    (tmp_path / "A7_1.uff").write_bytes(b"")
+    error = refusal("A7_1.uff", tmp_path, in_si)
+    assert error.reason == "empty"
+    assert str(error) == f"A7_1.uff, byte 0: the file has no bytes. {COPY}"
+
+
+def test_an_unknown_format(tmp_path, in_si):
+    (tmp_path / "a.xyz").write_bytes(b"hello world")
+    error = refusal("a.xyz", tmp_path, in_si)
+    assert "neither its first bytes (b'hello wo') nor its extension '.xyz' tells a known format" in str(error)
+    assert "Set the format in the layout to one of uff58, " in str(error)
+    error = refusal("a.xyz", tmp_path, replace(in_si, format="xls"))
+    assert "the layout: the format 'xls' is not known. Use one of uff58, " in str(error)
+
+
+def test_a_file_of_another_format_than_configured(tmp_path, in_si, hammer_test):
+    write(hammer_test, tmp_path / "a.npz", "npz")
+    for format in ("uff58", "tdms", "hdf5", "mat", "rcmdx", "wav", "lvm", "parquet"):
+        assert refusal("a.npz", tmp_path, replace(in_si, format=format)).reason in ("unreadable", "truncated"), format
+
+
+def test_a_missing_channel_names_those_there_are(tmp_path, in_si):
+    name = archive(tmp_path, fs=51200.0, force=saw(), rial=saw(), units=["N", "m/s²"])
+    error = only_error(name, tmp_path, in_si, 0)
+    assert error.reason == "channel_missing"
+    found = "there is no channel 'rail'; there are 'force', 'rial'"
+    assert str(error) == f"a.npz, record 1 of 1: {found}. Did you mean 'rial'? Correct the channel map."
+
+
+def test_a_missing_index(tmp_path, in_si):
+    name = archive(tmp_path, fs=51200.0, force=saw(), units=["N"])
+    channels = (RawChannel("force", 0, "force"), RawChannel("rail", 1, "acceleration"))
+    error = only_error(name, tmp_path, replace(in_si, channels=channels), 0)
+    assert error.reason == "channel_missing"
+    assert "record 1 of 1: there is no channel 1; the file has 1, counted from 0. Correct the channel map" in str(error)
+
+
+def test_an_unknown_channel_must_be_named_even_to_be_ignored(tmp_path, in_si):
+    name = archive(tmp_path, fs=51200.0, force=saw(), rail=saw(), web=saw(), units=["N", "m/s²", "V"])
+    error = only_error(name, tmp_path, in_si, 0)
+    assert error.reason == "channel_unknown"
+    remedy = "Add it to the layout, with 'quantity: ignored' if it is not wanted."
+    assert str(error) == f"a.npz, record 1 of 1: the file has channel 'web', which the layout does not name. {remedy}"
+    known = (*in_si.channels, RawChannel("web", "web", "ignored"))
+    (recording,) = read(name, tmp_path, replace(in_si, channels=known)).recordings
+    assert [c.name for c in recording.channels] == ["force", "rail"]
+
+
+def test_a_channel_named_twice(tmp_path, in_si):
+    name = archive(tmp_path, fs=51200.0, force=saw(), units=["N"])
+    channels = (RawChannel("force", "force", "force"), RawChannel("again", 0, "force"))
+    error = only_error(name, tmp_path, replace(in_si, channels=channels), 0)
+    assert "the layout names the channel 'force' twice. Name each once." in str(error)
+
+
+def test_a_unit_that_cannot_be_converted(tmp_path, in_si):
+    name = archive(tmp_path, fs=51200.0, force=saw(), rail=saw(), units=["V", "m/s²"])
+    error = only_error(name, tmp_path, in_si, 0)
+    assert error.reason == "unit_unknown"
+    assert str(error) == (
+        "a.npz, record 1 of 1, channel 'force': 'V' is no unit of force and no sensitivity is given. "
+        "Correct unit and sensitivity of this channel in the layout."
+    )
+
+
+@pytest.mark.parametrize("rate", [51199.0, 25600.0, 102400.0])
+def test_a_wrong_rate(rate, tmp_path, in_si):
+    name = archive(tmp_path, fs=rate, force=saw(), rail=saw(), units=["N", "m/s²"])
+    error = only_error(name, tmp_path, in_si, 0)
+    assert error.reason == "wrong_rate"
+    remedy = "Correct the rate in the layout, or find out why the logger was set differently."
+    assert str(error) == f"a.npz, record 1 of 1: sampled at {rate:g} Hz instead of 51200 Hz. {remedy}"
+
+
+@pytest.mark.parametrize("rate", [0.0, -51200.0, np.nan, np.inf])
+def test_a_rate_that_is_none(rate, tmp_path, in_si):
+    name = archive(tmp_path, fs=rate, force=saw(), rail=saw(), units=["N", "m/s²"])
+    assert only_error(name, tmp_path, in_si, 0).reason == "wrong_rate"
+
+
+def test_no_rate_at_all(tmp_path, in_si):
+    name = archive(tmp_path, force=saw(), rail=saw(), units=["N", "m/s²"])
+    error = only_error(name, tmp_path, replace(in_si, rate=None), 0)
+    assert error.reason == "wrong_rate"
+    assert "neither the file nor the layout says the sampling rate. Give the rate in the layout" in str(error)
+    assert read(name, tmp_path, in_si).recordings[0].rate == 51200.0
+
+
+def test_fewer_records_than_promised(tmp_path, in_si, hammer_test):
+    path = write(hammer_test[:3], tmp_path / "a.npz", "npz")
+    error = only_error(path.name, tmp_path, replace(in_si, n_records=10), 3)
+    assert error.reason == "truncated"
+    assert str(error) == f"a.npz, record 4 of 10: it holds 3 of the 10 records that the layout promises. {COPY}"
+
+
+def test_more_records_than_promised(tmp_path, in_si, hammer_test):
+    path = write(hammer_test, tmp_path / "a.npz", "npz")
+    error = only_error(path.name, tmp_path, replace(in_si, n_records=3), 4)
+    assert error.reason == "wrong_length"
+    assert "a.npz, record 4: it holds 4 records, 1 more than the layout promises. Correct n_records" in str(error)
+
+
+def test_fewer_samples_than_promised_cost_that_record(tmp_path, in_si, hammer_test):
+    hammer_test[1] = replace(hammer_test[1], samples=hammer_test[1].samples[:, :200])
+    path = write(hammer_test, tmp_path / "a.npz", "npz")
+    error = only_error(path.name, tmp_path, replace(in_si, n_samples=301), 3)
+    assert error.reason == "truncated"
+    assert str(error) == f"a.npz, record 2 of 4: ends after 200 of 301 samples. {COPY}"
+    kept = read(path.name, tmp_path, replace(in_si, n_samples=301)).recordings
+    assert [r.record for r in kept] == [0, 2, 3]
+
+
+def test_more_samples_than_promised(tmp_path, in_si, hammer_test):
+    path = write(hammer_test[:1], tmp_path / "a.npz", "npz")
+    error = only_error(path.name, tmp_path, replace(in_si, n_samples=300), 0)
+    assert error.reason == "wrong_length"
+    assert "record 1 of 1: it has 301 samples instead of 300. Correct n_samples in the layout" in str(error)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_a_sample_that_is_no_number_costs_that_record(value, tmp_path, in_si, hammer_test):
+    samples = hammer_test[2].samples.copy()
+    samples[1, 17] = samples[1, 200] = value
+    hammer_test[2] = replace(hammer_test[2], samples=samples)
+    path = write(hammer_test, tmp_path / "a.npz", "npz")
+    error = only_error(path.name, tmp_path, in_si, 3)
+    assert error.reason == "not_finite"
+    found = "2 of 301 samples are not finite, the first is sample 17. Export the record again from the logger."
+    assert str(error) == f"a.npz, record 3 of 4, channel 'rail': {found}"
+
+
+def test_samples_so_large_that_their_sum_overflows_are_finite(tmp_path, in_si):
+    name = archive(tmp_path, fs=51200.0, force=np.abs(saw()) * 3e307, rail=saw(), units=["N", "m/s²"])
+    assert read(name, tmp_path, in_si).errors == ()
+
+
+def test_a_dead_channel_costs_a_hammer_record(tmp_path, in_si):
+    name = archive(tmp_path, fs=51200.0, force=saw(), rail=np.full(100, 0.25), units=["N", "m/s²"])
+    error = only_error(name, tmp_path, in_si, 0)
+    assert error.reason == "dead_channel"
+    found = "all 100 samples are 0.25: the channel is dead. Check sensor, cable and channel map."
+    assert str(error) == f"a.npz, record 1 of 1, channel 'rail': {found}"
+
+
+def test_a_dead_channel_costs_a_passage_that_channel_only(tmp_path, in_si):
+    name = archive(tmp_path, fs=51200.0, force=saw(), rail=np.zeros(100), units=["N", "m/s²"])
+    result = read(name, tmp_path, replace(in_si, kind="passage"))
+    assert [c.name for c in result.recordings[0].channels] == ["force"]
+    np.testing.assert_array_equal(result.recordings[0].samples[0], saw())
+    assert [e.reason for e in result.errors] == ["dead_channel"]
+
+
+def test_a_steady_temperature_is_not_dead(tmp_path, in_si):
+    name = archive(tmp_path, fs=51200.0, force=saw(), pt100=np.full(100, 285.65), units=["N", "K"])
+    channels = (in_si.channels[0], RawChannel("rail_temperature", "pt100", "temperature"))
+    (recording,) = read(name, tmp_path, replace(in_si, channels=channels)).recordings
+    np.testing.assert_allclose(recording.signal("rail_temperature"), 12.5, rtol=1e-12)
+
+
+def test_the_sign_turns_offset_and_scale_around(tmp_path, in_si):
+    name = archive(tmp_path, fs=51200.0, t1=np.full(100, 300.0), units=["K"])
+    channels = (RawChannel("t", "t1", "temperature", sign=-1),)
+    (recording,) = read(name, tmp_path, replace(in_si, channels=channels)).recordings
+    np.testing.assert_allclose(recording.samples[0], -26.85, rtol=1e-12)
+
+
+def test_limit_and_resolution_reach_the_channel(tmp_path, in_volts):
+    name = archive(tmp_path, fs=51200.0, a1=saw(), h=saw())
+    channels = tuple(replace(c, limit=500.0, resolution=0.5, position=1.5, serial="7") for c in in_volts.channels)
+    (recording,) = read(name, tmp_path, replace(in_volts, channels=channels, n_records=1, n_samples=100)).recordings
+    rail = recording.channels[0]
+    assert (rail.limit, rail.resolution, rail.position, rail.serial) == (500.0, 0.5, 1.5, "7")
+
+
+def test_a_clock_that_runs_backwards_within_a_record(tmp_path, in_si):
+    time = np.arange(100) / 51200.0
+    time[60:] -= 0.001
+    name = archive(tmp_path, time=time, force=saw(), rail=saw(), units=["N", "m/s²"])
+    error = only_error(name, tmp_path, in_si, 0)
+    assert error.reason == "clock_backwards"
+    found = "the clock runs backwards or stands still: sample 59 at 0.00115234375 s, the next at 0.000171875 s"
+    assert str(error) == f"a.npz, record 1 of 1: {found}. Check the logger's clock and export the record again."
+
+
+def test_a_record_that_began_before_the_one_in_front_of_it(tmp_path, in_si, hammer_test):
+    hammer_test[2] = replace(hammer_test[2], started_at=hammer_test[0].started_at.replace(year=2023))
+    path = write(hammer_test, tmp_path / "a.npz", "npz")
+    error = only_error(path.name, tmp_path, in_si, 3)
+    assert error.reason == "clock_backwards"
+    began = "it began at 2023-05-13 10:00:01.250000, before the record in front of it (2024-05-13 10:01:01.250000)"
+    assert str(error) == f"a.npz, record 3: {began}. Check the logger's clock and the time zone in the layout."
+
+
+def test_time_that_jumps_has_lost_samples(tmp_path, in_si):
+    time = np.delete(np.arange(110), slice(40, 50)) / 51200.0
+    name = archive(tmp_path, time=time, force=saw(), rail=saw(), units=["N", "m/s²"])
+    error = only_error(name, tmp_path, in_si, 0)
+    assert error.reason == "truncated"
+    assert "time jumps from 0.00076171875 s to 0.0009765625 s at 51200 Hz: samples are missing" in str(error)
+
+
+def test_channels_of_different_length(tmp_path, in_si):
+    name = archive(tmp_path, fs=51200.0, force=saw(100), rail=saw(80), units=["N", "m/s²"])
+    error = only_error(name, tmp_path, in_si, 0)
+    assert error.reason == "truncated"
+    assert f"record 1 of 1: channel 'rail' ends after 80 samples, others after 100. {COPY}" in str(error)
+
+
+def test_a_record_missing_between_its_neighbours(tmp_path, in_si):
+    both = np.vstack([saw(), saw()[::-1]])
+    name = archive(tmp_path, fs=51200.0, record_001=both, record_003=both, channels=["force", "rail"], units=["N", "g"])
+    error = only_error(name, tmp_path, in_si, 2)
+    assert error.reason == "truncated"
+    assert f"a.npz, record 2: this record is missing between its neighbours. {COPY}" in str(error)

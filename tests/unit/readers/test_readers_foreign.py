@@ -1,0 +1,227 @@
+"""Layouts that others write, made here with the libraries that they use."""
+
+from dataclasses import replace
+
+import h5py
+import nptdms
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import scipy.io
+import soundfile
+
+from turnout.errors import ReadError
+from turnout.readers import read
+from turnout.records import RawChannel, RawDescription
+
+RATE = 51200.0
+FORCE, RAIL = 900.0 * np.sin(np.arange(300) / 7), 20.0 * np.cos(np.arange(300) / 3) + 0.5
+
+
+@pytest.fixture
+def by_index():
+    """Columns of numbers without names or units."""
+    channels = (
+        RawChannel("force", 0, "force", unit="V", sensitivity=0.23, sensitivity_unit="mV/N"),
+        RawChannel("rail", 1, "acceleration", unit="V", sensitivity=87.9, sensitivity_unit="mV/g"),
+    )
+    return RawDescription(channels, rate=RATE)
+
+
+@pytest.fixture
+def by_name():
+    return RawDescription((RawChannel("force", "Force", "force"), RawChannel("rail", "Acc", "acceleration")), rate=RATE)
+
+
+def both(recording):
+    np.testing.assert_allclose(recording.signal("force"), FORCE, rtol=1e-14)
+    np.testing.assert_allclose(recording.signal("rail"), RAIL, rtol=1e-14)
+
+
+def test_matlab_matrix_of_columns_with_fs(by_index, tmp_path):
+    volts = np.column_stack([FORCE * 0.23e-3, RAIL * 87.9e-3 / 9.80665])
+    scipy.io.savemat(tmp_path / "a.mat", {"data": volts, "Fs": RATE, "operator": "NN"})
+    (recording,) = read("a.mat", tmp_path, by_index).recordings
+    both(recording)
+    assert recording.conditions["operator"] == "NN"
+    (error,) = read("a.mat", tmp_path, replace(by_index, rate=25600.0)).errors
+    assert error.reason == "wrong_rate"
+
+
+def test_matlab_matrix_in_three_dimensions(by_index, tmp_path):
+    """(sample, channel, record), as MATLAB users stack their blows."""
+    volts = np.column_stack([FORCE * 0.23e-3, RAIL * 87.9e-3 / 9.80665])
+    scipy.io.savemat(tmp_path / "a.mat", {"y": np.stack([volts, 2 * volts], axis=2), "dt": 1 / RATE})
+    first, second = read("a.mat", tmp_path, by_index).recordings
+    both(first)
+    np.testing.assert_allclose(second.signal("rail"), 2 * RAIL, rtol=1e-14)
+
+
+def test_matlab_structure_and_structure_array(by_name, tmp_path):
+    one = {"Force": FORCE, "Acc": RAIL, "fs": RATE, "units": np.array(["N", "m/s^2"], dtype=object)}
+    scipy.io.savemat(tmp_path / "a.mat", {"measurement": one})
+    (recording,) = read("a.mat", tmp_path, by_name).recordings
+    both(recording)
+    scipy.io.savemat(tmp_path / "b.mat", {"hit_1": one, "hit_2": {**one, "Force": -FORCE}})
+    first, second = read("b.mat", tmp_path, by_name).recordings
+    both(first)
+    np.testing.assert_array_equal(second.signal("force"), -FORCE)
+
+
+def test_a_square_matrix_is_not_guessed_at(by_index, tmp_path):
+    scipy.io.savemat(tmp_path / "a.mat", {"data": np.random.default_rng(0).normal(size=(5, 5)), "fs": RATE})
+    (error,) = _raised("a.mat", tmp_path, by_index)
+    assert "(5, 5) samples do not match 5 channels" in str(error)
+
+
+def _raised(name, root, description):
+    try:
+        return read(name, root, description).errors
+    except ReadError as error:
+        return (error,)
+
+
+def test_two_matrices_are_not_guessed_at(by_index, tmp_path):
+    np.savez(tmp_path / "a.npz", x=np.zeros((2, 9)), y=np.zeros((2, 9)), fs=RATE)
+    (error,) = _raised("a.npz", tmp_path, by_index)
+    assert "several arrays could be the samples: 'x', 'y'. Export one array or one per record." in str(error)
+
+
+def test_hdf5_with_datasets_at_the_root(by_name, tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for name, samples, unit in (("Force", FORCE, "N"), ("Acc", RAIL, "m/s2")):
+            file[name] = samples
+            file[name].attrs["units"] = unit
+            file[name].attrs["sample_rate"] = RATE
+    both(read("a.h5", tmp_path, by_name).recordings[0])
+
+
+def test_hdf5_with_a_group_per_blow_and_a_time_vector(by_name, tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for blow in ("Impact 10", "Impact 9"):  # 9 comes before 10
+            group = file.create_group(blow)
+            group["time"] = np.arange(300) / RATE
+            group["Force"], group["Acc"] = FORCE * (1 if blow.endswith("9") else 3), RAIL
+            group["Force"].attrs["unit"], group["Acc"].attrs["unit"] = "N", "m/s²"
+    first, second = read("a.h5", tmp_path, by_name).recordings
+    both(first)
+    np.testing.assert_allclose(second.signal("force"), 3 * FORCE)
+
+
+def test_tdms_of_one_group_with_scaled_integers(by_name, tmp_path):
+    """LabVIEW stores converter steps and a linear scale: step 0.05 N."""
+    steps = np.round(FORCE / 0.05).astype("int16")
+    scale = {
+        "NI_Number_Of_Scales": 1,
+        "NI_Scaling_Status": "unscaled",
+        "NI_Scale[0]_Scale_Type": "Linear",
+        "NI_Scale[0]_Linear_Slope": 0.05,
+        "NI_Scale[0]_Linear_Y_Intercept": 0.0,
+        "NI_Scale[0]_Linear_Input_Source": 0xFFFFFFFF,  # the raw numbers
+    }
+    wave = {"wf_increment": 1 / RATE, "wf_samples": 300}
+    with nptdms.TdmsWriter(str(tmp_path / "a.tdms")) as writer:
+        writer.write_segment(
+            [
+                nptdms.ChannelObject("Untitled", "Force", steps, {**wave, **scale, "unit_string": "N"}),
+                nptdms.ChannelObject("Untitled", "Acc", RAIL, {**wave, "unit_string": "m/s^2"}),
+            ]
+        )
+    (recording,) = read("a.tdms", tmp_path, by_name).recordings
+    assert np.abs(recording.signal("force") - FORCE).max() <= 0.0251  # half a step
+    np.testing.assert_array_equal(recording.signal("rail"), RAIL)
+    group = replace(by_name, channels=(replace(by_name.channels[0], source="Untitled/Force"), by_name.channels[1]))
+    assert read("a.tdms", tmp_path, group).errors == ()
+
+
+@pytest.mark.parametrize(
+    ("head", "separator", "comma"),
+    [
+        ("Force,Acc\n", ",", False),
+        ("Force [N];Acc [m/s²]\n", ";", True),
+        ("fs;51200\nForce;Acc\n(N);(m/s²)\n", ";", True),
+        ("# sampled at site 7\nForce (N)\tAcc (m/s^2)\n", "\t", False),
+    ],
+)
+def test_text_with_any_separator_and_decimal_mark(head, separator, comma, by_name, tmp_path):
+    rows = "".join(f"{f:.17g}{separator}{a:.17g}\n" for f, a in zip(FORCE, RAIL))
+    rows = rows.replace(".", ",") if comma else rows
+    (tmp_path / "a.csv").write_text(head + rows, encoding="utf-8")
+    named = tuple(replace(c, unit=u) for c, u in zip(by_name.channels, ("N", "m/s²")))
+    both(read("a.csv", tmp_path, replace(by_name, channels=named)).recordings[0])
+
+
+def test_text_with_a_printed_time_column_gives_the_rate(by_name, tmp_path):
+    """Time in whole microseconds wanders by half of one around the line; the rate is known to 2 * 0.5 us / 5.8 ms."""
+    frame = pd.DataFrame({"time": (np.arange(300) / RATE).round(6), "Force [N]": FORCE, "Acc [m/s²]": RAIL})
+    frame.to_csv(tmp_path / "a.csv", index=False)
+    both(read("a.csv", tmp_path, by_name).recordings[0])
+    assert read("a.csv", tmp_path, by_name).recordings[0].rate == RATE
+    assert read("a.csv", tmp_path, replace(by_name, rate=51300.0)).errors[0].reason == "wrong_rate"
+
+
+def test_text_without_names_is_mapped_by_index(by_index, tmp_path):
+    np.savetxt(tmp_path / "a.txt", np.column_stack([FORCE, RAIL]), delimiter=",")
+    (recording,) = read("a.txt", tmp_path, by_index).recordings
+    np.testing.assert_allclose(recording.signal("force"), FORCE / 0.23e-3, rtol=1e-14)
+
+
+def test_text_with_a_word_among_its_numbers_names_the_place(by_index, tmp_path):
+    np.savetxt(tmp_path / "a.csv", np.column_stack([FORCE, RAIL]), delimiter=",")
+    text = (tmp_path / "a.csv").read_text().splitlines()
+    text[100] = "overload,0.5"
+    (tmp_path / "a.csv").write_text("\n".join(text) + "\n")
+    (error,) = _raised("a.csv", tmp_path, by_index)
+    assert error.reason == "unreadable"
+    assert "pyarrow cannot read it" in str(error) and "overload" in str(error)
+
+
+def test_parquet_of_a_data_frame_with_time_stamps(by_name, tmp_path):
+    stamps = pd.Timestamp("2024-05-13") + pd.to_timedelta(np.arange(300) / RATE, unit="s")
+    pd.DataFrame({"time": stamps, "Force": FORCE, "Acc": RAIL}).to_parquet(tmp_path / "a.parquet")
+    named = tuple(replace(c, unit=u) for c, u in zip(by_name.channels, ("N", "m/s²")))
+    both(read("a.parquet", tmp_path, replace(by_name, channels=named)).recordings[0])
+    table = pa.table({"Force": FORCE, "Acc": RAIL}).replace_schema_metadata({"rate": "51200.0", "units": "[]"})
+    pq.write_table(table, tmp_path / "b.parquet")
+    both(read("b.parquet", tmp_path, replace(by_name, channels=named)).recordings[0])
+
+
+def test_wav_of_16_bit_and_flac(by_index, tmp_path):
+    rng = np.random.default_rng(3)
+    samples = rng.uniform(-0.9, 0.9, size=(300, 2))
+    for name, subtype in (("a.wav", "PCM_16"), ("a.flac", "PCM_16"), ("b.wav", "FLOAT")):
+        soundfile.write(tmp_path / name, samples, int(RATE), subtype)
+        (recording,) = read(name, tmp_path, by_index).recordings
+        half_step = 1.01 / 2**15 if subtype == "PCM_16" else 2**-24
+        assert np.abs(recording.signal("force") * 0.23e-3 - samples[:, 0]).max() <= half_step
+        assert np.abs(recording.signal("rail") * 87.9e-3 / 9.80665 - samples[:, 1]).max() <= half_step
+
+
+def test_the_real_hammer_test_of_five_blows(shared_data):
+    """Truths printed in the file's own header, and its numbers as they stand there."""
+    channels = (
+        RawChannel("force", "Force (Trigger)", "force"),
+        RawChannel("response", "Acceleration (Trigger)", "acceleration"),
+    )
+    description = RawDescription(channels, rate=RATE, n_records=5, n_samples=51200)
+    result = read("impact2_response0.lvm", shared_data / "hammer_pyfrf", description)
+    assert result.errors == () and len(result.recordings) == 5
+    first, second = result.recordings[:2]
+    np.testing.assert_array_equal(first.samples[:, :2], [[-0.158373, -0.133621], [0.059175, 0.062299]])
+    np.testing.assert_array_equal(second.samples[:, 0], [-0.102166, 0.058501])
+    assert f"{first.started_at:%Y-%m-%d %H:%M:%S.%f}" == "2019-03-11 08:42:44.605411"
+    assert result.sha256 == "473b6380" + result.sha256[8:]
+
+
+def test_an_lvm_row_may_carry_a_comment(shared_data, tmp_path):
+    """Only some rows have the extra field; lvm_read pads, the numbers stay what they are."""
+    text = (shared_data / "hammer_pyfrf" / "impact2_response0.lvm").read_text().splitlines()[:40]
+    text[14] = text[14].replace("51200", "17")
+    text[24] += "\tovershoot"
+    (tmp_path / "a.lvm").write_text("\n".join(text) + "\n")
+    channels = (RawChannel("f", 0, "force"), RawChannel("a", 1, "acceleration"))
+    (recording,) = read("a.lvm", tmp_path, RawDescription(channels)).recordings
+    assert recording.n_sample == 17
+    assert recording.samples[0, 0] == -0.158373

@@ -1,0 +1,111 @@
+"""What is written is read again, in every format, as physical numbers and as volts."""
+
+from dataclasses import replace
+from hashlib import sha256
+
+import numpy as np
+import pytest
+
+from turnout.readers import read
+from turnout.readers.writing import WRITERS, write
+
+# Numbers that go through text with fewer digits than a double has: UFF58's E20.12 keeps 13.
+PRINTED = {"uff58": 1e-12}
+# The second of UFF's ID line 3 is a whole one.
+WHOLE_SECONDS = {"uff58", "uff58b"}
+
+
+def as_written(format, recordings, description):
+    """A WAV file holds one record."""
+    if format != "wav":
+        return recordings, description
+    return recordings[:1], replace(description, n_records=description.n_records and 1)
+
+
+@pytest.mark.parametrize("format", WRITERS)
+def test_si_comes_back_bit_for_bit(format, hammer_test, in_si, name_of, tmp_path):
+    recordings, description = as_written(format, hammer_test, in_si)
+    path = write(recordings, tmp_path / name_of(format), format)
+    result = read(path.name, tmp_path, description)
+    assert result.errors == ()
+    assert len(result.recordings) == len(recordings)
+    assert result.sha256 == sha256(path.read_bytes()).hexdigest()
+    for k, (got, put) in enumerate(zip(result.recordings, recordings)):
+        np.testing.assert_allclose(got.samples, put.samples, rtol=PRINTED.get(format, 0.0), atol=0.0)
+        assert got.rate == put.rate
+        assert [c.name for c in got.channels] == ["force", "rail"]
+        assert (got.source, got.record, got.kind) == (path.name, k, "hammer")
+        assert got.conditions["rail_temperature"] == 12.5
+        seconds = put.started_at.replace(microsecond=0) if format in WHOLE_SECONDS else put.started_at
+        assert got.started_at == seconds
+
+
+@pytest.mark.parametrize("format", WRITERS)
+def test_volts_come_back_with_sensitivity_sign_and_order(format, hammer_test, in_volts, name_of, tmp_path):
+    recordings, description = as_written(format, hammer_test, in_volts)
+    path = write(recordings, tmp_path / name_of(format), format, description)
+    result = read(path.name, tmp_path, description)
+    assert result.errors == ()
+    for got, put in zip(result.recordings, recordings, strict=True):
+        assert [c.name for c in got.channels] == ["rail", "force"]
+        for name in ("rail", "force"):  # one division and one multiplication round
+            tolerance = PRINTED.get(format, 4 * np.finfo(float).eps)
+            np.testing.assert_allclose(got.signal(name), put.signal(name), rtol=tolerance, atol=0.0)
+        seconds = put.started_at.replace(microsecond=0) if format in WHOLE_SECONDS else put.started_at
+        assert got.started_at == seconds  # written in Copenhagen's time, read back as UTC
+
+
+@pytest.mark.parametrize("format", [f for f in WRITERS if f != "uff58"])
+def test_single_precision_keeps_every_bit_of_a_float32(format, hammer_test, in_si, name_of, tmp_path):
+    recordings, description = as_written(format, hammer_test, in_si)
+    path = write(recordings, tmp_path / name_of(format), format, single=True)
+    for got, put in zip(read(path.name, tmp_path, description).recordings, recordings, strict=True):
+        np.testing.assert_array_equal(got.samples.astype("float32"), put.samples.astype("float32"))
+
+
+@pytest.mark.parametrize("format", [f for f in WRITERS if f != "csv"])
+def test_the_content_tells_the_format_where_the_extension_lies(format, hammer_test, in_si, tmp_path):
+    recordings, description = as_written(format, hammer_test, in_si)
+    write(recordings, tmp_path / "A7_1.raw", format)
+    got = read("A7_1.raw", tmp_path, description).recordings[0]
+    np.testing.assert_allclose(got.samples, recordings[0].samples, rtol=PRINTED.get(format, 0.0))
+
+
+@pytest.mark.parametrize("format", ["csv", "lvm"])
+def test_a_decimal_comma_is_read(format, hammer_test, in_si, name_of, tmp_path):
+    path = write(hammer_test, tmp_path / name_of(format), format, decimal_comma=True)
+    assert b"." not in path.read_bytes().splitlines()[-2]
+    np.testing.assert_array_equal(read(path.name, tmp_path, in_si).recordings[3].samples, hammer_test[3].samples)
+
+
+def test_one_channel_and_one_record_are_no_special_case(hammer_test, in_si, name_of, tmp_path):
+    alone = [replace(hammer_test[0], samples=hammer_test[0].samples[:1], channels=hammer_test[0].channels[:1])]
+    for format in WRITERS:
+        path = write(alone, tmp_path / name_of(format), format)
+        (got,) = read(path.name, tmp_path, replace(in_si, channels=in_si.channels[:1])).recordings
+        np.testing.assert_allclose(got.samples, alone[0].samples, rtol=PRINTED.get(format, 0.0), err_msg=format)
+
+
+def test_a_24_bit_wav_is_a_part_of_full_scale(hammer_test, in_volts, tmp_path):
+    """10 V full scale: one step is 10 V / 2^23, half of it the largest error."""
+    description = replace(in_volts, n_records=1, channels=tuple(replace(c, unit="V") for c in in_volts.channels))
+    path = write(hammer_test[:1], tmp_path / "p.wav", "wav", description, subtype="PCM_24", full_scale=10.0)
+    scaled = tuple(replace(c, unit="10 V") for c in description.channels)
+    (got,) = read(path.name, tmp_path, replace(description, channels=scaled)).recordings
+    step = 10.0 / 2**23
+    for name, volts in (("rail", 35.3e-3 / 9.80665), ("force", 0.23e-3)):
+        put = hammer_test[0].signal(name) * volts
+        error = np.abs(got.signal(name) * volts - put)
+        assert 0.1 * step < error.max() <= 0.501 * step  # it was rounded, and no more than that
+
+
+def test_a_wav_file_refuses_a_second_record(hammer_test, tmp_path):
+    with pytest.raises(ValueError, match="a WAV file holds one record, not 4"):
+        write(hammer_test, tmp_path / "a.wav", "wav")
+
+
+def test_the_writer_names_what_it_cannot_do(hammer_test, tmp_path):
+    with pytest.raises(ValueError, match="no writer for the format 'xls'; there are uff58, "):
+        write(hammer_test, tmp_path / "a", "xls")
+    with pytest.raises(ValueError, match="there is no recording to write"):
+        write([], tmp_path / "a", "npz")

@@ -1,0 +1,229 @@
+"""Universal Files of several vendors, against pyuff where it reads them, and the traps of the format."""
+
+import gzip
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import pyuff
+
+from turnout.errors import ReadError
+from turnout.readers import read
+from turnout.readers.uff import read_frf
+from turnout.readers.uff_sets import sets_of
+from turnout.readers.writing import write
+from turnout.records import RawChannel, RawDescription
+
+VENDORS = (
+    "Sample_UFF58_ascii.uff",
+    "Sample_UFF58b_bin.uff",
+    "TestLab 161 164 18 15 82.uff",
+    "binary8byte.uff",
+    "dataset_milestone_in_header.uff",
+    "non_ascii_header.uff",
+    "time-history-not-all-columns-filled.uff",
+)
+
+
+@pytest.fixture
+def vendors(shared_data):
+    return shared_data / "uff58_reader_samples"
+
+
+@pytest.mark.parametrize("name", VENDORS)
+def test_every_set_of_a_vendor_file_is_what_pyuff_reads(name, vendors):
+    ours = sets_of((vendors / name).read_bytes())
+    theirs = pyuff.UFF(str(vendors / name)).read_sets()
+    theirs = theirs if isinstance(theirs, list) else [theirs]
+    assert [int(s.kind.rstrip("b")) for s in ours] == [s["type"] for s in theirs]
+    for one, other in zip(ours, theirs):
+        if other["type"] == 58:
+            np.testing.assert_array_equal(one.data, other["data"])
+            assert (one.func_type, one.promised, one.step) == (
+                other["func_type"],
+                other["num_pts"],
+                other["abscissa_inc"],
+            )
+            assert [line.rstrip() for line in one.ids] == [other[f"id{i}"] for i in range(1, 6)]
+
+
+@pytest.mark.parametrize("name", ["Sample_UFF58_ascii.uff", "Sample_UFF58b_bin.uff"])
+def test_a_microphone_in_pascal(name, vendors):
+    """1/65536 s prints as 1.52588E-05: the whole number of Hz that prints the same is 65536."""
+    for source in ("Mic 01.0Scalar", "Mic 01", "Pressure", 0):
+        description = RawDescription((RawChannel("p", source, "pressure"),))
+        (recording,) = read(name, vendors, description).recordings
+        assert recording.rate == 65536.0
+        assert recording.n_sample == 79292
+        assert f"{recording.started_at:%Y-%m-%d %H:%M:%S}" == "2016-04-18 13:49:58"
+    assert read(name, vendors, replace(description, rate=65536.0)).errors == ()
+    (error,) = read(name, vendors, replace(description, rate=65537.0)).errors
+    assert error.reason == "wrong_rate"
+
+
+def test_eight_byte_binary_is_the_sine_it_says(vendors):
+    """Its header says: sine, 5 Hz, 100 samples per second."""
+    description = RawDescription((RawChannel("a", "sine 5 Hz", "acceleration"),), rate=100.0, n_samples=250)
+    (recording,) = read("binary8byte.uff", vendors, description).recordings
+    spectrum = np.abs(np.fft.rfft(recording.samples[0]))
+    assert np.fft.rfftfreq(250, 0.01)[spectrum.argmax()] == pytest.approx(5.0, abs=0.2)  # half a line of 0.4 Hz
+    assert np.abs(recording.samples[0]).max() == pytest.approx(9.80665, rel=2e-3)  # 1 g, no sample on the crest
+
+
+def test_a_unit_that_is_not_ascii_and_a_short_last_line(vendors):
+    description = RawDescription((RawChannel("a", "1x", "acceleration"),), rate=20000.0, n_samples=13)
+    (recording,) = read("time-history-not-all-columns-filled.uff", vendors, description).recordings
+    np.testing.assert_array_equal(recording.samples[0, [0, 12]], [-3.81956, -5.84096])  # as printed, m/s²
+
+
+def test_an_excerpt_is_called_cut_off(vendors):
+    """The file holds 42 of the 2 508 876 samples its header promises; pyuff gives the 42 without a word."""
+    description = RawDescription((RawChannel("p", 0, "pressure"),))
+    (error,) = read("dataset_milestone_in_header.uff", vendors, description).errors
+    assert error.reason == "truncated"
+    assert "byte 0: ends after 42 of 2508876 samples. Copy the file again" in str(error)
+
+
+def test_a_file_without_time_responses_says_so(vendors):
+    with pytest.raises(ReadError, match="it holds 1 functions and no time response"):
+        read("non_ascii_header.uff", vendors, RawDescription((RawChannel("a", 0, "acceleration"),)))
+    with pytest.raises(ReadError, match="it holds 0 functions and no time response"):
+        read(VENDORS[2], vendors, RawDescription((RawChannel("a", 0, "acceleration"),)))
+
+
+def test_frequency_responses_carry_their_unit(vendors):
+    frf = read_frf(vendors / "non_ascii_header.uff", vendors)
+    assert frf.units == ("(1/N)*(m/s²)",)
+    assert frf.frequency == pytest.approx(0.195313 * np.arange(6))
+    assert frf.frf[0, 1] == -0.0599924 - 0.0553260j  # as printed
+    with pytest.raises(ReadError, match="no frequency response"):
+        read_frf("binary8byte.uff", vendors)
+
+
+def test_the_beam_has_its_resonances_where_its_peaks_are_known(vendors):
+    """Peaks read off the plotted curves: 52.6, 144.6, 283.1, 468.3, 698.5, 973.0, 1293 Hz."""
+    frf = read_frf("beam.uff.gz", vendors)
+    assert frf.frf.shape == (3, 64000)
+    assert frf.frequency[[0, -1]] == pytest.approx([0.0, 6399.9])
+    for peak in (52.6, 144.6, 283.1, 468.3, 698.5, 973.0, 1293.0):
+        near = np.abs(frf.frequency - peak) < 3.0
+        sum_of_squares = (np.abs(frf.frf[:, near]) ** 2).sum(axis=0)
+        assert frf.frequency[near][sum_of_squares.argmax()] == pytest.approx(peak, abs=0.5)
+
+
+def test_frequency_responses_survive_a_cut_only_as_an_error(vendors, tmp_path):
+    whole = gzip.decompress((vendors / "beam.uff.gz").read_bytes())
+    (tmp_path / "beam.uff").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(ReadError, match="the set is not closed by -1"):
+        read_frf("beam.uff", tmp_path)
+
+
+def test_a_rate_that_the_header_cuts_off_snaps_to_the_configured_one(hammer_test, in_si, tmp_path):
+    """1/51200 s = 1.953125E-05, of which a header may keep 1.95312E-05, that is 51200.13 Hz."""
+    path = write(hammer_test, tmp_path / "a.uff", "uff58b")
+    cut = path.read_bytes().replace(b" 1.95313e-05", b" 1.95312E-05")
+    assert cut.count(b" 1.95312E-05") == 8
+    path.write_bytes(cut)
+    assert read("a.uff", tmp_path, in_si).recordings[0].rate == 51200.0
+    assert read("a.uff", tmp_path, replace(in_si, rate=None)).recordings[0].rate == 51200.0
+    assert read("a.uff", tmp_path, replace(in_si, rate=51201.0)).errors[0].reason == "wrong_rate"
+
+
+def test_bytes_that_look_like_the_delimiter_do_not_part_a_binary_set(hammer_test, in_si, tmp_path):
+    """pyuff looks for the delimiter everywhere: put one into a sample and it finds an odd number of them."""
+    trap = np.frombuffer(b"\n    -1\n", dtype="<f8")[0]
+    samples = hammer_test[1].samples.copy()
+    samples[0, 10] = trap
+    hammer_test[1] = replace(hammer_test[1], samples=samples)
+    path = write(hammer_test, tmp_path / "a.uff", "uff58b")
+    assert pyuff.UFF(str(path)).get_n_sets() == 8  # of 17 delimiters; sound ones are lost behind the false one
+    assert np.count_nonzero(pyuff.UFF(str(path)).get_set_types() == 58) < 8
+    result = read("a.uff", tmp_path, in_si)
+    assert result.errors == () and len(result.recordings) == 4
+    np.testing.assert_array_equal(result.recordings[1].samples, samples)
+
+
+@pytest.mark.parametrize("ending", [b"\r\n", b"\n"])
+def test_the_closing_delimiter_may_stand_on_a_line_of_its_own(ending, hammer_test, in_si, tmp_path):
+    """Some exporters end the binary numbers with a line break, others do not."""
+    path = write(hammer_test, tmp_path / "a.uff", "uff58b")
+    data = path.read_bytes()
+    at = 0
+    parts = []
+    for one in sets_of(data):
+        end = data.find(b"    -1\n", one.offset + 13 * 80 + 301 * 8 - 100)
+        parts.append(data[at:end] + ending)
+        at = end
+    path.write_bytes(b"".join(parts) + data[at:])
+    result = read("a.uff", tmp_path, in_si)
+    assert result.errors == ()
+    for got, put in zip(result.recordings, hammer_test, strict=True):
+        np.testing.assert_array_equal(got.samples, put.samples)
+
+
+def test_big_endian_and_crlf(hammer_test, in_si, tmp_path):
+    head, numbers, tail = _first_set(write(hammer_test[:1], tmp_path / "a.uff", "uff58b").read_bytes())
+    swapped = head.replace(b"    58b     1", b"    58b     2").replace(b"\n", b"\r\n")
+    big = np.frombuffer(numbers, "<f8").astype(">f8").tobytes()
+    one = replace(in_si, channels=in_si.channels[:1])
+    (tmp_path / "a.uff").write_bytes(swapped + big + tail.replace(b"\n", b"\r\n"))
+    np.testing.assert_array_equal(read("a.uff", tmp_path, one).recordings[0].samples[0], hammer_test[0].samples[0])
+
+
+def test_another_floating_point_format_is_refused(hammer_test, in_si, tmp_path):
+    head, numbers, tail = _first_set(write(hammer_test[:1], tmp_path / "a.uff", "uff58b").read_bytes())
+    (tmp_path / "a.uff").write_bytes(head.replace(b"     1     2", b"     1     1", 1) + numbers + tail)
+    (error,) = read("a.uff", tmp_path, replace(in_si, channels=in_si.channels[:1])).errors
+    assert "floating-point format 1 is not IEEE 754 (2)" in str(error)
+
+
+def _first_set(data):
+    """(head, numbers, closing delimiter) of the first set."""
+    at = sum(len(line) + 1 for line in data.split(b"\n", 13)[:13])
+    return data[:at], data[at : at + 301 * 8], b"    -1\n"
+
+
+def test_channel_after_channel_without_numbers_is_paired_by_order(hammer_test, in_si, tmp_path):
+    """pyuff's own writer, single precision said and double written, all forces first, then all accelerations."""
+    file = pyuff.UFF(str(tmp_path / "a.uff"))
+    for i, (name, unit) in enumerate((("force", "N"), ("rail", "m/s²"))):
+        for recording in hammer_test:
+            one = pyuff.prepare_58(
+                binary=1, func_type=1, rsp_node=i, rsp_dir=3, ref_node=0, ref_dir=0, id1=name, abscissa_spacing=1,
+                ord_data_type=2, abscissa_spec_data_type=17, ordinate_spec_data_type=12, orddenom_spec_data_type=0,
+                ordinate_axis_units_lab=unit, data=recording.samples[i], x=np.arange(301) / 51200.0,
+            )  # fmt: skip
+            file._write_set(one, "add", force_double=False)
+    result = read("a.uff", tmp_path, in_si)
+    assert result.errors == ()
+    for got, put in zip(result.recordings, hammer_test, strict=True):
+        np.testing.assert_array_equal(got.samples, put.samples)
+
+
+def test_a_lost_header_between_unnumbered_sets_forbids_pairing(hammer_test, in_si, tmp_path):
+    """Force of one blow and acceleration of the next would look like a sound record."""
+    path = write(hammer_test, tmp_path / "a.uff", "uff58")
+    data = path.read_bytes()
+    for k in range(4):
+        data = data.replace(f"    1         0{k + 1:5d}".encode(), b"    1         0    0")
+    assert len(_read_bytes(path, data, in_si).recordings) == 4
+    third = data.find(b"    -1\n    58", data.find(b"    -1\n    58", data.find(b"    -1\n    58") + 7) + 7)
+    broken = data[: third + 11] + b"??" + data[third + 13 :]
+    with pytest.raises(ReadError, match="no sequence numbers say which belong together"):
+        _read_bytes(path, broken, in_si)
+
+
+def _read_bytes(path, data, description):
+    path.write_bytes(data)
+    return read(path.name, path.parent, description)
+
+
+def test_a_set_after_the_last_record_costs_the_last_record(hammer_test, in_si, tmp_path):
+    path = write(hammer_test, tmp_path / "a.uff", "uff58b")
+    data = path.read_bytes()
+    last = data.rfind(b"    -1\n    58b")
+    result = _read_bytes(path, data[:last], in_si)
+    assert [r.record for r in result.recordings] == [0, 1, 2]
+    (error,) = result.errors
+    assert error.reason == "truncated"
+    assert "record 4 of 4: channel 'rail' is missing from this record" in str(error)

@@ -1,0 +1,88 @@
+"""Units and sensitivities against closed forms."""
+
+import math
+
+import pytest
+
+from turnout.readers.channels import settled_unit
+from turnout.readers.units import conversion, to_si
+
+G = 9.80665  # m/s², by definition (3rd CGPM, 1901)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "unit", "sensitivity", "sensitivity_unit", "one"),
+    [
+        ("force", "V", 0.23, "mV/N", 1 / 0.23e-3),  # hammer of the paper's Table 3: 1 V is 4347.8 N
+        ("acceleration", "V", 35.3, "mV/g", G / 35.3e-3),  # its accelerometers
+        ("acceleration", "mV", 87.9, "mV/g", G / 87.9),
+        ("acceleration", "V", 10.0, "mV/g", 980.665),
+        ("acceleration", "mV", 10.0, "mV/(m/s²)", 0.1),
+        ("acceleration", "V", 10.0, "mV/(m/s^2)", 100.0),
+        ("force", "count", 2.5, "N/count", 2.5),
+        ("force", "count", 4.0, "count/N", 0.25),
+        ("acceleration", "V", 50.0, "m/s²/V", 50.0),
+        ("acceleration", "V", 5.0, "(g)/V", 5 * G),
+        ("force", "0.305 mV", 0.23, "mV/N", 0.305 / 0.23),
+        ("force", "10 V", 0.5, "V/kN", 20e3),
+        ("force", "kN", None, "", 1000.0),
+        ("force", "Newtons", 0.23, "mV/N", 1.0),  # physical already: the sensitivity is not used
+        ("velocity", "km/h", None, "", 1 / 3.6),
+        ("displacement", "µm", None, "", 1e-6),
+        ("displacement", "\u03bcm", None, "", 1e-6),  # the Greek letter instead of the micro sign
+        ("strain", "µm/m", None, "", 1e-6),
+        ("acceleration", "m/s^2", None, "", 1.0),
+        ("acceleration", "[g]", None, "", G),
+    ],
+)
+def test_one_raw_unit_is_what_the_data_sheet_says(quantity, unit, sensitivity, sensitivity_unit, one):
+    convert = to_si(quantity, unit, sensitivity, sensitivity_unit)
+    assert math.isclose(convert.scale, one, rel_tol=1e-15 * 8)  # a handful of roundings
+    assert convert.offset == 0.0
+
+
+@pytest.mark.parametrize(("unit", "number", "celsius"), [("K", 273.15, 0.0), ("°F", 212.0, 100.0), ("°F", -40, -40)])
+def test_temperatures_have_an_offset(unit, number, celsius):
+    convert = to_si("temperature", unit)
+    assert math.isclose(convert.scale * number + convert.offset, celsius, abs_tol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("force", "furlong"), "the unit 'furlong' is not known; known are"),
+        (("force", "V"), "'V' is no unit of force and no sensitivity is given"),
+        (("force", "m/s²"), "'m/s²' is no unit of force and no sensitivity is given"),
+        (("force", "V", 10.0, "mV/g"), "a sensitivity in 'mV/g' does not lead from 'V' to 'N'"),
+        (("force", "count", 0.3, "mV/N"), "a sensitivity in 'mV/N' does not lead from 'count' to 'N'"),
+        (("force", "V", 10.0, "mV per N"), "the sensitivity's unit 'mV per N' is not of the form mV/N"),
+        (
+            ("force", "V", 0.0, "mV/N"),
+            "the sensitivity must be above 0, not 0.0; use the sign to turn",
+        ),
+        (("force", "V", float("nan"), "mV/N"), "the sensitivity must be above 0, not nan"),
+        (("colour", "V"), "the quantity 'colour' is not known; known are force, acceleration"),
+    ],
+)
+def test_what_cannot_be_converted_says_why(arguments, sentence):
+    with pytest.raises(ValueError) as caught:
+        to_si(*arguments)
+    assert sentence in str(caught.value)
+
+
+def test_a_lone_factor_of_zero_is_no_unit():
+    with pytest.raises(ValueError, match="'0 V' is not known"):
+        conversion("0 V")
+
+
+def test_file_and_layout_must_agree_where_both_speak():
+    assert settled_unit("g", "g") == "g"
+    assert settled_unit("m/s^2", "m/s²") == "m/s²"
+    assert settled_unit("EU", "V") == "V"  # the file's label means nothing
+    assert settled_unit("count", "0.305 mV") == "0.305 mV"  # the layout says what a count is worth
+    assert settled_unit("g", "V!") == "V"
+    for file_unit, layout_unit in (("mV", "V"), ("g", "m/s²"), ("N", "V")):
+        with pytest.raises(ValueError, match=f"the file says '{file_unit}', the layout '{layout_unit}'"):
+            settled_unit(file_unit, layout_unit)
+    with pytest.raises(ValueError, match="neither the file nor the layout says the unit"):
+        settled_unit("", None)

@@ -1,0 +1,145 @@
+"""Blows are found, measured and judged: one per record or many, sound or not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from turnout.receptance import find_impacts
+
+RATE = 20_000.0
+
+
+def reasons(impact):
+    return [r.reason for r in impact.rejections]
+
+
+def test_measurements_of_a_half_sine_are_those_of_its_formula(hammer):
+    force = hammer.force(peak=5000.0, contact=2e-3, start=5e-3)
+    (impact,) = hammer.impacts([hammer.recording(hammer.samples(force))])
+    # The first and last 1.3 % of a half-sine lie below 2 % of its peak; a sample is 50 µs.
+    assert impact.onset == 101 and impact.contact == pytest.approx(2e-3 * (1 - 2 * np.arcsin(0.02) / np.pi), abs=1e-4)
+    assert impact.peak == pytest.approx(5000.0, rel=1e-3)
+    assert impact.impulse == pytest.approx(2 / np.pi * 5000.0 * 2e-3, rel=3e-3)
+    assert impact.decay_start == impact.contact_end + 5  # 0.2 ms at 20 kHz behind the last sample of contact
+    assert impact.noise_force == pytest.approx(0.5, rel=0.3)  # 95 samples ahead: 3 sigma is 22 %
+    assert impact.band_edge * 2e-3 == pytest.approx(1.2976, abs=0.02)
+    assert impact.accepted and not impact.notes
+
+
+def test_a_continuous_record_is_cut_into_its_blows(hammer):
+    starts = (0.4, 1.3, 2.9)
+    force = sum(hammer.force(peak=p, start=s, n=70_000) for s, p in zip(starts, (4000.0, 6000.0, 5000.0)))
+    force += hammer.force(peak=60.0, start=2.1, n=70_000)  # the hammer is put down and taken up again
+    impacts = hammer.impacts([hammer.recording(hammer.samples(force))])
+    assert [round(i.peak, -2) for i in impacts] == [4000, 6000, 5000]
+    assert [i.record for i in impacts] == [0, 1, 2] and all(i.accepted for i in impacts)
+    # pre-trigger of 50 ms; the first window ends where the second begins, the others after 1 s or at the end
+    assert [i.force.size for i in impacts] == pytest.approx([0.9 * RATE, 1.05 * RATE, 0.65 * RATE], abs=3)
+    assert all(i.onset == pytest.approx(0.05 * RATE, abs=1) for i in impacts)
+
+
+def test_blows_are_numbered_within_their_file(hammer):
+    two = hammer.force(start=0.1, n=20_000) + hammer.force(start=0.6, n=20_000)
+    one = hammer.force(start=0.1, n=20_000)
+    recordings = [
+        hammer.recording(hammer.samples(two), 0, "many.wav"),
+        hammer.recording(hammer.samples(one), 1, "many.wav"),
+        hammer.recording(hammer.samples(one), 7, "single.uff"),
+    ]
+    assert [(i.source, i.record) for i in hammer.impacts(recordings)] == [
+        ("many.wav", 0), ("many.wav", 1), ("many.wav", 2), ("single.uff", 7),
+    ]  # fmt: skip
+
+
+def test_a_reversed_hammer_is_named_on_every_blow(hammer):
+    recordings = [replace(r, samples=r.samples * [[-1], [1]]) for r in hammer.recordings(4)]
+    for impact in hammer.impacts(recordings):
+        assert reasons(impact) == ["sign_reversed"] and impact.peak < 0
+
+
+def test_records_without_a_usable_blow_say_why(hammer):
+    sound = hammer.recordings(4)
+    broken = sound[0].samples.copy()
+    broken[1, 700:705] = np.nan
+    silent = np.stack([hammer.rng.normal(size=4000), hammer.rng.normal(size=4000)])
+    dead = sound[1].samples * [[1], [0]]
+    loose = np.stack([sound[2].samples[0], hammer.rng.normal(size=4000)])
+    flat = sound[3].samples * [[0], [1]]
+    bad = [hammer.recording(s, 10 + k) for k, s in enumerate((broken, silent, dead, loose, flat))]
+    impacts = hammer.impacts([*sound, *bad])
+    assert [reasons(i) for i in impacts[:4]] == [[]] * 4
+    assert [i.rejections[0].reason for i in impacts[4:]] == [
+        "not_finite", "no_impact", "dead_channel", "dead_channel", "dead_channel",
+    ]  # fmt: skip
+    assert "5 samples from 700 on" in impacts[4].rejections[0].detail
+
+
+def test_a_gap_in_a_continuous_record_costs_one_blow(hammer):
+    samples = hammer.samples(hammer.force(start=0.1, n=40_000) + hammer.force(start=1.2, n=40_000))
+    samples[1, 26_000:26_010] = np.nan
+    assert [reasons(i) for i in hammer.impacts([hammer.recording(samples)])] == [[], ["not_finite"]]
+
+
+def test_weak_and_overrange_blows_are_held_against_the_median(hammer):
+    recordings = hammer.recordings(6)
+    recordings.append(hammer.recording(hammer.samples(hammer.force(peak=600.0)), 6))
+    recordings.append(hammer.recording(hammer.samples(hammer.force(peak=40_000.0)), 7))
+    impacts = hammer.impacts(recordings)
+    assert [reasons(i) for i in impacts] == [[]] * 6 + [["weak"], ["overload"]]
+    assert impacts[6].rejections[0].value == pytest.approx(600.0, rel=0.01)
+    assert impacts[6].rejections[0].value < impacts[6].rejections[0].limit
+    assert "the test's median is" in impacts[7].rejections[0].detail
+
+
+def test_a_noisy_blow_is_rejected_and_an_evenly_noisy_test_is_not(hammer):
+    quiet = hammer.recordings(5, noise=(1e-4, 1e-2))
+    noisy = hammer.recording(hammer.samples(hammer.force(), noise=(1e-4, 0.08)), 5)
+    assert [reasons(i) for i in hammer.impacts([*quiet, noisy])] == [[]] * 5 + [["noisy"]]
+    assert all(i.accepted for i in hammer.impacts(hammer.recordings(6, noise=(1e-4, 0.1))))  # 20 dB
+    drowned = hammer.impacts(hammer.recordings(6, noise=(1e-4, 0.27)))
+    assert {r for i in drowned for r in reasons(i)} <= {"noisy", "dead_channel"} and not any(
+        i.accepted for i in drowned
+    )
+
+
+def test_late_and_cut_off_records_are_rejected(hammer):
+    recordings = hammer.recordings(4)
+    late = hammer.samples(hammer.force(start=0.19))
+    short = recordings[0].samples[:, :600]  # 30 ms, of which 23 ms decay: the ballast mode keeps e^-4 of itself
+    impacts = hammer.impacts([*recordings, hammer.recording(late, 8), hammer.recording(short, 9)])
+    assert [reasons(i) for i in impacts] == [[]] * 4 + [["late"], ["cut_off"]]
+    # An exponential window ends the leakage that a cut-off record would bring.
+    assert hammer.impacts([*recordings, hammer.recording(short, 9)], exponential_window=100.0)[-1].accepted
+
+
+def test_one_blow_alone_is_measured_and_not_compared(hammer):
+    (impact,) = hammer.impacts(hammer.recordings(1))
+    assert impact.accepted and impact.peak > 3900
+
+
+def test_a_significant_zero_line_is_taken_off_and_a_sound_one_left_alone(hammer):
+    sound = hammer.recordings(3)
+    shifted = [replace(r, samples=r.samples + np.array([[40.0], [25.0]])) for r in sound]
+    for a, b in zip(hammer.impacts(sound), hammer.impacts(shifted)):
+        assert b.force == pytest.approx(a.force, abs=1e-6) and b.peak == pytest.approx(a.peak, abs=1e-6)
+        assert np.mean(b.acceleration - a.acceleration) == pytest.approx(
+            0.0, abs=3 * a.noise_acceleration / np.sqrt(90)
+        )
+    assert sum(np.array_equal(i.acceleration, r.samples[1]) for i, r in zip(hammer.impacts(sound), sound)) >= 2
+
+
+def test_order_of_recordings_changes_nothing_but_the_order(hammer):
+    recordings = hammer.recordings(7)
+    forward, backward = hammer.impacts(recordings), hammer.impacts(recordings[::-1])[::-1]
+    for a, b in zip(forward, backward):
+        assert a.force.tobytes() == b.force.tobytes() and a.rejections == b.rejections and a.band_edge == b.band_edge
+
+
+def test_a_missing_channel_is_a_key_error_that_lists_what_there_is(hammer):
+    with pytest.raises(KeyError, match="hammer"):
+        find_impacts(hammer.recordings(1), "hammr", "rail")
+
+
+def test_no_recordings_give_no_impacts():
+    assert find_impacts([], "hammer", "rail") == ()

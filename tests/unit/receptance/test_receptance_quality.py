@@ -1,0 +1,169 @@
+"""Double hits, overloads and odd blows: found when there, silent when not. Statistics are in the benchmarks."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from turnout.receptance.agreement import pairwise_coherence, response_gain
+from turnout.receptance.flat_top import top_share
+from turnout.receptance.overload import rail_code
+from turnout.signal.pulses import FAMILIES, force_pulse
+
+RATE = 20_000.0
+
+
+def findings(impact):
+    return [r.reason for r in (*impact.rejections, *impact.notes)]
+
+
+@pytest.mark.parametrize(
+    "contact, delay", [(1e-4, 4e-3), (1e-4, 50e-3), (5e-4, 4e-3), (1.5e-3, 4e-3), (3e-3, 6e-3), (3e-3, 50e-3)]
+)
+def test_a_second_hit_of_five_percent_is_found_and_measured(hammer, contact, delay):
+    recordings = hammer.recordings(3, contact=contact)
+    both = hammer.force(contact=contact) + hammer.force(peak=250.0, contact=contact, start=5e-3 + delay)
+    impacts = hammer.impacts([*recordings, hammer.recording(hammer.samples(both), 3)])
+    assert [findings(i) for i in impacts] == [[]] * 3 + [["double_hit"]]
+    found = (*impacts[3].rejections, *impacts[3].notes)[0]
+    assert found.value == pytest.approx(0.05, rel=0.1) and f"{1e3 * delay:+.1f} ms" in found.detail
+    after = impacts[3].contact_end >= (5e-3 + delay) * RATE
+    assert after or impacts[3].force.size < (5e-3 + delay) * RATE  # no decay contains it
+    assert impacts[3].contact < 1.2 * contact + 1e-4
+
+
+def test_a_light_touch_ahead_of_the_blow_is_a_double_hit_too(hammer):
+    both = hammer.force(start=15e-3) + hammer.force(peak=800.0, start=5e-3)
+    (impact,) = hammer.impacts([hammer.recording(hammer.samples(both))])
+    assert findings(impact) == ["double_hit"] and "-10.0 ms" in (*impact.rejections, *impact.notes)[0].detail
+
+
+def test_policy_of_double_hits(hammer):
+    strong = hammer.force() + hammer.force(peak=4500.0, start=15e-3)
+    recording = [hammer.recording(hammer.samples(strong))]
+    (moved,), (rejected,) = hammer.impacts(recording), hammer.impacts(recording, double_hit="reject")
+    assert moved.accepted and moved.notes[0].reason == "double_hit" and "starts after" in moved.notes[0].detail
+    assert moved.decay_start / RATE > 16.5e-3
+    assert not rejected.accepted and rejected.rejections[0].reason == "double_hit"
+    # A second contact in the middle of a damped decay leaves nothing worth using.
+    (dropped,) = hammer.impacts(
+        [hammer.recording(hammer.samples(hammer.force() + hammer.force(peak=300.0, start=25e-3)))]
+    )
+    assert not dropped.accepted and "of the decay is left" in dropped.rejections[0].detail
+
+
+def test_a_second_hit_after_the_decay_ends_the_record_and_no_more(hammer):
+    late = hammer.samples(hammer.force() + hammer.force(peak=300.0, start=90e-3))
+    (cut,) = hammer.impacts([hammer.recording(late)])
+    assert cut.accepted and findings(cut) == ["double_hit"] and "cut before it" in cut.notes[0].detail
+    assert cut.acceleration.size == cut.force.size and cut.force.size == pytest.approx(90e-3 * RATE, abs=8)
+    assert cut.decay_start == cut.contact_end + 5 and cut.force[cut.decay_start :].max() < 10.0
+    (strict,) = hammer.impacts([hammer.recording(late)], double_hit="reject")
+    assert not strict.accepted
+
+
+def test_hum_and_a_drifting_zero_are_no_second_hits(hammer):
+    t = np.arange(4000) / RATE
+    recordings = hammer.recordings(4)
+    hum = [replace(r, samples=r.samples + np.stack([100 * np.sin(314.16 * t + 1), 0 * t])) for r in recordings]
+    undershoot = [
+        replace(r, samples=r.samples - np.stack([150 * np.exp(-t / 0.1) * (t > 6e-3), 0 * t])) for r in recordings
+    ]
+    for changed in (hum, undershoot):
+        assert not any(findings(i) for i in hammer.impacts(changed))
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("contact", [6e-4, 3e-3])
+@pytest.mark.parametrize("steps", [100, 2000])
+def test_sound_pulses_are_no_overload_on_a_quiet_converter(hammer, family, contact, steps):
+    recordings = []
+    for r in hammer.recordings(6, noise=(0.0, 1e-3), family=family, contact=contact):
+        step = r.samples[0].max() / steps
+        recordings.append(replace(r, samples=np.stack([np.round(r.samples[0] / step) * step, r.samples[1]])))
+    assert not any(findings(i) for i in hammer.impacts(recordings))
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_clipping_is_found_hard_analog_and_soft(hammer, family):
+    def test_with(distort, noise):
+        force = distort(hammer.force(peak=8000.0, family=family))
+        return hammer.impacts([*hammer.recordings(6, family=family), hammer.recording(hammer.samples(force, noise), 6)])
+
+    hard = test_with(lambda f: np.minimum(f, 6500.0), (0.0, 1e-3))
+    analog = test_with(lambda f: np.minimum(f, 6500.0), (5e-3, 1e-3))
+    soft = test_with(lambda f: 6500.0 * np.tanh(f / 6500.0), (1e-4, 1e-3))
+    for impacts, words in ((hard, "repeats its highest code"), (analog, "flat"), (soft, "flat")):
+        assert [findings(i) for i in impacts] == [[]] * 6 + [["overload"]]
+        assert words in impacts[6].rejections[0].detail
+
+
+def test_a_clipped_response_and_a_known_range_are_overloads(hammer):
+    recordings = hammer.recordings(5)
+    samples = recordings[0].samples.copy()
+    samples[1] = np.clip(samples[1], -0.6 * np.abs(samples[1]).max(), 0.6 * np.abs(samples[1]).max())
+    impacts = hammer.impacts([*recordings[1:], hammer.recording(samples, 9)])
+    assert [findings(i) for i in impacts] == [[]] * 4 + [["overload"]]
+    assert "rail repeats" in impacts[-1].rejections[0].detail
+    channels = (replace(recordings[0].channels[0], limit=3000.0), recordings[0].channels[1])
+    (known,) = hammer.impacts([replace(recordings[0], channels=channels)])
+    assert known.rejections[0].reason == "overload" and known.rejections[0].limit == 3000.0
+
+
+def test_three_equal_samples_by_chance_are_no_rail():
+    rng = np.random.default_rng(8)
+    t = np.arange(4000)
+    alarms = [rail_code(np.round(40 * np.sin(t / 9.0 + p) * np.exp(-t / 500) + rng.normal(size=4000)), 1.0, 1.0)
+              for p in rng.uniform(0, 6.3, 200)]  # fmt: skip
+    assert alarms == [None] * 200
+
+
+@pytest.mark.parametrize("family, share", [("half-sine", 0.3033), ("haversine", 0.2871), ("Hertzian", 0.2923)])
+def test_top_share_has_its_closed_form(family, share):
+    class About:
+        onset, end, half_width = 1, 199, 100.0
+
+    pulse = force_pulse(family, np.arange(201) / 200.0, 1.0)
+    # acos(0.95)/acos(0.5); the same of the square root; of the power 2/3
+    assert top_share(pulse, About) == pytest.approx(share, abs=2e-3)
+
+
+def test_the_odd_blow_is_named_with_both_coherences(hammer):
+    recordings = hammer.recordings(6)
+    other = hammer.samples(hammer.force())
+    other[1] = np.convolve(other[1], [0.2, -0.5, 0.9, 0.4, -0.8], mode="same")[::1] + 0.3 * np.roll(other[1], 55)
+    impacts = hammer.impacts([*recordings[:3], hammer.recording(other, 9), *recordings[3:]])
+    assert [findings(i) for i in impacts] == [[], [], [], ["odd_one_out"], [], [], []]
+    assert "with it" in impacts[3].rejections[0].detail and "without" in impacts[3].rejections[0].detail
+
+
+def test_a_response_of_opposite_sign_is_named_even_if_a_third_of_the_test_has_it(hammer):
+    recordings = hammer.recordings(9)
+    turned = [replace(r, samples=r.samples * [[1], [-1]]) if r.record % 3 == 0 else r for r in recordings]
+    impacts = hammer.impacts(turned)
+    assert [i.accepted for i in impacts] == [k % 3 != 0 for k in range(9)]
+    assert all("opposite sign" in impacts[k].rejections[0].detail for k in (0, 3, 6))
+
+
+def test_of_two_blows_none_is_odd(hammer):
+    recordings = hammer.recordings(2)
+    recordings[1] = replace(recordings[1], samples=recordings[1].samples * [[1], [-1]])
+    assert all(i.accepted for i in hammer.impacts(recordings))
+
+
+def test_pairs_are_symmetric_and_between_nothing_and_one():
+    rng = np.random.default_rng(3)
+    force, acceleration = rng.standard_normal((2, 7, 40, 2)) @ [1.0, 1j]
+    pairs = pairwise_coherence(force, acceleration)
+    assert np.array_equal(pairs, pairs.T) and (np.diag(pairs) == 1.0).all()
+    # Two records of nothing in common: z = 1 - (1 - p) at the median, 0.5, here the median of 40 lines.
+    assert 0.2 < np.median(pairs[pairs < 1.0]) < 0.8
+
+
+def test_a_shifted_resonance_is_no_change_of_size():
+    f = np.arange(20.0, 1200.0, 5.0)
+    force = np.outer([5.0, 4.0, 6.0, 5.0, 5.5], np.ones(f.size))
+    own = 616.0 * np.array([[1.0], [1.0], [1.0], [1.03], [0.97]])
+    acceleration = force * (1j * f) ** 2 / (own**2 - f**2 + 2j * 0.066 * own * f)
+    # Area under a resonance of acceleration goes with the frequency: 3 % shift, some percent of size and no more.
+    assert response_gain(force, acceleration) == pytest.approx(1.0, abs=0.05)

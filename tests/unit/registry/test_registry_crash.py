@@ -1,0 +1,137 @@
+"""Killed at any moment, out of space, locked out: nothing lost, nothing half, and the same bytes afterwards."""
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from filelock import FileLock
+from registry_rows import Bench, hammer_result
+
+from turnout.errors import RegistryError
+from turnout.fleet.batches import read_results
+from turnout.registry import registration
+from turnout.registry.database import is_behind, rebuild_database
+from turnout.registry.generation import load
+from turnout.registry.inspection import check, vacuum
+from turnout.registry.register import register
+
+REGISTER = (
+    "import sys; from turnout.registry.register import register; from turnout.fleet.batches import read_results;"
+    "print('ready', flush=True); register(sys.argv[2:], sys.argv[1], read=read_results)"
+)
+
+
+@pytest.fixture(scope="module")
+def calm(tmp_path_factory):
+    """Two batches, the registry after the first and after both, never disturbed."""
+    root = tmp_path_factory.mktemp("calm")
+    (root / "work").mkdir()
+    first, second = two_nights(Bench(root), hammer_result)
+    register([first], root / "one", read=read_results)
+    shutil.copytree(root / "one", root / "two")
+    register([first, second], root / "two", read=read_results)
+    return root, first, second
+
+
+@pytest.fixture
+def after_one(calm, bench):
+    """The registry after the first batch, to disturb."""
+    shutil.copytree(calm[0] / "one", bench.registry)
+    rebuild_database(bench.registry)
+    return bench
+
+
+def two_nights(bench, hammer):
+    first = [hammer(f"t{i}", f"A{j}", day) for i in range(4) for j in range(8) for day in ("2025-11-03", "2026-01-05")]
+    second = [hammer(f"t{i}", f"A{j}", "2026-01-05", key="k2") for i in range(4) for j in range(8)]
+    return bench.batch(*first), bench.batch(*second)
+
+
+def test_killed_at_random_moments_and_started_again_gives_the_same_bytes(bench, calm, hashes):
+    undisturbed, first, second = calm
+    generator, killed = random.Random(3), 0
+    for night in ([first], [first, second]):
+        for _ in range(3):
+            arguments = [sys.executable, "-c", REGISTER, str(bench.registry), *map(str, night)]
+            writer = subprocess.Popen(arguments, stdout=subprocess.PIPE)
+            writer.stdout.readline()
+            time.sleep(generator.uniform(0.05, 0.8))
+            killed += writer.poll() is None
+            writer.send_signal(signal.SIGKILL)
+            writer.wait()
+            writer.stdout.close()
+        register(night, bench.registry, read=read_results)
+    assert killed >= 3, "the kills came too late to mean anything"
+    vacuum(bench.registry)
+    assert hashes(bench.registry) == hashes(undisturbed / "two")
+    assert check(bench.registry) == []
+
+
+STEPS = ["write_sorted", "commit", "build_database", "delete_files"]
+
+
+@pytest.mark.parametrize("step", STEPS)
+@pytest.mark.parametrize("when", ["before", "after"])
+def test_a_stop_at_any_step_leaves_the_old_or_the_new_state(after_one, calm, hashes, monkeypatch, step, when):
+    bench, (undisturbed, first, second) = after_one, calm
+    real, calls = getattr(registration, step), []
+
+    def stopped(*arguments):
+        calls.append(arguments)
+        if len(calls) == 3 or step != "write_sorted":
+            if when == "after":
+                real(*arguments)
+            raise KeyboardInterrupt
+        return real(*arguments)
+
+    monkeypatch.setattr(registration, step, stopped)
+    with pytest.raises(KeyboardInterrupt):
+        register([first, second], bench.registry, read=read_results)
+    monkeypatch.undo()
+    before, after = bench.ask("select count(*) from modes_current")[0][0], load(bench.registry).number
+    assert (before, after) == (64, 2 if step in STEPS[2:] or (step, when) == ("commit", "after") else 1)
+    register([first, second], bench.registry, read=read_results)
+    assert bench.ask("select count(*), count(distinct model_id) from modes") == [(96, 96)]
+    assert not is_behind(bench.registry, load(bench.registry))
+    vacuum(bench.registry)
+    assert hashes(bench.registry) == hashes(undisturbed / "two")
+
+
+def test_a_full_disk_changes_nothing_and_says_what_to_do(after_one, calm, hashes):
+    bench, (_, first, second) = after_one, calm
+    before = hashes(bench.registry, without=())
+    limited = f"import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (3000, 3000)); {REGISTER}"
+    arguments = [sys.executable, "-c", limited, str(bench.registry), str(first), str(second)]
+    done = subprocess.run(arguments, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 1
+    last = done.stderr.strip().splitlines()[-1]
+    assert last.startswith("turnout.errors.RegistryError: cannot write ")
+    assert last.endswith("Nothing was changed: make room or give write permission, then run again.")
+    assert hashes(bench.registry, without=()) == before and not list(bench.registry.rglob("*.tmp"))
+    register([first, second], bench.registry, read=read_results)
+    assert bench.ask("select count(*) from modes") == [(96,)]
+
+
+def test_a_locked_registry_is_said_and_left_alone(bench, hammer):
+    bench.register(hammer())
+    with FileLock(bench.registry / ".lock"), pytest.raises(RegistryError, match=r"another run .* within 0.1 s"):
+        bench.register(hammer(section="A2"), patience=0.1)
+    assert bench.ask("select count(*) from modes") == [(1,)], "reading needs no lock"
+    bench.register()
+    assert bench.ask("select count(*) from modes") == [(2,)]
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_registry_without_permission_is_said(bench, hammer):
+    bench.register(hammer())
+    bench.registry.chmod(0o500)
+    try:
+        with pytest.raises(RegistryError, match="cannot write"):
+            bench.register(hammer(section="A2"))
+    finally:
+        bench.registry.chmod(0o700)

@@ -1,0 +1,123 @@
+"""A registry without a single measurement answers every view and macro, offline, and opens in older DuckDB."""
+
+import csv
+
+import duckdb
+import pytest
+
+from turnout.cli import main
+from turnout.errors import REASONS
+from turnout.registry.database import open_registry, view_columns
+from turnout.registry.listing import views
+from turnout.registry.register import register
+
+# DuckDB writes its storage version behind the magic bytes of the main header; 64 was written by all of 0.9.2 to 1.2.
+MAGIC, OLDEST_READ_BY_1_2 = b"DUCK", 64 + 3
+ARGUMENTS = {
+    "section": "'t1/A7'", "resonance": "'ballast'", "days": "365", "asof": "timestamp '2026-01-01'",
+    "event_kind": "'tamping'", "kind_of_event": "'tamping'", "turnout": "'t1'", "from_utc": "'2026-01-01'",
+    "to_utc": "'2026-02-01'", "since": "timestamp '2025-01-01'", "k": "1.0", "h": "5.0", "target_pct": "1.5",
+    "base_days": "365", "at_most": "20",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def empty(tmp_path_factory):
+    root = tmp_path_factory.mktemp("empty") / "registry"
+    register([], root, read=iter)
+    return root
+
+
+def sql_of(call):
+    """The view, or the macro with one value for each of its parameters, by position."""
+    name, _, parameters = call.partition("(")
+    wanted = [p.split(":=")[0].strip() for p in parameters.rstrip(")").split(",") if p.strip()]
+    return f"from {name}" + (f"({', '.join(ARGUMENTS[p] for p in wanted)})" if wanted else "")
+
+
+@pytest.mark.parametrize("call", sorted(views()))
+def test_every_view_and_macro_answers_when_there_is_nothing(empty, call):
+    with open_registry(empty) as connection:
+        rows = connection.execute(sql_of(call)).fetchall()
+    assert len(rows) == {"registry_info": 1, "reasons": len(REASONS)}.get(call, 0)
+
+
+def test_there_are_at_least_the_views_that_users_were_promised():
+    promised = {
+        "modes_current", "models_current", "epochs", "section_trend", "resonance_drift", "change_since_event",
+        "rejected", "cannot_see", "quarantine_open", "fleet_state", "campaigns_of", "fit_by_type", "fit_by_speed",
+        "fit_by_axle_load", "passage_fits_weekly", "fit_by_cluster_week", "sections_whose_scores_fell",
+        "passages_behind",
+    }  # fmt: skip
+    assert promised <= {call.partition("(")[0] for call in views()}
+
+
+def test_storage_is_of_version_1_2(empty):
+    with open(empty / "registry.duckdb", "rb") as stream:
+        header = stream.read(32)
+    assert header[8:12] == MAGIC
+    assert int.from_bytes(header[12:20], "little") <= OLDEST_READ_BY_1_2
+    with open_registry(empty) as connection:
+        tags = connection.execute("select tags from duckdb_databases() where database_name = 'registry'").fetchall()
+    assert tags[0][0]["storage_version"].startswith("v1.2.0")
+
+
+def test_nothing_is_loaded_from_anywhere(empty):
+    with open_registry(empty) as connection:
+        settings = connection.execute(
+            "select name, value from duckdb_settings() where name like 'auto%known_extensions' order by 1"
+        ).fetchall()
+        assert [v for _, v in settings] == ["false", "false"]
+        with pytest.raises(duckdb.Error, match="read-only"):
+            connection.execute("create table x(i integer)")
+
+
+def test_the_database_holds_no_rows(empty):
+    with open_registry(empty) as connection:
+        assert connection.execute("select count(*) from duckdb_tables()").fetchall() == [(0,)]
+
+
+def test_columns_carry_their_unit_as_a_comment(empty):
+    with open_registry(empty) as connection:
+        comments = connection.execute(
+            "select comment from duckdb_columns() where table_name in ('modes', 'modes_current') "
+            "and column_name = 'frequency_se_hz'"
+        ).fetchall()
+    assert comments == [("standard error of frequency_hz from the spread of its impacts [Hz]",)] * 2
+
+
+def test_query_prints_a_table_and_writes_csv(empty, tmp_path, capsys):
+    assert main(["query", "select 1.5 as a, null as b, 'x' as c", "--registry", str(empty)]) == 0
+    assert capsys.readouterr().out.splitlines() == ["  a  b  c", "---  -  -", "1.5     x", "(1 row)"]
+    target = tmp_path / "out.csv"
+    assert main(["query", "from range(3) t(i)", "--csv", str(target), "--registry", str(empty)]) == 0
+    assert list(csv.reader(target.open())) == [["i"], ["0"], ["1"], ["2"]]
+    assert main(["query", "from range(100) t(i)", "--rows", "2", "--registry", str(empty)]) == 0
+    assert capsys.readouterr().out.endswith("(2 of 100 rows)\n")
+
+
+def test_a_wrong_query_is_one_message_and_exit_code_2(empty, capsys):
+    assert main(["query", "from modes_curent", "--registry", str(empty)]) == 2
+    said = capsys.readouterr().err
+    assert "modes_curent" in said and "turnout query --list" in said and "Traceback" not in said
+
+
+def test_the_registry_command_looks_after_it(empty, capsys):
+    for action, said in [
+        ("check", "The registry holds what its list says."),
+        ("compact", "Nothing to do."),
+        ("vacuum", "Nothing to delete."),
+        ("relocate", "views over"),
+    ]:
+        assert main(["registry", action, "--registry", str(empty)]) == 0
+        assert said in capsys.readouterr().out
+    assert main(["registry", "describe", "section_trend"]) == 0
+    assert "frequency_hz" in capsys.readouterr().out
+    assert main(["registry", "describe", "section_trends"]) == 2
+    assert "Did you mean section_trend?" in capsys.readouterr().err
+    assert main(["registry", "check", "--registry", str(empty.parent)]) == 2
+
+
+def test_view_columns_are_listed_once():
+    listed = [(row["view"], row["parameters"], row["column"]) for row in view_columns()]
+    assert len(listed) == len(set(listed))

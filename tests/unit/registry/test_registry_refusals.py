@@ -1,0 +1,208 @@
+"""What may not enter is refused by name, becomes a quarantine row, and stops nothing else."""
+
+import json
+import math
+
+import pyarrow as pa
+import pytest
+from registry_rows import hammer_result
+
+from turnout.errors import RegistryError
+from turnout.fleet.batches import UnitResult
+from turnout.registry.columns import arrow_schema, create_table, tables
+from turnout.registry.database import open_registry
+from turnout.registry.derived import publish
+from turnout.registry.register import register
+from turnout.registry.staging import connect
+
+NAN, INF = math.nan, math.inf
+
+
+def results_as_given(path):
+    """The result as the test made it, past the encoding of batches, which turns NaN into NULL."""
+    return iter(HELD[path.name])
+
+
+HELD: dict[str, list[UnitResult]] = {}
+
+
+@pytest.fixture
+def register_raw(tmp_path):
+    """Register results that no batch file would hold."""
+
+    def run(*results):
+        path = tmp_path / f"raw-{len(HELD)}"
+        path.write_text("x" * len(HELD))
+        HELD[path.name] = sorted(results, key=lambda r: r.unit)
+        return register([path], tmp_path / "registry", read=results_as_given)
+
+    return run
+
+
+BAD_MODES = [
+    ("frequency_hz", NAN, "nan", "between 0.1 and 2000 Hz"),
+    ("frequency_hz", INF, "inf", "between 0.1 and 2000 Hz"),
+    ("frequency_hz", -INF, "-inf", "between 0.1 and 2000 Hz"),
+    ("frequency_hz", None, "missing", "given"),
+    ("frequency_hz", 0.0, "0.0", "between 0.1 and 2000 Hz"),
+    ("frequency_hz", 2000.5, "2000.5", "between 0.1 and 2000 Hz"),
+    ("frequency_hz", "150 Hz", "'150 Hz'", "of type double"),
+    ("frequency_hz", True, "True", "of type double"),
+    ("frequency_se_hz", NAN, "nan", "between 0 and 2000 Hz"),
+    ("frequency_se_hz", -0.1, "-0.1", "between 0 and 2000 Hz"),
+    ("damping_ratio", 1.0, "1.0", "between 1e-06 and 0.999"),
+    ("rail_temperature_c", 80.1, "80.1", "between -50 and 80 °C"),
+    ("rail_temperature_c", NAN, "nan", "between -50 and 80 °C"),
+    ("band", "rail", "rail", "one of ballast, railpad"),
+    ("n_impacts", -1, "-1", "at least 0"),
+    ("n_impacts", 2.5, "2.5", "of type integer"),
+    ("measured_at_utc", "yesterday", "'yesterday'", "of type timestamp"),
+    ("measured_at_utc", "2026-01-05T10:00:00+02:00", "+02:00'", "of type timestamp"),
+    ("turnout_id", 7, "7", "of type varchar"),
+    ("frequency_khz", 0.15, "0.15", "a column of columns.csv"),
+]
+
+
+@pytest.fixture(scope="module")
+def all_bad_at_once(tmp_path_factory):
+    """Every bad row in a unit of its own, sound units before, between and after them: place and found by section."""
+    root = tmp_path_factory.mktemp("bad")
+    bad = [hammer_result(section=f"B{i:02d}", **{c: v}) for i, (c, v, *_) in enumerate(BAD_MODES)]
+    sound = [hammer_result(section=s) for s in ("A1", "B05x", "C1")]
+    (root / "raw").write_text("raw")
+    HELD["raw"] = sorted([*bad, *sound], key=lambda r: r.unit)
+    done = register([root / "raw"], root / "registry", read=results_as_given)
+    assert done.n_refused == len(BAD_MODES)
+    with open_registry(root / "registry") as connection:
+        rows = connection.execute(
+            "select section_id, place, found, stage, reason_code, path from quarantine_open"
+        ).fetchall()
+        modes = connection.execute("select section_id from modes_current order by 1").fetchall()
+        assert connection.execute("select count(*) from models").fetchall() == [(len(BAD_MODES) + 3,)]
+    return {row[0]: row[1:] for row in rows}, modes
+
+
+def test_bad_rows_stop_no_sound_one(all_bad_at_once):
+    assert all_bad_at_once[1] == [("t1/A1",), ("t1/B05x",), ("t1/C1",)]
+
+
+@pytest.mark.parametrize("i", range(len(BAD_MODES)), ids=[f"{c}={v}" for c, v, *_ in BAD_MODES])
+def test_a_bad_value_is_refused_by_name(all_bad_at_once, i):
+    column, _, said, asked = BAD_MODES[i]
+    place, found, stage, reason, path = all_bad_at_once[0][f"t1/B{i:02d}"]
+    assert place == f"modes, row 1, column {column}"
+    assert said in found.split(", must be ")[0]
+    assert found.split(", must be ")[1].startswith(asked)
+    assert (stage, reason, path) == ("register", "internal_error", f"t1/hammer/2026-01-05/B{i:02d}_1.uff")
+
+
+def test_nothing_of_a_refused_row_is_lost(bench, register_raw, hammer):
+    register_raw(hammer(frequency=-1.0, damping_se=0.0123))
+    found = bench.ask("select found, measured_value from quarantine_open")[0]
+    row = json.loads(found[0].split("; row: ")[1])
+    assert (row["frequency_hz"], row["damping_se"]) == (-1.0, 0.0123)
+    assert found[1] == -1.0
+
+
+@pytest.mark.parametrize("matrix", [[0.5, NAN], [INF, 0.5], [0.5, None], "0.5 0.5", [["a"]]], ids=str)
+def test_a_list_with_one_bad_element_is_refused_and_its_modes_with_it(bench, register_raw, hammer, matrix):
+    bad = hammer(section="A1")
+    bad.tables["models"][0]["a_matrix"] = matrix
+    register_raw(bad, hammer(section="A2"))
+    assert bench.ask("select section_id from models") == bench.ask("select section_id from modes") == [("t1/A2",)]
+    assert bench.ask("select place from quarantine_open") == [("models, row 1, column a_matrix",)]
+
+
+def test_the_second_row_of_a_key_is_refused(bench, register_raw, hammer):
+    twice = hammer(section="A1")
+    twice.tables["modes"].append(dict(twice.tables["modes"][0], frequency_hz=99.0))
+    copied = hammer(section="A2")
+    copied.tables["models"][0]["model_id"] = copied.tables["modes"][0]["model_id"] = twice.tables["models"][0][
+        "model_id"
+    ]
+    done = register_raw(twice, copied)
+    assert done.n_refused == 3
+    assert bench.ask("select section_id, frequency_hz from modes") == [("t1/A1", 150.0)]
+    assert bench.ask("select section_id from models") == [("t1/A1",)]
+    places = bench.ask("select turnout_id, place from quarantine_open order by place, section_id")
+    assert [p for _, p in places] == [
+        "models, row 1, column model_id", "modes, row 1, column model_id+band", "modes, row 2, column model_id+band",
+    ]  # fmt: skip
+
+
+def test_a_table_or_a_row_of_no_kind_is_refused(bench, register_raw, hammer):
+    strange = hammer(section="A1")
+    strange.tables["weather"] = [{"rain": 1}]
+    strange.tables["impacts"] = ["not a row"]
+    register_raw(strange)
+    assert bench.ask("select place from quarantine_open order by 1") == [
+        ("impacts, row 1, column all",),
+        ("weather, row 1, column any",),
+    ]
+    assert bench.ask("select count(*) from modes") == [(1,)]
+
+
+def test_a_quarantine_row_that_is_itself_wrong_still_becomes_one(bench, register_raw, quarantined):
+    wrong = quarantined()
+    wrong.tables["quarantine"][0] |= {"kind": "telegram", "path": None, "measured_value": NAN}
+    register_raw(wrong)
+    rows = bench.ask("select reason_code, stage, place from quarantine_open")
+    assert rows == [("internal_error", "register", "quarantine, row 1, column kind")]
+
+
+def test_a_refusal_leaves_quarantine_when_the_code_is_mended(bench, register_raw, hammer):
+    register_raw(hammer(frequency=NAN, algo="1"))
+    register_raw(hammer(frequency=150.0, algo="2"))
+    assert bench.ask("select count(*) from quarantine_open") == [(0,)]
+    assert bench.ask("select frequency_hz from modes_current") == [(150.0,)]
+
+
+def test_a_half_written_batch_does_not_stop_the_others(bench, hammer):
+    sound = bench.batch(hammer(section="A1"))
+    broken = bench.batch(hammer(section="A2"))
+    whole = broken.read_bytes()
+    broken.write_bytes(whole[: len(whole) // 2])
+    done = bench.register()
+    assert list(done.faults) == [str(broken)] and sound.exists()
+    assert bench.ask("select section_id from modes_current") == [("t1/A1",)]
+    broken.write_bytes(whole)
+    assert bench.register().faults == {}
+    assert bench.ask("select count(*) from modes_current") == [(2,)]
+
+
+def test_every_double_of_every_table_refuses_nan_and_infinity():
+    connection, tried = connect(), 0
+    for table, columns in tables().items():
+        connection.execute(create_table(table, f"t_{table}").replace("not null", "").split(", primary key")[0] + ")")
+        for column in columns:
+            if column.type.removesuffix("[]") not in ("double", "float"):
+                continue
+            for bad in ("'nan'", "'inf'", "'-inf'"):
+                value = f"[1.0, {bad}::double]" if column.is_list else f"{bad}::double"
+                with pytest.raises(Exception, match="CHECK constraint"):
+                    connection.execute(f'insert into t_{table} ("{column.name}") values ({value})')
+                tried += 1
+    assert tried > 200
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        ({"state": ["ok", "fine"]}, "column state: fine, must be one of ok, baseline"),
+        ({"epoch": [0, None]}, "column epoch: None, must be given"),
+        ({"z": [0.0, INF]}, "column z: inf, must be"),
+        ({"zz": [0.0, 1.0]}, "column zz: columns.csv does not know it"),
+    ],
+)
+def test_a_derived_table_with_a_bad_row_is_refused_whole(tmp_path, rows, said):
+    days = pa.array(["2026-01-01", "2026-01-08"]).cast(pa.timestamp("us"))
+    good = {
+        "turnout_id": ["t1"] * 2, "section_id": ["t1/A1"] * 2, "band": ["ballast"] * 2, "source": ["hammer"] * 2,
+        "measured_at_utc": days, "epoch": [0, 0], "state": ["ok", "ok"], "z": [0.5, NAN],
+    }  # fmt: skip
+    assert publish(tmp_path / "registry", {"charts": pa.table(good)}).number == 1
+    with pytest.raises(RegistryError, match=said) as caught:
+        publish(tmp_path / "registry", {"charts": pa.table(good | rows)})
+    assert "2026-01-08" in str(caught.value) or "zz" in str(caught.value)
+    assert publish(tmp_path / "registry", {"charts": pa.table(good)}).number == 1
+    assert arrow_schema("charts").field("measured_at_utc").type == days.type

@@ -1,0 +1,234 @@
+"""Compaction, checks, moves and updates leave every answer as it was."""
+
+import json
+import os
+import shutil
+
+import duckdb
+import pytest
+from registry_rows import Bench, hammer_result
+
+from turnout.errors import RegistryError
+from turnout.registry import compaction
+from turnout.registry.compaction import compact, rebuild
+from turnout.registry.database import open_registry, rebuild_database
+from turnout.registry.generation import FILE, load
+from turnout.registry.inspection import check, vacuum
+from turnout.registry.view_files import in_order
+
+ALL_MODES = "select * from modes order by model_id, band"
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Six registrations, one of which supersedes a model."""
+    root = tmp_path_factory.mktemp("made")
+    (root / "work").mkdir()
+    bench = Bench(root)
+    for night in range(5):
+        results = [hammer_result(f"t{i}", day=f"2026-01-{10 + night}", frequency=100.0 + night) for i in range(4)]
+        bench.register(*results)
+    bench.register(hammer_result("t0", day="2026-01-10", frequency=99.0, key="k2"))
+    return bench
+
+
+@pytest.fixture
+def five_nights(made, tmp_path):
+    """A copy of it to spoil."""
+    shutil.copytree(made.root, tmp_path / "copy")
+    rebuild_database(tmp_path / "copy" / "registry")
+    bench = Bench(tmp_path / "copy")
+    bench.batches = [bench.root / "work" / b.name for b in made.batches]
+    return bench
+
+
+def test_compaction_keeps_every_row_and_answer(five_nights):
+    before = five_nights.ask(ALL_MODES), five_nights.ask("select * from modes_current order by all")
+    done = compact(five_nights.registry)
+    assert done["modes/year=2026"] == (6, 21)
+    assert (five_nights.ask(ALL_MODES), five_nights.ask("select * from modes_current order by all")) == before
+    assert len(load(five_nights.registry).of("modes")) == 2
+    assert compact(five_nights.registry) == {} and check(five_nights.registry) == []
+
+
+def test_compaction_waits_until_it_pays(bench, hammer):
+    for day in ("2026-01-05", "2026-01-12", "2026-01-19"):
+        bench.register(hammer(day=day))
+    assert compact(bench.registry, at_least=4) == {}
+    assert compact(bench.registry, at_least=3)["modes/year=2026"] == (3, 3)
+
+
+def test_compaction_parts_what_counts_from_what_does_not(five_nights, hammer):
+    def counts():
+        return sorted((f.rows, f.dead) for f in load(five_nights.registry).of("modes"))
+
+    assert counts() == [(1, 0), (4, 0), (4, 0), (4, 0), (4, 0), (4, 1)]
+    compact(five_nights.registry)
+    assert counts() == [(1, 1), (20, 0)]
+    current = five_nights.ask("select turnout_id, frequency_hz from modes_current order by all")
+    assert len(current) == 20 and ("t0", 99.0) in current and ("t0", 100.0) not in current
+    five_nights.register(hammer("t0", day="2026-01-10", frequency=100.0))
+    assert counts() == [(1, 0), (20, 1)], "taken back: the old row counts again, the new one does not"
+    assert five_nights.ask("select frequency_hz from modes_current where turnout_id = 't0' order by 1")[0] == (100.0,)
+    compact(five_nights.registry)
+    assert counts() == [(1, 1), (20, 0)] and five_nights.ask("select count(*) from modes_current") == [(20,)]
+
+
+def test_a_glob_counts_twice_during_compaction_and_the_list_does_not(five_nights, monkeypatch):
+    glob = f"select count(*) from read_parquet('{five_nights.registry}/modes/year=*/*.parquet')"
+    seen, real = [], compaction.commit
+
+    def look(root, generation):
+        seen.append((five_nights.ask("select count(*) from modes"), duckdb.sql(glob).fetchall()))
+        real(root, generation)
+        seen.append((five_nights.ask("select count(*) from modes"), duckdb.sql(glob).fetchall()))
+
+    monkeypatch.setattr(compaction, "commit", look)
+    compact(five_nights.registry)
+    assert [listed for listed, _ in seen] == [[(21,)], [(21,)]]
+    assert [globbed for _, globbed in seen] == [[(42,)], [(42,)]]
+
+
+def test_who_opened_the_registry_before_can_still_read_two_generations_on(five_nights, hammer):
+    with open_registry(five_nights.registry) as reader:
+        compact(five_nights.registry)
+        assert reader.execute("select count(*) from modes").fetchall() == [(21,)]
+        five_nights.register(hammer("t8"))
+        assert reader.execute("select count(*) from modes").fetchall() == [(21,)]
+    five_nights.register(hammer("t9"))
+    names = [p.name.split("-")[0] for p in (five_nights.registry / "modes" / "year=2026").iterdir()]
+    assert sorted(names) == ["batch", "batch", "compact", "superseded"], "dropped files go two generations later"
+    assert check(five_nights.registry) == []
+
+
+def test_a_small_table_that_changes_and_changes_back_is_never_deleted(bench):
+    def event(kind):
+        return {
+            "event_id": "e", "turnout_id": "t1", "event_at_utc": "2026-02-01T00:00:00", "kind": kind,
+            "resets_ballast": True, "resets_railpad": False,
+        }  # fmt: skip
+
+    for kind in ("tamping", "grinding", "tamping", "grinding", "tamping", "tamping"):
+        bench.register(tables={"events": [event(kind)]})
+        assert bench.ask("select kind from events") == [(kind,)]
+        assert check(bench.registry) == []
+
+
+def damage_truncate(path):
+    path.write_bytes(path.read_bytes()[:-100])
+
+
+def damage_flip(path):
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
+def damage_delete(path):
+    path.unlink()
+
+
+def damage_replace(path):
+    duckdb.sql(f"copy (select 1 as x) to '{path}' (format parquet)")
+
+
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        (damage_truncate, "bytes, the list says"),
+        (damage_flip, "its hash differs from the list"),
+        (damage_delete, "is gone"),
+        (damage_replace, "bytes, the list says"),
+    ],
+)
+def test_check_names_the_damaged_file(bench, hammer, damage, said):
+    bench.register(hammer())
+    file = load(bench.registry).of("modes")[0].path
+    damage(bench.registry / file)
+    problems = check(bench.registry)
+    assert len(problems) == 1 and problems[0].startswith(f"{file}: ") and said in problems[0]
+
+
+def test_vacuum_deletes_what_is_on_no_list_and_nothing_else(five_nights):
+    folder = five_nights.registry / "modes" / "year=2026"
+    (folder / "batch-feed-0000.parquet").write_bytes(b"left by a killed run")
+    (folder / ".batch-feed.77.tmp").write_bytes(b"half")
+    before = five_nights.ask(ALL_MODES)
+    assert "2 files are on no list" in check(five_nights.registry)[0]
+    assert sorted(os.path.basename(p) for p in vacuum(five_nights.registry)) == [
+        ".batch-feed.77.tmp", "batch-feed-0000.parquet",
+    ]  # fmt: skip
+    assert check(five_nights.registry) == [] and five_nights.ask(ALL_MODES) == before
+
+
+def test_a_moved_registry_is_relocated(five_nights):
+    before, moved = five_nights.ask(ALL_MODES), five_nights.root / "elsewhere with 'quotes'"
+    shutil.move(five_nights.registry, moved)
+    assert "registry.duckdb is not of generation" in check(moved)[0]
+    rebuild_database(moved)
+    five_nights.registry = moved
+    assert five_nights.ask(ALL_MODES) == before and check(moved) == []
+
+
+def test_a_column_added_later_is_null_in_old_rows_and_rebuild_writes_it(bench, hammer, monkeypatch):
+    bench.register(hammer(frequency=150.0))
+    file = bench.registry / load(bench.registry).of("modes")[0].path
+    strip_column(bench, "modes", file, "frequency_sd_hz")
+    bench.register(hammer(section="A2", frequency=151.0, frequency_sd_hz=0.5))
+    assert bench.ask("select frequency_hz, frequency_sd_hz from modes order by 1") == [(150.0, None), (151.0, 0.5)]
+    rebuild(bench.registry)
+    assert bench.ask("select frequency_hz, frequency_sd_hz from modes order by 1") == [(150.0, None), (151.0, 0.5)]
+    assert len({f.schema for f in load(bench.registry).of("modes")}) == 1 and check(bench.registry) == []
+
+
+def strip_column(bench, table, file, column):
+    """Rewrite one live file as an older version of the program would have written it."""
+    from turnout.content import sha256_of
+
+    older = file.with_name("older.parquet")
+    duckdb.sql(f"copy (select * exclude ({column}) from read_parquet('{file}')) to '{older}' (format parquet)")
+    older.replace(file)
+    path = bench.registry / FILE
+    generation = json.loads(path.read_text())
+    for entry in generation["files"]:
+        if entry["path"].endswith(file.name):
+            entry |= {"sha256": sha256_of(file), "bytes": file.stat().st_size, "schema": f"{table}:older"}
+    held = dict(next(v for k, v in generation["schemas"].items() if k.startswith(f"{table}:")))
+    del held[column]
+    generation["schemas"][f"{table}:older"] = held
+    path.write_text(json.dumps(generation))
+
+
+def test_a_column_that_changed_its_type_is_refused_before_anything_is_written(bench, hammer):
+    bench.register(hammer())
+    path = bench.registry / FILE
+    generation = json.loads(path.read_text())
+    name = next(k for k in generation["schemas"] if k.startswith("modes:"))
+    generation["schemas"][name]["n_impacts"] = "varchar"
+    path.write_text(json.dumps(generation))
+    with pytest.raises(RegistryError, match=r"modes, column n_impacts: files hold varchar, columns.csv says integer"):
+        bench.register(hammer(section="A2"))
+
+
+def test_a_spoilt_generation_file_is_said(bench, hammer):
+    bench.register(hammer())
+    (bench.registry / FILE).write_text("{")
+    with pytest.raises(RegistryError, match="not a generation file"):
+        bench.register(hammer(section="A2"))
+
+
+def test_no_registry_is_said(tmp_path):
+    with pytest.raises(RegistryError, match=r"there is no registry here. Run the pipeline"):
+        open_registry(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("texts", "said"),
+    [
+        ({"a": "-- needs: b"}, "views/a.sql needs b, and there is no such file"),
+        ({"a": "-- needs: b", "b": "-- needs: a"}, "need each other in a circle"),
+    ],
+)
+def test_views_that_cannot_be_ordered_are_refused(texts, said):
+    with pytest.raises(RegistryError, match=said):
+        in_order(texts)

@@ -1,0 +1,80 @@
+"""Charts put values where they belong: pixels are worked out by hand from the margins."""
+
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from turnout.report.chart import BOTTOM, LEFT, RIGHT, TOP, Axis, Chart
+from turnout.report.ticks import linear_ticks, log_ticks, time_ticks
+
+
+def chart(scale="linear"):
+    return Chart(Axis(10.0, 1000.0, "f [Hz]", scale), Axis(0.0, 4.0, "y"), "A <title> & more", width=476, height=266)
+
+
+def test_corners_of_the_data_are_corners_of_the_frame():
+    c = chart()
+    assert c.px([10.0, 1000.0]) == pytest.approx([LEFT, 476 - RIGHT])
+    assert c.py([0.0, 4.0]) == pytest.approx([266 - BOTTOM, TOP])
+
+
+def test_the_geometric_mean_is_in_the_middle_of_a_logarithmic_axis():
+    c = chart("log")
+    assert float(c.px(100.0)) == pytest.approx((LEFT + 476 - RIGHT) / 2)
+
+
+def test_a_missing_value_breaks_the_line_and_is_not_bridged():
+    c = chart()
+    c.line([10.0, 200.0, 400.0, 1000.0], [1.0, np.nan, 2.0, 3.0], "curve")
+    assert c.parts[0].count("M") == 2 and c.parts[0].count("L") == 1
+
+
+def test_a_band_with_a_hole_is_drawn_in_two_pieces():
+    c = chart()
+    c.band([10, 200, 400, 600, 1000], [1, 1, np.nan, 1, 1], [2, 2, 2, 2, 2], "interval")
+    assert len(c.parts) == 2
+
+
+def test_error_bars_span_low_to_high():
+    c = chart()
+    c.points([500.0], [2.0], "point", low=[1.0], high=[3.0])
+    bottom, top = (float(v) for v in re.search(r'M[\d.]+ ([\d.]+)V([\d.]+)"', c.parts[0]).groups())
+    assert (bottom, top) == pytest.approx((float(c.py(1.0)), float(c.py(3.0))), abs=0.05)
+
+
+def test_the_drawing_is_sound_xml_and_escapes_words():
+    c = chart("log")
+    c.line([10, 100], [1, 2], "curve", 'say "<this>"')
+    c.vertical(100.0, "event", "pads & clips")
+    c.text(0.5, 0.5, "<b>")
+    root = ElementTree.fromstring(c.svg().replace("<svg ", '<svg xmlns="http://www.w3.org/2000/svg" ', 1))
+    assert root.attrib["aria-label"] == "A <title> & more"
+    assert any(t.text == "pads & clips" for t in root.iter("{http://www.w3.org/2000/svg}text"))
+
+
+def test_a_constant_quantity_still_gives_an_axis_with_width():
+    axis = Axis(5.0, 5.0)
+    assert axis.low < 5.0 < axis.high
+
+
+@pytest.mark.parametrize("low,high", [(0.0, 1e-9), (98.2, 103.9), (-7.0, 13.0), (1e6, 1.0001e6)])
+def test_ticks_lie_inside_and_are_evenly_spaced(low, high):
+    ticks = linear_ticks(low, high)
+    steps = np.diff(ticks)
+    # ticks are rounded to 12 decimals, which bounds both errors
+    assert min(ticks) >= low - 1e-12 and max(ticks) <= high + 1e-12
+    assert 2 <= len(ticks) <= 12 and np.ptp(steps) <= 2e-12 + 1e-9 * steps[0]
+
+
+def test_logarithmic_ticks_are_one_two_five():
+    assert all(str(int(t / 10 ** np.floor(np.log10(t)) + 0.5)) in "125" for t in log_ticks(30.0, 1600.0))
+
+
+@pytest.mark.parametrize("days", [40, 200, 1100, 3700])
+def test_time_ticks_are_first_days_of_months_and_few(days):
+    start = 1.7e9
+    ticks = time_ticks(start, start + 86400 * days)
+    dates = np.array(ticks).astype("int64").astype("datetime64[s]")
+    assert (dates == dates.astype("datetime64[M]")).all() and 1 <= len(ticks) <= 9

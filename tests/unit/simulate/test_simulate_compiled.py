@@ -1,0 +1,89 @@
+"""Machine code of the kernels is kept where it can be written, and never older than any of its sources."""
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from turnout.fingerprint import closure
+from turnout.simulate import compiled
+
+HERE = Path(compiled.__file__).parent
+RUN = "from turnout.simulate.spline import uniform_pieces; print(uniform_pieces([0.0, 1.0, 4.0]).sum())"
+
+
+def imported_here(module):
+    tree = ast.parse((HERE / f"{module}.py").read_text())
+    return {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module}
+
+
+def test_every_kernel_that_another_one_calls_is_behind_the_name_of_the_folder():
+    with_kernels = {p.stem for p in HERE.glob("*.py") if "compiled import" in p.read_text()}
+    assert len(with_kernels) >= 6
+    called = {f"turnout.simulate.{name}" for name in with_kernels}
+    behind = closure(compiled.OUTERMOST)
+    for name in with_kernels:
+        assert called & imported_here(name) <= behind, f"{name} calls kernels that the folder does not depend on"
+    assert {"turnout.simulate.law", "turnout.simulate.compiled"} <= behind
+
+
+def test_no_kernel_goes_round_the_folder():
+    assert not [p.name for p in HERE.glob("*.py") if "numba" in imported_numba(p) and p.stem != "compiled"]
+
+
+def imported_numba(path):
+    return {n.module for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.ImportFrom)}
+
+
+def run(environment):
+    done = subprocess.run([sys.executable, "-c", RUN], env=os.environ | environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_the_users_own_setting_comes_first_and_is_used_again(tmp_path):
+    first = run({"NUMBA_CACHE_DIR": str(tmp_path)})
+    kept = {p: p.stat().st_mtime_ns for p in tmp_path.rglob("*.nbc")}
+    assert len(kept) == 1 and next(p.name for p in tmp_path.iterdir()).startswith("kernels-")
+    assert run({"NUMBA_CACHE_DIR": str(tmp_path)}) == first
+    assert {p: p.stat().st_mtime_ns for p in tmp_path.rglob("*.nbc")} == kept
+
+
+@pytest.fixture
+def nowhere(monkeypatch, tmp_path):
+    """Nothing beside the source and no user's cache can be written: both would lie below a file."""
+    (tmp_path / "file").write_text("")
+    monkeypatch.setattr(compiled, "__file__", str(tmp_path / "file" / "compiled.py"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    monkeypatch.setattr(compiled.config, "CACHE_DIR", "")
+    compiled.cache_folder.cache_clear()
+    yield tmp_path
+    compiled.cache_folder.cache_clear()
+
+
+def test_without_any_folder_to_write_kernels_still_compile(nowhere):
+    assert compiled.cache_folder() is None
+
+    @compiled.kernel
+    def twice(x):
+        return 2 * x
+
+    assert twice(21) == 42
+
+
+def test_the_users_cache_serves_an_installation_that_cannot_be_written(nowhere, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(nowhere / "home"))
+    folder = compiled.cache_folder()
+    assert folder.parent == nowhere / "home" / "turnout" and folder.is_dir()
+
+
+def test_other_code_has_another_folder_and_the_old_one_goes(nowhere, monkeypatch):
+    package = nowhere / "package"
+    (package / "__pycache__" / "kernels-0123456789abcdef").mkdir(parents=True)
+    monkeypatch.setattr(compiled, "__file__", str(package / "compiled.py"))
+    monkeypatch.setattr(compiled, "fingerprint", lambda *_: "feedfeedfeedfeed")
+    assert compiled.cache_folder().name == "kernels-feedfeedfeedfeed"
+    assert [p.name for p in (package / "__pycache__").iterdir()] == ["kernels-feedfeedfeedfeed"]

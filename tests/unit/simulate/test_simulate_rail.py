@@ -1,0 +1,72 @@
+"""The rail's element: exact statics, local compliance, refusals."""
+
+import numpy as np
+import pytest
+
+from turnout.errors import SimulationError
+from turnout.simulate.rail import (
+    Rail,
+    element_mass,
+    element_stiffness,
+    local_compliance,
+    rotation_functions,
+    shape_functions,
+)
+
+UIC60 = {
+    "bending_stiffness": 6.42e6,
+    "mass": 60.21,
+    "shear_stiffness": 0.4 * 81e9 * 76.7e-4,
+    "rotary_inertia": 7850 * 3.055e-5,
+}
+
+
+def clamped_deflection_by_two_elements(rail, length, at, force_at):
+    """Deflection at ``at`` of a clamped-clamped beam cut into three elements at both places."""
+    cuts = np.unique([0.0, min(at, force_at), max(at, force_at), 1.0]) * length
+    n = 2 * cuts.size
+    k = np.zeros((n, n))
+    for e, h in enumerate(np.diff(cuts)):
+        k[2 * e : 2 * e + 4, 2 * e : 2 * e + 4] += element_stiffness(rail, h)
+    f = np.zeros(n)
+    f[2 * int(np.argmin(np.abs(cuts - force_at * length)))] = 1.0
+    inner = slice(2, n - 2)
+    w = np.zeros(n)
+    w[inner] = np.linalg.solve(k[inner, inner], f[inner])
+    return w[2 * int(np.argmin(np.abs(cuts - at * length)))]
+
+
+@pytest.mark.parametrize("beam", ["timoshenko", "euler"])
+@pytest.mark.parametrize("places", [(0.5, 0.5), (0.23, 0.23), (0.31, 0.78), (0.9, 0.15)])
+def test_local_compliance_is_that_of_the_clamped_element(beam, places):
+    rail = Rail(**UIC60, beam=beam)
+    expected = clamped_deflection_by_two_elements(rail, 0.3, *places)
+    assert local_compliance(*places, 0.3, rail) == pytest.approx(expected, rel=1e-10)  # check 18; rounding of K^-1
+
+
+@pytest.mark.parametrize("beam", ["timoshenko", "euler"])
+def test_rigid_motion_costs_no_energy_and_carries_the_whole_mass(beam):
+    rail = Rail(**UIC60, beam=beam)
+    h = 0.37
+    lift, turn = np.array([1.0, 0.0, 1.0, 0.0]), np.array([-h / 2, 1.0, h / 2, 1.0])
+    stiffness, mass = element_stiffness(rail, h), element_mass(rail, h)
+    assert np.max(np.abs(stiffness @ lift)) < 1e-6 * np.max(stiffness)
+    assert np.max(np.abs(stiffness @ turn)) < 1e-6 * np.max(stiffness)
+    assert lift @ mass @ lift == pytest.approx(rail.mass * h, rel=1e-12)
+    rotary = 0.0 if beam == "euler" else rail.rotary_inertia * h
+    assert turn @ mass @ turn == pytest.approx(rail.mass * h**3 / 12 + rotary, rel=1e-12)
+
+
+def test_shape_functions_meet_the_nodes_and_rotate_with_the_section():
+    rail = Rail(**UIC60)
+    h = 0.3
+    p = rail.shear_ratio(h)
+    assert np.allclose(shape_functions(np.array([0.0, 1.0]), h, p), [[1, 0, 0, 0], [0, 0, 1, 0]])
+    assert np.allclose(rotation_functions(np.array([0.0, 1.0]), h, p), [[0, 1, 0, 0], [0, 0, 0, 1]])
+    assert np.sum(shape_functions(0.37, h, p)[[0, 2]]) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("change", [{"bending_stiffness": -1.0}, {"mass": 0.0}, {"damping": -1.0}, {"beam": "wire"}])
+def test_a_rail_that_cannot_be_is_refused_with_its_value(change):
+    with pytest.raises(SimulationError, match=str(next(iter(change.values()))).replace(".", r"\.")):
+        Rail(**(UIC60 | change))

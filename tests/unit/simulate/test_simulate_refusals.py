@@ -1,0 +1,139 @@
+"""Bad input is refused with time, place and value; a run never returns NaN."""
+
+import numpy as np
+import pytest
+
+from turnout.errors import ConfigError, SimulationError
+from turnout.simulate import Sensor, car, load_track, load_vehicle, simulate_hammer, simulate_passage, uniform_track
+from turnout.simulate.law import PowerLaw, TableLaw
+from turnout.simulate.link import Link
+from turnout.simulate.matrices import assemble
+from turnout.simulate.prepare import prepare
+from turnout.simulate.run import Drive, Probe, run
+from turnout.simulate.track import Track
+from turnout.simulate.turnout_track import TurnoutTrack
+from turnout.simulate.vehicle import Body, Vehicle, lone_wheels
+from turnout.simulate.wheel_path import Sections, check_path
+
+TRACK = uniform_track(24.0)
+SENSOR = [Sensor("A", 12.0)]
+
+
+def test_a_wheel_that_leaves_the_track_is_named_with_time_and_place():
+    drive = Drive(20.0, 40.0, entry=0.0)
+    with pytest.raises(SimulationError, match=r"wheel 0 leaves the track at 0\.1000 s: it is at 24\.001 m"):
+        run(prepare(TRACK, 1e-4), 0.5, [Probe(12.0)], lone_wheels(700.0), drive)
+
+
+def test_a_wheel_that_starts_off_the_track_is_named_at_time_zero():
+    with pytest.raises(SimulationError, match=r"wheel 1 leaves the track at 0\.0000 s: it is at -0\.500 m"):
+        run(prepare(TRACK, 1e-4), 0.1, [], lone_wheels(700.0, (0.0, 2.5)), Drive(2.0, 10.0, entry=0.0))
+
+
+@pytest.mark.parametrize("speed", [0.0, -3.0, np.nan, np.inf])
+def test_a_speed_that_is_none_is_refused(speed):
+    with pytest.raises(SimulationError, match="speed must be above 0 m/s"):
+        simulate_passage(TRACK, car(), speed, SENSOR)
+
+
+def test_a_pattern_of_the_wrong_length_says_both_lengths():
+    with pytest.raises(SimulationError, match="pad_stiffness has 12 values for 41 supports"):
+        TRACK.with_(pad_stiffness=np.ones(12))
+
+
+def test_negative_stiffness_says_support_place_and_value():
+    stiffness = TRACK.ballast_stiffness.copy()
+    stiffness[7] = -1e6
+    with pytest.raises(
+        SimulationError, match=r"ballast_stiffness of support 7 at 4\.200 m is negative: np\.float64\(-1000000"
+    ):
+        TRACK.with_(ballast_stiffness=stiffness)
+
+
+def test_a_value_that_is_no_number_is_refused():
+    with pytest.raises(SimulationError, match="pad_damping holds"):
+        TRACK.with_(pad_damping=np.nan)
+
+
+def test_a_path_that_jumps_says_where():
+    def step(x, wheel=0):
+        return np.where(np.asarray(x) > 12.3, 3e-3, 0.0)
+
+    with pytest.raises(SimulationError, match=r"jumps by 3\.00 mm at 12\.\d+ m"):
+        check_path((step,), 0.0, 24.0)
+    with pytest.raises(SimulationError, match="jumps"):
+        simulate_passage(TurnoutTrack(TRACK, {"main": ((step,),)}), car(half_pivot=3.0), 30.0, SENSOR)
+    check_path((Sections((3.0, 4.0, 5.0), (0.0, 2e-3, 0.0)),), 0.0, 24.0)
+
+
+def test_a_path_that_is_no_number_says_where():
+    with pytest.raises(SimulationError, match=r"not a number at 12\.00"):
+        simulate_passage(
+            TurnoutTrack(TRACK, {"main": ((lambda x, wheel=0: np.where(x > 12.0, np.nan, 0.0),),)}), car(), 30.0, SENSOR
+        )
+
+
+def test_newton_that_does_not_converge_says_time_port_and_residual():
+    """A force that steps up by more than the deformation can bear: open, closed, open, ... never either."""
+    step = TableLaw((-1.0, 2.9e-5, 2.9e-5 + 1e-12, 1.0), (0.0, 0.0, 6e4, 6e4), (0.0, 0.0, 0.0, 0.0))
+    wheel = lone_wheels(700.0, contact=step, gravity=0.0)
+    drive = Drive(12.0, 0.0, entry=0.0, thrown=(0.0, 1.0))
+    with pytest.raises(SimulationError, match=r"did not converge at 0\.0\d+ s: residual .* N at wheel 0"):
+        run(prepare(TRACK, 1e-4), 0.05, [], wheel, drive)
+
+
+def test_a_track_that_carries_nothing_is_refused():
+    with pytest.raises(SimulationError, match="carries no load"):
+        prepare(TRACK.with_(ballast_stiffness=0.0), 1e-4)
+
+
+def test_a_body_on_nothing_is_refused():
+    floating = Vehicle("v", (Body("box", 1e3, 1e3, 1.0), Body("wheel", 700.0, None, 0.0)), (), (1,))
+    with pytest.raises(SimulationError, match="rests on nothing"):
+        simulate_passage(TRACK, floating, 30.0, SENSOR)
+
+
+@pytest.mark.parametrize(
+    ("build", "said"),
+    [
+        (lambda: Track(TRACK.rail, [0.0, 2.0, 1.0], 1e8, 0.0, layers=1), "rising places"),
+        (lambda: assemble(TRACK).weights(99.0), "outside the track"),
+        (lambda: assemble(TRACK).weights(("ballast", 3)), "no degree of freedom"),
+        (lambda: Link(()), "acts on no degree"),
+        (lambda: Link(((("rail", 1), 1.0),), float("inf")), "not a finite number"),
+        (lambda: PowerLaw(-1.0), "not those of a contact"),
+        (lambda: TableLaw((0.0, 0.0), (0.0, 1.0), (0.0, 0.0)), "must rise"),
+        (lambda: prepare(TRACK, 0.0), "time step must be above 0"),
+        (lambda: prepare(TRACK, 1e-4, "euler"), "none of midpoint, radau, gauss"),
+        (lambda: simulate_passage(TRACK, car(), 30.0, []), "records nothing"),
+        (lambda: simulate_passage(TRACK, car(), 30.0, SENSOR, "sideways"), "neither 'facing' nor 'trailing'"),
+        (lambda: simulate_passage(TRACK, car(), 30.0, [Sensor("Z", 40.0)]), "'Z' at 40.000 m is outside"),
+        (lambda: simulate_passage(TurnoutTrack(TRACK), car(), 30.0, SENSOR, route="siding"), "no route 'siding'"),
+        (lambda: simulate_hammer(TRACK, "A7"), "no location 'A7'"),
+        (lambda: load_vehicle("tgv"), "no file config/vehicles/tgv.yaml; there are .*coach"),
+        (lambda: load_vehicle("ic3", load=7.0), "load 7.0"),
+        (lambda: load_track("nowhere"), "there are tommerup"),
+    ],
+)
+def test_other_bad_input_says_what_was_found(build, said):
+    with pytest.raises(SimulationError, match=said):
+        build()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("mass: {value: 3, unit: kg}", "a number without source"),
+        ("mass: {value: 3, unit: stone, source: x}", "unknown unit 'stone'"),
+        ("mass: {value: three, unit: kg, source: x}", "'three' is not a number"),
+        ("mass: {value: 3, unit: kg, source: estimate}", "an estimate without a prior"),
+        ("mass: {value: 3, unit: kg, source: x, sauce: y}", "unknown key 'sauce'"),
+        ("name: [1, 2", "line"),
+    ],
+)
+def test_a_parameter_file_is_refused_with_file_and_place(tmp_path, text, said):
+    path = tmp_path / "wrong.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ConfigError, match=said) as caught:
+        load_vehicle(str(path))
+    assert "wrong.yaml" in str(caught.value)

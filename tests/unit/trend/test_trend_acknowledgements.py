@@ -1,0 +1,124 @@
+"""config/acknowledgements.csv: entered by command or by hand, refused with place and remedy."""
+
+import shutil
+from datetime import datetime
+from types import SimpleNamespace
+
+import pytest
+
+from turnout.cli import main
+from turnout.config import load_configuration
+from turnout.config.acknowledgements import read_acknowledgements
+
+SECTIONS = {"T1": SimpleNamespace(tree={"sections": {"A": None}})}
+HEADER = "turnout,section,band,action,by,at,until,reason\n"
+
+
+@pytest.fixture
+def configuration(tmp_path, repository):
+    shutil.copytree(repository / "config", tmp_path / "config")
+    return tmp_path / "config"
+
+
+def place_of(configuration):
+    config = load_configuration(configuration)
+    turnout = config.turnout(config.ids[0])
+    return turnout.id, turnout.sections[0].label
+
+
+def test_an_alarm_is_acknowledged_and_silenced_by_command(configuration):
+    turnout, label = place_of(configuration)
+    said = ["--by", "M. Jensen", "--reason", "tamping, week 14", "--configuration", str(configuration)]
+    assert main(["acknowledge", f"{turnout}/{label}", "--band", "ballast", "--at", "2026-03-01", *said]) == 0
+    assert main(["acknowledge", turnout, "--suppress-until", "2026-05-01", "--at", "2026-03-02T08:30", *said]) == 0
+    first, second = load_configuration(configuration).acknowledgements
+    assert first["section_id"] == f"{turnout}/{label}" and first["reason"] == "tamping, week 14"
+    assert (first["action"], second["action"]) == ("acknowledge", "suppress")
+    assert second["until_utc"] == datetime(2026, 5, 1) and second["section_id"] is None and second["band"] is None
+    assert first["acknowledgement_id"] != second["acknowledgement_id"]
+
+
+def test_no_file_means_that_nobody_has_said_anything(tmp_path):
+    assert read_acknowledgements(tmp_path / "acknowledgements.csv") == ([], [])
+
+
+@pytest.mark.parametrize(
+    ("line", "complaint"),
+    [
+        ("T1,,,acknowlege,me,2026-01-01,,seen", "column 6: action is 'acknowlege'. Did you mean"),
+        ("T1,,ballst,acknowledge,me,2026-01-01,,seen", "column 5: band is 'ballst'"),
+        ("T1,,,acknowledge,me,1.1.2026,,seen", "column 21: at is '1.1.2026'. Write YYYY-MM-DD"),
+        ("T1,,,acknowledge,me,2026-01-01,,", "reason is empty"),
+        ("T1,,,suppress,me,2026-01-01T10:00+02:00,,seen", "with a time zone"),
+        ("T1,,,suppress,me,2026-01-01,,a,b", "double quotes"),
+        (",,,suppress,me,2026-01-01,,a", "column 1: turnout is empty"),
+        ("T1,,,suppress,me,2026-03-01,2026-02-01,a", "until 2026-02-01 is not after at 2026-03-01"),
+        ("T7,,,suppress,me,2026-03-01,,a", "turnout 'T7' has no row"),
+        ("T1,Z,,suppress,me,2026-03-01,,a", "column 4: turnout 'T1' has no section 'Z'"),
+        ('"T1",T1/Z,,suppress,me,2026-03-01,,a', "column 6: turnout 'T1' has no section 'Z'"),
+    ],
+)
+def test_a_bad_line_is_refused_with_its_place(tmp_path, line, complaint):
+    path = tmp_path / "acknowledgements.csv"
+    path.write_text(HEADER + "T1,A,ballast,acknowledge,me,2026-01-01,,seen\n" + line + "\n", encoding="utf-8")
+    rows, errors = read_acknowledgements(path, known=("T1",), variants=SECTIONS)
+    assert len(rows) == 1 and len(errors) == 1
+    assert "line 3" in str(errors[0]) and complaint.lower() in str(errors[0]).lower()
+
+
+def test_every_error_of_a_line_is_said(tmp_path):
+    path = tmp_path / "acknowledgements.csv"
+    path.write_text(HEADER + "T1,,ballst,suppres,me,1.1.2026,,x\n", encoding="utf-8")
+    _, errors = read_acknowledgements(path, known=("T1",), variants=SECTIONS)
+    assert [str(e).split(": ")[0] for e in errors] == [f"acknowledgements.csv, line 2, column {n}" for n in (12, 5, 23)]
+
+
+def test_a_bad_line_hides_no_alarm(configuration, tmp_path, capsys, caplog):
+    from benchmarks.trend_fleet import Fleet, modes
+    from benchmarks.trend_registry import small_registry
+
+    from turnout.chains.trend import trend_job
+    from turnout.registry.database import open_registry
+
+    turnout, _ = place_of(configuration)
+    lines = "{0},,,silence,me,2026-01-01,,x\nnowhere,,,acknowledge,me,2026-01-01,,x\n"
+    lines += "{0},,,acknowledge,me,2026-01-01,,x\n"
+    (configuration / "acknowledgements.csv").write_text(HEADER + lines.format(turnout), encoding="utf-8")
+    root = tmp_path / "registry"
+    small_registry(root, modes(Fleet(turnouts=1, weeks=60), 3))
+    done = trend_job(root / "_generation.json", tmp_path / "state", tmp_path / "list.csv", configuration)
+    with open_registry(root) as con:
+        assert con.execute("select turnout_id, action from acknowledgements").fetchall() == [(turnout, "acknowledge")]
+    assert (tmp_path / "list.csv").exists()
+    assert len(done["warnings"]) == 2 and "action is 'silence'" in caplog.text and "'nowhere' has no row" in caplog.text
+    assert main(["check", "--configuration", str(configuration)]) == 1
+    assert "acknowledgements.csv, line 3, column 1: turnout 'nowhere' has no row" in capsys.readouterr().out
+
+
+def test_a_silence_that_is_over_is_not_written(configuration, capsys):
+    turnout, _ = place_of(configuration)
+    said = ["--by", "me", "--reason", "x", "--configuration", str(configuration)]
+    assert main(["acknowledge", turnout, "--suppress-until", "2020-01-01", *said]) == 2
+    assert "is not after at" in capsys.readouterr().err and not (configuration / "acknowledgements.csv").exists()
+
+
+def test_an_unknown_section_is_not_written(configuration, capsys):
+    turnout, _ = place_of(configuration)
+    code = main(
+        ["acknowledge", f"{turnout}/nowhere", "--by", "me", "--reason", "x", "--configuration", str(configuration)]
+    )
+    assert code == 2 and "no section 'nowhere'" in capsys.readouterr().err
+    assert not (configuration / "acknowledgements.csv").exists()
+
+
+def test_maintenance_is_entered_by_command_and_a_bad_one_taken_back(configuration, capsys):
+    turnout, label = place_of(configuration)
+    before = (configuration / "events.csv").read_text()
+    base = ["--configuration", str(configuration)]
+    assert main(["events", f"{turnout}/{label}", "tamping", "2026-04-02", "--note", "machine 09-3X, night", *base]) == 0
+    assert main(["events", *base]) == 0
+    assert "machine 09-3X, night" in capsys.readouterr().out
+    after = (configuration / "events.csv").read_text()
+    assert after.startswith(before.rstrip("\n"))
+    assert main(["events", turnout, "tampin", "2026-04-02", *base]) == 2
+    assert (configuration / "events.csv").read_text() == after

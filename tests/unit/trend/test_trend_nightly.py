@@ -1,0 +1,171 @@
+"""From a registry to a registry: derived tables, years kept, the worklist, commands."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from benchmarks.trend_fleet import Fleet, drift, modes
+from benchmarks.trend_registry import small_registry
+
+from turnout.config.settings.trend import TrendSettings
+from turnout.registry.database import build_database, open_registry
+from turnout.registry.generation import Generation, commit, load
+from turnout.trend.nightly import update
+
+FLEET = Fleet(turnouts=3, weeks=120, phi=0.1)
+
+
+@pytest.fixture(scope="module")
+def rows():
+    which = np.zeros((3, 8), bool)
+    which[1, 4] = True
+    return modes(FLEET, 3, drift(FLEET, which, -4.0, 60))
+
+
+@pytest.fixture(scope="module")
+def registry(tmp_path_factory, rows, settings):
+    root = tmp_path_factory.mktemp("registry")
+    small_registry(root, rows)
+    return root, update(root, settings)
+
+
+def test_every_mode_has_its_row_and_every_chart_its_state(registry, rows):
+    root, done = registry
+    assert done.rows["charts"] == len(rows) + 3 * 120  # and the median of each turnout
+    assert done.rows["chart_status"] == 3 * 9
+    with open_registry(root) as con:
+        first = con.execute("select section_id, state from worklist").fetchall()[0]
+        assert first == ("T00001/S4", "inspect this week")
+        assert con.execute("select count(*) from charts where isnan(z) or isnan(expected_hz)").fetchall() == [(0,)]
+        assert con.execute("select count(*) from chart_states").fetchall() == [(27,)]
+
+
+def test_the_same_again_commits_nothing(registry, settings):
+    root, done = registry
+    before = load(root)
+    again = update(root, settings, done.digests)
+    assert again.written == () and again.generation == done.generation
+    assert load(root) == before
+    whole = update(root, settings)  # without the digests it writes, and writes the same
+    assert load(root) == before and whole.digests == done.digests
+
+
+def test_rows_in_another_order_give_the_same_files(registry, rows, settings, tmp_path):
+    root, _ = registry
+    small_registry(tmp_path, rows.sample(frac=1.0, random_state=1))
+    update(tmp_path, settings)
+    assert {f.path for f in load(tmp_path).files if f.table == "charts"} == {
+        f.path for f in load(root).files if f.table == "charts"
+    }
+
+
+def test_one_more_week_writes_only_its_year(rows, settings, tmp_path):
+    last = rows["measured_at_utc"].max()
+    small_registry(tmp_path, rows[rows["measured_at_utc"] < last])
+    first = update(tmp_path, settings)
+    assert first.written == (2016, 2017, 2018)
+    small_registry(tmp_path, rows, 5)
+    second = update(tmp_path, settings, first.digests)
+    assert second.written == (2018,)
+    with open_registry(tmp_path) as con:
+        assert con.execute("select count(*) from charts").fetchall()[0][0] == len(rows) + 360
+        assert con.execute("select max(measured_at_utc) from charts").fetchall()[0][0] == last
+
+
+def test_parts_of_the_fleet_share_one_memory(registry, settings, monkeypatch):
+    root, done = registry
+    monkeypatch.setattr("turnout.trend.nightly.CELLS_PER_PART", 960)
+    assert update(root, settings).digests == done.digests
+
+
+def test_an_empty_registry_is_no_fault(tmp_path, settings):
+    generation = Generation()
+    commit(tmp_path, generation)
+    build_database(tmp_path, generation)
+    done = update(tmp_path, settings)
+    assert done.rows == {"chart_status": 0, "baselines": 0, "alarms": 0, "charts": 0} and done.newest is None
+
+
+def test_the_list_on_the_terminal_says_where_what_and_how_sure(registry, capsys, tmp_path):
+    from turnout.cli import main
+
+    root, _ = registry
+    assert main(["worklist", "--registry", str(root)]) == 0
+    said = capsys.readouterr().out
+    assert "INSPECT THIS WEEK: T00001, S4, railpad" in said and "How sure: " in said and "Look at: worn" in said
+    assert main(["worklist", "--registry", str(root), "--csv", str(tmp_path / "list.csv")]) == 0
+    table = pd.read_csv(tmp_path / "list.csv")
+    assert table.loc[0, "section_id"] == "T00001/S4" and len(table) <= 20
+    assert main(["worklist", "--registry", str(root), "--asof", "yesterday"]) == 2
+    assert "YYYY-MM-DD" in capsys.readouterr().err
+
+
+def test_tables_go_out_as_files_that_others_read(registry, tmp_path, capsys):
+    from turnout.cli import main
+
+    root, _ = registry
+    assert main(["export", str(tmp_path / "out"), "--only", "charts", "worklist", "--registry", str(root)]) == 0
+    assert len(pd.read_parquet(tmp_path / "out" / "charts.parquet")) == 3 * 9 * 120
+    assert (
+        main(["export", str(tmp_path / "out"), "--format", "csv", "--only", "worklist", "--registry", str(root)]) == 0
+    )
+    assert pd.read_csv(tmp_path / "out" / "worklist.csv")["rank"].tolist()[0] == 1
+    assert main(["export", str(tmp_path), "--only", "nonsense", "--registry", str(root)]) == 2
+    assert "no table or view 'nonsense'" in capsys.readouterr().err
+
+
+def test_a_lake_is_written_where_its_package_is_there(registry, tmp_path, capsys):
+    from turnout.cli import main
+
+    code = main(["export", str(tmp_path), "--format", "delta", "--only", "alarms", "--registry", str(registry[0])])
+    try:
+        import deltalake
+    except ImportError:
+        assert code == 2 and "turnout[lakehouse]" in capsys.readouterr().err
+    else:
+        assert code == 0 and deltalake.DeltaTable(str(tmp_path / "alarms")).to_pyarrow_table().num_rows >= 1
+
+
+@pytest.mark.parametrize("stamp", ["1970-01-01 00:00:10", "2031-05-05"], ids=["never set", "ahead"])
+def test_one_wrong_clock_does_not_stop_the_night(registry, rows, settings, tmp_path, stamp):
+    root, _ = registry
+    extra = rows[(rows["measured_at_utc"] == rows["measured_at_utc"].max()) & (rows["turnout_id"] == "T00001")]
+    wrong = pd.concat([rows, extra.assign(measured_at_utc=np.datetime64(stamp, "us"))], ignore_index=True)
+    small_registry(tmp_path, wrong)
+    done = update(tmp_path, settings)
+    again = update(tmp_path, settings, done.digests)
+    assert again.written == () and again.generation == done.generation
+    question = "select section_id, state, n_campaigns, detectable_pct from chart_status order by all"
+    with open_registry(root) as sound, open_registry(tmp_path) as con:
+        assert con.execute(question).fetchall() == sound.execute(question).fetchall()
+        shown = con.execute("select section_id, measured_at_utc from charts where state = 'wrong_time'").fetchall()
+        assert len(shown) == 8 and {at for _, at in shown} == {pd.Timestamp(stamp).to_pydatetime()}
+        assert con.execute("select section_id from worklist").fetchall()[0] == ("T00001/S4",)
+
+
+def test_a_year_before_which_no_clock_is_believed_leaves_its_campaigns_in_sight(rows, tmp_path):
+    small_registry(tmp_path, rows)
+    done = update(tmp_path, TrendSettings(earliest_year=2017))
+    with open_registry(tmp_path) as con:
+        found = con.execute("select year(measured_at_utc) = 2016, state = 'wrong_time' from charts").fetchall()
+    assert all(early == wrong for early, wrong in found) and len(found) == done.rows["charts"]
+
+
+def test_a_look_back_equals_the_night_of_that_day(rows, settings, tmp_path):
+    then = pd.Timestamp("2018-01-15 12:00")
+    small_registry(tmp_path / "then", rows[rows["measured_at_utc"] <= then])
+    small_registry(tmp_path / "now", rows)
+    early, look = update(tmp_path / "then", settings), update(tmp_path / "now", settings, as_of=then)
+    assert look.digests == early.digests and look.rows == early.rows
+    question = "select * from chart_status order by all"
+    with open_registry(tmp_path / "then") as a, open_registry(tmp_path / "now") as b:
+        assert a.execute(question).fetchall() == b.execute(question).fetchall()
+
+
+def test_parts_with_few_and_with_many_sections_make_one_table(settings, tmp_path, monkeypatch):
+    monkeypatch.setattr("turnout.trend.nightly.CELLS_PER_PART", 300)
+    small = modes(Fleet(turnouts=1, sections=4, weeks=70, prefix="A"), 5)
+    large = modes(Fleet(turnouts=1, sections=140, weeks=2, prefix="B"), 6)
+    texts = {k: object for k in ("turnout_id", "section_id", "band", "source")}
+    rows = pd.concat([small.astype(texts), large.astype(texts)], ignore_index=True)
+    small_registry(tmp_path, rows)
+    assert update(tmp_path, settings).rows["charts"] >= len(rows)

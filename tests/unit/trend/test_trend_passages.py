@@ -1,0 +1,88 @@
+"""Trends from ordinary trains: weekly values with their own error bars, beside the hammer and never mixed."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from turnout.trend import chart_rows, chart_status, evaluate
+from turnout.trend.views import connect_views
+
+NEWEST = "2018-12-31"
+
+
+@pytest.fixture(scope="module")
+def trains():
+    """Three passages a day for two years at four sections; one resonance falls, one section grows louder."""
+    rng = np.random.default_rng(1)
+    when = pd.Timestamp("2017-01-02 05:00") + pd.to_timedelta(np.arange(3 * 728) * 8, unit="h")
+    year = (when - when[0]).days.to_numpy() / 365.25
+    rail = 11 + 12 * np.sin(2 * np.pi * (year - 0.3)) + rng.normal(0, 3, when.size)
+    speed = rng.uniform(80, 160, when.size)
+    ids = [f"p{i:05d}" for i in range(when.size)]
+    passages = pd.DataFrame({"passage_id": ids, "turnout_id": "T1", "passed_at_utc": when, "speed_kmh": speed,
+                             "status": "accepted", "rail_temperature_c": rail})  # fmt: skip
+    modes, fits = [], []
+    for s in range(4):
+        falling = -3.0 * np.maximum(year - 1.2, 0) if s == 2 else 0.0
+        error = rng.uniform(2.0, 8.0, when.size)
+        frequency = 150 * (1 + (-0.1 * (rail - 11) + falling) / 100) + error * rng.standard_normal(when.size)
+        modes.append(pd.DataFrame({"model_id": [f"m{s}{i}" for i in ids], "band": "ballast", "turnout_id": "T1",
+                                   "section_id": f"T1/S{s}", "measured_at_utc": when, "frequency_hz": frequency,
+                                   "frequency_se_hz": error, "rail_temperature_c": rail,
+                                   "source": "passage"}))  # fmt: skip
+        louder = 0.15 * (year > 1.5) if s == 1 else 0.0
+        for channel in ("a", "b"):
+            peak = (
+                (50 if channel == "a" else 300)
+                * (speed / 120) ** 1.6
+                * np.exp(louder + 0.3 * rng.standard_normal(when.size))
+            )
+            fits.append(pd.DataFrame({"passage_id": ids, "section_id": f"T1/S{s}", "channel": f"{channel}{s}",
+                                      "model_id": "m", "turnout_id": "T1", "passed_at_utc": when, "status": "accepted",
+                                      "peak_ms2": peak}))  # fmt: skip
+    fits = pd.concat(fits)
+    # Channel b0, six times as loud as its neighbour, falls silent after a year and a half.
+    fits = fits[(fits["channel"] != "b0") | (fits["passed_at_utc"] < "2018-07-01")]
+    return {"passages": passages, "modes": pd.concat(modes), "passage_fits": fits}
+
+
+@pytest.fixture(scope="module")
+def weekly(trains):
+    with connect_views(trains, NEWEST, rounded=False) as con:
+        return con.execute("select * from chart_values order by all").df()
+
+
+def test_weekly_values_are_weighted_means_with_the_error_of_their_scatter(trains, weekly):
+    found = weekly.query("section_id == 'T1/S0' and band == 'ballast'").set_index("measured_at_utc")
+    rows = trains["modes"].query("section_id == 'T1/S0'")
+    for week, part in rows.groupby(rows["measured_at_utc"].dt.to_period("W").dt.start_time):
+        weight = part["frequency_se_hz"] ** -2.0
+        assert found.loc[week, "frequency_hz"] == pytest.approx(np.average(part["frequency_hz"], weights=weight))
+        assert found.loc[week, "frequency_se_hz"] == pytest.approx(part["frequency_hz"].sem())
+    assert set(weekly["source"]) == {"passage"} and len(found) == 104
+
+
+def test_amplitudes_are_taken_at_the_usual_speed(weekly):
+    loud = weekly.query("band == 'amplitude' and section_id == 'T1/S3'")
+    # 21 trains x 2 sensors with a scatter of 30 %: 0.3 / sqrt(42) = 4.6 % a week. The spread of speeds, uncorrected,
+    # would add 1.6 x 20 % / sqrt(21) = 7 %.
+    assert np.std(np.log(loud["frequency_hz"])) == pytest.approx(0.046, rel=0.25)
+    assert (loud["frequency_se_hz"] / loud["frequency_hz"]).median() == pytest.approx(0.046, rel=0.15)
+
+
+def test_a_sensor_that_falls_silent_does_not_shift_the_level(weekly):
+    value = weekly.query("band == 'amplitude' and section_id == 'T1/S0'").set_index("measured_at_utc")["frequency_hz"]
+    before, after = np.log(value[:"2018-06-24"]), np.log(value["2018-07-02":])
+    assert abs(before.mean() - after.mean()) < 4 * np.hypot(before.sem(), after.sem())
+
+
+def test_trains_show_what_happened_with_their_own_spread(weekly, settings):
+    charts = evaluate(weekly, None, settings)
+    status = chart_status(charts, settings).set_index(["section_id", "band"])
+    assert status.loc[("T1/S2", "ballast"), "state"] == "alarm"
+    assert status.loc[("T1/S1", "amplitude"), "state"] == "alarm"
+    quiet = status.drop(index=[("T1/S2", "ballast"), ("T1/S1", "amplitude")])
+    assert not (quiet["state"] == "alarm").any()
+    rows = chart_rows(charts)
+    assert rows.query("band == 'amplitude'")["expected_hz"].isna().all()
+    assert rows.query("band == 'ballast' and section_id != '*'")["expected_hz"].notna().all()

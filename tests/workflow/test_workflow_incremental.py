@@ -1,0 +1,96 @@
+"""Only what is new is computed, and the run says so. One fleet goes through a working week, test by test."""
+
+import os
+import re
+
+import pytest
+import toy_fleet as toy
+
+SHARDS = 3
+
+
+# One fleet goes through the tests of this file in their order: they stay together on one worker.
+pytestmark = pytest.mark.xdist_group("workflow_incremental")
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory):
+    folder = toy.make(tmp_path_factory.mktemp("fleet"), n_turnout=5, n_section=2)
+    done = toy.run(folder, shards=SHARDS)
+    assert said(done) == {"known": 10, "processed": 10, "quarantined": 0}
+    return folder
+
+
+def said(done):
+    """Sums over the shards of what their summary lines say."""
+    lines = re.findall(r"^hammer \d+of\d+: (\d+) known, (\d+) processed, (\d+) quarantined", done.stdout, re.M)
+    return dict(zip(("known", "processed", "quarantined"), (sum(map(int, column)) for column in zip(*lines))))
+
+
+def test_a_second_run_does_nothing(fleet):
+    assert "Nothing to be done" in toy.run(fleet, shards=SHARDS).stdout
+
+
+def test_a_touched_file_is_not_computed_again(fleet):
+    os.utime(fleet / "raw/T00001/hammer/2024-01-01/A1_1.npz", (1, 1))
+    before = toy.data_files(fleet)
+    assert said(toy.run(fleet, shards=SHARDS))["processed"] == 0
+    assert toy.data_files(fleet) == before
+
+
+def test_one_new_file_is_one_unit_of_one_shard(fleet):
+    path = fleet / "raw/T00001/hammer/2024-01-01/A1_2.npz"
+    path.write_bytes(toy.raw_bytes(4711, fleet))
+    before = toy.rows(fleet)["recordings"]
+    done = toy.run(fleet, shards=SHARDS)
+    assert said(done)["processed"] == 1
+    assert len(re.findall(r"^localrule hammer:|^rule hammer:", done.stdout, re.M)) == 1
+    after = toy.rows(fleet)["recordings"]
+    assert [r for r in after if any("A1_2.npz" in str(v) for v in r)] and len(after) > len(before)
+
+
+def test_a_new_row_computes_its_turnout_and_changes_no_other_row(fleet):
+    toy.add_raw(fleet, "T00099")
+    with open(fleet / "config/turnouts.tsv", "a") as table:
+        table.write("T00099\ttoy\tline 1\n")
+    before = {t: [r for r in rows if "T00099" not in repr(r)] for t, rows in toy.rows(fleet).items()}
+    assert said(toy.run(fleet, shards=SHARDS))["processed"] == 2
+    after = {t: [r for r in rows if "T00099" not in repr(r)] for t, rows in toy.rows(fleet).items()}
+    for table in ("recordings", "impacts", "turnouts", "sections", "campaigns"):
+        assert after[table] == before[table]
+
+
+def test_an_override_computes_its_turnout_alone(fleet):
+    (fleet / "config/overrides").mkdir(exist_ok=True)
+    (fleet / "config/overrides/T00002.yaml").write_text("hammer: {channels: {rail: {sign: -1}}}\n")
+    assert said(toy.run(fleet, shards=SHARDS))["processed"] == 2
+
+
+def test_a_corrected_temperature_computes_its_campaign(fleet):
+    path = fleet / "raw/T00003/campaigns.csv"
+    path.write_text(path.read_text().replace("10.5", "11.5"))
+    done = toy.run(fleet, shards=SHARDS)
+    assert said(done)["processed"] == 2
+    assert any("11.5" in repr(r) for r in toy.rows(fleet)["campaigns"] if "T00003" in repr(r))
+
+
+def test_one_turnout_alone_leaves_the_others_for_later(fleet):
+    for turnout in ("T00000", "T00004"):
+        toy.add_raw(fleet, turnout, n_campaign=1, first=1)
+    done = toy.run(fleet, "turnouts=T00004", shards=SHARDS)
+    assert said(done)["processed"] == 2
+    assert said(toy.run(fleet, shards=SHARDS))["processed"] == 2
+    assert "Nothing to be done" in toy.run(fleet, shards=SHARDS).stdout
+
+
+@pytest.mark.parametrize(
+    "option, words",
+    [
+        ("turnout=T00004", "unknown option 'turnout'. Did you mean 'turnouts'?"),
+        ("turnouts=T0004", "no turnout 'T0004'. Did you mean 'T00004'?"),
+        ("strict=perhaps", "strict: 'perhaps'. Write true or false"),
+    ],
+)
+def test_a_wrong_option_is_said_before_any_job(fleet, option, words):
+    done = toy.run(fleet, option, check=False)
+    assert done.returncode != 0 and words in done.stdout.replace("\n", " ")

@@ -1,0 +1,110 @@
+"""The registry does not depend on shards, cores, checkpoints or kills."""
+
+import random
+import subprocess
+import sys
+import time
+
+import pytest
+import toy_fleet as toy
+
+from turnout.config import load_configuration
+from turnout.fleet.batches import read_results
+from turnout.fleet.plan import write_plans
+from turnout.fleet.shard import Stage, run_shard
+from turnout.fleet.state import batch_paths
+from turnout.fleet.tables import configuration_rows, fleet_hash
+from turnout.registry.register import register
+
+ALGO = "toy_fleet:unit"
+
+
+# One fleet goes through the tests of this file in their order: they stay together on one worker.
+pytestmark = pytest.mark.xdist_group("workflow_same_rows")
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory):
+    folder = toy.make(tmp_path_factory.mktemp("same"), n_turnout=12, n_section=3)
+    for path, (content, *_) in zip(
+        sorted((folder / "raw").glob("*/hammer/*/*.npz"))[2::4], toy.damages(folder).values()
+    ):
+        path.write_bytes(content)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def undisturbed(fleet):
+    toy.forget(fleet)
+    toy.run(fleet, shards=1, cores=1, check=False)
+    return toy.data_files(fleet)
+
+
+def without_engine(folder, shards, threads):
+    """The same steps as the workflow's, called one after another."""
+    from turnout import __version__
+
+    configuration, raw = load_configuration(folder / "config"), folder / "raw"
+    names = write_plans(configuration, raw, folder / "work/plan", shards)
+    plans = [folder / f"work/plan/{name}.json" for name in names]
+    states = [folder / f"work/hammer/{name}.json" for name in names]
+    for plan, state in zip(plans, states):
+        run_shard(plan, state, Stage("hammer", toy.unit, ALGO), configuration, raw, threads=threads)
+    register(
+        batch_paths(states), folder / "results/registry", read=read_results, code_version=__version__,
+        tables=configuration_rows(configuration, raw, plans), config_hash=fleet_hash(configuration),
+    )  # fmt: skip
+
+
+def test_a_run_leaves_data(undisturbed):
+    assert {"recordings", "impacts", "quarantine", "turnouts", "campaigns"} <= {table for table, _ in undisturbed}
+
+
+@pytest.mark.parametrize("shards, threads", [(7, 2), (64, 1)])
+def test_shards_and_cores_change_no_byte(fleet, undisturbed, shards, threads):
+    toy.forget(fleet)
+    without_engine(fleet, shards, threads)
+    assert toy.data_files(fleet) == undisturbed
+
+
+def test_the_engine_with_two_cores_and_seven_shards_changes_no_byte(fleet, undisturbed):
+    toy.forget(fleet)
+    toy.run(fleet, shards=7, cores=2, check=False)
+    assert toy.data_files(fleet) == undisturbed
+
+
+def test_kills_at_random_moments_change_no_byte(fleet, undisturbed):
+    toy.forget(fleet)
+    (fleet / "config/config.yaml").write_text("fleet: {checkpoint_units: 2}\n")
+    (fleet / "pause").write_text("0.1")
+    moments = random.Random(20171001)
+    for _ in range(3):
+        killed_after(fleet, moments.uniform(2.0, 7.0))
+    (fleet / "pause").unlink()
+    nightly(fleet)
+    (fleet / "config/config.yaml").write_text("")
+    assert toy.data_files(fleet) == undisturbed
+
+
+def killed_after(folder, seconds):
+    """Start a run, kill it and all its jobs without warning."""
+    run = subprocess.Popen(
+        nightly_command(), cwd=folder, env=toy.environment(), start_new_session=True,
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    time.sleep(seconds)
+    toy.kill(run)
+
+
+def nightly_command():
+    options = toy.command(shards=2)[3:]
+    profile = str(toy.REPOSITORY / "profiles/default")
+    return [sys.executable, "-m", "turnout.cli", "nightly", "--profile", profile, "--", *options]
+
+
+def nightly(folder):
+    done = subprocess.run(
+        nightly_command(), cwd=folder, env=toy.environment(), text=True, capture_output=True, check=False
+    )
+    assert "units known" in done.stdout, done.stdout + done.stderr
+    return done

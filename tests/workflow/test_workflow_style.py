@@ -1,0 +1,53 @@
+"""The workflow's files keep to their style, and the plans they make can be trusted by a person who reads them."""
+
+import re
+import subprocess
+import sys
+
+import pytest
+import toy_fleet as toy
+
+RULES = sorted((toy.REPOSITORY / "rules").glob("*.smk"))
+SCRIPTS = sorted((toy.REPOSITORY / "scripts").glob("*.py"))
+# Every script job costs an environment of its own there; here all share one.
+ALLOWED = "Specify a conda environment or container for each rule."
+
+
+def test_snakemake_lint_is_clean(tmp_path):
+    folder = toy.make(tmp_path, n_turnout=1)
+    done = toy.run(folder, "--lint", check=False)
+    complaints = re.findall(r"^\s+\* (.*?):", done.stdout, re.M)
+    assert [c for c in complaints if c != ALLOWED] == [], done.stdout
+
+
+def test_snakefmt_is_clean():
+    files = [str(toy.REPOSITORY / "Snakefile"), *map(str, RULES)]
+    done = subprocess.run([sys.executable, "-m", "snakefmt", "--check", *files], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("path", RULES, ids=lambda p: p.name)
+def test_every_rule_has_log_benchmark_resources_and_no_code(path):
+    text = path.read_text()
+    assert len(text.splitlines()) < 120 and not re.search(r"^\s+run:", text, re.M)
+    for body in re.split(r"^rule ", text, flags=re.M)[1:]:
+        for word in ("log:", "benchmark:", "resources:", "script:"):
+            assert re.search(rf"^    {word}", body, re.M), f"{path.name}, rule {body.split(':')[0]} lacks {word}"
+
+
+@pytest.mark.parametrize("path", SCRIPTS, ids=lambda p: p.name)
+def test_every_script_is_thin(path):
+    lines = path.read_text().splitlines()
+    assert len(lines) <= 25 and lines[0].startswith('"""')
+
+
+def test_profiles_are_read(tmp_path):
+    folder = toy.make(tmp_path, n_turnout=1)
+    said = toy.run(folder, "--dry-run").stdout
+    assert "profiles/default" in said and "hammer" in said
+
+
+def test_the_real_chain_is_the_default(tmp_path):
+    folder = toy.make(tmp_path, n_turnout=1)
+    said = toy.run(folder, "--dry-run", "--printshellcmds", chain=None, target=None).stdout
+    assert "rule hammer" in said

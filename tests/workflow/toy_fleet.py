@@ -1,0 +1,228 @@
+"""A fleet of tiny raw files, and a chain that only reads them: real workflow, hardly any computing."""
+
+import hashlib
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+RATE, N_SAMPLE, N_RECORD = 5000.0, 32, 2
+LAYOUT = """
+sections:
+{sections}
+hammer:
+  files: "hammer/{{campaign}}/{{section}}_{{test}}.{{ext}}"
+  rate: {rate}
+  records: {records}
+  samples: {samples}
+  force: force
+  response: rail
+  channels:
+    force: {{source: force, quantity: force, unit: N, mounting: hammer}}
+    rail: {{source: rail, quantity: acceleration, unit: m/s²}}
+"""
+
+
+def unit(unit, turnout, raw_root, algo=""):
+    """Toy chain: read every file, one row for it, one row per record."""
+    from turnout.chains.raw_rows import read_or_quarantine, recording_row
+
+    base = {
+        "turnout_id": unit.turnout,
+        "section_id": turnout.section_id(unit.section),
+        "campaign_id": f"{unit.turnout}/{unit.campaign}",
+    }
+    description = turnout.hammer.descriptions[unit.section]
+    rows = {"recordings": [], "impacts": [], "quarantine": []}
+    time.sleep(float(Path("pause").read_text()) if Path("pause").exists() else 0.0)
+    for path, size, _ in unit.files:
+        if path.endswith("_bug.npz"):
+            raise ZeroDivisionError("toy bug")
+        result = read_or_quarantine(path, raw_root, description, base, rows["quarantine"], "hammer")
+        if result is None:
+            continue
+        rows["recordings"].append(recording_row(result, path, size, description, base, "hammer"))
+        rows["impacts"] += [_impact(r, result.sha256[:32], base) for r in result.recordings]
+    return rows
+
+
+def nothing(unit, turnout, raw_root, algo=""):
+    """A chain that gives no row at all: what is left is the workflow's own work."""
+    return {}
+
+
+def _impact(recording, recording_id, base):
+    return {
+        **base,
+        "impact_id": f"{recording_id}:{recording.record}",
+        "recording_id": recording_id,
+        "test": 1,
+        "record": recording.record,
+        "status": "accepted",
+        "peak_n": float(recording.signal("force").max()),
+    }
+
+
+def raw_bytes(seed, folder, **changes):
+    """Bytes of an npz file with two channels; the same seed gives the same bytes."""
+    rng = np.random.default_rng(seed)
+    arrays = {"channels": np.array(["force", "rail"]), "units": np.array(["N", "m/s²"]), "fs": RATE}
+    for k in range(N_RECORD):
+        arrays[f"record_{k:03d}"] = np.stack([rng.uniform(1.0, 9.0, N_SAMPLE), rng.normal(0.0, 1.0, N_SAMPLE)])
+    arrays.update(changes)
+    path = Path(folder) / f".{os.getpid()}.npz"
+    np.savez(path, **{k: v for k, v in arrays.items() if v is not None})
+    content = path.read_bytes()
+    path.unlink()
+    return content
+
+
+def damages(folder):
+    """Ten ways in which a file is damaged: name -> (bytes, reason in quarantine, whether a sound record is left)."""
+    sound = raw_bytes(99, folder)
+    ok = np.random.default_rng(5).normal(size=(2, N_SAMPLE))
+    nan, dead = ok.copy(), ok.copy()
+    nan[1, 3], dead[1] = np.nan, 3.0
+    return {
+        "empty": (b"", "empty", False),
+        "half copied": (sound[: len(sound) // 2], "unreadable", False),
+        "not of its format": (np.random.default_rng(3).bytes(600), "unreadable", False),
+        "a byte flipped": (_flip(sound), "unreadable", True),
+        "wrong rate": (raw_bytes(11, folder, fs=4000.0), "wrong_rate", False),
+        "channel missing": (raw_bytes(12, folder, channels=np.array(["force", "wheel"])), "channel_missing", False),
+        "not a number": (raw_bytes(13, folder, record_001=nan), "not_finite", True),
+        "dead channel": (raw_bytes(14, folder, record_001=dead), "dead_channel", True),
+        "samples missing": (raw_bytes(15, folder, record_001=ok[:, :20]), "truncated", True),
+        "record missing": (raw_bytes(16, folder, record_001=None), "truncated", True),
+    }
+
+
+def _flip(content):
+    """One bit changed in the samples of the last record: the archive's checksum no longer fits."""
+    at = content.index(b"record_001.npy") + 200
+    return content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :]
+
+
+def labels(n):
+    return [f"A{i}" for i in range(1, n + 1)]
+
+
+def make(folder, n_turnout=6, n_section=2, n_campaign=1, n_test=1, config=""):
+    """Configuration and raw files of a fleet."""
+    folder = Path(folder)
+    for sub in ("config/layouts", "raw"):
+        (folder / sub).mkdir(parents=True, exist_ok=True)
+    sections = "\n".join(f"  {s}: {{panel: CP, track: main, position: {i}.5}}" for i, s in enumerate(labels(n_section)))
+    text = LAYOUT.format(sections=sections, rate=RATE, records=N_RECORD, samples=N_SAMPLE)
+    (folder / "config/layouts/toy.yaml").write_text(text)
+    shutil.copy(__file__, folder / "toy_fleet.py")
+    (folder / "config/config.yaml").write_text(config)
+    header = "turnout\tlayout\tline\n"
+    ids = [f"T{i:05d}" for i in range(n_turnout)]
+    (folder / "config/turnouts.tsv").write_text(
+        header + "".join(f"{t}\ttoy\tline {i % 2}\n" for i, t in enumerate(ids))
+    )
+    for turnout in ids:
+        add_raw(folder, turnout, n_section, n_campaign, n_test)
+    return folder
+
+
+def add_raw(folder, turnout, n_section=2, n_campaign=1, n_test=1, first=0):
+    """Raw files and campaigns.csv of one turnout."""
+    base = Path(folder) / "raw" / turnout
+    base.mkdir(parents=True, exist_ok=True)
+    days = [f"2024-{1 + k % 12:02d}-{1 + k // 12:02d}" for k in range(first + n_campaign)]
+    (base / "campaigns.csv").write_text(campaigns_csv(days))
+    for day in days[first:]:
+        (base / "hammer" / day).mkdir(parents=True, exist_ok=True)
+        for section in labels(n_section):
+            for test in range(1, n_test + 1):
+                name = f"{day}/{section}_{test}.npz"
+                seed = int(hashlib.sha256(f"{turnout}/{name}".encode()).hexdigest()[:12], 16)
+                (base / "hammer" / name).write_bytes(raw_bytes(seed, base))
+
+
+def campaigns_csv(days):
+    header = "campaign,started_at_utc,rail_temperature_c,hammer_id,tip,operator"
+    return (
+        "\n".join([header, *(f"{day},{day}T09:00:00,{10 + k}.5,h1,plastic,crew" for k, day in enumerate(days))]) + "\n"
+    )
+
+
+def environment():
+    """Environment of a run: this interpreter's programs come first in the path."""
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+    more = {"PATH": path, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    return os.environ | more
+
+
+def command(*options, cores=2, shards=1, chain="toy_fleet:unit", target="work/verdict.json"):
+    """Command line of a run with the toy chain, up to the verdict."""
+    base = [sys.executable, "-m", "snakemake", "--snakefile", str(REPOSITORY / "Snakefile")]
+    base += [target] if target else []
+    base += ["--cores", str(cores)] if cores else []
+    setting = [f"shards={shards}"] + ([f"chains={{hammer: '{chain}'}}"] if chain else [])
+    extra = [o for o in options if "=" in o and not o.startswith("-")]
+    return [*base, *[o for o in options if o not in extra], "--config", *setting, *extra]
+
+
+def run(folder, *options, check=True, **more):
+    """Run the workflow in ``folder``; the completed process with what it said in ``stdout``."""
+    done = subprocess.run(
+        command(*options, **more), cwd=folder, env=environment(), text=True, check=False,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+    )  # fmt: skip
+    if check and done.returncode:
+        raise AssertionError(f"exit code {done.returncode}\n{done.stdout}")
+    return done
+
+
+def kill(process):
+    """Kill a run and all its jobs without warning."""
+    for pid in [*_descendants(process.pid), process.pid]:
+        try:
+            os.kill(pid, signal.SIGKILL)
+        except ProcessLookupError:
+            pass
+    process.wait()
+
+
+def _descendants(pid):
+    """All processes below ``pid``."""
+    try:
+        children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    except FileNotFoundError:
+        return []
+    return [p for child in map(int, children) for p in [*_descendants(child), child]]
+
+
+def rows(folder):
+    """Rows of every table of the registry but ``runs``, sorted, without the columns that name the run."""
+    import duckdb
+
+    found = {}
+    with duckdb.connect(str(Path(folder) / "results/registry/registry.duckdb"), read_only=True) as con:
+        generation = json.loads((Path(folder) / "results/registry/_generation.json").read_text())
+        for table in sorted({f["table"] for f in generation["files"]} - {"runs"}):
+            columns = [c[0] for c in con.sql(f"describe {table}").fetchall() if c[0] not in ("run_id", "generation")]
+            found[table] = sorted(con.sql(f"select {', '.join(columns)} from {table}").fetchall(), key=repr)
+    return found
+
+
+def data_files(folder):
+    """(table, sha256) of every data file of the registry but those of ``runs``."""
+    generation = json.loads((Path(folder) / "results/registry/_generation.json").read_text())
+    return sorted((f["table"], f["sha256"]) for f in generation["files"] if f["table"] != "runs")
+
+
+def forget(folder):
+    """Remove all that a run made."""
+    for name in ("work", "results", "logs", ".snakemake"):
+        shutil.rmtree(Path(folder) / name, ignore_errors=True)
