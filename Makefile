@@ -25,7 +25,7 @@ demo: $(STAMP)
 	$(BIN)/turnout demo
 
 test: $(STAMP)
-	$(BIN)/python -m pytest -n 2 --dist loadgroup
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 real: $(STAMP)
 	$(BIN)/turnout real

@@ -18,7 +18,7 @@ from turnout_blind.score.report import report_of
 from turnout_blind.seal import BlindError, digest, verify
 from turnout_blind.site import draw_site
 
-pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("blind_set")]
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")

@@ -10,8 +10,7 @@ import toy_fleet as toy
 QUARANTINE = "select path, reason_code from {} where reason_code <> 'nothing_found'"
 
 
-# One fleet goes through the tests of this file in their order: they stay together on one worker.
-pytestmark = pytest.mark.xdist_group("workflow_damage")
+# One fleet goes through the tests of this file in their order: workers take whole files.
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +67,7 @@ def test_too_many_in_quarantine_fail_the_run_after_the_registry_is_out(fleet):
     for path in new[:10]:
         path.write_bytes(b"")
     done = toy.run(fleet, shards=2, check=False)
-    assert done.returncode != 0
+    assert done.returncode != 0, done.stdout
     assert "10 of 25 new units of the fleet have rows in quarantine, 40 %, above the limit of 20 %" in done.stdout
     assert len([p for p in open_quarantine(fleet) if p.startswith("T00005")]) == 10
     for path in new[:10]:

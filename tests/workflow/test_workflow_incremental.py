@@ -9,8 +9,7 @@ import toy_fleet as toy
 SHARDS = 3
 
 
-# One fleet goes through the tests of this file in their order: they stay together on one worker.
-pytestmark = pytest.mark.xdist_group("workflow_incremental")
+# One fleet goes through the tests of this file in their order: workers take whole files.
 
 
 @pytest.fixture(scope="module")

@@ -19,8 +19,7 @@ from turnout.registry.register import register
 ALGO = "toy_fleet:unit"
 
 
-# One fleet goes through the tests of this file in their order: they stay together on one worker.
-pytestmark = pytest.mark.xdist_group("workflow_same_rows")
+# One fleet goes through the tests of this file in their order: workers take whole files.
 
 
 @pytest.fixture(scope="module")
