@@ -93,7 +93,7 @@ def sensors_of(turnout: TurnoutConfig) -> tuple[PassageSensor, ...]:
         if channel.quantity == "acceleration":
             section = turnout.section(passages.sections[channel.name])
             position = channel.position if channel.position is not None else section.position
-            found.append(PassageSensor(channel.name, section.label, float(position), section.track))
+            found.append(PassageSensor(channel.name, section.label, float(position), section.track, section.panel))
     return tuple(found)
 
 

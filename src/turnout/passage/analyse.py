@@ -7,23 +7,21 @@ from dataclasses import replace
 import numpy as np
 
 from turnout.passage.at_sensors import sensor_times
+from turnout.passage.count import best_count, count_without_distance
 from turnout.passage.findings import Passage
 from turnout.passage.listen import hearing, listen, narrowed, track_taken
 from turnout.passage.motion import Motion
 from turnout.passage.order import wrong_channels, wrong_places
 from turnout.passage.other_train import second_train
-from turnout.passage.place import axle_places
+from turnout.passage.silence import fell_silent
 from turnout.passage.slowness import pair_likeness, refine_slowness, scan_slowness
 from turnout.passage.soundness import channel_states
 from turnout.passage.speed import combine, motion_of, slowness_from_sensors
-from turnout.passage.stack import aligned, counts, template_counts
-from turnout.passage.train_type import UNKNOWN, find_type, unknown_evidence
+from turnout.passage.stack import aligned
+from turnout.passage.train_type import UNKNOWN
 from turnout.records import Recording, Rejection
 
-KMH = 3.6
-USUAL_SPEED = 25.0  # m/s, where nothing but the bogies tells it; a factor of 1.8 is one standard deviation
 CLEAR = 1.5  # least ratio between accepted and refused peaks of an unknown train
-PLACE_SE = 0.05  # m, of an axle placed by the level around it; measured against the simulation
 
 
 def analyse(recording: Recording, sensors, patterns, settings) -> Passage:
@@ -60,13 +58,27 @@ def analyse(recording: Recording, sensors, patterns, settings) -> Passage:
     rows = hearing(heard)
     if rows.size == 0:
         return Passage("rejected", (*findings, Rejection("no_train", 0.0, None, "no sensor hears more than noise")))
-    used = [used[i] for i in rows]
-    passage = _of_train(narrowed(heard, rows), used, track, findings, recording.duration, patterns, settings)
-    if not passage.n_axle:
-        return passage
-    # a sensor that fell silent says nothing about the train, but its record up to then can be fitted
+    own = [used[i] for i in rows]
+    passage = _of_train(narrowed(heard, rows), own, track, findings, recording.duration, patterns, settings)
+    return _with_silent(passage, heard, used, lost) if passage.n_axle else passage
+
+
+def _with_silent(passage, heard, used, lost):
+    """The passage with the sensors that fell silent: they say nothing about the train, but can be fitted up to then."""
+    side = [i for i, s in enumerate(used) if s.track in ("both", passage.track)]
+    times = {used[i].name: passage.motion.passing(passage.offsets, used[i].position) for i in side}
+    wrong = {f.detail.split(":")[0] for f in passage.findings}
+    side = [i for i in side if used[i].name not in wrong]
+    silent = fell_silent(heard.only(side), [used[i].name for i in side], times, passage.motion.speed)
     later = {s.name: passage.motion.passing(passage.offsets, s.position) for s in lost}
-    return replace(passage, at_sensor={**passage.at_sensor, **later})
+    later |= {f.detail.split(":")[0]: times[f.detail.split(":")[0]] for f in silent}
+    findings = (*passage.findings, *silent)
+    return replace(
+        passage,
+        at_sensor={**passage.at_sensor, **later},
+        findings=findings,
+        status="partly" if findings else passage.status,
+    )
 
 
 def _of_train(heard, used, track, findings, duration, patterns, settings) -> Passage:
@@ -75,10 +87,10 @@ def _of_train(heard, used, track, findings, duration, patterns, settings) -> Pas
     if span > 0.05:
         heard, used, start, direction = _agreeing(heard, used, findings, settings)
         start = aligned(heard, start)
-        offer, found = _best_count(heard, start, span, patterns, settings)
+        offer, found = best_count(heard, start, span, patterns, settings)
     else:
         direction = "unknown"
-        start, offer, found = _without_distance(heard, patterns, settings)
+        start, offer, found = count_without_distance(heard, patterns, settings)
     if offer is None:
         return Passage("rejected", (*findings, Rejection("no_train", 0.0, None, "sound, but no axles in it")))
     passage = _settled(heard, used, start, offer, found, settings, span > 0.05)
@@ -121,101 +133,6 @@ def _from_scan(heard, settings):
     reference = float(np.mean(heard.positions))
     start = heard.begin - sign * reference * abs(slowness)
     return Motion(1 / abs(slowness), start, 0.0, sign), name
-
-
-def _best_count(heard, motion, span, patterns, settings):
-    """The count whose axles fit a template, else the one with the clearest cut; and its type.
-
-    First the cuts between peaks, then the rows of vehicles that collect most of the profile.
-    """
-    error = motion.speed * np.sqrt(2.0) * max(2 * settings.place_error, 0.1) / max(span, 0.1)
-    error = min(error, 0.25 * motion.speed)
-    offers = [o for o in counts(heard, motion, settings)[:8] if o.contrast >= 1.15 and len(o.offsets) >= 2]
-    best, first = _first_named(heard, motion, offers, error, patterns, settings)
-    if best is None:
-        best, _ = _first_named(heard, motion, template_counts(heard, motion, patterns), error, patterns, settings)
-    if best is None and len(heard.positions) < 4:
-        best = _from_one_of_few(heard, motion, patterns, settings)
-    return best or first or (None, None)
-
-
-def _from_one_of_few(heard, motion, patterns, settings):
-    """Two or three sensors that are not laid on each other well: each by itself, at speeds around the common one."""
-    for i, x in enumerate(heard.positions):
-        alone = heard.only([i])
-        middle = motion.passing(0.5 * (motion.way(heard.end) - motion.way(heard.begin)), x)
-        for factor in (1.0, 0.94, 1.06, 0.89, 1.12):
-            near = replace(motion, speed=motion.speed * factor)
-            near = replace(near, start=near.start + float(middle - near.passing(near.way(middle), 0.0)))
-            offers = template_counts(alone, near, patterns, 2)
-            best, _ = _first_named(alone, near, offers, 0.1 * near.speed, patterns, settings)
-            if best is not None:
-                offer, found = best
-                # told from the common motion again, whose places along the train the caller goes on with
-                times = near.passing(offer.offsets, x)
-                offsets = motion.way(times) - motion.direction * x
-                return replace(offer, offsets=offsets), found
-    return None
-
-
-def _first_named(heard, motion, offers, error, patterns, settings):
-    """First (count, type) that fits a template, and the first that was looked at; None where there is none."""
-    first, tried = None, set()
-    for offer in offers:
-        key = tuple(np.round(offer.offsets, 1))
-        if key in tried:
-            continue
-        tried.add(key)
-        for placed in _placed(heard, motion, offer):
-            times = motion.time(placed.offsets)
-            found = find_type(times, patterns, settings, motion.speed, error, PLACE_SE)
-            if found.type != UNKNOWN:
-                return (placed, found), first
-            first = first or (placed, found)
-    return None, first
-
-
-def _placed(heard, motion, offer):
-    """The offer with its axles placed by the whole level around them, and as its peaks have it."""
-    yield replace(offer, offsets=axle_places(heard, motion, offer.offsets))
-    yield offer
-
-
-def _without_distance(heard, patterns, settings):
-    """One sensor: speeds are tried, the one that makes the best bogies or fits a template is taken."""
-    offers = []
-    for speed in np.geomspace(settings.speed_minimum / KMH, settings.speed_maximum / KMH, 32):
-        motion = Motion(float(speed), heard.begin)
-        for offer in counts(heard, motion, settings)[:4]:
-            if len(offer.offsets) >= 2 and offer.contrast >= 1.15:
-                per_axle = unknown_evidence(np.diff(offer.offsets)) / (len(offer.offsets) - 1)
-                usual = -0.5 * (np.log(speed / USUAL_SPEED) / 0.6) ** 2
-                offers.append((usual + per_axle + 0.5 * min(np.log(offer.contrast), 1.5), motion, offer))
-    offers.sort(key=lambda o: -o[0])
-    first, tried = None, set()
-    for _, motion, offer in offers:
-        key = tuple(np.round(motion.time(offer.offsets), 2))
-        if key in tried or len(tried) == 12:
-            continue
-        tried.add(key)
-        best, seen = _first_named(heard, motion, [offer], 0.12 * motion.speed, patterns, settings)
-        if best is not None:
-            return motion, *best
-        first = first or (motion, *seen)
-    return _by_template(heard, patterns, settings) or first or (None, None, None)
-
-
-def _by_template(heard, patterns, settings):
-    """One sensor, and no cut between peaks fits: the row of vehicles that fits best at any speed."""
-    found = []
-    for speed in np.geomspace(settings.speed_minimum / KMH, settings.speed_maximum / KMH, 32):
-        motion = Motion(float(speed), heard.begin)
-        found += [(o.contrast, motion, o) for o in template_counts(heard, motion, patterns, 2)]
-    for _, motion, offer in sorted(found, key=lambda f: -f[0])[:8]:
-        best, _ = _first_named(heard, motion, [offer], 0.12 * motion.speed, patterns, settings)
-        if best is not None:
-            return motion, *best
-    return None
 
 
 def _settled(heard, used, start, offer, found, settings, several) -> Passage:

@@ -14,12 +14,13 @@ from turnout.records import Rejection
 @dataclass(frozen=True)
 class PassageSensor:
     """A channel of a passage: ``name``, the ``section`` it watches, its ``position`` [m], and which trains it feels:
-    ``track`` is "main", "diverging" or "both"."""
+    ``track`` is "main", "diverging" or "both". ``panel`` is that of the section, "" where it is not known."""
 
     name: str
     section: str
     position: float
     track: str = "both"
+    panel: str = ""
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from turnout.passage.slowness import coarser, pair_likeness, slowness_grid, stac
 from turnout.records import Rejection
 
 SEEN = 0.7  # m: a sensor hears a wheel within this of its own place
+BLOW = 2.5  # m: in the crossing panel it may hear the blow at the nose louder than the wheel above it
 POOR, GOOD = 0.85, 0.95  # of the likeness that free shifts reach: below nothing fits, above everything does
 WIDTH = 0.02  # s
 
@@ -57,7 +58,8 @@ def wrong_places(heard, motion, used):
 
     Each sensor's level along the train is compared with the median of the others, in the first and in the second
     half: a shift that changes is a drifting clock, a constant one a clock or a position in the configuration that is
-    off. Fewer than four sensors cannot say which one is wrong.
+    off. In the crossing panel a constant shift of less than ``BLOW`` is no finding: it may be the distance to the
+    nose. Fewer than four sensors cannot say which one is wrong.
     """
     n = len(used)
     keep = np.ones(n, dtype=bool)
@@ -66,14 +68,19 @@ def wrong_places(heard, motion, used):
     shifts = _shifts(heard, motion)
     shifts = shifts - np.median(shifts, axis=0)
     whole = shifts.mean(axis=1)
-    bad = np.flatnonzero(np.abs(whole) > SEEN)
+    limits = np.array([BLOW if s.panel == "CP" else SEEN for s in used])
+    drifts = np.abs(shifts[:, 1] - shifts[:, 0]) > SEEN
+    bad = np.flatnonzero((np.abs(whole) > limits) | drifts)
     if bad.size == 0 or bad.size > n // 2:
         return [], keep
     findings = []
     for i in bad:
-        word = "drifts" if abs(shifts[i, 1] - shifts[i, 0]) > 0.25 else "is off"
-        text = f"{used[i].name}: its clock {word}, {whole[i] / motion.speed * 1e3:.0f} ms against the others"
-        findings.append(Rejection("clock_drift", float(whole[i]), SEEN, text))
+        first, last = shifts[i] / motion.speed * 1e3
+        if drifts[i]:
+            text = f"{used[i].name}: its clock drifts, from {first:.0f} to {last:.0f} ms against the others"
+        else:
+            text = f"{used[i].name}: its clock is off, {whole[i] / motion.speed * 1e3:.0f} ms against the others"
+        findings.append(Rejection("clock_drift", float(whole[i]), float(limits[i]), text))
         keep[i] = False
     return findings, keep
 

@@ -6,41 +6,60 @@ import numpy as np
 from scipy import ndimage
 
 from turnout.passage.axles import GRID, along_train
+from turnout.passage.motion import Motion
 from turnout.passage.slowness import scan_slowness
 from turnout.records import Rejection
 
 LIKE = 0.25  # least correlation of what is left, among the sensors
-LEFT = 0.12  # least share of the level that is left
+SHARE = 0.1  # of the first train's level that half of the sensors must hear of the second, laid along its own motion
 
 
 def second_train(heard, passage, settings):
     """Finding "two_trains" where what the known motion leaves over moves coherently in another way.
 
     What all sensors have in common along the known train is taken off each of them: the lower median, so that a
-    second train, elsewhere along the first one at every sensor, stays. Needs three sensors; with fewer nothing can be
-    said and nothing is.
+    second train, elsewhere along the first one at every sensor, stays. A blow at a fixed place, as at the crossing's
+    nose, stays too, but only at the sensors beside it: half of all must hear the second train, at a tenth of the first
+    one's level. Needs three sensors; with fewer nothing can be said and nothing is.
     """
     if len(heard.positions) < 3:
         return []
     rest = without_train(heard, passage.motion)
-    left = rest.sum() / max(np.clip(heard.levels.values, 0, None).sum(), 1e-12)
     scan = scan_slowness(rest, heard.levels.step, heard.positions, settings)
     own = passage.motion.direction / passage.motion.speed
     other = np.abs(scan.slowness - own) > 0.15 * abs(own)
     same = scan.likeness[~other].max(initial=0.0)
     best = int(np.argmax(np.where(other, scan.likeness, -np.inf)))
     strength = float(scan.likeness[best])
-    if left < LEFT or strength < LIKE or strength < 1.2 * same:
+    if strength < LIKE or strength < 1.2 * same:
+        return []
+    way = 1 if scan.slowness[best] > 0 else -1
+    second = Motion(1.0 / abs(scan.slowness[best]), 0.0, 0.0, way)
+    first = _shared_level(heard, np.clip(_smooth(heard), 0.0, None), passage.motion)
+    if _shared_level(heard, rest, second) < SHARE * first:
         return []
     speed = 3.6 / scan.slowness[best]
     way = "facing" if speed > 0 else "trailing"
     return [Rejection("two_trains", strength, LIKE, f"another train at about {abs(speed):.0f} km/h, {way}")]
 
 
+def _smooth(heard):
+    """Levels over 20 ms."""
+    return ndimage.uniform_filter1d(heard.levels.values, max(round(0.02 / heard.levels.step), 1), axis=1)
+
+
+def _shared_level(heard, values, motion) -> float:
+    """Sum over the time of the lower median over the sensors, each shifted by the motion. [s]"""
+    step, end = heard.levels.step, values.shape[1] * heard.levels.step
+    ways = [motion.way(t) - motion.direction * x for t in (0.0, end) for x in heard.positions]
+    rows = np.sort(along_train(values, step, heard.positions, motion, min(ways), max(ways)), axis=0)
+    return float(rows[(len(rows) - 1) // 2].sum() * GRID / motion.speed)
+
+
 def without_train(heard, motion) -> np.ndarray:
     """(n_sensor, n_bin) levels above what the sensors share along the train, smoothed over 20 ms, never below 0."""
     step, positions = heard.levels.step, heard.positions
-    values = ndimage.uniform_filter1d(heard.levels.values, max(round(0.02 / step), 1), axis=1)
+    values = _smooth(heard)
     ways = [motion.way(t) - motion.direction * x for t in (heard.begin, heard.end) for x in positions]
     start, stop = min(ways) - 15.0, max(ways) + 15.0
     rows = np.sort(along_train(values, step, positions, motion, start, stop), axis=0)
