@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from turnout_blind.site import RAIL_DAMPING
+
 SOURCE = "the owner's register"
 
 
@@ -59,7 +61,7 @@ def track(site):
     lines += ["rail:", "  name: 60E1", "  beam: timoshenko"]
     rail = (("youngs_modulus", 210.0, "GPa"), ("second_moment", 3037.0, "cm⁴"), ("area", 76.7, "cm²"))
     rail += (("mass", 60.2, "kg/m"), ("shear_modulus", 80.77, "GPa"), ("shear_coefficient", 0.393, "-"))
-    rail += (("density", 7850.0, "kg/m³"), ("damping", 30.0, "N s/m²"))
+    rail += (("density", 7850.0, "kg/m³"), ("damping", RAIL_DAMPING, "N s/m²"))
     lines += [f"  {name}: {_value(value, unit)}" for name, value, unit in rail]
     lines += ["support:", *_support(site.nominal[0]), "sections:"]
     for label, zone, values in zip(("west", "east"), site.zones, site.nominal):
