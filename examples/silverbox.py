@@ -108,8 +108,8 @@ PAGE = """# A real oscillator, told nothing: the Silverbox
 2013, Three free data sets for development and benchmarking in nonlinear system identification; SNLS80mV.csv.*
 
 An electronic circuit that behaves as a mass on a spring that hardens. The diagnosis gets what a measuring campaign
-would give - input, output, a linear second-order model with wide priors - and a library of {n_laws} laws, one of which is
-right. It is fitted to five realisations of a multisine. Two recordings are reserved, read by nothing but the
+would give - input, output, a linear second-order model with wide priors - and a library of {n_laws} laws, one of which
+is right. It is fitted to five realisations of a multisine. Two recordings are reserved, read by nothing but the
 verification: another multisine, and the *arrow*, a sweep that grows beyond whatever was fitted.
 
 ## Told nothing

@@ -20,5 +20,5 @@ def test_the_page_follows_from_the_recording(shared_data):
 
 
 def test_without_a_recording_it_says_so(tmp_path):
-    with pytest.raises(SystemExit, match="skipped: .* does not exist"):
+    with pytest.raises(SystemExit, match=r"skipped: .* does not exist"):
         folder_of("nonlinear_silverbox", [str(tmp_path / "nowhere")])
