@@ -71,12 +71,12 @@ def between_variance(value, variance):
 
 def fit_common(start, decays, rate, drift, iterations=12, tolerance=1e-3):
     """Shared modes by Gauss-Newton with halved steps; returns (n_mode, 2) of ln f and zeta, and whether it settled."""
-    n_decay, n_mode = len(decays), len(start)
+    n_mode = len(start)
     mean = np.array(start, dtype=float)
     dof = degrees_of_freedom(decays, n_mode, len(drift))
 
     def at(theta):
-        return linearise(np.broadcast_to(theta, (n_decay, n_mode, 2)), decays, rate, drift)
+        return linearise(theta[None], decays, rate, drift)
 
     here = at(mean)
     for _ in range(iterations):

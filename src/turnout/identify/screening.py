@@ -54,8 +54,7 @@ def screen(kept, decays, rate, columns, settings, rejected):
     """Drop what is not significant where the realisation put it: first all that is hopeless, then one by one."""
     limit = settings.false_mode_probability
     while kept:
-        theta = np.broadcast_to(start_of(kept), (len(decays), len(kept), 2))
-        at = linearise(theta, decays, rate, columns)
+        at = linearise(start_of(kept)[None], decays, rate, columns)
         sigma2 = at.rss.sum() / degrees_of_freedom(decays, len(kept), len(columns))
         probability = common_probability(mode_chi_squared(at, sigma2))
         out = set(np.flatnonzero(probability > HOPELESS).tolist()) or {int(np.argmax(probability))}

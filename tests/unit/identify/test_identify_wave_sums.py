@@ -1,0 +1,78 @@
+"""Sums over damped waves from short tables agree with sums over the samples themselves."""
+
+import numpy as np
+import pytest
+
+from turnout.identify.linearise import drift_columns, linearise, powers
+from turnout.identify.wave_sums import WaveTable, geometric_sums, pair_sums
+
+# A prime: no pair of tables fits it without a rest.
+N = 599
+
+
+def waves_of_tests():
+    """Two sets of three z: heavily damped, lightly damped and almost undamped."""
+    pole = np.array([[-0.05 + 0.02j, -2e-3 + 0.2j, -1e-8 + 0.03j], [-0.3 + 0.3j, -1e-4 + 0.6j, -1e-3 + 2.0j]])
+    return np.exp(pole), np.exp(pole[..., None] * np.arange(N))
+
+
+@pytest.mark.parametrize("n", [1, 2, 24, 25, 599, 600])
+def test_the_last_power_lies_behind_the_last_sample(n):
+    z, _ = waves_of_tests()
+    np.testing.assert_allclose(WaveTable.of(z, n).last(), z**n, rtol=1e-11)
+
+
+def test_products_with_series_are_sums_over_the_samples():
+    z, wave = waves_of_tests()
+    table = WaveTable.of(z, N)
+    series = np.random.default_rng(0).standard_normal((2, 4, N))
+    expected = wave @ np.swapaxes(series, -1, -2)
+    np.testing.assert_allclose(table.products(table.blocks(series)), expected, atol=1e-11 * np.abs(expected).max())
+
+
+def test_series_are_the_real_parts_of_the_waves():
+    z, wave = waves_of_tests()
+    amplitude = np.random.default_rng(1).standard_normal((2, 4, 3, 2)) @ [1.0, 1j]
+    np.testing.assert_allclose(WaveTable.of(z, N).series(amplitude), (amplitude @ wave).real, atol=1e-11)
+
+
+def test_sums_of_products_of_two_waves_are_right_for_every_damping():
+    """Also where z z* is so near to 1 that the closed form has lost all its digits."""
+    z, wave = waves_of_tests()
+    plus, minus = pair_sums(WaveTable.of(z, N))
+    for p in range(3):
+        ramped = wave * np.arange(N) ** p
+        size = np.abs(ramped) @ np.swapaxes(np.abs(wave), -1, -2)
+        assert np.all(np.abs(plus[p] - ramped @ np.swapaxes(wave, -1, -2)) < 1e-11 * size)
+        assert np.all(np.abs(minus[p] - ramped @ np.swapaxes(wave, -1, -2).conj()) < 1e-11 * size)
+
+
+def test_both_ways_to_sum_a_series_agree_where_they_meet():
+    for distance in (0.49, 0.51):
+        q = np.exp(np.array([-1.0 + 1.0j, 1j, -1.0]) * distance / N)
+        direct = [np.sum(np.arange(N) ** p * q[:, None] ** np.arange(N), axis=1) for p in range(3)]
+        np.testing.assert_allclose(geometric_sums(q, q**N, N), direct, rtol=1e-11)
+
+
+@pytest.mark.parametrize("degree", [-1, 2])
+@pytest.mark.parametrize("shared", [True, False])
+def test_a_linearisation_is_that_of_the_matrices_it_does_not_form(degree, shared):
+    rng = np.random.default_rng(2)
+    theta = np.array([[[np.log(110.0), 0.3], [np.log(610.0), 0.05], [np.log(1300.0), 1e-4]]])
+    theta = theta if shared else theta + 0.01 * rng.standard_normal((4, 3, 2)) ** 2
+    decays, drift, rate = rng.standard_normal((4, N)), drift_columns(N, degree), 20e3
+    at = linearise(theta, decays, rate, drift)
+    each = np.broadcast_to(theta, (4, 3, 2))
+    for i in range(4):
+        omega, zeta = 2 * np.pi * np.exp(each[i, :, 0]) / rate, each[i, :, 1]
+        s = omega * (-zeta + 1j * np.sqrt(1 - zeta**2))
+        wave = powers(np.exp(s), N)
+        basis = np.vstack([wave.real, wave.imag, drift])
+        q, _ = np.linalg.qr(basis.T)
+        residual = decays[i] - q @ (q.T @ decays[i])
+        slope = np.stack([s, omega * (-1 - 1j * zeta / np.sqrt(1 - zeta**2))], axis=-1) * at.amplitude[i][:, None]
+        derivative = (slope[..., None] * (wave * np.arange(N))[:, None]).real.reshape(6, N)
+        projected = derivative - (derivative @ q) @ q.T
+        np.testing.assert_allclose(at.residual[i], residual, atol=1e-9)
+        np.testing.assert_allclose(at.score[i], derivative @ residual, rtol=1e-7)
+        np.testing.assert_allclose(at.information[i], projected @ projected.T, rtol=1e-7)
