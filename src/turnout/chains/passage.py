@@ -138,11 +138,10 @@ def _fit_rows(recording, passage, sensors, turnout, context, identity, settings)
     """One row per sensor that heard the train and whose section has a model."""
     unsound = {r.detail.split(":")[0] for r in passage.findings if r.reason in ("clipped", "sensor_lost")}
     found = []
+    latest = {label: model_at(models, identity["passed_at_utc"]) for label, models in context.models.items()}
     for sensor in sensors:
-        if sensor.name not in passage.at_sensor:
-            continue
-        section_model = model_at(context.models.get(sensor.section, ()), identity["passed_at_utc"])
-        if section_model is None:
+        section_model = latest.get(sensor.section)
+        if sensor.name not in passage.at_sensor or section_model is None:
             continue
         times = passage.at_sensor[sensor.name]
         until = next((r.value for r in passage.findings if r.reason == "sensor_lost" and sensor.name in r.detail), None)
@@ -152,7 +151,10 @@ def _fit_rows(recording, passage, sensors, turnout, context, identity, settings)
         fit = None
         if not clipped and len(times) >= 2:
             samples = recording.signal(sensor.name)
-            fit = fit_channel(samples, recording.rate, times, passage.motion.speed, section_model.model, settings)
+            others = {label: m.model for label, m in latest.items() if m is not None and label != sensor.section}
+            fit = fit_channel(
+                samples, recording.rate, times, passage.motion.speed, section_model.model, settings, others
+            )
         found.append(fit_row(fit, sensor, section_model.model_id, turnout, identity))
     return found
 

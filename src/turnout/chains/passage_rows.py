@@ -126,8 +126,13 @@ def fit_row(fit, sensor, model_id, turnout, identity) -> dict:
         "leave_one_out_pct": _plain(fit.scores.leave_one_out),
         "parameters_per_s": _plain(fit.parameters_per_second),
         "chi_squared_failed_share": fit.test.failed_share,
+        "along_b_share": _plain(fit.test.along_share),
         "peak_ms2": _plain(fit.peak),
     }
+    if fit.others:
+        row["fit_others_pct"] = max((_plain(s.fit) for s in fit.others.values() if np.isfinite(s.fit)), default=None)
+        skills = (_plain(s.forecast) for s in fit.others.values() if np.isfinite(s.forecast))
+        row["forecast_others_pct"] = max(skills, default=None)
     if null is not None:
         row |= {
             "fit_null_pct": _plain(null.fit),

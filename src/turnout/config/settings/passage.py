@@ -29,7 +29,14 @@ class PassageSettings:
     )
     chi_squared_level: float = setting(0.01, "", "level of the per-wheel test of the jump's direction", 1e-6, 0.2)
     not_an_impulse_share: float = setting(
-        0.5, "", "more failing wheels than this share: the load is not an impulse, no score means anything", 0.0, 1.0
+        0.5, "", "the load is not an impulse where more wheels than this share fail the test of the direction", 0.0, 1.0
+    )
+    along_b_minimum: float = setting(
+        0.8,
+        "",
+        "and less than this share of the jumps' power is along b: 0.9 for a model 10 % off, 0.3 for a 3 ms pulse",
+        0.0,
+        1.0,
     )
     null_models: int = setting(30, "", "random pole pairs behind each null band", 5, 1000)
     null_seed: int = setting(20171001, "", "seed of the random pole pairs: the same for every passage", 0)

@@ -1,0 +1,98 @@
+"""Effects of train type, speed and axle load on the scores, in SQL, against statsmodels with dummy variables."""
+
+import numpy as np
+import pandas as pd
+import pytest
+import statsmodels.api as sm
+from registry_fleet import passage_results
+from scipy import stats
+
+SAME = {"rtol": 1e-8, "atol": 1e-8}
+
+
+@pytest.fixture(scope="module")
+def scored(fleet):
+    rows = fleet.frame("from passage_scores where axle_load_t is not null order by section_id, passage_id")
+    return {section: part for section, part in rows.groupby("section_id")}
+
+
+def least_squares(rows, column):
+    """Result of statsmodels (HC3) with a level per type, speed in 10 km/h and load in t, and its design."""
+    design = pd.get_dummies(rows.train_type, dtype=float)
+    design["speed"], design["load"] = rows.speed_kmh / 10, rows.axle_load_t
+    return sm.OLS(rows[column], design).fit(cov_type="HC3"), design
+
+
+@pytest.mark.parametrize("score", ["fit", "forecast"])
+@pytest.mark.parametrize("factor", ["speed", "axle load"])
+def test_adjusted_effects_equal_those_of_a_design_matrix(fleet, scored, score, factor):
+    rows = fleet.frame(f"from fit_effects where score = '{score}' and factor = '{factor}'").set_index("section_id")
+    assert set(rows.index) == set(scored)
+    for section, own in scored.items():
+        found, _ = least_squares(own, f"{score}_pct")
+        name = "speed" if factor == "speed" else "load"
+        row = rows.loc[section]
+        np.testing.assert_allclose([row.change_pct, row.change_se_pct], [found.params[name], found.bse[name]], **SAME)
+        half = stats.t.ppf(0.975, len(own) - 5) * found.bse[name]
+        np.testing.assert_allclose([row.low_pct, row.high_pct], row.change_pct + np.array([-half, half]), rtol=1e-4)
+        x = own.speed_kmh / 10 if factor == "speed" else own.axle_load_t
+        np.testing.assert_allclose(row.raw_change_pct, np.polyfit(x, own[f"{score}_pct"], 1)[0], **SAME)
+        assert row.n == len(own)
+
+
+@pytest.mark.parametrize("freedom", [5, 8, 12, 40, 400])
+def test_the_quantile_of_the_intervals_is_that_of_student(freedom):
+    made = 1.96 + 2.3724 / freedom + 2.8225 / freedom**2 + 2.56 / freedom**3
+    assert made == pytest.approx(stats.t.ppf(0.975, freedom), abs=0.005)
+
+
+def test_adjusted_bars_are_means_of_partial_residuals(fleet, scored):
+    rows = fleet.frame("from fit_adjusted where score = 'fit'").set_index(["section_id", "factor", "class"])
+    for section, own in scored.items():
+        found, design = least_squares(own, "fit_pct")
+        speed = found.params["speed"] * (design.speed - design.speed.mean())
+        load = found.params["load"] * (design.load - design.load.mean())
+        of_type = own.fit_pct - speed - load
+        level = own.train_type.map(found.params[sorted(set(own.train_type))])
+        mean = own.fit_pct.mean()
+        for name, values in of_type.groupby(own.train_type):
+            row = rows.loc[(section, "train type", name)]
+            np.testing.assert_allclose(row.adjusted_pct, values.mean(), **SAME)
+            np.testing.assert_allclose(row.score_pct, own.fit_pct[values.index].mean(), **SAME)
+        of_speed = mean + speed + found.resid
+        first = 20 * np.floor(own.speed_kmh / 20).astype(int)
+        for low, values in of_speed.groupby(first):
+            row = rows.loc[(section, "speed", f"{low}-{low + 20} km/h")]
+            np.testing.assert_allclose(row.adjusted_pct, values.mean(), **SAME)
+            assert row.n == len(values) and row.class_from == low
+        assert (level + speed + load + found.resid).corr(own.fit_pct) > 0.5
+
+
+def test_without_loads_the_speed_is_adjusted_for_the_type_alone(bench):
+    """Half of the loads unknown: no effect of the load, the speed holds only the type fixed; bars of what is known."""
+    results = passage_results(n=120)
+    for result in results[::2]:
+        result.tables["passages"][0]["axle_load_t"] = None
+    bench.register(*results)
+    rows = bench.frame("from passage_scores where section_id = 'north_1/A7'")
+    found = bench.frame("from fit_effects where section_id = 'north_1/A7' and score = 'fit'")
+    assert list(found.factor) == ["speed"] and list(found.held_fixed) == ["train type"]
+    design = pd.get_dummies(rows.train_type, dtype=float)
+    design["speed"] = rows.speed_kmh / 10
+    made = sm.OLS(rows.fit_pct, design).fit(cov_type="HC3")
+    np.testing.assert_allclose(
+        [found.change_pct[0], found.change_se_pct[0]], [made.params.speed, made.bse.speed], **SAME
+    )
+    bars = bench.frame("from fit_adjusted where section_id = 'north_1/A7' and score = 'fit'").groupby("factor").n.sum()
+    assert bars.to_dict() == {"train type": len(rows), "speed": len(rows), "axle load": rows.axle_load_t.count()}
+
+
+def test_one_type_at_one_speed_has_no_effects_and_still_its_bars(bench):
+    results = passage_results(n=40)
+    for result in results:
+        result.tables["passages"][0] |= {"train_type": "IC", "speed_kmh": 120.0, "axle_load_t": 15.0}
+    bench.register(*results)
+    assert bench.ask("select count(*) from fit_effects") == [(0,)]
+    bars = bench.frame("from fit_adjusted where section_id = 'north_1/A7' and score = 'fit'")
+    assert len(bars) == 3
+    np.testing.assert_allclose(bars.adjusted_pct, bars.score_pct, **SAME)
