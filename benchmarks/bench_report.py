@@ -17,8 +17,9 @@ from turnout.registry.register import register
 from turnout.report.write import write_pages
 
 N_TURNOUT, N_CAMPAIGN, N_WRITTEN = 3_500, 12, 200
+ONCE = ("receptances_current", "results_current")
 PLAIN = ("turnouts", "sections", "events", "quarantine_open")
-DATED = ("modes_current", "models_current", "impacts_current", "receptances_current")
+DATED = ("modes_current", "models_current", "impacts_current", *ONCE)
 EMPTY = ("passages_current", "passage_scores")
 
 
@@ -33,12 +34,18 @@ def bars():
         with stopwatch() as watch:
             write_pages(connection, folder / "pages", turnouts=some, progress=False)
         per_page = (watch.cpu - nothing.cpu) / len(some)
+        event = "insert into events (turnout_id, event_id, event_at_utc, kind, resets_ballast, resets_railpad)"
+        connection.execute(f"{event} values ('{some[0]}', 'new', '2024-05-20', 'tamping', true, false)")
+        with stopwatch() as again:
+            n_changed = write_pages(connection, folder / "pages", turnouts=some, progress=False) - 1
         index = (folder / "pages" / "index.html").stat().st_size / 1e6
         page = sum(p.stat().st_size for p in (folder / "pages" / "turnouts").iterdir()) / len(some) / 1e3
         yield Bar(
             "pages of 3,500 turnouts x 8 sections", nothing.cpu + N_TURNOUT * per_page, 120.0, "CPU s", n="n=200 pages"
         )
         yield Bar("fleet page alone", nothing.cpu, None, "CPU s", "")
+        yield Bar("turnouts' pages written after one new event", n_changed, 1, "pages", n=f"of {len(some)} asked for")
+        yield Bar("the same with the fleet's page", again.cpu, None, "CPU s", "")
         yield Bar("fleet page", index, 5.0, "MB")
         yield Bar("a turnout's page", page, None, "kB", "")
     finally:
@@ -60,7 +67,7 @@ def _network(folder):
     for name in EMPTY:
         connection.execute(f"create table {name} as select * from r.{name} limit 0")
     for name in (*PLAIN, *DATED):
-        times = N_CAMPAIGN if name in DATED and name != "receptances_current" else 1
+        times = N_CAMPAIGN if name in DATED and name not in ONCE else 1
         connection.execute(_repeat(connection, name, times))
     return connection
 
@@ -72,7 +79,7 @@ def _repeat(connection, name, times):
         "turnout_id": "printf('t%05d', k)",
         "section_id": "replace(section_id, turnout_id, printf('t%05d', k))",
         "model_id": "printf('%s-%d-%d', model_id, k, j)",
-        "campaign_id": "printf('t%05d/%s', k, measured_at_utc)" if "measured_at_utc" in columns else "campaign_id",
+        "campaign_id": "printf('t%05d/%03d', k, 100 - j)",
         "measured_at_utc": "measured_at_utc - to_days(cast(30 * j as integer))",
     }
     chosen = ", ".join(f"{other[c]} as {c}" if c in other else c for c in columns)

@@ -13,6 +13,7 @@ rule report:
         "logs/report.log",
     benchmark:
         "logs/benchmarks/report.tsv"
+    threads: workflow.resource_settings.cores or 1
     resources:
         mem_mb=4000,
         runtime=60,

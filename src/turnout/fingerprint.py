@@ -14,8 +14,8 @@ def fingerprint(*modules: str) -> str:
 
     Imports inside functions count, a package counts where it is itself imported from, and
     ``import_module(f"turnout.readers.{name}")`` counts as every module of ``turnout.readers``. Data files of the
-    package (CSV, SQL) that lie beside an imported module count by their bytes. ValueError for a module that does
-    not exist.
+    package (CSV, SQL) that lie beside an imported module count by their bytes, a folder without modules (templates,
+    SQL) with the modules that name it in a string. ValueError for a module that does not exist.
 
     >>> fingerprint("turnout.errors") == fingerprint("turnout.errors")
     True
@@ -69,9 +69,19 @@ def _tree(name: str) -> tuple[str, tuple[str, ...]]:
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)) and _has_docstring(node):
             node.body = node.body[1:] or [ast.Pass()]
     digest = hashlib.sha256(ast.dump(tree).encode())
-    for data in sorted(p for p in path.parent.iterdir() if p.suffix in (".csv", ".sql")):
+    for data in _data(path.parent, tree):
         digest.update(data.name.encode() + data.read_bytes())
     return digest.hexdigest(), tuple(imported)
+
+
+def _data(folder: Path, tree: ast.AST) -> list[Path]:
+    """Tables beside a module, and all that lies in the folders of data that it names."""
+    found = [p for p in folder.iterdir() if p.suffix in (".csv", ".sql")]
+    named = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)}
+    for inner in folder.iterdir():
+        if inner.is_dir() and inner.name in named and not any(inner.glob("*.py")):
+            found += [p for p in inner.iterdir() if p.is_file()]
+    return sorted(found)
 
 
 def _has_docstring(node) -> bool:

@@ -5,6 +5,7 @@ from html import escape
 
 import numpy as np
 
+from turnout.report.strokes import drawn, runs
 from turnout.report.ticks import linear_ticks, log_ticks, say_day, say_number, time_ticks
 
 LEFT, RIGHT, TOP, BOTTOM = 62, 14, 26, 40
@@ -65,35 +66,32 @@ class Chart:
     def line(self, x, y, style, label=""):
         """A polyline, broken where a value is missing."""
         px, py = self.px(x), self.py(y)
-        good = np.isfinite(px) & np.isfinite(py)
-        path, pen_down = [], False
-        for xi, yi, ok in zip(px, py, good):
-            if ok:
-                path.append(f"{'L' if pen_down else 'M'}{xi:.1f} {yi:.1f}")
-            pen_down = bool(ok)
-        self.parts.append(f'<path class="{style}" d="{"".join(path)}">{_title(label)}</path>')
+        pieces = (drawn(px[piece], py[piece]) for piece in runs(np.isfinite(px) & np.isfinite(py)))
+        path = "".join("M" + _joined(*piece) for piece in pieces)
+        self.parts.append(f'<path class="{style}" d="{path}">{_title(label)}</path>')
 
     def band(self, x, low, high, style, label=""):
         """The area between two lines; pieces with missing values are left out."""
         px, low, high = self.px(x), self.py(low), self.py(high)
-        good = np.isfinite(px) & np.isfinite(low) & np.isfinite(high)
-        for piece in np.split(np.flatnonzero(good), np.flatnonzero(np.diff(np.flatnonzero(good)) > 1) + 1):
-            if piece.size:
-                there = [f"{px[i]:.1f} {high[i]:.1f}" for i in piece]
-                back = [f"{px[i]:.1f} {low[i]:.1f}" for i in piece[::-1]]
-                self.parts.append(f'<path class="{style}" d="M{"L".join(there + back)}Z">{_title(label)}</path>')
+        for piece in runs(np.isfinite(px) & np.isfinite(low) & np.isfinite(high)):
+            there, (x_back, y_back) = drawn(px[piece], high[piece]), drawn(px[piece], low[piece])
+            path = f"M{_joined(*there)}L{_joined(x_back[::-1], y_back[::-1])}Z"
+            self.parts.append(f'<path class="{style}" d="{path}">{_title(label)}</path>')
 
     def points(self, x, y, style, radius=3.0, low=None, high=None, labels=None):
         """Dots, with bars from ``low`` to ``high`` where given, and a text each on hovering."""
-        px, py = self.px(x), self.py(y)
-        bars = (self.py(low), self.py(high)) if low is not None and high is not None else None
-        for i in np.flatnonzero(np.isfinite(px) & np.isfinite(py)):
-            if bars is not None and np.isfinite(bars[0][i]) and np.isfinite(bars[1][i]):
-                self.parts.append(f'<path class="{style} bar" d="M{px[i]:.1f} {bars[0][i]:.1f}V{bars[1][i]:.1f}"/>')
-            text = _title(labels[i]) if labels is not None else ""
-            self.parts.append(
-                f'<circle class="{style}" cx="{px[i]:.1f}" cy="{py[i]:.1f}" r="{radius:g}">{text}</circle>'
-            )
+        px, py = np.atleast_1d(self.px(x)), np.atleast_1d(self.py(y))
+        shown = np.isfinite(px) & np.isfinite(py)
+        if low is not None and high is not None:
+            bottom, top = self.py(low), self.py(high)
+            barred = np.flatnonzero(shown & np.isfinite(bottom) & np.isfinite(top))
+            numbers = np.column_stack([px[barred], bottom[barred], top[barred]]).ravel()
+            if barred.size:
+                path = "M%.1f %.1fV%.1f" * barred.size % tuple(numbers.tolist())
+                self.parts.append(f'<path class="{style} bar" d="{path}"/>')
+        texts = [""] * len(px) if labels is None else [_title(label) for label in labels]
+        dot = f'<circle class="{style}" r="{radius:g}" cx="%.1f" cy="%.1f">%s</circle>'
+        self.parts += [dot % (px[i], py[i], texts[i]) for i in np.flatnonzero(shown).tolist()]
 
     def vertical(self, x, style, label="", row=0):
         """A line across the panel at ``x``, with a word at its head."""
@@ -137,15 +135,17 @@ class Chart:
 
     def _axes(self):
         bottom, right = self.height - BOTTOM, self.width - RIGHT
-        parts = [f'<path class="frame" d="M{LEFT} {TOP}V{bottom}H{right}"/>']
-        for value, text in self.x.ticks():
-            px = float(self.px(value))
-            parts.append(f'<path class="grid" d="M{px:.1f} {TOP}V{bottom}"/>')
-            parts.append(f'<text class="tick" x="{px:.1f}" y="{bottom + 14}" text-anchor="middle">{text}</text>')
-        for value, text in self.y.ticks():
-            py = float(self.py(value))
-            parts.append(f'<path class="grid" d="M{LEFT} {py:.1f}H{right}"/>')
-            parts.append(f'<text class="tick" x="{LEFT - 5}" y="{py + 3.5:.1f}" text-anchor="end">{text}</text>')
+        x_ticks, y_ticks = self.x.ticks(), self.y.ticks()
+        px, py = self.px([v for v, _ in x_ticks]).tolist(), self.py([v for v, _ in y_ticks]).tolist()
+        grid = [f"M{x:.1f} {TOP}V{bottom}" for x in px] + [f"M{LEFT} {y:.1f}H{right}" for y in py]
+        parts = [
+            f'<path class="frame" d="M{LEFT} {TOP}V{bottom}H{right}"/><path class="grid" d="{"".join(grid)}"/>',
+            '<g class="tick" text-anchor="middle">',
+            *[f'<text x="{x:.1f}" y="{bottom + 14}">{text}</text>' for x, (_, text) in zip(px, x_ticks)],
+            '</g><g class="tick" text-anchor="end">',
+            *[f'<text x="{LEFT - 5}" y="{y + 3.5:.1f}">{text}</text>' for y, (_, text) in zip(py, y_ticks)],
+            "</g>",
+        ]
         middle_x, middle_y = (LEFT + right) / 2, (TOP + bottom) / 2
         parts.append(
             f'<text class="label" x="{middle_x:.0f}" y="{self.height - 6}" text-anchor="middle">'
@@ -154,6 +154,12 @@ class Chart:
             f"{escape(self.y.label)}</text>"
         )
         return "".join(parts)
+
+
+def _joined(px, py):
+    """``x y`` of every point, with the letter of a straight line between them."""
+    numbers = np.column_stack([px, py]).ravel().tolist()
+    return ("%.1f %.1fL" * len(px) % tuple(numbers))[:-1]
 
 
 def _title(words):

@@ -1,20 +1,45 @@
 """The report step of the workflow and of ``turnout report``."""
 
+import multiprocessing
+from concurrent.futures import ProcessPoolExecutor
+
 from turnout.errors import RegistryError
 from turnout.registry.database import open_registry
-from turnout.report.write import write_pages
+from turnout.report.write import AT_ONCE, write_pages, write_turnouts
 
 
-def report_job(registry, pages, turnouts=None, log=None) -> int:
-    """Write the pages of the registry in folder ``registry`` into ``pages``; returns their number."""
+def report_job(registry, pages, turnouts=None, log=None, threads=1) -> int:
+    """Write the pages of the registry in folder ``registry`` into ``pages``; returns how many had to be written."""
     with open_registry(registry) as connection:
         _check_known(connection, turnouts)
-        generation = connection.execute("select generation from registry_info").fetchall()[0][0]
-        n = write_pages(connection, pages, generation, turnouts or None, progress=log is None)
+        generation, known = connection.execute(
+            "select (select generation from registry_info), (select count(*) from turnouts)"
+        ).fetchall()[0]
+
+        def elsewhere(content):
+            _in_processes(registry, pages, content, generation, threads)
+
+        many = elsewhere if threads > 1 and known > AT_ONCE else None
+        n = write_pages(connection, pages, generation, turnouts or None, log is None, many)
     if log is not None:
         with open(log, "w") as file:
-            file.write(f"{n} pages of generation {generation}\n")
+            file.write(f"{n} pages of generation {generation} written, {known + 1 - n} had not changed\n")
     return n
+
+
+def _in_processes(registry, pages, content, generation, threads):
+    """Shares of AT_ONCE turnouts to fresh processes, each with a connection of its own: DuckDB's cannot be forked."""
+    names = list(content)
+    with ProcessPoolExecutor(threads, multiprocessing.get_context("spawn")) as pool:
+        shares = [{t: content[t] for t in names[k : k + AT_ONCE]} for k in range(0, len(names), AT_ONCE)]
+        for done in [pool.submit(_write_share, registry, pages, share, generation) for share in shares]:
+            done.result()
+
+
+def _write_share(registry, pages, content, generation):
+    with open_registry(registry) as connection:
+        connection.execute("set threads = 1")
+        write_turnouts(connection, pages, content, generation)
 
 
 def _check_known(connection, turnouts):

@@ -6,15 +6,19 @@ from collections import defaultdict
 NEWEST = "qualify row_number() over (partition by section_id order by measured_at_utc desc, model_id) = 1"
 OF_SOME = "turnout_id in (select unnest($turnouts))"
 ROWS = {
+    "turnouts": f"select * from turnouts where {OF_SOME}",
     "sections": f"select * from sections where {OF_SOME} order by position_m, label",
     "events": f"select * from events where {OF_SOME} order by event_at_utc, event_id",
     "modes": f"""
-        select * from modes_current where band in ('ballast', 'railpad') and source = 'hammer' and {OF_SOME}
+        select turnout_id, section_id, model_id, band, measured_at_utc, frequency_hz, frequency_se_hz,
+            damping_ratio, damping_se, n_impacts, rail_temperature_c
+        from modes_current where band in ('ballast', 'railpad') and source = 'hammer' and {OF_SOME}
         order by section_id, band, measured_at_utc""",
     "models": f"select * from models_current where {OF_SOME} {NEWEST}",
     "receptances": f"select * from receptances_current where {OF_SOME} {NEWEST}",
     "impacts": f"""
-        select i.* from impacts_current i
+        select i.turnout_id, i.section_id, i.test, i.record, i.status, i.reason, i.detail, i.peak_n
+        from impacts_current i
         join (
             select section_id, max(campaign_id) as campaign_id from impacts_current where {OF_SOME} group by section_id
         ) newest using (section_id, campaign_id)
@@ -25,7 +29,9 @@ ROWS = {
         order by passed_at_utc desc""",
     "scores": f"select * from passage_scores where {OF_SOME}",
     "quarantine": f"select * from quarantine_open where {OF_SOME} order by path, record",
-    "charts": f"select * from charts where source = 'hammer' and {OF_SOME} order by section_id, band, measured_at_utc",
+    "charts": f"""
+        select turnout_id, section_id, band, measured_at_utc, expected_low_hz, expected_high_hz, state
+        from charts where source = 'hammer' and {OF_SOME} order by section_id, band, measured_at_utc""",
     "chart_states": f"select * from chart_states where {OF_SOME}",
     "worklist": f"select * from worklist where {OF_SOME} order by rank",
 }
@@ -74,16 +80,20 @@ class FleetSource:
     def states(self):
         """Charts by turnout and state, none before the first trend."""
         sql = "select turnout_id, state, count(*) as n from chart_states group by all order by all"
-        return self._fetch(sql) if "chart_states" in self.there else []
+        return self._fetch(sql) if self.has("chart_states") else []
 
     def worklist(self):
         """Tomorrow's list, empty before the first trend."""
-        return self._fetch("select * from worklist order by rank") if "worklist" in self.there else []
+        return self._fetch("select * from worklist order by rank") if self.has("worklist") else []
+
+    def has(self, kind):
+        """Whether the registry has rows of ``kind``: those of the trend come with its first run."""
+        return kind not in TREND_VIEWS or kind in self.there
 
     def of_some(self, turnout_ids):
         """Rows of every kind of the turnouts named: {kind: {turnout_id: [row, ...]}}."""
         chosen = {"turnouts": list(turnout_ids)}
-        kinds = [kind for kind in ROWS if kind not in TREND_VIEWS or kind in self.there]
+        kinds = [kind for kind in ROWS if self.has(kind)]
         rows = {kind: _by_turnout(self._fetch(ROWS[kind], chosen)) for kind in kinds if kind != "receptances"}
         return rows | {"receptances": _by_turnout(self._arrays(ROWS["receptances"], chosen))}
 

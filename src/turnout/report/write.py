@@ -1,4 +1,4 @@
-"""Write the pages of a registry: one for the fleet, one for each turnout."""
+"""Write the pages of a registry: one for the fleet, one for each turnout that has something new to say."""
 
 import os
 from importlib.resources import files
@@ -8,6 +8,7 @@ from jinja2 import Environment, PackageLoader
 from tqdm import tqdm
 
 from turnout import __version__
+from turnout.report.changed import MARK, content_of, contents
 from turnout.report.pages.fleet import fleet_page
 from turnout.report.pages.turnout import turnout_page
 from turnout.report.source import ROWS, FleetSource
@@ -15,8 +16,10 @@ from turnout.report.source import ROWS, FleetSource
 AT_ONCE = 100
 
 
-def write_pages(connection, folder, generation="", turnouts=None, progress=True):
-    """Write ``folder``/index.html and ``folder``/turnouts/<id>.html.
+def write_pages(connection, folder, generation="", turnouts=None, progress=True, elsewhere=None):
+    """Write ``folder``/index.html, and ``folder``/turnouts/<id>.html where it does not say what the registry says.
+
+    Pages of turnouts that the registry does not know any more are removed.
 
     Parameters
     ----------
@@ -28,6 +31,8 @@ def write_pages(connection, folder, generation="", turnouts=None, progress=True)
         Shown at the foot of every page.
     turnouts : iterable of str, optional
         Only these turnouts' pages; the fleet's page is always written.
+    elsewhere : callable, optional
+        Called with (turnout ids, their contents) instead of writing the turnouts' pages here.
 
     Returns
     -------
@@ -36,24 +41,51 @@ def write_pages(connection, folder, generation="", turnouts=None, progress=True)
     """
     folder = Path(folder)
     (folder / "turnouts").mkdir(parents=True, exist_ok=True)
-    environment = Environment(loader=PackageLoader("turnout.report"), trim_blocks=True, autoescape=True)
-    css = (files("turnout.report") / "templates" / "page.css").read_text()
-    shared = {"css": css, "version": __version__, "generation": generation}
+    environment, shared = _environment(), _shared(generation)
     source = FleetSource(connection)
     _replace(folder / "index.html", fleet_page(source, environment.get_template("fleet.html"), shared))
-    wanted = None if turnouts is None else set(turnouts)
-    chosen = [t for t in source.turnouts() if wanted is None or t["turnout_id"] in wanted]
-    template = environment.get_template("turnout.html")
-    with tqdm(total=len(chosen), desc="pages", disable=not progress, leave=False) as bar:
-        for start in range(0, len(chosen), AT_ONCE):
-            some = chosen[start : start + AT_ONCE]
-            rows = source.of_some([t["turnout_id"] for t in some])
-            for turnout in some:
-                name = turnout["turnout_id"]
+    content = contents(source)
+    if turnouts is None:
+        _remove_others(folder / "turnouts", content)
+    wanted = sorted(content if turnouts is None else set(turnouts) & set(content))
+    stale = {t: content[t] for t in wanted if content_of(folder / "turnouts" / f"{t}.html") != content[t]}
+    write = elsewhere or (lambda some: write_turnouts(connection, folder, some, generation, progress))
+    if stale:
+        write(stale)
+    return 1 + len(stale)
+
+
+def write_turnouts(connection, folder, content, generation="", progress=False):
+    """Write the pages of the turnouts in ``content``, a mapping to the hash that each page carries."""
+    source, shared = FleetSource(connection), _shared(generation)
+    template = _environment().get_template("turnout.html")
+    names = list(content)
+    with tqdm(total=len(names), desc="pages", disable=not progress, leave=False) as bar:
+        for start in range(0, len(names), AT_ONCE):
+            some = names[start : start + AT_ONCE]
+            rows = source.of_some(some)
+            for name in some:
                 own = {kind: rows[kind].get(name, []) if kind in rows else [] for kind in ROWS}
-                _replace(folder / "turnouts" / f"{name}.html", turnout_page(own, turnout, template, shared))
+                mark = {"mark": MARK.format(content[name])}
+                text = turnout_page(own, own["turnouts"][0], template, shared | mark)
+                _replace(Path(folder) / "turnouts" / f"{name}.html", text)
                 bar.update()
-    return 1 + len(chosen)
+
+
+def _environment():
+    return Environment(loader=PackageLoader("turnout.report", "templates"), trim_blocks=True, autoescape=True)
+
+
+def _shared(generation):
+    css = (files("turnout.report") / "templates" / "page.css").read_text()
+    return {"css": css, "version": __version__, "generation": generation}
+
+
+def _remove_others(folder, known):
+    """Remove our own pages of turnouts that are not ``known``; other files stay."""
+    for path in folder.glob("*.html"):
+        if path.stem not in known and content_of(path):
+            path.unlink()
 
 
 def _replace(path, text):

@@ -31,6 +31,10 @@ FILES = {
     "formats/one.py": "A = 1\n",
     "table/__init__.py": "from pathlib import Path\n",
     "table/columns.csv": "a,b\n",
+    "pages/__init__.py": "",
+    "pages/write.py": 'FOLDER = "templates"\n',
+    "pages/words.py": "W = 1\n",
+    "pages/templates/page.html": "<p>\n",
 }
 
 
@@ -64,6 +68,7 @@ def moved(package, module, name, old, new):
         ("turnout.formats", "formats/one.py", "A = 1", "A = 2"),
         ("turnout.table", "table/columns.csv", "a,b", "a,c"),
         ("turnout.core", "core.py", "def f(x)", "def f(x, y=0)"),
+        ("turnout.pages.write", "pages/templates/page.html", "<p>", "<b>"),
     ],
 )
 def test_it_moves(package, module, name, old, new):
@@ -78,6 +83,7 @@ def test_it_moves(package, module, name, old, new):
         ("turnout.core", "core.py", "    return", "\n    return"),
         ("turnout.core", "other.py", "return x", "return -x"),
         ("turnout.low", "core.py", "1.0", "1.5"),
+        ("turnout.pages.words", "pages/templates/page.html", "<p>", "<b>"),
     ],
 )
 def test_it_stays(package, module, name, old, new):

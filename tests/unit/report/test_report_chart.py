@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from turnout.report.chart import BOTTOM, LEFT, RIGHT, TOP, Axis, Chart
+from turnout.report.strokes import drawn
 from turnout.report.ticks import linear_ticks, log_ticks, time_ticks
 
 
@@ -78,3 +79,20 @@ def test_time_ticks_are_first_days_of_months_and_few(days):
     ticks = time_ticks(start, start + 86400 * days)
     dates = np.array(ticks).astype("int64").astype("datetime64[s]")
     assert (dates == dates.astype("datetime64[M]")).all() and 1 <= len(ticks) <= 9
+
+
+def test_a_long_curve_keeps_every_peak_and_at_most_four_points_for_each_pixel():
+    px = np.linspace(0.0, 99.99, 20_000)
+    py = np.sin(px) + 0.01 * np.cos(7000.0 * px)
+    py[[1234, 15_000]] = 5.0, -5.0
+    x, y = drawn(px, py)
+    assert len(x) <= 400 and {5.0, -5.0} <= set(y) and (np.diff(x) > 0).all()
+    for pixel in range(100):
+        before, after = py[np.floor(px) == pixel], y[np.floor(x) == pixel]
+        assert (before.min(), before.max()) == (after.min(), after.max())
+
+
+def test_a_short_curve_and_one_that_turns_back_are_drawn_whole():
+    assert len(drawn(np.arange(10.0), np.arange(10.0))[0]) == 10
+    back = np.concatenate([np.linspace(0, 1, 500), np.linspace(1, 0, 500)])
+    assert len(drawn(back, back)[0]) == 1000

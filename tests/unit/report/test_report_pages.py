@@ -1,6 +1,7 @@
 """Pages of a small registry that went through the whole chain, read as a reader would."""
 
 import re
+import shutil
 from datetime import date
 from html.parser import HTMLParser
 
@@ -17,6 +18,7 @@ from turnout.published.response import paper_response
 from turnout.readers.writing import write
 from turnout.registry.database import open_registry
 from turnout.registry.register import register
+from turnout.report.job import report_job
 from turnout.report.write import write_pages
 
 DAYS = (date(2024, 5, 13), date(2024, 6, 17))
@@ -130,3 +132,61 @@ def test_a_fleet_without_data_has_a_page(tmp_path):
     with open_registry(tmp_path / "registry") as connection:
         assert write_pages(connection, tmp_path / "pages", progress=False) == 1
     assert "Nothing to do" in " ".join(read(tmp_path / "pages" / "index.html").words)
+
+
+@pytest.fixture
+def copied(pages, tmp_path):
+    """(folder of pages, folder of the registry) of one's own."""
+    for name in ("pages", "registry"):
+        shutil.copytree(pages[0].parent / name, tmp_path / name, ignore=shutil.ignore_patterns(".spill"))
+    return tmp_path / "pages", tmp_path / "registry"
+
+
+def written(folder, action):
+    """Names of the turnouts' pages that ``action`` has written."""
+    before = {p: p.stat().st_mtime_ns for p in folder.glob("turnouts/*.html")}
+    action()
+    after = {p: p.stat().st_mtime_ns for p in folder.glob("turnouts/*.html")}
+    return sorted(p.stem for p in after if after[p] != before.get(p))
+
+
+def test_pages_are_written_once_and_again_only_where_the_registry_says_something_new(copied):
+    folder, registry = copied
+    assert written(folder, lambda: report_job(registry, folder, log=folder / "log")) == []
+    assert "1 pages of generation" in (folder / "log").read_text()
+    event = {"event_id": "e1", "turnout_id": "tommerup_s2", "event_at_utc": "2024-06-01T00:00:00", "kind": "tamping"}
+    event |= {"resets_ballast": True, "resets_railpad": False}
+    with open_registry(registry) as connection:
+        known = connection.execute("from events").to_arrow_table().to_pylist()
+    known = [row | {"event_at_utc": row["event_at_utc"].isoformat()} for row in known]
+    register([], registry, read=read_results, tables={"events": [*known, event]})
+    assert written(folder, lambda: report_job(registry, folder)) == ["tommerup_s2"]
+    assert "tamping" in (folder / "turnouts/tommerup_s2.html").read_text()
+
+
+def test_a_page_that_somebody_deleted_or_cut_off_is_written_again(copied):
+    folder, registry = copied
+    (folder / "turnouts/tommerup_s1.html").unlink()
+    (folder / "turnouts/tommerup_s2.html").write_text("<!doctype html>")
+    assert written(folder, lambda: report_job(registry, folder)) == ["tommerup_s1", "tommerup_s2"]
+
+
+def test_the_page_of_a_turnout_that_is_no_more_goes_and_other_files_stay(copied):
+    folder, registry = copied
+    page = (folder / "turnouts/tommerup_s1.html").read_text()
+    (folder / "turnouts/gone.html").write_text(page)
+    (folder / "turnouts/notes.html").write_text("<p>mine</p>")
+    report_job(registry, folder, ["tommerup_s1"])
+    assert (folder / "turnouts/gone.html").exists(), "asked for one turnout, it leaves the others alone"
+    report_job(registry, folder)
+    assert not (folder / "turnouts/gone.html").exists() and (folder / "turnouts/notes.html").exists()
+
+
+def test_several_processes_write_the_same_pages(copied, tmp_path, monkeypatch):
+    folder, registry = copied
+    monkeypatch.setattr("turnout.report.job.AT_ONCE", 1)
+    report_job(registry, tmp_path / "two", threads=2)
+    names = sorted(p.name for p in folder.glob("turnouts/*.html"))
+    assert len(names) > 2
+    assert sorted(p.name for p in (tmp_path / "two/turnouts").iterdir()) == names
+    assert all((tmp_path / "two/turnouts" / n).read_text() == (folder / "turnouts" / n).read_text() for n in names)

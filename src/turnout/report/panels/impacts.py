@@ -15,9 +15,13 @@ def impacts_panel(rows):
         f"Impacts: {used} used, {len(rows) - used} rejected",
         height=190,
     )
-    for i, (row, peak) in enumerate(zip(rows, peaks), start=1):
-        accepted = row["status"] == "accepted"
-        words = "used" if accepted else f"rejected: {row['reason']}. {row['detail'] or ''}"
-        label = f"test {row['test']}, record {row['record']}: {peak:.1f} kN, {words}"
-        chart.points([i], [peak], "used" if accepted else "rejected", 3.5, labels=[label])
+    for style in ("used", "rejected"):
+        some = [i for i, row in enumerate(rows) if (row["status"] == "accepted") == (style == "used")]
+        labels = [_words(rows[i], peaks[i]) for i in some]
+        chart.points([i + 1 for i in some], [peaks[i] for i in some], style, 3.5, labels=labels)
     return chart.svg()
+
+
+def _words(row, peak):
+    said = "used" if row["status"] == "accepted" else f"rejected: {row['reason']}. {row['detail'] or ''}"
+    return f"test {row['test']}, record {row['record']}: {peak:.1f} kN, {said}"

@@ -1,0 +1,59 @@
+"""Which pages say something else than the registry does now: one hash per turnout over all that its page shows."""
+
+import re
+
+from turnout.fingerprint import fingerprint
+
+# What a page is made of. A result's id stands for its models, modes, impacts, receptances and passages: it is a
+# hash of the raw files, the configuration and the code that they were computed from.
+SHOWN = {
+    "turnouts": "turnouts",
+    "sections": "sections",
+    "events": "events",
+    "results": "(select turnout_id, result_id from results_current)",
+    "quarantine": "quarantine_open",
+    "charts": """(
+        select turnout_id, section_id, band, measured_at_utc, expected_low_hz, expected_high_hz, state
+        from charts where source = 'hammer')""",
+    "chart_states": "chart_states",
+    "worklist": "worklist",
+}
+MARK = '<meta name="turnout-content" content="{}">'
+MARKED = re.compile(re.escape(MARK).replace(r"\{\}", "([0-9a-f]+)"))
+HEAD = 2000
+
+
+def contents(source):
+    """Hash of what the page of each turnout shows, with the code that draws it.
+
+    Parameters
+    ----------
+    source : FleetSource
+        The open registry.
+
+    Returns
+    -------
+    dict of str
+        32 hex characters by turnout. The order of rows counts for nothing, their number does.
+    """
+    parts = [
+        f"select turnout_id, '{kind}' as kind, count(*) as n, sum(hash(r)::hugeint) as total "
+        f"from {rows} r group by turnout_id"
+        for kind, rows in SHOWN.items()
+        if source.has(kind)
+    ]
+    sql = f"""
+        select turnout_id, md5($code || string_agg(kind || ' ' || n || ' ' || total, ',' order by kind)) as content
+        from ({" union all ".join(parts)}) semi join turnouts using (turnout_id) group by turnout_id"""
+    rows = source.connection.execute(sql, {"code": fingerprint("turnout.report.job")}).fetchall()
+    return dict(rows)
+
+
+def content_of(path):
+    """Hash of the content that the page ``path`` was made from; None for no page, or somebody else's."""
+    try:
+        with open(path, encoding="utf-8", errors="replace") as file:
+            found = MARKED.search(file.read(HEAD))
+    except FileNotFoundError:
+        return None
+    return found.group(1) if found else None
