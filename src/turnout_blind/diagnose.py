@@ -1,28 +1,33 @@
 """Let the frozen tool diagnose every case of a set, in processes that cannot read the truth."""
 
 import json
-import resource
+import os
 import shlex
-import subprocess
+import shutil
 import sys
-import time
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 
 import turnout
 from turnout_blind.isolation import Hidden
+from turnout_blind.running import limited, run
 from turnout_blind.seal import BlindError, digest, digest_of_folder, read_commit
 
-# Run in the folder of the case, which holds config/ and raw/. {python}, {case}, {folder}, {work} (a folder of the
-# case's own) and {out} (a JSON file of rows) are filled in; without {out} the rows are the JSON that it prints last.
+# Run in a copy of the case, which holds config/ and raw/. {python}, {case}, {folder} (the copy), {work} (a folder of
+# the case's own) and {out} (a JSON file of rows) are filled in; without {out} the rows are the JSON that it prints.
 COMMAND = "{python} -m turnout.cli diagnose --turnout {case} --work {work} --json"
+WALL, CPU = 1800.0, 900.0  # budget of a case: seconds of the clock and of the processor
 
 
-def diagnose_set(out, truth, command=COMMAND, only=None, timeout=1800, workers=1, say=print):
+def diagnose_set(
+    out, truth, command=COMMAND, only=None, timeout=WALL, workers=1, say=print, cpu=CPU, again=False, progress=None
+):
     """Write ``out``/findings/<case>.json and ``out``/diagnosis.json; returns the latter's content.
 
-    A case that has its findings is not run again, unless the tool has changed: then BlindError. A case on which the
-    tool fails gets rows None and the end of what it said. ``only``: these cases; ``workers`` of them at a time.
+    A case that has its run is not run again (but a failed one if ``again``), unless the tool has changed: then
+    BlindError. A case on which the tool fails, or that exceeds ``timeout`` seconds of the clock or ``cpu`` of the
+    processor, has no rows and the end of what was said; it never stops the others, and the scorer counts it as
+    silence. ``only``: these cases; ``workers`` of them at a time; ``progress`` wraps the cases as they end.
     """
     out, sealed = Path(out).resolve(), read_commit(out)
     tool = Path(turnout.__file__).parent
@@ -31,19 +36,36 @@ def diagnose_set(out, truth, command=COMMAND, only=None, timeout=1800, workers=1
     if held["tool_sha256"] != frozen:
         raise BlindError(record, "tool_sha256", "the tool has changed since the first case", "Diagnose a set made anew")
     held |= {"commit_sha256": digest((out / "commit.json").read_bytes()), "command": command}
+    held |= {"budget": {"wall_s": timeout, "cpu_s": cpu}}
     (out / "findings").mkdir(exist_ok=True)
     with Hidden(truth, _generators()) as hidden:
         held |= {"isolation": hidden.how, "canary": hidden.canary}
-        waiting = [case for case in sorted(only or sealed["cases"]) if case not in held["cases"]]
-        jobs = [(hidden, out, case, command, timeout) for case in waiting]
-        with ProcessPoolExecutor(workers) as pool:  # processes: each knows the CPU time of its own children
-            for case, run in zip(waiting, pool.map(_diagnose, jobs)):
-                held["cases"][case] = run
-                say(f"{case}: {run['said']}")
-                record.write_text(json.dumps(held, indent=1, sort_keys=True) + "\n")
+        waiting = [case for case in sorted(only or sealed["cases"]) if _waits(held["cases"].get(case), again)]
+        with ThreadPoolExecutor(workers) as pool:  # threads: each waits for a process, none can bring down the others
+            jobs = {pool.submit(_guarded, hidden, out, case, command, timeout, cpu): case for case in waiting}
+            try:
+                for job in (progress or (lambda done, total: done))(as_completed(jobs), len(jobs)):
+                    held["cases"][jobs[job]] = job.result()
+                    say(f"{jobs[job]}: {held['cases'][jobs[job]]['said']}")
+                    _write(record, held)
+            except KeyboardInterrupt:
+                pool.shutdown(cancel_futures=True)
+                raise
+    _write(record, held)
     if digest_of_folder(tool) != frozen:
         raise BlindError(tool, "source", "changed while it diagnosed", "Diagnose a set made anew, tool left alone")
     return held
+
+
+def _waits(run, again):
+    return run is None or (again and run["status"] != "answered")
+
+
+def _write(record, held):
+    """All or nothing: an interrupted write leaves the former file."""
+    part = record.with_suffix(".part")
+    part.write_text(json.dumps(held, indent=1, sort_keys=True) + "\n")
+    os.replace(part, record)
 
 
 def _generators():
@@ -52,40 +74,69 @@ def _generators():
     return sorted(folder for folder in here if folder.is_dir())
 
 
-def _diagnose(job):
-    hidden, out, case, command, timeout = job
-    rows, work, folder = out / "findings" / f"{case}.json", out / "work" / case, out / "cases" / case
-    named = {"python": sys.executable, "case": case, "folder": folder, "out": rows, "work": work}
-    words = [w.format(**named) for w in shlex.split(command)]
-    before, began, code, said = _cpu(), time.perf_counter(), -1, ""
+def _guarded(hidden, out, case, command, timeout, cpu):
+    """Whatever goes wrong with a case is that case's result."""
     try:
-        done = hidden.run(words, capture_output=True, text=True, timeout=timeout, cwd=folder)
-        code, said = done.returncode, done.stdout + done.stderr
-        if code == 0 and "{out}" not in command:
-            rows.write_text(json.dumps(_printed(done.stdout), indent=1) + "\n")
-    except subprocess.TimeoutExpired:
-        said = f"no answer within {timeout:.0f} s of the clock"
-    except (OSError, json.JSONDecodeError) as error:  # it cannot start, or prints no rows: a result too
-        code, said = code or -1, f"{type(error).__name__}: {error}"
-    ok = code == 0 and rows.exists()
+        return _diagnose(hidden, out, case, command, timeout, cpu)
+    except Exception as error:
+        return _result("failed", -1, 0.0, 0.0, f"{type(error).__name__}: {error}", None)
+
+
+def _diagnose(hidden, out, case, command, timeout, cpu):
+    rows, work, folder = out / "findings" / f"{case}.json", out / "work" / case, out / "copies" / case
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.copytree(out / "cases" / case, folder)  # what the tool writes beside its files breaks no seal
+    rows.unlink(missing_ok=True)
+    named = {"python": sys.executable, "case": case, "folder": folder, "out": rows, "work": work / "tool"}
+    try:
+        words = [w.format(**named) for w in shlex.split(command)]
+        done = run(limited(hidden.inside(words), cpu), folder, work, timeout, cpu)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+    said, ok = done.last_words, done.code == 0
+    if ok and "{out}" not in command:
+        found = printed(done.out)
+        ok = found is not None
+        said = said if ok else f"printed no rows; {said}"
+        if ok:
+            rows.write_text(json.dumps(found, indent=1) + "\n")
+    ok = ok and _are_rows(rows)
+    status = "answered" if ok else "over budget" if done.spent else "failed"
+    return _result(status, done.code, done.cpu, done.wall, said, rows if ok else None)
+
+
+def _result(status, code, cpu, wall, said, rows):
     return {
-        "status": "answered" if ok else "failed",
-        "exit_code": code,
-        "cpu_s": round(_cpu() - before, 2),
-        "wall_s": round(time.perf_counter() - began, 2),
-        "said": next(reversed(said.strip().splitlines()), "")[:300],
-        "rows_sha256": digest(rows.read_bytes()) if ok else None,
-    }
+        "status": status, "exit_code": code, "cpu_s": round(cpu, 2), "wall_s": round(wall, 2), "said": said[:300],
+        "rows_sha256": digest(rows.read_bytes()) if rows else None,
+    }  # fmt: skip
 
 
-def _printed(text):
-    """Rows of the JSON object or array that ends ``text``."""
-    lines = text.splitlines()
-    first = next((i for i, line in enumerate(lines) if line[:1] in "[{" and line.strip()), len(lines))
-    found = json.loads("\n".join(lines[first:]))
-    return found if isinstance(found, list) else [found]
+def _are_rows(path):
+    """Whether the file holds a list of objects with a verdict."""
+    try:
+        found = json.loads(path.read_text())
+    except (OSError, ValueError):
+        return False
+    return isinstance(found, list) and all(isinstance(r, dict) and r.get("verdict") for r in found)
 
 
-def _cpu():
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
+def printed(text):
+    """Rows of the last JSON object or array that begins a line of ``text``, None where there is none.
+
+    >>> printed('reading\\n[{"verdict": "none"}]\\npage: results/pages/T1.html')
+    [{'verdict': 'none'}]
+    >>> printed("nothing") is None
+    True
+    """
+    decoder, found, after = json.JSONDecoder(), None, 0
+    starts = [0, *(i + 1 for i, letter in enumerate(text) if letter == "\n")]
+    for start in starts:
+        if start < after or text[start : start + 1] not in ("[", "{"):
+            continue
+        try:
+            value, after = decoder.raw_decode(text, start)
+        except ValueError:
+            continue
+        found = value
+    return found if isinstance(found, list) or found is None else [found]

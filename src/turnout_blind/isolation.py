@@ -70,8 +70,10 @@ class Hidden:
         done = self.run(command, capture_output=True, text=True)
         return bool(done.stdout.strip())
 
+    def inside(self, command):
+        """``command`` (list) as it has to be run to be inside."""
+        return hidden_command(command, [self.truth, *self.more]) if self.how == "unshare" else list(command)
+
     def run(self, command, **options):
         """subprocess.run of ``command`` (list) inside."""
-        if self.how == "unshare":
-            command = hidden_command(command, [self.truth, *self.more])
-        return subprocess.run(command, **options)
+        return subprocess.run(self.inside(command), **options)

@@ -1,12 +1,16 @@
-"""Make a blind set: campaigns in one folder, sealed truths in another."""
+"""Make a blind set: campaigns in one folder, sealed truths in another; an interrupted one goes on where it stopped."""
 
+import json
+import os
 import secrets
-from concurrent.futures import ProcessPoolExecutor
+import shutil
+import time
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
 from turnout_blind.campaign import make_case
 from turnout_blind.effect import load_effects
-from turnout_blind.seal import BlindError, commit, write_truth
+from turnout_blind.seal import SET, BlindError, commit, digest, digest_of_folder, write_truth
 from turnout_blind.strata import case_id, plan_cases
 
 
@@ -27,24 +31,60 @@ def make_set(out, truth, seed=None, full=True, folders=(), only=None, limit=None
         Kinds to keep beside the controls; the first so many cases of the shuffled set.
     workers : int
         Processes.
+    progress : callable or None
+        (iterable of cases as they end, their number) -> iterable.
 
-    Errors: BlindError where ``truth`` lies inside ``out`` or ``out`` holds a set already.
+    Errors: BlindError where ``truth`` lies inside ``out``, where ``out`` holds a whole set already, or where an
+    interrupted set was begun otherwise or by other sources.
     """
     out, truth = Path(out).resolve(), Path(truth).resolve()
     if truth.is_relative_to(out):
         raise BlindError(truth, "--truth", "inside the folder that the tool is given", "Choose a folder beside it")
-    if (out / "cases").exists():
+    if (out / "commit.json").exists():
         raise BlindError(out, "cases", "a set is there already", "Choose another folder, or remove it")
-    seed = secrets.randbits(63) if seed is None else int(seed)
+    about = _begun(truth, seed, full, folders, only, limit)
+    seed = about["seed"]
     plans = plan_cases(seed, load_effects(*folders), full, only)[:limit]
-    jobs = [(out / "cases", case_id(seed, k), plan, tuple(map(str, folders))) for k, plan in enumerate(plans)]
-    truths = {"set": write_truth(truth, "set", {"seed": seed, "cases": len(jobs), "full": full})}
+    jobs = [(out / "cases", truth, case_id(seed, k), plan, tuple(map(str, folders))) for k, plan in enumerate(plans)]
+    waiting = [job for job in jobs if not _made(job)]
     with ProcessPoolExecutor(workers) as pool:
-        for made in (progress or iter)(pool.map(_make, jobs)):
-            truths[made["case"]] = write_truth(truth, made["case"], made)
+        running = [pool.submit(_make, job) for job in waiting]
+        for made in (progress or (lambda done, total: done))(as_completed(running), len(running)):
+            made.result()
+    shutil.rmtree(out / "unfinished", ignore_errors=True)
+    truths = {"set": digest((truth / SET).read_bytes())}
+    truths |= {job[2]: digest((truth / f"{job[2]}.json").read_bytes()) for job in jobs}
     return commit(out, truths)
 
 
+def _begun(truth, seed, full, folders, only, limit):
+    """set.json: what an interrupted set was begun with, or written now."""
+    wanted = {"full": full, "effects": sorted(map(str, folders)), "only": sorted(only or ()), "limit": limit}
+    wanted["generator_sha256"] = digest_of_folder(Path(__file__).parent, "*.py")
+    path = truth / SET
+    if not path.exists():
+        write_truth(truth, "set", {"seed": secrets.randbits(63) if seed is None else int(seed), **wanted})
+        return json.loads(path.read_bytes())
+    held = json.loads(path.read_bytes())
+    other = [k for k, v in wanted.items() if held[k] != v] + (["seed"] if seed not in (None, held["seed"]) else [])
+    if other:
+        raise BlindError(path, other[0], "begun otherwise", "Go on as it was begun, or remove both folders")
+    return held
+
+
+def _made(job):
+    cases, truth, case, _, _ = job
+    return (cases / case).is_dir() and (truth / f"{case}.json").exists()
+
+
 def _make(job):
-    folder, case, plan, folders = job
-    return make_case(folder, case, plan, load_effects(*folders))
+    """A case: built aside, its truth written, then put in its place, so that a half-made one is never taken for one."""
+    cases, truth, case, plan, folders = job
+    began, aside = time.process_time(), cases.parent / "unfinished"
+    shutil.rmtree(aside / case, ignore_errors=True)
+    made = make_case(aside, case, plan, load_effects(*folders))
+    write_truth(truth, case, {**made, "cpu_s": round(time.process_time() - began, 2)})
+    cases.mkdir(parents=True, exist_ok=True)
+    shutil.rmtree(cases / case, ignore_errors=True)
+    os.replace(aside / case, cases / case)
+    return case

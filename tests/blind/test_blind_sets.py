@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -179,13 +180,68 @@ def test_rows_are_taken_from_what_the_tool_prints(copy):
     """It prints notes, then its row, in the folder of the case; anything else is a failure with its words kept."""
     out, truth = copy
     one, other = (c.name for c in cases(out))
-    code = "import os; print(os.listdir()); print('{{\\n'+chr(34)+'verdict'+chr(34)+': '+chr(34)+'none'+chr(34)+'}}')"
-    held = diagnose_set(out, truth, f'{{python}} -c "print(5); {code}"', [one], say=lambda line: None)
+    held = diagnose_set(out, truth, "{python} -c 'import os; print(os.listdir())'", [one], say=lambda line: None)
     assert held["cases"][one]["status"] == "failed"  # a list of Python's is no JSON
-    code = code.split("; ", 2)[2]
-    held = diagnose_set(out, truth, f'{{python}} -c "print(5); {code}"', [other], say=lambda line: None)
+    assert held["cases"][one]["said"].startswith("printed no rows; [")
+    row = "print('{{\\n'+chr(34)+'verdict'+chr(34)+': '+chr(34)+'none'+chr(34)+'}}'); print('page: x.html')"
+    held = diagnose_set(out, truth, f'{{python}} -c "print(5); {row}"', [other], say=lambda line: None)
     assert held["cases"][other]["status"] == "answered"
     assert json.loads((out / "findings" / f"{other}.json").read_text()) == [{"verdict": "none"}]
+    held = diagnose_set(out, truth, f'{{python}} -c "{row}"', say=lambda line: None, again=True)
+    assert {run["status"] for run in held["cases"].values()} == {"answered"}
+
+
+@pytest.mark.skipif(not method(), reason="nothing here can hide a folder from this user")
+@pytest.mark.parametrize(
+    ("code", "budget", "said"),
+    [
+        ("import time; time.sleep(60)", {"timeout": 2.0}, "no answer within 2 s of the clock"),
+        ("while True: pass", {"cpu": 1.0}, "no answer within 1 s of the processor"),
+    ],
+)
+def test_a_case_that_exceeds_its_budget_is_silence(copy, code, budget, said):
+    out, truth = copy
+    held = diagnose_set(out, truth, f"{{python}} -c '{code}'", say=lambda line: None, workers=2, **budget)
+    assert {(run["status"], run["said"]) for run in held["cases"].values()} == {("over budget", said)}
+    reveal(out, truth)
+    assert "| controls: false alarms | 0.0 % (0)" in report_of(out)
+
+
+@pytest.mark.skipif(not method(), reason="nothing here can hide a folder from this user")
+def test_what_the_tool_writes_beside_its_files_breaks_no_seal(copy):
+    out, truth = copy
+    code = (
+        'import os, json; os.makedirs("results/pages"); open("raw/x", "w"); print(json.dumps([dict(verdict="none")]))'
+    )
+    held = diagnose_set(out, truth, f"{{python}} -c '{code}'", say=lambda line: None)
+    assert {run["status"] for run in held["cases"].values()} == {"answered"}
+    assert len(verify(out, truth)) == 2
+    assert not list((out / "copies").iterdir())
+
+
+def test_an_interrupted_set_goes_on(made, tmp_path, monkeypatch):
+    """The first case is there; the second, half-made, is made again; another seed or other sources are refused."""
+    out, truth = tmp_path / "set", tmp_path / "truth"
+    shutil.copytree(made[0], out)
+    shutil.copytree(made[1], truth)
+    sealed = (out / "commit.json").read_bytes()
+    (out / "commit.json").unlink()
+    kept, lost = cases(out)
+    (truth / f"{lost.name}.json").unlink()  # stopped between recording and truth
+    with pytest.raises(BlindError, match=r"seed: begun otherwise"):
+        make_set(out, truth, 20, only={"pad"}, limit=2)
+    made_again = []
+    monkeypatch.setattr("turnout_blind.make._make", lambda job: made_again.append(job[2]))
+    monkeypatch.setattr("turnout_blind.make.ProcessPoolExecutor", ThreadPoolExecutor)
+    (truth / f"{lost.name}.json").write_text("{}")
+    shutil.rmtree(lost)
+    with pytest.raises(BlindError, match="a set is there already"):
+        (out / "commit.json").write_bytes(sealed)
+        make_set(out, truth, only={"pad"}, limit=2)
+    (out / "commit.json").unlink()
+    make_set(out, truth, only={"pad"}, limit=2)
+    assert made_again == [lost.name]
+    assert kept.is_dir()
 
 
 @pytest.mark.skipif(not method(), reason="nothing here can hide a folder from this user")

@@ -5,8 +5,8 @@
   turnout blind reveal --out proof --truth proof-truth         opens the envelopes, verifies every hash
   turnout blind score --out proof                              every figure with its interval
 
---fast makes 40 cases instead of 235. --effects FOLDER adds effects of your own, one file each. Print commit.json's
-hash (make does) and publish it before anybody diagnoses.
+An interrupted make or diagnose goes on where it stopped. --fast makes 40 cases instead of 235. --effects FOLDER adds
+effects of your own, one file each. Print commit.json's hash (make does) and publish it before anybody diagnoses.
 """
 
 HELP = "prove the diagnosis on concealed effects: make, diagnose, reveal, score"
@@ -26,6 +26,8 @@ def add_arguments(parser):
     diagnose.add_argument("--command", help="command of the tool; {python}, {case}, {folder}, {out} are filled in")
     diagnose.add_argument("--cases", help="only these, by commas")
     diagnose.add_argument("--timeout", type=float, default=1800.0, help="seconds of the clock per case (default 1800)")
+    diagnose.add_argument("--cpu", type=float, default=900.0, help="seconds of the processor per case (default 900)")
+    diagnose.add_argument("--again", action="store_true", help="also cases that failed or exceeded their budget")
     diagnose.add_argument("--workers", type=int, default=1, help="cases at a time (default 1)")
     reveal = steps.add_parser("reveal", help="open the envelopes and verify every hash")
     score = steps.add_parser("score", help="print every figure with its interval")
@@ -47,23 +49,27 @@ def _truth(args):
 
 
 def _make(args):
-    from tqdm import tqdm
-
     from turnout_blind.make import make_set
 
     only = args.only.split(",") if args.only else None
-    sha = make_set(
-        args.out, _truth(args), args.seed, not args.fast, args.effects, only, args.limit, args.workers,
-        lambda cases: tqdm(cases, desc="cases", unit="case"),
-    )  # fmt: skip
+    sha = make_set(args.out, _truth(args), args.seed, not args.fast, args.effects, only, args.limit, args.workers, _bar)
     print(f"sealed: SHA-256 of commit.json is {sha}; the truth lies in {_truth(args)}")
+
+
+def _bar(done, total):
+    from tqdm import tqdm
+
+    return tqdm(done, desc="cases", unit="case", total=total, disable=None)
 
 
 def _diagnose(args):
     from turnout_blind.diagnose import COMMAND, diagnose_set
 
     only = args.cases.split(",") if args.cases else None
-    held = diagnose_set(args.out, _truth(args), args.command or COMMAND, only, args.timeout, args.workers)
+    held = diagnose_set(
+        args.out, _truth(args), args.command or COMMAND, only, args.timeout, args.workers, cpu=args.cpu,
+        again=args.again, progress=_bar,
+    )  # fmt: skip
     failed = sum(run["status"] != "answered" for run in held["cases"].values())
     print(f"{len(held['cases'])} cases diagnosed, {failed} without an answer; truth hidden by {held['isolation']}")
 
