@@ -1,4 +1,9 @@
-"""A lag of one channel of the passages' logger, all trains at one speed: a misplaced sensor would show the same."""
+"""A lag of a channel that no blow was recorded on, all trains at one speed: a misplaced sensor shows the same.
+
+A sensor d further on hears a wheel d / v later; blows would tell, for they reach it without a train.
+"""
+
+import numpy as np
 
 from turnout_blind.effect import Effect, any_sensor, sign
 from turnout_blind.effects.time_offset import shifted
@@ -10,10 +15,12 @@ def draw(rng, site, delay):
 
 
 def act(world, site, where, p):
-    """Only when trains pass: the hammer tests have a logger of their own."""
+    """Nothing but the logger's noise when the hammer strikes."""
 
     def fault(kind, rng):
-        return (lambda x, rate: shifted(x, rate, p["delay"])) if kind == "passage" else (lambda x, rate: x)
+        return (
+            (lambda x, rate: shifted(x, rate, p["delay"])) if kind == "passage" else (lambda x, rate: np.zeros_like(x))
+        )
 
     world.channels.setdefault(where["sensor"], []).append(fault)
 

@@ -1,0 +1,55 @@
+"""How plainly each rung of each ladder is to be seen, by the generator alone.
+
+    python -m benchmarks.blind_ladder [--rungs 0 3 6] [--sites 2] [--kinds void flat]
+
+Prints per kind and rung: the share of the recordings that the effect makes up, in blows and in passages [%], and the
+index: that share over what a recording hides anyway - 6 % of a blow's response (gains, seats, twist: what two owners'
+models differ by) and 46 % of a passage's, mostly roughness. Below 0.3 nobody sees it, above 1 everybody should.
+"""
+
+import argparse
+
+import numpy as np
+
+from turnout_blind.effect import load_effects
+from turnout_blind.site import draw_site
+from turnout_blind.visible import visible
+
+HIDDEN = {"hammer_pct": 6.0, "passage_pct": 46.0}
+
+
+def index_of(seen):
+    """Largest share over what hides it."""
+    return max(seen[kind] / HIDDEN[kind] for kind in HIDDEN)
+
+
+def measured(effect, rung, seed):
+    """Shares [%] that the effect makes up at a site drawn by ``seed``."""
+    rng = np.random.default_rng([seed, 5])
+    site = draw_site(rng, **effect.site)
+    world = site.world.copy()
+    drawn = effect.concealed(rng, site, rung)
+    effect.act(world, site, drawn.where, drawn.parameters)
+    return visible(site, world, [seed, rung])
+
+
+def main():
+    """Print the ladders."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rungs", type=int, nargs="+")
+    parser.add_argument("--sites", type=int, default=1)
+    parser.add_argument("--kinds", nargs="+")
+    args = parser.parse_args()
+    for kind, effect in sorted(load_effects().items()):
+        if args.kinds and kind not in args.kinds:
+            continue
+        last = len(effect.ladder) - 1
+        for rung in sorted({min(r, last) for r in args.rungs} if args.rungs else range(last + 1)):
+            seen = [measured(effect, rung, seed) for seed in range(args.sites)]
+            hammer, passage = (np.mean([s[k] for s in seen]) for k in HIDDEN)
+            index = np.mean([index_of(s) for s in seen])
+            print(f"{kind:18s} {rung}  {hammer:7.1f} {passage:7.1f}  {index:6.2f}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
