@@ -25,6 +25,7 @@ localrules:
 include: "rules/common.smk"
 include: "rules/hammer.smk"
 include: "rules/passage.smk"
+include: "rules/mismatch.smk"
 include: "rules/registry.smk"
 include: "rules/trend.smk"
 include: "rules/report.smk"

@@ -7,12 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
+from turnout.chains.accepted_terms import terms_on
+from turnout.chains.mismatch_context import track_file
 from turnout.config.load import load_configuration
 from turnout.config.settings.simulate import SimulateSettings
 from turnout.errors import SimulationError
 from turnout.readers.writing import write
 from turnout.simulate import Hammer, Sensor, load_track, load_vehicle, simulate_hammer, simulate_passage
 from turnout.simulate.hammer import hammer_sensors, located
+from turnout.simulate.turnout_track import stretch_of_track
 
 ENDINGS = {"uff58": "uff", "uff58b": "uff", "hdf5": "h5", "mat73": "mat", "rcmdx": "rcmdx"}
 NOISE = {"acceleration": 0.05, "force": 2.0, "velocity": 1e-6, "displacement": 1e-9}
@@ -25,9 +28,9 @@ def write_hammer(request):
     out, format, at, temperature, truth, seed.
     """
     turnout, settings = _turnout(request)
-    track = load_track(request["track"], seed=request["seed"])
+    track = _track(request, turnout)
     section = _place(request["section"])
-    place, _ = located(track, section)
+    place, base = located(track, section)
     description = None
     if turnout is not None:
         description = turnout.hammer.descriptions[str(section)]
@@ -40,6 +43,7 @@ def write_hammer(request):
             hammer,
             sensors,
             request["blows"],
+            terms_on(track, stretch_of_track(base, place, settings.hammer_half_length), _noted(request)),
             seed=1000 * request["seed"] + test,
             rate=rate,
             substeps=settings.substeps,
@@ -60,7 +64,7 @@ def write_hammer(request):
 def write_passage(request):
     """Simulate the passage of a request and write it; yields (path, what it holds)."""
     turnout, settings = _turnout(request)
-    track = load_track(request["track"], seed=request["seed"])
+    track = _track(request, turnout)
     vehicle = load_vehicle(request["vehicle"], request["load"], units=request["units"])
     description = turnout.passages.description if turnout is not None and turnout.passages else None
     sensors = _passage_sensors(description, track)
@@ -72,6 +76,7 @@ def write_passage(request):
         sensors,
         request["direction"],
         request["route"],
+        terms=terms_on(track, track.track_of(request["route"]), _said(vehicle, request)),
         seed=request["seed"],
         rate=rate,
         substeps=settings.substeps,
@@ -116,6 +121,14 @@ def _turnout(request):
     return turnout, turnout.settings.get("simulate", SimulateSettings())
 
 
+def _track(request, turnout):
+    """The track asked for, else the turnout's own, else that of Tommerup."""
+    if request["track"] is None and turnout is not None:
+        path = track_file(turnout)
+        return load_track(str(path), request["seed"], path.parent)
+    return load_track(request["track"] or "tommerup", request["seed"])
+
+
 def _place(section):
     try:
         return float(section)
@@ -133,6 +146,12 @@ def _time(request):
 def _noted(request):
     temperature = request.get("temperature")
     return {} if temperature is None else {"rail_temperature": temperature}
+
+
+def _said(vehicle, request):
+    """What accepted terms depend on: temperature, axle loads, train."""
+    loads = tuple(2.0 * float(load) for load in vehicle.static_loads)
+    return {"axle_loads": loads, "train": vehicle.name.lower(), **_noted(request)}
 
 
 def _ending(format_name):

@@ -1,9 +1,12 @@
 """Say what the simulation of a turnout leaves out, from its hammer tests and passages.
 
-turnout diagnose --turnout tommerup_s1
-turnout diagnose --turnout tommerup_s1 --sections A7 A8 --json
+  turnout diagnose --turnout tommerup_s1
+  turnout diagnose --turnout tommerup_s1 --sections A7 A8 --budget 10
+  turnout diagnose --turnout tommerup_s1 --accept
 
-An interrupted diagnosis goes on where it stopped: its fits are kept below --work until it is done.
+The newest visit is diagnosed, section by section, and a page is written. An interrupted diagnosis, or one whose
+budget is spent, goes on where it stopped. --accept writes the term that was named into the turnout's track file,
+from then on the simulation contains it; nothing is diagnosed again for that.
 """
 
 HELP = "say what the simulation of a turnout leaves out"
@@ -12,50 +15,79 @@ HELP = "say what the simulation of a turnout leaves out"
 def add_arguments(parser):
     """Options of the command."""
     parser.add_argument("--turnout", required=True, help="id in config/turnouts.tsv")
-    parser.add_argument("--sections", nargs="+", default=(), help="only these sections, which should be neighbours")
-    parser.add_argument("--track", help="file in config/tracks; default: the name of the layout")
+    parser.add_argument("--sections", nargs="+", default=(), help="only these sections")
+    parser.add_argument("--visit", help="day of a campaign, or month: default the newest")
+    parser.add_argument("--track", help="file in config/tracks; default: the turnout's own, else its layout's")
     parser.add_argument("--config", default="config", help="configuration folder (%(default)s)")
     parser.add_argument("--raw", default="raw", help="folder of raw files (%(default)s)")
-    parser.add_argument("--work", default="work/mismatch", help="where an interrupted diagnosis is kept (%(default)s)")
-    parser.add_argument("--json", action="store_true", help="print the registry row instead of words")
+    parser.add_argument("--work", default="work", help="where fits and results are kept (%(default)s)")
+    parser.add_argument("--pages", default="results/pages", help="where the page goes (%(default)s)")
+    parser.add_argument("--budget", type=float, metavar="MINUTES", help="stop after so long and keep what is done")
+    parser.add_argument("--accept", action="store_true", help="write what was named into the turnout's track file")
+    parser.add_argument("--finding", metavar="ID", help="which finding to accept, where several are named")
+    parser.add_argument("--anyway", action="store_true", help="accept a finding that is not named with grade A or B")
+    parser.add_argument("--json", action="store_true", help="print the registry rows instead of words")
 
 
 def run(args):
-    """Diagnose and print."""
+    """Diagnose and print, or accept what was found."""
     import json
-    from pathlib import Path
 
-    from tqdm import tqdm
+    from turnout.chains.mismatch_results import Results
 
-    from turnout.chains.checkpoint import Checkpoint
-    from turnout.chains.mismatch import diagnose_turnout
-    from turnout.fingerprint import fingerprint
+    results = Results(args.work, args.turnout)
+    if args.accept:
+        return _accept(args, results)
+    rows = _diagnosed(args)
+    results.keep(rows)
+    from turnout.report.findings import write_own_page
 
-    store = Checkpoint(Path(args.work), args.turnout, (*args.sections, fingerprint("turnout.chains.mismatch")))
-    with tqdm(total=None, unit="fit", disable=None) as bar:
-
-        def progress(done, total, what):
-            bar.total = total
-            bar.set_description(what[:40])
-            bar.update(done - bar.n)
-
-        diagnosis, row, notes = diagnose_turnout(
-            args.turnout, args.config, args.raw, args.track, tuple(args.sections), progress, store
-        )
-    for note in notes:
-        print(f"left out: {note}")
-    print(json.dumps(row, default=str, indent=1) if args.json else _words(diagnosis, row))
-    store.done()
+    page = write_own_page(rows, args.config, args.turnout, args.pages)
+    print(json.dumps(rows["mismatch_findings"], default=str, indent=1) if args.json else _words(rows))
+    print(f"page: {page}")
     return 0
 
 
-def _words(diagnosis, row):
-    verdict, check = diagnosis.verdict, diagnosis.verification
-    lines = [f"{verdict.answer} {verdict.grade}".strip() + f", probability {verdict.probability:.2f}", row["sentence"]]
-    if check.n:
-        said = {"before": check.before, "after": check.after, "rival": check.rival, "decoy": check.decoy}
-        shown = ", ".join(f"{k} {v:.1f} %" for k, v in said.items() if v is not None)
-        lines.append(f"fit on {check.n} recordings never used: {shown}")
+def _diagnosed(args):
+    """Rows by table of the visit asked for."""
+    from turnout.chains.mismatch_results import diagnose_turnout
+    from turnout.commands.diagnose_bar import DiagnoseBar
+
+    with DiagnoseBar() as bar:
+        return diagnose_turnout(
+            args.turnout, args.config, args.raw, args.work, args.visit, args.track, tuple(args.sections),
+            None if args.budget is None else 60.0 * args.budget, bar,
+        )  # fmt: skip
+
+
+def _accept(args, results):
+    """Write the finding into the track file and say what changed."""
+    from turnout.chains.accept import accept
+
+    path, words = accept(results.finding(args.finding), args.config, args.turnout, args.track, args.anyway)
+    print(f"{path}: {words}")
+    print("From now on the simulation contains it; each visit estimates it anew, see mismatch_parameters.")
+    return 0
+
+
+def _words(rows):
+    """What was found, group by group."""
+    lines = []
+    for row in rows["mismatch_findings"]:
+        said = f"{row['verdict'].replace('_', ' ')} {row['grade'] or ''}".strip()
+        lines.append(f"{row['sections']}: {said}, probability {row['probability']:.2f}. {row['sentence']}")
+        lines += [f"   {line}" for line in _details(row)]
+    for row in rows["quarantine"]:
+        lines.append(f"nothing can be said of {row['place']}: {row['found']}")
+    notes = dict.fromkeys(n for row in rows["mismatch_findings"] for n in (row["notes"] or "").splitlines())
+    return "\n".join([*lines, *(f"note: {note}" for note in notes)])
+
+
+def _details(row):
+    if row["n_held_out"]:
+        names = ("before", "after", "rival", "decoy")
+        shown = ", ".join(f"{n} {row[f'fit_{n}_pct']:.1f} %" for n in names if row[f"fit_{n}_pct"] is not None)
+        yield f"fit on {row['n_held_out']} recordings never used: {shown}"
     if row["next_measurement"]:
-        lines.append(row["next_measurement"] + ".")
-    return "\n".join(lines)
+        yield row["next_measurement"] + "."
+    yield f"from {row['n_hammer_tests']} hammer tests, {row['n_passages']} passages, {row['n_sensors']} sensors"

@@ -26,7 +26,9 @@ def add_arguments(parser):
     passage.add_argument("--route", default="main", help="route of the track file (default main)")
     passage.add_argument("--direction", choices=("facing", "trailing"), default="facing")
     for sub in (hammer, passage):
-        sub.add_argument("--track", default="tommerup", help="file in config/tracks, or its path (default tommerup)")
+        sub.add_argument(
+            "--track", help="file in config/tracks, or its path (default: the turnout's own, else tommerup)"
+        )
         sub.add_argument("--turnout", help="id in config/turnouts.tsv")
         sub.add_argument("--config", default="config", help="configuration folder (default config)")
         sub.add_argument("--raw", default="raw", help="folder of raw files (default raw)")

@@ -58,7 +58,7 @@ class Configuration:
             if column in row.values:
                 about[ABOUT.get(column, column)] = row.values[column]
         parts = self.variants[turnout].parts
-        return TurnoutConfig(id=row.id, layout=row.values["layout"], raw=row.raw, **about, **parts)
+        return TurnoutConfig(id=row.id, layout=row.values["layout"], raw=row.raw, folder=self.folder, **about, **parts)
 
 
 def with_raw(turnout: TurnoutConfig, raw_root: Path) -> TurnoutConfig:

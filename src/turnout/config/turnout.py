@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
+from pathlib import Path
 from typing import Any
 
 from turnout.config.frozen import Frozen
@@ -66,7 +67,8 @@ class TurnoutConfig:
     ``settings`` maps a part ("receptance", "identify" ...) to its settings. ``config_hash`` changes when
     anything does that can change a result; ``hashes`` the same for what one kind of unit uses ("hammer",
     "passage"). ``campaigns`` (by date) and ``trains`` (rows of trains.csv as text) come from the raw folder
-    and are empty until ``turnout.config.with_raw`` has filled them in.
+    and are empty until ``turnout.config.with_raw`` has filled them in. ``folder`` is where the configuration lies,
+    with tracks and vehicles in it.
     """
 
     id: str
@@ -87,6 +89,7 @@ class TurnoutConfig:
     id_scheme: str = ""
     campaigns: Mapping[str, Campaign] = field(default_factory=Frozen)
     trains: tuple[Mapping[str, str], ...] = ()
+    folder: Path = Path("config")
 
     def section(self, label: str) -> Section:
         """The section called ``label``; KeyError lists the labels there are."""

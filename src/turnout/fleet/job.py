@@ -9,6 +9,7 @@ from turnout import __version__
 from turnout.config import load_configuration
 from turnout.errors import TurnoutError
 from turnout.fleet.batches import read_results
+from turnout.fleet.launch import launched_at
 from turnout.fleet.shard import Stage, Summary, run_shard
 from turnout.fleet.state import batch_paths
 from turnout.fleet.tables import configuration_rows
@@ -16,9 +17,9 @@ from turnout.fleet.verdict import Verdict, verdict
 
 
 def stage_job(plan, state, log, params, threads: int) -> Summary:
-    """Run one stage of one shard; ``params`` holds kind, chain, algo, job and, where needed, context."""
+    """Run one stage of one shard; ``params`` holds kind, chain, algo, job and, where needed, context and gather."""
     _log_to(log)
-    stage = Stage(params.kind, params.chain, params.algo, params.get("context"))
+    stage = Stage(params.kind, params.chain, params.algo, params.get("context"), params.get("gather"))
     job = params.job
     configuration = load_configuration(job["configuration"])
     summary = run_shard(
@@ -50,7 +51,7 @@ def register_job(register, generation, log, params) -> None:
     tables = configuration_rows(configuration, Path(params.job["raw"]), plans)
     done = register(
         batch_paths(states), Path(generation).parent, read=read_results, tables=tables,
-        config_hash=params.configuration, code_version=__version__,
+        config_hash=params.configuration, code_version=__version__, started_at=launched_at(),
     )  # fmt: skip
     os.utime(generation)
     for batch, fault in done.faults.items():

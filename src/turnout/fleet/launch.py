@@ -2,11 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 
 from turnout.config import Configuration, load_configuration
 from turnout.config.keys import suggestion
 from turnout.errors import ConfigError
+from turnout.fleet.atomic import write_text
 from turnout.fleet.plan import write_plans
 from turnout.fleet.shards import shard_names
 from turnout.fleet.tables import fleet_hash
@@ -17,21 +19,26 @@ OPTIONS = {
     "turnouts": "ids, with commas between them: only these are computed",
     "shards": "number of shards, instead of that in config.yaml",
     "strict": "true: raise faults of the program instead of noting them",
+    "diagnose": "true: diagnose every turnout, whatever its settings say; false: none",
     "accept_vanished": "true: many known files are gone on purpose",
     "chains": "for each stage module:function, instead of the program's own",
 }
 PLANS = "work/plan"
+# When the newest run began, UTC; no rule knows of it, so that it makes nothing run again.
+LAUNCHED = "work/launched"
 
 
 @dataclass(frozen=True)
 class Launch:
-    """``shards`` take part in this run, ``every_shard`` names all; ``job`` is what a stage job is told."""
+    """``shards`` take part in this run, ``every_shard`` names all; ``job`` is what a stage job is told;
+    ``diagnose`` whose mismatches are diagnosed: "every" turnout's, those "enabled" in their settings, "" none."""
 
     shards: list[str]
     every_shard: list[str]
     turnouts: tuple[str, ...] | None
     fleet_hash: str
     job: dict = field(default_factory=dict)
+    diagnose: str = ""
     chains: Mapping[str, str] = field(default_factory=dict)
 
     def threads(self, cores: int | None) -> int:
@@ -57,11 +64,29 @@ def launch(options: Mapping, scan: bool, formats=None, to_si=None) -> Launch:
         "strict": _flag(options, "strict"),
     }
     if scan:
+        write_text(Path(LAUNCHED), datetime.now(UTC).replace(tzinfo=None).isoformat(timespec="seconds"))
         raw, accept = Path(job["raw"]), _flag(options, "accept_vanished")
         write_plans(configuration, raw, Path(PLANS), shards, turnouts, accept)
     names = shard_names(shards, turnouts)
     chains = dict(options.get("chains") or {})
-    return Launch(names, shard_names(shards), turnouts, fleet_hash(configuration), job, chains)
+    whose = _diagnosed(options, configuration)
+    return Launch(names, shard_names(shards), turnouts, fleet_hash(configuration), job, whose, chains)
+
+
+def launched_at() -> datetime | None:
+    """When the run began that this job belongs to; None outside a run."""
+    try:
+        return datetime.fromisoformat(Path(LAUNCHED).read_text(encoding="utf-8"))
+    except (FileNotFoundError, ValueError):
+        return None
+
+
+def _diagnosed(options: Mapping, configuration: Configuration) -> str:
+    """Whose mismatches are diagnosed: by the option, else by ``mismatch: enabled`` of any turnout."""
+    if "diagnose" in options:
+        return "every" if _flag(options, "diagnose") else ""
+    different = {id(v): v for v in configuration.variants.values()}.values()
+    return "enabled" if any(v.parts["settings"]["mismatch"].enabled for v in different) else ""
 
 
 def _turnouts(said, configuration: Configuration) -> tuple[str, ...] | None:

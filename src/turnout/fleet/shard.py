@@ -46,7 +46,8 @@ class Stage:
     """What a stage computes: units of ``kind`` by ``compute(unit, turnout, raw_root, algo=...)``.
 
     ``algo`` is the version of its code, part of every key. ``context(turnout_id)``, where given, returns
-    (token, value): the token enters the key, the value is passed on as ``context=``. Both may be named,
+    (token, value): the token enters the key, the value is passed on as ``context=``. ``gather(plan, configuration)``,
+    where given, makes units of the stage's own from a plan file, else they are the plan's. All three may be named,
     "package.module:function", and are then imported when there is something to compute.
     """
 
@@ -54,6 +55,7 @@ class Stage:
     compute: Callable | str
     algo: str
     context: Callable[[str], tuple[str, object]] | str | None = None
+    gather: Callable[[Path, Configuration], Iterable[Planned]] | str | None = None
 
 
 def named(function: Callable | str) -> Callable:
@@ -97,7 +99,8 @@ def run_shard(
     state.parent.mkdir(parents=True, exist_ok=True)
     with FileLock(state.parent / f".{state.stem}.lock"):
         run = _Run(Path(state), stage, configuration, Path(raw_root), threads, strict)
-        return run.bring_up(list(read_plan(plan)), only)
+        planned = named(stage.gather)(plan, configuration) if stage.gather else read_plan(plan)
+        return run.bring_up(list(planned), only)
 
 
 class _Run:

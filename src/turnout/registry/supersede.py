@@ -9,7 +9,7 @@ KINDS = {
     "model": ("models", "model_id", "t.section_id || ' ' || t.method"),
     "passage": ("passages", "passage_id", "t.passed_at_utc::varchar"),
     "quarantine": ("quarantine", "quarantine_id", "t.path || coalesce(t.record, -1) || t.stage || t.reason_code"),
-    "finding": ("mismatch_findings", "finding_id", "coalesce(t.section_id, '')"),
+    "finding": ("mismatch_findings", "finding_id", "coalesce(t.sections, t.section_id, '')"),
     "result": ("results", "result_id", "t.kind"),
 }
 

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from turnout.config.parameter_set import read_parameters
+from turnout.config.parameter_set import ParameterSet, read_parameters
 from turnout.errors import SimulationError
 from turnout.simulate.train import train
 from turnout.simulate.turnout_track import turnout_track
@@ -12,8 +12,24 @@ REPOSITORY = Path(__file__).resolve().parents[3]
 
 
 def load_track(name, seed=0, folder=None):
-    """``TurnoutTrack`` called ``name`` or in the file of that path; ``seed`` draws its scatter along the track."""
-    return turnout_track(read_parameters(_file(name, folder, "tracks")), seed)
+    """``TurnoutTrack`` called ``name`` or in the file of that path; ``seed`` draws its scatter along the track.
+
+    A file with ``extends`` takes what it does not say itself from the file of that name.
+    """
+    return turnout_track(_track_parameters(_file(name, folder, "tracks"), folder), seed)
+
+
+def _track_parameters(path, folder, below=()):
+    own = read_parameters(path)
+    if "extends" not in own:
+        return own
+    if path in below:
+        raise SimulationError(f"{path}: extends itself by way of {', '.join(p.name for p in below)}.")
+    beside = path.parent / f"{own['extends']}.yaml"
+    beside = beside if beside.is_file() else _file(own["extends"], folder, "tracks")
+    base = _track_parameters(beside, folder, (*below, path))
+    changed = {key: value for key, value in own.content.items() if key != "extends"}
+    return ParameterSet({**base.content, **changed}, path, "")
 
 
 def load_vehicle(name, load=0.5, folder=None, units=1):

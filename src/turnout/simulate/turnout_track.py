@@ -17,7 +17,8 @@ class TurnoutTrack:
 
     ``roughness_level`` [dB above the limit curve of ISO 3095], None for a smooth rail. ``locations`` are named
     (place [m], route); ``numbers`` the parameters with unit, source and prior as read. ``tracks`` holds the track
-    of a route that has rails of its own, as behind a crossing.
+    of a route that has rails of its own, as behind a crossing. ``terms`` are the entries of effects that recordings
+    showed to be missing from the base track, as read; ``turnout.chains.accepted_terms`` makes terms of them.
     """
 
     track: Track
@@ -26,6 +27,7 @@ class TurnoutTrack:
     locations: dict = field(default_factory=dict)
     numbers: tuple = ()
     tracks: dict = field(default_factory=dict)
+    terms: tuple = ()
 
     @property
     def name(self):
@@ -104,6 +106,7 @@ TRACK_KEYS = (
     "roughness",
     "routes",
     "locations",
+    "terms",
 )
 
 
@@ -123,7 +126,9 @@ def turnout_track(parameters, seed=0):
     }
     rough = p.get("roughness")
     level = rough.number("level", "dB", default=0.0) if rough else None
-    return TurnoutTrack(tracks[first], routes, level, locations, tuple(p.numbers()), tracks)
+    return TurnoutTrack(
+        tracks[first], routes, level, locations, tuple(p.numbers()), tracks, tuple(p.get("terms") or ())
+    )
 
 
 def _track(p, route, seed):

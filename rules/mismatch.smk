@@ -1,0 +1,38 @@
+"""Diagnosis of mismatches: the newest visit of each turnout that asks for it, from raw files to findings.
+
+`snakemake --config diagnose=true` asks for every turnout, `mismatch: enabled: true` in the settings for some.
+"""
+
+from pathlib import Path
+
+if RUN.diagnose:
+    STAGES.append("mismatch")
+MODELS = [
+    p
+    for kind in ("tracks", "vehicles")
+    for p in sorted(Path(RUN.job["configuration"]).glob(f"{kind}/*.yaml"))
+]
+
+
+rule mismatch:
+    input:
+        plan="work/plan/{shard}.json",
+        passage="work/passage/{shard}.json",
+        models=MODELS,
+    output:
+        state=update("work/mismatch/{shard}.json"),
+    log:
+        "logs/mismatch/{shard}.log",
+    benchmark:
+        "logs/benchmarks/mismatch/{shard}.tsv"
+    threads: shard_threads()
+    resources:
+        mem_mb=4000,
+        runtime=1440,
+    params:
+        **stage_params("mismatch", "turnout.chains.mismatch:mismatch_unit"),
+        kind="mismatch",
+        context="turnout.chains.mismatch_context:mismatch_context",
+        gather=f"turnout.chains.mismatch_visits:{RUN.diagnose or 'enabled'}_visit",
+    script:
+        "../scripts/stage.py"

@@ -1,0 +1,124 @@
+"""Effects that recordings showed to be missing from a track: as entries of its file, and as terms of physics."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, fields
+from typing import Any
+
+from turnout import physics
+from turnout.config.parameter_set import Number
+from turnout.errors import SimulationError
+
+# Fields of terms that number a support of the track; in a file the support's place [m] stands for it.
+SUPPORTS = ("sleeper", "support", "first", "last")
+# Effects that belong to a wheelset: it leaves with its train, the track's file is no place for it.
+OF_A_WHEELSET = ("wheel_flat", "out_of_round")
+KINDS: dict[str, Any] = {term.name: term for term in physics.TERMS}
+NOT_FIELDS = ("term", "accepted", "finding")
+NEAR = 0.35  # two places closer than this [m] are one support
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """One entry of ``terms``: ``family`` of the effect, ``fixed`` fields (places of supports in m), ``values``
+    parameter -> (value, standard error or None) in the parameter's own unit."""
+
+    family: str
+    fixed: Mapping[str, Any]
+    values: Mapping[str, tuple[float, float | None]]
+
+    @property
+    def parameters(self):
+        """The parameters of its term that were fitted, with units, neutral values and bounds."""
+        return tuple(p for p in KINDS[self.family].parameters if p.name in self.values)
+
+    @property
+    def place(self) -> float | None:
+        """Where it is [m], None where it has no place."""
+        found = [float(self.fixed[name]) for name in (*SUPPORTS, "place") if name in self.fixed]
+        return sum(found) / len(found) if found else None
+
+    @property
+    def key(self) -> str:
+        """Family and what it is fixed to, in one word."""
+        place = f"{self.place:.1f} m" if self.place is not None else ""
+        parts = [place, *(str(self.fixed[k]) for k in ("channel_name", "train") if self.fixed.get(k))]
+        where = ",".join(p for p in parts if p)
+        return f"{self.family}[{where}]" if where else self.family
+
+    def is_of(self, family, where) -> bool:
+        """Whether it is the effect ``family`` at the place, sensor or train in ``where``."""
+        if family != self.family:
+            return False
+        place = where.get("place")
+        if place is not None and self.place is not None and abs(place - self.place) > NEAR:
+            return False
+        said = {"sensor": self.fixed.get("channel_name"), "train": self.fixed.get("train")}
+        return all(where.get(k) in (None, v) for k, v in said.items())
+
+    def term(self, track, values: Mapping[str, float] | None = None):
+        """The term on a track of ``turnout.simulate``; None where the place is not on that track."""
+        chosen = {name: value for name, (value, _) in self.values.items()} | dict(values or {})
+        given: dict[str, Any] = {}
+        for name, value in self.fixed.items():
+            if name in SUPPORTS:
+                index = int(track.nearest_support(value))
+                if abs(float(track.support[index]) - value) > NEAR:
+                    return None
+                value = index
+            given[name] = value
+        return KINDS[self.family](**given, **chosen)
+
+
+def accepted_of(entries) -> tuple[Accepted, ...]:
+    """Entries of ``TurnoutTrack.terms``; SimulationError where one names no effect or a field it has not."""
+    return tuple(_accepted(entry) for entry in entries)
+
+
+def _accepted(entry) -> Accepted:
+    family, where = str(entry["term"]), f"{entry.path}, {entry.place}"
+    if family not in KINDS:
+        raise SimulationError(f"{where}: no effect {family!r}; there are {', '.join(sorted(KINDS))}.")
+    known = {p.name: p for p in KINDS[family].parameters}
+    names = {f.name for f in fields(KINDS[family])}
+    fixed: dict[str, Any] = {}
+    values: dict[str, tuple[float, float | None]] = {}
+    for name in entry:
+        if name in NOT_FIELDS:
+            continue
+        if name not in names:
+            raise SimulationError(f"{where}: {family} has no {name!r}; it has {', '.join(sorted(names))}.")
+        found = entry[name]
+        if name in known:
+            value = entry.number(name, known[name].unit)
+            values[name] = value, found.prior * abs(value) if found.prior is not None else None
+        else:
+            fixed[name] = found.value if isinstance(found, Number) else found
+    missing = names - set(fixed) - set(values) - {f.name for f in fields(KINDS[family]) if f.default is not MISSING}
+    if missing:
+        raise SimulationError(f"{where}: {family} needs {', '.join(sorted(missing))}.")
+    return Accepted(family, fixed, values)
+
+
+def terms_on(turnout, track, conditions: Mapping | None = None) -> tuple:
+    """Accepted terms of a ``TurnoutTrack`` on one of its tracks, or a stretch of it, under a recording's conditions."""
+    made = (entry.term(track) for entry in accepted_of(turnout.terms))
+    return tuple(term.under(conditions or {}) for term in made if term is not None)
+
+
+def described(term, candidate, standard_errors, track) -> dict:
+    """A fitted term as plain data: family, fixed fields with places in m, fitted parameters with errors and units."""
+    fitted = {p.name: p for p in candidate.parameters}
+    errors = dict(zip(fitted, standard_errors))
+    fixed: dict[str, Any] = {}
+    for f in fields(term):
+        value = getattr(term, f.name)
+        if f.name in fitted or (f.default is not MISSING and value == f.default):
+            continue
+        fixed[f.name] = round(float(track.support[value]), 3) if f.name in SUPPORTS else value
+    parameters = {
+        name: {"value": float(f"{getattr(term, name):.6g}"), "se": float(f"{errors[name]:.3g}"), "unit": p.unit}
+        for name, p in fitted.items()
+    }
+    return {"term": candidate.family, "fixed": fixed, "parameters": parameters}

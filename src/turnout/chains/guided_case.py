@@ -1,0 +1,136 @@
+"""A case with what was accepted before in it, that tells how far it is and stops when its time is up."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnout.errors import TurnoutError
+from turnout.mismatch.case import Case, Nuisance
+
+WIDE = 0.5  # prior sd of an accepted value on its next visit, as a share of its way from neutral: it may well grow
+LEAST_ERRORS = 3.0  # and at least so many of its standard errors
+STEP = 0.02  # of the prior sd, for derivatives
+
+
+class BudgetSpentError(TurnoutError):
+    """The time that a diagnosis was given is up; what is done is kept."""
+
+
+@dataclass
+class Watch:
+    """``deadline`` on the monotonic clock [s] or None; ``tell`` is called with the number of predictions so far."""
+
+    deadline: float | None = None
+    tell: Callable[[int], object] | None = None
+    count: int = 0
+
+    def tick(self):
+        """One more prediction; BudgetSpentError after the deadline."""
+        self.count += 1
+        if self.tell is not None:
+            self.tell(self.count)
+        if self.deadline is not None and time.monotonic() > self.deadline:
+            raise BudgetSpentError("the time given is up; what is done is kept, the same command goes on from there.")
+
+
+class GuidedCase(Case):
+    """``case`` with ``accepted`` effects in its simulation, each of whose parameters is free as a nuisance.
+
+    An effect that was accepted does not come back as a finding; its parameters are estimated anew at every visit,
+    about their accepted values with a prior wide enough for them to grow.
+    """
+
+    def __init__(self, case, accepted=(), watch=None):
+        self.case, self.watch = case, watch or Watch()
+        support = case.track() if accepted else None
+        self.accepted = tuple(a for a in accepted if a.term(support) is not None and a.values)
+        self.own = tuple(n for a in self.accepted for n in _nuisances(a))
+        self.nuisances = (*case.nuisances, *self.own)
+        self.candidates = tuple(
+            c for c in case.candidates if not any(a.is_of(c.family, c.where) for a in self.accepted)
+        )
+        self.observations, self.reserved = case.observations, case.reserved
+        self.frozen_jacobian = case.frozen_jacobian
+
+    def __getattr__(self, name):
+        return getattr(self.__dict__["case"], name)
+
+    def standing(self, values):
+        """Terms of the accepted effects at these values of their nuisances."""
+        track, made = self.case.track() if self.accepted else None, []
+        for a in self.accepted:
+            chosen = {p.name: float(values[_name(a, p)]) for p in a.parameters}
+            made.append(a.term(track, chosen))
+        return tuple(made)
+
+    def predict(self, values, terms, observations):
+        """Predictions with the accepted effects in them."""
+        self.watch.tick()
+        return self.case.predict(values, (*self.standing(values), *terms), observations)
+
+    def nuisance_jacobian(self, values, terms, observations, base):
+        """The case's own columns, and one by a difference for each parameter that was accepted."""
+        inner = self.case.nuisance_jacobian(values, (*self.standing(values), *terms), observations, base)
+        columns = [self._column(values, terms, observations, base, n) for n in self.own]
+        if not columns:
+            return inner
+        return [np.column_stack([j, *(c[k] for c in columns)]) for k, j in enumerate(inner)]
+
+    def _column(self, values, terms, observations, base, nuisance):
+        step = STEP * nuisance.sd
+        if values[nuisance.name] + step > nuisance.bounds[1]:
+            step = -step
+        moved = self.predict({**values, nuisance.name: values[nuisance.name] + step}, terms, observations)
+        return [(new - old) / step for new, old in zip(moved, base)]
+
+    def screen(self, fit):
+        """Linear columns of the candidates beside what was accepted."""
+        return self.case.screen(self._seen(fit))
+
+    def latent(self, fit):
+        """The force that is missing beside what was accepted."""
+        return self.case.latent(self._seen(fit))
+
+    def numerical_error(self, fit):
+        """Own numerical error with what was accepted."""
+        return self.case.numerical_error(self._seen(fit))
+
+    def _seen(self, fit):
+        return _Seen(fit, self.standing(fit.values)) if self.accepted else fit
+
+
+class _Seen:
+    """A fit whose terms begin with the accepted ones."""
+
+    def __init__(self, fit, standing):
+        self._fit, self.terms = fit, (*standing, *fit.terms)
+
+    def __getattr__(self, name):
+        return getattr(self.__dict__["_fit"], name)
+
+
+def _name(accepted, parameter):
+    return f"{accepted.key}.{parameter.name}"
+
+
+def _nuisances(accepted):
+    for p in accepted.parameters:
+        value, error = accepted.values[p.name]
+        sd = max(WIDE * abs(value - p.neutral), LEAST_ERRORS * (error or 0.0), 1e-3 * (p.bounds[1] - p.bounds[0]))
+        yield Nuisance(_name(accepted, p), p.unit, value, sd, bounds=p.bounds, meaning=p.meaning)
+
+
+def visit_of(case, fit) -> list[dict]:
+    """What a fit says of the accepted effects now: dicts with term, key, fixed, name, value, se, unit."""
+    found: list[dict] = []
+    if not getattr(case, "accepted", ()):
+        return found
+    index = {n.name: k for k, n in enumerate(case.nuisances)}
+    for a in case.accepted:
+        for p in a.parameters:
+            name = _name(a, p)
+            se = float(np.sqrt(max(fit.covariance[index[name], index[name]], 0.0)))
+            found.append({"accepted": a, "name": p.name, "value": fit.values[name], "se": se, "unit": p.unit})
+    return found

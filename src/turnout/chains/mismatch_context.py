@@ -1,0 +1,55 @@
+"""What a diagnosis of a turnout needs beside its files: its track's file, vehicles, what the passage stage found."""
+
+import hashlib
+import json
+from pathlib import Path
+
+from turnout.chains.accepted_terms import accepted_of
+from turnout.config.turnout import TurnoutConfig
+from turnout.content import sha256_of
+from turnout.errors import SimulationError
+from turnout.fleet.batches import read_results
+from turnout.fleet.state import batch_paths
+from turnout.simulate import load_track
+
+
+def track_file(turnout: TurnoutConfig, name: str | None = None) -> Path:
+    """The turnout's own file in the configuration's tracks, else that of its layout; SimulationError without one."""
+    if name and name.endswith((".yaml", ".yml")):
+        return Path(name)
+    folder = Path(turnout.folder) / "tracks"
+    for stem in (name,) if name else (turnout.id, turnout.layout):
+        if (folder / f"{stem}.yaml").is_file():
+            return folder / f"{stem}.yaml"
+    said = name or f"{turnout.id}.yaml nor {turnout.layout}"
+    raise SimulationError(f"{turnout.id}: no file {folder}/{said}.yaml; a diagnosis needs a track to simulate.")
+
+
+def track_of(turnout: TurnoutConfig, name: str | None = None):
+    """(TurnoutTrack, accepted effects) of a turnout."""
+    path = track_file(turnout, name)
+    track = load_track(str(path), folder=path.parent)
+    return track, accepted_of(track.terms)
+
+
+def digest_of_model(turnout: TurnoutConfig) -> str:
+    """Changes when a track's or a vehicle's file of the configuration does, "" where there are none."""
+    folder = Path(turnout.folder)
+    try:
+        own = track_file(turnout)
+    except SimulationError:
+        return ""
+    used = [own, *sorted((folder / "tracks").glob(f"{turnout.layout}.yaml")), *sorted((folder / "vehicles").glob("*"))]
+    parts = [[path.name, sha256_of(path)] for path in dict.fromkeys(used) if path.is_file()]
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:16]
+
+
+def mismatch_context(turnout: str, work="work") -> tuple[str, dict[str, dict]]:
+    """(token, tables of each passage unit by its id) as the passage stage left them in ``work``."""
+    found = {}
+    for path in batch_paths(sorted((Path(work) / "passage").glob("*.json"))):
+        for result in read_results(path):
+            if result.turnout == turnout:
+                found[result.unit] = {k: result.tables.get(k, []) for k in ("passages", "quarantine")}
+    ids = sorted(str(r.get("passage_id")) + str(r.get("status")) for t in found.values() for r in t["passages"])
+    return hashlib.sha256(json.dumps(ids).encode()).hexdigest()[:16], found

@@ -1,0 +1,159 @@
+"""A visit's raw files as hammer tests and passages of the engine; what cannot be used is said."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from turnout.chains.mismatch_trains import TrainUnknownError, train_of
+from turnout.chains.passage import PassageContext, passage_unit, sensors_of
+from turnout.chains.passage_context import known_patterns
+from turnout.config.turnout import TurnoutConfig
+from turnout.errors import ReadError
+from turnout.fleet.scan import unit_id
+from turnout.mismatch.track import HammerTest, Passage
+from turnout.readers import read
+from turnout.records import Unit
+
+HALF_BAY = 0.3  # m: an accelerometer "mid-span" sits this far from the sleeper struck
+OFF = 0.5  # m: a place in the layout further than this from the one in the track's file is somebody's mistake
+UNSOUND = ("clipped", "dead_channel", "not_finite", "sensor_lost", "channels_swapped")
+
+
+@dataclass
+class Gathered:
+    """What can be used of a visit, and ``notes`` on what cannot; ``sections`` of each test, ``unsound`` channels."""
+
+    tests: list[HammerTest] = field(default_factory=list)
+    sections: dict[str, str] = field(default_factory=dict)
+    passages: list[Passage] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    quarantine: list[dict] = field(default_factory=list)
+
+
+def gather(units: Iterable[Unit], turnout: TurnoutConfig, raw_root, track, told: Mapping[str, dict]) -> Gathered:
+    """Read all units of a visit. ``track`` is the TurnoutTrack, ``told`` the passage stage's tables by unit."""
+    found = Gathered()
+    for unit in units:
+        if unit.kind == "hammer" and turnout.hammer is not None:
+            _test(unit, turnout, raw_root, track, found)
+        elif unit.kind == "passage" and turnout.passages is not None:
+            tables = told.get(unit_id(unit)) or _analysed(unit, turnout, raw_root)
+            _passages(unit, turnout, raw_root, track, tables, found)
+    return found
+
+
+def _read(unit, description, raw_root, notes):
+    """Recordings of a unit; what cannot be read goes to the notes."""
+    for path, *_ in unit.files:
+        try:
+            result = read(path, raw_root, description)
+        except ReadError as error:
+            notes.append(str(error))
+            continue
+        notes += [str(e) for e in result.errors]
+        yield from result.recordings
+
+
+def _test(unit, turnout, raw_root, track, found):
+    recordings = tuple(_read(unit, turnout.hammer.descriptions[unit.section], raw_root, found.notes))
+    if not recordings:
+        return
+    place = float(turnout.section(unit.section).position)
+    if wrong := _misplaced(unit.section, place, track):
+        found.notes.append(wrong)
+        return
+    campaign = turnout.campaigns[unit.campaign]
+    noted = {} if campaign.rail_temperature is None else {"rail_temperature": campaign.rail_temperature}
+    name = f"{unit.section} {unit.campaign}"
+    force = turnout.hammer.force[unit.section]
+    seated = tuple(_seated(r, place) for r in recordings)
+    found.tests.append(HammerTest(name, place, seated, force, unit.campaign, noted))
+    found.sections[name] = unit.section
+
+
+def _misplaced(label, place, track) -> str:
+    """Why a place of the layout cannot be that of the track, "" where it can."""
+    base = track.track
+    if not base.start < place < base.end:
+        return f"section {label}: {place:.1f} m in the layout, the track goes from {base.start:.0f} to {base.end:.0f} m"
+    known = track.locations.get(label)
+    if known is not None and abs(known[0] - place) > OFF:
+        return (
+            f"section {label}: {place:.1f} m in the layout, {known[0]:.1f} m in the track's file; correct one of them"
+        )
+    return ""
+
+
+def _seated(recording, place):
+    """The recording with places for accelerometers that have none: at the blow, or half a bay on if mid-span."""
+    channels = tuple(
+        c
+        if c.quantity != "acceleration" or c.position is not None
+        else replace(c, position=place + (HALF_BAY if "mid-span" in c.mounting else 0.0))
+        for c in recording.channels
+    )
+    return replace(recording, channels=channels)
+
+
+def _analysed(unit, turnout, raw_root) -> dict[str, list[dict]]:
+    """What the passage stage would find."""
+    path = Path(turnout.settings["passage"].axle_patterns)
+    if not path.is_file():
+        path = Path(turnout.folder) / "vehicles" / path.name
+    return passage_unit(unit, turnout, raw_root, PassageContext(patterns=known_patterns(str(path))))
+
+
+def _passages(unit, turnout, raw_root, track, tables, found):
+    rows, bad = tables["passages"], tables["quarantine"]
+    recordings = list(_read(unit, turnout.passages.description, raw_root, found.notes))
+    for k, recording in enumerate(recordings):
+        row: dict[str, Any] = rows[k] if len(rows) == len(recordings) else {}
+        name = unit_id(unit).split("/", 2)[-1] + (f":{k}" if len(recordings) > 1 else "")
+        unsound = {q["place"].split(", ")[-1].split(":")[0] for q in bad if q["reason_code"] in UNSOUND}
+        unsound |= _misplaced_sensors(turnout, track, found.notes)
+        try:
+            train = train_of(row, recording.conditions, Path(turnout.folder) / "vehicles")
+        except TrainUnknownError as error:
+            found.notes.append(f"passage {name}: {error}")
+            continue
+        found.notes += [f"passage {name}: {doubt}" for doubt in train.doubts]
+        sound = _sound_channels(recording, turnout, train.route, unsound)
+        if gone := sorted(unsound & {c.name for c in recording.channels}):
+            found.notes.append(f"passage {name}: channels {', '.join(gone)} not used{_reasons(bad)}")
+        if not sound.channels:
+            found.notes.append(f"passage {name}: no sound channel on the {train.route} track")
+            continue
+        found.passages.append(
+            Passage(
+                name, sound, train.vehicle, train.speed, train.name, train.direction, train.route, _noted(row, sound)
+            )
+        )
+
+
+def _misplaced_sensors(turnout, track, notes):
+    """Sensors whose section lies elsewhere in the layout than on the track."""
+    found = {s.name: wrong for s in sensors_of(turnout) if (wrong := _misplaced(s.section, s.position, track))}
+    notes += [wrong for wrong in found.values() if wrong not in notes]
+    return set(found)
+
+
+def _reasons(bad):
+    found = ", ".join(sorted({q["reason_code"] for q in bad if q["reason_code"] in UNSOUND}))
+    return f" ({found})" if found else ""
+
+
+def _noted(row, recording):
+    temperature = row.get("rail_temperature_c")
+    temperature = recording.conditions.get("rail_temperature") if temperature is None else temperature
+    return {} if temperature is None else {"rail_temperature": float(temperature)}
+
+
+def _sound_channels(recording, turnout, route, unsound):
+    """The recording with those channels alone that feel trains of this route and are sound, at their places."""
+    sensors = {s.name: s for s in sensors_of(turnout) if s.track in ("both", route) and s.name not in unsound}
+    keep = [i for i, c in enumerate(recording.channels) if c.name in sensors]
+    channels = tuple(
+        replace(recording.channels[i], position=sensors[recording.channels[i].name].position) for i in keep
+    )
+    return replace(recording, samples=recording.samples[keep], channels=channels)

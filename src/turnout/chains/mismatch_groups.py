@@ -1,0 +1,102 @@
+"""Neighbouring sections of one track are one case: what lies further apart does not feel the same effect."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from turnout.chains.mismatch_gather import Gathered
+from turnout.config.turnout import TurnoutConfig
+from turnout.mismatch.track import Campaign
+from turnout.simulate import Sensor, TurnoutTrack
+
+GAP = 6.0  # m: sections further apart than this do not hear the same sleeper
+MOST_PASSAGES = 20  # of one case, the newest: with them a case stays below a quarter of an hour
+RESERVED_EVERY = 5  # of so many recordings one is read by the verification alone
+FEWEST_TO_RESERVE = 4
+
+
+@dataclass(frozen=True)
+class Group:
+    """Sections ``labels`` on ``route`` with their ``campaign``."""
+
+    labels: tuple[str, ...]
+    route: str
+    campaign: Campaign
+
+
+def groups(turnout: TurnoutConfig, track: TurnoutTrack, found: Gathered, only: Sequence[str] = ()) -> Iterator[Group]:
+    """The cases of a visit, by place; sections without any recording are left out."""
+    for route, labels in _neighbours(turnout, only):
+        campaign = _campaign(turnout, track, found, route, labels)
+        if campaign is not None:
+            yield Group(_measured(turnout, found, campaign, labels), route, campaign)
+
+
+def _neighbours(turnout, only):
+    """(route, labels) of sections that follow each other within ``GAP``, all of ``only`` together where given."""
+    for route in ("main", "diverging"):
+        mine = [s for s in turnout.sections if _route(s) == route and (not only or s.label in only)]
+        mine.sort(key=lambda s: s.position)
+        part: list = []
+        for section in mine:
+            if part and section.position - part[-1].position > GAP:
+                yield route, tuple(s.label for s in part)
+                part = []
+            part.append(section)
+        if part:
+            yield route, tuple(s.label for s in part)
+
+
+def _measured(turnout, found, campaign, labels):
+    """The labels that have a recording in the campaign."""
+    struck = {found.sections[t.name] for t in campaign.hammer}
+    watched = {turnout.passages.sections[s.name] for s in campaign.sensors} if turnout.passages else set()
+    return tuple(label for label in labels if label in struck | watched)
+
+
+def _route(section):
+    return "diverging" if section.track == "diverging" else "main"
+
+
+def _campaign(turnout, track, found, route, labels):
+    tests = tuple(t for t in found.tests if found.sections[t.name] in labels)
+    sensors = _sensors(turnout, labels)
+    names = {s.name for s in sensors}
+    shared = all(turnout.section(label).track == "both" for label in labels)
+    passages = [
+        p for p in found.passages if (shared or p.route == route) and names & {c.name for c in p.recording.channels}
+    ][-MOST_PASSAGES:]
+    heard = {c.name for p in passages for c in p.recording.channels} & names
+    sensors = tuple(s for s in sensors if s.name in heard)
+    if not tests and not passages:
+        return None
+    own, passages = (track, passages) if route == "main" else _as_main(track, route, passages)
+    return Campaign(own, sensors, tests, tuple(passages), reserved(passages, tests))
+
+
+def _sensors(turnout, labels):
+    if turnout.passages is None:
+        return ()
+    found = []
+    for channel in turnout.passages.description.channels:
+        label = turnout.passages.sections.get(channel.name)
+        if label in labels and channel.quantity == "acceleration":
+            position = channel.position if channel.position is not None else turnout.section(label).position
+            found.append(Sensor(channel.name, float(position), channel.mounting or "rail head"))
+    return tuple(found)
+
+
+def _as_main(track, route, passages):
+    """The turnout seen from another route: its track is the one that blows and trains of the case meet."""
+    if route not in track.routes:
+        return track, [replace(p, route="main") for p in passages]
+    own = track.track_of(route)
+    seen = replace(track, track=own, tracks={"main": own}, routes={"main": track.routes[route]})
+    return seen, [replace(p, route="main") for p in passages]
+
+
+def reserved(passages, tests) -> tuple[str, ...]:
+    """Names that only the verification reads: of passages in order of speed every fifth, else of the tests."""
+    items = sorted(passages, key=lambda p: p.speed) or sorted(tests, key=lambda t: t.place)
+    if len(items) < FEWEST_TO_RESERVE:
+        return ()
+    return tuple(item.name for k, item in enumerate(items) if k % RESERVED_EVERY == RESERVED_EVERY // 2)

@@ -1,0 +1,87 @@
+"""One turnout on request: its visit diagnosed, the result kept until it is accepted or asked for again."""
+
+import time
+from pathlib import Path
+
+from turnout.chains.guided_case import Watch
+from turnout.chains.mismatch import Options, diagnose_visit
+from turnout.chains.mismatch_context import mismatch_context
+from turnout.chains.mismatch_visits import unit_of, visits
+from turnout.config import load_configuration, with_raw
+from turnout.errors import SimulationError
+from turnout.fingerprint import fingerprint
+from turnout.fleet.atomic import write_text
+from turnout.fleet.batches import decode, encode
+from turnout.fleet.scan import scan
+
+
+def diagnose_turnout(
+    turnout_id, config="config", raw_root="raw", work="work", visit=None, track=None, sections=(), budget=None, bar=None
+):
+    """Rows by table of one visit of a turnout, the newest where none is named.
+
+    Parameters
+    ----------
+    budget : float or None
+        Seconds after which BudgetSpentError is raised; the fits that are done are kept.
+    bar : object with ``group`` and ``simulations``, or None
+        Told how far it is.
+
+    Raises
+    ------
+    SimulationError
+        The turnout has no recordings at all, no such visit or section, or no track file.
+    """
+    turnout = with_raw(load_configuration(config).turnout(turnout_id), Path(raw_root))
+    if unknown := sorted(set(sections) - {s.label for s in turnout.sections}):
+        raise SimulationError(f"{turnout_id} has no section {', '.join(unknown)}.")
+    label, units = _visit(turnout_id, visits(scan(turnout, Path(raw_root)).units), visit, raw_root)
+    unit = unit_of(turnout_id, label, units, turnout.hashes["mismatch"])
+    _, told = mismatch_context(turnout_id, work)
+    watch = Watch(None if budget is None else time.monotonic() + budget, bar.simulations if bar else None)
+    options = Options(track, tuple(sections), str(Path(work) / "mismatch-fits"), watch, bar.group if bar else None)
+    return diagnose_visit(unit, turnout, raw_root, told, fingerprint("turnout.chains.mismatch"), options)
+
+
+def _visit(turnout_id, found, wanted, raw_root):
+    if not found:
+        raise SimulationError(f"{turnout_id}: no hammer test and no passage below {raw_root}; nothing can be said.")
+    if wanted is None:
+        return list(found.items())[-1]
+    if wanted not in found:
+        raise SimulationError(f"{turnout_id} has no visit {wanted!r}; there are {', '.join(list(found)[-12:])}.")
+    return wanted, found[wanted]
+
+
+class Results:
+    """The last result of a turnout below ``work``."""
+
+    def __init__(self, work, turnout_id):
+        self.turnout_id = turnout_id
+        self.path = Path(work) / "mismatch-fits" / f"{turnout_id}.json"
+
+    def keep(self, tables):
+        """Write it."""
+        write_text(self.path, encode(tables))
+
+    def finding(self, finding_id=None):
+        """The finding called ``finding_id``, or the only one with a term; SimulationError where that is not clear."""
+        rows = self._rows()
+        if finding_id:
+            chosen = [r for r in rows if r["finding_id"].startswith(finding_id)]
+        else:
+            chosen = [r for r in rows if r["term_json"]]
+        if len(chosen) == 1:
+            return chosen[0]
+        there = "; ".join(
+            f"{r['finding_id'][:12]} {r['sections']}: {r['verdict']} {r['term'] or ''}".strip() for r in rows
+        )
+        wrong = "several findings carry a term" if chosen else "no such finding carries a term"
+        raise SimulationError(f"{self.turnout_id}: {wrong}; say which with --finding. There are {there or 'none'}.")
+
+    def _rows(self):
+        try:
+            return decode(self.path.read_text(encoding="utf-8"))["mismatch_findings"]
+        except FileNotFoundError:
+            said = f"{self.turnout_id} has no result below {self.path.parent}"
+            raise SimulationError(f"{said}: run turnout diagnose --turnout {self.turnout_id} first.") from None

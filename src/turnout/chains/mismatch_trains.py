@@ -1,0 +1,115 @@
+"""The train of a passage as the simulation knows it: vehicle file, number of units, load, speed, direction, route."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from turnout.errors import ConfigError, SimulationError
+from turnout.simulate import load_vehicle
+
+PATTERN = 0.4  # m rms between axles heard and those of the vehicle's file: half of a short bogie is 0.9
+LEAST_REACH = 0.03  # share by which the vehicle's axle distances may correct the speed found
+NEWTON_PER_TONNE = 9806.65
+KMH = 3.6
+
+
+@dataclass(frozen=True)
+class TrainFound:
+    """``vehicle`` of ``turnout.simulate`` called ``name``, ``speed`` [m/s], and ``doubts`` in words."""
+
+    name: str
+    vehicle: object
+    speed: float
+    direction: str
+    route: str
+    doubts: tuple[str, ...] = ()
+
+
+class TrainUnknownError(Exception):
+    """Why a passage cannot be simulated, in words."""
+
+
+def train_of(row: Mapping, said: Mapping, folder: Path) -> TrainFound:
+    """Train from the passage stage's ``row`` and what the file itself notes (``said``), vehicles in ``folder``.
+
+    The recording comes before the notes. TrainUnknownError where type or speed are not known, no vehicle has a file, or
+    its axles are not those that were heard.
+    """
+    speed = row.get("speed_kmh") or KMH * float(said.get("speed") or 0.0) or row.get("speed_listed_kmh")
+    name = _type(row, said)
+    if not speed or not name:
+        missing = "speed" if name else "type"
+        raise TrainUnknownError(f"the train's {missing} is not known ({row.get('detail') or 'no axles found'})")
+    speed = float(speed) / KMH
+    vehicle, doubts = _vehicle(name, row.get("n_axles") or None, row, said, folder)
+    speed, more = _by_its_axles(name, vehicle, row, speed)
+    direction, route = row.get("direction"), row.get("track")
+    if direction not in ("facing", "trailing"):
+        direction = str(said.get("direction", "facing"))
+    if route not in ("main", "diverging"):
+        route = str(said.get("track", "main"))
+    return TrainFound(name, vehicle, speed, direction, route, (*doubts, *more))
+
+
+def _type(row, said) -> str:
+    for found in (row.get("train_type"), row.get("train_type_listed"), said.get("train_type")):
+        if found and found != "unknown":
+            return str(found).lower().replace(" ", "_")
+    return ""
+
+
+def _vehicle(name, heard, row, said, folder):
+    try:
+        one = load_vehicle(name, 0.0, folder)
+    except (SimulationError, ConfigError) as error:
+        raise TrainUnknownError(f"type {name}: {error}") from None
+    n, units = len(one.wheels), int(said.get("units", 1))
+    if heard:
+        if heard % n:
+            wrong = "wrong vehicle file, another train, or other sensors"
+            raise TrainUnknownError(f"{heard} axles heard, {n} in {name}.yaml: {wrong}")
+        units = heard // n
+    share, doubts = _load_share(name, row, said, folder, units)
+    return load_vehicle(name, share, folder, units), doubts
+
+
+def _load_share(name, row, said, folder, units):
+    """Share of the payload that gives the measured axle load, half of it where none is known."""
+    empty, full = (float(np.mean(load_vehicle(name, s, folder, units).static_loads)) for s in (0.0, 1.0))
+    if full <= empty:
+        return 0.0, ()
+    if row.get("axle_load_t") is None:
+        noted = "load_share" in said
+        return float(said.get("load_share", 0.5)), () if noted else ("load not known, half of the payload assumed",)
+    share = (0.5 * row["axle_load_t"] * NEWTON_PER_TONNE - empty) / (full - empty)
+    inside = -0.3 <= share <= 1.5
+    doubts = () if inside else (f"axle load {row['axle_load_t']:.1f} t lies outside the vehicle's",)
+    return float(np.clip(share, 0.0, 1.5)), doubts
+
+
+def _by_its_axles(name, vehicle, row, speed):
+    """(speed [m/s], doubts): the vehicle's own axle distances over the times heard tell the speed best.
+
+    TrainUnknownError where the axles are not those of the vehicle at any speed near the one found.
+    """
+    times = np.asarray(row.get("axle_times_s") if row.get("axle_times_s") is not None else (), dtype=float)
+    places = np.asarray(vehicle.wheel_places, dtype=float)
+    if times.size != places.size or times.size < 2:
+        return speed, ()
+    reach = max(LEAST_REACH, 3.0 * float(row.get("speed_se_kmh") or 0.0) / (KMH * speed))
+    ways = [_fitted(times, p, speed, reach) for p in (places, places[-1] - places[::-1])]
+    off, own = min(ways)
+    if off > PATTERN:
+        raise TrainUnknownError(
+            f"its axles lie {off:.2f} m rms off those of {name}.yaml: wrong vehicle file, or sensors elsewhere"
+        )
+    return own, () if ways[0][0] <= PATTERN else (f"{name} runs the other way round",)
+
+
+def _fitted(times, places, speed, reach):
+    """(rms distance [m], speed [m/s]) of axles at ``times`` laid on ``places`` at a speed within ``reach``."""
+    t, x = times - times.mean(), places - places.mean()
+    own = float(np.clip(t @ x / (t @ t), (1.0 - reach) * speed, (1.0 + reach) * speed))
+    return float(np.sqrt(np.mean((own * t - x) ** 2))), own

@@ -1,0 +1,82 @@
+"""What a finding says in a sentence to somebody who will go and look."""
+
+import json
+
+# What the simulation lacked, in words; {place}, {channel}, {train} and every parameter with its unit may be used.
+SENTENCES = {
+    "hanging_sleeper": "The sleeper at {place} hangs {gap} above its ballast",
+    "lifting_sleepers": "The sleepers about {place} lift off their ballast",
+    "local_ballast": "The ballast under the sleeper at {place} is {factor} times as stiff as its neighbours'",
+    "local_pad": "The rail pad on the sleeper at {place} is {factor} times as stiff as its neighbours'",
+    "attached_resonator": "A mass of {mass} swings at {frequency} on the track at {place}",
+    "dry_friction": "Something rubs with up to {limit} at {place}",
+    "ballast_hardening": "The ballast about {place} stiffens under load",
+    "surface_dip": "The running surface has a dip of {depth} over {length} at {place}",
+    "rail_corrugation": "The rail is corrugated, wavelength {wavelength}",
+    "rail_bending": "The rail at {place} is {factor} times as stiff in bending",
+    "rail_shear": "The rail gives more in shear than the simulation's",
+    "pad_temperature": "The rail pads soften by {coefficient} of rail temperature",
+    "pad_preload": "The rail pads stiffen under load",
+    "zener_pad": "The rail pads are stiffer at high frequency than at low",
+    "ballast_inertia": "The ballast moves with the sleepers, {mass} of it under each",
+    "sleeper_mode": "The sleepers bend at {frequency}",
+    "wheel_flat": "A wheel of {train} has a flat of {length}",
+    "out_of_round": "A wheel of {train} is out of round",
+    "unsprung_mass": "The wheelsets of {train} are {factor} times as heavy as in its file",
+    "contact_stiffness": "The contact of wheel and rail is {factor} times as stiff",
+    "sensor_gain": "Sensor {channel} reads {gain} times what it should",
+    "mount_resonance": "Sensor {channel} is not fastened firmly: its mounting resonates",
+    "time_offset": "Channel {channel} lags by {delay}",
+    "clock_drift": "The clock of channel {channel} drifts",
+    "sensor_position": "Sensor {channel} sits {shift} from where the layout has it",
+    "clipping": "Channel {channel} is cut off at {limit}",
+    "hum": "Channel {channel} hums",
+    "high_pass": "Channel {channel} loses what is slower than {corner}",
+    "low_pass": "Channel {channel} loses what is fast",
+}
+MILLI = {"m": "mm", "s": "ms"}
+PERCENT = {"1/K": "% per kelvin"}
+
+
+def number_in_words(value, unit, digits=2):
+    """A value in the unit that reads best.
+
+    >>> number_in_words(0.00112, "m"), number_in_words(1.31, "-"), number_in_words(0.012, "1/K")
+    ('1.1 mm', '1.3', '1.2 % per kelvin')
+    """
+    if unit in PERCENT:
+        return f"{100.0 * value:.{digits}g} {PERCENT[unit]}"
+    if unit in MILLI and abs(value) < 0.1:
+        return f"{1e3 * value:.{digits}g} {MILLI[unit]}"
+    shown = f"{value:.{digits}g}" if abs(value) < 100 else f"{value:.0f}"
+    return shown if unit in ("-", "") else f"{shown} {unit}"
+
+
+def headline(finding) -> str:
+    """One sentence: what the simulation left out, or what is known instead."""
+    terms = json.loads(finding["term_json"] or "[]")
+    if finding["verdict"] in ("named", "a_or_b") and terms:
+        said = "; ".join(_sentence(term, finding) for term in terms)
+        if finding["verdict"] == "named":
+            return said + "."
+        other = (finding["rival_term"] or "").replace("_", " ")
+        return f"{said}, or it is {other}: these recordings cannot tell the two apart."
+    low, high = finding["place_low_m"], finding["place_high_m"]
+    if finding["verdict"] == "unknown":
+        return f"Something is missing between {low:.1f} and {high:.1f} m, and no known effect explains it."
+    return finding["sentence"] or ""
+
+
+def _sentence(term, finding) -> str:
+    fixed = term["fixed"]
+    places = [fixed[k] for k in ("sleeper", "support", "first", "last", "place") if k in fixed]
+    words = {name: number_in_words(p["value"], p["unit"]) for name, p in term["parameters"].items()}
+    words |= {
+        "place": f"{sum(places) / len(places):.1f} m" if places else "an unknown place",
+        "channel": fixed.get("channel_name") or finding["channel"] or "?",
+        "train": finding["train"] or fixed.get("train") or "a train",
+    }
+    try:
+        return SENTENCES[term["term"]].format(**words)
+    except KeyError:  # a new effect without a sentence of its own yet
+        return f"{term['term'].replace('_', ' ').capitalize()} at {words['place']}"

@@ -1,0 +1,36 @@
+-- One row per turnout, effect, place, sensor and parameter that was named or accepted: its latest value, and its growth.
+-- A straight line through all visits, each weighted by its standard error; NULL with a single visit. Visits before
+-- ballast work on their sections do not count for effects of the ballast. is_open: the newest visit still has it.
+-- needs: findings_newest
+create or replace view parameter_growth as
+with undone as (
+    select distinct f.finding_id
+    from findings_current f join events e on e.turnout_id = f.turnout_id and e.event_at_utc > f.found_at_utc
+    where e.resets_ballast and (
+        e.section_id is null or list_contains(string_split(f.sections, ', '), split_part(e.section_id, '/', -1)))
+),
+visits as (
+    select
+        p.turnout_id, p.term, round(p.position_m, 1) as position_m, p.channel, p.parameter, p.unit, p.found_at_utc,
+        p.value, p.value_se, p.finding_id, p.value_se ** -2 as weight,
+        epoch_us(p.found_at_utc) / 31557600e6 as year
+    from mismatch_parameters p join findings_current f using (finding_id) anti join undone using (finding_id)
+    where p.value_se > 0 and (p.accepted or f.verdict = 'named')
+),
+centred as (
+    select *, year - sum(weight * year) over thing / sum(weight) over thing as t from visits
+    window thing as (partition by turnout_id, term, position_m, channel, parameter, unit)
+),
+sums as (
+    select
+        turnout_id, term, position_m, channel, parameter, unit, count(*)::integer as n_visits,
+        min(found_at_utc) as first_at_utc, max(found_at_utc) as found_at_utc, arg_max(value, found_at_utc) as value,
+        arg_max(value_se, found_at_utc) as value_se, arg_max(finding_id, found_at_utc) as finding_id,
+        sum(weight * t * value) as product, nullif(sum(weight * t * t), 0) as spread
+    from centred group by all
+)
+select
+    turnout_id, term, position_m, channel, parameter, unit, n_visits, first_at_utc, found_at_utc, value, value_se,
+    product / spread as per_year, spread ** -0.5 as per_year_se,
+    finding_id in (select finding_id from findings_newest) as is_open, finding_id
+from sums;

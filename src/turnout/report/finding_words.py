@@ -1,0 +1,128 @@
+"""What a finding says to somebody who will go and look: what was left out, where, when, how sure."""
+
+import json
+
+from turnout.chains.mismatch_words import headline, number_in_words
+
+__all__ = ["answer", "check", "facts", "headline", "parameters", "rivals"]
+Z95 = 1.959964
+ANSWERS = {
+    "none": "nothing is missing",
+    "named": "named",
+    "a_or_b": "one of two",
+    "unknown": "something is missing, no name fits",
+    "numerics": "cannot tell: own numerical error",
+}
+
+
+def parameters(finding) -> list[dict]:
+    """Name, value with its 95 % interval, and unit of every fitted parameter."""
+    found = []
+    for term in json.loads(finding["term_json"] or "[]"):
+        for name, p in term["parameters"].items():
+            half = Z95 * p["se"]
+            low, high = p["value"] - half, p["value"] + half
+            found.append(
+                {
+                    "effect": term["term"].replace("_", " "),
+                    "name": name,
+                    "value": number_in_words(p["value"], p["unit"], 3),
+                    "interval": f"{number_in_words(low, p['unit'], 3)} to {number_in_words(high, p['unit'], 3)}",
+                }
+            )
+    return found
+
+
+def facts(finding) -> list[tuple[str, str]]:
+    """(question, answer) pairs: where, what it moves with, which band, when, from how much, how sure."""
+    evidence = json.loads(finding["evidence_json"] or "{}")
+    found = [("Where", _where(finding)), ("It is fixed to", _locked(finding, evidence))]
+    if finding["band_low_hz"] is not None and finding["verdict"] not in ("none", "numerics"):
+        found.append(("Band", f"{finding['band_low_hz']:.0f} to {finding['band_high_hz']:.0f} Hz"))
+    if finding["wheel_within_m"] is not None and finding["verdict"] not in ("none", "numerics"):
+        found.append(
+            ("When", f"four fifths of it while a wheel is within {finding['wheel_within_m']:.1f} m of the sensor")
+        )
+    if words := _conditions(evidence):
+        found.append(("Shows most in", words))
+    found.append(("From", _amount(finding)))
+    found.append(("How sure", _sure(finding, evidence)))
+    return [(question, answer) for question, answer in found if answer]
+
+
+def _where(finding):
+    if finding["position_m"] is not None:
+        error = finding["position_se_m"]
+        return f"{finding['position_m']:.1f} m" + (f" ± {Z95 * error:.2f} m" if error else "") + " from the switch toe"
+    if finding["channel"]:
+        return f"sensor {finding['channel']}"
+    if finding["verdict"] in ("named", "a_or_b"):
+        return "everywhere among these sensors"
+    return f"somewhere in {finding['place_low_m']:.1f} to {finding['place_high_m']:.1f} m"
+
+
+def _locked(finding, evidence):
+    """What the residual moves with: the significant frames, strongest first."""
+    if finding["train"]:
+        return f"the train: {finding['train']}"
+    frames = [f for f in evidence.get("frames", ()) if f["q"] is not None and f["q"] < 0.05]
+    words = [
+        f"{f['frame']} {f['level']} ({f['effect_db']:+.1f} dB, q = {f['q']:.3f}, n = {f['n']})" for f in frames[:3]
+    ]
+    if finding["locked_to"] and not words:
+        return finding["locked_to"]
+    return "; ".join(words) or "nothing in particular"
+
+
+def _conditions(evidence):
+    gains = sorted(((v or 0.0, k) for k, v in evidence.get("by_condition", {}).items()), reverse=True)
+    return ", ".join(f"{k} ({v:+.0f} nats)" for v, k in gains[:3] if v > 0.0)
+
+
+def _amount(finding):
+    parts = [
+        (finding["n_hammer_tests"], "hammer test"),
+        (finding["n_passages"], "passage"),
+        (finding["n_sensors"], "installed sensor"),
+    ]
+    return ", ".join(f"{n} {what}{'s' if n != 1 else ''}" for n, what in parts)
+
+
+def _sure(finding, evidence):
+    words = f"probability {finding['probability']:.2f}" if finding["probability"] is not None else ""
+    if finding["grade"] == "A":
+        words += "; with it the recordings are predicted as well as a sound turnout's"
+    if finding["grade"] == "B":
+        words += "; some structure is left, its shape is not resolved"
+    if evidence.get("reason"):
+        words += f"; {evidence['reason']}"
+    return words
+
+
+def answer(finding) -> str:
+    """The verdict in a few words."""
+    said = ANSWERS[finding["verdict"]]
+    return f"{said}, grade {finding['grade']}" if finding["grade"] else said
+
+
+def check(finding) -> str:
+    """What to do on site, a sentence."""
+    if finding["verdict"] == "none":
+        return "Nothing to check."
+    if finding["verdict"] == "numerics":
+        return "Nothing on site: refine mesh and step of the simulation."
+    said = finding["next_measurement"] or "Look at the place; repeat the measurement"
+    return said.rstrip(".") + "."
+
+
+def rivals(finding) -> list[dict]:
+    """What else was tried: name, nats gained on what was left out of the fit, share of the excess explained."""
+    evidence = json.loads(finding["evidence_json"] or "{}")
+    return [
+        {
+            "name": r["family"].replace("_", " "),
+            "nats": f"{r['nats']:+.0f}" if r["nats"] is not None else "–",
+            "explained": f"{100 * r['explained']:.0f} %" if r["explained"] is not None else "–",
+        }
+        for r in evidence.get("ranking", ())
+    ]

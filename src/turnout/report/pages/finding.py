@@ -1,0 +1,75 @@
+"""The page of a turnout's mismatches: understood in one minute, evidence below."""
+
+from turnout.report.finding_words import answer, check, facts, headline, parameters, rivals
+from turnout.report.panels.finding_curves import curve_panel, fit_panel, history_of_parameter
+from turnout.report.panels.finding_place import place_panel
+from turnout.report.words import day
+
+GRAVITY = ("named", "a_or_b", "unknown", "numerics", "none")
+BADGES = {"named": "inspect", "a_or_b": "plan", "unknown": "plan", "numerics": "learning", "none": "ok"}
+
+
+def finding_page(turnout, rows, template, shared):
+    """HTML of one turnout's diagnosis.
+
+    ``turnout`` is its row of ``turnouts``; ``rows`` maps "sections", "mismatch_findings" (of one visit),
+    "mismatch_curves", "mismatch_parameters" (of all visits) and "quarantine" to its rows.
+    """
+    findings = sorted(rows["mismatch_findings"], key=_order)
+    first = findings[0] if findings else None
+    return template.render(
+        turnout=turnout,
+        visit=first["visit"] if first else "",
+        newest=day(max((f["found_at_utc"] for f in findings), default=None)),
+        drawing=place_panel(rows["sections"], findings, first) if findings else "",
+        findings=[_finding(f, rows, k) for k, f in enumerate(findings)],
+        silent=[q for q in rows["quarantine"] if q["stage"] == "mismatch"],
+        notes=list(dict.fromkeys(n for f in findings for n in (f["notes"] or "").splitlines())),
+        **shared,
+    )
+
+
+def _order(finding):
+    return GRAVITY.index(finding["verdict"]), -(finding["probability"] or 0.0), finding["place_low_m"] or 0.0
+
+
+def _finding(finding, rows, number):
+    curves = [c for c in rows["mismatch_curves"] if c["finding_id"] == finding["finding_id"]]
+    changed = finding["term_json"] is not None
+    drawn = [(c["curve"], curve_panel(c, changed)) for c in sorted(curves, key=lambda c: c["curve_no"])]
+    return {
+        "number": number,
+        "id": finding["finding_id"][:12],
+        "sections": finding["sections"],
+        "headline": headline(finding),
+        "badge": BADGES[finding["verdict"]],
+        "answer": answer(finding),
+        "quiet": finding["verdict"] == "none",
+        "acceptable": finding["term_json"] is not None,
+        "facts": facts(finding),
+        "check": check(finding),
+        "parameters": parameters(finding),
+        "accepted": [p for p in _of(rows, finding) if p["accepted"]],
+        "rivals": rivals(finding),
+        "wide": "".join(svg for curve, svg in drawn if curve == "waveform"),
+        "panels": "".join([*(svg for curve, svg in drawn if curve != "waveform"), fit_panel(finding)]),
+        "history": "".join(_histories(rows, finding)),
+    }
+
+
+def _of(rows, finding):
+    return [p for p in rows["mismatch_parameters"] if p["finding_id"] == finding["finding_id"]]
+
+
+def _histories(rows, finding):
+    """A chart for each parameter of this finding that earlier visits know, too."""
+    for own in _of(rows, finding):
+        same = [p for p in rows["mismatch_parameters"] if _same(p, own)]
+        yield history_of_parameter(sorted(same, key=lambda p: p["found_at_utc"]))
+
+
+def _same(a, b):
+    near = a["position_m"] == b["position_m"] or (
+        None not in (a["position_m"], b["position_m"]) and abs(a["position_m"] - b["position_m"]) < 0.35
+    )
+    return near and all(a[k] == b[k] for k in ("term", "parameter", "channel"))

@@ -1,0 +1,125 @@
+"""Measured against simulated, before and after: waveform, spectrum, receptance, missing force."""
+
+import numpy as np
+
+from turnout.report.chart import Axis, Chart
+
+TITLES = {
+    "waveform": "Waveform",
+    "spectrum": "Power spectral density",
+    "receptance": "Receptance",
+    "latent": "The missing force",
+}
+WIDE = 944
+
+
+def curve_panel(row, changed=True):
+    """One row of ``mismatch_curves``; ``changed``: a term was found, so that there is an after."""
+    if row["curve"] == "latent":
+        return _latent(row)
+    x = np.asarray(row["x"], dtype=float)
+    names = ["measured", "before"] + (["after"] if changed else [])
+    values = {name: np.asarray(row[name], dtype=float) for name in names}
+    log = row["curve"] != "waveform"
+    chart = Chart(_across(row, x, log), _up(row, values, log), _title(row),
+                  width=WIDE if row["curve"] == "waveform" else 462, height=250)  # fmt: skip
+    words = {"measured": "measured", "before": "simulated before", "after": "simulated with what was left out"}
+    for name in names:
+        chart.line(x, values[name], f"curve-{name}", words[name])
+    _key(chart, names, words)
+    return chart.svg()
+
+
+def _title(row):
+    label = row["label"] if row["curve"] == "waveform" else row["label"].partition(",")[0]
+    return f"{TITLES[row['curve']]}: {label}"
+
+
+def _across(row, x, log):
+    label = f"{row['x_label']} [{row['x_unit']}]" if row["x_unit"] else row["x_label"]
+    return Axis(float(x.min()), float(x.max()), label, "log" if log else "linear")
+
+
+def _up(row, values, log):
+    """Axis that holds what was measured and, as far as it is near, what was simulated."""
+    every = np.concatenate([v[np.isfinite(v)] for v in values.values()])
+    label = {"waveform": "acceleration", "spectrum": "PSD", "receptance": "receptance"}[row["curve"]]
+    if log:
+        every = every[every > 0.0]
+        top = float(values["measured"].max())
+        low = max(float(every.min()), 1e-5 * top)
+        return Axis(low / 1.3, float(every.max()) * 3.0, f"{label} [{row['y_unit']}]", "log")
+    reach = float(np.max(np.abs(every))) * 1.25
+    return Axis(-reach, reach, f"{label} [{row['y_unit']}]")
+
+
+def _key(chart, names, words):
+    """Which line is which, in a row at the head of the panel."""
+    x = 0.01
+    for name in names:
+        chart.text(x, 0.06, words[name], f"key-{name}")
+        x += (6.2 * len(words[name]) + 16) / (chart.width - 76)
+
+
+def _latent(row):
+    """Mean missing force with its 95 % limits over the covariate that explains most."""
+    x, mean = np.asarray(row["x"], dtype=float), np.asarray(row["measured"], dtype=float)
+    low, high = np.asarray(row["before"], dtype=float), np.asarray(row["after"], dtype=float)
+    pad = 0.1 * float(np.ptp(np.concatenate([low, high]))) or 1.0
+    chart = Chart(
+        Axis(float(x.min()), float(x.max()), row["x_label"]),
+        Axis(float(low.min()) - pad, float(high.max()) + pad, f"force [{row['y_unit']}]"),
+        row["label"][:1].upper() + row["label"][1:],
+        height=250,
+    )
+    chart.band(x, low, high, "interval", "95 % limits")
+    chart.points(x, mean, "point", 2.5, low, high)
+    return chart.svg()
+
+
+def fit_panel(finding):
+    """Bars of the fit on recordings never used: before, with the term, best rival, decoy; "" without any."""
+    entries = [
+        ("before", finding["fit_before_pct"], "bar-before"),
+        ("with it", finding["fit_after_pct"], "bar-after"),
+        ("best rival", finding["fit_rival_pct"], "bar-rival"),
+        ("decoy", finding["fit_decoy_pct"], "bar-rival"),
+    ]
+    entries = [e for e in entries if e[1] is not None]
+    if not entries or not finding["n_held_out"]:
+        return ""
+    low = min(0.0, *(max(e[1], -100.0) for e in entries))
+    chart = Chart(
+        Axis(0.4, len(entries) + 0.6, "", "names", tuple(e[0] for e in entries)),
+        Axis(low, 100.0, "fit [%]"),
+        f"Fit on recordings never used, n = {finding['n_held_out']}",
+        height=250,
+    )
+    for k, (_, value, style) in enumerate(entries, start=1):
+        top, zero = float(chart.py(max(value, low))), float(chart.py(0.0))
+        x = float(chart.px(k))
+        chart.parts.append(
+            f'<rect class="{style}" x="{x - 26:.1f}" y="{min(top, zero):.1f}" width="52" '
+            f'height="{abs(zero - top):.1f}"/><text class="place" x="{x:.1f}" y="{min(top, zero) - 5:.1f}" '
+            f'text-anchor="middle">{value:.0f} %</text>'
+        )
+    return chart.svg()
+
+
+def history_of_parameter(rows):
+    """A parameter over the visits with its 95 % intervals; rows of ``mismatch_parameters``, oldest first."""
+    if len(rows) < 2:
+        return ""
+    seconds = [r["found_at_utc"].timestamp() for r in rows]
+    values = [r["value"] for r in rows]
+    low = [r["value"] if r["value_low"] is None else r["value_low"] for r in rows]
+    high = [r["value"] if r["value_high"] is None else r["value_high"] for r in rows]
+    span, pad = max(seconds) - min(seconds), 0.1 * (max(high) - min(low)) or 1.0
+    name = f"{rows[0]['term'].replace('_', ' ')}, {rows[0]['parameter']}"
+    chart = Chart(
+        Axis(min(seconds) - 0.05 * span - 86400, max(seconds) + 0.05 * span + 86400, "", "time"),
+        Axis(min([*low, 0.0]) - pad, max(high) + pad, f"{rows[0]['parameter']} [{rows[0]['unit']}]"),
+        f"{name}: {len(rows)} visits",
+    )
+    chart.points(np.array(seconds), np.array(values), "point", 3.0, np.array(low), np.array(high))
+    return chart.svg()

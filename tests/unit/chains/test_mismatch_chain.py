@@ -1,0 +1,249 @@
+"""From the files of a turnout to findings: what is found, what is accepted, what is said where little can be said."""
+
+import json
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+import small_turnout as small
+
+from turnout import physics
+from turnout.chains import mismatch
+from turnout.chains.accept import accept
+from turnout.chains.guided_case import BudgetSpentError
+from turnout.chains.mismatch_context import track_of
+from turnout.chains.mismatch_results import Results, diagnose_turnout
+from turnout.cli import main
+from turnout.config import load_configuration
+from turnout.errors import SimulationError
+from turnout.mismatch.track import TrackCase
+
+SOFT = 0.3
+
+
+def soft_ballast(track):
+    """Ballast with 0.3 of its stiffness under the sleeper at section A."""
+    return (physics.LocalBallast(track.nearest_support(small.SLEEPER), SOFT),)
+
+
+@pytest.fixture
+def folder(tmp_path, repository, monkeypatch):
+    """An empty turnout, and few families, so that a diagnosis takes a second."""
+    small.lay_out(tmp_path, repository)
+    monkeypatch.chdir(tmp_path)
+    families = ("local_ballast", "local_pad", "sensor_gain")
+    monkeypatch.setattr(mismatch, "TrackCase", partial(TrackCase, families=families))
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def blows(tmp_path_factory, repository):
+    """Blows on a turnout whose ballast is soft under one sleeper; tests copy them."""
+    made = tmp_path_factory.mktemp("blows")
+    small.lay_out(made, repository)
+    small.strike(made, soft_ballast)
+    return made / "raw"
+
+
+@pytest.fixture
+def soft(folder, blows):
+    import shutil
+
+    shutil.copytree(blows, folder / "raw")
+    return folder
+
+
+def said(tables):
+    """All that was said of what was not used."""
+    notes = [n for f in tables["mismatch_findings"] for n in (f["notes"] or "").splitlines()]
+    return "\n".join([*notes, *(q["found"] for q in tables["quarantine"])])
+
+
+def test_blows_alone_name_the_soft_ballast_at_its_sleeper(soft):
+    tables = diagnose_turnout("t1")
+    (row,) = tables["mismatch_findings"]
+    assert (row["verdict"], row["term"], row["position_m"]) == ("named", "local_ballast", 18.0)
+    assert row["sections"] == "A, B" and row["visit"] == "2026-07-25"
+    assert "18.0 m" in row["sentence"] and row["next_measurement"]
+    assert row["n_passages"] == 0 and row["n_hammer_tests"] == 2
+    (parameter,) = tables["mismatch_parameters"]
+    # true 0.3; blows on two sleepers leave the factor open by a fifth
+    assert parameter["value_low"] < SOFT + 0.1 and parameter["value_low"] < parameter["value"] < parameter["value_high"]
+    curve = next(c for c in tables["mismatch_curves"] if c["curve"] == "receptance")
+    better = np.abs(np.log(curve["after"] / curve["measured"])) < np.abs(np.log(curve["before"] / curve["measured"]))
+    assert better.mean() > 0.5
+
+
+def test_what_was_accepted_is_simulated_and_not_found_again(soft, capsys):
+    assert main(["diagnose", "--turnout", "t1"]) == 0
+    assert (soft / "results/pages/findings/t1.html").is_file()
+    assert main(["diagnose", "--turnout", "t1", "--accept"]) == 0
+    assert "local_ballast" in capsys.readouterr().out
+    turnout = load_configuration("config").turnout("t1")
+    _, (accepted,) = track_of(turnout)
+    assert (accepted.family, accepted.place) == ("local_ballast", 18.0)
+    text = (soft / "config/tracks/t1.yaml").read_text()
+    assert "extends: small" in text and "2026-07-25" in text and "95 %:" in text and "grade A" in text
+    tables = diagnose_turnout("t1")
+    (row,) = tables["mismatch_findings"]
+    assert row["verdict"] == "none" and row["term"] is None
+    (parameter,) = tables["mismatch_parameters"]
+    assert parameter["accepted"] and parameter["term"] == "local_ballast" and parameter["value"] < 0.7
+
+
+def test_the_simulated_file_holds_the_accepted_effect(soft):
+    """The file that `turnout simulate` writes is the recording of the track with the term, and not the one without."""
+    from turnout.chains.simulate import COMMON, write_hammer
+    from turnout.readers import read
+
+    turnout = load_configuration("config").turnout("t1")
+    Results("work", "t1").keep(diagnose_turnout("t1"))
+    request = COMMON | {"track": None, "turnout": "t1", "section": "A", "seed": 1, "tests": 1, "blows": 1}
+    request |= {"at": "2026-07-26T09:00:00", "config": "config"}
+    recorded = []
+    for name in ("before.h5", "after.h5"):
+        list(write_hammer(request | {"out": name}))
+        recorded.append(read(name, ".", turnout.hammer.descriptions["A"]).recordings[0].signal("rail"))
+        if name == "before.h5":
+            accept(Results("work", "t1").finding(), "config", "t1")
+    change = np.abs(recorded[1] - recorded[0]).max() / np.abs(recorded[0]).max()
+    assert change > 0.02
+
+
+def test_a_spent_budget_keeps_what_is_done(soft):
+    class Bar:
+        def __init__(self):
+            self.fits, self.groups = [], []
+
+        def group(self, group, number, count):
+            self.groups.append((group.labels, number, count))
+            return lambda done, total, what: self.fits.append((done, total))
+
+        def simulations(self, count):
+            self.count = count
+
+    with pytest.raises(BudgetSpentError, match="goes on from there"):
+        diagnose_turnout("t1", budget=0.0)
+    whole, again = Bar(), Bar()
+    first = diagnose_turnout("t1", bar=whole)
+    assert whole.groups == [(("A", "B"), 0, 1)] and whole.fits[-1][0] == whole.fits[-1][1] and whole.count > 3
+    second = diagnose_turnout("t1", bar=again)
+    assert second["mismatch_findings"] == first["mismatch_findings"] and not again.fits
+
+
+def test_only_some_sections_can_be_asked_for(soft):
+    (row,) = diagnose_turnout("t1", sections=("B",))["mismatch_findings"]
+    assert row["sections"] == "B" and row["section_id"] == "t1/B"
+    with pytest.raises(SimulationError, match="no section C"):
+        diagnose_turnout("t1", sections=("C",))
+    with pytest.raises(SimulationError, match="no visit '2026-01-01'"):
+        diagnose_turnout("t1", visit="2026-01-01")
+
+
+# Bad input: each gives what can still be said, or says why nothing can.
+
+
+def test_no_recording_at_all_is_said(folder, capsys):
+    assert main(["diagnose", "--turnout", "t1"]) == 2
+    assert "no hammer test and no passage" in capsys.readouterr().err
+
+
+def test_no_hammer_test_and_one_train_give_a_finding_without_held_out_recordings(folder):
+    small.roll(folder, speeds=(100.0,))
+    (row,) = diagnose_turnout("t1")["mismatch_findings"]
+    assert row["verdict"] in ("none", "named", "a_or_b", "unknown", "numerics")
+    assert (row["n_hammer_tests"], row["n_passages"], row["n_held_out"], row["fit_before_pct"]) == (0, 1, 0, None)
+
+
+def test_one_sensor_alone_gives_a_finding(folder):
+    def one(recording):
+        dead = recording.samples.copy()
+        dead[1] = 0.0
+        return replace(recording, samples=dead)
+
+    small.roll(folder, speeds=(100.0,), change=one)
+    tables = diagnose_turnout("t1")
+    assert "channel 'B'" in said(tables) and "dead" in said(tables)
+    assert [f["n_sensors"] for f in tables["mismatch_findings"]] == [1]
+
+
+def test_a_wrong_vehicle_file_is_told_by_its_axles(soft):
+    small.roll(soft, speeds=(100.0,), change=lambda r: replace(r, conditions={**r.conditions, "train_type": "ic3"}))
+    tables = diagnose_turnout("t1")
+    assert "4 axles heard, 8 in ic3.yaml: wrong vehicle file" in said(tables)
+    assert [f["n_passages"] for f in tables["mismatch_findings"]] == [0]
+
+
+def test_a_vehicle_without_a_file_is_said(soft):
+    small.roll(soft, speeds=(100.0,), change=lambda r: replace(r, conditions={**r.conditions, "train_type": "tgv"}))
+    assert "type tgv: no file config/vehicles/tgv.yaml" in said(diagnose_turnout("t1"))
+
+
+def test_a_wrong_layout_is_told_by_the_track_file(soft):
+    layout = soft / "config/layouts/small.yaml"
+    layout.write_text(layout.read_text().replace("position: 18.0", "position: 22.0"))
+    tables = diagnose_turnout("t1")
+    assert "section A: 22.0 m in the layout, 18.0 m in the track's file" in said(tables)
+    assert [f["sections"] for f in tables["mismatch_findings"]] == ["B"]
+
+
+def test_a_recording_from_another_turnout_is_not_used(soft):
+    """Its sensors lie three times as far apart: the axles come at times that no known train has."""
+    near = dict(small.PLACES)
+    small.PLACES["B"] = 19.8
+    try:
+        small.roll(soft, speeds=(60.0,), change=_called("locomotive"))
+    finally:
+        small.PLACES.update(near)
+    tables = diagnose_turnout("t1")
+    assert "wrong vehicle file" in said(tables) and "other sensors" in said(tables)
+    (row,) = tables["mismatch_findings"]
+    assert (row["n_hammer_tests"], row["n_passages"]) == (2, 0)
+
+
+def _called(name):
+    return lambda r: replace(r, conditions={"train_type": name})
+
+
+def test_channels_clipped_throughout_are_left_out(soft):
+    def clipped(recording):
+        return replace(recording, samples=np.clip(recording.samples, -0.5, 0.5))
+
+    layout = soft / "config/layouts/small.yaml"
+    layout.write_text(layout.read_text().replace("limit: 500", "limit: 0.5"))
+    small.roll(soft, speeds=(100.0,), change=clipped)
+    tables = diagnose_turnout("t1")
+    assert "clipped" in said(tables)
+    assert tables["mismatch_findings"][0]["n_passages"] == 0
+
+
+def test_a_file_that_cannot_be_read_is_said(soft):
+    (soft / "raw/t1/hammer/2026-07-25/B_1.h5").write_bytes(b"nothing")
+    tables = diagnose_turnout("t1")
+    assert "B_1.h5" in said(tables) and tables["mismatch_findings"][0]["n_hammer_tests"] == 1
+
+
+def test_a_turnout_without_a_track_is_said(soft, capsys):
+    (soft / "config/tracks/small.yaml").unlink()
+    assert main(["diagnose", "--turnout", "t1"]) == 2
+    assert "a diagnosis needs a track to simulate" in capsys.readouterr().err
+
+
+def test_the_rows_fit_the_registry(soft, tmp_path):
+    from turnout.fleet.batches import UnitResult, read_results, write_batch
+    from turnout.registry.database import open_registry
+    from turnout.registry.register import register
+
+    tables = diagnose_turnout("t1")
+    batch = write_batch(
+        tmp_path / "b", [UnitResult("t1/mismatch/2026-07-25", "t1", "mismatch", "k", "1", "ok", tables)]
+    )
+    done = register([batch], tmp_path / "registry", read=read_results)
+    assert done.n_refused == 0
+    with open_registry(tmp_path / "registry") as connection:
+        (found,) = connection.execute("select verdict, term, term_json from findings_newest").fetchall()
+        assert found[:2] == ("named", "local_ballast") and json.loads(found[2])[0]["fixed"] == {"sleeper": 18.0}
+        assert connection.execute("select count(*) from mismatch_curves").fetchall() == [
+            (len(tables["mismatch_curves"]),)
+        ]
