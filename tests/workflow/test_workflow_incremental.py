@@ -6,6 +6,8 @@ import re
 import pytest
 import toy_fleet as toy
 
+from turnout.registry.database import open_registry
+
 SHARDS = 3
 
 
@@ -24,6 +26,12 @@ def said(done):
     """Sums over the shards of what their summary lines say."""
     lines = re.findall(r"^hammer \d+of\d+: (\d+) known, (\d+) processed, (\d+) quarantined", done.stdout, re.M)
     return dict(zip(("known", "processed", "quarantined"), (sum(map(int, column)) for column in zip(*lines))))
+
+
+def test_the_registry_says_when_the_run_began(fleet):
+    with open_registry(fleet / "results/registry") as connection:
+        ((began, ended),) = connection.execute("select started_at_utc, ended_at_utc from runs").fetchall()
+    assert began.isoformat() == (fleet / "work/launched").read_text() and began <= ended
 
 
 def test_a_second_run_does_nothing(fleet):

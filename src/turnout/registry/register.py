@@ -3,7 +3,7 @@
 import gc
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import contextmanager
-from datetime import datetime
+from datetime import UTC, datetime
 from os import PathLike, fspath
 from pathlib import Path
 
@@ -41,7 +41,7 @@ def register(
         Rows that come from no recording. turnouts, sections, events, campaigns, acknowledgements are replaced
         whole; of other tables, what an earlier call gave and this one does not is superseded.
     config_hash, code_version, started_at
-        Noted in ``runs``.
+        Noted in ``runs``; by default the run began with this call. [UTC, naive]
     patience : float
         How long to wait for another run that holds the registry. [s]
 
@@ -50,7 +50,7 @@ def register(
     RegistryError
         Locked, disk full, no permission, or made by another version: nothing was changed.
     """
-    root = Path(registry_dir)
+    root, began = Path(registry_dir), started_at or datetime.now(UTC).replace(tzinfo=None)
     with locked(root, patience):
         before = load(root)
         check_schemas(before)
@@ -65,7 +65,7 @@ def register(
         registration.replace_whole(tables or {})
         registration.take(of_tables(tables or {}, count))
         consumed = [t for t, p in zip(tokens, batches) if fspath(p) not in faults]
-        about = {"code_version": code_version, "config_hash": config_hash, "started_at_utc": started_at}
+        about = {"code_version": code_version, "config_hash": config_hash, "started_at_utc": began}
         return registration.finish(consumed, faults, about)
 
 

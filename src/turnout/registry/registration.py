@@ -154,7 +154,6 @@ class Registration:
             "run_id": run_id, "ended_at_utc": datetime.now(UTC).replace(tzinfo=None), "host": platform.node(),
             "n_ok": len(self.result_ids) - self.n_bad, "n_quarantined": self.n_bad,
         }  # fmt: skip
-        row.setdefault("started_at_utc", None)
         columns = ", ".join(row)
         marks = ", ".join("?" for _ in row)
         self.con.execute(f"insert into new_runs ({columns}, _year) values ({marks}, 0)", list(row.values()))

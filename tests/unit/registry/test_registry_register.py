@@ -3,6 +3,7 @@
 import random
 import subprocess
 import sys
+from datetime import UTC, datetime
 
 import duckdb
 import pytest
@@ -118,6 +119,14 @@ def test_a_configuration_taken_back_makes_the_old_model_count_again(bench, hamme
     fourth = bench.register(hammer(frequency=151.0, key="k2"))
     assert bench.ask("select frequency_hz from modes_current") == [(151.0,)]
     assert len({r for (r,) in bench.ask("select run_id from runs")}) == 4 and "modes" not in fourth.rows
+
+
+def test_a_run_says_when_it_began_and_ended(bench, hammer):
+    before = datetime.now(UTC).replace(tzinfo=None)
+    bench.register(hammer(key="k1"))
+    bench.register(hammer(key="k2"), started_at=datetime(2024, 5, 13, 2, 0))
+    (told, _), (began, ended) = bench.ask("select started_at_utc, ended_at_utc from runs order by all")
+    assert told == datetime(2024, 5, 13, 2, 0) and before <= began <= ended
 
 
 def test_a_repaired_file_leaves_quarantine(bench, hammer, quarantined):
