@@ -5,6 +5,7 @@ from concurrent.futures import ProcessPoolExecutor
 
 from turnout.errors import RegistryError
 from turnout.registry.database import open_registry
+from turnout.report.findings import write_finding_pages
 from turnout.report.write import AT_ONCE, write_pages, write_turnouts
 
 
@@ -21,6 +22,7 @@ def report_job(registry, pages, turnouts=None, log=None, threads=1) -> int:
 
         many = elsewhere if threads > 1 and known > AT_ONCE else None
         n = write_pages(connection, pages, generation, turnouts or None, log is None, many)
+        write_finding_pages(connection, pages, generation, turnouts or None)
     if log is not None:
         with open(log, "w") as file:
             file.write(f"{n} pages of generation {generation} written, {known + 1 - n} had not changed\n")
