@@ -2,6 +2,8 @@
 
 from collections import defaultdict
 
+from turnout.report.trains import train_rows
+
 # One row per section of the newest model, whatever it says.
 NEWEST = "qualify row_number() over (partition by section_id order by measured_at_utc desc, model_id) = 1"
 OF_SOME = "turnout_id in (select unnest($turnouts))"
@@ -23,16 +25,12 @@ ROWS = {
             select section_id, max(campaign_id) as campaign_id from impacts_current where {OF_SOME} group by section_id
         ) newest using (section_id, campaign_id)
         order by i.section_id, i.test, i.record""",
-    "passages": f"""
-        select * from passages_current where {OF_SOME}
-        qualify row_number() over (partition by turnout_id order by passed_at_utc desc) <= 15
-        order by passed_at_utc desc""",
-    "scores": f"select * from passage_scores where {OF_SOME}",
     "quarantine": f"select * from quarantine_open where {OF_SOME} order by path, record",
     "charts": f"""
         select turnout_id, section_id, band, measured_at_utc, expected_low_hz, expected_high_hz, state
         from charts where source = 'hammer' and {OF_SOME} order by section_id, band, measured_at_utc""",
     "chart_states": f"select * from chart_states where {OF_SOME}",
+    "mismatches": f"select * from findings_newest where {OF_SOME} and verdict <> 'none' order by level_before desc",
     "worklist": f"select * from worklist where {OF_SOME} order by rank",
 }
 TURNOUTS = f"""
@@ -95,6 +93,7 @@ class FleetSource:
         chosen = {"turnouts": list(turnout_ids)}
         kinds = [kind for kind in ROWS if self.has(kind)]
         rows = {kind: _by_turnout(self._fetch(ROWS[kind], chosen)) for kind in kinds if kind != "receptances"}
+        rows |= train_rows(self._fetch, turnout_ids)
         return rows | {"receptances": _by_turnout(self._arrays(ROWS["receptances"], chosen))}
 
     def _arrays(self, sql, parameters):

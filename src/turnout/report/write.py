@@ -65,7 +65,7 @@ def write_turnouts(connection, folder, content, generation="", progress=False):
             some = names[start : start + AT_ONCE]
             rows = source.of_some(some)
             for name in some:
-                own = {kind: rows[kind].get(name, []) if kind in rows else [] for kind in ROWS}
+                own = {kind: rows[kind].get(name, []) if kind in rows else [] for kind in {*ROWS, *rows}}
                 mark = {"mark": MARK.format(content[name])}
                 text = turnout_page(own, own["turnouts"][0], template, shared | mark)
                 _replace(Path(folder) / "turnouts" / f"{name}.html", text)

@@ -1,6 +1,7 @@
 -- One row per passage, sensor and score (fit, forecast): what its train type, speed and axle load each contribute.
 -- Least squares with a level per train type and slopes in speed and axle load, per section: the ground of fit_effects
 -- and fit_adjusted. Where a fifth of the loads is missing they are left out, and the speed stands for them.
+-- Windows only, no part twice: a condition on turnout_id or section_id reaches the files.
 -- needs: passage_scores
 create or replace view fit_residuals as
 with measured as (
@@ -24,16 +25,18 @@ centred as (
         case when loads_known then axle_load_t - avg(axle_load_t) over type else 0 end as p, value_pct - type_pct as y
     from used window type as (partition by turnout_id, section_id, score, train_type)
 ),
-sums as (
+summed as (
     select
-        turnout_id, section_id, score, count(*) as n, count(distinct train_type) as n_types,
-        sum(v * v) as vv, sum(v * p) as vp, sum(p * p) as pp, sum(v * y) as vy, sum(p * y) as py,
-        avg(speed_kmh) as mean_speed, avg(axle_load_t) as mean_load, avg(value_pct) as mean_pct,
+        *, count(*) over place as n, count(distinct train_type) over place as n_types,
+        sum(v * v) over place as vv, sum(v * p) over place as vp, sum(p * p) over place as pp,
+        sum(v * y) over place as vy, sum(p * y) over place as py,
+        avg(speed_kmh) over place as mean_speed, avg(axle_load_t) over place as mean_load,
+        avg(value_pct) over place as mean_pct,
         -- a factor that the others determine to 99 % says nothing by itself
-        vv > 0.01 * count(*) * var_pop(speed_kmh / 10) as speed_varies,
-        coalesce(pp > 0.01 * count(*) * var_pop(axle_load_t), false) as load_varies,
+        vv > 0.01 * n * var_pop(speed_kmh / 10) over place as speed_varies,
+        coalesce(pp > 0.01 * n * var_pop(axle_load_t) over place, false) as load_varies,
         vp * vp < 0.99 * vv * pp or vv * pp = 0 as apart
-    from centred group by turnout_id, section_id, score
+    from centred window place as (partition by turnout_id, section_id, score)
 ),
 solved as (
     select
@@ -43,17 +46,16 @@ solved as (
         case when det is not null then vv / det when has_load then 1 / pp else 0 end as i_pp,
         case when det is not null then -vp / det else 0 end as i_vp,
         i_vv * vy + i_vp * py as per_speed, i_vp * vy + i_pp * py as per_load
-    from sums
+    from summed
 )
 select
-    c.turnout_id, c.section_id, c.score, c.passage_id, c.train_type, c.speed_kmh, c.axle_load_t, c.value_pct, c.null_pct,
-    s.n, s.n_types, s.has_speed, s.has_load, s.per_speed, s.per_load, s.i_vv, s.i_vp, s.i_pp, c.v, c.p,
-    c.type_pct - s.per_speed * (c.speed_kmh - 10 * c.v - s.mean_speed) / 10
-        - coalesce(s.per_load * (c.axle_load_t - c.p - s.mean_load), 0) as of_type_pct,
-    s.mean_pct + s.per_speed * (c.speed_kmh - s.mean_speed) / 10 as of_speed_pct,
-    s.mean_pct + coalesce(s.per_load * (c.axle_load_t - s.mean_load), 0) as of_load_pct,
-    c.y - s.per_speed * c.v - s.per_load * c.p as residual_pct,
-    -- what it would be without this passage (HC3)
-    residual_pct
-        / (1 - least(1.0 / c.n_type + s.i_vv * c.v * c.v + 2 * s.i_vp * c.v * c.p + s.i_pp * c.p * c.p, 0.999)) as left_out_pct
-from centred c join solved s using (turnout_id, section_id, score);
+    turnout_id, section_id, score, passage_id, train_type, speed_kmh, axle_load_t, value_pct, null_pct,
+    n, n_types, has_speed, has_load, per_speed, per_load, i_vv, i_vp, i_pp, v, p,
+    type_pct - per_speed * (speed_kmh - 10 * v - mean_speed) / 10
+        - coalesce(per_load * (axle_load_t - p - mean_load), 0) as of_type_pct,
+    mean_pct + per_speed * (speed_kmh - mean_speed) / 10 as of_speed_pct,
+    mean_pct + coalesce(per_load * (axle_load_t - mean_load), 0) as of_load_pct,
+    y - per_speed * v - per_load * p as residual_pct,
+    -- what it would be had this passage not been fitted (HC3)
+    residual_pct / (1 - least(1.0 / n_type + i_vv * v * v + 2 * i_vp * v * p + i_pp * p * p, 0.999)) as left_out_pct
+from solved;

@@ -1,14 +1,12 @@
 """The page of one turnout: where it stands, how its resonances moved, and the evidence behind the latest values."""
 
-from collections import Counter
-
 from turnout.report.panels.decay import decay_panel
 from turnout.report.panels.diagram import diagram
 from turnout.report.panels.history import history_panel
 from turnout.report.panels.impacts import impacts_panel
 from turnout.report.panels.receptance import coherence_panel, receptance_panel
-from turnout.report.panels.scores import scores_panel
 from turnout.report.panels.stabilisation import stabilisation_panel
+from turnout.report.trains import trains_part
 from turnout.report.words import badge, day, with_interval
 
 BANDS = ("ballast", "railpad")
@@ -35,11 +33,10 @@ def turnout_page(rows, turnout, template, shared):
         latest=day(max((m["measured_at_utc"] for m in models.values()), default=None)),
         diagram=diagram(rows["sections"], states) if rows["sections"] else "",
         findings=[_finding(w) for w in rows["worklist"]],
+        mismatches=[m["sentence"] for m in rows["mismatches"]],
         summary=[_summary(s, models.get(s["section_id"]), _of(rows, "modes", s)) for s in rows["sections"]],
         sections=[_section(rows, s, models, states) for s in rows["sections"]],
-        trains=[_train(p) for p in rows["passages"]],
-        scores="".join(scores_panel(score, rows["scores"], rows["sections"]) for score in ("fit", "forecast")),
-        findings_of_scores=_score_words(rows["scores"]),
+        part=trains_part(rows, rows["sections"]),
         quarantine=rows["quarantine"],
         events=[_event(e) for e in rows["events"]],
         **shared,
@@ -129,42 +126,6 @@ def _worst_states(charts):
             known = worst.get(chart["section_id"], "ok")
             worst[chart["section_id"]] = min(known, chart["state"], key=order.index)
     return worst
-
-
-def _train(passage):
-    """One passage in words."""
-    speed, error = passage["speed_kmh"], passage["speed_se_kmh"]
-    load, load_error = passage["axle_load_t"], passage["axle_load_se_t"]
-    said = {"speed": passage["speed_listed_kmh"], "type": passage["train_type_listed"]}
-    return {
-        "when": f"{passage['passed_at_utc']:%Y-%m-%d %H:%M}",
-        "type": passage["train_type"] or "unknown",
-        "listed": ", ".join(f"{v:g} km/h" if k == "speed" else v for k, v in said.items() if v) or "–",
-        "axles": passage["n_axles"] or "–",
-        "speed": "–" if speed is None else f"{speed:.1f} ± {'?' if error is None else f'{1.96 * error:.1f}'}",
-        "load": "not available"
-        if load is None
-        else f"{load:.1f} ± {'?' if load_error is None else f'{1.96 * load_error:.1f}'}",
-        "way": f"{passage['direction'] or 'unknown'}, {passage['track'] or 'unknown'}",
-        "status": passage["status"] + (f": {passage['detail']}" if passage["detail"] else ""),
-    }
-
-
-def _with_error(value, standard_error):
-    return f"{value:.1f} ± {'?' if standard_error is None else f'{1.96 * standard_error:.1f}'}"
-
-
-def _score_words(scores):
-    """What the scores are worth: how many of them their null or the test of the impulse explains."""
-    if not scores:
-        return ""
-    counts = Counter(s["status"] for s in scores)
-    n_passage = len({s["passage_id"] for s in scores})
-    return (
-        f"{len(scores)} scores of {n_passage} passages: {counts['accepted']} mean something; "
-        f"{counts['null_explains']} lie inside what random models reach; {counts['not_an_impulse']} fail the test "
-        "that a wheel acts as one impulse at the sensor: no score of theirs says anything about the model."
-    )
 
 
 def _event(event):

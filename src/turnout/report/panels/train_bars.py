@@ -1,0 +1,95 @@
+"""The paper's bar charts: mean and spread of a score by train type, speed or axle load, section by section."""
+
+from html import escape
+
+import numpy as np
+
+from turnout.report.chart import LEFT, TOP, Axis, Chart
+
+WIDTH = 952
+# Light to dark, told apart in print and by colour-blind readers.
+KEY = "○ = others held fixed with 95 %, orange = what random models reach"
+COLOURS = ("#c6dbef", "#6baed6", "#2171b5", "#08306b", "#fdd0a2", "#fd8d3c", "#d94801", "#7f2704")
+
+
+def train_bars(factor, rows, sections):
+    """SVG of one factor, "" where no class of it is known.
+
+    Parameters
+    ----------
+    factor : str
+        "train type", "speed" or "axle load".
+    rows : list of dict
+        Of ``fit_adjusted``: one score of one turnout. Bars are ``score_pct`` with its standard deviation, dots with
+        95 % intervals ``adjusted_pct``, orange lines the null.
+    sections : list of dict
+        In the order of the track.
+    """
+    rows = [r for r in rows if r["factor"] == factor]
+    if not rows:
+        return ""
+    classes = sorted({(r["class_from"] or 0.0, r["class"]) for r in rows})
+    names = [c for _, c in classes][: len(COLOURS)]
+    shown = [s for s in sections if any(r["section_id"] == s["section_id"] for r in rows)]
+    at = {(r["section_id"], r["class"]): r for r in rows}
+    n = sum(r["n_passages"] for r in rows if r["section_id"] == shown[0]["section_id"])
+    ends = [e for r in rows for e in (_low(r), _high(r))]
+    title = f"{rows[0]['score']} by {factor}: bar = mean, thin line = ± standard deviation, {KEY}"
+    chart = Chart(
+        Axis(0.5, len(shown) + 0.5, f"section ({n} passages at {shown[0]['label']})", "names", _labels(shown)),
+        Axis(min(0.0, max(min(ends), -60.0)) - 2.0, max(ends) * 1.25 + 4.0, f"{rows[0]['score']} [%]"),
+        title,
+        WIDTH,
+        230,
+    )
+    width = 0.8 / len(names)
+    for k, section in enumerate(shown, start=1):
+        for j, name in enumerate(names):
+            if row := at.get((section["section_id"], name)):
+                _bar(chart, k - 0.4 + (j + 0.5) * width, width, COLOURS[j], row)
+    _key(chart, names)
+    return chart.svg()
+
+
+def _labels(sections):
+    return tuple(s["label"] for s in sections)
+
+
+def _low(row):
+    return row["score_pct"] - (row["score_sd_pct"] or 0.0)
+
+
+def _high(row):
+    return max(row["score_pct"] + (row["score_sd_pct"] or 0.0), row["null_pct"] or 0.0)
+
+
+def _bar(chart, x, width, colour, row):
+    """One bar with its spread, its null, and beside it the mean with the other factors held fixed."""
+    left, right = (float(chart.px(x + side * 0.45 * width)) for side in (-1, 1))
+    top, zero = float(chart.py(row["score_pct"])), float(chart.py(0.0))
+    words = f"{row['class']}: {row['score_pct']:.1f} %, n = {row['n']}"
+    if row["score_sd_pct"] is not None:
+        words += f", spread {row['score_sd_pct']:.1f}"
+    words += f"; others held fixed {row['adjusted_pct']:.1f}"
+    chart.parts.append(
+        f'<rect x="{left:.1f}" y="{min(top, zero):.1f}" width="{right - left:.1f}" height="{abs(zero - top):.1f}" '
+        f'fill="{colour}"><title>{escape(words)}</title></rect>'
+    )
+    if row["score_sd_pct"] is not None:
+        chart.line([x, x], [_low(row), row["score_pct"] + row["score_sd_pct"]], "edge")
+    if row["null_pct"] is not None:
+        chart.line(
+            [x - 0.45 * width, x + 0.45 * width], [row["null_pct"]] * 2, "model", "95 % quantile of random models"
+        )
+    half = np.nan if row["adjusted_se_pct"] is None else 1.96 * row["adjusted_se_pct"]
+    mean = np.array([row["adjusted_pct"]])
+    chart.points(np.array([x + 0.2 * width]), mean, "measured", 2.5, mean - half, mean + half)
+
+
+def _key(chart, names):
+    """Colours of the classes."""
+    x, y = LEFT + 8, TOP + 6
+    for colour, name in zip(COLOURS, names):
+        chart.parts.append(f'<rect x="{x}" y="{y}" width="10" height="10" fill="{colour}" stroke="#65727f"/>')
+        chart.parts.append(f'<text x="{x + 14}" y="{y + 9}">{escape(name)}</text>')
+        x += 30 + 6.2 * len(name)

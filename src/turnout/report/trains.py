@@ -1,0 +1,111 @@
+"""The part about trains of a turnout's page: passages, scores by section, and what type, speed and load do to them."""
+
+from collections import defaultdict
+
+from turnout.registry.columns import literal
+from turnout.report.panels.train_bars import train_bars
+
+# Conditions on a constant list reach the files below the views' windows; a subquery would not.
+ROWS = {
+    "scores": """
+        select
+            turnout_id, section_id, status, count(*) as n, count(*) filter (fit_pct > fit_others_pct) as n_best,
+            count(fit_others_pct) as n_compared,
+            count(*) filter (chi_squared_failed_share > 0.5 and along_b_share < 0.8) as n_no_impulse
+        from passage_scores where turnout_id in ({own}) group by all""",
+    "bars": "select * from fit_adjusted where turnout_id in ({own}) order by section_id, factor, class_from, class",
+    "effects": "select * from fit_effects where turnout_id in ({own}) order by section_id, factor",
+    "passages": """
+        select * from passages_current where turnout_id in ({own})
+        qualify row_number() over (partition by turnout_id order by passed_at_utc desc) <= 15
+        order by passed_at_utc desc""",
+}
+FACTORS = ("train type", "speed", "axle load")
+SCORES = ("fit", "forecast")
+
+
+def train_rows(fetch, turnout_ids):
+    """{kind: {turnout_id: [row, ...]}} of what ``trains_part`` needs; ``fetch`` runs SQL and gives dictionaries."""
+    own, found = ", ".join(literal(t) for t in turnout_ids), {}
+    for kind, sql in ROWS.items():
+        grouped = defaultdict(list)
+        for row in fetch(sql.format(own=own)) if own else ():
+            grouped[row["turnout_id"]].append(row)
+        found[kind] = grouped
+    return found
+
+
+def trains_part(rows, sections):
+    """What the template shows of one turnout's trains; None where none was recorded.
+
+    ``rows`` are those of ``train_rows`` of this turnout, ``sections`` its rows of ``sections`` in order.
+    """
+    if not rows["passages"]:
+        return None
+    charts = {
+        score: "".join(train_bars(f, [b for b in rows["bars"] if b["score"] == score], sections) for f in FACTORS)
+        for score in SCORES
+    }
+    return {
+        "passages": [_passage(p) for p in rows["passages"]],
+        "words": score_words(rows["scores"]),
+        "charts": charts,
+        "loads_known": any(b["factor"] == "axle load" for b in rows["bars"]),
+        "effects": [_effect(e) for e in rows["effects"] if e["score"] == "fit"],
+    }
+
+
+def score_words(scores):
+    """What the scores are worth, counted."""
+    if not scores:
+        return ""
+    n = sum(s["n"] for s in scores)
+    of = {status: sum(s["n"] for s in scores if s["status"] == status) for status in {s["status"] for s in scores}}
+    said = [
+        f"{n} records of single sensors were compared with the model of their section: "
+        f"in {of.get('accepted', 0)} it foretells more than random models do and the wheels act as blows on it, "
+        f"in {of.get('not_an_impulse', 0)} it foretells more although they do not, "
+        f"in {of.get('null_explains', 0)} random models reach as much."
+    ]
+    rolling = sum(s["n_no_impulse"] for s in scores)
+    if rolling:
+        said.append(f"In {rolling} the wheels did not act as single blows: they press and shake the rail all the time.")
+    compared, best = (sum(s[k] for s in scores) for k in ("n_compared", "n_best"))
+    if compared:
+        said.append(f"The own section's model beats those of all other sections in {best} of {compared}.")
+    said.append("A score inside its null tells nothing about the track, neither good nor bad.")
+    return " ".join(said)
+
+
+def _passage(passage):
+    """One passage in words."""
+    load, load_error = passage["axle_load_t"], passage["axle_load_se_t"]
+    said = {"speed": passage["speed_listed_kmh"], "type": passage["train_type_listed"]}
+    return {
+        "when": f"{passage['passed_at_utc']:%Y-%m-%d %H:%M}",
+        "type": passage["train_type"] or "unknown",
+        "listed": ", ".join(f"{v:g} km/h" if k == "speed" else v for k, v in said.items() if v) or "–",
+        "axles": passage["n_axles"] or "–",
+        "speed": "–" if passage["speed_kmh"] is None else _with_error(passage["speed_kmh"], passage["speed_se_kmh"]),
+        "load": "not available" if load is None else _with_error(load, load_error),
+        "way": f"{passage['direction'] or 'unknown'}, {passage['track'] or 'unknown'}",
+        "status": passage["status"] + (f": {passage['detail']}" if passage["detail"] else ""),
+    }
+
+
+def _with_error(value, standard_error):
+    return f"{value:.1f} ± {'?' if standard_error is None else f'{1.96 * standard_error:.1f}'}"
+
+
+def _effect(effect):
+    """One effect in words, with whether its interval holds zero."""
+    clear = effect["low_pct"] > 0 or effect["high_pct"] < 0
+    return {
+        "section": effect["section_id"].split("/")[-1],
+        "factor": f"{effect['factor']}, per {effect['per']}",
+        "n": effect["n"],
+        "raw": "–" if effect["raw_change_pct"] is None else f"{effect['raw_change_pct']:+.2f}",
+        "held": f"{effect['change_pct']:+.2f} [{effect['low_pct']:+.2f}, {effect['high_pct']:+.2f}]",
+        "fixed": effect["held_fixed"],
+        "verdict": "differs from none" if clear else "cannot be told from none",
+    }

@@ -1,0 +1,75 @@
+"""The part about trains of a turnout's page: bars, words and effects say what the rows say."""
+
+import re
+from datetime import datetime
+
+import pytest
+
+from turnout.report.panels.train_bars import train_bars
+from turnout.report.trains import score_words, train_rows, trains_part
+
+SECTIONS = [{"section_id": f"t/{s}", "label": s} for s in ("OT", "A7")]
+
+
+def bar(section, name, score, **more):
+    row = {
+        "section_id": f"t/{section}", "score": "fit", "factor": "train type", "class": name, "class_from": None,
+        "n": 20, "n_passages": 20, "score_pct": score, "score_sd_pct": 4.0, "score_se_pct": 0.9, "null_pct": 12.0,
+        "adjusted_pct": score - 1.0, "adjusted_se_pct": 1.1,
+    }  # fmt: skip
+    return row | more
+
+
+def heights(svg):
+    return [float(h) for h in re.findall(r'<rect x="[\d.]+" y="[-\d.]+" width="[\d.]+" height="([\d.]+)" fill', svg)]
+
+
+def test_bars_are_as_high_as_their_scores_and_say_them():
+    svg = train_bars("train type", [bar("OT", "IC3", 10.0), bar("OT", "freight", 30.0)], SECTIONS)
+    low, high = sorted(heights(svg)[:2])
+    assert high == pytest.approx(3.0 * low, rel=0.02)
+    assert "freight: 30.0 %, n = 20, spread 4.0; others held fixed 29.0" in svg
+    assert ">OT<" in svg and ">A7<" not in svg, "a section without scores takes no room"
+
+
+def test_a_factor_that_nobody_knows_has_no_chart():
+    assert train_bars("axle load", [bar("OT", "IC3", 10.0)], SECTIONS) == ""
+
+
+def test_one_passage_has_a_bar_without_spread_or_interval():
+    lone = bar("OT", "IC3", 10.0, n=1, n_passages=1, score_sd_pct=None, score_se_pct=None, adjusted_se_pct=None)
+    svg = train_bars("train type", [lone], SECTIONS)
+    assert "nan" not in svg and "spread" not in svg.split("</text>", 2)[2]
+
+
+def test_the_words_count_what_the_scores_are_worth():
+    shared = {"n_best": 3, "n_compared": 10, "n_no_impulse": 7}
+    words = score_words([{"status": "null_explains", "n": 10} | shared, {"status": "accepted", "n": 2} | shared])
+    assert words.startswith("12 records of single sensors") and "in 2 it foretells more" in words
+    assert "in 10 random models reach as much" in words and "in 6 of 20" in words
+    assert score_words([]) == ""
+
+
+def test_the_part_says_speed_and_load_with_intervals_and_effects_with_what_was_held_fixed():
+    passage = {
+        "passed_at_utc": datetime(2026, 7, 24, 1, 18), "speed_kmh": 142.5, "speed_se_kmh": 0.2, "axle_load_t": None,
+        "axle_load_se_t": None, "speed_listed_kmh": 140.0, "train_type_listed": "IC3", "train_type": "IC3",
+        "n_axles": 8, "direction": "facing", "track": "main", "status": "accepted", "detail": None,
+    }  # fmt: skip
+    effect = {
+        "section_id": "t/A7", "score": "fit", "factor": "speed", "per": "10 km/h", "held_fixed": "train type", "n": 40,
+        "raw_change_pct": 0.5, "change_pct": -1.0, "low_pct": -1.5, "high_pct": -0.5,
+    }  # fmt: skip
+    rows = {"passages": [passage], "scores": [], "bars": [bar("A7", "IC3", 10.0)], "effects": [effect]}
+    part = trains_part(rows, SECTIONS)
+    assert part["passages"][0]["speed"] == "142.5 ± 0.4" and part["passages"][0]["load"] == "not available"
+    assert part["passages"][0]["listed"] == "140 km/h, IC3"
+    assert part["effects"][0]["held"] == "-1.00 [-1.50, -0.50]" and part["effects"][0]["verdict"] == "differs from none"
+    assert part["loads_known"] is False and trains_part(rows | {"passages": []}, SECTIONS) is None
+
+
+def test_names_with_quotes_ask_for_themselves():
+    asked = []
+    train_rows(lambda sql: asked.append(sql) or [], ["o'hara"])
+    assert all("'o''hara'" in sql for sql in asked) and len(asked) == 4
+    assert train_rows(lambda sql: 1 / 0, [])["bars"] == {}
