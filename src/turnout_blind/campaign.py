@@ -18,16 +18,7 @@ STAMP = 1_700_000_000  # of every file [s]
 
 def make_case(folder, case, plan, effects):
     """Write the campaign of a ``plan`` (``strata.CasePlan``) below ``folder``/``case``; returns its truth (a dict)."""
-    rng = np.random.default_rng(list(plan.seed))
-    options = {}
-    for kind, _ in plan.effects:
-        options.update(effects[kind].site)
-    site = draw_site(rng, **options)
-    world, drawn = site.world.copy(), []
-    for kind, rung in plan.effects:
-        concealed = effects[kind].concealed(rng, site, rung)
-        effects[kind].act(world, site, concealed.where, concealed.parameters)
-        drawn.append(concealed)
+    rng, site, world, drawn = stage(plan, effects)
     decoys, told = draw_decoys(rng, site)
     folder = Path(folder) / case
     write_configuration(folder / "config", case, site)
@@ -44,6 +35,21 @@ def make_case(folder, case, plan, effects):
         "temperatures": list(site.temperatures),
         "seed": [int(v) for v in plan.seed],
     }
+
+
+def stage(plan, effects):
+    """(generator of random numbers, site, world with the effects in it, what was concealed) of a plan."""
+    rng = np.random.default_rng(list(plan.seed))
+    options = {}
+    for kind, _ in plan.effects:
+        options.update(effects[kind].site)
+    site = draw_site(rng, **options)
+    world, drawn = site.world.copy(), []
+    for kind, rung in plan.effects:
+        concealed = effects[kind].concealed(rng, site, rung)
+        effects[kind].act(world, site, concealed.where, concealed.parameters)
+        drawn.append(concealed)
+    return rng, site, world, drawn
 
 
 def draw_decoys(rng, site):

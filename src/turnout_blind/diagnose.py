@@ -20,29 +20,31 @@ WALL, CPU = 1800.0, 900.0  # budget of a case: seconds of the clock and of the p
 
 
 def diagnose_set(
-    out, truth, command=COMMAND, only=None, timeout=WALL, workers=1, say=print, cpu=CPU, again=False, progress=None
-):
+    out, truth, command=COMMAND, only=None, timeout=WALL, workers=1, say=print, cpu=CPU, again=False, progress=None,
+    label=None,
+):  # fmt: skip
     """Write ``out``/findings/<case>.json and ``out``/diagnosis.json; returns the latter's content.
 
     A case that has its run is not run again (but a failed one if ``again``), unless the tool has changed: then
     BlindError. A case on which the tool fails, or that exceeds ``timeout`` seconds of the clock or ``cpu`` of the
     processor, has no rows and the end of what was said; it never stops the others, and the scorer counts it as
-    silence. ``only``: these cases; ``workers`` of them at a time; ``progress`` wraps the cases as they end.
+    silence. ``only``: these cases; ``workers`` of them at a time; ``progress`` wraps the cases as they end. With a
+    ``label`` it is an ablation: another command on the same cases, kept below ``out``/ablations/<label>.
     """
     out, sealed = Path(out).resolve(), read_commit(out)
-    tool = Path(turnout.__file__).parent
-    frozen, record = digest_of_folder(tool), out / "diagnosis.json"
+    tool, home = Path(turnout.__file__).parent, home_of(out, label)
+    frozen, record = digest_of_folder(tool), home / "diagnosis.json"
     held = json.loads(record.read_text()) if record.exists() else {"tool_sha256": frozen, "cases": {}}
     if held["tool_sha256"] != frozen:
         raise BlindError(record, "tool_sha256", "the tool has changed since the first case", "Diagnose a set made anew")
     held |= {"commit_sha256": digest((out / "commit.json").read_bytes()), "command": command}
     held |= {"budget": {"wall_s": timeout, "cpu_s": cpu}}
-    (out / "findings").mkdir(exist_ok=True)
+    (home / "findings").mkdir(parents=True, exist_ok=True)
     with Hidden(truth, _generators()) as hidden:
         held |= {"isolation": hidden.how, "canary": hidden.canary}
         waiting = [case for case in sorted(only or sealed["cases"]) if _waits(held["cases"].get(case), again)]
         with ThreadPoolExecutor(workers) as pool:  # threads: each waits for a process, none can bring down the others
-            jobs = {pool.submit(_guarded, hidden, out, case, command, timeout, cpu): case for case in waiting}
+            jobs = {pool.submit(_guarded, hidden, (out, home), case, command, timeout, cpu): case for case in waiting}
             try:
                 for job in (progress or (lambda done, total: done))(as_completed(jobs), len(jobs)):
                     held["cases"][jobs[job]] = job.result()
@@ -74,16 +76,21 @@ def _generators():
     return sorted(folder for folder in here if folder.is_dir())
 
 
-def _guarded(hidden, out, case, command, timeout, cpu):
+def home_of(out, label=None):
+    """Where findings lie: of the tool, or of an ablation of it."""
+    return Path(out) if label is None else Path(out) / "ablations" / label
+
+
+def _guarded(hidden, folders, case, command, timeout, cpu):
     """Whatever goes wrong with a case is that case's result."""
     try:
-        return _diagnose(hidden, out, case, command, timeout, cpu)
+        return _diagnose(hidden, *folders, case, command, timeout, cpu)
     except Exception as error:
         return _result("failed", -1, 0.0, 0.0, f"{type(error).__name__}: {error}", None)
 
 
-def _diagnose(hidden, out, case, command, timeout, cpu):
-    rows, work, folder = out / "findings" / f"{case}.json", out / "work" / case, out / "copies" / case
+def _diagnose(hidden, out, home, case, command, timeout, cpu):
+    rows, work, folder = home / "findings" / f"{case}.json", home / "work" / case, home / "copies" / case
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(out / "cases" / case, folder)  # what the tool writes beside its files breaks no seal
     rows.unlink(missing_ok=True)

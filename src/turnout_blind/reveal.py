@@ -4,6 +4,7 @@ import json
 import shutil
 from pathlib import Path
 
+from turnout_blind.diagnose import home_of
 from turnout_blind.seal import BlindError, digest, read_commit, verify
 
 
@@ -26,22 +27,31 @@ def reveal(out, truth):
     return truths
 
 
-def revealed(out):
-    """(truths, rows by case, diagnosis) of a revealed set, seals verified again; rows None where the tool failed."""
+def revealed(out, label=None):
+    """(truths, rows by case, diagnosis) of a revealed set, seals verified again; rows None where the tool failed.
+
+    ``label`` reads the findings of an ablation.
+    """
     out = Path(out)
     if not (out / "revealed").exists():
         raise BlindError(out, "revealed", "the truth has not been revealed", "Run turnout blind reveal first")
-    truths, record = verify(out, out / "revealed"), out / "diagnosis.json"
+    return verify(out, out / "revealed"), *findings(out, label)
+
+
+def findings(out, label=None):
+    """(rows by case, diagnosis) of a set; BlindError where they are not what the tool wrote under this commit."""
+    home = home_of(out, label)
+    record = home / "diagnosis.json"
     held = json.loads(record.read_text())
-    if held["commit_sha256"] != digest((out / "commit.json").read_bytes()):
+    if held["commit_sha256"] != digest((Path(out) / "commit.json").read_bytes()):
         raise BlindError(record, "commit_sha256", "diagnosed under another commit", "This set proves nothing")
     rows = {}
     for case in read_commit(out)["cases"]:
-        run, path = held["cases"].get(case), out / "findings" / f"{case}.json"
+        run, path = held["cases"].get(case), home / "findings" / f"{case}.json"
         rows[case] = None
         if run and run["status"] == "answered":
             data = path.read_bytes()
             if digest(data) != run["rows_sha256"]:
                 raise BlindError(path, "line 1", "not the rows that the tool wrote", "Diagnose a set made anew")
             rows[case] = json.loads(data)
-    return truths, rows, held
+    return rows, held

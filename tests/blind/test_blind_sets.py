@@ -12,9 +12,11 @@ from turnout.readers import read
 from turnout_blind.diagnose import diagnose_set
 from turnout_blind.effect import load_effects
 from turnout_blind.isolation import Hidden, method
+from turnout_blind.keep import keep, kept, verify_kept, verify_recordings
 from turnout_blind.make import make_set
 from turnout_blind.record import hammer_test
 from turnout_blind.reveal import reveal
+from turnout_blind.score.page import BEGIN, END, write_page
 from turnout_blind.score.report import report_of
 from turnout_blind.seal import BlindError, digest, verify
 from turnout_blind.site import draw_site
@@ -275,3 +277,55 @@ def test_the_canary_is_found_where_nothing_is_hidden(tmp_path, monkeypatch):
     with pytest.raises(BlindError, match="can be read from inside"):
         hidden.__enter__()
     assert not (tmp_path / "truth" / "canary.txt").exists()
+
+
+def answer(**more):
+    """A row as a tool writes it."""
+    row = {"verdict": "named", "term": "local_pad", "locked_to": "place", "position_m": 5.0, "probability": 0.8}
+    fits = {"fit_before_pct": 40.0, "fit_after_pct": 50.0, "fit_rival_pct": 45.0, "fit_decoy_pct": 41.0}
+    return {**row, **fits, "sentence": "a pad of 0.4 times the stiffness", **more}
+
+
+@pytest.fixture
+def scored(copy, tmp_path):
+    """A revealed set on which a tool said the same of both cases, and a lesser one said nothing."""
+    out, truth = copy
+    for label, row in ((None, answer()), ("mute", {"verdict": "none"})):
+        tool = tmp_path / f"{label}.py"
+        tool.write_text(f"import json, sys\njson.dump([{row!r}], open(sys.argv[1], 'w'))\n")
+        diagnose_set(out, truth, f"{{python}} {tool} {{out}}", say=lambda line: None, label=label)
+    reveal(out, truth)
+    return out
+
+
+@pytest.mark.skipif(not method(), reason="nothing here can hide a folder from this user")
+def test_a_page_shows_figures_pictures_stories_failures_and_ablations(scored, tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text(f"# Before\n\n{BEGIN}\nold\n{END}\n\nAfter\n")
+    single = next(t["case"] for t in verify(scored, scored / "revealed").values() if t["effects"])
+    write_page(page, scored, cases=[single])
+    text = page.read_text()
+    assert text.startswith("# Before") and text.endswith("After\n") and "\nold\n" not in text
+    assert "| controls: false alarms | 100.0 % (1)" in text  # the failure is there
+    assert "the tool (n = 2) | mute (n = 2)" in text
+    assert "| controls: false alarms | 1 of 1 | 0 of 1 |" in text
+    assert f"### {single}: pad" in text and "Said: *named (probability 0.80)" in text
+    for name in ("blind_severity.svg", "blind_reliability.svg", f"blind_story_{single}.svg"):
+        assert (tmp_path / name).read_text().startswith("<?xml")
+    page.write_text("no marks")
+    with pytest.raises(BlindError, match="not there once each"):
+        write_page(page, scored)
+
+
+@pytest.mark.skipif(not method(), reason="nothing here can hide a folder from this user")
+def test_a_kept_set_is_small_and_says_all(scored, tmp_path):
+    path = keep(scored, tmp_path / "kept")
+    assert path.stat().st_size < 20e3
+    held = kept(tmp_path / "kept")
+    assert set(verify_kept(held)) == set(held["rows"]) == {c.name for c in cases(scored)}
+    for case in held["truths"]:
+        verify_recordings(held, case, scored / "cases")
+        spoilt = json.loads(held["truths"][case])
+        spoilt["stratum"] = "double"
+        with pytest.raises(BlindError, match="not what was sealed"):
+            verify_kept({**held, "truths": {**held["truths"], case: json.dumps(spoilt)}})

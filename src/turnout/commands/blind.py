@@ -28,20 +28,28 @@ def add_arguments(parser):
     diagnose.add_argument("--timeout", type=float, default=1800.0, help="seconds of the clock per case (default 1800)")
     diagnose.add_argument("--cpu", type=float, default=900.0, help="seconds of the processor per case (default 900)")
     diagnose.add_argument("--again", action="store_true", help="also cases that failed or exceeded their budget")
+    diagnose.add_argument(
+        "--ablation", metavar="NAME", help="keep beside the tool's findings, as those of a lesser one"
+    )
     diagnose.add_argument("--workers", type=int, default=1, help="cases at a time (default 1)")
     reveal = steps.add_parser("reveal", help="open the envelopes and verify every hash")
     score = steps.add_parser("score", help="print every figure with its interval")
     score.add_argument("--names", help="JSON file {effect: [names of the tool that are right]} to add")
     score.add_argument("--report", help="file to write the report to, as Markdown")
-    for sub in (make, diagnose, reveal, score):
+    score.add_argument("--page", help="page between whose marks report, pictures and stories go, as docs/blind.md")
+    score.add_argument("--stories", help="cases to be told on the page, by commas (default: three are chosen)")
+    score.add_argument("--effects", action="append", default=[], help="folder with effects of your own")
+    keep = steps.add_parser("keep", help="keep a revealed set small: seals, truths, findings")
+    keep.add_argument("--folder", required=True, help="where it goes")
+    for sub in (make, diagnose, reveal, score, keep):
         sub.add_argument("--out", required=True, help="folder of the set")
-        if sub is not score:
+        if sub not in (score, keep):
             sub.add_argument("--truth", help="folder of the truth (default: --out with -truth behind it)")
 
 
 def run(args):
     """Take the step."""
-    return {"make": _make, "diagnose": _diagnose, "reveal": _reveal, "score": _score}[args.step](args)
+    return {"make": _make, "diagnose": _diagnose, "reveal": _reveal, "score": _score, "keep": _keep}[args.step](args)
 
 
 def _truth(args):
@@ -68,7 +76,7 @@ def _diagnose(args):
     only = args.cases.split(",") if args.cases else None
     held = diagnose_set(
         args.out, _truth(args), args.command or COMMAND, only, args.timeout, args.workers, cpu=args.cpu,
-        again=args.again, progress=_bar,
+        again=args.again, progress=_bar, label=args.ablation,
     )  # fmt: skip
     failed = sum(run["status"] != "answered" for run in held["cases"].values())
     print(f"{len(held['cases'])} cases diagnosed, {failed} without an answer; truth hidden by {held['isolation']}")
@@ -89,6 +97,17 @@ def _score(args):
 
     names = json.loads(Path(args.names).read_text()) if args.names else None
     text = report_of(args.out, names)
+    if args.page:
+        from turnout_blind.score.page import write_page
+
+        write_page(args.page, args.out, names, args.effects, args.stories.split(",") if args.stories else None)
     if args.report:
         Path(args.report).write_text(text, encoding="utf-8")
     print(text)
+
+
+def _keep(args):
+    from turnout_blind.keep import keep
+
+    path = keep(args.out, args.folder)
+    print(f"{path}: {path.stat().st_size / 1e3:.0f} kB")

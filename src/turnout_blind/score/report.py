@@ -7,36 +7,89 @@ from turnout_blind.reveal import revealed
 from turnout_blind.score.answers import answers_of
 from turnout_blind.score.figures import Share, confusion, figures, reliability, severity
 from turnout_blind.score.judged import judge
+from turnout_blind.seal import read_commit
+
+KEY = (
+    "controls: false alarms", "what: top-1 (clear singles)", "what: a wrong name (all singles)",
+    "outside the library: named wrongly", "two effects: both right", "cases without an answer",
+)  # fmt: skip
 
 
-def judged_set(out, more=None):
-    """(judged cases, diagnosis) of a revealed set."""
-    truths, rows, held = revealed(out)
-    return [judge(truths[case], answers_of(rows[case]), more) for case in sorted(truths)], held
+def judged_set(out, more=None, label=None):
+    """(judged cases, diagnosis) of a revealed set, or of an ablation of the tool on it; cases not run are left out."""
+    truths, rows, held = revealed(out, label)
+    return [judge(truths[case], answers_of(rows[case]), more) for case in sorted(truths) if case in held["cases"]], held
+
+
+def oracle_of(out):
+    """{case: held-out fit with the true effect [%]} from ``out``/oracle.json, {} where nobody has made them."""
+    path = Path(out) / "oracle.json"
+    return json.loads(path.read_text()) if path.exists() else {}
+
+
+def labels_of(out):
+    """Ablations of the tool on this set."""
+    return sorted(p.parent.name for p in (Path(out) / "ablations").glob("*/diagnosis.json"))
 
 
 def report_of(out, more=None):
-    """Markdown: figures beside their bars, confusion, severity, reliability, cost. ``more`` {kind: [right names]}.
+    """Markdown: figures beside their bars, confusion, severity, reliability, failures, ablations, cost.
 
-    The fits with the true effect are read from ``out``/oracle.json, {case: %}, where somebody has made them.
+    ``more`` {kind: [right names]}. Fits with the true effect are read from ``out``/oracle.json.
     """
     judged, held = judged_set(out, more)
-    path = Path(out) / "oracle.json"
-    oracle = json.loads(path.read_text()) if path.exists() else {}
-    runs = [run for run in held["cases"].values()]
-    cpu = sorted(run["cpu_s"] for run in runs)
     parts = [
-        f"{len(judged)} cases; commit {held['commit_sha256'][:16]}, tool {held['tool_sha256'][:16]}, truth hidden by "
-        f"{held['isolation']}; CPU per case: median {cpu[len(cpu) // 2]:.0f} s, most {cpu[-1]:.0f} s.",
-        figure_table(figures(judged, oracle)),
+        cost(judged, held, len(read_commit(out)["cases"])),
+        figure_table(figures(judged, oracle_of(out))),
         "What was said first, by what was concealed:",
         confusion_table(confusion(judged)),
         "Along the ladder (points of held-out fit that the effect costs: what was said; * = the right name among it):",
         severity_table(severity(judged)),
         "Stated probability and share right, by fifths:",
         "\n".join(f"- {p:.2f}: {share:.2f} of {n}" for p, share, n in reliability(judged)) or "- none stated",
+        "Every failure:",
+        failure_table(judged),
     ]
+    if labels_of(out):
+        parts += ["Ablations, on the same cases:", ablation_table(out, judged, more)]
     return "\n\n".join(parts) + "\n"
+
+
+def cost(judged, held, total):
+    """One paragraph: how many cases of ``total``, under which seals, at which cost."""
+    cpu = sorted(run["cpu_s"] for run in held["cases"].values()) or [float("nan")]
+    commit, tool = held["commit_sha256"][:16], held["tool_sha256"][:16]
+    return (
+        f"{len(judged)} of {total} sealed cases; commit {commit}, tool {tool}, truth hidden by {held['isolation']}; "
+        f"CPU per case: median {cpu[len(cpu) // 2]:.0f} s, most {cpu[-1]:.0f} s."
+    )
+
+
+def failure_table(judged):
+    """A row per case that went wrong: alarms on controls, wrong names, clear effects missed, no answer."""
+    lines = [
+        "| case | concealed | costs [points] | said first | wrong names | probability |",
+        "|---|---|---|---|---|---|",
+    ]
+    for j in sorted(judged, key=lambda j: (j.stratum, j.kinds, j.rungs)):
+        missed = j.stratum in ("single", "double") and j.clear and not all(j.hits)
+        if not j.answered or j.wrong or missed or (j.stratum == "control" and j.alarm):
+            what = " + ".join(f"{k} {r}" for k, r in zip(j.kinds, j.rungs)) or "nothing"
+            sure = "" if j.probability is None else f"{j.probability:.2f}"
+            lines.append(f"| {j.case} | {what} | {j.gain:.1f} | {j.said} | {', '.join(j.wrong)} | {sure} |")
+    return "\n".join(lines) if len(lines) > 2 else "None."
+
+
+def ablation_table(out, judged, more=None):
+    """A row per figure that names and alarms hang on, a column per ablation; every column over its own cases."""
+    columns = {"the tool": judged} | {label: judged_set(out, more, label)[0] for label in labels_of(out)}
+    found = {name: {f.name: f for f in figures(cases)} for name, cases in columns.items()}
+    lines = ["| figure | " + " | ".join(f"{n} (n = {len(c)})" for n, c in columns.items()) + " |"]
+    lines.append("|---" * (len(columns) + 1) + "|")
+    for name in KEY:
+        cells = [f"{f[name].k} of {f[name].n}" if f[name].n else "–" for f in found.values()]
+        lines.append(f"| {name} | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
 
 
 def figure_table(found):

@@ -1,0 +1,34 @@
+"""The measured part of a page, between two marks: written from a scored set, its prose around it left alone."""
+
+from pathlib import Path
+
+from turnout_blind.score.pictures import draw_reliability, draw_severity
+from turnout_blind.score.report import judged_set, oracle_of, report_of
+from turnout_blind.score.stories import tell
+from turnout_blind.seal import BlindError
+
+BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
+
+
+def write_page(path, out, more=None, effects=(), cases=None):
+    """Put report, pictures and stories of the set ``out`` between the marks of the page at ``path``.
+
+    Pictures go beside the page. Errors: BlindError where the page lacks the marks.
+    """
+    path = Path(path)
+    text = path.read_text(encoding="utf-8")
+    if text.count(BEGIN) != 1 or text.count(END) != 1:
+        raise BlindError(path, "marks", f"{BEGIN} and {END} are not there once each", "Put them where figures belong")
+    judged, _ = judged_set(out, more)
+    draw_severity(judged, path.with_name("blind_severity.svg"))
+    draw_reliability(judged, path.with_name("blind_reliability.svg"))
+    told = tell(out, path.parent, cases, more, oracle_of(out), effects)
+    measured = "\n\n".join(
+        [
+            report_of(out, more).strip(), "![What was said along every ladder](blind_severity.svg)",
+            "![Stated probability and share right](blind_reliability.svg)", told,
+        ]
+    )  # fmt: skip
+    head, rest = text.split(BEGIN)
+    path.write_text(f"{head}{BEGIN}\n\n{measured}\n\n{END}{rest.split(END)[1]}", encoding="utf-8")
+    return path
