@@ -1,16 +1,6 @@
 -- One row per section and axle load class of 2.5 t: mean, spread and standard error of the scores, as in the paper's Table 4.
 -- Train type, speed and axle load go together on a real line: a difference between classes is not yet their effect.
--- needs: passage_scores
+-- needs: fit_by_class
 create or replace view fit_by_axle_load as
-select
-    turnout_id, section_id, 2.5 * floor(axle_load_t / 2.5) as axle_load_from_t,
-    count(*) as n, count(distinct passage_id) as n_passages,
-    avg(fit_pct) as fit_pct, stddev_samp(fit_pct) as fit_sd_pct, stddev_samp(fit_pct) / sqrt(count(fit_pct)) as fit_se_pct,
-    avg(fit_null_pct) as fit_null_pct,
-    avg(forecast_pct) as forecast_pct, stddev_samp(forecast_pct) as forecast_sd_pct,
-    stddev_samp(forecast_pct) / sqrt(count(forecast_pct)) as forecast_se_pct,
-    avg(leave_one_out_pct) as leave_one_out_pct, stddev_samp(leave_one_out_pct) as leave_one_out_sd_pct,
-    stddev_samp(leave_one_out_pct) / sqrt(count(leave_one_out_pct)) as leave_one_out_se_pct,
-    avg((status = 'null_explains')::integer) as null_share
-from passage_scores
-group by turnout_id, section_id, axle_load_from_t;
+select turnout_id, section_id, class_from as axle_load_from_t, columns(* exclude (turnout_id, section_id, class_name, class_from))
+from fit_by_class('axle_load');

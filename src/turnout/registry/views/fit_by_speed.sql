@@ -1,16 +1,6 @@
 -- One row per section and speed class of 20 km/h: mean, spread and standard error of the scores, as in the paper's Table 4.
 -- Train type, speed and axle load go together on a real line: a difference between classes is not yet their effect.
--- needs: passage_scores
+-- needs: fit_by_class
 create or replace view fit_by_speed as
-select
-    turnout_id, section_id, 20 * floor(speed_kmh / 20) as speed_from_kmh,
-    count(*) as n, count(distinct passage_id) as n_passages,
-    avg(fit_pct) as fit_pct, stddev_samp(fit_pct) as fit_sd_pct, stddev_samp(fit_pct) / sqrt(count(fit_pct)) as fit_se_pct,
-    avg(fit_null_pct) as fit_null_pct,
-    avg(forecast_pct) as forecast_pct, stddev_samp(forecast_pct) as forecast_sd_pct,
-    stddev_samp(forecast_pct) / sqrt(count(forecast_pct)) as forecast_se_pct,
-    avg(leave_one_out_pct) as leave_one_out_pct, stddev_samp(leave_one_out_pct) as leave_one_out_sd_pct,
-    stddev_samp(leave_one_out_pct) / sqrt(count(leave_one_out_pct)) as leave_one_out_se_pct,
-    avg((status = 'null_explains')::integer) as null_share
-from passage_scores
-group by turnout_id, section_id, speed_from_kmh;
+select turnout_id, section_id, class_from as speed_from_kmh, columns(* exclude (turnout_id, section_id, class_name, class_from))
+from fit_by_class('speed');
