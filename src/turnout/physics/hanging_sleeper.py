@@ -48,7 +48,14 @@ class HangingSleeper(PhysicsTerm):
             return ()
         k, c = track.ballast_stiffness[self.sleeper], track.ballast_damping[self.sleeper]
         onset = min(ONSET, 0.5 * self.gap)
-        way = (-self.gap - onset, -self.gap, -self.gap + onset, self.gap - onset, self.gap, self.gap + onset)
+        way: tuple[float, ...] = (
+            -self.gap - onset,
+            -self.gap,
+            -self.gap + onset,
+            self.gap - onset,
+            self.gap,
+            self.gap + onset,
+        )
         withheld = tuple(-k * min(max(y, -self.gap), self.gap) for y in way)
         if onset == self.gap - onset:  # the two middle places are one
             way, withheld = (*way[:2], 0.0, *way[4:]), (*withheld[:2], 0.0, *withheld[4:])

@@ -1,5 +1,6 @@
 """A rail rougher than the base model's."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from turnout.physics.term import Parameter, PhysicsTerm
@@ -10,7 +11,7 @@ from turnout.simulate.roughness import roughness
 class Scaled:
     """A path times a number."""
 
-    path: object
+    path: Callable
     amount: float
 
     def __call__(self, x, wheel=0):

@@ -90,7 +90,8 @@ class PhysicsTerm:
 
     def neutral(self):
         """The same term with every parameter at its neutral value: it must change nothing."""
-        return replace(self, **{p.name: p.neutral for p in self.parameters})
+        # Every term is a dataclass; only its class says so.
+        return replace(self, **{p.name: p.neutral for p in self.parameters})  # type: ignore[type-var]
 
     def sentence(self):
         """What was left out, in words, with this term's numbers."""

@@ -8,6 +8,7 @@ from turnout.physics.term import PhysicsTerm
 class TransferTerm(PhysicsTerm):
     """A term of one channel, named by its field ``channel_name``, with ``transfer(frequency)`` complex (n,)."""
 
+    channel_name: str
     kind = "channel"
     frame = "sensor"
 

@@ -108,44 +108,19 @@ def calibrate(turnout, section, measured, location=None, parameters=tuple(PARAME
     j = track.nearest_support(place)
     centre = np.log([max(getattr(track, name)[j], 1.0) for name in parameters])
     spread = np.array([PARAMETERS[name][2] for name in parameters])
-    weights = [1.0 / np.sqrt(m.sd**2 + (model_sd * np.abs(m.value)) ** 2) for m in measured]
 
     def model(logs):
         changed = with_section(turnout, section, **dict(zip(parameters, np.exp(logs))))
         _, base = located(changed, location if location is not None else section)
         return _model(stretch_of_track(base, place, half_length), section, parameters, measured)
 
-    cache = {}
-
-    def residual(logs):
-        key = logs.tobytes()
-        if key not in cache:
-            cache.clear()
-            found = model(logs)
-            miss = [w * (h - m.value) for w, (h, _), m in zip(weights, found, measured)]
-            slope = [w[:, None] * g for w, (_, g) in zip(weights, found)]
-            r = np.concatenate([_split(m) for m in miss])
-            jacobian = np.concatenate([_split(s) for s in slope])
-            cache[key] = (
-                np.concatenate([r, (logs - centre) / spread]),
-                np.concatenate([jacobian, np.diag(1.0 / spread)]),
-            )
-        return cache[key]
-
+    residual = _residual(model, measured, model_sd, centre, spread)
     best = least_squares(lambda q: residual(q)[0], centre, jac=lambda q: residual(q)[1], method="trf", x_scale=spread)
-    covariance = np.linalg.inv(best.jac.T @ best.jac)
     before, after = ([h for h, _ in model(q)] for q in (centre, best.x))
     n = sum(2 * m.value.size for m in measured)
     reduced = float(np.sum(best.fun[:n] ** 2) / max(1, n - len(parameters)))
-    covariance = covariance * max(1.0, reduced)
+    covariance = np.linalg.inv(best.jac.T @ best.jac) * max(1.0, reduced)
     sd = np.sqrt(np.diag(covariance))
-    correlation = covariance / np.outer(sd, sd)
-    tied = [
-        (parameters[a], parameters[b])
-        for a in range(len(parameters))
-        for b in range(a)
-        if abs(correlation[a, b]) > CORRELATED
-    ]
     values = dict(zip(parameters, (float(v) for v in np.exp(best.x))))
     return Calibration(
         section,
@@ -153,12 +128,45 @@ def calibrate(turnout, section, measured, location=None, parameters=tuple(PARAME
         dict(zip(parameters, (float(s) for s in sd))),
         covariance,
         {name: bool(s < INFORMED * p) for name, s, p in zip(parameters, sd, spread)},
-        tuple(tied),
+        _tied(parameters, covariance / np.outer(sd, sd)),
         _misfit(measured, after),
         _misfit(measured, before),
         reduced,
         n,
         with_section(turnout, section, **values),
+    )
+
+
+def _residual(model, measured, model_sd, centre, spread):
+    """Function of the logarithms: residuals in their standard errors, the prior's behind them, and the Jacobian."""
+    weights = [1.0 / np.sqrt(m.sd**2 + (model_sd * np.abs(m.value)) ** 2) for m in measured]
+    newest: dict[bytes, tuple] = {}
+
+    def residual(logs):
+        key = logs.tobytes()
+        if key not in newest:
+            newest.clear()
+            found = model(logs)
+            miss = [w * (h - m.value) for w, (h, _), m in zip(weights, found, measured)]
+            slope = [w[:, None] * g for w, (_, g) in zip(weights, found)]
+            r = np.concatenate([_split(m) for m in miss])
+            jacobian = np.concatenate([_split(s) for s in slope])
+            newest[key] = (
+                np.concatenate([r, (logs - centre) / spread]),
+                np.concatenate([jacobian, np.diag(1.0 / spread)]),
+            )
+        return newest[key]
+
+    return residual
+
+
+def _tied(parameters, correlation):
+    """Pairs of parameters that the records cannot tell apart."""
+    return tuple(
+        (parameters[a], parameters[b])
+        for a in range(len(parameters))
+        for b in range(a)
+        if abs(correlation[a, b]) > CORRELATED
     )
 
 

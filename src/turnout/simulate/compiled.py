@@ -47,7 +47,7 @@ def cache_folder():
     name = f"kernels-{fingerprint(OUTERMOST)}"
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     beside = Path(__file__).resolve().parent / "__pycache__"
-    for base in (config.CACHE_DIR, beside, Path(home) / "turnout"):
+    for base in (config.CACHE_DIR, beside, Path(home) / "turnout"):  # type: ignore[attr-defined]
         if not base or str(base).startswith("~"):  # a user without a home
             continue
         folder = Path(base) / name
@@ -70,8 +70,8 @@ def _forget_older(folder):
 
 @contextmanager
 def _numba_keeps_in(folder):
-    before, config.CACHE_DIR = config.CACHE_DIR, str(folder)
+    before, config.CACHE_DIR = config.CACHE_DIR, str(folder)  # type: ignore[attr-defined]
     try:
         yield
     finally:
-        config.CACHE_DIR = before
+        config.CACHE_DIR = before  # type: ignore[attr-defined]

@@ -112,14 +112,15 @@ def _number(track, links):
     per_bay = track.elements_per_bay
     bays = [np.linspace(a, b, per_bay + 1)[:-1] for a, b in zip(track.support[:-1], track.support[1:])]
     node = np.append(np.concatenate(bays), track.support[-1])
-    extra = [set() for _ in track.support]
+    extra: list[set[tuple]] = [set() for _ in track.support]
     for link in links:
         for name, _ in link.ends:
             if not 0 <= name[1] < track.support.size:
                 raise SimulationError(f"link {link.tag!r}: support {name[1]} of {track.support.size}.")
             if name[0] != "rail":
                 extra[name[1]].add(name)
-    index, node_index, row = {}, np.empty(node.size, dtype=np.int64), 0
+    index: dict[tuple, int] = {}
+    node_index, row = np.empty(node.size, dtype=np.int64), 0
     for k in range(node.size):
         node_index[k], row = row, row + 2
         j, rest = divmod(k, per_bay)

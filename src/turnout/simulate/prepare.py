@@ -6,7 +6,7 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.simulate.banded import all_diagonals, factorise, inverse_windows, upper_rows
-from turnout.simulate.matrices import assemble
+from turnout.simulate.matrices import TrackMatrices, assemble
 from turnout.simulate.scheme import scheme as scheme_called
 from turnout.simulate.state import SchemeArrays, TrackArrays
 from turnout.simulate.track import Track
@@ -23,7 +23,7 @@ class Prepared:
     terms: tuple
     dt: float
     scheme_name: str
-    matrices: object
+    matrices: TrackMatrices
     arrays: TrackArrays
     scheme: SchemeArrays
     static: tuple
@@ -61,6 +61,7 @@ def prepare(track, dt=5e-5, scheme="radau", terms=()):
         )
     reach = _reach(track, matrices, s)
     window = inverse_windows(lower, upper, inverse_pivot, reach)
+    lower_back, upper_back, pivot_back, middle = _from_both_ends(system, window, reach)
     _, p, ei, kga = matrices.elements
     arrays = TrackArrays(
         matrices.n,
@@ -71,7 +72,10 @@ def prepare(track, dt=5e-5, scheme="radau", terms=()):
         all_diagonals(matrices.mass, max(4, matrices.half)),
         all_diagonals(matrices.stiffness, max(4, matrices.half)),
         window,
-        *_from_both_ends(system, window, reach),
+        lower_back,
+        upper_back,
+        pivot_back,
+        middle,
         matrices.node,
         matrices.node_index,
         p,

@@ -140,7 +140,9 @@ def _paths(prepared, vehicle, drive, n_step):
     ends = (drive.start - drive.direction * length, drive.start + drive.direction * way)
     low, high = min(ends) - 0.1, max(ends) + 0.1
     term_parts = [part for term in prepared.terms for part in term.paths(prepared.track, vehicle)]
-    pieces, known, path_of = [], {}, {}
+    pieces: list[np.ndarray] = []
+    known: dict[tuple, int] = {}
+    path_of: dict[tuple, int] = {}
     for wheel in range(len(vehicle.wheels)):
         for surface, parts in enumerate(drive.surfaces):
             mine = [p for p in (*parts, *term_parts) if getattr(p, "wheel", None) in (None, wheel)]

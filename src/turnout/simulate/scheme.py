@@ -40,6 +40,10 @@ class Scheme:
     scale: float
 
 
+def _real(value) -> complex:
+    return float(np.real(value))
+
+
 def scheme(name):
     """Scheme called "radau" (2 stages, order 3, L-stable), "gauss" (2 stages, order 4) or "midpoint".
 
@@ -60,14 +64,15 @@ def scheme(name):
     t, tau = right[:, k], left[k]
     real = len(b) == 1
     cast = np.real if real else np.asarray
+    number = _real if real else complex
     carry = 0.0 if name == "radau" else float(1.0 - b @ inverse @ np.ones(len(b)))
     return Scheme(
         name,
-        cast(rates[k])[()],
+        number(rates[k]),
         cast(t).copy(),
         cast(tau).copy(),
-        cast(tau.sum())[()],
-        cast(b @ inverse @ t)[()],
+        number(tau.sum()),
+        number(b @ inverse @ t),
         carry,
         c,
         b,

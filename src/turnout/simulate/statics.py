@@ -59,10 +59,10 @@ def equilibrium(prepared, vehicle, ports, placed, stand_in_stiffness, tolerance=
         # Least squares: a wheel whose force does not depend on where it is (a given load) may be anywhere.
         change = np.linalg.lstsq(jacobian, residual, rcond=1e-15)[0]
         force, wheel_z = force - change[:n_port], wheel_z - change[n_port:]
-    k = int(np.argmax(np.abs(residual)))
+    worst = int(np.argmax(np.abs(residual)))
     raise SimulationError(
-        f"static equilibrium at time 0 s not found: residual {residual[k]:.3g} N at port {k} of {n_port}, "
-        f"{ports.place[min(k, n_port - 1)]:.3f} m."
+        f"static equilibrium at time 0 s not found: residual {residual[worst]:.3g} N at port {worst} of {n_port}, "
+        f"{ports.place[min(worst, n_port - 1)]:.3f} m."
     )
 
 

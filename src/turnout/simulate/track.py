@@ -1,6 +1,7 @@
 """A track: one rail on supports, each with its own pad, sleeper and ballast, and what the wheels roll on."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +33,10 @@ class RailStretch:
     rail: Rail
 
 
+# One number stands for all supports; it becomes an array when the track is made.
+NOTHING: Any = 0.0
+
+
 @dataclass(frozen=True)
 class Track:
     """Half a track (one rail, half sleepers), everything per support.
@@ -50,16 +55,16 @@ class Track:
     support: np.ndarray
     pad_stiffness: np.ndarray
     pad_damping: np.ndarray
-    sleeper_mass: np.ndarray = 0.0
-    ballast_stiffness: np.ndarray = 0.0
-    ballast_damping: np.ndarray = 0.0
-    ballast_mass: np.ndarray = 0.0
-    subgrade_stiffness: np.ndarray = 0.0
-    subgrade_damping: np.ndarray = 0.0
-    bay_shear_stiffness: np.ndarray = 0.0
-    bay_shear_damping: np.ndarray = 0.0
-    pad_loss_factor: np.ndarray = 0.0
-    ballast_loss_factor: np.ndarray = 0.0
+    sleeper_mass: np.ndarray = NOTHING
+    ballast_stiffness: np.ndarray = NOTHING
+    ballast_damping: np.ndarray = NOTHING
+    ballast_mass: np.ndarray = NOTHING
+    subgrade_stiffness: np.ndarray = NOTHING
+    subgrade_damping: np.ndarray = NOTHING
+    bay_shear_stiffness: np.ndarray = NOTHING
+    bay_shear_damping: np.ndarray = NOTHING
+    pad_loss_factor: np.ndarray = NOTHING
+    ballast_loss_factor: np.ndarray = NOTHING
     layers: int = 2
     pad_width: float = 0.0
     elements_per_bay: int = 4
@@ -129,7 +134,7 @@ class Track:
 
     def support_links(self, j):
         """Springs, dampers and masses of support ``j``: what a term scales or takes away."""
-        rail = ((("rail", j), 1.0),)
+        rail: tuple = ((("rail", j), 1.0),)
         if self.pad_width and 0 < j < self.support.size - 1:
             rail = ((("rail", j, -1), 0.25), (("rail", j), 0.5), (("rail", j, 1), 0.25))
         pad = (self.pad_stiffness[j], self.pad_damping[j], 0.0, self.pad_loss_factor[j], "pad")

@@ -34,7 +34,9 @@ def train(parameters, load=0.5, units=1):
     if units < 1:
         raise SimulationError(f"{p['name']}: {units!r} units.")
     length = p.number("length", "m")
-    bodies, suspensions, wheels = [], [], []
+    bodies: list[Body] = []
+    suspensions: list[Suspension] = []
+    wheels: list[int] = []
     for unit in range(units):
         _add_unit(p, load, unit * length, bodies, suspensions, wheels)
     front = min(bodies[w].place for w in wheels)

@@ -204,7 +204,11 @@ def coupled(name, vehicles):
     >>> [float(p) for p in two.wheel_places[:5]]
     [0.0, 2.5, 17.7, 20.2, 26.0]
     """
-    bodies, suspensions, wheels, links, end = [], [], [], [], -vehicles[0].overhang
+    bodies: list[Body] = []
+    suspensions: list[Suspension] = []
+    wheels: list[int] = []
+    links: list[tuple] = []
+    end = -vehicles[0].overhang
     for vehicle in vehicles:
         shift, first = end + vehicle.overhang, len(bodies)
         row = int(sum(1 if b.inertia is None else 2 for b in bodies))
@@ -213,11 +217,12 @@ def coupled(name, vehicles):
         wheels += [w + first for w in vehicle.wheels]
         links += [(tuple((r + row, f) for r, f in ends), *rest) for ends, *rest in vehicle.extra_links]
         end += vehicle.length
-    parts = tuple(bodies), tuple(suspensions), tuple(wheels)
     lead = vehicles[0]
     return Vehicle(
         name,
-        *parts,
+        tuple(bodies),
+        tuple(suspensions),
+        tuple(wheels),
         contact=lead.contact,
         radius=lead.radius,
         extra_links=tuple(links),

@@ -126,7 +126,7 @@ def find_splits(blocks) -> tuple[int, ...]:
     most sections share.
     """
     n_section, n_campaign = blocks[0].shape
-    best, lowest = None, np.inf
+    best, lowest = (0,) * n_section, np.inf
     for start in range(n_campaign):
         splits, score = [start] * n_section, deviance(blocks, [start] * n_section)
         moved = True

@@ -54,4 +54,4 @@ def cusum(z, allowance, threshold, active, fresh) -> tuple[np.ndarray, np.ndarra
         since = np.where(resting & (counts[i] | fresh[i]), i, since)
         alarm = (alarm & ~resting & ~fresh[i]) | (total > threshold)
         statistic[i], opened[i], began[i] = total, alarm, since
-    return tuple(np.ascontiguousarray(found.T) for found in (statistic, opened, began))
+    return np.ascontiguousarray(statistic.T), np.ascontiguousarray(opened.T), np.ascontiguousarray(began.T)

@@ -14,7 +14,8 @@ def memory_classes(prepared) -> list[np.ndarray]:
     Spacing is classed in octaves of a week, so that a fleet measured weekly and one measured every two months
     do not lend each other their memory.
     """
-    names, classes = {}, []
+    names: dict[tuple, int] = {}
+    classes = []
     for p in prepared:
         octave = np.nan_to_num(np.round(np.log2(np.maximum(p.interval, 1.0) / 7.0)), nan=-99.0).astype(int)
         keys = zip(p.charts["band"], p.charts["source"], p.charts["section_id"] == WHOLE, octave)

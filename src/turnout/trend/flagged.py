@@ -54,11 +54,13 @@ def candidates(charts, status, settings) -> dict[int, Flag]:
         column = np.flatnonzero(np.isfinite(charts.residual[i]) & (p.epoch[i] == p.epoch[i, -1]))
         ratio = {d: getattr(charts, d)[i, -1] / getattr(charts, f"threshold_{d}")[i] for d in ("down", "up")}
         opened = tuple(d for d in ("down", "up") if getattr(charts, f"{d}_open")[i, -1])
+        temperature, known = _heat(charts, i, column)
         found[int(i)] = Flag(
             p.time[i, column],
             charts.residual[i, column],
             float(charts.memory[i]),
-            *_heat(charts, i, column),
+            temperature,
+            known,
             ratio,
             opened,
         )

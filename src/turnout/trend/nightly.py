@@ -15,7 +15,7 @@ from turnout.registry.derived import publish
 from turnout.registry.generation import load
 from turnout.trend.chart import finish
 from turnout.trend.evaluation import shared_memory
-from turnout.trend.flagged import candidates, describe_flagged
+from turnout.trend.flagged import Flag, candidates, describe_flagged
 from turnout.trend.panel import CHART, DAY, believable, days, lay_out, timestamps
 from turnout.trend.prepared import prepare
 from turnout.trend.rows import arrow_rows
@@ -89,8 +89,10 @@ def _tables(prepared, settings):
 
     ``prepared`` is emptied on the way, so that the arrays of a part go when it is done.
     """
-    frames, years = {name: [] for name in ("chart_status", "baselines", "alarms")}, {}
-    flags, seen = {}, 0
+    frames: dict[str, list[pd.DataFrame]] = {name: [] for name in ("chart_status", "baselines", "alarms")}
+    years: dict[int, list[pa.Table]] = {}
+    flags: dict[int, Flag] = {}
+    seen = 0
     memory = shared_memory(prepared)
     while prepared:
         done = finish(prepared.pop(0), memory.pop(0), settings)
@@ -145,5 +147,5 @@ def _panel(con, charts, newest, settings):
     ).fetchnumpy()
     con.unregister("_part")
     time = np.asarray(rows["us"], dtype=float) / (DAY * 1e6)
-    values = (np.asarray(rows[n], dtype=float) for n in names)
-    return lay_out(charts, np.asarray(rows["chart"]), time, *values, newest, settings)
+    frequency, error, temperature = (np.asarray(rows[n], dtype=float) for n in names)
+    return lay_out(charts, np.asarray(rows["chart"]), time, frequency, error, temperature, newest, settings)

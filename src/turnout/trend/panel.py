@@ -101,8 +101,8 @@ def panel_of(modes, settings, as_of=None) -> Panel:
     def column(name):
         return rows[name].to_numpy(dtype=float, na_value=np.nan) if name in rows else np.full(len(rows), np.nan)
 
-    values = (column(n) for n in ("frequency_hz", "frequency_se_hz", "rail_temperature_c"))
-    return lay_out(charts, chart, time, *values, newest, settings)
+    frequency, error, temperature = (column(n) for n in ("frequency_hz", "frequency_se_hz", "rail_temperature_c"))
+    return lay_out(charts, chart, time, frequency, error, temperature, newest, settings)
 
 
 def lay_out(charts, chart, time, frequency, error, temperature, newest, settings) -> Panel:

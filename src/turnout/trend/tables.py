@@ -176,5 +176,5 @@ def _alarms(charts, direction, run_length):
         threshold=getattr(charts, f"threshold_{direction}")[chart],
         run_length=run_length,
         closed_at_utc=timestamps(np.where(gone, p.time[chart, held], np.nan)),
-        closed_by=np.where(~gone, None, np.where(by_event, "event", "recovered")),
+        closed_by=np.where(gone, np.where(by_event, "event", "recovered"), np.array(None, dtype=object)),
     )

@@ -37,14 +37,14 @@ def digest(parts, *about) -> str:
     return whole.hexdigest()
 
 
-def _plain(chunk) -> np.ndarray:
+def _plain(chunk) -> memoryview:
     """Bytes of the values one by one: NULL as NaN or 0, text as a hash of its own."""
     if pa.types.is_string(chunk.type) or pa.types.is_large_string(chunk.type):
         chunk = chunk.dictionary_encode()
     if pa.types.is_dictionary(chunk.type):
         texts = chunk.dictionary.to_pylist()
         names = np.array([zlib.crc32(str(text).encode()) for text in texts], dtype=np.uint32)
-        return np.ascontiguousarray(names[chunk.indices.to_numpy(zero_copy_only=False)]).view(np.uint8)
+        return np.ascontiguousarray(names[chunk.indices.to_numpy(zero_copy_only=False)]).view(np.uint8).data
     if chunk.null_count:
         chunk = chunk.fill_null(float("nan") if pa.types.is_floating(chunk.type) else 0)
-    return np.ascontiguousarray(chunk.to_numpy(zero_copy_only=False)).view(np.uint8)
+    return np.ascontiguousarray(chunk.to_numpy(zero_copy_only=False)).view(np.uint8).data
