@@ -20,6 +20,8 @@ def run(args):
 
     from turnout.demo.others import fetch_all
     from turnout.demo.pipeline import run_pipeline
+    from turnout.demo.published_modes import beam_modes
+    from turnout.report.beams import write_beams
 
     folder = Path(args.folder)
     fetch_all(folder / "raw")
@@ -28,9 +30,12 @@ def run(args):
     if code:
         return code
     _tell_hits(folder)
-    _tell_modes(folder)
+    beams = list(beam_modes(folder / "raw"))
+    _tell_modes(beams)
+    page = write_beams(beams, folder / "results" / "pages")
     _tell_uff(folder)
     print(f"\nPages: {folder}/results/pages/index.html")
+    print(f"Modes of the beams, drawn: {page}; as a table: {page.with_suffix('.csv')}")
     return 0
 
 
@@ -46,13 +51,11 @@ def _tell_hits(folder):
         print(f"{record:>4}  {HITS[record]:<24} {status:<10} {detail or ''}")
 
 
-def _tell_modes(folder):
-    from turnout.demo.published_modes import beam_modes
-
-    for name, rows in beam_modes(folder / "raw"):
-        print(f"\nModes of the {name}: found without being told how many, nor where")
+def _tell_modes(beams):
+    for beam in beams:
+        print(f"\nModes of the {beam.name} ({beam.origin}): found without being told how many, nor where")
         print(f"{'published [Hz]':>15} {'found [Hz]':>22} {'published damping':>19} {'found damping [%]':>20} {'n':>4}")
-        for f, damping, mode in rows:
+        for f, damping, mode in beam.rows:
             said = "not published" if f is None else f"{f:.1f}"
             zeta = "" if damping is None else f"{damping:.2f} %"
             if mode is None:

@@ -1,6 +1,7 @@
 """What the makers of the recordings of others say about them, and what is found here, side by side."""
 
 from collections import Counter
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -22,17 +23,35 @@ FUNCTIONS = {0: "general functions", 1: "time responses", 2: "auto-spectra", 4: 
 HITS = {0: "overloaded on purpose", 1: "good", 2: "double impact", 3: "good", 4: "good"}
 
 
+@dataclass(frozen=True)
+class Beam:
+    """``frequency`` (n_line,) [Hz], ``responses`` (n_frf, n_line) complex; ``rows`` of (published frequency [Hz],
+    published damping [%], found mode), None where one is lacking."""
+
+    name: str
+    origin: str
+    frequency: np.ndarray
+    responses: np.ndarray
+    highest: float
+    rows: tuple
+
+
 def beam_modes(raw):
-    """Pairs of a name and rows (published, found) for the two files of frequency responses below ``raw``."""
+    """The beams of the two files of frequency responses below ``raw``, with their modes, published and found."""
     path = Path(raw) / SDYPY_FILE
     if sha256_of(path) != SDYPY_SHA256:
         # it is a pickle, and a pickle of unknown origin can do anything
         raise TurnoutError(f"{path} is not the published file. Delete it and run again")
     frequency, responses = np.load(path, allow_pickle=True)
-    responses = np.asarray(responses, complex).reshape(-1, len(frequency))
-    yield "beam of sdypy-EMA 0.27.3", _rows(np.asarray(frequency, float), responses, SDYPY_BEAM, 4500.0)
+    frequency, responses = np.asarray(frequency, float), np.asarray(responses, complex).reshape(-1, len(frequency))
+    yield _beam("beam of sdypy-EMA 0.27.3", "its makers' showcase", frequency, responses, SDYPY_BEAM, 4500.0)
     uff = read_frf("frf/beam.uff", raw)
-    yield "beam.uff of pyuff 2.4.2 (peaks read off its curves)", _rows(uff.frequency, uff.frf, UFF_BEAM, 1400.0)
+    yield _beam("beam.uff of pyuff 2.4.2", "peaks read off its curves", uff.frequency, uff.frf, UFF_BEAM, 1400.0)
+
+
+def _beam(name, origin, frequency, responses, published, highest):
+    rows = _rows(frequency, responses, published, highest)
+    return Beam(name, origin, frequency, np.atleast_2d(responses), highest, tuple(rows))
 
 
 def _rows(frequency, responses, published, highest):

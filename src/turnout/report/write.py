@@ -41,9 +41,9 @@ def write_pages(connection, folder, generation="", turnouts=None, progress=True,
     """
     folder = Path(folder)
     (folder / "turnouts").mkdir(parents=True, exist_ok=True)
-    environment, shared = _environment(), _shared(generation)
+    environment, shared = page_environment(), shared_by_pages(generation)
     source = FleetSource(connection)
-    _replace(folder / "index.html", fleet_page(source, environment.get_template("fleet.html"), shared))
+    replace_page(folder / "index.html", fleet_page(source, environment.get_template("fleet.html"), shared))
     content = contents(source)
     if turnouts is None:
         _remove_others(folder / "turnouts", content)
@@ -57,8 +57,8 @@ def write_pages(connection, folder, generation="", turnouts=None, progress=True,
 
 def write_turnouts(connection, folder, content, generation="", progress=False):
     """Write the pages of the turnouts in ``content``, a mapping to the hash that each page carries."""
-    source, shared = FleetSource(connection), _shared(generation)
-    template = _environment().get_template("turnout.html")
+    source, shared = FleetSource(connection), shared_by_pages(generation)
+    template = page_environment().get_template("turnout.html")
     names = list(content)
     with tqdm(total=len(names), desc="pages", disable=not progress, leave=False) as bar:
         for start in range(0, len(names), AT_ONCE):
@@ -68,15 +68,17 @@ def write_turnouts(connection, folder, content, generation="", progress=False):
                 own = {kind: rows[kind].get(name, []) if kind in rows else [] for kind in {*ROWS, *rows}}
                 mark = {"mark": MARK.format(content[name])}
                 text = turnout_page(own, own["turnouts"][0], template, shared | mark)
-                _replace(Path(folder) / "turnouts" / f"{name}.html", text)
+                replace_page(Path(folder) / "turnouts" / f"{name}.html", text)
                 bar.update()
 
 
-def _environment():
+def page_environment():
+    """Where the templates are."""
     return Environment(loader=PackageLoader("turnout.report", "templates"), trim_blocks=True, autoescape=True)
 
 
-def _shared(generation):
+def shared_by_pages(generation=""):
+    """What every page shows: its style, and what made it."""
     css = (files("turnout.report") / "templates" / "page.css").read_text()
     return {"css": css, "version": __version__, "generation": generation}
 
@@ -88,8 +90,8 @@ def _remove_others(folder, known):
             path.unlink()
 
 
-def _replace(path, text):
-    """Put the page in place in one step, so that nobody ever opens half of it."""
+def replace_page(path, text):
+    """Put a page in place in one step, so that nobody ever opens half of it."""
     temporary = path.with_name(f"{path.name}.{os.getpid()}.tmp")
     temporary.write_text(text, encoding="utf-8")
     os.replace(temporary, path)
