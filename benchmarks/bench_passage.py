@@ -20,7 +20,7 @@ from turnout.passage.clusters import fit_clusters
 from turnout.passage.continuous import cut_passages
 from turnout.passage.direction import direction_test
 from turnout.passage.effects import effects
-from turnout.passage.load import axle_load, calibrate, quasi_static
+from turnout.passage.load import axle_load, calibrate, quasi_static, train_amplitude
 from turnout.passage.nulls import null_bases, null_scores
 from turnout.passage.patterns import read_patterns
 from turnout.passage.scores import fit_percent, score
@@ -246,7 +246,7 @@ def _loads(cases) -> Iterator[Bar]:
     """Load of every other train after calibration on the rest."""
     amplitude = [
         {
-            c.name: float(np.mean(quasi_static(recording.signal(c.name), RATE, passage, c.position)))
+            c.name: train_amplitude(quasi_static(recording.signal(c.name), RATE, passage, c.position))
             for c in recording.channels
             if c.name in passage.at_sensor
         }
@@ -258,10 +258,11 @@ def _loads(cases) -> Iterator[Bar]:
         for name in amplitude[k]:
             others = [i for i in range(len(cases)) if i != k and name in amplitude[i]]
             made = calibrate(
-                [amplitude[i][name] for i in others],
+                [amplitude[i][name][0] for i in others],
                 [cases[i][2].axle_load for i in others],
                 [cases[i][1].motion.speed for i in others],
                 SETTINGS.load_trains_minimum,
+                [amplitude[i][name][1] for i in others],
             )
             if made is not None:
                 calibrations[name] = made

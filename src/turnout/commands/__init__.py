@@ -25,4 +25,5 @@ COMMANDS: tuple[str, ...] = (
     "registry",
     "report",
     "simulate",
+    "trains",
 )

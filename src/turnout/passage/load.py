@@ -10,6 +10,7 @@ from scipy import signal
 from turnout.passage.axles import GRID, along_train
 
 STEP = 0.001  # s
+HEARD = 0.3  # largest standard error of a train's amplitude, relative to it: beyond, its logarithm is no number
 TRUSTED = (0.12, 0.9)  # cycles per metre that are compared: longer ones drown in drift, shorter ones in vibration
 
 
@@ -59,7 +60,22 @@ def quasi_static(samples, rate: float, passage, position: float) -> np.ndarray:
     return np.linalg.lstsq(columns, signal.sosfiltfilt(sections, row), rcond=None)[0]
 
 
-def calibrate(amplitudes, loads, speeds, fewest: int = 5) -> LoadCalibration | None:
+def train_amplitude(per_axle) -> tuple[float, float]:
+    """Mean of ``quasi_static`` (n_axle,) and its standard error, both signed like a load; inf from a single axle.
+
+    A slow train leaves less than the noise: v² w''. Its axles then differ by more than loads do, and say so.
+
+    >>> mean, se = train_amplitude([1.0, 1.2, 0.8, 1.0])
+    >>> print(f"{mean:.2f} ± {se:.2f}")
+    1.00 ± 0.08
+    """
+    per_axle = np.asarray(per_axle, dtype=float)
+    if per_axle.size < 2:
+        return float(per_axle.mean()), float("inf")
+    return float(per_axle.mean()), float(per_axle.std(ddof=1) / np.sqrt(per_axle.size))
+
+
+def calibrate(amplitudes, loads, speeds, fewest: int = 5, errors=None) -> LoadCalibration | None:
     """Calibration of one channel from trains of known mean axle load; None from fewer than ``fewest`` trains.
 
     Parameters
@@ -70,10 +86,14 @@ def calibrate(amplitudes, loads, speeds, fewest: int = 5) -> LoadCalibration | N
         [t]
     speeds : (n_train,) array of float
         [m/s]
+    fewest : int
+    errors : (n_train,) array of float or None
+        Standard errors of the amplitudes; trains with more than ``HEARD`` of their amplitude do not count. [m/s²]
     """
     amplitudes, loads, speeds = (np.asarray(x, dtype=float) for x in (amplitudes, loads, speeds))
     amplitudes = np.abs(amplitudes)
-    good = (amplitudes > 0) & (loads > 0)
+    errors = np.zeros(amplitudes.shape) if errors is None else np.asarray(errors, dtype=float)
+    good = (amplitudes > 0) & (loads > 0) & (errors <= HEARD * amplitudes)
     if good.sum() < max(fewest, 3):
         return None
     reference = float(np.exp(np.mean(np.log(speeds[good]))))
@@ -81,13 +101,16 @@ def calibrate(amplitudes, loads, speeds, fewest: int = 5) -> LoadCalibration | N
     target = np.log(amplitudes[good] / loads[good])
     # acceleration goes with v²; trains of one speed cannot say otherwise
     prior = np.array([[0.0, 0.0], [0.0, 1 / 0.3**2]])
-    scatter = 0.05
+    scatter, own = 0.05, (errors[good] / amplitudes[good]) ** 2
     design = np.column_stack([np.ones(good.sum()), relative])
-    for _ in range(5):
-        normal = design.T @ design / scatter**2 + prior
-        solution = np.linalg.solve(normal, design.T @ target / scatter**2 + prior @ [0.0, 2.0])
+    for _ in range(10):
+        weight = 1.0 / (scatter**2 + own)
+        normal = (design * weight[:, None]).T @ design + prior
+        solution = np.linalg.solve(normal, design.T @ (weight * target) + prior @ [0.0, 2.0])
         residual = target - design @ solution
-        scatter = max(float(np.sqrt(np.sum(residual**2) / max(good.sum() - 2, 1))), 1e-3)
+        # what the trains' own errors leave over, weighted as the fit is
+        excess = np.sum(weight * (residual**2 * good.sum() / max(good.sum() - 2, 1) - own)) / weight.sum()
+        scatter = float(np.sqrt(max(excess, 1e-6)))
     low, high = speeds[good].min(), speeds[good].max()
     covariance = np.linalg.inv(normal)
     return LoadCalibration(
@@ -108,12 +131,12 @@ def axle_load(recording, passage, calibrations, settings) -> LoadFinding | None:
         if found is None or not 0.8 * found.slowest <= speed <= 1.25 * found.fastest:
             continue
         amplitudes = quasi_static(recording.signal(name), recording.rate, passage, known[name].position)
-        mean = abs(float(np.mean(amplitudes)))
-        if mean == 0:
+        mean, error = np.abs(train_amplitude(amplitudes))
+        if mean == 0 or error > HEARD * mean:
             continue
         where = np.array([1.0, np.log(speed / found.speed)])
         logs.append(np.log(mean) - where @ [found.log_gain, found.exponent])
-        errors.append(np.sqrt(where @ found.covariance @ where + found.scatter**2))
+        errors.append(np.sqrt(where @ found.covariance @ where + found.scatter**2 + (error / mean) ** 2))
         shapes.append(amplitudes / np.mean(amplitudes))
     if not logs:
         return None

@@ -60,7 +60,11 @@ class PassageSettings:
     unknown_prior: float = setting(0.2, "", "prior probability of a type that has no template", 0.001, 0.9)
     # loads
     load_relative_error_maximum: float = setting(
-        0.05, "", "a load with a larger relative standard error is said to be unavailable", 0.005, 0.5
+        0.025,
+        "",
+        "a load with a larger relative standard error is said to be unavailable: 5 % is two of them",
+        0.005,
+        0.5,
     )
     load_trains_minimum: int = setting(5, "", "trains of known weight that a calibration needs", 2)
     # what is kept beside the recordings

@@ -88,8 +88,8 @@ def _bar(chart, x, width, colour, row):
 
 def _key(chart, names):
     """Colours of the classes."""
-    x, y = LEFT + 8, TOP + 6
+    x, y = float(LEFT + 8), TOP + 6
     for colour, name in zip(COLOURS, names):
-        chart.parts.append(f'<rect x="{x}" y="{y}" width="10" height="10" fill="{colour}" stroke="#65727f"/>')
-        chart.parts.append(f'<text x="{x + 14}" y="{y + 9}">{escape(name)}</text>')
+        chart.parts.append(f'<rect x="{x:.0f}" y="{y}" width="10" height="10" fill="{colour}" stroke="#65727f"/>')
+        chart.parts.append(f'<text x="{x + 14:.0f}" y="{y + 9}">{escape(name)}</text>')
         x += 30 + 6.2 * len(name)

@@ -1,0 +1,119 @@
+"""What passages so far teach: the axle load that a sensor's slow part means, and clusters of like passages."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from turnout.chains.passage import _time_in, sensors_of
+from turnout.chains.passage_context import read_clusters, read_loads
+from turnout.config.turnout import TurnoutConfig
+from turnout.errors import ReadError
+from turnout.fleet.atomic import write_if_changed
+from turnout.fleet.scan import scan
+from turnout.passage.analyse import analyse
+from turnout.passage.clusters import Clusters, fit_clusters
+from turnout.passage.load import LoadCalibration, calibrate, quasi_static, train_amplitude
+from turnout.passage.train_data import listed_for, listed_trains
+from turnout.readers import read
+
+MOST_PASSAGES = 20_000  # for the clusters: more change no boundary, and mixtures take time
+RECENT = """
+    select train_type, speed_kmh, axle_load_t from passages_current
+    where status <> 'rejected' and train_type is not null and speed_kmh is not null
+    order by passed_at_utc desc, passage_id limit ?
+"""
+
+
+def learn_clusters(connection, settings) -> Clusters:
+    """Clusters of the latest passages of a registry, written beside the configuration; known ones keep their ids.
+
+    Parameters
+    ----------
+    connection : duckdb connection
+        An open registry.
+    settings : PassageSettings
+        Where they are kept, and how many there may be.
+    """
+    path = Path(settings.assets) / "clusters.json"
+    cursor = connection.execute(RECENT, [MOST_PASSAGES])
+    names = [d[0] for d in cursor.description]
+    found = fit_clusters([dict(zip(names, row)) for row in cursor.fetchall()], settings, read_clusters(path))
+    write_if_changed(path, json.dumps(found.document(), indent=1) + "\n")
+    return found
+
+
+def weighed_trains(turnout: TurnoutConfig, raw_root, patterns, settings, most: int = 60) -> list[dict]:
+    """Trains of known axle load in a turnout's raw folder, the latest ``most``, with what each sensor says of them.
+
+    Each is {"file", "load" [t], "speed" [m/s], "amplitudes": {channel: (mean, standard error) [m/s²]}}. A train counts
+    where trains.csv gives its axle load, its time and its number of axles fit one passage only, and nothing is wrong
+    with the recording.
+    """
+    listed, _ = listed_trains([row for row in turnout.trains if row.get("axle_load_t")])
+    found: list[dict] = []
+    passages = [u for u in scan(turnout, Path(raw_root)).units if u.kind == "passage"] if listed else []
+    for unit in sorted(passages, key=lambda u: u.label, reverse=True):
+        started = _time_in(unit.label)
+        if started is not None and not any(abs((t.passed_at - started).total_seconds()) < 900 for t in listed):
+            continue
+        found += _weighed(unit, turnout, raw_root, patterns, settings, listed)
+        if len(found) >= most:
+            break
+    return found
+
+
+def _weighed(unit, turnout, raw_root, patterns, settings, listed):
+    found = []
+    for path, *_ in unit.files:
+        try:
+            result = read(path, raw_root, turnout.passages.description)
+        except ReadError:
+            continue  # the passage stage has put it into quarantine
+        for recording in result.recordings:
+            passage = analyse(recording, sensors_of(turnout), patterns, settings)
+            started = recording.started_at or _time_in(unit.label)
+            if passage.status != "accepted" or started is None:
+                continue
+            moment = started + np.timedelta64(round(1e6 * float(passage.times[0])), "us").astype(object)
+            train = listed_for(moment, passage.n_axle, listed, settings.train_data_tolerance)
+            if train is not None:
+                found.append(_what_sensors_say(path, recording, passage, sensors_of(turnout), train))
+    return found
+
+
+def _what_sensors_say(path, recording, passage, sensors, train):
+    amplitudes = {
+        s.name: train_amplitude(quasi_static(recording.signal(s.name), recording.rate, passage, s.position))
+        for s in sensors
+        if s.name in passage.at_sensor
+    }
+    return {"file": path, "load": train.axle_load, "speed": passage.motion.speed, "amplitudes": amplitudes}
+
+
+def learn_loads(turnout: TurnoutConfig, trains, settings) -> dict[str, LoadCalibration]:
+    """Calibration of every sensor that heard enough trains of ``weighed_trains``, written beside other turnouts'."""
+    made = {}
+    for name in sorted({name for t in trains for name in t["amplitudes"]}):
+        heard = [t for t in trains if name in t["amplitudes"]]
+        amplitudes, errors = zip(*(t["amplitudes"][name] for t in heard))
+        loads, speeds = [t["load"] for t in heard], [t["speed"] for t in heard]
+        found = calibrate(amplitudes, loads, speeds, settings.load_trains_minimum, errors)
+        if found is not None:
+            made[name] = found
+    path = Path(settings.assets) / "loads.json"
+    known = read_loads(path)
+    if made:
+        known[turnout.id] = made
+        write_if_changed(path, json.dumps(_document(known), indent=1) + "\n")
+    return made
+
+
+def _document(known):
+    return {
+        turnout: {name: asdict(c) | {"covariance": c.covariance.tolist()} for name, c in sorted(channels.items())}
+        for turnout, channels in sorted(known.items())
+    }

@@ -1,0 +1,71 @@
+"""Learn from the trains so far: what axle load a sensor's slow part means, and which passages are alike.
+
+  turnout trains                           all turnouts: calibrate loads, find clusters
+  turnout trains --turnout tommerup_s1     loads of this turnout only, and clusters
+
+Loads need trains of known weight (axle_load_t in raw/<id>/trains.csv). Both are written into the folder that the
+setting passage.assets names; the next run uses them, and computes the passages that depend on them again.
+"""
+
+import argparse
+
+HELP = "learn axle loads and clusters from the trains so far"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Which turnouts, and where everything lies."""
+    parser.add_argument("--turnout", nargs="*", help="only the loads of these turnouts")
+    parser.add_argument("--configuration", default="config", help="folder of the configuration (%(default)s)")
+    parser.add_argument("--raw", default="raw", help="folder of the recordings (%(default)s)")
+    parser.add_argument("--registry", default="results/registry", help="folder of the registry (%(default)s)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print each calibration and each cluster."""
+    from turnout.chains.passage_context import known_patterns
+    from turnout.chains.passage_learning import learn_clusters, learn_loads, weighed_trains
+    from turnout.config import load_configuration, with_raw
+    from turnout.registry.database import open_registry
+
+    configuration = load_configuration(args.configuration)
+    names = args.turnout or list(configuration.rows)
+    settings = configuration.settings["passage"]
+    for name in names:
+        turnout = with_raw(configuration.turnout(name), args.raw)
+        if turnout.passages is None:
+            continue
+        settings = turnout.settings["passage"]
+        patterns = known_patterns(settings.axle_patterns)
+        trains = weighed_trains(turnout, args.raw, patterns, settings)
+        print("\n".join(_loads(name, trains, learn_loads(turnout, trains, settings), settings)))
+    with open_registry(args.registry) as connection:
+        clusters = learn_clusters(connection, settings)
+    print("\n".join(_clusters(clusters)))
+    return 0
+
+
+def _loads(name, trains, made, settings) -> list[str]:
+    """The calibrations of one turnout in words."""
+    if not made:
+        need = settings.load_trains_minimum
+        return [f"{name}: {len(trains)} trains of known weight, {need} are needed: axle loads stay unavailable"]
+    words = [f"{name}: {len(trains)} trains of known weight, {min(t['load'] for t in trains):.1f} to "]
+    words[0] += f"{max(t['load'] for t in trains):.1f} t per axle"
+    for channel, c in made.items():
+        words.append(
+            f"  {channel:<6} one train scatters by {100 * c.scatter:.1f} %, amplitude with speed to the power "
+            f"{c.exponent:.2f}, {3.6 * c.slowest:.0f} to {3.6 * c.fastest:.0f} km/h, n = {c.n}"
+        )
+    return words
+
+
+def _clusters(found) -> list[str]:
+    """The clusters in words."""
+    import numpy as np
+
+    words = [f"clusters, version {found.version}:"]
+    for c in found.clusters:
+        centre = np.exp(c.mean)
+        load = f", {centre[1]:.1f} t per axle" if len(centre) > 1 else ""
+        words.append(f"  {c.id:<14}{centre[0]:.0f} km/h{load}, n = {c.n}")
+    return words if found.clusters else ["no clusters: no train of a known type yet"]

@@ -1,0 +1,149 @@
+"""Loads and clusters are learnt from files and a registry, and serve the next passage."""
+
+import json
+from dataclasses import replace
+from datetime import datetime, timedelta
+
+import duckdb
+import numpy as np
+import pytest
+from benchmarks.passage_truth import IC3, PATTERNS, RATE, passing, rolling, sensors_for
+
+from turnout.chains.passage_context import read_clusters, read_loads
+from turnout.chains.passage_learning import learn_clusters, learn_loads, weighed_trains
+from turnout.cli import main
+from turnout.config import load_configuration, with_raw
+from turnout.passage.analyse import analyse
+from turnout.passage.load import axle_load, calibrate, train_amplitude
+from turnout.readers.writing import write
+from turnout.records import Channel
+
+PLACES = {"OT": -12.0, "SP": 3.6, "CLP": 13.8, "A7": 24.6, "ASM": 36.0}
+GAIN = {"OT": 1.0, "SP": 1.4, "CLP": 0.8, "A7": 1.2, "ASM": 0.9}
+WAVENUMBER = 1.1
+
+
+def weighed(rng, load, speed, scatter=0.01):
+    """Bursts that follow the wheels, and under each the v² w'' of a rail on its foundation, for ``load`` tonnes."""
+    places = list(PLACES.values())
+    recording = rolling(rng, IC3, speed, places, noise=0.01)
+    samples, time = 0.3 * recording.samples, np.arange(recording.n_sample) / RATE
+    for row, name, times in zip(samples, PLACES, passing(IC3, places, speed, 0.0, 1, 1.0)):
+        for t in times:
+            kx = WAVENUMBER * speed * np.abs(time - t)
+            shape = np.exp(-kx) * (np.cos(kx) - np.sin(kx))
+            row += 2e-3 * GAIN[name] * load * (1 + scatter * rng.standard_normal()) * speed**2 * shape
+    channels = tuple(Channel(n, "acceleration", x) for n, x in PLACES.items())
+    return replace(recording, samples=samples, channels=channels)
+
+
+@pytest.fixture(scope="module")
+def turnout(tmp_path_factory, repository):
+    """(turnout, raw, settings): seven trains on file, six of them with their axle load in trains.csv."""
+    raw, rng = tmp_path_factory.mktemp("weighed"), np.random.default_rng(31)
+    folder = raw / "tommerup_s1" / "passages"
+    folder.mkdir(parents=True)
+    rows = ["passed_at_utc,train_type,speed_kmh,axle_load_t"]
+    for k in range(7):
+        moment, load = datetime(2024, 5, 13, 6) + timedelta(hours=k), 10.0 + 1.5 * k
+        recording = replace(weighed(rng, load, 30.0 + 2.0 * k), started_at=moment)
+        others = [c for c in ("A8", "A9", "ASD")]
+        silent = 0.01 * rng.standard_normal((3, recording.n_sample))
+        more = tuple(Channel(n, "acceleration", x) for n, x in zip(others, (26.4, 28.2, 36.0)))
+        recording = replace(
+            recording, samples=np.vstack([recording.samples, silent]), channels=recording.channels + more
+        )
+        write([recording], folder / f"{moment:%Y%m%dT%H%M%SZ}.h5", "hdf5")
+        if k != 3:
+            rows.append(f"{moment.isoformat()},IC3,{3.6 * (30 + 2 * k):.0f},{load}")
+    (raw / "tommerup_s1" / "trains.csv").write_text("\n".join(rows) + "\n")
+    found = with_raw(load_configuration(repository / "config").turnout("tommerup_s1"), raw)
+    return found, raw, replace(found.settings["passage"], assets=str(raw / "assets"))
+
+
+def test_trains_of_known_weight_calibrate_the_sensors_and_weigh_the_next_train(turnout):
+    config, raw, settings = turnout
+    trains = weighed_trains(config, raw, PATTERNS, settings)
+    assert len(trains) == 6 and [t["load"] for t in trains] == [19.0, 17.5, 16.0, 13.0, 11.5, 10.0]
+    made = learn_loads(config, trains, settings)
+    assert set(made) == set(PLACES)
+    for name in PLACES:
+        assert made[name].exponent == pytest.approx(2.0, abs=0.15) and made[name].n == 6
+        assert np.exp(made[name].log_gain) / made[name].speed ** 2 / GAIN[name] == pytest.approx(
+            np.exp(made["OT"].log_gain) / made["OT"].speed ** 2, rel=0.05
+        )
+    known = read_loads(raw / "assets" / "loads.json")["tommerup_s1"]
+    assert known.keys() == made.keys() and known["A7"].scatter == made["A7"].scatter
+    recording = weighed(np.random.default_rng(32), 14.5, 36.0)
+    passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
+    found = axle_load(recording, passage, known, settings)
+    assert found.mean == pytest.approx(14.5, rel=0.05) and found.se < 0.025 * found.mean
+
+
+def test_too_few_trains_of_known_weight_calibrate_nothing(turnout):
+    config, raw, settings = turnout
+    trains = weighed_trains(config, raw, PATTERNS, settings, most=4)
+    assert len(trains) == 4
+    assert learn_loads(config, trains, replace(settings, assets=str(raw / "none"))) == {}
+    assert not (raw / "none").exists()
+
+
+def test_a_train_lost_in_noise_says_nothing_about_the_gain():
+    """Slow trains leave v² w'' below the noise: their own axles disagree, so they are left out or count for little."""
+    rng = np.random.default_rng(33)
+    speeds, loads = np.repeat([12.0, 25.0, 40.0], 10), rng.uniform(10, 20, 30)
+    axles = [0.01 * p * v**2 + 40.0 * rng.standard_normal(8) for p, v in zip(loads, speeds)]
+    mean, se = np.transpose([train_amplitude(a) for a in axles])
+    found = calibrate(mean, loads, speeds, 5, se)
+    assert found.n < 30 and found.slowest == 25.0
+    gain = found.log_gain - found.exponent * np.log(found.speed)
+    error = np.array([1.0, -np.log(found.speed)])
+    assert found.exponent == pytest.approx(2.0, abs=4 * np.sqrt(found.covariance[1, 1]))
+    assert np.exp(gain + (found.exponent - 2) * np.log(30.0)) == pytest.approx(0.01, rel=0.05)
+    assert error @ found.covariance @ error > 0
+
+
+def _speed_and_load(rng, fast):
+    centre, spread = ((160.0, 12.0) if fast else (80.0, 14.0)), (3.0, 0.2)
+    return [float(c + s * rng.standard_normal()) for c, s in zip(centre, spread)]
+
+
+def connection_of(rng, n):
+    con = duckdb.connect()
+    con.execute(
+        "create table passages_current (passage_id varchar, passed_at_utc timestamp, status varchar, "
+        "train_type varchar, speed_kmh double, axle_load_t double)"
+    )
+    for k in range(n):
+        fast = k % 2 == 0
+        con.execute(
+            "insert into passages_current values (?, ?, 'accepted', 'IC3', ?, ?)",
+            [str(k), datetime(2024, 1, 1) + timedelta(hours=k), *_speed_and_load(rng, fast)],
+        )
+    return con
+
+
+def test_clusters_come_from_the_registry_and_keep_their_ids_when_nights_are_added(tmp_path, settings):
+    rng, here = np.random.default_rng(34), replace(settings, assets=str(tmp_path))
+    first = learn_clusters(connection_of(rng, 120), here)
+    assert first.version == 1 and len(first.clusters) == 2
+    again = learn_clusters(connection_of(rng, 140), here)
+    assert again.version == 2 and read_clusters(tmp_path / "clusters.json").version == 2
+    for speed, load in ((160.0, 12.0), (80.0, 14.0)):
+        assert first.assign("IC3", speed, load) == again.assign("IC3", speed, load) is not None
+
+
+def test_the_command_says_what_it_learnt(turnout, tmp_path, monkeypatch, repository, capsys):
+    import shutil
+
+    _, raw, _ = turnout
+    shutil.copytree(repository / "config", tmp_path / "config")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(
+        "turnout.registry.database.open_registry", lambda path: connection_of(np.random.default_rng(1), 60)
+    )
+    assert main(["trains", "--turnout", "tommerup_s1", "--raw", str(raw)]) == 0
+    said = capsys.readouterr().out
+    assert "tommerup_s1: 6 trains of known weight, 10.0 to 19.0 t per axle" in said
+    assert "amplitude with speed to the power" in said and "clusters, version 1:" in said
+    assert json.loads((tmp_path / "config" / "passages" / "loads.json").read_text())["tommerup_s1"]
