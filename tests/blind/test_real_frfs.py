@@ -1,0 +1,48 @@
+"""Real hammer tests against too simple models: what was left out is found or said to be unknown."""
+
+import numpy as np
+import pytest
+from examples import real_frfs
+from examples.frf_case import LAMBDA, FrfCase, free_shape
+
+
+def test_shapes_of_a_free_beam():
+    """Unit mean square, 2 at an end in size, and the first is nil at 0.2242 of the length (any handbook)."""
+    x = np.linspace(0.0, 0.5, 2001)
+    shapes = np.array([free_shape(LAMBDA[:5], place) for place in x])
+    assert np.trapezoid(shapes**2, x, axis=0) / 0.5 == pytest.approx(np.ones(5), rel=2e-3)
+    assert np.abs(shapes[0]) == pytest.approx(2.0 * np.ones(5), rel=1e-4)
+    assert free_shape(LAMBDA[:1], 0.2242)[0] == pytest.approx(0.0, abs=2e-3)
+
+
+def test_a_resonance_is_read_off_a_made_response():
+    """Two places, one mode of unit mass: frequency, damping and shape of -x²/(1 - x² + 2i zeta x)."""
+    f = np.arange(50.0, 200.0, 0.25)
+    x = f / 120.0
+    line = -(x**2) / (1.0 - x**2 + 2j * 0.01 * x)
+    h = np.outer([0.5, -0.8], [0.5, -0.8])[:, :, None] * line
+    case = FrfCase(f, h, (60.0, 190.0), (120.0,))
+    values = {n.name: n.mean for n in case.nuisances}
+    predicted = case.predict(values, (), case.observations)
+    for o, p in zip(case.observations, predicted):
+        assert np.linalg.norm(p - o.data) < 0.05 * np.linalg.norm(o.data)
+
+
+@pytest.mark.slow
+def test_what_was_left_out_is_found_or_said_to_be_unknown(shared_data):
+    if not (shared_data / "frf_beam_sdypy").is_dir():
+        pytest.skip(f"no recordings: {shared_data}/frf_beam_sdypy does not exist")
+    found = real_frfs.analyse(shared_data)
+    said = {title: (d.verdict.answer, d.verdict.names) for title, (_, _, d) in found.items()}
+    assert said["A1"] == ("named", ("mode",))
+    frequency, damping = real_frfs.mode_found(found["A1"][2])
+    assert frequency == pytest.approx(477.4, abs=0.5)  # printed by the makers, one more estimator of theirs beside
+    assert damping == pytest.approx(0.20, abs=0.02)
+    assert found["A1"][2].verification.after > found["A1"][2].verification.before + 30.0
+    assert said["A2"][0] == "unknown"
+    assert any(f.frame == "frequency" and f.q < 0.05 for f in found["A2"][2].frames)
+    assert said["A3"] == ("named", ("mode",)) and real_frfs.mode_found(found["A3"][2])[0] < 60.0
+    assert said["A4"][0] == "unknown"
+    assert said["B1"] == ("named", ("blow_gain",))
+    assert found["B1"][2].fit.terms[0].where == "blow 1"
+    assert said["B2"][0] in ("unknown", "named") and set(said["B2"][1]) <= {"mode"}
