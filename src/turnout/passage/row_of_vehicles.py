@@ -21,6 +21,10 @@ def best_row(spacing, pattern: Pattern, tolerance: float):
     if not low <= n_axle <= high:
         return None
     limit = 20.0 + 4.0 * n_axle  # beyond it the chi-squared test fails whatever follows
+    # plain floats: a train has hundreds of thousands of pairs, most of them given up at the first spacing
+    seen, weight = [float(s) for s in spacing], 0.5 / tolerance**2
+    within = {id(v): np.diff(v.axles).tolist() for group in pattern.groups for v in group.vehicles}
+    chance = [float(np.log(len(group.vehicles))) for group in pattern.groups]
     # state: axles used, group, vehicles used of the group, last vehicle -> (cost, row, choices)
     layers = [{} for _ in range(n_axle + 1)]
     layers[0][(0, 0, None)] = (0.0, (), 0.0)
@@ -32,14 +36,16 @@ def best_row(spacing, pattern: Pattern, tolerance: float):
                     stop = used + len(vehicle.axles)
                     if stop > n_axle:
                         continue
-                    expected = np.diff(vehicle.axles)
+                    total = cost + chance[group]
                     if row:
-                        expected = np.concatenate([[row[-1].rear + vehicle.axles[0]], expected])
-                    seen = spacing[stop - 1 - len(expected) : stop - 1]
-                    total = cost + 0.5 * float(np.sum(((seen - expected) / tolerance) ** 2)) + np.log(len(choices))
+                        total += weight * (seen[used - 1] - row[-1].rear - vehicle.axles[0]) ** 2
+                    for k, expected in enumerate(within[id(vehicle)], used):
+                        if total >= limit:
+                            break
+                        total += weight * (seen[k] - expected) ** 2
                     key = (group, taken, vehicle.name)
                     if total < limit and total < layers[stop].get(key, UNREACHED)[0]:
-                        layers[stop][key] = (total, (*row, vehicle), free + np.log(len(choices)))
+                        layers[stop][key] = (total, (*row, vehicle), free + chance[group])
     ends = [v for (g, count, _), v in layers[n_axle].items() if _may_end(pattern, g, count)]
     return min(ends, key=lambda v: v[0], default=None)
 
