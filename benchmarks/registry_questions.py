@@ -29,19 +29,23 @@ NETWORK = {
         select a.section_id, a.band, median((b.f - a.f) / (b.t - a.t)) as slope
         from m a join m b on a.section_id = b.section_id and a.band = b.band and a.t < b.t group by all""",
 }
+# The sum is a loop, S = max(0, S + z), over the list of each chart: half the time of two windows over all rows.
 CUSUM = """
 with m as (select section_id, band, measured_at_utc, frequency_hz from modes_current
     where measured_at_utc > newest_measurement() - to_days(1461)),
-b as (select section_id, band, avg(frequency_hz) as f0, stddev_samp(frequency_hz) as sd from m
-    where measured_at_utc < newest_measurement() - to_days(1096) group by section_id, band),
-p as (
-    select m.section_id, m.band, m.measured_at_utc, sum((b.f0 - m.frequency_hz) / b.sd - 1.0) over (
-        partition by m.section_id, m.band order by m.measured_at_utc rows unbounded preceding) as p
-    from m join b on m.section_id = b.section_id and m.band = b.band
+b as (select row_number() over () as chart, * from (
+    select section_id, band, avg(frequency_hz) as f0, stddev_samp(frequency_hz) as sd from m
+    where measured_at_utc < newest_measurement() - to_days(1096) group by section_id, band)),
+z as (
+    select chart, list({'s': (f0 - frequency_hz) / sd - 1.0, 'highest': 0e0} order by measured_at_utc) as steps
+    from m join b using (section_id, band) group by chart
 ),
-s as (select section_id, band, p - least(0, min(p) over (
-    partition by section_id, band order by measured_at_utc rows unbounded preceding)) as s from p)
-select section_id, band, max(s) as highest from s group by all order by highest desc limit 20
+s as (
+    select chart, list_reduce(list_prepend({'s': 0e0, 'highest': 0e0}, steps), lambda now, step: {
+        's': greatest(0e0, now.s + step.s), 'highest': greatest(now.highest, now.s + step.s)}).highest as highest
+    from z order by highest desc limit 20
+)
+select section_id, band, highest from s join b using (chart) order by highest desc
 """
 PASSAGES = {
     "weekly summary of the fleet": "from passage_fits_weekly",
