@@ -132,7 +132,8 @@ class FrfCase(Case):
         return self._shape(np.mean(h[:, :, near].real, axis=2), rank)
 
     def _candidates(self):
-        low, high = 0.25 * self.frequency[0], 4.0 * self.frequency[-1]
+        whole = self.whole[0]
+        low, high = max(0.25 * self.frequency[0], whole[0]), min(4.0 * self.frequency[-1], whole[-1])
         places = [low * 2.0 ** (k / 2.0) for k in range(int(2.0 * np.log2(high / low)) + 1)]
         seen = {}
         for about in places:
