@@ -1,0 +1,110 @@
+"""Track decay rate of an endless track, vertical or lateral: the library's closed form for many frequencies at once.
+
+A test holds it against the library's meshed track (`turnout.simulate.decay_rate`). Lateral motion is the same beam with
+the rail's lateral bending and the fastening's lateral spring: no torsion, no bending of the web.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import expm
+
+from turnout.simulate.decay_rate import GRID
+
+BANDS = np.array([100, 125, 160, 200, 250, 315, 400, 500, 630, 800, 1000, 1250, 1600, 2000, 2500, 3150, 4000, 5000.0])
+LINES = 5  # per band
+SPACING = 0.6
+
+
+@dataclass(frozen=True)
+class Beam:
+    """Rail 60E1 in one direction: EI [N m²], κGA [N], ρI [kg m], and its mass [kg/m]."""
+
+    bending: float
+    shear: float
+    rotary: float
+    mass: float = 60.2
+
+
+VERTICAL = Beam(210e9 * 3.038e-5, 0.393 * 80.77e9 * 76.7e-4, 7850 * 3.038e-5)
+LATERAL = Beam(210e9 * 5.12e-6, 0.4 * 80.77e9 * 76.7e-4, 7850 * 5.12e-6)
+
+
+@dataclass(frozen=True)
+class Support:
+    """Per rail seat: springs [N/m] with loss factors, half a sleeper [kg]; ``rail_loss`` of the rail's bending.
+
+    ``absorbers``: (mass [kg/m], frequency [Hz], loss factor) of tuned masses along the rail.
+    """
+
+    pad: float
+    pad_loss: float
+    mass: float
+    ballast: float
+    ballast_loss: float
+    rail_loss: float
+    absorbers: tuple = ()
+
+
+def decay_rate(beam, support, bands=BANDS, lines=LINES):
+    r"""Decay rate [dB/m] in third octaves, (n_band,): :math:`4.343 / \sum_n |A(x_n)|^2 \Delta x_n / |A(0)|^2`.
+
+    The force acts between two supports; ``bands`` [Hz]. EN 15461, on the grid of `turnout.simulate.decay_rate`.
+    """
+    edge = 2.0 ** (1.0 / 6.0)
+    frequency = (np.asarray(bands)[:, None] * np.geomspace(1.0 / edge, edge, lines)).ravel()
+    h = responses(beam, support, frequency) * (frequency**2)[:, None]
+    energy = np.mean(np.abs(h.reshape(len(bands), lines, -1)) ** 2, axis=1)
+    x = SPACING * GRID
+    middle = 0.5 * (x[1:] + x[:-1])
+    width = np.diff(np.concatenate([[x[0]], middle, [x[-1] + 0.5 * (x[-1] - x[-2])]]))
+    return 4.343 / ((energy / energy[:, :1]) @ width)
+
+
+def responses(beam, support, frequency):
+    """(n_line, n_place) receptance of the endless track at the grid's places under a force between supports."""
+    omega = 2.0 * np.pi * np.asarray(frequency)
+    quarter = expm(_bending(omega, beam, support) * (0.25 * SPACING))
+    half = quarter @ quarter
+    jump = np.zeros((omega.size, 4, 4), dtype=complex) + np.eye(4)
+    jump[:, 3, 0] = seat(omega, support)
+    multiplier, vector = np.linalg.eig(jump @ half @ half)
+    order = np.argsort(np.abs(multiplier), axis=1)
+    multiplier = np.take_along_axis(multiplier, order, axis=1)
+    vector = np.take_along_axis(vector, order[:, None, :], axis=2)
+    here = half @ vector
+    ends = np.concatenate([here[:, :, :2], -here[:, :, 2:]], axis=2)
+    amount = np.linalg.solve(ends, np.tile([[0.0], [0.0], [0.0], [-1.0]], (omega.size, 1, 1)))[:, :2, 0]
+    parts, step = [vector[:, 0, :2]], vector[:, :, :2]
+    for _ in range(3):
+        step = quarter @ step
+        parts.append(step[:, 0, :])
+    found = np.empty((omega.size, GRID.size), dtype=complex)
+    for k, x in enumerate(GRID):
+        bays, rest = divmod(round(4.0 * x) + 2, 4)  # quarters of a bay behind the support before the force
+        found[:, k] = np.sum(parts[rest] * amount * multiplier[:, :2] ** bays, axis=1)
+    return found
+
+
+def seat(omega, support):
+    """(n,) dynamic stiffness under the rail of one support [N/m]."""
+    pad = support.pad * (1.0 + 1j * support.pad_loss)
+    below = support.ballast * (1.0 + 1j * support.ballast_loss) - omega**2 * support.mass
+    return pad * below / (pad + below)
+
+
+def _bending(omega, beam, support):
+    """(n, 4, 4) first-order system of the rail's deflection, rotation, moment and shear along x."""
+    system = np.zeros((omega.size, 4, 4), dtype=complex)
+    lossy = 1.0 + 1j * support.rail_loss
+    system[:, 0, 1] = 1.0
+    system[:, 0, 3] = 1.0 / (beam.shear * lossy)
+    system[:, 1, 2] = 1.0 / (beam.bending * lossy)
+    system[:, 2, 1] = -(omega**2) * beam.rotary
+    system[:, 2, 3] = -1.0
+    push = -(omega**2) * beam.mass + 0j
+    for mass, tuned, loss in support.absorbers:
+        own = (2.0 * np.pi * tuned) ** 2 * (1.0 + 1j * loss)
+        push = push - mass * omega**2 * own / (own - omega**2)
+    system[:, 3, 0] = push
+    return system
