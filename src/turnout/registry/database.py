@@ -11,6 +11,7 @@ import duckdb
 from turnout.errors import RegistryError
 from turnout.registry.columns import literal, tables
 from turnout.registry.generation import Generation, load, sync_folder
+from turnout.registry.ids import content_id
 from turnout.registry.parquet import read_live
 from turnout.registry.settled import LARGE, create_parts
 from turnout.registry.staging import connect
@@ -74,16 +75,23 @@ def build_database(registry_dir: Path, generation: Generation) -> None:
 
 
 def is_behind(registry_dir: Path, generation: Generation) -> bool:
-    """Whether ``registry.duckdb`` is missing, of another generation, or made for another folder."""
+    """Whether ``registry.duckdb`` is missing, of another generation, made for another folder or of other views."""
     file = Path(registry_dir) / DATABASE
     if not file.exists():
         return True
     try:
         with duckdb.connect(str(file), read_only=True, config=OFFLINE) as con:
-            row = con.execute("select generation, folder from registry_info").fetchall()[0]
+            row = con.execute("select generation, folder, views_version from registry_info").fetchall()[0]
     except duckdb.Error:
         return True
-    return row != (generation.number, str(Path(registry_dir).resolve()))
+    return row != (generation.number, str(Path(registry_dir).resolve()), views_version())
+
+
+@cache
+def views_version() -> str:
+    """Changes with any view, reason or description of a column: a newer program makes its views anew."""
+    described = [(c.table, c.name, c.unit, c.meaning) for t in tables().values() for c in t]
+    return content_id("views", view_files(), reasons_sql(), described, list(view_columns()))
 
 
 def rebuild_database(registry_dir: Path) -> Generation:
@@ -103,7 +111,8 @@ def _create_views(con, root: Path, generation: Generation) -> None:
     con.execute(
         f"create view registry_info as select {generation.number}::bigint as generation, "
         f"{literal(str(root))} as folder, {newest} as newest_measurement_at_utc, "
-        f"{len(generation.files)}::bigint as n_files, {sum(f.bytes for f in generation.files)}::bigint as n_bytes"
+        f"{len(generation.files)}::bigint as n_files, {sum(f.bytes for f in generation.files)}::bigint as n_bytes, "
+        f"{literal(views_version())} as views_version"
     )
     con.execute(reasons_sql())
     for name, sql in view_files().items():

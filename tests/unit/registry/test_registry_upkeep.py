@@ -9,7 +9,7 @@ import pytest
 from registry_rows import Bench, hammer_result
 
 from turnout.errors import RegistryError
-from turnout.registry import compaction
+from turnout.registry import compaction, database
 from turnout.registry.compaction import compact, rebuild
 from turnout.registry.database import open_registry, rebuild_database
 from turnout.registry.generation import FILE, load
@@ -232,3 +232,15 @@ def test_no_registry_is_said(tmp_path):
 def test_views_that_cannot_be_ordered_are_refused(texts, said):
     with pytest.raises(RegistryError, match=said):
         in_order(texts)
+
+
+def test_views_of_an_older_program_are_made_anew_though_there_is_no_new_row(bench, hammer, monkeypatch):
+    bench.register(hammer())
+    generation = bench.ask("select generation from registry_info")
+    monkeypatch.setattr("turnout.registry.database.views_version", lambda: "older")
+    database.build_database(bench.registry, load(bench.registry))
+    monkeypatch.undo()
+    assert bench.ask("select views_version from registry_info") == [("older",)]
+    bench.register()
+    assert bench.ask("select views_version from registry_info") == [(database.views_version(),)]
+    assert bench.ask("select generation from registry_info") == generation
