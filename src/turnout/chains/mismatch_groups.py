@@ -9,7 +9,8 @@ from turnout.mismatch.track import Campaign
 from turnout.simulate import Sensor, TurnoutTrack
 
 GAP = 6.0  # m: sections further apart than this do not hear the same sleeper
-MOST_PASSAGES = 20  # of one case, the newest: with them a case stays below a quarter of an hour
+MOST_PASSAGES = 8  # of one case: each is simulated hundreds of times, and more of the same kind tell little more
+MOST_AXLES = 96  # of all of them: the time of a simulation goes with the axles
 RESERVED_EVERY = 5  # of so many recordings one is read by the verification alone
 FEWEST_TO_RESERVE = 4
 
@@ -64,7 +65,8 @@ def _campaign(turnout, track, found, route, labels):
     shared = all(turnout.section(label).track == "both" for label in labels)
     passages = [
         p for p in found.passages if (shared or p.route == route) and names & {c.name for c in p.recording.channels}
-    ][-MOST_PASSAGES:]
+    ]
+    passages = telling(passages)
     heard = {c.name for p in passages for c in p.recording.channels} & names
     sensors = tuple(s for s in sensors if s.name in heard)
     if not tests and not passages:
@@ -92,6 +94,27 @@ def _as_main(track, route, passages):
     own = track.track_of(route)
     seen = replace(track, track=own, tracks={"main": own}, routes={"main": track.routes[route]})
     return seen, [replace(p, route="main") for p in passages]
+
+
+def telling(passages, most=MOST_PASSAGES, axles=MOST_AXLES):
+    """At most ``most`` passages and ``axles``: one train of each type, then short trains, extremes of speed first."""
+    kinds: dict[str, list] = {}
+    for p in sorted(passages, key=lambda p: (len(p.vehicle.wheels), p.train, p.speed)):
+        kinds.setdefault(p.train, []).append(p)
+    queues = [_extremes_first(members) for members in kinds.values()]
+    order = [q[0] for q in queues] + [p for q in queues for p in q[1:]]
+    chosen: list = []
+    for p in order:
+        total = sum(len(c.vehicle.wheels) for c in chosen) + len(p.vehicle.wheels)
+        if len(chosen) < most and (total <= axles or not chosen):
+            chosen.append(p)
+    return [p for p in passages if any(p is c for c in chosen)]
+
+
+def _extremes_first(members):
+    """Slowest, fastest, second slowest, second fastest ... of passages in order of speed."""
+    n = len(members)
+    return [members[k // 2 if k % 2 == 0 else n - 1 - k // 2] for k in range(n)]
 
 
 def reserved(passages, tests) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from turnout.simulate.turnout_track import stretch_of_track
 
 DAY = datetime(2026, 7, 25, 9, 0)
 PLACES = {"A": 18.0, "B": 18.6}
-SLEEPER = 18.0
+SLEEPER, SOFT = 18.0, 0.3
 LAYOUT = """
 sections:
   A: {panel: CP, track: main, position: 18.0}
@@ -83,9 +83,14 @@ def hangs(gap):
     return lambda track: (physics.HangingSleeper(track.nearest_support(SLEEPER), gap),)
 
 
-def strike(folder, terms=None, labels=("A", "B"), day=DAY, blows=3, seed=1):
+def soft_ballast(track):
+    """Ballast with 0.3 of its stiffness under the sleeper at section A."""
+    return (physics.LocalBallast(track.nearest_support(SLEEPER), SOFT),)
+
+
+def strike(folder, terms=None, labels=("A", "B"), day=DAY, blows=3, seed=1, turnout="t1"):
     """Hammer tests of a campaign."""
-    config, raw = Path(folder) / "config", Path(folder) / "raw" / "t1"
+    config, raw = Path(folder) / "config", Path(folder) / "raw" / turnout
     track = load_track("small", folder=config / "tracks")
     for k, label in enumerate(labels):
         place = PLACES[label]

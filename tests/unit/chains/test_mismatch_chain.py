@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import small_turnout as small
 
-from turnout import physics
 from turnout.chains import mismatch
 from turnout.chains.accept import accept
 from turnout.chains.guided_case import BudgetSpentError
@@ -18,13 +17,6 @@ from turnout.cli import main
 from turnout.config import load_configuration
 from turnout.errors import SimulationError
 from turnout.mismatch.track import TrackCase
-
-SOFT = 0.3
-
-
-def soft_ballast(track):
-    """Ballast with 0.3 of its stiffness under the sleeper at section A."""
-    return (physics.LocalBallast(track.nearest_support(small.SLEEPER), SOFT),)
 
 
 @pytest.fixture
@@ -42,7 +34,7 @@ def blows(tmp_path_factory, repository):
     """Blows on a turnout whose ballast is soft under one sleeper; tests copy them."""
     made = tmp_path_factory.mktemp("blows")
     small.lay_out(made, repository)
-    small.strike(made, soft_ballast)
+    small.strike(made, small.soft_ballast)
     return made / "raw"
 
 
@@ -69,7 +61,10 @@ def test_blows_alone_name_the_soft_ballast_at_its_sleeper(soft):
     assert row["n_passages"] == 0 and row["n_hammer_tests"] == 2
     (parameter,) = tables["mismatch_parameters"]
     # true 0.3; blows on two sleepers leave the factor open by a fifth
-    assert parameter["value_low"] < SOFT + 0.1 and parameter["value_low"] < parameter["value"] < parameter["value_high"]
+    assert (
+        parameter["value_low"] < small.SOFT + 0.1
+        and parameter["value_low"] < parameter["value"] < parameter["value_high"]
+    )
     curve = next(c for c in tables["mismatch_curves"] if c["curve"] == "receptance")
     better = np.abs(np.log(curve["after"] / curve["measured"])) < np.abs(np.log(curve["before"] / curve["measured"]))
     assert better.mean() > 0.5

@@ -1,0 +1,33 @@
+"""What is diagnosed together: which sections, which trains, what is kept for the verification."""
+
+from types import SimpleNamespace
+
+from turnout.chains.mismatch_groups import reserved, telling
+
+
+def train(name, kind, axles, speed):
+    return SimpleNamespace(name=name, train=kind, vehicle=SimpleNamespace(wheels=range(axles)), speed=speed)
+
+
+FLEET = [train(f"ic3 {k}", "ic3", 8, 30.0 + k) for k in range(9)]
+FLEET += [train(f"intercity {k}", "intercity", 24, 40.0 + k) for k in range(3)] + [
+    train("freight", "freight", 40, 25.0)
+]
+
+
+def test_every_type_is_there_and_short_trains_fill_up_from_the_extremes_of_speed():
+    chosen = telling(FLEET, most=8, axles=96)
+    assert {p.train for p in chosen} == {"ic3", "intercity", "freight"}
+    assert sum(len(p.vehicle.wheels) for p in chosen) <= 96
+    ic3 = [p.speed for p in chosen if p.train == "ic3"]
+    assert min(ic3) == 30.0 and max(ic3) == 38.0
+
+
+def test_one_long_train_is_better_than_none():
+    assert telling(FLEET[-1:], axles=8) == FLEET[-1:]
+
+
+def test_few_passages_keep_none_back_and_many_a_fifth_from_the_midst_of_the_speeds():
+    assert reserved(FLEET[:3], ()) == ()
+    assert reserved(FLEET[:5], ()) == ("ic3 2",)
+    assert reserved(FLEET[:9], ()) == ("ic3 2", "ic3 7")

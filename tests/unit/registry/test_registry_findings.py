@@ -1,0 +1,133 @@
+"""Findings in the registry: what grows, what reads wrong, what nobody can name, against numpy from the rows."""
+
+from datetime import datetime, timedelta
+
+import numpy as np
+import pytest
+from registry_rows import Bench
+
+from turnout.fleet.batches import UnitResult
+from turnout.registry.database import open_registry
+
+START = datetime(2025, 1, 10, 9, 0)
+YEAR = 365.25 * 86400.0
+
+
+def visit(turnout, day, verdict="named", term=None, values=(), sections="A7, A8", rival=None, accepted=False):
+    """Result of one visit; ``values`` are (parameter, value, se, unit, place, channel)."""
+    found = START + timedelta(days=day)
+    identity = f"{turnout}-{sections}-{day}"
+    finding = {
+        "finding_id": identity, "turnout_id": turnout, "found_at_utc": found.isoformat(), "verdict": verdict,
+        "grade": "A" if verdict == "named" else None, "term": term, "rival_term": rival, "probability": 0.9,
+        "sections": sections, "visit": f"{found:%Y-%m-%d}", "route": "main", "place_low_m": 24.6, "place_high_m": 26.4,
+        "level_before": 3.0 + day / 100, "next_measurement": "Measure again",
+    }  # fmt: skip
+    parameters = [
+        {
+            "finding_id": identity, "parameter_no": k, "turnout_id": turnout, "found_at_utc": found.isoformat(),
+            "term": term, "position_m": place, "channel": channel, "parameter": name, "value": value, "value_se": se,
+            "value_low": value - 2 * se, "value_high": value + 2 * se, "unit": unit, "accepted": accepted,
+        }
+        for k, (name, value, se, unit, place, channel) in enumerate(values)
+    ]  # fmt: skip
+    curve = {
+        "finding_id": identity, "curve_no": 0, "turnout_id": turnout, "curve": "waveform", "x_label": "time",
+        "x_unit": "s", "y_unit": "m/s²", "x": [0.0, 1.0], "measured": [1.0, 2.0], "before": [0.0, 1.0],
+    }  # fmt: skip
+    tables = {"mismatch_findings": [finding], "mismatch_parameters": parameters, "mismatch_curves": [curve]}
+    return UnitResult(f"{turnout}/mismatch/{found:%Y-%m-%d}{sections[:1]}", turnout, "mismatch", "k", "1", "ok", tables)
+
+
+def gap(turnout, day, value, se, **more):
+    more.setdefault("accepted", day > 0)
+    return visit(turnout, day, term="hanging_sleeper", values=[("gap", value, se, "m", 24.6, None)], **more)
+
+
+DAYS = (0, 45, 95, 140, 190)
+GROWING = [(0.40e-3, 0.03e-3), (0.47e-3, 0.02e-3), (0.66e-3, 0.05e-3), (0.71e-3, 0.03e-3), (0.93e-3, 0.04e-3)]
+EVENT = {
+    "event_id": "e1", "turnout_id": "t4", "section_id": "t4/A7", "kind": "tamping", "resets_ballast": True,
+    "resets_railpad": False, "event_at_utc": (START + timedelta(days=60)).isoformat(),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory):
+    results = [gap("t1", d, v, s) for d, (v, s) in zip(DAYS, GROWING)]
+    results += [gap("t2", d, 0.5e-3 + 1e-6 * (d % 7), 0.05e-3) for d in DAYS]  # stays
+    results += [gap("t3", d, 0.5 * v, s) for d, (v, s) in zip(DAYS[:3], GROWING)]  # grows, small, then gone
+    results.append(visit("t3", 300, verdict="none"))
+    results += [gap("t4", d, v, s) for d, (v, s) in zip(DAYS[:2], GROWING)]  # tamped since
+    results.append(gap("t5", 0, 0.8e-3, 0.05e-3))  # seen once
+    gain = [("gain", 1.31, 0.02, "-", None, "A8")]
+    results.append(visit("t6", 0, term="sensor_gain", values=gain))
+    results.append(visit("t7", 0, term="sensor_gain", values=[("gain", 1.03, 0.04, "-", None, "A7")]))
+    results.append(visit("t8", 0, term="sensor_gain", values=gain))
+    results.append(visit("t8", 30, verdict="none"))  # repaired
+    results.append(visit("t9", 0, verdict="unknown"))
+    results.append(visit("t9", 0, verdict="none", sections="OT"))
+    doubtful = [("factor", 0.4, 0.1, "-", 24.6, None)]
+    results.append(visit("t10", 0, verdict="a_or_b", term="local_ballast", rival="hanging_sleeper", values=doubtful))
+    bench = Bench(tmp_path_factory.mktemp("findings"))
+    assert bench.register(*results, tables={"events": [EVENT]}).n_refused == 0
+    with open_registry(bench.registry) as connection:
+        yield connection
+
+
+def straight_line(days, values, errors):
+    """Slope per year and its standard error by numpy's weighted polynomial."""
+    year = np.array(days) * 86400.0 / YEAR
+    fit, covariance = np.polyfit(year, values, 1, w=1.0 / np.array(errors), cov="unscaled")
+    return fit[0], np.sqrt(covariance[0, 0])
+
+
+def test_growth_is_the_weighted_straight_line(fleet):
+    frame = fleet.execute("from parameter_growth where term = 'hanging_sleeper'").df().set_index("turnout_id")
+    values, errors = zip(*GROWING)
+    for turnout, days, factor in (("t1", DAYS, 1.0), ("t3", DAYS[:3], 0.5)):
+        n = len(days)
+        slope, error = straight_line(days, factor * np.array(values[:n]), errors[:n])
+        assert frame.per_year[turnout] == pytest.approx(slope, rel=1e-8)
+        assert frame.per_year_se[turnout] == pytest.approx(error, rel=1e-8)
+        assert frame.n_visits[turnout] == n
+    assert frame.value["t1"] == 0.93e-3 and np.isnan(frame.per_year["t5"])
+    assert not frame.is_open["t3"] and frame.is_open["t1"]
+    assert "t4" not in frame.index  # its visits lie before the tamping
+
+
+def test_hanging_sleepers_that_grow_are_large_open_and_growing(fleet):
+    rows = fleet.execute("select turnout_id, gap_m from hanging_sleepers_that_grow()").fetchall()
+    assert rows == [("t1", 0.93e-3)]
+    assert fleet.execute("from hanging_sleepers_that_grow(above := 0.001)").fetchall() == []
+
+
+def test_a_wrong_gain_excludes_one_and_is_still_there(fleet):
+    rows = fleet.execute(
+        "select turnout_id, channel, gain, gain_low, gain_high from sensors_with_wrong_gain"
+    ).fetchall()
+    ((turnout, channel, gain, low, high),) = rows
+    assert (turnout, channel, gain) == ("t6", "A8", 1.31)
+    assert (low, high) == pytest.approx((1.31 - 1.959964 * 0.02, 1.31 + 1.959964 * 0.02))
+
+
+def test_what_nobody_can_name_is_unknown_or_one_of_two(fleet):
+    rows = fleet.execute("select turnout_id, verdict, term, rival_term from mismatches_without_name order by all")
+    assert rows.fetchall() == [("t10", "a_or_b", "local_ballast", "hanging_sleeper"), ("t9", "unknown", None, None)]
+
+
+def test_the_newest_visit_of_each_group_counts(fleet):
+    rows = fleet.execute(
+        "select sections, verdict from findings_newest where turnout_id = 't9' order by all"
+    ).fetchall()
+    assert rows == [("A7, A8", "unknown"), ("OT", "none")]
+    assert fleet.execute("select verdict from findings_newest where turnout_id = 't8'").fetchall() == [("none",)]
+
+
+def test_a_refused_finding_takes_its_parameters_and_curves_with_it(tmp_path):
+    bad = gap("t1", 0, 0.4e-3, 0.1e-3)
+    bad.tables["mismatch_findings"][0]["verdict"] = "perhaps"
+    bench = Bench(tmp_path)
+    assert bench.register(bad).n_refused == 1
+    for table in ("mismatch_findings", "mismatch_parameters", "mismatch_curves"):
+        assert bench.ask(f"select count(*) from {table}") == [(0,)]
