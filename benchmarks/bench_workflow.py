@@ -15,6 +15,7 @@ import time
 from pathlib import Path
 
 from benchmarks.bar import Bar, stopwatch
+from benchmarks.workflow_hammer import same_rows_of_the_hammer_chain
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "workflow"))
 import toy_fleet as toy
@@ -31,6 +32,7 @@ def bars():
         yield from network(folder / "network")
         yield from damage_and_kills(folder)
         yield from same_rows(folder)
+        yield from same_rows_of_the_hammer_chain(folder / "hammer", toy)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
