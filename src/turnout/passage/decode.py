@@ -35,6 +35,8 @@ def decoded(profile, start: float, pattern: Pattern, around: float, feature: str
     walk = _Walk(profile, top, peaks, first, np.tile(SCALES, min(STARTS, peaks.size)))
     for group in pattern.groups:
         for count in range(group.maximum):
+            if not walk.alive.any():
+                break  # every row has ended: nothing is added to any of them any more
             walk.couple(group.vehicles, forced=count < group.minimum)
     value, places = walk.best()
     if places is None or len(places) < 4:

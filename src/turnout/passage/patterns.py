@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -87,6 +88,20 @@ class Pattern:
 
     def axle_counts(self) -> tuple[int, int]:
         """Least and largest number of axles."""
+        return self._axle_counts
+
+    @cached_property
+    def spacings(self) -> dict[str, list[float]]:
+        """Vehicle's name -> distances between its own axles. [m]"""
+        return {v.name: np.diff(v.axles).tolist() for g in self.groups for v in g.vehicles}
+
+    @cached_property
+    def log_choices(self) -> list[float]:
+        """Logarithm of the number of vehicles that each group leaves to choice."""
+        return [float(np.log(len(g.vehicles))) for g in self.groups]
+
+    @cached_property
+    def _axle_counts(self):
         counts = [[len(v.axles) for v in g.vehicles] for g in self.groups]
         low = sum(min(c) * g.minimum for c, g in zip(counts, self.groups))
         return low, sum(max(c) * g.maximum for c, g in zip(counts, self.groups))

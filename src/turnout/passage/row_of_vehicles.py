@@ -22,9 +22,8 @@ def best_row(spacing, pattern: Pattern, tolerance: float):
         return None
     limit = 20.0 + 4.0 * n_axle  # beyond it the chi-squared test fails whatever follows
     # plain floats: a train has hundreds of thousands of pairs, most of them given up at the first spacing
-    seen, weight = [float(s) for s in spacing], 0.5 / tolerance**2
-    within = {id(v): np.diff(v.axles).tolist() for group in pattern.groups for v in group.vehicles}
-    chance = [float(np.log(len(group.vehicles))) for group in pattern.groups]
+    seen, weight, within = np.asarray(spacing).tolist(), 0.5 / tolerance**2, pattern.spacings
+    chance = pattern.log_choices
     # state: axles used, group, vehicles used of the group, last vehicle -> (cost, row, choices)
     layers = [{} for _ in range(n_axle + 1)]
     layers[0][(0, 0, None)] = (0.0, (), 0.0)
@@ -39,7 +38,7 @@ def best_row(spacing, pattern: Pattern, tolerance: float):
                     total = cost + chance[group]
                     if row:
                         total += weight * (seen[used - 1] - row[-1].rear - vehicle.axles[0]) ** 2
-                    for k, expected in enumerate(within[id(vehicle)], used):
+                    for k, expected in enumerate(within[vehicle.name], used):
                         if total >= limit:
                             break
                         total += weight * (seen[k] - expected) ** 2
