@@ -1,16 +1,18 @@
 """One explanation of the decays of a test (modes, background and noise), and how good it is for its size."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from turnout.identify.background import Background, needed_background
 from turnout.identify.linearise import linearise
-from turnout.identify.mixed import MixedFit
+from turnout.identify.mixed import MixedFit, fit_mixed
 from turnout.identify.noise import noise_filter, whiten
 from turnout.identify.screening import fit_and_prune, screen
 
 NOISE_PASSES = 3
+# Two optima of as many modes differ by more: each residual sum is known to a hundredth.
+SAME = 1e-4
 
 
 @dataclass
@@ -32,7 +34,7 @@ class Explanation:
         return len(self.whitening) > 1 or self.background.drift_degree >= 0
 
 
-def explain(start, decays, rate, background, settings, most=None, heaviest=None) -> Explanation:
+def explain(start, decays, rate, background, settings, most=None, heaviest=None, known=None) -> Explanation:
     """Maximum likelihood from candidates ``start``, pruned until each mode passes its tests.
 
     Parameters
@@ -48,11 +50,18 @@ def explain(start, decays, rate, background, settings, most=None, heaviest=None)
         What is needed of it, beside the modes of the first fit, replaces ``background``.
     heaviest : float, optional
         Damping up to which a pole may stay in the fit although it is no mode.
+    known : list of MixedFit, optional
+        First fits of explanations with this ``background``; this one is added. One that is there already is not
+        followed again: ``fit`` is then None.
     """
     told = Explanation(None, [], background)
     columns = background.columns(decays.shape[1], rate)
     kept = screen(start, decays, rate, columns, settings, told.rejected)
     told.fit, told.kept = fit_and_prune(kept, decays, rate, columns, settings, told.rejected, heaviest=heaviest)
+    if told.fit is not None and known is not None:
+        if any(_same(told.fit, other) for other in known):
+            return Explanation(None, [], background)
+        known.append(told.fit)
     if told.fit is not None:
         if most is not None:
             told.background = needed_background(told.fit.theta, decays, rate, most)
@@ -60,19 +69,34 @@ def explain(start, decays, rate, background, settings, most=None, heaviest=None)
     return told
 
 
+def _same(fit, other):
+    """Whether two fits of the same decays have settled in the same modes."""
+    return len(fit.mean) == len(other.mean) and abs(fit.rss / other.rss - 1.0) < SAME
+
+
 def _settle_noise(told, decays, rate, settings, heaviest):
     """Fit the decays whitened by the noise that the last fit left, until its order settles."""
     columns = told.background.columns(decays.shape[1], rate)
+    needed: set = set()
     for _ in range(NOISE_PASSES):
         residual = linearise(told.fit.theta, decays, rate, columns).residual
         before, told.whitening = told.whitening, noise_filter(residual, settings.noise_order_maximum)
         white = whiten(decays, told.whitening)
         short = told.background.columns(white.shape[1], rate)
         told.fit, told.kept = fit_and_prune(
-            told.kept, white, rate, short, settings, told.rejected, before=told.fit, heaviest=heaviest
+            told.kept, white, rate, short, settings, told.rejected, told.fit, heaviest, needed
         )
         if told.fit is None or len(told.whitening) == 1 or len(told.whitening) == len(before):
             break
+
+
+def polished(told: Explanation, decays, rate) -> Explanation:
+    """The same explanation with its fit iterated until it settles."""
+    if told.fit is None:
+        return told
+    white = whiten(decays, told.whitening)
+    columns = told.background.columns(white.shape[1], rate)
+    return replace(told, fit=fit_mixed(None, white, rate, columns, theta=told.fit.theta))
 
 
 def criterion(told: Explanation, decays) -> float:

@@ -7,6 +7,7 @@ import numpy as np
 from turnout.identify.linearise import Linearisation, linearise
 
 LARGEST_STEP = np.array([0.2, 0.15])
+PRINCIPAL = 8
 LOWEST_DAMPING, HIGHEST_DAMPING = 1e-5, 0.95
 
 
@@ -70,10 +71,15 @@ def between_variance(value, variance):
 
 
 def fit_common(start, decays, rate, drift, iterations=12, tolerance=1e-3):
-    """Shared modes by Gauss-Newton with halved steps; returns (n_mode, 2) of ln f and zeta, and whether it settled."""
+    """Shared modes by Gauss-Newton with halved steps; returns (n_mode, 2) of ln f and zeta, and whether it settled.
+
+    All sums over decays are the same for any rotation of the decays, so those are turned into their principal ones,
+    of which ``PRINCIPAL`` hold the signal; ``start`` (n_mode, 2), ``decays`` (n_decay, n), ``drift`` (n_drift, n).
+    """
     n_mode = len(start)
     mean = np.array(start, dtype=float)
     dof = degrees_of_freedom(decays, n_mode, len(drift))
+    decays, rest = _principal(decays)
 
     def at(theta):
         return linearise(theta[None], decays, rate, drift)
@@ -83,7 +89,7 @@ def fit_common(start, decays, rate, drift, iterations=12, tolerance=1e-3):
         information = here.information.sum(axis=0)
         step = _solve(information, here.score.sum(axis=0)).reshape(n_mode, 2)
         scale = min(1.0, *(LARGEST_STEP / np.maximum(np.abs(step).max(axis=0), 1e-300)))
-        sigma2 = here.rss.sum() / dof
+        sigma2 = (here.rss.sum() + rest) / dof
         size = np.sqrt(max(0.0, step.ravel() @ information @ step.ravel()) / max(sigma2, 1e-300))
         for _ in range(8):
             trial = mean + scale * step
@@ -99,6 +105,14 @@ def fit_common(start, decays, rate, drift, iterations=12, tolerance=1e-3):
         if settled:
             return mean, True
     return mean, False
+
+
+def _principal(decays):
+    """The decays' principal combinations (at most ``PRINCIPAL``, n), and the power of the others."""
+    if len(decays) <= PRINCIPAL:
+        return decays, 0.0
+    power, turn = np.linalg.eigh(decays @ decays.T)
+    return turn[:, -PRINCIPAL:].T @ decays, float(np.sum(np.maximum(power[:-PRINCIPAL], 0.0)))
 
 
 def fit_mixed(start, decays, rate, drift, theta=None, iterations=12, tolerance=0.01) -> MixedFit:
@@ -128,7 +142,7 @@ def fit_mixed(start, decays, rate, drift, theta=None, iterations=12, tolerance=0
     """
     settled = True
     if theta is None:
-        mean, settled = fit_common(start, decays, rate, drift)
+        mean, settled = fit_common(start, decays, rate, drift, tolerance=tolerance * np.sqrt(len(decays)))
         theta = np.repeat(mean[None], len(decays), axis=0)
     n_decay, n_mode = theta.shape[:2]
     dof = degrees_of_freedom(decays, n_mode, len(drift))

@@ -11,6 +11,8 @@ from turnout.identify.significance import common_probability, mode_chi_squared, 
 
 HOPELESS = 0.01
 LISTED_PRESENCE = 0.2
+# Within a tenth of the errors of single blows a fit says as much about its modes as to the last digit.
+SEARCH = {"iterations": 12, "tolerance": 0.1}
 
 
 def rejection(candidate, reason, value, limit) -> dict:
@@ -67,46 +69,63 @@ def screen(kept, decays, rate, columns, settings, rejected):
 
 
 def fit_and_prune(
-    kept, decays, rate, columns, settings, rejected, before: MixedFit | None = None, heaviest: float | None = None
+    kept,
+    decays,
+    rate,
+    columns,
+    settings,
+    rejected,
+    before: MixedFit | None = None,
+    heaviest: float | None = None,
+    needed: set | None = None,
 ):
-    """Maximum likelihood with all modes, dropping the worst that fails a test until none does: (fit, kept)."""
+    """Maximum likelihood with all modes, dropping the worst that fails a test until none does: (fit, kept).
+
+    ``needed`` collects the candidates (by identity) that are no needless twins, and those in it are not asked again.
+    The fits are good enough to choose by (``SEARCH``), not for the last digit.
+    """
     if not kept:
         return None, kept
+    needed = set() if needed is None else needed
     theta = None if before is None else before.theta
-    fit = fit_mixed(start_of(kept), decays, rate, columns, theta=theta)
+    fit = fit_mixed(start_of(kept), decays, rate, columns, theta=theta, **SEARCH)
     while True:
         failures = mode_failures(fit, settings, heaviest)
         if failures:
             worst, (reason, value, limit) = failures[0]
             smaller = None
         else:
-            worst, smaller, probability = _needless_twin(fit, decays, rate, columns, settings)
+            worst, smaller, probability = _needless_twin(fit, kept, decays, rate, columns, settings, needed)
             if worst is None:
                 return fit, kept
             reason, value, limit = "splits a stronger mode", probability, settings.false_mode_probability
-        moved = replace(kept[worst], frequency=np.exp(fit.mean[worst, 0]), damping=fit.mean[worst, 1])
+        moved = replace(kept[worst], frequency=np.exp(fit.inside[worst, 0]), damping=fit.mean[worst, 1])
         rejected.append(rejection(moved, reason, value, limit))
         kept = kept[:worst] + kept[worst + 1 :]
         if not kept:
             return None, kept
-        fit = smaller or fit_mixed(np.delete(fit.inside, worst, axis=0), decays, rate, columns)
+        fit = smaller or fit_mixed(np.delete(fit.inside, worst, axis=0), decays, rate, columns, **SEARCH)
 
 
-def _needless_twin(fit, decays, rate, columns, settings):
+def _needless_twin(fit, kept, decays, rate, columns, settings, needed):
     """A mode that overlaps a stronger one and without which the decays fit as well: (index, fit without, p).
 
     Poles that differ between blows look like two poles to a realisation of all blows, never to a fit of each.
     """
     statistic = mode_chi_squared(fit.at, fit.sigma2).sum(axis=0)
     for weak in np.argsort(statistic):
+        if id(kept[weak]) in needed:
+            continue
         gap = np.abs(fit.mean[:, 0] - fit.mean[weak, 0])
         overlaps = (gap < fit.mean[:, 1] + fit.mean[weak, 1]) & (statistic > statistic[weak])
         if not overlaps.any():
             continue
-        without = fit_mixed(np.delete(fit.inside, weak, axis=0), decays, rate, columns)
+        # from common modes on: what is left must be free to move to where it does the work of both
+        without = fit_mixed(np.delete(fit.inside, weak, axis=0), decays, rate, columns, **SEARCH)
         probability = float(chi2.sf((without.rss - fit.rss) / fit.sigma2, 4 * len(decays)))
         if probability > settings.false_mode_probability:
             return int(weak), without, probability
+        needed.add(id(kept[weak]))
     return None, None, 1.0
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from turnout.identify.background import Background, highest_drift, hum_frequencies
-from turnout.identify.explanation import criterion, explain
+from turnout.identify.explanation import criterion, explain, polished
 from turnout.identify.hankel import hankel_rows
 from turnout.identify.likely_poles import DAMPING, likely_poles
 from turnout.identify.linearise import linearise
@@ -74,6 +74,7 @@ def select_modes(decays, rate, settings) -> Selection:
     told = explain(kept, decays, rate, Background(min(BUILD_DRIFT, most.drift_degree), hum), settings, most)
     if told.fit is not None and told.doubtful:
         told = min((told, *_others(told, table, decays, rate, settings)), key=lambda e: criterion(e, decays))
+    told = polished(told, decays, rate)
     result = Selection(table, rejected + told.rejected)
     if told.fit is not None:
         fit = result.fit = told.fit
@@ -92,9 +93,10 @@ def _others(told, table, decays, rate, settings):
     hum, drift = told.background.hum, told.background.drift_degree
     for background, most in ((Background(-1, hum), MOST_STARTS), (Background(drift, hum), 1))[: 1 + (drift >= 0)]:
         columns = background.columns(decays.shape[1], rate)
+        known: list = []
         for start in likely_poles(table, decays, rate, columns, settings, most):
             # a pole that may stand for many weak modes stays in the fit, though it is not known well enough for a name
-            other = explain(start, decays, rate, background, settings, heaviest=DAMPING[1])
+            other = explain(start, decays, rate, background, settings, heaviest=DAMPING[1], known=known)
             if other.fit is not None:
                 yield other
                 if not other.doubtful:
