@@ -1,6 +1,7 @@
 """The distinguishability of effects under a planned campaign, and the cheapest addition to it."""
 
 from dataclasses import replace
+from pathlib import Path
 
 from turnout.mismatch.distinguish import cheapest_addition, distinguishability
 from turnout.mismatch.track.planned import Plan, Train
@@ -11,11 +12,15 @@ from turnout.simulate import Sensor, load_track, load_vehicle
 COST = {"a second rail temperature": 8.0, "hammer tests at the sensors": 4.0, "a second speed": 1.0}
 
 
-def planned_matrix(track, sensors, blows, temperatures, trains, speeds, families=None):
-    """(Distinguishability, advice) of a plan: places [m], temperatures [°C], vehicle files, speeds [km/h]."""
-    turnout = load_track(track)
+def planned_matrix(track, sensors, blows, temperatures, trains, speeds, families=None, config=None):
+    """(Distinguishability, advice) of a plan: places [m], temperatures [°C], vehicle files, speeds [km/h].
+
+    ``config`` is the folder whose tracks and vehicles are meant, that of the place it is run in by default.
+    """
+    tracks, cars = (_folder(config, kind) for kind in ("tracks", "vehicles"))
+    turnout = load_track(track, folder=tracks)
     points = tuple((x, t) for x in blows for t in temperatures)
-    vehicles = {name: load_vehicle(name) for name in trains}
+    vehicles = {name: load_vehicle(name, folder=cars) for name in trains}
     rolling = tuple(Train(v, n, s / 3.6, t) for n, v in vehicles.items() for s in speeds for t in temperatures)
     seats = tuple(Sensor(f"S{k + 1}", x) for k, x in enumerate(sensors))
     plan = Plan(turnout, seats, points, rolling)
@@ -25,6 +30,12 @@ def planned_matrix(track, sensors, blows, temperatures, trains, speeds, families
     if not resolved:
         return matrix, "No single addition tells more pairs apart."
     return matrix, f"Most would be added by {name}: {resolved} more pairs told apart."
+
+
+def _folder(config, kind):
+    """A folder of the configuration, None where there is none: the program's own then serve."""
+    folder = Path(config or "config") / kind
+    return folder if folder.is_dir() else None
 
 
 def _matrix(plan, families):

@@ -13,6 +13,7 @@ from turnout.fingerprint import fingerprint
 from turnout.fleet.atomic import write_text
 from turnout.fleet.batches import decode, encode
 from turnout.fleet.scan import scan
+from turnout.registry.database import open_registry
 
 
 def diagnose_turnout(
@@ -54,10 +55,10 @@ def _visit(turnout_id, found, wanted, raw_root):
 
 
 class Results:
-    """The last result of a turnout below ``work``."""
+    """The last result of a turnout below ``work``, else what the ``registry`` holds of it."""
 
-    def __init__(self, work, turnout_id):
-        self.turnout_id = turnout_id
+    def __init__(self, work, turnout_id, registry=None):
+        self.turnout_id, self.registry = turnout_id, registry
         self.path = Path(work) / "mismatch-fits" / f"{turnout_id}.json"
 
     def keep(self, tables):
@@ -83,5 +84,16 @@ class Results:
         try:
             return decode(self.path.read_text(encoding="utf-8"))["mismatch_findings"]
         except FileNotFoundError:
-            said = f"{self.turnout_id} has no result below {self.path.parent}"
+            if rows := self._registered():
+                return rows
+            said = f"{self.turnout_id} has no result below {self.path.parent}, nor in the registry"
             raise SimulationError(f"{said}: run turnout diagnose --turnout {self.turnout_id} first.") from None
+
+    def _registered(self):
+        """Newest findings of the turnout in the registry, where there is one: the fleet's stage left them."""
+        if self.registry is None or not (Path(self.registry) / "registry.duckdb").exists():
+            return []
+        with open_registry(self.registry) as connection:
+            cursor = connection.execute("from findings_newest where turnout_id = ?", [self.turnout_id])
+            names = [d[0] for d in cursor.description]
+            return [dict(zip(names, row)) for row in cursor.fetchall()]

@@ -21,6 +21,7 @@ def add_arguments(parser):
     parser.add_argument("--config", default="config", help="configuration folder (%(default)s)")
     parser.add_argument("--raw", default="raw", help="folder of raw files (%(default)s)")
     parser.add_argument("--work", default="work", help="where fits and results are kept (%(default)s)")
+    parser.add_argument("--registry", default="results/registry", help="what --accept looks in, too (%(default)s)")
     parser.add_argument("--pages", default="results/pages", help="where the page goes (%(default)s)")
     parser.add_argument("--budget", type=float, metavar="MINUTES", help="stop after so long and keep what is done")
     parser.add_argument("--accept", action="store_true", help="write what was named into the turnout's track file")
@@ -35,7 +36,7 @@ def run(args):
 
     from turnout.chains.mismatch_results import Results
 
-    results = Results(args.work, args.turnout)
+    results = Results(args.work, args.turnout, args.registry)
     if args.accept:
         return _accept(args, results)
     rows = _diagnosed(args)

@@ -13,6 +13,7 @@ HELP = "which effects a planned campaign can tell apart"
 def add_arguments(parser):
     """Options of the command."""
     parser.add_argument("--track", default="tommerup", help="file in config/tracks (%(default)s)")
+    parser.add_argument("--config", default="config", help="configuration folder (%(default)s)")
     parser.add_argument("--sensors", nargs="+", type=float, required=True, metavar="M", help="places on the rail [m]")
     parser.add_argument("--blows", nargs="*", type=float, default=(), metavar="M", help="places of the hammer [m]")
     parser.add_argument("--temperatures", nargs="+", type=float, default=(15.0,), metavar="C", help="of the rail [°C]")
@@ -26,7 +27,14 @@ def run(args):
     from turnout.chains.distinguish import planned_matrix
 
     matrix, advice = planned_matrix(
-        args.track, args.sensors, args.blows, args.temperatures, args.trains, args.speeds, args.families
+        args.track,
+        args.sensors,
+        args.blows,
+        args.temperatures,
+        args.trains,
+        args.speeds,
+        args.families,
+        args.config,
     )
     print(matrix)
     for name in matrix.names:

@@ -242,3 +242,16 @@ def test_the_rows_fit_the_registry(soft, tmp_path):
         assert connection.execute("select count(*) from mismatch_curves").fetchall() == [
             (len(tables["mismatch_curves"]),)
         ]
+
+
+def test_a_finding_of_the_fleet_is_accepted_from_the_registry(soft, tmp_path):
+    from turnout.fleet.batches import UnitResult, read_results, write_batch
+    from turnout.registry.register import register
+
+    tables = diagnose_turnout("t1")
+    result = UnitResult("t1/mismatch/2026-07-25", "t1", "mismatch", "k", "1", "ok", tables)
+    register([write_batch(tmp_path / "b", [result])], tmp_path / "registry", read=read_results)
+    path, words = accept(Results("work", "t1", tmp_path / "registry").finding(), "config", "t1")
+    assert path.name == "t1.yaml" and "local_ballast" in words
+    with pytest.raises(SimulationError, match="run turnout diagnose"):
+        Results("work", "t2", tmp_path / "registry").finding()

@@ -1,0 +1,187 @@
+"""A finding written into a track file: readable, refused where it is not sure, replaced and not doubled."""
+
+import json
+import shutil
+from datetime import datetime
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import small_turnout as small
+
+from turnout import physics
+from turnout.chains.accept import accept
+from turnout.chains.accepted_terms import OF_A_WHEELSET, accepted_of, described, terms_on
+from turnout.chains.guided_case import GuidedCase
+from turnout.errors import SimulationError
+from turnout.mismatch.track import TrackCase
+from turnout.mismatch.track.planned import measured_campaign, small_plan
+from turnout.simulate import load_track, simulate_hammer
+
+GAP = {"value": 1.12e-3, "se": 0.05e-3, "unit": "m"}
+HANGS = {"term": "hanging_sleeper", "fixed": {"sleeper": 18.0}, "parameters": {"gap": GAP}}
+
+
+def finding(term=HANGS, **more):
+    row = {
+        "finding_id": "0123456789abcdef", "sections": "A, B", "verdict": "named", "grade": "A",
+        "found_at_utc": datetime(2026, 7, 25, 10), "term_json": json.dumps([term]),
+    }  # fmt: skip
+    return row | more
+
+
+@pytest.fixture
+def config(tmp_path, repository):
+    return small.lay_out(tmp_path, repository)
+
+
+def own(config):
+    return load_track("t1", folder=config / "tracks")
+
+
+def test_a_file_of_its_own_extends_that_of_the_layout(config):
+    before = (config / "tracks/small.yaml").read_text()
+    path, words = accept(finding(), config, "t1")
+    assert (config / "tracks/small.yaml").read_text() == before
+    assert path == config / "tracks/t1.yaml" and "gap 0.00112 ± 9.8e-05 m" in words
+    text = path.read_text()
+    for part in ("extends: small", "value: 1.12", 'unit: "mm"', "finding 0123456789ab", "up to 2026-07-25", "grade A"):
+        assert part in text
+    # 1.12 ± 1.96 * 0.05
+    assert "95 %: 1.02 to 1.22 mm" in text
+    (entry,) = accepted_of(own(config).terms)
+    assert (entry.family, entry.place) == ("hanging_sleeper", 18.0)
+    assert entry.values["gap"] == pytest.approx((1.12e-3, 0.05e-3), rel=0.01)
+    base = load_track("small", folder=config / "tracks")
+    assert np.array_equal(own(config).track.ballast_stiffness, base.track.ballast_stiffness)
+
+
+def test_comments_and_all_other_lines_of_a_file_stay(config, repository):
+    path = config / "tracks/t1.yaml"
+    shutil.copy(repository / "config/tracks/tommerup.yaml", path)
+    before = path.read_text()
+    at = HANGS | {"fixed": {"sleeper": 24.6}}
+    accept(finding(at), config, "t1")
+    assert path.read_text().startswith(before) and "extends" not in path.read_text()
+    place = own(config).track.support[accepted_of(own(config).terms)[0].term(own(config).track).sleeper]
+    assert place == pytest.approx(24.6)
+
+
+def test_the_same_effect_at_the_same_place_is_replaced_another_is_added(config):
+    accept(finding(), config, "t1")
+    accept(finding(HANGS | {"parameters": {"gap": GAP | {"value": 1.5e-3}}}), config, "t1")
+    accept(finding(HANGS | {"fixed": {"sleeper": 18.6}}), config, "t1")
+    gain = {
+        "term": "sensor_gain",
+        "fixed": {"channel_name": "A"},
+        "parameters": {"gain": GAP | {"value": 1.2, "unit": "-"}},
+    }
+    accept(finding(gain), config, "t1")
+    found = accepted_of(own(config).terms)
+    assert [(a.key, round(next(iter(a.values.values()))[0], 6)) for a in found] == [
+        ("hanging_sleeper[18.0 m]", 1.5e-3), ("hanging_sleeper[18.6 m]", 1.12e-3), ("sensor_gain[A]", 1.2),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("more", [{"verdict": "unknown", "grade": None}, {"verdict": "a_or_b"}, {"grade": None}])
+def test_what_is_not_named_is_refused_unless_asked_for(config, more):
+    with pytest.raises(SimulationError, match="--anyway"):
+        accept(finding(**more), config, "t1")
+    assert not (config / "tracks/t1.yaml").exists()
+    accept(finding(**more), config, "t1", anyway=True)
+    assert len(own(config).terms) == 1
+
+
+def test_nothing_to_accept_and_what_belongs_to_a_wheelset_are_refused(config):
+    with pytest.raises(SimulationError, match="no term"):
+        accept(finding(term_json=None, verdict="none"), config, "t1", anyway=True)
+    flat = {"term": "wheel_flat", "fixed": {"wheel": 1}, "parameters": {"length": GAP}}
+    with pytest.raises(SimulationError, match="belongs to a wheelset"):
+        accept(finding(flat), config, "t1", anyway=True)
+
+
+def test_a_place_off_the_track_or_a_value_out_of_bounds_changes_nothing(config):
+    for wrong in ({"fixed": {"sleeper": 99.0}}, {"parameters": {"gap": GAP | {"value": 0.2}}}):
+        with pytest.raises(SimulationError):
+            accept(finding(HANGS | wrong), config, "t1")
+        assert [p.name for p in (config / "tracks").iterdir()] == ["small.yaml"]
+
+
+def test_an_entry_by_hand_that_makes_no_sense_is_named(config):
+    accept(finding(), config, "t1")
+    path = config / "tracks/t1.yaml"
+    text = path.read_text()
+    without = "".join(line for line in text.splitlines(keepends=True) if "gap" not in line)
+    for changed, said in (
+        (text.replace("term: hanging_sleeper", "term: hanging"), "no effect"),
+        (text.replace("    gap:", "    depth:"), "has no 'depth'"),
+        (without, "needs gap"),
+    ):
+        path.write_text(changed)
+        with pytest.raises(SimulationError, match=said):
+            accepted_of(own(config).terms)
+
+
+def test_a_track_that_extends_itself_is_refused(config):
+    (config / "tracks/a.yaml").write_text("extends: b\n")
+    (config / "tracks/b.yaml").write_text("extends: a\n")
+    with pytest.raises(SimulationError, match="extends itself"):
+        load_track("a", folder=config / "tracks")
+
+
+OF_TRACK_AND_SENSORS = [t for t in physics.TERMS if t.name not in ("roughness_level", *OF_A_WHEELSET)]
+
+
+@pytest.mark.parametrize("term", OF_TRACK_AND_SENSORS, ids=lambda t: t.name)
+def test_every_effect_comes_back_from_the_file_as_it_was_written(config, term):
+    """The file carries four digits: nothing may be further off than that."""
+    made = term.example()
+    candidate = SimpleNamespace(family=term.name, parameters=term.parameters)
+    track = own_track(config)
+    told = described(made, candidate, [0.1 * abs(getattr(made, p.name)) for p in term.parameters], track)
+    accept(finding(told), config, "t1")
+    back = accepted_of(own(config).terms)[0].term(own(config).track)
+    for name, value in vars(made).items():
+        assert getattr(back, name) == (pytest.approx(value, rel=1e-3) if isinstance(value, float) else value)
+
+
+def own_track(config):
+    return load_track("small", folder=config / "tracks").track
+
+
+def test_an_accepted_gap_is_simulated(config):
+    """A blow on a sleeper that hangs finds no ballast: the file's term does what the term itself does."""
+    accept(finding(), config, "t1")
+    track = own(config)
+    short = {"n_blows": 1, "half_length": 99.0, "duration": 0.1}
+    by_file = simulate_hammer(track, 18.0, terms=terms_on(track, track.track), **short)
+    index = track.track.nearest_support(18.0)
+    by_hand = simulate_hammer(track, 18.0, terms=(physics.HangingSleeper(index, 1.12e-3),), **short)
+    assert np.array_equal(by_file[0].samples, by_hand[0].samples)
+
+
+def test_accepted_effects_are_simulated_and_estimated_anew_in_a_case(config):
+    """With the term in the case, the prediction is the one with the term given; its column is the derivative."""
+    plan = small_plan((15.0,), passages=False, blows=(21.6, 24.0))
+    case = TrackCase(measured_campaign(plan, seed=2), families=("local_ballast",))
+    entry = {
+        "term": "local_ballast",
+        "fixed": {"sleeper": 24.0},
+        "parameters": {"factor": GAP | {"value": 0.5, "unit": "-"}},
+    }
+    accept(finding(entry), config, "t1", anyway=True)
+    accepted = accepted_of(own(config).terms)
+    guided = GuidedCase(case, accepted)
+    (own_nuisance,) = guided.own
+    assert own_nuisance.mean == 0.5 and own_nuisance.sd == pytest.approx(0.25)
+    assert len(guided.candidates) == len(case.candidates) - 1
+    values = {n.name: n.mean for n in guided.nuisances}
+    term = physics.LocalBallast(case.track().nearest_support(24.0), 0.5)
+    with_it = guided.predict(values, (), guided.observations)
+    assert all(np.array_equal(a, b) for a, b in zip(with_it, case.predict(values, (term,), case.observations)))
+    jacobian = guided.nuisance_jacobian(values, (), guided.observations, with_it)
+    moved = guided.predict({**values, own_nuisance.name: 0.501}, (), guided.observations)
+    for j, a, b in zip(jacobian, moved, with_it):
+        assert j.shape[1] == len(guided.nuisances)
+        # a secant of 0.005 against one of 0.001
+        assert j[:, -1] == pytest.approx((a - b) / 1e-3, abs=0.02 * np.abs((a - b) / 1e-3).max())

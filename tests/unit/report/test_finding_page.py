@@ -1,0 +1,208 @@
+"""The page of mismatches: one sentence, one place, intervals, and every answer drawn without a number missing."""
+
+import json
+import re
+from datetime import datetime
+from html.parser import HTMLParser
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from jinja2 import Environment, PackageLoader
+
+from turnout.chains.mismatch_words import headline
+from turnout.report.finding_words import answer, check, facts, parameters
+from turnout.report.pages.finding import finding_page
+from turnout.report.panels.finding_place import Drawing, marked_place
+
+SECTIONS = [
+    {"label": "OT", "panel": "OT", "track": "both", "position_m": -12.0},
+    {"label": "SP", "panel": "SP", "track": "both", "position_m": 3.6},
+    {"label": "A7", "panel": "CP", "track": "main", "position_m": 24.6},
+    {"label": "A9", "panel": "CP", "track": "diverging", "position_m": 28.2},
+]
+GAP = {
+    "term": "hanging_sleeper",
+    "fixed": {"sleeper": 24.6},
+    "parameters": {"gap": {"value": 1.12e-3, "se": 0.05e-3, "unit": "m"}},
+}
+EVIDENCE = {
+    "reason": "",
+    "frames": [{"frame": "place", "level": "24.6", "effect_db": 6.1, "q": 0.002, "n": 80}],
+    "posterior": {"hanging_sleeper": 0.97},
+    "ranking": [{"family": "hanging_sleeper", "nats": 154.2, "explained": 0.93}],
+    "by_condition": {"ic3 120 km/h": 80.0, "ic3 90 km/h": -2.0},
+}
+
+
+def finding(verdict="named", **more):
+    row = {
+        "finding_id": f"id-{verdict}-{more.get('sections', 'A7')}", "turnout_id": "t1", "section_id": "t1/A7",
+        "found_at_utc": datetime(2026, 7, 25, 10), "verdict": verdict, "grade": None, "term": None, "rival_term": None,
+        "locked_to": None, "position_m": None, "position_se_m": None, "channel": None, "band_low_hz": 21.0,
+        "band_high_hz": 88.0, "probability": 0.97, "p_value": None, "fit_before_pct": 41.0, "fit_after_pct": None,
+        "fit_rival_pct": None, "fit_decoy_pct": None, "n_held_out": 2, "sentence": "As the engine says it.",
+        "next_measurement": "Look under this sleeper", "visit": "2026-07-25", "sections": "A7", "route": "main",
+        "place_low_m": 24.6, "place_high_m": 24.6, "train": None, "wheel_within_m": 0.9, "n_hammer_tests": 1,
+        "n_passages": 6, "n_sensors": 1, "level_before": 3.0, "level_after": 1.1, "term_json": None,
+        "evidence_json": json.dumps(EVIDENCE), "notes": None,
+    }  # fmt: skip
+    return row | more
+
+
+def named(**more):
+    with_term = {
+        "term": "hanging_sleeper",
+        "grade": "A",
+        "position_m": 24.6,
+        "fit_after_pct": 78.0,
+        "fit_rival_pct": 50.0,
+    }
+    return finding("named", **with_term, fit_decoy_pct=43.0, term_json=json.dumps([GAP]), **more)
+
+
+def curves(row):
+    x = np.linspace(0.01, 0.8, 100)
+    base = {"finding_id": row["finding_id"], "turnout_id": "t1", "channel": "A7", "recording": "p1"}
+    lists = {name: np.sin(9 * x + k) + 1.5 for k, name in enumerate(("measured", "before", "after", "rival"))}
+    kinds = [("waveform", "time", "s", "m/s²"), ("spectrum", "frequency", "Hz", "(m/s²)²/Hz"),
+             ("receptance", "frequency", "Hz", "m/N"), ("latent", "displacement", "", "N")]  # fmt: skip
+    return [
+        base | lists | {"curve": c, "curve_no": k, "label": f"{c} of p1, never used", "x": x, "x_label": name,
+                        "x_unit": unit, "y_unit": y}
+        for k, (c, name, unit, y) in enumerate(kinds)
+    ]  # fmt: skip
+
+
+def page(*findings, parameters=(), quarantine=()):
+    template = Environment(loader=PackageLoader("turnout.report", "templates"), trim_blocks=True, autoescape=True)
+    rows = {
+        "sections": SECTIONS, "mismatch_findings": list(findings), "quarantine": list(quarantine),
+        "mismatch_parameters": list(parameters), "mismatch_curves": [c for f in findings for c in curves(f)],
+    }  # fmt: skip
+    shared = {"css": "", "finding_css": "", "version": "1", "generation": 3}
+    return finding_page({"turnout_id": "t1", "name": "Test"}, rows, template.get_template("finding.html"), shared)
+
+
+class Balanced(HTMLParser):
+    """Counts open elements."""
+
+    VOID = {"meta", "br", "img", "link"}
+
+    def __init__(self):
+        super().__init__()
+        self.open = []
+
+    def handle_starttag(self, tag, attrs):
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag, f"</{tag}> closes something else"
+
+
+ROWS = {
+    "named": named(),
+    "a_or_b": named() | {"verdict": "a_or_b", "rival_term": "local_ballast", "finding_id": "two", "grade": None},
+    "unknown": finding("unknown"),
+    "numerics": finding("numerics", band_low_hz=None, band_high_hz=None, wheel_within_m=None),
+    "none": finding("none"),
+}
+
+
+@pytest.mark.parametrize("verdict", ROWS)
+def test_every_answer_makes_a_sound_page(verdict):
+    text = page(ROWS[verdict])
+    parser = Balanced()
+    parser.feed(text)
+    assert not parser.open
+    for drawing in re.findall(r"<svg.*?</svg>(?:</svg>)?", text, re.S):
+        assert "nan" not in drawing and "inf" not in drawing
+    assert "None" not in re.sub(r"<[^>]*>", " ", text)
+    ElementTree.fromstring(re.search(r'<svg class="diagram".*?</svg>', text, re.S)[0])
+
+
+def test_a_named_finding_says_what_where_how_much_and_what_to_check():
+    text = page(named())
+    assert "<h1>The sleeper at 24.6 m hangs 1.1 mm above its ballast.</h1>" in text.replace("\n", "")
+    # 1.12 mm and 0.05 mm of standard error: 1.959964 * 0.05 = 0.098
+    assert "1.02 mm to 1.22 mm" in text
+    for words in ("21 to 88 Hz", "a wheel is within 0.9 m", "ic3 120 km/h (+80 nats)", "Look under this sleeper."):
+        assert words in text
+    for fit in ("41 %", "78 %", "50 %", "43 %"):
+        assert f">{fit}</text>" in text
+    assert "--accept" in text and "never used" in text
+
+
+def test_one_of_two_says_which_measurement_would_tell():
+    row = ROWS["a_or_b"] | {"next_measurement": "Measure passages of a lighter and a heavier train"}
+    assert "or it is local ballast: these recordings cannot tell the two apart" in headline(row)
+    assert check(row) == "Measure passages of a lighter and a heavier train."
+
+
+def test_unknown_is_located_and_offers_nothing_to_accept():
+    text = page(ROWS["unknown"])
+    assert "Something is missing between 24.6 and 24.6 m, and no known effect explains it." in text
+    assert "place 24.6 (+6.1 dB, q = 0.002, n = 80)" in text and "--accept" not in text
+
+
+def test_none_and_numerics_send_nobody_out():
+    assert check(ROWS["none"]) == "Nothing to check."
+    assert "refine" in check(ROWS["numerics"]) and answer(ROWS["numerics"]).startswith("cannot tell")
+
+
+def test_the_worst_comes_first_and_the_rest_is_folded():
+    text = page(finding("none", sections="OT"), named(), finding("unknown", sections="SP"))
+    order = [
+        text.index(words) for words in ("named, grade A", "no name fits</span> SP", "simulation and recordings agree")
+    ]
+    assert order[0] < order[1] and '<details><summary><span class="badge ok">OT' in text
+
+
+def test_the_arrow_points_at_the_place_or_the_sensor():
+    drawing = Drawing(SECTIONS)
+    # ends lie 4 m beyond the sections, 20 pixels from the edges: -16 m at 20, 32.2 m at 900
+    assert drawing.px(-16.0) == 20 and drawing.px(32.2) == pytest.approx(900)
+    assert marked_place(named(), SECTIONS) == (24.6, "24.6 m")
+    assert marked_place(finding("named", channel="A9"), SECTIONS) == (28.2, "sensor A9")
+    assert marked_place(finding("unknown"), SECTIONS) == (None, "")
+
+
+def test_what_was_accepted_is_shown_over_the_visits():
+    rows = [
+        {
+            "finding_id": "id-none-A7" if day == 25 else f"old{day}", "turnout_id": "t1", "parameter_no": 0,
+            "found_at_utc": datetime(2026, 7, day), "term": "hanging_sleeper", "position_m": 24.6, "channel": None,
+            "parameter": "gap", "value": 1e-3 + 1e-5 * day, "value_se": 1e-5, "value_low": 1e-3, "value_high": 1.3e-3,
+            "unit": "m", "accepted": True,
+        }
+        for day in (1, 12, 25)
+    ]  # fmt: skip
+    text = page(finding("none"), parameters=rows)
+    assert "hanging sleeper, gap: 3 visits" in text and "Accepted before, estimated anew" in text
+
+
+def test_why_nothing_can_be_said_stands_on_the_page():
+    row = {"stage": "mismatch", "place": "sections A7", "found": "no channel with 2 sound blows", "remedy": "See docs"}
+    text = page(quarantine=[row])
+    assert "Nothing can be said" in text and "no channel with 2 sound blows" in text
+
+
+def test_numbers_read_as_engineers_write_them():
+    (row,) = parameters(named())
+    assert row["value"] == "1.12 mm"
+    assert dict(facts(named()))["From"] == "1 hammer test, 6 passages, 1 installed sensor"
+
+
+def test_every_effect_of_the_catalogue_has_its_sentence():
+    from turnout.chains.mismatch_words import SENTENCES
+    from turnout.physics import TERMS
+
+    assert {t.name for t in TERMS} - set(SENTENCES) <= {"roughness_level"}
+    for term in TERMS:
+        made = {
+            p.name: {"value": getattr(term.example(), p.name, p.neutral), "se": 0.0, "unit": p.unit}
+            for p in term.parameters
+        }
+        row = named() | {"term_json": json.dumps([{"term": term.name, "fixed": {"sleeper": 24.6}, "parameters": made}])}
+        assert "{" not in headline(row) and headline(row).endswith(".")
