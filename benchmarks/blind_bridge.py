@@ -1,93 +1,145 @@
-"""One case of a blind set -> finding rows, by the diagnosis as a library.
+"""One case of a blind set -> finding rows, by the diagnosis as a library: all visits together, and lesser tools.
 
-``python -m benchmarks.blind_bridge FOLDER CASE ROWS.json`` reads FOLDER/config and FOLDER/raw as any user's, and
-writes rows with the columns of mismatch_findings. It reads neither truth nor generator.
+    turnout blind diagnose --out proof --command "{python} -m benchmarks.blind_bridge {folder} {case} {out}"
+    turnout blind diagnose --out proof --ablation in_sample \\
+        --command "{python} -m benchmarks.blind_bridge {folder} {case} {out} --lesser in_sample"
+
+Reads FOLDER/config and FOLDER/raw as any user's; neither truth nor generator. Run it with the checkout on PYTHONPATH.
 """
 
+import argparse
 import json
-import sys
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
+from turnout.chains.mismatch_context import track_of
+from turnout.chains.mismatch_gather import gather
+from turnout.chains.mismatch_groups import groups
 from turnout.config.load import load_configuration, with_raw
+from turnout.config.settings.mismatch import MismatchSettings
+from turnout.fleet.scan import scan
 from turnout.mismatch.diagnose import diagnose
-from turnout.mismatch.track.campaign import Campaign, HammerTest, Passage
+from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.shortlist import shortlist
 from turnout.mismatch.track.track_case import TrackCase
-from turnout.readers import read
-from turnout.simulate import Sensor, load_track, load_vehicle
+
+LESSER = {
+    "in_sample": "names by the fit to what was fitted, not by conditions left out",
+    "score_test": "names by the score test on the fitted base model, nothing refitted",
+    "single_start": "every term is refitted from its first start alone",
+    "no_materiality": "differences of half a percent count",
+    "hammer_only": "hammer tests alone",
+    "passages_only": "passages alone",
+}
 
 
-def campaign_of(folder, case):
-    """``Campaign`` of the recordings and notes below ``folder``; two passages of eight are reserved."""
+def campaigns_of(folder, case):
+    """Campaigns of the engine, one per group of neighbouring sections, over all visits of a case."""
     folder = Path(folder)
-    turnout = with_raw(load_configuration(folder / "config").turnout(case), folder / "raw")
-    track = load_track(folder / "config" / "tracks" / "site.yaml")
-    channels = turnout.passages.description.channels
-    sensors = tuple(Sensor(c.name, c.position, c.mounting) for c in channels)
-    passages = tuple(_passages(folder, case, turnout))
-    reserved = {}
-    for passage in sorted(passages, key=lambda p: p.speed):
-        reserved[passage.train] = passage.name  # the fastest of each train
-    kept = tuple(reserved[t] for t in ("railcar", "loaded") if t in reserved)
-    return Campaign(track, sensors, tuple(_tests(folder, case, turnout, track)), passages, kept)
+    raw = folder / "raw"
+    turnout = with_raw(load_configuration(folder / "config").turnout(case), raw)
+    track, _ = track_of(turnout)
+    found = gather(scan(turnout, raw).units, turnout, raw, track, {})
+    return [group.campaign for group in groups(turnout, track, found)]
 
 
-def _tests(folder, case, turnout, track):
-    for path in sorted((folder / "raw" / case).glob("hammer/*/*.npz")):
-        section, day = path.stem.split("_")[0], path.parent.name
-        made = read(path, folder / "raw", turnout.hammer.descriptions[section]).recordings
-        place = track.locations[section][0]
-        noted = {"rail_temperature": turnout.campaigns[day].rail_temperature}
-        yield HammerTest(f"{section} {day}", place, made, "force", day, noted)
+def case_of(campaign, settings=None, lesser=None):
+    """``TrackCase`` of a campaign, made poorer as ``lesser`` says."""
+    settings = settings or MismatchSettings()
+    if lesser == "no_materiality":
+        settings = replace(settings, materiality=0.005, pair_tolerance=0.005)
+    if lesser == "hammer_only":
+        campaign = replace(campaign, passages=(), reserved=tuple(t.name for t in campaign.hammer[-1:]))
+    if lesser == "passages_only":
+        campaign = replace(campaign, hammer=())
+    case = TrackCase(campaign, settings)
+    if lesser == "single_start":
+        case.candidates = tuple(replace(c, starts=c.starts[:1]) for c in case.candidates)
+    return case, settings
 
 
-def _passages(folder, case, turnout):
-    paths = sorted((folder / "raw" / case).glob("passages/*.npz"))
-    vehicles = {}
-    for path, train in zip(paths, sorted(turnout.trains, key=lambda t: t["passed_at_utc"])):
-        if not train["speed_kmh"]:
-            continue  # nobody noted its speed
-        recording = read(path, folder / "raw", turnout.passages.description).recordings[0]
-        name = train["train_type"]
-        vehicles.setdefault(name, load_vehicle(name, 0.0, folder / "config" / "vehicles"))
-        noted = {"rail_temperature": float(recording.conditions["rail_temperature"])}
-        yield Passage(path.stem, recording, vehicles[name], float(train["speed_kmh"]) / 3.6, name, conditions=noted)
+def rows(folder, case, lesser=None):
+    """Finding rows of all groups, one per effect found, or one "none"."""
+    found = []
+    for campaign in campaigns_of(folder, case):
+        made, settings = case_of(campaign, lesser=lesser)
+        found += _by_score_test(made, settings) if lesser == "score_test" else _by_diagnosis(made, settings, lesser)
+    return found
+
+
+def _by_diagnosis(case, settings, lesser):
+    diagnosis = diagnose(case, settings)
+    if lesser != "in_sample" or not diagnosis.verdict.scores:
+        return rows_of(diagnosis)
+    best = min(diagnosis.verdict.scores, key=lambda s: s.fit.cost)
+    gained = 0.5 * (diagnosis.base.cost - best.fit.cost) - len(best.candidate.parameters)
+    if gained <= settings.threshold:
+        return [_row("none", None, None, diagnosis.verification)]
+    return [_row("named", best.candidate, best.fit, diagnosis.verification)]
+
+
+def _by_score_test(case, settings):
+    """The family that leads the queue, if its linear gain is beyond the threshold."""
+    base = fit_jointly(case, iterations=settings.base_iterations)
+    plan = shortlist(case, base, settings)
+    if not plan or max(base.level.values()) <= settings.control_level:
+        return [_row("none", None, None, None)]
+    return [_row("named", plan[0][0], None, None)]
 
 
 def rows_of(diagnosis):
-    """Finding rows, one per effect found, or one "none"."""
-    rows, seen = [], diagnosis.verification
+    """Finding rows of a diagnosis."""
+    found = []
     for verdict in diagnosis.verdicts:
         best = verdict.scores[0] if verdict.scores and verdict.names else None
-        where = dict(best.candidate.where) if best else {}
-        names, candidate = verdict.names, best.candidate if best else None
-        frame = candidate.frame if best else diagnosis.frames[0].frame if diagnosis.frames else None
-        n = len(candidate.parameters) if best else 0
-        values = zip(candidate.parameters, best.fit.psi[-n:], best.fit.psi_se[-n:]) if n else ()
-        numbers = {p.name: {"value": float(v), "se": float(s), "unit": p.unit} for p, v, s in values}
-        rows.append(
-            {
-                "verdict": verdict.answer, "grade": verdict.grade or None, "term": names[0] if names else None,
-                "rival_term": names[1] if len(names) > 1 else None, "locked_to": frame,
-                "position_m": where.get("place"), "channel": where.get("sensor"),
-                "probability": verdict.probability, "fit_before_pct": _number(seen.before),
-                "fit_after_pct": _number(seen.after), "fit_rival_pct": _number(seen.rival),
-                "fit_decoy_pct": _number(seen.decoy), "n_held_out": seen.n, "sentence": verdict.reason,
-                "parameters_json": json.dumps({**numbers, "where": where}),
+        row = _row(verdict.answer, best and best.candidate, best and best.fit, diagnosis.verification)
+        frame = diagnosis.frames[0].frame if diagnosis.frames else None
+        found.append(
+            row
+            | {
+                "grade": verdict.grade or None, "rival_term": verdict.names[1] if len(verdict.names) > 1 else None,
+                "locked_to": row["locked_to"] or frame, "probability": verdict.probability, "sentence": verdict.reason,
             }
         )  # fmt: skip
-    return rows
+    return found
+
+
+def _row(verdict, candidate, fit, seen):
+    where = dict(candidate.where) if candidate else {}
+    n = len(candidate.parameters) if candidate and fit else 0
+    values = zip(candidate.parameters, fit.psi[-n:], fit.psi_se[-n:]) if n else ()
+    numbers = {p.name: {"value": float(v), "se": float(s), "unit": p.unit} for p, v, s in values}
+    fits = {f"fit_{name}_pct": _number(getattr(seen, name, None)) for name in ("before", "after", "rival", "decoy")}
+    return {
+        "verdict": verdict, "term": candidate.family if candidate else None,
+        "locked_to": candidate.frame if candidate else None, "position_m": where.get("place"),
+        "channel": where.get("sensor"), **fits, "n_held_out": getattr(seen, "n", 0),
+        "parameters_json": json.dumps({**numbers, "where": {k: _plain(v) for k, v in where.items()}}),
+    }  # fmt: skip
+
+
+def _plain(value):
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def _number(value):
     return None if value is None or value != value else float(value)
 
 
-def main(folder, case, out):
+def main():
     """Diagnose and write."""
-    rows = rows_of(diagnose(TrackCase(campaign_of(folder, case))))
-    Path(out).write_text(json.dumps(rows, indent=1) + "\n")
-    print(", ".join(f"{r['verdict']} {r['term'] or ''}".strip() for r in rows))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder")
+    parser.add_argument("case")
+    parser.add_argument("out")
+    parser.add_argument("--lesser", choices=sorted(LESSER), help="a poorer tool, for the ablations")
+    args = parser.parse_args()
+    found = rows(args.folder, args.case, args.lesser)
+    Path(args.out).write_text(json.dumps(found, indent=1) + "\n")
+    print(", ".join(f"{r['verdict']} {r['term'] or ''}".strip() for r in found))
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    main()
