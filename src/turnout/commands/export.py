@@ -61,6 +61,6 @@ def _delta(con, quoted, path) -> int:
         from deltalake import write_deltalake
     except ImportError:
         raise RegistryError("Delta Lake needs a package: pip install 'turnout[lakehouse]'.") from None
-    rows = con.execute(f"select * from {quoted}").to_arrow_table()
+    rows = con.sql(f"select * from {quoted}").to_arrow_table()
     write_deltalake(str(path), rows, mode="overwrite")
     return rows.num_rows
