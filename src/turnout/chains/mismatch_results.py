@@ -15,11 +15,13 @@ from turnout.fleet.batches import decode, encode
 from turnout.fleet.scan import scan
 from turnout.registry.database import open_registry
 
+ALL = "all"  # every visit in one case: what depends on temperature or time needs more than one
+
 
 def diagnose_turnout(
     turnout_id, config="config", raw_root="raw", work="work", visit=None, track=None, sections=(), budget=None, bar=None
 ):
-    """Rows by table of one visit of a turnout, the newest where none is named.
+    """Rows by table of one visit of a turnout, the newest where none is named; for "all" every visit as one.
 
     Parameters
     ----------
@@ -49,6 +51,8 @@ def _visit(turnout_id, found, wanted, raw_root):
         raise SimulationError(f"{turnout_id}: no hammer test and no passage below {raw_root}; nothing can be said.")
     if wanted is None:
         return list(found.items())[-1]
+    if wanted == ALL:
+        return list(found)[-1], [unit for members in found.values() for unit in members]
     if wanted not in found:
         raise SimulationError(f"{turnout_id} has no visit {wanted!r}; there are {', '.join(list(found)[-12:])}.")
     return wanted, found[wanted]

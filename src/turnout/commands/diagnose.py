@@ -16,7 +16,7 @@ def add_arguments(parser):
     """Options of the command."""
     parser.add_argument("--turnout", required=True, help="id in config/turnouts.tsv")
     parser.add_argument("--sections", nargs="+", default=(), help="only these sections")
-    parser.add_argument("--visit", help="day of a campaign, or month: default the newest")
+    parser.add_argument("--visit", help="day of a campaign, month, or all together: default the newest")
     parser.add_argument("--track", help="file in config/tracks; default: the turnout's own, else its layout's")
     parser.add_argument("--config", default="config", help="configuration folder (%(default)s)")
     parser.add_argument("--raw", default="raw", help="folder of raw files (%(default)s)")
