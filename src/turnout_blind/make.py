@@ -2,6 +2,7 @@
 
 import json
 import os
+import platform
 import secrets
 import shutil
 import time
@@ -60,7 +61,7 @@ def make_set(out, truth, seed=None, full=True, folders=(), only=None, limit=None
 def _begun(truth, seed, full, folders, only, limit):
     """set.json: what an interrupted set was begun with, or written now."""
     wanted = {"full": full, "effects": sorted(map(str, folders)), "only": sorted(only or ()), "limit": limit}
-    wanted["generator_sha256"] = digest_of_folder(Path(__file__).parent, "*.py")
+    wanted |= {"generator_sha256": digest_of_folder(Path(__file__).parent, "*.py"), "made_on": platform.machine()}
     path = truth / SET
     if not path.exists():
         write_truth(truth, "set", {"seed": secrets.randbits(63) if seed is None else int(seed), **wanted})

@@ -59,4 +59,6 @@ def _difference(before, after, band, down):
     f = np.fft.rfftfreq(before.shape[1], STEP)
     inside = (f >= band[0]) & (f <= band[1])
     a, b = (np.fft.rfft(x)[:, inside] for x in (before, after))
-    return float(np.max(100.0 * np.linalg.norm(b - a, axis=1) / np.linalg.norm(b, axis=1)))
+    missed, whole = np.linalg.norm(b - a, axis=1), np.linalg.norm(b, axis=1)
+    heard = whole > 0.0  # a channel that was unplugged shows nothing of the effect
+    return float(np.max(100.0 * missed[heard] / whole[heard], initial=0.0))

@@ -12,6 +12,7 @@ from turnout_blind.roughness import level, patch_share, rail_roughness, wheel_ro
 from turnout_blind.score.names import RIGHT, SAME
 from turnout_blind.site import draw_site
 from turnout_blind.strata import case_id, plan_cases
+from turnout_blind.visible import _difference
 
 EFFECTS = load_effects()
 MAY = {"turnout", "turnout.errors", "turnout.records", "turnout.readers", "turnout.readers.writing"}
@@ -147,3 +148,12 @@ def test_sixteen_bits_and_their_range():
     assert shown.size == 5000
     assert np.allclose(steps, np.round(steps))
     assert (steps.min(), steps.max()) == (-32768, 32767)
+
+
+def test_a_channel_that_shows_nothing_shows_nothing_of_the_effect():
+    """It must not count as infinitely plain."""
+    t = np.arange(6000) / 60000.0
+    before = np.array([np.sin(600.0 * t), np.sin(600.0 * t)])
+    after = np.array([1.1 * np.sin(600.0 * t), 0.0 * t])
+    assert _difference(before, after, (30.0, 800.0), 3) == pytest.approx(100.0 / 11.0, rel=1e-6)
+    assert _difference(before, 0.0 * after, (30.0, 800.0), 3) == 0.0
