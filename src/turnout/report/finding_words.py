@@ -69,9 +69,19 @@ def _locked(finding, evidence):
     words = [
         f"{f['frame']} {f['level']} ({f['effect_db']:+.1f} dB, q = {f['q']:.3f}, n = {f['n']})" for f in frames[:3]
     ]
-    if finding["locked_to"] and not words:
-        return finding["locked_to"]
+    if finding["verdict"] in ("named", "a_or_b") and finding["locked_to"]:
+        most = f"; before, most was left at {'; '.join(words)}" if words else ""
+        return f"{_of_what(finding)}{most}"
     return "; ".join(words) or "nothing in particular"
+
+
+def _of_what(finding):
+    """What a named effect belongs to, in words."""
+    if finding["locked_to"] in ("sensor", "clock") and finding["channel"]:
+        return f"sensor {finding['channel']}"
+    return {"condition": "load or temperature", "amplitude": "how strong the load is"}.get(
+        finding["locked_to"], f"the {finding['locked_to']}"
+    )
 
 
 def _conditions(evidence):

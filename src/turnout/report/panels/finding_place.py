@@ -51,16 +51,16 @@ class Drawing:
         style = STYLES[finding["verdict"]]
         self.parts.append(f'<path class="stretch {style}" d="M{path}"><title>{words}</title></path>')
 
-    def sensor(self, section, row):
-        """A measured section with its label; crowded labels take turns."""
+    def sensor(self, section, row, unnamed=False):
+        """A measured section with its label, or ``unnamed``; crowded labels take turns."""
         diverging = section["track"] == "diverging"
         x, y = self.px(section["position_m"] or 0.0), self.py(section["position_m"] or 0.0, diverging)
         side = 24 + 13 * (row % 2) if diverging else -16 - 13 * (row % 2)
         label = escape(section["label"])
-        self.parts.append(
-            f'<circle class="seat" cx="{x:.1f}" cy="{y:.1f}" r="4.5"><title>{label}</title></circle>'
-            f'<text class="tick" x="{x:.1f}" y="{y + side:.1f}" text-anchor="middle">{label}</text>'
-        )
+        self.parts.append(f'<circle class="seat" cx="{x:.1f}" cy="{y:.1f}" r="4.5"><title>{label}</title></circle>')
+        if not unnamed:
+            text = f'<text class="tick" x="{x:.1f}" y="{y + side:.1f}" text-anchor="middle">{label}</text>'
+            self.parts.append(text)
 
     def mark(self, place, diverging, words):
         """An arrow to a place, with words at its tail."""
@@ -88,13 +88,21 @@ def place_panel(sections, findings, marked=None):
     drawing.rails()
     for finding in findings:
         drawing.stretch(finding)
-    for row, section in enumerate(sorted(sections, key=lambda s: (s["track"] == "diverging", s["position_m"] or 0.0))):
-        drawing.sensor(section, row)
-    if marked is not None:
-        place, words = marked_place(marked, sections)
-        if place is not None:
-            drawing.mark(place, marked["route"] == "diverging", words)
+    place, words = marked_place(marked, sections) if marked is not None else (None, "")
+    ordered = sorted(sections, key=lambda s: (s["track"] == "diverging", s["position_m"] or 0.0))
+    for row, section in enumerate(ordered):
+        hidden = place is not None and marked is not None and _under(section, place, marked["route"])
+        drawing.sensor(section, row, hidden)
+        words += f" ({section['label']})" if hidden and section["label"] not in words else ""
+    if place is not None and marked is not None:
+        drawing.mark(place, marked["route"] == "diverging", words)
     return drawing.svg()
+
+
+def _under(section, place, route):
+    """Whether the arrow would lie on the section's label."""
+    same = (section["track"] == "diverging") == (route == "diverging")
+    return same and abs((section["position_m"] or 0.0) - place) < 0.5
 
 
 def marked_place(finding, sections):
