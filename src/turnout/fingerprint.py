@@ -45,6 +45,7 @@ def forget() -> None:
     """Read the source files again: they changed while this process ran."""
     _file.cache_clear()
     _tree.cache_clear()
+    _beside.cache_clear()
 
 
 @cache
@@ -64,24 +65,32 @@ def _tree(name: str) -> tuple[str, tuple[str, ...]]:
     if path is None:
         raise ValueError(f"no module {name} in the package {PACKAGE}")
     tree = ast.parse(path.read_text(encoding="utf-8"))
-    imported = _imports(tree, name, path.name == "__init__.py")
-    for node in ast.walk(tree):
+    nodes = list(ast.walk(tree))
+    imported = _imports(nodes, name, path.name == "__init__.py")
+    for node in nodes:
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)) and _has_docstring(node):
             node.body = node.body[1:] or [ast.Pass()]
     digest = hashlib.sha256(ast.dump(tree).encode())
-    for data in _data(path.parent, tree):
+    for data in _data(path.parent, nodes):
         digest.update(data.name.encode() + data.read_bytes())
     return digest.hexdigest(), tuple(imported)
 
 
-def _data(folder: Path, tree: ast.AST) -> list[Path]:
+def _data(folder: Path, nodes: list[ast.AST]) -> list[Path]:
     """Tables beside a module, and all that lies in the folders of data that it names."""
-    found = [p for p in folder.iterdir() if p.suffix in (".csv", ".sql")]
-    named = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)}
-    for inner in folder.iterdir():
-        if inner.is_dir() and inner.name in named and not any(inner.glob("*.py")):
-            found += [p for p in inner.iterdir() if p.is_file()]
-    return sorted(found)
+    tables, folders = _beside(folder)
+    if not folders:
+        return list(tables)
+    named = {node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)}
+    return sorted([*tables, *(p for inner in folders if inner.name in named for p in inner.iterdir() if p.is_file())])
+
+
+@cache
+def _beside(folder: Path) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
+    """Tables in a folder, and its folders in which there is no module."""
+    found = sorted(folder.iterdir())
+    inner = (p for p in found if p.is_dir() and p.name != "__pycache__" and not any(p.glob("*.py")))
+    return tuple(p for p in found if p.suffix in (".csv", ".sql")), tuple(inner)
 
 
 def _has_docstring(node) -> bool:
@@ -89,9 +98,9 @@ def _has_docstring(node) -> bool:
     return isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant) and isinstance(first.value.value, str)
 
 
-def _imports(tree: ast.Module, name: str, is_package: bool) -> list[str]:
-    found = []
-    for node in ast.walk(tree):
+def _imports(nodes: list[ast.AST], name: str, is_package: bool) -> list[str]:
+    found: list[str] = []
+    for node in nodes:
         if isinstance(node, ast.Import):
             found += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
