@@ -41,7 +41,7 @@ def residuals_by_pandas(modes, charts, baselines) -> pd.Series:
     cells = pd.concat(centred)
     median = []
     for _, campaign in cells.groupby(["turnout_id", "band", "source", "measured_at_utc"]):
-        settled = campaign["complete"] & (campaign["state"] != "learning")
+        settled = campaign["complete"] & (campaign["state"] != "learning") & campaign["is_sibling"]
         for i in range(len(campaign)):
             others = np.delete(campaign["centred"].to_numpy(), i)[np.delete(settled.to_numpy(), i)]
             use = campaign["with_siblings"].iloc[i] and len(others) >= 3

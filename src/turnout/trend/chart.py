@@ -10,6 +10,8 @@ from turnout.trend.prepared import Prepared, first_epoch, stacked
 from turnout.trend.residuals import learning, of_sections, of_turnouts
 from turnout.trend.threshold import threshold_for
 
+SIBLING_ROUNDS = 3
+
 
 @dataclass
 class Charts:
@@ -17,8 +19,9 @@ class Charts:
 
     (n_chart, n_campaign) arrays: ``residual`` and ``sigma`` [%], ``z``, ``down``, ``up`` (CUSUM), ``down_open``,
     ``up_open`` (alarm open), ``down_began``, ``up_began`` (last campaign before the change), ``learning``,
-    ``fitted`` (expected value, % of f0). (n_chart,): ``allowance, learn, guard, memory, spread, threshold_down,
-    threshold_up``; ``level`` and ``learned`` are (n_chart, n_epoch).
+    ``fitted`` (expected value, % of f0); ``serving`` (siblings of others), of the sections alone. (n_chart,):
+    ``allowance, learn, guard, memory, spread, threshold_down, threshold_up``; ``level`` and ``learned`` are
+    (n_chart, n_epoch).
     """
 
     prepared: Prepared
@@ -35,6 +38,7 @@ class Charts:
     z: np.ndarray
     fitted: np.ndarray
     learning: np.ndarray
+    serving: np.ndarray
     extra: np.ndarray
     threshold_down: np.ndarray
     threshold_up: np.ndarray
@@ -68,8 +72,7 @@ def finish(p: Prepared, memory, settings) -> Charts:
     learn = np.where(visible, settings.learning_large, settings.learning_small)
     window, settled = learning(p, learn, n, settings.siblings_minimum + 1)
     summing = _Summing(p, allowance, window, guard * widening, settings)
-    sections = of_sections(p, window, settled, settings)
-    first = summing(slice(0, n), sections)
+    sections, first, serving = _siblings_without_alarm(p, window, settled, summing, settings)
     alarmed = first["down_open"] | first["up_open"]
     turnouts = of_turnouts(p, sections, window, settled, alarmed, settings)
     second = summing(slice(n, None), turnouts)
@@ -79,8 +82,25 @@ def finish(p: Prepared, memory, settings) -> Charts:
     learned = by_epoch(both["values"], window & np.isfinite(both["values"]), p.epoch, level.shape[1])[1]
     return Charts(
         p, allowance, learn, guard, memory, widening, level, shift, learned, both["residual"], both["sigma"],
-        fitted=both["values"] - both["residual"], learning=window, **sums,
+        fitted=both["values"] - both["residual"], learning=window, serving=serving, **sums,
     )  # fmt: skip
+
+
+def _siblings_without_alarm(p, window, settled, summing, settings):
+    """Residuals and sums of the sections, and which of their campaigns are siblings: none that is in alarm.
+
+    Sections that have fallen far may raise an alarm in a sound one first; without them it is quiet, and a sibling
+    again.
+    """
+    n = len(p.panel.charts)
+    serving = settled[:n]
+    for _ in range(SIBLING_ROUNDS):
+        sections = of_sections(p, window, settled, serving, settings)
+        sums = summing(slice(0, n), sections)
+        before, serving = serving, settled[:n] & ~(sums["down_open"] | sums["up_open"])
+        if np.array_equal(before, serving):
+            break
+    return sections, sums, before
 
 
 class _Summing:

@@ -49,12 +49,16 @@ def learning(p, learn, n_section, need):
     return window, settled
 
 
-def of_sections(p: Prepared, window, settled, settings) -> Residuals:
-    """Residuals of the sections. ``window`` and ``settled`` are those of ``learning``."""
+def of_sections(p: Prepared, window, settled, serving, settings) -> Residuals:
+    """Residuals of the sections. ``window`` and ``settled`` are those of ``learning``.
+
+    (n_chart, n_campaign) ``serving`` says which settled campaigns are siblings of others: not those in alarm, for
+    one section that has fallen far would pull the median of a few with it and raise an alarm in sound ones.
+    """
     n = len(p.panel.charts)
     group, epoch = p.panel.charts["group"].to_numpy(), p.epoch[:n]
     level, e = _centred(p.values, window[:n], epoch)
-    median, others = median_of_others(e, settled[:n], group)
+    median, others = median_of_others(e, serving, group)
     enough = np.isfinite(e) & (others >= settings.siblings_minimum)
     young = np.isfinite(e) & ~settled[:n] & ~enough
     if young.any():

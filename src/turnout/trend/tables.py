@@ -73,6 +73,7 @@ def chart_rows(charts) -> pd.DataFrame:
             "z": np.take(charts.z.ravel(), cell),
             "cusum_down": np.take(charts.down.ravel(), cell),
             "cusum_up": np.take(charts.up.ravel(), cell),
+            "is_sibling": section & np.take(charts.serving.ravel(), np.where(section, cell, 0)),
             "state": pd.Categorical.from_codes(np.take(cell_states(charts).ravel(), cell), STATES),
         }
     )
@@ -89,7 +90,11 @@ def _with_wrong_times(rows, left_out):
     wrong = left_out[(left_out["reason"] == "wrong_time") & left_out["measured_at_utc"].notna()]
     if wrong.empty:
         return rows
-    wrong = wrong[[*KEYS, "measured_at_utc"]].drop_duplicates().assign(epoch=np.int32(0), state="wrong_time")
+    wrong = (
+        wrong[[*KEYS, "measured_at_utc"]]
+        .drop_duplicates()
+        .assign(epoch=np.int32(0), is_sibling=False, state="wrong_time")
+    )
     for name in (*KEYS, "state"):
         known = rows[name].cat.categories
         known = known.append(pd.Index(wrong[name].unique()).difference(known, sort=True))

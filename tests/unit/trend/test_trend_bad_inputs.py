@@ -168,6 +168,17 @@ def test_a_noisier_campaign_weighs_less(settings):
     assert a.down_open[2].any() and not b.down_open[2].any()
 
 
+def test_sections_that_fall_far_raise_no_alarm_in_a_sound_one(settings):
+    # Three of eight fall by 10 %: the median of the others moves by .9 sd (order statistics of four of seven).
+    which = np.zeros((1, 8), bool)
+    which[0, [1, 4, 6]] = True
+    for seed in range(6):
+        charts = evaluate(modes(FLEET, seed, step(FLEET, which, -10.0, 80)), None, settings)
+        opened = (charts.down_open | charts.up_open)[:8, 80:].any(axis=1)
+        assert opened[which[0]].all() and not opened[~which[0]].any()
+        assert not charts.serving[which[0], 90:].any() and charts.serving[~which[0], 90:].all()
+
+
 def test_ballast_as_noisy_as_printed_in_the_paper_cannot_see(settings):
     # Table 3 of the paper, ballast: frequency and printed spread, taken as one sigma of a campaign.
     printed = {"OT": (154.6, 11.7), "SP": (167.2, 7.0), "CLP": (105.9, 20.0), "CP A7": (99.6, 5.2),

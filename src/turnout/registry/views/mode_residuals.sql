@@ -1,14 +1,14 @@
 -- One row per chart and campaign since a date: the residual of the chart, computed anew from modes and baselines.
 -- corrected_pct: 100 (f / f0 - 1) - b (T - T0) - level of the epoch. residual_pct: the same minus the median of the
 -- other sections of the turnout, where the chart uses them and three are there, minus their usual difference.
--- Sections that learn their level are nobody's sibling, except of others that learn too.
+-- Sections in alarm are nobody's sibling, nor are those that learn their level, except of others that learn too.
 -- needs: chart_values
 create or replace macro mode_residuals(since) as table
 with corrected as (
     select
         c.turnout_id, c.section_id, c.band, c.source, c.measured_at_utc, c.epoch, c.state,
         m.frequency_hz, b.with_siblings, b.sibling_shift_pct,
-        b.complete and c.state <> 'learning' as settled,
+        b.complete and c.state <> 'learning' as settled, c.is_sibling,
         100 * (m.frequency_hz / b.frequency_hz - 1)
             - b.slope_pct_per_c * (m.rail_temperature_c - b.rail_temperature_c) - b.level_pct as corrected_pct
     from charts c
@@ -19,7 +19,7 @@ with corrected as (
 together as (
     select
         turnout_id, band, source, measured_at_utc,
-        list(corrected_pct order by corrected_pct) filter (where settled) as settled_pct,
+        list(corrected_pct order by corrected_pct) filter (where is_sibling) as settled_pct,
         list(corrected_pct order by corrected_pct) as all_pct
     from corrected
     group by all
@@ -27,7 +27,7 @@ together as (
 others as (
     select
         c.*,
-        case when settled then list_position(settled_pct, corrected_pct) else 0 end as place,
+        case when is_sibling then list_position(settled_pct, corrected_pct) else 0 end as place,
         list_position(all_pct, corrected_pct) as place_in_all,
         coalesce(settled_pct, []) as settled_pct,
         all_pct
@@ -37,7 +37,7 @@ others as (
 medians as (
     select
         *,
-        len(settled_pct) - settled::integer as n_settled,
+        len(settled_pct) - is_sibling::integer as n_settled,
         list_median(list_concat(settled_pct[1:place - 1], settled_pct[place + 1:])) as settled_median,
         list_median(list_concat(all_pct[1:place_in_all - 1], all_pct[place_in_all + 1:])) as all_median
     from others
