@@ -187,7 +187,8 @@ PAGE = """# Track decay rates of Bern-Niederwangen: what changed
 
 *Made by `python -m benchmarks.niederwangen FOLDER`; every number and verdict comes from that run. Source of the
 measurements: repository mic-haf/SDWirkungNi (SBB; Scossa-Romano and Oertli), CC0 1.0. What was changed at the
-track, where and when, is not in the folder and was not looked up.*
+track, where and when, is not in the folder and was not looked up. What was added or taken away is asked with a model of
+the track in `niederwangen_mismatch.md`.*
 
 {n} hammer measurements of the track decay rate [dB/m] in {n_bands} third-octave bands, two directions and two
 rails, at
