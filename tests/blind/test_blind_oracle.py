@@ -1,0 +1,65 @@
+"""What an oracle is told, and rows as the bridge writes them; neither runs a simulation here."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from benchmarks.blind_bridge import rows_of
+from benchmarks.blind_oracle import _candidates, _told
+
+from turnout.mismatch import Candidate
+from turnout.physics import Parameter
+from turnout_blind.score.answers import answers_of
+from turnout_blind.score.judged import judge
+
+FACTOR = Parameter("factor", "-", 1.0, (0.05, 5.0), "of stiffness", "a test")
+
+
+def candidate(family, **where):
+    return Candidate(family, (FACTOR,), dict, ((0.4,), (2.5,)), where, "place" if "place" in where else "sensor", 7)
+
+
+PADS = [candidate("local_pad", sleeper=j, place=0.6 * j) for j in range(10)]
+CASE = SimpleNamespace(
+    candidates=(*PADS, candidate("local_ballast", place=3.0), candidate("sensor_gain", sensor="A2"),
+                candidate("sensor_gain", sensor="A3"), candidate("unsprung_mass", train="loaded"))
+)  # fmt: skip
+EFFECT = {"kind": "pad", "where": {"position": 3.1, "sleeper": 40}, "parameters": {"factor": 0.33}, "rung": 4,
+          "locked_to": "place"}  # fmt: skip
+
+
+def test_an_oracle_gets_the_right_name_at_the_true_place_and_nothing_else():
+    assert [c.where["place"] for c in _candidates(CASE, EFFECT)] == [3.0]
+    gain = {"kind": "gain", "where": {"sensor": "A3"}, "parameters": {"gain": 1.2}}
+    assert [c.where for c in _candidates(CASE, gain)] == [{"sensor": "A3"}]
+    mass = {"kind": "unsprung_mass", "where": {"train": "railcar"}, "parameters": {"factor": 1.4}}
+    assert not list(_candidates(CASE, mass))
+    assert not list(_candidates(CASE, {"kind": "guard_rail_rattle", "where": {"position": 3.0}, "parameters": {}}))
+
+
+def test_an_oracle_starts_from_the_truth_within_the_bounds():
+    assert _told(PADS[5], EFFECT) == [0.33]
+    assert _told(PADS[5], {**EFFECT, "parameters": {"factor": 0.01}}) == [0.05]
+    assert _told(PADS[5], {**EFFECT, "kind": "void", "parameters": {"gap": 1e-3}}) == [0.4]
+
+
+def test_rows_of_the_bridge_are_read_by_the_scorer():
+    fit = SimpleNamespace(psi=np.array([0.35]), psi_se=np.array([0.02]))
+    best = SimpleNamespace(candidate=PADS[5], fit=fit)
+    verdict = SimpleNamespace(
+        answer="named", names=("local_pad",), grade="A", probability=0.9, scores=(best,), reason="because"
+    )
+    seen = SimpleNamespace(before=40.0, after=48.0, rival=44.0, decoy=float("nan"), n=2)
+    rows = rows_of(SimpleNamespace(verdicts=(verdict,), verification=seen, frames=()))
+    assert json.loads(json.dumps(rows)) == rows
+    truth = {
+        "case": "T1",
+        "stratum": "single",
+        "effects": [EFFECT],
+        "visible": {"hammer_pct": 40.0, "passage_pct": 5.0},
+    }
+    judged = judge(truth, answers_of(rows))
+    assert judged.hits == ("named",) and judged.located == {"lock": True, "place": True}
+    assert judged.fits == (40.0, 48.0)
+    assert judged.parameters == ((pytest.approx(0.02 / 0.33), True),)
