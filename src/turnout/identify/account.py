@@ -40,5 +40,6 @@ def fit_diagnostics(selection: Selection, index, dropped) -> dict:
         "modes_in_fit": tuple(float(f) for f in np.exp(fit.mean[:, 0])),
         "damping_in_fit": tuple(float(zeta) for zeta in fit.mean[:, 1]),
         "converged": fit.converged,
+        "explanations": 1 + len(selection.others),
         "impacts_without_mode": tuple((int(index[i]), float(np.exp(fit.mean[m, 0]))) for i, m in absent),
     }

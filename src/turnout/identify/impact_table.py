@@ -1,6 +1,6 @@
 """Modes of single blows, and the campaign value with interval that they add up to."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -12,7 +12,8 @@ from turnout.records import Mode
 class ImpactEstimates:
     """One mode in several blows: ``impact`` (n,) numbers, ``estimate`` and ``error`` (n, 2) of ln f [Hz] and zeta.
 
-    ``strength`` (n,) is the norm of each decay; ``bound`` (2,) the Cramér-Rao bound, None where unknown.
+    ``strength`` (n,) is the norm of each decay; ``bound`` (2,) the Cramér-Rao bound, None where unknown;
+    ``choice`` (2,) the error of the choice among explanations, which all blows share.
     """
 
     band: str
@@ -22,6 +23,7 @@ class ImpactEstimates:
     strength: np.ndarray
     energy: float | None = None
     bound: np.ndarray | None = None
+    choice: np.ndarray = field(default_factory=lambda: np.zeros(2))
 
     def rows(self) -> list[dict]:
         """The table ``per_impact`` of a modal model."""
@@ -45,8 +47,8 @@ class ImpactEstimates:
         own estimate, and weighing by it would favour one side.
         """
         error = np.median(self.error * self.strength[:, None], axis=0) / self.strength[:, None]
-        log_f = summarise(self.estimate[:, 0], error[:, 0], confidence)
-        zeta = summarise(self.estimate[:, 1], error[:, 1], confidence)
+        log_f = summarise(self.estimate[:, 0], error[:, 0], confidence, self.choice[0])
+        zeta = summarise(self.estimate[:, 1], error[:, 1], confidence, self.choice[1])
         f = float(np.exp(log_f.mean))
         return Mode(
             band=self.band,

@@ -6,6 +6,7 @@ from turnout.identify.account import fit_diagnostics, stabilisation_rows
 from turnout.identify.assemble import assemble, no_decays, no_model
 from turnout.identify.band_choice import choose_bands
 from turnout.identify.bound import cramer_rao_bound
+from turnout.identify.choice import choice_error
 from turnout.identify.decays import common_length
 from turnout.identify.gate import residues_of_receptance
 from turnout.identify.impact_table import ImpactEstimates
@@ -33,7 +34,7 @@ def identify_joint(decays, rate: float, settings, receptance=None, leads=None) -
     }
     if choice.status == "rejected":
         return no_model(rate, "joint", diagnostics=told, **rest)
-    estimates = _estimates(selection, choice, records, index, rate)
+    estimates = _estimates(selection, choice, records, index, rate, settings)
     modes = tuple(e.mode(settings.confidence) for e in estimates)
     residues, scale = _residues(modes, choice, selection, receptance)
     return assemble(
@@ -63,7 +64,7 @@ def _select_without_odd_blows(records, index, dropped, rate, settings):
     return selection, records, index, dropped
 
 
-def _estimates(selection, choice, records, index, rate):
+def _estimates(selection, choice, records, index, rate, settings):
     fit = selection.fit
     white = whiten(records, selection.whitening)
     columns = selection.background.columns(white.shape[1], rate)
@@ -79,6 +80,7 @@ def _estimates(selection, choice, records, index, rate):
             strength[shows],
             float(selection.energy[m]),
             bound[m],
+            choice_error(fit.mean[m], selection.others, settings.spread_maximum),
         )
         for band, m in choice.modes.items()
         for shows in (selection.shows[:, m],)

@@ -27,6 +27,7 @@ class Selection:
     ``fit`` is None if nothing was found. Per mode of it: ``presence`` over orders and starts, ``energy`` share,
     ``chi_squared`` and ``amplitude`` (n_decay, n_mode); ``residual_power`` (n_decay,) is what they leave.
     ``unfit`` maps modes that stay in the fit but cannot be named to (reason, value, limit).
+    ``others`` are the modes (n_mode, 2) of the explanations that were not chosen.
     ``rejected`` lists mappings of frequency, damping, reason, value and limit; ``whitening`` and ``background``
     describe what else was modelled.
     """
@@ -42,6 +43,7 @@ class Selection:
     whitening: np.ndarray = field(default_factory=lambda: np.ones(1))
     background: Background = field(default_factory=Background)
     unfit: dict = field(default_factory=dict)
+    others: list = field(default_factory=list)
 
     @property
     def shows(self) -> np.ndarray:
@@ -72,10 +74,13 @@ def select_modes(decays, rate, settings) -> Selection:
     hum = hum_frequencies(table, n, rate, settings)
     most = Background(highest_drift(n, rate, settings), hum)
     told = explain(kept, decays, rate, Background(min(BUILD_DRIFT, most.drift_degree), hum), settings, most)
+    told_all = [told]
     if told.fit is not None and told.doubtful:
-        told = min((told, *_others(told, table, decays, rate, settings)), key=lambda e: criterion(e, decays))
+        told_all += _others(told, table, decays, rate, settings)
+        told = min(told_all, key=lambda e: criterion(e, decays))
+    others = [e.fit.mean for e in told_all if e is not told and e.fit is not None]
     told = polished(told, decays, rate)
-    result = Selection(table, rejected + told.rejected)
+    result = Selection(table, rejected + told.rejected, others=others)
     if told.fit is not None:
         fit = result.fit = told.fit
         result.background, result.whitening = told.background, told.whitening

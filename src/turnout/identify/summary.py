@@ -20,7 +20,7 @@ class Summary:
     n: int
 
 
-def summarise(value, se, confidence: float = 0.95) -> Summary:
+def summarise(value, se, confidence: float = 0.95, choice: float = 0.0) -> Summary:
     r"""Random-effects mean of estimates that each have a standard error.
 
     .. math:: m = \frac{\sum w_i x_i}{\sum w_i}, \quad w_i = \frac{1}{s_i^2 + \tau^2}, \quad
@@ -35,6 +35,8 @@ def summarise(value, se, confidence: float = 0.95) -> Summary:
     value, se : (n,) array of float
         Estimates and standard errors, same unit; ValueError if there are none.
     confidence : float
+    choice : float
+        Standard error that all estimates share, such as that of the choice of a model; no blow shows it.
 
     References
     ----------
@@ -51,11 +53,13 @@ def summarise(value, se, confidence: float = 0.95) -> Summary:
     if n == 0:
         raise ValueError("no estimates to summarise")
     if n == 1:
-        half = norm.ppf(0.5 + confidence / 2.0) * se[0]
-        return Summary(float(value[0]), float(se[0]), float(value[0] - half), float(value[0] + half), 0.0, 1)
+        error = float(np.hypot(se[0], choice))
+        half = norm.ppf(0.5 + confidence / 2.0) * error
+        return Summary(float(value[0]), error, float(value[0] - half), float(value[0] + half), 0.0, 1)
     spread2 = float(between_variance(value, np.maximum(se**2, 1e-300)))
     weight = 1.0 / (np.maximum(se**2, 1e-300) + spread2)
     mean = float(np.sum(weight * value) / weight.sum())
     error = float(np.sqrt(np.sum(weight * (value - mean) ** 2) / ((n - 1) * weight.sum())))
+    error = float(np.hypot(error, choice))
     half = t.ppf(0.5 + confidence / 2.0, n - 1) * error
     return Summary(mean, error, float(mean - half), float(mean + half), float(np.sqrt(spread2)), n)

@@ -6,7 +6,7 @@ import pytest
 from turnout.identify import cramer_rao_bound, discrete_pole, summarise
 from turnout.identify.held_out import held_out_fit, random_mode_fits
 from turnout.identify.linearise import drift_columns, linearise, powers
-from turnout.identify.mixed import between_variance, fit_mixed
+from turnout.identify.mixed import between_variance, fit_common, fit_mixed
 from turnout.identify.noise import noise_filter, whiten
 from turnout.published import hammer_test, published_model
 
@@ -113,6 +113,28 @@ def test_equal_errors_give_the_t_interval():
 
 def test_a_weak_blow_weighs_less_in_the_mean():
     assert summarise([0.0, 0.1, 9.0], [0.1, 0.1, 90.0]).mean < 0.06
+
+
+def test_the_error_of_a_choice_widens_the_interval_and_leaves_the_mean():
+    plain, chosen = (summarise([3.0, 5.0, 4.0, 8.0], [0.3] * 4, choice=c) for c in (0.0, 2.0))
+    assert (chosen.mean, chosen.spread) == (plain.mean, plain.spread)
+    assert chosen.se == pytest.approx(np.hypot(plain.se, 2.0))
+    assert (chosen.high - chosen.mean) / (plain.high - plain.mean) == pytest.approx(chosen.se / plain.se)
+
+
+def test_the_fit_with_shared_poles_sees_all_decays_through_their_principal_ones():
+    """At its optimum the score of all 30 decays vanishes against their own information."""
+    _, decays = decays_of(n=30, seed=6)
+    model = published_model("CP A7")
+    start = theta_of(model.frequency, model.damping) * [1.001, 1.05]
+    theta, settled = fit_common(start, decays, 20e3, NO_DRIFT)
+    at = linearise(theta[None], decays, 20e3, NO_DRIFT)
+    information, score = at.information.sum(axis=0), at.score.sum(axis=0)
+    step = np.linalg.solve(information, score)
+    # In standard errors; noise that the 22 others hold is all that is left.
+    sigma2 = at.rss.sum() / decays.size
+    assert settled
+    assert np.sqrt(step @ information @ step / sigma2) < 0.3
 
 
 def test_a_single_blow_keeps_its_own_error():

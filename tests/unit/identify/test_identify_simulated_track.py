@@ -63,6 +63,15 @@ def test_repeated_tests_find_the_same_modes_or_say_that_they_cannot(section):
             assert model.mode(band) is not None or doubts
 
 
+def test_an_interval_holds_the_choice_among_explanations():
+    """More than one was made, and the interval is wider than the scatter of the blows alone asks for."""
+    model = identify(test_of_ten_blows("A9", 5), RATE, SETTINGS)
+    mode = model.mode("ballast")
+    blows = np.array([row["frequency"] for row in model.per_impact if row["band"] == "ballast"])
+    assert model.diagnostics["explanations"] > 1
+    assert mode.frequency_se > 1.5 * blows.std(ddof=1) / np.sqrt(len(blows))
+
+
 @pytest.mark.parametrize("section", ["A9"])
 def test_the_railpad_mode_is_the_highest_peak_of_its_band(section):
     """Damping of 5 % moves a peak off its resonance by less than 1 %, the flank of a neighbour by about as much."""
