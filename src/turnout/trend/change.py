@@ -76,10 +76,7 @@ def fits(time, values, memory, pieces=4, temperature=None, known=0.0) -> dict[st
     -2.5 -2.0 0.0
     """
     t = (time - time[-1]) / YEAR
-    phi = memory_of_steps(time, memory)
-    share = 1.0 / (1.0 - phi**2)
-    diagonal, beside = np.append(1.0, share), np.append(-phi * share, 0.0)
-    diagonal[:-1] += phi**2 * share
+    diagonal, beside = _precision(time, memory)
 
     def weighted(v):
         found = diagonal * v + beside * np.append(v[1:], 0.0)
@@ -117,6 +114,15 @@ def fits(time, values, memory, pieces=4, temperature=None, known=0.0) -> dict[st
             *((v_1 - onset * v_0) / -onset for v_0, v_1 in ((one_0, one_1), (y_0, y_1), (heat_0, heat_1))),
         ),
     }
+
+
+def _precision(time, memory):
+    """Diagonal of the precision matrix of an AR(1), and what stands beside it: (n,) arrays, the last of these 0."""
+    phi = memory_of_steps(time, memory)
+    share = 1.0 / (1.0 - phi**2)
+    diagonal, beside = np.append(1.0, share), np.append(-phi * share, 0.0)
+    diagonal[:-1] += phi**2 * share
+    return diagonal, beside
 
 
 def find_change(time, values, memory, temperature=None, known=0.0, level=0.95) -> Change:
