@@ -11,11 +11,6 @@ MISSING = {
     "turnout/passage/findings.py Passage.n_axle",
     "turnout/passage/findings.py Passage.times",
     "turnout/passage/findings.py Passage.heard",
-    "turnout/simulate/law.py PowerLaw.numbers",
-    "turnout/simulate/law.py GapLaw.numbers",
-    "turnout/simulate/law.py LinearLaw.numbers",
-    "turnout/simulate/law.py FrictionLaw.numbers",
-    "turnout/trend/forecast.py Forecast.sentence",
 }
 
 

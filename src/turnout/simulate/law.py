@@ -34,6 +34,7 @@ class PowerLaw:
 
     @property
     def numbers(self):
+        """The three numbers of the law in the order in which the compiled march takes them."""
         return self.stiffness, self.exponent, self.damping
 
     def force(self, d, rate=0.0):
@@ -61,6 +62,7 @@ class GapLaw:
 
     @property
     def numbers(self):
+        """The three numbers of the law in the order in which the compiled march takes them."""
         return self.stiffness, self.damping, self.onset
 
     def force(self, d, rate=0.0):
@@ -110,6 +112,7 @@ class LinearLaw:
 
     @property
     def numbers(self):
+        """The three numbers of the law in the order in which the compiled march takes them."""
         return self.stiffness, self.damping, self.preload
 
     def force(self, d, rate=0.0):
@@ -127,6 +130,7 @@ class FrictionLaw:
 
     @property
     def numbers(self):
+        """The three numbers of the law in the order in which the compiled march takes them."""
         return self.limit, self.slip_rate, 0.0
 
     def force(self, d, rate=0.0):

@@ -27,6 +27,7 @@ class Forecast:
 
     @property
     def sentence(self) -> str:
+        """The forecast in words: the earliest date, never one date alone, or why there is none."""
         if self.verdict == "too_short":
             return "too early for a date"
         if self.verdict == "settling":
