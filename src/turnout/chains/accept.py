@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
 
-from turnout.chains.accepted_terms import OF_A_WHEELSET, SUPPORTS, accepted_of
+from turnout.chains.accepted_terms import KINDS, OF_A_WHEELSET, SUPPORTS, accepted_of
 from turnout.chains.mismatch_context import track_file
 from turnout.config import load_configuration
 from turnout.errors import SimulationError
@@ -55,8 +55,16 @@ def _refuse(finding, turnout_id, anyway):
     families = {t["term"] for t in json.loads(finding["term_json"])}
     if found := families & set(OF_A_WHEELSET):
         raise SimulationError(f"{said}; {min(found)} belongs to a wheelset, which no track file describes.")
+    if not anyway and not any(_material(t) for t in json.loads(finding["term_json"])):
+        raise SimulationError(f"{said}, but no parameter differs from having no effect; --anyway accepts it.")
     if (finding["verdict"] != "named" or finding["grade"] not in ("A", "B")) and not anyway:
         raise SimulationError(f"{said}, not named with grade A or B; --anyway accepts it all the same.")
+
+
+def _material(term):
+    """Whether a parameter of a term lies further from neutral than its 95 % interval reaches."""
+    neutral = {p.name: p.neutral for p in KINDS[term["term"]].parameters}
+    return any(abs(p["value"] - neutral[name]) > 1.96 * p["se"] for name, p in term["parameters"].items())
 
 
 def _write(path, text):

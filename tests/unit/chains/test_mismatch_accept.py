@@ -139,7 +139,7 @@ def test_every_effect_comes_back_from_the_file_as_it_was_written(config, term):
     candidate = SimpleNamespace(family=term.name, parameters=term.parameters)
     track = own_track(config)
     told = described(made, candidate, [0.1 * abs(getattr(made, p.name)) for p in term.parameters], track)
-    accept(finding(told), config, "t1")
+    accept(finding(told), config, "t1", anyway=True)
     back = accepted_of(own(config).terms)[0].term(own(config).track)
     for name, value in vars(made).items():
         assert getattr(back, name) == (pytest.approx(value, rel=1e-3) if isinstance(value, float) else value)
@@ -185,3 +185,10 @@ def test_accepted_effects_are_simulated_and_estimated_anew_in_a_case(config):
         assert j.shape[1] == len(guided.nuisances)
         # a secant of 0.005 against one of 0.001
         assert j[:, -1] == pytest.approx((a - b) / 1e-3, abs=0.02 * np.abs((a - b) / 1e-3).max())
+
+
+def test_a_term_that_cannot_be_told_from_no_effect_is_refused(config):
+    nothing = HANGS | {"parameters": {"gap": GAP | {"value": 1e-6}}}
+    with pytest.raises(SimulationError, match="no parameter differs"):
+        accept(finding(nothing), config, "t1")
+    assert accept(finding(nothing), config, "t1", anyway=True)[0].exists()

@@ -92,6 +92,8 @@ def test_growth_is_the_weighted_straight_line(fleet):
         assert frame.per_year_se[turnout] == pytest.approx(error, rel=1e-8)
         assert frame.n_visits[turnout] == n
     assert frame.value["t1"] == 0.93e-3 and np.isnan(frame.per_year["t5"])
+    alone = fleet.execute("select per_year, per_year_se from parameter_growth where n_visits = 1").fetchall()
+    assert set(alone) == {(None, None)}
     assert not frame.is_open["t3"] and frame.is_open["t1"]
     assert "t4" not in frame.index  # its visits lie before the tamping
 

@@ -26,7 +26,8 @@ sums as (
         turnout_id, term, position_m, channel, parameter, unit, count(*)::integer as n_visits,
         min(found_at_utc) as first_at_utc, max(found_at_utc) as found_at_utc, arg_max(value, found_at_utc) as value,
         arg_max(value_se, found_at_utc) as value_se, arg_max(finding_id, found_at_utc) as finding_id,
-        sum(weight * t * value) as product, nullif(sum(weight * t * t), 0) as spread
+        sum(weight * t * value) as product,
+        case when min(found_at_utc) < max(found_at_utc) then sum(weight * t * t) end as spread
     from centred group by all
 )
 select

@@ -1,0 +1,232 @@
+"""The mismatch of Barkhordari et al. at A4 made anew: calibrated on unloaded track, too strong under a train.
+
+python -m examples.paper_mismatch     writes docs/paper_mismatch.md and its picture; some minutes
+
+The recordings are simulated: the truth is known, and the diagnosis is not told. Every number in the page comes from
+the run; its prose is fixed.
+"""
+
+import numpy as np
+from examples.recorded import DOCS, plotting, save, table
+from scipy.signal import welch
+
+from turnout import physics
+from turnout.chains.mismatch_words import SENTENCES
+from turnout.mismatch import diagnose
+from turnout.mismatch.finding import recommendation, sentence
+from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.track import TrackCase
+from turnout.mismatch.track.planned import Plan, Train, measured_campaign
+from turnout.simulate import Sensor, car, load_track
+
+SPEED = 160.0 / 3.6
+SENSORS = (Sensor("A1", 0.6, "rail web"), Sensor("A4", 9.0, "rail web"))
+BLOWS = ((0.6, 15.0), (9.0, 15.0))
+SLOPE = 1e4  # pads of 205 to 307 MN/m gain 240 MN/m under this car: what was concealed
+BANDS = ((5.0, 40.0), (40.0, 160.0))
+SEED = 12  # of scatter and roughness: with it the pattern is that of the publication
+
+
+def plan(trains):
+    """Two sensors, blows beside both, and these trains."""
+    return Plan(load_track("tommerup"), SENSORS, BLOWS, trains, tuple(t for t in ("heavy 2",) if len(trains) > 4))
+
+
+def as_in_the_paper():
+    """One car with two bogies at 160 km/h."""
+    return plan((Train(car("car"), "car", SPEED),))
+
+
+def with_more_trains():
+    """A light and a heavy car as well, each at two speeds."""
+    light = car("light", body_mass=8000.0, half_pivot=5.0)
+    heavy = car("heavy", body_mass=34000.0, body_inertia=1.6e6, half_pivot=6.0, half_base=0.95)
+    more = tuple(Train(v, v.name, s) for v in (light, heavy) for s in (28.0, 40.0))
+    return plan((Train(car("car"), "car", SPEED), *more))
+
+
+def study(planned):
+    """(case, fit to blows alone, its passages, diagnosis) of a plan under the concealed effect."""
+    campaign = measured_campaign(planned, (physics.PadPreload(SLOPE),), SEED)
+    case = TrackCase(campaign)
+    blows = [o for o in case.observations if o.kind == "hammer"]
+    unloaded = fit_jointly(case, observations=blows, iterations=15)
+    passages = [o for o in case.observations if o.kind == "passage"]
+    return case, case.predict(unloaded.values, (), passages), diagnose(case)
+
+
+def densities(case, values):
+    """sensor -> (frequency, PSD) of the first passage's ``values`` (n_sensor * n,)."""
+    made = next(iter(case.rollings.values()))
+    rows, rate = np.reshape(values, (len(made.sensors), -1)), 1.0 / float(np.mean(np.diff(made.time)))
+    return {s.name: welch(row, rate, nperseg=min(row.size, 256)) for s, row in zip(made.sensors, rows)}
+
+
+def models(case, unloaded, found):
+    """name -> values of the first passage: recorded, and by each model."""
+    k = next(i for i, o in enumerate(case.observations) if o.kind == "passage")
+    return {
+        "recorded": case.observations[k].data,
+        "calibrated on blows alone": unloaded[0],
+        "all fitted together": found.base.predictions[k],
+        "with the leading effect": _leading(found).predictions[k],
+    }
+
+
+def _leading(found):
+    return found.verdict.scores[0].fit if found.verdict.scores else found.base
+
+
+def excess(case, shown):
+    """(model, sensor) -> dB by which each band of the model is too strong."""
+    recorded, found = densities(case, shown["recorded"]), {}
+    for name, values in list(shown.items())[1:]:
+        for sensor, (f, density) in densities(case, values).items():
+            inside = [(f >= low) & (f < high) for low, high in BANDS]
+            power = [(density[i].sum(), recorded[sensor][1][i].sum()) for i in inside]
+            found[name, sensor] = [10.0 * np.log10(a / b) for a, b in power]
+    return found
+
+
+def draw(case, shown, path):
+    """PSD at both sensors, recorded and simulated."""
+    plt = plotting()
+    figure, axes = plt.subplots(1, 2, figsize=(9, 3.4), sharey=True, layout="constrained")
+    for axis, sensor in zip(axes, ("A1", "A4")):
+        for (name, values), style in zip(shown.items(), ("k-", "C1--", "C2:", "C0-")):
+            f, density = densities(case, values)[sensor]
+            inside = (f >= 5.0) & (f <= 160.0)
+            axis.semilogy(f[inside], density[inside], style, lw=1.2, label=name)
+        axis.set(title=sensor, xlabel="frequency [Hz]")
+    axes[0].set_ylabel("PSD [(m/s²)²/Hz]")
+    axes[0].legend(fontsize=7)
+    save(figure, path)
+
+
+def excess_rows(levels):
+    """Rows of the table of bands."""
+    for (name, sensor), (low, high) in levels.items():
+        yield [name, sensor, f"{low:+.1f} dB", f"{high:+.1f} dB"]
+
+
+def answer_row(name, case, found):
+    """What the diagnosis says of one campaign."""
+    v = found.verdict
+    said = v.answer.replace("_", " ") + (f" {v.grade}" if v.grade else "")
+    n = sum(o.kind == "passage" for o in (*case.observations, *case.reserved))
+    names = ", ".join(v.names).replace("_", " ") or "–"
+    return [name, n, f"**{said}**", names, f"{v.probability:.2f}", v.reason or "–", _unseen(found.verification)]
+
+
+def _unseen(check):
+    """Fit on the train that nothing was fitted to, by each model."""
+    said = {"before": check.before, "with the first": check.after, "with the rival": check.rival, "decoy": check.decoy}
+    shown = ", ".join(f"{name} {value:.0f} %" for name, value in said.items() if value is not None)
+    return shown if check.n else "no train to spare"
+
+
+def ranking_rows(found):
+    """The leaders, with the first parameter of each."""
+    for score in found.verdict.scores[:4]:
+        p = score.candidate.parameters[0]
+        k = -len(score.candidate.parameters)
+        value, se = score.fit.psi[k], score.fit.psi_se[k]
+        first = f"{p.name} {value:.3g} ± {1.96 * se:.2g} {p.unit}".removesuffix(" -")
+        yield [score.candidate.key.replace("_", " "), f"{score.gain:+.0f}", first]
+
+
+PAGE = """# The mismatch of the publication at A4, made anew
+
+*Made by `python -m examples.paper_mismatch`; every number comes from that run. The recordings are simulated.*
+
+Barkhordari et al. simulate one car over the turnout, calibrated on receptances of the unloaded track. It agrees with
+the recording below 40 Hz and is too strong from 40 to 300 Hz at A4. They blame the number of rail cross sections and
+stop there. Their recording is not public, so which effect it was cannot be found out here. What can be shown is what
+this program says when the same thing happens for a reason that is known, and concealed from it.
+
+## The case
+The track of `config/tracks/tommerup.yaml`, sensors A1 and A4, blows beside both, one car with two bogies at 160 km/h.
+Concealed: the pads stiffen under load, by {slope:.0f} N/m per newton (Wu and Thompson 1999 measured such growth). A
+hammer meets the unloaded pad: however well the track is calibrated on blows, it is too soft under the car.
+
+{excess}
+
+How much stronger the simulation is than the recording. The draw of scatter and roughness was chosen so that the
+pattern is the publication's: right below 40 Hz, too strong above. Of another draw the same effect makes another pattern
+(seed 11: A1 too strong, A4 too weak), which is one more reason not to guess a cause from a band. Passages are compared
+up to 160 Hz: above, roughness that no simulation knows dominates, so the upper half of the publication's band is not
+looked at.
+
+![Power spectral density at A1 and A4](paper_mismatch.svg)
+
+## What the diagnosis says
+
+{answers}
+
+With the publication's one train: {sentence_one}
+
+With a light and a heavy car at two speeds each: {sentence_more} {next_more}
+
+Leaders with the one train:
+
+{ranking_one}
+
+Leaders with five:
+
+{ranking_more}
+
+## Why
+An effect that grows with load looks, under a single train, like anything that makes the loaded track differ from the
+struck one: free numbers that any sound turnout needs (pads, ballast, gains, speed, load) take up most of it, and what
+is left is within the tolerance of 6 % below which a difference is nobody's business. That one train is not enough to
+name anything is the honest answer. Other axle loads and speeds add evidence; how many more, `turnout distinguish` says
+before anybody measures. A coarse description of the rail's shape, which the publication suspects, is a
+fault of the simulation and not of the track: that is what the answer "numerics" is for, and the tool looks for it
+first, by halving step and mesh.
+
+What was concealed: {concealed}. {outcome}
+"""
+
+
+def outcome(found):
+    """Whether the truth was said, in words."""
+    v = found.verdict
+    if v.answer == "named":
+        return (
+            "The tool named it." if v.names[0] == "pad_preload" else f"**The tool named {v.names[0]}: that is wrong.**"
+        )
+    if v.answer == "a_or_b" and "pad_preload" in v.names:
+        return "The tool named it as one of two."
+    leads = found.verdict.scores and found.verdict.scores[0].family == "pad_preload"
+    return "The tool gave it no name" + (", though it leads the ranking." if leads else ", and it does not lead.")
+
+
+def main():
+    """Both campaigns, the picture and the page."""
+    case, unloaded, found = study(as_in_the_paper())
+    shown = models(case, unloaded, found)
+    draw(case, shown, DOCS / "paper_mismatch.svg")
+    more_case, _, more = study(with_more_trains())
+    answers = table(
+        ("campaign", "passages", "answer", "names", "probability", "because", "fit on a train never used"),
+        [answer_row("as in the publication", case, found), answer_row("with more trains", more_case, more)],
+    )
+    ranks = ("effect", "nats gained", "first parameter")
+    text = PAGE.format(
+        slope=SLOPE,
+        excess=table(("simulation", "sensor", "5-40 Hz", "40-160 Hz"), excess_rows(excess(case, shown))),
+        answers=answers,
+        sentence_one=sentence(found),
+        sentence_more=sentence(more),
+        next_more=(recommendation(more) + "." if recommendation(more) else ""),
+        ranking_one=table(ranks, ranking_rows(found)),
+        ranking_more=table(ranks, ranking_rows(more)),
+        concealed=SENTENCES["pad_preload"].lower(),
+        outcome=f"One train: {outcome(found)} Five trains: {outcome(more)}",
+    )
+    (DOCS / "paper_mismatch.md").write_text(text, encoding="utf-8")
+    print(answers)
+
+
+if __name__ == "__main__":
+    main()
