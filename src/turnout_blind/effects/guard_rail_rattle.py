@@ -17,4 +17,4 @@ def act(world, site, where, p):
     world.riders.append((where["position"], p["mass"], k, 0.1 * k / 40.0, p["play"], 4e7))
 
 
-EFFECT = Effect("guard_rail_rattle", "place", (20.0, 40.0, 70.0, 110.0), draw, act, "outside")
+EFFECT = Effect("guard_rail_rattle", "place", (20.0, 50.0, 110.0, 220.0), draw, act, "outside")

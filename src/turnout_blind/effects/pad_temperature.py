@@ -16,4 +16,6 @@ def act(world, site, where, p):
     world.softening = lambda kelvin: before(kelvin) * float(np.exp(-rate * kelvin))
 
 
-EFFECT = Effect("pad_temperature", "condition", tuple(np.geomspace(8e-4, 2.5e-2, 7)), draw, act)
+# Two temperatures: with one it is not identifiable, which is ``one_temperature``.
+LADDER = tuple(np.geomspace(8e-4, 2.5e-2, 7))
+EFFECT = Effect("pad_temperature", "condition", LADDER, draw, act, site={"same_temperature": False})

@@ -116,7 +116,7 @@ def _values(judged, oracle):
     yield Share("held-out fit: fell by over a point", sum(fell), len(fell), 0.0, "<=")
     worst = [abs(stated - share) for stated, share, n in reliability(judged) if n >= 5]
     n = sum(j.probability is not None for j in judged)
-    yield Value("probability: worst fifth, |stated - seen|", max(worst, default=float("nan")), n if worst else 0, 0.1)
+    yield Value("probability: worst fifth, stated from seen", max(worst, default=float("nan")), n if worst else 0, 0.1)
 
 
 def _median(values):

@@ -26,7 +26,7 @@ RIGHT = {
     "drifting_support": (),
     "neighbouring_train": (),
     "one_temperature": ("pad_temperature",),
-    "one_speed_lag": ("time_offset",),
+    "beyond_reach": ("local_pad",),
     "bottomless_void": ("hanging_sleeper",),
     "common_gain": ("sensor_gain",),
 }
@@ -39,7 +39,6 @@ LOCKS = {
     "corrugation": ("wavelength", "place"),
     "hardening": ("amplitude", "place", "condition"),
     "time_offset": ("sensor", "clock"),
-    "one_speed_lag": ("sensor", "clock"),
     "clipping": ("sensor", "amplitude"),
     "local_resonator": ("place", "frequency"),
     "guard_rail_rattle": ("place", "amplitude", "frequency"),

@@ -43,7 +43,7 @@ def draw_severity(judged, path):
     plt = pyplot()
     mine = [j for j in judged if j.stratum in ("single", "outside", "unidentifiable")]
     kinds = sorted({(("single", "outside", "unidentifiable").index(j.stratum), j.kinds[0]) for j in mine})
-    figure, axis = plt.subplots(figsize=(7.5, 0.6 + 0.27 * len(kinds)), layout="constrained")
+    figure, axis = plt.subplots(figsize=(7.5, 1.2 + 0.27 * len(kinds)), layout="constrained")
     rows = {kind: len(kinds) - 1 - i for i, (_, kind) in enumerate(kinds)}
     for rank, j in _side_by_side(mine):
         word, y, x = outcome(j), rows[j.kinds[0]], j.rungs[0] + rank
@@ -55,7 +55,7 @@ def draw_severity(judged, path):
     axis.set_xlim(-0.6, 6.6)
     axis.set_ylim(-0.6, len(kinds) - 0.4)
     handles = [plt.Rectangle((0, 0), 1, 1, facecolor=c) for c in COLOURS.values()]
-    axis.legend(handles, list(COLOURS), ncols=5, loc="upper center", bbox_to_anchor=(0.5, -0.06), frameon=False)
+    figure.legend(handles, list(COLOURS), ncols=5, loc="outside lower center", frameon=False)
     axis.set_title("what was said, from hidden to obvious; framed: it costs more than 3 points of fit", fontsize=9)
     return save(figure, path)
 

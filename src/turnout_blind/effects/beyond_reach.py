@@ -1,0 +1,21 @@
+"""A bad pad so far from all sensors that neither blow nor train brings news of it: nothing at all shows the same."""
+
+from turnout_blind.effect import Effect
+
+AWAY = 13.0  # from the nearest sensor [m]
+
+
+def draw(rng, site, factor):
+    """Factor on stiffness, before the first sensor or behind the last."""
+    before = rng.random() < 0.5
+    j = site.world.nearest(min(site.sensors) - AWAY if before else max(site.sensors) + AWAY)
+    return {"sleeper": j, "position": float(site.world.place[j])}, {"factor": float(factor)}
+
+
+def act(world, site, where, p):
+    """Stiffness by the factor, damping by its root."""
+    world.pad[where["sleeper"]] *= p["factor"]
+    world.pad_damping[where["sleeper"]] *= p["factor"] ** 0.5
+
+
+EFFECT = Effect("beyond_reach", "place", (0.5, 0.36, 0.25, 0.16), draw, act, "unidentifiable")

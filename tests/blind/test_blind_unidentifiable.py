@@ -1,0 +1,85 @@
+"""Effects that are called not identifiable are: another site without the effect leaves the same recordings."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from turnout_blind.effect import load_effects
+from turnout_blind.record import passage_motion
+from turnout_blind.site import draw_site
+from turnout_blind.vehicle import Train
+from turnout_blind.visible import HAMMER_BAND, PASSAGE_BAND, PASSAGE_DOWN, _blow, _difference, _shown
+
+EFFECTS = load_effects()
+HIDDEN = 5.0  # % of the response, below the 6 % that two owners' models differ by
+
+
+def concealed(kind, rung=-1, seed=3):
+    """Site, world with the effect at the top of its ladder, and what was drawn."""
+    effect = EFFECTS[kind]
+    rng = np.random.default_rng([seed, 9])
+    site = draw_site(rng, **effect.site)
+    world = site.world.copy()
+    drawn = effect.concealed(rng, site, rung % len(effect.ladder))
+    effect.act(world, site, drawn.where, drawn.parameters)
+    return site, world, drawn
+
+
+def roll_apart(site, world, other_site, other_world, k=0):
+    """Share [%] of a passage's response by which two worlds differ."""
+    shown = [
+        _shown(s, w, passage_motion(s, w, k, np.random.default_rng(k)), "passage", [1])
+        for s, w in ((other_site, other_world), (site, world))
+    ]
+    return _difference(*shown, PASSAGE_BAND, PASSAGE_DOWN)
+
+
+def strike_apart(site, world, other):
+    """The same of a blow at each place."""
+    return _difference(_blow(site, other, [1]), _blow(site, world, [1]), HAMMER_BAND, 3)
+
+
+def test_no_kind_is_called_so_without_a_test_here():
+    kinds = {k for k, e in EFFECTS.items() if e.stratum == "unidentifiable"}
+    assert kinds == {"one_temperature", "bottomless_void", "common_gain", "beyond_reach"}
+
+
+def test_pads_softened_by_warmth_are_soft_pads_where_it_is_always_warm():
+    site, world, drawn = concealed("one_temperature")
+    rival = site.world.copy()
+    warm = np.mean(site.temperatures) - rival.reference
+    rival.pad = rival.pad * np.exp(-drawn.parameters["coefficient"] * warm)
+    assert strike_apart(site, world, rival) < HIDDEN
+    assert roll_apart(site, world, site, rival) < HIDDEN
+    assert strike_apart(site, world, site.world) > HIDDEN  # it is there to be seen, if not to be told
+
+
+def test_a_gap_that_never_closes_is_no_ballast_at_all():
+    site, world, drawn = concealed("bottomless_void", rung=0)
+    rival = site.world.copy()
+    rival.ballast[drawn.where["sleeper"]] = rival.ballast_damping[drawn.where["sleeper"]] = 0.0
+    loaded = next(k for k, p in enumerate(site.passages) if p.train == "loaded")
+    assert roll_apart(site, world, site, rival, loaded) == pytest.approx(0.0, abs=1e-6)
+    assert strike_apart(site, world, rival) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_channels_all_too_sensitive_are_heavier_trains_on_rougher_rails():
+    site, world, drawn = concealed("common_gain")
+    gain = drawn.parameters["gain"]
+
+    def heavier(car):  # the wheels keep their mass, the body takes the rest
+        more = (gain - 1.0) * (car.body + 2.0 * car.bogie + 4.0 * car.wheelset)
+        return replace(car, body=car.body + more)
+
+    trains = {n: Train(t.name, tuple(map(heavier, t.cars)), t.radius, t.contact) for n, t in site.true_trains.items()}
+    rough = {k: (lambda *a, f=f: gain * f(*a)) for k, f in site.roughness.items()}
+    other = replace(site, true_trains=trains, roughness=rough)
+    assert roll_apart(site, world, other, site.world) < HIDDEN
+    assert roll_apart(site, world, site, site.world) > 2.0 * HIDDEN
+
+
+def test_a_pad_out_of_earshot_is_nothing_at_all():
+    site, world, _ = concealed("beyond_reach")
+    assert strike_apart(site, world, site.world) < HIDDEN
+    assert roll_apart(site, world, site, site.world) < HIDDEN
