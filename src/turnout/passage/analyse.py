@@ -142,18 +142,17 @@ def _settled(heard, used, start, offer, found, settings, several) -> Passage:
         times = sensor_times(heard, motion, offsets) if several else motion.time(offsets)[None]
         from_sensors = _sensor_speed(times, heard.positions, motion.direction, settings) if several else None
         from_type = None
+        centre = motion.time(offsets)
+        middle = 0.5 * float(centre[0] + centre[-1])
         if found.type != UNKNOWN:
-            centre = motion.time(offsets)
-            from_type = (found.speed, found.speed_se, found.acceleration, found.acceleration_se, centre[0])
+            from_type = (found.middle, found.middle_se, found.acceleration, found.acceleration_se, middle)
         if from_sensors is None and from_type is None:
             # an unknown train on one sensor: its bogies give the speed to a sixth
-            from_type = (motion.speed, 0.16 * motion.speed, 0.0, 0.3, float(motion.time(offsets[0])))
-        first = float(motion.time(offsets[0]))
-        speed = combine(from_sensors, from_type, first)
-        axle_times = motion.time(offsets)
-        settled = abs(speed.speed / motion.speed - 1) < 2e-3
-        motion = motion_of(speed, first, motion.direction)
-        offsets = motion.way(axle_times)
+            from_type = (motion.speed, 0.16 * motion.speed, 0.0, 0.3, middle)
+        speed = combine(from_sensors, from_type, middle)
+        settled = abs(speed.at(centre[0]) / motion.speed - 1) < 2e-3
+        motion = motion_of(speed, float(centre[0]), motion.direction)
+        offsets = motion.way(centre)
         if settled:
             break
     if found.type == UNKNOWN and not several:

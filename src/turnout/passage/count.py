@@ -13,6 +13,8 @@ from turnout.passage.train_type import UNKNOWN, find_type, unknown_evidence
 
 KMH = 3.6
 USUAL_SPEED = 25.0  # m/s, where nothing but the bogies tells it; a factor of 1.8 is one standard deviation
+BEYOND = 25.0  # m, a train is heard before its first axle and after its last one together
+SHORT = 0.3  # m, that two sensors close to each other may hear a wheel off its place
 PLACE_SE = 0.05  # m, of an axle placed by the level around it; measured against the simulation
 
 
@@ -21,7 +23,7 @@ def best_count(heard, motion, span, patterns, settings):
 
     First the cuts between peaks, then the rows of vehicles that collect most of the profile.
     """
-    error = motion.speed * np.sqrt(2.0) * max(2 * settings.place_error, 0.1) / max(span, 0.1)
+    error = motion.speed * np.sqrt(2.0) * max(2 * settings.place_error, _reach(span)) / max(span, 0.1)
     error = min(error, 0.25 * motion.speed)
     offers = [o for o in counts(heard, motion, settings)[:8] if o.contrast >= 1.15 and len(o.offsets) >= 2]
     best, first = _first_named(heard, motion, offers, error, patterns, settings)
@@ -32,23 +34,32 @@ def best_count(heard, motion, span, patterns, settings):
     return best or first or (None, None)
 
 
+def _reach(span):
+    """How far off a sensor may hear a wheel [m]: many metres of sensors average it out."""
+    return SHORT if span < 10.0 else 0.1
+
+
 def _from_one_of_few(heard, motion, patterns, settings):
-    """Two or three sensors that are not laid on each other well: each by itself, at speeds around the common one."""
+    """Two or three sensors that are not laid on each other well: each by itself, at speeds around the common one.
+
+    Of all rows of vehicles that a sensor finds by itself, that which collects most.
+    """
+    found_by_one = []
     for i, x in enumerate(heard.positions):
         alone = heard.only([i])
         middle = motion.passing(0.5 * (motion.way(heard.end) - motion.way(heard.begin)), x)
         for factor in (1.0, 0.94, 1.06, 0.89, 1.12):
             near = replace(motion, speed=motion.speed * factor)
             near = replace(near, start=near.start + float(middle - near.passing(near.way(middle), 0.0)))
-            offers = template_counts(alone, near, patterns, 2)
+            offers = template_counts(alone, near, patterns, 4)
             best, _ = _first_named(alone, near, offers, 0.1 * near.speed, patterns, settings)
             if best is not None:
                 offer, found = best
                 # told from the common motion again, whose places along the train the caller goes on with
                 times = near.passing(offer.offsets, x)
                 offsets = motion.way(times) - motion.direction * x
-                return replace(offer, offsets=offsets), found
-    return None
+                found_by_one.append((offer.contrast, replace(offer, offsets=offsets), found))
+    return max(found_by_one, key=lambda f: f[0])[1:] if found_by_one else None
 
 
 def _first_named(heard, motion, offers, error, patterns, settings):
@@ -62,10 +73,16 @@ def _first_named(heard, motion, offers, error, patterns, settings):
         for placed in _placed(heard, motion, offer):
             times = motion.time(placed.offsets)
             found = find_type(times, patterns, settings, motion.speed, error, PLACE_SE)
-            if found.type != UNKNOWN:
+            if found.type != UNKNOWN and _covers(heard, motion, placed.offsets):
                 return (placed, found), first
             first = first or (placed, found)
     return None, first
+
+
+def _covers(heard, motion, offsets) -> bool:
+    """Whether axles reach along all that is heard; a few of a longer train's would fit a shorter one by chance."""
+    heard_length = motion.way(heard.end) - motion.way(heard.begin) - np.ptp(heard.positions)
+    return bool(offsets[-1] - offsets[0] + BEYOND >= 0.9 * heard_length)
 
 
 def _placed(heard, motion, offer):

@@ -25,7 +25,7 @@ class PassageSensor:
 
 @dataclass(frozen=True)
 class SpeedFinding:
-    """``speed`` [m/s] at the turnout's origin with ``se``, ``acceleration`` [m/s²] with ``acceleration_se``.
+    """``speed`` [m/s] with ``se`` at ``time`` [s], halfway through the passage; ``acceleration`` [m/s²] with its error.
 
     ``source`` says what it rests on: "sensors", "axle spacing", "both" or "bogie" (a guess from an unknown train's
     bogies). ``disagreement`` is the difference of sensors and axle spacing in standard errors, None without both.
@@ -37,6 +37,11 @@ class SpeedFinding:
     acceleration_se: float
     source: str
     disagreement: float | None = None
+    time: float = 0.0
+
+    def at(self, time: float) -> float:
+        """Speed at another time. [m/s]"""
+        return self.speed + self.acceleration * (time - self.time)
 
 
 @dataclass(frozen=True)

@@ -90,14 +90,14 @@ def combine(from_sensors, from_type, at: float) -> SpeedFinding:
     sensors, spacing = carried
     if sensors is None or spacing is None:
         v, se, a, a_se = sensors or spacing
-        return SpeedFinding(v, se, a, a_se, "sensors" if sensors else "axle spacing")
+        return SpeedFinding(v, se, a, a_se, "sensors" if sensors else "axle spacing", None, at)
     difference = (sensors[0] - spacing[0]) / np.hypot(sensors[1], spacing[1])
     if abs(difference) > 3.0:
         # distances in a train are known better than where along the rail a sensor hears it
-        return SpeedFinding(*spacing, "axle spacing", float(difference))
+        return SpeedFinding(*spacing, "axle spacing", float(difference), at)
     v, se = weighted(sensors[:2], spacing[:2])
     a, a_se = weighted(sensors[2:], spacing[2:])
-    return SpeedFinding(v, se, a, a_se, "both", float(difference))
+    return SpeedFinding(v, se, a, a_se, "both", float(difference), at)
 
 
 def weighted(first, second) -> tuple[float, float]:
@@ -113,4 +113,4 @@ def weighted(first, second) -> tuple[float, float]:
 
 def motion_of(finding: SpeedFinding, start: float, direction: int) -> Motion:
     """Motion with the found speed, first axle at the origin at ``start`` [s]."""
-    return Motion(finding.speed, start, finding.acceleration, direction)
+    return Motion(finding.at(start), start, finding.acceleration, direction)

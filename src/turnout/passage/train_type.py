@@ -21,7 +21,9 @@ class TypeFinding:
 
     ``vehicles`` and ``offsets`` (n_axle,) [m] belong to the best template even where it was not accepted, then
     ``residual`` [m], the rms deviation of the axle spacings, says why. ``speed`` [m/s] at the first axle,
-    ``speed_se``, ``acceleration`` [m/s²] and ``acceleration_se`` follow from the template's distances.
+    ``speed_se``, ``acceleration`` [m/s²] and ``acceleration_se`` follow from the template's distances, ``middle`` and
+    ``middle_se`` are the speed halfway between the first and the last axle: an acceleration that is not sure moves it
+    least.
     """
 
     type: str
@@ -34,6 +36,8 @@ class TypeFinding:
     speed_se: float | None = None
     acceleration: float | None = None
     acceleration_se: float | None = None
+    middle: float | None = None
+    middle_se: float | None = None
 
 
 @dataclass(frozen=True)
@@ -104,6 +108,8 @@ def _decide(times, found, n_type, settings, speed, sigma):
     if best is None:
         return TypeFinding(UNKNOWN, posterior[UNKNOWN], posterior)
     (v, a), covariance = best.motion
+    half = 0.5 * float(times[-1] - times[0])
+    to_middle = np.array([1.0, half])
     accepted = posterior[best.type] >= settings.type_probability and best.p_value >= 1e-3
     return TypeFinding(
         best.type if accepted else UNKNOWN,
@@ -116,6 +122,8 @@ def _decide(times, found, n_type, settings, speed, sigma):
         float(np.sqrt(covariance[0, 0])),
         float(a),
         float(np.sqrt(covariance[1, 1])),
+        float(v + a * half),
+        float(np.sqrt(to_middle @ covariance @ to_middle)),
     )
 
 
@@ -187,8 +195,23 @@ def _candidate(times, type_, row, settings, speed, speed_se, sigma):
     rms = float(np.sqrt(np.mean(residual**2)))
     # the error of the motion follows the scatter that is seen, as far as a few axles can tell it
     covariance = covariance * min(1.0, max((rms / sigma) ** 2 * len(times) / freedom, 0.1))
+    # neighbours err alike, a heavy vehicle's axles most of all: so many fewer of them count
+    covariance = covariance * _alike(v * past + 0.5 * a * past**2 - places)
     p_value = float(stats.chi2.sf(square, freedom))
     return _Candidate(type_, evidence, p_value, vehicles, places, rms, ((v, a), covariance))
+
+
+def _alike(residual) -> float:
+    r"""How much larger a variance is for residuals (n,) that follow each other: :math:`(1 + \rho) / (1 - \rho)`.
+
+    >>> _alike(np.array([1.0, -1.0] * 4)), round(_alike(np.array([1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0])), 1)
+    (1.0, 4.3)
+    """
+    centred = residual - residual.mean()
+    power = float(np.sum(centred**2))
+    rho = float(np.sum(centred[1:] * centred[:-1])) / power if power > 0 else 0.0
+    rho = min(max(rho, 0.0), 0.8)
+    return (1.0 + rho) / (1.0 - rho)
 
 
 def _starts(times, pattern, settings, speed, speed_se):
