@@ -13,4 +13,4 @@ def act(world, site, where, p):
     world.lift[where["sleeper"] - 1 : where["sleeper"] + 2] = p["lift"]
 
 
-EFFECT = Effect("bilinear_clip", "place", (0.4, 0.2, 0.1, 0.03), draw, act, "outside")
+EFFECT = Effect("bilinear_clip", "place", (0.95, 0.8, 0.5, 0.1), draw, act, "outside")
