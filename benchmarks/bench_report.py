@@ -20,7 +20,7 @@ N_TURNOUT, N_CAMPAIGN, N_WRITTEN = 3_500, 12, 200
 ONCE = ("receptances_current", "results_current")
 PLAIN = ("turnouts", "sections", "events", "quarantine_open")
 DATED = ("modes_current", "models_current", "impacts_current", *ONCE)
-EMPTY = ("passages_current", "passage_scores")
+EMPTY = ("passages_current", "passage_scores", "findings_newest", "fit_adjusted", "fit_effects")
 
 
 def bars():
