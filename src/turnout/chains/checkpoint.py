@@ -52,3 +52,17 @@ class Checkpoint(MutableMapping):
                 path.unlink()
             self.folder.rmdir()
         self.seen.clear()
+
+
+class Replay(Checkpoint):
+    """The same for what is large and many: nothing is held in memory."""
+
+    def __getitem__(self, key):
+        try:
+            return super().__getitem__(key)
+        finally:
+            self.seen.clear()
+
+    def __setitem__(self, key, value):
+        super().__setitem__(key, value)
+        self.seen.clear()

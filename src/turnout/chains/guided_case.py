@@ -27,11 +27,11 @@ class Watch:
     count: int = 0
 
     def tick(self):
-        """One more prediction; BudgetSpentError after the deadline."""
+        """One more prediction; BudgetSpentError after the deadline, but for the first: every run gets on."""
         self.count += 1
         if self.tell is not None:
             self.tell(self.count)
-        if self.deadline is not None and time.monotonic() > self.deadline:
+        if self.deadline is not None and self.count > 1 and time.monotonic() > self.deadline:
             raise BudgetSpentError("the time given is up; what is done is kept, the same command goes on from there.")
 
 
@@ -39,11 +39,12 @@ class GuidedCase(Case):
     """``case`` with ``accepted`` effects in its simulation, each of whose parameters is free as a nuisance.
 
     An effect that was accepted does not come back as a finding; its parameters are estimated anew at every visit,
-    about their accepted values with a prior wide enough for them to grow.
+    about their accepted values with a prior wide enough for them to grow. ``replay``, a mapping or None, keeps every
+    prediction: an interrupted diagnosis asks for the same ones again and goes on within a fit.
     """
 
-    def __init__(self, case, accepted=(), watch=None):
-        self.case, self.watch = case, watch or Watch()
+    def __init__(self, case, accepted=(), watch=None, replay=None):
+        self.case, self.watch, self.replay = case, watch or Watch(), replay
         support = case.track() if accepted else None
         self.accepted = tuple(a for a in accepted if a.term(support) is not None and a.values)
         self.own = tuple(n for a in self.accepted for n in _nuisances(a))
@@ -67,16 +68,34 @@ class GuidedCase(Case):
 
     def predict(self, values, terms, observations):
         """Predictions with the accepted effects in them."""
-        self.watch.tick()
-        return self.case.predict(values, (*self.standing(values), *terms), observations)
+        all_terms = (*self.standing(values), *terms)
+        return self._once("p", values, all_terms, observations, self.case.predict)
 
     def nuisance_jacobian(self, values, terms, observations, base):
         """The case's own columns, and one by a difference for each parameter that was accepted."""
-        inner = self.case.nuisance_jacobian(values, (*self.standing(values), *terms), observations, base)
+        all_terms = (*self.standing(values), *terms)
+
+        def differentiate(*arguments):
+            return self.case.nuisance_jacobian(*arguments, base)
+
+        inner = self._once("j", values, all_terms, observations, differentiate)
         columns = [self._column(values, terms, observations, base, n) for n in self.own]
         if not columns:
             return inner
         return [np.column_stack([j, *(c[k] for c in columns)]) for k, j in enumerate(inner)]
+
+    def _once(self, kind, values, terms, observations, compute):
+        """Computed where the replay lacks it."""
+        if self.replay is None:
+            self.watch.tick()
+            return compute(values, terms, observations)
+        key = f"{kind}:{sorted(values.items())!r}:{terms!r}:{[o.name for o in observations]!r}"
+        try:
+            return self.replay[key]
+        except KeyError:
+            self.watch.tick()
+        self.replay[key] = found = compute(values, terms, observations)
+        return found
 
     def _column(self, values, terms, observations, base, nuisance):
         step = STEP * nuisance.sd

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from turnout.chains.checkpoint import Checkpoint
+from turnout.chains.checkpoint import Checkpoint, Replay
 from turnout.chains.guided_case import GuidedCase, Watch
 from turnout.chains.mismatch_context import digest_of_model, track_of
 from turnout.chains.mismatch_gather import gather
@@ -75,18 +75,20 @@ def diagnose_visit(unit, turnout, raw_root, told, algo="", options: Options | No
 
 def _one(group: Group, turnout, accepted, about, options, number) -> dict[str, list[dict]]:
     """Rows of one group, from the store where an interrupted run left them."""
-    store = Checkpoint(
-        Path(options.fits), f"{turnout.id}-{about['visit']}-{'+'.join(group.labels)}", (about["identity"],)
-    )
+    name = f"{turnout.id}-{about['visit']}-{'+'.join(group.labels)}"
+    store = Checkpoint(Path(options.fits), name, (about["identity"],))
     if "rows" in store:
         return store["rows"]
+    replay = Replay(Path(options.fits), f"{name}-predictions", (about["identity"],))
     tell = options.progress(group, *number) if options.progress else None
     try:
-        case = GuidedCase(TrackCase(group.campaign, turnout.settings["mismatch"]), accepted, options.watch)
+        track_case = TrackCase(group.campaign, turnout.settings["mismatch"])
+        case = GuidedCase(track_case, accepted, options.watch, replay if options.watch.deadline is not None else None)
         rows = finding_tables(diagnose(case, turnout.settings["mismatch"], tell, store), case, group, about)
     except (SimulationError, np.linalg.LinAlgError) as error:
         said = f"sections {', '.join(group.labels)}: {error}"
         return {"quarantine": [_nothing(None, turnout, "; ".join([said, *about["notes"]])[:1000], group)]}
+    replay.done()
     store.done()
     store["rows"] = rows
     return rows

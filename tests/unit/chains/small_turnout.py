@@ -83,9 +83,9 @@ def hangs(gap):
     return lambda track: (physics.HangingSleeper(track.nearest_support(SLEEPER), gap),)
 
 
-def soft_ballast(track):
-    """Ballast with 0.3 of its stiffness under the sleeper at section A."""
-    return (physics.LocalBallast(track.nearest_support(SLEEPER), SOFT),)
+def soft_pad(track):
+    """A rail pad with 0.3 of its stiffness on the sleeper at section A."""
+    return (physics.LocalPad(track.nearest_support(SLEEPER), SOFT),)
 
 
 def strike(folder, terms=None, labels=("A", "B"), day=DAY, blows=3, seed=1, turnout="t1"):

@@ -31,10 +31,10 @@ def folder(tmp_path, repository, monkeypatch):
 
 @pytest.fixture(scope="module")
 def blows(tmp_path_factory, repository):
-    """Blows on a turnout whose ballast is soft under one sleeper; tests copy them."""
+    """Blows on a turnout with one soft pad; tests copy them."""
     made = tmp_path_factory.mktemp("blows")
     small.lay_out(made, repository)
-    small.strike(made, small.soft_ballast)
+    small.strike(made, small.soft_pad)
     return made / "raw"
 
 
@@ -52,10 +52,10 @@ def said(tables):
     return "\n".join([*notes, *(q["found"] for q in tables["quarantine"])])
 
 
-def test_blows_alone_name_the_soft_ballast_at_its_sleeper(soft):
+def test_blows_alone_name_the_soft_pad_at_its_sleeper(soft):
     tables = diagnose_turnout("t1")
     (row,) = tables["mismatch_findings"]
-    assert (row["verdict"], row["term"], row["position_m"]) == ("named", "local_ballast", 18.0)
+    assert (row["verdict"], row["term"], row["position_m"]) == ("named", "local_pad", 18.0)
     assert row["sections"] == "A, B" and row["visit"] == "2026-07-25"
     assert "18.0 m" in row["sentence"] and row["next_measurement"]
     assert row["n_passages"] == 0 and row["n_hammer_tests"] == 2
@@ -74,17 +74,17 @@ def test_what_was_accepted_is_simulated_and_not_found_again(soft, capsys):
     assert main(["diagnose", "--turnout", "t1"]) == 0
     assert (soft / "results/pages/findings/t1.html").is_file()
     assert main(["diagnose", "--turnout", "t1", "--accept"]) == 0
-    assert "local_ballast" in capsys.readouterr().out
+    assert "local_pad" in capsys.readouterr().out
     turnout = load_configuration("config").turnout("t1")
     _, (accepted,) = track_of(turnout)
-    assert (accepted.family, accepted.place) == ("local_ballast", 18.0)
+    assert (accepted.family, accepted.place) == ("local_pad", 18.0)
     text = (soft / "config/tracks/t1.yaml").read_text()
     assert "extends: small" in text and "2026-07-25" in text and "95 %:" in text and "grade A" in text
     tables = diagnose_turnout("t1")
     (row,) = tables["mismatch_findings"]
     assert row["verdict"] == "none" and row["term"] is None
     (parameter,) = tables["mismatch_parameters"]
-    assert parameter["accepted"] and parameter["term"] == "local_ballast" and parameter["value"] < 0.7
+    assert parameter["accepted"] and parameter["term"] == "local_pad" and parameter["value"] < 0.7
 
 
 def test_the_simulated_file_holds_the_accepted_effect(soft):
@@ -125,6 +125,34 @@ def test_a_spent_budget_keeps_what_is_done(soft):
     assert whole.groups == [(("A", "B"), 0, 1)] and whole.fits[-1][0] == whole.fits[-1][1] and whole.count > 3
     second = diagnose_turnout("t1", bar=again)
     assert second["mismatch_findings"] == first["mismatch_findings"] and not again.fits
+
+
+def test_small_budgets_one_after_the_other_reach_the_same_end(soft):
+    """Each run makes at least one prediction more, and none twice: no more in all than in one go."""
+    whole, first = _Count(), diagnose_turnout("t1", work="other", bar=(one_go := _Count()))
+    for _ in range(500):
+        try:
+            second = diagnose_turnout("t1", budget=0.0, bar=whole)
+            break
+        except BudgetSpentError:
+            continue
+    assert second["mismatch_findings"] == first["mismatch_findings"]
+    assert 0 < whole.total - whole.refused <= one_go.total
+    assert not list((soft / "work/mismatch-fits").glob("*predictions*"))
+
+
+class _Count:
+    """Counts predictions over several runs; the one that meets the end of the budget is counted and not made."""
+
+    def __init__(self):
+        self.total = self.refused = 0
+
+    def group(self, group, number, count):
+        return lambda done, total, what: None
+
+    def simulations(self, count):
+        self.total += 1
+        self.refused += count == 2
 
 
 def test_only_some_sections_can_be_asked_for(soft):
@@ -238,7 +266,7 @@ def test_the_rows_fit_the_registry(soft, tmp_path):
     assert done.n_refused == 0
     with open_registry(tmp_path / "registry") as connection:
         (found,) = connection.execute("select verdict, term, term_json from findings_newest").fetchall()
-        assert found[:2] == ("named", "local_ballast") and json.loads(found[2])[0]["fixed"] == {"sleeper": 18.0}
+        assert found[:2] == ("named", "local_pad") and json.loads(found[2])[0]["fixed"] == {"sleeper": 18.0}
         assert connection.execute("select count(*) from mismatch_curves").fetchall() == [
             (len(tables["mismatch_curves"]),)
         ]
@@ -252,6 +280,6 @@ def test_a_finding_of_the_fleet_is_accepted_from_the_registry(soft, tmp_path):
     result = UnitResult("t1/mismatch/2026-07-25", "t1", "mismatch", "k", "1", "ok", tables)
     register([write_batch(tmp_path / "b", [result])], tmp_path / "registry", read=read_results)
     path, words = accept(Results("work", "t1", tmp_path / "registry").finding(), "config", "t1")
-    assert path.name == "t1.yaml" and "local_ballast" in words
+    assert path.name == "t1.yaml" and "local_pad" in words
     with pytest.raises(SimulationError, match="run turnout diagnose"):
         Results("work", "t2", tmp_path / "registry").finding()
