@@ -48,6 +48,7 @@ def nightly(options: Sequence[str], profile: str, limit: float | None = None, wo
     lock = FileLock(work / ".nightly.lock")
     try:
         with lock.acquire(timeout=0):
+            _refuse_beside_another()
             _clear(options, Path(profile).name)
             before = _batches(work)
             code = _snakemake([*options, "--workflow-profile", profile, "--rerun-incomplete"], limit)
@@ -55,6 +56,20 @@ def nightly(options: Sequence[str], profile: str, limit: float | None = None, wo
     except Timeout:
         found = f"{work / '.nightly.lock'} is held: another nightly run is going on"
         raise TurnoutError(f"{found}. Wait for it, or end it.") from None
+
+
+def _refuse_beside_another() -> None:
+    """TurnoutError where somebody's own Snakemake works in this folder: its lock is not a killed run's."""
+    here = os.getcwd()
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            words = (process / "cmdline").read_bytes().split(b"\0")
+            works_here = os.readlink(process / "cwd") == here
+        except OSError:  # it has ended, or is another user's
+            continue
+        head = any(w == b"snakemake" or w.endswith(b"/snakemake") for w in words[:3]) and b"--mode" not in words
+        if works_here and head:  # with --mode it is one job of a run, such as _clear cancels
+            raise TurnoutError(f"process {process.name} is a Snakemake run in this folder. Wait for it, or end it.")
 
 
 def _clear(options: Sequence[str], profile: str) -> None:

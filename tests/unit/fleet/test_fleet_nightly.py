@@ -1,5 +1,6 @@
 """The unattended run: one at a time, and what a killed one left is cleared."""
 
+import subprocess
 import sys
 
 import pytest
@@ -38,3 +39,15 @@ def test_it_is_said_in_one_line():
     assert (
         said == "failed with exit code 1: 100 units known, 7 processed, 2 of these with rows in quarantine, 3 vanished"
     )
+
+
+def test_a_run_that_somebody_started_by_hand_is_not_robbed_of_its_lock(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "snakemake").write_text("import time\nprint('up', flush=True)\ntime.sleep(60)\n")
+    with subprocess.Popen([sys.executable, str(tmp_path / "snakemake")], stdout=subprocess.PIPE) as by_hand:
+        try:
+            by_hand.stdout.readline()
+            with pytest.raises(TurnoutError, match=f"process {by_hand.pid} is a Snakemake run in this folder"):
+                nightly([], "profiles/default")
+        finally:
+            by_hand.kill()
