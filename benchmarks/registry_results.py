@@ -125,6 +125,7 @@ def _passage(i, g):
                 "forecast_null_pct": 12 + g.gauss(0, 0.7), "leave_one_out_pct": fit - 15 + g.gauss(0, 3),
                 "leave_one_out_null_pct": 30 + g.gauss(0, 0.7), "parameters_per_s": 3.0 * n_axles / 10,
                 "chi_squared_failed_share": g.randrange(n_axles // 2) / n_axles, "n_wheels": n_axles,
+                "along_b_share": min(1.0, max(0.0, g.gauss(0.7, 0.15))), "forecast_others_pct": fit + g.gauss(-38, 5),
                 "peak_ms2": 100 * (1 + 0.2 * g.random()),
             }
         )  # fmt: skip

@@ -129,10 +129,8 @@ def fit_row(fit, sensor, model_id, turnout, identity) -> dict:
         "along_b_share": _plain(fit.test.along_share),
         "peak_ms2": _plain(fit.peak),
     }
-    if fit.others:
-        row["fit_others_pct"] = max((_plain(s.fit) for s in fit.others.values() if np.isfinite(s.fit)), default=None)
-        skills = (_plain(s.forecast) for s in fit.others.values() if np.isfinite(s.forecast))
-        row["forecast_others_pct"] = max(skills, default=None)
+    skills = [s.forecast for s in fit.others.values() if np.isfinite(s.forecast)]
+    row["forecast_others_pct"] = float(max(skills)) if skills else None
     if null is not None:
         row |= {
             "fit_null_pct": _plain(null.fit),

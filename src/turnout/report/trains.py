@@ -9,8 +9,8 @@ from turnout.report.panels.train_bars import train_bars
 ROWS = {
     "scores": """
         select
-            turnout_id, section_id, status, count(*) as n, count(*) filter (fit_pct > fit_others_pct) as n_best,
-            count(fit_others_pct) as n_compared,
+            turnout_id, section_id, status, count(*) as n, count(*) filter (forecast_pct > forecast_others_pct) as n_best,
+            count(forecast_others_pct) as n_compared,
             count(*) filter (chi_squared_failed_share > 0.5 and along_b_share < 0.8) as n_no_impulse
         from passage_scores where turnout_id in ({own}) group by all""",
     "bars": "select * from fit_adjusted where turnout_id in ({own}) order by section_id, factor, class_from, class",
@@ -72,7 +72,7 @@ def score_words(scores):
         said.append(f"In {rolling} the wheels did not act as single blows: they press and shake the rail all the time.")
     compared, best = (sum(s[k] for s in scores) for k in ("n_compared", "n_best"))
     if compared:
-        said.append(f"The own section's model beats those of all other sections in {best} of {compared}.")
+        said.append(f"The own section's model foretells more than that of any other section in {best} of {compared}.")
     said.append("A score inside its null tells nothing about the track, neither good nor bad.")
     return " ".join(said)
 
