@@ -110,6 +110,32 @@ def band_of(shown, changed):
     return _core(f, left)
 
 
+def band_of_blows(case, found):
+    """The same from the hammer tests, where they gain more than the passages do; None elsewhere."""
+    lines, weights, rolling = [], [], 0.0
+    for k, o in enumerate(case.observations):
+        gain = _gain_in_sigma(o, found, k)
+        pair = case.pairs.get(o.name)
+        if pair is None:
+            rolling += o.effective * float(gain.sum())
+        else:
+            lines.append(pair.frequency)
+            weights.append(o.effective * gain.reshape(2, -1).sum(axis=0))
+    if not lines or float(np.concatenate(weights).sum()) <= rolling:
+        return None
+    f, weight = np.concatenate(lines), np.maximum(np.concatenate(weights), 0.0)
+    order = np.argsort(f, kind="stable")
+    return _core(f[order], weight[order])
+
+
+def _gain_in_sigma(o, found, k):
+    """(n,) squares explained by the term, or missing where none was found, in units of sigma."""
+    left = ((o.data - found.base.predictions[k]) / o.sigma) ** 2
+    if found.fit is found.base:
+        return left
+    return left - ((o.data - found.fit.predictions[k]) / o.sigma) ** 2
+
+
 def reach_of(shown, changed):
     """Distance of the nearest wheel [m] within which four fifths of what is explained (or missing) happen."""
     if shown is None:

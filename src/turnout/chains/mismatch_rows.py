@@ -7,7 +7,7 @@ import numpy as np
 
 from turnout.chains.accepted_terms import described
 from turnout.chains.guided_case import visit_of
-from turnout.chains.mismatch_curves import band_of, best_shown, curve_rows, passages_shown, reach_of
+from turnout.chains.mismatch_curves import band_of, band_of_blows, best_shown, curve_rows, passages_shown, reach_of
 from turnout.chains.mismatch_words import headline
 from turnout.mismatch.finding import finding_row
 from turnout.registry.ids import content_id
@@ -23,7 +23,7 @@ def finding_tables(found, case, group, about) -> dict[str, list[dict]]:
     changed = found.fit is not found.base
     row = finding_row(found, {**identity, "result_id": ""})
     row.pop("result_id")
-    band, reach = band_of(shown, changed), reach_of(shown, changed)
+    band, reach = band_of_blows(case, found) or band_of(shown, changed), reach_of(shown, changed)
     low, high = band or (row["band_low_hz"], row["band_high_hz"])
     row |= {"band_low_hz": low, "band_high_hz": high, "wheel_within_m": reach}
     row |= _numbers(found, case, group, about)
