@@ -129,7 +129,7 @@ def fit_row(fit, sensor, model_id, turnout, identity) -> dict:
         "along_b_share": _plain(fit.test.along_share),
         "peak_ms2": _plain(fit.peak),
     }
-    skills = [s.forecast for s in fit.others.values() if np.isfinite(s.forecast)]
+    skills = [skill for skill in fit.others.values() if np.isfinite(skill)]
     row["forecast_others_pct"] = float(max(skills)) if skills else None
     if null is not None:
         row |= {

@@ -10,7 +10,7 @@ import numpy as np
 from turnout.passage.basis import band_pass, filtered, wheel_basis
 from turnout.passage.direction import DirectionTest, direction_test
 from turnout.passage.nulls import NullBand, null_bases, null_scores
-from turnout.passage.scores import Scores, common_delay, leave_one_out_null, score
+from turnout.passage.scores import Scores, common_delay, delay_power, forecast, leave_one_out_null, score
 from turnout.passage.timing import ImpactTimes, impact_times
 from turnout.passage.wheels import joint_fit
 from turnout.passage.whiten import whitener
@@ -26,8 +26,9 @@ class ChannelFit:
 
     ``times`` (n_wheel,) [s] of the impacts with ``times_se`` and ``ambiguous`` flags; ``amplitudes`` (n_wheel,)
     along b with ``amplitudes_se`` [m/s² per unit of b c]; ``test`` the chi-squared test per wheel; ``scores`` of the
-    model, ``null`` band of random models, ``others`` the scores of other sections' models by name; ``ceiling`` the
-    fit that noise alone would leave [%]; ``peak`` [m/s²] of the band-passed acceleration; ``parameters_per_second``.
+    model, ``null`` band of random models, ``others`` the forecast skill of other sections' models by name; ``ceiling``
+    the fit that noise alone would leave [%]; ``peak`` [m/s²] of the band-passed acceleration;
+    ``parameters_per_second``.
     """
 
     status: str
@@ -70,7 +71,7 @@ def fit_channel(samples, rate: float, axle_times, speed: float, model: ModalMode
         Of the sensor's section.
     settings : PassageSettings
     others : mapping or None
-        Name -> ModalModel of other sections, scored beside it.
+        Name -> ModalModel of other sections, whose forecast skill is told beside.
     nulls : bool
         Also score random models. Without them "null_explains" cannot be said.
 
@@ -84,13 +85,13 @@ def fit_channel(samples, rate: float, axle_times, speed: float, model: ModalMode
     through = band_pass(settings.band_low, settings.band_high, settings.filter_order, rate)
     data = filtered(part, through)
     quiet = _quiet(samples, rate, axle_times, speed)
-    basis = wheel_basis(model, through, rate)
-    late = common_delay(data, expected, basis, settings)
+    basis = _basis(model, rate, settings)
+    late = common_delay(delay_power(data, expected, basis, settings))
     times, test = _impacts(part, expected + late, quiet, speed, model, rate, settings)
     scores = score(data, expected, basis, settings)
     null = NullBand.of(null_scores(data, expected, _bases(model.order, rate, settings), settings)) if nulls else None
     beside = {
-        name: score(data, expected, wheel_basis(m, through, rate), settings) for name, m in (others or {}).items()
+        name: forecast(data, expected, _basis(m, rate, settings), settings)[0] for name, m in (others or {}).items()
     }
     found = joint_fit(data, times.times, basis)
     offset = _offset(samples, rate, axle_times)
@@ -163,6 +164,20 @@ def _judged(scores, null, test, settings) -> tuple[str, str]:
     if test.failed_share > settings.not_an_impulse_share and test.along_share < settings.along_b_minimum:
         return NOT_AN_IMPULSE, f"{test.along_share:.0%} of the jumps' power is along b"
     return ACCEPTED, "without null band" if null is None else ""
+
+
+def _basis(model, rate, settings):
+    """``wheel_basis`` behind the band-pass; the same few models come with every passage and are kept."""
+    parts = tuple(np.ascontiguousarray(x, dtype=float).tobytes() for x in (model.a, model.b, model.c))
+    return _kept_basis(parts, len(np.atleast_1d(model.b)), model.rate, rate, settings)
+
+
+@lru_cache(maxsize=64)
+def _kept_basis(parts, n, model_rate, rate, settings):
+    a, b, c = (np.frombuffer(x) for x in parts)
+    model = ModalModel(a.reshape(n, n), b, c, model_rate, ())
+    through = band_pass(settings.band_low, settings.band_high, settings.filter_order, rate)
+    return wheel_basis(model, through, rate)
 
 
 @lru_cache(maxsize=8)

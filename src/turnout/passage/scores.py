@@ -85,14 +85,14 @@ def score(data, expected, basis: WheelBasis, settings) -> Scores:
     """
     rate, n = basis.rate, len(data)
     half, expected = settings.time_search * rate, np.asarray(expected, dtype=float)
-    late = common_delay(data, expected, basis, settings)
-    times = np.sort(search_times(data, expected + late, basis, half))
+    heard = delay_power(data, expected, basis, settings)
+    times = np.sort(search_times(data, expected + common_delay(heard), basis, half))
     fitted = joint_fit(data, times, basis)
     first, length = wheel_windows(times, n, round(settings.score_window * rate), 2)
     own = [slice(max(a, 0), a + k) for a, k in zip(first, length)]
     scored = np.concatenate([np.arange(s.start, s.stop) for s in own])
     parts = np.array([fit_percent(data[s], fitted.prediction[s]) for s in own])
-    ahead, ahead_parts = forecast(data, expected, basis, settings)
+    ahead, ahead_parts = forecast(data, expected, basis, settings, heard)
     left, left_parts = leave_one_out(data, times, basis, own)
     return Scores(
         fit_percent(data[scored], fitted.prediction[scored]),
@@ -104,10 +104,20 @@ def score(data, expected, basis: WheelBasis, settings) -> Scores:
     )
 
 
-def common_delay(data, expected, basis: WheelBasis, settings, without_own: bool = False) -> np.ndarray:
-    """(n_wheel,) delay of all wheels against the detected axles that explains most, the same for all. [samples]
+@dataclass(frozen=True)
+class DelayPower:
+    """``power`` (n_wheel, n_delay): what each wheel's free jump explains at delays from -``reach`` by ``stride``.
 
-    ``without_own``: for every wheel what the others say, so that its own future does not enter.
+    Already the best within reach of the wheel's own search. [samples]
+    """
+
+    power: np.ndarray
+    stride: int
+    reach: int
+
+
+def delay_power(data, expected, basis: WheelBasis, settings) -> DelayPower:
+    """How much each wheel explains at every delay against the detected axles.
 
     An envelope has its peak behind an impact and a sensor hears a wheel before it is there, alike for all wheels.
     Free jumps are compared, a few times per period of the band's upper edge: they do not depend on the phase.
@@ -119,24 +129,34 @@ def common_delay(data, expected, basis: WheelBasis, settings, without_own: bool 
     inner = short.correlated(rows, 2 * reach + 1)[:, ::stride]
     power = np.sum((inner @ np.linalg.inv(short.whitening)) ** 2, axis=2)
     own = 2 * round(settings.time_search * basis.rate / stride) + 1
-    each = ndimage.maximum_filter1d(power, own, axis=1)
+    return DelayPower(ndimage.maximum_filter1d(power, own, axis=1), stride, reach)
+
+
+def common_delay(heard: DelayPower, without_own: bool = False) -> np.ndarray:
+    """(n_wheel,) delay of all wheels against the detected axles that explains most, the same for all. [samples]
+
+    ``without_own``: for every wheel what the others say, so that its own future does not enter.
+    """
+    each = heard.power
     total = np.broadcast_to(each.sum(axis=0), each.shape) - (each if without_own and len(each) > 1 else 0.0)
     # the middle of the range over which every wheel keeps its best time within reach of its own search
-    best = [np.median(np.flatnonzero(row >= row.max() * (1 - 1e-9))) for row in total]
-    return np.array(best) * stride - reach
+    best = [np.median(np.flatnonzero(row >= row.max() * (1 - 1e-9))) for row in (total if without_own else total[:1])]
+    return np.broadcast_to(np.array(best), len(each)) * heard.stride - heard.reach
 
 
-def forecast(data, expected, basis: WheelBasis, settings):
+def forecast(data, expected, basis: WheelBasis, settings, heard: DelayPower | None = None):
     """Forecast skill [%], pooled and (n_wheel,) per wheel: jumps from the first milliseconds, judged on the next.
 
     Causal: the filter is, and nothing behind ``forecast_train`` after a wheel's expected impact enters its time and
     amplitude; what earlier wheels still ring is taken from their own forecasts, and how far the sensor hears wheels
     from where they were detected from the other wheels. A wheel whose successor comes too soon is not judged.
+    ``heard`` is ``delay_power`` of the same arguments, where it is known.
     """
     rate, n = basis.rate, len(data)
     train, test = round(settings.forecast_train * rate), round(settings.forecast_test * rate)
     half, expected = settings.time_search * rate, np.asarray(expected, dtype=float)
-    expected = expected + common_delay(data, expected, basis, settings, without_own=True)
+    heard = heard or delay_power(data, expected, basis, settings)
+    expected = expected + common_delay(heard, without_own=True)
     following = np.append(np.floor(expected[1:] - half).astype(int), n)
     end = np.round(expected).astype(int) + train
     total = _from_training(data, expected, end, basis, half)

@@ -23,17 +23,10 @@ class ChannelState:
 def channel_states(recording: Recording) -> tuple[ChannelState, ...]:
     """State of every acceleration channel, in the order of ``recording.of_quantity("acceleration")``."""
     rows = recording.of_quantity("acceleration")
-    noise = [_noise(recording.samples[i]) for i in rows]
-    return tuple(_state(recording.channels[i], recording.samples[i], recording.rate, n) for i, n in zip(rows, noise))
+    return tuple(_state(recording.channels[i], recording.samples[i], recording.rate) for i in rows)
 
 
-def _noise(samples) -> float:
-    """Robust standard deviation of sample differences: what a living channel cannot be without."""
-    step = np.diff(samples)
-    return float(np.median(np.abs(step))) if step.size else 0.0
-
-
-def _state(channel, samples, rate, noise) -> ChannelState:
+def _state(channel, samples, rate) -> ChannelState:
     if not np.all(np.isfinite(samples)):
         bad = np.flatnonzero(~np.isfinite(samples))
         found = Rejection("not_finite", float(bad.size), 0.0, f"{channel.name}: first at {bad[0] / rate:.3f} s")
