@@ -194,14 +194,15 @@ class _Run:
 
     def _withdraw_vanished(self, wanted: Iterable[str]) -> int:
         """Count units whose files are all gone. Their rows stay; of a unit that only ever was in quarantine
-        nothing is left to repair: an empty result takes its rows out of the list of open ones."""
+        nothing is left to repair: an empty result takes its rows out of the list of open ones. A stage that gathers
+        its own units looks at some of them only: none has vanished for that."""
         gone = [name for name in self.state.units if name not in wanted]
         for name in gone:
             known = self.state.units[name]
             if known.status == "quarantined":
                 turnout, kind, _ = name.split("/", 2)
                 self.waiting.append((UnitResult(name, turnout, kind, "vanished", known.algo, "vanished", {}), ""))
-        return len(gone)
+        return 0 if self.stage.gather else len(gone)
 
     def _checkpoint(self) -> None:
         if self.waiting:
