@@ -21,6 +21,7 @@ from turnout.passage.stack import aligned
 from turnout.passage.train_type import UNKNOWN
 from turnout.records import Recording, Rejection
 
+SHORT_SPAN, PLACE_ALONE = 10.0, 0.3  # m: sensors closer together than this, and how far off each may hear a wheel
 CLEAR = 1.5  # least ratio between accepted and refused peaks of an unknown train
 
 
@@ -138,9 +139,12 @@ def _from_scan(heard, settings):
 def _settled(heard, used, start, offer, found, settings, several) -> Passage:
     """Motion from sensors and template together, axle offsets on its scale, times at the sensors."""
     motion, offsets = start, offer.offsets
+    # a few metres of sensors, and nothing else that tells: where each of them hears a wheel decides
+    alone = several and found.type == UNKNOWN and np.ptp(heard.positions) < SHORT_SPAN
+    place_error = PLACE_ALONE if alone else settings.place_error
     for _ in range(2):
         times = sensor_times(heard, motion, offsets) if several else motion.time(offsets)[None]
-        from_sensors = _sensor_speed(times, heard.positions, motion.direction, settings) if several else None
+        from_sensors = _sensor_speed(times, heard, motion.direction, place_error, settings) if several else None
         from_type = None
         centre = motion.time(offsets)
         middle = 0.5 * float(centre[0] + centre[-1])
@@ -161,14 +165,14 @@ def _settled(heard, used, start, offer, found, settings, several) -> Passage:
     return Passage("accepted", (), motion, speed, offsets, type=found, at_sensor=at_sensor, contrast=offer.contrast)
 
 
-def _sensor_speed(times, positions, direction, settings):
+def _sensor_speed(times, heard, direction, place_error, settings):
     """(v, se, a, a_se, time) from delays between sensors; None where too few axles are heard at two sensors."""
     good = np.isfinite(times)
     axles = good.sum(axis=0) >= 2
     if axles.sum() < 2:
         return None
     q, change, se, change_se, at, _ = slowness_from_sensors(
-        times[:, axles], positions, direction, settings.place_error, settings.acceleration_limit
+        times[:, axles], heard.positions, direction, place_error, settings.acceleration_limit
     )
     if not q > 0:
         return None

@@ -25,7 +25,9 @@ def best_count(heard, motion, span, patterns, settings):
     """
     error = motion.speed * np.sqrt(2.0) * max(2 * settings.place_error, _reach(span)) / max(span, 0.1)
     error = min(error, 0.25 * motion.speed)
-    offers = [o for o in counts(heard, motion, settings)[:8] if o.contrast >= 1.15 and len(o.offsets) >= 2]
+    offers = [o for o in counts(heard, motion, settings)[:8] if len(o.offsets) >= 2]
+    # a guess, which is said to be one, still leaves direction, track and speed
+    offers = [o for o in offers if o.contrast >= 1.15] or offers[:1]
     best, first = _first_named(heard, motion, offers, error, patterns, settings)
     if best is None:
         best, _ = _first_named(heard, motion, template_counts(heard, motion, patterns), error, patterns, settings)
