@@ -43,7 +43,7 @@ def add_arguments(parser):
     keep.add_argument("--folder", required=True, help="where it goes")
     for sub in (make, diagnose, reveal, score, keep):
         sub.add_argument("--out", required=True, help="folder of the set")
-        if sub not in (score, keep):
+        if sub is not score:
             sub.add_argument("--truth", help="folder of the truth (default: --out with -truth behind it)")
 
 
@@ -109,5 +109,5 @@ def _score(args):
 def _keep(args):
     from turnout_blind.keep import keep
 
-    path = keep(args.out, args.folder)
+    path = keep(args.out, args.folder, _truth(args))
     print(f"{path}: {path.stat().st_size / 1e3:.0f} kB")

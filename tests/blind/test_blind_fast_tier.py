@@ -1,0 +1,84 @@
+"""Forty revealed cases, kept without their recordings: their seals hold, and their seeds make them again."""
+
+import json
+import platform
+
+import numpy as np
+import pytest
+from benchmarks.blind_bridge import rows
+
+from turnout_blind.campaign import make_case
+from turnout_blind.effect import load_effects
+from turnout_blind.keep import kept, plan_of, verify_kept, verify_recordings
+from turnout_blind.score.answers import answers_of
+from turnout_blind.score.figures import Share, figures
+from turnout_blind.score.judged import judge
+
+SMALL = 120e3  # bytes of the kept set
+
+
+@pytest.fixture(scope="module")
+def held(repository):
+    folder = repository / "tests" / "blind" / "fast"
+    if not folder.is_dir():
+        pytest.skip("no kept set: turnout blind make --fast --seed 20261120, then turnout blind keep")
+    assert (folder / "set.json.gz").stat().st_size < SMALL
+    return kept(folder)
+
+
+def test_all_forty_seals_hold_and_all_effects_follow_from_the_seed(held):
+    truths = verify_kept(held)
+    strata = [t["stratum"] for t in truths.values()]
+    assert len(truths) == 40
+    assert {s: strata.count(s) for s in set(strata)} == {
+        "control": 10, "single": 17, "double": 3, "outside": 5, "unidentifiable": 5,
+    }  # fmt: skip
+    assert len({t["nonce"] for t in truths.values()}) == 40
+
+
+def test_rungs_of_the_ladders_show_more_and_more(held):
+    """Of the singles kept: what the generator says is to be seen grows with the rung, over all kinds together."""
+    single = [t for t in verify_kept(held).values() if t["stratum"] == "single"]
+    rungs = [t["effects"][0]["rung"] for t in single]
+    seen = [max(t["visible"].values()) for t in single]
+    ranks = [np.argsort(np.argsort(v)) for v in (rungs, seen)]
+    assert np.corrcoef(*ranks)[0, 1] > 0.3
+    assert all(max(t["visible"].values()) == 0.0 for t in verify_kept(held).values() if not t["effects"])
+
+
+@pytest.fixture(scope="module")
+def again(held, tmp_path_factory):
+    """(id, folder of cases, truth) of the first control, made once more from its seed."""
+    case = min(c for c, text in held["truths"].items() if json.loads(text)["stratum"] == "control")
+    folder = tmp_path_factory.mktemp("again")
+    return case, folder, make_case(folder, case, plan_of(held, case), load_effects())
+
+
+@pytest.mark.slow
+def test_a_case_made_again_is_the_one_that_was_sealed(held, again):
+    """Bit for bit, with the same arithmetic; elsewhere there is nothing to compare."""
+    made_on = json.loads(held["set"]).get("made_on")
+    if made_on not in (None, platform.machine()):
+        pytest.skip(f"sealed on {made_on}: another processor rounds otherwise")
+    case, folder, truth = again
+    verify_recordings(held, case, folder)
+    assert truth["visible"] == json.loads(held["truths"][case])["visible"]
+
+
+@pytest.mark.slow
+def test_the_tool_names_nothing_in_the_blows_of_a_control(again):
+    """Hammer tests alone, which take it seconds; the whole campaign is for a release."""
+    case, folder, _ = again
+    answers = answers_of(rows(folder / case, case, "hammer_only"))
+    assert answers and not [a.names for a in answers if a.verdict == "named"]
+
+
+def test_kept_answers_are_scored_with_their_truths(held):
+    """Where the tool has spoken: every figure can be had from the kept set alone, and no row is lost."""
+    if held["diagnosis"] is None:
+        pytest.skip("no tool has spoken about the kept set yet: turnout blind diagnose, reveal, keep")
+    truths = verify_kept(held)
+    judged = [judge(truths[c], answers_of(held["rows"][c])) for c in truths if c in held["diagnosis"]["cases"]]
+    found = {f.name: f for f in figures(judged)}
+    assert sum(isinstance(f, Share) for f in found.values()) >= 15
+    assert len(judged) == len(held["diagnosis"]["cases"])
