@@ -11,6 +11,7 @@ from sklearn.metrics import adjusted_rand_score
 
 from benchmarks import passage_fleet, passage_truth
 from benchmarks.bar import Bar, stopwatch
+from benchmarks.passage_paper import paper_trends
 from benchmarks.passage_truth import IC3, RATE, paper_model, struck, struck_train
 from turnout.config.settings.passage import PassageSettings
 from turnout.passage.analyse import analyse
@@ -188,6 +189,7 @@ def simulated_fleet(runs=None, strangers=None) -> Iterator[Bar]:
     """Four types, 40 to 180 km/h, empty and loaded, three noise levels, 1 to 12 sensors."""
     rng, patterns = np.random.default_rng(5), known_patterns()
     runs = list(runs if runs is not None else passage_fleet.fleet(SPEEDS))
+    yield from paper_trends(runs, SETTINGS)
     cases = [(r, rows, noise) for r in runs for noise in NOISES for rows in SUBSETS]
     tally = {"axles": 0, "speed": 0, "place": 0, "type": 0, "given": 0, "named_wrong": 0, "sure_wrong": 0}
     loads, n_several = {}, 0

@@ -54,7 +54,7 @@ def _train(recording, passage) -> list[str]:
         return words
     speed, type_ = passage.speed, passage.type
     words.append(f"  axles      {passage.n_axle}, the clearest cut between them and the rest is {passage.contrast:.1f}")
-    words.append(f"  speed      {3.6 * speed.speed:.1f} ± {3.6 * speed.se:.1f} km/h from {speed.source}")
+    words.append(f"  speed      {3.6 * speed.speed:.1f} ± {3.6 * speed.se:.1f} km/h halfway, from {speed.source}")
     words.append(f"  change     {speed.acceleration:+.2f} ± {speed.acceleration_se:.2f} m/s²")
     if speed.disagreement is not None and abs(speed.disagreement) > 3:
         words.append(f"  sensors and axle spacing differ by {abs(speed.disagreement):.1f} standard errors")
@@ -75,7 +75,7 @@ def _fits(recording, passage, turnout, context, settings) -> list[str]:
     from turnout.chains.passage import model_at, sensors_of
     from turnout.passage.channel_fit import fit_channel
 
-    words = ["  sensor      fit / null   forecast / null  left out / null   not along b  peak m/s²  status"]
+    words = ["  sensor      fit / null   forecast / null  left out / null   along b  peak m/s²  status"]
     for sensor in sensors_of(turnout):
         models = context.models.get(sensor.section, ())
         model = model_at(models, recording.started_at or datetime.max)
@@ -91,7 +91,7 @@ def _fits(recording, passage, turnout, context, settings) -> list[str]:
         s, null = fit.scores, fit.null
         words.append(
             f"  {sensor.name:<10}{s.fit:6.1f} /{null.fit:5.1f} {s.forecast:9.1f} /{null.forecast:6.1f} "
-            f"{s.leave_one_out:9.1f} /{null.leave_one_out:6.1f} {fit.test.failed_share:12.0%} {fit.peak:11.1f}"
+            f"{s.leave_one_out:9.1f} /{null.leave_one_out:6.1f} {fit.test.along_share:10.0%} {fit.peak:10.1f}"
             f"  {fit.status}"
         )
     words.append(f"  {fit_rate(settings)}")

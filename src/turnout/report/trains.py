@@ -9,8 +9,8 @@ from turnout.report.panels.train_bars import train_bars
 ROWS = {
     "scores": """
         select
-            turnout_id, section_id, status, count(*) as n, count(*) filter (forecast_pct > forecast_others_pct) as n_best,
-            count(forecast_others_pct) as n_compared,
+            turnout_id, section_id, status, count(*) as n, count(forecast_others_pct) as n_compared,
+            count(*) filter (forecast_pct > forecast_others_pct) as n_best,
             count(*) filter (chi_squared_failed_share > 0.5 and along_b_share < 0.8) as n_no_impulse
         from passage_scores where turnout_id in ({own}) group by all""",
     "bars": "select * from fit_adjusted where turnout_id in ({own}) order by section_id, factor, class_from, class",
