@@ -63,7 +63,8 @@ def headline(finding) -> str:
         return f"{said}, or it is {other}: these recordings cannot tell the two apart."
     low, high = finding["place_low_m"], finding["place_high_m"]
     if finding["verdict"] == "unknown":
-        return f"Something is missing between {low:.1f} and {high:.1f} m, and no known effect explains it."
+        where = f"between {low:.1f} and {high:.1f} m" if high - low > 0.1 else f"about {low:.1f} m"
+        return f"Something is missing {where}, and no known effect explains it."
     return finding["sentence"] or ""
 
 

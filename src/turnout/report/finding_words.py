@@ -58,7 +58,8 @@ def _where(finding):
         return f"sensor {finding['channel']}"
     if finding["verdict"] in ("named", "a_or_b"):
         return "everywhere among these sensors"
-    return f"somewhere in {finding['place_low_m']:.1f} to {finding['place_high_m']:.1f} m"
+    low, high = finding["place_low_m"], finding["place_high_m"]
+    return f"somewhere in {low:.1f} to {high:.1f} m" if high - low > 0.1 else f"about {low:.1f} m"
 
 
 def _locked(finding, evidence):

@@ -142,7 +142,7 @@ def test_one_of_two_says_which_measurement_would_tell():
 
 def test_unknown_is_located_and_offers_nothing_to_accept():
     text = page(ROWS["unknown"])
-    assert "Something is missing between 24.6 and 24.6 m, and no known effect explains it." in text
+    assert "Something is missing about 24.6 m, and no known effect explains it." in text
     assert "place 24.6 (+6.1 dB, q = 0.002, n = 80)" in text and "--accept" not in text
 
 
