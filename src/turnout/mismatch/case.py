@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -31,6 +32,8 @@ class Observation:
     ``data``, ``sigma`` (n,) in the same unit: noise and materiality floor; ``effective`` share of the samples
     that are independent, 0 to 1. Folds leave out a ``condition``; ``kind`` shares one noise scale. ``cells`` (n,)
     numbers the time-frequency cell of each sample, -1 for none; ``labels`` frame -> (n_cell,) level of each cell.
+    ``modes`` (n, m) in the unit of the data are errors of this recording's own with unit variance each (roughness
+    of its wheels, tolerance of a model that errs smoothly): they are integrated out, see ``whitened``.
     """
 
     name: str
@@ -42,6 +45,7 @@ class Observation:
     covariates: Mapping[str, float] = field(default_factory=dict)
     cells: np.ndarray | None = None
     labels: Mapping[str, np.ndarray] = field(default_factory=dict)
+    modes: np.ndarray | None = None
 
     def __post_init__(self):
         data = np.asarray(self.data, dtype=float)
@@ -53,10 +57,47 @@ class Observation:
         object.__setattr__(self, "data", data)
         object.__setattr__(self, "sigma", sigma)
 
+    @cached_property
+    def _subspace(self):
+        """Orthonormal directions (n, m) of the modes over sigma, and how much each is shrunk (m,)."""
+        if self.modes is None or not self.modes.shape[1]:
+            return None
+        scaled = self.modes / self.sigma[:, None]
+        power, turn = np.linalg.eigh(scaled.T @ scaled)
+        keep = power > 1e-4
+        power = power[keep]
+        return scaled @ turn[:, keep] / np.sqrt(power), 1.0 - 1.0 / np.sqrt(1.0 + power)
+
+    def whitened(self, values):
+        r"""``values`` (n,) or (n, k) over the standard deviation of all that is random: :math:`C^{-1/2} x`,
+        :math:`C = \mathrm{diag}(\sigma^2) + M M^T` with M the ``modes``.
+
+        >>> o = Observation("a", "a", np.zeros(3), 2.0, modes=np.array([[2.0], [2.0], [2.0]]))
+        >>> [round(float(v), 3) for v in o.whitened(np.array([2.0, 2.0, 2.0]))]  # along the mode: over sqrt(1 + 3)
+        [0.5, 0.5, 0.5]
+        >>> [round(float(v), 3) for v in o.whitened(np.array([2.0, -2.0, 0.0]))]  # across it: over sigma alone
+        [1.0, -1.0, 0.0]
+        """
+        if isinstance(values, Whitened):
+            return np.asarray(values)
+        scaled = values / (self.sigma if values.ndim == 1 else self.sigma[:, None])
+        if self._subspace is None:
+            return scaled
+        along, shrunk = self._subspace
+        inner = along.T @ scaled
+        return scaled - along @ (shrunk * inner if values.ndim == 1 else shrunk[:, None] * inner)
+
     @property
     def n_effective(self):
         """Number of independent samples."""
         return self.effective * self.data.size
+
+
+class Whitened(np.ndarray):
+    """Values of an observation that are whitened already."""
+
+    def __new__(cls, values):
+        return np.asarray(values, dtype=float).view(cls)
 
 
 @dataclass(frozen=True)
@@ -65,7 +106,8 @@ class Candidate:
 
     ``family`` is the name that a verdict may give, ``where`` the place scanned, ``frame`` what it is fixed to,
     ``scanned`` how many places the family has; ``starts`` are parameter sets that do not depend on the base fit;
-    with ``start_from_base`` off the nuisances, too, start from their priors.
+    with ``start_from_base`` off the nuisances, too, start from their priors; ``always``: tried on the cheap
+    observations at every place, whatever the residual promises; families with the same word are alike there.
     ``parameters`` have name, unit, neutral, bounds and prior as ``turnout.physics.Parameter``.
     """
 
@@ -77,6 +119,7 @@ class Candidate:
     frame: str = ""
     scanned: int = 1
     start_from_base: bool = True
+    always: str = ""
 
     @property
     def key(self):
@@ -98,7 +141,9 @@ class Case:
     """Base of all cases: give it observations, nuisances, candidates and override ``predict``.
 
     ``reserved`` are observations that nothing but the final verification reads. ``frozen_jacobian`` tells the
-    engine that a prediction is dear: the nuisances' derivatives are then kept and updated by Broyden's formula.
+    engine that a prediction is dear: the nuisances' derivatives are then kept and updated by Broyden's formula, but
+    for observations that are ``cheap``. ``start_values`` are values of nuisances where fits start, else their means;
+    ``control_level`` the weighted mean square by kind that cases without an effect reach, else that of the settings.
     """
 
     observations: tuple[Observation, ...] = ()
@@ -106,6 +151,12 @@ class Case:
     nuisances: tuple[Nuisance, ...] = ()
     candidates: tuple[Candidate, ...] = ()
     frozen_jacobian = False
+    start_values: Mapping[str, float] = {}
+    control_level: Mapping[str, float] = {}
+
+    def cheap(self, observation):
+        """Derivatives of this observation cost next to nothing."""
+        return False
 
     def predict(self, values, terms, observations):
         """List of (n,) predictions, one per observation; ``values`` are nuisances, ``terms`` the effects."""
@@ -136,9 +187,28 @@ class Case:
                         jacobian[:, k] = (new - old) / (0.1 * nuisance.sd)
         return found
 
+    def own_jacobian(self, values, terms, observation, predicted, names):
+        """(n, n_name) derivatives of an observation by nuisances of its own."""
+        full = self.nuisance_jacobian(values, terms, [observation], [predicted])[0]
+        order = [n.name for n in self.nuisances]
+        return full[:, [order.index(name) for name in names]]
+
     def screen(self, fit):
-        """Linear columns for the candidates, key -> list of (n,) per observation; {}: predict each at its start."""
+        """Columns for candidates at their starts, (key, start) -> list of (n,) per observation; those that are missing
+        are predicted."""
         return {}
+
+    def further(self, fit):
+        """Candidates that only a look at the residual of ``fit`` suggests."""
+        return ()
+
+    def roughened(self):
+        """The same case with broad, independent errors: its optimum has a wide basin."""
+        return self
+
+    def cheap_part(self):
+        """A case of the cheap observations alone, with the same shared nuisances; None where there is none."""
+        return None
 
     def latent(self, fit):
         """Covariates of the latent force: name -> (n,), with "force"; None where the case has no such view."""

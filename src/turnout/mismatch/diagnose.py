@@ -1,13 +1,13 @@
 """The ten steps, from a case to a verdict with everything it rests on."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
 from turnout.mismatch.held_out import held_out_score, mean_square_out
-from turnout.mismatch.joint import Joint, fit_jointly
+from turnout.mismatch.joint import cost_at, fit_jointly
 from turnout.mismatch.latent import Latent, latent_law
 from turnout.mismatch.locate import attribute, cell_energies
 from turnout.mismatch.shortlist import shortlist
@@ -86,7 +86,7 @@ def diagnose(case, settings=None, progress=None, store=None):
         if verdict.answer not in ("named", "a_or_b"):
             break
         fit = best.fit
-        if verdict.answer == "a_or_b" or max(fit.level.values()) <= settings.control_level:
+        if verdict.answer == "a_or_b" or (not case.frozen_jacobian and _over(case, fit, settings) <= 1.0):
             break
     rival = _rival(verdicts[0])
     return Diagnosis(
@@ -107,100 +107,129 @@ def _kept(store, key, compute, candidates=()):
 def _scored(case, fit, settings, tell, store, effect):
     """Best Score of each family, all refitted jointly on top of ``fit``."""
     plan = shortlist(case, fit, settings)
-    reference = held_out_score(case, fit)
-    control = _control(fit, settings)
     scores = {}
-    for done, (candidate, start) in enumerate(plan):
+    for done, (candidate, start, back) in enumerate(plan):
         key = f"{effect}:{'+'.join(c.key for c in fit.candidates)}:{candidate.key}:{tuple(np.round(start, 12))}"
         both = (*fit.candidates, candidate)
-        refit = _kept(store, key, lambda c=candidate, s=start: _refit(case, fit, c, s, settings), both)
+        refit = _kept(store, key, lambda c=candidate, s=start, b=back: _refit(case, fit, c, s, b, settings), both)
         tell(done + 1, len(plan), candidate.key)
         if refit is None:
             continue
-        score = _score(case, fit, refit, candidate, reference, control)
+        score = _score(case, fit, refit, candidate, settings)
         known = scores.get(candidate.family)
         if known is None or score.gain > known.gain:
             scores[candidate.family] = score
     ranked = sorted(scores.values(), key=lambda s: -s.gain)
-    if case.frozen_jacobian:
-        ranked = [*_polished(case, fit, ranked[:2], settings, store, effect, reference), *ranked[2:]]
-    return tuple(sorted(ranked, key=lambda s: -s.gain))
+    if case.frozen_jacobian and ranked:
+        leaders = [s for s in ranked[:2] if s.gain > max(settings.threshold, ranked[0].gain - settings.margin)]
+        polished = [_polished(case, fit, s, settings, store, effect) for s in leaders]
+        ranked = sorted([*polished, *ranked[len(leaders) :]], key=lambda s: -s.gain)
+    return tuple([_checked(case, fit, s) for s in ranked[:1]] + ranked[1:])
 
 
-def _polished(case, fit, scores, settings, store, effect, reference):
-    """The leaders refitted to the end, with derivatives of their own: the verdict rests on these."""
-    for score in scores:
-        if score.gain < -settings.threshold:
-            yield score
-            continue
-        key = f"{effect}:polished:{score.candidate.key}:{len(fit.candidates)}"
-        refit = _kept(store, key, lambda f=score.fit: _to_the_end(case, f, settings), score.fit.candidates)
-        yield _score(case, fit, refit, score.candidate, reference, _control(fit, settings))
+def _polished(case, fit, score, settings, store, effect):
+    """A leader refitted to the end, with derivatives of its own: the verdict rests on these."""
+    key = f"{effect}:polished:{score.candidate.key}:{len(fit.candidates)}"
+    refit = _kept(store, key, lambda: _to_the_end(case, score.fit, settings), score.fit.candidates)
+    new = _score(case, fit, refit, score.candidate, settings)
+    return new if new.gain > score.gain else score
+
+
+def _checked(case, fit, score):
+    """The leader of a dear case with its gain condition by condition, each left out in turn."""
+    if not case.frozen_jacobian:
+        return score
+    mine, reference = held_out_score(case, score.fit), held_out_score(case, fit)
+    by_condition = {c: mine[c] - reference[c] for c in reference}
+    return replace(score, worst=min(by_condition.values(), default=0.0), by_condition=by_condition)
 
 
 def _to_the_end(case, fit, settings):
-    return fit_jointly(case, fit.candidates, fit.psi, fit.values, iterations=settings.base_iterations)
+    return fit_jointly(case, fit.candidates, fit.psi, fit.values, iterations=settings.iterations)
 
 
-def _refit(case, fit, candidate, start, settings):
+def _refit(case, fit, candidate, start, back, settings):
     """Joint refit from this start; None where the simulation cannot go there."""
     keep = fit.jacobian if case.frozen_jacobian else None
     psi = np.concatenate([fit.psi, start])
     candidates = (*fit.candidates, candidate)
-    values = dict(fit.values)
-    if not candidate.start_from_base:  # what the base may have bent to hide the effect goes back to its prior
+    values = {**fit.values, **back}
+    if not candidate.start_from_base and not back:  # what the base may have bent goes back to its prior
         values |= {n.name: n.mean for n in case.nuisances if n.owner is None and n.trust < 1.0}
     try:
+        psi = _best_start(case, candidates, psi, values) if back else psi
         return fit_jointly(case, candidates, psi, values, keep, iterations=settings.iterations)
     except SimulationError:
         return None
 
 
-def _control(fit, settings):
-    return {kind: settings.control_level for kind in fit.level}
+def _best_start(case, candidates, psi, values):
+    """``psi`` or the last candidate's own starts: what the cheap observations cannot see is asked of the dear ones."""
+    candidate = candidates[-1]
+    if candidate.start_from_base:
+        return psi
+    n, found = psi.size - len(candidate.parameters), []
+    for start in (psi[n:], *candidate.starts):
+        tried = np.concatenate([psi[:n], np.asarray(start, dtype=float)])
+        try:
+            found.append((cost_at(case, candidates, tried, values), tuple(tried)))
+        except SimulationError:
+            continue
+    return np.array(min(found)[1]) if found else psi
+
+
+def _control(case, fit, settings):
+    """Weighted mean square by kind that controls reach."""
+    return {kind: case.control_level.get(kind, settings.control_level) for kind in fit.level}
 
 
 def _excess(level, control):
     return sum(max(0.0, level[kind] - control[kind]) for kind in level)
 
 
-def _score(case, fit, refit, candidate, reference, control):
-    mine = held_out_score(case, refit)
-    by_condition = {c: mine[c] - reference[c] for c in reference}
-    gain = sum(by_condition.values()) if by_condition else 0.5 * (fit.cost - refit.cost) - len(candidate.parameters)
+def _score(case, fit, refit, candidate, settings):
+    """Gain less the logarithm of the places scanned: held out condition by condition, or, where nuisances are many and
+    predictions dear, in evidence, in which the first condition is predicted from the priors."""
+    gain, by_condition = refit.evidence - fit.evidence, {}
+    if not case.frozen_jacobian:
+        mine, reference = held_out_score(case, refit), held_out_score(case, fit)
+        by_condition = {c: mine[c] - reference[c] for c in reference}
+        gain = sum(by_condition.values()) if by_condition else gain
+    control = _control(case, fit, settings)
     before = _excess(fit.level, control)
     explained = 1.0 - _excess(refit.level, control) / before if before > 0.0 else 1.0
     worst = min(by_condition.values(), default=0.0)
     return Score(candidate, gain - np.log(candidate.scanned), worst, explained, refit, by_condition)
 
 
+def _over(case, fit, settings):
+    """Weighted mean square over the level of controls, the largest of the kinds."""
+    control = _control(case, fit, settings)
+    return max(fit.level[kind] / control[kind] for kind in fit.level)
+
+
 def _judged(case, fit, scored, settings):
     best = max(scored, key=lambda s: s.gain, default=None)
-    excess = max(fit.level.values()) / settings.control_level
+    excess = _over(case, fit, settings)
     if best is None:
         return judge([], excess, settings), None
     consistent, structure = True, 0.0
     if best.gain > settings.threshold:
-        consistent = _consistent(case, best.fit, settings)
+        consistent = _consistent(case, fit, best.fit, settings)
         left = _latent_of(case, best.fit)
         structure = max(left.r2.values(), default=0.0) if left else 0.0
-    return judge(scored, excess, settings, consistent, structure), best
+    left = _over(case, best.fit, settings)
+    return judge(scored, excess, settings, consistent, structure, left), best
 
 
-def _consistent(case, fit, settings):
-    """Reserved conditions are predicted about as well as those fitted, given what the parameters leave open."""
+def _consistent(case, base, fit, settings):
+    """Reserved conditions are predicted no worse than without the effect, within what as many samples scatter."""
     if not case.reserved:
         return True
-    predictions = predict_reserved(case, fit, case.reserved)
-    inside = max(1.0, mean_square_out(case, fit, case.observations, fit.predictions))
-    joint = Joint(case, fit.candidates, case.reserved)
-    theta = np.concatenate([[fit.values[n.name] for n in case.nuisances], fit.psi])
-    for o, p, jacobian in zip(case.reserved, predictions, joint.jacobian(theta, predictions)):
-        rows = jacobian / o.sigma[:, None]
-        open_ = float(np.mean(np.sum((rows @ fit.covariance) * rows, axis=1)))
-        if mean_square_out(case, fit, [o], [p]) > settings.withdrawn_ratio * (inside + open_):
-            return False
-    return True
+    before, after = (
+        mean_square_out(case, f, case.reserved, predict_reserved(case, f, case.reserved)) for f in (base, fit)
+    )
+    return after <= settings.withdrawn_ratio * before
 
 
 def _own_numerics(case, base, settings):
@@ -210,8 +239,8 @@ def _own_numerics(case, base, settings):
         return ""
     own = wrong = 0.0
     for o, e, r in zip(case.observations, errors, base.residuals):
-        own += o.effective * float(np.sum((e / o.sigma) ** 2))
-        wrong += o.effective * float(np.sum((r / o.sigma) ** 2))
+        own += o.effective * float(np.sum(o.whitened(e) ** 2))
+        wrong += o.effective * float(np.sum(o.whitened(r) ** 2))
     n = sum(o.n_effective for o in case.observations)
     material = own / n > 1.0 / 9.0
     if material and own > settings.numerics_share**2 * wrong:

@@ -53,7 +53,7 @@ def distinguishability(case, strengths=None):
     fit = fit_jointly(case, iterations=0)
     joint = Joint(case)
     unit = dict.fromkeys(fit.scale, 1.0)
-    rows, _ = joint.whitened(fit.jacobian, fit.residuals, unit)
+    rows, _ = joint.stacked(fit.jacobian, fit.white, unit)
     scaled = rows * joint.sd
     normal = np.linalg.inv(scaled.T @ scaled + np.eye(scaled.shape[1]))
     names, columns = [], []
@@ -65,7 +65,8 @@ def distinguishability(case, strengths=None):
             new = case.predict(fit.values, (candidate.term(weak),), case.observations)
         except SimulationError:
             continue
-        _, column = joint.whitened(fit.jacobian, [a - b for a, b in zip(new, fit.predictions)], unit)
+        change = [o.whitened(a - b) for o, a, b in zip(case.observations, new, fit.predictions)]
+        _, column = joint.stacked(fit.jacobian, change, unit)
         names.append(candidate.family)
         columns.append(column / share)
     c = np.array(columns)

@@ -17,56 +17,56 @@ def held_out_score(case, fit, observations=None):
     """
     joint = Joint(case, fit.candidates, observations)
     theta = np.concatenate([[fit.values[n.name] for n in case.nuisances], fit.psi])
+    parts = [_Part(joint, o, j, r) for o, j, r in zip(joint.observations, fit.jacobian, fit.white)]
     conditions = [o.condition for o in joint.observations]
     found = {}
     for condition in dict.fromkeys(conditions):
-        out = [i for i, c in enumerate(conditions) if c == condition]
-        kept = [i for i, c in enumerate(conditions) if c != condition]
+        out = [p for p, c in zip(parts, conditions) if c == condition]
+        kept = [p for p, c in zip(parts, conditions) if c != condition]
         if kept:
             found[condition] = _density(joint, fit, theta, out, kept)
     return found
 
 
-def _scales(joint, fit, kept):
+class _Part:
+    """Sums over one observation, at noise scale 1, distances in prior standard deviations."""
+
+    def __init__(self, joint, observation, jacobian, white):
+        rows = np.sqrt(observation.effective) * jacobian * joint.sd
+        right = np.sqrt(observation.effective) * white
+        self.kind, self.n = observation.kind, observation.n_effective
+        self.gram, self.across, self.square = rows.T @ rows, rows.T @ right, float(right @ right)
+        self.log_sigma = observation.effective * float(np.sum(np.log(observation.sigma)))
+
+
+def _scales(fit, kept):
     """Noise scale by kind from the kept observations; a kind that is wholly left out keeps that of the full fit."""
     total, count = {}, {}
-    for i in kept:
-        o, r = joint.observations[i], fit.residuals[i]
-        total[o.kind] = total.get(o.kind, 0.0) + o.effective * float(np.sum((r / o.sigma) ** 2))
-        count[o.kind] = count.get(o.kind, 0.0) + o.n_effective
+    for p in kept:
+        total[p.kind] = total.get(p.kind, 0.0) + p.square
+        count[p.kind] = count.get(p.kind, 0.0) + p.n
     return {**fit.scale, **{kind: max(1.0, total[kind] / count[kind]) for kind in total}}
 
 
-def _weighted(joint, fit, indices, scale):
-    rows, right, log_sigma, n = [], [], 0.0, 0.0
-    for i in indices:
-        o = joint.observations[i]
-        weight = np.sqrt(o.effective / scale[o.kind]) / o.sigma
-        rows.append(fit.jacobian[i] * weight[:, None])
-        right.append(fit.residuals[i] * weight)
-        log_sigma += o.effective * float(np.sum(np.log(o.sigma))) + 0.5 * o.n_effective * np.log(scale[o.kind])
-        n += o.n_effective
-    return np.concatenate(rows), np.concatenate(right), log_sigma, n
-
-
 def _density(joint, fit, theta, out, kept):
-    scale = _scales(joint, fit, kept)
-    rows, right, _, _ = _weighted(joint, fit, kept, scale)
-    scaled = rows * joint.sd
-    normal = scaled.T @ scaled + np.eye(theta.size)
-    shift = np.linalg.solve(normal, scaled.T @ right + (joint.mean - theta) / joint.sd)
-    rows, right, log_sigma, n = _weighted(joint, fit, out, scale)
-    there = rows * joint.sd
-    missed = right - there @ shift
-    # Woodbury on the p by p side: N(missed; 0, 1 + there normal^-1 there')
-    inner = normal + there.T @ there
-    projected = there.T @ missed
-    quadratic = missed @ missed - projected @ np.linalg.solve(inner, projected)
+    scale = _scales(fit, kept)
+    gram, across = (sum(getattr(p, what) / scale[p.kind] for p in kept) for what in ("gram", "across"))
+    normal = gram + np.eye(theta.size)
+    shift = np.linalg.solve(normal, across + (joint.mean - theta) / joint.sd)
+    gram, across = (sum(getattr(p, what) / scale[p.kind] for p in out) for what in ("gram", "across"))
+    square = sum(p.square / scale[p.kind] for p in out)
+    n = sum(p.n for p in out)
+    log_sigma = sum(p.log_sigma + 0.5 * p.n * np.log(scale[p.kind]) for p in out)
+    # missed = right - rows shift; Woodbury on the p by p side: N(missed; 0, 1 + rows normal^-1 rows')
+    missed = square - 2.0 * shift @ across + shift @ gram @ shift
+    projected = across - gram @ shift
+    inner = normal + gram
+    quadratic = missed - projected @ np.linalg.solve(inner, projected)
     log_ratio = np.linalg.slogdet(inner)[1] - np.linalg.slogdet(normal)[1]
     return float(-0.5 * (quadratic + log_ratio + n * np.log(2.0 * np.pi)) - log_sigma)
 
 
 def mean_square_out(case, fit, observations, predictions):
-    """Mean square of ``observations`` minus ``predictions`` in units of sigma."""
-    total = sum(o.effective * float(np.sum(((o.data - p) / o.sigma) ** 2)) for o, p in zip(observations, predictions))
+    """Mean square of ``observations`` minus ``predictions``, whitened."""
+    total = sum(o.effective * float(np.sum(o.whitened(o.data - p) ** 2)) for o, p in zip(observations, predictions))
     return total / sum(o.n_effective for o in observations)

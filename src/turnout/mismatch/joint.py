@@ -8,15 +8,17 @@ from turnout.errors import SimulationError
 
 TRUST_TERM = 0.35  # largest step of a term's parameter as a share of its bounds
 DONE = 0.05  # nats; a smaller gain ends the iteration
-STALL = 2e-3  # of minus twice the log posterior per sample; a smaller gain asks for a new Jacobian
+STALL = 5e-4  # of minus twice the log posterior per sample; below it a dear fit asks for a new Jacobian, or ends
 
 
 @dataclass(frozen=True)
 class Fit:
-    """``values`` of nuisances, ``psi`` (n_term,) of the terms; ``residuals`` and ``jacobian`` lists by observation.
+    """``values`` of nuisances, ``psi`` (n_term,) of the terms; ``residuals`` a list by observation, ``white`` the same
+    whitened, ``jacobian`` whitened too.
 
     ``scale`` noise scale by kind, at least 1; ``cost`` minus twice the log posterior up to a constant;
-    ``covariance`` of nuisances and psi; ``level`` weighted mean square by kind, in units of ``sigma``.
+    ``covariance`` of nuisances and psi; ``level`` weighted mean square by kind, in units of ``sigma``;
+    ``evidence`` log probability of the data by Laplace's approximation, up to a constant of the case. [nats]
     """
 
     values: dict
@@ -30,6 +32,8 @@ class Fit:
     cost: float
     covariance: np.ndarray
     evaluations: int
+    white: list
+    evidence: float = 0.0
 
     @property
     def terms(self):
@@ -95,14 +99,14 @@ class Joint:
             return None
 
     def residuals(self, predictions):
-        """Data minus prediction."""
-        return [o.data - p for o, p in zip(self.observations, predictions)]
+        """Data minus prediction, whitened."""
+        return [o.whitened(o.data - p) for o, p in zip(self.observations, predictions)]
 
     def level(self, residuals):
-        """Mean square of residuals in units of sigma, by kind."""
+        """Mean square of whitened residuals, by kind."""
         total, count = {}, {}
         for o, r in zip(self.observations, residuals):
-            total[o.kind] = total.get(o.kind, 0.0) + o.effective * float(np.sum((r / o.sigma) ** 2))
+            total[o.kind] = total.get(o.kind, 0.0) + o.effective * float(np.sum(r**2))
             count[o.kind] = count.get(o.kind, 0.0) + o.n_effective
         return {kind: total[kind] / count[kind] for kind in total}
 
@@ -115,25 +119,38 @@ class Joint:
             value += n * (np.log(scale) + mean_square / scale)
         return value + float(np.sum(((theta - self.mean) / self.sd) ** 2))
 
-    def whitened(self, jacobian, residuals, scale):
-        """Stacked weighted Jacobian (n, p) and residual (n,)."""
+    def stacked(self, jacobian, residuals, scale):
+        """Stacked weighted Jacobian (n, p) and residual (n,) from whitened ones."""
         rows, right = [], []
         for o, j, r in zip(self.observations, jacobian, residuals):
-            weight = np.sqrt(o.effective / scale[o.kind]) / o.sigma
-            rows.append(j * weight[:, None])
-            right.append(r * weight)
+            weight = np.sqrt(o.effective / scale[o.kind])
+            rows.append(weight * j)
+            right.append(weight * r)
         return np.concatenate(rows), np.concatenate(right)
 
     def jacobian(self, theta, predictions, keep=None):
-        """Derivatives at ``theta``; the nuisances' from ``keep`` where given."""
+        """Whitened derivatives at ``theta``; the nuisances' from ``keep`` where given."""
         values, psi = self.split(theta)
         terms = terms_of(self.candidates, psi)
         if keep is None:
             base = self.case.nuisance_jacobian(values, terms, self.observations, predictions)
+            base = [o.whitened(j) for o, j in zip(self.observations, base)]
         else:
             base = [j[:, : self.n] for j in keep]
         columns = [self._column(theta, k, predictions) for k in range(self.n, theta.size)]
         return [np.column_stack([j, *(c[i] for c in columns)]) if columns else np.array(j) for i, j in enumerate(base)]
+
+    def renewed(self, theta, predictions, jacobian):
+        """The Jacobian with that of cheap observations made anew."""
+        chosen = [i for i, o in enumerate(self.observations) if self.case.cheap(o)]
+        if not chosen:
+            return jacobian
+        part = Joint(self.case, self.candidates, [self.observations[i] for i in chosen])
+        new = part.jacobian(theta, [predictions[i] for i in chosen])
+        found = list(jacobian)
+        for i, j in zip(chosen, new):
+            found[i] = j
+        return found
 
     def _column(self, theta, k, predictions):
         p = self.parameters[k - self.n]
@@ -141,7 +158,8 @@ class Joint:
         step = -step if theta[k] + step > p.bounds[1] else step
         moved = np.array(theta)
         moved[k] += step
-        return [(new - old) / step for new, old in zip(self.predict(moved), predictions)]
+        new = self.predict(moved)
+        return [o.whitened((b - a) / step) for o, a, b in zip(self.observations, predictions, new)]
 
 
 def _prior(p):
@@ -151,6 +169,13 @@ def _prior(p):
 
 def _reach(p):
     return TRUST_TERM * (p.bounds[1] - p.bounds[0])
+
+
+def cost_at(case, candidates, psi, values):
+    """Minus twice the log posterior at these parameters and nuisances, nothing fitted."""
+    joint = Joint(case, candidates)
+    theta = np.concatenate([[values.get(n.name, n.mean) for n in case.nuisances], psi])
+    return joint.cost(theta, joint.residuals(joint.predict(theta)))
 
 
 def fit_jointly(case, candidates=(), start=None, values=None, keep=None, observations=None, iterations=6):
@@ -165,25 +190,24 @@ def fit_jointly(case, candidates=(), start=None, values=None, keep=None, observa
     """
     joint = Joint(case, candidates, observations, iterations)
     psi = np.array([p.neutral for p in joint.parameters]) if start is None else np.asarray(start, dtype=float)
-    names = [n.name for n in case.nuisances]
-    first = [values[name] for name in names] if values else [n.mean for n in case.nuisances]
+    known = {**case.start_values, **(values or {})}
+    first = [known.get(n.name, n.mean) for n in case.nuisances]
     theta = np.concatenate([first, psi])
     predictions = joint.predict(theta)
     residuals = joint.residuals(predictions)
     cost, jacobian = joint.cost(theta, residuals), None
     if theta.size:
         jacobian = joint.jacobian(theta, predictions, keep)
+        if keep is not None:
+            jacobian = joint.renewed(theta, predictions, jacobian)
         theta, predictions, residuals, jacobian, cost = _iterate(
-            joint, theta, predictions, residuals, jacobian, cost, case.frozen_jacobian, keep is not None
+            joint, theta, predictions, residuals, jacobian, cost, case.frozen_jacobian
         )
-        if case.frozen_jacobian and keep is None:  # others start from it: exact again at the optimum
-            jacobian = joint.jacobian(theta, predictions)
     return _finished(joint, theta, predictions, residuals, jacobian, cost)
 
 
-def _iterate(joint, theta, predictions, residuals, jacobian, cost, frozen, given):
-    """Steps until nothing is gained; a kept Jacobian is made anew, once per stall, unless it was ``given``."""
-    fresh = True
+def _iterate(joint, theta, predictions, residuals, jacobian, cost, frozen):
+    """Steps until nothing is gained; a dear Jacobian is only updated, the others are made anew at each step."""
     for _ in range(joint.iterations):
         found = _shorter(joint, theta, _step(joint, theta, residuals, jacobian), cost)
         gain = cost - found[3] if found else 0.0
@@ -191,21 +215,13 @@ def _iterate(joint, theta, predictions, residuals, jacobian, cost, frozen, given
             tried, new = found[0], found[1]
             if frozen:
                 moved = tried - theta
-                jacobian = _broyden(jacobian, moved / joint.sd**2, moved, predictions, new)
+                jacobian = _broyden(jacobian, moved / joint.sd**2, moved, residuals, found[2])
+                jacobian = joint.renewed(tried, new, jacobian)
             theta, predictions, residuals, cost = found
-        if frozen and (gain < STALL * joint.size or not found):
-            if gain < 2.0 * DONE and (fresh or given):
-                break
-            if given and gain < 2.0 * STALL:
-                break
-            if not fresh and not given:
-                jacobian, fresh = joint.jacobian(theta, predictions), True
-                continue
-        elif gain < 2.0 * DONE:
+        if gain < max(2.0 * DONE, STALL * joint.size if frozen else 0.0):
             break
         if not frozen:
             jacobian = joint.jacobian(theta, predictions)
-        fresh = not frozen
     return theta, predictions, residuals, jacobian, cost
 
 
@@ -227,8 +243,8 @@ def _step(joint, theta, residuals, jacobian):
     """Damped step; the noise scale is the one the step itself will leave, else a bad start would trust its priors."""
     parts = {}
     for o, j, r in zip(joint.observations, jacobian, residuals):
-        weight = np.sqrt(o.effective) / o.sigma
-        rows, right = j * (weight[:, None] * joint.sd), r * weight
+        weight = np.sqrt(o.effective)
+        rows, right = weight * j * joint.sd, weight * r
         old = parts.get(o.kind, (0.0, 0.0, 0.0, 0.0))
         new = rows.T @ rows, rows.T @ right, float(right @ right), o.n_effective
         parts[o.kind] = tuple(a + b for a, b in zip(old, new))
@@ -251,23 +267,26 @@ def _step(joint, theta, residuals, jacobian):
 
 
 def _broyden(jacobian, weight, moved, old, new):
-    """Rank-one update that makes the Jacobian say what the last step did, distances in prior deviations."""
+    """Rank-one update that makes the Jacobian say what the last step did to the residuals, in prior deviations."""
     size = float(weight @ moved)
-    return [j + np.outer(b - a - j @ moved, weight) / size for j, a, b in zip(jacobian, old, new)]
+    return [j + np.outer(a - b - j @ moved, weight) / size for j, a, b in zip(jacobian, old, new)]
 
 
 def _finished(joint, theta, predictions, residuals, jacobian, cost):
     level = joint.level(residuals)
     scale = {kind: max(1.0, v) for kind, v in level.items()}
-    covariance = np.zeros((theta.size, theta.size))
+    covariance, evidence = np.zeros((theta.size, theta.size)), -0.5 * cost
     if theta.size:
-        rows, _ = joint.whitened(jacobian, residuals, scale)
+        rows, _ = joint.stacked(jacobian, residuals, scale)
         scaled = rows * joint.sd
-        covariance = np.linalg.inv(scaled.T @ scaled + np.eye(theta.size)) * np.outer(joint.sd, joint.sd)
+        normal = scaled.T @ scaled + np.eye(theta.size)
+        covariance = np.linalg.inv(normal) * np.outer(joint.sd, joint.sd)
+        evidence -= 0.5 * float(np.linalg.slogdet(normal)[1])
     else:
         jacobian = [np.zeros((o.data.size, 0)) for o in joint.observations]
     values, psi = joint.split(theta)
+    plain = [o.data - p for o, p in zip(joint.observations, predictions)]
     return Fit(
-        values, joint.candidates, psi, predictions, residuals, jacobian, scale, level, cost, covariance,
-        joint.evaluations,
+        values, joint.candidates, psi, predictions, plain, jacobian, scale, level, cost, covariance,
+        joint.evaluations, residuals, evidence,
     )  # fmt: skip

@@ -20,14 +20,14 @@ class Frame:
 
 
 def cell_energies(observations, residuals):
-    """Log mean square in units of sigma of every cell, (n,), and its levels: frame -> (n,) object."""
+    """Log mean square of the whitened residual of every cell, (n,), and its levels: frame -> (n,) object."""
     energy, labels, names = [], {}, sorted({k for o in observations for k in o.labels})
     for o, r in zip(observations, residuals):
         if o.cells is None:
             continue
         inside = o.cells >= 0
         count = np.bincount(o.cells[inside])
-        total = np.bincount(o.cells[inside], ((r / o.sigma) ** 2)[inside])
+        total = np.bincount(o.cells[inside], (o.whitened(r) ** 2)[inside])
         good = np.flatnonzero(count > 0)
         energy.append(np.log(np.maximum(total[good] / count[good], 1e-6)))
         for name in names:

@@ -7,55 +7,60 @@ from turnout.mismatch.joint import Joint
 
 
 def shortlist(case, fit, settings):
-    """(candidate, start) pairs in order of promise.
+    """(candidate, start, values) in order of promise; ``values`` are nuisances to start from.
 
-    Places of a family are ranked by the score of their linear columns; the best are then predicted at every start
-    of their own, which does not depend on the base fit, and scored with that secant, nuisances free. A case whose
-    predictions are cheap has every family refitted from every start; a dear one the ``refits`` most promising
-    families.
+    A case whose predictions are cheap has every family refitted from every start. For a dear one ``scout`` fits the
+    families that show in the cheap observations; the others are scored by the columns of their starts
+    (``Case.screen``), or predicted where they have none.
     """
-    projector = Projector(case, fit)
-    columns = case.screen(fit)
-    families = {}
-    for candidate in case.candidates:
-        if candidate.key not in {c.key for c in fit.candidates}:
-            families.setdefault(candidate.family, []).append(candidate)
-    plan = []
-    for members in families.values():
-        ranked = sorted(members, key=lambda c: -projector.score(columns.get(c.key), c, 0)[0])
-        plan += _starts(case, fit, projector, ranked[: settings.joint_starts] if columns else ranked)
-    plan.sort(key=lambda entry: -entry[0])
-    if case.frozen_jacobian:
-        plan = _promising(plan, settings.refits)
-    return [(candidate, start) for _, candidate, start in plan]
+    from turnout.mismatch.scout import scout
 
-
-def _starts(case, fit, projector, candidates):
-    found = []
+    known = {c.key for c in fit.candidates}
+    candidates = [c for c in (*case.candidates, *case.further(fit)) if c.key not in known]
+    if not case.frozen_jacobian:
+        return [(c, np.asarray(s, dtype=float), {}) for c in candidates for s in c.starts]
+    scored = {}
+    for found in scout(case, fit, settings):
+        entry = found.gain, found.candidate, found.psi, found.values
+        scored.setdefault(found.candidate.family, []).append(entry)
+    projector, columns = Projector(case, fit), case.screen(fit)
     for candidate in candidates:
-        for k, start in enumerate(candidate.starts):
-            start = np.asarray(start, dtype=float)
-            if not case.frozen_jacobian:
-                found.append((0.0, candidate, start))
-                continue
-            try:
-                new = case.predict(fit.values, (*fit.terms, candidate.term(start)), case.observations)
-            except SimulationError:  # this effect cannot be simulated at this strength here
-                continue
-            gain, share = projector.score([a - b for a, b in zip(new, fit.predictions)], candidate, k)
-            found.append((gain, candidate, candidate.neutral + share * (start - candidate.neutral)))
-    return found
+        for k in range(len(candidate.starts)):
+            parts = columns.get((candidate.key, k))
+            if parts is None:
+                parts = _predicted(case, fit, candidate, k)
+            gain, share = projector.score(parts, candidate, k)
+            entry = 0.5 * gain - np.log(candidate.scanned), candidate, amplified(candidate, k, share), {}
+            scored.setdefault(candidate.family, []).append(entry)
+    least = settings.threshold if fit.candidates else settings.promise  # the residual must promise a second effect
+    return [entry[1:] for entry in _promising(scored, settings) if entry[0] > least]
 
 
-def _promising(plan, refits):
-    """The best start of each of the first ``refits`` families, and the runner-up of the first one."""
-    chosen, seen = [], {}
-    for entry in plan:
-        family = entry[1].family
-        limit = 2 if family == plan[0][1].family else 1
-        if seen.get(family, 0) < limit and (family in seen or len(seen) < refits):
-            seen[family] = seen.get(family, 0) + 1
-            chosen.append(entry)
+def amplified(candidate, k, share):
+    """A start with ``share`` of the way from neutral in its first parameter; the others are its shape."""
+    start = np.array(candidate.starts[k], dtype=float)
+    start[0] = candidate.neutral[0] + share * (start[0] - candidate.neutral[0])
+    return start
+
+
+def _predicted(case, fit, candidate, k):
+    """Change of the prediction at a start; None where this effect cannot be simulated at this strength here."""
+    try:
+        new = case.predict(fit.values, (*fit.terms, candidate.term(candidate.starts[k])), case.observations)
+    except SimulationError:
+        return None
+    return [a - b for a, b in zip(new, fit.predictions)]
+
+
+def _promising(scored, settings):
+    """The best start of each of the first ``refits`` families; of the first three also their second best place."""
+    ranked = [sorted(entries, key=lambda e: -e[0]) for entries in scored.values()]
+    ranked.sort(key=lambda entries: -entries[0][0])
+    chosen = []
+    for rank, entries in enumerate(ranked[: settings.refits]):
+        chosen.append(entries[0])
+        if rank < 3:
+            chosen += [e for e in entries[1:] if e[1].key != entries[0][1].key][: settings.joint_starts - 1]
     return chosen
 
 
@@ -64,11 +69,12 @@ class Projector:
 
     def __init__(self, case, fit):
         self.joint, self.fit = Joint(case, fit.candidates), fit
-        rows, self.right = self.joint.whitened(fit.jacobian, fit.residuals, fit.scale)
+        rows, self.right = self.joint.stacked(fit.jacobian, fit.white, fit.scale)
         self.scaled = rows * self.joint.sd
         self.normal = np.linalg.inv(self.scaled.T @ self.scaled + np.eye(self.scaled.shape[1]))
         theta = np.concatenate([[fit.values[n.name] for n in case.nuisances], fit.psi])
         self.pull = (self.joint.mean - theta) / self.joint.sd
+        self.shift = self.normal @ (self.scaled.T @ self.right + self.pull)
 
     def score(self, parts, candidate, start):
         r"""(gain, share): best gain in chi-squared along a column, and how much of it, within the bounds.
@@ -79,10 +85,12 @@ class Projector:
         """
         if parts is None:
             return 0.0, 1.0
-        _, column = self.joint.whitened(self.fit.jacobian, parts, self.fit.scale)
+        white = [o.whitened(p) if p.any() else p for o, p in zip(self.joint.observations, parts)]
+        weight = [np.sqrt(o.effective / self.fit.scale[o.kind]) for o in self.joint.observations]
+        column = np.concatenate([w * p for w, p in zip(weight, white)])
         across = self.scaled.T @ column
         size = float(column @ column - across @ self.normal @ across)
-        slope = float(column @ self.right - across @ self.normal @ (self.scaled.T @ self.right + self.pull))
+        slope = float(column @ self.right - across @ self.shift)
         if size <= 1e-12 * float(column @ column) or size <= 0.0:
             return 0.0, 1.0
         share = float(np.clip(slope / size, 0.1, _furthest(candidate, candidate.starts[start])))
@@ -92,7 +100,7 @@ class Projector:
 def _furthest(candidate, start):
     """Largest multiple of the way from neutral to ``start`` within the bounds, at most 3."""
     reach = 3.0
-    for p, s in zip(candidate.parameters, start):
+    for p, s in list(zip(candidate.parameters, start))[:1]:
         way = s - p.neutral
         if way:
             limit = p.bounds[1] if way > 0 else p.bounds[0]

@@ -73,7 +73,7 @@ def _withdraw(probabilities):
     probabilities[top], probabilities["unknown"] = probabilities["unknown"], probabilities[top]
 
 
-def judge(scores, excess, settings, consistent=True, structure=0.0):
+def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0):
     """Verdict from scored candidates.
 
     Parameters
@@ -86,6 +86,8 @@ def judge(scores, excess, settings, consistent=True, structure=0.0):
         The best candidate predicts reserved conditions about as well as those it was fitted to.
     structure : float
         Share of the residual of the best candidate that a free law of the state still explains.
+    left : float
+        Weighted mean square that the best candidate leaves over the level of controls.
     """
     ranked = sorted(scores, key=lambda s: -s.gain)
     probabilities = posterior(scores, excess, settings)
@@ -106,17 +108,16 @@ def judge(scores, excess, settings, consistent=True, structure=0.0):
     best = found[0]
     if excess > 1.0 and best.explained < settings.explained:
         return verdict("unknown", reason=f"the best candidate explains {best.explained:.0%} of the excess")
-    left = max(best.fit.level.values()) / settings.control_level
     if left > settings.leftover:
         return verdict("unknown", reason=f"{best.family} leaves {left:.0f} times the level of controls")
     if not consistent:
         return verdict("unknown", reason=f"{best.family} does not hold on conditions it was not fitted to")
-    if structure > settings.structure_left and best.fit.chi2 > settings.control_level:
+    if structure > settings.structure_left and left > 1.0:
         return verdict("unknown", reason=f"a free law still explains {structure:.0%} of what {best.family} leaves")
     if best.worst < -max(settings.threshold, 0.1 * best.gain):
         return verdict("unknown", reason=f"{best.family} makes one condition worse by {-best.worst:.0f} nats")
     rivals = [s for s in found[1:] if best.gain - s.gain < settings.margin]
     if rivals:
         return verdict("a_or_b", (best.family, rivals[0].family), reason="within the margin of each other")
-    grade = "A" if max(best.fit.level.values()) <= settings.control_level else "B"
+    grade = "A" if left <= 1.0 else "B"
     return verdict("named", (best.family,), grade)

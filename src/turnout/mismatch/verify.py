@@ -4,7 +4,7 @@ import numpy as np
 
 from turnout.mismatch.joint import Joint
 
-FITTED_STEPS = 3
+FITTED_STEPS = 2
 
 
 def fit_percent(observations, predictions, centre=True):
@@ -38,10 +38,9 @@ def predict_reserved(case, fit, observations):
     residuals = joint.residuals(predictions)
     cost = joint.cost(theta, residuals)
     for _ in range(FITTED_STEPS):
-        values, _ = joint.split(theta)
-        jacobian = case.nuisance_jacobian(values, fit.terms, observations, predictions)
+        white = _own_columns(case, joint, theta, fit.terms, predictions, own)
         scale = {kind: max(1.0, v) for kind, v in joint.level(residuals).items()}
-        rows, right = joint.whitened([j[:, own[: joint.n]] for j in jacobian], residuals, scale)
+        rows, right = joint.stacked(white, residuals, scale)
         scaled = rows * joint.sd[own]
         pull = (joint.mean[own] - theta[own]) / joint.sd[own]
         step = np.linalg.solve(scaled.T @ scaled + np.eye(int(own.sum())), scaled.T @ right + pull)
@@ -53,6 +52,19 @@ def predict_reserved(case, fit, observations):
             break
         theta, predictions, residuals, cost = tried, new, joint.residuals(new), new_cost
     return predictions
+
+
+def _own_columns(case, joint, theta, terms, predictions, own):
+    """Whitened derivatives by what the observations own themselves, each of its own alone."""
+    values, found = joint.split(theta)[0], []
+    owned = [n for n, mine in zip(case.nuisances, own) if mine]
+    for o, p in zip(joint.observations, predictions):
+        columns = np.zeros((o.data.size, len(owned)))
+        mine = [k for k, n in enumerate(owned) if n.owner == o.name]
+        if mine:
+            columns[:, mine] = case.own_jacobian(values, terms, o, p, [owned[k].name for k in mine])
+        found.append(o.whitened(columns))
+    return found
 
 
 def decoy(observations, predictions, reserved, reserved_predictions, n):

@@ -39,7 +39,8 @@ def test_passages_below_160_hz_are_blind_to_frequency_dependent_pads_and_blows_a
     plan = small_plan((15.0,), speeds=(40.0,))
     rolling = of(replace(plan, blows=()), (*FAMILIES, "surface_dip"))
     assert "none" in rolling.confused("zener_pad")
-    assert one_warm_day.seen[one_warm_day.names.index("zener_pad")] > 1000.0
+    # twenty times what a name needs: the model's own smooth errors, integrated out, take part of it
+    assert one_warm_day.seen[one_warm_day.names.index("zener_pad")] > 100.0
     ratio = {n: s for n, s in zip(rolling.names, rolling.seen)}
     blows = {n: s for n, s in zip(one_warm_day.names, one_warm_day.seen)}
     # 5 nats of expected evidence are what a name needs

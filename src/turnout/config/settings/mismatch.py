@@ -19,6 +19,12 @@ class MismatchSettings:
     control_level: float = setting(
         1.6, "-", "weighted mean square above which a fit has not reached the level of controls", 1.0, 100.0
     )
+    hammer_control: float = setting(
+        0.8, "-", "weighted mean square of receptances that controls of another generator stay below", 0.1, 100.0
+    )
+    passage_control: float = setting(
+        0.7, "-", "weighted mean square of passages that controls of another generator stay below", 0.1, 100.0
+    )
     threshold: float = setting(
         12.0, "nats", "held-out gain that no control exceeded, with a reserve of half; see docs/mismatch.md", 0.0
     )
@@ -40,8 +46,10 @@ class MismatchSettings:
     permutations: int = setting(499, why="smallest p value is 1 / (permutations + 1)", minimum=99)
     false_discovery_rate: float = setting(0.05, "-", "of the frames named, expected share of wrong ones", 0.001, 0.5)
     base_iterations: int = setting(15, why="Gauss-Newton steps of the base fit", minimum=1, maximum=100)
-    joint_starts: int = setting(1, why="places of a family that are tried from all their starts", minimum=1, maximum=20)
-    refits: int = setting(6, why="families refitted jointly where a prediction is dear", minimum=2, maximum=50)
+    scouted_places: int = setting(2, why="places of a family fitted to the hammer tests alone", minimum=1, maximum=50)
+    promise: float = setting(2.0, "nats", "estimated gain below which a candidate is not refitted", 0.0)
+    joint_starts: int = setting(1, why="places of the first families that are refitted", minimum=1, maximum=20)
+    refits: int = setting(5, why="families refitted jointly where a prediction is dear", minimum=2, maximum=50)
     iterations: int = setting(6, why="Gauss-Newton steps of a joint refit", minimum=1, maximum=50)
     effects: int = setting(2, why="effects sought one after the other", minimum=1, maximum=3)
     numerics_share: float = setting(

@@ -16,9 +16,32 @@ COMMON = (
     ("ballast_damping", "ballast", "damping", 0.5),
     ("sleeper_mass", "sleeper", "mass", 0.06),
 )
-OWN = (("pad_stiffness", "pad", "stiffness"), ("ballast_stiffness", "ballast", "stiffness"))
-SCATTER = 0.10  # from support to support, Oscarsson 2002
-REACH = 1.3  # supports this far beyond sensors and blows have values of their own [m]
+
+
+@dataclass(frozen=True)
+class Own:
+    """A value that every support of the zone has of its own: ``field`` of the track, short ``tag``, the ``link`` it
+    belongs to, ``what`` of it, and the standard deviation ``sd`` of its logarithm from support to support."""
+
+    field: str
+    tag: str
+    link: str
+    what: str
+    sd: float
+
+
+# Scatter from support to support: Oscarsson 2002; dampers were never measured one by one, sleepers are cast alike.
+OWN = (
+    Own("pad_stiffness", "pad", "pad", "stiffness", 0.10),
+    Own("ballast_stiffness", "ballast", "ballast", "stiffness", 0.10),
+    Own("pad_damping", "pad_damper", "pad", "damping", 0.15),
+    Own("ballast_damping", "ballast_damper", "ballast", "damping", 0.15),
+    Own("sleeper_mass", "sleeper", "sleeper", "mass", 0.03),
+)
+# ln of the profile's stiffness: wear and rolling tolerances; published shear coefficients of 60E1 go from 0.34 to 0.41.
+RAIL = (("rail_bending", 0.015), ("rail_shear", 0.08))
+SEAT_SD = 0.02  # a sensor's place is known to this [m]
+REACH = 1.9  # supports this far beyond sensors and blows have values of their own [m]
 MARGIN = 18.0  # track kept beyond them [m]
 
 
@@ -56,9 +79,12 @@ def zone_of(turnout, places):
 def track_nuisances(zone, trains):
     """Nuisances of track and vehicles, all as logarithms of a factor on the file's value."""
     found = [Nuisance(name, "-", 0.0, sd, bounds=(-2.0, 2.0), meaning=f"ln {name}") for name, _, _, sd in COMMON]
-    for name, tag, _ in OWN:
+    for own in OWN:
         for j in zone.supports:
-            found.append(Nuisance(f"{tag}_{j}", "-", 0.0, SCATTER, bounds=(-0.6, 0.6), meaning=f"ln {name} of {j}"))
+            meaning, most = f"ln {own.field} of {j}", 6.0 * own.sd
+            found.append(Nuisance(f"{own.tag}_{j}", "-", 0.0, own.sd, bounds=(-most, most), meaning=meaning))
+    for name, sd in RAIL:
+        found.append(Nuisance(name, "-", 0.0, sd, bounds=(-6.0 * sd, 6.0 * sd), meaning=f"ln {name} of the rail"))
     for train in trains:
         found.append(Nuisance(f"wheels_{train}", "-", 0.0, 0.08, bounds=(-0.5, 0.5), meaning="ln unsprung mass"))
     return found
@@ -67,10 +93,20 @@ def track_nuisances(zone, trains):
 def track_with(track, zone, values):
     """The track with the factors of ``values`` on its supports."""
     changes = {name: getattr(track, name) * np.exp(values[name]) for name, *_ in COMMON}
-    for name, tag, _ in OWN:
+    for own in OWN:
         for j in zone.supports:
-            changes[name][j] *= np.exp(values[f"{tag}_{j}"])
+            changes[own.field][j] *= np.exp(values[f"{own.tag}_{j}"])
     return track.with_(**changes)
+
+
+def inner_names(zone):
+    """Names of all that ``track_with`` reads, first among the nuisances of a case."""
+    return [n for n, *_ in COMMON] + [f"{own.tag}_{j}" for own in OWN for j in zone.supports]
+
+
+def inner_values(zone, values):
+    """All that ``track_with`` reads, as one row: a key for what was computed with it."""
+    return np.array([values[n] for n in inner_names(zone)]).tobytes()
 
 
 def vehicle_with(vehicle, values, train, load):

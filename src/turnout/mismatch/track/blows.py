@@ -1,20 +1,24 @@
 """Hammer tests as observations: receptances of accepted blows, their prediction and derivatives."""
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
-from turnout.mismatch.case import Nuisance, Observation
+from turnout.mismatch.case import Observation
 from turnout.mismatch.track.base_model import COMMON, OWN
+from turnout.mismatch.track.skeleton import matrices_of
 from turnout.receptance import find_impacts
 from turnout.simulate.frequency import responses
 from turnout.simulate.link import Link
-from turnout.simulate.matrices import assemble
 
 LINES = np.unique(np.round(np.geomspace(35.0, 900.0, 44) / 2.0) * 2.0)  # [Hz]; two blows' worth of resolution
 SWING, RATE = 1e-6, 0.02  # motion of a blow for the tangent of a law [m, m/s]
 DELAY = 8e-6  # sd of a hammer pair's delay: 2 degrees at 700 Hz [s]
 FEWEST = 2
+SMOOTH = 0.3  # octaves over which the errors of a model of the track hang together
+FARTHER = 1.5  # m; over this way an error of the waves' speed and decay doubles the variance of a receptance's error
+LINE_SHARE = 0.4  # of the tolerance that differs from line to line
 
 
 @dataclass(frozen=True)
@@ -28,6 +32,11 @@ class Pair:
     frequency: np.ndarray
     size: np.ndarray
     conditions: dict
+
+    @property
+    def lines(self):
+        """(n,) index of its lines in ``LINES``."""
+        return np.searchsorted(LINES, self.frequency)
 
 
 def pairs_of(test, sensors, tolerance):
@@ -54,12 +63,17 @@ def pairs_of(test, sensors, tolerance):
     return found
 
 
+@lru_cache(maxsize=4)
+def _kernel(n, rate):
+    """(n_line, n) of the transform at ``LINES``."""
+    return np.exp(-2j * np.pi * LINES[:, None] * np.arange(n) / rate)
+
+
 def _receptance(impacts):
     """H1 over whole blows and its standard error from blow to blow, both (n_line,)."""
     force, response = [], []
     for i in impacts:
-        t = np.arange(i.force.size) / i.rate
-        kernel = np.exp(-2j * np.pi * LINES[:, None] * t)
+        kernel = _kernel(i.force.size, i.rate)
         force.append(kernel @ i.force)
         response.append(kernel @ i.acceleration)
     force, response = np.array(force), np.array(response)
@@ -77,7 +91,7 @@ def sized(pair, size):
 
 def observed(pair, h, spread, tolerance):
     """Observation of a receptance (n,) with its standard error ``spread``."""
-    sigma = np.sqrt((spread / pair.size) ** 2 / 2.0 + tolerance**2)
+    sigma = np.sqrt((spread / pair.size) ** 2 / 2.0 + (LINE_SHARE * tolerance * _around(pair)) ** 2)
     data = np.concatenate([h.real, h.imag]) / np.tile(pair.size, 2)
     octave = np.floor(np.log2(pair.frequency / 31.25)).astype(int)
     bands = np.unique(octave)
@@ -87,14 +101,37 @@ def observed(pair, h, spread, tolerance):
     labels["frequency"] = np.array([f"{31.25 * 2.0**b:.0f} Hz" for b in bands], dtype=object)
     condition = f"blows at {pair.test.place:.1f} m {pair.test.visit}".strip()
     return Observation(
-        pair.name, condition, data, np.tile(sigma, 2), 0.7, "hammer", dict(pair.conditions), cells, labels
-    )
+        pair.name, condition, data, np.tile(sigma, 2), 0.7, "hammer", dict(pair.conditions), cells, labels,
+        tolerated(pair, h, tolerance),
+    )  # fmt: skip
 
 
-def pair_nuisances(pair, tolerance):
-    """Gain, tilt and delay of one pair: what a hammer, its calibration and a mounting leave open."""
-    parts = (("gain", "-", tolerance), ("tilt", "-", tolerance), ("delay", "s", DELAY))
-    return [Nuisance(f"{what}@{pair.name}", unit, 0.0, sd, pair.name) for what, unit, sd in parts]
+def _around(pair):
+    """Root mean square of the magnitude over a third of an octave about each line, over its own (n,), at least 1:
+    errors of a model fill the antiresonances."""
+    near = np.abs(np.log2(pair.frequency[:, None] / pair.frequency)) < 0.34
+    return np.maximum(np.sqrt(near @ pair.size**2 / near.sum(axis=1)) / pair.size, 1.0)
+
+
+def tolerated(pair, h, tolerance):
+    r"""(2n, m) modes of what a receptance may differ by without a cause worth a name.
+
+    Gain, tilt over frequency and delay of the pair (hammer, calibration, mounting), and an error of the model that is
+    smooth over :math:`\ell = 0.3` octaves: :math:`\epsilon h` with complex normal ε of covariance
+    :math:`\tau^2 (1 + d^2 / d_0^2) \exp(-\Delta^2 / 2 \ell^2)`, Δ in octaves, d the way from blow to sensor.
+    """
+    octave = np.log2(pair.frequency)
+    place = getattr(pair.sensor, "place", pair.test.place)
+    size = tolerance * np.hypot(1.0, (place - pair.test.place) / FARTHER)
+    kernel = np.exp(-0.5 * ((octave[:, None] - octave) / SMOOTH) ** 2)
+    power, turn = np.linalg.eigh(kernel)
+    keep = power > 1e-3
+    smooth = size * turn[:, keep] * np.sqrt(power[keep])
+    chain = np.column_stack([np.full(octave.size, tolerance), tolerance * (octave - np.log2(200.0)) / 2.0])
+    unit = (h / np.abs(h) * _around(pair))[:, None]
+    late = (-2j * np.pi * pair.frequency * DELAY * h / np.abs(h))[:, None]
+    columns = np.column_stack([unit * smooth, 1j * unit * smooth, (h / np.abs(h))[:, None] * chain, late])
+    return np.concatenate([columns.real, columns.imag])
 
 
 def tangent(terms, track):
@@ -123,18 +160,18 @@ class _Tangent:
 
 
 class BlowModel:
-    """Receptances of one track with terms at given conditions; ``gradient`` by the supports' values."""
+    """Receptances of one track with terms at given conditions on ``LINES``; ``gradient`` by the supports' values."""
 
-    def __init__(self, track, terms, frequency):
-        self.track, self.frequency = track, frequency
-        self.terms = terms
-        self.matrices = assemble(track, (*terms, _Tangent(tangent(terms, track))))
+    def __init__(self, track, terms):
+        self.track, self.terms = track, terms
+        self.added = (*terms, _Tangent(tangent(terms, track)))
+        self.matrices = matrices_of(track, self.added)
         self.by_place = {}
 
     def displacement(self, place):
         """(n_line, n) of all degrees of freedom under a unit force at a place."""
         if place not in self.by_place:
-            self.by_place[place] = responses(self.matrices, self.frequency, [place])[:, 0]
+            self.by_place[place] = responses(self.matrices, LINES, [place])[:, 0]
         return self.by_place[place]
 
     def place_of(self, sensor):
@@ -149,10 +186,20 @@ class BlowModel:
             h = h + self.matrices.compliance(float(excited))
         return h
 
+    def seat_gradient(self, excited, measured, way=0.01):
+        """Derivative by the sensor's place on the rail, (n_line,) [1/N]; 0 on a sleeper."""
+        if isinstance(measured, tuple):
+            return np.zeros(LINES.size, dtype=complex)
+        u, ends = self.displacement(excited), []
+        for place in (measured - way, measured + way):
+            rows, weights = self.matrices.weights(place)
+            ends.append(u[:, rows] @ weights)
+        return (ends[1] - ends[0]) / (2.0 * way)
+
     def gradient(self, excited, measured, zone):
-        """Derivative by the logarithm of each common and own value: name -> (n_line,)."""
+        """Derivatives by the logarithm of each common and own value, (n_line, n) in the order of ``inner_names``."""
         u, v = self.displacement(excited), self.displacement(measured)
-        index, omega, found = self.matrices.index, 2.0 * np.pi * self.frequency, {}
+        index, omega = self.matrices.index, 2.0 * np.pi * LINES[:, None]
         supports = np.arange(self.track.support.size)
         rail = [index[("rail", j)] for j in supports]
         sleeper = [index[("sleeper", j)] for j in supports]
@@ -162,12 +209,44 @@ class BlowModel:
         }
         product["sleeper"] = product["ballast"]
         factor = {"stiffness": -1.0 + 0.0 * omega, "damping": -1j * omega, "mass": omega**2}
-        for name, tag, what, _ in COMMON:
-            found[name] = factor[what] * (product[tag] @ getattr(self.track, name))
-        for name, tag, what in OWN:
-            for j in zone.supports:
-                found[f"{tag}_{j}"] = factor[what] * product[tag][:, j] * getattr(self.track, name)[j]
-        return found
+        inside = slice(zone.first, zone.last + 1)
+        common = [factor[what] * (product[tag] @ getattr(self.track, name))[:, None] for name, tag, what, _ in COMMON]
+        own = [factor[o.what] * product[o.link][:, inside] * getattr(self.track, o.field)[inside] for o in OWN]
+        return np.concatenate([*common, *own], axis=1)
+
+
+def rail_columns(model, excited, measured):
+    r"""Derivative of a receptance by the logarithms of the rail's bending and shear stiffness, (n_line, 2).
+
+    .. math:: -u^T \left(\Delta K - \omega^2 \Delta M\right) v / \delta
+
+    with the change of all rail elements for :math:`\delta` = 1 %.
+    """
+    u, v = model.displacement(excited), model.displacement(measured)
+    omega2, found = (2.0 * np.pi * LINES[:, None]) ** 2, []
+    for name in ("bending_stiffness", "shear_stiffness"):
+        other = matrices_of(_stiffened(model.track, name, 0.01), model.added)
+        k, m = (getattr(other, w) - getattr(model.matrices, w) for w in ("stiffness", "mass"))
+        force = banded_product(k, v) - omega2 * banded_product(m, v)
+        found.append(-np.sum(u * force, axis=1) / 0.01)
+    return np.stack(found, axis=1)
+
+
+def _stiffened(track, name, more):
+    def changed(rail):
+        return replace(rail, **{name: getattr(rail, name) * (1.0 + more)})
+
+    stretches = tuple(replace(s, rail=changed(s.rail)) for s in track.stretches)
+    return track.with_(rail=changed(track.rail), stretches=stretches)
+
+
+def banded_product(upper, x):
+    """Symmetric matrix of upper diagonals (half + 1, n) times rows of x (..., n)."""
+    found = upper[0] * x
+    for k in range(1, upper.shape[0]):
+        found[..., :-k] += upper[k, :-k] * x[..., k:]
+        found[..., k:] += upper[k, :-k] * x[..., :-k]
+    return found
 
 
 def channel_factor(terms, sensor, frequency):
@@ -180,25 +259,10 @@ def channel_factor(terms, sensor, frequency):
 
 
 def split(value):
-    """Re and Im one behind the other."""
+    """Re and Im one behind the other, along the first axis."""
     return np.concatenate([value.real, value.imag])
 
 
-def pair_chain(pair, values, h):
-    """Receptance over its measured magnitude with the pair's own gain, tilt and delay, complex (n,)."""
-    tilt = np.log(pair.frequency / 200.0) / np.log(4.0)
-    gain = 1.0 + values[f"gain@{pair.name}"] + values[f"tilt@{pair.name}"] * tilt
-    return h / pair.size * gain * np.exp(-2j * np.pi * pair.frequency * values[f"delay@{pair.name}"])
-
-
-def pair_columns(pair, values, predicted):
-    """Derivatives of a predicted pair by its own three nuisances, name -> (2n,)."""
-    n = pair.frequency.size
-    h = predicted[:n] + 1j * predicted[n:]
-    tilt = np.log(pair.frequency / 200.0) / np.log(4.0)
-    gain = 1.0 + values[f"gain@{pair.name}"] + values[f"tilt@{pair.name}"] * tilt
-    return {
-        f"gain@{pair.name}": split(h / gain),
-        f"tilt@{pair.name}": split(h * tilt / gain),
-        f"delay@{pair.name}": split(-2j * np.pi * pair.frequency * h),
-    }
+def scaled(pair, h):
+    """The pair's lines of a receptance on ``LINES`` over its measured magnitude, complex (n,) or (n, k)."""
+    return h[pair.lines] / (pair.size if h.ndim == 1 else pair.size[:, None])

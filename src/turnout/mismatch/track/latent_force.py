@@ -20,7 +20,7 @@ def latent_force(case, fit):
         frequency, g = green(case, fit.values, fit.terms, made)
         rows = residual.reshape(len(made.sensors), -1)
         size = 1 << int(np.ceil(np.log2(2 * rows.shape[1])))
-        grid = np.fft.rfftfreq(size, 1.0 / rolling.CLOCK)
+        grid = np.fft.rfftfreq(size, 1.0 / made.clock)
         inside = np.flatnonzero((grid >= rolling.LOW) & (grid <= made.high))
         nearest = np.clip(np.searchsorted(frequency, grid[inside]), 0, frequency.size - 1)
         spectra.append((made, np.fft.rfft(rows, size)[:, inside].T, g[nearest, :, :, 1], inside, size))
@@ -57,7 +57,7 @@ def _force(r, g, inside, size, n):
 
 def _append(case, fit, made, parts, force, k):
     _, sleeper = support_forces(case, fit.values, fit.terms, made)
-    rate = 4.0 * case.solver.rate
+    rate = case.solver.rate
     time = made.time - made.reference - fit.values[f"time@{made.name}"] + rolling.LEAD
     y = rolling.read_at(sleeper[k][None], rate, time)[0]
     place = case.track().support[case.zone.first + k]
@@ -65,7 +65,7 @@ def _append(case, fit, made, parts, force, k):
     nearest = wheels[np.argmin(np.abs(wheels), axis=0), np.arange(time.size)]
     parts["force"].append(force)
     parts["displacement"].append(y)
-    parts["velocity"].append(np.gradient(y, 1.0 / rolling.CLOCK))
+    parts["velocity"].append(np.gradient(y, 1.0 / made.clock))
     parts["position"].append(np.clip(nearest, -6.0, 6.0))
     parts["time"].append(made.time)
     temperature = made.passage.conditions.get("rail_temperature", np.nan)

@@ -14,21 +14,21 @@ def library(case, families=None):
     return tuple(c for c in found if families is None or c.family in families)
 
 
-def _candidate(term, make, starts, where=None, scanned=1, base=True, parameters=None):
+def _candidate(term, make, starts, where=None, scanned=1, base=True, parameters=None, always=""):
     chosen = tuple(p for p in term.parameters if parameters is None or p.name in parameters)
     frame = getattr(term, "frame", "place")
-    return Candidate(term.name, chosen, make, starts, where or {}, frame, scanned, base)
+    return Candidate(term.name, chosen, make, starts, where or {}, frame, scanned, base, always)
 
 
 def _supports(case):
     """One place per support of the zone."""
     places, n = case.track().support, len(case.zone.supports)
-    for j in case.zone.supports:
+    for j in case.zone.supports:  # ballast first: what hangs looks like soft ballast to a hammer
         where = {"sleeper": j, "place": round(float(places[j]), 3)}
+        for term, alike in ((physics.LocalBallast, "ballast"), (physics.LocalPad, "pad")):
+            yield _candidate(term, lambda p, j=j, t=term: t(j, **p), ((0.4,), (2.5,)), where, n, always=alike)
         yield _candidate(physics.HangingSleeper, lambda p, j=j: physics.HangingSleeper(j, **p),
-                         ((4e-4,), (1.5e-3,)), where, n, base=False)  # fmt: skip
-        for term in (physics.LocalBallast, physics.LocalPad):
-            yield _candidate(term, lambda p, j=j, t=term: t(j, **p), ((0.4,), (2.5,)), where, n)
+                         ((4e-4,), (1.5e-3,)), where, n, base=False, always="ballast")  # fmt: skip
         yield _candidate(physics.AttachedResonator, lambda p, j=j: physics.AttachedResonator(j, **p),
                          ((15.0, 120.0, 0.03), (15.0, 350.0, 0.03)), where, n)  # fmt: skip
         if case.rollings:  # for a blow of one strength friction is a damper: it takes trains to call it by its name

@@ -1,12 +1,13 @@
 """A planned campaign as a case: its data are what the base model predicts, its sigma what such recordings have."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.track import blows, rolling
 from turnout.mismatch.track.library import library
+from turnout.mismatch.track.rough_wheels import wheel_modes
 from turnout.mismatch.track.track_case import TrackCase
 
 NOISE = 0.02  # of a sensor over its own rms
@@ -43,7 +44,7 @@ class PlannedCase(TrackCase):
             noted = {} if train.temperature is None else {"rail_temperature": train.temperature}
             passage = Planned(f"{train.name} {k + 1}", train.vehicle, train.speed, train.name, conditions=noted)
             stop = rolling.duration_of(passage, train.speed, plan.sensors) + 0.45 + rolling.EDGE
-            time = np.arange(0.45 - rolling.EDGE, stop, 1.0 / rolling.CLOCK)
+            time = np.arange(0.45 - rolling.EDGE, stop, 1.0 / rolling.clock_of(train.speed))
             self.rollings[passage.name] = rolling.Rolling(passage.name, passage, plan.sensors, time, 0.45, train.speed)
         self.nuisances = tuple(self._nuisances())
         self.observations = tuple(self._expected())
@@ -52,13 +53,14 @@ class PlannedCase(TrackCase):
     def _expected(self):
         values = {n.name: n.mean for n in self.nuisances}
         for pair in list(self.pairs.values()):
-            h = self._receptance(values, (), pair, {})
+            h = self._receptance(values, (), pair)
             h = h[: blows.LINES.size] + 1j * h[blows.LINES.size :]
             self.pairs[pair.name] = pair = blows.sized(pair, np.abs(h))
             yield blows.observed(pair, h, NOISE * np.abs(h), self.settings.pair_tolerance)
         for made in self.rollings.values():
             data = self._passage(values, (), made).reshape(len(made.sensors), -1)
-            yield rolling.observed(made, data, NOISE * np.std(data, axis=1), self.settings.materiality)
+            planned = rolling.observed(made, data, NOISE * np.std(data, axis=1), self.settings.materiality)
+            yield replace(planned, modes=wheel_modes(self, values, made, planned.sigma))
 
 
 class _Intended:

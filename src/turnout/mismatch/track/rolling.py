@@ -9,10 +9,10 @@ from turnout.mismatch.case import Nuisance, Observation
 from turnout.simulate.prepare import prepare
 from turnout.simulate.run import Drive, run
 
-SHORTEST_WAVE = 0.22  # of the rail's roughness as modelled [m]
-LOW, HIGH = 5.0, 160.0  # band in which the deterministic part dominates the roughness [Hz]
-RATE = 2400.0  # of the simulation: with Radau IIA 3 % of the waveform below 160 Hz, half of the materiality floor
-CLOCK = 500.0  # of the observation [Hz]
+SHORTEST_WAVE = 0.3  # of the rail's roughness as modelled [m]
+LOW, HIGH = 5.0, 112.0  # band in which the deterministic part dominates the roughness [Hz]
+RATE = 1800.0  # of the simulation: with Radau IIA 3 % of the waveform below 112 Hz, half of the materiality floor
+FOLDS = (9, 6, 5)  # steps of the simulation per sample of an observation, the first that holds its band
 LEAD = 0.25  # s of rolling before the first wheel reaches the first sensor
 EDGE = 0.08  # s kept before the first and behind the last wheel
 SPEED_SD, TIME_SD, LOAD_SD = 0.004, 1.5e-3, 0.05
@@ -44,6 +44,11 @@ class Rolling:
         """Upper end of the band [Hz]: at low speed the waves of the rail that are modelled end there."""
         return band_end(self.speed)
 
+    @property
+    def clock(self):
+        """Samples per second of the observation [Hz]."""
+        return clock_of(self.speed)
+
     def limited(self, samples, rate):
         """Rows of ``samples`` within the passage's band."""
         return band_limited(samples, rate, high=self.high)
@@ -60,10 +65,15 @@ def band_limited(samples, rate, low=LOW, high=HIGH):
     """Rows of ``samples`` between ``low`` and ``high`` [Hz], zero phase, cosine edges of a third."""
     n = samples.shape[-1]
     size = 1 << int(np.ceil(np.log2(n + rate * 0.25)))
-    f = np.fft.rfftfreq(size, 1.0 / rate)
-    gate = np.clip((f - 0.67 * low) / (0.33 * low), 0.0, 1.0) * np.clip((1.25 * high - f) / (0.25 * high), 0.0, 1.0)
-    gate = 0.5 - 0.5 * np.cos(np.pi * gate)
-    return np.fft.irfft(np.fft.rfft(samples, size) * gate, size)[..., :n]
+    passed = gate(np.fft.rfftfreq(size, 1.0 / rate), low, high)
+    return np.fft.irfft(np.fft.rfft(samples, size) * passed, size)[..., :n]
+
+
+def gate(frequency, low, high):
+    """What ``band_limited`` lets through at each frequency [Hz], 0 to 1."""
+    f = np.asarray(frequency)
+    passed = np.clip((f - 0.67 * low) / (0.33 * low), 0.0, 1.0) * np.clip((1.25 * high - f) / (0.25 * high), 0.0, 1.0)
+    return 0.5 - 0.5 * np.cos(np.pi * passed)
 
 
 def read_at(samples, rate, time):
@@ -93,6 +103,12 @@ def band_end(speed):
     return min(HIGH, speed / SHORTEST_WAVE / 1.25)
 
 
+def clock_of(speed):
+    """Samples per second that hold the band of a passage at this speed, a whole part of ``RATE`` [Hz]."""
+    enough = [RATE / fold for fold in FOLDS if RATE / fold > 2.4 * 1.25 * band_end(speed)]
+    return enough[0] if enough else RATE / FOLDS[-1]
+
+
 class Roll:
     """Simulated passages on one track with one set of terms; the factorisation is shared among them."""
 
@@ -103,12 +119,13 @@ class Roll:
         self.track = track
         self.prepared = prepare(track, 1.0 / settings.rate, settings.scheme, self.terms)
 
-    def __call__(self, passage, vehicle, speed, sensors, probes=(), path=()):
-        """(n_sensor + n_probe, n) band-limited signals at four times the rate; time 0: first wheel ``LEAD`` ahead."""
+    def __call__(self, passage, vehicle, speed, sensors, probes=(), path=(), described=None):
+        """(n_sensor + n_probe, n) signals of the march; time 0: first wheel ``LEAD`` before the first sensor where it
+        is ``described`` to be."""
         for term in self.terms:
             vehicle = term.vehicle(vehicle)
         sign = 1 if passage.direction == "facing" else -1
-        places = sign * np.array([s.place for s in sensors])
+        places = sign * np.array([s.place for s in described or sensors])
         start = sign * (places.min() - speed * LEAD)
         way = np.ptp(places) + float(vehicle.wheel_places[-1]) + speed * (LEAD + 2.0 * EDGE)
         seats = [seat(s, self.terms).probe(self.track) for s in sensors]
@@ -169,12 +186,13 @@ def rolling_of(passage, sensors, reference, speed, tolerance):
     recording = passage.recording
     limited = _limited(recording, sensors, band_end(speed))
     stop = reference + duration_of(passage, speed, sensors) + EDGE
-    time = np.arange(max(0.0, reference - EDGE), min(stop, recording.duration - 0.01), 1.0 / CLOCK)
+    step = 1.0 / clock_of(speed)
+    time = np.arange(max(0.0, reference - EDGE), min(stop, recording.duration - 0.01), step)
     if time.size < 20:
         raise SimulationError(f"passage {passage.name!r}: the train lies outside the recording.")
     rolling = Rolling(passage.name, passage, tuple(sensors), time, reference, speed)
     data = read_at(limited, recording.rate, time)
-    quiet = read_at(limited, recording.rate, np.arange(0.02, max(0.1, reference - 0.15), 1.0 / CLOCK))
+    quiet = read_at(limited, recording.rate, np.arange(0.02, max(0.1, reference - 0.15), step))
     return rolling, observed(rolling, data, np.std(quiet, axis=1), tolerance)
 
 

@@ -1,88 +1,145 @@
-"""Score-test columns of the candidates, batched over pseudo-forces of one base simulation."""
+"""What each candidate would change, without a simulation of its own: the columns that order the queue.
+
+At supports a law is a pseudo-force of the base simulation, in a receptance an exact change of one link; a dip is a path
+that all wheels follow; whole-track terms act through the base fit's own derivatives.
+"""
 
 import numpy as np
 
+from turnout.mismatch.case import Whitened
 from turnout.mismatch.track import blows
-from turnout.mismatch.track.columns import carried, support_forces
+from turnout.mismatch.track.columns import PAD, RAIL, SLEEPER, carried, support_forces
+from turnout.mismatch.track.rolled_waves import Carrier
+from turnout.physics.pad_temperature import REFERENCE
 
 LAWS = ("hanging_sleeper", "local_ballast", "local_pad", "dry_friction", "ballast_hardening", "attached_resonator")
+WHOLE = ("pad_temperature", "unsprung_mass", "zener_pad", "rail_shear", "ballast_inertia", "sleeper_mode")
+PATHS = ("surface_dip", "rail_corrugation")
+CHANNELS = (
+    "sensor_gain", "mount_resonance", "time_offset", "low_pass", "high_pass", "clock_drift", "clipping", "hum",
+    "sensor_position",
+)  # fmt: skip
 
 
-def screen_columns(case, fit):
-    """key -> list of (n,) per observation: change of the prediction when the candidate takes its first start."""
-    at_supports = [c for c in case.candidates if c.family in LAWS]
-    others = [c for c in case.candidates if c.family not in LAWS and _many(case, c)]
-    found = {c.key: [np.zeros(o.data.size) for o in case.observations] for c in (*at_supports, *others)}
-    for i, o in enumerate(case.observations):
+def screen_columns(case, fit, observations):
+    """(key, start) -> list of (n,) per observation: change of the prediction when a candidate takes that start.
+
+    ``fit`` is of ``observations``, all of the case or some.
+    """
+    chosen = [(c, k) for c in case.candidates for k in range(len(c.starts)) if c.family in (*LAWS, *PATHS, *CHANNELS)]
+    found = {(c.key, k): [np.zeros(o.data.size) for o in observations] for c, k in chosen}
+    laws, paths = ([(c, k) for c, k in chosen if c.family in names] for names in (LAWS, PATHS))
+    for i, o in enumerate(observations):
         if o.name in case.rollings:
-            parts = _passage(case, fit, case.rollings[o.name], at_supports)
+            made = case.rollings[o.name]
+            parts = _passage(case, fit, made, laws) | _paths(case, fit, made, paths)
         else:
-            parts = _pair(case, fit, case.pairs[o.name], at_supports)
+            parts = _pair(case, fit, case.pairs[o.name], laws)
         for key, column in parts.items():
             found[key][i] = column
-    for candidate in others:
-        term = candidate.term(candidate.starts[0])
-        predicted = case.predict(fit.values, (*fit.terms, term), case.observations)
-        found[candidate.key] = [new - old for new, old in zip(predicted, fit.predictions)]
+    for c, k in chosen:
+        if c.family in CHANNELS:
+            found[c.key, k] = _channel(case, fit, c, k, observations)
+    for c in case.candidates:
+        for k in range(len(c.starts)) if c.family in WHOLE else ():
+            found[c.key, k] = _whole(case, fit, c, k, observations)
     return found
 
 
-def _many(case, candidate):
-    """Families with several places whose prediction is cheap: sensors, whose channels need no simulation."""
-    return candidate.scanned > 1 and "sensor" in candidate.where and candidate.family != "sensor_position"
+def _whole(case, fit, candidate, k, observations):
+    """A term of the whole track or a train: blows exactly, passages by the base fit's derivatives where it has them."""
+    start, found = candidate.starts[k], []
+    names = {n.name: i for i, n in enumerate(case.nuisances)}
+    terms = (*fit.terms, candidate.term(start))
+    for i, (o, old) in enumerate(zip(observations, fit.predictions)):
+        if o.name in case.pairs:
+            found.append(case.predict(fit.values, terms, [o])[0] - old)
+            continue
+        said, column, amount = case.said(case.rollings[o.name]), None, 0.0
+        if candidate.family == "pad_temperature" and "rail_temperature" in said:
+            column, amount = "pad_stiffness", -start[0] * (said["rail_temperature"] - REFERENCE)
+        elif candidate.family == "unsprung_mass" and said["train"] == candidate.where["train"]:
+            column, amount = f"wheels_{said['train']}", np.log(start[0])
+        if column is None:
+            found.append(np.zeros(o.data.size))
+        else:
+            found.append(Whitened(amount * fit.jacobian[i][:, names[column]]))
+    return found
 
 
-def _passage(case, fit, made, candidates):
-    if not candidates:
+def _channel(case, fit, candidate, k, observations):
+    """A channel's term acts on signals that are known; where a sensor sits shows in blows, hardly in passages."""
+    terms = (*fit.terms, candidate.term(candidate.starts[k]))
+    found = []
+    for o, old in zip(observations, fit.predictions):
+        if o.name in case.rollings and candidate.family == "sensor_position":
+            found.append(np.zeros(o.data.size))
+        else:
+            found.append(case.predict(fit.values, terms, [o])[0] - old)
+    return found
+
+
+def _paths(case, fit, made, chosen):
+    """Response to a path that all wheels follow."""
+    if not chosen:
+        return {}
+    carrier = Carrier(case, fit.values, made)
+    rows = []
+    for c, k in chosen:
+        parts = c.term(c.starts[k]).paths(None, made.passage.vehicle)
+        rows.append(sum((part(carrier.way, 0) for part in parts), np.zeros(carrier.way.size)))
+    columns = carrier.followed(np.array(rows))
+    return {(c.key, k): column for (c, k), column in zip(chosen, columns.T)}
+
+
+def _passage(case, fit, made, chosen):
+    """Response to the pseudo-forces of laws at supports."""
+    if not chosen:
         return {}
     rail, sleeper = support_forces(case, fit.values, fit.terms, made)
-    rate, forces = 4.0 * case.solver.rate, {}
+    rate, forces = case.solver.rate, {}
     track = case.track(made.passage.route)
-    for c in candidates:
-        j = c.where["sleeper"]
+    for c, start in chosen:
+        j, values = c.where["sleeper"], c.starts[start]
         k = j - case.zone.first
         y, d = sleeper[k], rail[k] - sleeper[k]
         kb, kp = track.ballast_stiffness[j], track.pad_stiffness[j]
-        start = c.starts[0]
         if c.family == "hanging_sleeper":
-            force = j, 1, kb * np.clip(y, -start[0], start[0])
+            force = j, SLEEPER, kb * np.clip(y, -values[0], values[0])
         elif c.family == "local_ballast":
-            force = j, 1, -(start[0] - 1.0) * kb * y
+            force = j, SLEEPER, -(values[0] - 1.0) * kb * y
         elif c.family == "local_pad":
-            force = j, 2, -(start[0] - 1.0) * kp * d
+            force = j, PAD, -(values[0] - 1.0) * kp * d
         elif c.family == "dry_friction":
-            force = j, 2, -start[0] * np.tanh(np.gradient(d) * rate / 2e-3)
+            force = j, PAD, -values[0] * np.tanh(np.gradient(d) * rate / 2e-3)
         elif c.family == "ballast_hardening":
-            force = j, 1, -start[0] * kb * y * (y / 1e-3) ** 2
+            force = j, SLEEPER, -values[0] * kb * y * (y / 1e-3) ** 2
         else:
-            force = j, 0, -start[0] * np.gradient(np.gradient(rail[k])) * rate**2
-        forces[c.key] = force
+            force = j, RAIL, -values[0] * np.gradient(np.gradient(rail[k])) * rate**2
+        forces[c.key, start] = force
     return carried(case, fit.values, fit.terms, made, forces)
 
 
-def _pair(case, fit, pair, candidates):
-    """Secant change of a receptance by a candidate's matrix entries, to first order in its reach."""
-    if not candidates:
-        return {}
-    model = case._blow_model(fit.values, fit.terms, pair, {})
-    place = model.place_of(pair.sensor)
+def _pair(case, fit, pair, chosen):
+    r"""Change of a receptance by one link w with impedance z, exactly: :math:`-z\,u_w v_w / (1 + z\,g_w)`."""
+    model = case.blow_model(fit.values, fit.terms, pair)
+    place = model.place_of(case.seat(pair.sensor, fit.values, fit.terms))
     u, v = model.displacement(pair.test.place), model.displacement(place)
-    chain = blows.pair_chain(pair, fit.values, np.ones(pair.frequency.size, dtype=complex))
-    omega, index, found = 2.0 * np.pi * pair.frequency, model.matrices.index, {}
-    for c in candidates:
-        term = c.term(c.starts[0]).under(pair.conditions)
-        links = [*term.links(model.track), *blows.tangent((term,), model.track)]
-        change = np.zeros(pair.frequency.size, dtype=complex)
-        for link in links:
-            ends = [(index[name], weight) for name, weight in link.ends if name in index]
-            if len(ends) < len(link.ends):
-                continue
-            reach_u = sum(weight * u[:, row] for row, weight in ends)
-            reach_v = sum(weight * v[:, row] for row, weight in ends)
-            z = link.stiffness + 1j * omega * link.damping - omega**2 * link.mass
-            change -= z * reach_u * reach_v
+    chain = case._chain(fit.values, fit.terms, pair)
+    omega, index, found = 2.0 * np.pi * blows.LINES, model.matrices.index, {}
+    for c, k in chosen:
+        term = c.term(c.starts[k]).under(pair.conditions)
         if c.family == "attached_resonator":
-            row = index[("rail", c.where["sleeper"])]
-            change -= term.dynamic_stiffness(pair.frequency) * u[:, row] * v[:, row]
-        found[c.key] = blows.split(change * chain)
+            links = [(((("rail", c.where["sleeper"]), 1.0),), term.dynamic_stiffness(blows.LINES))]
+        else:
+            made = [*term.links(model.track), *blows.tangent((term,), model.track)]
+            links = [(m.ends, m.stiffness + 1j * omega * m.damping - omega**2 * m.mass) for m in made]
+        change = np.zeros(blows.LINES.size, dtype=complex)
+        for ends, z in links:
+            rows = [(index[name], weight) for name, weight in ends]
+            reach_u = sum(weight * u[:, row] for row, weight in rows)
+            reach_v = sum(weight * v[:, row] for row, weight in rows)
+            own = sum(a * b * model.displacement(name)[:, row] for name, a in ends for row, b in rows)
+            change -= z * reach_u * reach_v / (1.0 + z * own)
+        found[c.key, k] = blows.split(blows.scaled(pair, change * chain))
     return found

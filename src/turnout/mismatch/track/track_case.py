@@ -1,21 +1,34 @@
 """Hammer tests and passages of one turnout as a case for the engine."""
 
 from collections import OrderedDict
+from dataclasses import replace
 
 import numpy as np
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
 from turnout.mismatch.case import Case, Nuisance
+from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.track import blows, rolling
-from turnout.mismatch.track.base_model import COMMON, OWN, track_nuisances, track_with, vehicle_with, zone_of
-from turnout.mismatch.track.columns import columns_of, green, support_forces
+from turnout.mismatch.track.base_model import (
+    COMMON,
+    RAIL,
+    SEAT_SD,
+    inner_values,
+    track_nuisances,
+    track_with,
+    vehicle_with,
+    zone_of,
+)
+from turnout.mismatch.track.columns import columns_of, support_forces
 from turnout.mismatch.track.library import library
 from turnout.mismatch.track.rough_rail import Waves, wave_columns
+from turnout.mismatch.track.rough_wheels import wheel_modes
 from turnout.simulate.run import Probe
 
 KEPT = 150  # simulated passages remembered
 GAIN_SD = 0.02
+ROUGHLY = 0.1  # relative error of a receptance in the first fit
 
 
 class TrackCase(Case):
@@ -25,7 +38,9 @@ class TrackCase(Case):
 
     def __init__(self, campaign, settings=None, families=None, solver=None):
         self._prepare(campaign, settings or MismatchSettings(), solver or rolling.Track1D())
-        found = [*self._hammer(), *self._passages()]
+        found, self.start_values = list(self._hammer()), {}
+        self.start_values = self._from_blows([o for _, o in found])
+        found += self._passages()
         if not found:
             raise SimulationError("nothing to diagnose: " + "; ".join(self.notes))
         reserved = set(campaign.reserved)
@@ -36,11 +51,21 @@ class TrackCase(Case):
         self.nuisances = tuple(self._nuisances())
         self.candidates = library(self, families)
 
+    def _from_blows(self, observations):
+        """Values of the nuisances of track and sensors that the hammer tests alone give: where all fits start."""
+        self.nuisances, self.observations = tuple(self._nuisances()), tuple(observations)
+        if not observations:
+            return {}
+        roughly = fit_jointly(Blows(self).roughened(), iterations=12)
+        self.start_values, self._rail = roughly.values, {}
+        return fit_jointly(Blows(self), values=roughly.values, iterations=12).values
+
     def _prepare(self, campaign, settings, solver):
         """What does not depend on recordings."""
         self.settings, self.solver, self.campaign = settings, solver, campaign
         self.zone = zone_of(campaign.turnout, campaign.places())
-        self._simulated, self._rolls = OrderedDict(), OrderedDict()
+        self._simulated, self._rolls, self._models = OrderedDict(), OrderedDict(), OrderedDict()
+        self._rail = {}
         self.trains = tuple(dict.fromkeys(p.train or p.name for p in campaign.passages))
         self.pairs, self.rollings, self.notes = {}, {}, []
         self.waves = self._waves()
@@ -74,7 +99,7 @@ class TrackCase(Case):
     def _passages(self):
         if not self.campaign.passages:
             return
-        values = {n.name: 0.0 for n in (*track_nuisances(self.zone, self.trains), *self.waves.nuisances())}
+        values = {n.name: 0.0 for n in self._nuisances()} | self.start_values
         for passage in self.campaign.passages:
             sensors = [s for s in self.campaign.sensors if s.name in {c.name for c in passage.recording.channels}]
             if not sensors:
@@ -90,16 +115,17 @@ class TrackCase(Case):
                 continue
             made, observation = rolling.rolling_of(passage, sensors, reference, speed, self.settings.materiality)
             self.rollings[passage.name] = made
-            yield passage.name, observation
+            modes = wheel_modes(self, {**values, **dict.fromkeys(_own_of(passage), 0.0)}, made, observation.sigma)
+            yield passage.name, replace(observation, modes=modes)
 
     def _nuisances(self):
         yield from track_nuisances(self.zone, self.trains)
         for sensor in self.campaign.sensors:
             yield Nuisance(f"gain_{sensor.name}", "-", 0.0, GAIN_SD, meaning="gain of a sensor less one")
-        if self.rollings:
+            if not sensor.mounting.startswith("sleeper"):
+                yield Nuisance(f"seat_{sensor.name}", "m", 0.0, SEAT_SD, meaning="place of a sensor less its file's")
+        if self.waves:
             yield from self.waves.nuisances()
-        for pair in self.pairs.values():
-            yield from blows.pair_nuisances(pair, self.settings.pair_tolerance)
         for made in self.rollings.values():
             yield from rolling.rolling_nuisances(made.passage)
 
@@ -109,28 +135,47 @@ class TrackCase(Case):
 
     def predict(self, values, terms, observations):
         """Prediction of receptances and passages."""
-        models, found = {}, []
+        found = []
         for o in observations:
             if o.name in self.pairs:
-                found.append(self._receptance(values, terms, self.pairs[o.name], models))
+                found.append(self._receptance(values, terms, self.pairs[o.name]))
             else:
                 found.append(self._passage(values, terms, self.rollings[o.name]))
         return found
 
-    def _blow_model(self, values, terms, pair, models):
+    def blow_model(self, values, terms, pair):
+        """The track of a hammer pair, remembered."""
         under = tuple(t.under(pair.conditions) for t in terms if t.kind in ("matrix", "port"))
-        key = repr(under), pair.frequency.tobytes()
-        if key not in models:
-            models[key] = blows.BlowModel(track_with(self.track(), self.zone, values), under, pair.frequency)
-        return models[key]
+        key = repr(under), inner_values(self.zone, values)
+        if key not in self._models:
+            self._models[key] = blows.BlowModel(track_with(self.track(), self.zone, values), under)
+            while len(self._models) > 8:
+                self._models.popitem(last=False)
+        return self._models[key]
 
-    def _receptance(self, values, terms, pair, models):
-        model = self._blow_model(values, terms, pair, models)
-        sensor = rolling.seat(pair.sensor, terms)
-        h = model.receptance(pair.test.place, model.place_of(sensor))
-        h = h * blows.channel_factor(terms, pair.sensor, pair.frequency)
-        h = h * (1.0 + values.get(f"gain_{pair.channel}", 0.0))
-        return blows.split(blows.pair_chain(pair, values, h))
+    def seat(self, sensor, values, terms):
+        """The sensor where ``values`` and ``terms`` say that it sits."""
+        more = values.get(f"seat_{sensor.name}", 0.0)
+        return rolling.seat(replace(sensor, place=sensor.place + more) if more else sensor, terms)
+
+    def _rail_columns(self, pair):
+        """Derivatives by the rail's stiffness, (n_line, 2), taken once: these move by a per cent."""
+        if pair.name not in self._rail:
+            values = {n.name: n.mean for n in self.nuisances} | dict(self.start_values)
+            model = self.blow_model(values, (), pair)
+            self._rail[pair.name] = blows.rail_columns(model, pair.test.place, model.place_of(pair.sensor))
+        return self._rail[pair.name]
+
+    def _chain(self, values, terms, pair):
+        """What the channel makes of a receptance, (n_line,) complex."""
+        factor = blows.channel_factor(terms, pair.sensor, blows.LINES)
+        return factor * (1.0 + values.get(f"gain_{pair.channel}", 0.0))
+
+    def _receptance(self, values, terms, pair):
+        model = self.blow_model(values, terms, pair)
+        h = model.receptance(pair.test.place, model.place_of(self.seat(pair.sensor, values, terms)))
+        h = h + self._rail_columns(pair) @ [values[name] for name, _ in RAIL]
+        return blows.split(blows.scaled(pair, h * self._chain(values, terms, pair)))
 
     def _passage(self, values, terms, made):
         clean = self._clean(values, terms, made)
@@ -144,32 +189,37 @@ class TrackCase(Case):
             shown.append((1.0 + values[f"gain_{sensor.name}"]) * rolling.read_at(row, rate, time))
         return np.concatenate(shown)
 
-    def _clean(self, values, terms, made, probes=()):
-        """Simulated signals before the channels, four times as fine as the march, remembered."""
-        under = tuple(t.under(self._said(made)) for t in terms if t.kind != "channel" or _moves(t))
-        inner = [values[n] for n, *_ in COMMON] + [values[f"{t}_{j}"] for _, t, _ in OWN for j in self.zone.supports]
+    def _clean(self, values, terms, made):
+        """Simulated signals of the sensors before their channels, four times as fine as the march."""
+        return rolling.finer(self.marched(values, terms, made)[: len(made.sensors)])
+
+    def marched(self, values, terms, made, probes=()):
+        """Simulated signals of sensors and ``probes`` on the simulation's clock, remembered."""
+        under = tuple(t.under(self.said(made)) for t in terms if t.kind != "channel" or _moves(t))
         train = made.passage.train or made.passage.name
         own = values[f"wheels_{train}"], values[f"speed@{made.name}"], values[f"load@{made.name}"]
         path = self.waves.path(values)
         shape = path[0].dip.tobytes() if path else b""
-        key = made.name, np.array([*inner, *own]).tobytes(), shape, repr(under), len(probes)
+        seats = tuple(values.get(f"seat_{s.name}", 0.0) for s in made.sensors)
+        key = made.name, inner_values(self.zone, values), own, seats, shape, repr(under), len(probes)
         if key not in self._simulated:
             vehicle = vehicle_with(made.passage.vehicle, values, train, own[2])
             roll = self._roll(values, under, made.passage)
-            signals = roll(made.passage, vehicle, made.speed * (1.0 + own[1]), made.sensors, probes, path)
+            sensors = [replace(s, place=s.place + more) for s, more in zip(made.sensors, seats)]
+            signals = roll(made.passage, vehicle, made.speed * (1.0 + own[1]), sensors, probes, path, made.sensors)
             self._simulated[key] = signals
             while len(self._simulated) > KEPT:
                 self._simulated.popitem(last=False)
-        return rolling.finer(self._simulated[key])
+        return self._simulated[key]
 
-    def _said(self, made):
+    def said(self, made):
+        """Conditions of a passage, as terms ask for them."""
         passage = made.passage
         loads = tuple(2.0 * load for load in passage.vehicle.static_loads)
         return {"axle_loads": loads, "train": passage.train or passage.name, "name": made.name, **passage.conditions}
 
     def _roll(self, values, terms, passage):
-        inner = [values[n] for n, *_ in COMMON] + [values[f"{t}_{j}"] for _, t, _ in OWN for j in self.zone.supports]
-        key = passage.route, np.array(inner).tobytes(), repr(terms)
+        key = passage.route, inner_values(self.zone, values), repr(terms)
         if key not in self._rolls:
             track = track_with(self.track(passage.route), self.zone, values)
             self._rolls[key] = rolling.Roll(self.zone.turnout, track, terms, self.solver)
@@ -177,15 +227,34 @@ class TrackCase(Case):
                 self._rolls.popitem(last=False)
         return self._rolls[key]
 
+    @property
+    def control_level(self):
+        """What controls reach, by kind."""
+        return {"hammer": self.settings.hammer_control, "passage": self.settings.passage_control}
+
+    def cheap_part(self):
+        """The hammer tests."""
+        return Blows(self) if self.pairs else None
+
+    def cheap(self, observation):
+        """Blows are; passages have to be simulated."""
+        return observation.name in self.pairs
+
+    def own_jacobian(self, values, terms, observation, predicted, names):
+        """Columns of a passage's own time, speed and load."""
+        if observation.name in self.pairs:
+            return super().own_jacobian(values, terms, observation, predicted, names)
+        found = dict(self._own_columns(values, terms, self.rollings[observation.name], predicted))
+        return np.column_stack([found[name] for name in names])
+
     def nuisance_jacobian(self, values, terms, observations, base):
         """Exact for receptances, gains, times; common values of passages by differences, supports' by pseudo-forces."""
-        index, models = {n.name: k for k, n in enumerate(self.nuisances)}, {}
+        index = {n.name: k for k, n in enumerate(self.nuisances)}
         found = [np.zeros((o.data.size, len(self.nuisances))) for o in observations]
         passages = [(o, p, j) for o, p, j in zip(observations, base, found) if o.name in self.rollings]
         for o, predicted, jacobian in zip(observations, base, found):
             if o.name in self.pairs:
-                for name, column in self._pair_columns(values, terms, self.pairs[o.name], predicted, models):
-                    jacobian[:, index[name]] = column
+                self.pair_columns(values, terms, self.pairs[o.name], predicted, jacobian, index)
         if passages:
             self._common_columns(values, terms, passages, index)
         for o, predicted, jacobian in passages:
@@ -196,17 +265,22 @@ class TrackCase(Case):
             jacobian[:, first : first + len(self.waves.names)] = wave_columns(self, values, made)
         return found
 
-    def _pair_columns(self, values, terms, pair, predicted, models):
-        model = self._blow_model(values, terms, pair, models)
-        place = model.place_of(rolling.seat(pair.sensor, terms))
-        chain = blows.pair_chain(pair, values, np.ones(pair.frequency.size, dtype=complex))
-        chain = chain * blows.channel_factor(terms, pair.sensor, pair.frequency)
-        chain = chain * (1.0 + values.get(f"gain_{pair.channel}", 0.0))
-        for name, column in model.gradient(pair.test.place, place, self.zone).items():
-            yield name, blows.split(column * chain)
-        yield from blows.pair_columns(pair, values, predicted).items()
-        if f"gain_{pair.channel}" in values:
-            yield f"gain_{pair.channel}", predicted / (1.0 + values[f"gain_{pair.channel}"])
+    def pair_columns(self, values, terms, pair, predicted, jacobian, index):
+        """Fill the columns of a pair; the track's own values come first among the nuisances."""
+        model = self.blow_model(values, terms, pair)
+        place = model.place_of(self.seat(pair.sensor, values, terms))
+        chain = self._chain(values, terms, pair)
+        block = model.gradient(pair.test.place, place, self.zone) * chain[:, None]
+        jacobian[:, : block.shape[1]] = blows.split(blows.scaled(pair, block))
+        rail = blows.split(blows.scaled(pair, self._rail_columns(pair) * chain[:, None]))
+        for k, (name, _) in enumerate(RAIL):
+            jacobian[:, index[name]] = rail[:, k]
+        gain, seat = f"gain_{pair.channel}", f"seat_{pair.channel}"
+        if gain in index:
+            jacobian[:, index[gain]] = predicted / (1.0 + values[gain])
+        if seat in index:
+            column = model.seat_gradient(pair.test.place, place) * chain
+            jacobian[:, index[seat]] = blows.split(blows.scaled(pair, column))
 
     def _common_columns(self, values, terms, passages, index):
         names = [name for name, *_ in COMMON] + [f"wheels_{train}" for train in self.trains]
@@ -219,24 +293,25 @@ class TrackCase(Case):
                     continue
                 jacobian[:, index[name]] = (self._passage(moved, terms, made) - predicted) / step
 
-    def _passage_columns(self, values, terms, made, predicted):
+    def _own_columns(self, values, terms, made, predicted):
         n = made.time.size
-        rows = predicted.reshape(-1, n)
         moment = f"time@{made.name}"
         later = self._passage({**values, moment: values[moment] + 1e-5}, terms, made)  # nothing is simulated again
         slope = -(later - predicted).reshape(-1, n) / 1e-5
-        lag = made.time - made.reference
-        yield f"time@{made.name}", -slope.ravel()
-        yield f"speed@{made.name}", (slope * lag).ravel()
+        yield moment, -slope.ravel()
+        yield f"speed@{made.name}", (slope * (made.time - made.reference)).ravel()
         load = f"load@{made.name}"
         yield load, (self._passage({**values, load: values[load] + 0.03}, terms, made) - predicted) / 0.03
+
+    def _passage_columns(self, values, terms, made, predicted):
+        yield from self._own_columns(values, terms, made, predicted)
+        rows = predicted.reshape(-1, made.time.size)
         for k, sensor in enumerate(made.sensors):
             column = np.zeros_like(rows)
             column[k] = rows[k] / (1.0 + values[f"gain_{sensor.name}"])
             yield f"gain_{sensor.name}", column.ravel()
-        if not self.pairs:  # blows, where there are some, tell a support's own values far better
-            histories = support_forces(self, values, terms, made)
-            yield from columns_of(self, values, terms, made, histories).items()
+        histories = support_forces(self, values, terms, made)
+        yield from columns_of(self, values, terms, made, histories).items()
 
     def probes(self):
         """Displacements of rail and sleeper at every support of the zone: what pseudo-forces are made of."""
@@ -246,7 +321,7 @@ class TrackCase(Case):
         """Linear columns of the candidates that have one."""
         from turnout.mismatch.track.screening import screen_columns
 
-        return screen_columns(self, fit)
+        return screen_columns(self, fit, self.observations)
 
     def latent(self, fit):
         """Missing force at the support that explains most of the residual."""
@@ -273,9 +348,39 @@ class TrackCase(Case):
         finally:
             self.solver, self._simulated, self._rolls = kept
 
-    def green(self, values, terms, made):
-        """Free track's response of the passage's sensors to forces at the zone's rail seats and sleepers."""
-        return green(self, values, terms, made)
+
+class Blows(Case):
+    """The hammer tests of a TrackCase alone: cheap, with exact derivatives."""
+
+    def __init__(self, case, observations=None):
+        chosen = case.observations if observations is None else observations
+        self.whole, self.observations = case, tuple(o for o in chosen if o.name in case.pairs)
+        self.nuisances = tuple(n for n in case.nuisances if n.owner is None and "_wave_" not in n.name)
+        self.predict = case.predict
+
+    def roughened(self):
+        """With one broad error of every line: smooth errors would excuse a resonance out of place."""
+        plain = [replace(o, sigma=np.hypot(o.sigma, ROUGHLY), modes=None) for o in self.observations]
+        return Blows(self.whole, plain)
+
+    def screen(self, fit):
+        """Columns of all candidates that blows show."""
+        from turnout.mismatch.track.screening import screen_columns
+
+        return screen_columns(self.whole, fit, self.observations)
+
+    def nuisance_jacobian(self, values, terms, observations, base):
+        """Exact."""
+        index = {n.name: k for k, n in enumerate(self.nuisances)}
+        found = [np.zeros((o.data.size, len(self.nuisances))) for o in observations]
+        for o, predicted, jacobian in zip(observations, base, found):
+            self.whole.pair_columns(values, terms, self.whole.pairs[o.name], predicted, jacobian, index)
+        return found
+
+
+def _own_of(passage):
+    """Names of the nuisances of a passage."""
+    return [n.name for n in rolling.rolling_nuisances(passage)]
 
 
 def _moves(term):

@@ -1,0 +1,116 @@
+"""Joint fits to the cheap observations alone: every family at its likeliest places, before anything dear is fitted.
+
+What the base model may have bent to hide an effect does not matter here: each fit starts from the priors with the
+effect in it. A first fit with broad, independent errors finds the basin, a second one with the errors as they are
+finds the bottom: smooth errors would excuse a resonance that is out of place.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnout.errors import SimulationError
+from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.shortlist import Projector, amplified
+
+STEPS, GLANCE = 15, 4
+
+
+@dataclass(frozen=True)
+class Found:
+    """A candidate fitted to the cheap observations: ``gain`` in evidence less the logarithm of its places [nats],
+    ``psi`` its parameters, ``values`` the nuisances, ``level`` left, ``before`` the level without it."""
+
+    gain: float
+    candidate: object
+    psi: np.ndarray
+    values: dict
+    level: float
+    before: float
+
+
+def scout(case, fit, settings):
+    """Found at the best place of every family that the cheap observations show, on top of ``fit``; [] without them."""
+    cheap = case.cheap_part()
+    if cheap is None:
+        return []
+    held, n = fit.candidates, fit.psi.size
+    rough = cheap.roughened()
+    first = fit_jointly(rough, held, fit.psi, iterations=STEPS)
+    base = fit_jointly(cheap, held, first.psi, first.values, iterations=STEPS)
+    entries = _ranked(case, rough, first, held) + _ranked(case, cheap, base, held)
+    found, glances = [], {}
+    for members in _by_family(entries).values():
+        best = None
+        for candidate, start in _likeliest(members, rough, first, held, settings, glances):
+            refit = _fitted(rough, cheap, (*held, candidate), np.concatenate([first.psi, start]))
+            if refit is None:
+                continue
+            gain = refit.evidence - base.evidence - np.log(candidate.scanned)
+            if best is None or gain > best.gain:
+                levels = (max(f.level.values()) for f in (refit, base))
+                best = Found(gain, candidate, refit.psi[n:], refit.values, *levels)
+        if best is not None:
+            found.append(best)
+    return sorted(found, key=lambda f: -f.gain)
+
+
+def _ranked(case, cheap, fit, held):
+    """(nats, candidate, start) by the columns of every candidate that shows in the cheap observations."""
+    projector, columns, found = Projector(cheap, fit), cheap.screen(fit), []
+    known = {c.key for c in held}
+    for candidate in case.candidates:
+        for k in range(len(candidate.starts)):
+            parts = columns.get((candidate.key, k))
+            if candidate.key in known or parts is None or not any(p.any() for p in parts):
+                continue
+            gain, share = projector.score(parts, candidate, k)
+            found.append((0.5 * gain, candidate, amplified(candidate, k, share)))
+    return found
+
+
+def _by_family(entries):
+    families = {}
+    for entry in entries:
+        families.setdefault(entry[1].family, []).append(entry)
+    return families
+
+
+def _likeliest(members, rough, first, held, settings, glances):
+    """The places of a family that promise most, each with its best start.
+
+    Families that the base model swallows (``always``) are tried at every place by a few steps of the broad fit; those
+    alike share these ``glances``.
+    """
+    best = {}
+    for gain, candidate, start in sorted(members, key=lambda m: m[0]):
+        best[candidate.key] = gain, candidate, start
+    alike = next(iter(best.values()))[1].always
+    if alike:
+        for _, c, s in best.values():
+            place = alike, tuple(sorted(c.where.items()))
+            if place not in glances:
+                glances[place] = _glance(rough, first, held, c, s)
+        ranked = sorted(best.values(), key=lambda m: -glances[alike, tuple(sorted(m[1].where.items()))])
+        return [(c, s) for _, c, s in ranked[: settings.scouted_places]]
+    ranked = sorted(best.values(), key=lambda m: -m[0])[: settings.scouted_places]
+    return [(c, s) for gain, c, s in ranked if gain > settings.promise]
+
+
+def _glance(rough, first, held, candidate, start):
+    """Gain in half the cost after a few steps of the broad fit from the priors."""
+    psi = np.concatenate([first.psi, start])
+    try:
+        fit = fit_jointly(rough, (*held, candidate), psi, {n.name: n.mean for n in rough.nuisances}, iterations=GLANCE)
+    except SimulationError:
+        return -np.inf
+    return 0.5 * (first.cost - fit.cost)
+
+
+def _fitted(rough, cheap, candidates, psi):
+    """From the priors through the broad errors to the narrow ones; None where the simulation cannot go there."""
+    try:
+        first = fit_jointly(rough, candidates, psi, {n.name: n.mean for n in rough.nuisances}, iterations=STEPS)
+        return fit_jointly(cheap, candidates, first.psi, first.values, iterations=STEPS)
+    except SimulationError:
+        return None
