@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 
 from turnout.chains.passage_rows import finding_rows, fit_row, passage_row
@@ -11,6 +11,7 @@ from turnout.config.turnout import PassageConfig, TurnoutConfig
 from turnout.errors import ReadError
 from turnout.passage.analyse import analyse
 from turnout.passage.channel_fit import fit_channel
+from turnout.passage.continuous import cut_passages
 from turnout.passage.findings import PassageSensor
 from turnout.passage.load import axle_load
 from turnout.passage.train_data import listed_for, listed_trains
@@ -80,7 +81,9 @@ def passage_unit(
                     quarantine_row(error, base, "passage", "passage", recording.record, recording_id)
                 )
                 continue
-            _one_train(recording, started_at, recording_id, path, turnout, context, rows)
+            for part, late, name in trains_in(recording, turnout.settings["passage"]):
+                moment = started_at + timedelta(seconds=late)
+                _one_train(part, moment, recording_id, path, turnout, context, rows, name)
         first = rows["passages"][0]["passage_id"] if rows["passages"] else None
         rows["recordings"].append(recording_row(result, path, size, description, base, "passage", passage_id=first))
     return rows
@@ -110,8 +113,24 @@ def _described(turnout: TurnoutConfig) -> PassageConfig:
     return turnout.passages
 
 
-def _one_train(recording, started_at, recording_id, path, turnout, context, rows):
-    """Rows of the train in one record."""
+def trains_in(recording, settings):
+    """(recording, seconds after the start, name) of every passage in a record: itself, unless it is a continuous one.
+
+    What is longer than ``settings.longest`` comes from a logger that never stops, and is cut at the quiet times.
+    """
+    if recording.duration <= settings.longest:
+        yield recording, 0.0, ()
+        return
+    rows = recording.of_quantity("acceleration")
+    step, channels = max(round(settings.chunk * recording.rate), 1), tuple(recording.channels[i] for i in rows)
+    blocks = (recording.samples[rows, k : k + step] for k in range(0, recording.n_sample, step))
+    for piece in cut_passages(blocks, recording.rate, settings):
+        part = replace(recording, samples=piece.samples.astype(float), channels=channels)
+        yield part, piece.start / recording.rate, (str(piece.start),)
+
+
+def _one_train(recording, started_at, recording_id, path, turnout, context, rows, name=()):
+    """Rows of the train in one record; ``name`` tells it from others in the same record."""
     settings = turnout.settings["passage"]
     sensors = sensors_of(turnout)
     if not sensors:
@@ -120,7 +139,7 @@ def _one_train(recording, started_at, recording_id, path, turnout, context, rows
     base = {"turnout_id": turnout.id}
     first = float(passage.times[0]) if passage.n_axle else 0.0
     passed_at = started_at + timedelta(seconds=round(first, 3))
-    passage_id = content_id("passage", recording_id, str(recording.record))
+    passage_id = content_id("passage", recording_id, str(recording.record), *name)
     rows["quarantine"] += finding_rows(passage, base, path, recording.record, recording_id)
     listed, _ = listed_trains(turnout.trains)
     match = listed_for(passed_at, passage.n_axle, listed, settings.train_data_tolerance) if passage.n_axle else None

@@ -158,3 +158,25 @@ def test_the_time_may_stand_in_the_name_of_the_file(tmp_path):
     unit, turnout = lay_out(tmp_path, replace(recording, started_at=None), "20240102T030405Z")
     row = passage_unit(unit, turnout, tmp_path, context())["passages"][0]
     assert row["passed_at_utc"].replace(microsecond=0) in (datetime(2024, 1, 2, 3, 4, 6), datetime(2024, 1, 2, 3, 4, 5))
+
+
+def test_a_continuous_loggers_file_gives_a_passage_per_train(tmp_path):
+    """Three trains in fifty seconds: each has its own time, speed and id; their quiet times are no passages."""
+    rng, length = np.random.default_rng(41), int(50.0 * 20000)
+    samples = 0.003 * rng.standard_normal((len(PLACES), length))
+    speeds, starts = (40.0, 44.4, 36.0), (3.0, 18.0, 33.0)
+    for k, (speed, start) in enumerate(zip(speeds, starts)):
+        recording, _ = on_main(seed=50 + k, speed=speed)
+        first = int(start * 20000)
+        samples[:, first : first + recording.n_sample] += recording.samples
+    recording = replace(recording, samples=samples)
+    unit, turnout = lay_out(tmp_path, recording)
+    own = replace(turnout.settings["passage"], longest=20.0)
+    turnout = replace(turnout, settings={**turnout.settings, "passage": own})
+    rows = passage_unit(unit, turnout, tmp_path, context())
+    found = rows["passages"]
+    assert [p["n_axles"] for p in found] == [8, 8, 8] and len({p["passage_id"] for p in found}) == 3
+    assert [p["speed_kmh"] for p in found] == pytest.approx([3.6 * v for v in speeds], rel=3e-3)
+    late = [(p["passed_at_utc"] - datetime(2024, 5, 13, 10)).total_seconds() for p in found]
+    assert np.diff(late) == pytest.approx(np.diff(starts), abs=0.3)
+    assert len(rows["passage_fits"]) == 3 and rows["quarantine"] == [] and len(rows["recordings"]) == 1

@@ -8,7 +8,7 @@ from turnout.report.chart import LEFT, TOP, Axis, Chart
 
 WIDTH = 952
 # Light to dark, told apart in print and by colour-blind readers.
-KEY = "○ = others held fixed with 95 %, orange = what random models reach"
+KEY = "○ others held fixed, 95 %, orange: random models"
 COLOURS = ("#c6dbef", "#6baed6", "#2171b5", "#08306b", "#fdd0a2", "#fd8d3c", "#d94801", "#7f2704")
 
 
@@ -34,7 +34,7 @@ def train_bars(factor, rows, sections):
     at = {(r["section_id"], r["class"]): r for r in rows}
     n = sum(r["n_passages"] for r in rows if r["section_id"] == shown[0]["section_id"])
     ends = [e for r in rows for e in (_low(r), _high(r))]
-    title = f"{rows[0]['score']} by {factor}: bar = mean, thin line = ± standard deviation, {KEY}"
+    title = f"{rows[0]['score']} by {factor}: bar: mean, thin line: ± spread, {KEY}"
     chart = Chart(
         Axis(0.5, len(shown) + 0.5, f"section ({n} passages at {shown[0]['label']})", "names", _labels(shown)),
         Axis(min(0.0, max(min(ends), -60.0)) - 2.0, max(ends) * 1.25 + 4.0, f"{rows[0]['score']} [%]"),
