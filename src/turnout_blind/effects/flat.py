@@ -22,4 +22,4 @@ def act(world, site, where, p):
     world.treads.setdefault((where["train"], where["axle"]), []).append(tread)
 
 
-EFFECT = Effect("flat", "wheel", (0.02, 0.028, 0.036, 0.046, 0.058, 0.072, 0.09), draw, act)
+EFFECT = Effect("flat", "wheel", tuple(np.geomspace(0.006, 0.08, 7)), draw, act)

@@ -1,4 +1,4 @@
-"""A wheel out of round by its second or third harmonic."""
+"""A polygonal wheel, five to nine waves round its tread (Nielsen and Johansson 2000: long waves move a rail little)."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from turnout_blind.effect import Effect, any_axle
 
 def draw(rng, site, amplitude):
     """Amplitude, order, angle."""
-    order = int(rng.integers(2, 4))
+    order = int(rng.integers(5, 10))
     return any_axle(rng, site), {"amplitude": float(amplitude), "order": order, "angle": float(rng.uniform(0, 6.28))}
 
 
@@ -20,4 +20,4 @@ def act(world, site, where, p):
     world.treads.setdefault((where["train"], where["axle"]), []).append(tread)
 
 
-EFFECT = Effect("out_of_round", "wheel", tuple(np.geomspace(3e-5, 6e-4, 7)), draw, act)
+EFFECT = Effect("out_of_round", "wheel", tuple(np.geomspace(1e-5, 4e-4, 7)), draw, act)
