@@ -5,6 +5,9 @@ import numpy as np
 from turnout.errors import SimulationError
 from turnout.mismatch.joint import Joint
 
+NEAR = 0.95  # m: one bay and a half
+HOPELESS = 0.1  # of the leader's estimated gain; what promises less is not refitted, but the second is
+
 
 def shortlist(case, fit, settings):
     """(candidate, start, values) in order of promise; ``values`` are nuisances to start from.
@@ -15,12 +18,13 @@ def shortlist(case, fit, settings):
     """
     from turnout.mismatch.scout import scout
 
-    known = {c.key for c in fit.candidates}
-    candidates = [c for c in (*case.candidates, *case.further(fit)) if c.key not in known]
+    candidates = [
+        c for c in (*case.candidates, *case.further(fit)) if not any(_same_place(c, k) for k in fit.candidates)
+    ]
     if not case.frozen_jacobian:
         return [(c, np.asarray(s, dtype=float), {}) for c in candidates for s in c.starts]
     scored = {}
-    for found in scout(case, fit, settings):
+    for found in [] if fit.candidates else scout(case, fit, settings):  # what is left is small enough for columns
         entry = found.gain, found.candidate, found.psi, found.values
         scored.setdefault(found.candidate.family, []).append(entry)
     projector, columns = Projector(case, fit), case.screen(fit)
@@ -33,7 +37,18 @@ def shortlist(case, fit, settings):
             entry = 0.5 * gain - np.log(candidate.scanned), candidate, amplified(candidate, k, share), {}
             scored.setdefault(candidate.family, []).append(entry)
     least = settings.threshold if fit.candidates else settings.promise  # the residual must promise a second effect
-    return [entry[1:] for entry in _promising(scored, settings) if entry[0] > least]
+    found = [entry for entry in _promising(scored, settings) if entry[0] > least]
+    least = HOPELESS * max((entry[0] for entry in found), default=0.0)
+    return [entry[1:] for rank, entry in enumerate(found) if rank < 2 or entry[0] > least]
+
+
+def _same_place(candidate, accepted):
+    """A second law at the place, sensor or train of an accepted effect would only mend its shape."""
+    if candidate.key == accepted.key:
+        return True
+    a, b = candidate.where, accepted.where
+    near = "place" in a and "place" in b and abs(a["place"] - b["place"]) < NEAR
+    return near or any(k in a and a[k] == b.get(k) for k in ("sensor", "train"))
 
 
 def amplified(candidate, k, share):

@@ -150,3 +150,36 @@ def test_a_kept_fit_is_not_computed_again():
     again = diagnose(case, MismatchSettings(), store=store)
     assert again.verdict == first.verdict or again.names == first.names
     assert len(calls) < 10  # the verification alone
+
+
+def test_errors_of_another_generator_are_no_effect_where_they_are_integrated_out():
+    """Finding: a null of our own is too optimistic. A smooth error that our simulator does not make, one for each
+    recording, is named as physics when the noise is taken as independent, and not when it is a mode."""
+
+    def foreign(seed, modes):
+        case = Line(lambda x: 1.2 * x + 0.1, seed=seed, slope_sd=0.05)
+        rng = np.random.default_rng([seed, 1])
+        made = []
+        for o in (*case.observations, *case.reserved):
+            x = case.x[o.name]
+            shapes = 0.3 * np.column_stack([x**2, x**3]) / np.abs(x).max() ** 2
+            error = shapes @ rng.normal(size=2)
+            made.append(Observation(o.name, o.condition, o.data + error, 0.05, modes=shapes if modes else None))
+        case.observations, case.reserved = tuple(made[:3]), tuple(made[3:])
+        return diagnose(case).verdict.answer
+
+    ignored = [foreign(seed, modes=False) for seed in range(8)]
+    known = [foreign(seed, modes=True) for seed in range(8)]
+    assert ignored.count("none") == 0  # every control alarms
+    assert known.count("none") == 8
+
+
+def test_whitening_gives_unit_variance_to_what_it_was_told_of():
+    rng = np.random.default_rng(3)
+    modes = rng.normal(size=(40, 5))
+    o = Observation("a", "a", np.zeros(40), 0.3, modes=modes)
+    drawn = np.array([modes @ rng.normal(size=5) + 0.3 * rng.normal(size=40) for _ in range(400)])
+    white = o.whitened(drawn.T)
+    # 16000 numbers of variance 1: the mean square scatters by sqrt(2 / 16000) = 1.1 %
+    assert np.mean(white**2) == pytest.approx(1.0, abs=0.045)
+    assert o.whitened(drawn[0]) == pytest.approx(white[:, 0])
