@@ -91,14 +91,7 @@ def _wheels(case):
     if not case.rollings:
         return
     yield _candidate(physics.ContactStiffness, lambda p: physics.ContactStiffness(**p), ((0.5,),))
-    flats = getattr(case, "flats", None) or {}
     for train in case.trains:
         where = {"train": train}
         yield _candidate(physics.UnsprungMass, lambda p, t=train: physics.UnsprungMass(train=t, **p),
                          ((1.4,), (0.7,)), where, len(case.trains))  # fmt: skip
-    for (train, wheel), (phases, radius, scanned) in flats.items():
-        yield _candidate(
-            physics.WheelFlat,
-            lambda p, w=wheel, r=radius, t=train, f=phases: physics.WheelFlat(w, radius=r, train=t, phases=f, **p),
-            ((0.05,), (0.09,)), {"train": train, "axle": wheel + 1}, scanned,
-        )  # fmt: skip

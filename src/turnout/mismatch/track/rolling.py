@@ -11,7 +11,7 @@ from turnout.simulate.run import Drive, run
 
 SHORTEST_WAVE = 0.3  # of the rail's roughness as modelled [m]
 LOW, HIGH = 5.0, 112.0  # band in which the deterministic part dominates the roughness [Hz]
-RATE = 1800.0  # of the simulation: with Radau IIA 3 % of the waveform below 112 Hz, half of the materiality floor
+RATE = 1800.0  # of the simulation: with Radau IIA 1 to 2 % of the waveform of a band, a third of the materiality floor
 FOLDS = (9, 6, 5)  # steps of the simulation per sample of an observation, the first that holds its band
 LEAD = 0.25  # s of rolling before the first wheel reaches the first sensor
 EDGE = 0.08  # s kept before the first and behind the last wheel

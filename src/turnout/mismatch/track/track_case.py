@@ -50,6 +50,7 @@ class TrackCase(Case):
             raise SimulationError("every recording is reserved for the verification: nothing is left to fit.")
         self.nuisances = tuple(self._nuisances())
         self.candidates = library(self, families)
+        self.flats = families is None or "wheel_flat" in families
 
     def _from_blows(self, observations):
         """Values of the nuisances of track and sensors that the hammer tests alone give: where all fits start."""
@@ -316,6 +317,12 @@ class TrackCase(Case):
     def probes(self):
         """Displacements of rail and sleeper at every support of the zone: what pseudo-forces are made of."""
         return [Probe((kind, j), 0) for j in self.zone.supports for kind in ("rail", "sleeper")]
+
+    def further(self, fit):
+        """Wheels with a flat."""
+        from turnout.mismatch.track.flats import flats
+
+        return flats(self, fit) if self.rollings and self.flats else ()
 
     def screen(self, fit):
         """Linear columns of the candidates that have one."""

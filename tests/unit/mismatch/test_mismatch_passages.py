@@ -1,0 +1,64 @@
+"""Passages: columns against the simulation, a flat found in the residual, our own numerics."""
+
+import numpy as np
+import pytest
+
+from turnout import physics
+from turnout.mismatch import diagnose
+from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.track import TrackCase
+from turnout.mismatch.track.flats import flats
+from turnout.mismatch.track.planned import measured_campaign, small_plan
+from turnout.mismatch.track.rolling import Track1D
+
+
+@pytest.fixture(scope="module")
+def plan():
+    return small_plan((15.0,), blows=(24.0,))
+
+
+@pytest.fixture(scope="module")
+def sound(plan):
+    case = TrackCase(measured_campaign(plan, (), 7))
+    return case, {n.name: case.start_values.get(n.name, n.mean) for n in case.nuisances}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wavelength", [0.9, 0.5])
+def test_the_derivative_by_a_wave_of_the_rail_points_where_the_simulation_goes(sound, wavelength):
+    case, values = sound
+    name = case.waves.names[2 * int(np.argmin(np.abs(case.waves.lengths - wavelength)))]
+    index = [n.name for n in case.nuisances].index(name)
+    seen = [o for o in case.observations if o.name == "heavy 2"]
+    before = case.predict(values, (), seen)
+    column = case.nuisance_jacobian(values, (), seen, before)[0][:, index]
+    change = case.predict({**values, name: case.nuisances[index].sd}, (), seen)[0] - before[0]
+    cosine = change @ column / np.sqrt((change @ change) * (column @ column))
+    assert cosine > 0.9
+
+
+@pytest.mark.slow
+def test_a_flat_is_found_on_its_wheel_with_the_place_where_it_strikes(plan):
+    flat = physics.WheelFlat(2, 0.07, 0.43, 1.1, "heavy")
+    case = TrackCase(measured_campaign(plan, (flat,), 7))
+    found = flats(case, fit_jointly(case, iterations=12))
+    assert found and found[0].where == {"train": "heavy", "axle": 3}
+    turn = 2.0 * np.pi * 0.43
+    for _, phase in found[0].term([0.07]).phases:
+        way = (phase - 1.1 + 0.5 * turn) % turn - 0.5 * turn
+        assert abs(way) < turn / 24.0  # the grid of phases
+    assert found[0].starts[0][0] == pytest.approx(0.07, abs=0.015)
+
+
+@pytest.mark.slow
+def test_no_wheel_is_blamed_where_none_has_a_flat(plan, sound):
+    case, _ = sound
+    assert flats(case, fit_jointly(case, iterations=12)) == ()
+
+
+@pytest.mark.slow
+def test_too_coarse_a_step_is_answered_numerics_and_carries_no_name(plan):
+    """Gauss's scheme at 1.8 kHz folds what nodes and sleepers excite into the band, see docs/decisions."""
+    case = TrackCase(measured_campaign(plan, (), 7), solver=Track1D(1800.0, "gauss"))
+    found = diagnose(case)
+    assert found.verdict.answer == "numerics" and not found.names
