@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from turnout.errors import TurnoutError
-from turnout.mismatch.case import Case, Nuisance
+from turnout.mismatch.case import Nuisance
 
 WIDE = 0.5  # prior sd of an accepted value on its next visit, as a share of its way from neutral: it may well grow
 LEAST_ERRORS = 3.0  # and at least so many of its standard errors
@@ -35,7 +35,7 @@ class Watch:
             raise BudgetSpentError("the time given is up; what is done is kept, the same command goes on from there.")
 
 
-class GuidedCase(Case):
+class GuidedCase:
     """``case`` with ``accepted`` effects in its simulation, each of whose parameters is free as a nuisance.
 
     An effect that was accepted does not come back as a finding; its parameters are estimated anew at every visit,
@@ -43,27 +43,32 @@ class GuidedCase(Case):
     prediction: an interrupted diagnosis asks for the same ones again and goes on within a fit.
     """
 
-    def __init__(self, case, accepted=(), watch=None, replay=None):
+    def __init__(self, case, accepted=(), watch=None, replay=None, track=None):
         self.case, self.watch, self.replay = case, watch or Watch(), replay
-        support = case.track() if accepted else None
-        self.accepted = tuple(a for a in accepted if a.term(support) is not None and a.values)
+        self.base_track = (track or case.track()) if accepted else None
+        self.accepted = tuple(a for a in accepted if a.term(self.base_track) is not None and a.values)
         self.own = tuple(n for a in self.accepted for n in _nuisances(a))
         self.nuisances = (*case.nuisances, *self.own)
-        self.candidates = tuple(
-            c for c in case.candidates if not any(a.is_of(c.family, c.where) for a in self.accepted)
-        )
-        self.observations, self.reserved = case.observations, case.reserved
-        self.frozen_jacobian = case.frozen_jacobian
+        self.candidates = self._new(case.candidates)
 
     def __getattr__(self, name):
         return getattr(self.__dict__["case"], name)
 
+    def _new(self, candidates):
+        """Those that are not accepted already."""
+        return tuple(c for c in candidates if not any(a.is_of(c.family, c.where) for a in self.accepted))
+
+    def _around(self, case):
+        """A cheap view of the same case, with the same accepted effects; it takes seconds and is never cut short."""
+        watch = Watch(None, self.watch.tell)
+        return None if case is None else GuidedCase(case, self.accepted, watch, None, self.base_track)
+
     def standing(self, values):
         """Terms of the accepted effects at these values of their nuisances."""
-        track, made = self.case.track() if self.accepted else None, []
+        made = []
         for a in self.accepted:
             chosen = {p.name: float(values[_name(a, p)]) for p in a.parameters}
-            made.append(a.term(track, chosen))
+            made.append(a.term(self.base_track, chosen))
         return tuple(made)
 
     def predict(self, values, terms, observations):
@@ -104,6 +109,22 @@ class GuidedCase(Case):
         moved = self.predict({**values, nuisance.name: values[nuisance.name] + step}, terms, observations)
         return [(new - old) / step for new, old in zip(moved, base)]
 
+    def own_jacobian(self, values, terms, observation, predicted, names):
+        """Derivatives of an observation by nuisances of its own, with the accepted effects."""
+        return self.case.own_jacobian(values, (*self.standing(values), *terms), observation, predicted, names)
+
+    def cheap_part(self):
+        """The case's, with the accepted effects in it."""
+        return self._around(self.case.cheap_part())
+
+    def roughened(self):
+        """The case's, with the accepted effects in it."""
+        return self._around(self.case.roughened())
+
+    def further(self, fit):
+        """Candidates that the residual suggests beside what was accepted."""
+        return self._new(self.case.further(self._seen(fit)))
+
     def screen(self, fit):
         """Linear columns of the candidates beside what was accepted."""
         return self.case.screen(self._seen(fit))
@@ -121,7 +142,7 @@ class GuidedCase(Case):
 
 
 class _Seen:
-    """A fit whose terms begin with the accepted ones."""
+    """A fit whose terms begin with the accepted ones, as the case inside has to see it."""
 
     def __init__(self, fit, standing):
         self._fit, self.terms = fit, (*standing, *fit.terms)
