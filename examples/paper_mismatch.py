@@ -177,10 +177,10 @@ Leaders with five:
 
 ## Why
 An effect that grows with load looks, under a single train, like anything that makes the loaded track differ from the
-struck one: free numbers that any sound turnout needs (pads, ballast, gains, speed, load) take up most of it, and what
-is left is within the tolerance of 6 % below which a difference is nobody's business. That one train is not enough to
-name anything is the honest answer. Other axle loads and speeds add evidence; how many more, `turnout distinguish` says
-before anybody measures. A coarse description of the rail's shape, which the publication suspects, is a
+struck one: free numbers that any sound turnout needs (pads, ballast, gains, speed, load, waves of the rail) take up most
+of it. One train is not enough to name anything. Other axle loads and speeds add evidence; how much, `turnout distinguish`
+says before anybody measures. Where the fit on a train never used stays low beside the answer "none", thresholds hide what
+is there: a low fit is worth a look whatever the answer. A coarse description of the rail's shape, which the publication suspects, is a
 fault of the simulation and not of the track: that is what the answer "numerics" is for, and the tool looks for it
 first, by halving step and mesh.
 
@@ -197,8 +197,9 @@ def outcome(found):
         )
     if v.answer == "a_or_b" and "pad_preload" in v.names:
         return "The tool named it as one of two."
-    leads = found.verdict.scores and found.verdict.scores[0].family == "pad_preload"
-    return "The tool gave it no name" + (", though it leads the ranking." if leads else ", and it does not lead.")
+    leads = v.scores and v.scores[0].family == "pad_preload"
+    said = "The tool missed it: nothing above its thresholds" if v.answer == "none" else "The tool gave it no name"
+    return said + (", though the right name leads the ranking." if leads else ", and the right name does not lead.")
 
 
 def main():
