@@ -177,12 +177,12 @@ Leaders with five:
 
 ## Why
 An effect that grows with load looks, under a single train, like anything that makes the loaded track differ from the
-struck one: free numbers that any sound turnout needs (pads, ballast, gains, speed, load, waves of the rail) take up most
-of it. One train is not enough to name anything. Other axle loads and speeds add evidence; how much, `turnout distinguish`
-says before anybody measures. Where the fit on a train never used stays low beside the answer "none", thresholds hide what
-is there: a low fit is worth a look whatever the answer. A coarse description of the rail's shape, which the publication suspects, is a
-fault of the simulation and not of the track: that is what the answer "numerics" is for, and the tool looks for it
-first, by halving step and mesh.
+struck one: free numbers that any sound turnout needs (pads, ballast, gains, speed, load, waves of the rail) take up
+most of it. One train is not enough to name anything. Other axle loads and speeds add evidence; how much, `turnout
+distinguish` says before anybody measures. Where the fit on a train never used stays low beside the answer "none",
+thresholds hide what is there: a low fit is worth a look whatever the answer. A coarse description of the rail's
+shape, which the publication suspects, is a fault of the simulation and not of the track: that is what the answer
+"numerics" is for, and the tool looks for it first, by halving step and mesh.
 
 What was concealed: {concealed}. {outcome}
 """
