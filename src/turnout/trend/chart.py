@@ -95,6 +95,7 @@ def _siblings_without_alarm(p, window, settled, summing, settings):
     n = len(p.panel.charts)
     serving = settled[:n]
     for _ in range(SIBLING_ROUNDS):
+        sections = sums = None  # both rounds' arrays together would be the peak of memory
         sections = of_sections(p, window, settled, serving, settings)
         sums = summing(slice(0, n), sections)
         before, serving = serving, settled[:n] & ~(sums["down_open"] | sums["up_open"])

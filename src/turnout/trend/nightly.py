@@ -23,7 +23,7 @@ from turnout.trend.states import chart_status
 from turnout.trend.tables import alarm_rows, baseline_rows, chart_rows
 from turnout.trend.years import digest, split_by_year
 
-CELLS_PER_PART = 2_500_000
+CELLS_PER_PART = 1_500_000
 HAMMER = (
     "select turnout_id, section_id, band, source, measured_at_utc, frequency_hz, frequency_se_hz, rail_temperature_c "
     "from modes_current where source = 'hammer' and coalesce(method, 'joint') = 'joint'"
