@@ -107,7 +107,8 @@ class Candidate:
     ``family`` is the name that a verdict may give, ``where`` the place scanned, ``frame`` what it is fixed to,
     ``scanned`` how many places the family has; ``starts`` are parameter sets that do not depend on the base fit;
     with ``start_from_base`` off the nuisances, too, start from their priors; ``always``: tried on the cheap
-    observations at every place, whatever the residual promises; families with the same word are alike there.
+    observations at every place, whatever the residual promises; families with the same word are alike there;
+    ``least``: distance of the first parameter from neutral below which nobody would act.
     ``parameters`` have name, unit, neutral, bounds and prior as ``turnout.physics.Parameter``.
     """
 
@@ -120,6 +121,7 @@ class Candidate:
     scanned: int = 1
     start_from_base: bool = True
     always: str = ""
+    least: float = 0.0
 
     @property
     def key(self):

@@ -209,8 +209,9 @@ def _over(case, fit, settings):
 
 
 def _judged(case, fit, scored, settings):
-    best = max(scored, key=lambda s: s.gain, default=None)
+    best = max((s for s in scored if s.material), key=lambda s: s.gain, default=None)
     excess = _over(case, fit, settings)
+    scored = tuple(s for s in scored if s.material)
     if best is None:
         return judge([], excess, settings), None
     consistent, structure = True, 0.0

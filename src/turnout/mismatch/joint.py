@@ -68,11 +68,11 @@ def terms_of(candidates, psi):
 class Joint:
     """Least squares of a case with some candidates in it; holds what does not change between steps."""
 
-    def __init__(self, case, candidates=(), observations=None, iterations=6):
+    def __init__(self, case, candidates=(), observations=None, iterations=6, done=DONE):
         self.case, self.candidates = case, tuple(candidates)
         self.observations = tuple(case.observations if observations is None else observations)
         self.parameters = [p for c in self.candidates for p in c.parameters]
-        self.iterations, self.evaluations = iterations, 0
+        self.iterations, self.evaluations, self.done = iterations, 0, done
         self.size = sum(o.n_effective for o in self.observations)
         priors = [(n.mean, n.sd) for n in case.nuisances] + [_prior(p) for p in self.parameters]
         self.mean, self.sd = (np.array(v, dtype=float) for v in zip(*priors)) if priors else (np.zeros(0),) * 2
@@ -178,17 +178,17 @@ def cost_at(case, candidates, psi, values):
     return joint.cost(theta, joint.residuals(joint.predict(theta)))
 
 
-def fit_jointly(case, candidates=(), start=None, values=None, keep=None, observations=None, iterations=6):
+def fit_jointly(case, candidates=(), start=None, values=None, keep=None, observations=None, iterations=6, done=DONE):
     r"""Maximum of the posterior of nuisances and term parameters together.
 
     .. math:: \min_{\eta,\psi} \sum_k n_k \left[\ln s_k^2 + \overline{r^2}_k / s_k^2\right]
               + \sum (\eta - \mu)^2 / \sigma_\eta^2, \quad s_k \ge 1
 
     Damped Gauss-Newton: a step is cut to 0.7 prior standard deviations of any nuisance and halved until the cost
-    falls. ``start`` (n_term,) of psi; ``values`` of the nuisances; ``keep`` a Jacobian whose nuisance columns are
-    used instead of new ones and then updated by Broyden's rank-one formula.
+    falls, until a step gains less than ``done`` nats. ``start`` (n_term,) of psi; ``values`` of the nuisances;
+    ``keep`` a Jacobian whose nuisance columns are used instead of new ones and then updated by Broyden's formula.
     """
-    joint = Joint(case, candidates, observations, iterations)
+    joint = Joint(case, candidates, observations, iterations, done)
     psi = np.array([p.neutral for p in joint.parameters]) if start is None else np.asarray(start, dtype=float)
     known = {**case.start_values, **(values or {})}
     first = [known.get(n.name, n.mean) for n in case.nuisances]
@@ -218,7 +218,7 @@ def _iterate(joint, theta, predictions, residuals, jacobian, cost, frozen):
                 jacobian = _broyden(jacobian, moved / joint.sd**2, moved, residuals, found[2])
                 jacobian = joint.renewed(tried, new, jacobian)
             theta, predictions, residuals, cost = found
-        if gain < max(2.0 * DONE, STALL * joint.size if frozen else 0.0):
+        if gain < max(2.0 * joint.done, STALL * joint.size if frozen else 0.0):
             break
         if not frozen:
             jacobian = joint.jacobian(theta, predictions)

@@ -14,6 +14,7 @@ from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.shortlist import Projector, amplified
 
 STEPS, GLANCE = 15, 4
+ENOUGH = 0.5  # nats; a step that gains less ends a scout's fit
 
 
 @dataclass(frozen=True)
@@ -36,8 +37,8 @@ def scout(case, fit, settings):
         return []
     held, n = fit.candidates, fit.psi.size
     rough = cheap.roughened()
-    first = fit_jointly(rough, held, fit.psi, iterations=STEPS)
-    base = fit_jointly(cheap, held, first.psi, first.values, iterations=STEPS)
+    first = fit_jointly(rough, held, fit.psi, iterations=STEPS, done=ENOUGH)
+    base = fit_jointly(cheap, held, first.psi, first.values, iterations=STEPS, done=ENOUGH)
     entries = _ranked(case, rough, first, held) + _ranked(case, cheap, base, held)
     found, glances = [], {}
     for members in _by_family(entries).values():
@@ -110,7 +111,9 @@ def _glance(rough, first, held, candidate, start):
 def _fitted(rough, cheap, candidates, psi):
     """From the priors through the broad errors to the narrow ones; None where the simulation cannot go there."""
     try:
-        first = fit_jointly(rough, candidates, psi, {n.name: n.mean for n in rough.nuisances}, iterations=STEPS)
-        return fit_jointly(cheap, candidates, first.psi, first.values, iterations=STEPS)
+        first = fit_jointly(
+            rough, candidates, psi, {n.name: n.mean for n in rough.nuisances}, iterations=STEPS, done=ENOUGH
+        )
+        return fit_jointly(cheap, candidates, first.psi, first.values, iterations=STEPS, done=ENOUGH)
     except SimulationError:
         return None

@@ -21,7 +21,15 @@ class Score:
 
     @property
     def family(self):
+        """Name of the effect."""
         return self.candidate.family
+
+    @property
+    def material(self):
+        """It is large enough that somebody would act."""
+        n = len(self.candidate.parameters)
+        size = abs(float(self.fit.psi[-n]) - self.candidate.neutral[0]) if n else np.inf
+        return size >= getattr(self.candidate, "least", 0.0)
 
 
 @dataclass(frozen=True)
@@ -100,7 +108,7 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0):
             sure = sum(probabilities.get(name, 0.0) for name in names)
         return Verdict(answer, tuple(names), grade, float(sure), probabilities, tuple(ranked), reason)
 
-    found = [s for s in ranked if s.gain > settings.threshold]
+    found = [s for s in ranked if s.gain > settings.threshold and s.material]
     if not found:
         if excess > 1.0:
             return verdict("unknown", reason="above the level of controls, and no candidate helps")

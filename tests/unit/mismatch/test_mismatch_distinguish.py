@@ -45,4 +45,5 @@ def test_passages_below_160_hz_are_blind_to_frequency_dependent_pads_and_blows_a
     blows = {n: s for n, s in zip(one_warm_day.names, one_warm_day.seen)}
     # 5 nats of expected evidence are what a name needs
     assert ratio["mount_resonance"] < 5.0 < blows["mount_resonance"]
-    assert ratio["surface_dip"] > 1000.0 and "surface_dip" not in blows  # a hammer does not roll over a dip
+    # the rail's own waves, and each wheel's, take part of what a dip does; a hammer does not roll over it
+    assert ratio["surface_dip"] > 100.0 and "surface_dip" not in blows

@@ -6,6 +6,12 @@ from turnout import physics
 from turnout.mismatch.case import Candidate
 
 DIP_STEP = 0.6  # places of a dip scanned [m]; its own shift covers what lies between
+# Least size worth a name, in the unit of the first parameter: below it nobody would go to the site.
+LEAST = {
+    "high_pass": 2.0, "sensor_gain": 0.04, "sensor_position": 0.05, "time_offset": 5e-5, "clock_drift": 2e-4,
+    "local_pad": 0.15, "local_ballast": 0.15, "hanging_sleeper": 5e-5, "surface_dip": 3e-5, "pad_temperature": 1e-3,
+    "unsprung_mass": 0.07, "contact_stiffness": 0.1, "rail_shear": 0.3,
+}  # fmt: skip
 
 
 def library(case, families=None):
@@ -17,7 +23,9 @@ def library(case, families=None):
 def _candidate(term, make, starts, where=None, scanned=1, base=True, parameters=None, always=""):
     chosen = tuple(p for p in term.parameters if parameters is None or p.name in parameters)
     frame = getattr(term, "frame", "place")
-    return Candidate(term.name, chosen, make, starts, where or {}, frame, scanned, base, always)
+    return Candidate(
+        term.name, chosen, make, starts, where or {}, frame, scanned, base, always, LEAST.get(term.name, 0.0)
+    )
 
 
 def _supports(case):

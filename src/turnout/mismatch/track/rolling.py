@@ -14,6 +14,7 @@ LOW, HIGH = 5.0, 112.0  # band in which the deterministic part dominates the rou
 RATE = 1800.0  # of the simulation: with Radau IIA 1 to 2 % of the waveform of a band, a third of the materiality floor
 FOLDS = (9, 6, 5)  # steps of the simulation per sample of an observation, the first that holds its band
 LEAD = 0.25  # s of rolling before the first wheel reaches the first sensor
+COUPLING = 0.7  # an amplifier's lower corner that no data sheet mentions [Hz]
 EDGE = 0.08  # s kept before the first and behind the last wheel
 SPEED_SD, TIME_SD, LOAD_SD = 0.004, 1.5e-3, 0.05
 
@@ -211,6 +212,19 @@ def observed(rolling, data, noise, tolerance):
         covariates["temperature"] = float(temperature)
     condition = " ".join(said)
     return Observation(rolling.name, condition, data.ravel(), sigma.ravel(), 0.35, "passage", covariates, cells, labels)
+
+
+def coupling_modes(rolling, data):
+    r"""(n_sensor * n_time, n_sensor) modes of amplifiers whose lower corner is not exactly known.
+
+    Well above its corner a high-pass adds :math:`-2 \pi f_c \int a\,dt`; f_c is known to ``COUPLING``.
+    """
+    rows = data.reshape(len(rolling.sensors), -1)
+    velocity = np.cumsum(rows - rows.mean(axis=1, keepdims=True), axis=1) / rolling.clock
+    found = np.zeros((rows.size, rows.shape[0]))
+    for k, row in enumerate(2.0 * np.pi * COUPLING * (velocity - velocity.mean(axis=1, keepdims=True))):
+        found[k * row.size : (k + 1) * row.size, k] = row
+    return found
 
 
 def _cells(rolling):

@@ -116,13 +116,16 @@ class TrackCase(Case):
                 continue
             made, observation = rolling.rolling_of(passage, sensors, reference, speed, self.settings.materiality)
             self.rollings[passage.name] = made
-            modes = wheel_modes(self, {**values, **dict.fromkeys(_own_of(passage), 0.0)}, made, observation.sigma)
-            yield passage.name, replace(observation, modes=modes)
+            modes = (
+                rolling.coupling_modes(made, observation.data),
+                wheel_modes(self, {**values, **dict.fromkeys(_own_of(passage), 0.0)}, made, observation.sigma),
+            )
+            yield passage.name, replace(observation, modes=np.column_stack(modes))
 
     def _nuisances(self):
         yield from track_nuisances(self.zone, self.trains)
         for sensor in self.campaign.sensors:
-            yield Nuisance(f"gain_{sensor.name}", "-", 0.0, GAIN_SD, meaning="gain of a sensor less one")
+            yield Nuisance(f"gain_{sensor.name}", "-", 0.0, GAIN_SD, meaning="gain of a sensor less one", trust=3.0)
             if not sensor.mounting.startswith("sleeper"):
                 yield Nuisance(f"seat_{sensor.name}", "m", 0.0, SEAT_SD, meaning="place of a sensor less its file's")
         if self.waves:
