@@ -32,6 +32,7 @@ EFFECTS = {
     "ballast_inertia": (physics.BallastInertia(200.0, 2e4), {}),
     "sleeper_mode": (physics.SleeperMode(0.3, 250.0), {}),
     "surface_dip": (physics.SurfaceDip(23.1, 6e-4, 0.5), {"place": 23.1}),
+    "wheel_flat": (physics.WheelFlat(2, 0.08, 0.43, 1.1, "heavy"), {"train": "heavy", "axle": 3}),
     "unsprung_mass": (physics.UnsprungMass(1.5, "heavy"), {"train": "heavy"}),
     "sensor_gain": (physics.SensorGain("S3", 1.3), {"sensor": "S3"}),
     "mount_resonance": (physics.MountResonance("S1", 1 / 350.0, 8.0), {"sensor": "S1"}),
