@@ -10,7 +10,7 @@ DIP_STEP = 0.6  # places of a dip scanned [m]; its own shift covers what lies be
 LEAST = {
     "high_pass": 2.0, "sensor_gain": 0.04, "sensor_position": 0.05, "time_offset": 5e-5, "clock_drift": 2e-4,
     "local_pad": 0.15, "local_ballast": 0.15, "hanging_sleeper": 5e-5, "surface_dip": 3e-5, "pad_temperature": 1e-3,
-    "unsprung_mass": 0.07, "contact_stiffness": 0.1, "rail_shear": 0.3,
+    "unsprung_mass": 0.07, "contact_stiffness": 0.1, "rail_shear": 0.9,
 }  # fmt: skip
 
 
