@@ -1,7 +1,5 @@
 """Raw files of a fleet in, registry and pages out. `snakemake --config turnouts=ID` does it for one turnout."""
 
-import os
-
 from snakemake.utils import min_version
 
 from turnout.fleet.launch import launch
@@ -9,10 +7,6 @@ from turnout.readers.formats import FORMATS
 from turnout.readers.units import to_si
 
 min_version("9.14")
-
-# One BLAS thread per process: the processes share the cores among themselves.
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
 
 RUN = launch(config, scan=workflow.is_main_process, formats=FORMATS, to_si=to_si)
 

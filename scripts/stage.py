@@ -1,5 +1,9 @@
 """Rule of any stage: the plan of one shard in, its new units computed, its state out."""
 
-from turnout.fleet.job import stage_job
+from turnout.one_thread import one_thread
+
+one_thread()
+
+from turnout.fleet.job import stage_job  # noqa: E402
 
 stage_job(snakemake.input.plan, snakemake.output.state, snakemake.log[0], snakemake.params, snakemake.threads)

@@ -11,6 +11,7 @@ ALLOWED = {
     "content": set(),
     "errors": set(),
     "records": set(),
+    "one_thread": set(),
     **{room: LOWEST for room in FLOOR},
     **{room: LOWEST | FLOOR for room in PARTS},
     "physics": LOWEST | FLOOR | PARTS,
