@@ -70,7 +70,10 @@ def _with_silent(passage, heard, used, lost):
     times = {used[i].name: passage.motion.passing(passage.offsets, used[i].position) for i in side}
     wrong = {f.detail.split(":")[0] for f in passage.findings}
     side = [i for i in side if used[i].name not in wrong]
-    silent = fell_silent(heard.only(side), [used[i].name for i in side], times, passage.motion.speed)
+    if not side and not lost:
+        return passage
+    names = [used[i].name for i in side]
+    silent = fell_silent(heard.only(side), names, times, passage.motion.speed) if side else ()
     later = {s.name: passage.motion.passing(passage.offsets, s.position) for s in lost}
     later |= {f.detail.split(":")[0]: times[f.detail.split(":")[0]] for f in silent}
     findings = (*passage.findings, *silent)

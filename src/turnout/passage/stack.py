@@ -36,7 +36,7 @@ class Listening:
 
     def only(self, rows) -> Listening:
         """Some of the sensors."""
-        rows = np.asarray(rows)
+        rows = np.asarray(rows, dtype=int)
         levels = self.levels
         part = Levels(levels.values[rows], levels.step, levels.scatter[rows], levels.loud[rows])
         return Listening(part, self.slow[rows], self.positions[rows], self.begin, self.end)

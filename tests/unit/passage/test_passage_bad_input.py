@@ -74,3 +74,12 @@ def test_a_sensor_that_falls_off_halfway_says_until_when_it_is_sound(after, sett
     lost = findings(passage, "sensor_lost")
     assert len(lost) == 1 and lost[0].detail.startswith("c2: ")
     assert lost[0].value == pytest.approx(2.0, abs=0.1)
+
+
+def test_all_channels_clipped_still_tell_that_a_train_came(settings):
+    """Every sensor says nothing about the track; the axles are what the clipped parts let through."""
+    recording = rolling(np.random.default_rng(25), IC3, 40.0, PLACES)
+    samples = np.clip(recording.samples, -0.05, 0.05)
+    passage = analyse(replace(recording, samples=samples), sensors_for(recording), PATTERNS, settings)
+    assert passage.status in ("partly", "quarantined", "rejected")
+    assert {f.detail.split(":")[0] for f in findings(passage, "clipped")} == {c.name for c in recording.channels}
