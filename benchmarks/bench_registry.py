@@ -112,7 +112,7 @@ def empty(folder):
 ARGUMENTS = {
     "section": "'a/b'", "resonance": "'ballast'", "days": "90", "asof": "timestamp '2026-01-01'", "k": "1.0",
     "h": "5.0",    "kind_of_event": "'tamping'", "turnout": "'a'", "from_utc": "'2026-01-01'", "to_utc": "'2026-02-01'",
-    "since": "timestamp '2025-01-01'", "kind_of_class": "'speed'",
+    "above": "0.0003", "since": "timestamp '2025-01-01'", "kind_of_class": "'speed'",
 }  # fmt: skip
 
 

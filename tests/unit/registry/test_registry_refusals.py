@@ -198,7 +198,7 @@ def test_a_derived_table_with_a_bad_row_is_refused_whole(tmp_path, rows, said):
     days = pa.array(["2026-01-01", "2026-01-08"]).cast(pa.timestamp("us"))
     good = {
         "turnout_id": ["t1"] * 2, "section_id": ["t1/A1"] * 2, "band": ["ballast"] * 2, "source": ["hammer"] * 2,
-        "measured_at_utc": days, "epoch": [0, 0], "state": ["ok", "ok"], "z": [0.5, NAN],
+        "measured_at_utc": days, "epoch": [0, 0], "state": ["ok", "ok"], "z": [0.5, NAN], "is_sibling": [True, True],
     }  # fmt: skip
     assert publish(tmp_path / "registry", {"charts": pa.table(good)}).number == 1
     with pytest.raises(RegistryError, match=said) as caught:
