@@ -32,7 +32,7 @@ class Ran:
 def limited(command, cpu):
     """``command`` (list) that the system ends after ``cpu`` seconds of its processor [s], by a signal of its own."""
     soft = int(cpu)
-    return ["sh", "-c", f"ulimit -H -t {soft + 5}; ulimit -S -t {soft}; exec {shlex.join(map(str, command))}"]
+    return ["sh", "-c", f"ulimit -S -t {soft}; ulimit -H -t {soft + 5}; exec {shlex.join(map(str, command))}"]
 
 
 def run(command, folder, logs, wall, cpu):
