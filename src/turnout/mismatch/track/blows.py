@@ -7,7 +7,7 @@ import numpy as np
 
 from turnout.mismatch.case import Observation
 from turnout.mismatch.track.base_model import COMMON, OWN
-from turnout.mismatch.track.skeleton import matrices_of
+from turnout.mismatch.track.skeleton import FixedLinks, matrices_of
 from turnout.receptance import find_impacts
 from turnout.simulate.frequency import responses
 from turnout.simulate.link import Link
@@ -146,25 +146,12 @@ def tangent(terms, track):
     return found
 
 
-class _Tangent:
-    """The ports of terms as matrix entries."""
-
-    def __init__(self, links):
-        self._links = links
-
-    def links(self, track):
-        return self._links
-
-    def rail(self, track):
-        return track
-
-
 class BlowModel:
     """Receptances of one track with terms at given conditions on ``LINES``; ``gradient`` by the supports' values."""
 
     def __init__(self, track, terms):
         self.track, self.terms = track, terms
-        self.added = (*terms, _Tangent(tangent(terms, track)))
+        self.added = (*terms, FixedLinks(tangent(terms, track)))
         self.matrices = matrices_of(track, self.added)
         self.by_place = {}
 

@@ -24,7 +24,7 @@ def matrices_of(track, terms=()):
     for term in terms:
         track = term.rail(track)
     if track.layers != 2:
-        return assemble(track, (_Links(links),))
+        return assemble(track, (FixedLinks(links),))
     extra = frozenset(name for link in links for name, _ in link.ends if name[0] not in ("rail", "sleeper"))
     joins = frozenset(tuple(name for name, _ in link.ends) for link in links if len(link.ends) > 1)
     key = (
@@ -39,16 +39,18 @@ def matrices_of(track, terms=()):
     return _known[key].filled(track, links)
 
 
-class _Links:
-    """Links as a term."""
+class FixedLinks:
+    """Links that are known already, as a term: matrix entries and nothing else."""
 
     def __init__(self, links):
         self._links = links
 
     def links(self, track):
+        """The links, whatever the track."""
         return self._links
 
     def rail(self, track):
+        """The track as it is."""
         return track
 
 
@@ -57,7 +59,7 @@ class Skeleton:
 
     def __init__(self, track, links):
         nothing = [replace(k, stiffness=0.0, damping=0.0, mass=0.0, loss_factor=0.0) for k in links]
-        self.base = assemble(track, (_Links(nothing),))
+        self.base = assemble(track, (FixedLinks(nothing),))
         self.values = {name: getattr(track, name) for name, *_ in VALUES}
         self.places = {tag: self._places(track, tag) for tag in ("pad", "ballast", "sleeper")}
 
@@ -86,7 +88,7 @@ class Skeleton:
                 diagonal, row, weight, support = self.places[tag]
                 np.add.at(made[what], (diagonal, row), weight * more[support])
         if any(k.loss_factor for k in links) or track.pad_loss_factor.any() or track.ballast_loss_factor.any():
-            return assemble(track, (_Links(links),))  # hysteresis goes with the stiffness: the plain way
+            return assemble(track, (FixedLinks(links),))  # hysteresis goes with the stiffness: the plain way
         for link in links:
             rows, weights = link_vector(link, base.index)
             for a, wa in zip(rows, weights):
