@@ -183,3 +183,56 @@ def test_whitening_gives_unit_variance_to_what_it_was_told_of():
     # 16000 numbers of variance 1: the mean square scatters by sqrt(2 / 16000) = 1.1 %
     assert np.mean(white**2) == pytest.approx(1.0, abs=0.045)
     assert o.whitened(drawn[0]) == pytest.approx(white[:, 0])
+
+
+class Offset(Line):
+    """A sensor with an offset on x in 1 to 2; ``known`` tells whether the model has that nuisance."""
+
+    def __init__(self, seed, known):
+        super().__init__(lambda x: x, seed, powers=(2, 3))
+        rng = np.random.default_rng(seed)
+        self.x = {n: 1.0 + 0.1 * k + np.linspace(0.0, 1.0, 60) for k, n in enumerate(self.x)}
+        data = {n: 1.2 * x + 0.5 + 0.01 * rng.normal(size=x.size) for n, x in self.x.items()}
+        made = [Observation(n, n, y, 0.01) for n, y in data.items()]
+        self.observations, self.reserved = tuple(made[:3]), tuple(made[3:])
+        if not known:
+            self.nuisances = self.nuisances[:1]
+
+    def predict(self, values, terms, observations):
+        return super().predict({"level": 0.0, **values}, terms, observations)
+
+
+def test_a_nuisance_that_is_missing_comes_back_as_physics_and_is_none_where_it_is_known():
+    """Finding: an offset forgotten in the model is a bent law; with the offset free nothing is missing."""
+    forgotten = [diagnose(Offset(seed, known=False)) for seed in range(6)]
+    known = [diagnose(Offset(seed, known=True)).verdict.answer for seed in range(6)]
+    best = [max(d.scored, key=lambda s: s.gain) for d in forgotten]
+    assert all(b.gain > MismatchSettings().threshold for b in best)  # each looks like a discovery
+    assert known == ["none"] * 6
+
+
+def test_two_laws_that_agree_on_one_condition_are_told_apart_by_another():
+    """Finding: what is left out must differ in condition. x|x| follows x³ on one reach with another slope; on further
+    reaches it cannot, although neither data nor noise are more."""
+
+    def margin(reaches, seed):
+        case = Line(lambda x: x + 0.1 * x**3, seed, powers=(3,), noise=0.08)
+        rng = np.random.default_rng(seed)
+        case.x = {f"part {k}": np.linspace(-r, r, 60) for k, r in enumerate(reaches)}
+        data = {n: x + 0.1 * x**3 + 0.08 * rng.normal(size=x.size) for n, x in case.x.items()}
+        case.observations, case.reserved = tuple(Observation(n, n, y, 0.08) for n, y in data.items()), ()
+        parameter = Parameter("amount", "-", 0.0, (-2.0, 2.0), "share of a law", "made up 2026")
+        square = Candidate("signed_square", (parameter,), lambda psi: ("square", psi["amount"]), ((0.3,),))
+        case.candidates = (*case.candidates, square)
+        law = {3: lambda x: x**3, "square": lambda x: x * np.abs(x)}
+        case.predict = lambda v, terms, obs: [
+            v["level"] + v["slope"] * case.x[o.name] + sum(a * law[p](case.x[o.name]) for p, a in terms) for o in obs
+        ]
+        gain = {s.family: s.gain for s in diagnose(case).scored}
+        return gain["power_3"] - gain["signed_square"]
+
+    asked = MismatchSettings().margin
+    same = [margin((1.5, 1.5, 1.5), seed) for seed in range(6)]
+    other = [margin((0.5, 1.5, 3.0), seed) for seed in range(6)]
+    assert max(np.abs(same)) < asked  # cannot tell
+    assert min(other) > asked
