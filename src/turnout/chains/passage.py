@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 
 from turnout.chains.passage_rows import finding_rows, fit_row, passage_row
@@ -15,7 +15,7 @@ from turnout.passage.continuous import cut_passages
 from turnout.passage.findings import PassageSensor
 from turnout.passage.load import axle_load
 from turnout.passage.train_data import listed_for, listed_trains
-from turnout.records import ModalModel, Unit
+from turnout.records import ModalModel, Recording, Unit
 from turnout.registry.ids import content_id
 
 
@@ -68,11 +68,12 @@ def passage_unit(
     rows: dict[str, list[dict]] = {"recordings": [], "passages": [], "passage_fits": [], "quarantine": []}
     description = _described(turnout).description
     for path, size, _ in unit.files:
-        result = read_or_quarantine(path, raw_root, description, base, rows["quarantine"], "passage")
+        longest = turnout.settings["passage"].longest
+        result = read_or_quarantine(path, raw_root, description, base, rows["quarantine"], "passage", longest=longest)
         if result is None:
             continue
         recording_id = result.sha256[:32]
-        for recording in result.recordings:
+        for recording in sorted((*result.recordings, *result.long), key=lambda r: r.record):
             started_at = recording.started_at or _time_in(unit.label)
             if started_at is None:
                 remedy = "Put the time in its name as YYYYMMDDTHHMMSSZ, or record it in the file"
@@ -81,9 +82,14 @@ def passage_unit(
                     quarantine_row(error, base, "passage", "passage", recording.record, recording_id)
                 )
                 continue
-            for part, late, name in trains_in(recording, turnout.settings["passage"]):
-                moment = started_at + timedelta(seconds=late)
-                _one_train(part, moment, recording_id, path, turnout, context, rows, name)
+            try:
+                for part, late, name in trains_in(recording, turnout.settings["passage"]):
+                    moment = started_at + timedelta(seconds=late)
+                    _one_train(part, moment, recording_id, path, turnout, context, rows, name)
+            except ReadError as error:  # a long record is read as it goes: its file may be damaged or change meanwhile
+                rows["quarantine"].append(
+                    quarantine_row(error, base, "passage", "passage", recording.record, recording_id)
+                )
         first = rows["passages"][0]["passage_id"] if rows["passages"] else None
         rows["recordings"].append(recording_row(result, path, size, description, base, "passage", passage_id=first))
     return rows
@@ -116,16 +122,20 @@ def _described(turnout: TurnoutConfig) -> PassageConfig:
 def trains_in(recording, settings):
     """(recording, seconds after the start, name) of every passage in a record: itself, unless it is a continuous one.
 
-    What is longer than ``settings.longest`` comes from a logger that never stops, and is cut at the quiet times.
+    What is longer than ``settings.longest`` comes from a logger that never stops, and is cut at the quiet times; a
+    ``LongRecording`` is read stretch by stretch meanwhile, with a ReadError where its file turns out damaged.
     """
     if recording.duration <= settings.longest:
         yield recording, 0.0, ()
         return
-    rows = recording.of_quantity("acceleration")
-    step, channels = max(round(settings.chunk * recording.rate), 1), tuple(recording.channels[i] for i in rows)
-    blocks = (recording.samples[rows, k : k + step] for k in range(0, recording.n_sample, step))
+    rows = list(recording.of_quantity("acceleration"))
+    known = {
+        name: getattr(recording, name) for name in ("rate", "kind", "source", "record", "started_at", "conditions")
+    }
+    channels = tuple(recording.channels[i] for i in rows)
+    blocks = (block[rows] for block in recording.stretches(settings.chunk))
     for piece in cut_passages(blocks, recording.rate, settings):
-        part = replace(recording, samples=piece.samples.astype(float), channels=channels)
+        part = Recording(samples=piece.samples.astype(float), channels=channels, **known)
         yield part, piece.start / recording.rate, (str(piece.start),)
 
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
+from datetime import timedelta
 from pathlib import Path
 
-import numpy as np
-
-from turnout.chains.passage import _time_in, sensors_of
+from turnout.chains.passage import _time_in, sensors_of, trains_in
 from turnout.chains.passage_context import read_clusters, read_loads
 from turnout.config.turnout import TurnoutConfig
 from turnout.errors import ReadError
@@ -19,6 +18,7 @@ from turnout.passage.clusters import Clusters, fit_clusters
 from turnout.passage.load import LoadCalibration, calibrate, quasi_static, train_amplitude
 from turnout.passage.train_data import listed_for, listed_trains
 from turnout.readers import read
+from turnout.records import LongRecording, Recording
 
 MOST_PASSAGES = 20_000  # for the clusters: more change no boundary, and mixtures take time
 RECENT = """
@@ -70,19 +70,28 @@ def _weighed(unit, turnout, raw_root, patterns, settings, listed):
     found = []
     for path, *_ in unit.files:
         try:
-            result = read(path, raw_root, turnout.passages.description)
+            result = read(path, raw_root, turnout.passages.description, settings.longest)
+            everything: list[Recording | LongRecording] = [*result.recordings, *result.long]
+            for recording in everything:
+                started = recording.started_at or _time_in(unit.label)
+                if started is None:
+                    continue
+                for part, late, _ in trains_in(recording, settings):
+                    moment = started + timedelta(seconds=late)
+                    found += _weighed_train(part, moment, path, turnout, patterns, settings, listed)
         except ReadError:
             continue  # the passage stage has put it into quarantine
-        for recording in result.recordings:
-            passage = analyse(recording, sensors_of(turnout), patterns, settings)
-            started = recording.started_at or _time_in(unit.label)
-            if passage.status != "accepted" or started is None:
-                continue
-            moment = started + np.timedelta64(round(1e6 * float(passage.times[0])), "us").astype(object)
-            train = listed_for(moment, passage.n_axle, listed, settings.train_data_tolerance)
-            if train is not None:
-                found.append(_what_sensors_say(path, recording, passage, sensors_of(turnout), train))
     return found
+
+
+def _weighed_train(recording, started, path, turnout, patterns, settings, listed):
+    """What the sensors say of one passage, [] where it is not sound or its weight is not known."""
+    passage = analyse(recording, sensors_of(turnout), patterns, settings)
+    if passage.status != "accepted":
+        return []
+    moment = started + timedelta(seconds=round(float(passage.times[0]), 6))
+    train = listed_for(moment, passage.n_axle, listed, settings.train_data_tolerance)
+    return [] if train is None else [_what_sensors_say(path, recording, passage, sensors_of(turnout), train)]
 
 
 def _what_sensors_say(path, recording, passage, sensors, train):

@@ -7,13 +7,14 @@ from turnout.readers import read
 from turnout.registry.ids import content_id
 
 
-def read_or_quarantine(path, raw_root, description, base, quarantine, kind, known=None):
+def read_or_quarantine(path, raw_root, description, base, quarantine, kind, known=None, longest=None):
     """ReadResult of one file, or None; a quarantine row for the file or for each damaged record.
 
-    ``known`` maps the files that were read before to their ids: the same bytes are not used twice.
+    Records of more than ``longest`` seconds of a large file stay in it. ``known`` maps the files that were read before
+    to their ids: the same bytes are not used twice.
     """
     try:
-        result = read(path, raw_root, description)
+        result = read(path, raw_root, description, longest)
     except ReadError as error:
         quarantine.append(quarantine_row(error, base, kind, "read"))
         return None
@@ -25,7 +26,7 @@ def read_or_quarantine(path, raw_root, description, base, quarantine, kind, know
             twice = ReadError(path, "the file", f"same bytes as {other}", "Delete one of them", reason="duplicate")
             quarantine.append(quarantine_row(twice, base, kind, "read", None, recording_id))
             return None
-    return result if result.recordings else None
+    return result if result.recordings or result.long else None
 
 
 def quarantine_row(error: ReadError, base, kind, stage, record=None, recording_id=None) -> dict:
@@ -48,7 +49,8 @@ def quarantine_row(error: ReadError, base, kind, stage, record=None, recording_i
 
 def recording_row(result, path, size, description, base, kind, **more) -> dict:
     """Row of ``recordings``."""
-    first = result.recordings[0]
+    everything = (*result.recordings, *result.long)
+    first = everything[0]
     return {
         "recording_id": result.sha256[:32],
         "turnout_id": base["turnout_id"],
@@ -60,7 +62,7 @@ def recording_row(result, path, size, description, base, kind, **more) -> dict:
         "file_bytes": size,
         "sampling_rate_hz": first.rate,
         "n_channels": len(first.channels),
-        "n_records": len(result.recordings),
+        "n_records": len(everything),
         "n_samples": first.n_sample,
         "expected_n_samples": description.n_samples,
         **more,

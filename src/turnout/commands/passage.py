@@ -22,28 +22,38 @@ def run(args: argparse.Namespace) -> int:
     """Print the train of each record and, unless told otherwise, the fit at each sensor."""
     from pathlib import Path
 
-    from turnout.chains.passage import sensors_of
+    from turnout.chains.passage import trains_in
     from turnout.chains.passage_context import passage_context
     from turnout.config import load_configuration
     from turnout.errors import ConfigError
-    from turnout.passage.analyse import analyse
     from turnout.readers import read
 
     turnout = load_configuration(args.configuration).turnout(args.turnout)
     if turnout.passages is None:
         raise ConfigError(turnout.layout, "passages", "nothing about passages", "Add them to the layout")
     path = Path(args.file)
-    result = read(path.name, path.parent, turnout.passages.description)
+    settings = turnout.settings["passage"]
+    result = read(path.name, path.parent, turnout.passages.description, settings.longest)
     for error in result.errors:
         print(f"Not used: {error}")
-    settings = turnout.settings["passage"]
     _, context = passage_context(turnout.id, args.work, settings)
-    for recording in result.recordings:
-        passage = analyse(recording, sensors_of(turnout), context.patterns, settings)
-        print("\n".join(_train(recording, passage)))
-        if passage.n_axle and not args.no_fit:
-            print("\n".join(_fits(recording, passage, turnout, context, settings)))
+    for whole in (*result.recordings, *result.long):
+        for recording, late, name in trains_in(whole, settings):
+            _show(recording, late if name else None, turnout, context, settings, args.no_fit)
     return 0
+
+
+def _show(recording, late, turnout, context, settings, no_fit):
+    """Print one train, and how it is fitted."""
+    from turnout.chains.passage import sensors_of
+    from turnout.passage.analyse import analyse
+
+    if late is not None:
+        print(f"{late:.1f} s after the start of the record:")
+    passage = analyse(recording, sensors_of(turnout), context.patterns, settings)
+    print("\n".join(_train(recording, passage)))
+    if passage.n_axle and not no_fit:
+        print("\n".join(_fits(recording, passage, turnout, context, settings)))
 
 
 def _train(recording, passage) -> list[str]:

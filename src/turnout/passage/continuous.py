@@ -40,9 +40,29 @@ def cut_passages(blocks: Iterable[np.ndarray], rate: float, settings) -> Iterato
         [Hz]
     """
     state = _Cutter(rate, settings)
-    for block in blocks:
-        yield from state.feed(np.atleast_2d(block))
+    for block in equal_blocks(blocks, max(round(settings.chunk * rate), 1)):
+        yield from state.feed(block)
     yield from state.end()
+
+
+def equal_blocks(blocks, length: int) -> Iterator[np.ndarray]:
+    """The same samples in blocks of ``length``, the last one shorter: what is found must not depend on the blocks.
+
+    >>> [b.tolist() for b in equal_blocks([np.array([[1, 2]]), np.array([[3, 4, 5]])], 3)]
+    [[[1, 2, 3]], [[4, 5]]]
+    """
+    parts, n = [], 0
+    for block in blocks:
+        block = np.atleast_2d(block)
+        while block.shape[1]:
+            take = min(length - n, block.shape[1])
+            parts.append(block[:, :take])
+            block, n = block[:, take:], n + take
+            if n == length:
+                yield np.concatenate(parts, axis=1)
+                parts, n = [], 0
+    if parts:
+        yield np.concatenate(parts, axis=1)
 
 
 @dataclass

@@ -1,14 +1,19 @@
 """Raw files of ten kinds -> ``Recording`` in SI units, or a reason why not."""
 
+from dataclasses import replace
+
 from turnout.readers.description import describe
 from turnout.readers.formats import FORMATS, detect
 from turnout.readers.places import load
-from turnout.records import RawDescription, ReadResult
+from turnout.records import LongRecording, RawDescription, ReadResult, Recording
 
 __all__ = ["FORMATS", "read"]
 
 
-def read(path, root, description: RawDescription) -> ReadResult:
+HELD = 32 * 2**20  # bytes: a file up to this size is read whole, whatever its length in time
+
+
+def read(path, root, description: RawDescription, longest: float | None = None, held: int = HELD) -> ReadResult:
     """Recordings of one raw file, in SI units, in the order and with the signs that the configuration promises.
 
     Parameters
@@ -19,11 +24,16 @@ def read(path, root, description: RawDescription) -> ReadResult:
         The raw root: nothing outside it is opened, symbolic links included.
     description : RawDescription
         Format (or "auto"), channel map with units and sensitivities, rate, counts, time zone.
+    longest : float or None
+        Records of more seconds than this stay in a file of more than ``held`` bytes and come as ``LongRecording``;
+        None: every record is read.
+    held : int
 
     Returns
     -------
     ReadResult
-        Sound records, one ReadError for each damaged one, sha256 of the file's bytes.
+        Sound records, one ReadError for each damaged one, sha256 of the file's bytes. A long record has been read
+        through once, to know which of its channels are sound.
 
     Raises
     ------
@@ -44,22 +54,16 @@ def read(path, root, description: RawDescription) -> ReadResult:
     array([   0. , 4347.8,    0. ])
     """
     source = load(path, root)
-    before = _state(source)
+    source = replace(source, stay=longest is not None and source.size > held)
+    before = source.state()
     raw = _format(source, description).read_raw(source)
     digest = source.sha256()
-    if _state(source) != before:
+    recordings, errors = describe(raw, description, source, longest)
+    if source.state() != before:
         raise source.error("the file", "it changed while it was read", "Start again when its copying has ended")
-    recordings, errors = describe(raw, description, source)
-    return ReadResult(recordings=recordings, errors=errors, sha256=digest)
-
-
-def _state(source):
-    """Size and time of change; None where the file is gone."""
-    try:
-        status = source.path.stat()
-    except OSError:
-        return None
-    return status.st_size, status.st_mtime_ns
+    held_back = tuple(r for r in recordings if isinstance(r, LongRecording))
+    whole = tuple(r for r in recordings if isinstance(r, Recording))
+    return ReadResult(recordings=whole, errors=errors, sha256=digest, long=held_back)
 
 
 def _format(source, description):

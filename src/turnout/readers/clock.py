@@ -8,6 +8,8 @@ import numpy as np
 
 from turnout.errors import ReadError
 
+PART = 2**18  # samples of a time column that are looked at together
+USUAL = 2**21  # samples that the usual step is taken from
 STAMP = "%Y-%m-%d %H:%M:%S.%f"
 
 
@@ -55,24 +57,32 @@ def rate_of_time(time):
     """
     time = np.asarray(time, dtype=float)
     span = time[-1] - time[0]
-    steps = np.diff(time)
-    step = float(np.median(steps))
-    jumps = np.abs(steps - step) > 0.5 * step
-    if jumps.any():
-        return 1.0 / step, 1e-9, int(np.argmax(jumps))
+    step = float(np.median(np.diff(time[:USUAL])))
+    for start, part in _parts(time):
+        jumps = np.abs(np.diff(part) - step) > 0.5 * step
+        if jumps.any():
+            return 1.0 / step, 1e-9, start + int(np.argmax(jumps))
     rate = (time.size - 1) / span
-    deviation = np.abs(time - time[0] - np.arange(time.size) / rate).max()
+    deviation = max(
+        np.abs(part - time[0] - np.arange(start, start + part.size) / rate).max() for start, part in _parts(time)
+    )
     return float(rate), float(max(2 * deviation / span, 1e-9)), None
+
+
+def _parts(time):
+    """(first index, samples) of consecutive parts that share one sample: hours are looked at in little memory."""
+    for start in range(0, max(time.size - 1, 1), PART):
+        yield start, time[start : start + PART + 1]
 
 
 def check_time(time, where, source):
     """ReadError where a time column runs backwards, is not finite, or jumps over missing samples."""
-    if not np.isfinite(time).all():
-        found = f"the time of sample {int(np.argmin(np.isfinite(time)))} is not a number"
-        raise source.error(where, found, reason="not_finite")
-    steps = np.diff(time)
-    if (steps <= 0).any():
-        k = int(np.argmax(steps <= 0))
+    for start, part in _parts(time):
+        if not np.isfinite(part).all():
+            found = f"the time of sample {start + int(np.argmin(np.isfinite(part)))} is not a number"
+            raise source.error(where, found, reason="not_finite")
+    backwards = (start + int(np.argmax(b)) for start, part in _parts(time) if (b := np.diff(part) <= 0).any())
+    if (k := next(backwards, None)) is not None:
         found = (
             f"the clock runs backwards or stands still: sample {k} at {time[k]:.9g} s, the next at {time[k + 1]:.9g} s"
         )

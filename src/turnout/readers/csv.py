@@ -18,6 +18,7 @@ from pyarrow import csv
 
 from turnout.readers.raw import COPY_AGAIN, RawFile, RawRecord
 from turnout.readers.stamps import moment
+from turnout.readers.stored import Column
 from turnout.readers.variables import COUNT, RATE, START, STEP, TIME, Facts
 
 NOTE = re.compile(r"^#?\s*([A-Za-z_][\w .]*?)\s*[:=,;\t]\s*(.*)$")
@@ -27,28 +28,30 @@ NOTES = {*RATE, *STEP, *START, *COUNT, "n_samples"}
 
 def read_raw(source) -> RawFile:
     """Records of a text file."""
-    if source.data[-1:] not in (b"\n", b"\r"):
+    data = source.mapped if source.stay else source.data
+    if data[-1:] not in (b"\n", b"\r"):
         found = "the last line has no line break: its last number may be cut"
         line = source.data.count(b"\n") + 1
         raise source.error(
             f"line {line}", found, f"{COPY_AGAIN}, or add the line break if it is whole", reason="truncated"
         )
-    head, names, units, at, separator = _head(source)
-    columns = _table(source, at, separator, len(names))
+    head, names, units, at, separator = _head(data, source)
+    read = _staying if source.stay and "record" not in [name.strip().lower() for name in names] else _table
+    columns = read(source, data, at, separator, names)
     facts = Facts(head, source)
     records = tuple(_records(columns, names, units, facts, source))
     return RawFile(records, facts.count(COUNT))
 
 
-def _head(source):
+def _head(data, source):
     """(notes, names, units, offset of the first number, separator)."""
     notes: dict[str, float | str] = {}
     before: list[list[str]] = []
     position = 0
-    while position < len(source.data):
-        end = source.data.find(b"\n", position)
-        end = len(source.data) if end < 0 else end
-        line = source.data[position:end].decode("utf-8-sig", "replace").strip("\r\n")
+    while position < len(data):
+        end = data.find(b"\n", position)
+        end = len(data) if end < 0 else end
+        line = data[position:end].decode("utf-8-sig", "replace").strip("\r\n")
         separator = max(("\t", ";", ","), key=line.count)
         cells = [cell.strip().strip('"') for cell in line.split(separator)]
         if line.strip() and all(_is_number(cell) or cell == "" for cell in cells) and any(cells):
@@ -90,26 +93,80 @@ def _names(lines, count):
     return names, units
 
 
-def _table(source, at, separator, width):
+def _table(source, data, at, separator, names):
     """Columns of numbers."""
-    first = source.data[at : at + 4096]
+    options = _options(data, at, separator, len(names))
+    with source.parsed_by("pyarrow", f"the numbers after line {_line(data, at)}"):
+        table = csv.read_csv(io.BytesIO(memoryview(data)[at:]), **options)
+    return [column.to_numpy(zero_copy_only=False) for column in table.columns]
+
+
+def _staying(source, data, at, separator, names):
+    """Columns that read on when they are asked; a time column is read at once."""
+    options = _options(data, at, separator, len(names))
+    time = next((i for i, name in enumerate(names) if name.strip().lower() in TIME), None)
+    rows = Rows(source.path, at, options)
+    with source.parsed_by("pyarrow", f"the numbers after line {_line(data, at)}"):
+        read = rows.scan(time)
+    columns = [rows.column(i) for i in range(len(names))]
+    return columns if time is None else [*columns[:time], read, *columns[time + 1 :]]
+
+
+def _line(data, at):
+    return data[:at].count(b"\n")
+
+
+class Rows:
+    """Rows of a text file, read one after the other; asked for what has gone by, the reading starts again."""
+
+    def __init__(self, path, at, options):
+        self.path, self.at, self.options = path, at, options
+        self.n_row, self.begin, self.held, self.reader = 0, 0, [], None
+
+    def scan(self, time):
+        """Count the rows; (n_row,) of the column ``time`` on the way, None without one."""
+        found = []
+        for batch in self._opened():
+            self.n_row += batch.num_rows
+            if time is not None:
+                found.append(batch.column(time).to_numpy(zero_copy_only=False))
+        return None if time is None else np.concatenate(found)
+
+    def column(self, i):
+        """Column number ``i``."""
+        return Column(lambda start, stop: self._stretch(i, start, stop), self.n_row, np.dtype(float))
+
+    def _opened(self):
+        file = self.path.open("rb")
+        file.seek(self.at)
+        return csv.open_csv(file, **self.options)
+
+    def _stretch(self, i, start, stop):
+        if self.reader is None or start < self.begin:
+            self.reader, self.begin, self.held = self._opened(), 0, []
+        end = self.begin + sum(batch.num_rows for batch in self.held)
+        while end < stop:
+            self.held.append(self.reader.read_next_batch())
+            end += self.held[-1].num_rows
+            while self.begin + self.held[0].num_rows <= start:
+                self.begin += self.held.pop(0).num_rows
+        table = pa.Table.from_batches(self.held).slice(start - self.begin, stop - start)
+        return table.column(i).to_numpy()
+
+
+def _options(data, at, separator, width):
+    """How pyarrow reads the numbers from byte ``at`` on."""
+    first = data[at : at + 4096]
     point = "," if separator != "," and b"," in first and b"." not in first else "."
-    head = source.data[:at].count(b"\n")
-    options = csv.ConvertOptions(
+    converting = csv.ConvertOptions(
         column_types={str(i): pa.float64() for i in range(width)},
         decimal_point=point,
         null_values=["", "NaN", "nan", "NA", "-"],
         strings_can_be_null=True,
     )
     reading = csv.ReadOptions(use_threads=False, column_names=[str(i) for i in range(width)], block_size=1 << 24)
-    with source.parsed_by("pyarrow", f"the numbers after line {head}"):
-        table = csv.read_csv(
-            io.BytesIO(memoryview(source.data)[at:]),
-            read_options=reading,
-            parse_options=csv.ParseOptions(delimiter=separator),
-            convert_options=options,
-        )
-    return [column.to_numpy(zero_copy_only=False) for column in table.columns]
+    parsing = csv.ParseOptions(delimiter=separator)
+    return {"read_options": reading, "parse_options": parsing, "convert_options": converting}
 
 
 def _records(columns, names, units, facts, source):
@@ -134,7 +191,7 @@ def _records(columns, names, units, facts, source):
         start = facts.one((f"started_at_{k}", *START), k, n)
         yield RawRecord(
             names=tuple(names[i] for i in kept),
-            samples=[columns[i][a:b] for i in kept],
+            samples=[columns[i] if isinstance(columns[i], Column) else columns[i][a:b] for i in kept],
             rate=facts.rate(),
             units=tuple(units[i] for i in kept),
             started_at=moment(start),

@@ -8,17 +8,19 @@ import numpy as np
 from turnout.errors import ReadError
 from turnout.readers.channels import mappings
 from turnout.readers.clock import check_order, check_time, settled_rate, started_at
+from turnout.readers.long_record import Soundness, Stretches, fault
 from turnout.readers.raw import COPY_AGAIN
-from turnout.records import RawDescription, Recording
+from turnout.records import LongRecording, RawDescription, Recording
 
 TOO_SHORT = 2  # samples; one sample has neither rate nor spread
 
 
-def describe(raw, description: RawDescription, source):
+def describe(raw, description: RawDescription, source, longest=None):
     """(recordings, errors) of a raw file; a damaged record costs that record only.
 
     In a passage, a channel that is dead or not finite costs that channel only: the recording goes without it and
-    the error says so. A hammer test needs all its channels.
+    the error says so. A hammer test needs all its channels. A record of more than ``longest`` seconds becomes a
+    ``LongRecording`` where the source lets samples stay in the file.
     """
     if not raw.records and not raw.expected:
         raise source.error("the file", "it holds no record", COPY_AGAIN, reason="empty")
@@ -35,7 +37,8 @@ def describe(raw, description: RawDescription, source):
                 raise record
             if k in backwards:
                 raise backwards[k]
-            recording, lost = _recording(record, k, len(raw.records), description, source)
+            limit = longest if source.stay and description.kind == "passage" else None
+            recording, lost = _recording(record, k, len(raw.records), description, source, limit)
             recordings.append(replace(recording, started_at=dict(starts)[k]))
             errors.extend(lost)
         except ReadError as error:
@@ -59,8 +62,8 @@ def _count_errors(raw, description, source):
         yield source.error(f"record {description.n_records + 1}", found, remedy, reason="wrong_length")
 
 
-def _recording(record, k, n_record, description, source):
-    """(Recording, errors of its lost channels) of raw record ``k``; ReadError where it cannot be used."""
+def _recording(record, k, n_record, description, source, longest):
+    """(recording, errors of its lost channels) of raw record ``k``; ReadError where it cannot be used."""
     where = f"record {k + 1} of {n_record}"
     n_sample = _sample_count(record, where, description.n_samples, source)
     if record.time is not None:
@@ -69,25 +72,26 @@ def _recording(record, k, n_record, description, source):
     mapped = mappings(record, description.channels, where, source)
     if not mapped:
         raise source.error(where, "the layout wants none of its channels", "Name channels in the layout")
-    samples = np.empty((len(mapped), n_sample))
-    for row, m in zip(samples, mapped):
-        np.multiply(record.samples[m.index], m.scale, out=row)
-        if m.offset:
-            row += m.offset
-    faults = {i: e for i, m in enumerate(mapped) if (e := _fault(samples[i], m.channel, where, source)) is not None}
+    stretches = Stretches(record, mapped, where, source, source.state())
+    stays = longest is not None and n_sample / rate > longest
+    samples = np.empty((0, 0)) if stays else stretches(0, n_sample)
+    judged = Soundness.over(stretches, n_sample).by_channel() if stays else [_judged(row) for row in samples]
+    faults = {i: e for i, j in enumerate(judged) if (e := fault(n_sample, j, mapped[i].channel, where, source))}
     if faults and (description.kind != "passage" or len(faults) == len(mapped)):
         raise next(iter(faults.values()))
     kept = [i for i in range(len(mapped)) if i not in faults]
-    recording = Recording(
-        samples=samples if not faults else samples[kept],
-        rate=rate,
-        channels=tuple(mapped[i].channel for i in kept),
-        kind=description.kind,
-        source=source.name,
-        record=k,
-        conditions=MappingProxyType(dict(record.conditions)),
-    )
-    return recording, list(faults.values())
+    known = {
+        "rate": rate,
+        "channels": tuple(mapped[i].channel for i in kept),
+        "kind": description.kind,
+        "source": source.name,
+        "record": k,
+        "conditions": MappingProxyType(dict(record.conditions)),
+    }
+    lost = list(faults.values())
+    if stays:
+        return LongRecording(stretches.of(kept), n_sample, **known), lost
+    return Recording(samples=samples if not faults else samples[kept], **known), lost
 
 
 def _sample_count(record, where, promised, source):
@@ -112,18 +116,11 @@ def _sample_count(record, where, promised, source):
     return shortest
 
 
-def _fault(row, channel, where, source):
-    """ReadError of a channel with NaN, infinity, or no movement at all; None for a sound one."""
-    place = f"{where}, channel {channel.name!r}"
+def _judged(row):
+    """(samples that are not finite, the first of them, first value, whether all are equal) of a channel (n,)."""
     with np.errstate(over="ignore", invalid="ignore"):
         suspect = not np.isfinite(row.sum())
+    n_bad, first_bad = 0, -1
     if suspect and not (finite := np.isfinite(row)).all():
-        found = (
-            f"{np.count_nonzero(~finite)} of {row.size} samples are not finite, the first is sample {np.argmin(finite)}"
-        )
-        return source.error(place, found, "Export the record again from the logger", reason="not_finite")
-    constant = row[0] == row[-1] and row.min() == row.max()
-    if constant and channel.quantity != "temperature":
-        found = f"all {row.size} samples are {row[0]:.6g}: the channel is dead"
-        return source.error(place, found, "Check sensor, cable and channel map", reason="dead_channel")
-    return None
+        n_bad, first_bad = int(np.count_nonzero(~finite)), int(np.argmin(finite))
+    return n_bad, first_bad, row[0], bool(row[0] == row[-1] and row.min() == row.max())

@@ -10,15 +10,22 @@ import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.raw import RawFile
-from turnout.readers.variables import RATE, STEP, raw_file
+from turnout.readers.stored import stored
+from turnout.readers.variables import RATE, STEP, TIME, raw_file
 
+MANY = 2**16  # numbers: fewer are no long record
 UNIT = ("unit", "units", "Unit", "Units")
 
 
 def read_raw(source) -> RawFile:
     """Records of an HDF5 file."""
-    with source.parsed_by("HDF5"), h5py.File(source.path, "r") as file:
-        variables = _variables(file, source)
+    if source.stay:
+        with source.parsed_by("HDF5"):
+            # not closed here: a dataset keeps its file open as long as it is there
+            variables = _variables(h5py.File(source.path, "r"), source)
+    else:
+        with source.parsed_by("HDF5"), h5py.File(source.path, "r") as file:
+            variables = _variables(file, source)
     return raw_file(variables, source)
 
 
@@ -32,7 +39,8 @@ def _variables(group, source):
             continue
         try:
             with source.parsed_by("HDF5", f"dataset {member.name!r}"):
-                variables[name] = _values(member)
+                large = source.stay and stays(member) and name.lower() not in TIME
+                variables[name] = stored(member) if large else _values(member)
         except ReadError as error:
             variables[name] = error
             continue
@@ -44,6 +52,11 @@ def _variables(group, source):
     if units and not any(key.lower() == "units" for key in variables):
         variables["units"] = units
     return variables
+
+
+def stays(dataset) -> bool:
+    """Whether a dataset can be samples of a long record: numbers in one or two dimensions, many of them."""
+    return dataset.dtype.kind in "fiu" and dataset.ndim in (1, 2) and dataset.size >= MANY
 
 
 def _values(dataset):

@@ -6,11 +6,14 @@ axes reversed; the channels' count and the longer axis tell which is which.
 
 import warnings
 
+import h5py
 import numpy as np
 import pymatreader
 
+from turnout.readers.hdf5 import stays
 from turnout.readers.raw import RawFile
-from turnout.readers.variables import raw_file
+from turnout.readers.stored import stored
+from turnout.readers.variables import TIME, raw_file
 
 LEAST = 128  # bytes of the header of version 5
 
@@ -21,8 +24,19 @@ def read_raw(source) -> RawFile:
         raise source.error("the header", f"the file ends after {source.size} bytes", reason="truncated")
     with source.parsed_by("pymatreader"), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # objects and tables it cannot read are no samples
-        read = pymatreader.read_mat(source.path)
+        large = _large(source) if source.stay and source.head.startswith(b"MATLAB 7.3") else {}
+        read = pymatreader.read_mat(source.path, ignore_fields=list(large)) | large
     return raw_file(_plain({k: v for k, v in read.items() if not k.startswith("__")}), source)
+
+
+def _large(source):
+    """Arrays of version 7.3 that stay in the file: those outside structures. Version 5 cannot be read in parts."""
+    file = h5py.File(source.path, "r")  # not closed here: a dataset keeps its file open
+    return {
+        name: stored(member)
+        for name, member in file.items()
+        if isinstance(member, h5py.Dataset) and stays(member) and name.lower() not in TIME
+    }
 
 
 def _plain(value):

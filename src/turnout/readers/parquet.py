@@ -7,24 +7,28 @@ the metadata of its field. A cut file has lost its footer and cannot be opened; 
 import json
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 
 from turnout.readers.raw import COPY_AGAIN, RawFile, RawRecord
 from turnout.readers.stamps import moment
+from turnout.readers.stored import Column
 from turnout.readers.variables import COUNT, START, TIME, Facts
 
 
 def read_raw(source) -> RawFile:
     """Records of a Parquet file."""
     with source.parsed_by("pyarrow"):
-        table = pq.read_table(source.path, page_checksum_verification=True, use_threads=False)
-        columns = {name: table.column(name).to_numpy() for name in table.column_names}
-    facts = Facts(_notes(table.schema), source)
-    units = {field.name: _unit(field) for field in table.schema}
+        file = pq.ParquetFile(source.path, page_checksum_verification=True)
+        schema, n_row = file.schema_arrow, file.metadata.num_rows
+        rows = RowGroups(file) if source.stay and "record" not in schema.names else None
+        columns = _columns(file, rows)
+    facts = Facts(_notes(schema), source)
+    units = {field.name: _unit(field) for field in schema}
     numbers = columns.pop("record", None)
-    edges = [0, table.num_rows]
+    edges = [0, n_row]
     if numbers is not None:
-        edges = [0, *(np.flatnonzero(np.diff(numbers)) + 1), table.num_rows]
+        edges = [0, *(np.flatnonzero(np.diff(numbers)) + 1), n_row]
     time = next((name for name in columns if name.lower() in TIME), None)
     names = [name for name, x in columns.items() if name != time and x.dtype.kind in "fiu"]
     n = len(edges) - 1
@@ -39,7 +43,7 @@ def read_raw(source) -> RawFile:
         records.append(
             RawRecord(
                 names=tuple(names),
-                samples=[columns[name][part] for name in names],
+                samples=[columns[name] if rows else columns[name][part] for name in names],
                 rate=facts.rate(),
                 units=tuple(units[name] for name in names),
                 started_at=moment(facts.one(START, k, n)),
@@ -47,7 +51,49 @@ def read_raw(source) -> RawFile:
                 time=None if time is None else _seconds(columns[time][part]),
             )
         )
-    return RawFile(tuple(records) if table.num_rows else (), facts.count(COUNT))
+    return RawFile(tuple(records) if n_row else (), facts.count(COUNT))
+
+
+def _columns(file, rows):
+    """Name -> numbers, or the column that reads them; a time column is always read."""
+    names = file.schema_arrow.names
+    if rows is None:
+        table = file.read(use_threads=False)
+        return {name: table.column(name).to_numpy() for name in names}
+    stay = [f.name for f in file.schema_arrow if (pa.types.is_floating(f.type) or pa.types.is_integer(f.type))]
+    stay = [name for name in stay if name.lower() not in TIME]
+    table = file.read([name for name in names if name not in stay], use_threads=False)
+    read = {name: table.column(name).to_numpy() for name in table.column_names}
+    kept = {name: rows.column(name) for name in stay}
+    return {name: read.get(name, kept.get(name)) for name in names}
+
+
+class RowGroups:
+    """Row groups of a file, of which two are held, neighbours: a stretch may lie across a border."""
+
+    def __init__(self, file):
+        self.file, self.held = file, {}
+        sizes = [file.metadata.row_group(k).num_rows for k in range(file.num_row_groups)]
+        self.edges = np.concatenate([[0], np.cumsum(sizes)]).astype(int)
+
+    def column(self, name):
+        """The numbers of one column."""
+        dtype = self.file.schema_arrow.field(name).type.to_pandas_dtype()
+        return Column(lambda start, stop: self._stretch(name, start, stop), int(self.edges[-1]), dtype)
+
+    def _stretch(self, name, start, stop):
+        first, last = np.searchsorted(self.edges, [start, max(stop - 1, start)], side="right") - 1
+        parts = []
+        for k in range(first, last + 1):
+            low, high = max(start - self.edges[k], 0), stop - self.edges[k]
+            parts.append(self._group(k).column(name).to_numpy()[low:high])
+        return np.concatenate(parts)
+
+    def _group(self, k):
+        if k not in self.held:
+            self.held = {i: group for i, group in self.held.items() if abs(i - k) == 1}
+            self.held[k] = self.file.read_row_group(k, use_threads=False)
+        return self.held[k]
 
 
 def _notes(schema):

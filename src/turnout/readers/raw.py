@@ -1,6 +1,7 @@
 """What a reader of one format hands over: the numbers as they stand in the file, nothing converted."""
 
 import hashlib
+import mmap
 from collections.abc import Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -47,18 +48,34 @@ class Source:
     """One file: where it lies, the name that messages use, its size and first bytes. ``data`` is read when asked for.
 
     Formats whose library reads from the path leave ``data`` alone: a large block of fresh memory costs as much as the
-    reading.
+    reading. Where samples may ``stay`` in the file, a reader whose format allows it hands over ``Column``s in place of
+    arrays, and goes by ``mapped``.
     """
 
     path: Path
     name: str
     size: int
     head: bytes
+    stay: bool = False
 
     @cached_property
     def data(self) -> bytes:
         """All bytes of the file."""
         return self.path.read_bytes()
+
+    @cached_property
+    def mapped(self) -> mmap.mmap:
+        """The bytes of the file, none of them in memory before it is looked at."""
+        with self.path.open("rb") as file:
+            return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+
+    def state(self) -> tuple[int, int] | None:
+        """Size and time of change; None where the file is gone."""
+        try:
+            status = self.path.stat()
+        except OSError:
+            return None
+        return status.st_size, status.st_mtime_ns
 
     def sha256(self) -> str:
         """Of the file's bytes, in hexadecimal."""
@@ -86,14 +103,14 @@ class Source:
 class RawRecord:
     """One stretch of simultaneous samples, as it stands in the file.
 
-    ``samples`` holds one (n_sample,) array per name, in ``units`` ("" where the file does not say).
+    ``samples`` holds one (n_sample,) array or ``Column`` per name, in ``units`` ("" where the file does not say).
     ``rate`` [Hz] is None where the file does not say; ``rate_tolerance`` is the relative precision with which
     its format can state it. ``started_at`` is aware where the format says the zone, naive where it does not.
     ``time`` [s] is the file's own time column, ``aliases`` are further names by which a channel may be asked for.
     """
 
     names: tuple[str, ...]
-    samples: Sequence[np.ndarray]
+    samples: Sequence
     rate: float | None = None
     units: tuple[str, ...] = ()
     rate_tolerance: float = 1e-9

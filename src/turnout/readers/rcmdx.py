@@ -7,6 +7,7 @@ nanoseconds since 1970 UTC, one per sample, and must agree with ``CommonTriggerF
 Layout: OpenRail Association, RCM-DX Specification 2.0.
 """
 
+from contextlib import nullcontext
 from datetime import UTC, datetime, timedelta
 
 import h5py
@@ -14,7 +15,9 @@ import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.clock import rate_of_time
+from turnout.readers.hdf5 import stays
 from turnout.readers.raw import CONDITIONS, COPY_AGAIN, RawFile, RawRecord
+from turnout.readers.stored import stored
 from turnout.readers.variables import Facts
 
 FREQUENCY = ("CommonTriggerFrequency", "CommonTriggerFreq", "CommonTriggerFrequence", "TriggerValue")
@@ -24,7 +27,7 @@ SINGLE_PRECISION = 2.0**-23  # the frequency is a 32 bit float
 
 def read_raw(source) -> RawFile:
     """Records of an RCM-DX file, in the order of its sessions."""
-    with source.parsed_by("HDF5"), h5py.File(source.path, "r") as file:
+    with source.parsed_by("HDF5"), _opened(source) as file:
         if "RCMDX" not in file:
             raise source.error("the root", "there is no group RCMDX", "Set the format in the layout to hdf5")
         found: list[tuple[h5py.Group, dict]] = []
@@ -41,6 +44,12 @@ def read_raw(source) -> RawFile:
     records.sort(key=lambda named: named[0])  # sessions are named by their date
     notes = found[0][1] if found else {}
     return RawFile(tuple(record for _, record in records), Facts(notes, source).count(("recordcount",)))
+
+
+def _opened(source):
+    """The file; where samples stay in it, the datasets keep it open."""
+    file = h5py.File(source.path, "r")
+    return nullcontext(file) if source.stay else file
 
 
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
@@ -74,7 +83,7 @@ def _record(group, notes, source):
     where = f"data source {group.name!r}"
     stamps = group["timestamp"][()]
     data = [c["data"] for c in channels.values()]
-    samples = [d[()] for d in data]
+    samples = [stored(d) if source.stay and stays(d) else d[()] for d in data]
     for name, x in zip(channels, samples):
         if len(x) != len(stamps):
             found = f"{len(x)} samples and {len(stamps)} time stamps"

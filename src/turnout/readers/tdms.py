@@ -5,12 +5,14 @@ npTDMS gives what it finds of a cut-off file in silence. The lead-ins of the seg
 """
 
 import struct
+from contextlib import nullcontext
 
 import nptdms
 
 from turnout.errors import ReadError
 from turnout.readers.raw import COPY_AGAIN, RawFile, RawRecord
 from turnout.readers.stamps import moment
+from turnout.readers.stored import Column
 from turnout.readers.variables import COUNT, START, Facts, natural
 
 nptdms.log.log_manager.set_level("ERROR")  # what it warns of on the console is found by cut_off and becomes a reason
@@ -20,11 +22,12 @@ UNFINISHED = 0xFFFFFFFFFFFFFFFF
 
 def read_raw(source) -> RawFile:
     """Records of a TDMS file, in the natural order of the groups' names."""
-    with source.path.open("rb") as file:  # not the path: npTDMS would believe an index file beside it
+    file = source.path.open("rb")  # not the path: npTDMS would believe an index file beside it
+    with nullcontext() if source.stay else file:
         cut = cut_off(file, source.size)
         with source.parsed_by("npTDMS", reason="truncated" if cut else "unreadable"):
             file.seek(0)
-            tdms = nptdms.TdmsFile.read(file)
+            tdms = nptdms.TdmsFile.open(file) if source.stay else nptdms.TdmsFile.read(file)
     groups = sorted((g for g in tdms.groups() if any(len(c) for c in g.channels())), key=lambda g: natural(g.name))
     names = {channel.name for group in groups for channel in group.channels()}
     damaged = _damaged(tdms) if cut else set()
@@ -83,7 +86,7 @@ def _sound_record(group, k, n, names, damaged, properties, source):
         raise source.error(where, found, "Record all channels of a group at one rate", reason="wrong_rate")
     step = steps.pop()
     with source.parsed_by("npTDMS", where):
-        samples = [c[:] for c in channels]
+        samples = [_numbers(c, source.stay) for c in channels]
     facts = Facts({**properties, **group.properties, **channels[0].properties}, source)
     return RawRecord(
         names=tuple(c.name for c in channels),
@@ -94,3 +97,10 @@ def _sound_record(group, k, n, names, damaged, properties, source):
         conditions=facts.conditions(0, 1),
         aliases=tuple((f"{group.name}/{c.name}",) for c in channels),
     )
+
+
+def _numbers(channel, stay):
+    """All numbers of a channel, or the column that reads them when asked: npTDMS steps over what is not asked for."""
+    if not stay or channel.dtype.kind not in "fiu":
+        return channel[:]
+    return Column(lambda start, stop: channel.read_data(start, stop - start), len(channel), channel.dtype)

@@ -2,13 +2,14 @@
 
 import gzip
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from turnout.readers.places import load
 from turnout.readers.raw import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, number_or_text
 from turnout.readers.stamps import uff_moment
+from turnout.readers.stored import Column
 from turnout.readers.uff_sets import UffSet, says_si, sets_of
 
 TIME_RESPONSE, FREQUENCY_RESPONSE, TIME_AXIS = 1, 4, 17
@@ -37,13 +38,30 @@ def read_raw(source) -> RawFile:
     serve as well. The version or sequence number (record 6, field 3) says which record a set is of; where all sets
     carry the same, records are found by the order of the channels.
     """
-    everything = sets_of(source.data)
+    data = source.mapped if source.stay else source.data
+    everything = sets_of(data)
+    if source.stay:
+        everything = tuple(replace(s, data=_in_file(s.data, data, source.path)) for s in everything)
     sets = [s for s in everything if s.kind in ("", "58", "58b")]
     wanted = [s for s in sets if s.damage or _is_time(s)]
     if not wanted or not any(s.kind for s in wanted):
         found = wanted[0].damage if wanted else f"it holds {len(sets)} functions and no time response"
         raise source.error(f"byte {wanted[0].offset if wanted else 0}", found, COPY_AGAIN)
-    return RawFile(tuple(_records(wanted, says_si(source.data, everything), source)))
+    return RawFile(tuple(_records(wanted, says_si(data, everything), source)))
+
+
+def _in_file(numbers, mapped, path):
+    """A column that reads from the file what ``numbers`` is a view of; text, which is none, as it is."""
+    base = np.frombuffer(mapped, np.uint8).__array_interface__["data"][0]
+    offset = numbers.__array_interface__["data"][0] - base
+    if not 0 <= offset <= len(mapped) - numbers.nbytes or not numbers.flags.c_contiguous or not numbers.size:
+        return numbers
+    dtype = numbers.dtype
+    return Column(
+        lambda start, stop: np.fromfile(path, dtype, stop - start, offset=offset + start * dtype.itemsize),
+        numbers.size,
+        dtype,
+    )
 
 
 def _is_time(one: UffSet):

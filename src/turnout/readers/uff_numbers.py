@@ -3,6 +3,7 @@
 import re
 from dataclasses import dataclass
 from itertools import pairwise
+from mmap import mmap
 
 import numpy as np
 
@@ -18,7 +19,7 @@ class Delimiter:
     end: int
 
 
-def delimiter(data: bytes, position: int) -> Delimiter | None:
+def delimiter(data: bytes | mmap, position: int) -> Delimiter | None:
     """The first delimiter from ``position`` on; plain search, because a pattern over megabytes of numbers is slow."""
     at = position
     while (at := data.find(b"    -1", at)) >= 0:

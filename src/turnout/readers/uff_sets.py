@@ -9,6 +9,7 @@ Layout: Structural Dynamics Research Laboratory, University of Cincinnati, Unive
 
 from dataclasses import dataclass, field
 from itertools import pairwise
+from mmap import mmap
 
 import numpy as np
 
@@ -43,15 +44,16 @@ class UffSet:
     damage: str = ""
 
 
-def sets_of(data: bytes) -> tuple[UffSet, ...]:
-    """All data sets of a file in their order, those of other numbers with ``kind`` and ``offset`` alone."""
+def sets_of(data: bytes | mmap) -> tuple[UffSet, ...]:
+    """All data sets of a file, read or mapped, in their order; of other numbers ``kind`` and ``offset`` alone."""
     found = []
     position = 0
     while (begin := delimiter(data, position)) is not None:
         if len(data) - begin.end < 200 and not data[begin.end :].strip():
             found.append(UffSet(begin.start, "", damage="a delimiter opens a set that never comes"))
             break
-        if data.startswith(b"    -1", begin.end):  # an unclosed set has taken the opening of the next one for its end
+        # an unclosed set has taken the opening of the next one for its end
+        if data[begin.end : begin.end + 6] == b"    -1":
             found.append(UffSet(begin.start, "", damage="a delimiter closes a set that was never opened"))
             position = begin.end
             continue

@@ -25,6 +25,7 @@ import numpy as np
 from turnout.errors import ReadError
 from turnout.readers.raw import CONDITIONS, RawFile, RawRecord
 from turnout.readers.stamps import moment
+from turnout.readers.stored import ARRAYS
 
 RATE = ("rate", "fs", "f_s", "rate_hz", "fs_hz", "sample_rate", "samplerate", "sampling_rate", "sampling_frequency")
 STEP = ("dt", "delta_t", "sample_interval", "wf_increment")
@@ -154,7 +155,7 @@ def _whole(variables, facts, source, k=0, n=1):
             "the file", f"several arrays could be the samples: {candidates}", "Export one array or one per record"
         )
     for name, array in matrices.items():
-        blocks = array if array.ndim == 3 else array[None]
+        blocks = array if array.ndim == 3 else [array]
         if array.ndim == 3 and len(names := texts(facts.get(NAMES))) and array.shape[1] != len(names):
             raise source.error(f"variable {name!r}", f"{array.shape} samples do not match {len(names)} channels")
         if array.ndim == 3 and array.shape[0] > array.shape[2]:  # MATLAB: (sample, channel, record)
@@ -172,7 +173,7 @@ def _whole(variables, facts, source, k=0, n=1):
 
 def _matrices(variables):
     """Arrays of samples in two or three dimensions."""
-    arrays = {name: v for name, v in variables.items() if isinstance(v, np.ndarray) and v.dtype.kind in "fiu"}
+    arrays = {name: v for name, v in variables.items() if isinstance(v, ARRAYS) and v.dtype.kind in "fiu"}
     return {name: v for name, v in arrays.items() if v.ndim in (2, 3) and min(v.shape) >= 1 and max(v.shape) > 1}
 
 
@@ -182,7 +183,7 @@ def _vectors(variables):
     found = {
         name: v
         for name, v in variables.items()
-        if isinstance(v, np.ndarray) and v.ndim == 1 and v.dtype.kind in "fiu" and v.size > 1
+        if isinstance(v, ARRAYS) and v.ndim == 1 and v.dtype.kind in "fiu" and v.size > 1
         if name.lower() not in known
     }
     longest = max((v.size for v in found.values()), default=0)
@@ -191,7 +192,7 @@ def _vectors(variables):
 
 def _record(block, facts, k, n, where, source):
     """The record of a matrix (channel, sample) or (sample, channel)."""
-    block = np.atleast_2d(block)
+    block = np.atleast_2d(block) if isinstance(block, np.ndarray) else block
     names, units = texts(facts.get(NAMES)), texts(facts.get(UNITS))
     if block.ndim != 2 or block.dtype.kind not in "fiu":
         raise source.error(where, f"{block.dtype} of shape {block.shape} is no matrix of samples")

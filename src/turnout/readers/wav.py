@@ -7,11 +7,15 @@ scale is 10 V. What a comment in JSON says (``channels``, ``units``, ``started_a
 
 import json
 import struct
+from dataclasses import dataclass
+from pathlib import Path
 
+import numpy as np
 import soundfile
 
 from turnout.readers.raw import COPY_AGAIN, RawFile, RawRecord
 from turnout.readers.stamps import moment
+from turnout.readers.stored import Stored
 from turnout.readers.variables import NAMES, START, UNITS, Facts, texts
 
 OPEN_END = 0xFFFFFFFF
@@ -24,17 +28,18 @@ def read_raw(source) -> RawFile:
             raise source.error("the header", cut, COPY_AGAIN, reason="truncated")
         raw.seek(0)
         with source.parsed_by("libsndfile"), soundfile.SoundFile(raw.fileno(), closefd=False) as file:
-            samples = file.read(dtype="float64", always_2d=True)
-            rate, frames, comment = file.samplerate, file.frames, file.comment
-    if len(samples) != frames:
-        found = f"ends after {len(samples)} of {frames} samples"
+            rate, comment = file.samplerate, file.comment
+            frames = Frames(source.path, file.frames, file.channels)
+            samples = Stored(frames, turned=True) if source.stay else file.read(dtype="float64", always_2d=True).T
+    if samples.shape[1] != frames.shape[0]:
+        found = f"ends after {samples.shape[1]} of {frames.shape[0]} samples"
         raise source.error("record 1 of 1", found, COPY_AGAIN, reason="truncated")
     facts = Facts(_notes(comment), source)
-    n = samples.shape[1]
+    n = len(samples)
     names, units = texts(facts.get(NAMES)), texts(facts.get(UNITS))
     record = RawRecord(
         names=tuple(names) if len(names) == n else tuple(str(i) for i in range(n)),
-        samples=list(samples.T),
+        samples=list(samples),
         rate=facts.rate() or float(rate),
         units=tuple(units) if len(units) == n else ("",) * n,
         started_at=moment(facts.one(START, 0, 1)),
@@ -42,6 +47,27 @@ def read_raw(source) -> RawFile:
         aliases=tuple((str(i),) for i in range(n)),
     )
     return RawFile((record,))
+
+
+@dataclass(frozen=True)
+class Frames:
+    """``n_frame`` frames of ``n_channel`` channels of an audio file, sliced like an array (frame, channel)."""
+
+    path: Path
+    n_frame: int
+    n_channel: int
+    dtype = np.dtype(float)
+
+    @property
+    def shape(self):
+        """Number of frames and of channels."""
+        return self.n_frame, self.n_channel
+
+    def __getitem__(self, part: slice) -> np.ndarray:
+        start, stop, _ = part.indices(self.n_frame)
+        with soundfile.SoundFile(self.path) as file:
+            file.seek(start)
+            return file.read(stop - start, dtype="float64", always_2d=True)
 
 
 def cut_off(file, size: int) -> str:

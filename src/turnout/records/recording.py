@@ -2,35 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from types import MappingProxyType
 
 import numpy as np
 
+from turnout.records.channel import Channel
+from turnout.records.long_recording import LongRecording
+
 NOTHING: Mapping = MappingProxyType({})
-
-
-@dataclass(frozen=True)
-class Channel:
-    """One measured quantity of a recording.
-
-    ``quantity`` is "force" [N], "acceleration" [m/s²], "velocity" [m/s], "displacement" [m], "strain" [-]
-    or "temperature" [°C]; the samples are in that SI unit with the configured sign already applied.
-    ``position`` is the place along the track [m] in the turnout's coordinate, ``mounting`` where the sensor
-    sits ("rail head at sleeper", "rail head mid-span", "rail web", "sleeper", "hammer"). ``limit`` is the
-    range beyond which the instrument clips and ``resolution`` one step of its converter, both in the SI
-    unit, None where unknown.
-    """
-
-    name: str
-    quantity: str
-    position: float | None = None
-    mounting: str = ""
-    serial: str = ""
-    limit: float | None = None
-    resolution: float | None = None
 
 
 @dataclass(frozen=True)
@@ -85,6 +67,12 @@ class Recording:
         """Length [s]."""
         return self.n_sample / self.rate
 
+    def stretches(self, length: float) -> Iterator[np.ndarray]:
+        """The whole recording in consecutive stretches of ``length`` seconds, (n_channel, n) each."""
+        step = max(round(length * self.rate), 1)
+        for start in range(0, self.n_sample, step):
+            yield self.samples[:, start : start + step]
+
     def index(self, name: str) -> int:
         """Row of the channel called ``name``; KeyError lists the names there are."""
         for i, channel in enumerate(self.channels):
@@ -103,8 +91,12 @@ class Recording:
 
 @dataclass(frozen=True)
 class ReadResult:
-    """What came out of one raw file: its sound records, and an error for each damaged one."""
+    """What came out of one raw file: its sound records, and an error for each damaged one.
+
+    ``long`` are those that stay in the file, where that was asked for.
+    """
 
     recordings: tuple[Recording, ...]
     errors: tuple[Exception, ...] = ()
     sha256: str = ""
+    long: tuple[LongRecording, ...] = ()

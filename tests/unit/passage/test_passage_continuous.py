@@ -5,9 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from benchmarks.passage_truth import IC3, RATE, rolling
+from benchmarks.passage_truth import IC3, PATTERNS, RATE, rolling, sensors_for
 
+from turnout.chains.passage import trains_in
+from turnout.passage.analyse import analyse
 from turnout.passage.continuous import cut_passages
+from turnout.readers import read
+from turnout.readers.writing import write
+from turnout.records import Channel, RawChannel, RawDescription, Recording
 
 
 def record(starts, speeds, length, seed=1):
@@ -70,3 +75,50 @@ def test_memory_does_not_grow_with_the_record(settings):
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[1] < peaks[0] + 4e6
+
+
+def logged(folder, format, starts=(12.0, 28.6, 55.0), length=70.0):
+    """A file of one long record: the second train is across the border of two blocks, at 30 s."""
+    channels = (Channel("c0", "acceleration", 0.0), Channel("c1", "acceleration", 4.0))
+    recording = Recording(record(starts, (40.0, 20.0, 33.0), length), RATE, channels, "passage")
+    return write([recording], folder / f"x.{format}", {"uff": "uff58b"}.get(format, format)).name
+
+
+DESCRIBED = RawDescription(
+    (RawChannel("c0", "c0", "acceleration", position=0.0), RawChannel("c1", "c1", "acceleration", position=4.0)),
+    kind="passage",
+    rate=RATE,
+)
+
+
+@pytest.mark.parametrize("format", ["hdf5", "tdms", "uff", "wav"])
+def test_passages_of_a_file_read_in_stretches_are_those_of_the_file_read_whole(format, settings, tmp_path):
+    name = logged(tmp_path, format)
+    short = replace(settings, longest=20.0, chunk=10.0)
+    (whole,) = read(name, tmp_path, DESCRIBED).recordings
+    (long,) = read(name, tmp_path, DESCRIBED, short.longest, held=0).long
+    of_whole, of_long = list(trains_in(whole, short)), list(trains_in(long, short))
+    assert [late for _, late, _ in of_whole] == pytest.approx([11.0, 27.6, 54.0], abs=0.15)
+    assert of_whole[1][1] < 30.0 < of_whole[1][1] + of_whole[1][0].duration
+    assert [(late, key) for _, late, key in of_whole] == [(late, key) for _, late, key in of_long]
+    sensors = sensors_for(whole)
+    for (one, _, _), (other, _, _) in zip(of_whole, of_long):
+        assert np.array_equal(one.samples, other.samples) and one.channels == other.channels
+        first, second = (analyse(part, sensors, PATTERNS, settings) for part in (one, other))
+        assert first.n_axle == len(IC3) and repr(first) == repr(second)
+
+
+def test_a_file_is_cut_in_memory_that_does_not_grow_with_it(settings, tmp_path):
+    """2 channels of 20 kHz: 3.2 MB in 10 s as float64. 60 s or 240 s of it, the same peak within one such block."""
+    short, peaks = replace(settings, longest=20.0), []
+    for length in (60.0, 240.0):
+        folder = tmp_path / f"{length:g}"
+        folder.mkdir()
+        name = logged(folder, "hdf5", (12.0,), length)
+        tracemalloc.start()
+        (long,) = read(name, folder, DESCRIBED, short.longest, held=0).long
+        assert len(list(trains_in(long, short))) == 1
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < peaks[0] + 3.2e6
+    assert peaks[1] < 240.0 * RATE * 2 * 8 / 2

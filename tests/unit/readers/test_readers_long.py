@@ -1,0 +1,137 @@
+"""Long records that stay in their file: the same channels, samples and errors as when the file is read whole."""
+
+from datetime import datetime
+
+import h5py
+import numpy as np
+import pyarrow as pa
+import pytest
+from pyarrow import parquet as pq
+
+from turnout.errors import ReadError
+from turnout.readers import read
+from turnout.readers.writing import WRITERS, write
+from turnout.records import Channel, LongRecording, RawChannel, RawDescription, Recording
+
+RATE, N = 8000.0, 2**17 + 301  # no multiple of any block, and enough numbers to stay in an HDF5 file
+STAYING = ("uff58b", "tdms", "hdf5", "rcmdx", "mat73", "wav", "csv", "parquet")
+
+
+@pytest.fixture(scope="module")
+def logged():
+    """Three channels that differ in scale, offset and content."""
+    rng = np.random.default_rng(17)
+    samples = rng.normal(size=(3, N)) * [[30.0], [2.0], [0.1]] + [[-7.0], [0.0], [40.0]]
+    channels = tuple(Channel(name, "acceleration") for name in ("left", "right", "sleeper"))
+    return Recording(samples, RATE, channels, "passage", started_at=datetime(2024, 5, 13, 10, 0, 1))
+
+
+def leave(recording, folder, format):
+    """A file as a logger leaves it: text and Parquet without the column that numbers records."""
+    path = folder / f"x.{'mat' if format == 'mat73' else format}"
+    if format not in ("csv", "parquet"):
+        return write([recording], path, format)
+    table = pa.table({c.name: row for c, row in zip(recording.channels, recording.samples)})
+    if format == "parquet":
+        table = table.replace_schema_metadata({"rate": str(RATE), "started_at": "2024-05-13T10:00:01"})
+        unit = [f.with_metadata({"unit": "m/s²"}) for f in table.schema]
+        pq.write_table(table.cast(pa.schema(unit, table.schema.metadata)), path, row_group_size=30_000)
+        return path
+    with path.open("w") as file:
+        file.write(f"# rate: {RATE}\n# started_at: 2024-05-13T10:00:01\n")
+        file.write(",".join(f"{c.name} [m/s²]" for c in recording.channels) + "\n")
+        np.savetxt(file, recording.samples.T, fmt="%.17g", delimiter=",")
+    return path
+
+
+@pytest.fixture
+def in_another_order():
+    """Two of the channels as accelerations, turned round and the other way about; the third is not wanted."""
+    return RawDescription(
+        (
+            RawChannel("sleeper", "sleeper", "acceleration", unit="g!", sign=-1),
+            RawChannel("left", "left", "acceleration"),
+            RawChannel("right", "right", "ignored"),
+        ),
+        kind="passage",
+        rate=RATE,
+    )
+
+
+@pytest.mark.parametrize("format", WRITERS)
+def test_stretches_are_what_whole_reading_gives(format, logged, in_another_order, tmp_path):
+    path = leave(logged, tmp_path, format)
+    (whole,) = read(path.name, tmp_path, in_another_order).recordings
+    result = read(path.name, tmp_path, in_another_order, longest=10.0, held=0)
+    assert result.recordings == () and result.errors == ()
+    (long,) = result.long
+    assert (long.n_sample, long.rate, long.channels) == (N, whole.rate, whole.channels)
+    assert (long.started_at, long.source, long.record) == (whole.started_at, whole.source, whole.record)
+    assert np.array_equal(np.concatenate(list(long.stretches(1.7)), axis=1), whole.samples)
+    # forwards, back, across any border of a block of the format
+    for start, stop in ((70_000, 70_011), (3, 9), (65_000, 67_000), (N - 5, N)):
+        assert np.array_equal(long.read(start, stop), whole.samples[:, start:stop])
+
+
+@pytest.mark.parametrize("format", STAYING)
+def test_samples_stay_in_files_of_formats_that_allow_it(format, logged, in_another_order, tmp_path):
+    path = leave(logged, tmp_path, format)
+    (long,) = read(path.name, tmp_path, in_another_order, longest=10.0, held=0).long
+    assert not any(isinstance(x, np.ndarray) for x in long.read.record.samples)
+
+
+@pytest.mark.parametrize(("shape", "chunks"), [((3, N), (3, 4096)), ((N, 3), (4096, 3)), ((3, N), None)])
+def test_a_matrix_stays_whichever_way_it_lies(shape, chunks, logged, tmp_path):
+    with h5py.File(tmp_path / "x.h5", "w") as file:
+        data = logged.samples if shape[0] == 3 else logged.samples.T
+        file.create_dataset("data", data=data, chunks=chunks)
+        file.attrs["rate"] = RATE
+    wanted = RawDescription(
+        tuple(RawChannel(n, i, "acceleration", unit="m/s²") for i, n in enumerate("abc")), kind="passage", rate=RATE
+    )
+    (long,) = read("x.h5", tmp_path, wanted, longest=10.0, held=0).long
+    assert np.array_equal(long.read(5000, 9001), logged.samples[:, 5000:9001])
+
+
+def test_short_records_and_small_files_are_read_as_ever(logged, in_another_order, tmp_path):
+    path = write([logged], tmp_path / "x.h5", "hdf5")
+    duration = N / RATE
+    for longest, held in ((None, 0), (duration + 1.0, 0), (1.0, 10**9)):
+        result = read(path.name, tmp_path, in_another_order, longest=longest, held=held)
+        assert len(result.recordings) == 1 and result.long == ()
+
+
+@pytest.mark.parametrize("format", ["hdf5", "tdms", "parquet"])
+def test_a_channel_that_is_dead_or_not_finite_costs_itself_only_and_says_the_same(
+    format, logged, in_another_order, tmp_path
+):
+    samples = logged.samples.copy()
+    samples[0] = 3.25
+    samples[2, [5, 99_000, N - 1]] = np.nan
+    spoiled = Recording(samples, RATE, logged.channels, "passage")
+    three = RawDescription(
+        tuple(RawChannel(c.name, c.name, "acceleration") for c in logged.channels), kind="passage", rate=RATE
+    )
+    path = leave(spoiled, tmp_path, format)
+    whole = read(path.name, tmp_path, three)
+    long = read(path.name, tmp_path, three, longest=10.0, held=0)
+    assert [str(e) for e in long.errors] == [str(e) for e in whole.errors] and len(whole.errors) == 2
+    assert [c.name for c in long.long[0].channels] == ["right"]
+    assert np.array_equal(long.long[0].read(0, N), whole.recordings[0].samples)
+
+
+def test_a_file_that_changes_between_the_stretches_is_an_error_with_its_place(logged, in_another_order, tmp_path):
+    path = write([logged], tmp_path / "x.wav", "wav")
+    (long,) = read(path.name, tmp_path, in_another_order, longest=10.0, held=0).long
+    long.read(0, 100)
+    with path.open("ab") as file:
+        file.write(b"more")
+    with pytest.raises(ReadError, match=r"record 1 of 1: it changed while it was read, at sample 100\."):
+        long.read(100, 200)
+
+
+def test_a_hammer_test_is_never_long(logged, in_another_order, tmp_path):
+    path = write([logged], tmp_path / "x.h5", "hdf5")
+    hammer = RawDescription(in_another_order.channels, kind="hammer", rate=RATE)
+    result = read(path.name, tmp_path, hammer, longest=1.0, held=0)
+    assert isinstance(result.recordings[0], Recording) and not isinstance(result.recordings[0], LongRecording)
