@@ -10,7 +10,7 @@ from turnout.simulate.passage import simulate_passage
 from turnout.simulate.sensor import Sensor
 from turnout.simulate.track import PER_SUPPORT, uniform_track
 from turnout.simulate.turnout_track import TurnoutTrack
-from turnout.simulate.vehicle import car
+from turnout.simulate.vehicle import car, coupled
 
 
 @dataclass(frozen=True)
@@ -56,6 +56,21 @@ def small_plan(temperatures=(5.0, 25.0), speeds=(28.0, 40.0), blows=(20.4, 24.0,
     reserved = ("light 2", "heavy 3") if passages and len(trains) == 8 else ()
     points = tuple((x, t) for x in blows for t in temperatures)
     return Plan(turnout, sensors, points, trains if passages else (), reserved)
+
+
+def turnout_plan(temperatures=(5.0, 25.0), speeds=(22.0, 25.0, 28.0, 32.0, 36.0)):
+    """A whole turnout: eight hammer points, twenty passages of two coupled cars each, twelve sensors over 27 m."""
+    turnout = TurnoutTrack(uniform_track(72.0), {"main": ((),)})
+    places = np.round(21.6 + 2.4 * np.arange(12) + 0.3 * (np.arange(12) % 3), 3)
+    sensors = tuple(Sensor(f"S{k + 1}", float(x), "rail" if k % 4 else "sleeper") for k, x in enumerate(places))
+    light = car("light", body_mass=8000.0, half_pivot=5.0, length=15.5, overhang=1.5)
+    heavy = car(
+        "heavy", body_mass=34000.0, body_inertia=1.6e6, half_pivot=6.0, half_base=0.95, length=17.0, overhang=1.55
+    )
+    pairs = [coupled(name, (vehicle, vehicle)) for name, vehicle in (("light", light), ("heavy", heavy))]
+    trains = tuple(Train(pair, pair.name, speed, t) for pair in pairs for speed in speeds for t in temperatures)
+    points = tuple((float(x), t) for x in np.round(22.8 + 3.6 * np.arange(8), 3) for t in temperatures)
+    return Plan(turnout, sensors, points, trains, ("light 3", "heavy 8"))
 
 
 def measured_campaign(plan, terms=(), seed=0):
