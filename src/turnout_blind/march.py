@@ -27,9 +27,10 @@ class Beam(NamedTuple):
 
 class Supports(NamedTuple):
     """(n,) each; ``first`` and ``weights`` (n, 4) on the grid. ``lift`` pad stiffness in uplift over that in
-    compression, ``gap`` [m] under the sleeper (below 0: none, ballast holds both ways), ``close`` [m] over which it
-    closes, ``hardening`` [1/m], ``drift`` [1/s] of ballast stiffness; ``shear`` and ``shear_damping`` to the next
-    sleeper; branches: share of pad stiffness and rate [1/s] of Maxwell elements."""
+    compression, ``gap`` [m] under the sleeper (below 0: none, ballast holds both ways), ``seated`` share of its bed
+    that has no gap, ``close`` [m] over which the gap closes, ``hardening`` [1/m], ``drift`` [1/s] of ballast
+    stiffness; ``shear`` and ``shear_damping`` to the next sleeper; branches: share of pad stiffness and rate [1/s] of
+    Maxwell elements."""
 
     first: np.ndarray
     weights: np.ndarray
@@ -40,6 +41,7 @@ class Supports(NamedTuple):
     ballast: np.ndarray
     ballast_damping: np.ndarray
     gap: np.ndarray
+    seated: np.ndarray
     close: np.ndarray
     hardening: np.ndarray
     drift: np.ndarray
@@ -148,11 +150,12 @@ def _ballast(s, j, y, rate, t):
     k = s.ballast[j] * (1.0 + s.drift[j] * t)
     if s.gap[j] < 0.0:
         return k * y * (1.0 + s.hardening[j] * abs(y)) + s.ballast_damping[j] * rate
+    held = s.seated[j] * (k * y + s.ballast_damping[j] * rate)
     d = y - s.gap[j]
     if d <= 0.0:
-        return 0.0
+        return held
     shut = 1.0 - np.exp(-d / s.close[j])
-    return max(0.0, k * (d - s.close[j] * shut) + s.ballast_damping[j] * rate * shut)
+    return held + (1.0 - s.seated[j]) * max(0.0, k * (d - s.close[j] * shut) + s.ballast_damping[j] * rate * shut)
 
 
 @numba.njit(cache=True)

@@ -36,6 +36,7 @@ class World:
     ballast_damping: np.ndarray
     lift: np.ndarray = field(default_factory=_none)
     gap: np.ndarray = field(default_factory=_none)
+    seated: np.ndarray = field(default_factory=_none)
     close: np.ndarray = field(default_factory=_none)
     hardening: np.ndarray = field(default_factory=_none)
     drift: np.ndarray = field(default_factory=_none)
@@ -56,7 +57,7 @@ class World:
 
     def __post_init__(self):
         n = self.place.size
-        neutral = {"lift": 1.0, "gap": -1.0, "close": 1e-4, "hardening": 0.0, "drift": 0.0}
+        neutral = {"lift": 1.0, "gap": -1.0, "seated": 0.0, "close": 1e-4, "hardening": 0.0, "drift": 0.0}
         for name, value in neutral.items():
             if getattr(self, name).size != n:
                 setattr(self, name, np.full(n, value))
@@ -97,7 +98,7 @@ class World:
         n = self.place.size
         return Supports(
             first, weights, self.pad * soft, self.pad_damping, self.lift, self.mass, ballast,
-            self.ballast_damping, gap, self.close, self.hardening, self.drift,
+            self.ballast_damping, gap, self.seated, self.close, self.hardening, self.drift,
             np.full(n, self.shear), np.full(n, self.shear_damping), self.branch_share, self.branch_rate,
         )  # fmt: skip
 

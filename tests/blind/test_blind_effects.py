@@ -112,6 +112,33 @@ def test_an_effect_of_ones_own_is_one_file(tmp_path):
         load_effects(tmp_path)
 
 
+def test_a_polygon_passes_at_a_frequency_of_the_track():
+    """n v / 2 pi R of the order drawn, at the train's mean speed: 60 to 110 Hz, half an order off by rounding."""
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        site = draw_site(rng)
+        drawn = EFFECTS["out_of_round"].concealed(rng, site, 6)
+        train = site.trains[drawn.where["train"]]
+        turns = np.mean([p.speed for p in site.passages if p.train == train.name]) / (2.0 * np.pi * train.radius)
+        assert 60.0 - 0.51 * turns < drawn.parameters["order"] * turns < 110.0 + 0.51 * turns
+        assert drawn.parameters["amplitude"] == pytest.approx(5e-4)  # 1 mm from peak to peak
+
+
+def test_a_clipped_channel_shows_its_limit_as_the_mean_of_both_sides():
+    """Of what is far beyond; nothing within 0.73 of it is touched; the limit counts in peaks that the channel meets."""
+    site = draw_site(np.random.default_rng(4))
+    world = site.world.copy()
+    drawn = EFFECTS["clipping"].concealed(np.random.default_rng(4), site, 2)
+    EFFECTS["clipping"].act(world, site, drawn.where, drawn.parameters)
+    (fault,) = world.channels[drawn.where["sensor"]]
+    shown, limit = fault("hammer", None), drawn.parameters["limit"]
+    far = shown(np.array([100.0, -100.0]) * limit, 6e4)
+    assert 0.5 * (far[0] - far[1]) == pytest.approx(limit)
+    small = np.linspace(-0.73, 0.73, 9) * limit
+    assert shown(small, 6e4) == pytest.approx(small)
+    assert 20.0 < limit / drawn.parameters["share"] < 1000.0  # a blow of 10 kN on a rail, within the sensor's range
+
+
 def test_rail_roughness_has_its_level_in_every_octave():
     """Variance in a third of an octave against 10^(L/10) µm², over realisations; 25 % for 30 of them."""
     x = np.arange(0.0, 20.0, 5e-3)

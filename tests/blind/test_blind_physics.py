@@ -56,7 +56,7 @@ def winkler(per_metre, rail, damping=0.0, length=60.0):
     ones = np.ones(place.size)
     return replace(
         world, place=place, pad=0.1 * per_metre * ones, pad_damping=0.1 * damping * ones, mass=1e12 * ones,
-        ballast=0.0 * ones, ballast_damping=0.0 * ones, lift=ones, gap=-ones, close=1e-4 * ones,
+        ballast=0.0 * ones, ballast_damping=0.0 * ones, lift=ones, gap=-ones, seated=0.0 * ones, close=1e-4 * ones,
         hardening=0.0 * ones, drift=0.0 * ones,
     )  # fmt: skip
 
@@ -171,6 +171,22 @@ def test_a_sleeper_without_ballast_swings_on_its_pad():
             assert abs(found[0] - exact) < 0.06 * abs(exact), frequency
 
 
+@pytest.mark.parametrize("seated", [0.8, 0.35])
+def test_a_sleeper_that_hangs_in_part_has_that_part_less_ballast(seated):
+    """Under a hammer the gap stays open: the exact series with the share of ballast that bears."""
+    world = uniform_world(pad_damping=1e4, ballast_damping=8e4, sponge=0.0)
+    j = world.nearest(0.0)
+    softer = world.copy()
+    softer.ballast[j] *= seated
+    softer.ballast_damping[j] *= seated
+    world.gap[j], world.seated[j] = 0.01, seated
+    f, h = receptance(world, [0.0], 0.0)
+    for frequency in (60.0, 110.0, 160.0, 300.0):
+        found, f0 = at(f, h, frequency)
+        exact = on_supports(softer, [0.0], [0.0], 2.0 * np.pi * f0)[0, 0]
+        assert abs(found[0] - exact) < 0.06 * abs(exact), frequency
+
+
 def test_maxwell_branches_stiffen_the_pads():
     """k (1 + sum g i w/(i w + r)) in the exact series."""
     world = uniform_world(pad_damping=1e4, sponge=0.0)
@@ -262,6 +278,10 @@ def test_softly_closing_gap():
     assert _ballast(s, 3, 1.1e-3, 0.0, 0.0) < 0.35 * k * 1e-4
     assert _ballast(s, 3, 4e-3, 0.0, 0.0) == pytest.approx(k * (3e-3 - 2e-4), rel=1e-6)
     assert _ballast(s, 4, -1e-3, 0.0, 0.0) == pytest.approx(-k * 1e-3)  # an ordinary sleeper is held both ways
+    world.seated[3] = 0.4
+    s = world.supports()
+    assert _ballast(s, 3, 0.9e-3, 0.0, 0.0) == pytest.approx(0.4 * k * 0.9e-3)
+    assert _ballast(s, 3, 4e-3, 0.0, 0.0) == pytest.approx(k * (0.4 * 4e-3 + 0.6 * (3e-3 - 2e-4)), rel=1e-6)
 
 
 def test_sleepers_pass_at_speed_over_spacing():

@@ -166,6 +166,15 @@ def test_parameters_are_compared_with_what_was_concealed():
     assert judge(t, answers_of([outside])).parameters == ((pytest.approx(0.3), False),)
 
 
+def test_the_gap_of_a_sleeper_that_hangs_in_part_is_not_compared():
+    t = truth("s", "single", "void")
+    named = row(t["effects"][0], "hanging_sleeper")
+    t["effects"][0]["parameters"] = {"gap": 1e-3, "seated": 0.35}
+    judged = judge(t, answers_of([named]))
+    assert judged.hits == ("named",)
+    assert judged.parameters == ()
+
+
 def test_effects_too_small_to_cost_fit_are_not_held_against_the_tool():
     assert gain_of({"hammer_pct": 0.0, "passage_pct": 5.0}) < 0.3
     hidden = judge(truth("s", "single", "void", share=5.0), answers_of([{"verdict": "none"}]))

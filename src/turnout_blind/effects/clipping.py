@@ -1,21 +1,33 @@
-"""An amplifier that saturates softly, one side before the other."""
+"""An amplifier that saturates softly, one side before the other; its limit counts in peaks that the channel meets."""
 
 import numpy as np
 
 from turnout_blind.effect import Effect, any_sensor
+from turnout_blind.record import passage_motion, sensor_places
+from turnout_blind.run import strike
 
 
-def draw(rng, site, limit):
-    """Largest value shown upward; downward it is 15 % less."""
-    return any_sensor(rng, site), {"limit": float(limit)}
+def peak(site, sensor):
+    """Largest acceleration of a sensor [m/s²] in one ordinary blow at each place and in the fastest passage."""
+    i, places = site.names().index(sensor), sensor_places(site, site.world)
+    blows = [strike(site.world, places, x, [0.0], [0.95], 0.03, tip=site.tip)[1][i] for x in site.blows]
+    fastest = max(range(len(site.passages)), key=lambda k: site.passages[k].speed)
+    rolled = passage_motion(site, site.world, fastest, None)[i]
+    return float(max(np.abs(x).max() for x in (*blows, rolled)))
+
+
+def draw(rng, site, share):
+    """Largest value shown, the mean of both sides."""
+    where = any_sensor(rng, site)
+    return where, {"limit": share * peak(site, where["sensor"]), "share": float(share)}
 
 
 def act(world, site, where, p):
-    """Follows up to 80 % of the limit, then bends over."""
+    """8 % more upward, 8 % less downward; follows up to 80 % of that, then bends over."""
 
     def fault(kind, rng):
         def bent(x, rate):
-            limit = np.where(x > 0.0, p["limit"], 0.85 * p["limit"])
+            limit = np.where(x > 0.0, 1.08 * p["limit"], 0.92 * p["limit"])
             size, knee = np.abs(x), 0.8 * limit
             over = np.maximum(size - knee, 0.0)
             return np.sign(x) * (np.minimum(size, knee) + 0.2 * limit * np.tanh(over / (0.2 * limit)))
@@ -25,4 +37,4 @@ def act(world, site, where, p):
     world.channels.setdefault(where["sensor"], []).append(fault)
 
 
-EFFECT = Effect("clipping", "sensor", (150.0, 90.0, 55.0, 32.0, 19.0, 11.0, 6.0), draw, act)
+EFFECT = Effect("clipping", "sensor", (1.2, 1.0, 0.9, 0.8, 0.68, 0.55, 0.4), draw, act)

@@ -1,20 +1,24 @@
-"""A guard rail's block that lies loose between two stops on the rail and rattles."""
+"""A guard rail's block that has worked loose and rattles between two stops on the rail, steel on steel."""
 
 import numpy as np
 
 from turnout_blind.effect import Effect
 
+STOP = 8e8  # stiffness of the stops [N/m]
 
-def draw(rng, site, mass):
-    """Mass and play of the block."""
+
+def draw(rng, site, level):
+    """Mass and play: a bolt's head in a wide hole moves little, a length of guard rail in a narrow one much."""
+    mass, play = level
     place = float(rng.uniform(min(site.sensors), max(site.sensors)))
-    return {"position": place}, {"mass": float(mass), "play": float(rng.uniform(3e-5, 1.5e-4))}
+    return {"position": place}, {"mass": float(mass), "play": float(play * np.exp(0.2 * rng.normal()))}
 
 
 def act(world, site, where, p):
-    """A soft spring (6 Hz) carries it, stops of 40 MN/m catch it."""
+    """A soft spring (6 Hz) carries it, the stops catch it."""
     k = p["mass"] * (2.0 * np.pi * 6.0) ** 2
-    world.riders.append((where["position"], p["mass"], k, 0.1 * k / 40.0, p["play"], 4e7))
+    world.riders.append((where["position"], p["mass"], k, 0.1 * k / 40.0, p["play"], STOP))
 
 
-EFFECT = Effect("guard_rail_rattle", "place", (20.0, 50.0, 110.0, 220.0), draw, act, "outside")
+LADDER = ((4.0, 4e-4), (15.0, 2e-4), (60.0, 8e-5), (200.0, 2.5e-5))
+EFFECT = Effect("guard_rail_rattle", "place", LADDER, draw, act, "outside")

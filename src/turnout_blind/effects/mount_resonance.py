@@ -1,4 +1,9 @@
-"""A sensor on a loose mount: it resonates, with play-free but weak contact, above and below its resonance."""
+"""A sensor on a loose mount: it resonates, with play-free but weak contact, above and below its resonance.
+
+It yields beside the mount that every sensor has (2.5 to 4.5 kHz): at 5 kHz both together are a good mount still.
+"""
+
+import numpy as np
 
 from turnout_blind.effect import Effect, any_sensor
 from turnout_blind.instrument import mounting
@@ -18,4 +23,4 @@ def act(world, site, where, p):
     world.channels.setdefault(where["sensor"], []).append(fault)
 
 
-EFFECT = Effect("mount_resonance", "sensor", (2000.0, 1300.0, 900.0, 620.0, 430.0, 290.0, 180.0), draw, act)
+EFFECT = Effect("mount_resonance", "sensor", tuple(np.geomspace(5000.0, 180.0, 7)), draw, act)

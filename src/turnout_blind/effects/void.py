@@ -1,20 +1,25 @@
-"""A sleeper that hangs above its ballast; the gap closes softly, stone after stone, and grows from train to train."""
+"""A sleeper that hangs: first over a part of its bed, then over all of it. The gap closes softly, stone after stone.
 
-import numpy as np
+A gap of any size shows in a blow once nothing bears the unloaded sleeper; voids grow from partial ones (Kaewunruen and
+Remennikov 2008, Dynamic properties of railway track), so that low rungs keep a share of the ballast's stiffness.
+"""
 
 from turnout_blind.effect import Effect, sleeper_near
 
 
-def draw(rng, site, gap):
-    """Gap, the length over which it closes, its growth per passage."""
-    return sleeper_near(rng, site), {"gap": float(gap), "close": float(gap * rng.uniform(0.1, 0.4)), "growth": 0.02}
+def draw(rng, site, level):
+    """Gap, share of the bed that still bears, the length over which the gap closes, its growth per passage."""
+    gap, seated = level
+    close = float(gap * rng.uniform(0.1, 0.4))
+    return sleeper_near(rng, site), {"gap": float(gap), "seated": float(seated), "close": close, "growth": 0.02}
 
 
 def act(world, site, where, p):
-    """Ballast reacts only below the gap."""
+    """Beside the share that bears, ballast reacts only below the gap."""
     j = where["sleeper"]
-    world.gap[j], world.close[j] = p["gap"], p["close"]
+    world.gap[j], world.seated[j], world.close[j] = p["gap"], p["seated"], p["close"]
     world.wear_per_passage[j] = (p["gap"] * p["growth"], 1.0)
 
 
-EFFECT = Effect("void", "place", tuple(np.geomspace(5e-5, 2.5e-3, 7)), draw, act)
+LADDER = ((5e-5, 0.97), (1e-4, 0.92), (2e-4, 0.82), (3.5e-4, 0.62), (7e-4, 0.35), (1.3e-3, 0.0), (2.5e-3, 0.0))
+EFFECT = Effect("void", "place", LADDER, draw, act)

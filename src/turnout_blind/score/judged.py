@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from turnout_blind.score.names import SAME, right_locks, right_names
+from turnout_blind.score.names import right_locks, right_names, same_parameters
 
 BAY = 0.6  # a place is right within one bay [m]
 LEVEL = 46.0  # what controls leave unexplained of a passage never used [% of its norm]; roughness, mostly
@@ -127,7 +127,7 @@ def _compared(effects, right, loud):
     """(relative error, whether the 95 % interval covers, or None without a standard error) per parameter named."""
     for effect, names in zip(effects, right):
         answer = next((a for a in loud if a.verdict == "named" and set(a.names) & set(names)), None)
-        for own, theirs in SAME.get(effect["kind"], {}).items():
+        for own, theirs in same_parameters(effect).items():
             if answer is None or answer.parameters.get(theirs, (None,))[0] is None:
                 continue
             value, se = answer.parameters[theirs]

@@ -32,7 +32,7 @@ RIGHT = {
 }
 
 # Kind -> what it may be said to be locked to. A lag is the sensor's or its clock's; what acts with amplitude at one
-# place is locked to either.
+# place is locked to either. A polygon goes with its wheel, too heavy wheelsets with their train, and with nothing else.
 LOCKS = {
     "pad_fractional": ("condition", "frequency"),
     "rail_shear": ("condition", "frequency"),
@@ -48,8 +48,9 @@ LOCKS = {
     "common_gain": ("condition", "sensor", "train"),
 }
 
-# Kind -> {parameter: the tool's parameter of the same meaning}. Shapes that differ have none that could be compared:
-# the length of a rounded flat is half again the tool's, a power law has no single branch.
+# Kind -> {parameter: the tool's parameter of the same meaning}. A flat's length is in both that of the chord with a
+# depth of l^2 / 16 R, however far its edges are worn; a limit is the mean of both sides. Not compared: a power law has
+# no single branch, a polygon's cosine and sine hang on where the angle is counted from, a mount yields beside another.
 SAME = {
     "void": {"gap": "gap"},
     "ballast": {"factor": "factor"},
@@ -69,6 +70,16 @@ SAME = {
 def right_names(kind, more=None):
     """Names that are right for ``kind``; ``more`` {kind: [names]} for effects of one's own."""
     return tuple(RIGHT.get(kind, ())) + tuple((more or {}).get(kind, ()))
+
+
+def same_parameters(effect):
+    """{parameter: the tool's of the same meaning} of one concealed effect (its entry in the truth).
+
+    A sleeper that still bears on a part of its bed has no gap of its own: only one that hangs whole has.
+    """
+    if effect["parameters"].get("seated", 0.0) > 0.0:
+        return {}
+    return SAME.get(effect["kind"], {})
 
 
 def right_locks(kind, locked_to):
