@@ -11,6 +11,7 @@ from turnout.simulate import load_vehicle
 
 PATTERN = 0.4  # m rms between axles heard and those of the vehicle's file: half of a short bogie is 0.9
 LEAST_REACH = 0.03  # share by which the vehicle's axle distances may correct the speed found
+LEAST_HEARD = 0.6  # share of a noted train's axles: a flat or a dip adds axles and hides some, it does not halve them
 NEWTON_PER_TONNE = 9806.65
 KMH = 3.6
 
@@ -35,16 +36,28 @@ def train_of(row: Mapping, said: Mapping, folder: Path) -> TrainFound:
     """Train from the passage stage's ``row`` and what the file itself notes (``said``), vehicles in ``folder``.
 
     The recording comes before the notes. TrainUnknownError where type or speed are not known, no vehicle has a file, or
-    its axles are not those that were heard.
+    its axles are not those that were heard. A train that the notes name, with its speed, is believed against axles that
+    do not fit, with a doubt: flats, dips and polygonal wheels sound like axles, and whoever simulates the passage sees
+    whether it is that train.
     """
-    speed = row.get("speed_kmh") or KMH * float(said.get("speed") or 0.0) or row.get("speed_listed_kmh")
-    name = _type(row, said)
+    noted = KMH * float(said.get("speed") or 0.0) or row.get("speed_listed_kmh")
+    speed = row.get("speed_kmh") or noted
+    names = _types(row, said)
+    name = _with_a_file(names, folder)
     if not speed or not name:
         missing = "speed" if name else "type"
         raise TrainUnknownError(f"the train's {missing} is not known ({row.get('detail') or 'no axles found'})")
+    believed = noted if name in _types({**row, "train_type": None}, said) else None
+    if believed and name != names[0]:  # the speed heard is that of another train's axle distances
+        speed = believed
     speed = float(speed) / KMH
-    vehicle, doubts = _vehicle(name, row.get("n_axles") or None, row, said, folder)
-    speed, more = _by_its_axles(name, vehicle, row, speed)
+    vehicle, doubts = _vehicle(name, row.get("n_axles") or None, row, said, folder, bool(believed))
+    try:
+        speed, more = _by_its_axles(name, vehicle, row, speed)
+    except TrainUnknownError as error:
+        if not believed:
+            raise
+        speed, more = float(believed) / KMH, (f"{error}; taken as noted",)
     direction, route = row.get("direction"), row.get("track")
     if direction not in ("facing", "trailing"):
         direction = str(said.get("direction", "facing"))
@@ -53,26 +66,32 @@ def train_of(row: Mapping, said: Mapping, folder: Path) -> TrainFound:
     return TrainFound(name, vehicle, speed, direction, route, (*doubts, *more))
 
 
-def _type(row, said) -> str:
-    for found in (row.get("train_type"), row.get("train_type_listed"), said.get("train_type")):
-        if found and found != "unknown":
-            return str(found).lower().replace(" ", "_")
-    return ""
+def _types(row, said) -> list[str]:
+    """Types heard, listed and noted, in this order."""
+    found = (row.get("train_type"), row.get("train_type_listed"), said.get("train_type"))
+    return [str(name).lower().replace(" ", "_") for name in found if name and name != "unknown"]
 
 
-def _vehicle(name, heard, row, said, folder):
+def _with_a_file(names, folder) -> str:
+    """The first type that has a vehicle file, else the first, "" without any."""
+    there = [name for name in names if (Path(folder) / f"{name}.yaml").is_file()]
+    return next(iter([*there, *names]), "")
+
+
+def _vehicle(name, heard, row, said, folder, believed):
     try:
         one = load_vehicle(name, 0.0, folder)
     except (SimulationError, ConfigError) as error:
         raise TrainUnknownError(f"type {name}: {error}") from None
-    n, units = len(one.wheels), int(said.get("units", 1))
-    if heard:
-        if heard % n:
-            wrong = "wrong vehicle file, another train, or other sensors"
-            raise TrainUnknownError(f"{heard} axles heard, {n} in {name}.yaml: {wrong}")
+    n, units, wrong = len(one.wheels), int(said.get("units", 1)), ()
+    if heard and heard % n:
+        wrong = (f"{heard} axles heard, {n} in {name}.yaml: wrong vehicle file, another train, or other sensors",)
+        if not believed or heard < LEAST_HEARD * n * units:
+            raise TrainUnknownError(*wrong)
+    elif heard:
         units = heard // n
     share, doubts = _load_share(name, row, said, folder, units)
-    return load_vehicle(name, share, folder, units), doubts
+    return load_vehicle(name, share, folder, units), (*doubts, *wrong)
 
 
 def _load_share(name, row, said, folder, units):

@@ -108,7 +108,7 @@ class TrackCase(Case):
                 continue
             signals = self._roll(values, (), passage)(passage, passage.vehicle, passage.speed, sensors)
             reference, speed, likeness = rolling.align(passage, sensors, signals, self.solver.rate)
-            if likeness < 0.3:
+            if likeness < rolling.ALIKE:
                 self.notes.append(
                     f"passage {passage.name}: likeness {likeness:.2f} with the simulation of "
                     f"{passage.train or 'its train'}; wrong vehicle file, wrong sensor places or another turnout"
