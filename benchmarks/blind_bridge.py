@@ -21,6 +21,7 @@ from turnout.config.load import load_configuration, with_raw
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.fleet.scan import scan
 from turnout.mismatch.diagnose import diagnose
+from turnout.mismatch.finding import acts
 from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.shortlist import shortlist
 from turnout.mismatch.track.track_case import TrackCase
@@ -94,7 +95,7 @@ def rows_of(diagnosis):
     found = []
     for verdict in diagnosis.verdicts:
         best = verdict.scores[0] if verdict.scores and verdict.names else None
-        row = _row(verdict.answer, best and best.candidate, best and best.fit, diagnosis.verification)
+        row = _row(verdict.answer, best and best.candidate, best and best.fit, diagnosis.verification, diagnosis.where)
         frame = diagnosis.frames[0].frame if diagnosis.frames else None
         found.append(
             row
@@ -106,15 +107,15 @@ def rows_of(diagnosis):
     return found
 
 
-def _row(verdict, candidate, fit, seen):
-    where = dict(candidate.where) if candidate else {}
+def _row(verdict, candidate, fit, seen, found=None):
+    where = dict(candidate.where) if candidate else acts(found) if verdict == "unknown" else {}
     n = len(candidate.parameters) if candidate and fit else 0
     values = zip(candidate.parameters, fit.psi[-n:], fit.psi_se[-n:]) if n else ()
     numbers = {p.name: {"value": float(v), "se": float(s), "unit": p.unit} for p, v, s in values}
     fits = {f"fit_{name}_pct": _number(getattr(seen, name, None)) for name in ("before", "after", "rival", "decoy")}
     return {
         "verdict": verdict, "term": candidate.family if candidate else None,
-        "locked_to": candidate.frame if candidate else None, "position_m": where.get("place"),
+        "locked_to": candidate.frame if candidate else where.get("frame"), "position_m": where.get("place"),
         "channel": where.get("sensor"), **fits, "n_held_out": getattr(seen, "n", 0),
         "parameters_json": json.dumps({**numbers, "where": {k: _plain(v) for k, v in where.items()}}),
     }  # fmt: skip

@@ -129,6 +129,10 @@ class GuidedCase:
         """Linear columns of the candidates beside what was accepted."""
         return self.case.screen(self._seen(fit))
 
+    def spaces(self, fit):
+        """What the residual may be locked to beside what was accepted."""
+        return self.case.spaces(self._seen(fit))
+
     def latent(self, fit):
         """The force that is missing beside what was accepted."""
         return self.case.latent(self._seen(fit))

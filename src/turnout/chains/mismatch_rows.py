@@ -75,7 +75,6 @@ def _numbers(found, case, group, about) -> dict:
         "n_sensors": len(campaign.sensors),
         "level_before": float(max(found.base.level.values())),
         "level_after": float(max(fit.level.values())),
-        "train": _train(found),
         "term_json": json.dumps(terms, sort_keys=True) if terms else None,
         "evidence_json": json.dumps(_evidence(found), sort_keys=True),
         "notes": "\n".join([*about["notes"], *case.notes][:NOTES_KEPT]) or None,
@@ -88,12 +87,6 @@ def _errors(fit):
     for candidate in fit.candidates:
         yield se[first : first + len(candidate.parameters)]
         first += len(candidate.parameters)
-
-
-def _train(found):
-    where = found.fit.candidates[0].where if found.fit.candidates else {}
-    axle = f", axle {where['axle']}" if where.get("axle") else ""
-    return f"{where['train']}{axle}" if where.get("train") else None
 
 
 def _evidence(found) -> dict:

@@ -63,9 +63,21 @@ def headline(finding) -> str:
         return f"{said}, or it is {other}: these recordings cannot tell the two apart."
     low, high = finding["place_low_m"], finding["place_high_m"]
     if finding["verdict"] == "unknown":
-        where = f"between {low:.1f} and {high:.1f} m" if high - low > 0.1 else f"about {low:.1f} m"
-        return f"Something is missing {where}, and no known effect explains it."
+        return f"Something is missing {_somewhere(finding, low, high)}, and no known effect explains it."
     return finding["sentence"] or ""
+
+
+def _somewhere(finding, low, high):
+    """Where it acts, else between which places was measured."""
+    if finding["position_m"] is not None:
+        return f"at {finding['position_m']:.1f} m"
+    if finding["train"]:
+        train, _, axle = finding["train"].partition(", axle ")
+        return f"on axle {axle} of {train}" if axle else f"on {train}"
+    if finding["channel"]:
+        return f"in channel {finding['channel']}"
+    between = f"between {low:.1f} and {high:.1f} m" if high - low > 0.1 else f"about {low:.1f} m"
+    return f"{between} that comes and goes without a wheel" if finding["locked_to"] == "clock" else between
 
 
 def _sentence(term, finding) -> str:

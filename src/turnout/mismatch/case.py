@@ -145,7 +145,9 @@ class Case:
     ``reserved`` are observations that nothing but the final verification reads. ``frozen_jacobian`` tells the
     engine that a prediction is dear: the nuisances' derivatives are then kept and updated by Broyden's formula, but
     for observations that are ``cheap``. ``start_values`` are values of nuisances where fits start, else their means;
-    ``control_level`` the weighted mean square by kind that cases without an effect reach, else that of the settings.
+    ``control_level`` the weighted mean square by kind that cases without an effect reach, else that of the settings;
+    ``cell_level`` the same for one channel of one recording, by kind;
+    ``disturbed`` recordings not used, since something else than the known inputs shows in them (``track.quiet``).
     """
 
     observations: tuple[Observation, ...] = ()
@@ -155,6 +157,8 @@ class Case:
     frozen_jacobian = False
     start_values: Mapping[str, float] = {}
     control_level: Mapping[str, float] = {}
+    cell_level: Mapping[str, float] = {}
+    disturbed: tuple = ()
 
     def cheap(self, observation):
         """Derivatives of this observation cost next to nothing."""
@@ -211,6 +215,10 @@ class Case:
     def cheap_part(self):
         """A case of the cheap observations alone, with the same shared nuisances; None where there is none."""
         return None
+
+    def spaces(self, fit):
+        """Subspaces of the observations that a cause could be locked to, ``spaces.Space``; none by default."""
+        return ()
 
     def latent(self, fit):
         """Covariates of the latent force: name -> (n,), with "force"; None where the case has no such view."""

@@ -12,7 +12,8 @@ from turnout.mismatch.latent import Latent, latent_law
 from turnout.mismatch.locate import attribute, cell_energies
 from turnout.mismatch.shortlist import shortlist
 from turnout.mismatch.verdict import Score, Verdict, judge
-from turnout.mismatch.verify import decoy, fit_percent, predict_reserved
+from turnout.mismatch.verify import decoy, falls, fit_percent, predict_reserved
+from turnout.mismatch.whereabouts import Whereabouts, whereabouts
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,8 @@ class Verification:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Outcome of ``diagnose``: one verdict per effect found, the fits, the frames, the latent force."""
+    """Outcome of ``diagnose``: one verdict per effect found, the fits, the frames, the latent force, and ``where`` that
+    acts which got no name."""
 
     verdicts: tuple[Verdict, ...]
     base: object
@@ -38,6 +40,7 @@ class Diagnosis:
     latent: Latent | None = None
     preflight: dict = field(default_factory=dict)
     scored: tuple = ()
+    where: Whereabouts | None = None
 
     @property
     def verdict(self):
@@ -88,10 +91,11 @@ def diagnose(case, settings=None, progress=None, store=None):
         fit = best.fit
         if verdict.answer == "a_or_b" or (not case.frozen_jacobian and _over(case, fit, settings) <= 1.0):
             break
-    rival = _rival(verdicts[0])
+    rival, refused = _rival(verdicts[0]), verdicts[0].scores[0] if verdicts[0].scores else None
+    where = whereabouts(case, base, refused) if verdicts[0].answer == "unknown" else None
     return Diagnosis(
         tuple(verdicts), base, fit, frames, _verified(case, base, fit, rival), _latent_of(case, base), {},
-        tuple(scored),
+        tuple(scored), where,
     )  # fmt: skip
 
 
@@ -208,29 +212,44 @@ def _over(case, fit, settings):
     return max(fit.level[kind] / control[kind] for kind in fit.level)
 
 
+def _loudest(case, fit):
+    """Largest mean square of one channel in one recording over what it is in controls, of the kinds that tell."""
+    found = [0.0]
+    for o, white in zip(case.observations, fit.white):
+        if o.kind not in case.cell_level or o.cells is None or "sensor" not in o.labels:
+            continue
+        inside = o.cells >= 0
+        level, code = np.unique(o.labels["sensor"].astype(str), return_inverse=True)
+        channel = code[o.cells[inside]]
+        count = np.maximum(np.bincount(channel, minlength=level.size), 1)
+        square = np.bincount(channel, np.asarray(white)[inside] ** 2, minlength=level.size)
+        found.append(float(np.max(square / count)) / case.cell_level[o.kind])
+    return max(found)
+
+
 def _judged(case, fit, scored, settings):
     best = max((s for s in scored if s.material), key=lambda s: s.gain, default=None)
-    excess = _over(case, fit, settings)
+    excess = max(_over(case, fit, settings), _loudest(case, fit))
     scored = tuple(s for s in scored if s.material)
     if best is None:
-        return judge([], excess, settings), None
+        return judge([], excess, settings, disturbed=bool(case.disturbed)), None
     consistent, structure = True, 0.0
     if best.gain > settings.threshold:
         consistent = _consistent(case, fit, best.fit, settings)
         left = _latent_of(case, best.fit)
         structure = max(left.r2.values(), default=0.0) if left else 0.0
     left = _over(case, best.fit, settings)
-    return judge(scored, excess, settings, consistent, structure, left), best
+    return judge(scored, excess, settings, consistent, structure, left, bool(case.disturbed)), best
 
 
 def _consistent(case, base, fit, settings):
-    """Reserved conditions are predicted no worse than without the effect, within what as many samples scatter."""
+    """Reserved conditions are predicted no worse than without the effect."""
     if not case.reserved:
         return True
-    before, after = (
-        mean_square_out(case, f, case.reserved, predict_reserved(case, f, case.reserved)) for f in (base, fit)
-    )
-    return after <= settings.withdrawn_ratio * before
+    before, after = (predict_reserved(case, f, case.reserved) for f in (base, fit))
+    squares = [mean_square_out(case, f, case.reserved, p) for f, p in ((base, before), (fit, after))]
+    fell = falls(case.reserved, before, after, settings.fall)
+    return squares[1] <= settings.withdrawn_ratio * squares[0] and not fell
 
 
 def _own_numerics(case, base, settings):

@@ -30,6 +30,7 @@ SEPARATES = {
     "sensor_position": "passages at another speed",
     "attached_resonator": "a hammer test above and beside this place",
 }
+BAY = 0.6  # m between supports, where places are looked into
 ELSE = "hammer tests at the points between, and a train of another load and speed"
 
 
@@ -41,7 +42,7 @@ def sentence(diagnosis):
     if verdict.answer == "numerics":
         return f"The simulation is not fine enough to be compared: {verdict.reason}."
     if verdict.answer == "unknown":
-        return f"Something is missing {place_in_words(diagnosis)} that no candidate explains: {verdict.reason}."
+        return f"Something is missing {place_in_words(diagnosis)}: {verdict.reason}."
     words = [f"What the model left out: {t.sentence()}." for t in diagnosis.fit.terms]
     if verdict.answer == "a_or_b":
         other = verdict.names[1].replace("_", " ")
@@ -50,7 +51,9 @@ def sentence(diagnosis):
 
 
 def place_in_words(diagnosis):
-    """Where the residual is concentrated, from the frame attribution."""
+    """Where what is missing acts, else where the residual is concentrated by the frame attribution."""
+    if diagnosis.where is not None:
+        return str(diagnosis.where)
     found = [f for f in diagnosis.frames if f.q < 0.05]
     if not found:
         return "at no place, sensor or train in particular"
@@ -71,7 +74,7 @@ def finding_row(diagnosis, identity):
     """Row of ``mismatch_findings``; ``identity`` holds finding_id, turnout_id, section_id, found_at_utc, result_id."""
     verdict, check = diagnosis.verdict, diagnosis.verification
     term = next(iter(diagnosis.fit.candidates), None) if verdict.answer in ("named", "a_or_b") else None
-    where = term.where if term else {}
+    where = term.where if term else acts(diagnosis.where)
     frame = diagnosis.frames[0] if diagnosis.frames and diagnosis.frames[0].q < 0.05 else None
     return {
         **identity,
@@ -79,9 +82,9 @@ def finding_row(diagnosis, identity):
         "grade": verdict.grade or None,
         "term": verdict.names[0] if verdict.names else None,
         "rival_term": verdict.names[1] if len(verdict.names) > 1 else None,
-        "locked_to": term.frame if term else (frame.frame if frame else None),
+        "locked_to": term.frame if term else where.get("frame") or (frame.frame if frame else None),
         "position_m": where.get("place"),
-        "position_se_m": _se(diagnosis, "shift"),
+        "position_se_m": _se(diagnosis, "shift") if term else where.get("place_se"),
         "channel": where.get("sensor") or (str(frame.level) if frame and frame.frame == "sensor" else None),
         "band_low_hz": None,
         "band_high_hz": None,
@@ -93,9 +96,27 @@ def finding_row(diagnosis, identity):
         "fit_decoy_pct": _finite(check.decoy),
         "n_held_out": check.n,
         "parameters_json": json.dumps(parameters(diagnosis), sort_keys=True) if term else None,
+        "train": in_train(where),
         "sentence": sentence(diagnosis),
         "next_measurement": recommendation(diagnosis) or None,
     }
+
+
+def in_train(where):
+    """Train and axle of a place of action, in words; None where it has none."""
+    if not where.get("train"):
+        return None
+    return f"{where['train']}, axle {where['axle']}" if where.get("axle") else where["train"]
+
+
+def acts(found):
+    """Frame, place with standard error, sensor, train and axle of the ``Whereabouts``, {} of None."""
+    if found is None:
+        return {}
+    said = {"frame": found.frame, "sensor": found.sensor, "train": found.train, "axle": found.axle}
+    if found.place is not None:  # an interval of 95 %, not below half a bay
+        said |= {"place": found.place, "place_se": max(found.high - found.low, BAY) / 4.0}
+    return said
 
 
 def parameters(diagnosis):

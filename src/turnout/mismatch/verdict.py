@@ -81,7 +81,7 @@ def _withdraw(probabilities):
     probabilities[top], probabilities["unknown"] = probabilities["unknown"], probabilities[top]
 
 
-def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0):
+def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, disturbed=False):
     """Verdict from scored candidates.
 
     Parameters
@@ -96,6 +96,8 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0):
         Share of the residual of the best candidate that a free law of the state still explains.
     left : float
         Weighted mean square that the best candidate leaves over the level of controls.
+    disturbed : bool
+        Something that is no train shakes the sensors in some recordings; these are not among those fitted.
     """
     ranked = sorted(scores, key=lambda s: -s.gain)
     probabilities = posterior(scores, excess, settings)
@@ -112,6 +114,8 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0):
     if not found:
         if excess > 1.0:
             return verdict("unknown", reason="above the level of controls, and no candidate helps")
+        if disturbed:
+            return verdict("unknown", reason="something shakes all sensors while no wheel is near")
         return verdict("none", reason="nothing above the thresholds")
     best = found[0]
     if excess > 1.0 and best.explained < settings.explained:

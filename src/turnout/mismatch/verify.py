@@ -5,6 +5,7 @@ import numpy as np
 from turnout.mismatch.joint import Joint
 
 FITTED_STEPS = 2
+BLOCKS = 25
 
 
 def fit_percent(observations, predictions, centre=True):
@@ -21,6 +22,20 @@ def fit_percent(observations, predictions, centre=True):
         missed += o.effective * float(np.sum(((o.data - p) / o.sigma) ** 2))
         total += o.effective * float(np.sum(((o.data - middle) / o.sigma) ** 2))
     return round(100.0 * (1.0 - float(np.sqrt(missed / total))), 4)
+
+
+def falls(observations, before, after, points):
+    """Whether ``after`` fits worse than ``before`` by more than ``points`` of fit and by more than its standard error.
+
+    The difference of weighted squares is taken over ``BLOCKS`` stretches of each observation; these scatter.
+    """
+    parts = [
+        o.effective * float(np.sum(d))
+        for o, b, a in zip(observations, before, after)
+        for d in np.array_split((((o.data - a) ** 2 - (o.data - b) ** 2) / o.sigma**2), BLOCKS)
+    ]
+    error = np.std(parts, ddof=1) * np.sqrt(len(parts))
+    return sum(parts) > error and fit_percent(observations, after) < fit_percent(observations, before) - points
 
 
 def predict_reserved(case, fit, observations):

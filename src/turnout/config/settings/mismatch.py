@@ -25,6 +25,9 @@ class MismatchSettings:
     passage_control: float = setting(
         0.7, "-", "weighted mean square of passages that controls of another generator stay below", 0.1, 100.0
     )
+    cell_control: float = setting(
+        1.4, "-", "the same of one channel of one passage, the largest of some twenty", 0.1, 100.0
+    )
     threshold: float = setting(
         12.0, "nats", "held-out gain that no control exceeded, with a reserve of half; see docs/mismatch.md", 0.0
     )
@@ -35,6 +38,9 @@ class MismatchSettings:
     )
     withdrawn_ratio: float = setting(
         2.0, "-", "mean square on reserved over calibration recordings that withdraws a name", 1.0
+    )
+    fall: float = setting(
+        0.5, "%", "points of fit on reserved recordings that a name may cost, or their standard error", 0.0, 100.0
     )
     structure_left: float = setting(
         0.4, "-", "share of what is left that a free law of the state still explains: shape unresolved", 0.0, 1.0

@@ -22,6 +22,7 @@ from turnout.mismatch.track.base_model import (
 )
 from turnout.mismatch.track.columns import columns_of, support_forces
 from turnout.mismatch.track.library import library
+from turnout.mismatch.track.quiet import disturbances
 from turnout.mismatch.track.rough_rail import Waves, wave_columns
 from turnout.mismatch.track.rough_wheels import wheel_modes
 from turnout.simulate.run import Probe
@@ -40,7 +41,7 @@ class TrackCase(Case):
         self._prepare(campaign, settings or MismatchSettings(), solver or rolling.Track1D())
         found, self.start_values = list(self._hammer()), {}
         self.start_values = self._from_blows([o for _, o in found])
-        found += self._passages()
+        found += self._undisturbed(list(self._passages()))
         if not found:
             raise SimulationError("nothing to diagnose: " + "; ".join(self.notes))
         reserved = set(campaign.reserved)
@@ -121,6 +122,17 @@ class TrackCase(Case):
                 wheel_modes(self, {**values, **dict.fromkeys(_own_of(passage), 0.0)}, made, observation.sigma),
             )
             yield passage.name, replace(observation, modes=np.column_stack(modes))
+
+    def _undisturbed(self, found):
+        """The passages in which nothing but their train shakes the sensors; all where fewer than two would be left."""
+        self.disturbed = tuple(disturbances(self.rollings))
+        shaken = {d.name: d for d in self.disturbed}
+        if len(found) - len(shaken) < 2:
+            return found
+        for name, d in shaken.items():
+            del self.rollings[name]
+            self.notes.append(f"passage {name}: not used, {d.louder:.0f} dB louder {d.when} its train than the others")
+        return [(name, o) for name, o in found if name not in shaken]
 
     def _nuisances(self):
         yield from track_nuisances(self.zone, self.trains)
@@ -236,6 +248,11 @@ class TrackCase(Case):
         """What controls reach, by kind."""
         return {"hammer": self.settings.hammer_control, "passage": self.settings.passage_control}
 
+    @property
+    def cell_level(self):
+        """What one channel of one passage reaches in controls."""
+        return {"passage": self.settings.cell_control}
+
     def cheap_part(self):
         """The hammer tests."""
         return Blows(self) if self.pairs else None
@@ -332,6 +349,12 @@ class TrackCase(Case):
         from turnout.mismatch.track.screening import screen_columns
 
         return screen_columns(self, fit, self.observations)
+
+    def spaces(self, fit):
+        """Forces at places, faults of channels, wheels and single passages that the residual may be locked to."""
+        from turnout.mismatch.track.missing_source import missing_sources
+
+        return missing_sources(self, fit)
 
     def latent(self, fit):
         """Missing force at the support that explains most of the residual."""

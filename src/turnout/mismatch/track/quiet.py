@@ -1,0 +1,89 @@
+"""Quiet before the first and after the last wheel: what shakes the sensors then is no wheel of this train.
+
+The mean square of a quiet segment in a band of width W over a time T is chi-squared with 2 W T degrees of freedom, so
+that the ratio of one passage's to that of the others follows Fisher's F. Half of the sensors must show it: a noisy
+channel is another matter.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import binom, f
+
+AWAY = 12.0  # m from a wheel to the nearest sensor: what the train itself sends ahead has died down
+SHORTEST = 0.25  # s of quiet that are worth a look
+BAND = (5.0, 100.0)  # Hz
+LOUDER = 3.0  # dB over the other passages; sound passages differ by 1 dB
+CORRELATED = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0)  # lines of a Hann window
+DISTURBED = 1e-4  # chance of one such segment among all
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """A passage whose quiet segment, ``when`` "before" or "after" its train, is ``louder`` [dB] than the others', with
+    the chance ``p`` of that, for all segments looked at."""
+
+    name: str
+    when: str
+    louder: float
+    p: float
+
+
+def disturbances(rollings):
+    """Disturbance of every passage in which something else shook the sensors; ``rollings`` by name."""
+    found, segments = [], {"before": {}, "after": {}}
+    for made in rollings.values():
+        for when, (start, stop) in _quiet(made).items():
+            if stop - start >= SHORTEST:
+                segments[when][made.name] = _level(made, start, stop)
+    looked_at = sum(len(s) for s in segments.values() if len(s) > 2)
+    for when, levels in segments.items():
+        for name in levels if len(levels) > 2 else ():
+            others = [level for other, level in levels.items() if other != name]
+            louder, p = louder_than(levels[name], others)
+            if louder > LOUDER and p * looked_at < DISTURBED:
+                found.append(Disturbance(name, when, louder, min(1.0, p * looked_at)))
+    return found
+
+
+def _quiet(made):
+    """(start, stop) of the segments with every wheel far from every sensor [s]."""
+    train = np.ptp([s.place for s in made.sensors]) + made.passage.vehicle.wheel_places[-1]
+    away = AWAY / made.speed
+    end = made.passage.recording.duration
+    return {"before": (0.02, made.reference - away), "after": (made.reference + train / made.speed + away, end - 0.02)}
+
+
+def _level(made, start, stop):
+    """Mean square in the band by sensor (n,), and its degrees of freedom."""
+    recording = made.passage.recording
+    rows = [recording.index(s.name) for s in made.sensors]
+    first, last = int(start * recording.rate), int(stop * recording.rate)
+    return band_level(recording.samples[rows][:, first:last], recording.rate)
+
+
+def band_level(samples, rate):
+    """Mean square of rows of ``samples`` within ``BAND`` per line (n,), and its degrees of freedom.
+
+    A Hann window keeps the strong low frequencies at the segment's end out; neighbouring lines then are correlated by
+    2/3 and 1/6, so that two degrees per line become 2 / (1 + 2 (4/9 + 1/36)) (Welch 1967).
+    """
+    n = samples.shape[1]
+    window = np.hanning(n)
+    spectrum = np.fft.rfft((samples - samples.mean(axis=1, keepdims=True)) * window, axis=1)
+    grid = np.fft.rfftfreq(n, 1.0 / rate)
+    inside = (grid >= BAND[0]) & (grid <= BAND[1])
+    level = np.mean(np.abs(spectrum[:, inside]) ** 2, axis=1) / np.sum(window**2)
+    return level, 2.0 * inside.sum() / CORRELATED
+
+
+def louder_than(level, others):
+    """(dB, chance) of a segment against others: the lower median over the sensors of its excess over their median, and
+    the binomial chance that as many sensors exceed the F ratio at that rank."""
+    power, freedom = level
+    usual = np.median([p for p, _ in others], axis=0)
+    ratio = np.sort(power / np.maximum(usual, 1e-300))
+    rank = (ratio.size - 1) // 2
+    middle = float(ratio[rank])
+    tail = float(f.sf(middle, freedom, np.median([n for _, n in others])))
+    return 10.0 * float(np.log10(max(middle, 1e-300))), float(binom.sf(ratio.size - rank - 1, ratio.size, tail))

@@ -1,0 +1,133 @@
+"""What has no name is located: evidence for subspaces, quiet about a train, falls of the held-out fit."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from turnout.mismatch.case import Case, Observation
+from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.spaces import AMPLITUDES, NOISE, Space, evidence, weigh
+from turnout.mismatch.track import quiet
+from turnout.mismatch.verify import falls
+from turnout.mismatch.whereabouts import whereabouts
+
+N, K = 60, 6
+
+
+def orthonormal(n, k, seed=3):
+    return np.linalg.qr(np.random.default_rng(seed).normal(size=(n, k)))[0]
+
+
+@pytest.mark.parametrize("i, j", [(9, 4), (14, 9)])
+def test_evidence_of_a_subspace_is_the_closed_form(i, j):
+    """Residual with mean square f outside and f + a² inside a subspace of k of n dimensions:
+    (n/2) ln(mean over f) - (k/2) ln(1 + a²/f), here with both maxima on the grid."""
+    floor = K / N * AMPLITUDES[i] / (NOISE[j] - 1.0)
+    inside = np.sqrt(floor + AMPLITUDES[i])
+    basis = orthonormal(N, N)
+    r = basis @ np.concatenate([np.full(K, inside), np.full(N - K, np.sqrt(floor))])
+    b = 7.0 * basis[:, :K]  # the scale of the columns must not matter
+    expected = 0.5 * N * np.log(NOISE[j]) - 0.5 * K * np.log1p(AMPLITUDES[i] / floor)
+    assert evidence(b.T @ b, b.T @ r, r @ r, N, floor) == pytest.approx(expected, rel=1e-9)
+
+
+def test_what_sound_recordings_leave_is_no_evidence():
+    basis = orthonormal(N, N)
+    r = basis @ np.full(N, np.sqrt(0.5))
+    b = basis[:, :K]
+    assert evidence(b.T @ b, b.T @ r, r @ r, N, 0.5) == 0.0
+    assert evidence(b.T @ b, b.T @ r, r @ r, N, 2.0) == 0.0
+
+
+class Places(Case):
+    """Three sensors; a force at place 0, 1 or 2 is seen by them with the rows of ``seen``; no nuisance."""
+
+    seen = np.array([[1.0, 0.5, 0.2], [0.5, 1.0, 0.5], [0.2, 0.5, 1.0]])
+
+    def __init__(self, rows):
+        self.observations = (Observation("a", "a", rows.ravel(), 1.0, kind="passage"),)
+        self.n = rows.shape[1]
+
+    def predict(self, values, terms, observations):
+        return [np.zeros(o.data.size) for o in observations]
+
+    def spaces(self, fit):
+        free, eye = np.eye(self.n), np.eye(3)
+        parts = {("place", float(x)): np.kron(self.seen[:, x : x + 1], free) for x in range(3)}
+        parts |= {("sensor", f"S{s}"): np.kron(eye[:, s : s + 1], free) for s in range(3)}
+        yield Space(("a",), np.eye(3 * self.n), parts)
+
+
+@pytest.mark.parametrize(
+    "mix, frame, level", [([0.2, 0.5, 1.0], "place", 2.0), ([0.5, 1.0, 0.5], "place", 1.0), ([0, 1, 0], "sensor", "S1")]
+)
+def test_a_force_is_told_from_a_channel(mix, frame, level):
+    rng = np.random.default_rng(8)
+    rows = 0.5 * rng.normal(size=(3, 40)) + 4.0 * np.outer(mix, rng.normal(size=40))
+    case = Places(rows)
+    fit = fit_jointly(case)
+    best = weigh(case, fit, {"passage": 1.0})[0]
+    assert (best.frame, best.level) == (frame, level)
+    found = whereabouts(case, fit)
+    assert (found.frame, found.place) == (frame, level if frame == "place" else None)
+    assert found.sensor == (level if frame == "sensor" else None)
+
+
+def test_nothing_is_located_in_noise():
+    case = Places(0.5 * np.random.default_rng(2).normal(size=(3, 40)))
+    assert whereabouts(case, fit_jointly(case)) is None
+
+
+def test_the_refused_candidate_is_heard_where_it_explains_more():
+    case = Places(0.5 * np.random.default_rng(2).normal(size=(3, 40)))
+    candidate = SimpleNamespace(frame="wheel", where={"train": "freight", "axle": 3}, key="k")
+    refused = SimpleNamespace(candidate=candidate, gain=30.0, explained=0.4)
+    found = whereabouts(case, fit_jointly(case), refused)
+    assert (found.frame, found.train, found.axle) == ("wheel", "freight", 3)
+    refused.explained = 0.1
+    assert whereabouts(case, fit_jointly(case), refused) is None
+
+
+def levels_of(rng, n_sensor=4, n=2500, rate=5000.0, scale=1.0):
+    return quiet.band_level(scale * rng.normal(size=(n_sensor, n)), rate)
+
+
+def test_degrees_of_freedom_of_a_quiet_segment():
+    """Variance of the band's mean square over its mean squared is 2 / degrees of freedom."""
+    rng = np.random.default_rng(1)
+    drawn = [levels_of(rng, n_sensor=500) for _ in range(4)]
+    power = np.concatenate([p for p, _ in drawn])
+    seen = np.var(power) / np.mean(power) ** 2
+    assert seen == pytest.approx(2.0 / drawn[0][1], rel=4.0 * np.sqrt(2.0 / power.size))
+
+
+def test_quiet_segments_of_noise_have_uniform_chances():
+    rng = np.random.default_rng(5)
+    chances = np.array([quiet.louder_than(levels_of(rng), [levels_of(rng)])[1] for _ in range(600)])
+    for q in (0.1, 0.5):
+        assert abs(np.mean(chances < q) - q) < 4.0 * np.sqrt(q * (1.0 - q) / chances.size)
+
+
+def test_another_train_shakes_all_sensors_and_a_noisy_channel_is_alone():
+    rng = np.random.default_rng(6)
+    others = [levels_of(rng) for _ in range(5)]
+    louder, p = quiet.louder_than(levels_of(rng, scale=2.0), others)  # twice the amplitude: 6 dB
+    assert louder == pytest.approx(6.0, abs=1.0)
+    assert p < quiet.DISTURBED
+    power, freedom = levels_of(rng)
+    louder, p = quiet.louder_than((power * np.array([100.0, 1.0, 1.0, 1.0]), freedom), others)
+    assert louder < quiet.LOUDER
+    assert p > quiet.DISTURBED
+
+
+def test_a_fall_of_the_held_out_fit_counts_beyond_its_standard_error():
+    rng = np.random.default_rng(7)
+    y, e = rng.normal(size=2500) * 10.0, rng.normal(size=2500)
+    held = [Observation("a", "a", y, 1.0)]
+    assert falls(held, [y - e], [y - 2.0 * e], 0.5)  # every stretch is worse
+    assert not falls(held, [y - 2.0 * e], [y - e], 0.5)
+    assert not falls(held, [y - e], [y - e], 0.0)
+    mixed = np.where(np.arange(2500) < 1250, 0.0, np.sqrt(2.05)) * e  # half gains what the other half loses, nearly
+    assert not falls(held, [y - e], [y - mixed], 0.0)
+    assert not falls(held, [y - e], [y - 1.001 * e], 0.5)  # worse everywhere, but not by half a point
