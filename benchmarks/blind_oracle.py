@@ -1,9 +1,10 @@
 """Fits with the true effect, by the same engine on the same recordings left out: what a perfect name would gain.
 
-    python -m benchmarks.blind_oracle SET [--cases T1234abcd ...] [--workers 2]
+    python -m benchmarks.blind_oracle SET [--cases T1234abcd ...] [--clear 30] [--workers 2]
 
 SET is a revealed set. Writes SET/oracle.json, {case: fit [%]}, and SET/oracle_detail.json; goes on where it stopped. A
 case whose effects the library does not hold has no oracle. Errors of a case are its result and stop nothing.
+``--clear`` takes so many clear singles in the order of their ids, which are hashes: a sample that nobody has drawn.
 """
 
 import argparse
@@ -17,7 +18,7 @@ from turnout.errors import TurnoutError
 from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.track.track_case import TrackCase
 from turnout.mismatch.verify import fit_percent, predict_reserved
-from turnout_blind.score.judged import BAY
+from turnout_blind.score.judged import BAY, CLEAR, gain_of
 from turnout_blind.score.names import SAME, right_names
 
 STEPS = 15
@@ -74,6 +75,17 @@ def _told(candidate, effect):
     ]
 
 
+def clear_singles(truths):
+    """Cases of one effect that costs more than 3 points of held-out fit and has a name, by id."""
+    return [
+        case
+        for case, truth in sorted(truths.items())
+        if truth["stratum"] == "single"
+        and gain_of(truth["visible"]) > CLEAR
+        and right_names(truth["effects"][0]["kind"])
+    ]
+
+
 def _job(job):
     folder, case, truth = job
     try:
@@ -87,13 +99,15 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("set")
     parser.add_argument("--cases", nargs="+")
+    parser.add_argument("--clear", type=int, help="so many of the clear singles")
     parser.add_argument("--workers", type=int, default=1)
     args = parser.parse_args()
     out = Path(args.set)
     truths = {p.stem: json.loads(p.read_text()) for p in sorted((out / "revealed").glob("T*.json"))}
     detail = out / "oracle_detail.json"
     found = json.loads(detail.read_text()) if detail.exists() else {}
-    wanted = [c for c in args.cases or truths if c not in found and truths[c]["stratum"] in ("single", "double")]
+    chosen = args.cases or (truths if args.clear is None else clear_singles(truths)[: args.clear])
+    wanted = [c for c in chosen if c not in found and truths[c]["stratum"] in ("single", "double")]
     with ProcessPoolExecutor(args.workers) as pool:
         jobs = [pool.submit(_job, (out / "cases" / case, case, truths[case])) for case in wanted]
         for done in as_completed(jobs):

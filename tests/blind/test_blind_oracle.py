@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from benchmarks.blind_bridge import rows_of
-from benchmarks.blind_oracle import _candidates, _told
+from benchmarks.blind_oracle import _candidates, _told, clear_singles
 
 from turnout.mismatch import Candidate
 from turnout.physics import Parameter
@@ -44,6 +44,15 @@ def test_an_oracle_starts_from_the_truth_within_the_bounds():
     assert _told(PADS[5], {**EFFECT, "kind": "void", "parameters": {"gap": 1e-3}}) == [0.4]
 
 
+def test_a_sample_of_clear_singles_is_drawn_by_id_alone():
+    def truth(stratum, share, kind="pad"):
+        return {"stratum": stratum, "visible": {"hammer_pct": 0.0, "passage_pct": share}, "effects": [{"kind": kind}]}
+
+    truths = {"T3": truth("single", 60.0), "T1": truth("single", 40.0), "T2": truth("single", 5.0)}
+    truths |= {"T0": truth("double", 60.0), "T4": truth("outside", 60.0), "T5": truth("single", 60.0, "squeal")}
+    assert clear_singles(truths) == ["T1", "T3"]
+
+
 def test_rows_of_the_bridge_are_read_by_the_scorer():
     fit = SimpleNamespace(psi=np.array([0.35]), psi_se=np.array([0.02]))
     best = SimpleNamespace(candidate=PADS[5], fit=fit)
@@ -51,7 +60,7 @@ def test_rows_of_the_bridge_are_read_by_the_scorer():
         answer="named", names=("local_pad",), grade="A", probability=0.9, scores=(best,), reason="because"
     )
     seen = SimpleNamespace(before=40.0, after=48.0, rival=44.0, decoy=float("nan"), n=2)
-    rows = rows_of(SimpleNamespace(verdicts=(verdict,), verification=seen, frames=()))
+    rows = rows_of(SimpleNamespace(verdicts=(verdict,), verification=seen, frames=(), where=None))
     assert json.loads(json.dumps(rows)) == rows
     truth = {
         "case": "T1",

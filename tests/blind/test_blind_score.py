@@ -166,6 +166,16 @@ def test_parameters_are_compared_with_what_was_concealed():
     assert judge(t, answers_of([outside])).parameters == ((pytest.approx(0.3), False),)
 
 
+@pytest.mark.parametrize(
+    ("train", "right"), [("railcar, axle 3", True), ("railcar, axle 4", False), ("loaded, axle 3", False)]
+)
+def test_train_and_axle_are_read_from_their_column(train, right):
+    """Beside the sentence, in which another number may stand."""
+    t = truth("s", "single", "flat")
+    said = {"verdict": "unknown", "locked_to": "wheel", "train": train, "sentence": "forces at axle 7 of a train"}
+    assert judge(t, answers_of([said])).located == {"lock": True, "axle": right}
+
+
 def test_the_gap_of_a_sleeper_that_hangs_in_part_is_not_compared():
     t = truth("s", "single", "void")
     named = row(t["effects"][0], "hanging_sleeper")

@@ -51,7 +51,8 @@ def _answers(row):
 def _answer(row):
     where, parameters = _parameters(row.get("parameters_json"), row.get("term"))
     said = row.get("sentence") or ""
-    axle, train = where.get("axle"), where.get("train")
+    train, axle = _in_train(row.get("train"))
+    axle, train = where.get("axle", axle), where.get("train", train)
     if axle is None and (found := re.search(r"(?:axle|wheel)\s+(\d+)(?: of (?!every)(\w+))?", said)):
         axle, train = int(found.group(1)), train or found.group(2)
     names = tuple(n for n in (row.get("term"), row.get("rival_term") if row["verdict"] == "a_or_b" else None) if n)
@@ -61,6 +62,12 @@ def _answer(row):
         None if axle is None else int(axle), row.get("probability"), row.get("fit_before_pct"),
         row.get("fit_after_pct"), parameters,
     )  # fmt: skip
+
+
+def _in_train(text):
+    """(train, axle) of "loaded, axle 3", either None where it is not said."""
+    train, _, axle = (text or "").partition(", axle ")
+    return train or None, int(axle) if axle.isdecimal() else None
 
 
 def _parameters(text, term=None):
