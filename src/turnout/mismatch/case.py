@@ -108,7 +108,8 @@ class Candidate:
     ``scanned`` how many places the family has; ``starts`` are parameter sets that do not depend on the base fit;
     with ``start_from_base`` off the nuisances, too, start from their priors; ``always``: tried on the cheap
     observations at every place, whatever the residual promises; families with the same word are alike there;
-    ``least``: distance of the first parameter from neutral below which nobody would act.
+    ``least``: distance of the first parameter from neutral below which nobody would act; ``even``: the cheap
+    observations hardly tell a value from its mirror image about neutral.
     ``parameters`` have name, unit, neutral, bounds and prior as ``turnout.physics.Parameter``.
     """
 
@@ -122,6 +123,7 @@ class Candidate:
     start_from_base: bool = True
     always: str = ""
     least: float = 0.0
+    even: bool = False
 
     @property
     def key(self):
@@ -133,6 +135,12 @@ class Candidate:
     def neutral(self):
         """(n_parameter,) values at which the term vanishes."""
         return np.array([p.neutral for p in self.parameters])
+
+    def mirrored(self, values):
+        """``values`` (n_parameter,) with the first parameter on the other side of neutral."""
+        found = np.array(values, dtype=float)
+        found[0] = 2.0 * self.parameters[0].neutral - found[0]
+        return found
 
     def term(self, values):
         """The term with parameters (n_parameter,)."""

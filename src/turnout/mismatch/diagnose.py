@@ -161,7 +161,7 @@ def _refit(case, fit, candidate, start, back, settings):
     if not candidate.start_from_base and not back:  # what the base may have bent goes back to its prior
         values |= {n.name: n.mean for n in case.nuisances if n.owner is None and n.trust < 1.0}
     try:
-        psi = _best_start(case, candidates, psi, values) if back else psi
+        psi = _best_start(case, candidates, psi, values) if back or candidate.even else psi
         return fit_jointly(case, candidates, psi, values, keep, iterations=settings.iterations)
     except SimulationError:
         return None
@@ -170,10 +170,11 @@ def _refit(case, fit, candidate, start, back, settings):
 def _best_start(case, candidates, psi, values):
     """``psi`` or the last candidate's own starts: what the cheap observations cannot see is asked of the dear ones."""
     candidate = candidates[-1]
-    if candidate.start_from_base:
+    if candidate.start_from_base and not candidate.even:
         return psi
     n, found = psi.size - len(candidate.parameters), []
-    for start in (psi[n:], *candidate.starts):
+    others = (candidate.mirrored(psi[n:]),) if candidate.even else candidate.starts
+    for start in (psi[n:], *others):
         tried = np.concatenate([psi[:n], np.asarray(start, dtype=float)])
         try:
             found.append((cost_at(case, candidates, tried, values), tuple(tried)))

@@ -88,11 +88,11 @@ def _likeliest(members, rough, first, held, settings, glances):
         best[candidate.key] = gain, candidate, start
     alike = next(iter(best.values()))[1].always
     if alike:
-        for _, c, s in best.values():
+        for _, c, s in best.values() if len(best) > 1 else ():
             place = alike, tuple(sorted(c.where.items()))
             if place not in glances:
                 glances[place] = _glance(rough, first, held, c, s)
-        ranked = sorted(best.values(), key=lambda m: -glances[alike, tuple(sorted(m[1].where.items()))])
+        ranked = sorted(best.values(), key=lambda m: -glances.get((alike, tuple(sorted(m[1].where.items()))), 0.0))
         return [(c, s) for _, c, s in ranked[: settings.scouted_places]]
     ranked = sorted(best.values(), key=lambda m: -m[0])[: settings.scouted_places]
     return [(c, s) for gain, c, s in ranked if gain > settings.promise]

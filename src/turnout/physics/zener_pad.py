@@ -20,11 +20,12 @@ class ZenerPad(PhysicsTerm):
     """
 
     ratio: float
-    relaxation_time: float = 3e-4
+    relaxation_time: float = 5e-4
 
     name = "zener_pad"
     left_out = "pads stiffen by {ratio:.2f} of their static stiffness above 1/(2 pi {relaxation_time:.2g} s)"
     kind = "matrix"
+    frame = "frequency"
     parameters = (
         Parameter("ratio", "-", 0.0, (0.0, 10.0), "stiffness of the branch over the pad's static stiffness", SOURCE),
     )

@@ -17,8 +17,9 @@ RAIL, SLEEPER, PAD = range(3)  # a pad's force presses the rail and lifts the sl
 
 def support_forces(case, values, terms, made):
     """Histories at the zone's supports on the simulation's clock: rail and sleeper displacement (n_support, n) [m]."""
-    signals = case.marched(values, terms, made, case.probes())[len(made.sensors) :]
-    return signals[0::2], signals[1::2]
+    signals = case.marched(values, terms, made, case.probes(values, terms, made))[len(made.sensors) :]
+    last = 2 * len(case.zone.supports)
+    return signals[0:last:2], signals[1:last:2]
 
 
 def green(case, values, terms, made):

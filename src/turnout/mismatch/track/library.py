@@ -5,12 +5,16 @@ import numpy as np
 from turnout import physics
 from turnout.mismatch.case import Candidate
 
+GAPS = (1.3e-4, 3e-4, 7e-4, 1.6e-3)  # below the first a train closes it at once, behind the last it never does [m]
+MOUNTINGS = (300.0, 200.0, 450.0, 650.0, 900.0, 1200.0)  # half a width at Q = 3 apart [Hz]
+DELAYS = (1.5e-4, 6e-4, 2.5e-3)  # a column is straight over a tenth of a turn of what it delays [s]
 DIP_STEP = 0.6  # places of a dip scanned [m]; its own shift covers what lies between
 # Least size worth a name, in the unit of the first parameter: below it nobody would go to the site.
 LEAST = {
     "high_pass": 2.0, "sensor_gain": 0.04, "sensor_position": 0.05, "time_offset": 5e-5, "clock_drift": 2e-4,
     "local_pad": 0.15, "local_ballast": 0.15, "hanging_sleeper": 5e-5, "surface_dip": 3e-5, "pad_temperature": 1e-3,
-    "unsprung_mass": 0.07, "contact_stiffness": 0.1, "rail_shear": 0.9,
+    "unsprung_mass": 0.07, "contact_stiffness": 0.1, "rail_shear": 0.9, "mount_resonance": 1 / 2000.0,
+    "zener_pad": 0.08,
 }  # fmt: skip
 
 
@@ -20,11 +24,11 @@ def library(case, families=None):
     return tuple(c for c in found if families is None or c.family in families)
 
 
-def _candidate(term, make, starts, where=None, scanned=1, base=True, parameters=None, always=""):
+def _candidate(term, make, starts, where=None, scanned=1, base=True, parameters=None, always="", even=False):
     chosen = tuple(p for p in term.parameters if parameters is None or p.name in parameters)
     frame = getattr(term, "frame", "place")
     return Candidate(
-        term.name, chosen, make, starts, where or {}, frame, scanned, base, always, LEAST.get(term.name, 0.0)
+        term.name, chosen, make, starts, where or {}, frame, scanned, base, always, LEAST.get(term.name, 0.0), even
     )
 
 
@@ -36,7 +40,7 @@ def _supports(case):
         for term, alike in ((physics.LocalBallast, "ballast"), (physics.LocalPad, "pad")):
             yield _candidate(term, lambda p, j=j, t=term: t(j, **p), ((0.4,), (2.5,)), where, n, always=alike)
         yield _candidate(physics.HangingSleeper, lambda p, j=j: physics.HangingSleeper(j, **p),
-                         ((4e-4,), (1.5e-3,)), where, n, base=False, always="ballast")  # fmt: skip
+                         tuple((g,) for g in GAPS), where, n, base=False, always="ballast")  # fmt: skip
         yield _candidate(physics.AttachedResonator, lambda p, j=j: physics.AttachedResonator(j, **p),
                          ((15.0, 120.0, 0.03), (15.0, 350.0, 0.03)), where, n)  # fmt: skip
         if case.rollings:  # for a blow of one strength friction is a damper: it takes trains to call it by its name
@@ -47,13 +51,18 @@ def _supports(case):
 
 
 def _whole_track(case):
-    yield _candidate(physics.PadTemperature, lambda p: physics.PadTemperature(**p), ((0.01,),))
+    """Common values of the base model bend first to hide what the whole track has: blows are asked whatever is left."""
+
+    def everywhere(term, starts):
+        return _candidate(term, lambda p: term(**p), starts, always=term.name)
+
+    yield everywhere(physics.PadTemperature, ((0.01,),))
     if case.rollings:
         yield _candidate(physics.PadPreload, lambda p: physics.PadPreload(**p), ((3e3,),))
-    yield _candidate(physics.ZenerPad, lambda p: physics.ZenerPad(**p), ((0.7,),))
-    yield _candidate(physics.RailShear, lambda p: physics.RailShear(**p), ((2.0,), (-1.5,)))
-    yield _candidate(physics.BallastInertia, lambda p: physics.BallastInertia(**p), ((120.0, 0.0),))
-    yield _candidate(physics.SleeperMode, lambda p: physics.SleeperMode(**p), ((0.25, 180.0), (0.25, 400.0)))
+    yield everywhere(physics.ZenerPad, ((0.4,),))
+    yield everywhere(physics.RailShear, ((2.0,), (-1.5,)))
+    yield everywhere(physics.BallastInertia, ((120.0, 0.0),))
+    yield everywhere(physics.SleeperMode, ((0.25, 180.0), (0.25, 400.0)))
 
 
 def _sensors(case):
@@ -66,9 +75,9 @@ def _sensors(case):
             return _candidate(term, lambda p: term(name, **p), starts, where, n, **more)
 
         yield per(physics.SensorGain, ((0.8,), (1.25,)))
-        yield per(physics.MountResonance, ((1 / 300.0, 8.0), (1 / 600.0, 8.0)))
-        yield per(physics.TimeOffset, ((1e-3,), (-1e-3,)))
-        yield per(physics.SensorPosition, ((0.3,), (-0.3,)))
+        yield per(physics.MountResonance, tuple((1.0 / f, 8.0) for f in MOUNTINGS))
+        yield per(physics.TimeOffset, tuple((sign * d,) for d in DELAYS for sign in (1.0, -1.0)))
+        yield per(physics.SensorPosition, ((0.15,), (-0.15,), (0.4,), (-0.4,)), even=True)
         yield per(physics.LowPass, ((1 / 500.0,),))
         yield per(physics.HighPass, ((12.0,),))
         if case.rollings:

@@ -35,11 +35,9 @@ def screen_columns(case, fit, observations):
             parts = _passage(case, fit, made, laws) | _paths(case, fit, made, paths)
         else:
             parts = _pair(case, fit, case.pairs[o.name], laws)
+        parts |= _channels(case, fit, o, fit.predictions[i], [(c, k) for c, k in chosen if c.family in CHANNELS])
         for key, column in parts.items():
             found[key][i] = column
-    for c, k in chosen:
-        if c.family in CHANNELS:
-            found[c.key, k] = _channel(case, fit, c, k, observations)
     for c in case.candidates:
         for k in range(len(c.starts)) if c.family in WHOLE else ():
             found[c.key, k] = _whole(case, fit, c, k, observations)
@@ -67,15 +65,23 @@ def _whole(case, fit, candidate, k, observations):
     return found
 
 
-def _channel(case, fit, candidate, k, observations):
-    """A channel's term acts on signals that are known; where a sensor sits shows in blows, hardly in passages."""
-    terms = (*fit.terms, candidate.term(candidate.starts[k]))
-    found = []
-    for o, old in zip(observations, fit.predictions):
-        if o.name in case.rollings and candidate.family == "sensor_position":
-            found.append(np.zeros(o.data.size))
-        else:
-            found.append(case.predict(fit.values, terms, [o])[0] - old)
+def _channels(case, fit, observation, old, chosen):
+    """A channel's term acts on signals that are known; where a sensor sits is asked of blows alone, whose receptance
+    costs next to nothing."""
+    made, found = case.rollings.get(observation.name), {}
+    clean = None if made is None else case.clean(fit.values, fit.terms, made)
+    for c, k in chosen:
+        terms = (*fit.terms, c.term(c.starts[k]))
+        if made is None:
+            if case.pairs[observation.name].channel == c.where["sensor"]:
+                found[c.key, k] = case.predict(fit.values, terms, [observation])[0] - old
+        elif c.family != "sensor_position":
+            rows = old.reshape(len(made.sensors), -1)
+            change = np.zeros_like(rows)
+            for row, sensor in enumerate(made.sensors):
+                if sensor.name == c.where["sensor"]:
+                    change[row] = case.shown(fit.values, terms, made, sensor, clean[row]) - rows[row]
+            found[c.key, k] = change.ravel()
     return found
 
 

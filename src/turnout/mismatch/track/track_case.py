@@ -29,6 +29,7 @@ from turnout.simulate.run import Probe
 
 KEPT = 150  # simulated passages remembered
 GAIN_SD = 0.02
+FURTHER = 0.01  # way over which a derivative by a sensor's place is taken [m]
 ROUGHLY = 0.1  # relative error of a receptance in the first fit
 
 
@@ -194,18 +195,18 @@ class TrackCase(Case):
         return blows.split(blows.scaled(pair, h * self._chain(values, terms, pair)))
 
     def _passage(self, values, terms, made):
-        clean = self._clean(values, terms, made)
-        rate, time = 4.0 * self.solver.rate, made.time - made.reference - values[f"time@{made.name}"] + rolling.LEAD
-        shown = []
-        for sensor, row in zip(made.sensors, clean):
-            for term in terms:
-                if term.kind == "channel":
-                    row = term.under({"name": made.name}).channel(row, rate, sensor)
-            row = made.limited(row, rate)
-            shown.append((1.0 + values[f"gain_{sensor.name}"]) * rolling.read_at(row, rate, time))
-        return np.concatenate(shown)
+        clean = self.clean(values, terms, made)
+        return np.concatenate([self.shown(values, terms, made, s, row) for s, row in zip(made.sensors, clean)])
 
-    def _clean(self, values, terms, made):
+    def shown(self, values, terms, made, sensor, row):
+        """What the channel of a sensor shows of the simulated signal ``row``, on the clock of the recording."""
+        rate, time = 4.0 * self.solver.rate, made.time - made.reference - values[f"time@{made.name}"] + rolling.LEAD
+        for term in terms:
+            if term.kind == "channel":
+                row = term.under({"name": made.name}).channel(row, rate, sensor)
+        return (1.0 + values[f"gain_{sensor.name}"]) * rolling.read_at(made.limited(row, rate), rate, time)
+
+    def clean(self, values, terms, made):
         """Simulated signals of the sensors before their channels, four times as fine as the march."""
         return rolling.finer(self.marched(values, terms, made)[: len(made.sensors)])
 
@@ -324,6 +325,16 @@ class TrackCase(Case):
         load = f"load@{made.name}"
         yield load, (self._passage({**values, load: values[load] + 0.03}, terms, made) - predicted) / 0.03
 
+    def _seat_columns(self, values, terms, made, predicted):
+        further = self.marched(values, terms, made, self.probes(values, terms, made))
+        further = rolling.finer(further[len(made.sensors) + 2 * len(self.zone.supports) :])
+        rows = predicted.reshape(-1, made.time.size)
+        for k, sensor in enumerate(made.sensors):
+            if not sensor.mounting.startswith("sleeper"):
+                column = np.zeros_like(rows)
+                column[k] = (self.shown(values, terms, made, sensor, further[k]) - rows[k]) / FURTHER
+                yield f"seat_{sensor.name}", column.ravel()
+
     def _passage_columns(self, values, terms, made, predicted):
         yield from self._own_columns(values, terms, made, predicted)
         rows = predicted.reshape(-1, made.time.size)
@@ -331,12 +342,17 @@ class TrackCase(Case):
             column = np.zeros_like(rows)
             column[k] = rows[k] / (1.0 + values[f"gain_{sensor.name}"])
             yield f"gain_{sensor.name}", column.ravel()
+        yield from self._seat_columns(values, terms, made, predicted)
         histories = support_forces(self, values, terms, made)
         yield from columns_of(self, values, terms, made, histories).items()
 
-    def probes(self):
-        """Displacements of rail and sleeper at every support of the zone: what pseudo-forces are made of."""
-        return [Probe((kind, j), 0) for j in self.zone.supports for kind in ("rail", "sleeper")]
+    def probes(self, values, terms, made):
+        """Displacements of rail and sleeper at every support of the zone, of which pseudo-forces are made; then each
+        sensor a little further along."""
+        seated = [self.seat(s, values, terms) for s in made.sensors]
+        track = self.track(made.passage.route)
+        further = [replace(s, place=s.place + FURTHER).probe(track) for s in seated]
+        return [Probe((kind, j), 0) for j in self.zone.supports for kind in ("rail", "sleeper")] + further
 
     def further(self, fit):
         """Wheels with a flat."""
