@@ -11,7 +11,8 @@ import numpy as np
 from scipy.stats import binom, f
 
 AWAY = 12.0  # m from a wheel to the nearest sensor: what the train itself sends ahead has died down
-SHORTEST = 0.25  # s of quiet that are worth a look
+CAR = 26.0  # m
+SHORTEST = 0.15  # s of quiet that are worth a look
 BAND = (5.0, 100.0)  # Hz
 LOUDER = 3.0  # dB over the other passages; sound passages differ by 1 dB
 CORRELATED = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0)  # lines of a Hann window
@@ -29,11 +30,16 @@ class Disturbance:
     p: float
 
 
-def disturbances(rollings):
-    """Disturbance of every passage in which something else shook the sensors; ``rollings`` by name."""
+def disturbances(rollings, strange=None):
+    """Disturbance of every passage in which something else shook the sensors; ``rollings`` by name.
+
+    ``strange`` passages look like no train of their file, maybe for that reason: their trains may be longer by a car.
+    """
     found, segments = [], {"before": {}, "after": {}}
-    for made in rollings.values():
+    for made in (*rollings.values(), *(strange or {}).values()):
         for when, (start, stop) in _quiet(made).items():
+            if when == "after" and made.name in (strange or {}):
+                start += CAR / made.speed
             if stop - start >= SHORTEST:
                 segments[when][made.name] = _level(made, start, stop)
     looked_at = sum(len(s) for s in segments.values() if len(s) > 2)

@@ -70,7 +70,7 @@ class TrackCase(Case):
         self._simulated, self._rolls, self._models = OrderedDict(), OrderedDict(), OrderedDict()
         self._rail = {}
         self.trains = tuple(dict.fromkeys(p.train or p.name for p in campaign.passages))
-        self.pairs, self.rollings, self.notes = {}, {}, []
+        self.pairs, self.rollings, self.strange, self.notes = {}, {}, {}, []
         self.waves = self._waves()
 
     def peak(self, channel):
@@ -115,6 +115,9 @@ class TrackCase(Case):
                     f"passage {passage.name}: likeness {likeness:.2f} with the simulation of "
                     f"{passage.train or 'its train'}; wrong vehicle file, wrong sensor places or another turnout"
                 )
+                self.strange[passage.name] = rolling.Rolling(
+                    passage.name, passage, tuple(sensors), np.zeros(0), reference, speed
+                )
                 continue
             made, observation = rolling.rolling_of(passage, sensors, reference, speed, self.settings.materiality)
             self.rollings[passage.name] = made
@@ -126,8 +129,8 @@ class TrackCase(Case):
 
     def _undisturbed(self, found):
         """The passages in which nothing but their train shakes the sensors; all where fewer than two would be left."""
-        self.disturbed = tuple(disturbances(self.rollings))
-        shaken = {d.name: d for d in self.disturbed}
+        self.disturbed = tuple(disturbances(self.rollings, self.strange))
+        shaken = {d.name: d for d in self.disturbed if d.name in self.rollings}
         if len(found) - len(shaken) < 2:
             return found
         for name, d in shaken.items():
