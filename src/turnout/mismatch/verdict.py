@@ -81,6 +81,35 @@ def _withdraw(probabilities):
     probabilities[top], probabilities["unknown"] = probabilities["unknown"], probabilities[top]
 
 
+def calibrate(probabilities, chosen, certainty, settings):
+    r"""Probability that the answer ``chosen`` is right, after which ``probabilities`` are scaled to sum to 1.
+
+    .. math:: \mathrm{logit}\,p' = (1 - s)\,\mathrm{logit}\,c + s\,\mathrm{logit}\,p
+
+    with c the share of such answers that were right in opened cases and s how much the softmax p says beyond it:
+    Platt scaling (1999) with an offset per kind of answer.
+
+    >>> from turnout.config.settings.mismatch import MismatchSettings
+    >>> round(calibrate({"a": 0.5, "none": 0.5}, ("a",), 0.5, MismatchSettings()), 6)
+    0.5
+    """
+    raw = min(1.0 - 1e-3, max(1e-3, sum(probabilities.get(name, 0.0) for name in chosen)))
+    odds = (1.0 - settings.softmax_share) * _logit(certainty) + settings.softmax_share * _logit(raw)
+    sure = float(1.0 / (1.0 + np.exp(-odds)))
+    rest = sum(v for name, v in probabilities.items() if name not in chosen)
+    inside = sum(probabilities.get(name, 0.0) for name in chosen)
+    for name in probabilities:
+        among = name in chosen
+        total = inside if among else rest
+        if total > 0.0:
+            probabilities[name] *= (sure if among else 1.0 - sure) / total
+    return sure
+
+
+def _logit(p):
+    return float(np.log(p / (1.0 - p)))
+
+
 def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, disturbed=False):
     """Verdict from scored candidates.
 
@@ -105,10 +134,8 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
     def verdict(answer, names=(), grade="", reason=""):
         if answer == "unknown":
             _withdraw(probabilities)
-        sure = probabilities.get(names[0] if answer == "named" else answer, 0.0)
-        if answer == "a_or_b":
-            sure = sum(probabilities.get(name, 0.0) for name in names)
-        return Verdict(answer, tuple(names), grade, float(sure), probabilities, tuple(ranked), reason)
+        sure = calibrate(probabilities, names or (answer,), settings.certainty(answer, disturbed), settings)
+        return Verdict(answer, tuple(names), grade, sure, probabilities, tuple(ranked), reason)
 
     found = [s for s in ranked if s.gain > settings.threshold and s.material]
     if not found:

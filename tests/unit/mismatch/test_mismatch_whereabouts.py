@@ -5,10 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.case import Case, Observation
 from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.spaces import AMPLITUDES, NOISE, Space, evidence, weigh
 from turnout.mismatch.track import quiet
+from turnout.mismatch.verdict import calibrate, judge
 from turnout.mismatch.verify import falls
 from turnout.mismatch.whereabouts import whereabouts
 
@@ -131,3 +133,24 @@ def test_a_fall_of_the_held_out_fit_counts_beyond_its_standard_error():
     mixed = np.where(np.arange(2500) < 1250, 0.0, np.sqrt(2.05)) * e  # half gains what the other half loses, nearly
     assert not falls(held, [y - e], [y - mixed], 0.0)
     assert not falls(held, [y - e], [y - 1.001 * e], 0.5)  # worse everywhere, but not by half a point
+
+
+def test_the_stated_probability_is_between_what_was_seen_and_what_the_softmax_says():
+    """On the logit scale, the softmax counts for a share; the posterior goes on summing to 1."""
+    settings = MismatchSettings()
+    posterior = {"none": 0.2, "unknown": 0.05, "a": 0.6, "b": 0.15}
+    sure = calibrate(posterior, ("a",), 0.9, settings)
+    share = settings.softmax_share
+    odds = 9.0 ** (1.0 - share) * 1.5**share
+    assert sure == pytest.approx(odds / (1.0 + odds))
+    assert posterior["a"] == pytest.approx(sure)
+    assert sum(posterior.values()) == pytest.approx(1.0)
+    assert posterior["none"] / posterior["b"] == pytest.approx(0.2 / 0.15)
+
+
+def test_another_train_makes_an_unknown_of_nothing_else():
+    settings = MismatchSettings()
+    assert judge([], 0.5, settings).answer == "none"
+    verdict = judge([], 0.5, settings, disturbed=True)
+    assert verdict.answer == "unknown"
+    assert verdict.probability > judge([], 5.0, settings).probability

@@ -46,6 +46,15 @@ class MismatchSettings:
         0.4, "-", "share of what is left that a free law of the state still explains: shape unresolved", 0.0, 1.0
     )
     temperature: float = setting(4.0, "-", "softens scores into probabilities; fitted on the calibration set", 0.1)
+    softmax_share: float = setting(0.2, "-", "how much the softmax says beyond the kind of answer", 0.0, 1.0)
+    certainty_none: float = setting(0.85, "-", "share of 'none' that was right in opened cases", 0.01, 0.99)
+    certainty_named: float = setting(0.93, "-", "share of names that were right in opened cases", 0.01, 0.99)
+    certainty_unknown: float = setting(
+        0.6, "-", "share of 'unknown' in opened cases where the catalogue had no name", 0.01, 0.99
+    )
+    certainty_clock: float = setting(
+        0.93, "-", "the same where sensors shook while no wheel was near, by Jeffreys' prior", 0.01, 0.99
+    )
     unknown_offset: float = setting(
         -12.0, "nats", "score of 'unknown' relative to the best's shortfall; fitted on the calibration set"
     )
@@ -61,3 +70,9 @@ class MismatchSettings:
     numerics_share: float = setting(
         0.333, "-", "own numerical error over mismatch above which no cause is named", 0.01, 1.0
     )
+
+    def certainty(self, answer, disturbed=False):
+        """Share of answers like this one that were right in opened cases."""
+        if answer == "unknown" and disturbed:
+            return self.certainty_clock
+        return {"none": self.certainty_none, "unknown": self.certainty_unknown}.get(answer, self.certainty_named)
