@@ -3,6 +3,7 @@
 import numpy as np
 
 from turnout.errors import SimulationError
+from turnout.mismatch.absorbed import absorbed
 from turnout.mismatch.joint import Joint
 
 NEAR = 0.95  # m: one bay and a half
@@ -27,8 +28,15 @@ def shortlist(case, fit, settings):
     for found in [] if fit.candidates else scout(case, fit, settings):  # what is left is small enough for columns
         entry = found.gain, found.candidate, found.psi, found.values
         scored.setdefault(found.candidate.family, []).append(entry)
+    for entry in absorbed(case, fit):
+        if entry[1] in candidates:
+            scored.setdefault(entry[1].family, []).append(entry)
     projector, columns = Projector(case, fit), case.screen(fit)
     for candidate in candidates:
+        if candidate.promise is not None:
+            entry = candidate.promise, candidate, np.asarray(candidate.starts[0]), dict(candidate.begin)
+            scored.setdefault(candidate.family, []).append(entry)
+            continue
         for k in range(len(candidate.starts)):
             parts = columns.get((candidate.key, k))
             if parts is None:

@@ -7,7 +7,10 @@ from turnout.physics.term import Parameter, PhysicsTerm
 
 @dataclass(frozen=True)
 class LocalBallast(PhysicsTerm):
-    r"""Ballast stiffness and damping of one sleeper are :math:`r` times those of the base; linear, unlike a gap."""
+    r"""Ballast stiffness of one sleeper is :math:`r` times that of the base; linear, unlike a gap.
+
+    The damping ratio stays, so the damper :math:`c = 2 \zeta \sqrt{k m}` goes with :math:`\sqrt{r}`.
+    """
 
     sleeper: int
     factor: float
@@ -18,7 +21,8 @@ class LocalBallast(PhysicsTerm):
     frame = "place"
     parameters = (
         Parameter("factor", "-", 1.0, (0.05, 8.0), "ballast stiffness over that of the base model",
-                  "Oscarsson 2002, Dynamic train-track interaction: variability attributable to scatter in properties"),
+                  "Oscarsson 2002, Dynamic train-track interaction: variability attributable to scatter in properties",
+                  (1.0, 1.5)),
     )  # fmt: skip
 
     @classmethod
@@ -31,4 +35,7 @@ class LocalBallast(PhysicsTerm):
         self.check()
         found = [link for link in track.support_links(self.sleeper) if link.tag == "ballast"]
         more = self.factor - 1.0
-        return [replace(k, stiffness=more * k.stiffness, damping=more * k.damping, tag="local_ballast") for k in found]
+        slower = self.factor**0.5 - 1.0
+        return [
+            replace(k, stiffness=more * k.stiffness, damping=slower * k.damping, tag="local_ballast") for k in found
+        ]

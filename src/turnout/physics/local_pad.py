@@ -7,7 +7,10 @@ from turnout.physics.term import Parameter, PhysicsTerm
 
 @dataclass(frozen=True)
 class LocalPad(PhysicsTerm):
-    r"""Pad stiffness and damping of one support are :math:`r` times those of the base."""
+    r"""Pad stiffness of one support is :math:`r` times that of the base.
+
+    The damping ratio stays, so the damper :math:`c = 2 \zeta \sqrt{k m}` goes with :math:`\sqrt{r}`.
+    """
 
     sleeper: int
     factor: float
@@ -18,7 +21,8 @@ class LocalPad(PhysicsTerm):
     frame = "place"
     parameters = (
         Parameter("factor", "-", 1.0, (0.05, 8.0), "pad stiffness over that of the base model",
-                  "Oregui et al. 2016, Sensitivity analysis of railpad parameters on vertical railway track dynamics"),
+                  "Oregui et al. 2016, Sensitivity analysis of railpad parameters on vertical railway track dynamics",
+                  (1.0, 1.5)),
     )  # fmt: skip
 
     @classmethod
@@ -31,4 +35,5 @@ class LocalPad(PhysicsTerm):
         self.check()
         found = [link for link in track.support_links(self.sleeper) if link.tag == "pad"]
         more = self.factor - 1.0
-        return [replace(k, stiffness=more * k.stiffness, damping=more * k.damping, tag="local_pad") for k in found]
+        slower = self.factor**0.5 - 1.0
+        return [replace(k, stiffness=more * k.stiffness, damping=slower * k.damping, tag="local_pad") for k in found]

@@ -62,3 +62,17 @@ def test_too_coarse_a_step_is_answered_numerics_and_carries_no_name(plan):
     case = TrackCase(measured_campaign(plan, (), 7), solver=Track1D(1800.0, "gauss"))
     found = diagnose(case)
     assert found.verdict.answer == "numerics" and not found.names
+
+
+def test_the_derivative_by_a_sensors_place_is_where_the_simulation_goes_when_it_is_moved(sound):
+    case, values = sound
+    observation = next(o for o in case.observations if o.name in case.rollings)
+    names = [n.name for n in case.nuisances]
+    predicted = case.predict(values, (), [observation])
+    column = case.nuisance_jacobian(values, (), [observation], predicted)[0]
+    moved = next(n for n in names if n.startswith("seat_"))
+    further = case.predict({**values, moved: values[moved] + 0.01}, (), [observation])[0]  # simulated anew
+    expected = (further - predicted[0]) / 0.01
+    assert np.linalg.norm(expected) > 0.0
+    # signals are solved to 1e-3 of the contact force; two runs with other probes may differ by rounding alone
+    assert np.linalg.norm(column[:, names.index(moved)] - expected) < 1e-6 * np.linalg.norm(expected)

@@ -24,11 +24,11 @@ def library(case, families=None):
     return tuple(c for c in found if families is None or c.family in families)
 
 
-def _candidate(term, make, starts, where=None, scanned=1, base=True, parameters=None, always="", even=False):
+def _candidate(term, make, starts, where=None, scanned=1, base=True, parameters=None, always="", **more):
     chosen = tuple(p for p in term.parameters if parameters is None or p.name in parameters)
     frame = getattr(term, "frame", "place")
     return Candidate(
-        term.name, chosen, make, starts, where or {}, frame, scanned, base, always, LEAST.get(term.name, 0.0), even
+        term.name, chosen, make, starts, where or {}, frame, scanned, base, always, LEAST.get(term.name, 0.0), **more
     )
 
 
@@ -38,7 +38,8 @@ def _supports(case):
     for j in case.zone.supports:  # ballast first: what hangs looks like soft ballast to a hammer
         where = {"sleeper": j, "place": round(float(places[j]), 3)}
         for term, alike in ((physics.LocalBallast, "ballast"), (physics.LocalPad, "pad")):
-            yield _candidate(term, lambda p, j=j, t=term: t(j, **p), ((0.4,), (2.5,)), where, n, always=alike)
+            yield _candidate(term, lambda p, j=j, t=term: t(j, **p), ((0.4,), (2.5,)), where, n, always=alike,
+                             twin=f"{alike}_{j}")  # fmt: skip
         yield _candidate(physics.HangingSleeper, lambda p, j=j: physics.HangingSleeper(j, **p),
                          tuple((g,) for g in GAPS), where, n, base=False, always="ballast")  # fmt: skip
         yield _candidate(physics.AttachedResonator, lambda p, j=j: physics.AttachedResonator(j, **p),
