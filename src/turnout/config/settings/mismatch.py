@@ -26,7 +26,7 @@ class MismatchSettings:
         0.7, "-", "weighted mean square of passages that controls of another generator stay below", 0.1, 100.0
     )
     cell_control: float = setting(
-        1.4, "-", "the same of one channel of one passage, the largest of some twenty", 0.1, 100.0
+        1.25, "-", "the same of one channel of one passage: one control in 200, by the extreme values of 16", 0.1, 100.0
     )
     threshold: float = setting(
         12.0, "nats", "held-out gain that no control exceeded, with a reserve of half; see docs/mismatch.md", 0.0
