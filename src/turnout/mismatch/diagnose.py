@@ -6,13 +6,14 @@ import numpy as np
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
-from turnout.mismatch.held_out import held_out_score, mean_square_out
+from turnout.mismatch.held_out import held_out_score
 from turnout.mismatch.joint import cost_at, fit_jointly
-from turnout.mismatch.latent import Latent, latent_law
+from turnout.mismatch.latent import Latent
 from turnout.mismatch.locate import attribute, cell_energies
+from turnout.mismatch.scoring import judged, latent_of, over, score_of
 from turnout.mismatch.shortlist import shortlist
-from turnout.mismatch.verdict import Score, Verdict, judge
-from turnout.mismatch.verify import decoy, falls, fit_percent, predict_reserved
+from turnout.mismatch.verdict import Verdict
+from turnout.mismatch.verify import decoy, fit_percent, predict_reserved
 from turnout.mismatch.whereabouts import Whereabouts, whereabouts
 
 
@@ -78,23 +79,23 @@ def diagnose(case, settings=None, progress=None, store=None):
     numerics = _own_numerics(case, base, settings)
     if numerics:
         verdict = Verdict("numerics", reason=numerics, probability=1.0)
-        return Diagnosis((verdict,), base, base, frames, _verified(case, base, base, None), _latent_of(case, base))
+        return Diagnosis((verdict,), base, base, frames, _verified(case, base, base, None), latent_of(case, base))
     verdicts, fit, scored = [], base, ()
     for effect in range(settings.effects):
         scored = _scored(case, fit, settings, tell, store, effect)
-        verdict, best = _judged(case, fit, scored, settings)
+        verdict, best = judged(case, fit, scored, settings)
         if effect and verdict.answer != "named":
             break
         verdicts.append(verdict)
         if verdict.answer not in ("named", "a_or_b"):
             break
         fit = best.fit
-        if verdict.answer == "a_or_b" or (not case.frozen_jacobian and _over(case, fit, settings) <= 1.0):
+        if verdict.answer == "a_or_b" or (not case.frozen_jacobian and over(case, fit, settings) <= 1.0):
             break
     rival, refused = _rival(verdicts[0]), verdicts[0].scores[0] if verdicts[0].scores else None
     where = whereabouts(case, base, refused) if verdicts[0].answer == "unknown" else None
     return Diagnosis(
-        tuple(verdicts), base, fit, frames, _verified(case, base, fit, rival), _latent_of(case, base), {},
+        tuple(verdicts), base, fit, frames, _verified(case, base, fit, rival), latent_of(case, base), {},
         tuple(scored), where,
     )  # fmt: skip
 
@@ -119,7 +120,7 @@ def _scored(case, fit, settings, tell, store, effect):
         tell(done + 1, len(plan), candidate.key)
         if refit is None:
             continue
-        score = _score(case, fit, refit, candidate, settings)
+        score = score_of(case, fit, refit, candidate, settings)
         known = scores.get(candidate.family)
         if known is None or score.gain > known.gain:
             scores[candidate.family] = score
@@ -135,7 +136,7 @@ def _polished(case, fit, score, settings, store, effect):
     """A leader refitted to the end, with derivatives of its own: the verdict rests on these."""
     key = f"{effect}:polished:{score.candidate.key}:{len(fit.candidates)}"
     refit = _kept(store, key, lambda: _to_the_end(case, score.fit, settings), score.fit.candidates)
-    new = _score(case, fit, refit, score.candidate, settings)
+    new = score_of(case, fit, refit, score.candidate, settings)
     return new if new.gain > score.gain else score
 
 
@@ -183,76 +184,6 @@ def _best_start(case, candidates, psi, values):
     return np.array(min(found)[1]) if found else psi
 
 
-def _control(case, fit, settings):
-    """Weighted mean square by kind that controls reach."""
-    return {kind: case.control_level.get(kind, settings.control_level) for kind in fit.level}
-
-
-def _excess(level, control):
-    return sum(max(0.0, level[kind] - control[kind]) for kind in level)
-
-
-def _score(case, fit, refit, candidate, settings):
-    """Gain less the logarithm of the places scanned: held out condition by condition, or, where nuisances are many and
-    predictions dear, in evidence, in which the first condition is predicted from the priors."""
-    gain, by_condition = refit.evidence - fit.evidence, {}
-    if not case.frozen_jacobian:
-        mine, reference = held_out_score(case, refit), held_out_score(case, fit)
-        by_condition = {c: mine[c] - reference[c] for c in reference}
-        gain = sum(by_condition.values()) if by_condition else gain
-    control = _control(case, fit, settings)
-    before = _excess(fit.level, control)
-    explained = 1.0 - _excess(refit.level, control) / before if before > 0.0 else 1.0
-    worst = min(by_condition.values(), default=0.0)
-    return Score(candidate, gain - np.log(candidate.scanned), worst, explained, refit, by_condition)
-
-
-def _over(case, fit, settings):
-    """Weighted mean square over the level of controls, the largest of the kinds."""
-    control = _control(case, fit, settings)
-    return max(fit.level[kind] / control[kind] for kind in fit.level)
-
-
-def _loudest(case, fit):
-    """Largest mean square of one channel in one recording over what it is in controls, of the kinds that tell."""
-    found = [0.0]
-    for o, white in zip(case.observations, fit.white):
-        if o.kind not in case.cell_level or o.cells is None or "sensor" not in o.labels:
-            continue
-        inside = o.cells >= 0
-        level, code = np.unique(o.labels["sensor"].astype(str), return_inverse=True)
-        channel = code[o.cells[inside]]
-        count = np.maximum(np.bincount(channel, minlength=level.size), 1)
-        square = np.bincount(channel, np.asarray(white)[inside] ** 2, minlength=level.size)
-        found.append(float(np.max(square / count)) / case.cell_level[o.kind])
-    return max(found)
-
-
-def _judged(case, fit, scored, settings):
-    best = max((s for s in scored if s.material), key=lambda s: s.gain, default=None)
-    excess = max(_over(case, fit, settings), _loudest(case, fit))
-    scored = tuple(s for s in scored if s.material)
-    if best is None:
-        return judge([], excess, settings, disturbed=bool(case.disturbed)), None
-    consistent, structure = True, 0.0
-    if best.gain > settings.threshold:
-        consistent = _consistent(case, fit, best.fit, settings)
-        left = _latent_of(case, best.fit)
-        structure = max(left.r2.values(), default=0.0) if left else 0.0
-    left = _over(case, best.fit, settings)
-    return judge(scored, excess, settings, consistent, structure, left, bool(case.disturbed)), best
-
-
-def _consistent(case, base, fit, settings):
-    """Reserved conditions are predicted no worse than without the effect."""
-    if not case.reserved:
-        return True
-    before, after = (predict_reserved(case, f, case.reserved) for f in (base, fit))
-    squares = [mean_square_out(case, f, case.reserved, p) for f, p in ((base, before), (fit, after))]
-    fell = falls(case.reserved, before, after, settings.fall)
-    return squares[1] <= settings.withdrawn_ratio * squares[0] and not fell
-
-
 def _own_numerics(case, base, settings):
     """A sentence where our own error reaches a third of the mismatch, "" otherwise."""
     errors = case.numerical_error(base)
@@ -267,14 +198,6 @@ def _own_numerics(case, base, settings):
     if material and own > settings.numerics_share**2 * wrong:
         return f"own numerical error is {np.sqrt(own / wrong):.0%} of the mismatch: refine mesh and step first"
     return ""
-
-
-def _latent_of(case, fit):
-    seen = case.latent(fit)
-    if not seen:
-        return None
-    covariates = {k: v for k, v in seen.items() if k not in ("force", "unit")}
-    return latent_law(seen["force"], covariates, seen.get("unit", "N"))
 
 
 def _rival(verdict):

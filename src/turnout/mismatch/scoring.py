@@ -1,0 +1,89 @@
+"""How good a candidate is: its gain, the share of the excess that it explains, what it leaves; and the verdict."""
+
+import numpy as np
+
+from turnout.mismatch.held_out import held_out_score, mean_square_out
+from turnout.mismatch.latent import latent_law
+from turnout.mismatch.verdict import Score, judge
+from turnout.mismatch.verify import falls, predict_reserved
+
+
+def _control(case, fit, settings):
+    """Weighted mean square by kind that controls reach."""
+    return {kind: case.control_level.get(kind, settings.control_level) for kind in fit.level}
+
+
+def _excess(level, control):
+    return sum(max(0.0, level[kind] - control[kind]) for kind in level)
+
+
+def score_of(case, fit, refit, candidate, settings):
+    """Gain less the logarithm of the places scanned: held out condition by condition, or, where nuisances are many and
+    predictions dear, in evidence, in which the first condition is predicted from the priors."""
+    gain, by_condition = refit.evidence - fit.evidence, {}
+    if not case.frozen_jacobian:
+        mine, reference = held_out_score(case, refit), held_out_score(case, fit)
+        by_condition = {c: mine[c] - reference[c] for c in reference}
+        gain = sum(by_condition.values()) if by_condition else gain
+    control = _control(case, fit, settings)
+    before = _excess(fit.level, control)
+    explained = 1.0 - _excess(refit.level, control) / before if before > 0.0 else 1.0
+    worst = min(by_condition.values(), default=0.0)
+    gain += candidate.aside
+    return Score(candidate, gain - np.log(candidate.scanned), worst, explained, refit, by_condition)
+
+
+def over(case, fit, settings):
+    """Weighted mean square over the level of controls, the largest of the kinds."""
+    control = _control(case, fit, settings)
+    return max(fit.level[kind] / control[kind] for kind in fit.level)
+
+
+def _loudest(case, fit):
+    """Largest mean square of one channel in one recording over what it is in controls, of the kinds that tell."""
+    found = [0.0]
+    for o, white in zip(case.observations, fit.white):
+        if o.kind not in case.cell_level or o.cells is None or "sensor" not in o.labels:
+            continue
+        inside = o.cells >= 0
+        level, code = np.unique(o.labels["sensor"].astype(str), return_inverse=True)
+        channel = code[o.cells[inside]]
+        count = np.maximum(np.bincount(channel, minlength=level.size), 1)
+        square = np.bincount(channel, np.asarray(white)[inside] ** 2, minlength=level.size)
+        found.append(float(np.max(square / count)) / case.cell_level[o.kind])
+    return max(found)
+
+
+def judged(case, fit, scored, settings):
+    """(Verdict on the ``scored`` candidates on top of ``fit``, the best Score of a size that matters or None)."""
+    best = max((s for s in scored if s.material), key=lambda s: s.gain, default=None)
+    excess = max(over(case, fit, settings), _loudest(case, fit))
+    scored = tuple(s for s in scored if s.material)
+    if best is None:
+        return judge([], excess, settings, disturbed=bool(case.disturbed)), None
+    consistent, structure = True, 0.0
+    if best.gain > settings.threshold:
+        consistent = _consistent(case, fit, best.fit, settings)
+        left = latent_of(case, best.fit)
+        structure = max(left.r2.values(), default=0.0) if left else 0.0
+    left = over(case, best.fit, settings)
+    return judge(scored, excess, settings, consistent, structure, left, bool(case.disturbed)), best
+
+
+def _consistent(case, base, fit, settings):
+    """Reserved conditions are predicted no worse than without the effect."""
+    if not case.reserved:
+        return True
+    before, after = (predict_reserved(case, f, case.reserved) for f in (base, fit))
+    squares = [mean_square_out(case, f, case.reserved, p) for f, p in ((base, before), (fit, after))]
+    fell = falls(case.reserved, before, after, settings.fall)
+    return squares[1] <= settings.withdrawn_ratio * squares[0] and not fell
+
+
+def latent_of(case, fit):
+    """``Latent`` of the force that ``fit`` misses, None where the case has no such view."""
+    seen = case.latent(fit)
+    if not seen:
+        return None
+    covariates = {k: v for k, v in seen.items() if k not in ("force", "unit")}
+    return latent_law(seen["force"], covariates, seen.get("unit", "N"))
