@@ -12,7 +12,8 @@ SOURCE = "Newton and Clark 1979, An investigation into the dynamic effects on th
 class WheelFlat(PhysicsTerm):
     r"""One wheel drops by :math:`l^2/16R` once a turn; the phase differs from passage to passage.
 
-    ``train`` names the trains that carry it ("" all), ``phases`` the rolling way to the first flat by recording.
+    ``train`` names the trains that carry it ("" all), ``phases`` the rolling way to the first flat by recording; in a
+    recording that is not among them the angle is not known, and nothing is said.
     """
 
     wheel: int
@@ -38,10 +39,11 @@ class WheelFlat(PhysicsTerm):
         return self.left_out.format(length=self.length, number=self.wheel + 1, who=self.train or "every train")
 
     def under(self, conditions):
-        """With the phase of a recording; no flat in another train."""
-        if self.train and conditions.get("train", self.train) != self.train:
+        """With the phase of a recording; no flat in another train, nor where the phase is not known."""
+        known, name = dict(self.phases), conditions.get("name")
+        if (self.train and conditions.get("train", self.train) != self.train) or (known and name not in known):
             return replace(self, length=0.0)
-        return replace(self, phase=dict(self.phases).get(conditions.get("name"), self.phase))
+        return replace(self, phase=known.get(name, self.phase))
 
     def paths(self, track, vehicle):
         """The path of that wheel alone."""

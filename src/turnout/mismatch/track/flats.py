@@ -1,74 +1,76 @@
-"""Wheels with a flat, sought in the residual: which wheel of which train, and where on the rail it strikes each time.
+"""Wheels with a flat: found by their blows in the loudness of passages, then sized by their signal in the band.
 
-A flat is a short drop once a turn. Its length is common to all passages of the train, the angle at which the wheel
-comes is not: every passage has a phase of its own, and the evidence pays for having chosen it.
+A flat's length is common to all passages of the train, the angle at which the wheel comes is not: every passage has a
+phase of its own. The blows tell it to some centimetres; the simulation, with loss of contact, tells the rest.
 """
 
 import numpy as np
 
 from turnout import physics
+from turnout.errors import SimulationError
 from turnout.mismatch.case import Candidate
-from turnout.mismatch.track.rolled_waves import Carrier
+from turnout.mismatch.track.strikes import strikes
 
-NOMINAL = 0.06  # length of the flat that the columns stand for [m]
-PHASES = 24  # places tried within a turn
-APART = 0.15  # phases closer than this look alike in the band [m]
-AMOUNTS = np.geomspace(0.2, 12.0, 25)  # of the nominal flat's area
-NAMED = 2  # wheels offered
+NAMED = 1  # wheels offered
+LEAST = 3.0  # nats of the blows, less the logarithm of the wheels, below which nobody looks closer
+ABOUT, APART = np.arange(-0.24, 0.25, 0.06), 0.15  # m: phases tried about that of the blows; closer ones look alike
+NEAR = (-0.03, 0.0, 0.03)  # m: and about the best of them
+MIDDLING, LENGTHS = 0.05, (0.025, 0.035, 0.045, 0.055, 0.07, 0.09)  # m
 
 
 def flats(case, fit):
     """Candidates of the wheels that most likely carry a flat."""
-    white = {o.name: (o, w) for o, w in zip(case.observations, fit.white) if o.name in case.rollings}
-    ranked = []
-    for train in case.trains:
-        names = [n for n in white if case.said(case.rollings[n])["train"] == train]
-        if not names:
-            continue
-        vehicle = case.rollings[names[0]].passage.vehicle
-        turn = 2.0 * np.pi * vehicle.radius
-        carriers = [(Carrier(case, fit.values, case.rollings[n]), *white[n], n) for n in names]
-        for wheel in range(len(vehicle.wheels)):
-            gain, amount, phases = _of_wheel(fit, carriers, wheel, turn, vehicle.radius)
-            ranked.append((gain - len(names) * np.log(turn / APART), train, wheel, amount, phases, vehicle.radius))
-    ranked.sort(key=lambda entry: -entry[0])
-    return tuple(_candidate(*entry[1:], len(ranked)) for entry in ranked[:NAMED] if entry[0] > 0.0)
+    found = strikes(case)
+    return tuple(_candidate(case, fit, s, len(found)) for s in found[:NAMED] if s.nats > LEAST + np.log(len(found)))
 
 
-def _of_wheel(fit, carriers, wheel, turn, radius):
-    """(nats, area over the nominal flat's, ((recording, phase), ...)) of one wheel."""
-    along, power, found = [], [], []
-    for carrier, o, white, name in carriers:
-        phases = np.arange(PHASES) * turn / PHASES
-        columns = o.whitened(carrier.alone(wheel, _drops(carrier.way, phases, turn, radius)))
-        weight = o.effective / fit.scale[o.kind]
-        along.append(weight * (columns.T @ white))
-        power.append(weight * np.sum(columns**2, axis=0))
-        found.append((name, phases))
-    gains = [sum(np.max(a * b - 0.5 * a * a * c) for b, c in zip(along, power)) for a in AMOUNTS]
-    best = int(np.argmax(gains))
-    a = AMOUNTS[best]
-    chosen = tuple(
-        (name, float(phases[np.argmax(a * b - 0.5 * a * a * c)])) for (name, phases), b, c in zip(found, along, power)
-    )
-    return float(gains[best]), float(a), chosen
+def _candidate(case, fit, struck, wheels):
+    length, phases, gain = _sized(case, fit, struck)
 
-
-def _drops(way, phases, turn, radius):
-    """(n_phase, n_x) drops of the nominal flat, their area shared by the two places beside them [m]."""
-    step, area = way[1] - way[0], NOMINAL**3 / (32.0 * radius)
-    rows = np.zeros((phases.size, way.size))
-    for row, phase in zip(rows, phases):
-        for x in np.arange(phase + turn * np.ceil((way[0] - phase) / turn), way[-1], turn):
-            row += np.clip(1.0 - np.abs(way - x) / step, 0.0, None) * area / step
-    return rows
-
-
-def _candidate(train, wheel, amount, phases, radius, scanned):
     def make(p):
-        return physics.WheelFlat(wheel, radius=radius, train=train, phases=phases, **p)
+        return physics.WheelFlat(struck.wheel, radius=struck.radius, train=struck.train, phases=phases, **p)
 
-    length = min(NOMINAL * amount ** (1.0 / 3.0), 0.149)
-    places = scanned * (2.0 * np.pi * radius / APART) ** len(phases)
-    where = {"train": train, "axle": wheel + 1}
-    return Candidate("wheel_flat", physics.WheelFlat.parameters, make, ((length,),), where, "wheel", places)
+    where = {"train": struck.train, "axle": struck.wheel + 1}
+    scanned = wheels * (1.0 + np.ptp(ABOUT) / APART) ** len(phases)
+    return Candidate(
+        "wheel_flat", physics.WheelFlat.parameters, make, ((length,),), where, "wheel", scanned,
+        promise=float(gain + struck.nats - np.log(scanned)), aside=struck.nats,
+    )  # fmt: skip
+
+
+def _sized(case, fit, struck):
+    """(length [m], phases, nats) at which the simulated flat explains most of the band, loss of contact included."""
+    phases = _turned(case, fit, struck, struck.phases, ABOUT, MIDDLING)
+    length, _ = _longest(case, fit, struck, phases)
+    phases = _turned(case, fit, struck, phases, NEAR, length)
+    length, gain = _longest(case, fit, struck, phases)
+    return length, phases, max(gain, 0.0)
+
+
+def _turned(case, fit, struck, phases, about, length):
+    """The phases moved to where a flat of this length explains most."""
+    found = []
+    for name, phase in phases:
+        tried = [(_gain(case, fit, struck, name, phase + more, length), float(phase + more)) for more in about]
+        found.append((name, max(tried)[1]))
+    return tuple(found)
+
+
+def _longest(case, fit, struck, phases):
+    """(length, nats) of the length that explains most at these phases."""
+    sizes = [(sum(_gain(case, fit, struck, *at, length) for at in phases), length) for length in LENGTHS]
+    gain, length = max(sizes)
+    return length, gain
+
+
+def _gain(case, fit, struck, name, phase, length):
+    """Nats that a flat explains of one passage, all else as fitted."""
+    k = next(i for i, o in enumerate(case.observations) if o.name == name)
+    o = case.observations[k]
+    term = physics.WheelFlat(struck.wheel, length, struck.radius, phase, struck.train)
+    try:
+        (predicted,) = case.predict(fit.values, (*fit.terms, term), [o])
+    except SimulationError:
+        return -np.inf
+    before, after = (float(np.sum(o.whitened(o.data - p) ** 2)) for p in (fit.predictions[k], predicted))
+    return 0.5 * o.effective / fit.scale[o.kind] * (before - after)

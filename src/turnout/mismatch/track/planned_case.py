@@ -48,7 +48,7 @@ class PlannedCase(TrackCase):
             self.rollings[passage.name] = rolling.Rolling(passage.name, passage, plan.sensors, time, 0.45, train.speed)
         self.nuisances = tuple(self._nuisances())
         self.observations = tuple(self._expected())
-        self.candidates, self.flats = library(self, families), False
+        self.candidates, self.families = library(self, families), ()
 
     def _expected(self):
         values = {n.name: n.mean for n in self.nuisances}

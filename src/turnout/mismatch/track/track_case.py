@@ -52,7 +52,7 @@ class TrackCase(Case):
             raise SimulationError("every recording is reserved for the verification: nothing is left to fit.")
         self.nuisances = tuple(self._nuisances())
         self.candidates = library(self, families)
-        self.flats = families is None or "wheel_flat" in families
+        self.families = families
 
     def _from_blows(self, observations):
         """Values of the nuisances of track and sensors that the hammer tests alone give: where all fits start."""
@@ -358,10 +358,10 @@ class TrackCase(Case):
         return [Probe((kind, j), 0) for j in self.zone.supports for kind in ("rail", "sleeper")] + further
 
     def further(self, fit):
-        """Wheels with a flat."""
-        from turnout.mismatch.track.flats import flats
+        """Dips, corrugation and wheels, as the residual and the loudness of passages suggest them."""
+        from turnout.mismatch.track.geometry_scan import geometry_scan
 
-        return flats(self, fit) if self.rollings and self.flats else ()
+        return geometry_scan(self, fit, self.families) if self.rollings else ()
 
     def screen(self, fit):
         """Linear columns of the candidates that have one."""

@@ -1,0 +1,12 @@
+"""What passages themselves suggest about rail and wheels: candidates that no grid of the library could hold."""
+
+from turnout.mismatch.track.flats import flats
+from turnout.mismatch.track.rail_scan import rail_scan
+
+
+def geometry_scan(case, fit, families=None):
+    """Candidates of ``families`` (None: all) for the residual of ``fit``."""
+    found = list(rail_scan(case, fit, families))
+    if families is None or "wheel_flat" in families:
+        found += flats(case, fit)
+    return tuple(found)
