@@ -25,9 +25,10 @@ def fit_percent(observations, predictions, centre=True):
 
 
 def falls(observations, before, after, points):
-    """Whether ``after`` fits worse than ``before`` by more than ``points`` of fit and by more than its standard error.
+    """Whether ``after`` fits worse than ``before`` by more than ``points`` of fit and than two standard errors.
 
-    The difference of weighted squares is taken over ``BLOCKS`` stretches of each observation; these scatter.
+    The difference of weighted squares is taken over ``BLOCKS`` stretches of each observation; these scatter. One
+    standard error is reached by one in six names that say nothing about these observations.
     """
     parts = [
         o.effective * float(np.sum(d))
@@ -35,7 +36,7 @@ def falls(observations, before, after, points):
         for d in np.array_split((((o.data - a) ** 2 - (o.data - b) ** 2) / o.sigma**2), BLOCKS)
     ]
     error = np.std(parts, ddof=1) * np.sqrt(len(parts))
-    return sum(parts) > error and fit_percent(observations, after) < fit_percent(observations, before) - points
+    return sum(parts) > 2.0 * error and fit_percent(observations, after) < fit_percent(observations, before) - points
 
 
 def predict_reserved(case, fit, observations):

@@ -123,7 +123,7 @@ def test_another_train_shakes_all_sensors_and_a_noisy_channel_is_alone():
     assert p > quiet.DISTURBED
 
 
-def test_a_fall_of_the_held_out_fit_counts_beyond_its_standard_error():
+def test_a_fall_of_the_held_out_fit_counts_beyond_two_standard_errors():
     rng = np.random.default_rng(7)
     y, e = rng.normal(size=2500) * 10.0, rng.normal(size=2500)
     held = [Observation("a", "a", y, 1.0)]

@@ -40,7 +40,7 @@ class MismatchSettings:
         2.0, "-", "mean square on reserved over calibration recordings that withdraws a name", 1.0
     )
     fall: float = setting(
-        0.5, "%", "points of fit on reserved recordings that a name may cost, or their standard error", 0.0, 100.0
+        1.0, "%", "points of fit on reserved recordings that a name may cost, or two standard errors", 0.0, 100.0
     )
     structure_left: float = setting(
         0.4, "-", "share of what is left that a free law of the state still explains: shape unresolved", 0.0, 1.0
