@@ -44,7 +44,8 @@ def scout(case, fit, settings):
     for members in _by_family(entries).values():
         best = None
         for candidate, start in _likeliest(members, rough, first, held, settings, glances):
-            refit = _fitted(rough, cheap, (*held, candidate), np.concatenate([first.psi, start]))
+            hopeless = first.cost - 2.0 * settings.promise if candidate.always else np.inf
+            refit = _fitted(rough, cheap, (*held, candidate), np.concatenate([first.psi, start]), hopeless)
             if refit is None:
                 continue
             gain = refit.evidence - base.evidence - np.log(candidate.scanned)
@@ -108,12 +109,15 @@ def _glance(rough, first, held, candidate, start):
     return 0.5 * (first.cost - fit.cost)
 
 
-def _fitted(rough, cheap, candidates, psi):
-    """From the priors through the broad errors to the narrow ones; None where the simulation cannot go there."""
+def _fitted(rough, cheap, candidates, psi, hopeless):
+    """From the priors through the broad errors to the narrow ones; None where the simulation cannot go there, or where
+    the broad fit costs as much as the ``hopeless`` one without the effect: it was asked on no other promise."""
     try:
         first = fit_jointly(
             rough, candidates, psi, {n.name: n.mean for n in rough.nuisances}, iterations=STEPS, done=ENOUGH
         )
+        if first.cost > hopeless:
+            return None
         return fit_jointly(cheap, candidates, first.psi, first.values, iterations=STEPS, done=ENOUGH)
     except SimulationError:
         return None

@@ -1,9 +1,12 @@
 """Candidates of a turnout: every term of the catalogue at every place it could be."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from turnout import physics
 from turnout.mismatch.case import Candidate
+from turnout.mismatch.track.ceiling import LIMIT_SD
 
 GAPS = (1.3e-4, 3e-4, 7e-4, 1.6e-3)  # below the first a train closes it at once, behind the last it never does [m]
 MOUNTINGS = (300.0, 200.0, 450.0, 650.0, 900.0, 1200.0)  # half a width at Q = 3 apart [Hz]
@@ -87,6 +90,17 @@ def _sensors(case):
             if peak > 0.0:
                 yield per(physics.Clipping, ((0.6 * peak,),))
                 yield per(physics.Hum, ((0.1 * peak, 0.0),))
+    for name, ceiling in case.ceilings.items():
+        yield _clipped(name, ceiling)
+
+
+def _clipped(name, ceiling):
+    """A channel that is used no more; its limit is known from the peaks, not from a fit."""
+    limit = replace(physics.Clipping.parameters[0], prior=(ceiling.limit, LIMIT_SD * ceiling.limit))
+    return Candidate(
+        physics.Clipping.name, (limit,), lambda p: physics.Clipping(name, **p), ((ceiling.limit,),), {"sensor": name},
+        physics.Clipping.frame, promise=ceiling.gain, aside=ceiling.gain,
+    )  # fmt: skip
 
 
 def _surface(case):

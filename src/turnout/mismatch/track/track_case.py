@@ -20,6 +20,7 @@ from turnout.mismatch.track.base_model import (
     vehicle_with,
     zone_of,
 )
+from turnout.mismatch.track.ceiling import ceilings, within_range
 from turnout.mismatch.track.columns import columns_of, support_forces
 from turnout.mismatch.track.library import library
 from turnout.mismatch.track.quiet import disturbances
@@ -37,9 +38,12 @@ class TrackCase(Case):
     """``Case`` of a ``Campaign``; ``families`` restricts the candidates, ``solver`` the simulation used in fits."""
 
     frozen_jacobian = True
+    ceilings: dict = {}
 
     def __init__(self, campaign, settings=None, families=None, solver=None):
-        self._prepare(campaign, settings or MismatchSettings(), solver or rolling.Track1D())
+        settings = settings or MismatchSettings()
+        self.ceilings = ceilings(campaign, settings.threshold)
+        self._prepare(within_range(campaign, self.ceilings), settings, solver or rolling.Track1D())
         found, self.start_values = list(self._hammer()), {}
         self.start_values = self._from_blows([o for _, o in found])
         found += self._undisturbed(list(self._passages()))
@@ -92,6 +96,7 @@ class TrackCase(Case):
     def _hammer(self):
         for test in self.campaign.hammer:
             sensors = [*self.campaign.sensors, *_loose(test, self.campaign.sensors)]
+            sensors = [s for s in sensors if s.name not in self.ceilings]
             pairs = blows.pairs_of(test, sensors, self.settings.pair_tolerance)
             if not pairs:
                 self.notes.append(f"hammer test {test.name}: no channel with {blows.FEWEST} sound blows")

@@ -1,0 +1,69 @@
+"""Channels that show no more than so much: their peaks stay where those of the other sensors follow the trains."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+FEWEST_PASSAGES, FEWEST_SENSORS = 4, 3
+FLOOR = 0.02  # ln; peaks fall between samples, and mountings ring behind a blow
+TOP = 0.8  # of the peak; above it a clipped channel spends its time
+LIMIT_SD = 0.1  # of the limit; the two sides of an amplifier seldom saturate alike
+
+
+@dataclass(frozen=True)
+class Ceiling:
+    """A channel's ``limit`` [m/s²] and what speaks for it, ``gain`` [nats]."""
+
+    limit: float
+    gain: float
+
+
+def ceilings(campaign, threshold):
+    """Ceiling of every sensor, by name, whose passages show one beyond ``threshold`` [nats].
+
+    Reserved passages count as well: whether a channel may be used is no prediction, and holds for them too.
+    """
+    names = [s.name for s in campaign.sensors]
+    recordings = [p.recording for p in campaign.passages]
+    recordings = [r for r in recordings if set(names) <= {c.name for c in r.channels}]
+    if len(recordings) < FEWEST_PASSAGES or len(names) < FEWEST_SENSORS:
+        return {}
+    sizes = [np.abs(r.samples[[r.index(n) for n in names]]) for r in recordings]
+    peaks = np.log([np.maximum(np.max(x, axis=1), 1e-12) for x in sizes])
+    found = {}
+    for k, name in enumerate(names):
+        others = np.delete(peaks, k, axis=1).mean(axis=1)
+        gain = saturation(peaks[:, k], others) - np.log(len(names))
+        if gain > threshold:
+            found[name] = Ceiling(_limit([x[k] for x in sizes]), float(gain))
+    return found if len(names) - len(found) > 1 else {}
+
+
+def saturation(peaks, others):
+    r"""Gain [nats] of a ceiling over peaks that follow ``others``; both (n,) logarithms of peaks, one per passage.
+
+    .. math:: y_k = \min(c,\, a + x_k) + e_k \quad\text{against}\quad y_k = a + x_k + e_k, \qquad
+              g = \tfrac n2 \ln\frac{s_0^2 + f^2}{s_1^2 + f^2} - \tfrac12 \ln n
+
+    with the mean squares s² of the residuals and the least scatter f. At least two passages must reach the ceiling.
+    """
+    order = np.argsort(others)
+    y, x = np.asarray(peaks)[order], np.asarray(others)[order]
+    n, follows = y.size, y - x
+    free, capped = np.sum((follows - follows.mean()) ** 2), [np.sum((y - y.mean()) ** 2)]
+    for below in range(1, n - 1):
+        a, c = follows[:below].mean(), y[below:].mean()
+        if a + x[below] >= c:
+            capped.append(np.sum((y[below:] - c) ** 2) + np.sum((follows[:below] - a) ** 2))
+    return float(0.5 * n * np.log((free / n + FLOOR**2) / (min(capped) / n + FLOOR**2)) - 0.5 * np.log(n))
+
+
+def _limit(sizes):
+    """Median of what lies near the peak, of the passage that spends most of its time there [m/s²]."""
+    crowded = max(sizes, key=lambda x: np.mean(x > TOP * x.max()))
+    return float(np.median(crowded[crowded > TOP * crowded.max()]))
+
+
+def within_range(campaign, found):
+    """The campaign without the sensors that have a ceiling: what these show is no response of the track."""
+    return replace(campaign, sensors=tuple(s for s in campaign.sensors if s.name not in found))
