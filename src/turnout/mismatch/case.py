@@ -114,6 +114,7 @@ class Candidate:
     ``parameters`` have name, unit, neutral, bounds and prior as ``turnout.physics.Parameter``.
     One found by a look at the residual has the gain it promises [nats] in ``promise``, starts as it is, from the
     nuisances ``begin``; ``aside`` is evidence from data that are no observations [nats].
+    ``loose`` is the share by which the size of an effect errs since its law is not quite the one out there.
     """
 
     family: str
@@ -131,6 +132,7 @@ class Candidate:
     promise: float | None = None
     begin: Mapping[str, float] = field(default_factory=dict)
     aside: float = 0.0
+    loose: float = 0.0
 
     @property
     def key(self):

@@ -46,8 +46,14 @@ class Fit:
 
     @property
     def psi_se(self):
-        """(n_term,) standard errors of the terms' parameters."""
-        return np.sqrt(np.maximum(np.diag(self.covariance)[len(self.values) :], 0.0))
+        """(n_term,) standard errors of the terms' parameters; a size errs by the ``loose`` share of it as well."""
+        found, first = np.sqrt(np.maximum(np.diag(self.covariance)[len(self.values) :], 0.0)), 0
+        for candidate in self.candidates:
+            if candidate.parameters:
+                size = self.psi[first] - candidate.parameters[0].neutral
+                found[first] = np.hypot(found[first], candidate.loose * size)
+            first += len(candidate.parameters)
+        return found
 
     @property
     def chi2(self):

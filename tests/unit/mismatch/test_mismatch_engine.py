@@ -1,5 +1,7 @@
 """The engine on systems small enough to know the answer by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -236,3 +238,11 @@ def test_two_laws_that_agree_on_one_condition_are_told_apart_by_another():
     other = [margin((0.5, 1.5, 3.0), seed) for seed in range(6)]
     assert max(np.abs(same)) < asked  # cannot tell
     assert min(other) > asked
+
+
+def test_a_size_errs_by_the_share_its_law_is_loose_as_well():
+    case = Line(lambda x: x + 0.4 * x**2)
+    strict = case.candidates[0]
+    fit = fit_jointly(case, (strict,), np.array([0.3]))
+    loose = fit.with_candidates((replace(strict, loose=0.15),))
+    assert np.allclose(loose.psi_se**2, fit.psi_se**2 + (0.15 * fit.psi) ** 2, rtol=1e-12)
