@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import f
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.case import Case, Observation
@@ -154,3 +155,15 @@ def test_another_train_makes_an_unknown_of_nothing_else():
     verdict = judge([], 0.5, settings, disturbed=True)
     assert verdict.answer == "unknown"
     assert verdict.probability > judge([], 5.0, settings).probability
+
+
+def test_passages_with_different_sensors_are_compared_by_those_they_share():
+    levels = {
+        "a": ({"S1": 4.0, "S2": 8.0, "S3": 1.0}, 50.0),
+        "b": ({"S1": 1.0, "S2": 2.0}, 50.0),
+        "c": ({"S1": 1.0}, 50.0),
+    }
+    louder, p = quiet.louder_than(*quiet._comparable(levels, "a"))
+    assert louder == pytest.approx(10.0 * np.log10(4.0))  # S3, which no other passage has, says nothing
+    assert p == pytest.approx(f.sf(4.0, 50.0, 50.0) ** 2)  # both sensors
+    assert quiet.louder_than(*quiet._comparable(levels, "c")) == (0.0, 1.0)

@@ -45,8 +45,7 @@ def disturbances(rollings, strange=None):
     looked_at = sum(len(s) for s in segments.values() if len(s) > 2)
     for when, levels in segments.items():
         for name in levels if len(levels) > 2 else ():
-            others = [level for other, level in levels.items() if other != name]
-            louder, p = louder_than(levels[name], others)
+            louder, p = louder_than(*_comparable(levels, name))
             if louder > LOUDER and p * looked_at < DISTURBED:
                 found.append(Disturbance(name, when, louder, min(1.0, p * looked_at)))
     return found
@@ -60,12 +59,22 @@ def _quiet(made):
     return {"before": (0.02, made.reference - away), "after": (made.reference + train / made.speed + away, end - 0.02)}
 
 
+def _comparable(levels, name):
+    """Level of a passage and those of the others, of the sensors that it shares; nan where another lacks one."""
+    own, freedom = levels[name]
+    rest = [level for other, level in levels.items() if other != name]
+    sensors = [s for s in own if any(s in power for power, _ in rest)]
+    others = [(np.array([power.get(s, np.nan) for s in sensors]), n) for power, n in rest]
+    return (np.array([own[s] for s in sensors]), freedom), others
+
+
 def _level(made, start, stop):
-    """Mean square in the band by sensor (n,), and its degrees of freedom."""
+    """Mean square in the band by sensor, and its degrees of freedom."""
     recording = made.passage.recording
     rows = [recording.index(s.name) for s in made.sensors]
     first, last = int(start * recording.rate), int(stop * recording.rate)
-    return band_level(recording.samples[rows][:, first:last], recording.rate)
+    level, freedom = band_level(recording.samples[rows][:, first:last], recording.rate)
+    return {s.name: float(v) for s, v in zip(made.sensors, level)}, freedom
 
 
 def band_level(samples, rate):
@@ -87,7 +96,9 @@ def louder_than(level, others):
     """(dB, chance) of a segment against others: the lower median over the sensors of its excess over their median, and
     the binomial chance that as many sensors exceed the F ratio at that rank."""
     power, freedom = level
-    usual = np.median([p for p, _ in others], axis=0)
+    if power.size < 2:  # one channel alone may be noisy
+        return 0.0, 1.0
+    usual = np.nanmedian([p for p, _ in others], axis=0)
     ratio = np.sort(power / np.maximum(usual, 1e-300))
     rank = (ratio.size - 1) // 2
     middle = float(ratio[rank])
