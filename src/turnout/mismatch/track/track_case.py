@@ -22,7 +22,7 @@ from turnout.mismatch.track.base_model import (
 )
 from turnout.mismatch.track.ceiling import ceilings, within_range
 from turnout.mismatch.track.columns import columns_of, support_forces
-from turnout.mismatch.track.library import library
+from turnout.mismatch.track.library import LOOSE, library
 from turnout.mismatch.track.quiet import disturbances
 from turnout.mismatch.track.rough_rail import Waves, wave_columns
 from turnout.mismatch.track.rough_wheels import wheel_modes
@@ -31,7 +31,6 @@ from turnout.simulate.run import Probe
 KEPT = 150  # simulated passages remembered
 GAIN_SD = 0.02
 FURTHER = 0.01  # way over which a derivative by a sensor's place is taken [m]
-LOOSE = 0.15  # share by which sizes err: nine effects of another simulator, opened, had a median of 0.12, rms 0.18
 ROUGHLY = 0.1  # relative error of a receptance in the first fit
 
 
@@ -56,7 +55,7 @@ class TrackCase(Case):
         if not self.observations:
             raise SimulationError("every recording is reserved for the verification: nothing is left to fit.")
         self.nuisances = tuple(self._nuisances())
-        self.candidates = tuple(replace(c, loose=LOOSE) for c in library(self, families))
+        self.candidates = library(self, families)
         self.families = families
 
     def _from_blows(self, observations):
