@@ -83,7 +83,8 @@ def _vehicle(name, heard, row, said, folder, believed):
         one = load_vehicle(name, 0.0, folder)
     except (SimulationError, ConfigError) as error:
         raise TrainUnknownError(f"type {name}: {error}") from None
-    n, units, wrong = len(one.wheels), int(said.get("units", 1)), ()
+    n, units = len(one.wheels), int(said.get("units", 1))
+    wrong: tuple[str, ...] = ()
     if heard and heard % n:
         wrong = (f"{heard} axles heard, {n} in {name}.yaml: wrong vehicle file, another train, or other sensors",)
         if not believed or heard < LEAST_HEARD * n * units:
