@@ -1,6 +1,6 @@
 """A wheel that is not round."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.wheel_path import OutOfRound as Wave
@@ -10,21 +10,30 @@ SOURCE = "Nielsen and Johansson 2000, Out-of-round railway wheels - a literature
 
 @dataclass(frozen=True)
 class OutOfRound(PhysicsTerm):
-    r"""One wheel has n waves around it, :math:`p = a \cos(n x/R) + b \sin(n x/R)`."""
+    r"""One wheel has n waves around it, :math:`p = a \cos(n (x - x_0)/R) + b \sin(n (x - x_0)/R)`.
+
+    ``train`` names the trains that carry it ("" all), ``phases`` the way :math:`x_0` [m] by recording: the angle at
+    which a wheel comes differs from passage to passage. In a recording that is not among them nothing
+    is said.
+    """
 
     wheel: int
     cosine: float
     sine: float = 0.0
     order: int = 3
     radius: float = 0.43
+    train: str = ""
+    phases: tuple = ()
+    turned: float = 0.0
 
     name = "out_of_round"
-    left_out = "wheel {number} has {order} waves around it with an amplitude of {amplitude:.2e} m"
+    left_out = "wheel {number} of {who} has {order} waves around it with an amplitude of {amplitude:.2e} m"
     kind = "path"
     frame = "wheel"
     parameters = (
         Parameter("cosine", "m", 0.0, (-1e-3, 1e-3), "amplitude in phase with the place", SOURCE),
         Parameter("sine", "m", 0.0, (-1e-3, 1e-3), "amplitude a quarter wave on", SOURCE),
+        Parameter("turned", "-", 0.0, (-0.03, 0.03), "radius beyond that given, relative", SOURCE, (0.0, 0.005)),
     )
 
     @classmethod
@@ -35,13 +44,25 @@ class OutOfRound(PhysicsTerm):
     def sentence(self):
         """What was left out, in words."""
         amplitude = (self.cosine**2 + self.sine**2) ** 0.5
-        return self.left_out.format(number=self.wheel + 1, order=self.order, amplitude=amplitude)
+        who = self.train or "every train"
+        return self.left_out.format(number=self.wheel + 1, who=who, order=self.order, amplitude=amplitude)
+
+    def under(self, conditions):
+        """With the angle of a recording; round in another train, and where the angle is not known."""
+        known, name = dict(self.phases), conditions.get("name")
+        if (self.train and conditions.get("train", self.train) != self.train) or (known and name not in known):
+            return replace(self, cosine=0.0, sine=0.0)
+        return replace(self, phases=((name, known[name]),)) if known else self
 
     def paths(self, track, vehicle):
         """Two waves a quarter apart."""
         self.check()
-        quarter = 0.5 * 3.141592653589793 * self.radius / self.order
+        if self.cosine == 0.0 and self.sine == 0.0:
+            return ()
+        radius = self.radius * (1.0 + self.turned)
+        quarter = 0.5 * 3.141592653589793 * radius / self.order
+        start = self.phases[0][1] if self.phases else 0.0
         return (
-            Wave(self.wheel, self.cosine, self.order, self.radius),
-            Wave(self.wheel, self.sine, self.order, self.radius, phase=quarter),
+            Wave(self.wheel, self.cosine, self.order, radius, start),
+            Wave(self.wheel, self.sine, self.order, radius, start + quarter),
         )

@@ -1,6 +1,7 @@
 """What passages themselves suggest about rail and wheels: candidates that no grid of the library could hold."""
 
 from turnout.mismatch.track.flats import flats
+from turnout.mismatch.track.polygons import polygons
 from turnout.mismatch.track.rail_scan import rail_scan
 
 
@@ -9,4 +10,6 @@ def geometry_scan(case, fit, families=None):
     found = list(rail_scan(case, fit, families))
     if families is None or "wheel_flat" in families:
         found += flats(case, fit)
+    if families is None or "out_of_round" in families:
+        found += polygons(case, fit)
     return tuple(found)

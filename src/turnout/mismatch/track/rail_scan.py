@@ -9,18 +9,22 @@ the amplitudes of the waves that make up the shape, a shape of height a costs no
 is the gain in chi-squared when the waves give it back, without a simulation.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from turnout import physics
 from turnout.mismatch.case import Candidate
 from turnout.mismatch.shortlist import Projector
+from turnout.mismatch.track.rolling import SHORTEST_WAVE
 
 PLACE_STEP, BEYOND = 0.1, 1.0  # m: between places of a dip tried, and how far beyond the sensors
 LENGTHS, SHARPNESSES = (0.25, 0.4, 0.6, 0.9), (0.2, 0.9)
 APART = 0.3  # m; dips closer than this look alike
 DEPTH = 1e-3
-WAVELENGTHS = np.geomspace(0.28, 0.7, 34)
+WAVELENGTHS = np.geomspace(1.02 * SHORTEST_WAVE, 0.75, 34)  # m; the shorter ones are no free waves
 REACHES = (1.8, 3.2, 5.0)  # m: half the stretch of a corrugation
+HIGH = 3e-5  # m; amplitude of corrugation that is ground away
 LINES = 12.0  # wavelengths in that range that sensors 6 m apart tell from each other
 
 
@@ -74,7 +78,7 @@ def _dip(case, scan):
     depth = float(np.clip(depth, -2.5e-3, 5e-3))
     scanned = np.ptp(grid) / APART
     return Candidate(
-        "surface_dip", physics.SurfaceDip.parameters, lambda p: physics.SurfaceDip(float(x), **p),
+        "surface_dip", _about(physics.SurfaceDip, shift=(0.0, APART)), lambda p: physics.SurfaceDip(float(x), **p),
         ((depth, length, sharp, 0.0),), {"place": round(float(x), 3)}, "place", scanned, least=3e-5,
         promise=float(0.5 * slope[best] ** 2 / size[best] - np.log(scanned)),
         begin=scan.released(shapes[best] * depth / DEPTH),
@@ -97,12 +101,18 @@ def _corrugation(case, scan):
     gain, a, b, wavelength, amount, pair = best
     sine, cosine = (float(v) for v in np.clip(1e-5 * amount, -2.5e-4, 2.5e-4))
     scanned = LINES * len(middles)
+    priors = {"sine": (0.0, HIGH), "cosine": (0.0, HIGH), "wavelength": (float(wavelength), 0.03 * float(wavelength))}
     return Candidate(
-        "rail_corrugation", physics.RailCorrugation.parameters, lambda p: physics.RailCorrugation(a, b, **p),
+        "rail_corrugation", _about(physics.RailCorrugation, **priors), lambda p: physics.RailCorrugation(a, b, **p),
         ((sine, cosine, float(wavelength)),), {"wavelength": round(float(wavelength), 3), "place": 0.5 * (a + b)},
         "wavelength", scanned, promise=float(0.5 * gain - np.log(scanned)),
         begin=scan.released(1e5 * np.array([sine, cosine]) @ pair),
     )  # fmt: skip
+
+
+def _about(term, **priors):
+    """Parameters of a term whose place was scanned: what the scan has paid for is not paid for again."""
+    return tuple(replace(p, prior=priors[p.name]) if p.name in priors else p for p in term.parameters)
 
 
 def _path(term, x):

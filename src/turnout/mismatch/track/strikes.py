@@ -5,10 +5,11 @@ to 30 dB over their noise at the moment of the blow, in all sensors near the pla
 be anything; a row of blows a turn apart, each loudest where one wheel is, is a flat on that wheel. The datum is the
 loudest moment z around each expected blow, one per sensor; with x the way from blow to sensor
 
-.. math:: \Lambda = \sum \ln \frac{(1-\epsilon) N(z; \max(A - \beta x, 0), 1) + \epsilon U}
-          {(1-\epsilon) N(z; 0, 1) + \epsilon U}
+.. math:: \Lambda = \sum \ln \frac{(1-\epsilon) N(z; m, 1 + m/4) + \epsilon U}
+          {(1-\epsilon) N(z; 0, 1) + \epsilon U}, \quad m = \max(A - \beta x, 0)
 
-so that no single bang, whatever its cause, says more than :math:`\ln(1/\epsilon U)`.
+(blows differ from one to the next: on a sleeper, between two), so that no single bang, whatever its cause, says more
+than :math:`\ln(1/\epsilon U)`.
 """
 
 from dataclasses import dataclass
@@ -21,8 +22,12 @@ LOW, HIGH = 250.0, 900.0  # [Hz]
 BIN, ABOUT, AROUND = 0.002, 0.006, 0.12  # s: of the loudness, of a blow, of the noise that it is compared with
 RADII = np.arange(-0.05, 0.031, 0.01)  # a wheel is turned down in service; its file is right to a few per cent
 STEP = 0.06  # m between the phases tried
-STRENGTHS, DECAYS = (2.0, 4.0, 7.0, 11.0), (0.3, 0.8, 1.6)  # A in deviations of the noise, beta in deviations per metre
+STRENGTHS, DECAYS = (
+    (2.0, 4.0, 7.0, 12.0, 20.0),
+    (0.3, 0.8, 1.6, 3.0),
+)  # A in deviations of the noise, beta in deviations per metre
 ODD, WIDE = 0.05, 1.0 / 20.0  # share and density of what neither noise nor flat explains
+UNEVEN = 0.25  # spread of the blows, as a share of their expected loudness
 HEARD = 5.0  # m; farther blows are lost among nearer wheels
 TOGETHER = 0.5  # sensors hear the same bang: their data count half
 
@@ -64,8 +69,12 @@ def _shifted(rows, steps):
 
 def likelihood(seen, expected):
     """Log ratio of likelihoods of ``seen`` deviations under a blow of ``expected`` deviations and under none. [nats]"""
-    noise, blow = (np.exp(-0.5 * (seen - m) ** 2) / np.sqrt(2.0 * np.pi) for m in (0.0, expected))
+    noise, blow = (_normal(seen - m, 1.0 + UNEVEN * m) for m in (0.0, expected))
     return np.log((1.0 - ODD) * blow + ODD * WIDE) - np.log((1.0 - ODD) * noise + ODD * WIDE)
+
+
+def _normal(off, spread):
+    return np.exp(-0.5 * (off / spread) ** 2) / (np.sqrt(2.0 * np.pi) * spread)
 
 
 def heard(made):

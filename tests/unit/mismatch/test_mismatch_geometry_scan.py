@@ -1,0 +1,93 @@
+"""Flats by their blows, dips by what the waves of the rail took in, polygonal wheels by their line: closed forms."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from turnout import physics
+from turnout.mismatch.track.polygons import AMPLITUDES, _evidence
+from turnout.mismatch.track.strikes import ODD, WIDE, likelihood, loudness, of_wheel
+
+TURN, SPEED, RATE = 2.0 * np.pi * 0.46, 25.0, 5000.0
+WHEELS = np.array([0.0, 1.8, 10.7, 12.5])
+PLACES = (2.4, 4.5, 6.6, 8.7)
+
+
+def passage(phase, wheel, name, radius=0.46, strength=30.0, seed=0):
+    """Noise, and bursts of 4 ms when ``wheel`` strikes: less by a fifth in amplitude per metre to the sensor."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 2.4, 1.0 / RATE)
+    samples = rng.normal(size=(len(PLACES), time.size))
+    reference = 0.5
+    turn = 2.0 * np.pi * radius
+    for k in range(-3, 8):
+        place = phase + k * turn
+        moment = reference + (place - PLACES[0] + WHEELS[wheel]) / SPEED
+        inside = (time >= moment) & (time < moment + 0.004)
+        for row, x in zip(samples, PLACES):
+            row[inside] += strength * 0.8 ** abs(place - x) * rng.normal(size=inside.sum())
+    sensors = tuple(SimpleNamespace(name=f"A{i}", place=x) for i, x in enumerate(PLACES))
+    vehicle = SimpleNamespace(radius=0.46, wheel_places=WHEELS, wheels=range(4))
+    recording = SimpleNamespace(samples=samples, rate=RATE, index=lambda n: int(n[1]))
+    run = SimpleNamespace(direction="facing", vehicle=vehicle, recording=recording)
+    return SimpleNamespace(name=name, sensors=sensors, reference=reference, speed=SPEED, time=time, passage=run)
+
+
+def scanned(mades):
+    loud = [loudness(m.passage.recording.samples, RATE, 0.0, 2.4) for m in mades]
+    return [of_wheel(mades, loud, w) for w in range(len(WHEELS))]
+
+
+def test_a_row_of_blows_names_the_wheel_that_makes_them_its_radius_and_where_it_strikes():
+    mades = [passage(1.1, 1, "a", 0.446, seed=1), passage(2.3, 1, "b", 0.446, seed=2)]
+    found = scanned(mades)
+    nats = [n for n, *_ in found]
+    assert int(np.argmax(nats)) == 1 and nats[1] > 20.0
+    _, radius, phases = found[1]
+    assert radius == pytest.approx(0.446, abs=0.0046)  # one step of the scan
+    for (_, at), true in zip(phases, (1.1, 2.3)):  # blows near the sensors, on the third turn or so, lie where they did
+        way = np.array([at + k * 2 * np.pi * radius for k in range(4)])[:, None]
+        assert np.abs(way - [true + k * 2 * np.pi * 0.446 for k in range(4)]).min() < 0.2
+
+
+def test_noise_and_bangs_at_one_place_blame_no_wheel():
+    assert max(n for n, *_ in scanned([passage(1.1, 1, "a", strength=0.0, seed=s) for s in (3, 4)])) < 4.0
+    banged = passage(1.1, 1, "a", strength=0.0, seed=5)
+    banged.passage.recording.samples[:, 5000:5020] *= 30.0  # one bang, all sensors
+    assert max(n for n, *_ in scanned([banged])) < 4.0
+
+
+def test_no_single_bang_says_more_than_its_bound():
+    """ln of ((1-e) / sqrt(2 pi) + e U) / (e U), the density of noise at its middle over that of the odd."""
+    bound = np.log(((1.0 - ODD) / np.sqrt(2.0 * np.pi) + ODD * WIDE) / (ODD * WIDE))
+    z, m = np.meshgrid(np.linspace(-5.0, 100.0, 200), np.linspace(0.0, 30.0, 50))
+    assert np.all(np.abs(likelihood(z, m)) <= bound)
+    assert likelihood(-1e3, 0.0) == 0.0 == likelihood(0.7, 0.0)
+    bell = (1.0 - ODD) * np.exp(-0.5 * (30.0 / 8.5) ** 2) / (np.sqrt(2.0 * np.pi) * 8.5)  # spread 1 + 30 / 4
+    assert likelihood(0.0, 30.0) == pytest.approx(np.log1p(bell / (ODD * WIDE)) - bound)
+
+
+def test_the_evidence_of_a_wave_is_that_of_two_normal_amplitudes_integrated_out():
+    """By quadrature: the mean over amplitudes N(0, a^2) of exp(s.c - c.M.c / 2)."""
+    m = np.array([[3e10, 4e9], [4e9, 2e10]])
+    s = np.array([6e5, -3e5])
+    (row,) = _evidence(s[None], m[None])[2:3]
+    a = AMPLITUDES[2]
+    grid = np.linspace(-8.0, 8.0, 1601) * a
+    x, y = np.meshgrid(grid, grid, indexing="ij")
+    weight = np.exp(-0.5 * (x**2 + y**2) / a**2) / (2.0 * np.pi * a**2) * (grid[1] - grid[0]) ** 2
+    power = s[0] * x + s[1] * y - 0.5 * (m[0, 0] * x * x + 2.0 * m[0, 1] * x * y + m[1, 1] * y * y)
+    assert row[0] == pytest.approx(np.log(np.sum(weight * np.exp(power))), abs=1e-6)
+
+
+def test_a_wheel_is_round_where_its_angle_is_not_known():
+    term = physics.OutOfRound(2, 1e-4, 0.0, order=5, radius=0.45, train="loaded", phases=(("a", 0.3),))
+    assert term.under({"train": "railcar", "name": "a"}).paths(None, None) == ()
+    assert term.under({"train": "loaded", "name": "b"}).paths(None, None) == ()
+    x = np.linspace(0.0, 3.0, 50)
+    parts = term.under({"train": "loaded", "name": "a"}).paths(None, None)
+    assert sum(p(x, 2) for p in parts) == pytest.approx(1e-4 * np.cos(5.0 * (x - 0.3) / 0.45))
+    flat = physics.WheelFlat(2, 0.05, 0.45, train="loaded", phases=(("a", 0.3),))
+    assert flat.under({"train": "loaded", "name": "b"}).paths(None, None) == ()
+    assert flat.under({"train": "loaded", "name": "a"}).phase == 0.3
