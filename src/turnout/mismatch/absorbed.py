@@ -2,8 +2,6 @@
 
 import numpy as np
 
-USUAL = 0.7  # standard deviation of the logarithm of what is called soft or stiff: a factor of two either way
-
 
 def absorbed(case, fit):
     """(gain [nats], candidate, start, values) of every candidate that has a ``twin`` among the nuisances.
@@ -19,7 +17,7 @@ def absorbed(case, fit):
             continue
         twin = case.nuisances[k]
         m, s = fit.values[twin.name] - twin.mean, float(np.sqrt(fit.covariance[k, k]))
-        opened = gain_when_opened(m, s, twin.sd)
+        opened = gain_when_opened(m, s, twin.sd, candidate.twin_sd)
         if opened is None:
             continue
         gain, size = opened
@@ -28,12 +26,12 @@ def absorbed(case, fit):
             n.name: float(np.clip(fit.values[n.name] + d, *n.bounds)) for n, d in zip(case.nuisances, shift)
         }  # fmt: skip
         low, high = candidate.parameters[0].bounds
-        start = np.clip([np.exp(size)], low, high)
+        start = np.clip([np.exp(size) if candidate.twin_log else candidate.neutral[0] + size], low, high)
         found.append((gain - np.log(candidate.scanned), candidate, start, {**values, twin.name: twin.mean}))
     return found
 
 
-def gain_when_opened(m, s, tau, wide=USUAL):
+def gain_when_opened(m, s, tau, wide):
     r"""(gain [nats], estimate) when a prior N(0, τ²), under which the posterior is N(m, s²), becomes N(0, T²).
 
     .. math:: s'^{-2} = s^{-2} - \tau^{-2}, \quad m' = m\, s'^2 / s^2, \quad
@@ -41,7 +39,7 @@ def gain_when_opened(m, s, tau, wide=USUAL):
 
     The estimate is that under the wide prior, :math:`m' T^2 / (s'^2 + T^2)`. None where the data say nothing.
 
-    >>> gain_when_opened(0.0, 0.1, 0.1) is None
+    >>> gain_when_opened(0.0, 0.1, 0.1, 0.7) is None
     True
     """
     if s >= 0.999 * tau:

@@ -109,8 +109,8 @@ class Candidate:
     with ``start_from_base`` off the nuisances, too, start from their priors; ``always``: tried on the cheap
     observations at every place, whatever the residual promises; families with the same word are alike there;
     ``least``: distance of the first parameter from neutral below which nobody would act; ``even``: the cheap
-    observations hardly tell a value from its mirror image about neutral; ``twin``: nuisance that is the logarithm of
-    the first parameter and hides it.
+    observations hardly tell a value from its mirror image about neutral; ``twin``: nuisance that hides it, the
+    first parameter's logarithm or (``twin_log`` off) distance from neutral, and would have ``twin_sd`` with the effect.
     ``parameters`` have name, unit, neutral, bounds and prior as ``turnout.physics.Parameter``.
     One found by a look at the residual has the gain it promises [nats] in ``promise``, starts as it is, from the
     nuisances ``begin``; ``aside`` is evidence from data that are no observations [nats].
@@ -129,6 +129,8 @@ class Candidate:
     least: float = 0.0
     even: bool = False
     twin: str = ""
+    twin_sd: float = 0.7
+    twin_log: bool = True
     promise: float | None = None
     begin: Mapping[str, float] = field(default_factory=dict)
     aside: float = 0.0

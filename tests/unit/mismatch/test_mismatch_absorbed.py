@@ -14,7 +14,7 @@ TAU, NOISE, WIDE = 0.1, 0.06, 0.7
 def test_opening_a_prior_gains_the_ratio_of_two_marginal_densities():
     y = -0.69
     s = (TAU**-2 + NOISE**-2) ** -0.5
-    gain, size = gain_when_opened(y * s**2 / NOISE**2, s, TAU)
+    gain, size = gain_when_opened(y * s**2 / NOISE**2, s, TAU, WIDE)
     opened, closed = (stats.norm(0.0, np.hypot(NOISE, sd)).logpdf(y) for sd in (WIDE, TAU))
     assert np.isclose(gain, opened - closed, rtol=1e-12)
     assert np.isclose(size, y * WIDE**2 / (WIDE**2 + NOISE**2), rtol=1e-12)

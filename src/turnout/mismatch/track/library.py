@@ -80,10 +80,11 @@ def _sensors(case):
         def per(term, starts, name=name, where=where, **more):
             return _candidate(term, lambda p: term(name, **p), starts, where, n, **more)
 
-        yield per(physics.SensorGain, ((0.8,), (1.25,)))
+        yield per(physics.SensorGain, ((0.8,), (1.25,)), twin=f"gain_{name}", twin_sd=0.3, twin_log=False)
         yield per(physics.MountResonance, tuple((1.0 / f, 8.0) for f in MOUNTINGS))
         yield per(physics.TimeOffset, tuple((sign * d,) for d in DELAYS for sign in (1.0, -1.0)))
-        yield per(physics.SensorPosition, ((0.15,), (-0.15,), (0.4,), (-0.4,)), even=True)
+        yield per(physics.SensorPosition, ((0.15,), (-0.15,), (0.4,), (-0.4,)), even=True,
+                  twin=f"seat_{name}", twin_sd=0.3, twin_log=False)  # fmt: skip
         yield per(physics.LowPass, ((1 / 500.0,),))
         yield per(physics.HighPass, ((12.0,),))
         if case.rollings:
