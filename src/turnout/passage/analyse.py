@@ -91,7 +91,7 @@ def _of_train(heard, used, track, findings, duration, patterns, settings) -> Pas
     if span > 0.05:
         heard, used, start, direction = _agreeing(heard, used, findings, settings)
         start = aligned(heard, start)
-        offer, found = best_count(heard, start, span, patterns, settings)
+        start, offer, found = best_count(heard, start, span, patterns, settings)
     else:
         direction = "unknown"
         start, offer, found = count_without_distance(heard, patterns, settings)

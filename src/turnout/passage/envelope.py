@@ -18,13 +18,15 @@ class Levels:
 
     ``step`` [s] between bins; bin k covers [k, k + 1) steps from the start of the recording. ``scatter``
     (n_channel,) standard deviation of the values where it is quiet, ``loud`` (n_channel,) power that the loudest
-    tenth of 50 ms blocks exceed, mean over the bands in logarithms. [(m/s²)²]
+    tenth of 50 ms blocks exceed, mean over the bands in logarithms. [(m/s²)²] ``amplitude`` (n_channel, n_bin): mean
+    over the bands of the root of the power, each band over its own root mean square.
     """
 
     values: np.ndarray
     step: float
     scatter: np.ndarray
     loud: np.ndarray
+    amplitude: np.ndarray
 
     @property
     def n_bin(self) -> int:
@@ -73,7 +75,9 @@ def levels(samples, rate: float, step: float, bands=BANDS) -> Levels:
     n = max(values.shape[1] // block, 1)
     blocks = powers[..., : n * block].reshape(*powers.shape[:2], n, -1).mean(axis=-1)
     loud = np.exp(np.log(np.maximum(np.quantile(blocks, 0.9, axis=-1), 1e-300)).mean(axis=1))
-    return Levels(values - centre[:, None], step, np.maximum(scatter, 0.05), loud)
+    usual = np.maximum(powers.mean(axis=-1, keepdims=True), np.finfo(float).tiny)
+    amplitude = np.sqrt(powers / usual).mean(axis=1)
+    return Levels(values - centre[:, None], step, np.maximum(scatter, 0.05), loud, amplitude)
 
 
 def quiet_level(powers, block: int) -> np.ndarray:

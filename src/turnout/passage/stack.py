@@ -38,7 +38,7 @@ class Listening:
         """Some of the sensors."""
         rows = np.asarray(rows, dtype=int)
         levels = self.levels
-        part = Levels(levels.values[rows], levels.step, levels.scatter[rows], levels.loud[rows])
+        part = Levels(levels.values[rows], levels.step, levels.scatter[rows], levels.loud[rows], levels.amplitude[rows])
         return Listening(part, self.slow[rows], self.positions[rows], self.begin, self.end)
 
 

@@ -86,7 +86,9 @@ def test_one_sensor_knows_the_speed_from_the_template_and_no_direction(settings)
     recording = rolling(np.random.default_rng(6), IC3, 40.0, (2.0,))
     passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
     assert (passage.type.type, passage.direction, passage.speed.source) == ("IC3", "unknown", "axle spacing")
-    assert passage.speed.speed == pytest.approx(40.0, rel=5e-3)
+    # 8 axles over 53 m, each placed to some 10 cm by bursts of 0.4 m: 0.2 % of the speed
+    assert passage.speed.se < 3e-3 * 40.0
+    assert passage.speed.speed == pytest.approx(40.0, abs=3 * passage.speed.se)
 
 
 def test_one_sensor_and_an_unknown_train_say_how_little_is_known(settings):

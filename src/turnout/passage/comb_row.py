@@ -1,0 +1,130 @@
+"""The row of vehicles that explains most, once it is known how one wheel sounds: dynamic programming over vehicles."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from turnout.passage.comb import LEAD, STEP, TAPS, Profiles
+from turnout.passage.patterns import Pattern
+
+SLACK = 1  # steps that a vehicle may stand off: lengths on the grid, a speed a little off
+
+
+def likeliest_row(profiles: Profiles, teeth, pattern: Pattern, first: float, reach: float = 30.0):
+    r"""(row of vehicles, start [m]) of ``pattern`` that leaves least over; None where there is none.
+
+    .. math:: \|y - \sum_j k(s - d_j)\|^2 = \|y\|^2 - \sum_j \Bigl(2 m(d_j) - \sum_l a(d_j - d_l)\Bigr)
+
+    with m the correlation of profile and tooth and a that of the tooth with itself: terms of a vehicle, and of a
+    vehicle and the one before it. The first axle is sought within ``reach`` metres of ``first``, both as told from
+    where the hearing begins. ``teeth`` (n_sensor, TAPS), ``profiles`` of one motion.
+    """
+    values = profiles.values[:, 0]
+    match = sum(np.correlate(np.pad(v, TAPS // 2), k, "valid") for v, k in zip(values, teeth))
+    self_match = sum(np.correlate(np.pad(k, TAPS - 1), k, "valid") for k in teeth)
+    n, inner = match.size, {}
+    couplings = _Couplings(self_match)
+    for group in pattern.groups:
+        for v in group.vehicles:
+            inner[v.name] = _gain(match, v, couplings)
+    layers: dict[tuple, dict] = {}
+    for node in _first_nodes(pattern):
+        for v in pattern.groups[node[0]].vehicles:
+            gain = np.full(n, -np.inf)
+            at = round((first + LEAD - v.axles[0]) / STEP)
+            part = slice(max(at - int(reach / STEP), 0), max(at + int(reach / STEP) + 1, 0))
+            gain[part] = inner[v.name][part]
+            layers.setdefault(node, {})[v.name] = (gain, ([None], np.zeros(n, int), np.zeros(n, int)), v)
+    best = (-np.inf, None)
+    for node in [(g, c) for g, group in enumerate(pattern.groups) for c in range(1, group.maximum + 1)]:
+        for name, (score, _, v) in layers.get(node, {}).items():
+            if not np.isfinite(score).any():
+                continue
+            if _may_end(pattern, node) and score.max() > best[0]:
+                best = (float(score.max()), (node, name, int(score.argmax())))
+            for following in _next_nodes(pattern, node):
+                for w in pattern.groups[following[0]].vehicles:
+                    _extend(layers, node, following, v, w, score, inner[w.name], couplings)
+    return None if best[1] is None else _traced(layers, best[1])
+
+
+class _Couplings:
+    """What overlapping teeth take off: -a(distance) twice, between axles."""
+
+    def __init__(self, self_match):
+        self.places = (np.arange(self_match.size) - TAPS + 1) * STEP
+        self.values = self_match
+
+    def at(self, distance):
+        """a at ``distance`` [m]."""
+        return np.interp(distance, self.places, self.values, left=0.0, right=0.0)
+
+    def between(self, v, w):
+        """Of all axles of ``v`` with those of ``w`` behind it."""
+        apart = v.length + np.asarray(w.axles)[None] - np.asarray(v.axles)[:, None]
+        return 2.0 * float(np.sum(self.at(apart)))
+
+
+def _gain(match, v, couplings):
+    """(n,) what vehicle ``v`` explains with its front coupler at each place of the grid."""
+    place = np.arange(match.size)
+    total = np.zeros(match.size)
+    for axle in v.axles:
+        total += 2.0 * np.interp(place + axle / STEP, place, match, right=0.0)
+    axles = np.asarray(v.axles)
+    return total - float(np.sum(couplings.at(axles[:, None] - axles[None])))
+
+
+def _extend(layers, node, following, v, w, score, gain, couplings):
+    """Put ``w`` behind every row that ends with ``v``; of rows that end alike the better one stays."""
+    n, length = score.size, round(v.length / STEP)
+    reached, step = np.full(n, -np.inf), np.zeros(n, dtype=int)
+    for shift in range(length - SLACK, length + SLACK + 1):
+        here = np.full(n, -np.inf)
+        here[min(shift, n) :] = score[: max(n - shift, 0)]
+        better = here > reached
+        reached, step = np.where(better, here, reached), np.where(better, shift, step)
+    reached = reached + gain - couplings.between(v, w)
+    known = layers.setdefault(following, {}).get(w.name)
+    sources = [] if known is None else known[1][0]
+    source = np.full(n, len(sources))
+    if known is not None:
+        better = reached > known[0]
+        reached = np.where(better, reached, known[0])
+        source, step = np.where(better, source, known[1][1]), np.where(better, step, known[1][2])
+    layers[following][w.name] = (reached, ([*sources, (node, v.name)], source, step), w)
+
+
+def _traced(layers, end):
+    """(row, start [m]) from the end of the best row back to its beginning."""
+    row, (node, name, place) = [], end
+    while True:
+        _, (sources, source, step), v = layers[node][name]
+        row.append(v)
+        before = sources[source[place]]
+        if before is None:
+            return tuple(reversed(row)), place * STEP - LEAD + v.axles[0]
+        node, name, place = *before, place - int(step[place])
+
+
+def _first_nodes(pattern):
+    for g, group in enumerate(pattern.groups):
+        yield g, 1
+        if group.minimum > 0:
+            return
+
+
+def _next_nodes(pattern, node):
+    g, count = node
+    if count < pattern.groups[g].maximum:
+        yield g, count + 1
+    if count >= pattern.groups[g].minimum:
+        for later in range(g + 1, len(pattern.groups)):
+            yield later, 1
+            if pattern.groups[later].minimum > 0:
+                return
+
+
+def _may_end(pattern, node):
+    g, count = node
+    return count >= pattern.groups[g].minimum and all(group.minimum == 0 for group in pattern.groups[g + 1 :])

@@ -1,0 +1,135 @@
+"""Which known train, at which speed: combs of all rows of vehicles laid along what is heard, the likeliest first."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import product
+
+import numpy as np
+
+from turnout.passage.comb import Comb, evidence, explained, profiles_at, teeth_of
+from turnout.passage.comb_row import likeliest_row
+from turnout.passage.motion import Motion
+from turnout.passage.patterns import Pattern, offsets
+
+FINE = 0.003  # relative step between speeds
+LOOSE = 0.5  # m over the whole row that a speed may be off in the first search
+OUTSIDE = 75.0  # m that a train is heard before its first axle and after its last one together, at most
+BEND = 0.15  # m between accelerations, that the middle of a train lies off its ends; and m/s² at most
+CLOSE = 2.0  # m by which a train may be longer than what is heard
+KEPT = 3  # rows of a type that are looked at closely
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A row of vehicles on what is heard: ``share`` explained, ``evidence`` [nat], ``start`` [m] of the first axle
+    behind the beginning of what is heard, ``motion``, and ``vehicles`` of the ``pattern``."""
+
+    pattern: Pattern
+    vehicles: tuple
+    comb: Comb
+    motion: Motion
+    start: float
+    share: float
+    evidence: float
+    choices: float = 0.0
+
+
+@lru_cache(maxsize=4)
+def even_rows(patterns) -> tuple:
+    """(pattern, vehicles, comb) of every row whose groups are each of one kind of vehicle."""
+    found = {}
+    for pattern in patterns:
+        groups = []
+        for g in pattern.groups:
+            counts = range(max(g.minimum, 1), g.maximum + 1)
+            groups.append([()] * (g.minimum == 0) + [(v,) * n for n in counts for v in g.vehicles])
+        for parts in product(*groups):
+            row = tuple(v for part in parts for v in part)
+            if sum(len(v.axles) for v in row) >= 4:
+                found[pattern.type, tuple((v.length, v.axles) for v in row)] = (pattern, row)
+    return tuple((pattern, row, Comb.of(offsets(row))) for pattern, row in found.values())
+
+
+def choices_of(pattern, row) -> float:
+    """Logarithm of the number of rows of the same vehicles' count that the pattern leaves to choice, at most."""
+    kinds = max(len(g.vehicles) for g in pattern.groups)
+    return float(np.log(kinds) * len(row)) if len({v.name for v in row}) > 2 else float(np.log(kinds))
+
+
+def likeliest(heard, motions, patterns) -> dict[str, Fitted]:
+    """Type -> its likeliest row of vehicles, out of ``motions`` in order of their speed, ``FINE`` apart."""
+    profiles = profiles_at(heard, motions)
+    n_sensor, first = len(heard.positions), {}
+    for pattern, row, comb in even_rows(patterns):
+        span = comb.offsets[-1]
+        near = np.flatnonzero((profiles.length > span - CLOSE) & (profiles.length < span + OUTSIDE))
+        near = near[:: max(int(LOOSE / span / FINE), 1)]
+        if not near.size:
+            continue
+        share, starts = explained(profiles, comb, near, every=4)
+        worth = evidence(share.max(axis=1), profiles.length[near], n_sensor) - choices_of(pattern, row)
+        k = int(np.argmax(worth))
+        start = float(starts[int(np.argmax(share[k]))])
+        found = Fitted(pattern, row, comb, profiles.motions[near[k]], start, float(share[k].max()), float(worth[k]))
+        first.setdefault(pattern.type, []).append(found)
+    best = {}
+    for type_, rows in first.items():
+        rows = sorted(rows, key=lambda f: -f.evidence)[:KEPT]
+        best[type_] = max((closely(heard, f) for f in rows), key=lambda f: f.evidence)
+    return best
+
+
+def closely(heard, fitted: Fitted, passes: int = 3) -> Fitted:
+    """The row with its speed, and where the pattern leaves a choice its vehicles, improved in turn."""
+    fitted = sharper(heard, fitted, 0.006)
+    for _ in range(passes):
+        better = _other_vehicles(heard, fitted)
+        better = sharper(heard, better, 0.004) if better is not fitted else fitted
+        if better.evidence <= fitted.evidence:
+            break
+        fitted = better
+    return fitted
+
+
+def about_middle(heard, fitted: Fitted) -> Motion:
+    """The motion told from the row's middle: ``start`` is when it passes the middle of the sensors, ``speed`` then."""
+    motion, place = fitted.motion, fitted.motion.direction * float(np.mean(heard.positions))
+    first = float(motion.way(heard.begin)) - place + fitted.start
+    middle = float(motion.time(first + 0.5 * fitted.comb.offsets[-1] + place))
+    return replace(motion, speed=float(motion.speed_at(middle)), start=middle)
+
+
+def sharper(heard, fitted: Fitted, reach: float) -> Fitted:
+    """The same row at the best of the speeds within ``reach`` (relative), and of accelerations around its own."""
+    middle = about_middle(heard, fitted)
+    bend = 16.0 * BEND / (fitted.comb.offsets[-1] / middle.speed) ** 2
+    bends = middle.acceleration + min(bend, BEND) * np.arange(-2, 3)
+    speeds = middle.speed * (1.0 + np.linspace(-reach, reach, 9))
+    motions = [replace(middle, speed=v, acceleration=a) for a in bends for v in speeds]
+    profiles = profiles_at(heard, motions)
+    share, starts = explained(profiles, fitted.comb, np.arange(len(motions)))
+    k, s = np.unravel_index(int(np.argmax(share)), share.shape)
+    worth = evidence(share[k, s], profiles.length[k], len(heard.positions))
+    worth -= choices_of(fitted.pattern, fitted.vehicles)
+    if worth <= fitted.evidence:
+        return fitted
+    return replace(fitted, motion=motions[k], start=float(starts[s]), share=float(share[k, s]), evidence=float(worth))
+
+
+def _other_vehicles(heard, fitted):
+    """The row that goes best with the tooth of this one; itself where there is nothing to choose."""
+    if fitted.pattern.only_row() is not None:
+        return fitted
+    profiles = profiles_at(heard, [fitted.motion])
+    teeth, _ = teeth_of(profiles, fitted.comb, fitted.start)
+    found = likeliest_row(profiles, teeth, fitted.pattern, fitted.start)
+    if found is None or found[0] == fitted.vehicles or sum(len(v.axles) for v in found[0]) < 4:
+        return fitted
+    comb = Comb.of(offsets(found[0]))
+    share, starts = explained(profiles, comb, np.arange(1))
+    k = int(np.argmax(share[0]))
+    worth = evidence(share[0, k], profiles.length[0], len(heard.positions))
+    worth -= choices_of(fitted.pattern, found[0])
+    return Fitted(fitted.pattern, found[0], comb, fitted.motion, float(starts[k]), float(share[0, k]), float(worth))
