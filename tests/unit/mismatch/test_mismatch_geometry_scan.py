@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 from turnout import physics
+from turnout.mismatch.case import Case, Observation
+from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.track.polygons import AMPLITUDES, _evidence
+from turnout.mismatch.track.rail_scan import RailScan
+from turnout.mismatch.track.rough_rail import Waves
 from turnout.mismatch.track.strikes import ODD, WIDE, likelihood, loudness, of_wheel
 
 TURN, SPEED, RATE = 2.0 * np.pi * 0.46, 25.0, 5000.0
@@ -91,3 +95,40 @@ def test_a_wheel_is_round_where_its_angle_is_not_known():
     flat = physics.WheelFlat(2, 0.05, 0.45, train="loaded", phases=(("a", 0.3),))
     assert flat.under({"train": "loaded", "name": "b"}).paths(None, None) == ()
     assert flat.under({"train": "loaded", "name": "a"}).phase == 0.3
+
+
+class OnlyWaves(Case):
+    """One recording that a handful of waves of the rail are seen in through a random matrix."""
+
+    def __init__(self):
+        rng = np.random.default_rng(11)
+        self.waves = Waves(PLACES, 0.0)
+        self.nuisances = tuple(self.waves.nuisances())
+        self.observations = (Observation("a", "a", rng.normal(size=400), 1.0, kind="passage"),)
+        self.columns = rng.normal(size=(400, len(self.nuisances))) / self.waves.sd
+
+    def predict(self, values, terms, observations):
+        return [self.columns @ [values[n] for n in self.waves.names]]
+
+    def nuisance_jacobian(self, values, terms, observations, base):
+        return [self.columns]
+
+
+def test_the_gain_of_a_shape_is_that_of_a_least_squares_fit_with_its_column_beside_the_waves():
+    case = OnlyWaves()
+    fit = fit_jointly(case, iterations=3)
+    scan = RailScan(case, fit)
+    shape = np.where(np.abs(scan.x - 5.0) < 0.4, 1e-3 * np.cos(np.pi * (scan.x - 5.0) / 0.8) ** 2, 0.0)
+    slope, size = scan.scored(shape[None])
+
+    column = case.columns @ (shape @ scan.basis * case.waves.sd)  # what the shape's waves show
+    prior = np.diag(1.0 / case.waves.sd)
+    rows, right = np.vstack([case.columns, prior]), np.append(case.observations[0].data, np.zeros(prior.shape[0]))
+    wider = np.column_stack([rows, np.append(column, np.zeros(prior.shape[0]))])
+    costs = [np.sum((right - m @ np.linalg.lstsq(m, right, rcond=None)[0]) ** 2) for m in (rows, wider)]
+    assert slope[0] ** 2 / size[0, 0] == pytest.approx(costs[0] - costs[1], rel=1e-6)
+
+    theta = np.linalg.lstsq(wider, right, rcond=None)[0]  # the waves that are left are those of that fit
+    height = slope[0] / size[0, 0]
+    left = scan.released(height * shape)
+    assert [left[n] for n in case.waves.names] == pytest.approx(theta[:-1], rel=1e-5, abs=1e-6 * case.waves.sd.max())
