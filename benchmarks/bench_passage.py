@@ -361,3 +361,63 @@ def _logger(rng) -> Iterator[Bar]:
     whole = 12 * 600 * RATE * 8 / 2**20
     note = f"{found} passages; the file as float64 is {whole:.0f} MiB; CPU with making the data {watch.cpu:.0f} s"
     yield Bar("cost: 10 min x 12 channels x 20 kHz, peak memory of the cut", peak, 200.0, "MiB", "<=", "", note)
+    yield from _logger_file(rng)
+
+
+CHILD = """
+import resource, sys, time
+from turnout.passage.analyse import analyse
+from turnout.chains.passage import trains_in
+from turnout.readers import read
+from turnout.records import RawChannel, RawDescription
+from benchmarks.bench_passage import SETTINGS, passage_truth
+channels = tuple(RawChannel(f"c{i}", f"c{i}", "acceleration", unit="1e-3 m/s²", position=3.0 * i) for i in range(12))
+described = RawDescription(channels, kind="passage", rate=20000.0)
+def peak():
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+import h5py, turnout.readers.hdf5
+before, began = peak(), time.process_time()
+result = read(sys.argv[2], sys.argv[1], described, SETTINGS.longest)
+axles = []
+for record in (*result.recordings, *result.long):
+    for part, _, _ in trains_in(record, SETTINGS):
+        axles.append(analyse(part, passage_truth.sensors_for(part), passage_truth.PATTERNS, SETTINGS).n_axle)
+print(peak() - before, time.process_time() - began, *axles)
+"""
+
+
+def _logger_file(rng) -> Iterator[Bar]:
+    """Files of 200 s and 600 s, whole numbers of 2 bytes, read, cut and analysed in a process of their own."""
+    import subprocess
+    import sys
+    import tempfile
+
+    import h5py
+
+    places = [3.0 * k for k in range(12)]
+    train = 1e3 * passage_truth.rolling(rng, IC3, 33.0, places, noise=0.0).samples
+    peaks = []
+    for seconds, starts in ((200, (60,)), (600, (60, 287, 452))):
+        with tempfile.TemporaryDirectory() as folder:
+            with h5py.File(Path(folder) / "logger.h5", "w") as file:
+                file.attrs["rate"] = RATE
+                for i, row in enumerate(train):
+                    samples = np.tile(rng.normal(0.0, 20.0, int(20 * RATE)), seconds // 20)
+                    for start in starts:
+                        samples[int(start * RATE) :][: row.size] += row
+                    file.create_dataset(f"c{i}", data=np.round(samples).astype(np.int16), chunks=(2**16,))
+            command = [sys.executable, "-c", CHILD, folder, "logger.h5"]
+            said = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
+        peaks.append(float(said[0]))
+        whole = 12 * seconds * RATE * 8 / 2**20
+        note = f"axles {' '.join(said[2:])}; {float(said[1]):.0f} CPU s; whole as float64 {whole:.0f}"
+        yield Bar(
+            f"cost: logger file of {seconds} s, resident memory of reading to axles",
+            peaks[-1],
+            400.0,
+            "MiB",
+            "<=",
+            "",
+            note,
+        )
+    yield Bar("cost: ... three times the file", peaks[1] / peaks[0], 1.2, "times", "<=")

@@ -14,7 +14,7 @@ from turnout.passage.stack import counts, template_counts
 from turnout.passage.train_type import UNKNOWN, find_type, unknown_evidence
 
 KMH = 3.6
-FEW = 3  # sensors from which on their common peaks tell the axles
+COMBS, PEAKS = 3, 3  # sensors up to which a known train is sought by its comb, and from which on by common peaks
 USUAL_SPEED = 25.0  # m/s, where nothing but the bogies tells it; a factor of 1.8 is one standard deviation
 BEYOND = 25.0  # m, a train is heard before its first axle and after its last one together
 SHORT = 0.3  # m, that two sensors close to each other may hear a wheel off its place
@@ -29,11 +29,12 @@ def best_count(heard, motion, span, patterns, settings):
     """
     error = motion.speed * np.sqrt(2.0) * max(2 * settings.place_error, _reach(span)) / max(span, 0.1)
     error = min(error, 0.25 * motion.speed)
-    if len(heard.positions) < FEW:
+    if len(heard.positions) <= COMBS:
         known = known_train(heard, _near(motion, heard, 3.0 * error), patterns, settings)
         if known is not None:
             return known
-        patterns = ()  # a cut between few sensors' peaks may fit a template by chance
+        # a cut between the peaks of one or two may fit a template by chance
+        patterns = patterns if len(heard.positions) >= PEAKS else ()
     offers = [o for o in counts(heard, motion, settings)[:8] if len(o.offsets) >= 2]
     # a guess, which is said to be one, still leaves direction, track and speed
     offers = [o for o in offers if o.contrast >= 1.15] or offers[:1]
