@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from benchmarks.passage_truth import IC3, PATTERNS, RATE, rolling, sensors_for, struck_train
 
+from turnout.chains.passage_context import known_patterns
 from turnout.passage.analyse import analyse
 from turnout.passage.motion import Motion
 from turnout.passage.order import wrong_places
@@ -217,3 +218,18 @@ def test_motion_and_its_inverse_agree_with_the_law_of_motion():
     later = motion.moved(40.0)
     assert later.time(0.0) == pytest.approx(motion.time(40.0))
     assert later.speed == pytest.approx(np.sqrt(20.0**2 - 2 * 0.3 * 40.0))
+
+
+@pytest.mark.parametrize(
+    ("axles", "type_"),
+    [
+        ((0.0, 3.0, 9.5, 12.5), "locomotive"),
+        ((0.0, 3.0, 9.5, 12.5, 18.98, 21.98, 28.48, 31.48), "locomotive"),
+        ((0.0, 2.5, 19.0, 21.5), "unknown"),  # a coach by itself
+    ],
+)
+def test_a_lone_locomotive_has_its_template_and_a_lone_coach_has_none(axles, type_, settings, repository):
+    patterns = known_patterns(str(repository / "config" / "vehicles" / "axle_patterns.yaml"))
+    recording = rolling(np.random.default_rng(9), np.array(axles), 25.0, (0.0, 10.0, 30.0, 40.0))
+    passage = analyse(recording, sensors_for(recording), patterns, settings)
+    assert (passage.n_axle, passage.type.type) == (len(axles), type_)
