@@ -114,6 +114,8 @@ class Candidate:
     ``parameters`` have name, unit, neutral, bounds and prior as ``turnout.physics.Parameter``.
     One found by a look at the residual has the gain it promises [nats] in ``promise``, starts as it is, from the
     nuisances ``begin``; ``aside`` is evidence from data that are no observations [nats].
+    ``kin``: laws of one part; where one leads at a place, all with that word are refitted there. ``limit`` is the
+    family that it cannot be told from at the lower bound of its first parameter.
     ``loose`` is the share by which the size of an effect errs since its law is not quite the one out there.
     """
 
@@ -135,6 +137,8 @@ class Candidate:
     begin: Mapping[str, float] = field(default_factory=dict)
     aside: float = 0.0
     loose: float = 0.0
+    kin: str = ""
+    limit: str = ""
 
     @property
     def key(self):

@@ -16,6 +16,9 @@ from turnout.mismatch.verdict import Verdict
 from turnout.mismatch.verify import decoy, fit_percent, predict_reserved
 from turnout.mismatch.whereabouts import Whereabouts, whereabouts
 
+# Share of the first effect's evidence that a law of not quite its shape leaves: sizes are right to a fifth.
+SHAPE = 0.05
+
 
 @dataclass(frozen=True)
 class Verification:
@@ -84,7 +87,7 @@ def diagnose(case, settings=None, progress=None, store=None):
     for effect in range(settings.effects):
         scored = _scored(case, fit, settings, tell, store, effect)
         verdict, best = judged(case, fit, scored, settings)
-        if effect and verdict.answer != "named":
+        if effect and (verdict.answer != "named" or best.gain < SHAPE * verdicts[0].scores[0].gain):
             break
         verdicts.append(verdict)
         if verdict.answer not in ("named", "a_or_b"):
@@ -162,7 +165,7 @@ def _refit(case, fit, candidate, start, back, settings):
     if not candidate.start_from_base and not back:  # what the base may have bent goes back to its prior
         values |= {n.name: n.mean for n in case.nuisances if n.owner is None and n.trust < 1.0}
     try:
-        psi = _best_start(case, candidates, psi, values) if back or candidate.even else psi
+        psi = _best_start(case, candidates, psi, values)
         return fit_jointly(case, candidates, psi, values, keep, iterations=settings.iterations)
     except SimulationError:
         return None

@@ -7,6 +7,9 @@ from turnout.mismatch.latent import latent_law
 from turnout.mismatch.verdict import Score, judge
 from turnout.mismatch.verify import falls, predict_reserved
 
+ODD = 3.0  # times the spread of like parts: one in 370 of sound ones
+FEWEST = 6  # like parts that make a spread
+
 
 def _control(case, fit, settings):
     """Weighted mean square by kind that controls reach."""
@@ -30,7 +33,27 @@ def score_of(case, fit, refit, candidate, settings):
     explained = 1.0 - _excess(refit.level, control) / before if before > 0.0 else 1.0
     worst = min(by_condition.values(), default=0.0)
     gain += candidate.aside
-    return Score(candidate, gain - np.log(candidate.scanned), worst, explained, refit, by_condition)
+    usual = _usual(case, refit, candidate)
+    return Score(candidate, gain - np.log(candidate.scanned), worst, explained, refit, by_condition, usual)
+
+
+def _usual(case, refit, candidate):
+    r"""Whether a part is odd by no more than ``ODD`` times what its like differ by, with the effect in the model.
+
+    .. math:: |\ln \psi| < 3 s, \quad s^2 = \overline{(v_j - ar v)^2} + \overline{\sigma_j^2}
+
+    with :math:`v_j` the logarithms that the other parts were given and :math:`\sigma_j` their standard errors.
+    """
+    if not candidate.twin or not candidate.twin_log:
+        return False
+    stem = candidate.twin.rsplit("_", 1)[0]
+    like = [k for k, n in enumerate(case.nuisances) if n.name.rsplit("_", 1)[0] == stem and n.name != candidate.twin]
+    first = refit.psi[-len(candidate.parameters)]
+    if len(like) < FEWEST or first <= 0.0:
+        return False
+    values = np.array([refit.values[case.nuisances[k].name] for k in like])
+    spread = np.sqrt(values.var() + np.mean(np.diag(refit.covariance)[like]))
+    return abs(float(np.log(first))) < ODD * spread
 
 
 def over(case, fit, settings):

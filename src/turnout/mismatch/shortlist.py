@@ -47,7 +47,18 @@ def shortlist(case, fit, settings):
     least = settings.threshold if fit.candidates else settings.promise  # the residual must promise a second effect
     found = [entry for entry in _promising(scored, settings) if entry[0] > least]
     least = HOPELESS * max((entry[0] for entry in found), default=0.0)
-    return [entry[1:] for rank, entry in enumerate(found) if rank < 2 or entry[0] > least]
+    chosen = [entry for rank, entry in enumerate(found) if rank < 2 or entry[0] > least]
+    return [entry[1:] for entry in (*chosen, *_kin(chosen, scored))]
+
+
+def _kin(chosen, scored):
+    """Best starts of the laws that act on the same parts as the first chosen: columns hardly tell them apart."""
+    parts = [(e[1].kin, e[1].where) for e in chosen if e[1].kin][:2]
+    known, best = {entry[1].key for entry in chosen}, {}
+    for entry in sorted((e for entries in scored.values() for e in entries), key=lambda e: e[0]):
+        if (entry[1].kin, entry[1].where) in parts and entry[1].key not in known:
+            best[entry[1].key] = entry
+    return list(best.values())
 
 
 def _same_place(candidate, accepted):

@@ -10,7 +10,8 @@ VERDICTS = ("none", "named", "a_or_b", "unknown", "numerics")
 @dataclass(frozen=True)
 class Score:
     """A candidate after its joint refit: ``gain`` in held-out log density over the base model less the log of the
-    places scanned [nats], ``worst`` the least gain of a fold, ``explained`` share of the excess, ``fit``."""
+    places scanned [nats], ``worst`` the least gain of a fold, ``explained`` share of the excess, ``fit``; ``usual``: of
+    a size by which like parts of this very case differ anyway."""
 
     candidate: object
     gain: float
@@ -18,6 +19,7 @@ class Score:
     explained: float
     fit: object
     by_condition: dict = field(default_factory=dict)
+    usual: bool = False
 
     @property
     def family(self):
@@ -27,9 +29,18 @@ class Score:
     @property
     def material(self):
         """It is large enough that somebody would act."""
+        if self.usual:
+            return False
         n = len(self.candidate.parameters)
         size = abs(float(self.fit.psi[-n]) - self.candidate.neutral[0]) if n else np.inf
         return size >= getattr(self.candidate, "least", 0.0)
+
+    def is_limit_of(self, other):
+        """``other`` is at the bound, within its standard error, where it cannot be told from this at the same place."""
+        if getattr(other.candidate, "limit", "") != self.family or other.candidate.where != self.candidate.where:
+            return False
+        n = len(other.candidate.parameters)
+        return float(other.fit.psi[-n] - other.fit.psi_se[-n]) <= other.candidate.parameters[0].bounds[0]
 
 
 @dataclass(frozen=True)
@@ -155,6 +166,9 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
         return verdict("unknown", reason=f"a free law still explains {structure:.0%} of what {best.family} leaves")
     if best.worst < -max(settings.threshold, 0.1 * best.gain):
         return verdict("unknown", reason=f"{best.family} makes one condition worse by {-best.worst:.0f} nats")
+    same = [s for s in found[1:] if s.is_limit_of(best) and s.explained >= settings.explained]
+    if same:  # what carries nothing hangs
+        return verdict("a_or_b", (best.family, same[0].family), reason=f"{best.family} is at its limit")
     rivals = [s for s in found[1:] if best.gain - s.gain < settings.margin]
     if rivals:
         return verdict("a_or_b", (best.family, rivals[0].family), reason="within the margin of each other")

@@ -18,8 +18,9 @@ LEAST = {
     "high_pass": 2.0, "sensor_gain": 0.04, "sensor_position": 0.05, "time_offset": 5e-5, "clock_drift": 2e-4,
     "local_pad": 0.15, "local_ballast": 0.15, "hanging_sleeper": 5e-5, "surface_dip": 3e-5, "pad_temperature": 1e-3,
     "unsprung_mass": 0.07, "contact_stiffness": 0.1, "rail_shear": 0.9, "mount_resonance": 1 / 2000.0,
-    "zener_pad": 0.08,
+    "zener_pad": 0.08, "dry_friction": 500.0,
 }  # fmt: skip
+LIMIT = {"local_ballast": "hanging_sleeper"}  # ballast without stiffness is a gap that no train closes
 
 
 def library(case, families=None):
@@ -44,16 +45,17 @@ def _supports(case):
         where = {"sleeper": j, "place": round(float(places[j]), 3)}
         for term, alike in ((physics.LocalBallast, "ballast"), (physics.LocalPad, "pad")):
             yield _candidate(term, lambda p, j=j, t=term: t(j, **p), ((0.4,), (2.5,)), where, n, always=alike,
-                             twin=f"{alike}_{j}")  # fmt: skip
+                             twin=f"{alike}_{j}", kin=alike, limit=LIMIT.get(term.name, ""))  # fmt: skip
         yield _candidate(physics.HangingSleeper, lambda p, j=j: physics.HangingSleeper(j, **p),
-                         tuple((g,) for g in GAPS), where, n, base=False, always="ballast")  # fmt: skip
+                         tuple((g,) for g in GAPS), where, n, base=False, always="ballast",
+                         kin="ballast")  # fmt: skip
         yield _candidate(physics.AttachedResonator, lambda p, j=j: physics.AttachedResonator(j, **p),
                          ((15.0, 120.0, 0.03), (15.0, 350.0, 0.03)), where, n)  # fmt: skip
         if case.rollings:  # for a blow of one strength friction is a damper: it takes trains to call it by its name
             yield _candidate(physics.DryFriction, lambda p, j=j: physics.DryFriction(j, **p), ((1500.0,),), where, n)
         if case.rollings and case.zone.first < j < case.zone.last:
             yield _candidate(physics.BallastHardening, lambda p, j=j: physics.BallastHardening(j - 1, j + 1, **p),
-                             ((3.0,),), where, n)  # fmt: skip
+                             ((3.0,),), where, n, kin="ballast")  # fmt: skip
 
 
 def _whole_track(case):
