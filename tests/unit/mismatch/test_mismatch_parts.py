@@ -1,0 +1,73 @@
+"""Laws of one part: refitted side by side, told apart where they can be, and odd only against their like."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from turnout.config.settings.mismatch import MismatchSettings
+from turnout.mismatch.case import Candidate, Nuisance
+from turnout.mismatch.scoring import ODD, _usual
+from turnout.mismatch.shortlist import _kin
+from turnout.mismatch.verdict import Score, judge
+from turnout.physics import Parameter
+
+FACTOR = (Parameter("factor", "-", 1.0, (0.05, 20.0), "share of stiffness", "made up 2026"),)
+HERE = {"sleeper": 7, "place": 4.2}
+
+
+def candidate(family, where=HERE, **more):
+    return Candidate(family, FACTOR, lambda psi: psi, ((0.4,),), where, **more)
+
+
+def score(found, gain, factor, error, explained=1.0):
+    fit = SimpleNamespace(psi=np.array([factor]), psi_se=np.array([error]))
+    return Score(found, gain, 0.0, explained, fit)
+
+
+def answer(*scores):
+    return judge(list(scores), 2.0, MismatchSettings())
+
+
+@pytest.mark.parametrize("factor, said", [(0.05, "a_or_b"), (0.12, "a_or_b"), (0.40, "named")])
+def test_ballast_that_carries_nothing_may_be_a_gap_that_no_train_closes(factor, said):
+    ballast = score(candidate("local_ballast", limit="hanging_sleeper"), 600.0, factor, 0.1)
+    verdict = answer(ballast, score(candidate("hanging_sleeper"), 500.0, 2e-3, 2e-4))
+    assert verdict.answer == said
+    assert verdict.names[0] == "local_ballast"
+
+
+def test_a_gap_elsewhere_or_one_that_explains_nothing_is_no_limit():
+    ballast = score(candidate("local_ballast", limit="hanging_sleeper"), 600.0, 0.05, 0.1)
+    elsewhere = score(candidate("hanging_sleeper", {"sleeper": 9, "place": 5.4}), 500.0, 2e-3, 2e-4)
+    useless = score(candidate("hanging_sleeper"), 500.0, 2e-3, 2e-4, explained=0.1)
+    assert answer(ballast, elsewhere).answer == "named"
+    assert answer(ballast, useless).answer == "named"
+
+
+@pytest.mark.parametrize("times, usual", [(0.9 * ODD, True), (1.1 * ODD, False), (-1.1 * ODD, False)])
+def test_a_support_is_odd_against_the_spread_of_its_like(times, usual):
+    """Seven other pads have logarithms of mean 0.3 and variance 4e-2, each known to a variance of 9e-2; pad 0 is its
+    own candidate and ballast is not its like."""
+    values = 0.3 + 0.2 * np.sqrt(7.0 / 6.0) * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 0.0])
+    names = ["pad_0", *(f"pad_{k + 1}" for k in range(7)), "ballast_3"]
+    case = SimpleNamespace(nuisances=[Nuisance(n, "-", 0.0, 0.1) for n in names])
+    spread = np.sqrt(4e-2 + 9e-2)
+    refit = SimpleNamespace(
+        values=dict(zip(names, [9.0, *values, 9.0])),
+        covariance=np.diag([50.0, *np.full(7, 9e-2), 50.0, 1e-4]),
+        psi=np.array([np.exp(times * spread)]),
+    )
+    assert _usual(case, refit, candidate("local_pad", twin="pad_0")) == usual
+    assert not _usual(case, refit, candidate("local_pad"))
+
+
+def test_laws_of_the_leading_parts_are_refitted_from_their_best_starts():
+    there = {"sleeper": 9, "place": 5.4}
+    leader, gap = candidate("local_ballast", kin="ballast"), candidate("hanging_sleeper", kin="ballast")
+    other, far = candidate("sensor_gain", {"sensor": "S1"}), candidate("hanging_sleeper", there, kin="ballast")
+    chosen = [(40.0, leader, np.array([0.4]), {}), (30.0, other, np.array([0.9]), {})]
+    weak, strong = (-9.0, gap, np.array([1.0]), {}), (-2.0, gap, np.array([2.0]), {})
+    scored = {"local_ballast": chosen[:1], "hanging_sleeper": [strong, (5.0, far, np.array([3.0]), {}), weak]}
+    assert _kin(chosen, scored) == [strong]
+    assert _kin(chosen[1:], scored) == []
