@@ -21,7 +21,7 @@ SMALL = 120e3  # bytes of the kept set
 def held(repository):
     folder = repository / "tests" / "blind" / "fast"
     if not folder.is_dir():
-        pytest.skip("no kept set: turnout blind make --fast --seed 20261120, then turnout blind keep")
+        pytest.skip("no kept set: turnout blind make --fast --seed 20261121, then turnout blind keep")
     assert (folder / "set.json.gz").stat().st_size < SMALL
     return kept(folder)
 
