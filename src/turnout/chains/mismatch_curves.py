@@ -9,6 +9,7 @@ from turnout.mismatch.verify import predict_reserved
 
 WINDOW = 0.8  # s of waveform shown
 SEGMENT = 0.5  # s of a piece of Welch's estimate: 2 Hz lines
+TELLS = 0.1  # share of the missing force that a law must explain to be worth a look
 CORE = (0.1, 0.9)  # shares of the gain between which band and reach are quoted
 
 
@@ -229,6 +230,8 @@ def _latent(found):
     if found.latent is None or not found.latent.best:
         return []
     name = found.latent.best
+    if found.latent.r2[name] < TELLS:
+        return []
     centre, mean, error = found.latent.curves[name]
     label = f"missing force against {name}: it explains {found.latent.r2[name]:.0%}"
     row = _row("latent", label, (name, ""), found.latent.unit, [centre, mean, mean - 1.96 * error, mean + 1.96 * error])

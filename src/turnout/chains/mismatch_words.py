@@ -2,7 +2,7 @@
 
 import json
 
-# What the simulation lacked, in words; {place}, {channel}, {train} and every parameter with its unit may be used.
+# What the simulation lacked, in words; {place}, {channel}, {train}, {wheel} and every parameter with its unit may be used.
 SENTENCES = {
     "hanging_sleeper": "The sleeper at {place} hangs {gap} above its ballast",
     "lifting_sleepers": "The sleepers about {place} lift off their ballast",
@@ -20,8 +20,8 @@ SENTENCES = {
     "zener_pad": "The rail pads are stiffer at high frequency than at low",
     "ballast_inertia": "The ballast moves with the sleepers, {mass} of it under each",
     "sleeper_mode": "The sleepers bend at {frequency}",
-    "wheel_flat": "A wheel of {train} has a flat of {length}",
-    "out_of_round": "A wheel of {train} is out of round",
+    "wheel_flat": "A wheel on {wheel} has a flat of {length}",
+    "out_of_round": "A wheel on {wheel} is out of round",
     "unsprung_mass": "The wheelsets of {train} are {factor} times as heavy as in its file",
     "contact_stiffness": "The contact of wheel and rail is {factor} times as stiff",
     "sensor_gain": "Sensor {channel} reads {gain} times what it should",
@@ -80,6 +80,16 @@ def _somewhere(finding, low, high):
     return f"{between} that comes and goes without a wheel" if finding["locked_to"] == "clock" else between
 
 
+def _wheel(said):
+    """Axle and train the other way round.
+
+    >>> _wheel("IC 2000, axle 3"), _wheel("a train")
+    ('axle 3 of IC 2000', 'an axle of a train')
+    """
+    train, _, axle = said.partition(", axle ")
+    return f"axle {axle} of {train}" if axle else f"an axle of {train}"
+
+
 def _sentence(term, finding) -> str:
     fixed = term["fixed"]
     places = [fixed[k] for k in ("sleeper", "support", "first", "last", "place") if k in fixed]
@@ -88,6 +98,7 @@ def _sentence(term, finding) -> str:
         "place": f"{sum(places) / len(places):.1f} m" if places else "an unknown place",
         "channel": fixed.get("channel_name") or finding["channel"] or "?",
         "train": finding["train"] or fixed.get("train") or "a train",
+        "wheel": _wheel(finding["train"] or fixed.get("train") or "a train"),
     }
     try:
         return SENTENCES[term["term"]].format(**words)

@@ -70,7 +70,7 @@ def _locked(finding, evidence):
     words = [
         f"{f['frame']} {f['level']} ({f['effect_db']:+.1f} dB, q = {f['q']:.3f}, n = {f['n']})" for f in frames[:3]
     ]
-    if finding["verdict"] in ("named", "a_or_b") and finding["locked_to"]:
+    if finding["verdict"] in ("named", "a_or_b", "unknown") and finding["locked_to"]:
         most = f"; before, most was left at {'; '.join(words)}" if words else ""
         return f"{_of_what(finding)}{most}"
     return "; ".join(words) or "nothing in particular"
