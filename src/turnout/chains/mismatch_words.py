@@ -2,7 +2,7 @@
 
 import json
 
-# What the simulation lacked, in words; {place}, {channel}, {train}, {wheel} and every parameter with its unit may be used.
+# What the simulation lacked, in words; {place}, {channel}, {train}, {wheel} and every parameter with its unit.
 SENTENCES = {
     "hanging_sleeper": "The sleeper at {place} hangs {gap} above its ballast",
     "lifting_sleepers": "The sleepers about {place} lift off their ballast",
