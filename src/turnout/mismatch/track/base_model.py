@@ -80,14 +80,27 @@ def track_nuisances(zone, trains):
     """Nuisances of track and vehicles, all as logarithms of a factor on the file's value."""
     found = [Nuisance(name, "-", 0.0, sd, bounds=(-2.0, 2.0), meaning=f"ln {name}") for name, _, _, sd in COMMON]
     for own in OWN:
+        steps = steps_of(getattr(zone.turnout.track, own.field))
         for j in zone.supports:
-            meaning, most = f"ln {own.field} of {j}", 6.0 * own.sd
-            found.append(Nuisance(f"{own.tag}_{j}", "-", 0.0, own.sd, bounds=(-most, most), meaning=meaning))
+            sd = float(np.hypot(own.sd, steps[j]))
+            meaning, most = f"ln {own.field} of {j}", 6.0 * sd
+            found.append(Nuisance(f"{own.tag}_{j}", "-", 0.0, sd, bounds=(-most, most), meaning=meaning))
     for name, sd in RAIL:
         found.append(Nuisance(name, "-", 0.0, sd, bounds=(-6.0 * sd, 6.0 * sd), meaning=f"ln {name} of the rail"))
     for train in trains:
         found.append(Nuisance(f"wheels_{train}", "-", 0.0, 0.08, bounds=(-0.5, 0.5), meaning="ln unsprung mass"))
     return found
+
+
+def steps_of(values):
+    """(n,) largest step of the logarithm to a neighbour: where sections meet, a support may belong to either, since a
+    track file has their border to a bay.
+
+    >>> [round(float(s), 3) for s in steps_of(np.array([2.0, 2.0, 1.0, 1.0]))]
+    [0.0, 0.693, 0.693, 0.0]
+    """
+    step = np.abs(np.diff(np.log(values)))
+    return np.maximum(np.append(step, 0.0), np.append(0.0, step))
 
 
 def track_with(track, zone, values):
