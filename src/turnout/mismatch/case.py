@@ -33,7 +33,8 @@ class Observation:
     that are independent, 0 to 1. Folds leave out a ``condition``; ``kind`` shares one noise scale. ``cells`` (n,)
     numbers the time-frequency cell of each sample, -1 for none; ``labels`` frame -> (n_cell,) level of each cell.
     ``modes`` (n, m) in the unit of the data are errors of this recording's own with unit variance each (roughness
-    of its wheels, tolerance of a model that errs smoothly): they are integrated out, see ``whitened``.
+    of its wheels, tolerance of a model that errs smoothly): they are integrated out, see ``whitened``; in single
+    precision, where they are many, what is whitened is right to 1e-6 of its size.
     """
 
     name: str
@@ -66,7 +67,8 @@ class Observation:
         power, turn = np.linalg.eigh(scaled.T @ scaled)
         keep = power > 1e-4
         power = power[keep]
-        return scaled @ turn[:, keep] / np.sqrt(power), 1.0 - 1.0 / np.sqrt(1.0 + power)
+        along = (scaled @ turn[:, keep] / np.sqrt(power)).astype(self.modes.dtype)
+        return along, 1.0 - 1.0 / np.sqrt(1.0 + power)
 
     def whitened(self, values):
         r"""``values`` (n,) or (n, k) over the standard deviation of all that is random: :math:`C^{-1/2} x`,
@@ -84,8 +86,9 @@ class Observation:
         if self._subspace is None:
             return scaled
         along, shrunk = self._subspace
-        inner = along.T @ scaled
-        return scaled - along @ (shrunk * inner if values.ndim == 1 else shrunk[:, None] * inner)
+        inner = along.T @ scaled.astype(along.dtype)
+        inner *= (shrunk if values.ndim == 1 else shrunk[:, None]).astype(along.dtype)
+        return scaled - along @ inner
 
     @property
     def n_effective(self):

@@ -45,7 +45,7 @@ class MismatchSettings:
     structure_left: float = setting(
         0.4, "-", "share of what is left that a free law of the state still explains: shape unresolved", 0.0, 1.0
     )
-    temperature: float = setting(4.0, "-", "softens scores into probabilities; fitted on the calibration set", 0.1)
+    temperature: float = setting(4.0, "-", "softens scores into probabilities; chosen by hand, too few cases were opened to fit it", 0.1)
     softmax_share: float = setting(0.2, "-", "how much the softmax says beyond the kind of answer", 0.0, 1.0)
     certainty_none: float = setting(0.75, "-", "share of 'none' that was right in opened cases", 0.01, 0.99)
     certainty_named: float = setting(0.93, "-", "share of names that were right in opened cases", 0.01, 0.99)
@@ -56,7 +56,7 @@ class MismatchSettings:
         0.83, "-", "the same where sensors shook while no wheel was near, two of two by Jeffreys' prior", 0.01, 0.99
     )
     unknown_offset: float = setting(
-        -12.0, "nats", "score of 'unknown' relative to the best's shortfall; fitted on the calibration set"
+        -12.0, "nats", "score of 'unknown' relative to the best's shortfall; chosen by hand"
     )
     permutations: int = setting(499, why="smallest p value is 1 / (permutations + 1)", minimum=99)
     false_discovery_rate: float = setting(0.05, "-", "of the frames named, expected share of wrong ones", 0.001, 0.5)

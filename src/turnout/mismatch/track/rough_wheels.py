@@ -15,7 +15,10 @@ KEPT = 0.02  # share of a sample's own variance below which a mode is not worth 
 
 
 def wheel_modes(case, values, made, sigma):
-    """(n_sensor * n_time, n_mode) signals of one standard deviation of the waves of all wheels; ``sigma`` (n,)."""
+    """(n_sensor * n_time, n_mode) signals of one standard deviation of the waves of all wheels; ``sigma`` (n,).
+
+    In single precision: a long train over many sensors has a thousand modes of ten thousand samples each.
+    """
     waves, circumference = case.waves, 2.0 * np.pi * made.passage.vehicle.radius
     sd = amplitude_sd(waves.lengths, waves.length, WHEEL_LEVEL)
     # out of round: the variance of an harmonic is spread over the waves up to half an order beside it
@@ -25,7 +28,7 @@ def wheel_modes(case, values, made, sigma):
     carrier = Carrier(case, values, made)
     spectra = carrier.spectra(waves.lengths, np.ones(carrier.node.size))
     wheels = [carrier.shown(spectra, carrier.wheel(w)) * np.repeat(sd, 2) for w in range(carrier.behind.size)]
-    modes = np.concatenate(wheels, axis=1)
-    scaled = modes / sigma[:, None]
+    modes = np.concatenate([w.astype(np.float32) for w in wheels], axis=1)
+    scaled = modes / sigma[:, None].astype(np.float32)
     power, turn = np.linalg.eigh(scaled.T @ scaled)
     return modes @ turn[:, power > KEPT]

@@ -129,7 +129,7 @@ class TrackCase(Case):
             made, observation = rolling.rolling_of(passage, sensors, reference, speed, self.settings.materiality)
             self.rollings[passage.name] = made
             modes = (
-                rolling.coupling_modes(made, observation.data),
+                rolling.coupling_modes(made, observation.data).astype(np.float32),
                 wheel_modes(self, {**values, **dict.fromkeys(_own_of(passage), 0.0)}, made, observation.sigma),
             )
             yield passage.name, replace(observation, modes=np.column_stack(modes))
