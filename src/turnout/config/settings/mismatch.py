@@ -45,7 +45,7 @@ class MismatchSettings:
     structure_left: float = setting(
         0.4, "-", "share of what is left that a free law of the state still explains: shape unresolved", 0.0, 1.0
     )
-    temperature: float = setting(4.0, "-", "softens scores into probabilities; chosen by hand, too few cases were opened to fit it", 0.1)
+    temperature: float = setting(4.0, "-", "softens scores into probabilities; chosen by hand", 0.1)
     softmax_share: float = setting(0.2, "-", "how much the softmax says beyond the kind of answer", 0.0, 1.0)
     certainty_none: float = setting(0.75, "-", "share of 'none' that was right in opened cases", 0.01, 0.99)
     certainty_named: float = setting(0.93, "-", "share of names that were right in opened cases", 0.01, 0.99)
