@@ -160,6 +160,9 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
         return verdict("unknown", reason=f"the best candidate explains {best.explained:.0%} of the excess")
     if left > settings.leftover:
         return verdict("unknown", reason=f"{best.family} leaves {left:.0f} times the level of controls")
+    weak = best.gain < 2.0 * settings.threshold
+    if not consistent and weak and excess <= 1.0 and not disturbed:
+        return verdict("none", reason=f"nothing above the thresholds but {best.family}, which does not hold elsewhere")
     if not consistent:
         return verdict("unknown", reason=f"{best.family} does not hold on conditions it was not fitted to")
     if structure > settings.structure_left and left > 1.0:

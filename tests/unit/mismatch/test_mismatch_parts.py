@@ -71,3 +71,13 @@ def test_laws_of_the_leading_parts_are_refitted_from_their_best_starts():
     scored = {"local_ballast": chosen[:1], "hanging_sleeper": [strong, (5.0, far, np.array([3.0]), {}), weak]}
     assert _kin(chosen, scored) == [strong]
     assert _kin(chosen[1:], scored) == []
+
+
+@pytest.mark.parametrize(
+    "gain, excess, said", [(1.1, 0.9, "none"), (2.1, 0.9, "unknown"), (1.1, 1.2, "unknown"), (20.0, 0.5, "unknown")]
+)
+def test_a_weak_name_that_predicts_worse_is_nothing_where_nothing_is_left_to_explain(gain, excess, said):
+    """``gain`` in thresholds, ``excess`` over the level of controls: either by itself keeps the question open."""
+    settings = MismatchSettings()
+    found = score(candidate("rail_shear", {}), gain * settings.threshold, 2.0, 0.1)
+    assert judge([found], excess, settings, consistent=False).answer == said
