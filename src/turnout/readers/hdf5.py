@@ -10,10 +10,9 @@ import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.raw import RawFile
-from turnout.readers.stored import stored
+from turnout.readers.stored import stays, stored
 from turnout.readers.variables import RATE, STEP, TIME, raw_file
 
-MANY = 2**16  # numbers: fewer are no long record
 UNIT = ("unit", "units", "Unit", "Units")
 
 
@@ -52,11 +51,6 @@ def _variables(group, source):
     if units and not any(key.lower() == "units" for key in variables):
         variables["units"] = units
     return variables
-
-
-def stays(dataset) -> bool:
-    """Whether a dataset can be samples of a long record: numbers in one or two dimensions, many of them."""
-    return dataset.dtype.kind in "fiu" and dataset.ndim in (1, 2) and dataset.size >= MANY
 
 
 def _values(dataset):

@@ -10,9 +10,8 @@ import h5py
 import numpy as np
 import pymatreader
 
-from turnout.readers.hdf5 import stays
 from turnout.readers.raw import RawFile
-from turnout.readers.stored import stored
+from turnout.readers.stored import stays, stored
 from turnout.readers.variables import TIME, raw_file
 
 LEAST = 128  # bytes of the header of version 5

@@ -15,9 +15,8 @@ import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.clock import rate_of_time
-from turnout.readers.hdf5 import stays
 from turnout.readers.raw import CONDITIONS, COPY_AGAIN, RawFile, RawRecord
-from turnout.readers.stored import stored
+from turnout.readers.stored import stays, stored
 from turnout.readers.variables import Facts
 
 FREQUENCY = ("CommonTriggerFrequency", "CommonTriggerFreq", "CommonTriggerFrequence", "TriggerValue")

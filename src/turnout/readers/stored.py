@@ -2,6 +2,13 @@
 
 import numpy as np
 
+MANY = 2**16  # numbers: fewer are no long record
+
+
+def stays(dataset) -> bool:
+    """Whether a dataset can be samples of a long record: numbers in one or two dimensions, many of them."""
+    return dataset.dtype.kind in "fiu" and dataset.ndim in (1, 2) and dataset.size >= MANY
+
 
 class Stored:
     """A matrix in a file: ``shape``, ``ndim``, ``dtype``, ``T`` and rows as an array has them; rows are ``Column``.

@@ -53,7 +53,8 @@ def test_a_file_cut_anywhere_says_so_and_keeps_only_sound_records(format, writte
         path.write_bytes(data[: int(part * len(data))])
         recordings, errors = outcome(path, in_si)
         assert all(e.reason in REASONS and e.path == path.name for e in errors)
-        assert errors or len(recordings) == len(whole)  # whole without its last line break
+        between = format.startswith("uff58") and path.read_bytes().rstrip().endswith(b"    -1")  # a shorter, whole file
+        assert errors or between or len(recordings) == len(whole)  # whole without its last line break
         assert_sound(recordings, whole)
 
     cut()
