@@ -17,9 +17,9 @@ def peak(site, sensor):
 
 
 def draw(rng, site, share):
-    """Largest value shown, the mean of both sides."""
+    """Largest value shown, the mean of both sides, to four digits: the peak has the round-off of the libraries."""
     where = any_sensor(rng, site)
-    return where, {"limit": share * peak(site, where["sensor"]), "share": float(share)}
+    return where, {"limit": float(f"{share * peak(site, where['sensor']):.4g}"), "share": float(share)}
 
 
 def act(world, site, where, p):
