@@ -1,6 +1,7 @@
 """Universal File Format 58 and 58b: time responses as records, frequency responses through ``read_frf``."""
 
 import gzip
+import re
 from collections import Counter
 from dataclasses import dataclass, replace
 
@@ -12,6 +13,7 @@ from turnout.readers.stamps import uff_moment
 from turnout.readers.stored import Column
 from turnout.readers.uff_sets import UffSet, says_si, sets_of
 
+PROMISED = re.compile(r"record \d+ of (\d+)$")
 TIME_RESPONSE, FREQUENCY_RESPONSE, TIME_AXIS = 1, 4, 17
 # Specific data type (records 9 and 10) where there is no label and dataset 164 declares SI.
 SI_OF_TYPE = {8: "m", 9: "N", 11: "m/s", 12: "m/s²", 13: "N", 15: "Pa"}
@@ -36,7 +38,8 @@ def read_raw(source) -> RawFile:
 
     A channel is called by ID line 1; the response entity, the ordinate's label and the degree of freedom ("12 +Z")
     serve as well. The version or sequence number (record 6, field 3) says which record a set is of; where all sets
-    carry the same, records are found by the order of the channels.
+    carry the same, records are found by the order of the channels. "record k of n" in ID line 5, which our own writer
+    leaves, promises n records.
     """
     data = source.mapped if source.stay else source.data
     everything = sets_of(data)
@@ -47,7 +50,13 @@ def read_raw(source) -> RawFile:
     if not wanted or not any(s.kind for s in wanted):
         found = wanted[0].damage if wanted else f"it holds {len(sets)} functions and no time response"
         raise source.error(f"byte {wanted[0].offset if wanted else 0}", found, COPY_AGAIN)
-    return RawFile(tuple(_records(wanted, says_si(data, everything), source)))
+    return RawFile(tuple(_records(wanted, says_si(data, everything), source)), _promised(wanted))
+
+
+def _promised(sets):
+    """Records that the sets say the file has, None where they say nothing."""
+    said = [m for s in sets if s.ids and (m := PROMISED.match(s.ids[4]))]
+    return max((int(m[1]) for m in said), default=None)
 
 
 def _in_file(numbers, mapped, path):

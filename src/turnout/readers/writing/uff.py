@@ -1,4 +1,7 @@
-"""Universal File Format 58 (ASCII) and 58b (binary): one set per record and channel, numbered in record 6, field 3."""
+"""Universal File Format 58 (ASCII) and 58b (binary): one set per record and channel, numbered in record 6, field 3.
+
+ID line 5 says which record of how many a set is of: a file that ends between two sets is otherwise a whole, shorter one.
+"""
 
 import numpy as np
 
@@ -12,17 +15,17 @@ def write_raw(records, path, binary):
     with path.open("wb") as file:
         for k, record in enumerate(records):
             for i in range(len(record.names)):
-                file.write(_set(record, i, k, binary))
+                file.write(_set(record, i, k, len(records), binary))
 
 
-def _set(record, i, k, binary):
+def _set(record, i, k, n, binary):
     samples = record.samples[i]
     double = samples.dtype == np.float64
     numbers = samples.astype("<f8" if double else "<f4").tobytes() if binary else _text(samples, double)
-    return _head(record, i, k, binary, double, len(numbers)) + numbers + b"    -1\n"
+    return _head(record, i, k, n, binary, double, len(numbers)) + numbers + b"    -1\n"
 
 
-def _head(record, i, k, binary, double, n_bytes):
+def _head(record, i, k, n, binary, double, n_bytes):
     """The opening delimiter and records 1 to 11."""
     name, unit = record.names[i], record.units[i]
     start = "NONE" if record.started_at is None else record.started_at.strftime("%d-%b-%y %H:%M:%S")
@@ -35,7 +38,7 @@ def _head(record, i, k, binary, double, n_bytes):
         f"{'NONE':<80}",
         f"{start:<80}",
         f"{notes:<80.80}",
-        f"{'NONE':<80}",
+        f"{f'record {k + 1} of {n}':<80}",
         f"{1:5d}{0:10d}{k + 1:5d}{0:10d} {name:<10.10}{i + 1:10d}{0:4d} {'NONE':<10}{0:10d}{0:4d}",
         f"{4 if double else 2:10d}{len(record.samples[i]):10d}{1:10d}{0.0:13.5e}{1 / record.rate:13.5e}{0.0:13.5e}",
         f"{17:10d}{0:5d}{0:5d}{0:5d} {'time':<20} {'s':<20}",
