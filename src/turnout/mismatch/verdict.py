@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+WEAK = 2.0  # thresholds; below it a name that held-out recordings refuse is no evidence that anything is missing
 VERDICTS = ("none", "named", "a_or_b", "unknown", "numerics")
 
 
@@ -160,7 +161,7 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
         return verdict("unknown", reason=f"the best candidate explains {best.explained:.0%} of the excess")
     if left > settings.leftover:
         return verdict("unknown", reason=f"{best.family} leaves {left:.0f} times the level of controls")
-    weak = best.gain < 2.0 * settings.threshold
+    weak = best.gain < WEAK * settings.threshold
     if not consistent and weak and excess <= 1.0 and not disturbed:
         return verdict("none", reason=f"nothing above the thresholds but {best.family}, which does not hold elsewhere")
     if not consistent:

@@ -28,7 +28,7 @@ def likeliest_row(profiles: Profiles, teeth, pattern: Pattern, first: float, rea
         for v in group.vehicles:
             inner[v.name] = _gain(match, v, couplings)
     layers: dict[tuple, dict] = {}
-    for node in _first_nodes(pattern):
+    for node in pattern.following(0, 0):
         for v in pattern.groups[node[0]].vehicles:
             gain = np.full(n, -np.inf)
             at = round((first + LEAD - v.axles[0]) / STEP)
@@ -40,9 +40,9 @@ def likeliest_row(profiles: Profiles, teeth, pattern: Pattern, first: float, rea
         for name, (score, _, v) in layers.get(node, {}).items():
             if not np.isfinite(score).any():
                 continue
-            if _may_end(pattern, node) and score.max() > best[0]:
+            if pattern.may_end(*node) and score.max() > best[0]:
                 best = (float(score.max()), (node, name, int(score.argmax())))
-            for following in _next_nodes(pattern, node):
+            for following in pattern.following(*node):
                 for w in pattern.groups[following[0]].vehicles:
                     _extend(layers, node, following, v, w, score, inner[w.name], couplings)
     return None if best[1] is None else _traced(layers, best[1])
@@ -105,26 +105,3 @@ def _traced(layers, end):
         if before is None:
             return tuple(reversed(row)), place * STEP - LEAD + v.axles[0]
         node, name, place = *before, place - int(step[place])
-
-
-def _first_nodes(pattern):
-    for g, group in enumerate(pattern.groups):
-        yield g, 1
-        if group.minimum > 0:
-            return
-
-
-def _next_nodes(pattern, node):
-    g, count = node
-    if count < pattern.groups[g].maximum:
-        yield g, count + 1
-    if count >= pattern.groups[g].minimum:
-        for later in range(g + 1, len(pattern.groups)):
-            yield later, 1
-            if pattern.groups[later].minimum > 0:
-                return
-
-
-def _may_end(pattern, node):
-    g, count = node
-    return count >= pattern.groups[g].minimum and all(group.minimum == 0 for group in pattern.groups[g + 1 :])

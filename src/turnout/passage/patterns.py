@@ -80,6 +80,20 @@ class Pattern:
             return None
         return 0.0, tuple(v for g in self.groups for v in g.vehicles * g.minimum), 0.0
 
+    def following(self, g: int, count: int):
+        """(group, how many of it are then used) of the next vehicle, behind ``count`` vehicles of group ``g``."""
+        if count < self.groups[g].maximum:
+            yield g, count + 1
+        if count >= self.groups[g].minimum:
+            for later in range(g + 1, len(self.groups)):
+                yield later, 1
+                if self.groups[later].minimum > 0:
+                    return
+
+    def may_end(self, g: int, count: int) -> bool:
+        """Whether the train may end behind ``count`` vehicles of group ``g``."""
+        return count >= self.groups[g].minimum and all(group.minimum == 0 for group in self.groups[g + 1 :])
+
     def lengths(self) -> tuple[float, float]:
         """Least and largest length over couplers. [m]"""
         lengths = [[v.length for v in g.vehicles] for g in self.groups]

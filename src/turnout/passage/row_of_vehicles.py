@@ -29,7 +29,7 @@ def best_row(spacing, pattern: Pattern, tolerance: float):
     layers[0][(0, 0, None)] = (0.0, (), 0.0)
     for used in range(n_axle):
         for (g, count, _), (cost, row, free) in layers[used].items():
-            for group, taken in _next(pattern, g, count):
+            for group, taken in pattern.following(g, count):
                 choices = pattern.groups[group].vehicles
                 for vehicle in choices:
                     stop = used + len(vehicle.axles)
@@ -45,21 +45,5 @@ def best_row(spacing, pattern: Pattern, tolerance: float):
                     key = (group, taken, vehicle.name)
                     if total < limit and total < layers[stop].get(key, UNREACHED)[0]:
                         layers[stop][key] = (total, (*row, vehicle), free + chance[group])
-    ends = [v for (g, count, _), v in layers[n_axle].items() if _may_end(pattern, g, count)]
+    ends = [v for (g, count, _), v in layers[n_axle].items() if pattern.may_end(g, count)]
     return min(ends, key=lambda v: v[0], default=None)
-
-
-def _next(pattern, g, count):
-    """Groups that the next vehicle may come from, with how many of it are then used."""
-    if count < pattern.groups[g].maximum:
-        yield g, count + 1
-    if count >= pattern.groups[g].minimum:
-        for later in range(g + 1, len(pattern.groups)):
-            yield later, 1
-            if pattern.groups[later].minimum > 0:
-                return
-
-
-def _may_end(pattern, g, count):
-    rest = pattern.groups[g + 1 :]
-    return count >= pattern.groups[g].minimum and all(group.minimum == 0 for group in rest)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from types import MappingProxyType
@@ -11,12 +11,13 @@ import numpy as np
 
 from turnout.records.channel import Channel
 from turnout.records.long_recording import LongRecording
+from turnout.records.sampled import Sampled
 
 NOTHING: Mapping = MappingProxyType({})
 
 
 @dataclass(frozen=True)
-class Recording:
+class Recording(Sampled):
     """Simultaneously sampled channels over one stretch of time, measured or simulated.
 
     Parameters
@@ -62,16 +63,9 @@ class Recording:
         """Samples per channel."""
         return self.samples.shape[1]
 
-    @property
-    def duration(self) -> float:
-        """Length [s]."""
-        return self.n_sample / self.rate
-
-    def stretches(self, length: float) -> Iterator[np.ndarray]:
-        """The whole recording in consecutive stretches of ``length`` seconds, (n_channel, n) each."""
-        step = max(round(length * self.rate), 1)
-        for start in range(0, self.n_sample, step):
-            yield self.samples[:, start : start + step]
+    def read(self, start: int, stop: int) -> np.ndarray:
+        """(n_channel, stop - start) samples."""
+        return self.samples[:, start:stop]
 
     def index(self, name: str) -> int:
         """Row of the channel called ``name``; KeyError lists the names there are."""
@@ -83,10 +77,6 @@ class Recording:
     def signal(self, name: str) -> np.ndarray:
         """(n_sample,) samples of the channel called ``name``, in its SI unit."""
         return self.samples[self.index(name)]
-
-    def of_quantity(self, quantity: str) -> tuple[int, ...]:
-        """Rows of all channels that measure ``quantity``."""
-        return tuple(i for i, c in enumerate(self.channels) if c.quantity == quantity)
 
 
 @dataclass(frozen=True)

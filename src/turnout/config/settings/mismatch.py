@@ -47,10 +47,14 @@ class MismatchSettings:
     )
     temperature: float = setting(4.0, "-", "softens scores into probabilities; chosen by hand", 0.1)
     softmax_share: float = setting(0.2, "-", "how much the softmax says beyond the kind of answer", 0.0, 1.0)
-    certainty_none: float = setting(0.75, "-", "share of 'none' that was right in opened cases", 0.01, 0.99)
-    certainty_named: float = setting(0.93, "-", "share of names that were right in opened cases", 0.01, 0.99)
+    certainty_none: float = setting(
+        0.75, "-", "share of 'none' that is right, judged from few opened cases", 0.01, 0.99
+    )
+    certainty_named: float = setting(
+        0.93, "-", "share of names that are right, judged from few opened cases", 0.01, 0.99
+    )
     certainty_unknown: float = setting(
-        0.55, "-", "share of 'unknown' in opened cases where the catalogue had no name", 0.01, 0.99
+        0.55, "-", "share of 'unknown' where the catalogue has no name, judged from few opened cases", 0.01, 0.99
     )
     certainty_clock: float = setting(
         0.83, "-", "the same where sensors shook while no wheel was near, two of two by Jeffreys' prior", 0.01, 0.99

@@ -14,7 +14,6 @@ from turnout.simulate.wheel_path import Sampled
 
 REACH = 3.0  # rolling before the first and behind the last sensor that still shakes them [m]
 LONGEST, SHORTEST = 3.0, rolling.SHORTEST_WAVE  # [m]
-UNSURE = 0.0  # dB on the limit curve, itself an upper limit for sound rails; more hides dips of half a millimetre
 STEP = 0.02  # m
 
 
@@ -31,7 +30,9 @@ class Waves:
         self.names = tuple(
             f"{'cos' if q == 0.0 else 'sin'}_wave_{o}" for o, q in zip(np.repeat(orders, 2), self.quarter)
         )
-        self.sd = amplitude_sd(self.wavelength, self.length, offset + UNSURE)
+        self.sd = amplitude_sd(
+            self.wavelength, self.length, offset
+        )  # the limit curve is an upper limit for sound rails: more hides dips of half a millimetre
 
     def nuisances(self):
         """One amplitude per wave [m]."""

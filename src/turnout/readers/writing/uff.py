@@ -1,6 +1,6 @@
 """Universal File Format 58 (ASCII) and 58b (binary): one set per record and channel, numbered in record 6, field 3.
 
-ID line 5 says which record of how many a set is of: a file that ends between two sets is otherwise a whole, shorter one.
+ID line 5 says which record of how many a set is of: a file cut between two sets is otherwise a whole, shorter one.
 """
 
 import numpy as np
