@@ -87,7 +87,7 @@ def _by_score_test(case, settings):
     plan = shortlist(case, base, settings)
     if not plan or max(base.level.values()) <= settings.control_level:
         return [_row("none", None, None, None)]
-    return [_row("named", plan[0][0], None, None)]
+    return [_row("named", plan[0].candidate, None, None)]
 
 
 def rows_of(diagnosis):

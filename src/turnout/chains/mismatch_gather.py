@@ -17,6 +17,7 @@ from turnout.records import Unit
 
 HALF_BAY = 0.3  # m: an accelerometer "mid-span" sits this far from the sleeper struck
 OFF = 0.5  # m: a place in the layout further than this from the one in the track's file is somebody's mistake
+TOPS = 0.002  # share of samples at the range that leaves the band of the diagnosis as it is: tops of blows above it
 UNSOUND = ("clipped", "dead_channel", "not_finite", "sensor_lost", "channels_swapped")
 
 
@@ -110,7 +111,7 @@ def _passages(unit, turnout, raw_root, track, tables, found):
     for k, recording in enumerate(recordings):
         row: dict[str, Any] = rows[k] if len(rows) == len(recordings) else {}
         name = unit_id(unit).split("/", 2)[-1] + (f":{k}" if len(recordings) > 1 else "")
-        unsound = {q["place"].split(", ")[-1].split(":")[0] for q in bad if q["reason_code"] in UNSOUND}
+        unsound = {q["place"].split(", ")[-1].split(":")[0] for q in bad if _spoils(q)}
         unsound |= _misplaced_sensors(turnout, track, found.notes)
         try:
             train = train_of(row, recording.conditions, Path(turnout.folder) / "vehicles")
@@ -131,6 +132,12 @@ def _passages(unit, turnout, raw_root, track, tables, found):
         )
 
 
+def _spoils(row):
+    """A channel that this quarantine row speaks of is of no use: one that cut off the very top of some blows is."""
+    slightly = row["reason_code"] == "clipped" and (row.get("measured_value") or 1.0) < TOPS
+    return row["reason_code"] in UNSOUND and not slightly
+
+
 def _misplaced_sensors(turnout, track, notes):
     """Sensors whose section lies elsewhere in the layout than on the track."""
     found = {s.name: wrong for s in sensors_of(turnout) if (wrong := _misplaced(s.section, s.position, track))}
@@ -139,7 +146,7 @@ def _misplaced_sensors(turnout, track, notes):
 
 
 def _reasons(bad):
-    found = ", ".join(sorted({q["reason_code"] for q in bad if q["reason_code"] in UNSOUND}))
+    found = ", ".join(sorted({q["reason_code"] for q in bad if _spoils(q)}))
     return f" ({found})" if found else ""
 
 

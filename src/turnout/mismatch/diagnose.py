@@ -18,6 +18,9 @@ from turnout.mismatch.whereabouts import Whereabouts, whereabouts
 
 # Share of the first effect's evidence that a law of not quite its shape leaves: sizes are right to a fifth.
 SHAPE = 0.05
+HELD = 0.5  # of what the cheap observations gained; a refit that holds less has not come to its end
+PROMISING = 0.5  # of the threshold, which laws of a part must gain before its other laws are asked
+HALVINGS = 4  # of a start that costs more than nothing; a sixteenth of it is a straight line
 
 
 @dataclass(frozen=True)
@@ -85,7 +88,8 @@ def diagnose(case, settings=None, progress=None, store=None):
         return Diagnosis((verdict,), base, base, frames, _verified(case, base, base, None), latent_of(case, base))
     verdicts, fit, scored = [], base, ()
     for effect in range(settings.effects):
-        scored = _scored(case, fit, settings, tell, store, effect)
+        promising = {s.family for s in scored if s.gain > settings.threshold}
+        scored = _scored(case, fit, settings, tell, store, effect, promising)
         verdict, best = judged(case, fit, scored, settings)
         if effect and (verdict.answer != "named" or best.gain < SHAPE * verdicts[0].scores[0].gain):
             break
@@ -112,27 +116,40 @@ def _kept(store, key, compute, candidates=()):
     return None if fit is None else fit.with_candidates(candidates)
 
 
-def _scored(case, fit, settings, tell, store, effect):
+def _scored(case, fit, settings, tell, store, effect, promising):
     """Best Score of each family, all refitted jointly on top of ``fit``."""
-    plan = shortlist(case, fit, settings)
-    scores = {}
-    for done, (candidate, start, back) in enumerate(plan):
-        key = f"{effect}:{'+'.join(c.key for c in fit.candidates)}:{candidate.key}:{tuple(np.round(start, 12))}"
-        both = (*fit.candidates, candidate)
-        refit = _kept(store, key, lambda c=candidate, s=start, b=back: _refit(case, fit, c, s, b, settings), both)
-        tell(done + 1, len(plan), candidate.key)
-        if refit is None:
+    plan = shortlist(case, fit, settings, promising)
+    scores, best = {}, -np.inf
+    for done, entry in enumerate(plan):
+        if entry.rival and best < PROMISING * settings.threshold:
             continue
-        score = score_of(case, fit, refit, candidate, settings)
-        known = scores.get(candidate.family)
+        score = _tried(case, fit, entry, settings, store, effect)
+        tell(done + 1, len(plan), entry.candidate.key)
+        if score is None:
+            continue
+        best, known = max(best, score.gain), scores.get(score.family)
         if known is None or score.gain > known.gain:
-            scores[candidate.family] = score
+            scores[score.family] = score
     ranked = sorted(scores.values(), key=lambda s: -s.gain)
     if case.frozen_jacobian and ranked:
         leaders = [s for s in ranked[:2] if s.gain > max(settings.threshold, ranked[0].gain - settings.margin)]
         polished = [_polished(case, fit, s, settings, store, effect) for s in leaders]
         ranked = sorted([*polished, *ranked[len(leaders) :]], key=lambda s: -s.gain)
     return tuple([_checked(case, fit, s) for s in ranked[:1]] + ranked[1:])
+
+
+def _tried(case, fit, entry, settings, store, effect):
+    """Score of an entry of the shortlist after its joint refit; None where the simulation cannot go there."""
+    candidate, start = entry.candidate, entry.start
+    key = f"{effect}:{'+'.join(c.key for c in fit.candidates)}:{candidate.key}:{tuple(np.round(start, 12))}"
+    both = (*fit.candidates, candidate)
+    refit = _kept(store, key, lambda: _refit(case, fit, candidate, start, entry.values, settings), both)
+    if refit is None:
+        return None
+    score = score_of(case, fit, refit, candidate, settings)
+    if case.frozen_jacobian and score.gain < HELD * entry.promised and entry.promised > settings.threshold:
+        return _polished(case, fit, score, settings, store, effect)
+    return score
 
 
 def _polished(case, fit, score, settings, store, effect):
@@ -166,6 +183,8 @@ def _refit(case, fit, candidate, start, back, settings):
         values |= {n.name: n.mean for n in case.nuisances if n.owner is None and n.trust < 1.0}
     try:
         psi = _best_start(case, candidates, psi, values)
+        if candidate.start_from_base and not back:
+            psi = _sobered(case, candidates, psi, fit)
         return fit_jointly(case, candidates, psi, values, keep, iterations=settings.iterations)
     except SimulationError:
         return None
@@ -185,6 +204,21 @@ def _best_start(case, candidates, psi, values):
         except SimulationError:
             continue
     return np.array(min(found)[1]) if found else psi
+
+
+def _sobered(case, candidates, psi, fit):
+    """``psi`` with the last candidate nearer to neutral, by halves, until it costs no more than ``fit`` without it:
+    what a column promises of a large size need not hold."""
+    n, psi = len(candidates[-1].parameters), np.array(psi, dtype=float)
+    neutral = candidates[-1].parameters[0].neutral
+    for _ in range(HALVINGS):
+        try:
+            if cost_at(case, candidates, psi, fit.values) <= fit.cost:
+                break
+        except SimulationError:
+            pass
+        psi[-n] = neutral + 0.5 * (psi[-n] - neutral)
+    return psi
 
 
 def _own_numerics(case, base, settings):

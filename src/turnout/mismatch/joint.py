@@ -8,7 +8,8 @@ from turnout.errors import SimulationError
 
 TRUST_TERM = 0.35  # largest step of a term's parameter as a share of its bounds
 DONE = 0.05  # nats; a smaller gain ends the iteration
-STALL = 5e-4  # of minus twice the log posterior per sample; below it a dear fit asks for a new Jacobian, or ends
+RENEWED = 4  # steps after which a dear Jacobian is made anew
+STALL = 5e-4  # of minus twice the log posterior per sample; a dear fit that gains less ends
 
 
 @dataclass(frozen=True)
@@ -207,13 +208,16 @@ def fit_jointly(case, candidates=(), start=None, values=None, keep=None, observa
         if keep is not None:
             jacobian = joint.renewed(theta, predictions, jacobian)
         theta, predictions, residuals, jacobian, cost = _iterate(
-            joint, theta, predictions, residuals, jacobian, cost, case.frozen_jacobian
+            joint, theta, predictions, residuals, jacobian, cost, RENEWED if keep is None else 0
         )
     return _finished(joint, theta, predictions, residuals, jacobian, cost)
 
 
-def _iterate(joint, theta, predictions, residuals, jacobian, cost, frozen):
-    """Steps until nothing is gained; a dear Jacobian is only updated, the others are made anew at each step."""
+def _iterate(joint, theta, predictions, residuals, jacobian, cost, renew):
+    """Steps until nothing is gained; a dear Jacobian is updated, and made anew after every ``renew`` steps (0: never)
+    where much is still gained: on a long way it comes to point elsewhere."""
+    frozen = joint.case.frozen_jacobian
+    enough, since = max(2.0 * joint.done, STALL * joint.size if frozen else 0.0), 0
     for _ in range(joint.iterations):
         found = _shorter(joint, theta, _step(joint, theta, residuals, jacobian), cost)
         gain = cost - found[3] if found else 0.0
@@ -224,10 +228,11 @@ def _iterate(joint, theta, predictions, residuals, jacobian, cost, frozen):
                 jacobian = _broyden(jacobian, moved / joint.sd**2, moved, residuals, found[2])
                 jacobian = joint.renewed(tried, new, jacobian)
             theta, predictions, residuals, cost = found
-        if gain < max(2.0 * joint.done, STALL * joint.size if frozen else 0.0):
+        since += 1
+        if gain < enough:
             break
-        if not frozen:
-            jacobian = joint.jacobian(theta, predictions)
+        if not frozen or 0 < renew <= since:
+            jacobian, since = joint.jacobian(theta, predictions), 0
     return theta, predictions, residuals, jacobian, cost
 
 

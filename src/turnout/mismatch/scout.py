@@ -14,13 +14,14 @@ from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.shortlist import Projector, amplified
 
 STEPS, GLANCE = 15, 4
+BLIND = 0.999  # of the prior standard deviation is left: nothing was learnt
 ENOUGH = 0.5  # nats; a step that gains less ends a scout's fit
 
 
 @dataclass(frozen=True)
 class Found:
     """A candidate fitted to the cheap observations: ``gain`` in evidence less the logarithm of its places [nats],
-    ``psi`` its parameters, ``values`` the nuisances, ``level`` left, ``before`` the level without it."""
+    ``psi`` its parameters, ``values`` of nuisances that they show, ``level`` left, ``before`` the level without it."""
 
     gain: float
     candidate: object
@@ -30,10 +31,11 @@ class Found:
     before: float
 
 
-def scout(case, fit, settings):
-    """Found at the best place of every family that the cheap observations show, on top of ``fit``; [] without them."""
+def scout(case, fit, settings, families=None):
+    """Found at the best place of every family, or of these ``families``, that the cheap observations show, on top of
+    ``fit``; [] without them."""
     cheap = case.cheap_part()
-    if cheap is None:
+    if cheap is None or (families is not None and not families):
         return []
     held, n = fit.candidates, fit.psi.size
     rough = cheap.roughened()
@@ -41,7 +43,9 @@ def scout(case, fit, settings):
     base = fit_jointly(cheap, held, first.psi, first.values, iterations=STEPS, done=ENOUGH)
     entries = _ranked(case, rough, first, held) + _ranked(case, cheap, base, held)
     found, glances = [], {}
-    for members in _by_family(entries).values():
+    for family, members in _by_family(entries).items():
+        if families is not None and family not in families:
+            continue
         best = None
         for candidate, start in _likeliest(members, rough, first, held, settings, glances):
             hopeless = first.cost - 2.0 * settings.promise if candidate.always else np.inf
@@ -51,10 +55,16 @@ def scout(case, fit, settings):
             gain = refit.evidence - base.evidence - np.log(candidate.scanned)
             if best is None or gain > best.gain:
                 levels = (max(f.level.values()) for f in (refit, base))
-                best = Found(gain, candidate, refit.psi[n:], refit.values, *levels)
+                best = Found(gain, candidate, refit.psi[n:], _seen(cheap, refit), *levels)
         if best is not None:
             found.append(best)
     return sorted(found, key=lambda f: -f.gain)
+
+
+def _seen(case, fit):
+    """Values of the nuisances that the cheap observations say anything about."""
+    sd = np.sqrt(np.diag(fit.covariance))
+    return {n.name: fit.values[n.name] for n, s in zip(case.nuisances, sd) if s < BLIND * n.sd}
 
 
 def _ranked(case, cheap, fit, held):

@@ -1,5 +1,7 @@
 """Which candidates are refitted jointly, and from where: scores order the queue, they never speak the verdict."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from turnout.errors import SimulationError
@@ -10,12 +12,25 @@ NEAR = 0.95  # m: one bay and a half
 HOPELESS = 0.1  # of the leader's estimated gain; what promises less is not refitted, but the second is
 
 
-def shortlist(case, fit, settings):
-    """(candidate, start, values) in order of promise; ``values`` are nuisances to start from.
+@dataclass(frozen=True)
+class Entry:
+    """A ``candidate`` to refit from ``start`` (n_term,) and ``values`` of nuisances; ``promised`` is what the cheap
+    observations alone gained [nats]; a ``rival`` is refitted only where the laws that it is kin to gain something."""
+
+    candidate: object
+    start: np.ndarray
+    values: dict
+    promised: float = 0.0
+    rival: bool = False
+
+
+def shortlist(case, fit, settings, promising=()):
+    """Entries in order of promise.
 
     A case whose predictions are cheap has every family refitted from every start. For a dear one ``scout`` fits the
     families that show in the cheap observations; the others are scored by the columns of their starts
-    (``Case.screen``), or predicted where they have none.
+    (``Case.screen``), or predicted where they have none. On top of an effect only the families that were ``promising``
+    beside it are scouted: for the others what is left is small enough for columns.
     """
     from turnout.mismatch.scout import scout
 
@@ -23,11 +38,13 @@ def shortlist(case, fit, settings):
         c for c in (*case.candidates, *case.further(fit)) if not any(_same_place(c, k) for k in fit.candidates)
     ]
     if not case.frozen_jacobian:
-        return [(c, np.asarray(s, dtype=float), {}) for c in candidates for s in c.starts]
-    scored = {}
-    for found in [] if fit.candidates else scout(case, fit, settings):  # what is left is small enough for columns
-        entry = found.gain, found.candidate, found.psi, found.values
-        scored.setdefault(found.candidate.family, []).append(entry)
+        return [Entry(c, np.asarray(s, dtype=float), {}) for c in candidates for s in c.starts]
+    scored, scouted = {}, {}
+    for found in scout(case, fit, settings, promising if fit.candidates else None):
+        if found.candidate in candidates:
+            entry = found.gain, found.candidate, found.psi, found.values
+            scouted[found.candidate.key] = found.gain
+            scored.setdefault(found.candidate.family, []).append(entry)
     for entry in absorbed(case, fit):
         if entry[1] in candidates:
             scored.setdefault(entry[1].family, []).append(entry)
@@ -48,7 +65,16 @@ def shortlist(case, fit, settings):
     found = [entry for entry in _promising(scored, settings) if entry[0] > least]
     least = HOPELESS * max((entry[0] for entry in found), default=0.0)
     chosen = [entry for rank, entry in enumerate(found) if rank < 2 or entry[0] > least]
-    return [entry[1:] for entry in (*chosen, *_kin(chosen, scored))]
+    found = [(e, False) for e in chosen] + [(e, True) for e in _kin(chosen, scored)]
+    found = [(_fitted_already(e, scored), rival) for e, rival in found]
+    return [Entry(*e[1:], scouted.get(e[1].key, 0.0), rival) for e, rival in found]
+
+
+def _fitted_already(entry, scored):
+    """The entry, with start and nuisances of the best fit that was made of this candidate already, where one was: a
+    column is straight, and the nuisances have to come back all the way."""
+    made = [e for e in scored[entry[1].family] if e[1].key == entry[1].key and e[3]]
+    return max(made, key=lambda e: e[0], default=entry)
 
 
 def _kin(chosen, scored):

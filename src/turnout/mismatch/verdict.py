@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 WEAK = 2.0  # thresholds; below it a name that held-out recordings refuse is no evidence that anything is missing
+TORN = 0.2  # of the gain; a condition that loses more than this, and half a threshold, speaks against the name
 VERDICTS = ("none", "named", "a_or_b", "unknown", "numerics")
 
 
@@ -162,13 +163,14 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
     if left > settings.leftover:
         return verdict("unknown", reason=f"{best.family} leaves {left:.0f} times the level of controls")
     weak = best.gain < WEAK * settings.threshold
-    if not consistent and weak and excess <= 1.0 and not disturbed:
+    torn = best.worst < -max(0.5 * settings.threshold, TORN * best.gain)
+    if (torn or not consistent) and weak and excess <= 1.0 and not disturbed:
         return verdict("none", reason=f"nothing above the thresholds but {best.family}, which does not hold elsewhere")
     if not consistent:
         return verdict("unknown", reason=f"{best.family} does not hold on conditions it was not fitted to")
     if structure > settings.structure_left and left > 1.0:
         return verdict("unknown", reason=f"a free law still explains {structure:.0%} of what {best.family} leaves")
-    if best.worst < -max(settings.threshold, 0.1 * best.gain):
+    if torn:
         return verdict("unknown", reason=f"{best.family} makes one condition worse by {-best.worst:.0f} nats")
     same = [s for s in found[1:] if s.is_limit_of(best) and s.explained >= settings.explained]
     if same:  # what carries nothing hangs

@@ -4,7 +4,8 @@ import numpy as np
 
 from turnout.mismatch.joint import Joint
 
-FITTED_STEPS = 2
+FITTED_STEPS = 8
+SETTLED = 1.0  # of minus twice the log posterior
 BLOCKS = 25
 
 
@@ -54,20 +55,34 @@ def predict_reserved(case, fit, observations):
     residuals = joint.residuals(predictions)
     cost = joint.cost(theta, residuals)
     for _ in range(FITTED_STEPS):
-        white = _own_columns(case, joint, theta, fit.terms, predictions, own)
-        scale = {kind: max(1.0, v) for kind, v in joint.level(residuals).items()}
-        rows, right = joint.stacked(white, residuals, scale)
-        scaled = rows * joint.sd[own]
-        pull = (joint.mean[own] - theta[own]) / joint.sd[own]
-        step = np.linalg.solve(scaled.T @ scaled + np.eye(int(own.sum())), scaled.T @ right + pull)
-        tried = theta.copy()
-        tried[own] += joint.sd[own] * np.clip(step, -1.0, 1.0)
-        new = joint.predict(tried)
-        new_cost = joint.cost(tried, joint.residuals(new))
-        if new_cost >= cost:
+        step = _own_step(case, joint, theta, fit.terms, predictions, residuals, own)
+        found = next((f for f in (_moved(joint, theta, own, 0.5**h * step) for h in range(3)) if f[3] < cost), None)
+        if found is None:
             break
-        theta, predictions, residuals, cost = tried, new, joint.residuals(new), new_cost
+        gain = cost - found[3]
+        theta, predictions, residuals, cost = found
+        if gain < SETTLED:
+            break
     return predictions
+
+
+def _own_step(case, joint, theta, terms, predictions, residuals, own):
+    """Gauss-Newton step of what the observations own themselves, at most one prior standard deviation each."""
+    white = _own_columns(case, joint, theta, terms, predictions, own)
+    scale = {kind: max(1.0, v) for kind, v in joint.level(residuals).items()}
+    rows, right = joint.stacked(white, residuals, scale)
+    scaled = rows * joint.sd[own]
+    pull = (joint.mean[own] - theta[own]) / joint.sd[own]
+    step = np.linalg.solve(scaled.T @ scaled + np.eye(int(own.sum())), scaled.T @ right + pull)
+    return joint.sd[own] * np.clip(step, -1.0, 1.0)
+
+
+def _moved(joint, theta, own, step):
+    tried = theta.copy()
+    tried[own] += step
+    predictions = joint.predict(tried)
+    residuals = joint.residuals(predictions)
+    return tried, predictions, residuals, joint.cost(tried, residuals)
 
 
 def _own_columns(case, joint, theta, terms, predictions, own):

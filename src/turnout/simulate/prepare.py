@@ -39,8 +39,10 @@ class Prepared:
         return x
 
 
-def prepare(track, dt=5e-5, scheme="radau", terms=()):
+def prepare(track, dt=5e-5, scheme="radau", terms=(), decay=WINDOW_DECAY):
     """Assemble and factorise ``track`` with the matrix entries of ``terms`` for steps of ``dt`` [s].
+
+    What a wheel's force does at a distance is left out where it has fallen by exp(-``decay``).
 
     Errors: SimulationError where the track carries no load (its stiffness is not positive definite).
     """
@@ -59,7 +61,7 @@ def prepare(track, dt=5e-5, scheme="radau", terms=()):
         raise SimulationError(
             f"{track.name}: the track carries no load, its stiffness has pivot {1 / static[2][k]:.3g} in row {k}."
         )
-    reach = _reach(track, matrices, s)
+    reach = _reach(track, matrices, s, decay)
     window = inverse_windows(lower, upper, inverse_pivot, reach)
     lower_back, upper_back, pivot_back, middle = _from_both_ends(system, window, reach)
     _, p, ei, kga = matrices.elements
@@ -107,11 +109,11 @@ def _from_both_ends(system, window, reach):
     return *_factors(turned), np.ascontiguousarray(middle)
 
 
-def _reach(track, matrices, s):
+def _reach(track, matrices, s, decay_at_end):
     """Half width of the windows: decay of EI w'''' + s² m w = 0 down to rounding, in rows."""
     rails = {*matrices.rails}
     decay = min(float(np.min(np.abs(np.roots([r.bending_stiffness, 0, 0, 0, s * s * r.mass]).real))) for r in rails)
-    span = WINDOW_DECAY / decay
+    span = decay_at_end / decay
     node = matrices.node
     rows = [
         matrices.node_index[min(np.searchsorted(node, x + span), node.size - 1)] - i

@@ -2,6 +2,9 @@
 
 from types import SimpleNamespace
 
+import pytest
+
+from turnout.chains.mismatch_gather import _spoils
 from turnout.chains.mismatch_groups import reserved, telling
 
 
@@ -31,3 +34,12 @@ def test_few_passages_keep_none_back_and_many_a_fifth_from_the_midst_of_the_spee
     assert reserved(FLEET[:3], ()) == ()
     assert reserved(FLEET[:5], ()) == ("ic3 2",)
     assert reserved(FLEET[:9], ()) == ("ic3 2", "ic3 7")
+
+
+@pytest.mark.parametrize(
+    "reason, share, spoils",
+    [("clipped", 5e-4, False), ("clipped", 0.01, True), ("clipped", None, True), ("dead_channel", 0.0, True),
+     ("no_train", None, False)],
+)  # fmt: skip
+def test_a_channel_that_cut_off_the_top_of_some_blows_is_used(reason, share, spoils):
+    assert _spoils({"reason_code": reason, "measured_value": share}) == spoils

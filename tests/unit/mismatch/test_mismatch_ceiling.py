@@ -1,8 +1,12 @@
 """Ceilings of channels: peaks that follow the trains, peaks that stay, peaks of which only the loud ones stay."""
 
-import numpy as np
+from types import SimpleNamespace
 
-from turnout.mismatch.track.ceiling import FLOOR, saturation
+import numpy as np
+import pytest
+
+from turnout.mismatch.track.ceiling import FLOOR, ceilings, saturation
+from turnout.records import Channel, Recording
 
 LOUD = np.log([40.0, 55.0, 70.0, 100.0, 140.0, 200.0])
 SCATTER = 0.1 * np.array([1.0, -1.0, 0.5, -0.5, 1.0, -1.0])
@@ -22,3 +26,19 @@ def test_only_the_loud_passages_may_reach_the_ceiling():
     assert saturation(peaks, LOUD) > 12.0
     # the quiet ones alone are at no ceiling; whatever is flat gains something over what follows
     assert saturation(peaks[::-1], LOUD) < 0.5 * saturation(peaks, LOUD)
+
+
+@pytest.mark.parametrize("limit, found", [(None, ["A1"]), (1000.0, ["A1"]), (90.0, [])])
+def test_a_channel_at_the_range_that_its_file_states_is_no_faulty_one(limit, found):
+    """Two of six passages stay below 90 m/s², where A1 ends: a fault, unless that is the range stated."""
+
+    def passage(loud):
+        peaks = np.array([min(loud, 90.0), 1.3 * loud, 0.8 * loud])
+        samples = peaks[:, None] * np.sin(np.linspace(0.0, 50.0, 1001))
+        named = ("A1", "A2", "A3")
+        channels = tuple(Channel(n, "acceleration", "m/s²", limit=limit if n == "A1" else None) for n in named)
+        return SimpleNamespace(recording=Recording(samples, 2000.0, channels))
+
+    sensors = [SimpleNamespace(name=n) for n in ("A1", "A2", "A3")]
+    campaign = SimpleNamespace(sensors=sensors, passages=[passage(np.exp(loud)) for loud in LOUD])
+    assert list(ceilings(campaign, 12.0)) == found

@@ -8,7 +8,7 @@ import pytest
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.case import Candidate, Nuisance
 from turnout.mismatch.scoring import ODD, _usual
-from turnout.mismatch.shortlist import _kin
+from turnout.mismatch.shortlist import _fitted_already, _kin
 from turnout.mismatch.verdict import Score, judge
 from turnout.physics import Parameter
 
@@ -81,3 +81,30 @@ def test_a_weak_name_that_predicts_worse_is_nothing_where_nothing_is_left_to_exp
     settings = MismatchSettings()
     found = score(candidate("rail_shear", {}), gain * settings.threshold, 2.0, 0.1)
     assert judge([found], excess, settings, consistent=False).answer == said
+
+
+@pytest.mark.parametrize(
+    "gain, worst, excess, said",
+    [
+        (1.4, -0.4, 0.5, "named"),
+        (1.4, -0.6, 0.5, "none"),
+        (1.4, -0.6, 2.0, "unknown"),
+        (10.0, -1.9, 2.0, "named"),
+        (10.0, -2.1, 0.5, "unknown"),
+    ],
+)
+def test_a_name_that_one_condition_speaks_against_is_none(gain, worst, excess, said):
+    """``gain`` and ``worst`` in thresholds: half of one is chance, a fifth of the gain is not."""
+    settings = MismatchSettings()
+    fit = SimpleNamespace(psi=np.array([2.0]), psi_se=np.array([0.1]))
+    found = Score(candidate("rail_shear", {}), gain * settings.threshold, worst * settings.threshold, 1.0, fit)
+    assert judge([found], excess, settings).answer == said
+
+
+def test_a_fit_that_was_made_is_a_better_start_than_a_column():
+    here, there = candidate("sensor_gain", {"sensor": "A1"}), candidate("sensor_gain", {"sensor": "A2"})
+    column = (90.0, here, np.array([0.85]), {})
+    made, elsewhere = (60.0, here, np.array([0.66]), {"gain_A1": 0.0}), (70.0, there, np.array([0.9]), {"gain_A2": 0.1})
+    scored = {"sensor_gain": [column, made, elsewhere]}
+    assert _fitted_already(column, scored) is made
+    assert _fitted_already(column, {"sensor_gain": [column, elsewhere]}) is column

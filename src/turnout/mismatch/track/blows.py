@@ -153,7 +153,7 @@ class BlowModel:
         self.track, self.terms = track, terms
         self.added = (*terms, FixedLinks(tangent(terms, track)))
         self.matrices = matrices_of(track, self.added)
-        self.by_place = {}
+        self.by_place, self.strain = {}, {}
 
     def displacement(self, place):
         """(n_line, n) of all degrees of freedom under a unit force at a place."""
@@ -183,6 +183,29 @@ class BlowModel:
             ends.append(u[:, rows] @ weights)
         return (ends[1] - ends[0]) / (2.0 * way)
 
+    def strains(self, place):
+        """(n_line, n_element) bending and shearing of the rail's elements under a unit force at a place."""
+        if place not in self.strain:
+            u, row, h = self.displacement(place), self.matrices.node_index, self.matrices.elements[0]
+            w, turn = u[:, row], u[:, row + 1]
+            self.strain[place] = np.diff(turn), np.diff(w) / h - 0.5 * (turn[:, :-1] + turn[:, 1:])
+        return self.strain[place]
+
+    def rail_gradient(self, excited, measured):
+        r"""Derivatives by the logarithms of the rail's bending and shear stiffness, (n_line, 2).
+
+        .. math:: -\sum_e \frac{EI}{h} s_u s_v + \frac{12 EI}{h (1+P)^2} a_u a_v, \quad
+                  -\sum_e \frac{12 EI P}{h (1+P)^2} a_u a_v
+
+        with :math:`s = \theta_2 - \theta_1`, :math:`a = (w_2 - w_1)/h - (\theta_1 + \theta_2)/2` of each element and P
+        its share of shear: the element's two modes (Przemieniecki 1968, ch. 11). Its mass hardly hangs on them.
+        """
+        (s_u, a_u), (s_v, a_v) = self.strains(excited), self.strains(measured)
+        h, p, ei, _ = self.matrices.elements
+        sheared = 12.0 * ei / (h * (1.0 + p) ** 2)
+        a = a_u * a_v
+        return -np.stack([(s_u * s_v) @ (ei / h) + a @ sheared, a @ (sheared * p)], axis=1)
+
     def gradient(self, excited, measured, zone):
         """Derivatives by the logarithm of each common and own value, (n_line, n) in the order of ``inner_names``."""
         u, v = self.displacement(excited), self.displacement(measured)
@@ -200,40 +223,6 @@ class BlowModel:
         common = [factor[what] * (product[tag] @ getattr(self.track, name))[:, None] for name, tag, what, _ in COMMON]
         own = [factor[o.what] * product[o.link][:, inside] * getattr(self.track, o.field)[inside] for o in OWN]
         return np.concatenate([*common, *own], axis=1)
-
-
-def rail_columns(model, excited, measured):
-    r"""Derivative of a receptance by the logarithms of the rail's bending and shear stiffness, (n_line, 2).
-
-    .. math:: -u^T \left(\Delta K - \omega^2 \Delta M\right) v / \delta
-
-    with the change of all rail elements for :math:`\delta` = 1 %.
-    """
-    u, v = model.displacement(excited), model.displacement(measured)
-    omega2, found = (2.0 * np.pi * LINES[:, None]) ** 2, []
-    for name in ("bending_stiffness", "shear_stiffness"):
-        other = matrices_of(_stiffened(model.track, name, 0.01), model.added)
-        k, m = (getattr(other, w) - getattr(model.matrices, w) for w in ("stiffness", "mass"))
-        force = banded_product(k, v) - omega2 * banded_product(m, v)
-        found.append(-np.sum(u * force, axis=1) / 0.01)
-    return np.stack(found, axis=1)
-
-
-def _stiffened(track, name, more):
-    def changed(rail):
-        return replace(rail, **{name: getattr(rail, name) * (1.0 + more)})
-
-    stretches = tuple(replace(s, rail=changed(s.rail)) for s in track.stretches)
-    return track.with_(rail=changed(track.rail), stretches=stretches)
-
-
-def banded_product(upper, x):
-    """Symmetric matrix of upper diagonals (half + 1, n) times rows of x (..., n)."""
-    found = upper[0] * x
-    for k in range(1, upper.shape[0]):
-        found[..., :-k] += upper[k, :-k] * x[..., k:]
-        found[..., k:] += upper[k, :-k] * x[..., :-k]
-    return found
 
 
 def channel_factor(terms, sensor, frequency):

@@ -25,7 +25,7 @@ def ceilings(campaign, threshold):
     """
     names = [s.name for s in campaign.sensors]
     recordings = [p.recording for p in campaign.passages]
-    recordings = [r for r in recordings if set(names) <= {c.name for c in r.channels}]
+    recordings = [r for r in recordings if set(names) <= {c.name for c in r.channels} and not _at_its_range(r)]
     if len(recordings) < FEWEST_PASSAGES or len(names) < FEWEST_SENSORS:
         return {}
     sizes = [np.abs(r.samples[[r.index(n) for n in names]]) for r in recordings]
@@ -37,6 +37,12 @@ def ceilings(campaign, threshold):
         if gain > threshold:
             found[name] = Ceiling(_limit([x[k] for x in sizes]), float(gain))
     return found if len(names) - len(found) > 1 else {}
+
+
+def _at_its_range(recording):
+    """A channel reaches the range that its file states: that it goes no higher is known."""
+    limits = [np.inf if c.limit is None else 0.999 * c.limit for c in recording.channels]
+    return bool(np.any(np.max(np.abs(recording.samples), axis=1) >= limits))
 
 
 def saturation(peaks, others):

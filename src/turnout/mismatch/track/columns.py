@@ -4,6 +4,8 @@ The free track carries the force to the sensors and to the wheels; these answer 
 to a wave of its surface (``rolled_waves``).
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from turnout.mismatch.track import rolling
@@ -11,13 +13,24 @@ from turnout.mismatch.track.base_model import track_with
 from turnout.mismatch.track.rolled_waves import Carrier
 from turnout.mismatch.track.skeleton import matrices_of
 from turnout.simulate.frequency import responses
+from turnout.simulate.run import Probe
 
+FURTHER = 0.01  # way over which a derivative by a sensor's place is taken [m]
 RAIL, SLEEPER, PAD = range(3)  # a pad's force presses the rail and lifts the sleeper
+
+
+def probes(case, values, terms, made):
+    """Displacements of rail and sleeper at every support of the zone, of which pseudo-forces are made; then each
+    sensor a little further along."""
+    seated = [case.seat(s, values, terms) for s in made.sensors]
+    track = case.track(made.passage.route)
+    further = [replace(s, place=s.place + FURTHER).probe(track) for s in seated]
+    return [Probe((kind, j), 0) for j in case.zone.supports for kind in ("rail", "sleeper")] + further
 
 
 def support_forces(case, values, terms, made):
     """Histories at the zone's supports on the simulation's clock: rail and sleeper displacement (n_support, n) [m]."""
-    signals = case.marched(values, terms, made, case.probes(values, terms, made))[len(made.sensors) :]
+    signals = case.marched(values, terms, made, probes(case, values, terms, made))[len(made.sensors) :]
     last = 2 * len(case.zone.supports)
     return signals[0:last:2], signals[1:last:2]
 

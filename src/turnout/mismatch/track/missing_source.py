@@ -96,7 +96,7 @@ def _through(case, fit, pair, support):
     model = case.blow_model(fit.values, fit.terms, pair)
     row = model.matrices.index["rail", support]
     place = model.place_of(case.seat(pair.sensor, fit.values, fit.terms))
-    chain = case._chain(fit.values, fit.terms, pair)
+    chain = case.chain(fit.values, fit.terms, pair)
     return model.displacement(pair.test.place)[:, row] * model.displacement(place)[:, row] * chain
 
 

@@ -13,6 +13,8 @@ SHORTEST_WAVE = 0.3  # of the rail's roughness as modelled [m]
 LOW, HIGH = 5.0, 112.0  # band in which the deterministic part dominates the roughness [Hz]
 RATE = 1800.0  # of the simulation: with Radau IIA 1 to 2 % of the waveform of a band, a third of the materiality floor
 FOLDS = (9, 6, 5)  # steps of the simulation per sample of an observation, the first that holds its band
+DECAY = 12.0  # of a force's effect along the rail, as exponent: 1e-5 of it is left out
+BLURRED = 0.03  # s about a sample at the range
 LEAD = 0.25  # s of rolling before the first wheel reaches the first sensor
 COUPLING = 0.7  # an amplifier's lower corner that no data sheet mentions [Hz]
 EDGE = 0.08  # s kept before the first and behind the last wheel
@@ -120,7 +122,7 @@ class Roll:
         if settings.elements:
             track = track.with_(elements_per_bay=settings.elements)
         self.track = track
-        self.prepared = prepare(track, 1.0 / settings.rate, settings.scheme, self.terms)
+        self.prepared = prepare(track, 1.0 / settings.rate, settings.scheme, self.terms, DECAY)
 
     def __call__(self, passage, vehicle, speed, sensors, probes=(), path=(), described=None):
         """(n_sensor + n_probe, n) signals of the march; time 0: first wheel ``LEAD`` before the first sensor where it
@@ -196,14 +198,30 @@ def rolling_of(passage, sensors, reference, speed, tolerance):
     rolling = Rolling(passage.name, passage, tuple(sensors), time, reference, speed)
     data = read_at(limited, recording.rate, time)
     quiet = read_at(limited, recording.rate, np.arange(0.02, max(0.1, reference - 0.15), step))
-    return rolling, observed(rolling, data, np.std(quiet, axis=1), tolerance)
+    return rolling, observed(rolling, data, np.std(quiet, axis=1), tolerance, _topped(recording, sensors, time))
 
 
-def observed(rolling, data, noise, tolerance):
-    """Observation of (n_sensor, n) samples with ``noise`` (n_sensor,) and a materiality floor."""
+def _topped(recording, sensors, time):
+    """(n_sensor, n) whether the channel was at its range within ``BLURRED`` of each time: what it missed there rings in
+    the whole band."""
+    found = np.zeros((len(sensors), time.size), dtype=bool)
+    for row, sensor in zip(found, sensors):
+        k = recording.index(sensor.name)
+        limit = recording.channels[k].limit
+        if limit is not None:
+            at = np.flatnonzero(np.abs(recording.samples[k]) >= 0.999 * limit) / recording.rate
+            row[:] = np.searchsorted(at, time - BLURRED) < np.searchsorted(at, time + BLURRED)
+    return found
+
+
+def observed(rolling, data, noise, tolerance, topped=None):
+    """Observation of (n_sensor, n) samples with ``noise`` (n_sensor,) and a materiality floor; where ``topped`` they
+    say no more than their own size."""
     wide = np.array([np.convolve(row**2, np.ones(31) / 31, mode="same") for row in data])
     floor = 0.02 * np.sqrt(np.mean(data**2, axis=1)) + 1e-9
     sigma = np.sqrt((noise**2 + floor**2)[:, None] + tolerance**2 * wide)
+    if topped is not None and topped.any():
+        sigma = np.where(topped, np.hypot(sigma, np.max(np.abs(data), axis=1, keepdims=True)), sigma)
     cells, labels = _cells(rolling)
     passage = rolling.passage
     temperature = passage.conditions.get("rail_temperature")

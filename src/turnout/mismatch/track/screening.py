@@ -131,7 +131,7 @@ def _pair(case, fit, pair, chosen):
     model = case.blow_model(fit.values, fit.terms, pair)
     place = model.place_of(case.seat(pair.sensor, fit.values, fit.terms))
     u, v = model.displacement(pair.test.place), model.displacement(place)
-    chain = case._chain(fit.values, fit.terms, pair)
+    chain = case.chain(fit.values, fit.terms, pair)
     omega, index, found = 2.0 * np.pi * blows.LINES, model.matrices.index, {}
     for c, k in chosen:
         term = c.term(c.starts[k]).under(pair.conditions)

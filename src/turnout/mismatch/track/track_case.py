@@ -9,30 +9,27 @@ from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
 from turnout.mismatch.case import Case, Nuisance
 from turnout.mismatch.joint import fit_jointly
-from turnout.mismatch.track import blows, rolling
+from turnout.mismatch.track import blows, derivatives, rolling
 from turnout.mismatch.track.base_model import (
-    COMMON,
     RAIL,
     SEAT_SD,
     inner_values,
     track_nuisances,
     track_with,
     vehicle_with,
+    with_rail,
     zone_of,
 )
+from turnout.mismatch.track.blows_case import Blows
 from turnout.mismatch.track.ceiling import ceilings, within_range
-from turnout.mismatch.track.columns import columns_of, support_forces
 from turnout.mismatch.track.library import LOOSE, library
 from turnout.mismatch.track.quiet import disturbances
-from turnout.mismatch.track.rough_rail import Waves, wave_columns
+from turnout.mismatch.track.rough_rail import Waves
 from turnout.mismatch.track.rough_wheels import wheel_modes
-from turnout.simulate.run import Probe
 
 KEPT = 150  # simulated passages remembered
 GAIN_SD = 0.02
-FURTHER = 0.01  # way over which a derivative by a sensor's place is taken [m]
 TIMED = 0.25  # likeness above which it is sure when a train came; one found at a wrong time reached 0.10
-ROUGHLY = 0.1  # relative error of a receptance in the first fit
 
 
 class TrackCase(Case):
@@ -65,18 +62,28 @@ class TrackCase(Case):
         if not observations:
             return {}
         roughly = fit_jointly(Blows(self).roughened(), iterations=12)
-        self.start_values, self._rail = roughly.values, {}
-        return fit_jointly(Blows(self), values=roughly.values, iterations=12).values
+        self.start_values = roughly.values
+        self._recentre(roughly.values)
+        found = fit_jointly(Blows(self), values=roughly.values, iterations=12).values
+        self._recentre(found)
+        return found
 
     def _prepare(self, campaign, settings, solver):
         """What does not depend on recordings."""
         self.settings, self.solver, self.campaign = settings, solver, campaign
         self.zone = zone_of(campaign.turnout, campaign.places())
-        self._simulated, self._rolls, self._models = OrderedDict(), OrderedDict(), OrderedDict()
-        self._rail = {}
+        self.rail = {}
+        self._recentre({})
         self.trains = tuple(dict.fromkeys(p.train or p.name for p in campaign.passages))
         self.pairs, self.rollings, self.strange, self.notes = {}, {}, {}, []
         self.waves = self._waves()
+
+    def _recentre(self, values):
+        """The track gets the rail of ``values``, about which receptances are straight in what it may differ by; nothing
+        simulated is remembered any more."""
+        rail = {name: values.get(name, 0.0) for name, _ in RAIL}
+        self.zone, self.rail = with_rail(self.zone, {k: v - self.rail.get(k, 0.0) for k, v in rail.items()}), rail
+        self._simulated, self._rolls, self._models = OrderedDict(), OrderedDict(), OrderedDict()
 
     def peak(self, channel):
         """Largest value a channel showed in the passages, 0 where it showed none. [m/s²]"""
@@ -167,7 +174,7 @@ class TrackCase(Case):
             if o.name in self.pairs:
                 found.append(self._receptance(values, terms, self.pairs[o.name]))
             else:
-                found.append(self._passage(values, terms, self.rollings[o.name]))
+                found.append(self.passage_of(values, terms, self.rollings[o.name]))
         return found
 
     def blow_model(self, values, terms, pair):
@@ -185,26 +192,19 @@ class TrackCase(Case):
         more = values.get(f"seat_{sensor.name}", 0.0)
         return rolling.seat(replace(sensor, place=sensor.place + more) if more else sensor, terms)
 
-    def _rail_columns(self, pair):
-        """Derivatives by the rail's stiffness, (n_line, 2), taken once: these move by a per cent."""
-        if pair.name not in self._rail:
-            values = {n.name: n.mean for n in self.nuisances} | dict(self.start_values)
-            model = self.blow_model(values, (), pair)
-            self._rail[pair.name] = blows.rail_columns(model, pair.test.place, model.place_of(pair.sensor))
-        return self._rail[pair.name]
-
-    def _chain(self, values, terms, pair):
+    def chain(self, values, terms, pair):
         """What the channel makes of a receptance, (n_line,) complex."""
         factor = blows.channel_factor(terms, pair.sensor, blows.LINES)
         return factor * (1.0 + values.get(f"gain_{pair.channel}", 0.0))
 
     def _receptance(self, values, terms, pair):
         model = self.blow_model(values, terms, pair)
-        h = model.receptance(pair.test.place, model.place_of(self.seat(pair.sensor, values, terms)))
-        h = h + self._rail_columns(pair) @ [values[name] for name, _ in RAIL]
-        return blows.split(blows.scaled(pair, h * self._chain(values, terms, pair)))
+        place = model.place_of(self.seat(pair.sensor, values, terms))
+        h = model.receptance(pair.test.place, place)
+        h = h + model.rail_gradient(pair.test.place, place) @ [values[name] - at for name, at in self.rail.items()]
+        return blows.split(blows.scaled(pair, h * self.chain(values, terms, pair)))
 
-    def _passage(self, values, terms, made):
+    def passage_of(self, values, terms, made):
         clean = self.clean(values, terms, made)
         return np.concatenate([self.shown(values, terms, made, s, row) for s, row in zip(made.sensors, clean)])
 
@@ -274,95 +274,11 @@ class TrackCase(Case):
 
     def own_jacobian(self, values, terms, observation, predicted, names):
         """Columns of a passage's own time, speed and load."""
-        if observation.name in self.pairs:
-            return super().own_jacobian(values, terms, observation, predicted, names)
-        found = dict(self._own_columns(values, terms, self.rollings[observation.name], predicted))
-        return np.column_stack([found[name] for name in names])
+        return derivatives.own_jacobian(self, values, terms, observation, predicted, names)
 
     def nuisance_jacobian(self, values, terms, observations, base):
         """Exact for receptances, gains, times; common values of passages by differences, supports' by pseudo-forces."""
-        index = {n.name: k for k, n in enumerate(self.nuisances)}
-        found = [np.zeros((o.data.size, len(self.nuisances))) for o in observations]
-        passages = [(o, p, j) for o, p, j in zip(observations, base, found) if o.name in self.rollings]
-        for o, predicted, jacobian in zip(observations, base, found):
-            if o.name in self.pairs:
-                self.pair_columns(values, terms, self.pairs[o.name], predicted, jacobian, index)
-        if passages:
-            self._common_columns(values, terms, passages, index)
-        for o, predicted, jacobian in passages:
-            made = self.rollings[o.name]
-            for name, column in self._passage_columns(values, terms, made, predicted):
-                jacobian[:, index[name]] = column
-            first = index[self.waves.names[0]]
-            jacobian[:, first : first + len(self.waves.names)] = wave_columns(self, values, made)
-        return found
-
-    def pair_columns(self, values, terms, pair, predicted, jacobian, index):
-        """Fill the columns of a pair; the track's own values come first among the nuisances."""
-        model = self.blow_model(values, terms, pair)
-        place = model.place_of(self.seat(pair.sensor, values, terms))
-        chain = self._chain(values, terms, pair)
-        block = model.gradient(pair.test.place, place, self.zone) * chain[:, None]
-        jacobian[:, : block.shape[1]] = blows.split(blows.scaled(pair, block))
-        rail = blows.split(blows.scaled(pair, self._rail_columns(pair) * chain[:, None]))
-        for k, (name, _) in enumerate(RAIL):
-            jacobian[:, index[name]] = rail[:, k]
-        gain, seat = f"gain_{pair.channel}", f"seat_{pair.channel}"
-        if gain in index:
-            jacobian[:, index[gain]] = predicted / (1.0 + values[gain])
-        if seat in index:
-            column = model.seat_gradient(pair.test.place, place) * chain
-            jacobian[:, index[seat]] = blows.split(blows.scaled(pair, column))
-
-    def _common_columns(self, values, terms, passages, index):
-        names = [name for name, *_ in COMMON] + [f"wheels_{train}" for train in self.trains]
-        for name in names:
-            step = 0.04
-            moved = {**values, name: values[name] + step}
-            for o, predicted, jacobian in passages:
-                made = self.rollings[o.name]
-                if name.startswith("wheels_") and name != f"wheels_{made.passage.train or made.passage.name}":
-                    continue
-                jacobian[:, index[name]] = (self._passage(moved, terms, made) - predicted) / step
-
-    def _own_columns(self, values, terms, made, predicted):
-        n = made.time.size
-        moment = f"time@{made.name}"
-        later = self._passage({**values, moment: values[moment] + 1e-5}, terms, made)  # nothing is simulated again
-        slope = -(later - predicted).reshape(-1, n) / 1e-5
-        yield moment, -slope.ravel()
-        yield f"speed@{made.name}", (slope * (made.time - made.reference)).ravel()
-        load = f"load@{made.name}"
-        yield load, (self._passage({**values, load: values[load] + 0.03}, terms, made) - predicted) / 0.03
-
-    def _seat_columns(self, values, terms, made, predicted):
-        further = self.marched(values, terms, made, self.probes(values, terms, made))
-        further = rolling.finer(further[len(made.sensors) + 2 * len(self.zone.supports) :])
-        rows = predicted.reshape(-1, made.time.size)
-        for k, sensor in enumerate(made.sensors):
-            if not sensor.mounting.startswith("sleeper"):
-                column = np.zeros_like(rows)
-                column[k] = (self.shown(values, terms, made, sensor, further[k]) - rows[k]) / FURTHER
-                yield f"seat_{sensor.name}", column.ravel()
-
-    def _passage_columns(self, values, terms, made, predicted):
-        yield from self._own_columns(values, terms, made, predicted)
-        rows = predicted.reshape(-1, made.time.size)
-        for k, sensor in enumerate(made.sensors):
-            column = np.zeros_like(rows)
-            column[k] = rows[k] / (1.0 + values[f"gain_{sensor.name}"])
-            yield f"gain_{sensor.name}", column.ravel()
-        yield from self._seat_columns(values, terms, made, predicted)
-        histories = support_forces(self, values, terms, made)
-        yield from columns_of(self, values, terms, made, histories).items()
-
-    def probes(self, values, terms, made):
-        """Displacements of rail and sleeper at every support of the zone, of which pseudo-forces are made; then each
-        sensor a little further along."""
-        seated = [self.seat(s, values, terms) for s in made.sensors]
-        track = self.track(made.passage.route)
-        further = [replace(s, place=s.place + FURTHER).probe(track) for s in seated]
-        return [Probe((kind, j), 0) for j in self.zone.supports for kind in ("rail", "sleeper")] + further
+        return derivatives.nuisance_jacobian(self, values, terms, observations, base)
 
     def further(self, fit):
         """Dips, corrugation and wheels, as the residual and the loudness of passages suggest them."""
@@ -404,38 +320,9 @@ class TrackCase(Case):
         kept = self.solver, self._simulated, self._rolls
         self.solver, self._simulated, self._rolls = finer, OrderedDict(), OrderedDict()
         try:
-            return self._passage(fit.values, fit.terms, made)
+            return self.passage_of(fit.values, fit.terms, made)
         finally:
             self.solver, self._simulated, self._rolls = kept
-
-
-class Blows(Case):
-    """The hammer tests of a TrackCase alone: cheap, with exact derivatives."""
-
-    def __init__(self, case, observations=None):
-        chosen = case.observations if observations is None else observations
-        self.whole, self.observations = case, tuple(o for o in chosen if o.name in case.pairs)
-        self.nuisances = tuple(n for n in case.nuisances if n.owner is None and "_wave_" not in n.name)
-        self.predict = case.predict
-
-    def roughened(self):
-        """With one broad error of every line: smooth errors would excuse a resonance out of place."""
-        plain = [replace(o, sigma=np.hypot(o.sigma, ROUGHLY), modes=None) for o in self.observations]
-        return Blows(self.whole, plain)
-
-    def screen(self, fit):
-        """Columns of all candidates that blows show."""
-        from turnout.mismatch.track.screening import screen_columns
-
-        return screen_columns(self.whole, fit, self.observations)
-
-    def nuisance_jacobian(self, values, terms, observations, base):
-        """Exact."""
-        index = {n.name: k for k, n in enumerate(self.nuisances)}
-        found = [np.zeros((o.data.size, len(self.nuisances))) for o in observations]
-        for o, predicted, jacobian in zip(observations, base, found):
-            self.whole.pair_columns(values, terms, self.whole.pairs[o.name], predicted, jacobian, index)
-        return found
 
 
 def _own_of(passage):

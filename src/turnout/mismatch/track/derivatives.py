@@ -1,0 +1,100 @@
+"""Derivatives of receptances and passages by the nuisances of a turnout: exact where they can be, else differences."""
+
+import numpy as np
+
+from turnout.mismatch.case import Case
+from turnout.mismatch.track import blows, rolling
+from turnout.mismatch.track.base_model import COMMON, RAIL
+from turnout.mismatch.track.columns import FURTHER, columns_of, probes, support_forces
+from turnout.mismatch.track.rough_rail import wave_columns
+
+
+def own_jacobian(case, values, terms, observation, predicted, names):
+    """Columns of a passage's own time, speed and load."""
+    if observation.name in case.pairs:
+        return Case.own_jacobian(case, values, terms, observation, predicted, names)
+    found = dict(_own_columns(case, values, terms, case.rollings[observation.name], predicted))
+    return np.column_stack([found[name] for name in names])
+
+
+def nuisance_jacobian(case, values, terms, observations, base):
+    """Exact for receptances, gains, times; common values of passages by differences, supports' by pseudo-forces."""
+    index = {n.name: k for k, n in enumerate(case.nuisances)}
+    found = [np.zeros((o.data.size, len(case.nuisances))) for o in observations]
+    passages = [(o, p, j) for o, p, j in zip(observations, base, found) if o.name in case.rollings]
+    for o, predicted, jacobian in zip(observations, base, found):
+        if o.name in case.pairs:
+            pair_columns(case, values, terms, case.pairs[o.name], predicted, jacobian, index)
+    if passages:
+        _common_columns(case, values, terms, passages, index)
+    for o, predicted, jacobian in passages:
+        made = case.rollings[o.name]
+        for name, column in _passage_columns(case, values, terms, made, predicted):
+            jacobian[:, index[name]] = column
+        first = index[case.waves.names[0]]
+        jacobian[:, first : first + len(case.waves.names)] = wave_columns(case, values, made)
+    return found
+
+
+def pair_columns(case, values, terms, pair, predicted, jacobian, index):
+    """Fill the columns of a pair; the track's own values come first among the nuisances."""
+    model = case.blow_model(values, terms, pair)
+    place = model.place_of(case.seat(pair.sensor, values, terms))
+    chain = case.chain(values, terms, pair)
+    block = model.gradient(pair.test.place, place, case.zone) * chain[:, None]
+    jacobian[:, : block.shape[1]] = blows.split(blows.scaled(pair, block))
+    rail = blows.split(blows.scaled(pair, model.rail_gradient(pair.test.place, place) * chain[:, None]))
+    for k, (name, _) in enumerate(RAIL):
+        jacobian[:, index[name]] = rail[:, k]
+    gain, seat = f"gain_{pair.channel}", f"seat_{pair.channel}"
+    if gain in index:
+        jacobian[:, index[gain]] = predicted / (1.0 + values[gain])
+    if seat in index:
+        column = model.seat_gradient(pair.test.place, place) * chain
+        jacobian[:, index[seat]] = blows.split(blows.scaled(pair, column))
+
+
+def _common_columns(case, values, terms, passages, index):
+    names = [name for name, *_ in COMMON] + [f"wheels_{train}" for train in case.trains]
+    for name in names:
+        step = 0.04
+        moved = {**values, name: values[name] + step}
+        for o, predicted, jacobian in passages:
+            made = case.rollings[o.name]
+            if name.startswith("wheels_") and name != f"wheels_{made.passage.train or made.passage.name}":
+                continue
+            jacobian[:, index[name]] = (case.passage_of(moved, terms, made) - predicted) / step
+
+
+def _own_columns(case, values, terms, made, predicted):
+    n = made.time.size
+    moment = f"time@{made.name}"
+    later = case.passage_of({**values, moment: values[moment] + 1e-5}, terms, made)  # nothing is simulated again
+    slope = -(later - predicted).reshape(-1, n) / 1e-5
+    yield moment, -slope.ravel()
+    yield f"speed@{made.name}", (slope * (made.time - made.reference)).ravel()
+    load = f"load@{made.name}"
+    yield load, (case.passage_of({**values, load: values[load] + 0.03}, terms, made) - predicted) / 0.03
+
+
+def _seat_columns(case, values, terms, made, predicted):
+    further = case.marched(values, terms, made, probes(case, values, terms, made))
+    further = rolling.finer(further[len(made.sensors) + 2 * len(case.zone.supports) :])
+    rows = predicted.reshape(-1, made.time.size)
+    for k, sensor in enumerate(made.sensors):
+        if not sensor.mounting.startswith("sleeper"):
+            column = np.zeros_like(rows)
+            column[k] = (case.shown(values, terms, made, sensor, further[k]) - rows[k]) / FURTHER
+            yield f"seat_{sensor.name}", column.ravel()
+
+
+def _passage_columns(case, values, terms, made, predicted):
+    yield from _own_columns(case, values, terms, made, predicted)
+    rows = predicted.reshape(-1, made.time.size)
+    for k, sensor in enumerate(made.sensors):
+        column = np.zeros_like(rows)
+        column[k] = rows[k] / (1.0 + values[f"gain_{sensor.name}"])
+        yield f"gain_{sensor.name}", column.ravel()
+    yield from _seat_columns(case, values, terms, made, predicted)
+    histories = support_forces(case, values, terms, made)
+    yield from columns_of(case, values, terms, made, histories).items()
