@@ -96,7 +96,7 @@ def diagnose(case, settings=None, progress=None, store=None):
         verdicts.append(verdict)
         if verdict.answer not in ("named", "a_or_b"):
             break
-        fit = best.fit
+        fit = best.fit if best.fit.jacobian else _to_the_end(case, best.fit, settings)
         if verdict.answer == "a_or_b" or (not case.frozen_jacobian and over(case, fit, settings) <= 1.0):
             break
     rival, refused = _rival(verdicts[0]), verdicts[0].scores[0] if verdicts[0].scores else None
@@ -132,10 +132,11 @@ def _scored(case, fit, settings, tell, store, effect, promising):
             scores[score.family] = score
     ranked = sorted(scores.values(), key=lambda s: -s.gain)
     if case.frozen_jacobian and ranked:
-        leaders = [s for s in ranked[:2] if s.gain > max(settings.threshold, ranked[0].gain - settings.margin)]
+        material = [s for s in ranked if s.material][:2]
+        leaders = [s for s in material if s.gain > max(settings.threshold, material[0].gain - settings.margin)]
         polished = [_polished(case, fit, s, settings, store, effect) for s in leaders]
-        ranked = sorted([*polished, *ranked[len(leaders) :]], key=lambda s: -s.gain)
-    return tuple([_checked(case, fit, s) for s in ranked[:1]] + ranked[1:])
+        ranked = sorted([*polished, *(s for s in ranked if all(s is not x for x in leaders))], key=lambda s: -s.gain)
+    return tuple(_checked(case, fit, s) for s in ranked)
 
 
 def _tried(case, fit, entry, settings, store, effect):
@@ -156,13 +157,12 @@ def _polished(case, fit, score, settings, store, effect):
     """A leader refitted to the end, with derivatives of its own: the verdict rests on these."""
     key = f"{effect}:polished:{score.candidate.key}:{len(fit.candidates)}"
     refit = _kept(store, key, lambda: _to_the_end(case, score.fit, settings), score.fit.candidates)
-    new = score_of(case, fit, refit, score.candidate, settings)
-    return new if new.gain > score.gain else score
+    return score_of(case, fit, refit, score.candidate, settings)
 
 
 def _checked(case, fit, score):
-    """The leader of a dear case with its gain condition by condition, each left out in turn."""
-    if not case.frozen_jacobian:
+    """A leader of a dear case with its gain condition by condition, each left out in turn."""
+    if not case.frozen_jacobian or not score.fit.jacobian:
         return score
     mine, reference = held_out_score(case, score.fit), held_out_score(case, fit)
     by_condition = {c: mine[c] - reference[c] for c in reference}
@@ -185,9 +185,10 @@ def _refit(case, fit, candidate, start, back, settings):
         psi = _best_start(case, candidates, psi, values)
         if candidate.start_from_base and not back:
             psi = _sobered(case, candidates, psi, fit)
-        return fit_jointly(case, candidates, psi, values, keep, iterations=settings.iterations)
+        refit = fit_jointly(case, candidates, psi, values, keep, iterations=settings.iterations)
     except SimulationError:
         return None
+    return refit.light() if case.frozen_jacobian else refit
 
 
 def _best_start(case, candidates, psi, values):

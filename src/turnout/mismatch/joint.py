@@ -15,7 +15,7 @@ STALL = 5e-4  # of minus twice the log posterior per sample; a dear fit that gai
 @dataclass(frozen=True)
 class Fit:
     """``values`` of nuisances, ``psi`` (n_term,) of the terms; ``residuals`` a list by observation, ``white`` the same
-    whitened, ``jacobian`` whitened too.
+    whitened, ``jacobian`` whitened too, [] in one that is ``light``; that of a dear case is in single precision.
 
     ``scale`` noise scale by kind, at least 1; ``cost`` minus twice the log posterior up to a constant;
     ``covariance`` of nuisances and psi; ``level`` weighted mean square by kind, in units of ``sigma``;
@@ -40,6 +40,10 @@ class Fit:
     def terms(self):
         """The terms with their fitted parameters."""
         return terms_of(self.candidates, self.psi)
+
+    def light(self):
+        """The same fit without its Jacobian, by far the largest part of it."""
+        return replace(self, jacobian=[])
 
     def with_candidates(self, candidates):
         """The same fit with these candidates, which carry functions and are not kept on disk."""
@@ -145,7 +149,8 @@ class Joint:
         else:
             base = [j[:, : self.n] for j in keep]
         columns = [self._column(theta, k, predictions) for k in range(self.n, theta.size)]
-        return [np.column_stack([j, *(c[i] for c in columns)]) if columns else np.array(j) for i, j in enumerate(base)]
+        whole = [np.column_stack([j, *(c[i] for c in columns)]) if columns else np.array(j) for i, j in enumerate(base)]
+        return [j.astype(np.float32) for j in whole] if self.case.frozen_jacobian else whole
 
     def renewed(self, theta, predictions, jacobian):
         """The Jacobian with that of cheap observations made anew."""
@@ -280,7 +285,11 @@ def _step(joint, theta, residuals, jacobian):
 def _broyden(jacobian, weight, moved, old, new):
     """Rank-one update that makes the Jacobian say what the last step did to the residuals, in prior deviations."""
     size = float(weight @ moved)
-    return [j + np.outer(a - b - j @ moved, weight) / size for j, a, b in zip(jacobian, old, new)]
+    change = [
+        np.outer((a - b - j @ moved).astype(j.dtype), (weight / size).astype(j.dtype))
+        for j, a, b in zip(jacobian, old, new)
+    ]
+    return [j + c for j, c in zip(jacobian, change)]
 
 
 def _finished(joint, theta, predictions, residuals, jacobian, cost):
@@ -288,9 +297,10 @@ def _finished(joint, theta, predictions, residuals, jacobian, cost):
     scale = {kind: max(1.0, v) for kind, v in level.items()}
     covariance, evidence = np.zeros((theta.size, theta.size)), -0.5 * cost
     if theta.size:
-        rows, _ = joint.stacked(jacobian, residuals, scale)
-        scaled = rows * joint.sd
-        normal = scaled.T @ scaled + np.eye(theta.size)
+        normal = np.eye(theta.size)
+        for o, j in zip(joint.observations, jacobian):
+            scaled = np.sqrt(o.effective / scale[o.kind]) * j * joint.sd
+            normal += scaled.T @ scaled
         covariance = np.linalg.inv(normal) * np.outer(joint.sd, joint.sd)
         evidence -= 0.5 * float(np.linalg.slogdet(normal)[1])
     else:

@@ -58,7 +58,7 @@ class PlannedCase(TrackCase):
             self.pairs[pair.name] = pair = blows.sized(pair, np.abs(h))
             yield blows.observed(pair, h, NOISE * np.abs(h), self.settings.pair_tolerance)
         for made in self.rollings.values():
-            data = self._passage(values, (), made).reshape(len(made.sensors), -1)
+            data = self.passage_of(values, (), made).reshape(len(made.sensors), -1)
             planned = rolling.observed(made, data, NOISE * np.std(data, axis=1), self.settings.materiality)
             yield replace(planned, modes=wheel_modes(self, values, made, planned.sigma))
 
