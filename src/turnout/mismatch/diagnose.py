@@ -121,8 +121,10 @@ def _scored(case, fit, settings, tell, store, effect, promising):
     plan = shortlist(case, fit, settings, promising)
     scores, best = {}, -np.inf
     for done, entry in enumerate(plan):
-        if entry.rival and best < PROMISING * settings.threshold:
-            continue
+        if entry.rival:
+            if best < PROMISING * settings.threshold:
+                continue
+            entry = _after_its_kin(entry, scores)
         score = _tried(case, fit, entry, settings, store, effect)
         tell(done + 1, len(plan), entry.candidate.key)
         if score is None:
@@ -136,7 +138,30 @@ def _scored(case, fit, settings, tell, store, effect, promising):
         leaders = [s for s in material if s.gain > max(settings.threshold, material[0].gain - settings.margin)]
         polished = [_polished(case, fit, s, settings, store, effect) for s in leaders]
         ranked = sorted([*polished, *(s for s in ranked if all(s is not x for x in leaders))], key=lambda s: -s.gain)
+        ranked = _beside(case, fit, ranked, settings)
     return tuple(_checked(case, fit, s) for s in ranked)
+
+
+def _beside(case, fit, ranked, settings):
+    """The scores, the best one that matters with what it gains on top of one that leads and does not: a law of the
+    whole track too small to act on may be what another law has taken for itself."""
+    leader, best = ranked[0], next((s for s in ranked if s.material), None)
+    if best is None or leader is best or best.gain <= settings.threshold:
+        return ranked
+    held, psi = leader.fit, np.concatenate([leader.fit.psi, best.fit.psi[fit.psi.size :]])
+    try:
+        both = fit_jointly(case, (*held.candidates, best.candidate), psi, held.values, iterations=settings.iterations)
+    except SimulationError:
+        return ranked
+    left = both.evidence - held.evidence + best.candidate.aside - np.log(best.candidate.scanned)
+    return sorted((replace(s, gain=min(s.gain, left)) if s is best else s for s in ranked), key=lambda s: -s.gain)
+
+
+def _after_its_kin(entry, scores):
+    """The rival with the nuisances that the best law of its part was given: they are nearly its own."""
+    candidate = entry.candidate
+    kin = [s for s in scores.values() if s.candidate.kin == candidate.kin and s.candidate.where == candidate.where]
+    return replace(entry, values=max(kin, key=lambda s: s.gain).fit.values) if kin else entry
 
 
 def _tried(case, fit, entry, settings, store, effect):

@@ -4,7 +4,7 @@ import numpy as np
 
 from turnout.mismatch.held_out import held_out_score, mean_square_out
 from turnout.mismatch.latent import latent_law
-from turnout.mismatch.verdict import Score, judge
+from turnout.mismatch.verdict import Score, judge, objected
 from turnout.mismatch.verify import falls, predict_reserved
 
 ODD = 3.0  # times the spread of like parts: one in 370 of sound ones
@@ -86,20 +86,22 @@ def judged(case, fit, scored, settings):
         return judge([], excess, settings, disturbed=bool(case.disturbed)), None
     consistent, structure = True, 0.0
     if best.gain > settings.threshold:
-        consistent = _consistent(case, fit, best.fit, settings)
+        consistent = _consistent(case, fit, best, settings)
         left = latent_of(case, best.fit)
         structure = max(left.r2.values(), default=0.0) if left else 0.0
     left = over(case, best.fit, settings)
     return judge(scored, excess, settings, consistent, structure, left, bool(case.disturbed)), best
 
 
-def _consistent(case, base, fit, settings):
-    """Reserved conditions are predicted no worse than without the effect."""
+def _consistent(case, base, best, settings):
+    """Reserved conditions are predicted no worse than without the effect: neither at twice the mean square, nor at a
+    lower fit that costs as much of the evidence as no condition may (``verdict.objected``)."""
     if not case.reserved:
         return True
-    before, after = (predict_reserved(case, f, case.reserved) for f in (base, fit))
-    squares = [mean_square_out(case, f, case.reserved, p) for f, p in ((base, before), (fit, after))]
-    fell = falls(case.reserved, before, after, settings.fall)
+    before, after = (predict_reserved(case, f, case.reserved) for f in (base, best.fit))
+    squares = [mean_square_out(case, f, case.reserved, p) for f, p in ((base, before), (best.fit, after))]
+    lost = 0.5 * sum(o.n_effective for o in case.reserved) * (squares[1] - squares[0])
+    fell = falls(case.reserved, before, after, settings.fall) and objected(-lost, best.gain, settings)
     return squares[1] <= settings.withdrawn_ratio * squares[0] and not fell
 
 

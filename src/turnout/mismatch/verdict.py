@@ -123,6 +123,11 @@ def _logit(p):
     return float(np.log(p / (1.0 - p)))
 
 
+def objected(worst, gain, settings):
+    """Whether a condition left out, in which a name gains ``worst``, speaks against one that gains ``gain`` in all."""
+    return worst < -max(0.5 * settings.threshold, TORN * gain)
+
+
 def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, disturbed=False):
     """Verdict from scored candidates.
 
@@ -163,7 +168,7 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
     if left > settings.leftover:
         return verdict("unknown", reason=f"{best.family} leaves {left:.0f} times the level of controls")
     weak = best.gain < WEAK * settings.threshold
-    torn = best.worst < -max(0.5 * settings.threshold, TORN * best.gain)
+    torn = objected(best.worst, best.gain, settings)
     if (torn or not consistent) and weak and excess <= 1.0 and not disturbed:
         return verdict("none", reason=f"nothing above the thresholds but {best.family}, which does not hold elsewhere")
     if not consistent:

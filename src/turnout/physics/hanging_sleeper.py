@@ -12,15 +12,17 @@ ONSET = 1e-5  # way over which the ballast's damping comes and goes [m]
 class HangingSleeper(PhysicsTerm):
     r"""Withhold the ballast reaction while one sleeper moves within its gap.
 
-    .. math:: F = k_b \, \mathrm{clip}(y, -g, g) + c_b \dot y \, [|y| < g]
+    .. math:: F = (1 - s) \left( k_b \, \mathrm{clip}(y, -g, g) + c_b \dot y \, [|y| < g] \right)
 
-    The base simulation has :math:`-k_b y - c_b \dot y` under every sleeper; this gives it back within the gap.
+    The base simulation has :math:`-k_b y - c_b \dot y` under every sleeper; this gives it back within the gap, but for
+    the share s of the sleeper that is ``seated``: voids grow from partial ones.
     y is the sleeper's position below where it hangs unloaded. A hammer's blow moves it by micrometres both ways:
     there it is a free sleeper. A lift by more than the gap is left to the base.
     """
 
     sleeper: int
     gap: float
+    seated: float = 0.0
 
     name = "hanging_sleeper"
     left_out = "sleeper {sleeper} hangs {gap:.4f} m above its ballast"
@@ -34,6 +36,14 @@ class HangingSleeper(PhysicsTerm):
             meaning="clearance when unloaded",
             source="Lundqvist and Dahlberg 2005, Load impact on railway track due to unsupported sleepers",
         ),
+        Parameter(
+            "seated",
+            unit="-",
+            neutral=0.0,
+            bounds=(0.0, 0.95),
+            meaning="share of the ballast that bears the unloaded sleeper",
+            source="Kaewunruen and Remennikov 2008, Dynamic properties of railway track and its components",
+        ),
     )
 
     @classmethod
@@ -46,7 +56,8 @@ class HangingSleeper(PhysicsTerm):
         self.check()
         if self.gap == 0.0:
             return ()
-        k, c = track.ballast_stiffness[self.sleeper], track.ballast_damping[self.sleeper]
+        hangs = 1.0 - self.seated
+        k, c = hangs * track.ballast_stiffness[self.sleeper], hangs * track.ballast_damping[self.sleeper]
         onset = min(ONSET, 0.5 * self.gap)
         way: tuple[float, ...] = (
             -self.gap - onset,

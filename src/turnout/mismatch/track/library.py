@@ -10,6 +10,7 @@ from turnout.mismatch.track.ceiling import LIMIT_SD
 
 LOOSE = 0.15  # share by which sizes err: nine effects of another simulator, opened, had a median of 0.12, rms 0.18
 GAPS = (1.3e-4, 3e-4, 7e-4, 1.6e-3)  # below the first a train closes it at once, behind the last it never does [m]
+SEATED = (0.0, 0.4)  # share of the bed that still bears: nothing, or nearly a half
 MOUNTINGS = (300.0, 200.0, 450.0, 650.0, 900.0, 1200.0)  # half a width at Q = 3 apart [Hz]
 DELAYS = (1.5e-4, 6e-4, 2.5e-3)  # a column is straight over a tenth of a turn of what it delays [s]
 DIP_STEP = 0.6  # places of a dip scanned [m]; its own shift covers what lies between
@@ -47,7 +48,7 @@ def _supports(case):
             yield _candidate(term, lambda p, j=j, t=term: t(j, **p), ((0.4,), (2.5,)), where, n, always=alike,
                              twin=f"{alike}_{j}", kin=alike, limit=LIMIT.get(term.name, ""))  # fmt: skip
         yield _candidate(physics.HangingSleeper, lambda p, j=j: physics.HangingSleeper(j, **p),
-                         tuple((g,) for g in GAPS), where, n, base=False, always="ballast",
+                         tuple((g, s) for s in SEATED for g in GAPS), where, n, base=False, always="ballast",
                          kin="ballast")  # fmt: skip
         yield _candidate(physics.AttachedResonator, lambda p, j=j: physics.AttachedResonator(j, **p),
                          ((15.0, 120.0, 0.03), (15.0, 350.0, 0.03)), where, n)  # fmt: skip

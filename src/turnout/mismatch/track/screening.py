@@ -111,7 +111,7 @@ def _passage(case, fit, made, chosen):
         y, d = sleeper[k], rail[k] - sleeper[k]
         kb, kp = track.ballast_stiffness[j], track.pad_stiffness[j]
         if c.family == "hanging_sleeper":
-            force = j, SLEEPER, kb * np.clip(y, -values[0], values[0])
+            force = j, SLEEPER, (1.0 - values[1]) * kb * np.clip(y, -values[0], values[0])
         elif c.family == "local_ballast":
             force = j, SLEEPER, -(values[0] - 1.0) * kb * y
         elif c.family == "local_pad":

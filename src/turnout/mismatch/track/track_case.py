@@ -71,8 +71,7 @@ class TrackCase(Case):
     def _prepare(self, campaign, settings, solver):
         """What does not depend on recordings."""
         self.settings, self.solver, self.campaign = settings, solver, campaign
-        self.zone = zone_of(campaign.turnout, campaign.places())
-        self.rail = {}
+        self.nominal = zone_of(campaign.turnout, campaign.places())
         self._recentre({})
         self.trains = tuple(dict.fromkeys(p.train or p.name for p in campaign.passages))
         self.pairs, self.rollings, self.strange, self.notes = {}, {}, {}, []
@@ -81,8 +80,8 @@ class TrackCase(Case):
     def _recentre(self, values):
         """The track gets the rail of ``values``, about which receptances are straight in what it may differ by; nothing
         simulated is remembered any more."""
-        rail = {name: values.get(name, 0.0) for name, _ in RAIL}
-        self.zone, self.rail = with_rail(self.zone, {k: v - self.rail.get(k, 0.0) for k, v in rail.items()}), rail
+        self.rail = {name: values.get(name, 0.0) for name, _ in RAIL}
+        self.zone = with_rail(self.nominal, self.rail)
         self._simulated, self._rolls, self._models = OrderedDict(), OrderedDict(), OrderedDict()
 
     def peak(self, channel):
@@ -163,9 +162,9 @@ class TrackCase(Case):
         for made in self.rollings.values():
             yield from rolling.rolling_nuisances(made.passage)
 
-    def track(self, route="main"):
-        """The kept part of the base track under a route."""
-        return self.zone.turnout.track_of(route)
+    def track(self, route="main", terms=()):
+        """The kept part of the base track under a route; ``terms`` that change the rail change that of its file."""
+        return (self.nominal if _rails(terms) else self.zone).turnout.track_of(route)
 
     def predict(self, values, terms, observations):
         """Prediction of receptances and passages."""
@@ -182,7 +181,7 @@ class TrackCase(Case):
         under = tuple(t.under(pair.conditions) for t in terms if t.kind in ("matrix", "port"))
         key = repr(under), inner_values(self.zone, values)
         if key not in self._models:
-            self._models[key] = blows.BlowModel(track_with(self.track(), self.zone, values), under)
+            self._models[key] = blows.BlowModel(track_with(self.track(terms=under), self.zone, values), under)
             while len(self._models) > 8:
                 self._models.popitem(last=False)
         return self._models[key]
@@ -201,7 +200,8 @@ class TrackCase(Case):
         model = self.blow_model(values, terms, pair)
         place = model.place_of(self.seat(pair.sensor, values, terms))
         h = model.receptance(pair.test.place, place)
-        h = h + model.rail_gradient(pair.test.place, place) @ [values[name] - at for name, at in self.rail.items()]
+        centre = dict.fromkeys(self.rail, 0.0) if _rails(terms) else self.rail
+        h = h + model.rail_gradient(pair.test.place, place) @ [values[name] - at for name, at in centre.items()]
         return blows.split(blows.scaled(pair, h * self.chain(values, terms, pair)))
 
     def passage_of(self, values, terms, made):
@@ -248,7 +248,7 @@ class TrackCase(Case):
     def _roll(self, values, terms, passage):
         key = passage.route, inner_values(self.zone, values), repr(terms)
         if key not in self._rolls:
-            track = track_with(self.track(passage.route), self.zone, values)
+            track = track_with(self.track(passage.route, terms), self.zone, values)
             self._rolls[key] = rolling.Roll(self.zone.turnout, track, terms, self.solver)
             while len(self._rolls) > 12:
                 self._rolls.popitem(last=False)
@@ -328,6 +328,13 @@ class TrackCase(Case):
 def _own_of(passage):
     """Names of the nuisances of a passage."""
     return [n.name for n in rolling.rolling_nuisances(passage)]
+
+
+def _rails(terms):
+    """One of the terms is another rail."""
+    from turnout.physics.term import PhysicsTerm
+
+    return any(type(t).rail is not PhysicsTerm.rail for t in terms)
 
 
 def _moves(term):
