@@ -73,3 +73,13 @@ def test_channels_without_blows_are_left_out_and_said(plan):
     assert {o.name.split(":")[0] for o in case.observations} == {"blows 2"}
     with pytest.raises(SimulationError, match="nothing to diagnose"):
         TrackCase(replace(campaign, hammer=(silent,)))
+
+
+@pytest.mark.slow
+def test_a_rail_soft_in_shear_is_sized_against_the_rail_of_its_file(plan):
+    """The fits start from a rail moved to where blows have it; what is named is still what the file's rail lacks, 4 per
+    GN beside its own 4.1."""
+    case, found = found_in(plan, physics.RailShear(4.0))
+    assert case.rail["rail_shear"] < -0.05
+    assert found.names[:1] == ("rail_shear",)
+    assert abs(found.fit.psi[0] - 4.0) < 2.0 * found.fit.psi_se[0]

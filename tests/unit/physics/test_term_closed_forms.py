@@ -153,6 +153,14 @@ def test_a_hanging_sleeper_is_held_by_nothing_but_pads_within_its_gap():
     assert -90e6 * 1.5e-3 - port.law.force(1.5e-3) == pytest.approx(-90e6 * 0.5e-3)  # k (y - g) beyond it
 
 
+def test_a_sleeper_that_is_partly_seated_keeps_that_share_of_its_ballast_within_the_gap():
+    (port,) = physics.HangingSleeper(20, 1e-3, 0.3).ports(TRACK)
+    for y in (-9e-4, 3e-4, 9e-4):
+        assert -90e6 * y - port.law.force(y) == pytest.approx(-0.3 * 90e6 * y)
+    beyond = 0.3 * 90e6 * 1.5e-3 + 0.7 * 90e6 * 0.5e-3  # the rest joins where the gap closes
+    assert -90e6 * 1.5e-3 - port.law.force(1.5e-3) == pytest.approx(-beyond)
+
+
 def test_hardening_doubles_the_tangent_at_the_deflection_of_duffings_law():
     """k(1 + h (y/1mm)²) has the tangent k(1 + 3h) at 1 mm."""
     (port,) = physics.BallastHardening(20, 20, 1.0).ports(TRACK)

@@ -1,0 +1,51 @@
+"""What leads and is too small to act on: the next name has to gain something beside it."""
+
+import numpy as np
+import pytest
+
+from turnout.config.settings.mismatch import MismatchSettings
+from turnout.mismatch.case import Candidate, Case, Observation
+from turnout.mismatch.diagnose import _beside
+from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.scoring import score_of
+from turnout.physics import Parameter
+
+AMOUNT = (Parameter("amount", "-", 0.0, (-3.0, 3.0), "share of a shape", "made up 2026"),)
+X = np.linspace(0.0, 1.0, 400)
+SHAPES = {"wave": np.sin(9.0 * X), "near": np.sin(9.4 * X), "ramp": X - 0.5}
+
+
+class Shapes(Case):
+    """Sums of shapes under noise of 0.1; a wave counts from 10 on, the others always."""
+
+    frozen_jacobian = True
+
+    def __init__(self, **true):
+        noise = 0.1 * np.random.default_rng(6).normal(size=X.size)
+        data = sum(a * SHAPES[n] for n, a in true.items()) + noise
+        self.observations = (Observation("all", "all", data, np.full(X.size, 0.1)),)
+        self.candidates = tuple(
+            Candidate(n, AMOUNT, lambda p, n=n: (n, p["amount"]), ((0.5,),), {"shape": n}, least=10.0 * (n == "wave"))
+            for n in SHAPES
+        )
+
+    def predict(self, values, terms, observations):
+        return [sum((a * SHAPES[n] for n, a in terms), np.zeros(X.size))]
+
+    def cheap(self, observation):
+        return True
+
+    def ranked(self, settings):
+        base = fit_jointly(self)
+        fits = [(c, fit_jointly(self, (c,), c.starts[0])) for c in self.candidates]
+        scores = [score_of(self, base, f, c, settings) for c, f in fits]
+        return _beside(self, base, sorted(scores, key=lambda s: -s.gain), settings)
+
+
+@pytest.mark.parametrize("true, kept", [({"wave": 1.0}, False), ({"wave": 1.0, "ramp": 0.8}, True)])
+def test_a_name_that_lives_on_what_leads_is_dropped_and_another_effect_is_not(true, kept):
+    """A wave of nearly the right length gains hundreds of nats of the wave alone, and next to nothing beside it."""
+    settings = MismatchSettings()
+    ranked = Shapes(**true).ranked(settings)
+    best = next(s for s in ranked if s.material)
+    assert (best.gain > settings.threshold) == kept
