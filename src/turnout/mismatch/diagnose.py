@@ -1,26 +1,21 @@
 """The ten steps, from a case to a verdict with everything it rests on."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from turnout.config.settings.mismatch import MismatchSettings
-from turnout.errors import SimulationError
-from turnout.mismatch.held_out import held_out_score
-from turnout.mismatch.joint import cost_at, fit_jointly
+from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.latent import Latent
 from turnout.mismatch.locate import attribute, cell_energies
-from turnout.mismatch.scoring import judged, latent_of, over, score_of
-from turnout.mismatch.shortlist import shortlist
+from turnout.mismatch.refits import kept, scored, to_the_end
+from turnout.mismatch.scoring import judged, latent_of, over
 from turnout.mismatch.verdict import Verdict
 from turnout.mismatch.verify import decoy, fit_percent, predict_reserved
 from turnout.mismatch.whereabouts import Whereabouts, whereabouts
 
 # Share of the first effect's evidence that a law of not quite its shape leaves: sizes are right to a fifth.
 SHAPE = 0.05
-HELD = 0.5  # of what the cheap observations gained; a refit that holds less has not come to its end
-PROMISING = 0.5  # of the threshold, which laws of a part must gain before its other laws are asked
-HALVINGS = 4  # of a start that costs more than nothing; a sixteenth of it is a straight line
 
 
 @dataclass(frozen=True)
@@ -80,171 +75,31 @@ def diagnose(case, settings=None, progress=None, store=None):
     """
     settings, store = settings or MismatchSettings(), {} if store is None else store
     tell = progress or (lambda done, total, what: None)
-    base = _kept(store, "base", lambda: fit_jointly(case, iterations=settings.base_iterations))
+    base = kept(store, "base", lambda: fit_jointly(case, iterations=settings.base_iterations))
     frames = tuple(attribute(*cell_energies(case.observations, base.residuals), settings.permutations))
     numerics = _own_numerics(case, base, settings)
     if numerics:
         verdict = Verdict("numerics", reason=numerics, probability=1.0)
         return Diagnosis((verdict,), base, base, frames, _verified(case, base, base, None), latent_of(case, base))
-    verdicts, fit, scored = [], base, ()
+    verdicts, fit, scores = [], base, ()
     for effect in range(settings.effects):
-        promising = {s.family for s in scored if s.gain > settings.threshold}
-        scored = _scored(case, fit, settings, tell, store, effect, promising)
-        verdict, best = judged(case, fit, scored, settings)
+        promising = {s.family for s in scores if s.gain > settings.threshold}
+        scores = scored(case, fit, settings, tell, store, effect, promising)
+        verdict, best = judged(case, fit, scores, settings)
         if effect and (verdict.answer != "named" or best.gain < SHAPE * verdicts[0].scores[0].gain):
             break
         verdicts.append(verdict)
         if verdict.answer not in ("named", "a_or_b"):
             break
-        fit = best.fit if best.fit.jacobian else _to_the_end(case, best.fit, settings)
+        fit = best.fit if best.fit.jacobian else to_the_end(case, best.fit, settings)
         if verdict.answer == "a_or_b" or (not case.frozen_jacobian and over(case, fit, settings) <= 1.0):
             break
     rival, refused = _rival(verdicts[0]), verdicts[0].scores[0] if verdicts[0].scores else None
     where = whereabouts(case, base, refused) if verdicts[0].answer == "unknown" else None
     return Diagnosis(
         tuple(verdicts), base, fit, frames, _verified(case, base, fit, rival), latent_of(case, base), {},
-        tuple(scored), where,
+        scores, where,
     )  # fmt: skip
-
-
-def _kept(store, key, compute, candidates=()):
-    """A fit by its key, computed where the store lacks it; stores hold fits without their candidates' functions."""
-    if key not in store:
-        fit = compute()
-        store[key] = fit.with_candidates(()) if fit is not None else None
-    fit = store[key]
-    return None if fit is None else fit.with_candidates(candidates)
-
-
-def _scored(case, fit, settings, tell, store, effect, promising):
-    """Best Score of each family, all refitted jointly on top of ``fit``."""
-    plan = shortlist(case, fit, settings, promising)
-    scores, best = {}, -np.inf
-    for done, entry in enumerate(plan):
-        if entry.rival:
-            if best < PROMISING * settings.threshold:
-                continue
-            entry = _after_its_kin(entry, scores)
-        score = _tried(case, fit, entry, settings, store, effect)
-        tell(done + 1, len(plan), entry.candidate.key)
-        if score is None:
-            continue
-        best, known = max(best, score.gain), scores.get(score.family)
-        if known is None or score.gain > known.gain:
-            scores[score.family] = score
-    ranked = sorted(scores.values(), key=lambda s: -s.gain)
-    if case.frozen_jacobian and ranked:
-        material = [s for s in ranked if s.material][:2]
-        leaders = [s for s in material if s.gain > max(settings.threshold, material[0].gain - settings.margin)]
-        polished = [_polished(case, fit, s, settings, store, effect) for s in leaders]
-        ranked = sorted([*polished, *(s for s in ranked if all(s is not x for x in leaders))], key=lambda s: -s.gain)
-        ranked = _beside(case, fit, ranked, settings)
-    return tuple(_checked(case, fit, s) for s in ranked)
-
-
-def _beside(case, fit, ranked, settings):
-    """The scores, the best one that matters with what it gains on top of one that leads and does not: a law of the
-    whole track too small to act on may be what another law has taken for itself."""
-    leader, best = ranked[0], next((s for s in ranked if s.material), None)
-    if best is None or leader is best or best.gain <= settings.threshold:
-        return ranked
-    held, psi = leader.fit, np.concatenate([leader.fit.psi, best.fit.psi[fit.psi.size :]])
-    try:
-        both = fit_jointly(case, (*held.candidates, best.candidate), psi, held.values, iterations=settings.iterations)
-    except SimulationError:
-        return ranked
-    left = both.evidence - held.evidence + best.candidate.aside - np.log(best.candidate.scanned)
-    return sorted((replace(s, gain=min(s.gain, left)) if s is best else s for s in ranked), key=lambda s: -s.gain)
-
-
-def _after_its_kin(entry, scores):
-    """The rival with the nuisances that the best law of its part was given: they are nearly its own."""
-    candidate = entry.candidate
-    kin = [s for s in scores.values() if s.candidate.kin == candidate.kin and s.candidate.where == candidate.where]
-    return replace(entry, values=max(kin, key=lambda s: s.gain).fit.values) if kin else entry
-
-
-def _tried(case, fit, entry, settings, store, effect):
-    """Score of an entry of the shortlist after its joint refit; None where the simulation cannot go there."""
-    candidate, start = entry.candidate, entry.start
-    key = f"{effect}:{'+'.join(c.key for c in fit.candidates)}:{candidate.key}:{tuple(np.round(start, 12))}"
-    both = (*fit.candidates, candidate)
-    refit = _kept(store, key, lambda: _refit(case, fit, candidate, start, entry.values, settings), both)
-    if refit is None:
-        return None
-    score = score_of(case, fit, refit, candidate, settings)
-    if case.frozen_jacobian and score.gain < HELD * entry.promised and entry.promised > settings.threshold:
-        return _polished(case, fit, score, settings, store, effect)
-    return score
-
-
-def _polished(case, fit, score, settings, store, effect):
-    """A leader refitted to the end, with derivatives of its own: the verdict rests on these."""
-    key = f"{effect}:polished:{score.candidate.key}:{len(fit.candidates)}"
-    refit = _kept(store, key, lambda: _to_the_end(case, score.fit, settings), score.fit.candidates)
-    return score_of(case, fit, refit, score.candidate, settings)
-
-
-def _checked(case, fit, score):
-    """A leader of a dear case with its gain condition by condition, each left out in turn."""
-    if not case.frozen_jacobian or not score.fit.jacobian:
-        return score
-    mine, reference = held_out_score(case, score.fit), held_out_score(case, fit)
-    by_condition = {c: mine[c] - reference[c] for c in reference}
-    return replace(score, worst=min(by_condition.values(), default=0.0), by_condition=by_condition)
-
-
-def _to_the_end(case, fit, settings):
-    return fit_jointly(case, fit.candidates, fit.psi, fit.values, iterations=settings.iterations)
-
-
-def _refit(case, fit, candidate, start, back, settings):
-    """Joint refit from this start; None where the simulation cannot go there."""
-    keep = fit.jacobian if case.frozen_jacobian else None
-    psi = np.concatenate([fit.psi, start])
-    candidates = (*fit.candidates, candidate)
-    values = {**fit.values, **back}
-    if not candidate.start_from_base and not back:  # what the base may have bent goes back to its prior
-        values |= {n.name: n.mean for n in case.nuisances if n.owner is None and n.trust < 1.0}
-    try:
-        psi = _best_start(case, candidates, psi, values)
-        if candidate.start_from_base and not back:
-            psi = _sobered(case, candidates, psi, fit)
-        refit = fit_jointly(case, candidates, psi, values, keep, iterations=settings.iterations)
-    except SimulationError:
-        return None
-    return refit.light() if case.frozen_jacobian else refit
-
-
-def _best_start(case, candidates, psi, values):
-    """``psi`` or the last candidate's own starts: what the cheap observations cannot see is asked of the dear ones."""
-    candidate = candidates[-1]
-    if candidate.start_from_base and not candidate.even:
-        return psi
-    n, found = psi.size - len(candidate.parameters), []
-    others = (candidate.mirrored(psi[n:]),) if candidate.even else candidate.starts
-    for start in (psi[n:], *others):
-        tried = np.concatenate([psi[:n], np.asarray(start, dtype=float)])
-        try:
-            found.append((cost_at(case, candidates, tried, values), tuple(tried)))
-        except SimulationError:
-            continue
-    return np.array(min(found)[1]) if found else psi
-
-
-def _sobered(case, candidates, psi, fit):
-    """``psi`` with the last candidate nearer to neutral, by halves, until it costs no more than ``fit`` without it:
-    what a column promises of a large size need not hold."""
-    n, psi = len(candidates[-1].parameters), np.array(psi, dtype=float)
-    neutral = candidates[-1].parameters[0].neutral
-    for _ in range(HALVINGS):
-        try:
-            if cost_at(case, candidates, psi, fit.values) <= fit.cost:
-                break
-        except SimulationError:
-            pass
-        psi[-n] = neutral + 0.5 * (psi[-n] - neutral)
-    return psi
 
 
 def _own_numerics(case, base, settings):

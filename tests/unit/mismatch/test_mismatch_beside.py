@@ -5,8 +5,8 @@ import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.case import Candidate, Case, Observation
-from turnout.mismatch.diagnose import _beside
 from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.refits import beside
 from turnout.mismatch.scoring import score_of
 from turnout.physics import Parameter
 
@@ -39,7 +39,7 @@ class Shapes(Case):
         base = fit_jointly(self)
         fits = [(c, fit_jointly(self, (c,), c.starts[0])) for c in self.candidates]
         scores = [score_of(self, base, f, c, settings) for c, f in fits]
-        return _beside(self, base, sorted(scores, key=lambda s: -s.gain), settings)
+        return beside(self, base, sorted(scores, key=lambda s: -s.gain), settings)
 
 
 @pytest.mark.parametrize("true, kept", [({"wave": 1.0}, False), ({"wave": 1.0, "ramp": 0.8}, True)])

@@ -46,7 +46,7 @@ class PlannedCase(TrackCase):
             stop = rolling.duration_of(passage, train.speed, plan.sensors) + 0.45 + rolling.EDGE
             time = np.arange(0.45 - rolling.EDGE, stop, 1.0 / rolling.clock_of(train.speed))
             self.rollings[passage.name] = rolling.Rolling(passage.name, passage, plan.sensors, time, 0.45, train.speed)
-        self.nuisances = tuple(self._nuisances())
+        self.nuisances = tuple(self.listed())
         self.observations = tuple(self._expected())
         self.candidates, self.families = library(self, families), ()
 

@@ -23,13 +23,12 @@ from turnout.mismatch.track.base_model import (
 from turnout.mismatch.track.blows_case import Blows
 from turnout.mismatch.track.ceiling import ceilings, within_range
 from turnout.mismatch.track.library import LOOSE, library
-from turnout.mismatch.track.quiet import disturbances
+from turnout.mismatch.track.observing import hammer_observations, passage_observations, undisturbed
 from turnout.mismatch.track.rough_rail import Waves
-from turnout.mismatch.track.rough_wheels import wheel_modes
+from turnout.physics.term import PhysicsTerm
 
 KEPT = 150  # simulated passages remembered
 GAIN_SD = 0.02
-TIMED = 0.25  # likeness above which it is sure when a train came; one found at a wrong time reached 0.10
 
 
 class TrackCase(Case):
@@ -42,9 +41,9 @@ class TrackCase(Case):
         settings = settings or MismatchSettings()
         self.ceilings = ceilings(campaign, settings.threshold)
         self._prepare(within_range(campaign, self.ceilings), settings, solver or rolling.Track1D())
-        found, self.start_values = list(self._hammer()), {}
+        found, self.start_values = list(hammer_observations(self)), {}
         self.start_values = self._from_blows([o for _, o in found])
-        found += self._undisturbed(list(self._passages()))
+        found += undisturbed(self, list(passage_observations(self)))
         if not found:
             raise SimulationError("nothing to diagnose: " + "; ".join(self.notes))
         reserved = set(campaign.reserved)
@@ -52,13 +51,13 @@ class TrackCase(Case):
         self.reserved = tuple(o for name, o in found if name in reserved)
         if not self.observations:
             raise SimulationError("every recording is reserved for the verification: nothing is left to fit.")
-        self.nuisances = tuple(self._nuisances())
+        self.nuisances = tuple(self.listed())
         self.candidates = library(self, families)
         self.families = families
 
     def _from_blows(self, observations):
         """Values of the nuisances of track and sensors that the hammer tests alone give: where all fits start."""
-        self.nuisances, self.observations = tuple(self._nuisances()), tuple(observations)
+        self.nuisances, self.observations = tuple(self.listed()), tuple(observations)
         if not observations:
             return {}
         roughly = fit_jointly(Blows(self).roughened(), iterations=12)
@@ -100,58 +99,8 @@ class TrackCase(Case):
         offset = self.campaign.turnout.roughness_level
         return Waves([s.place for s in self.campaign.sensors], 0.0 if offset is None else offset)
 
-    def _hammer(self):
-        for test in self.campaign.hammer:
-            sensors = [*self.campaign.sensors, *_loose(test, self.campaign.sensors)]
-            sensors = [s for s in sensors if s.name not in self.ceilings]
-            pairs = blows.pairs_of(test, sensors, self.settings.pair_tolerance)
-            if not pairs:
-                self.notes.append(f"hammer test {test.name}: no channel with {blows.FEWEST} sound blows")
-            for pair, observation in pairs:
-                self.pairs[pair.name] = pair
-                yield test.name, observation
-
-    def _passages(self):
-        if not self.campaign.passages:
-            return
-        values = {n.name: 0.0 for n in self._nuisances()} | self.start_values
-        for passage in self.campaign.passages:
-            sensors = [s for s in self.campaign.sensors if s.name in {c.name for c in passage.recording.channels}]
-            if not sensors:
-                self.notes.append(f"passage {passage.name}: none of the sensors recorded it")
-                continue
-            signals = self._roll(values, (), passage)(passage, passage.vehicle, passage.speed, sensors)
-            reference, speed, likeness = rolling.align(passage, sensors, signals, self.solver.rate)
-            if likeness < rolling.ALIKE:
-                self.notes.append(
-                    f"passage {passage.name}: likeness {likeness:.2f} with the simulation of "
-                    f"{passage.train or 'its train'}; wrong vehicle file, wrong sensor places or another turnout"
-                )
-                if likeness > TIMED:
-                    self.strange[passage.name] = rolling.Rolling(
-                        passage.name, passage, tuple(sensors), np.zeros(0), reference, speed
-                    )
-                continue
-            made, observation = rolling.rolling_of(passage, sensors, reference, speed, self.settings.materiality)
-            self.rollings[passage.name] = made
-            modes = (
-                rolling.coupling_modes(made, observation.data).astype(np.float32),
-                wheel_modes(self, {**values, **dict.fromkeys(_own_of(passage), 0.0)}, made, observation.sigma),
-            )
-            yield passage.name, replace(observation, modes=np.column_stack(modes))
-
-    def _undisturbed(self, found):
-        """The passages in which nothing but their train shakes the sensors; all where fewer than two would be left."""
-        self.disturbed = tuple(disturbances(self.rollings, self.strange))
-        shaken = {d.name: d for d in self.disturbed if d.name in self.rollings}
-        if len(found) - len(shaken) < 2:
-            return found
-        for name, d in shaken.items():
-            del self.rollings[name]
-            self.notes.append(f"passage {name}: not used, {d.louder:.0f} dB louder {d.when} its train than the others")
-        return [(name, o) for name, o in found if name not in shaken]
-
-    def _nuisances(self):
+    def listed(self):
+        """All nuisances of track, trains, sensors, waves and passages."""
         yield from track_nuisances(self.zone, self.trains)
         for sensor in self.campaign.sensors:
             yield Nuisance(f"gain_{sensor.name}", "-", 0.0, GAIN_SD, meaning="gain of a sensor less one", trust=3.0)
@@ -231,7 +180,7 @@ class TrackCase(Case):
         key = made.name, inner_values(self.zone, values), own, seats, shape, repr(under), len(probes)
         if key not in self._simulated:
             vehicle = vehicle_with(made.passage.vehicle, values, train, own[2])
-            roll = self._roll(values, under, made.passage)
+            roll = self.roll(values, under, made.passage)
             sensors = [replace(s, place=s.place + more) for s, more in zip(made.sensors, seats)]
             signals = roll(made.passage, vehicle, made.speed * (1.0 + own[1]), sensors, probes, path, made.sensors)
             self._simulated[key] = signals
@@ -245,7 +194,8 @@ class TrackCase(Case):
         loads = tuple(2.0 * load for load in passage.vehicle.static_loads)
         return {"axle_loads": loads, "train": passage.train or passage.name, "name": made.name, **passage.conditions}
 
-    def _roll(self, values, terms, passage):
+    def roll(self, values, terms, passage):
+        """The simulation of passages on this track with these terms, remembered."""
         key = passage.route, inner_values(self.zone, values), repr(terms)
         if key not in self._rolls:
             track = track_with(self.track(passage.route, terms), self.zone, values)
@@ -325,32 +275,11 @@ class TrackCase(Case):
             self.solver, self._simulated, self._rolls = kept
 
 
-def _own_of(passage):
-    """Names of the nuisances of a passage."""
-    return [n.name for n in rolling.rolling_nuisances(passage)]
-
-
 def _rails(terms):
     """One of the terms is another rail."""
-    from turnout.physics.term import PhysicsTerm
-
     return any(type(t).rail is not PhysicsTerm.rail for t in terms)
 
 
 def _moves(term):
     """A channel term that changes what is simulated: the sensor's seat."""
-    from turnout.physics.term import PhysicsTerm
-
     return type(term).sensor is not PhysicsTerm.sensor
-
-
-def _loose(test, sensors):
-    """Accelerometers of a hammer test that are no installed sensors."""
-    from turnout.simulate.sensor import Sensor
-
-    known, found = {s.name for s in sensors}, {}
-    for recording in test.recordings[:1]:
-        for channel in recording.channels:
-            if channel.quantity == "acceleration" and channel.name not in known and channel.position is not None:
-                found[channel.name] = Sensor(channel.name, channel.position, channel.mounting)
-    return found.values()

@@ -1,0 +1,83 @@
+"""The recordings of a campaign as observations of a case, and why some are none."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from turnout.mismatch.track import blows, rolling
+from turnout.mismatch.track.quiet import disturbances
+from turnout.mismatch.track.rough_wheels import wheel_modes
+from turnout.simulate.sensor import Sensor
+
+TIMED = 0.25  # likeness above which it is sure when a train came; one found at a wrong time reached 0.10
+
+
+def hammer_observations(case):
+    """(name of the test, Observation) of every response channel with sound blows; pairs and notes go to the case."""
+    for test in case.campaign.hammer:
+        sensors = [*case.campaign.sensors, *_loose(test, case.campaign.sensors)]
+        sensors = [s for s in sensors if s.name not in case.ceilings]
+        pairs = blows.pairs_of(test, sensors, case.settings.pair_tolerance)
+        if not pairs:
+            case.notes.append(f"hammer test {test.name}: no channel with {blows.FEWEST} sound blows")
+        for pair, observation in pairs:
+            case.pairs[pair.name] = pair
+            yield test.name, observation
+
+
+def passage_observations(case):
+    """(name, Observation) of every passage that looks like its train; rollings and notes go to the case."""
+    if not case.campaign.passages:
+        return
+    values = {n.name: 0.0 for n in case.listed()} | case.start_values
+    for passage in case.campaign.passages:
+        sensors = [s for s in case.campaign.sensors if s.name in {c.name for c in passage.recording.channels}]
+        if not sensors:
+            case.notes.append(f"passage {passage.name}: none of the sensors recorded it")
+            continue
+        signals = case.roll(values, (), passage)(passage, passage.vehicle, passage.speed, sensors)
+        reference, speed, likeness = rolling.align(passage, sensors, signals, case.solver.rate)
+        if likeness < rolling.ALIKE:
+            case.notes.append(
+                f"passage {passage.name}: likeness {likeness:.2f} with the simulation of "
+                f"{passage.train or 'its train'}; wrong vehicle file, wrong sensor places or another turnout"
+            )
+            if likeness > TIMED:
+                case.strange[passage.name] = rolling.Rolling(
+                    passage.name, passage, tuple(sensors), np.zeros(0), reference, speed
+                )
+            continue
+        made, observation = rolling.rolling_of(passage, sensors, reference, speed, case.settings.materiality)
+        case.rollings[passage.name] = made
+        modes = (
+            rolling.coupling_modes(made, observation.data).astype(np.float32),
+            wheel_modes(case, {**values, **dict.fromkeys(_own_of(passage), 0.0)}, made, observation.sigma),
+        )
+        yield passage.name, replace(observation, modes=np.column_stack(modes))
+
+
+def undisturbed(case, found):
+    """The passages in which nothing but their train shakes the sensors; all where fewer than two would be left."""
+    case.disturbed = tuple(disturbances(case.rollings, case.strange))
+    shaken = {d.name: d for d in case.disturbed if d.name in case.rollings}
+    if len(found) - len(shaken) < 2:
+        return found
+    for name, d in shaken.items():
+        del case.rollings[name]
+        case.notes.append(f"passage {name}: not used, {d.louder:.0f} dB louder {d.when} its train than the others")
+    return [(name, o) for name, o in found if name not in shaken]
+
+
+def _own_of(passage):
+    """Names of the nuisances of a passage."""
+    return [n.name for n in rolling.rolling_nuisances(passage)]
+
+
+def _loose(test, sensors):
+    """Accelerometers of a hammer test that are no installed sensors."""
+    known, found = {s.name for s in sensors}, {}
+    for recording in test.recordings[:1]:
+        for channel in recording.channels:
+            if channel.quantity == "acceleration" and channel.name not in known and channel.position is not None:
+                found[channel.name] = Sensor(channel.name, channel.position, channel.mounting)
+    return found.values()
