@@ -34,6 +34,8 @@ SENTENCES = {
     "high_pass": "Channel {channel} loses what is slower than {corner}",
     "low_pass": "Channel {channel} loses what is fast",
 }
+# The same where the recordings leave a parameter open by more than half of its value.
+OPEN = {"hanging_sleeper": ("gap", "The sleeper at {place} hangs above its ballast, and no train here closes the gap")}
 MILLI = {"m": "mm", "s": "ms"}
 PERCENT = {"1/K": "% per kelvin"}
 
@@ -101,6 +103,12 @@ def _sentence(term, finding) -> str:
         "wheel": _wheel(finding["train"] or fixed.get("train") or "a train"),
     }
     try:
-        return SENTENCES[term["term"]].format(**words)
+        return _said(term).format(**words)
     except KeyError:  # a new effect without a sentence of its own yet
         return f"{term['term'].replace('_', ' ').capitalize()} at {words['place']}"
+
+
+def _said(term) -> str:
+    name, vague = OPEN.get(term["term"], ("", ""))
+    known = term["parameters"].get(name)
+    return vague if known and known["se"] > 0.5 * abs(known["value"]) else SENTENCES[term["term"]]

@@ -110,7 +110,7 @@ def _from_both_ends(system, window, reach):
 
 
 def _reach(track, matrices, s, decay_at_end):
-    """Half width of the windows: decay of EI w'''' + s² m w = 0 down to rounding, in rows."""
+    """Half width of the windows: decay of EI w'''' + s² m w = 0 down to exp(-``decay_at_end``), in rows."""
     rails = {*matrices.rails}
     decay = min(float(np.min(np.abs(np.roots([r.bending_stiffness, 0, 0, 0, s * s * r.mass]).real))) for r in rails)
     span = decay_at_end / decay

@@ -206,3 +206,9 @@ def test_every_effect_of_the_catalogue_has_its_sentence():
         }
         row = named() | {"term_json": json.dumps([{"term": term.name, "fixed": {"sleeper": 24.6}, "parameters": made}])}
         assert "{" not in headline(row) and headline(row).endswith(".")
+
+
+@pytest.mark.parametrize("error, said", [(1e-4, "hangs 1.1 mm above"), (2e-3, "no train here closes the gap")])
+def test_a_gap_that_is_only_known_from_below_has_no_size(error, said):
+    gap = {**GAP, "parameters": {**GAP["parameters"], "gap": {**GAP["parameters"]["gap"], "se": error}}}
+    assert said in headline(named() | {"term_json": json.dumps([gap])})
