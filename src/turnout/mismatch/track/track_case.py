@@ -154,6 +154,7 @@ class TrackCase(Case):
         return blows.split(blows.scaled(pair, h * self.chain(values, terms, pair)))
 
     def passage_of(self, values, terms, made):
+        """(n_sensor * n_time,) what the channels of a passage show, one sensor behind the other."""
         clean = self.clean(values, terms, made)
         return np.concatenate([self.shown(values, terms, made, s, row) for s, row in zip(made.sensors, clean)])
 
