@@ -109,11 +109,11 @@ def _from_both_ends(system, window, reach):
     return *_factors(turned), np.ascontiguousarray(middle)
 
 
-def _reach(track, matrices, s, decay_at_end):
-    """Half width of the windows: decay of EI w'''' + s² m w = 0 down to exp(-``decay_at_end``), in rows."""
+def _reach(track, matrices, s, exponent):
+    """Half width of the windows: decay of EI w'''' + s² m w = 0 down to exp(-``exponent``), in rows."""
     rails = {*matrices.rails}
     decay = min(float(np.min(np.abs(np.roots([r.bending_stiffness, 0, 0, 0, s * s * r.mass]).real))) for r in rails)
-    span = decay_at_end / decay
+    span = exponent / decay
     node = matrices.node
     rows = [
         matrices.node_index[min(np.searchsorted(node, x + span), node.size - 1)] - i

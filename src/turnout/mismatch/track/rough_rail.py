@@ -30,9 +30,8 @@ class Waves:
         self.names = tuple(
             f"{'cos' if q == 0.0 else 'sin'}_wave_{o}" for o, q in zip(np.repeat(orders, 2), self.quarter)
         )
-        self.sd = amplitude_sd(
-            self.wavelength, self.length, offset
-        )  # the limit curve is an upper limit for sound rails: more hides dips of half a millimetre
+        # the limit curve is an upper limit for sound rails: more hides dips of half a millimetre
+        self.sd = amplitude_sd(self.wavelength, self.length, offset)
 
     def nuisances(self):
         """One amplitude per wave [m]."""
