@@ -89,7 +89,7 @@ def _readable(said, diagnosis):
         v = term.values
         if "log_frequency" in v:
             old = f"log_frequency {v['log_frequency']:.4g}, log_damping {v['log_damping']:.4g}"
-            new = f"{np.exp(v['log_frequency']):.1f} Hz, damping {100.0 * np.exp(v['log_damping']):.2f} %"
+            new = f"{np.exp(v['log_frequency']) * stretched(diagnosis):.1f} Hz, damping {100.0 * np.exp(v['log_damping']):.2f} %"
             said = said.replace(old, new)
     return said
 
@@ -101,9 +101,18 @@ def where(diagnosis):
 
 
 def mode_found(diagnosis):
-    """(frequency [Hz], damping ratio [%]) of the resonance named."""
+    """(frequency [Hz], damping ratio [%]) of the resonance named, its frequency the mean over the blows used.
+
+    A common stretch of all blows and the frequencies of all resonances only show as a product.
+    """
     v = next(t.values for t in diagnosis.fit.terms if t.kind == "mode")
-    return float(np.exp(v["log_frequency"])), 100.0 * float(np.exp(v["log_damping"]))
+    return float(np.exp(v["log_frequency"])) * stretched(diagnosis), 100.0 * float(np.exp(v["log_damping"]))
+
+
+def stretched(diagnosis):
+    """Mean factor on all frequencies over the blows that were used; a reserved one is at its prior."""
+    own = [v for name, v in diagnosis.fit.values.items() if name.startswith("stretch@") and v != 0.0]
+    return 1.0 + float(np.mean(own))
 
 
 def draw(found, path):
