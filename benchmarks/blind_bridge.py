@@ -94,8 +94,8 @@ def rows_of(diagnosis):
     """Finding rows of a diagnosis."""
     found = []
     for verdict in diagnosis.verdicts:
-        best = verdict.scores[0] if verdict.scores and verdict.names else None
-        row = _row(verdict.answer, best and best.candidate, best and best.fit, diagnosis.verification, diagnosis.where)
+        best = verdict.scores[0].candidate if verdict.scores and verdict.names else None
+        row = _row(verdict.answer, best, diagnosis.fit, diagnosis.verification, diagnosis.where)
         frame = diagnosis.frames[0].frame if diagnosis.frames else None
         found.append(
             row
@@ -109,8 +109,8 @@ def rows_of(diagnosis):
 
 def _row(verdict, candidate, fit, seen, found=None):
     where = dict(candidate.where) if candidate else acts(found) if verdict == "unknown" else {}
-    n = len(candidate.parameters) if candidate and fit else 0
-    values = zip(candidate.parameters, fit.psi[-n:], fit.psi_se[-n:]) if n else ()
+    mine = fit.part(candidate) if candidate and fit else None
+    values = zip(candidate.parameters, fit.psi[mine], fit.psi_se[mine]) if mine else ()
     numbers = {p.name: {"value": float(v), "se": float(s), "unit": p.unit} for p, v, s in values}
     fits = {f"fit_{name}_pct": _number(getattr(seen, name, None)) for name in ("before", "after", "rival", "decoy")}
     return {

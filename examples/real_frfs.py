@@ -89,7 +89,8 @@ def _readable(said, diagnosis):
         v = term.values
         if "log_frequency" in v:
             old = f"log_frequency {v['log_frequency']:.4g}, log_damping {v['log_damping']:.4g}"
-            new = f"{np.exp(v['log_frequency']) * stretched(diagnosis):.1f} Hz, damping {100.0 * np.exp(v['log_damping']):.2f} %"
+            frequency = np.exp(v["log_frequency"]) * stretched(diagnosis)
+            new = f"{frequency:.1f} Hz, damping {100.0 * np.exp(v['log_damping']):.2f} %"
             said = said.replace(old, new)
     return said
 

@@ -118,7 +118,8 @@ class Candidate:
     One found by a look at the residual has the gain it promises [nats] in ``promise``, starts as it is, from the
     nuisances ``begin``; ``aside`` is evidence from data that are no observations [nats].
     ``kin``: laws of one part; where one leads at a place, all with that word are refitted there. ``limit`` is the
-    family that it cannot be told from at the lower bound of its first parameter.
+    family that it cannot be told from at the lower bound of its first parameter. ``whole``: its response turns with its
+    size, so that a start promises what it is and says nothing of a larger or smaller one.
     ``loose`` is the share by which the size of an effect errs since its law is not quite the one out there.
     """
 
@@ -142,6 +143,7 @@ class Candidate:
     loose: float = 0.0
     kin: str = ""
     limit: str = ""
+    whole: bool = False
 
     @property
     def key(self):

@@ -10,6 +10,7 @@ from turnout.mismatch.latent import Latent
 from turnout.mismatch.locate import attribute, cell_energies
 from turnout.mismatch.refits import kept, scored, to_the_end
 from turnout.mismatch.scoring import judged, latent_of, over
+from turnout.mismatch.together import reconsidered, refused
 from turnout.mismatch.verdict import Verdict
 from turnout.mismatch.verify import decoy, fit_percent, predict_reserved
 from turnout.mismatch.whereabouts import Whereabouts, whereabouts
@@ -83,19 +84,21 @@ def diagnose(case, settings=None, progress=None, store=None):
         return Diagnosis((verdict,), base, base, frames, _verified(case, base, base, None), latent_of(case, base))
     verdicts, fit, scores = [], base, ()
     for effect in range(settings.effects):
-        promising = {s.family for s in scores if s.gain > settings.threshold}
+        promising = None if refused(verdicts) else {s.family for s in scores if s.gain > settings.threshold}
         scores = scored(case, fit, settings, tell, store, effect, promising)
         verdict, best = judged(case, fit, scores, settings)
         if effect and (verdict.answer != "named" or best.gain < SHAPE * verdicts[0].scores[0].gain):
             break
         verdicts.append(verdict)
-        if verdict.answer not in ("named", "a_or_b"):
+        if verdict.answer == "none" or best is None or best.gain <= settings.threshold:
             break
         fit = best.fit if best.fit.jacobian else to_the_end(case, best.fit, settings)
         if verdict.answer == "a_or_b" or (not case.frozen_jacobian and over(case, fit, settings) <= 1.0):
             break
-    rival, refused = _rival(verdicts[0]), verdicts[0].scores[0] if verdicts[0].scores else None
-    where = whereabouts(case, base, refused) if verdicts[0].answer == "unknown" else None
+    if refused(verdicts):
+        verdicts, fit = reconsidered(case, base, fit, verdicts, settings)
+    rival, leader = _rival(verdicts[0]), verdicts[0].scores[0] if verdicts[0].scores else None
+    where = whereabouts(case, base, leader) if verdicts[0].answer == "unknown" else None
     return Diagnosis(
         tuple(verdicts), base, fit, frames, _verified(case, base, fit, rival), latent_of(case, base), {},
         scores, where,

@@ -49,6 +49,16 @@ class Fit:
         """The same fit with these candidates, which carry functions and are not kept on disk."""
         return replace(self, candidates=tuple(candidates))
 
+    def part(self, candidate):
+        """Where the parameters of ``candidate`` are in ``psi``, a slice."""
+        first = 0
+        for known in self.candidates:
+            last = first + len(known.parameters)
+            if known.key == candidate.key:
+                return slice(first, last)
+            first = last
+        raise KeyError(f"{candidate.key} is not in this fit")
+
     @property
     def psi_se(self):
         """(n_term,) standard errors of the terms' parameters; a size errs by the ``loose`` share of it as well."""

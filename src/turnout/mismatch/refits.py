@@ -8,7 +8,7 @@ from turnout.errors import SimulationError
 from turnout.mismatch.held_out import held_out_score
 from turnout.mismatch.joint import cost_at, fit_jointly
 from turnout.mismatch.scoring import score_of
-from turnout.mismatch.shortlist import shortlist
+from turnout.mismatch.shortlist import Entry, shortlist
 
 HELD = 0.5  # of what the cheap observations gained; a refit that holds less has not come to its end
 PROMISING = 0.5  # of the threshold, which laws of a part must gain before its other laws are asked
@@ -33,12 +33,27 @@ def scored(case, fit, settings, tell, store, effect, promising):
             scores[score.family] = score
     ranked = sorted(scores.values(), key=lambda s: -s.gain)
     if case.frozen_jacobian and ranked:
+        ranked = _limits_beside(case, fit, ranked, settings, store, effect)
         material = [s for s in ranked if s.material][:2]
         leaders = [s for s in material if s.gain > max(settings.threshold, material[0].gain - settings.margin)]
         polished = [_polished(case, fit, s, settings, store, effect) for s in leaders]
         ranked = sorted([*polished, *(s for s in ranked if all(s is not x for x in leaders))], key=lambda s: -s.gain)
         ranked = beside(case, fit, ranked, settings)
     return tuple(_checked(case, fit, s) for s in ranked)
+
+
+def _limits_beside(case, fit, ranked, settings, store, effect):
+    """The scores, where a law at its bound leads with the family that it cannot be told from there (``limit``) fitted
+    anew from the leader's nuisances: they are its own as well."""
+    leader = ranked[0]
+    for k, score in enumerate(ranked[1:], 1):
+        if leader.gain > settings.threshold and score.is_limit_of(leader):
+            start = score.fit.psi[fit.psi.size :]
+            entry = Entry(score.candidate, start, leader.fit.values)
+            again = _tried(case, fit, entry, settings, store, f"{effect}:beside")
+            if again is not None and again.gain > score.gain:
+                ranked[k] = again
+    return sorted(ranked, key=lambda s: -s.gain)
 
 
 def beside(case, fit, ranked, settings):

@@ -11,6 +11,13 @@ ODD = 3.0  # times the spread of like parts: one in 370 of sound ones
 FEWEST = 6  # like parts that make a spread
 
 
+def explained_of(case, fit, refit, settings):
+    """Share of the excess over the level of controls that ``refit`` takes away, 1 where there is none."""
+    control = _control(case, fit, settings)
+    before = _excess(fit.level, control)
+    return 1.0 - _excess(refit.level, control) / before if before > 0.0 else 1.0
+
+
 def _control(case, fit, settings):
     """Weighted mean square by kind that controls reach."""
     return {kind: case.control_level.get(kind, settings.control_level) for kind in fit.level}
@@ -28,9 +35,7 @@ def score_of(case, fit, refit, candidate, settings):
         mine, reference = held_out_score(case, refit), held_out_score(case, fit)
         by_condition = {c: mine[c] - reference[c] for c in reference}
         gain = sum(by_condition.values()) if by_condition else gain
-    control = _control(case, fit, settings)
-    before = _excess(fit.level, control)
-    explained = 1.0 - _excess(refit.level, control) / before if before > 0.0 else 1.0
+    explained = explained_of(case, fit, refit, settings)
     worst = min(by_condition.values(), default=0.0)
     gain += candidate.aside
     usual = _usual(case, refit, candidate)
@@ -48,7 +53,7 @@ def _usual(case, refit, candidate):
         return False
     stem = candidate.twin.rsplit("_", 1)[0]
     like = [k for k, n in enumerate(case.nuisances) if n.name.rsplit("_", 1)[0] == stem and n.name != candidate.twin]
-    first = refit.psi[-len(candidate.parameters)]
+    first = refit.psi[refit.part(candidate).start]
     if len(like) < FEWEST or first <= 0.0:
         return False
     values = np.array([refit.values[case.nuisances[k].name] for k in like])
@@ -62,7 +67,7 @@ def over(case, fit, settings):
     return max(fit.level[kind] / control[kind] for kind in fit.level)
 
 
-def _loudest(case, fit):
+def loudest(case, fit):
     """Largest mean square of one channel in one recording over what it is in controls, of the kinds that tell."""
     found = [0.0]
     for o, white in zip(case.observations, fit.white):
@@ -80,20 +85,25 @@ def _loudest(case, fit):
 def judged(case, fit, scored, settings):
     """(Verdict on the ``scored`` candidates on top of ``fit``, the best Score of a size that matters or None)."""
     best = max((s for s in scored if s.material), key=lambda s: s.gain, default=None)
-    excess = max(over(case, fit, settings), _loudest(case, fit))
+    excess = max(over(case, fit, settings), loudest(case, fit))
     scored = tuple(s for s in scored if s.material)
     if best is None:
         return judge([], excess, settings, disturbed=bool(case.disturbed)), None
     consistent, structure = True, 0.0
     if best.gain > settings.threshold:
-        consistent = _consistent(case, fit, best, settings)
-        left = latent_of(case, best.fit)
-        structure = max(left.r2.values(), default=0.0) if left else 0.0
+        consistent = consistent_elsewhere(case, fit, best, settings)
+        structure = structure_left(case, best.fit)
     left = over(case, best.fit, settings)
     return judge(scored, excess, settings, consistent, structure, left, bool(case.disturbed)), best
 
 
-def _consistent(case, base, best, settings):
+def structure_left(case, fit):
+    """Share of what ``fit`` leaves that a free law of the state still explains."""
+    left = latent_of(case, fit)
+    return max(left.r2.values(), default=0.0) if left else 0.0
+
+
+def consistent_elsewhere(case, base, best, settings):
     """Reserved conditions are predicted no worse than without the effect: neither at twice the mean square, nor at a
     lower fit that costs as much of the evidence as no condition may (``verdict.objected``)."""
     if not case.reserved:

@@ -153,7 +153,8 @@ class Projector:
         slope = float(column @ self.right - across @ self.shift)
         if size <= 1e-12 * float(column @ column) or size <= 0.0:
             return 0.0, 1.0
-        share = float(np.clip(slope / size, 0.1, _furthest(candidate, candidate.starts[start])))
+        nearest = slope / size if not candidate.whole else 1.0
+        share = float(np.clip(nearest, 0.1, _furthest(candidate, candidate.starts[start])))
         return 2.0 * share * slope - share**2 * size, share
 
 

@@ -24,6 +24,12 @@ class Score:
     usual: bool = False
 
     @property
+    def size(self):
+        """(value, standard error) of its first parameter, the size of the effect."""
+        first = self.fit.part(self.candidate).start
+        return float(self.fit.psi[first]), float(self.fit.psi_se[first])
+
+    @property
     def family(self):
         """Name of the effect."""
         return self.candidate.family
@@ -33,16 +39,16 @@ class Score:
         """It is large enough that somebody would act."""
         if self.usual:
             return False
-        n = len(self.candidate.parameters)
-        size = abs(float(self.fit.psi[-n]) - self.candidate.neutral[0]) if n else np.inf
+        known = self.candidate.parameters
+        size = abs(self.size[0] - known[0].neutral) if known else np.inf
         return size >= getattr(self.candidate, "least", 0.0)
 
     def is_limit_of(self, other):
         """``other`` is at the bound, within its standard error, where it cannot be told from this at the same place."""
         if getattr(other.candidate, "limit", "") != self.family or other.candidate.where != self.candidate.where:
             return False
-        n = len(other.candidate.parameters)
-        return float(other.fit.psi[-n] - other.fit.psi_se[-n]) <= other.candidate.parameters[0].bounds[0]
+        size, error = other.size
+        return size - error <= other.candidate.parameters[0].bounds[0]
 
 
 @dataclass(frozen=True)

@@ -16,12 +16,17 @@ FACTOR = (Parameter("factor", "-", 1.0, (0.05, 20.0), "share of stiffness", "mad
 HERE = {"sleeper": 7, "place": 4.2}
 
 
+def first(_):
+    """Parameters of the only candidate of a fit."""
+    return slice(0, 1)
+
+
 def candidate(family, where=HERE, **more):
     return Candidate(family, FACTOR, lambda psi: psi, ((0.4,),), where, **more)
 
 
 def score(found, gain, factor, error, explained=1.0):
-    fit = SimpleNamespace(psi=np.array([factor]), psi_se=np.array([error]))
+    fit = SimpleNamespace(psi=np.array([factor]), psi_se=np.array([error]), part=first)
     return Score(found, gain, 0.0, explained, fit)
 
 
@@ -57,6 +62,7 @@ def test_a_support_is_odd_against_the_spread_of_its_like(times, usual):
         values=dict(zip(names, [9.0, *values, 9.0])),
         covariance=np.diag([50.0, *np.full(7, 9e-2), 50.0, 1e-4]),
         psi=np.array([np.exp(times * spread)]),
+        part=first,
     )
     assert _usual(case, refit, candidate("local_pad", twin="pad_0")) == usual
     assert not _usual(case, refit, candidate("local_pad"))
@@ -96,7 +102,7 @@ def test_a_weak_name_that_predicts_worse_is_nothing_where_nothing_is_left_to_exp
 def test_a_name_that_one_condition_speaks_against_is_none(gain, worst, excess, said):
     """``gain`` and ``worst`` in thresholds: half of one is chance, a fifth of the gain is not."""
     settings = MismatchSettings()
-    fit = SimpleNamespace(psi=np.array([2.0]), psi_se=np.array([0.1]))
+    fit = SimpleNamespace(psi=np.array([2.0]), psi_se=np.array([0.1]), part=first)
     found = Score(candidate("rail_shear", {}), gain * settings.threshold, worst * settings.threshold, 1.0, fit)
     assert judge([found], excess, settings).answer == said
 

@@ -1,6 +1,8 @@
 """The base model of a turnout: which of its numbers are free, how free, and the track that they give."""
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from operator import itemgetter
 
 import numpy as np
 
@@ -130,12 +132,17 @@ def track_with(track, zone, values):
 
 def inner_names(zone):
     """Names of all that ``track_with`` reads, first among the nuisances of a case."""
-    return [n for n, *_ in COMMON] + [f"{own.tag}_{j}" for own in OWN for j in zone.supports]
+    return _names_of(zone.supports)
+
+
+@lru_cache(maxsize=8)
+def _names_of(supports):
+    return [n for n, *_ in COMMON] + [f"{own.tag}_{j}" for own in OWN for j in supports]
 
 
 def inner_values(zone, values):
     """All that ``track_with`` reads, as one row: a key for what was computed with it."""
-    return np.array([values[n] for n in inner_names(zone)]).tobytes()
+    return np.array(itemgetter(*inner_names(zone))(values)).tobytes()
 
 
 def vehicle_with(vehicle, values, train, load):

@@ -153,13 +153,26 @@ class BlowModel:
         self.track, self.terms = track, terms
         self.added = (*terms, FixedLinks(tangent(terms, track)))
         self.matrices = matrices_of(track, self.added)
-        self.by_place, self.strain = {}, {}
+        self.by_place, self.strain, self.weight = {}, {}, {}
+
+    def solve(self, places):
+        """Remember the displacements under unit forces at these places: together they need one factorisation."""
+        new = [p for p in dict.fromkeys(places) if p not in self.by_place]
+        if new:
+            found = responses(self.matrices, LINES, new)
+            self.by_place |= {p: found[:, k] for k, p in enumerate(new)}
 
     def displacement(self, place):
         """(n_line, n) of all degrees of freedom under a unit force at a place."""
-        if place not in self.by_place:
-            self.by_place[place] = responses(self.matrices, LINES, [place])[:, 0]
+        self.solve([place])
         return self.by_place[place]
+
+    def moved(self, excited, measured):
+        """(n_line,) displacement at one place under a unit force at another, nodes' motion alone. [m/N]"""
+        if measured not in self.weight:
+            self.weight[measured] = self.matrices.weights(measured)
+        rows, weights = self.weight[measured]
+        return self.displacement(excited)[:, rows] @ weights
 
     def place_of(self, sensor):
         """Place of a sensor on the model."""
@@ -167,8 +180,7 @@ class BlowModel:
 
     def receptance(self, excited, measured):
         """(n_line,) complex [m/N]."""
-        rows, weights = self.matrices.weights(measured)
-        h = self.displacement(excited)[:, rows] @ weights
+        h = self.moved(excited, measured)
         if not isinstance(measured, tuple) and abs(excited - measured) < 1e-9:
             h = h + self.matrices.compliance(float(excited))
         return h
@@ -177,11 +189,7 @@ class BlowModel:
         """Derivative by the sensor's place on the rail, (n_line,) [1/N]; 0 on a sleeper."""
         if isinstance(measured, tuple):
             return np.zeros(LINES.size, dtype=complex)
-        u, ends = self.displacement(excited), []
-        for place in (measured - way, measured + way):
-            rows, weights = self.matrices.weights(place)
-            ends.append(u[:, rows] @ weights)
-        return (ends[1] - ends[0]) / (2.0 * way)
+        return (self.moved(excited, measured + way) - self.moved(excited, measured - way)) / (2.0 * way)
 
     def strains(self, place):
         """(n_line, n_element) bending and shearing of the rail's elements under a unit force at a place."""

@@ -12,7 +12,8 @@ LOOSE = 0.15  # share by which sizes err: nine effects of another simulator, ope
 GAPS = (1.3e-4, 3e-4, 7e-4, 1.6e-3)  # below the first a train closes it at once, behind the last it never does [m]
 SEATED = (0.0, 0.4)  # share of the bed that still bears: nothing, or nearly a half
 MOUNTINGS = (300.0, 200.0, 450.0, 650.0, 900.0, 1200.0)  # half a width at Q = 3 apart [Hz]
-DELAYS = (1.5e-4, 6e-4, 2.5e-3)  # a column is straight over a tenth of a turn of what it delays [s]
+DELAYS = (1e-4, 2.5e-4, *np.arange(5e-4, 5.6e-3, 5e-4))  # a quarter of a turn at 500 Hz apart [s]
+DRIFTS = (2.5e-4, 5e-4, 1e-3, 2e-3, 4e-3)  # a sensor is passed within some seconds
 DIP_STEP = 0.6  # places of a dip scanned [m]; its own shift covers what lies between
 # Least size worth a name, in the unit of the first parameter: below it nobody would go to the site.
 LEAST = {
@@ -85,13 +86,13 @@ def _sensors(case):
 
         yield per(physics.SensorGain, ((0.8,), (1.25,)), twin=f"gain_{name}", twin_sd=0.3, twin_log=False)
         yield per(physics.MountResonance, tuple((1.0 / f, 8.0) for f in MOUNTINGS))
-        yield per(physics.TimeOffset, tuple((sign * d,) for d in DELAYS for sign in (1.0, -1.0)))
+        yield per(physics.TimeOffset, tuple((sign * d,) for d in DELAYS for sign in (1.0, -1.0)), whole=True)
         yield per(physics.SensorPosition, ((0.15,), (-0.15,), (0.4,), (-0.4,)), even=True,
                   twin=f"seat_{name}", twin_sd=0.3, twin_log=False)  # fmt: skip
         yield per(physics.LowPass, ((1 / 500.0,),))
         yield per(physics.HighPass, ((12.0,),))
         if case.rollings:
-            yield per(physics.ClockDrift, ((1e-3,), (-1e-3,)))
+            yield per(physics.ClockDrift, tuple((sign * d,) for d in DRIFTS for sign in (1.0, -1.0)), whole=True)
             peak = case.peak(name)
             if peak > 0.0:
                 yield per(physics.Clipping, ((0.6 * peak,),), loose=0.0)  # neutral is no limit: a share of infinity
@@ -132,4 +133,4 @@ def _wheels(case):
     for train in case.trains:
         where = {"train": train}
         yield _candidate(physics.UnsprungMass, lambda p, t=train: physics.UnsprungMass(train=t, **p),
-                         ((1.4,), (0.7,)), where, len(case.trains))  # fmt: skip
+                         ((1.4,), (0.7,)), where, len(case.trains), twin=f"wheels_{train}", twin_sd=0.3)  # fmt: skip

@@ -130,10 +130,18 @@ class TrackCase(Case):
         under = tuple(t.under(pair.conditions) for t in terms if t.kind in ("matrix", "port"))
         key = repr(under), inner_values(self.zone, values)
         if key not in self._models:
-            self._models[key] = blows.BlowModel(track_with(self.track(terms=under), self.zone, values), under)
+            made = blows.BlowModel(track_with(self.track(terms=under), self.zone, values), under)
+            self._models[key] = made
+            made.solve(self._touched(values, terms, pair.conditions, made))
             while len(self._models) > 8:
                 self._models.popitem(last=False)
         return self._models[key]
+
+    def _touched(self, values, terms, conditions, model):
+        """Places of blows and of the sensors that heard them, of all hammer tests under these conditions."""
+        alike = [p for p in self.pairs.values() if p.conditions == conditions]
+        sensors = {p.channel: p.sensor for p in alike}.values()
+        return [p.test.place for p in alike] + [model.place_of(self.seat(s, values, terms)) for s in sensors]
 
     def seat(self, sensor, values, terms):
         """The sensor where ``values`` and ``terms`` say that it sits."""

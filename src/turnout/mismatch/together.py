@@ -1,0 +1,60 @@
+"""Two effects at once: a name that was refused alone is asked again with the other effect in the model.
+
+What the first leaves, or bends, may be the second: either alone explains too little, and neither would be named.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from turnout.errors import SimulationError
+from turnout.mismatch.held_out import held_out_score
+from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.scoring import consistent_elsewhere, explained_of, loudest, over, structure_left
+from turnout.mismatch.verdict import TORN, judge
+
+RIVALS = 2  # that are fitted anew beside the second effect
+
+
+def refused(verdicts):
+    """Whether the first verdict, on an effect that was found, is "unknown"."""
+    return bool(verdicts) and verdicts[0].answer == "unknown"
+
+
+def reconsidered(case, base, fit, verdicts, settings):
+    """(verdicts, fit) after a second effect was sought on top of a first one that was refused: both stand where the
+    second is named and the first, or a close rival of it, passes with the second in the model."""
+    if len(verdicts) > 1:
+        pairs = list(_beside_second(case, base, fit, verdicts[0].scores, settings))
+        pairs.sort(key=lambda s: -s.gain)
+        best = pairs[0].fit
+        consistent = consistent_elsewhere(case, base, pairs[0], settings)
+        excess = max(over(case, base, settings), loudest(case, base))
+        left = over(case, best, settings)
+        found = judge(pairs, excess, settings, consistent, structure_left(case, best), left, bool(case.disturbed))
+        if found.answer in ("named", "a_or_b"):
+            return [found, *verdicts[1:]], best
+    return verdicts[:1], base
+
+
+def _beside_second(case, base, fit, scores, settings):
+    """The first effect's leader and its close rivals, each with what it is worth beside the second effect."""
+    leader, second = scores[0], fit.candidates[-1]
+    yield _worth(case, base, fit, leader, settings)
+    close = leader.gain - max(settings.margin, TORN * leader.gain)
+    for rival in [s for s in scores[1:] if s.gain > max(close, settings.threshold)][:RIVALS]:
+        psi = np.concatenate([rival.fit.psi, fit.psi[-len(second.parameters) :]])
+        try:
+            both = fit_jointly(case, (rival.candidate, second), psi, fit.values, iterations=settings.iterations)
+        except SimulationError:
+            continue
+        yield _worth(case, base, both, rival, settings)
+
+
+def _worth(case, base, both, score, settings):
+    """The score of a first effect by what the fit with ``both`` gains."""
+    mine, reference = held_out_score(case, both), held_out_score(case, base)
+    by_condition = {c: mine[c] - reference[c] for c in reference}
+    gain = both.evidence - base.evidence + score.candidate.aside - np.log(score.candidate.scanned)
+    explained, worst = explained_of(case, base, both, settings), min(by_condition.values(), default=0.0)
+    return replace(score, gain=gain, fit=both, explained=explained, worst=worst, by_condition=by_condition)
