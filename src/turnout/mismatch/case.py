@@ -111,14 +111,15 @@ class Candidate:
     ``scanned`` how many places the family has; ``starts`` are parameter sets that do not depend on the base fit;
     with ``start_from_base`` off the nuisances, too, start from their priors; ``always``: tried on the cheap
     observations at every place, whatever the residual promises; families with the same word are alike there;
-    ``least``: distance of the first parameter from neutral below which nobody would act; ``even``: the cheap
+    ``least``: distance of the first ``sized`` parameters from neutral below which nobody would act; ``even``: the cheap
     observations hardly tell a value from its mirror image about neutral; ``twin``: nuisance that hides it, the
     first parameter's logarithm or (``twin_log`` off) distance from neutral, and would have ``twin_sd`` with the effect.
     ``parameters`` have name, unit, neutral, bounds and prior as ``turnout.physics.Parameter``.
     One found by a look at the residual has the gain it promises [nats] in ``promise``, starts as it is, from the
     nuisances ``begin``; ``aside`` is evidence from data that are no observations [nats].
     ``kin``: laws of one part; where one leads at a place, all with that word are refitted there. ``limit`` is the
-    family that it cannot be told from at the lower bound of its first parameter. ``whole``: its response turns with its
+    family that it cannot be told from at the lower bound of its first parameter; ``plain`` is (family, k): where its
+    first parameter does not matter it is that law, of the size of its k-th. ``whole``: its response turns with its
     size, so that a start promises what it is and says nothing of a larger or smaller one.
     ``loose`` is the share by which the size of an effect errs since its law is not quite the one out there.
     """
@@ -143,13 +144,20 @@ class Candidate:
     loose: float = 0.0
     kin: str = ""
     limit: str = ""
+    plain: tuple = ()
     whole: bool = False
+    sized: int = 1
 
     @property
     def key(self):
         """Family and place in one word."""
         place = ",".join(f"{k}={v}" for k, v in sorted(self.where.items()))
         return f"{self.family}[{place}]" if place else self.family
+
+    @property
+    def part(self):
+        """(kin, place): what it is a law of."""
+        return self.kin, self.where.get("place")
 
     @property
     def neutral(self):

@@ -74,7 +74,7 @@ def beside(case, fit, ranked, settings):
 def _after_its_kin(entry, scores):
     """The rival with the nuisances that the best law of its part was given: they are nearly its own."""
     candidate = entry.candidate
-    kin = [s for s in scores.values() if s.candidate.kin == candidate.kin and s.candidate.where == candidate.where]
+    kin = [s for s in scores.values() if s.candidate.part == candidate.part]
     return replace(entry, values=max(kin, key=lambda s: s.gain).fit.values) if kin else entry
 
 

@@ -13,7 +13,7 @@ from turnout.errors import SimulationError
 from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.shortlist import Projector, amplified
 
-STEPS, GLANCE = 15, 4
+STEPS, GLANCE, GLANCED = 15, 4, 5
 BLIND = 0.999  # of the prior standard deviation is left: nothing was learnt
 ENOUGH = 0.5  # nats; a step that gains less ends a scout's fit
 
@@ -55,16 +55,18 @@ def scout(case, fit, settings, families=None):
             gain = refit.evidence - base.evidence - np.log(candidate.scanned)
             if best is None or gain > best.gain:
                 levels = (max(f.level.values()) for f in (refit, base))
-                best = Found(gain, candidate, refit.psi[n:], _seen(cheap, refit), *levels)
+                best = Found(gain, candidate, refit.psi[n:], _seen(cheap, refit, candidate), *levels)
         if best is not None:
             found.append(best)
     return sorted(found, key=lambda f: -f.gain)
 
 
-def _seen(case, fit):
-    """Values of the nuisances that the cheap observations say anything about."""
+def _seen(case, fit, candidate):
+    """Values of the nuisances that the cheap observations say anything about, and of the twin, of which they say
+    nothing beside the candidate: what the base model took it for must not come on top."""
     sd = np.sqrt(np.diag(fit.covariance))
-    return {n.name: fit.values[n.name] for n, s in zip(case.nuisances, sd) if s < BLIND * n.sd}
+    known = {n.name: s < BLIND * n.sd or n.name == candidate.twin for n, s in zip(case.nuisances, sd)}
+    return {name: fit.values[name] for name, seen in known.items() if seen}
 
 
 def _ranked(case, cheap, fit, held):
@@ -92,12 +94,16 @@ def _likeliest(members, rough, first, held, settings, glances):
     """The places of a family that promise most, each with its best start.
 
     Families that the base model swallows (``always``) are tried at every place by a few steps of the broad fit; those
-    alike share these ``glances``.
+    alike share these ``glances``. One of the whole track is tried so from its ``GLANCED`` most promising starts.
     """
     best = {}
     for gain, candidate, start in sorted(members, key=lambda m: m[0]):
         best[candidate.key] = gain, candidate, start
     alike = next(iter(best.values()))[1].always
+    if alike and len(best) == 1:
+        starts = {tuple(start): (candidate, start) for _, candidate, start in sorted(members, key=lambda m: m[0])}
+        tried = list(starts.values())[-GLANCED:]
+        return [max(tried, key=lambda m: _glance(rough, first, held, *m)) if tried[1:] else tried[0]]
     if alike:
         for _, c, s in best.values() if len(best) > 1 else ():
             place = alike, tuple(sorted(c.where.items()))

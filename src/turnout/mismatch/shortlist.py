@@ -79,11 +79,12 @@ def _fitted_already(entry, scored):
 
 def _kin(chosen, scored):
     """Best starts of the laws that act on the same parts as the first chosen: columns hardly tell them apart."""
-    parts = [(e[1].kin, e[1].where) for e in chosen if e[1].kin][:2]
-    known, best = {entry[1].key for entry in chosen}, {}
+    parts = [e[1].part for e in chosen if e[1].kin][:2]
+    known, best = {(entry[1].family, entry[1].part) for entry in chosen}, {}
     for entry in sorted((e for entries in scored.values() for e in entries), key=lambda e: e[0]):
-        if (entry[1].kin, entry[1].where) in parts and entry[1].key not in known:
-            best[entry[1].key] = entry
+        law = entry[1].family, entry[1].part
+        if entry[1].part in parts and law not in known:
+            best[law] = entry
     return list(best.values())
 
 

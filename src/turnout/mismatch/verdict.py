@@ -24,10 +24,10 @@ class Score:
     usual: bool = False
 
     @property
-    def size(self):
-        """(value, standard error) of its first parameter, the size of the effect."""
-        first = self.fit.part(self.candidate).start
-        return float(self.fit.psi[first]), float(self.fit.psi_se[first])
+    def own(self):
+        """(values, standard errors) of its parameters; the first is the size of the effect."""
+        mine = self.fit.part(self.candidate)
+        return self.fit.psi[mine], self.fit.psi_se[mine]
 
     @property
     def family(self):
@@ -39,16 +39,24 @@ class Score:
         """It is large enough that somebody would act."""
         if self.usual:
             return False
-        known = self.candidate.parameters
-        size = abs(self.size[0] - known[0].neutral) if known else np.inf
+        known, sized = self.candidate.parameters, self.candidate.sized
+        size = np.linalg.norm(self.own[0][:sized] - self.candidate.neutral[:sized]) if known else np.inf
         return size >= getattr(self.candidate, "least", 0.0)
 
     def is_limit_of(self, other):
         """``other`` is at the bound, within its standard error, where it cannot be told from this at the same place."""
         if getattr(other.candidate, "limit", "") != self.family or other.candidate.where != self.candidate.where:
             return False
-        size, error = other.size
-        return size - error <= other.candidate.parameters[0].bounds[0]
+        sizes, errors = other.own
+        return float(sizes[0] - errors[0]) <= other.candidate.parameters[0].bounds[0]
+
+    def is_plain_form_of(self, other):
+        """``other`` at the same place says the same with a parameter more: its size is this one's."""
+        family, k = other.candidate.plain or ("", 0)
+        if family != self.family or other.candidate.where != self.candidate.where:
+            return False
+        (mine, error), (others, errors) = self.own, other.own
+        return abs(mine[0] - others[k]) <= 2.0 * np.hypot(error[0], errors[k])
 
 
 @dataclass(frozen=True)
@@ -183,10 +191,13 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
         return verdict("unknown", reason=f"a free law still explains {structure:.0%} of what {best.family} leaves")
     if torn:
         return verdict("unknown", reason=f"{best.family} makes one condition worse by {-best.worst:.0f} nats")
-    same = [s for s in found[1:] if s.is_limit_of(best) and s.explained >= settings.explained]
+    plain = next((s for s in found[1:] if best.gain - s.gain < settings.margin and s.is_plain_form_of(best)), None)
+    best = plain or best  # the law with fewer numbers says as much
+    same = [s for s in found if s.is_limit_of(best) and s.explained >= settings.explained]
     if same:  # what carries nothing hangs
         return verdict("a_or_b", (best.family, same[0].family), reason=f"{best.family} is at its limit")
-    rivals = [s for s in found[1:] if best.gain - s.gain < settings.margin]
+    rivals = [s for s in found if s is not best and best.gain - s.gain < settings.margin]
+    rivals = [s for s in rivals if not best.is_plain_form_of(s)]
     if rivals:
         return verdict("a_or_b", (best.family, rivals[0].family), reason="within the margin of each other")
     grade = "A" if left <= 1.0 else "B"

@@ -20,13 +20,13 @@ class MismatchSettings:
         1.6, "-", "weighted mean square above which a fit has not reached the level of controls", 1.0, 100.0
     )
     hammer_control: float = setting(
-        0.8, "-", "weighted mean square of receptances that controls of another generator stay below", 0.1, 100.0
+        0.9, "-", "weighted mean square of receptances that controls of another generator stay below", 0.1, 100.0
     )
     passage_control: float = setting(
         0.7, "-", "weighted mean square of passages that controls of another generator stay below", 0.1, 100.0
     )
     cell_control: float = setting(
-        1.25, "-", "the same of one channel of one passage: one control in 200, by the extreme values of 16", 0.1, 100.0
+        2.0, "-", "the same of one channel of one passage: the largest of 55 controls was 1.9, others 1.2", 0.1, 100.0
     )
     threshold: float = setting(
         12.0, "nats", "held-out gain that no control exceeded, with a reserve of half; see docs/mismatch.md", 0.0

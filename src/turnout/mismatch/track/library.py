@@ -14,6 +14,8 @@ SEATED = (0.0, 0.4)  # share of the bed that still bears: nothing, or nearly a h
 MOUNTINGS = (300.0, 200.0, 450.0, 650.0, 900.0, 1200.0)  # half a width at Q = 3 apart [Hz]
 DELAYS = (1e-4, 2.5e-4, *np.arange(5e-4, 5.6e-3, 5e-4))  # a quarter of a turn at 500 Hz apart [s]
 DRIFTS = (2.5e-4, 5e-4, 1e-3, 2e-3, 4e-3)  # a sensor is passed within some seconds
+RINGING = tuple(np.geomspace(90.0, 500.0, 6))  # a hung mass shows over half an octave [Hz]
+BENDING = tuple(np.geomspace(85.0, 760.0, 20))  # two widths of the resonance apart [Hz]
 DIP_STEP = 0.6  # places of a dip scanned [m]; its own shift covers what lies between
 # Least size worth a name, in the unit of the first parameter: below it nobody would go to the site.
 LEAST = {
@@ -22,6 +24,7 @@ LEAST = {
     "unsprung_mass": 0.07, "contact_stiffness": 0.1, "rail_shear": 0.9, "mount_resonance": 1 / 2000.0,
     "zener_pad": 0.08, "dry_friction": 500.0, "attached_resonator": 5.0,
 }  # fmt: skip
+STRETCHES = (1, 2, 4)  # sleepers to either side that stiffen alike
 LIMIT = {"local_ballast": "hanging_sleeper"}  # ballast without stiffness is a gap that no train closes
 
 
@@ -35,8 +38,8 @@ def _candidate(term, make, starts, where=None, scanned=1, base=True, parameters=
     chosen = tuple(p for p in term.parameters if parameters is None or p.name in parameters)
     frame = getattr(term, "frame", "place")
     return Candidate(
-        term.name, chosen, make, starts, where or {}, frame, scanned, base, always, LEAST.get(term.name, 0.0),
-        **{"loose": LOOSE, **more},
+        term.name, chosen, make, starts, where or {}, frame, scanned, base, always,
+        **{"loose": LOOSE, "least": LEAST.get(term.name, 0.0), **more},
     )  # fmt: skip
 
 
@@ -50,29 +53,31 @@ def _supports(case):
                              twin=f"{alike}_{j}", kin=alike, limit=LIMIT.get(term.name, ""))  # fmt: skip
         yield _candidate(physics.HangingSleeper, lambda p, j=j: physics.HangingSleeper(j, **p),
                          tuple((g, s) for s in SEATED for g in GAPS), where, n, base=False, always="ballast",
-                         kin="ballast")  # fmt: skip
+                         kin="ballast", plain=("local_ballast", 1))  # fmt: skip
         yield _candidate(physics.AttachedResonator, lambda p, j=j: physics.AttachedResonator(j, **p),
-                         ((15.0, 120.0, 0.03), (15.0, 350.0, 0.03)), where, n)  # fmt: skip
+                         tuple((15.0, f, 0.03) for f in RINGING), where, n)  # fmt: skip
         if case.rollings:  # for a blow of one strength friction is a damper: it takes trains to call it by its name
             yield _candidate(physics.DryFriction, lambda p, j=j: physics.DryFriction(j, **p), ((1500.0,),), where, n)
-        if case.rollings and case.zone.first < j < case.zone.last:
-            yield _candidate(physics.BallastHardening, lambda p, j=j: physics.BallastHardening(j - 1, j + 1, **p),
-                             ((3.0,),), where, n, kin="ballast")  # fmt: skip
+        for half in STRETCHES if case.rollings else ():
+            if case.zone.first <= j - half and j + half <= case.zone.last:
+                yield _candidate(physics.BallastHardening,
+                                 lambda p, a=j - half, b=j + half: physics.BallastHardening(a, b, **p), ((2.0,),),
+                                 {**where, "sleepers": 2 * half + 1}, len(STRETCHES) * n, kin="ballast")  # fmt: skip
 
 
 def _whole_track(case):
     """Common values of the base model bend first to hide what the whole track has: blows are asked whatever is left."""
 
-    def everywhere(term, starts):
-        return _candidate(term, lambda p: term(**p), starts, always=term.name)
+    def everywhere(term, starts, **more):
+        return _candidate(term, lambda p: term(**p), starts, always=term.name, **more)
 
     yield everywhere(physics.PadTemperature, ((0.01,),))
     if case.rollings:
         yield _candidate(physics.PadPreload, lambda p: physics.PadPreload(**p), ((3e3,),))
     yield everywhere(physics.ZenerPad, ((0.4,),))
-    yield everywhere(physics.RailShear, ((2.0,), (-1.5,)))
+    yield everywhere(physics.RailShear, ((1.5,), (3.5,), (6.0,), (9.0,), (-1.5,)), whole=True)
     yield everywhere(physics.BallastInertia, ((120.0, 0.0),))
-    yield everywhere(physics.SleeperMode, ((0.25, 180.0), (0.25, 400.0)))
+    yield everywhere(physics.SleeperMode, tuple((0.25, f) for f in BENDING))
 
 
 def _sensors(case):
@@ -96,7 +101,8 @@ def _sensors(case):
             peak = case.peak(name)
             if peak > 0.0:
                 yield per(physics.Clipping, ((0.6 * peak,),), loose=0.0)  # neutral is no limit: a share of infinity
-                yield per(physics.Hum, ((0.1 * peak, 0.0),))
+                least = case.settings.materiality * peak
+                yield per(physics.Hum, ((0.1 * peak, 0.0),), least=least, sized=2)
     for name, ceiling in case.ceilings.items():
         yield _clipped(name, ceiling)
 

@@ -105,25 +105,32 @@ def _passage(case, fit, made, chosen):
     rail, sleeper = support_forces(case, fit.values, fit.terms, made)
     rate, forces = case.solver.rate, {}
     track = case.track(made.passage.route)
-    for c, start in chosen:
-        j, values = c.where["sleeper"], c.starts[start]
+    laws = [(c.family, c.starts[start], j) for c, start in chosen for j in _sleepers(c)]
+    for family, values, j in dict.fromkeys(laws):
         k = j - case.zone.first
         y, d = sleeper[k], rail[k] - sleeper[k]
         kb, kp = track.ballast_stiffness[j], track.pad_stiffness[j]
-        if c.family == "hanging_sleeper":
+        if family == "hanging_sleeper":
             force = j, SLEEPER, (1.0 - values[1]) * kb * np.clip(y, -values[0], values[0])
-        elif c.family == "local_ballast":
+        elif family == "local_ballast":
             force = j, SLEEPER, -(values[0] - 1.0) * kb * y
-        elif c.family == "local_pad":
+        elif family == "local_pad":
             force = j, PAD, -(values[0] - 1.0) * kp * d
-        elif c.family == "dry_friction":
+        elif family == "dry_friction":
             force = j, PAD, -values[0] * np.tanh(np.gradient(d) * rate / 2e-3)
-        elif c.family == "ballast_hardening":
+        elif family == "ballast_hardening":
             force = j, SLEEPER, -values[0] * kb * y * (y / 1e-3) ** 2
         else:
             force = j, RAIL, -values[0] * np.gradient(np.gradient(rail[k])) * rate**2
-        forces[c.key, start] = force
-    return carried(case, fit.values, fit.terms, made, forces)
+        forces[family, values, j] = force
+    columns = carried(case, fit.values, fit.terms, made, forces)
+    return {(c.key, k): sum(columns[c.family, c.starts[k], j] for j in _sleepers(c)) for c, k in chosen}
+
+
+def _sleepers(candidate):
+    """Supports that its law acts at."""
+    half = (candidate.where.get("sleepers", 1) - 1) // 2
+    return range(candidate.where["sleeper"] - half, candidate.where["sleeper"] + half + 1)
 
 
 def _pair(case, fit, pair, chosen):
