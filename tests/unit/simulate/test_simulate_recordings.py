@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from turnout.physics import DryFriction
+from turnout.physics.dry_friction import SLIP
 from turnout.simulate import (
     Hammer,
     Sensor,
@@ -195,3 +197,19 @@ def test_own_error_falls_with_the_step_and_is_small_where_it_should_be():
     assert fine.allows(1.0).shape == (1, 5) and fine.allows(1.0)[0, 0] and not fine.allows(0.0).any()
     assert "A " in str(fine)
     assert end_error(case).max() < 0.2
+
+
+def test_friction_that_a_blow_cannot_overcome_is_a_dashpot():
+    """Below slip F0 tanh(v/v0) is a damper of F0/v0: 20 kN over 2 mm/s, to the 1 % of (v/v0)²/3 at a sixth of v0."""
+    track, sensors = uniform_track(24.0), [Sensor("A", 12.0), Sensor("B", 12.9)]
+    stuck = np.array(track.pad_damping)
+    stuck[20] += 2e4 / SLIP
+    shown = [
+        simulate_hammer(t, 12.0, sensors=sensors, n_blows=1, duration=0.05, pretrigger=0.005, terms=terms)[0].samples[
+            1:
+        ]
+        for t, terms in ((track, (DryFriction(20, 2e4),)), (track.with_(pad_damping=stuck), ()), (track, ()))
+    ]
+    error, effect = (np.linalg.norm(shown[1] - shown[k]) for k in (0, 2))
+    assert effect > 0.2 * np.linalg.norm(shown[2])
+    assert error < 0.03 * effect

@@ -1,0 +1,102 @@
+"""Two effects at once: refused one by one, named together; and laws that say the same with fewer numbers."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from turnout.config.settings.mismatch import MismatchSettings
+from turnout.mismatch import diagnose
+from turnout.mismatch.case import Candidate, Case, Nuisance, Observation
+from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.scout import _seen
+from turnout.mismatch.shortlist import Projector
+from turnout.mismatch.verdict import Score, judge
+from turnout.physics import Parameter
+
+AMOUNT = (Parameter("amount", "-", 0.0, (-9.0, 9.0), "share of a shape", "made up 2026"),)
+X = np.linspace(0.0, 1.0, 300)
+SHAPES = {"wave": np.sin(9.0 * X), "ramp": X - 0.5, "ripple": np.sin(40.0 * X), "bowl": (X - 0.4) ** 2}
+
+
+class Shapes(Case):
+    """Sums of shapes of the ``known`` kinds in three conditions, under noise of 0.1."""
+
+    def __init__(self, known, **true):
+        rng = np.random.default_rng(11)
+        data = [sum(a * SHAPES[n] for n, a in true.items()) + 0.1 * rng.normal(size=X.size) for _ in range(3)]
+        self.observations = tuple(Observation(f"o{k}", f"day {k}", d, np.full(X.size, 0.1)) for k, d in enumerate(data))
+        self.candidates = tuple(
+            Candidate(n, AMOUNT, lambda p, n=n: (n, p["amount"]), ((0.5,),), {"shape": n}) for n in known
+        )
+
+    def predict(self, values, terms, observations):
+        return [sum((a * SHAPES[n] for n, a in terms), np.zeros(X.size)) for _ in observations]
+
+
+def test_two_effects_of_which_either_leaves_too_much_are_both_named():
+    """Alone the larger leaves twenty times the level of controls; its size and the other's are those put in."""
+    found = diagnose(Shapes(("wave", "ramp", "bowl"), wave=1.2, ripple=0.0, ramp=2.5))
+    assert found.names == ("ramp", "wave") or found.names == ("wave", "ramp")
+    for candidate, size in zip(found.fit.candidates, found.fit.psi):
+        assert size == pytest.approx({"wave": 1.2, "ramp": 2.5}[candidate.family], abs=0.06)  # four standard errors
+    assert all(v.answer == "named" for v in found.verdicts)
+
+
+def test_an_effect_that_no_name_fits_keeps_the_first_one_refused_too():
+    """What is left beside the best shape is a ripple, which no candidate has."""
+    found = diagnose(Shapes(("wave", "ramp", "bowl"), ripple=1.5, ramp=2.5))
+    assert found.verdict.answer == "unknown" and not found.names
+    assert found.fit is found.base
+
+
+def own(candidate, values, errors):
+    """Score of 100 nats with these parameters."""
+    fit = SimpleNamespace(psi=np.array(values), psi_se=np.array(errors), part=lambda _: slice(0, len(values)))
+    return Score(candidate, 100.0, 0.0, 1.0, fit)
+
+
+FACTOR = (Parameter("factor", "-", 1.0, (0.05, 20.0), "share of stiffness", "made up 2026"),)
+GAP = (
+    Parameter("gap", "m", 0.0, (0.0, 5e-3), "clearance", "made up 2026"),
+    Parameter("seated", "-", 0.0, (0.0, 0.95), "share that bears", "made up 2026"),
+)
+
+
+@pytest.mark.parametrize("seated, said", [(0.33, ("local_ballast",)), (0.75, ("hanging_sleeper", "local_ballast"))])
+def test_a_part_that_never_lands_is_called_by_its_simpler_law(seated, said):
+    """A third of the bed bears, and no train closes the gap: that is ballast of a third. One whose seated share is not
+    what the ballast carries is another thing."""
+    here = {"sleeper": 7, "place": 4.2}
+    ballast = Candidate("local_ballast", FACTOR, lambda p: p, ((0.4,),), here)
+    gap = Candidate("hanging_sleeper", GAP, lambda p: p, ((1e-3, 0.0),), here, plain=("local_ballast", 1))
+    verdict = judge([own(gap, [3e-3, seated], [1e-3, 0.03]), own(ballast, [0.35], [0.04])], 2.0, MismatchSettings())
+    assert verdict.names == said
+
+
+def test_the_size_of_what_has_two_amplitudes_is_that_of_both():
+    """0.3 and 0.4 are half a metre per second squared."""
+    pair = (AMOUNT[0], Parameter("cosine", "-", 0.0, (-9.0, 9.0), "the other part", "made up 2026"))
+    hum = Candidate("hum", pair, lambda p: p, ((1.0, 0.0),), {"sensor": "A"}, least=0.49, sized=2)
+    assert own(hum, [0.3, 0.4], [0.01, 0.01]).material
+    assert not own(hum, [0.3, 0.38], [0.01, 0.01]).material
+
+
+@pytest.mark.parametrize("whole, share", [(False, 1.0 / 3.0), (True, 1.0)])
+def test_a_start_that_turns_promises_what_it_is(whole, share):
+    """The data want a third of the start; half the cost falls by 2 s q - s² q with q its size and s the share."""
+    case = Shapes(("wave",), wave=1.0)
+    projector = Projector(case, fit_jointly(case))
+    candidate = Candidate("wave", AMOUNT, lambda p: p, ((3.0,),), whole=whole)
+    gain, found = projector.score([3.0 * SHAPES["wave"]] * 3, candidate, 0)
+    assert found == pytest.approx(share, rel=0.02)
+    assert (gain < 0.0) == whole
+
+
+def test_a_twin_goes_back_with_its_effect_even_where_nothing_is_learnt_of_it():
+    """Of seat_A2 nothing is learnt either, and nothing is said."""
+    case = SimpleNamespace(nuisances=[Nuisance(n, "-", 0.0, 0.1) for n in ("seat_A1", "gain_A1", "seat_A2")])
+    values = {"seat_A1": 0.0, "gain_A1": 0.03, "seat_A2": 0.0}
+    fit = SimpleNamespace(covariance=np.diag([1e-2, 1e-4, 1e-2]), values=values)
+    moved = SimpleNamespace(twin="seat_A1")
+    assert _seen(case, fit, moved) == {"seat_A1": 0.0, "gain_A1": 0.03}
