@@ -33,7 +33,7 @@ def scored(case, fit, settings, tell, store, effect, promising):
             scores[score.family] = score
     ranked = sorted(scores.values(), key=lambda s: -s.gain)
     if case.frozen_jacobian and ranked:
-        ranked = _limits_beside(case, fit, ranked, settings, store, effect)
+        ranked = _same_law_beside(case, fit, ranked, settings, store, effect)
         material = [s for s in ranked if s.material][:2]
         leaders = [s for s in material if s.gain > max(settings.threshold, material[0].gain - settings.margin)]
         polished = [_polished(case, fit, s, settings, store, effect) for s in leaders]
@@ -42,14 +42,14 @@ def scored(case, fit, settings, tell, store, effect, promising):
     return tuple(_checked(case, fit, s) for s in ranked)
 
 
-def _limits_beside(case, fit, ranked, settings, store, effect):
-    """The scores, where a law at its bound leads with the family that it cannot be told from there (``limit``) fitted
-    anew from the leader's nuisances: they are its own as well."""
+def _same_law_beside(case, fit, ranked, settings, store, effect):
+    """The scores, with families that the leader cannot be told from as it was found (its ``limit``, its ``plain`` form)
+    fitted anew from the leader's nuisances: they are their own as well."""
     leader = ranked[0]
     for k, score in enumerate(ranked[1:], 1):
-        if leader.gain > settings.threshold and score.is_limit_of(leader):
-            start = score.fit.psi[fit.psi.size :]
-            entry = Entry(score.candidate, start, leader.fit.values)
+        alike = score.is_limit_of(leader) or score.is_plain_form_of(leader)
+        if leader.gain > settings.threshold and alike:
+            entry = Entry(score.candidate, score.own[0], leader.fit.values)
             again = _tried(case, fit, entry, settings, store, f"{effect}:beside")
             if again is not None and again.gain > score.gain:
                 ranked[k] = again

@@ -29,8 +29,9 @@ def shortlist(case, fit, settings, promising=()):
 
     A case whose predictions are cheap has every family refitted from every start. For a dear one ``scout`` fits the
     families that show in the cheap observations; the others are scored by the columns of their starts
-    (``Case.screen``), or predicted where they have none. On top of an effect only the families that were ``promising``
-    beside it are scouted: for the others what is left is small enough for columns.
+    (``Case.screen``), or predicted where they have none. On top of an effect only the families of the whole track,
+    which common values hide, and those that were ``promising`` beside it are scouted (all where it is None): for the
+    others what is left is small enough for columns.
     """
     from turnout.mismatch.scout import scout
 
@@ -40,6 +41,8 @@ def shortlist(case, fit, settings, promising=()):
     if not case.frozen_jacobian:
         return [Entry(c, np.asarray(s, dtype=float), {}) for c in candidates for s in c.starts]
     scored, scouted = {}, {}
+    if fit.candidates and promising is not None:
+        promising = {*promising, *(c.family for c in case.candidates if c.always and c.scanned == 1)}
     for found in scout(case, fit, settings, promising if fit.candidates else None):
         if found.candidate in candidates:
             entry = found.gain, found.candidate, found.psi, found.values

@@ -43,7 +43,7 @@ OWN = (
 # ln of the profile's stiffness: wear and rolling tolerances; published shear coefficients of 60E1 go from 0.34 to 0.41,
 # and 14 controls of another simulator, right by its own closed forms, asked for 0.12 ± 0.02 less (95 %).
 RAIL = (("rail_bending", 0.015), ("rail_shear", 0.12))
-WHEELS_SD = 0.06  # ln unsprung mass: reprofiling takes a tenth of it; root mean square of 100 in another simulator
+WHEELS_SD = 0.06  # ln unsprung mass: reprofiling takes a tenth of it; 42 of another simulator: 0.054
 SEAT_SD = 0.02  # a sensor's place is known to this [m]
 REACH = 1.9  # supports this far beyond sensors and blows have values of their own [m]
 MARGIN = 18.0  # track kept beyond them [m]
