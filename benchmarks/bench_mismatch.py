@@ -121,6 +121,8 @@ def development():
     """Cases made with our own simulator: necessary, not sufficient."""
     wanted = os.environ.get("TURNOUT_MISMATCH_CASES", ",".join(DEFAULT)).split(",")
     chosen = [(k, *c) for k, c in enumerate(DEVELOPMENT) if wanted == ["all"] or c[0] in wanted]
+    if not chosen:
+        return
     right, alarms, controls, covered, cost = 0, 0, 0, 0, []
     for k, name, term, where in chosen:
         campaign = measured_campaign(small_plan(), (term,) if term else (), 500 + k)

@@ -15,13 +15,14 @@ from pathlib import Path
 
 from benchmarks.blind_bridge import campaigns_of
 from turnout.errors import TurnoutError
-from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.joint import cost_at, fit_jointly
 from turnout.mismatch.track.track_case import TrackCase
 from turnout.mismatch.verify import fit_percent, predict_reserved
 from turnout_blind.score.judged import BAY, CLEAR, gain_of
 from turnout_blind.score.names import SAME, right_names
 
 STEPS = 15
+STARTS = 2
 
 
 def oracle(folder, case, truth):
@@ -42,10 +43,10 @@ def oracle(folder, case, truth):
 
 
 def _with(case, fit, effect):
-    """The best fit with this effect in it, where it is, from all starts and from the truth itself."""
+    """The best fit with this effect in it, where it is, from the truth itself and from the likeliest starts."""
     found = []
     for candidate in _candidates(case, effect):
-        for start in (_told(candidate, effect), *candidate.starts):
+        for start in (_told(candidate, effect), *_likeliest(case, fit, candidate)):
             try:
                 found.append(
                     fit_jointly(case, (*fit.candidates, candidate), [*fit.psi, *start], fit.values, iterations=STEPS)
@@ -53,6 +54,17 @@ def _with(case, fit, effect):
             except TurnoutError:  # it cannot be simulated from here
                 continue
     return min(found, key=lambda f: f.cost, default=None)
+
+
+def _likeliest(case, fit, candidate):
+    """The ``STARTS`` of its starts that cost least before anything is fitted."""
+    cost = {}
+    for start in candidate.starts:
+        try:
+            cost[start] = cost_at(case, (*fit.candidates, candidate), [*fit.psi, *start], fit.values)
+        except TurnoutError:  # it cannot be simulated there
+            continue
+    return sorted(cost, key=cost.get)[:STARTS]
 
 
 def _candidates(case, effect):

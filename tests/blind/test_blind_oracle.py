@@ -54,13 +54,13 @@ def test_a_sample_of_clear_singles_is_drawn_by_id_alone():
 
 
 def test_rows_of_the_bridge_are_read_by_the_scorer():
-    fit = SimpleNamespace(psi=np.array([0.35]), psi_se=np.array([0.02]))
+    fit = SimpleNamespace(psi=np.array([0.35]), psi_se=np.array([0.02]), part=lambda _: slice(0, 1))
     best = SimpleNamespace(candidate=PADS[5], fit=fit)
     verdict = SimpleNamespace(
         answer="named", names=("local_pad",), grade="A", probability=0.9, scores=(best,), reason="because"
     )
     seen = SimpleNamespace(before=40.0, after=48.0, rival=44.0, decoy=float("nan"), n=2)
-    rows = rows_of(SimpleNamespace(verdicts=(verdict,), verification=seen, frames=(), where=None))
+    rows = rows_of(SimpleNamespace(verdicts=(verdict,), verification=seen, frames=(), where=None, fit=fit))
     assert json.loads(json.dumps(rows)) == rows
     truth = {
         "case": "T1",
