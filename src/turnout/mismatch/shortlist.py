@@ -133,8 +133,8 @@ class Projector:
 
     def __init__(self, case, fit):
         self.joint, self.fit = Joint(case, fit.candidates), fit
-        rows, self.right = self.joint.stacked(fit.jacobian, fit.white, fit.scale)
-        self.scaled = rows * self.joint.sd
+        self.scaled, self.right = self.joint.stacked(fit.jacobian, fit.white, fit.scale)
+        self.scaled *= self.joint.sd
         self.normal = np.linalg.inv(self.scaled.T @ self.scaled + np.eye(self.scaled.shape[1]))
         theta = np.concatenate([[fit.values[n.name] for n in case.nuisances], fit.psi])
         self.pull = (self.joint.mean - theta) / self.joint.sd

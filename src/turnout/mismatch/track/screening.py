@@ -24,10 +24,11 @@ CHANNELS = (
 def screen_columns(case, fit, observations):
     """(key, start) -> list of (n,) per observation: change of the prediction when a candidate takes that start.
 
-    ``fit`` is of ``observations``, all of the case or some.
+    ``fit`` is of ``observations``, all of the case or some. In single precision; columns that vanish share their zeros.
     """
     chosen = [(c, k) for c in case.candidates for k in range(len(c.starts)) if c.family in (*LAWS, *PATHS, *CHANNELS)]
-    found = {(c.key, k): [np.zeros(o.data.size) for o in observations] for c, k in chosen}
+    blank = [np.zeros(o.data.size, dtype=np.float32) for o in observations]
+    found = {(c.key, k): list(blank) for c, k in chosen}
     laws, paths = ([(c, k) for c, k in chosen if c.family in names] for names in (LAWS, PATHS))
     for i, o in enumerate(observations):
         if o.name in case.rollings:
@@ -37,7 +38,7 @@ def screen_columns(case, fit, observations):
             parts = _pair(case, fit, case.pairs[o.name], laws)
         parts |= _channels(case, fit, o, fit.predictions[i], [(c, k) for c, k in chosen if c.family in CHANNELS])
         for key, column in parts.items():
-            found[key][i] = column
+            found[key][i] = column.astype(np.float32)
     for c in case.candidates:
         for k in range(len(c.starts)) if c.family in WHOLE else ():
             found[c.key, k] = _whole(case, fit, c, k, observations)
