@@ -83,7 +83,7 @@ def loudest(case, fit):
 
 
 def judged(case, fit, scored, settings):
-    """(Verdict on the ``scored`` candidates on top of ``fit``, the best Score of a size that matters or None)."""
+    """(Verdict on the ``scored`` candidates on top of ``fit``, the Score that it names or would have, or None)."""
     best = max((s for s in scored if s.material), key=lambda s: s.gain, default=None)
     excess = max(over(case, fit, settings), loudest(case, fit))
     scored = tuple(s for s in scored if s.material)
@@ -94,7 +94,8 @@ def judged(case, fit, scored, settings):
         consistent = consistent_elsewhere(case, fit, best, settings)
         structure = structure_left(case, best.fit)
     left = over(case, best.fit, settings)
-    return judge(scored, excess, settings, consistent, structure, left, bool(case.disturbed)), best
+    verdict = judge(scored, excess, settings, consistent, structure, left, bool(case.disturbed))
+    return verdict, verdict.scores[0]
 
 
 def structure_left(case, fit):

@@ -33,7 +33,7 @@ def reconsidered(case, base, fit, verdicts, settings):
         left = over(case, best, settings)
         found = judge(pairs, excess, settings, consistent, structure_left(case, best), left, bool(case.disturbed))
         if found.answer in ("named", "a_or_b"):
-            return [found, *verdicts[1:]], best
+            return [found, *verdicts[1:]], found.scores[0].fit
     return verdicts[:1], base
 
 

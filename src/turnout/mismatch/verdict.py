@@ -193,6 +193,7 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
         return verdict("unknown", reason=f"{best.family} makes one condition worse by {-best.worst:.0f} nats")
     plain = next((s for s in found[1:] if best.gain - s.gain < settings.margin and s.is_plain_form_of(best)), None)
     best = plain or best  # the law with fewer numbers says as much
+    ranked = [best, *(s for s in ranked if s is not best)]
     same = [s for s in found if s.is_limit_of(best) and s.explained >= settings.explained]
     if same:  # what carries nothing hangs
         return verdict("a_or_b", (best.family, same[0].family), reason=f"{best.family} is at its limit")

@@ -72,6 +72,7 @@ def test_a_part_that_never_lands_is_called_by_its_simpler_law(seated, said):
     gap = Candidate("hanging_sleeper", GAP, lambda p: p, ((1e-3, 0.0),), here, plain=("local_ballast", 1))
     verdict = judge([own(gap, [3e-3, seated], [1e-3, 0.03]), own(ballast, [0.35], [0.04])], 2.0, MismatchSettings())
     assert verdict.names == said
+    assert verdict.scores[0].family == said[0]  # whose fit and place are shown
 
 
 def test_the_size_of_what_has_two_amplitudes_is_that_of_both():
