@@ -23,7 +23,8 @@ LEAST = {
     "local_pad": 0.15, "local_ballast": 0.15, "hanging_sleeper": 5e-5, "surface_dip": 3e-5, "pad_temperature": 1e-3,
     "unsprung_mass": 0.07, "contact_stiffness": 0.1, "rail_shear": 0.9, "mount_resonance": 1 / 2000.0,
     "zener_pad": 0.15, "dry_friction": 500.0, "attached_resonator": 5.0,
-    "ballast_hardening": 0.3, "pad_preload": 500.0, "low_pass": 1 / 2000.0, "sleeper_mode": 0.05, "ballast_inertia": 20.0,
+    "ballast_hardening": 0.3, "pad_preload": 500.0, "low_pass": 1 / 2000.0, "sleeper_mode": 0.05,
+    "ballast_inertia": 20.0,
 }  # fmt: skip
 STRETCHES = (1, 2, 4)  # sleepers to either side that stiffen alike
 LIMIT = {"local_ballast": "hanging_sleeper"}  # ballast without stiffness is a gap that no train closes
