@@ -178,10 +178,15 @@ class Joint:
         p = self.parameters[k - self.n]
         step = 0.02 * min(p.bounds[1] - p.bounds[0], 10.0 * self.sd[k], max(abs(theta[k] - p.neutral), 0.1 * _reach(p)))
         step = -step if theta[k] + step > p.bounds[1] else step
-        moved = np.array(theta)
-        moved[k] += step
-        new = self.predict(moved)
-        return [o.whitened((b - a) / step) for o, a, b in zip(self.observations, predictions, new)]
+        for way in (step, -step):  # the simulation may not go to one side
+            moved = np.array(theta)
+            moved[k] += way
+            new = self.tried(moved)
+            if new is not None:
+                break
+        else:
+            raise SimulationError(f"{p.name} {theta[k]:.4g} {p.unit}: no derivative, the simulation fails beside it.")
+        return [o.whitened((b - a) / way) for o, a, b in zip(self.observations, predictions, new)]
 
 
 def _prior(p):
