@@ -12,6 +12,7 @@ from turnout.mismatch.shortlist import Entry, shortlist
 
 HELD = 0.5  # of what the cheap observations gained; a refit that holds less has not come to its end
 PROMISING = 0.5  # of the threshold, which laws of a part must gain before its other laws are asked
+ROUNDS = 3  # of steps for a leader; one that still gains afterwards is far from any law
 HALVINGS = 4  # of a start that costs more than nothing; a sixteenth of it is a straight line
 
 
@@ -35,7 +36,8 @@ def scored(case, fit, settings, tell, store, effect, promising):
     if case.frozen_jacobian and ranked:
         ranked = _same_law_beside(case, fit, ranked, settings, store, effect)
         material = [s for s in ranked if s.material][:2]
-        leaders = [s for s in material if s.gain > max(settings.threshold, material[0].gain - settings.margin)]
+        close = min(material[0].gain - settings.margin, HELD * material[0].gain) if material else 0.0
+        leaders = [s for s in material if s.gain > max(settings.threshold, close)]
         polished = [_polished(case, fit, s, settings, store, effect) for s in leaders]
         ranked = sorted([*polished, *(s for s in ranked if all(s is not x for x in leaders))], key=lambda s: -s.gain)
         ranked = beside(case, fit, ranked, settings)
@@ -62,12 +64,20 @@ def beside(case, fit, ranked, settings):
     leader, best = ranked[0], next((s for s in ranked if s.material), None)
     if best is None or leader is best or best.gain <= settings.threshold:
         return ranked
-    held, psi = leader.fit, np.concatenate([leader.fit.psi, best.fit.psi[fit.psi.size :]])
-    try:
-        both = fit_jointly(case, (*held.candidates, best.candidate), psi, held.values, iterations=settings.iterations)
-    except SimulationError:
+    held, own = leader.fit, best.fit.psi[fit.psi.size :]
+    none = np.concatenate([fit.psi, leader.candidate.neutral])
+    found, both = [], (*held.candidates, best.candidate)
+    for psi, values in ((held.psi, held.values), (none, best.fit.values)):  # from what either has ended at
+        start = np.concatenate([psi, own])
+        try:
+            found.append(
+                fit_jointly(case, (*held.candidates, best.candidate), start, values, iterations=settings.iterations)
+            )
+        except SimulationError:
+            continue
+    if not found:
         return ranked
-    left = both.evidence - held.evidence + best.candidate.aside - np.log(best.candidate.scanned)
+    left = max(f.evidence for f in found) - held.evidence + best.candidate.aside - np.log(best.candidate.scanned)
     return sorted((replace(s, gain=min(s.gain, left)) if s is best else s for s in ranked), key=lambda s: -s.gain)
 
 
@@ -95,7 +105,7 @@ def _tried(case, fit, entry, settings, store, effect):
 def _polished(case, fit, score, settings, store, effect):
     """A leader refitted to the end, with derivatives of its own: the verdict rests on these."""
     key = f"{effect}:polished:{score.candidate.key}:{len(fit.candidates)}"
-    refit = kept(store, key, lambda: to_the_end(case, score.fit, settings), score.fit.candidates)
+    refit = kept(store, key, lambda: _ended(case, score.fit, settings), score.fit.candidates)
     return score_of(case, fit, refit, score.candidate, settings)
 
 
@@ -106,6 +116,18 @@ def _checked(case, fit, score):
     mine, reference = held_out_score(case, score.fit), held_out_score(case, fit)
     by_condition = {c: mine[c] - reference[c] for c in reference}
     return replace(score, worst=min(by_condition.values(), default=0.0), by_condition=by_condition)
+
+
+def _ended(case, fit, settings):
+    """Continued until a round of steps gains less than a name needs; each begins with new derivatives."""
+    for _ in range(ROUNDS):
+        try:
+            before, fit = fit, to_the_end(case, fit, settings)
+        except SimulationError:
+            break
+        if fit.evidence - before.evidence < settings.threshold:
+            break
+    return fit
 
 
 def to_the_end(case, fit, settings):

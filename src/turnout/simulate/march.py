@@ -8,7 +8,7 @@ from turnout.simulate.port_system import evaluate, flexibility, newton_update, p
 
 ITERATIONS = 60
 PLAIN = 12  # of them without a look at whether they come nearer
-ROUNDED = 100.0  # tolerances; a law as steep as stuck friction is not known closer from rounded velocities
+ROUNDED = 1000.0  # tolerances; a law as steep as stuck friction is not known closer from rounded velocities
 CONVERGED, NEWTON, LEFT_TRACK = range(3)
 
 
