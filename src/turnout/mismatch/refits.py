@@ -70,9 +70,7 @@ def beside(case, fit, ranked, settings):
     for psi, values in ((held.psi, held.values), (none, best.fit.values)):  # from what either has ended at
         start = np.concatenate([psi, own])
         try:
-            found.append(
-                fit_jointly(case, (*held.candidates, best.candidate), start, values, iterations=settings.iterations)
-            )
+            found.append(fit_jointly(case, both, start, values, iterations=settings.iterations))
         except SimulationError:
             continue
     if not found:
