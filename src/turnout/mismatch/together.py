@@ -23,8 +23,9 @@ def refused(verdicts):
 
 def reconsidered(case, base, fit, verdicts, settings):
     """(verdicts, fit) after a second effect was sought on top of a first one that was refused: both stand where the
-    second is named and the first, or a close rival of it, passes with the second in the model."""
-    if len(verdicts) > 1:
+    second is named and the first, or a close rival of it, passes with the second in the model. Two of one kind do not
+    vouch for one another: they can mend nearly any shape."""
+    if len(verdicts) > 1 and verdicts[1].names[:1] != (verdicts[0].scores[0].family,):
         pairs = list(_beside_second(case, base, fit, verdicts[0].scores, settings))
         pairs.sort(key=lambda s: -s.gain)
         best = pairs[0].fit
