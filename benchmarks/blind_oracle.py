@@ -22,7 +22,7 @@ from turnout_blind.score.judged import BAY, CLEAR, gain_of
 from turnout_blind.score.names import SAME, right_names
 
 STEPS = 15
-STARTS = 2
+STARTS = 2  # beside the truth itself: scans of phase and frequency have dozens
 
 
 def oracle(folder, case, truth):
