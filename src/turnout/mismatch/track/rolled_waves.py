@@ -44,7 +44,8 @@ class Carrier:
         self.carry = carry * np.exp(-2j * np.pi * self.grid[:, None, None] * self.passing)
         load = float(np.mean(vehicle.static_loads))
         omega = 2.0 * np.pi * lines
-        self.lines, self.compliance = lines, point + _wheel(vehicle, omega) + 1.0 / vehicle.contact.tangent(load)
+        contact = 1.0 / vehicle.contact.tangent(load)
+        self.lines, self.compliance = lines, point + wheel_receptance(vehicle, omega) + contact
         begin = made.time[0] - made.reference - values[f"time@{made.name}"]
         gate = rolling.gate(self.grid, rolling.LOW, made.high)
         self.clock = gate * self.rate * np.exp(2j * np.pi * self.grid * begin)
@@ -154,7 +155,7 @@ def _transfers(case, track, made):
     return frequency, -((2.0 * np.pi * frequency) ** 2)[:, None, None] * h, point, matrices.node[near]
 
 
-def _wheel(vehicle, omega):
+def wheel_receptance(vehicle, omega):
     """Receptance of the first wheel under the vehicle [m/N]."""
     mass, damping, stiffness, _ = vehicle.matrices
     row = int(vehicle.wheel_rows[0])
