@@ -38,6 +38,26 @@ def test_the_derivative_by_a_wave_of_the_rail_points_where_the_simulation_goes(s
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    "term", [physics.SensorPosition("S3", 0.4), physics.TimeOffset("S3", 3e-3), physics.SensorGain("S3", 0.6)]
+)
+def test_the_derivatives_of_a_channel_with_a_fault_are_those_of_what_it_shows(sound, term):
+    """A wave of the rail and a pad, seen by S3 alone where and when and as loud as the term says."""
+    case, values = sound
+    (seen,) = (o for o in case.observations if o.name == "heavy 2")
+    wave = case.waves.names[2 * int(np.argmin(np.abs(case.waves.lengths - 0.7)))]
+    row = [s.name for s in case.rollings["heavy 2"].sensors].index("S3")
+    before = case.predict(values, (term,), [seen])[0]
+    jacobian = case.nuisance_jacobian(values, (term,), [seen], [before])[0]
+    for name, size in ((wave, 3e-5), ("pad_40", 0.05)):
+        column = jacobian[:, [n.name for n in case.nuisances].index(name)]
+        change = (case.predict({**values, name: values[name] + size}, (term,), [seen])[0] - before) / size
+        a, b = (v.reshape(4, -1)[row] for v in (column, change))
+        assert a @ b / np.sqrt((a @ a) * (b @ b)) > 0.9  # as that of a sound channel
+        assert np.linalg.norm(a) == pytest.approx(np.linalg.norm(b), rel=0.25)
+
+
+@pytest.mark.slow
 def test_a_flat_is_found_on_its_wheel_with_the_place_where_it_strikes(plan):
     flat = physics.WheelFlat(2, 0.07, 0.43, 1.1, "heavy")
     case = TrackCase(measured_campaign(plan, (flat,), 7))

@@ -40,7 +40,7 @@ def green(case, values, terms, made):
     track = track_with(case.track(made.passage.route), case.zone, values)
     matrices = matrices_of(track, [t.under(case.said(made)) for t in terms if t.kind == "matrix"])
     frequency = np.arange(4.0, 1.3 * rolling.HIGH, 2.0)
-    places = [s.probe(track).place for s in made.sensors]
+    places = [case.seat(s, values, terms).probe(track).place for s in made.sensors]
     rows = [matrices.index[kind, j] for j in case.zone.supports for kind in ("rail", "sleeper")]
     h = responses(matrices, frequency, places, rows)
     omega2 = (2.0 * np.pi * frequency) ** 2
@@ -62,7 +62,7 @@ def carried(case, values, terms, made, forces):
 
     Returns key -> (n_sensor * n_time,) on the observation's clock.
     """
-    carrier = Carrier(case, values, made)
+    carrier = Carrier(case, values, made, terms)
     _, g = green(case, values, terms, made)
     sag = _sag(case, values, made, carrier.way)
     g, sag = (np.concatenate([x, x[..., :1] - x[..., 1:]], axis=-1) for x in (g, sag.transpose(0, 2, 1)))

@@ -32,7 +32,7 @@ def nuisance_jacobian(case, values, terms, observations, base):
         for name, column in _passage_columns(case, values, terms, made, predicted):
             jacobian[:, index[name]] = column
         first = index[case.waves.names[0]]
-        jacobian[:, first : first + len(case.waves.names)] = wave_columns(case, values, made)
+        jacobian[:, first : first + len(case.waves.names)] = wave_columns(case, values, terms, made)
     return found
 
 

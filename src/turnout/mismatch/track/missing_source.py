@@ -59,7 +59,7 @@ def _turned(transfer):
 
 def _wheels(case, fit, made):
     """Waves of each wheel, which the passage knows as errors of ordinary size."""
-    waves, carrier = case.waves, Carrier(case, fit.values, made)
+    waves, carrier = case.waves, Carrier(case, fit.values, made, fit.terms)
     sd = np.repeat(amplitude_sd(waves.lengths, waves.length, WHEEL_LEVEL), 2)
     spectra = carrier.spectra(waves.lengths, np.ones(carrier.node.size))
     blocks = [carrier.shown(spectra, carrier.wheel(w)) * sd for w in range(carrier.behind.size)]

@@ -54,7 +54,7 @@ def of_train(case, fit, train, wavelengths=WAVELENGTHS):
 def _slopes(case, fit, o, white, n_wheel, wavelengths):
     """(n_wheel, n_wavelength, 2) slopes and (n_wavelength, 2, 2) sizes of one passage."""
     made = case.rollings[o.name]
-    carrier = Carrier(case, fit.values, made)
+    carrier = Carrier(case, fit.values, made, fit.terms)
     spectra = carrier.spectra(wavelengths, np.ones(carrier.node.size))
     weight = o.effective / fit.scale[o.kind]
     twice = o.whitened(np.asarray(white) * o.sigma) / o.sigma  # the whitening is symmetric: columns need not pass it

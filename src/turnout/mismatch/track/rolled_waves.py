@@ -13,6 +13,7 @@ import numpy as np
 
 from turnout.mismatch.track import rolling
 from turnout.mismatch.track.base_model import track_with
+from turnout.mismatch.track.blows import channel_factor
 from turnout.mismatch.track.skeleton import matrices_of
 from turnout.simulate.frequency import responses
 
@@ -21,12 +22,13 @@ RING = 0.35  # s that the track rings on
 
 
 class Carrier:
-    """Waves of one passage on the track that ``values`` give; ``node`` (n,) places where forces are carried [m]."""
+    """Waves of one passage on the track that ``values`` and ``terms`` give, as its sensors show them where they sit;
+    ``node`` (n,) places where forces are carried [m]."""
 
-    def __init__(self, case, values, made):
+    def __init__(self, case, values, made, terms=()):
         self.made, waves, vehicle = made, case.waves, made.passage.vehicle
-        track = track_with(case.track(made.passage.route), case.zone, values)
-        lines, transfer, point, self.node = _transfers(case, track, made)
+        terms = [t.under(case.said(made)) for t in terms]
+        lines, transfer, point, self.node = _transfers(case, values, made, terms)
         self.speed = made.speed * (1.0 + values[f"speed@{made.name}"])
         self.sign = 1.0 if made.passage.direction == "facing" else -1.0
         self.first = self.sign * min(self.sign * s.place for s in made.sensors)
@@ -48,7 +50,8 @@ class Carrier:
         self.lines, self.compliance = lines, point + wheel_receptance(vehicle, omega) + contact
         begin = made.time[0] - made.reference - values[f"time@{made.name}"]
         gate = rolling.gate(self.grid, rolling.LOW, made.high)
-        self.clock = gate * self.rate * np.exp(2j * np.pi * self.grid * begin)
+        shown = np.array([channel_factor(terms, s, self.grid) * (1.0 + values[f"gain_{s.name}"]) for s in made.sensors])
+        self.clock = (gate * self.rate * np.exp(2j * np.pi * self.grid * begin) * shown).T  # (f, sensor)
 
     def train(self):
         """(f,) sum over all wheels of their delays."""
@@ -136,19 +139,21 @@ class Carrier:
 
     def _on_clock(self, spectrum):
         full = np.zeros((self.size // 2 + 1, *spectrum.shape[1:]), dtype=complex)
-        full[self.inside] = spectrum * self.clock[:, None, None]
+        full[self.inside] = spectrum * self.clock[:, :, None]
         n = self.made.time.size
         return np.fft.irfft(full, self.size, axis=0)[:n].transpose(1, 0, 2).reshape(n * len(self.made.sensors), -1)
 
 
-def _transfers(case, track, made):
+def _transfers(case, values, made, terms):
     """Lines, acceleration of the sensors per force on rail nodes (m, n_sensor, n_node), point receptance, nodes."""
-    matrices = matrices_of(track)
+    track = track_with(case.track(made.passage.route, terms), case.zone, values)
+    matrices = matrices_of(track, [t for t in terms if t.kind == "matrix"])
     frequency = np.arange(4.0, 1.3 * rolling.HIGH, 2.0)
     near = np.flatnonzero((matrices.node >= case.waves.start - 0.3) & (matrices.node <= case.waves.end + 0.3))
     near = near[::STRIDE]
     rows = matrices.node_index[near]
-    h = responses(matrices, frequency, [s.probe(track).place for s in made.sensors], rows)
+    seated = [case.seat(s, values, terms) for s in made.sensors]
+    h = responses(matrices, frequency, [s.probe(track).place for s in seated], rows)
     middle = float(matrices.node[near][near.size // 2])
     point_rows, weights = matrices.weights(middle)
     point = responses(matrices, frequency, [middle], point_rows)[:, 0] @ weights

@@ -69,7 +69,7 @@ def amplitude_sd(wavelength, length, offset):
     return 1e-6 * 10.0 ** (level(wavelength, offset) / 20.0) * np.sqrt(1.0 / (length * width))
 
 
-def wave_columns(case, values, made):
+def wave_columns(case, values, terms, made):
     """(n_sensor * n_time, n_wave) derivative of a passage by the waves' amplitudes."""
-    carrier = Carrier(case, values, made)
+    carrier = Carrier(case, values, made, terms)
     return carrier.signals(case.waves.lengths, case.waves.fade(carrier.node), carrier.train())

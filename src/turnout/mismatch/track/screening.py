@@ -90,7 +90,7 @@ def _paths(case, fit, made, chosen):
     """Response to a path that all wheels follow."""
     if not chosen:
         return {}
-    carrier = Carrier(case, fit.values, made)
+    carrier = Carrier(case, fit.values, made, fit.terms)
     rows = []
     for c, k in chosen:
         parts = c.term(c.starts[k]).paths(None, made.passage.vehicle)
