@@ -235,7 +235,7 @@ def fit_jointly(case, candidates=(), start=None, values=None, keep=None, observa
 
 def _iterate(joint, theta, predictions, residuals, jacobian, cost, renew):
     """Steps until nothing is gained; a dear Jacobian is updated, and made anew after every ``renew`` steps (0: never)
-    where much is still gained: on a long way it comes to point elsewhere."""
+    and before the last: on a long way it comes to point elsewhere."""
     frozen = joint.case.frozen_jacobian
     enough, since = max(2.0 * joint.done, STALL * joint.size if frozen else 0.0), 0
     for _ in range(joint.iterations):
@@ -249,9 +249,9 @@ def _iterate(joint, theta, predictions, residuals, jacobian, cost, renew):
                 jacobian = joint.renewed(tried, new, jacobian)
             theta, predictions, residuals, cost = found
         since += 1
-        if gain < enough:
+        if gain < enough and (since == 1 or not (frozen and renew)):
             break
-        if not frozen or 0 < renew <= since:
+        if not frozen or 0 < renew <= since or (renew and gain < enough):
             jacobian, since = joint.jacobian(theta, predictions), 0
     return theta, predictions, residuals, jacobian, cost
 
