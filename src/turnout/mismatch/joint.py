@@ -253,6 +253,8 @@ def _iterate(joint, theta, predictions, residuals, jacobian, cost, renew):
             break
         if not frozen or 0 < renew <= since or (renew and gain < enough):
             jacobian, since = joint.jacobian(theta, predictions), 0
+    else:
+        jacobian = joint.jacobian(theta, predictions) if renew and since else jacobian
     return theta, predictions, residuals, jacobian, cost
 
 

@@ -1,5 +1,6 @@
 """Corrugation above the band that is simulated: found by its wavelength, sized by the track's receptance."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,6 +10,7 @@ from turnout import physics
 from turnout.mismatch.track import TrackCase
 from turnout.mismatch.track.planned import measured_campaign, small_plan
 from turnout.mismatch.track.short_waves import LOUD, SPREAD, Loud, evidence, short_waves
+from turnout.simulate.wheel_path import Corrugation
 
 
 def looked_at(*terms, seed=7, plan=None):
@@ -37,12 +39,41 @@ def test_one_train_alone_cannot_tell_a_rail_from_wheels():
     assert looked_at(physics.RailCorrugation(20.5, 27.0, 3e-5, 0.0, 0.16), plan=plan)[1] == ()
 
 
+def hummed(speeds, seed=5):
+    """Two trains at these speeds [m/s], a hum of 150 Hz in all sensors, as strong as the passage itself."""
+    plan = small_plan((15.0,), blows=())
+    trains = [replace(t, speed=v) for t, v in zip(plan.trains, speeds)]
+    campaign = measured_campaign(SimpleNamespace(**{**vars(plan), "trains": tuple(trains)}), (), seed)
+    passages = []
+    for p in campaign.passages:
+        time = np.arange(p.recording.samples.shape[1]) / p.recording.rate
+        hum = np.std(p.recording.samples) * np.sin(2.0 * np.pi * 150.0 * time)
+        passages.append(replace(p, recording=replace(p.recording, samples=p.recording.samples + hum)))
+    case = TrackCase(replace(campaign, passages=tuple(passages)))
+    return short_waves(case, SimpleNamespace(candidates=(), values={n.name: n.mean for n in case.nuisances}))
+
+
+def test_a_hum_is_no_corrugation_nor_can_trains_of_one_speed_tell():
+    assert hummed((28.0, 40.0, 28.4, 39.5)) == ()
+    assert hummed((28.0, 28.4, 28.2, 28.3)) == ()
+
+
+def test_corrugation_in_the_tracks_file_is_not_found_again():
+    plan, true = small_plan((15.0,), blows=()), physics.RailCorrugation(20.5, 27.0, 3e-5, 0.0, 0.16)
+    surfaces = {"main": ((Corrugation(20.5, 27.0, 3e-5, 0.16),),)}
+    known = SimpleNamespace(**{**vars(plan), "turnout": replace(plan.turnout, routes=surfaces)})
+    campaign = replace(measured_campaign(plan, (true,), 7), turnout=known.turnout)
+    case = TrackCase(campaign)
+    assert short_waves(case, SimpleNamespace(candidates=(), values={n.name: n.mean for n in case.nuisances})) == ()
+
+
 def test_the_evidence_is_that_of_a_loudness_integrated_out():
     """By quadrature over what corrugation adds, N(0, LOUD²); the least of the trains counts, what is quiet does not."""
     level = np.array([[1.9, 0.4], [1.1, -3.0], [1.5, 0.2]])
-    louder = [Loud("a", "x", np.exp(level), np.ones((3, 2))), Loud("b", "y", np.exp(level + 1.0), np.ones((3, 2)))]
+    sound, all_ = np.ones((3, 2)), np.ones(3, dtype=bool)
+    louder = [Loud(n, n, v, np.exp(level + more), sound, all_) for n, v, more in (("x", 20.0, 0.0), ("y", 30.0, 1.0))]
     sd, added = SPREAD / np.sqrt(3.0), np.linspace(-40.0, 40.0, 200001)
     prior = np.exp(-0.5 * (added / LOUD) ** 2) / (LOUD * np.sqrt(2.0 * np.pi))
-    for z, nats in zip((1.5, 0.0), evidence(louder)):
+    for z, nats in zip((1.5, 0.0), evidence(louder, 3.0)):
         ratio = np.exp(-0.5 * ((z - added) / sd) ** 2 + 0.5 * (z / sd) ** 2)
         assert nats == pytest.approx(np.log(np.trapezoid(prior * ratio, added)), abs=1e-6)

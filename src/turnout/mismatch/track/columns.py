@@ -37,8 +37,9 @@ def support_forces(case, values, terms, made):
 
 def green(case, values, terms, made):
     """(frequency (m,), G (m, n_sensor, n_support, 2)) acceleration per force on rail seat and sleeper [m/s²/N]."""
-    track = track_with(case.track(made.passage.route), case.zone, values)
-    matrices = matrices_of(track, [t.under(case.said(made)) for t in terms if t.kind == "matrix"])
+    under = [t.under(case.said(made)) for t in terms]
+    track = track_with(case.track(made.passage.route, under), case.zone, values)
+    matrices = matrices_of(track, [t for t in under if t.kind == "matrix"])
     frequency = np.arange(4.0, 1.3 * rolling.HIGH, 2.0)
     places = [case.seat(s, values, terms).probe(track).place for s in made.sensors]
     rows = [matrices.index[kind, j] for j in case.zone.supports for kind in ("rail", "sleeper")]
@@ -47,10 +48,11 @@ def green(case, values, terms, made):
     return frequency, -omega2[:, None, None, None] * h.reshape(*h.shape[:2], -1, 2)
 
 
-def _sag(case, values, made, way):
+def _sag(case, values, terms, made, way):
     """(n_support, 2, n_x) static motion of the rail at ``way`` per force on rail seat and sleeper [m/N]."""
-    track = track_with(case.track(made.passage.route), case.zone, values)
-    matrices = matrices_of(track)
+    under = [t.under(case.said(made)) for t in terms]
+    track = track_with(case.track(made.passage.route, under), case.zone, values)
+    matrices = matrices_of(track, [t for t in under if t.kind == "matrix"])
     names = [(kind, j) for j in case.zone.supports for kind in ("rail", "sleeper")]
     h = responses(matrices, [0.0], names, matrices.node_index)[0].real
     inside = [np.interp(way, matrices.node, row) for row in h]
@@ -64,7 +66,7 @@ def carried(case, values, terms, made, forces):
     """
     carrier = Carrier(case, values, made, terms)
     _, g = green(case, values, terms, made)
-    sag = _sag(case, values, made, carrier.way)
+    sag = _sag(case, values, terms, made, carrier.way)
     g, sag = (np.concatenate([x, x[..., :1] - x[..., 1:]], axis=-1) for x in (g, sag.transpose(0, 2, 1)))
     support = np.array([j - case.zone.first for j, _, _ in forces.values()])
     kind = np.array([k for _, k, _ in forces.values()])

@@ -4,6 +4,7 @@ import numpy as np
 
 from turnout.mismatch.track import rolling
 from turnout.mismatch.track.columns import green, support_forces
+from turnout.mismatch.track.rolled_waves import shown_by
 
 
 def latent_force(case, fit):
@@ -18,6 +19,7 @@ def latent_force(case, fit):
     for o, residual in passages:
         made = case.rollings[o.name]
         frequency, g = green(case, fit.values, fit.terms, made)
+        g = g * shown_by(fit.values, fit.terms, made, frequency)[:, :, None, None]
         rows = residual.reshape(len(made.sensors), -1)
         size = 1 << int(np.ceil(np.log2(2 * rows.shape[1])))
         grid = np.fft.rfftfreq(size, 1.0 / made.clock)

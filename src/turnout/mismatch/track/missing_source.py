@@ -10,7 +10,7 @@ import numpy as np
 from turnout.mismatch.spaces import Space
 from turnout.mismatch.track import blows, rolling
 from turnout.mismatch.track.columns import green
-from turnout.mismatch.track.rolled_waves import Carrier
+from turnout.mismatch.track.rolled_waves import Carrier, shown_by
 from turnout.mismatch.track.rough_rail import amplitude_sd
 from turnout.mismatch.track.rough_wheels import WHEEL_LEVEL
 
@@ -38,6 +38,7 @@ def _forces(case, fit, made):
     one = np.sqrt(2.0 / n) * np.stack([np.cos(turn), np.sin(turn)], axis=-1).reshape(n, -1)
     columns = np.kron(np.eye(n_sensor), one)
     frequency, g = green(case, fit.values, fit.terms, made)
+    g = g * shown_by(fit.values, fit.terms, made, frequency)[:, :, None, None]
     g = g[np.clip(np.searchsorted(frequency, lines), 0, frequency.size - 1), :, :, 0]
     parts, size = {("clock", made.name): None}, one.shape[1]
     for k, j in enumerate(case.zone.supports):

@@ -50,8 +50,8 @@ class Carrier:
         self.lines, self.compliance = lines, point + wheel_receptance(vehicle, omega) + contact
         begin = made.time[0] - made.reference - values[f"time@{made.name}"]
         gate = rolling.gate(self.grid, rolling.LOW, made.high)
-        shown = np.array([channel_factor(terms, s, self.grid) * (1.0 + values[f"gain_{s.name}"]) for s in made.sensors])
-        self.clock = (gate * self.rate * np.exp(2j * np.pi * self.grid * begin) * shown).T  # (f, sensor)
+        shown = shown_by(values, terms, made, self.grid)
+        self.clock = (gate * self.rate * np.exp(2j * np.pi * self.grid * begin))[:, None] * shown
 
     def train(self):
         """(f,) sum over all wheels of their delays."""
@@ -142,6 +142,12 @@ class Carrier:
         full[self.inside] = spectrum * self.clock[:, :, None]
         n = self.made.time.size
         return np.fft.irfft(full, self.size, axis=0)[:n].transpose(1, 0, 2).reshape(n * len(self.made.sensors), -1)
+
+
+def shown_by(values, terms, made, frequency):
+    """(m, n_sensor) complex: what the channels make of a signal, by the linear ones of ``terms`` and their gains."""
+    factors = [channel_factor(terms, s, frequency) * (1.0 + values[f"gain_{s.name}"]) for s in made.sensors]
+    return np.column_stack(factors)
 
 
 def _transfers(case, values, made, terms):

@@ -7,7 +7,8 @@ bins of :math:`\lambda = v/f`, and B the median of the bins around it,
 .. math:: z = \overline{\ln (P / B)}
 
 is scattered by what roughness happens to be under that sensor, alike in all passages, and stands out where the rail has
-waves of that length. A wave of a wheel shows in its train alone, a hum at one frequency, not at one wavelength.
+waves of that length. A wave of a wheel shows in its train alone, a hum or a resonance at one frequency: at different
+wavelengths in slow and in fast passages.
 """
 
 from dataclasses import dataclass, replace
@@ -30,6 +31,8 @@ HIGHEST = 0.35  # of the sampling rate: above it the anti-alias filter may speak
 SPREAD = 0.8  # of z of one sensor on sound rail: 0.62 and 1.0 in two simulators, three degrees of freedom give 0.97
 LOUD = 2.0  # of z where there is corrugation, as a prior
 TRAINS = 2  # fewer cannot tell a rail from wheels
+SPEEDS = 1.25  # fastest over slowest passage; closer ones cannot tell a wavelength from a frequency
+HEARD = 2.0  # m; sensors closer than this hear the same rail
 REACHES = (1.0, 1.8, 3.2, 5.0)  # m: half the stretch
 AMPLITUDES = np.geomspace(2e-6, 3e-4, 60)  # m
 TRANSFER = 0.15  # by which the response at one frequency errs
@@ -39,12 +42,15 @@ LEAST = 1e-5  # m; what EN 13231-3 lets a ground rail keep of waves up to 0.3 m
 
 @dataclass(frozen=True)
 class Loud:
-    """One passage: ``train``, power (n_sensor, n_bin) and its background, both means of the spectrum's squares."""
+    """One passage: ``train``, ``speed`` [m/s], power (n_alive, n_bin) and its background, both means of the spectrum's
+    squares, of the sensors (n_sensor,) that are ``alive``."""
 
     name: str
     train: str
+    speed: float
     power: np.ndarray
     usual: np.ndarray
+    alive: np.ndarray
 
     @property
     def above(self):
@@ -70,45 +76,74 @@ def loud_of(case, made, wavelengths):
     power = np.abs(np.fft.rfft(samples * tukey(samples.shape[1], min(edge, 1.0)), n)) ** 2
     frequency = np.arange(power.shape[1]) * recording.rate / n
     edges = np.searchsorted(frequency, made.speed / wavelengths[:, None] * np.exp([-0.5 * WIDTH, 0.5 * WIDTH]))
+    alive = np.any(samples != samples[:, :1], axis=1)
+    power = power[alive]
     total = np.column_stack([power[:, a : max(b, a + 1)].mean(axis=1) for a, b in edges])
     level = np.log(total)
     near = np.abs(np.subtract.outer(np.arange(wavelengths.size), np.arange(wavelengths.size)))
     near = (near >= AWAY) & (near <= AROUND)
     usual = np.exp(np.column_stack([np.median(level[:, row], axis=1) for row in near]))
-    return Loud(made.name, case.said(made)["train"], total, usual)
+    return Loud(made.name, made.passage.train, made.speed, total, usual, alive)
 
 
-def evidence(passages):
-    """(n_bin,) nats for a line that all trains show, over roughness alone."""
+def groups(passages):
+    """Passages of each train, and the slower and the faster ones: all must show what is the rail's."""
     trains = sorted({p.train for p in passages})
-    by_train = [np.mean([p.above.mean(axis=0) for p in passages if p.train == t], axis=0) for t in trains]
-    z, n = np.maximum(np.min(by_train, axis=0), 0.0), np.mean([len(p.above) for p in passages])
-    spread = SPREAD**2 / n
+    middle = np.sqrt(min(p.speed for p in passages) * max(p.speed for p in passages))
+    found = [[p for p in passages if p.train == t] for t in trains]
+    return [*found, [p for p in passages if p.speed < middle], [p for p in passages if p.speed >= middle]]
+
+
+def evidence(passages, apart):
+    """(n_bin,) nats for a line that all trains show at all speeds, over roughness alone; ``apart`` is the number of
+    sensors that hear different rail."""
+    z = np.min([np.mean([p.above.mean(axis=0) for p in group], axis=0) for group in groups(passages)], axis=0)
+    z, spread = np.maximum(z, 0.0), SPREAD**2 / apart
     wide = spread + LOUD**2
     return 0.5 * np.log(spread / wide) + 0.5 * z**2 * (1.0 / spread - 1.0 / wide)
 
 
 def short_waves(case, fit):
-    """The likeliest short corrugation as a candidate, () where sound rail is likelier."""
-    reserved = {o.name for o in case.reserved}
-    mades = [m for m in case.rollings.values() if case.said(m)["train"]]
-    if any(c.family == "rail_corrugation" for c in fit.candidates):
+    """The likeliest short corrugation as a candidate, () where sound rail is likelier or nothing could tell."""
+    mades = [m for m in case.rollings.values() if m.passage.train]
+    if any(c.family == "rail_corrugation" for c in fit.candidates) or not _telling(mades):
         return ()
-    wavelengths = bins(case)
-    louds = {m.name: loud_of(case, m, wavelengths) for m in mades}
-    seen = [p for p in louds.values() if p.name not in reserved]
-    if len({p.train for p in seen}) < TRAINS:
+    wavelengths, reserved = bins(case), {o.name for o in case.reserved}
+    if wavelengths.size <= 2 * AROUND:
         return ()
-    nats = evidence(seen)
-    nats[wavelengths >= rolling.SHORTEST_WAVE] = -np.inf
-    k, kept = int(np.argmax(nats)), [p for p in louds.values() if p.name in reserved]
-    if nats[k] < np.log(nats.size) or (kept and not _holds(kept, seen, k)):
+    louds = [loud_of(case, m, wavelengths) for m in mades]
+    seen, kept = ([p for p in louds if (p.name in reserved) == left_out] for left_out in (False, True))
+    if not _telling([case.rollings[p.name] for p in seen]) or not all(len(p.power) for p in louds):
+        return ()
+    nats = evidence(seen, _apart(case))
+    nats[_known(case, wavelengths)] = -np.inf
+    k = int(np.argmax(nats))
+    if wavelengths[k] >= rolling.SHORTEST_WAVE or nats[k] < np.log(nats.size) or (kept and not _holds(kept, seen, k)):
         return ()
     return (_candidate(case, fit, wavelengths, k, float(nats[k]), seen),)
 
 
+def _telling(mades):
+    """Whether trains and speeds differ enough to tell the rail from wheels and from frequencies."""
+    speeds = [m.speed for m in mades]
+    return len({m.passage.train for m in mades}) >= TRAINS and max(speeds) > SPEEDS * min(speeds)
+
+
+def _apart(case):
+    """Number of sensors that hear different rail."""
+    places = sorted(s.place for s in case.campaign.sensors)
+    return 1.0 + float(np.sum(np.minimum(np.diff(places) / HEARD, 1.0)))
+
+
+def _known(case, wavelengths):
+    """(n_bin,) whether the track's file has corrugation of about that length."""
+    parts = [p for m in case.rollings.values() for s in case.zone.turnout.surfaces(m.passage.route) for p in s]
+    known = np.array([p.wavelength for p in parts if hasattr(p, "wavelength")])
+    return np.any(np.abs(np.log(wavelengths[:, None] / known)) < (LINE + 0.5) * WIDTH, axis=1)
+
+
 def _holds(kept, seen, k):
-    """Passages left out show at least half of the line."""
+    """Passages left out show at least half of the line: what does not predict them is no finding."""
     levels = [np.mean([p.above[:, k].mean() for p in passages]) for passages in (kept, seen)]
     return levels[0] > 0.5 * levels[1]
 
@@ -144,7 +179,7 @@ def _sized(case, fit, length, about, seen):
     found = np.zeros((len(shapes), AMPLITUDES.size))
     for p in seen:
         unit = _unit_energy(case, fit, case.rollings[p.name], length, shapes)  # (n_shape, n_sensor)
-        expected = AMPLITUDES[:, None, None] ** 2 * unit + p.usual[:, about].sum(axis=1)
+        expected = AMPLITUDES[:, None, None] ** 2 * unit[:, p.alive] + p.usual[:, about].sum(axis=1)
         found += np.sum((np.log(p.power[:, about].sum(axis=1)) - np.log(expected)) ** 2, axis=2).T
     n = sum(len(p.power) for p in seen)
     best, size = np.unravel_index(int(np.argmin(found)), found.shape)
