@@ -15,6 +15,7 @@ import numpy as np
 
 from benchmarks.bar import Bar, stopwatch
 from turnout import physics
+from turnout.chains.mismatch_groups import reserved, telling
 from turnout.mismatch import diagnose
 from turnout.mismatch.distinguish import distinguishability
 from turnout.mismatch.lumped import OscillatorCase
@@ -151,6 +152,8 @@ def whole_turnout():
     if WHOLE not in os.environ.get("TURNOUT_MISMATCH_CASES", ""):
         return
     campaign = measured_campaign(turnout_plan(), (physics.HangingSleeper(52, 8e-4),), 700)
+    chosen = telling(campaign.passages)  # as turnout diagnose does
+    campaign = replace(campaign, passages=tuple(chosen), reserved=reserved(chosen, campaign.hammer))
     started = time.monotonic()
     with stopwatch() as watch:
         found = diagnose(TrackCase(campaign), progress=_said)

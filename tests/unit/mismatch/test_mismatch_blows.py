@@ -2,14 +2,17 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
 from turnout import physics
+from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
 from turnout.mismatch import diagnose
 from turnout.mismatch.finding import finding_row
 from turnout.mismatch.track import Campaign, TrackCase
+from turnout.mismatch.track.observing import hammer_observations
 from turnout.mismatch.track.planned import measured_campaign, small_plan
 from turnout.simulate import uniform_track
 from turnout.simulate.turnout_track import TurnoutTrack
@@ -83,3 +86,13 @@ def test_a_rail_soft_in_shear_is_sized_against_the_rail_of_its_file(plan):
     assert case.rail["rail_shear"] < -0.05
     assert found.names[:1] == ("rail_shear",)
     assert abs(found.fit.psi[0] - 4.0) < 2.0 * found.fit.psi_se[0]
+
+
+def test_a_blow_is_not_asked_of_sensors_far_from_it():
+    """At 8 m the tolerance of a model has 1 + (8 / 1.5)^2 = 29 times its variance at the blow."""
+    plan = small_plan((15.0,), blows=(20.4, 30.0), passages=False)
+    case = SimpleNamespace(
+        campaign=measured_campaign(plan), ceilings={}, settings=MismatchSettings(), notes=[], pairs={}
+    )
+    heard = {(p.test.place, p.channel) for p in case.pairs.values()} if list(hammer_observations(case)) else set()
+    assert heard == {(20.4, s.name) for s in plan.sensors} | {(30.0, "S2"), (30.0, "S3"), (30.0, "S4")}
