@@ -8,9 +8,11 @@ import numpy as np
 
 from turnout.errors import TurnoutError
 from turnout.mismatch.case import Nuisance
+from turnout.mismatch.joint import fit_jointly
 
 WIDE = 0.5  # prior sd of an accepted value on its next visit, as a share of its way from neutral: it may well grow
 LEAST_ERRORS = 3.0  # and at least so many of its standard errors
+STEPS = 12  # of the fits to hammer tests alone that give the start
 STEP = 0.02  # of the prior sd, for derivatives
 
 
@@ -50,6 +52,16 @@ class GuidedCase:
         self.own = tuple(n for a in self.accepted for n in _nuisances(a))
         self.nuisances = (*case.nuisances, *self.own)
         self.candidates = self._new(case.candidates)
+        self.start_values = self._started() if self.own else case.start_values
+
+    def _started(self):
+        """Where fits start: those of the case have bent its supports to what was accepted, these know of it."""
+        cheap = self.cheap_part()
+        if cheap is None:
+            return self.case.start_values
+        means = {n.name: n.mean for n in cheap.nuisances}
+        roughly = fit_jointly(cheap.roughened(), values=means, iterations=STEPS)
+        return {**self.case.start_values, **fit_jointly(cheap, values=roughly.values, iterations=STEPS).values}
 
     def __getattr__(self, name):
         return getattr(self.__dict__["case"], name)
@@ -142,14 +154,16 @@ class GuidedCase:
         return self.case.numerical_error(self._seen(fit))
 
     def _seen(self, fit):
-        return _Seen(fit, self.standing(fit.values)) if self.accepted else fit
+        return _Seen(fit, self.standing(fit.values), len(self.case.nuisances), len(self.own)) if self.accepted else fit
 
 
 class _Seen:
-    """A fit whose terms begin with the accepted ones, as the case inside has to see it."""
+    """A fit whose terms begin with the accepted ones, as the case inside has to see it: with its ``n`` nuisances and
+    without the ``own`` ones of what was accepted, which come behind them."""
 
-    def __init__(self, fit, standing):
+    def __init__(self, fit, standing, n, own):
         self._fit, self.terms = fit, (*standing, *fit.terms)
+        self.jacobian = [np.delete(j, slice(n, n + own), axis=1) for j in fit.jacobian]
 
     def __getattr__(self, name):
         return getattr(self.__dict__["_fit"], name)

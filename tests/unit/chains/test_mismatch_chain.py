@@ -84,7 +84,19 @@ def test_what_was_accepted_is_simulated_and_not_found_again(soft, capsys):
     (row,) = tables["mismatch_findings"]
     assert row["verdict"] == "none" and row["term"] is None
     (parameter,) = tables["mismatch_parameters"]
-    assert parameter["accepted"] and parameter["term"] == "local_pad" and parameter["value"] < 0.7
+    assert parameter["accepted"] and parameter["term"] == "local_pad"
+    assert parameter["value_low"] < small.SOFT < parameter["value_high"] < 0.7
+
+
+def test_what_was_accepted_is_not_found_again_in_passages_either(soft):
+    """The residual is searched for dips and wheels beside what was accepted."""
+    assert main(["diagnose", "--turnout", "t1"]) == 0 == main(["diagnose", "--turnout", "t1", "--accept"])
+    small.roll(soft, small.soft_pad)
+    tables = diagnose_turnout("t1")
+    (row,) = tables["mismatch_findings"]
+    assert (row["verdict"], row["n_passages"]) == ("none", 2)
+    (parameter,) = tables["mismatch_parameters"]
+    assert parameter["accepted"] and parameter["value_low"] < small.SOFT < parameter["value_high"]
 
 
 def test_the_simulated_file_holds_the_accepted_effect(soft):

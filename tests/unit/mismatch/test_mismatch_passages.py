@@ -39,10 +39,16 @@ def test_the_derivative_by_a_wave_of_the_rail_points_where_the_simulation_goes(s
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "term", [physics.SensorPosition("S3", 0.4), physics.TimeOffset("S3", 3e-3), physics.SensorGain("S3", 0.6)]
+    "term",
+    [
+        physics.SensorPosition("S3", 0.4),
+        physics.TimeOffset("S3", 3e-3),
+        physics.SensorGain("S3", 0.6),
+        physics.UnsprungMass(2.5, "heavy"),
+    ],
 )
-def test_the_derivatives_of_a_channel_with_a_fault_are_those_of_what_it_shows(sound, term):
-    """A wave of the rail and a pad, seen by S3 alone where and when and as loud as the term says."""
+def test_derivatives_of_passages_are_those_beside_the_term(sound, term):
+    """A wave of the rail and a pad, seen by S3 where, when and as loud as the term says, pressed by such wheels."""
     case, values = sound
     (seen,) = (o for o in case.observations if o.name == "heavy 2")
     wave = case.waves.names[2 * int(np.argmin(np.abs(case.waves.lengths - 0.7)))]

@@ -1,11 +1,13 @@
 """Matrices filled into a skeleton are those assembled in full."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from turnout import physics
+from turnout.mismatch.track.base_model import COMMON, OWN
 from turnout.mismatch.track.blows import BlowModel
 from turnout.mismatch.track.skeleton import matrices_of
 from turnout.simulate import uniform_track
@@ -35,6 +37,37 @@ def test_a_filled_skeleton_is_the_assembled_track(terms):
         for name in ("mass", "damping", "stiffness", "hysteresis"):
             a, b = getattr(full, name), getattr(filled, name)
             assert b == pytest.approx(a, rel=1e-9, abs=1e-9 * np.abs(a).max())
+
+
+FOLLOWING = [
+    physics.LocalBallast(18, 0.3),
+    physics.LocalPad(19, 2.5),
+    physics.HangingSleeper(19, 5e-4),
+    physics.HangingSleeper(19, 5e-4, 0.4),
+    physics.ZenerPad(0.8),
+    physics.SleeperMode(0.3, 250.0),
+    physics.PadTemperature(0.012).under({"rail_temperature": 35.0}),
+]
+
+
+@pytest.mark.parametrize("term", FOLLOWING, ids=lambda term: repr(term)[:30])
+def test_derivatives_by_supports_know_what_follows_them_in_a_term(term):
+    """Against differences of the receptance: a free sleeper's ballast, a share of soft ballast, a pad's branch."""
+    rng, track = np.random.default_rng(2), uniform_track(24.0)
+    own = {o.field: np.exp(0.2 * rng.normal(size=track.support.size)) for o in OWN}
+    track = track.with_(**{field: getattr(track, field) * by for field, by in own.items()})
+    found = BlowModel(track, (term,)).gradient(10.7, 11.6, SimpleNamespace(first=18, last=19))
+    size = np.abs(found).max(axis=0).max()
+
+    def changed(field, where, step):
+        by = np.ones(track.support.size)
+        by[where] = np.exp(step)
+        return BlowModel(track.with_(**{field: getattr(track, field) * by}), (term,)).receptance(10.7, 11.6)
+
+    columns = [(name, slice(None)) for name, *_ in COMMON] + [(o.field, j) for o in OWN for j in (18, 19)]
+    for k, at in enumerate(columns):
+        difference = (changed(*at, 1e-4) - changed(*at, -1e-4)) / 2e-4
+        assert found[:, k] == pytest.approx(difference, rel=3e-3, abs=1e-5 * size), at  # the first order of SHARE
 
 
 @pytest.mark.parametrize("name", ["bending_stiffness", "shear_stiffness"])

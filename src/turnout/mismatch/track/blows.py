@@ -1,7 +1,7 @@
 """Hammer tests as observations: receptances of accepted blows, their prediction and derivatives."""
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -11,10 +11,12 @@ from turnout.mismatch.track.skeleton import FixedLinks, matrices_of
 from turnout.receptance import find_impacts
 from turnout.simulate.frequency import responses
 from turnout.simulate.link import Link
+from turnout.simulate.matrices import link_vector
 
 LINES = np.unique(np.round(np.geomspace(35.0, 900.0, 44) / 2.0) * 2.0)  # [Hz]; two blows' worth of resolution
 SWING, RATE = 1e-6, 0.02  # motion of a blow for the tangent of a law [m, m/s]
 DELAY = 8e-6  # sd of a hammer pair's delay: 2 degrees at 700 Hz [s]
+SHARE = 1e-3  # of a support's value, by which what follows it is found
 FEWEST = 2
 SMOOTH = 0.3  # octaves over which the errors of a model of the track hang together
 FARTHER = 1.5  # m; over this way an error of the waves' speed and decay doubles the variance of a receptance's error
@@ -228,9 +230,30 @@ class BlowModel:
         product["sleeper"] = product["ballast"]
         factor = {"stiffness": -1.0 + 0.0 * omega, "damping": -1j * omega, "mass": omega**2}
         inside = slice(zone.first, zone.last + 1)
-        common = [factor[what] * (product[tag] @ getattr(self.track, name))[:, None] for name, tag, what, _ in COMMON]
-        own = [factor[o.what] * product[o.link][:, inside] * getattr(self.track, o.field)[inside] for o in OWN]
-        return np.concatenate([*common, *own], axis=1)
+        by_support = {o.field: factor[o.what] * product[o.link] * getattr(self.track, o.field) for o in OWN}
+        for field, support, rows, weights, (stiffness, damping, mass) in self.following:
+            change = mass * omega**2 - 1j * omega * damping - stiffness
+            by_support[field][:, support] += change[:, 0] * (u[:, rows] @ weights) * (v[:, rows] @ weights)
+        common = [by_support[name].sum(axis=1, keepdims=True) for name, *_ in COMMON]
+        return np.concatenate([*common, *(by_support[o.field][:, inside] for o in OWN)], axis=1)
+
+    @cached_property
+    def following(self):
+        """Links of the terms that follow a value of their support: [(field, support, rows, weights, (k, c, m) per
+        logarithm of the value)]. Soft ballast has a share of it, a pad's branch goes with the pad, a gap has none."""
+        if not self.terms:
+            return []
+        found, known = [], self._links(self.track)
+        for field in dict.fromkeys(o.field for o in OWN):
+            moved = self._links(self.track.with_(**{field: getattr(self.track, field) * (1.0 + SHARE)}))
+            for a, b in zip(known, moved):
+                change = tuple((getattr(b, w) - getattr(a, w)) / SHARE for w in ("stiffness", "damping", "mass"))
+                if any(change):
+                    found.append((field, a.ends[0][0][1], *link_vector(a, self.matrices.index), change))
+        return found
+
+    def _links(self, track):
+        return [*(link for term in self.terms for link in term.links(track)), *tangent(self.terms, track)]
 
 
 def channel_factor(terms, sensor, frequency):

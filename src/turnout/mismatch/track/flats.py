@@ -21,8 +21,8 @@ MIDDLING, LENGTHS = 0.05, (0.025, 0.035, 0.045, 0.055, 0.07, 0.09)  # m
 def flats(case, fit):
     """Candidates of the wheels that most likely carry a flat."""
     found, known = strikes(case), {c.where.get("train") for c in fit.candidates}
-    loud = [s for s in found[:NAMED] if s.nats > LEAST + np.log(len(found)) and s.train not in known]
-    return tuple(_candidate(case, fit, s, len(found)) for s in loud)
+    loud = [s for s in found if s.nats > LEAST + np.log(len(found)) and s.train not in known]
+    return tuple(_candidate(case, fit, s, len(found)) for s in loud[:NAMED])
 
 
 def _candidate(case, fit, struck, wheels):

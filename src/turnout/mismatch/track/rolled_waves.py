@@ -12,7 +12,7 @@ with :math:`\tau_n` when it passes the node and T the way between nodes over v.
 import numpy as np
 
 from turnout.mismatch.track import rolling
-from turnout.mismatch.track.base_model import track_with
+from turnout.mismatch.track.base_model import track_with, vehicle_with
 from turnout.mismatch.track.blows import channel_factor
 from turnout.mismatch.track.skeleton import matrices_of
 from turnout.simulate.frequency import responses
@@ -26,8 +26,8 @@ class Carrier:
     ``node`` (n,) places where forces are carried [m]."""
 
     def __init__(self, case, values, made, terms=()):
-        self.made, waves, vehicle = made, case.waves, made.passage.vehicle
         terms = [t.under(case.said(made)) for t in terms]
+        self.made, waves, vehicle = made, case.waves, _vehicle(values, made, terms)
         lines, transfer, point, self.node = _transfers(case, values, made, terms)
         self.speed = made.speed * (1.0 + values[f"speed@{made.name}"])
         self.sign = 1.0 if made.passage.direction == "facing" else -1.0
@@ -142,6 +142,15 @@ class Carrier:
         full[self.inside] = spectrum * self.clock[:, :, None]
         n = self.made.time.size
         return np.fft.irfft(full, self.size, axis=0)[:n].transpose(1, 0, 2).reshape(n * len(self.made.sensors), -1)
+
+
+def _vehicle(values, made, terms):
+    """The vehicle as ``values`` and ``terms`` have it."""
+    passage = made.passage
+    vehicle = vehicle_with(passage.vehicle, values, passage.train or passage.name, values[f"load@{made.name}"])
+    for term in terms:
+        vehicle = term.vehicle(vehicle)
+    return vehicle
 
 
 def shown_by(values, terms, made, frequency):

@@ -14,6 +14,7 @@ from turnout.physics.pad_temperature import REFERENCE
 
 LAWS = ("hanging_sleeper", "local_ballast", "local_pad", "dry_friction", "ballast_hardening", "attached_resonator")
 WHOLE = ("pad_temperature", "unsprung_mass", "zener_pad", "rail_shear", "ballast_inertia", "sleeper_mode")
+TOLD = ("pad_temperature", "unsprung_mass")  # those whose columns passages have; without blows others are simulated
 PATHS = ("surface_dip", "rail_corrugation")
 CHANNELS = (
     "sensor_gain", "mount_resonance", "time_offset", "low_pass", "high_pass", "clock_drift", "clipping", "hum",
@@ -40,7 +41,7 @@ def screen_columns(case, fit, observations):
         for key, column in parts.items():
             found[key][i] = column.astype(np.float32)
     for c in case.candidates:
-        for k in range(len(c.starts)) if c.family in WHOLE else ():
+        for k in range(len(c.starts)) if c.family in (WHOLE if case.pairs else TOLD) else ():
             found[c.key, k] = _whole(case, fit, c, k, observations)
     return found
 
