@@ -53,7 +53,10 @@ def train_of(row: Mapping, said: Mapping, folder: Path) -> TrainFound:
     speed = float(speed) / KMH
     vehicle, doubts = _vehicle(name, row.get("n_axles") or None, row, said, folder, bool(believed))
     try:
-        speed, more = _by_its_axles(name, vehicle, row, speed)
+        speed, turned = _by_its_axles(name, vehicle, row, speed)
+        more: tuple[str, ...] = (f"{name} runs the other way round",) if turned else ()
+        if turned:  # its axles count from the other end: a train of its own
+            name, vehicle = f"{name} reversed", vehicle.turned()
     except TrainUnknownError as error:
         if not believed:
             raise
@@ -110,14 +113,15 @@ def _load_share(name, row, said, folder, units):
 
 
 def _by_its_axles(name, vehicle, row, speed):
-    """(speed [m/s], doubts): the vehicle's own axle distances over the times heard tell the speed best.
+    """(speed [m/s], whether it runs the other way round): the vehicle's own axle distances over the times heard tell
+    the speed best.
 
     TrainUnknownError where the axles are not those of the vehicle at any speed near the one found.
     """
     times = np.asarray(row.get("axle_times_s") if row.get("axle_times_s") is not None else (), dtype=float)
     places = np.asarray(vehicle.wheel_places, dtype=float)
     if times.size != places.size or times.size < 2:
-        return speed, ()
+        return speed, False
     reach = max(LEAST_REACH, 3.0 * float(row.get("speed_se_kmh") or 0.0) / (KMH * speed))
     ways = [_fitted(times, p, speed, reach) for p in (places, places[-1] - places[::-1])]
     off, own = min(ways)
@@ -125,7 +129,7 @@ def _by_its_axles(name, vehicle, row, speed):
         raise TrainUnknownError(
             f"its axles lie {off:.2f} m rms off those of {name}.yaml: wrong vehicle file, or sensors elsewhere"
         )
-    return own, () if ways[0][0] <= PATTERN else (f"{name} runs the other way round",)
+    return own, ways[0][0] > PATTERN
 
 
 def _fitted(times, places, speed, reach):

@@ -152,6 +152,18 @@ class Vehicle:
         """The same vehicle with some fields changed."""
         return replace(self, **changes)
 
+    def turned(self):
+        """The same vehicle running the other way round, its last wheel first."""
+        last = float(self.wheel_places[-1])
+        pitch = {int(r) + 1 for r, b in zip(self.row, self.bodies) if b.inertia is not None}
+        links = tuple((tuple((r, -w if r in pitch else w) for r, w in ends), *rest) for ends, *rest in self.extra_links)
+        return self.with_(
+            bodies=tuple(replace(b, place=last - b.place) for b in self.bodies),
+            suspensions=tuple(replace(s, lever=-s.lever, lower_lever=-s.lower_lever) for s in self.suspensions),
+            wheels=self.wheels[::-1], extra_links=links,
+            overhang=self.length - last - self.overhang if self.length else self.overhang,
+        )  # fmt: skip
+
 
 def _add(matrix, ends, value):
     for a, wa in ends:

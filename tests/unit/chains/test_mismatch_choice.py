@@ -6,6 +6,8 @@ import pytest
 
 from turnout.chains.mismatch_gather import _spoils
 from turnout.chains.mismatch_groups import reserved, telling
+from turnout.chains.mismatch_trains import train_of
+from turnout.simulate import load_vehicle
 
 
 def train(name, kind, axles, speed):
@@ -34,6 +36,22 @@ def test_few_passages_keep_none_back_and_many_a_fifth_from_the_midst_of_the_spee
     assert reserved(FLEET[:3], ()) == ()
     assert reserved(FLEET[:5], ()) == ("ic3 2",)
     assert reserved(FLEET[:9], ()) == ("ic3 2", "ic3 7")
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_train_that_runs_the_other_way_round_is_simulated_so(turned, repository):
+    """Its locomotive pushes: axles, their order and loads are those of the reversed train, which is one of its own."""
+    folder = repository / "config" / "vehicles"
+    file = load_vehicle("intercity", 0.5, folder)
+    places = file.wheel_places[-1] - file.wheel_places[::-1] if turned else file.wheel_places
+    row = {"train_type": "intercity", "speed_kmh": 120.0, "n_axles": 24, "axle_times_s": 2.0 + places / 33.0}
+    found = train_of(row, {}, folder)
+    assert found.speed == pytest.approx(33.0)
+    assert found.vehicle.wheel_places == pytest.approx(places)
+    assert found.vehicle.static_loads == pytest.approx(file.static_loads[:: -1 if turned else 1])
+    assert (found.name, any("other way" in d for d in found.doubts)) == (
+        ("intercity reversed", True) if turned else ("intercity", False)
+    )
 
 
 @pytest.mark.parametrize(

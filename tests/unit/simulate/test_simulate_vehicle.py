@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 from turnout.config.parameter_set import read_parameters
 from turnout.simulate import car, load_track, load_vehicle
 from turnout.simulate.parameters import REPOSITORY
-from turnout.simulate.vehicle import GRAVITY, coupled
+from turnout.simulate.vehicle import GRAVITY, Body, Suspension, Vehicle, coupled
 
 AXLES = {
     "ic3": 8,
@@ -66,6 +67,31 @@ def test_the_contact_stiffness_is_that_of_hertz(name):
     vehicle = load_vehicle(name)
     hertz = 4.0 / 3.0 * 210e9 / (2.0 * (1.0 - 0.3**2)) * (vehicle.radius * 0.3) ** 0.25
     assert vehicle.contact.stiffness == pytest.approx(hertz, rel=0.02)
+
+
+def lopsided():
+    """A body that rests on wheels 2 m before and 5 m behind its centre, with a shear link from its pitch to a wheel."""
+    bodies = (Body("body", 2e4, 3e5, 2.0), Body("a", 700.0, None, 0.0), Body("b", 900.0, None, 7.0))
+    springs = (Suspension(0, 1, -2.0, 5e5, 4e3), Suspension(0, 2, 5.0, 8e5, 6e3))
+    link = (((1, 0.7), (3, -1.0)), 2e5, 1e3, 5.0)
+    return Vehicle("lopsided", bodies, springs, (1, 2), extra_links=(link,), length=10.0, overhang=1.0)
+
+
+@pytest.mark.parametrize("vehicle", [load_vehicle("intercity"), lopsided()], ids=["intercity", "lopsided"])
+def test_a_train_that_runs_the_other_way_round_has_its_wheels_loads_and_modes_in_reverse(vehicle):
+    turned = vehicle.turned()
+    last = vehicle.wheel_places[-1]
+    assert turned.wheel_places == pytest.approx(last - vehicle.wheel_places[::-1])
+    assert turned.static_loads == pytest.approx(vehicle.static_loads[::-1])
+    assert turned.static_loads[0] != pytest.approx(vehicle.static_loads[0], rel=1e-3)  # the input breaks symmetry
+    assert turned.overhang + vehicle.overhang + last == pytest.approx(vehicle.length)
+    modes = [np.sort(eigh(v.matrices[2], v.matrices[0], eigvals_only=True)) for v in (vehicle, turned)]
+    assert modes[0] == pytest.approx(modes[1], abs=1e-9 * modes[0][-1])
+    again = turned.turned()
+    assert [b.place for b in again.bodies] == pytest.approx([b.place for b in vehicle.bodies])
+    assert (again.suspensions, again.wheels, again.extra_links) == (
+        vehicle.suspensions, vehicle.wheels, vehicle.extra_links,
+    )  # fmt: skip
 
 
 def test_coupled_cars_keep_their_places_and_blocks():
