@@ -1,5 +1,7 @@
 """Passages: columns against the simulation, a flat found in the residual, our own numerics."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.track import TrackCase
 from turnout.mismatch.track.flats import flats
 from turnout.mismatch.track.planned import measured_campaign, small_plan
-from turnout.mismatch.track.rolling import Track1D
+from turnout.mismatch.track.rolling import ALIKE, Track1D, align
 
 
 @pytest.fixture(scope="module")
@@ -102,3 +104,28 @@ def test_the_derivative_by_a_sensors_place_is_where_the_simulation_goes_when_it_
     assert np.linalg.norm(expected) > 0.0
     # signals are solved to 1e-3 of the contact force; two runs with other probes may differ by rounding alone
     assert np.linalg.norm(column[:, names.index(moved)] - expected) < 1e-6 * np.linalg.norm(expected)
+
+
+@pytest.mark.parametrize("wrong", [0, 1])
+def test_one_sensor_that_disagrees_does_not_cost_the_passage_but_a_wrong_train_does(sound, wrong):
+    """Its sign reversed, four sensors are alike by (3 - 1) / 4 at most; three of them as before. Two reversed, or the
+    wrong train, stay below what is asked for."""
+    case, values = sound
+    passage = next(p for p in case.campaign.passages if p.name == "heavy 2")
+    sensors = case.rollings["heavy 2"].sensors
+    signals = case.roll(values, (), passage)(passage, passage.vehicle, passage.speed, sensors)
+    reference, speed, _ = align(passage, sensors, signals, case.solver.rate)
+    rows = [passage.recording.index(s.name) for s in sensors]
+
+    def reversed_(*which):
+        samples = passage.recording.samples.copy()
+        samples[[rows[k] for k in which]] *= -1.0
+        turned = replace(passage, recording=replace(passage.recording, samples=samples))
+        return align(turned, sensors, signals, case.solver.rate)
+
+    found = reversed_(wrong)
+    assert found[2] > ALIKE and found[0] == pytest.approx(reference, abs=2.6e-3)  # two steps of the search
+    assert found[1] == pytest.approx(speed, rel=0.003)
+    assert reversed_(wrong, wrong + 2)[2] < ALIKE
+    light = case.roll(values, (), passage)(passage, case.rollings["light 2"].passage.vehicle, passage.speed, sensors)
+    assert align(passage, sensors, light, case.solver.rate)[2] < ALIKE
