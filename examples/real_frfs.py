@@ -211,10 +211,10 @@ def plain_beam(d):
     printed, half, above = beam_printed()
     mine, theirs = f"{1e4 * size:.3f} ± {1.96e4 * error:.3f}", f"{1e4 * printed:.2f} ± {1e4 * half:.2f}"
     return (
-        f"found**, with grade {d.verdict.grade}: shear and rotatory inertia, slenderness ({mine}) 1e-4 (95 %) from 100 to\n"
-        f"  1900 Hz. The second to the seventh frequency that the makers print, up to {PRINTED[-1]:.0f} Hz, ask for\n"
-        f"  ({theirs}) 1e-4. The first lies {above:.1%} above that law, which is the structure that stays: what holds\n"
-        "  the beam and what its seven accelerometers weigh is not told."
+        f"found**, with grade {d.verdict.grade}: shear and rotatory inertia, slenderness ({mine}) 1e-4 (95 %) from\n"
+        f"  100 to 1900 Hz. The second to the seventh frequency that the makers print, up to {PRINTED[-1]:.0f} Hz,\n"
+        f"  ask for ({theirs}) 1e-4. The first lies {above:.1%} above that law, which is the structure that stays:\n"
+        "  what holds the beam and what its seven accelerometers weigh is not told."
     )
 
 

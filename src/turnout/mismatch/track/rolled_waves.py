@@ -44,10 +44,7 @@ class Carrier:
         self.step = (self.node[1] - self.node[0]) / self.speed
         carry = _at(self.grid, lines, transfer)  # (f, sensor, node)
         self.carry = carry * np.exp(-2j * np.pi * self.grid[:, None, None] * self.passing)
-        load = float(np.mean(vehicle.static_loads))
-        omega = 2.0 * np.pi * lines
-        contact = 1.0 / vehicle.contact.tangent(load)
-        self.lines, self.compliance = lines, point + wheel_receptance(vehicle, omega) + contact
+        self.lines, self.compliance = lines, point + wheel_and_contact(vehicle, lines)
         begin = made.time[0] - made.reference - values[f"time@{made.name}"]
         gate = rolling.gate(self.grid, rolling.LOW, made.high)
         shown = shown_by(values, terms, made, self.grid)
@@ -175,13 +172,15 @@ def _transfers(case, values, made, terms):
     return frequency, -((2.0 * np.pi * frequency) ** 2)[:, None, None] * h, point, matrices.node[near]
 
 
-def wheel_receptance(vehicle, omega):
-    """Receptance of the first wheel under the vehicle [m/N]."""
+def wheel_and_contact(vehicle, frequency):
+    """(m,) receptance of the first wheel under the vehicle, and of its contact [m/N]."""
+    omega, contact = 2.0 * np.pi * frequency, vehicle.contact.tangent(float(np.mean(vehicle.static_loads)))
     mass, damping, stiffness, _ = vehicle.matrices
     row = int(vehicle.wheel_rows[0])
     unit = np.zeros(vehicle.n)
     unit[row] = 1.0
-    return np.array([np.linalg.solve(stiffness + 1j * w * damping - w * w * mass, unit)[row] for w in omega])
+    wheel = [np.linalg.solve(stiffness + 1j * w * damping - w * w * mass, unit)[row] for w in omega]
+    return np.array(wheel) + 1.0 / contact
 
 
 def _at(grid, frequency, values):

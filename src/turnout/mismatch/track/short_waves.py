@@ -20,7 +20,7 @@ from turnout import physics
 from turnout.mismatch.case import Candidate
 from turnout.mismatch.track import rolling
 from turnout.mismatch.track.base_model import track_with
-from turnout.mismatch.track.rolled_waves import wheel_receptance
+from turnout.mismatch.track.rolled_waves import wheel_and_contact
 from turnout.mismatch.track.skeleton import matrices_of
 from turnout.simulate.frequency import responses
 
@@ -207,8 +207,7 @@ def _unit_energy(case, fit, made, length, shapes):
     middle_rows, weights = matrices.weights(float(node[node.size // 2]))
     rail = responses(matrices, frequency, [float(node[node.size // 2])], middle_rows)[:, 0] @ weights
     vehicle = made.passage.vehicle
-    contact = 1.0 / vehicle.contact.tangent(float(np.mean(vehicle.static_loads)))
-    force = 1.0 / np.abs(wheel_receptance(vehicle, omega) + contact + rail)[0]
+    force = 1.0 / np.abs(wheel_and_contact(vehicle, frequency) + rail)[0]
     gain = (omega**2 * force * np.abs(carried)) ** 2  # (n_sensor, n_node)
     inside = np.array([np.abs(node - m) <= r for m, r in shapes])
     energy = 0.5 * len(vehicle.wheels) / made.speed * np.trapezoid(inside[:, None] * gain, node, axis=2)
