@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -132,6 +133,15 @@ class GuidedCase:
     def roughened(self):
         """The case's, with the accepted effects in it."""
         return self._around(self.case.roughened())
+
+    def renewed(self, fit):
+        """With errors of the observations as ``fit`` has them."""
+        inner = self.case.renewed(self._seen(fit))
+        if inner is self.case:
+            return self
+        found = copy(self)
+        found.case = inner
+        return found
 
     def further(self, fit):
         """Candidates that the residual suggests beside what was accepted."""

@@ -26,7 +26,7 @@ def absorbed(case, fit):
             n.name: float(np.clip(fit.values[n.name] + d, *n.bounds)) for n, d in zip(case.nuisances, shift)
         }  # fmt: skip
         low, high = candidate.parameters[0].bounds
-        start = np.clip([np.exp(size) if candidate.twin_log else candidate.neutral[0] + size], low, high)
+        start = np.clip([(candidate.from_twin or np.exp)(size)], low, high)
         found.append((gain - np.log(candidate.scanned), candidate, start, {**values, twin.name: twin.mean}))
     return found
 

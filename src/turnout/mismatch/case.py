@@ -112,8 +112,8 @@ class Candidate:
     with ``start_from_base`` off the nuisances, too, start from their priors; ``always``: tried on the cheap
     observations at every place, whatever the residual promises; families with the same word are alike there;
     ``least``: distance of the first ``sized`` parameters from neutral below which nobody would act; ``even``: the cheap
-    observations hardly tell a value from its mirror image about neutral; ``twin``: nuisance that hides it, the
-    first parameter's logarithm or (``twin_log`` off) distance from neutral, and would have ``twin_sd`` with the effect.
+    observations hardly tell a value from its mirror image about neutral; ``twin``: nuisance that hides it, which
+    would have ``twin_sd`` with the effect; ``from_twin`` makes the first parameter of it, None: its exponential.
     ``parameters`` have name, unit, neutral, bounds and prior as ``turnout.physics.Parameter``.
     One found by a look at the residual has the gain it promises [nats] in ``promise``, starts as it is, from the
     nuisances ``begin``; ``aside`` is evidence from data that are no observations [nats].
@@ -121,7 +121,9 @@ class Candidate:
     family that it cannot be told from at the lower bound of its first parameter; ``plain`` is (family, k): where its
     first parameter does not matter it is that law, of the size of its k-th. ``whole``: its response turns with its
     size, so that a start promises what it is and says nothing of a larger or smaller one.
-    ``loose`` is the share by which the size of an effect errs since its law is not quite the one out there.
+    ``loose`` is the share by which the size of an effect errs since its law is not quite the one out there; an
+    ``exact`` one is what it says (a gain, a lag, a place): nothing that it leaves is due to its shape. ``told_by`` is a
+    kind of observations that must speak for it, too: to all others it is another law.
     """
 
     family: str
@@ -137,11 +139,13 @@ class Candidate:
     even: bool = False
     twin: str = ""
     twin_sd: float = 0.7
-    twin_log: bool = True
+    from_twin: Callable[[float], float] | None = None
     promise: float | None = None
     begin: Mapping[str, float] = field(default_factory=dict)
     aside: float = 0.0
     loose: float = 0.0
+    exact: bool = False
+    told_by: str = ""
     kin: str = ""
     limit: str = ""
     plain: tuple = ()
@@ -156,8 +160,8 @@ class Candidate:
 
     @property
     def part(self):
-        """(kin, place): what it is a law of."""
-        return self.kin, self.where.get("place")
+        """(kin, place or sensor): what it is a law of."""
+        return self.kin, self.where.get("place", self.where.get("sensor"))
 
     @property
     def neutral(self):
@@ -183,7 +187,8 @@ class Case:
     for observations that are ``cheap``. ``start_values`` are values of nuisances where fits start, else their means;
     ``control_level`` the weighted mean square by kind that cases without an effect reach, else that of the settings;
     ``cell_level`` the same for one channel of one recording, by kind;
-    ``disturbed`` recordings not used, since something else than the known inputs shows in them (``track.quiet``).
+    ``disturbed`` recordings not used, since something else than the known inputs shows in them (``track.quiet``);
+    ``foreign`` trains, no recording of which looks as their description has it.
     """
 
     observations: tuple[Observation, ...] = ()
@@ -195,6 +200,7 @@ class Case:
     control_level: Mapping[str, float] = {}
     cell_level: Mapping[str, float] = {}
     disturbed: tuple = ()
+    foreign: tuple = ()
 
     def cheap(self, observation):
         """Derivatives of this observation cost next to nothing."""
@@ -246,6 +252,10 @@ class Case:
 
     def roughened(self):
         """The same case with broad, independent errors: its optimum has a wide basin."""
+        return self
+
+    def renewed(self, fit):
+        """The same case with errors of its observations as the model of ``fit`` makes them; itself where they stay."""
         return self
 
     def cheap_part(self):

@@ -77,6 +77,7 @@ def diagnose(case, settings=None, progress=None, store=None):
     settings, store = settings or MismatchSettings(), {} if store is None else store
     tell = progress or (lambda done, total, what: None)
     base = kept(store, "base", lambda: fit_jointly(case, iterations=settings.base_iterations))
+    case, base = _with_its_errors(case, base, settings, store)
     frames = tuple(attribute(*cell_energies(case.observations, base.residuals), settings.permutations))
     numerics = _own_numerics(case, base, settings)
     if numerics:
@@ -87,22 +88,38 @@ def diagnose(case, settings=None, progress=None, store=None):
         promising = None if refused(verdicts) else {s.family for s in scores if s.gain > settings.threshold}
         scores = scored(case, fit, settings, tell, store, effect, promising)
         verdict, best = judged(case, fit, scores, settings)
-        if effect and (verdict.answer != "named" or best.gain < SHAPE * verdicts[0].scores[0].gain):
+        if effect and (verdict.answer != "named" or best.gain < _shape_of(verdicts[0].scores[0])):
             break
         verdicts.append(verdict)
         if verdict.answer == "none" or best is None or best.gain <= settings.threshold:
             break
         fit = best.fit if best.fit.jacobian else to_the_end(case, best.fit, settings)
+        if verdict.answer == "named":
+            case, fit = _with_its_errors(case, fit, settings, store)
         if verdict.answer == "a_or_b" or (not case.frozen_jacobian and over(case, fit, settings) <= 1.0):
             break
     if refused(verdicts):
         verdicts, fit = reconsidered(case, base, fit, verdicts, settings)
-    rival, leader = _rival(verdicts[0]), verdicts[0].scores[0] if verdicts[0].scores else None
+    rival, leader = _rival(verdicts[0]), next((s for s in verdicts[0].scores[:1] if s.gain > settings.threshold), None)
     where = whereabouts(case, base, leader) if verdicts[0].answer == "unknown" else None
     return Diagnosis(
         tuple(verdicts), base, fit, frames, _verified(case, base, fit, rival), latent_of(case, base), {},
         scores, where,
     )  # fmt: skip
+
+
+def _with_its_errors(case, fit, settings, store):
+    """(case, fit) with the errors of the observations as the model of ``fit`` makes them, and fitted again."""
+    new = case.renewed(fit)
+    if new is case:
+        return case, fit
+    key = f"renewed:{'+'.join(c.key for c in fit.candidates)}"
+    return new, kept(store, key, lambda: to_the_end(new, fit, settings), fit.candidates)
+
+
+def _shape_of(score):
+    """Evidence that a law of not quite the shape out there may leave to another name. [nats]"""
+    return 0.0 if score.candidate.exact else SHAPE * score.gain
 
 
 def _own_numerics(case, base, settings):

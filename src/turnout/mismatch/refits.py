@@ -6,13 +6,14 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.held_out import held_out_score
-from turnout.mismatch.joint import cost_at, fit_jointly
+from turnout.mismatch.joint import Joint, cost_at, fit_jointly
 from turnout.mismatch.scoring import score_of
 from turnout.mismatch.shortlist import Entry, shortlist
 
 HELD = 0.5  # of what the cheap observations gained; a refit that holds less has not come to its end
 PROMISING = 0.5  # of the threshold, which laws of a part must gain before its other laws are asked
 ROUNDS = 3  # of steps for a leader; one that still gains afterwards is far from any law
+FAR = 4.0  # thresholds promised by the cheap observations, beyond which the base fit's derivatives point elsewhere
 HALVINGS = 4  # of a start that costs more than nothing; a sixteenth of it is a straight line
 
 
@@ -25,7 +26,7 @@ def scored(case, fit, settings, tell, store, effect, promising):
             if best < PROMISING * settings.threshold:
                 continue
             entry = _after_its_kin(entry, scores)
-        score = _tried(case, fit, entry, settings, store, effect)
+        score = _tried(case, fit, entry, settings, store, effect, best)
         tell(done + 1, len(plan), entry.candidate.key)
         if score is None:
             continue
@@ -59,10 +60,10 @@ def _same_law_beside(case, fit, ranked, settings, store, effect):
 
 
 def beside(case, fit, ranked, settings):
-    """The scores, the best one that matters with what it gains on top of one that leads and does not: a law of the
-    whole track too small to act on may be what another law has taken for itself."""
+    """The scores, the best one that matters with what it gains on top of one that leads by more than the margin and
+    does not: a law of the whole track too small to act on may be what another law has taken for itself."""
     leader, best = ranked[0], next((s for s in ranked if s.material), None)
-    if best is None or leader is best or best.gain <= settings.threshold:
+    if best is None or leader.gain - best.gain <= settings.margin or best.gain <= settings.threshold:
         return ranked
     held, own = leader.fit, best.fit.psi[fit.psi.size :]
     none = np.concatenate([fit.psi, leader.candidate.neutral])
@@ -86,16 +87,18 @@ def _after_its_kin(entry, scores):
     return replace(entry, values=max(kin, key=lambda s: s.gain).fit.values) if kin else entry
 
 
-def _tried(case, fit, entry, settings, store, effect):
-    """Score of an entry of the shortlist after its joint refit; None where the simulation cannot go there."""
+def _tried(case, fit, entry, settings, store, effect, best=0.0):
+    """Score of an entry of the shortlist after its joint refit; None where the simulation cannot go there. What holds
+    less than it promised goes on, unless the ``best`` so far is out of its reach."""
     candidate, start = entry.candidate, entry.start
     key = f"{effect}:{'+'.join(c.key for c in fit.candidates)}:{candidate.key}:{tuple(np.round(start, 12))}"
-    both = (*fit.candidates, candidate)
-    refit = kept(store, key, lambda: _refit(case, fit, candidate, start, entry.values, settings), both)
+    both, far = (*fit.candidates, candidate), entry.promised > FAR * settings.threshold
+    refit = kept(store, key, lambda: _refit(case, fit, candidate, start, entry.values, far, settings), both)
     if refit is None:
         return None
     score = score_of(case, fit, refit, candidate, settings)
-    if case.frozen_jacobian and score.gain < HELD * entry.promised and entry.promised > settings.threshold:
+    worth = max(settings.threshold, HELD * best)
+    if case.frozen_jacobian and score.gain < HELD * entry.promised and entry.promised > worth:
         return _polished(case, fit, score, settings, store, effect)
     return score
 
@@ -133,9 +136,8 @@ def to_the_end(case, fit, settings):
     return fit_jointly(case, fit.candidates, fit.psi, fit.values, iterations=settings.iterations)
 
 
-def _refit(case, fit, candidate, start, back, settings):
+def _refit(case, fit, candidate, start, back, far, settings):
     """Joint refit from this start; None where the simulation cannot go there."""
-    keep = fit.jacobian if case.frozen_jacobian else None
     psi = np.concatenate([fit.psi, start])
     candidates = (*fit.candidates, candidate)
     values = {**fit.values, **back}
@@ -145,10 +147,20 @@ def _refit(case, fit, candidate, start, back, settings):
         psi = _best_start(case, candidates, psi, values)
         if candidate.start_from_base and not back:
             psi = _sobered(case, candidates, psi, fit)
+        keep = _derivatives(case, fit, candidates, psi, values, far)
         refit = fit_jointly(case, candidates, psi, values, keep, iterations=settings.iterations)
     except SimulationError:
         return None
     return refit.light() if case.frozen_jacobian else refit
+
+
+def _derivatives(case, fit, candidates, psi, values, far):
+    """A dear case's derivatives from which a refit starts: those of ``fit``, but for a start ``far`` from it."""
+    if not case.frozen_jacobian or not far:
+        return fit.jacobian if case.frozen_jacobian else None
+    joint = Joint(case, candidates)
+    theta = np.concatenate([[values.get(n.name, n.mean) for n in case.nuisances], psi])
+    return joint.jacobian(theta, joint.predict(theta))
 
 
 def _best_start(case, candidates, psi, values):

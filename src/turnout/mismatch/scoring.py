@@ -38,8 +38,18 @@ def score_of(case, fit, refit, candidate, settings):
     explained = explained_of(case, fit, refit, settings)
     worst = min(by_condition.values(), default=0.0)
     gain += candidate.aside
-    usual = _usual(case, refit, candidate)
+    usual = _usual(case, refit, candidate) or not _shown(case, fit, refit, candidate, settings)
     return Score(candidate, gain - np.log(candidate.scanned), worst, explained, refit, by_condition, usual)
+
+
+def _shown(case, fit, refit, candidate, settings):
+    """Whether the kind of observations that must speak for a candidate, if any, fits better with it by a margin."""
+    gain = sum(
+        o.effective * float(np.sum(np.square(a)) - np.sum(np.square(b))) / fit.scale[o.kind]
+        for o, a, b in zip(case.observations, fit.white, refit.white)
+        if o.kind == candidate.told_by
+    )
+    return not candidate.told_by or 0.5 * gain > settings.margin
 
 
 def _usual(case, refit, candidate):
@@ -49,10 +59,11 @@ def _usual(case, refit, candidate):
 
     with :math:`v_j` the logarithms that the other parts were given and :math:`\sigma_j` their standard errors.
     """
-    if not candidate.twin or not candidate.twin_log:
+    if not candidate.twin or candidate.from_twin:
         return False
-    stem = candidate.twin.rsplit("_", 1)[0]
-    like = [k for k, n in enumerate(case.nuisances) if n.name.rsplit("_", 1)[0] == stem and n.name != candidate.twin]
+    stem = candidate.twin.rsplit("_", 1)[0]  # of pad_31; pad_stiffness is that of all
+    like = [k for k, n in enumerate(case.nuisances) if n.name.removeprefix(f"{stem}_").isdigit()]
+    like = [k for k in like if case.nuisances[k].name != candidate.twin]
     first = refit.psi[refit.part(candidate).start]
     if len(like) < FEWEST or first <= 0.0:
         return False
@@ -88,13 +99,13 @@ def judged(case, fit, scored, settings):
     excess = max(over(case, fit, settings), loudest(case, fit))
     scored = tuple(s for s in scored if s.material)
     if best is None:
-        return judge([], excess, settings, disturbed=bool(case.disturbed)), None
+        return judge([], excess, settings, disturbed=bool(case.disturbed), foreign=case.foreign), None
     consistent, structure = True, 0.0
     if best.gain > settings.threshold:
         consistent = consistent_elsewhere(case, fit, best, settings)
         structure = structure_left(case, best.fit)
     left = over(case, best.fit, settings)
-    verdict = judge(scored, excess, settings, consistent, structure, left, bool(case.disturbed))
+    verdict = judge(scored, excess, settings, consistent, structure, left, bool(case.disturbed), case.foreign)
     return verdict, verdict.scores[0]
 
 

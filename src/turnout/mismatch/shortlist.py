@@ -92,9 +92,11 @@ def _kin(chosen, scored):
 
 
 def _same_place(candidate, accepted):
-    """A second law at the place, sensor or train of an accepted effect would only mend its shape."""
+    """A second law at the place, sensor or train of an accepted effect would only mend its shape, where it can."""
     if candidate.key == accepted.key:
         return True
+    if candidate.exact and accepted.exact:
+        return False
     a, b = candidate.where, accepted.where
     near = "place" in a and "place" in b and abs(a["place"] - b["place"]) < NEAR
     return near or any(k in a and a[k] == b.get(k) for k in ("sensor", "train"))

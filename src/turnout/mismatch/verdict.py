@@ -13,7 +13,7 @@ VERDICTS = ("none", "named", "a_or_b", "unknown", "numerics")
 class Score:
     """A candidate after its joint refit: ``gain`` in held-out log density over the base model less the log of the
     places scanned [nats], ``worst`` the least gain of a fold, ``explained`` share of the excess, ``fit``; ``usual``: of
-    a size by which like parts of this very case differ anyway."""
+    a size by which like parts of this very case differ anyway, or not shown by those who would have to."""
 
     candidate: object
     gain: float
@@ -142,7 +142,7 @@ def objected(worst, gain, settings):
     return worst < -max(0.5 * settings.threshold, TORN * gain)
 
 
-def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, disturbed=False):
+def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, disturbed=False, foreign=()):
     """Verdict from scored candidates.
 
     Parameters
@@ -159,6 +159,8 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
         Weighted mean square that the best candidate leaves over the level of controls.
     disturbed : bool
         Something that is no train shakes the sensors in some recordings; these are not among those fitted.
+    foreign : tuple of str
+        Trains, no recording of which is among those fitted, since none looks like its vehicle file.
     """
     ranked = sorted(scores, key=lambda s: -s.gain)
     probabilities = posterior(scores, excess, settings)
@@ -175,6 +177,8 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
             return verdict("unknown", reason="above the level of controls, and no candidate helps")
         if disturbed:
             return verdict("unknown", reason="something shakes all sensors while no wheel is near")
+        if foreign:
+            return verdict("unknown", reason=f"no passage of {', '.join(foreign)} looks like its vehicle file")
         return verdict("none", reason="nothing above the thresholds")
     best = found[0]
     if excess > 1.0 and best.explained < settings.explained:
@@ -197,7 +201,7 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
     same = [s for s in found if s.is_limit_of(best) and s.explained >= settings.explained]
     if same:  # what carries nothing hangs
         return verdict("a_or_b", (best.family, same[0].family), reason=f"{best.family} is at its limit")
-    rivals = [s for s in found if s is not best and best.gain - s.gain < settings.margin]
+    rivals = [s for s in ranked if s is not best and s.material and best.gain - s.gain < settings.margin]
     rivals = [s for s in rivals if not best.is_plain_form_of(s)]
     if rivals:
         return verdict("a_or_b", (best.family, rivals[0].family), reason="within the margin of each other")

@@ -49,6 +49,8 @@ def whereabouts(case, fit, refused=None):
     if case.disturbed:
         names = ", ".join(d.name for d in case.disturbed)
         return Whereabouts("clock", names, max(d.louder for d in case.disturbed))
+    if case.foreign and refused is None:
+        return Whereabouts("train", case.foreign[0], 0.0, train=case.foreign[0])
     floor = {o.kind: case.control_level.get(o.kind, 1.0) for o in case.observations}
     witnesses = sorted(_alone(case, weigh(case, fit, floor)), key=lambda w: -w.nats)
     heard = refused is not None and refused.explained >= EXPLAINS

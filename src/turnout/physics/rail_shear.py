@@ -20,7 +20,8 @@ class RailShear(PhysicsTerm):
     frame = "condition"
     parameters = (
         Parameter("flexibility", "-", 0.0, (-3.0, 20.0), "shear flexibility added, in 1/GN",
-                  "Timoshenko 1921, On the correction for shear of the differential equation; 60E1 has 4.1 per GN"),
+                  "Timoshenko 1921, On the correction for shear of the differential equation; 60E1 has 4.1 per GN",
+                  (2.0, 4.0)),
     )  # fmt: skip
 
     @classmethod

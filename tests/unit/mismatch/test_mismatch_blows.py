@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from turnout import physics
@@ -11,7 +12,7 @@ from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
 from turnout.mismatch import diagnose
 from turnout.mismatch.finding import finding_row
-from turnout.mismatch.track import Campaign, TrackCase
+from turnout.mismatch.track import Campaign, TrackCase, blows
 from turnout.mismatch.track.observing import hammer_observations
 from turnout.mismatch.track.planned import measured_campaign, small_plan
 from turnout.simulate import uniform_track
@@ -86,6 +87,19 @@ def test_a_rail_soft_in_shear_is_sized_against_the_rail_of_its_file(plan):
     assert case.rail["rail_shear"] < -0.05
     assert found.names[:1] == ("rail_shear",)
     assert abs(found.fit.psi[0] - 4.0) < 2.0 * found.fit.psi_se[0]
+
+
+def test_a_receptance_follows_the_rail_however_far_it_goes(plan):
+    """A rail whose shear stiffness is exp(-0.41) of its file's: the receptance is that of such a rail, to 1e-3."""
+    case = TrackCase(measured_campaign(plan, (), 3))
+    (name, pair), *_ = case.pairs.items()
+    values = {n.name: n.mean for n in case.nuisances} | {"rail_shear": -0.41}
+    (found,) = case.predict(values, (), [o for o in case.observations if o.name == name])
+    track = case.nominal.turnout.track
+    softer = replace(track.rail, shear_stiffness=track.rail.shear_stiffness * np.exp(-0.41))
+    model = blows.BlowModel(track.with_(rail=softer), ())
+    exact = blows.split(blows.scaled(pair, model.receptance(pair.test.place, model.place_of(pair.sensor))))
+    assert np.linalg.norm(found - exact) < 1e-3 * np.linalg.norm(exact)
 
 
 def test_a_blow_is_not_asked_of_sensors_far_from_it():

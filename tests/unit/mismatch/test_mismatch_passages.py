@@ -1,17 +1,21 @@
 """Passages: columns against the simulation, a flat found in the residual, our own numerics."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from turnout import physics
+from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch import diagnose
 from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.scoring import judged
 from turnout.mismatch.track import TrackCase
 from turnout.mismatch.track.flats import flats
 from turnout.mismatch.track.planned import measured_campaign, small_plan
 from turnout.mismatch.track.rolling import ALIKE, Track1D, align
+from turnout.mismatch.whereabouts import whereabouts
 
 
 @pytest.fixture(scope="module")
@@ -129,3 +133,46 @@ def test_one_sensor_that_disagrees_does_not_cost_the_passage_but_a_wrong_train_d
     assert reversed_(wrong, wrong + 2)[2] < ALIKE
     light = case.roll(values, (), passage)(passage, case.rollings["light 2"].passage.vehicle, passage.speed, sensors)
     assert align(passage, sensors, light, case.solver.rate)[2] < ALIKE
+
+
+def power(case, train):
+    """Variance of a train's modes over the band below 60 Hz, by the passage first recorded."""
+    o = next(o for o in case.observations if o.name in case.rollings and o.name.startswith(train))
+    made = case.rollings[o.name]
+    rows = np.asarray(o.modes, dtype=float).reshape(len(made.sensors), made.time.size, -1)
+    spectrum = np.abs(np.fft.rfft(rows, axis=1)) ** 2
+    inside = np.fft.rfftfreq(made.time.size, 1.0 / made.clock) < 60.0
+    return float(spectrum[:, inside].sum())
+
+
+@pytest.mark.slow
+def test_errors_of_a_passage_are_those_of_wheels_as_heavy_as_the_fit_has_them(sound):
+    """The prior of roughness knows the wheels' mass: with twice the mass P2 comes down, by 1 / sqrt 2 where the rail is
+    a spring, and what roughness does below 60 Hz grows; the other train's errors stay what they were."""
+    case, values = sound
+    fit = fit_jointly(case, values=values, iterations=1)
+    assert case.renewed(fit) is case
+    heavy = replace(fit, values={**fit.values, "wheels_heavy": np.log(2.0)}, covariance=1e-4 * np.eye(len(fit.values)))
+    new = case.renewed(heavy)
+    assert new is not case and new.renewed(heavy) is new
+    assert power(new, "heavy") > 1.3 * power(case, "heavy")
+    assert power(new, "light") == power(case, "light")
+    assert case.heavier == {} and set(new.heavier) == {"heavy"}
+    term = next(c for c in case.candidates if c.family == "unsprung_mass" and c.where["train"] == "heavy")
+    named = replace(fit, candidates=(term,), psi=np.array([2.0]))
+    assert case.renewed(named).heavier["heavy"] == pytest.approx(np.log(2.0), abs=0.1)
+
+
+def test_a_train_that_looks_like_no_such_train_is_said_and_located(plan):
+    """The heavy train came with other wheelsets than its file has: none of its passages is used, nor passed over."""
+    campaign = measured_campaign(plan, (), 7)
+    other = {p.train: p.vehicle for p in campaign.passages}
+    swapped = [replace(p, vehicle=other["light"]) if p.train == "heavy" else p for p in campaign.passages]
+    case = TrackCase(replace(campaign, passages=tuple(swapped)))
+    assert case.foreign == ("heavy",) and len([n for n in case.notes if "likeness" in n]) == 2
+    verdict, _ = judged(case, SimpleNamespace(level={"passage": 0.1}, white=[]), (), MismatchSettings())
+    assert verdict.answer == "unknown" and "heavy" in verdict.reason
+    where = whereabouts(case, None)
+    assert where.frame == "train" and where.train == "heavy"
+    one = [p for p in campaign.passages if p.train == "light"] + [p for p in swapped if p.train == "heavy"][:1]
+    assert TrackCase(replace(campaign, passages=tuple(one))).foreign == ()  # one passage may be another train

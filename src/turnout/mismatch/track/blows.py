@@ -148,6 +148,16 @@ def tangent(terms, track):
     return found
 
 
+def _own_shear(track, terms):
+    """Share of the rail's flexibility in shear that is the file's, the rest being that of ``terms``."""
+    if track.rail.beam == "euler":
+        return 0.0
+    changed = track
+    for term in terms:
+        changed = term.rail(changed)
+    return changed.rail.shear_stiffness / track.rail.shear_stiffness
+
+
 class BlowModel:
     """Receptances of one track with terms at given conditions on ``LINES``; ``gradient`` by the supports' values."""
 
@@ -155,6 +165,7 @@ class BlowModel:
         self.track, self.terms = track, terms
         self.added = (*terms, FixedLinks(tangent(terms, track)))
         self.matrices = matrices_of(track, self.added)
+        self.own_shear = _own_shear(track, terms)
         self.by_place, self.strain, self.weight = {}, {}, {}
 
     def solve(self, places):
@@ -214,7 +225,8 @@ class BlowModel:
         h, p, ei, _ = self.matrices.elements
         sheared = 12.0 * ei / (h * (1.0 + p) ** 2)
         a = a_u * a_v
-        return -np.stack([(s_u * s_v) @ (ei / h) + a @ sheared, a @ (sheared * p)], axis=1)
+        shear = self.own_shear * (a @ (sheared * p))
+        return -np.stack([(s_u * s_v) @ (ei / h) + a @ sheared, shear], axis=1)
 
     def gradient(self, excited, measured, zone):
         """Derivatives by the logarithm of each common and own value, (n_line, n) in the order of ``inner_names``."""

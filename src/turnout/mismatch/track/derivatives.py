@@ -21,10 +21,12 @@ def nuisance_jacobian(case, values, terms, observations, base):
     """Exact for receptances, gains, times; common values of passages by differences, supports' by pseudo-forces."""
     index = {n.name: k for k, n in enumerate(case.nuisances)}
     found = [np.zeros((o.data.size, len(case.nuisances))) for o in observations]
+    model_of = case.blow_models(values, terms)
     passages = [(o, p, j) for o, p, j in zip(observations, base, found) if o.name in case.rollings]
     for o, predicted, jacobian in zip(observations, base, found):
         if o.name in case.pairs:
-            pair_columns(case, values, terms, case.pairs[o.name], predicted, jacobian, index)
+            pair = case.pairs[o.name]
+            pair_columns(case, values, terms, pair, model_of(pair), predicted, jacobian, index)
     if passages:
         _common_columns(case, values, terms, passages, index)
     for o, predicted, jacobian in passages:
@@ -36,9 +38,8 @@ def nuisance_jacobian(case, values, terms, observations, base):
     return found
 
 
-def pair_columns(case, values, terms, pair, predicted, jacobian, index):
+def pair_columns(case, values, terms, pair, model, predicted, jacobian, index):
     """Fill the columns of a pair; the track's own values come first among the nuisances."""
-    model = case.blow_model(values, terms, pair)
     place = model.place_of(case.seat(pair.sensor, values, terms))
     chain = case.chain(values, terms, pair)
     block = model.gradient(pair.test.place, place, case.zone) * chain[:, None]

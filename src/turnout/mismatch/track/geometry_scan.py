@@ -3,6 +3,7 @@
 from turnout.mismatch.track.flats import flats
 from turnout.mismatch.track.polygons import polygons
 from turnout.mismatch.track.rail_scan import rail_scan
+from turnout.mismatch.track.short_polygons import short_polygons
 from turnout.mismatch.track.short_waves import short_waves
 
 
@@ -14,5 +15,5 @@ def geometry_scan(case, fit, families=None):
     if families is None or "wheel_flat" in families:
         found += flats(case, fit)
     if families is None or "out_of_round" in families:
-        found += polygons(case, fit)
+        found += (*polygons(case, fit), *short_polygons(case, fit))
     return tuple(found)

@@ -1,5 +1,6 @@
 """The recordings of a campaign as observations of a case, and why some are none."""
 
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -50,11 +51,16 @@ def passage_observations(case):
             continue
         made, observation = rolling.rolling_of(passage, sensors, reference, speed, case.settings.materiality)
         case.rollings[passage.name] = made
-        modes = (
-            rolling.coupling_modes(made, observation.data).astype(np.float32),
-            wheel_modes(case, {**values, **dict.fromkeys(_own_of(passage), 0.0)}, made, observation.sigma),
-        )
-        yield passage.name, replace(observation, modes=np.column_stack(modes))
+        yield passage.name, with_errors(case, {**values, **dict.fromkeys(_own_of(passage), 0.0)}, made, observation)
+
+
+def with_errors(case, values, made, observation):
+    """The observation with the errors of a passage's own on the track and the wheels that ``values`` give."""
+    modes = (
+        rolling.coupling_modes(made, observation.data).astype(np.float32),
+        wheel_modes(case, values, made, observation.sigma),
+    )
+    return replace(observation, modes=np.column_stack(modes))
 
 
 def undisturbed(case, found):
@@ -67,6 +73,15 @@ def undisturbed(case, found):
         del case.rollings[name]
         case.notes.append(f"passage {name}: not used, {d.louder:.0f} dB louder {d.when} its train than the others")
     return [(name, o) for name, o in found if name not in shaken]
+
+
+def foreign(case):
+    """Trains of which no passage looks like their vehicle file, though several came and another train's do."""
+    came = Counter(p.train for p in case.campaign.passages if p.train)
+    known = {case.said(made)["train"] for made in case.rollings.values()}
+    shaken = {d.name for d in case.disturbed}
+    left = {p.train for p in case.campaign.passages if p.name in shaken}
+    return tuple(t for t, n in came.items() if known and n > 1 and t not in known and t not in left)
 
 
 def _own_of(passage):

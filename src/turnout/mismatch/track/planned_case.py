@@ -53,7 +53,7 @@ class PlannedCase(TrackCase):
     def _expected(self):
         values = {n.name: n.mean for n in self.nuisances}
         for pair in list(self.pairs.values()):
-            h = self._receptance(values, (), pair)
+            h = self._receptance(values, (), pair, self.blow_model(values, (), pair))
             h = h[: blows.LINES.size] + 1j * h[blows.LINES.size :]
             self.pairs[pair.name] = pair = blows.sized(pair, np.abs(h))
             yield blows.observed(pair, h, NOISE * np.abs(h), self.settings.pair_tolerance)

@@ -198,6 +198,15 @@ def _unit_energy(case, fit, made, length, shapes):
     .. math:: \int y^2 dt = \tfrac12 \sum_w |F|^2 \int |G(x)|^2 e(x)^2 \, dx / v, \quad
               F = 1 / (A_{wheel} + A_{contact} + A_{rail})
     """
+    node, gain = carried_energy(case, fit, made, length)
+    inside = np.array([np.abs(node - m) <= r for m, r in shapes])
+    energy = 0.5 * len(made.passage.vehicle.wheels) / made.speed * np.trapezoid(inside[:, None] * gain, node, axis=2)
+    return energy * made.passage.recording.rate**2 / (2.0 * WIDTH * made.speed / length)  # Parseval, half at f < 0
+
+
+def carried_energy(case, fit, made, length):
+    """Nodes (n,) [m], and the square of the acceleration at each sensor while one wheel rolls there over a wave of this
+    length and one metre high, (n_sensor, n) [1/s^4]."""
     track = track_with(case.track(made.passage.route), case.zone, fit.values)
     matrices, frequency = matrices_of(track), np.array([made.speed / length])
     near = np.flatnonzero((matrices.node >= case.waves.start) & (matrices.node <= case.waves.end))[::STRIDE]
@@ -208,7 +217,4 @@ def _unit_energy(case, fit, made, length, shapes):
     rail = responses(matrices, frequency, [float(node[node.size // 2])], middle_rows)[:, 0] @ weights
     vehicle = made.passage.vehicle
     force = 1.0 / np.abs(wheel_and_contact(vehicle, frequency) + rail)[0]
-    gain = (omega**2 * force * np.abs(carried)) ** 2  # (n_sensor, n_node)
-    inside = np.array([np.abs(node - m) <= r for m, r in shapes])
-    energy = 0.5 * len(vehicle.wheels) / made.speed * np.trapezoid(inside[:, None] * gain, node, axis=2)
-    return energy * made.passage.recording.rate**2 / (2.0 * WIDTH * frequency[0])  # Parseval, half at f < 0
+    return node, (omega**2 * force * np.abs(carried)) ** 2

@@ -55,12 +55,13 @@ class FixedLinks:
 
 
 class Skeleton:
-    """Everything of the matrices but the supports' values."""
+    """Everything of the matrices but the supports' values: these are 1 in it, so that no rounding hangs on the track
+    that came first."""
 
     def __init__(self, track, links):
         nothing = [replace(k, stiffness=0.0, damping=0.0, mass=0.0, loss_factor=0.0) for k in links]
+        track = track.with_(**{name: np.ones(track.support.size) for name, *_ in VALUES})
         self.base = assemble(track, (FixedLinks(nothing),))
-        self.values = {name: getattr(track, name) for name, *_ in VALUES}
         self.places = {tag: self._places(track, tag) for tag in ("pad", "ballast", "sleeper")}
 
     def _places(self, track, tag):
@@ -83,10 +84,8 @@ class Skeleton:
         made = {what: getattr(base, what).copy() for what in ("stiffness", "damping", "mass")}
         hysteresis = base.hysteresis
         for name, what, tag in VALUES:
-            more = getattr(track, name) - self.values[name]
-            if more.any():
-                diagonal, row, weight, support = self.places[tag]
-                np.add.at(made[what], (diagonal, row), weight * more[support])
+            diagonal, row, weight, support = self.places[tag]
+            np.add.at(made[what], (diagonal, row), weight * (getattr(track, name) - 1.0)[support])
         if any(k.loss_factor for k in links) or track.pad_loss_factor.any() or track.ballast_loss_factor.any():
             return assemble(track, (FixedLinks(links),))  # hysteresis goes with the stiffness: the plain way
         for link in links:

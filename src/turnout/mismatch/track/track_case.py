@@ -1,6 +1,7 @@
 """Hammer tests and passages of one turnout as a case for the engine."""
 
 from collections import OrderedDict
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from turnout.mismatch.track.base_model import (
     RAIL,
     SEAT_SD,
     inner_values,
+    near_rail,
     track_nuisances,
     track_with,
     vehicle_with,
@@ -23,12 +25,20 @@ from turnout.mismatch.track.base_model import (
 from turnout.mismatch.track.blows_case import Blows
 from turnout.mismatch.track.ceiling import ceilings, within_range
 from turnout.mismatch.track.library import LOOSE, library
-from turnout.mismatch.track.observing import hammer_observations, passage_observations, undisturbed
+from turnout.mismatch.track.observing import (
+    foreign,
+    hammer_observations,
+    passage_observations,
+    undisturbed,
+    with_errors,
+)
 from turnout.mismatch.track.rough_rail import Waves
+from turnout.mismatch.track.rough_wheels import heavier
 from turnout.physics.term import PhysicsTerm
 
 KEPT = 150  # simulated passages remembered
 GAIN_SD = 0.02
+FOLLOWED = 0.15  # ln of unsprung mass: what roughness does near P2 then changes by a fifth of its amplitude
 
 
 class TrackCase(Case):
@@ -36,6 +46,7 @@ class TrackCase(Case):
 
     frozen_jacobian = True
     ceilings: dict = {}
+    heavier: dict = {}
 
     def __init__(self, campaign, settings=None, families=None, solver=None):
         settings = settings or MismatchSettings()
@@ -44,6 +55,7 @@ class TrackCase(Case):
         found, self.start_values = list(hammer_observations(self)), {}
         self.start_values = self._from_blows([o for _, o in found])
         found += undisturbed(self, list(passage_observations(self)))
+        self.foreign = foreign(self)
         if not found:
             raise SimulationError("nothing to diagnose: " + "; ".join(self.notes))
         reserved = set(campaign.reserved)
@@ -117,31 +129,48 @@ class TrackCase(Case):
 
     def predict(self, values, terms, observations):
         """Prediction of receptances and passages."""
-        found = []
+        found, model_of = [], self.blow_models(values, terms)
         for o in observations:
             if o.name in self.pairs:
-                found.append(self._receptance(values, terms, self.pairs[o.name]))
+                pair = self.pairs[o.name]
+                found.append(self._receptance(values, terms, pair, model_of(pair)))
             else:
                 found.append(self.passage_of(values, terms, self.rollings[o.name]))
         return found
 
+    def blow_models(self, values, terms):
+        """``blow_model`` of any pair at these values, asked for once per conditions."""
+        known = {}
+
+        def of(pair):
+            said = tuple(sorted(pair.conditions.items()))
+            if said not in known:
+                known[said] = self.blow_model(values, terms, pair)
+            return known[said]
+
+        return of
+
     def blow_model(self, values, terms, pair):
         """The track of a hammer pair, remembered."""
         under = tuple(t.under(pair.conditions) for t in terms if t.kind in ("matrix", "port"))
-        key = repr(under), inner_values(self.zone, values)
+        near = near_rail(values)
+        touched = self._touched(values, terms, pair.conditions)  # solved together: rounding hangs on what else is
+        key = repr(under), tuple(near.values()), inner_values(self.zone, values), touched
         if key not in self._models:
-            made = blows.BlowModel(track_with(self.track(terms=under), self.zone, values), under)
+            track = with_rail(self.nominal, near).turnout.track_of("main")
+            made = blows.BlowModel(track_with(track, self.zone, values), under)
             self._models[key] = made
-            made.solve(self._touched(values, terms, pair.conditions, made))
+            made.solve(touched)
             while len(self._models) > 8:
                 self._models.popitem(last=False)
         return self._models[key]
 
-    def _touched(self, values, terms, conditions, model):
+    def _touched(self, values, terms, conditions):
         """Places of blows and of the sensors that heard them, of all hammer tests under these conditions."""
         alike = [p for p in self.pairs.values() if p.conditions == conditions]
-        sensors = {p.channel: p.sensor for p in alike}.values()
-        return [p.test.place for p in alike] + [model.place_of(self.seat(s, values, terms)) for s in sensors]
+        seated = [self.seat(s, values, terms) for s in {p.channel: p.sensor for p in alike}.values()]
+        track = self.track()
+        return *(p.test.place for p in alike), *(s.probe(track).place for s in seated)
 
     def seat(self, sensor, values, terms):
         """The sensor where ``values`` and ``terms`` say that it sits."""
@@ -153,12 +182,10 @@ class TrackCase(Case):
         factor = blows.channel_factor(terms, pair.sensor, blows.LINES)
         return factor * (1.0 + values.get(f"gain_{pair.channel}", 0.0))
 
-    def _receptance(self, values, terms, pair):
-        model = self.blow_model(values, terms, pair)
+    def _receptance(self, values, terms, pair, model):
         place = model.place_of(self.seat(pair.sensor, values, terms))
         h = model.receptance(pair.test.place, place)
-        centre = dict.fromkeys(self.rail, 0.0) if _rails(terms) else self.rail
-        h = h + model.rail_gradient(pair.test.place, place) @ [values[name] - at for name, at in centre.items()]
+        h = h + model.rail_gradient(pair.test.place, place) @ [values[k] - at for k, at in near_rail(values).items()]
         return blows.split(blows.scaled(pair, h * self.chain(values, terms, pair)))
 
     def passage_of(self, values, terms, made):
@@ -238,6 +265,23 @@ class TrackCase(Case):
     def nuisance_jacobian(self, values, terms, observations, base):
         """Exact for receptances, gains, times; common values of passages by differences, supports' by pseudo-forces."""
         return derivatives.nuisance_jacobian(self, values, terms, observations, base)
+
+    def renewed(self, fit):
+        """With the roughness of wheels as heavy as ``fit`` has them; itself where all are within ``FOLLOWED``."""
+        now = heavier(self, fit) if self.rollings else {}
+        moved = {train: m for train, m in now.items() if abs(m - self.heavier.get(train, 0.0)) > FOLLOWED}
+        if not moved:
+            return self
+        found = copy(self)
+        found.heavier = {**self.heavier, **moved}
+        values = {**fit.values, **{f"wheels_{train}": m for train, m in moved.items()}}
+
+        def anew(o):
+            made = self.rollings.get(o.name)
+            return with_errors(self, values, made, o) if made and self.said(made)["train"] in moved else o
+
+        found.observations, found.reserved = (tuple(map(anew, o)) for o in (self.observations, self.reserved))
+        return found
 
     def further(self, fit):
         """Dips, corrugation and wheels, as the residual and the loudness of passages suggest them."""

@@ -1,0 +1,63 @@
+"""Second effects: what a law that is exact leaves is another effect, what another law leaves may be its own shape."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from turnout.config.settings.mismatch import MismatchSettings
+from turnout.mismatch import diagnose
+from turnout.mismatch.case import Candidate, Case, Observation
+from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.scoring import score_of
+from turnout.mismatch.shortlist import _same_place
+from turnout.mismatch.track import TrackCase
+from turnout.mismatch.track.planned import measured_campaign, small_plan
+from turnout.physics import Parameter
+
+AMOUNT = (Parameter("amount", "-", 0.0, (-400.0, 400.0), "share of a shape", "made up 2026"),)
+X = np.linspace(0.0, 1.0, 400)
+SHAPES = {"wave": np.sin(9.0 * X), "ramp": X - 0.5}
+
+
+class Shapes(Case):
+    """A wave of 200 with a ramp of 0.28 beneath it, noise of 0.1."""
+
+    def __init__(self, exact):
+        data = 200.0 * SHAPES["wave"] + 0.28 * SHAPES["ramp"] + 0.1 * np.random.default_rng(6).normal(size=X.size)
+        self.observations = (Observation("all", "all", data, np.full(X.size, 0.1)),)
+        starts = (100.0,), (0.3,)
+        self.candidates = tuple(
+            Candidate(n, AMOUNT, lambda p, n=n: (n, p["amount"]), starts, {"shape": n}, exact=exact) for n in SHAPES
+        )
+
+    def predict(self, values, terms, observations):
+        return [sum((a * SHAPES[n] for n, a in terms), np.zeros(X.size))]
+
+
+@pytest.mark.parametrize("exact, names", [(True, ("wave", "ramp")), (False, ("wave",))])
+def test_a_second_effect_needs_a_share_of_the_first_only_where_its_law_may_be_off(exact, names):
+    """The ramp is worth 200 ln(1 + 2.8^2 / 12) = 100 nats, the wave 200 ln(2000^2 / 3.3) = 2,800: 28 times as many."""
+    assert diagnose(Shapes(exact)).names == names
+
+
+def test_a_gain_is_sought_beside_a_lag_of_the_same_channel_and_a_mounting_is_not():
+    case = TrackCase(measured_campaign(small_plan((15.0,), blows=(24.0,), passages=False), (), 7))
+    of = {c.family: c for c in case.candidates if c.where.get("sensor") == "S2"}
+    assert not _same_place(of["sensor_gain"], of["time_offset"])
+    assert _same_place(of["mount_resonance"], of["time_offset"]) and _same_place(of["sensor_gain"], of["sensor_gain"])
+
+
+def test_friction_is_told_by_trains():
+    """To blows it is a damper: a fit in which passages gain nothing gives it no name, whatever blows gain."""
+    case = TrackCase(measured_campaign(small_plan((15.0,), blows=(24.0,)), (), 7))
+    assert {c.told_by for c in case.candidates if c.family == "dry_friction"} == {"passage"}
+    base = fit_jointly(case, iterations=0)
+    friction = next(c for c in case.candidates if c.family == "dry_friction")
+    for kind, material in (("hammer", False), ("passage", True)):
+        white = [0.5 * np.asarray(w) if o.kind == kind else w for o, w in zip(case.observations, base.white)]
+        better = replace(
+            base, candidates=(friction,), psi=np.array([3000.0]), white=white, evidence=base.evidence + 90.0
+        )
+        better = replace(better, covariance=np.eye(len(base.values) + 1))
+        assert bool(score_of(case, base, better, friction, MismatchSettings()).material) == material

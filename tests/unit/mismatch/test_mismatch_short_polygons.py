@@ -1,0 +1,63 @@
+"""Polygonal wheels with waves too short to simulate: the wheel, the size and the null, by the library's own march."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from turnout import physics
+from turnout.mismatch.track import TrackCase
+from turnout.mismatch.track.planned import measured_campaign, small_plan
+from turnout.mismatch.track.short_polygons import LOUD, ONE, SPREAD, evidence, short_polygons
+
+
+def found_in(*terms, seed=7, changed=lambda campaign: campaign):
+    case = TrackCase(changed(measured_campaign(small_plan((15.0,), blows=()), terms, seed)))
+    values = {n.name: n.mean for n in case.nuisances}
+    return short_polygons(case, SimpleNamespace(candidates=(), values=values, terms=()))
+
+
+def turned(wheel, size, order):
+    return physics.OutOfRound(wheel, 0.8 * size, 0.6 * size, order, train="heavy")
+
+
+@pytest.mark.parametrize(("wheel", "size", "order", "seed"), [(1, 6e-5, 13, 7), (3, 2.5e-5, 18, 9)])
+def test_a_short_polygon_is_found_on_its_wheel_with_its_size(wheel, size, order, seed):
+    """In recordings with roughness of every wheel; the march and its contact know nothing of the closed form."""
+    (found,) = found_in(turned(wheel, size, order), seed=seed)
+    assert found.where == {"train": "heavy", "axle": wheel + 1}
+    mean, error = found.parameters[0].prior
+    assert mean == pytest.approx(size, abs=1.96 * error) and error < 0.35 * size
+    assert found.promise > 12.0
+
+
+def test_sound_wheels_corrugation_and_hum_are_no_polygons():
+    def hummed(campaign):
+        def loud(p):
+            time = np.arange(p.recording.samples.shape[1]) / p.recording.rate
+            hum = np.std(p.recording.samples) * np.sin(2.0 * np.pi * 150.0 * time)
+            return replace(p, recording=replace(p.recording, samples=p.recording.samples + hum))
+
+        return replace(campaign, passages=tuple(map(loud, campaign.passages)))
+
+    assert found_in(seed=8) == ()
+    assert found_in(physics.RailCorrugation(20.5, 27.0, 3e-5, 0.0, 0.16)) == ()
+    assert found_in(seed=5, changed=hummed) == ()
+
+
+def test_what_passages_left_out_do_not_show_is_no_finding():
+    """The wheel is polygonal in the passages used and round in the one reserved."""
+    sound, worn = (measured_campaign(small_plan((15.0,), blows=()), terms, 7) for terms in ((), (turned(1, 6e-5, 13),)))
+    kept = next(p.name for p in worn.passages if p.train == "heavy")
+    passages = tuple(s if w.name == kept else w for s, w in zip(sound.passages, worn.passages))
+    assert found_in(changed=lambda _: replace(worn, reserved=(kept,)))
+    assert found_in(changed=lambda _: replace(worn, passages=passages, reserved=(kept,))) == ()
+
+
+def test_the_evidence_is_that_of_a_loudness_integrated_out():
+    """By quadrature over what a polygon adds, N(0, LOUD²)."""
+    sd, added = np.sqrt(SPREAD**2 + ONE**2 / 8), np.linspace(-40.0, 40.0, 200001)
+    prior = np.exp(-0.5 * (added / LOUD) ** 2) / (LOUD * np.sqrt(2.0 * np.pi))
+    ratio = np.exp(-0.5 * ((2.3 - added) / sd) ** 2 + 0.5 * (2.3 / sd) ** 2)
+    assert evidence(2.3, 8) == pytest.approx(np.log(np.trapezoid(prior * ratio, added)), abs=1e-6)
