@@ -53,14 +53,14 @@ def test_a_gap_elsewhere_or_one_that_explains_nothing_is_no_limit():
 @pytest.mark.parametrize("times, usual", [(0.9 * ODD, True), (1.1 * ODD, False), (-1.1 * ODD, False)])
 def test_a_support_is_odd_against_the_spread_of_its_like(times, usual):
     """Seven other pads have logarithms of mean 0.3 and variance 4e-2, each known to a variance of 9e-2; pad 0 is its
-    own candidate and ballast is not its like."""
+    own candidate; ballast is not its like, nor is what all pads have in common."""
     values = 0.3 + 0.2 * np.sqrt(7.0 / 6.0) * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 0.0])
-    names = ["pad_0", *(f"pad_{k + 1}" for k in range(7)), "ballast_3"]
+    names = ["pad_0", *(f"pad_{k + 1}" for k in range(7)), "ballast_3", "pad_stiffness"]
     case = SimpleNamespace(nuisances=[Nuisance(n, "-", 0.0, 0.1) for n in names])
     spread = np.sqrt(4e-2 + 9e-2)
     refit = SimpleNamespace(
-        values=dict(zip(names, [9.0, *values, 9.0])),
-        covariance=np.diag([50.0, *np.full(7, 9e-2), 50.0, 1e-4]),
+        values=dict(zip(names, [9.0, *values, 9.0, 9.0])),
+        covariance=np.diag([50.0, *np.full(7, 9e-2), 50.0, 50.0, 1e-4]),
         psi=np.array([np.exp(times * spread)]),
         part=first,
     )
@@ -77,6 +77,16 @@ def test_laws_of_the_leading_parts_are_refitted_from_their_best_starts():
     scored = {"local_ballast": chosen[:1], "hanging_sleeper": [strong, (5.0, far, np.array([3.0]), {}), weak]}
     assert _kin(chosen, scored) == [strong]
     assert _kin(chosen[1:], scored) == []
+
+
+@pytest.mark.parametrize("behind, said", [(0.9, "a_or_b"), (1.1, "named")])
+def test_a_rival_within_the_margin_is_one_also_below_the_threshold(behind, said):
+    """13 nats and 8 are odds of 150 to 1 between the two, whatever either is worth against nothing."""
+    settings = MismatchSettings()
+    best = settings.threshold + 1.0
+    rival = best - behind * settings.margin
+    pair = [score(candidate(n, {}), g, 2.0, 0.1) for n, g in (("clipping", best), ("wheel_flat", rival))]
+    assert judge(pair, 0.5, settings).answer == said
 
 
 @pytest.mark.parametrize(
