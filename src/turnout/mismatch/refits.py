@@ -89,7 +89,7 @@ def _after_its_kin(entry, scores):
 
 def _tried(case, fit, entry, settings, store, effect, best=0.0):
     """Score of an entry of the shortlist after its joint refit; None where the simulation cannot go there. What holds
-    less than it promised goes on, unless the ``best`` so far is out of its reach."""
+    less than it promised goes on; a fault of a channel only if the ``best`` so far is within its reach."""
     candidate, start = entry.candidate, entry.start
     key = f"{effect}:{'+'.join(c.key for c in fit.candidates)}:{candidate.key}:{tuple(np.round(start, 12))}"
     both, far = (*fit.candidates, candidate), entry.promised > FAR * settings.threshold
@@ -97,7 +97,7 @@ def _tried(case, fit, entry, settings, store, effect, best=0.0):
     if refit is None:
         return None
     score = score_of(case, fit, refit, candidate, settings)
-    worth = max(settings.threshold, HELD * best)
+    worth = max(settings.threshold, HELD * best if candidate.frame == "sensor" else 0.0)
     if case.frozen_jacobian and score.gain < HELD * entry.promised and entry.promised > worth:
         return _polished(case, fit, score, settings, store, effect)
     return score

@@ -106,8 +106,7 @@ def _sensors(case):
         yield per(physics.LowPass, ((1 / 500.0,),), kin="channel")
         yield per(physics.HighPass, ((12.0,),))
         if case.rollings:
-            yield per(physics.ClockDrift, tuple((sign * d,) for d in DRIFTS for sign in (1.0, -1.0)), whole=True,
-                      loose=EXACT, exact=True)  # fmt: skip
+            yield per(physics.ClockDrift, tuple((sign * d,) for d in DRIFTS for sign in (1.0, -1.0)), whole=True)
             peak = case.peak(name)
             if peak > 0.0:
                 yield per(physics.Clipping, ((0.6 * peak,),), loose=0.0)  # neutral is no limit: a share of infinity
