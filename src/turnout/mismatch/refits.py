@@ -89,15 +89,16 @@ def _after_its_kin(entry, scores):
 
 def _tried(case, fit, entry, settings, store, effect, best=0.0):
     """Score of an entry of the shortlist after its joint refit; None where the simulation cannot go there. What holds
-    less than it promised goes on; a fault of a channel only if the ``best`` so far is within its reach."""
-    candidate, start = entry.candidate, entry.start
+    less than it promised goes on. A fault of a channel starts with derivatives of its own where it promises much, and
+    goes on only if the ``best`` so far is within its reach."""
+    candidate, start, of_channel = entry.candidate, entry.start, entry.candidate.frame == "sensor"
     key = f"{effect}:{'+'.join(c.key for c in fit.candidates)}:{candidate.key}:{tuple(np.round(start, 12))}"
-    both, far = (*fit.candidates, candidate), entry.promised > FAR * settings.threshold
+    both, far = (*fit.candidates, candidate), of_channel and entry.promised > FAR * settings.threshold
     refit = kept(store, key, lambda: _refit(case, fit, candidate, start, entry.values, far, settings), both)
     if refit is None:
         return None
     score = score_of(case, fit, refit, candidate, settings)
-    worth = max(settings.threshold, HELD * best if candidate.frame == "sensor" else 0.0)
+    worth = max(settings.threshold, HELD * best if of_channel else 0.0)
     if case.frozen_jacobian and score.gain < HELD * entry.promised and entry.promised > worth:
         return _polished(case, fit, score, settings, store, effect)
     return score
