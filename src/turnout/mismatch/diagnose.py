@@ -5,10 +5,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from turnout.config.settings.mismatch import MismatchSettings
+from turnout.errors import SimulationError
 from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.latent import Latent
 from turnout.mismatch.locate import attribute, cell_energies
-from turnout.mismatch.refits import kept, scored, to_the_end
+from turnout.mismatch.refits import kept, scored, to_the_end, with_derivatives
 from turnout.mismatch.scoring import judged, latent_of, over
 from turnout.mismatch.together import reconsidered, refused
 from turnout.mismatch.verdict import Verdict
@@ -93,7 +94,13 @@ def diagnose(case, settings=None, progress=None, store=None):
         verdicts.append(verdict)
         if verdict.answer == "none" or best is None or best.gain <= settings.threshold:
             break
-        fit = best.fit if best.fit.jacobian else to_the_end(case, best.fit, settings)
+        found = with_derivatives(case, best.fit, settings)
+        if not found.jacobian and effect:  # the simulation fails beside it
+            verdicts.pop()
+            break
+        fit = found
+        if not fit.jacobian:
+            break
         if verdict.answer == "named":
             case, fit = _with_its_errors(case, fit, settings, store)
         if verdict.answer == "a_or_b" or (not case.frozen_jacobian and over(case, fit, settings) <= 1.0):
@@ -114,7 +121,10 @@ def _with_its_errors(case, fit, settings, store):
     if new is case:
         return case, fit
     key = f"renewed:{'+'.join(c.key for c in fit.candidates)}"
-    return new, kept(store, key, lambda: to_the_end(new, fit, settings), fit.candidates)
+    try:
+        return new, kept(store, key, lambda: to_the_end(new, fit, settings), fit.candidates)
+    except SimulationError:
+        return case, fit
 
 
 def _shape_of(score):

@@ -137,6 +137,14 @@ def to_the_end(case, fit, settings):
     return fit_jointly(case, fit.candidates, fit.psi, fit.values, iterations=settings.iterations)
 
 
+def with_derivatives(case, fit, settings):
+    """The fit, continued if it has no derivatives; as it is where the simulation fails beside it."""
+    try:
+        return fit if fit.jacobian else to_the_end(case, fit, settings)
+    except SimulationError:
+        return fit
+
+
 def _refit(case, fit, candidate, start, back, far, settings):
     """Joint refit from this start; None where the simulation cannot go there."""
     psi = np.concatenate([fit.psi, start])

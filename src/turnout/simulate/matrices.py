@@ -136,20 +136,22 @@ def _number(track, links):
 
 
 def _add_rail(track, rails, node, node_index, mass, damping, stiffness):
-    known = {}
-    for e, rail in enumerate(rails):
-        h = node[e + 1] - node[e]
-        key = (rail, round(h, 12))
+    known, length = {}, np.diff(node)
+    keys = [(rail, round(h, 12)) for rail, h in zip(rails, length)]
+    for key, h in zip(keys, length):
         if key not in known:
-            known[key] = element_mass(rail, h), element_stiffness(rail, h)
-        m, k = known[key]
-        rows = (node_index[e], node_index[e] + 1, node_index[e + 1], node_index[e + 1] + 1)
-        rate = rail.damping / rail.mass + _end_rate(track, 0.5 * (node[e] + node[e + 1]))
-        for a in range(4):
-            for b in range(a, 4):
-                mass[rows[b] - rows[a], rows[a]] += m[a, b]
-                stiffness[rows[b] - rows[a], rows[a]] += k[a, b]
-                damping[rows[b] - rows[a], rows[a]] += rate * m[a, b]
+            known[key] = element_mass(key[0], h), element_stiffness(key[0], h)
+    m, k = (np.array(parts) for parts in zip(*(known[key] for key in keys)))
+    middle = 0.5 * (node[:-1] + node[1:])
+    rate = np.array([rail.damping / rail.mass + _end_rate(track, x) for rail, x in zip(rails, middle)])
+    first, last = node_index[:-1], node_index[1:]
+    rows = first, first + 1, last, last + 1
+    for a in range(4):
+        for b in range(a, 4):
+            where = rows[b] - rows[a], rows[a]
+            np.add.at(mass, where, m[:, a, b])
+            np.add.at(stiffness, where, k[:, a, b])
+            np.add.at(damping, where, rate * m[:, a, b])
 
 
 def _end_rate(track, x):

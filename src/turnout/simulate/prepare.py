@@ -1,6 +1,6 @@
 """Factorise a track once for a time step and scheme; many trains, speeds and paths then share it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -17,7 +17,8 @@ WINDOW_DECAY = 30.0  # exp(-30) = 1e-13: windows of the inverse are exact to rou
 
 @dataclass(frozen=True)
 class Prepared:
-    """A track ready to march: ``matrices`` for sensors and statics, ``arrays`` and ``scheme`` for the kernels."""
+    """A track ready to march: ``matrices`` for sensors and statics, ``arrays`` and ``scheme`` for the kernels;
+    ``stand_ins`` remembers what stands in for the track at each place where wheels came on."""
 
     track: Track
     terms: tuple
@@ -27,6 +28,7 @@ class Prepared:
     arrays: TrackArrays
     scheme: SchemeArrays
     static: tuple
+    stand_ins: dict = field(default_factory=dict, compare=False, repr=False)
 
     def static_response(self, rows, weights):
         """(n,) static deflection of all degrees of freedom under a unit force with these weights."""
@@ -39,17 +41,18 @@ class Prepared:
         return x
 
 
-def prepare(track, dt=5e-5, scheme="radau", terms=(), decay=WINDOW_DECAY):
+def prepare(track, dt=5e-5, scheme="radau", terms=(), decay=WINDOW_DECAY, matrices=None):
     """Assemble and factorise ``track`` with the matrix entries of ``terms`` for steps of ``dt`` [s].
 
-    What a wheel's force does at a distance is left out where it has fallen by exp(-``decay``).
+    What a wheel's force does at a distance is left out where it has fallen by exp(-``decay``). ``matrices`` are those
+    of this track with these terms, where they are assembled already.
 
     Errors: SimulationError where the track carries no load (its stiffness is not positive definite).
     """
     if not dt > 0.0:
         raise SimulationError(f"time step must be above 0 s, got {dt!r}.")
     terms = tuple(terms)
-    matrices = assemble(track, terms)
+    matrices = assemble(track, terms) if matrices is None else matrices
     chosen = scheme_called(scheme)
     s = chosen.rate / dt
     system = s * s * matrices.mass + s * matrices.damping + matrices.stiffness

@@ -129,8 +129,10 @@ def _fail(status, prepared, step, port, value, ports):
 
 
 def _stand_in(prepared, drive):
-    node = prepared.matrices.node
-    return stand_in_of(prepared, float(node[0]) + drive.margin + drive.entry)
+    place, known = float(prepared.matrices.node[0]) + drive.margin + drive.entry, prepared.stand_ins
+    if place not in known:
+        known[place] = stand_in_of(prepared, place)
+    return known[place]
 
 
 def _paths(prepared, vehicle, drive, n_step):

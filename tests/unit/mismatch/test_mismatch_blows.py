@@ -12,7 +12,7 @@ from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
 from turnout.mismatch import diagnose
 from turnout.mismatch.finding import finding_row
-from turnout.mismatch.track import Campaign, TrackCase, blows
+from turnout.mismatch.track import Campaign, TrackCase, blows, derivatives
 from turnout.mismatch.track.observing import hammer_observations
 from turnout.mismatch.track.planned import measured_campaign, small_plan
 from turnout.simulate import uniform_track
@@ -110,3 +110,30 @@ def test_a_blow_is_not_asked_of_sensors_far_from_it():
     )
     heard = {(p.test.place, p.channel) for p in case.pairs.values()} if list(hammer_observations(case)) else set()
     assert heard == {(20.4, s.name) for s in plan.sensors} | {(30.0, "S2"), (30.0, "S3"), (30.0, "S4")}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("limit", "most"), [(1000.0, 0.8), (4000.0, 0.45)])
+def test_a_blow_slips_in_a_loose_joint_and_sticks_in_a_tight_one(plan, limit, most):
+    """Time histories with dry friction against the law's secant: one rate for both leaves 0.77 and 0.54 of the change
+    at 20 mm/s, 0.98 and 0.41 at 2 mm/s."""
+    support = plan.turnout.track.nearest_support(22.2)
+    case = TrackCase(measured_campaign(plan, (physics.DryFriction(support, limit),), 3))
+    values = {n.name: n.mean for n in case.nuisances}
+    term = physics.DryFriction(case.nominal.turnout.track.nearest_support(22.2), limit)
+    before, after = (case.predict(values, terms, case.observations) for terms in ((), (term,)))
+    left, change = (sum(np.sum((o.data - p) ** 2) for o, p in zip(case.observations, q)) for q in (after, before))
+    assert left < most**2 * change
+
+
+def test_a_derivative_goes_to_the_side_where_the_simulation_can():
+    """A passage quadratic in the load that cannot be simulated above: the slope from below, 2 x 3 less the step."""
+
+    def simulated(values, terms, made):
+        if values["load"] > 3.0:
+            raise SimulationError("too heavy")
+        return np.array([values["load"] ** 2])
+
+    case = SimpleNamespace(passage_of=simulated)
+    found = derivatives._difference(case, {"load": 3.0}, (), None, np.array([9.0]), "load", 0.1)
+    assert found == pytest.approx([5.9])

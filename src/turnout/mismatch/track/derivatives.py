@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from turnout.errors import SimulationError
 from turnout.mismatch.case import Case
 from turnout.mismatch.track import blows, rolling
 from turnout.mismatch.track.base_model import COMMON, RAIL
@@ -58,13 +59,19 @@ def pair_columns(case, values, terms, pair, model, predicted, jacobian, index):
 def _common_columns(case, values, terms, passages, index):
     names = [name for name, *_ in COMMON] + [f"wheels_{train}" for train in case.trains]
     for name in names:
-        step = 0.04
-        moved = {**values, name: values[name] + step}
         for o, predicted, jacobian in passages:
             made = case.rollings[o.name]
             if name.startswith("wheels_") and name != f"wheels_{made.passage.train or made.passage.name}":
                 continue
-            jacobian[:, index[name]] = (case.passage_of(moved, terms, made) - predicted) / step
+            jacobian[:, index[name]] = _difference(case, values, terms, made, predicted, name, 0.04)
+
+
+def _difference(case, values, terms, made, predicted, name, step):
+    """Derivative of a passage by one value, to the side where the simulation can go."""
+    try:
+        return (case.passage_of({**values, name: values[name] + step}, terms, made) - predicted) / step
+    except SimulationError:
+        return (predicted - case.passage_of({**values, name: values[name] - step}, terms, made)) / step
 
 
 def _own_columns(case, values, terms, made, predicted):
@@ -75,7 +82,7 @@ def _own_columns(case, values, terms, made, predicted):
     yield moment, -slope.ravel()
     yield f"speed@{made.name}", (slope * (made.time - made.reference)).ravel()
     load = f"load@{made.name}"
-    yield load, (case.passage_of({**values, load: values[load] + 0.03}, terms, made) - predicted) / 0.03
+    yield load, _difference(case, values, terms, made, predicted, load, 0.03)
 
 
 def _seat_columns(case, values, terms, made, predicted):

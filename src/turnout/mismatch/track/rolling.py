@@ -6,6 +6,7 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.case import Nuisance, Observation
+from turnout.mismatch.track.skeleton import matrices_of
 from turnout.simulate.prepare import prepare
 from turnout.simulate.run import Drive, run
 
@@ -122,7 +123,8 @@ class Roll:
         if settings.elements:
             track = track.with_(elements_per_bay=settings.elements)
         self.track = track
-        self.prepared = prepare(track, 1.0 / settings.rate, settings.scheme, self.terms, DECAY)
+        matrices = matrices_of(track, self.terms)
+        self.prepared = prepare(track, 1.0 / settings.rate, settings.scheme, self.terms, DECAY, matrices)
 
     def __call__(self, passage, vehicle, speed, sensors, probes=(), path=(), described=None):
         """(n_sensor + n_probe, n) signals of the march; time 0: first wheel ``LEAD`` before the first sensor where it

@@ -7,7 +7,7 @@ that all wheels follow; whole-track terms act through the base fit's own derivat
 import numpy as np
 
 from turnout.mismatch.case import Whitened
-from turnout.mismatch.track import blows
+from turnout.mismatch.track.added_links import AddedLinks
 from turnout.mismatch.track.columns import PAD, RAIL, SLEEPER, carried, support_forces
 from turnout.mismatch.track.rolled_waves import Carrier
 from turnout.physics.pad_temperature import REFERENCE
@@ -31,12 +31,13 @@ def screen_columns(case, fit, observations):
     blank = [np.zeros(o.data.size, dtype=np.float32) for o in observations]
     found = {(c.key, k): list(blank) for c, k in chosen}
     laws, paths = ([(c, k) for c, k in chosen if c.family in names] for names in (LAWS, PATHS))
+    added = AddedLinks(case, fit)
     for i, o in enumerate(observations):
         if o.name in case.rollings:
             made = case.rollings[o.name]
             parts = _passage(case, fit, made, laws) | _paths(case, fit, made, paths)
         else:
-            parts = _pair(case, fit, case.pairs[o.name], laws)
+            parts = added.changes(case.pairs[o.name], laws)
         parts |= _channels(case, fit, o, fit.predictions[i], [(c, k) for c, k in chosen if c.family in CHANNELS])
         for key, column in parts.items():
             found[key][i] = column.astype(np.float32)
@@ -133,28 +134,3 @@ def _sleepers(candidate):
     """Supports that its law acts at."""
     half = (candidate.where.get("sleepers", 1) - 1) // 2
     return range(candidate.where["sleeper"] - half, candidate.where["sleeper"] + half + 1)
-
-
-def _pair(case, fit, pair, chosen):
-    r"""Change of a receptance by one link w with impedance z, exactly: :math:`-z\,u_w v_w / (1 + z\,g_w)`."""
-    model = case.blow_model(fit.values, fit.terms, pair)
-    place = model.place_of(case.seat(pair.sensor, fit.values, fit.terms))
-    u, v = model.displacement(pair.test.place), model.displacement(place)
-    chain = case.chain(fit.values, fit.terms, pair)
-    omega, index, found = 2.0 * np.pi * blows.LINES, model.matrices.index, {}
-    for c, k in chosen:
-        term = c.term(c.starts[k]).under(pair.conditions)
-        if c.family == "attached_resonator":
-            links = [(((("rail", c.where["sleeper"]), 1.0),), term.dynamic_stiffness(blows.LINES))]
-        else:
-            made = [*term.links(model.track), *blows.tangent((term,), model.track)]
-            links = [(m.ends, m.stiffness + 1j * omega * m.damping - omega**2 * m.mass) for m in made]
-        change = np.zeros(blows.LINES.size, dtype=complex)
-        for ends, z in links:
-            rows = [(index[name], weight) for name, weight in ends]
-            reach_u = sum(weight * u[:, row] for row, weight in rows)
-            reach_v = sum(weight * v[:, row] for row, weight in rows)
-            own = sum(a * b * model.displacement(name)[:, row] for name, a in ends for row, b in rows)
-            change -= z * reach_u * reach_v / (1.0 + z * own)
-        found[c.key, k] = blows.split(blows.scaled(pair, change * chain))
-    return found

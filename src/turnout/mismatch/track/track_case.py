@@ -82,7 +82,7 @@ class TrackCase(Case):
     def _prepare(self, campaign, settings, solver):
         """What does not depend on recordings."""
         self.settings, self.solver, self.campaign = settings, solver, campaign
-        self.nominal = zone_of(campaign.turnout, campaign.places())
+        self.nominal, self._railed = zone_of(campaign.turnout, campaign.places()), {}
         self._recentre({})
         self.trains = tuple(dict.fromkeys(p.train or p.name for p in campaign.passages))
         self.pairs, self.rollings, self.strange, self.notes = {}, {}, {}, []
@@ -157,13 +157,19 @@ class TrackCase(Case):
         touched = self._touched(values, terms, pair.conditions)  # solved together: rounding hangs on what else is
         key = repr(under), tuple(near.values()), inner_values(self.zone, values), touched
         if key not in self._models:
-            track = with_rail(self.nominal, near).turnout.track_of("main")
-            made = blows.BlowModel(track_with(track, self.zone, values), under)
+            made = blows.BlowModel(track_with(self._on_grid(near), self.zone, values), under)
             self._models[key] = made
             made.solve(touched)
             while len(self._models) > 8:
                 self._models.popitem(last=False)
         return self._models[key]
+
+    def _on_grid(self, near):
+        """The main track with its rail where ``near_rail`` has it, remembered."""
+        key = tuple(near.values())
+        if key not in self._railed:
+            self._railed[key] = with_rail(self.nominal, near).turnout.track_of("main")
+        return self._railed[key]
 
     def _touched(self, values, terms, conditions):
         """Places of blows and of the sensors that heard them, of all hammer tests under these conditions."""
