@@ -65,7 +65,9 @@ class GuidedCase:
         return {**self.case.start_values, **fit_jointly(cheap, values=roughly.values, iterations=STEPS).values}
 
     def __getattr__(self, name):
-        return getattr(self.__dict__["case"], name)
+        if "case" not in self.__dict__:  # a copy that is being made
+            raise AttributeError(name)
+        return getattr(self.case, name)
 
     def _new(self, candidates):
         """Those that are not accepted already."""

@@ -192,3 +192,17 @@ def test_a_term_that_cannot_be_told_from_no_effect_is_refused(config):
     with pytest.raises(SimulationError, match="no parameter differs"):
         accept(finding(nothing), config, "t1")
     assert accept(finding(nothing), config, "t1", anyway=True)[0].exists()
+
+
+def test_a_case_whose_errors_were_made_anew_is_guided_as_before():
+    """Errors follow the wheels that a fit finds: the case inside is another, its observations are asked of that."""
+    anew = SimpleNamespace(observations=("rough",))
+    inner = SimpleNamespace(
+        nuisances=(), candidates=("a",), start_values={}, observations=("smooth",), renewed=lambda fit: anew
+    )
+    guided = GuidedCase(inner)
+    found = guided.renewed(None)
+    assert found.observations == ("rough",) and guided.observations == ("smooth",)
+    assert found.watch is guided.watch and found.candidates == ("a",)
+    inner.renewed = lambda fit: inner
+    assert guided.renewed(None) is guided
