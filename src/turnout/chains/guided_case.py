@@ -91,6 +91,15 @@ class GuidedCase:
         all_terms = (*self.standing(values), *terms)
         return self._once("p", values, all_terms, observations, self.case.predict)
 
+    def moved(self, values, terms, new, observations, predictions):
+        """Predictions a small step away, with the accepted effects in them."""
+        standing = self.standing(values)
+
+        def beside(values, terms, observations):
+            return self.case.moved(values, (*standing, *terms), (*standing, *new), observations, predictions)
+
+        return self._once(f"m:{new!r}", values, terms, observations, beside)
+
     def nuisance_jacobian(self, values, terms, observations, base):
         """The case's own columns, and one by a difference for each parameter that was accepted."""
         all_terms = (*self.standing(values), *terms)

@@ -210,6 +210,10 @@ class Case:
         """List of (n,) predictions, one per observation; ``values`` are nuisances, ``terms`` the effects."""
         raise NotImplementedError
 
+    def moved(self, values, terms, new, observations, predictions):
+        """Predictions with ``new`` terms, a small step from ``terms`` with known ``predictions``: for derivatives."""
+        return self.predict(values, new, observations)
+
     def nuisance_jacobian(self, values, terms, observations, base):
         """List of (n, n_nuisance) derivatives; by forward differences unless a case knows better.
 

@@ -178,12 +178,17 @@ class Joint:
         p = self.parameters[k - self.n]
         step = 0.02 * min(p.bounds[1] - p.bounds[0], 10.0 * self.sd[k], max(abs(theta[k] - p.neutral), 0.1 * _reach(p)))
         step = -step if theta[k] + step > p.bounds[1] else step
+        values, psi = self.split(theta)
+        terms = terms_of(self.candidates, psi)
         for way in (step, -step):  # the simulation may not go to one side
-            moved = np.array(theta)
-            moved[k] += way
-            new = self.tried(moved)
-            if new is not None:
+            moved = np.array(psi)
+            moved[k - self.n] += way
+            self.evaluations += 1
+            try:
+                new = self.case.moved(values, terms, terms_of(self.candidates, moved), self.observations, predictions)
                 break
+            except SimulationError:
+                continue
         else:
             raise SimulationError(f"{p.name} {theta[k]:.4g} {p.unit}: no derivative, the simulation fails beside it.")
         return [o.whitened((b - a) / way) for o, a, b in zip(self.observations, predictions, new)]

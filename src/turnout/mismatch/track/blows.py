@@ -278,17 +278,24 @@ class BlowModel:
         logarithm of the value)]. Soft ballast has a share of it, a pad's branch goes with the pad, a gap has none."""
         if not self.terms:
             return []
-        found, known = [], self._links(self.track)
+        found, known = [], self.links(self.terms)
         for field in dict.fromkeys(o.field for o in OWN):
-            moved = self._links(self.track.with_(**{field: getattr(self.track, field) * (1.0 + SHARE)}))
+            moved = self.links(self.terms, self.track.with_(**{field: getattr(self.track, field) * (1.0 + SHARE)}))
             for a, b in zip(known, moved):
                 change = tuple((getattr(b, w) - getattr(a, w)) / SHARE for w in ("stiffness", "damping", "mass"))
                 if any(change):
                     found.append((field, a.ends[0][0][1], *link_vector(a, self.matrices.index), change))
         return found
 
-    def _links(self, track):
-        return [*(link for term in self.terms for link in term.links(track)), *tangent(self.terms, track)]
+    def links(self, terms, track=None):
+        """Links of ``terms`` on this track or another, tangents of their ports behind."""
+        track = track or self.track
+        return [*(link for term in terms for link in term.links(track)), *tangent(terms, track)]
+
+
+def shown(terms, conditions):
+    """Those of ``terms`` that are in a track's receptances, as they are under ``conditions``."""
+    return tuple(t.under(conditions) for t in terms if t.kind in ("matrix", "port"))
 
 
 def channel_factor(terms, sensor, frequency):

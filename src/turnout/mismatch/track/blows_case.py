@@ -18,7 +18,7 @@ class Blows(Case):
         chosen = case.observations if observations is None else observations
         self.whole, self.observations = case, tuple(o for o in chosen if o.name in case.pairs)
         self.nuisances = tuple(n for n in case.nuisances if n.owner is None and "_wave_" not in n.name)
-        self.predict = case.predict
+        self.predict, self.moved = case.predict, case.moved
 
     def roughened(self):
         """With one broad error of every line: smooth errors would excuse a resonance out of place."""

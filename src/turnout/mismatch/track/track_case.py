@@ -10,7 +10,7 @@ from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
 from turnout.mismatch.case import Case, Nuisance
 from turnout.mismatch.joint import fit_jointly
-from turnout.mismatch.track import blows, derivatives, rolling
+from turnout.mismatch.track import blows, derivatives, nudged_links, rolling
 from turnout.mismatch.track.base_model import (
     RAIL,
     SEAT_SD,
@@ -138,6 +138,10 @@ class TrackCase(Case):
                 found.append(self.passage_of(values, terms, self.rollings[o.name]))
         return found
 
+    def moved(self, values, terms, new, observations, predictions):
+        """Predictions a small step away: receptances without solving the track again."""
+        return nudged_links.moved(self, values, terms, new, observations, predictions)
+
     def blow_models(self, values, terms):
         """``blow_model`` of any pair at these values, asked for once per conditions."""
         known = {}
@@ -152,7 +156,7 @@ class TrackCase(Case):
 
     def blow_model(self, values, terms, pair):
         """The track of a hammer pair, remembered."""
-        under = tuple(t.under(pair.conditions) for t in terms if t.kind in ("matrix", "port"))
+        under = blows.shown(terms, pair.conditions)
         near = near_rail(values)
         touched = self._touched(values, terms, pair.conditions)  # solved together: rounding hangs on what else is
         key = repr(under), tuple(near.values()), inner_values(self.zone, values), touched

@@ -1,0 +1,77 @@
+"""Derivatives of receptances by parameters of terms, without solving the track again."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from turnout import physics
+from turnout.mismatch.track import TrackCase, blows
+from turnout.mismatch.track.nudged_links import nudged
+from turnout.mismatch.track.planned import measured_campaign, small_plan
+from turnout.simulate import uniform_track
+from turnout.simulate.turnout_track import TurnoutTrack
+
+J = 27
+
+
+@pytest.fixture(scope="module")
+def somewhere():
+    """(case, nuisances off their means, unlike at every support; the rail where models are made)."""
+    small = small_plan((25.0,), passages=False, blows=(21.6, 24.0))
+    turnout = TurnoutTrack(uniform_track(36.0, start=6.0), {"main": ((),)})
+    plan = replace(small, turnout=turnout, n_blows=3, sensors=small.sensors[:3])
+    case, rng = TrackCase(measured_campaign(plan, (), 3)), np.random.default_rng(0)
+    values = {n.name: n.mean + 0.3 * n.sd * rng.standard_normal() for n in case.nuisances}
+    return case, values | {"rail_bending": 0.0, "rail_shear": 0.0}
+
+
+def off(case, values, old, new):
+    """How far the step from ``old`` is from the one predicted, over its size."""
+    before = case.predict(values, (old,), case.observations)
+    short = np.concatenate(case.moved(values, (old,), (new,), case.observations, before))
+    exact, before = np.concatenate(case.predict(values, (new,), case.observations)), np.concatenate(before)
+    return np.linalg.norm(short - exact) / np.linalg.norm(exact - before)
+
+
+@pytest.mark.parametrize(
+    "term",
+    [
+        lambda s: physics.LocalBallast(J, 0.5 + 0.01 * s),
+        lambda s: physics.LocalPad(J, 2.0 + 0.02 * s),
+        lambda s: physics.HangingSleeper(J, 4e-4, 0.3 + 0.01 * s),
+        lambda s: physics.AttachedResonator(J, 20.0, 180.0 + s),
+        lambda s: physics.PadTemperature(0.005 + 1e-4 * s),
+        lambda s: physics.ZenerPad(0.5 + 0.01 * s),
+        lambda s: physics.SleeperMode(0.25, 200.0 + s),
+        lambda s: physics.BallastInertia(120.0 + s, 1e3),
+    ],
+)
+def test_a_step_of_a_parameter_is_right_to_first_order(somewhere, term):
+    """A tangent errs by the square of the step: over its size a quarter of the step leaves a quarter of the error."""
+    whole, quarter = (off(*somewhere, term(0.0), term(s)) for s in (1.0, 0.25))
+    assert quarter < 0.05
+    assert quarter == pytest.approx(whole / 4.0, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (physics.RailShear(1.0), physics.RailShear(1.1)),
+        (physics.TimeOffset("S2", 1e-3), physics.TimeOffset("S2", 1.1e-3)),
+        (physics.SensorPosition("S3", 0.1), physics.SensorPosition("S3", 0.15)),
+        (physics.DryFriction(J, 0.0), physics.DryFriction(J, 100.0)),
+    ],
+)
+def test_what_is_no_change_of_links_is_predicted(somewhere, old, new):
+    """Another rail, a channel, a link that was not there."""
+    assert off(*somewhere, old, new) < 1e-9
+
+
+def test_links_that_are_others_are_no_small_step(somewhere):
+    case, values = somewhere
+    model = case.blow_model(values, (physics.LocalBallast(J, 0.5),), next(iter(case.pairs.values())))
+    assert nudged(model, (physics.LocalBallast(J + 1, 0.5),)) is None
+    assert nudged(model, (physics.LocalPad(J, 0.5),)) is None
+    ends, impedance = nudged(model, (physics.LocalBallast(J, 0.5),))
+    assert ends.shape[0] == 0 and impedance.shape == (0, blows.LINES.size)
