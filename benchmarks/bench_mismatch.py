@@ -183,10 +183,12 @@ def located(found, where):
 def inside(found, term):
     """The first parameter within 1.96 standard errors; of two waves a quarter apart, whose shares turn with the place
     they are counted from, their amplitude."""
-    names = [p.name for p in found.fit.candidates[0].parameters]
+    candidate, n = found.fit.candidates[0], len(found.fit.values)
+    names = [p.name for p in candidate.parameters]
     if {"sine", "cosine"} <= set(names):
         waves = [names.index("sine"), names.index("cosine")]
-        size, se = found.fit.psi[waves], found.fit.psi_se[waves]
+        size, covariance = found.fit.psi[waves], found.fit.covariance[n:, n:][np.ix_(waves, waves)]
         amplitude = np.hypot(*size)
-        return abs(amplitude - np.hypot(term.sine, term.cosine)) <= 1.96 * np.hypot(*(size * se)) / amplitude
+        se = np.hypot(np.sqrt(size @ covariance @ size) / amplitude, candidate.loose * amplitude)
+        return abs(amplitude - np.hypot(term.sine, term.cosine)) <= 1.96 * se
     return abs(found.fit.psi[0] - getattr(term, names[0])) <= 1.96 * found.fit.psi_se[0]

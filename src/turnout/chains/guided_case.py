@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from turnout.errors import TurnoutError
+from turnout.errors import SimulationError, TurnoutError
 from turnout.mismatch.case import Nuisance
 from turnout.mismatch.joint import fit_jointly
 
 WIDE = 0.5  # prior sd of an accepted value on its next visit, as a share of its way from neutral: it may well grow
+NO_LIMIT = 100.0  # times a value, beyond which its neutral one stands for "no limit at all"
 LEAST_ERRORS = 3.0  # and at least so many of its standard errors
 STEPS = 12  # of the fits to hammer tests alone that give the start
 STEP = 0.02  # of the prior sd, for derivatives
@@ -130,7 +131,11 @@ class GuidedCase:
         step = STEP * nuisance.sd
         if values[nuisance.name] + step > nuisance.bounds[1]:
             step = -step
-        moved = self.predict({**values, nuisance.name: values[nuisance.name] + step}, terms, observations)
+        try:
+            moved = self.predict({**values, nuisance.name: values[nuisance.name] + step}, terms, observations)
+        except SimulationError:  # it may go to the other side
+            step = -step
+            moved = self.predict({**values, nuisance.name: values[nuisance.name] + step}, terms, observations)
         return [(new - old) / step for new, old in zip(moved, base)]
 
     def own_jacobian(self, values, terms, observation, predicted, names):
@@ -187,7 +192,9 @@ class _Seen:
         self.jacobian = [np.delete(j, slice(n, n + own), axis=1) for j in fit.jacobian]
 
     def __getattr__(self, name):
-        return getattr(self.__dict__["_fit"], name)
+        if "_fit" not in self.__dict__:
+            raise AttributeError(name)
+        return getattr(self._fit, name)
 
 
 def _name(accepted, parameter):
@@ -197,8 +204,15 @@ def _name(accepted, parameter):
 def _nuisances(accepted):
     for p in accepted.parameters:
         value, error = accepted.values[p.name]
-        sd = max(WIDE * abs(value - p.neutral), LEAST_ERRORS * (error or 0.0), 1e-3 * (p.bounds[1] - p.bounds[0]))
+        sd = max(_reach(p, value), LEAST_ERRORS * (error or 0.0))
         yield Nuisance(_name(accepted, p), p.unit, value, sd, bounds=p.bounds, meaning=p.meaning)
+
+
+def _reach(p, value):
+    """How far an accepted value may go: a share of its way from neutral, or of itself where neutral is no limit."""
+    if abs(p.neutral) > NO_LIMIT * abs(value):
+        return WIDE * abs(value)
+    return max(WIDE * abs(value - p.neutral), 1e-3 * (p.bounds[1] - p.bounds[0]))
 
 
 def visit_of(case, fit) -> list[dict]:

@@ -32,14 +32,16 @@ def track_of(turnout: TurnoutConfig, name: str | None = None):
     return track, accepted_of(track.terms)
 
 
-def digest_of_model(turnout: TurnoutConfig) -> str:
-    """Changes when a track's or a vehicle's file of the configuration does, "" where there are none."""
+def digest_of_model(turnout: TurnoutConfig, name: str | None = None) -> str:
+    """Changes when a track's or a vehicle's file of the configuration does, "" where there are none; beside a track
+    that is asked for by ``name`` all in its folder count, since it may extend any of them."""
     folder = Path(turnout.folder)
     try:
-        own = track_file(turnout)
+        own = track_file(turnout, name)
     except SimulationError:
         return ""
     used = [own, *sorted((folder / "tracks").glob(f"{turnout.layout}.yaml")), *sorted((folder / "vehicles").glob("*"))]
+    used += sorted(own.parent.glob("*.y*ml")) if name else []
     parts = [[path.name, sha256_of(path)] for path in dict.fromkeys(used) if path.is_file()]
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:16]
 

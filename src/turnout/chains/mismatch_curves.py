@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import welch
 
-from turnout.mismatch.verify import predict_reserved
+from turnout.mismatch.verify import fit_of_reserved
 
 WINDOW = 0.8  # s of waveform shown
 SEGMENT = 0.5  # s of a piece of Welch's estimate: 2 Hz lines
@@ -39,8 +39,9 @@ def passages_shown(case, found) -> list[Shown]:
     rival = _rival(found)
     shown: list[Shown] = []
     if case.reserved:
-        sets = [predict_reserved(case, fit, case.reserved) for fit in _fits(found, rival)]
-        shown += _split(case, case.reserved, sets, True)
+        sets = [fit_of_reserved(case, fit)[0] for fit in _fits(found, rival)]
+        sets = [predictions or sets[0] for predictions in sets]
+        shown += _split(case, case.reserved, sets, True) if sets[0] else []
     sets = [fit.predictions for fit in _fits(found, rival)]
     return shown + _split(case, case.observations, sets, False)
 

@@ -66,7 +66,7 @@ def _campaign(turnout, track, found, route, labels):
     passages = [
         p for p in found.passages if (shared or p.route == route) and names & {c.name for c in p.recording.channels}
     ]
-    passages = telling(passages)
+    passages = telling(formations(passages))
     heard = {c.name for p in passages for c in p.recording.channels} & names
     sensors = tuple(s for s in sensors if s.name in heard)
     if not tests and not passages:
@@ -94,6 +94,16 @@ def _as_main(track, route, passages):
     own = track.track_of(route)
     seen = replace(track, track=own, tracks={"main": own}, routes={"main": track.routes[route]})
     return seen, [replace(p, route="main") for p in passages]
+
+
+def formations(passages):
+    """The passages, trains of one type that came in several lengths as trains of their own: wheels are counted."""
+    axles = {id(p): len(p.vehicle.wheels) for p in passages}
+    lengths: dict[str, set] = {}
+    for p in passages:
+        lengths.setdefault(p.train, set()).add(axles[id(p)])
+    several = {train for train, found in lengths.items() if train and len(found) > 1}
+    return [replace(p, train=f"{p.train}, {axles[id(p)]} axles") if p.train in several else p for p in passages]
 
 
 def telling(passages, most=MOST_PASSAGES, axles=MOST_AXLES):

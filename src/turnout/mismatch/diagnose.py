@@ -13,7 +13,7 @@ from turnout.mismatch.refits import kept, scored, to_the_end, with_derivatives
 from turnout.mismatch.scoring import judged, latent_of, over
 from turnout.mismatch.together import reconsidered, refused
 from turnout.mismatch.verdict import Verdict
-from turnout.mismatch.verify import decoy, fit_percent, predict_reserved
+from turnout.mismatch.verify import decoy, fit_of_reserved, fit_percent
 from turnout.mismatch.whereabouts import Whereabouts, whereabouts
 
 # Share of the first effect's evidence that a law of not quite its shape leaves: sizes are right to a fifth.
@@ -95,13 +95,13 @@ def diagnose(case, settings=None, progress=None, store=None):
         if verdict.answer == "none" or best is None or best.gain <= settings.threshold:
             break
         found = with_derivatives(case, best.fit, settings)
-        if not found.jacobian and effect:  # the simulation fails beside it
+        if not found.jacobian and effect:  # the simulation fails beside it: it can be neither weighed nor built on
             verdicts.pop()
             break
         fit = found
         if not fit.jacobian:
             break
-        if verdict.answer == "named":
+        if verdict.answer == "named" and not refused(verdicts):  # these are weighed against the base's errors
             case, fit = _with_its_errors(case, fit, settings, store)
         if verdict.answer == "a_or_b" or (not case.frozen_jacobian and over(case, fit, settings) <= 1.0):
             break
@@ -157,11 +157,11 @@ def _rival(verdict):
 def _verified(case, base, fit, rival):
     if not case.reserved:
         return Verification(0, float("nan"))
-    before = predict_reserved(case, base, case.reserved)
-    first = fit_percent(case.reserved, before)
+    n, (before, first) = len(case.reserved), fit_of_reserved(case, base)
+    if before is None:
+        return Verification(n, float("nan"))
     if fit is base:
-        return Verification(len(case.reserved), first)
-    after = fit_percent(case.reserved, predict_reserved(case, fit, case.reserved))
+        return Verification(n, first)
     free = decoy(case.observations, base.predictions, case.reserved, before, fit.psi.size)
-    other = fit_percent(case.reserved, predict_reserved(case, rival.fit, case.reserved)) if rival else None
-    return Verification(len(case.reserved), first, after, other, fit_percent(case.reserved, free))
+    other = fit_of_reserved(case, rival.fit)[1] if rival else None
+    return Verification(n, first, fit_of_reserved(case, fit)[1], other, fit_percent(case.reserved, free))

@@ -257,10 +257,20 @@ def _iterate(joint, theta, predictions, residuals, jacobian, cost, renew):
         if gain < enough and (since == 1 or not (frozen and renew)):
             break
         if not frozen or 0 < renew <= since or (renew and gain < enough):
-            jacobian, since = joint.jacobian(theta, predictions), 0
+            jacobian, since = _anew(joint, theta, predictions, jacobian), 0
     else:
-        jacobian = joint.jacobian(theta, predictions) if renew and since else jacobian
+        jacobian = _anew(joint, theta, predictions, jacobian) if renew and since else jacobian
     return theta, predictions, residuals, jacobian, cost
+
+
+def _anew(joint, theta, predictions, updated):
+    """The Jacobian made anew; of a dear case the ``updated`` one where the simulation fails beside ``theta``."""
+    try:
+        return joint.jacobian(theta, predictions)
+    except SimulationError:
+        if joint.case.frozen_jacobian:
+            return updated
+        raise
 
 
 def _shorter(joint, theta, step, cost):

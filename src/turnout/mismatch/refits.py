@@ -106,7 +106,7 @@ def _tried(case, fit, entry, settings, store, effect, best=0.0):
 
 def _polished(case, fit, score, settings, store, effect):
     """A leader refitted to the end, with derivatives of its own: the verdict rests on these."""
-    key = f"{effect}:polished:{score.candidate.key}:{len(fit.candidates)}"
+    key = f"{effect}:polished:{score.candidate.key}:{len(fit.candidates)}:{tuple(np.round(score.fit.psi, 12))}"
     refit = kept(store, key, lambda: _ended(case, score.fit, settings), score.fit.candidates)
     return score_of(case, fit, refit, score.candidate, settings)
 

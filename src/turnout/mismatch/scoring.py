@@ -5,7 +5,7 @@ import numpy as np
 from turnout.mismatch.held_out import held_out_score, mean_square_out
 from turnout.mismatch.latent import latent_law
 from turnout.mismatch.verdict import Score, judge, objected
-from turnout.mismatch.verify import falls, predict_reserved
+from turnout.mismatch.verify import falls, fit_of_reserved
 
 ODD = 3.0  # times the spread of like parts: one in 370 of sound ones
 FEWEST = 6  # like parts that make a spread
@@ -117,10 +117,12 @@ def structure_left(case, fit):
 
 def consistent_elsewhere(case, base, best, settings):
     """Reserved conditions are predicted no worse than without the effect: neither at twice the mean square, nor at a
-    lower fit that costs as much of the evidence as no condition may (``verdict.objected``)."""
+    lower fit that costs as much of the evidence as no condition may (``verdict.objected``), nor not at all."""
     if not case.reserved:
         return True
-    before, after = (predict_reserved(case, f, case.reserved) for f in (base, best.fit))
+    before, after = (fit_of_reserved(case, f)[0] for f in (base, best.fit))
+    if after is None or before is None:
+        return before is None
     squares = [mean_square_out(case, f, case.reserved, p) for f, p in ((base, before), (best.fit, after))]
     lost = 0.5 * sum(o.n_effective for o in case.reserved) * (squares[1] - squares[0])
     fell = falls(case.reserved, before, after, settings.fall) and objected(-lost, best.gain, settings)

@@ -40,11 +40,11 @@ def reconsidered(case, base, fit, verdicts, settings):
 
 def _beside_second(case, base, fit, scores, settings):
     """The first effect's leader and its close rivals, each with what it is worth beside the second effect."""
-    leader, second = scores[0], fit.candidates[-1]
+    leader, second = scores[0], fit.candidates[1]
     yield _worth(case, base, fit, leader, settings)
     close = leader.gain - max(settings.margin, TORN * leader.gain)
     for rival in [s for s in scores[1:] if s.gain > max(close, settings.threshold)][:RIVALS]:
-        psi = np.concatenate([rival.fit.psi, fit.psi[-len(second.parameters) :]])
+        psi = np.concatenate([rival.fit.psi, fit.psi[fit.part(second)]])
         try:
             both = fit_jointly(case, (rival.candidate, second), psi, fit.values, iterations=settings.iterations)
         except SimulationError:

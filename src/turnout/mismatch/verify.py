@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from turnout.errors import SimulationError
 from turnout.mismatch.joint import Joint
 
 FITTED_STEPS = 8
@@ -25,6 +26,15 @@ def fit_percent(observations, predictions, centre=True):
     return round(100.0 * (1.0 - float(np.sqrt(missed / total))), 4)
 
 
+def fit_of_reserved(case, fit):
+    """(predictions of the reserved recordings, fit [%]) by a fitted model; (None, None) where none can be made."""
+    try:
+        found = predict_reserved(case, fit, case.reserved)
+    except SimulationError:
+        return None, None
+    return found, fit_percent(case.reserved, found)
+
+
 def falls(observations, before, after, points):
     """Whether ``after`` fits worse than ``before`` by more than ``points`` of fit and than two standard errors.
 
@@ -44,6 +54,7 @@ def predict_reserved(case, fit, observations):
     """Predictions of ``observations`` by the fitted model; only nuisances they own themselves are fitted to them.
 
     Any model gets that same freedom (a passage's own speed, time and load), so that models stay comparable.
+    SimulationError where the model cannot be simulated there.
     """
     joint = Joint(case, fit.candidates, observations)
     theta = np.concatenate([[fit.values[n.name] for n in case.nuisances], fit.psi])
@@ -56,7 +67,8 @@ def predict_reserved(case, fit, observations):
     cost = joint.cost(theta, residuals)
     for _ in range(FITTED_STEPS):
         step = _own_step(case, joint, theta, fit.terms, predictions, residuals, own)
-        found = next((f for f in (_moved(joint, theta, own, 0.5**h * step) for h in range(3)) if f[3] < cost), None)
+        tried = (_moved(joint, theta, own, 0.5**h * step) for h in range(3))
+        found = next((f for f in tried if f is not None and f[3] < cost), None)
         if found is None:
             break
         gain = cost - found[3]
@@ -80,7 +92,9 @@ def _own_step(case, joint, theta, terms, predictions, residuals, own):
 def _moved(joint, theta, own, step):
     tried = theta.copy()
     tried[own] += step
-    predictions = joint.predict(tried)
+    predictions = joint.tried(tried)
+    if predictions is None:
+        return None
     residuals = joint.residuals(predictions)
     return tried, predictions, residuals, joint.cost(tried, residuals)
 

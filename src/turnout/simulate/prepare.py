@@ -28,7 +28,7 @@ class Prepared:
     arrays: TrackArrays
     scheme: SchemeArrays
     static: tuple
-    stand_ins: dict = field(default_factory=dict, compare=False, repr=False)
+    stand_ins: dict = field(default_factory=dict, init=False, compare=False, repr=False)
 
     def static_response(self, rows, weights):
         """(n,) static deflection of all degrees of freedom under a unit force with these weights."""

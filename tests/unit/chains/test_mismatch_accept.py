@@ -13,6 +13,7 @@ from turnout import physics
 from turnout.chains.accept import accept
 from turnout.chains.accepted_terms import OF_A_WHEELSET, accepted_of, described, terms_on
 from turnout.chains.guided_case import GuidedCase
+from turnout.chains.mismatch_context import digest_of_model
 from turnout.errors import SimulationError
 from turnout.mismatch.track import TrackCase
 from turnout.mismatch.track.planned import measured_campaign, small_plan
@@ -206,3 +207,52 @@ def test_a_case_whose_errors_were_made_anew_is_guided_as_before():
     assert found.watch is guided.watch and found.candidates == ("a",)
     inner.renewed = lambda fit: inner
     assert guided.renewed(None) is guided
+
+
+def test_another_track_is_another_diagnosis(config):
+    """What was kept of an interrupted run was simulated on the track that it was asked for."""
+    turnout = SimpleNamespace(id="t1", folder=config, layout="small")
+    shutil.copy(config / "tracks/small.yaml", config / "tracks/other.yaml")
+    own_file, other = digest_of_model(turnout), digest_of_model(turnout, "other")
+    with open(config / "tracks/other.yaml", "a", encoding="utf-8") as file:
+        file.write("# measured anew\n")
+    assert digest_of_model(turnout, "other") not in (own_file, other)
+    assert digest_of_model(turnout) == own_file
+
+
+def accepted_as(law, value, error):
+    """An accepted effect with one parameter, which the simulation below takes as it is."""
+    return SimpleNamespace(
+        key=law.name, parameters=law.parameters[:1], values={law.parameters[0].name: (value, error)},
+        term=lambda track, values=None: values or {}, is_of=lambda *_: False,
+    )  # fmt: skip
+
+
+def test_an_accepted_limit_may_move_by_half_of_itself():
+    """80 m/s²: beside 100,000, which stands for no limit, it would be free from 0 to anything."""
+    inner = SimpleNamespace(
+        nuisances=(), candidates=(), start_values={}, track=lambda: "track", cheap_part=lambda: None
+    )
+    (limit,) = GuidedCase(inner, (accepted_as(physics.Clipping, 80.0, 1.0),)).own
+    assert limit.sd == pytest.approx(40.0)
+    (gap,) = GuidedCase(inner, (accepted_as(physics.HangingSleeper, 1e-3, 1e-5),)).own
+    assert gap.sd == pytest.approx(5e-4)
+
+
+def test_the_derivative_by_an_accepted_gap_goes_to_the_side_where_the_simulation_can():
+    """The response is the gap in millimetres, squared; above a millimetre nothing converges: 2 less the step."""
+
+    def predict(values, terms, observations):
+        if terms[0]["gap"] > 1e-3:
+            raise SimulationError("Newton's iteration did not converge")
+        return [np.array([(1e3 * terms[0]["gap"]) ** 2])]
+
+    inner = SimpleNamespace(
+        nuisances=(), candidates=(), start_values={}, track=lambda: "track", cheap_part=lambda: None, predict=predict,
+        nuisance_jacobian=lambda *_: [np.zeros((1, 0))],
+    )  # fmt: skip
+    guided = GuidedCase(inner, (accepted_as(physics.HangingSleeper, 1e-3, 1e-5),))
+    (one,) = guided.own
+    values, seen = {one.name: 1e-3}, [SimpleNamespace(name="o")]
+    (column,) = guided.nuisance_jacobian(values, (), seen, guided.predict(values, (), seen))
+    assert column[0, 0] == pytest.approx(1e3 * (2.0 - 0.02 * 0.5), rel=1e-6)

@@ -5,8 +5,9 @@ from types import SimpleNamespace
 import pytest
 
 from turnout.chains.mismatch_gather import _spoils
-from turnout.chains.mismatch_groups import reserved, telling
+from turnout.chains.mismatch_groups import formations, reserved, telling
 from turnout.chains.mismatch_trains import train_of
+from turnout.mismatch.track.campaign import Passage
 from turnout.simulate import load_vehicle
 
 
@@ -26,6 +27,16 @@ def test_every_type_is_there_and_short_trains_fill_up_from_the_extremes_of_speed
     assert sum(len(p.vehicle.wheels) for p in chosen) <= 96
     ic3 = [p.speed for p in chosen if p.train == "ic3"]
     assert min(ic3) == 30.0 and max(ic3) == 38.0
+
+
+def test_trains_of_one_type_and_two_lengths_are_two_trains():
+    """The wheels of a type with one length keep its name."""
+    lengths = {"a": ("ic3", 8), "b": ("ic3", 12), "c": ("ic3", 8), "d": ("freight", 40), "e": ("", 4), "f": ("", 8)}
+    fleet = [Passage(k, None, SimpleNamespace(wheels=range(n)), 30.0, kind) for k, (kind, n) in lengths.items()]
+    found = {p.name: p.train for p in formations(fleet)}
+    assert found == {
+        "a": "ic3, 8 axles", "b": "ic3, 12 axles", "c": "ic3, 8 axles", "d": "freight", "e": "", "f": "",
+    }  # fmt: skip
 
 
 def test_one_long_train_is_better_than_none():

@@ -1,12 +1,14 @@
 """Derivatives of receptances by parameters of terms, without solving the track again."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from turnout import physics
 from turnout.mismatch.track import TrackCase, blows
+from turnout.mismatch.track.added_links import AddedLinks
 from turnout.mismatch.track.nudged_links import nudged
 from turnout.mismatch.track.planned import measured_campaign, small_plan
 from turnout.simulate import uniform_track
@@ -75,3 +77,15 @@ def test_links_that_are_others_are_no_small_step(somewhere):
     assert nudged(model, (physics.LocalPad(J, 0.5),)) is None
     ends, impedance = nudged(model, (physics.LocalBallast(J, 0.5),))
     assert ends.shape[0] == 0 and impedance.shape == (0, blows.LINES.size)
+
+
+def test_an_added_link_changes_a_receptance_as_a_track_that_has_it(somewhere):
+    """A pad, and a mass on a spring, at three supports, at their starts: one link each, so exact."""
+    case, values = somewhere
+    chosen = [(c, 0) for c in case.candidates if c.family in ("local_pad", "attached_resonator")][::7]
+    added = AddedLinks(case, SimpleNamespace(values=values, terms=()), chosen)
+    for o in case.observations[:3]:
+        (before,) = case.predict(values, (), [o])
+        for (c, k), found in zip(chosen, added.changes(case.pairs[o.name]).values()):
+            (after,) = case.predict(values, (c.term(c.starts[k]),), [o])
+            assert np.linalg.norm(found - (after - before)) < 1e-9 * np.linalg.norm(after - before)

@@ -7,21 +7,22 @@ from turnout.mismatch.track import blows
 
 
 class AddedLinks:
-    """Changes of receptances about a fit; what candidates add is asked once for all pairs under the same conditions."""
+    """Changes of receptances about a fit by each of ``chosen`` [(candidate, start)]; what these add is asked once for
+    all pairs under the same conditions."""
 
-    def __init__(self, case, fit):
-        self.case, self.fit, self.known = case, fit, {}
+    def __init__(self, case, fit, chosen):
+        self.case, self.fit, self.chosen, self.known = case, fit, chosen, {}
 
-    def changes(self, pair, chosen):
-        r"""(key, start) -> (n,) change of a pair's observation by each of ``chosen`` (candidate, start).
+    def changes(self, pair):
+        r"""(key, start) -> (n,) change of a pair's observation.
 
         One link w with impedance z changes a receptance by :math:`-z\,u_w v_w / (1 + z\,g_w)`, u and v the motion of
         its ends under the blow and under a force at the sensor, g under a pair of forces at its own ends; several links
         of one candidate are taken as if each were alone.
         """
+        case, fit, chosen = self.case, self.fit, self.chosen
         if not chosen:
             return {}
-        case, fit = self.case, self.fit
         model = case.blow_model(fit.values, fit.terms, pair)
         said = tuple(sorted(pair.conditions.items()))
         if said not in self.known:

@@ -15,9 +15,9 @@ from turnout.simulate.matrices import link_vector
 
 LINES = np.unique(np.round(np.geomspace(35.0, 900.0, 44) / 2.0) * 2.0)  # [Hz]; two blows' worth of resolution
 SWING = 1e-6  # motion of a blow for the tangent of a law [m]
-# Rate of a joint under a blow: free, less what a force against it takes, at least that of a joint which is held. Blows
-# of 5 kN on a simulated track with friction of 0.3 to 8 kN are met best at 20, 13, 8, 3 and 1.5 mm/s.
-FREE, MOBILITY, HELD = 0.018, 4e-6, 2e-3  # [m/s, m/s per N, m/s]
+# Rate of a joint under a blow: from that of a free one to that of one which is held, over so much force against it.
+# Blows of 5 kN on a simulated track with friction of 0.3 to 8 kN are met best at 20, 13, 8, 3 and 1.5 mm/s.
+FREE, HELD, HOLDING = 0.021, 1.5e-3, 2e3  # [m/s, m/s, N]
 DELAY = 8e-6  # sd of a hammer pair's delay: 2 degrees at 700 Hz [s]
 SHARE = 1e-3  # of a support's value, by which what follows it is found
 FEWEST = 2
@@ -146,7 +146,7 @@ def tangent(terms, track):
         for port in term.ports(track):
             law, d = port.law, -port.gap
             k = (float(law.force(d + SWING, 0.0)) - float(law.force(d - SWING, 0.0))) / (2.0 * SWING)
-            rate = max(FREE - MOBILITY * _against(law, d, FREE), HELD)
+            rate = HELD + (FREE - HELD) * np.exp(-abs(_against(law, d, FREE)) / HOLDING)
             c = _against(law, d, rate) / rate
             found.append(Link(port.ends, k, c, tag="tangent"))
     return found

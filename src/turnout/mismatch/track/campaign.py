@@ -53,6 +53,12 @@ class Campaign:
         if len(set(names)) < len(names):
             twice = next(n for n in names if names.count(n) > 1)
             raise SimulationError(f"the name {twice!r} stands for two recordings; give each its own.")
+        lengths: dict[str, int] = {}
+        for p in self.passages:
+            n = len(p.vehicle.wheels)
+            if p.train and lengths.setdefault(p.train, n) != n:
+                said = f"train {p.train!r} has {lengths[p.train]} and {n} wheels"
+                raise SimulationError(f"{said}: wheels are counted from the front, give each length a name of its own.")
         for name in self.reserved:
             if name not in names:
                 raise SimulationError(f"reserved {name!r} is no recording; there are {', '.join(names)}.")

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from turnout.errors import SimulationError
 from turnout.mismatch.track import blows, rolling
 from turnout.mismatch.track.quiet import disturbances
 from turnout.mismatch.track.rough_wheels import wheel_modes
@@ -37,7 +38,11 @@ def passage_observations(case):
         if not sensors:
             case.notes.append(f"passage {passage.name}: none of the sensors recorded it")
             continue
-        signals = case.roll(values, (), passage)(passage, passage.vehicle, passage.speed, sensors)
+        try:
+            signals = case.roll(values, (), passage)(passage, passage.vehicle, passage.speed, sensors)
+        except SimulationError as error:
+            case.notes.append(f"passage {passage.name}: cannot be simulated: {error}")
+            continue
         reference, speed, likeness = rolling.align(passage, sensors, signals, case.solver.rate)
         if likeness < rolling.ALIKE:
             case.notes.append(

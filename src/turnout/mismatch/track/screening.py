@@ -31,13 +31,13 @@ def screen_columns(case, fit, observations):
     blank = [np.zeros(o.data.size, dtype=np.float32) for o in observations]
     found = {(c.key, k): list(blank) for c, k in chosen}
     laws, paths = ([(c, k) for c, k in chosen if c.family in names] for names in (LAWS, PATHS))
-    added = AddedLinks(case, fit)
+    added = AddedLinks(case, fit, laws)
     for i, o in enumerate(observations):
         if o.name in case.rollings:
             made = case.rollings[o.name]
             parts = _passage(case, fit, made, laws) | _paths(case, fit, made, paths)
         else:
-            parts = added.changes(case.pairs[o.name], laws)
+            parts = added.changes(case.pairs[o.name])
         parts |= _channels(case, fit, o, fit.predictions[i], [(c, k) for c, k in chosen if c.family in CHANNELS])
         for key, column in parts.items():
             found[key][i] = column.astype(np.float32)

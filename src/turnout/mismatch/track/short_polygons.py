@@ -44,7 +44,7 @@ def short_polygons(case, fit):
     if not case.rollings:
         return ()
     lengths = wavelengths(case.rollings.values())
-    tried = np.flatnonzero((lengths < SHORTEST_WAVE) & (lengths > lengths[-1] * np.exp(FAR)))
+    tried = np.flatnonzero((lengths < SHORTEST_WAVE) & (lengths > lengths.min(initial=np.inf) * np.exp(FAR)))
     if not tried.size:
         return ()
     reserved, found, n = {o.name for o in case.reserved}, [], 0
@@ -55,7 +55,7 @@ def short_polygons(case, fit):
             z, apart = louder(seen, tried, lengths)
             n += z.shape[0]
             w, k = np.unravel_index(int(np.argmax(z)), z.shape)
-            if not kept or louder(kept, tried, lengths)[0][w, k] > 0.5 * z[w, k]:
+            if apart and (not kept or louder(kept, tried, lengths)[0][w, k] > 0.5 * z[w, k]):
                 found.append((evidence(z[w, k], apart), train, int(w), int(tried[k]), seen))
     if not found:
         return ()
@@ -106,7 +106,10 @@ def _usual(level, k, lengths):
 def louder(slots, tried, lengths):
     """(n_wheel, n_tried) mean of z over sensors and passages, and the number of slots of a wheel behind it."""
     above = [np.stack([s.level[..., k] - _usual(s.level, k, lengths) for k in tried], axis=-1) for s in slots]
-    z = np.concatenate([a - np.nanmedian(a, axis=1, keepdims=True) for a in above if not np.isnan(a).all()])
+    heard = [a - np.nanmedian(a, axis=1, keepdims=True) for a in above if not np.isnan(a).all()]
+    z = np.concatenate([*heard, np.full((0, *above[0].shape[1:]), np.nan)])
+    if not z.size:
+        return np.full(above[0].shape[1:], -np.inf), 0
     return np.nan_to_num(np.nanmean(z, axis=0), nan=-np.inf), z.shape[0]
 
 

@@ -20,9 +20,9 @@ _known = OrderedDict()
 
 def matrices_of(track, terms=()):
     """``assemble(track, terms)`` for a track of two layers, in a twentieth of the time once its like is known."""
-    links = [link for term in terms for link in term.links(track)]
     for term in terms:
         track = term.rail(track)
+    links = [link for term in terms for link in term.links(track)]
     if track.layers != 2:
         return assemble(track, (FixedLinks(links),))
     extra = frozenset(name for link in links for name, _ in link.ends if name[0] not in ("rail", "sleeper"))

@@ -1,0 +1,104 @@
+"""Simulations that cannot go somewhere cost what was asked of them there, never the diagnosis."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from turnout.errors import SimulationError
+from turnout.mismatch import diagnose
+from turnout.mismatch.case import Candidate, Case, Nuisance, Observation
+from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.track import Campaign, TrackCase
+from turnout.mismatch.track.campaign import Passage
+from turnout.mismatch.track.planned import measured_campaign, small_plan
+from turnout.mismatch.track.short_polygons import louder, short_polygons
+from turnout.physics import Parameter
+
+AMOUNT = (Parameter("amount", "-", 0.0, (-9.0, 9.0), "share of a wave", "made up 2026"),)
+X = np.linspace(0.0, 1.0, 200)
+WAVE = np.sin(9.0 * X)
+
+
+class Brittle(Case):
+    """A wave of 1.2 in three recordings and in one that is kept back; ``refuses`` (terms, observations) or not."""
+
+    def __init__(self, refuses):
+        rng, self.refuses = np.random.default_rng(5), refuses
+        found = [Observation(f"o{k}", f"day {k}", 1.2 * WAVE + 0.1 * rng.normal(size=X.size), 0.1) for k in range(4)]
+        self.observations, self.reserved = tuple(found[:3]), tuple(found[3:])
+        self.candidates = (Candidate("wave", AMOUNT, lambda p: p["amount"], ((0.5,),)),)
+
+    def predict(self, values, terms, observations):
+        if self.refuses(terms, observations):
+            raise SimulationError("Newton's iteration did not converge")
+        return [sum(terms) * WAVE for _ in observations]
+
+
+def test_a_name_that_cannot_be_simulated_on_what_was_kept_back_is_not_given():
+    """Without the fault it is named, and the fit after it is told."""
+    sound = diagnose(Brittle(lambda terms, observations: False))
+    assert sound.names == ("wave",) and sound.verification.after > 80.0
+    found = diagnose(Brittle(lambda terms, observations: bool(terms) and observations[0].name == "o3"))
+    assert found.verdict.answer == "unknown" and not found.names
+    assert found.verification.n == 1
+
+
+def test_where_nothing_kept_back_can_be_simulated_the_others_speak():
+    found = diagnose(Brittle(lambda terms, observations: observations[0].name == "o3"))
+    assert found.names == ("wave",)
+    assert np.isnan(found.verification.before) and found.verification.after is None
+
+
+def test_a_dear_fit_keeps_its_updated_derivatives_where_no_new_ones_can_be_made():
+    """From 3 to the data's 1.2 in steps; derivatives are refused from the second time on."""
+
+    class Dear(Case):
+        frozen_jacobian, asked = True, 0
+        nuisances = (Nuisance("amount", "-", 3.0, 1.0),)
+        observations = (Observation("o", "day", 1.2 * WAVE, 0.1),)
+
+        def predict(self, values, terms, observations):
+            return [(values["amount"] + 0.3 * values["amount"] ** 2 - 0.432) * WAVE]
+
+        def nuisance_jacobian(self, values, terms, observations, base):
+            self.asked += 1
+            if self.asked > 1:
+                raise SimulationError("it fails beside")
+            return super().nuisance_jacobian(values, terms, observations, base)
+
+    case = Dear()
+    found = fit_jointly(case, iterations=12)
+    assert case.asked > 1
+    assert found.values["amount"] == pytest.approx(1.2, abs=0.05)  # five standard errors
+
+
+def test_a_train_of_two_lengths_is_refused():
+    """Wheels are counted from the front: the ninth of eight is no wheel."""
+    long, short = (Passage(f"p{n}", None, SimpleNamespace(wheels=range(n)), 20.0, "freight") for n in (12, 8))
+    with pytest.raises(SimulationError, match="'freight' has 12 and 8 wheels"):
+        Campaign(None, (), passages=(long, short))
+
+
+def test_a_passage_that_cannot_be_simulated_is_noted_and_the_others_are_used():
+    campaign = measured_campaign(small_plan((15.0,), blows=(24.0,)), (), 3)
+    (first, *_), names = campaign.passages, {p.name for p in campaign.passages}
+
+    class Picky(TrackCase):
+        def roll(self, values, terms, passage):
+            if passage.name == first.name:
+                raise SimulationError("wheel 3 leaves the track")
+            return super().roll(values, terms, passage)
+
+    case = Picky(campaign)
+    assert any(first.name in note and "wheel 3 leaves" in note for note in case.notes)
+    assert names - {first.name} >= set(case.rollings) and len(case.rollings) > 2
+
+
+def test_wheels_that_were_never_heard_are_not_called_polygonal():
+    """No slot of theirs was recorded; a recording too slow for short waves has no bin for them either."""
+    nothing = SimpleNamespace(level=np.full((2, 4, 60), np.nan))
+    z, apart = louder([nothing], np.arange(20, 40), np.exp(-0.04 * np.arange(60)))
+    assert apart == 0 and np.all(np.isneginf(z)) and z.shape == (4, 20)
+    slow = SimpleNamespace(speed=30.0, passage=SimpleNamespace(recording=SimpleNamespace(rate=100.0)))
+    assert short_polygons(SimpleNamespace(rollings={"a": slow}, reserved=()), None) == ()
