@@ -23,9 +23,8 @@ def refused(verdicts):
 
 def reconsidered(case, base, fit, verdicts, settings):
     """(verdicts, fit) after a second effect was sought on top of a first one that was refused: both stand where the
-    second is named and the first, or a close rival of it, passes with the second in the model. Two of one kind do not
-    vouch for one another: they can mend nearly any shape."""
-    if len(verdicts) > 1 and verdicts[1].names[:1] != (verdicts[0].scores[0].family,):
+    second is named and the first, or a close rival of it, passes with the second in the model."""
+    if len(verdicts) > 1 and _vouches(verdicts[0].scores[0], verdicts[1].scores[0]):
         pairs = list(_beside_second(case, base, fit, verdicts[0].scores, settings))
         pairs.sort(key=lambda s: -s.gain)
         best = pairs[0].fit
@@ -36,6 +35,13 @@ def reconsidered(case, base, fit, verdicts, settings):
         if found.answer in ("named", "a_or_b"):
             return [found, *verdicts[1:]], found.scores[0].fit
     return verdicts[:1], base
+
+
+def _vouches(first, second):
+    """Two of one kind do not vouch for one another: they can mend nearly any shape. Those of two trains do: there is no
+    recording that shows both."""
+    trains = {s.candidate.where.get("train") for s in (first, second)}
+    return first.family != second.family or (len(trains) == 2 and None not in trains)
 
 
 def _beside_second(case, base, fit, scores, settings):

@@ -50,6 +50,34 @@ def test_an_effect_that_no_name_fits_keeps_the_first_one_refused_too():
     assert found.fit is found.base
 
 
+class Trains(Shapes):
+    """Two trains with a wave each, seen twenty times over the noise; ``told`` whether candidates say of which train."""
+
+    def __init__(self, told):
+        super().__init__(())
+        rng, self.of = np.random.default_rng(12), {"o0": "a", "o1": "b", "o2": "a", "o3": "b"}
+        self.observations = tuple(
+            Observation(name, f"day {name}", 2.0 * SHAPES["wave"] + 0.1 * rng.normal(size=X.size), 0.1)
+            for name in self.of
+        )
+        self.candidates = tuple(
+            Candidate("wave", AMOUNT, lambda p, t=t: (t, p["amount"]), ((0.5,),), {"train" if told else "part": t})
+            for t in "ab"
+        )
+
+    def predict(self, values, terms, observations):
+        return [sum(a * SHAPES["wave"] for t, a in terms if t == self.of[o.name]) + 0.0 * X for o in observations]
+
+
+@pytest.mark.parametrize("told, names", [(True, ("wave", "wave")), (False, ())])
+def test_wheels_of_two_trains_vouch_for_one_another(told, names):
+    """No recording shows both. Two of one kind that may act on the same recordings do not."""
+    found = diagnose(Trains(told))
+    assert found.names == names
+    if told:
+        assert {c.where["train"] for c in found.fit.candidates} == {"a", "b"}
+
+
 def own(candidate, values, errors):
     """Score of 100 nats with these parameters."""
     fit = SimpleNamespace(psi=np.array(values), psi_se=np.array(errors), part=lambda _: slice(0, len(values)))
