@@ -36,6 +36,8 @@ SENTENCES = {
 }
 # The same where the recordings leave a parameter open by more than half of its value.
 OPEN = {"hanging_sleeper": ("gap", "The sleeper at {place} hangs above its ballast, and no train here closes the gap")}
+# And where it is below 0.
+REVERSED = {"sensor_gain": ("gain", "Sensor {channel} has the wrong polarity: it reads {gain} times what it should")}
 MILLI = {"m": "mm", "s": "ms"}
 PERCENT = {"1/K": "% per kelvin"}
 
@@ -109,6 +111,9 @@ def _sentence(term, finding) -> str:
 
 
 def _said(term) -> str:
+    name, turned = REVERSED.get(term["term"], ("", ""))
+    if name and term["parameters"][name]["value"] < 0.0:
+        return turned
     name, vague = OPEN.get(term["term"], ("", ""))
     known = term["parameters"].get(name)
     return vague if known and known["se"] > 0.5 * abs(known["value"]) else SENTENCES[term["term"]]

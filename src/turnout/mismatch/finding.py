@@ -9,7 +9,7 @@ CHECKS = {
     "surface_dip": "Measure the running surface there with a straightedge; weld or grind",
     "wheel_flat": "Send the wheelset to the lathe; the track needs nothing",
     "unsprung_mass": "Check the vehicle file of this train",
-    "sensor_gain": "Calibrate this sensor, swap it with its neighbour",
+    "sensor_gain": "Calibrate this sensor, look at its polarity, swap it with its neighbour",
     "mount_resonance": "Fasten this sensor again and strike the rail beside it",
     "time_offset": "Check the clock of this channel",
     "sensor_position": "Measure where this sensor sits",

@@ -10,7 +10,10 @@ from turnout.physics.transfer import TransferTerm
 
 @dataclass(frozen=True)
 class SensorGain(TransferTerm):
-    r"""One channel shows :math:`g` times what it should, at every frequency, in passages and hammer tests alike."""
+    r"""One channel shows :math:`g` times what it should, at every frequency, in passages and hammer tests alike.
+
+    Below 0 its polarity is wrong.
+    """
 
     channel_name: str
     gain: float
@@ -18,8 +21,8 @@ class SensorGain(TransferTerm):
     name = "sensor_gain"
     left_out = "channel {channel_name} shows {gain:.3f} times the true signal"
     parameters = (
-        Parameter("gain", "-", 1.0, (0.2, 5.0), "shown signal over true signal",
-                  "ISO 16063-21:2003, comparison calibration: 1 to 5 % when new"),
+        Parameter("gain", "-", 1.0, (-5.0, 5.0), "shown signal over true signal",
+                  "ISO 16063-21:2003, comparison calibration: 1 to 5 % when new", (1.0, 2.5)),
     )  # fmt: skip
 
     @classmethod

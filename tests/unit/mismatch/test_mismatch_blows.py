@@ -54,6 +54,15 @@ def test_warm_pads_are_named_from_two_temperatures(plan):
     assert told["value"] == pytest.approx(found.fit.psi[0], abs=told["se"])
 
 
+@pytest.mark.slow
+def test_a_sensor_wired_the_other_way_round_is_named(plan):
+    """Everything that it shows has the other sign, in every band: no delay does that."""
+    _, found = found_in(plan, physics.SensorGain("S3", -1.0))
+    assert found.names == ("sensor_gain",)
+    assert found.fit.candidates[0].where == {"sensor": "S3"}
+    assert abs(found.fit.psi[0] + 1.0) < 2.0 * found.fit.psi_se[0]
+
+
 def test_nothing_to_diagnose_is_said():
     with pytest.raises(SimulationError, match="neither a hammer test nor a passage"):
         Campaign(TurnoutTrack(uniform_track(12.0)), ())

@@ -212,3 +212,15 @@ def test_every_effect_of_the_catalogue_has_its_sentence():
 def test_a_gap_that_is_only_known_from_below_has_no_size(error, said):
     gap = {**GAP, "parameters": {**GAP["parameters"], "gap": {**GAP["parameters"]["gap"], "se": error}}}
     assert said in headline(named() | {"term_json": json.dumps([gap])})
+
+
+@pytest.mark.parametrize(
+    "gain, said", [(1.3, "A2 reads 1.3 times"), (-1.0, "A2 has the wrong polarity: it reads -1 times")]
+)
+def test_a_sensor_with_the_wrong_sign_is_said_so(gain, said):
+    term = {
+        "term": "sensor_gain",
+        "fixed": {"channel_name": "A2"},
+        "parameters": {"gain": {"value": gain, "se": 0.03, "unit": "-"}},
+    }
+    assert said in headline(named() | {"term_json": json.dumps([term])})
