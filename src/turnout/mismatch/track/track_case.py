@@ -1,6 +1,5 @@
 """Hammer tests and passages of one turnout as a case for the engine."""
 
-from collections import OrderedDict
 from copy import copy
 from dataclasses import replace
 
@@ -10,18 +9,8 @@ from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
 from turnout.mismatch.case import Case, Nuisance
 from turnout.mismatch.joint import fit_jointly
-from turnout.mismatch.track import blows, derivatives, nudged_links, rolling
-from turnout.mismatch.track.base_model import (
-    RAIL,
-    SEAT_SD,
-    inner_values,
-    near_rail,
-    track_nuisances,
-    track_with,
-    vehicle_with,
-    with_rail,
-    zone_of,
-)
+from turnout.mismatch.track import derivatives, rolling
+from turnout.mismatch.track.base_model import RAIL, SEAT_SD, track_nuisances, with_rail, zone_of
 from turnout.mismatch.track.blows_case import Blows
 from turnout.mismatch.track.ceiling import ceilings, within_range
 from turnout.mismatch.track.library import LOOSE, library
@@ -32,16 +21,15 @@ from turnout.mismatch.track.observing import (
     undisturbed,
     with_errors,
 )
+from turnout.mismatch.track.predicting import Predicting
 from turnout.mismatch.track.rough_rail import Waves
 from turnout.mismatch.track.rough_wheels import heavier
-from turnout.physics.term import PhysicsTerm
 
-KEPT = 150  # simulated passages remembered
 GAIN_SD = 0.02
 FOLLOWED = 0.15  # ln of unsprung mass: what roughness does near P2 then changes by a fifth of its amplitude
 
 
-class TrackCase(Case):
+class TrackCase(Predicting, Case):
     """``Case`` of a ``Campaign``; ``families`` restricts the candidates, ``solver`` the simulation used in fits."""
 
     frozen_jacobian = True
@@ -93,7 +81,7 @@ class TrackCase(Case):
         simulated is remembered any more."""
         self.rail = {name: values.get(name, 0.0) for name, _ in RAIL}
         self.zone = with_rail(self.nominal, self.rail)
-        self._simulated, self._rolls, self._models = OrderedDict(), OrderedDict(), OrderedDict()
+        self._forget()
 
     def peak(self, channel):
         """Largest value a channel showed in the passages, 0 where it showed none. [m/s²]"""
@@ -122,133 +110,6 @@ class TrackCase(Case):
             yield from self.waves.nuisances()
         for made in self.rollings.values():
             yield from rolling.rolling_nuisances(made.passage)
-
-    def track(self, route="main", terms=()):
-        """The kept part of the base track under a route; ``terms`` that change the rail change that of its file."""
-        return (self.nominal if _rails(terms) else self.zone).turnout.track_of(route)
-
-    def predict(self, values, terms, observations):
-        """Prediction of receptances and passages."""
-        found, model_of = [], self.blow_models(values, terms)
-        for o in observations:
-            if o.name in self.pairs:
-                pair = self.pairs[o.name]
-                found.append(self._receptance(values, terms, pair, model_of(pair)))
-            else:
-                found.append(self.passage_of(values, terms, self.rollings[o.name]))
-        return found
-
-    def moved(self, values, terms, new, observations, predictions):
-        """Predictions a small step away: receptances without solving the track again."""
-        return nudged_links.moved(self, values, terms, new, observations, predictions)
-
-    def blow_models(self, values, terms):
-        """``blow_model`` of any pair at these values, asked for once per conditions."""
-        known = {}
-
-        def of(pair):
-            said = tuple(sorted(pair.conditions.items()))
-            if said not in known:
-                known[said] = self.blow_model(values, terms, pair)
-            return known[said]
-
-        return of
-
-    def blow_model(self, values, terms, pair):
-        """The track of a hammer pair, remembered."""
-        under = blows.shown(terms, pair.conditions)
-        near = near_rail(values)
-        touched = self._touched(values, terms, pair.conditions)  # solved together: rounding hangs on what else is
-        key = repr(under), tuple(near.values()), inner_values(self.zone, values), touched
-        if key not in self._models:
-            made = blows.BlowModel(track_with(self._on_grid(near), self.zone, values), under)
-            self._models[key] = made
-            made.solve(touched)
-            while len(self._models) > 8:
-                self._models.popitem(last=False)
-        return self._models[key]
-
-    def _on_grid(self, near):
-        """The main track with its rail where ``near_rail`` has it, remembered."""
-        key = tuple(near.values())
-        if key not in self._railed:
-            self._railed[key] = with_rail(self.nominal, near).turnout.track_of("main")
-        return self._railed[key]
-
-    def _touched(self, values, terms, conditions):
-        """Places of blows and of the sensors that heard them, of all hammer tests under these conditions."""
-        alike = [p for p in self.pairs.values() if p.conditions == conditions]
-        seated = [self.seat(s, values, terms) for s in {p.channel: p.sensor for p in alike}.values()]
-        track = self.track()
-        return *(p.test.place for p in alike), *(s.probe(track).place for s in seated)
-
-    def seat(self, sensor, values, terms):
-        """The sensor where ``values`` and ``terms`` say that it sits."""
-        more = values.get(f"seat_{sensor.name}", 0.0)
-        return rolling.seat(replace(sensor, place=sensor.place + more) if more else sensor, terms)
-
-    def chain(self, values, terms, pair):
-        """What the channel makes of a receptance, (n_line,) complex."""
-        factor = blows.channel_factor(terms, pair.sensor, blows.LINES)
-        return factor * (1.0 + values.get(f"gain_{pair.channel}", 0.0))
-
-    def _receptance(self, values, terms, pair, model):
-        place = model.place_of(self.seat(pair.sensor, values, terms))
-        h = model.receptance(pair.test.place, place)
-        h = h + model.rail_gradient(pair.test.place, place) @ [values[k] - at for k, at in near_rail(values).items()]
-        return blows.split(blows.scaled(pair, h * self.chain(values, terms, pair)))
-
-    def passage_of(self, values, terms, made):
-        """(n_sensor * n_time,) what the channels of a passage show, one sensor behind the other."""
-        clean = self.clean(values, terms, made)
-        return np.concatenate([self.shown(values, terms, made, s, row) for s, row in zip(made.sensors, clean)])
-
-    def shown(self, values, terms, made, sensor, row):
-        """What the channel of a sensor shows of the simulated signal ``row``, on the clock of the recording."""
-        rate, time = 4.0 * self.solver.rate, made.time - made.reference - values[f"time@{made.name}"] + rolling.LEAD
-        for term in terms:
-            if term.kind == "channel":
-                row = term.under({"name": made.name}).channel(row, rate, sensor)
-        return (1.0 + values[f"gain_{sensor.name}"]) * rolling.read_at(made.limited(row, rate), rate, time)
-
-    def clean(self, values, terms, made):
-        """Simulated signals of the sensors before their channels, four times as fine as the march."""
-        return rolling.finer(self.marched(values, terms, made)[: len(made.sensors)])
-
-    def marched(self, values, terms, made, probes=()):
-        """Simulated signals of sensors and ``probes`` on the simulation's clock, remembered."""
-        under = tuple(t.under(self.said(made)) for t in terms if t.kind != "channel" or _moves(t))
-        train = made.passage.train or made.passage.name
-        own = values[f"wheels_{train}"], values[f"speed@{made.name}"], values[f"load@{made.name}"]
-        path = self.waves.path(values)
-        shape = path[0].dip.tobytes() if path else b""
-        seats = tuple(values.get(f"seat_{s.name}", 0.0) for s in made.sensors)
-        key = made.name, inner_values(self.zone, values), own, seats, shape, repr(under), len(probes)
-        if key not in self._simulated:
-            vehicle = vehicle_with(made.passage.vehicle, values, train, own[2])
-            roll = self.roll(values, under, made.passage)
-            sensors = [replace(s, place=s.place + more) for s, more in zip(made.sensors, seats)]
-            signals = roll(made.passage, vehicle, made.speed * (1.0 + own[1]), sensors, probes, path, made.sensors)
-            self._simulated[key] = signals
-            while len(self._simulated) > KEPT:
-                self._simulated.popitem(last=False)
-        return self._simulated[key]
-
-    def said(self, made):
-        """Conditions of a passage, as terms ask for them."""
-        passage = made.passage
-        loads = tuple(2.0 * load for load in passage.vehicle.static_loads)
-        return {"axle_loads": loads, "train": passage.train or passage.name, "name": made.name, **passage.conditions}
-
-    def roll(self, values, terms, passage):
-        """The simulation of passages on this track with these terms, remembered."""
-        key = passage.route, inner_values(self.zone, values), repr(terms)
-        if key not in self._rolls:
-            track = track_with(self.track(passage.route, terms), self.zone, values)
-            self._rolls[key] = rolling.Roll(self.zone.turnout, track, terms, self.solver)
-            while len(self._rolls) > 12:
-                self._rolls.popitem(last=False)
-        return self._rolls[key]
 
     @property
     def control_level(self):
@@ -317,33 +178,3 @@ class TrackCase(Case):
         from turnout.mismatch.track.latent_force import latent_force
 
         return latent_force(self, fit)
-
-    def numerical_error(self, fit):
-        """Difference to half the step and half the mesh (but under pads that are spread over nodes), where passages are
-        there; 0 where these cannot be simulated."""
-        if not self.rollings:
-            return None
-        finer = rolling.Track1D(2.0 * self.solver.rate, self.solver.scheme, 2 * (self.solver.elements or 4))
-        made = [self.rollings.get(o.name) for o in self.observations]
-        refined = [m and self._refined(fit, m, finer, p) for m, p in zip(made, fit.predictions)]
-        return [np.zeros(p.size) if new is None else new - p for new, p in zip(refined, fit.predictions)]
-
-    def _refined(self, fit, made, finer, predicted):
-        kept = self.solver, self._simulated, self._rolls
-        self.solver, self._simulated, self._rolls = finer, OrderedDict(), OrderedDict()
-        try:
-            return self.passage_of(fit.values, fit.terms, made)
-        except SimulationError:
-            return predicted
-        finally:
-            self.solver, self._simulated, self._rolls = kept
-
-
-def _rails(terms):
-    """One of the terms is another rail."""
-    return any(type(t).rail is not PhysicsTerm.rail for t in terms)
-
-
-def _moves(term):
-    """A channel term that changes what is simulated: the sensor's seat."""
-    return type(term).sensor is not PhysicsTerm.sensor
