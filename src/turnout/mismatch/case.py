@@ -111,9 +111,10 @@ class Candidate:
     ``scanned`` how many places the family has; ``starts`` are parameter sets that do not depend on the base fit;
     with ``start_from_base`` off the nuisances, too, start from their priors; ``always``: tried on the cheap
     observations at every place, whatever the residual promises; families with the same word are alike there;
-    ``least``: distance of the first ``sized`` parameters from neutral below which nobody would act; ``even``: the cheap
-    observations hardly tell a value from its mirror image about neutral; ``twin``: nuisance that hides it, which
-    would have ``twin_sd`` with the effect; ``from_twin`` makes the first parameter of it, None: its exponential.
+    ``least``: distance of the first ``sized`` parameters from neutral below which nobody would act, and which it has to
+    exceed by ``sure`` standard errors of the first; ``even``: the cheap observations hardly tell a value from its
+    mirror image about neutral; ``twin``: nuisance that hides it, which would have ``twin_sd`` with the effect;
+    ``from_twin`` makes the first parameter of it, None: its exponential.
     ``parameters`` have name, unit, neutral, bounds and prior as ``turnout.physics.Parameter``.
     One found by a look at the residual has the gain it promises [nats] in ``promise``, starts as it is, from the
     nuisances ``begin``; ``aside`` is evidence from data that are no observations [nats].
@@ -151,6 +152,7 @@ class Candidate:
     plain: tuple = ()
     whole: bool = False
     sized: int = 1
+    sure: float = 0.0
 
     @property
     def key(self):

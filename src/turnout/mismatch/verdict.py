@@ -41,7 +41,8 @@ class Score:
             return False
         known, sized = self.candidate.parameters, self.candidate.sized
         size = np.linalg.norm(self.own[0][:sized] - self.candidate.neutral[:sized]) if known else np.inf
-        return size >= getattr(self.candidate, "least", 0.0)
+        open_by = self.candidate.sure * float(self.own[1][0]) if self.candidate.sure else 0.0
+        return size - open_by >= self.candidate.least
 
     def is_limit_of(self, other):
         """``other`` is at the bound, within its standard error, where it cannot be told from this at the same place."""

@@ -111,6 +111,14 @@ def test_the_size_of_what_has_two_amplitudes_is_that_of_both():
     assert not own(hum, [0.3, 0.38], [0.01, 0.01]).material
 
 
+@pytest.mark.parametrize("error, told", [(1.0, True), (4.0, False)])
+def test_a_mass_that_may_as_well_be_nothing_is_not_named(error, told):
+    """8 kg, of which 5 matter: sure by three standard errors, or open."""
+    mass = (Parameter("mass", "kg", 0.0, (0.0, 200.0), "what hangs there", "made up 2026"),)
+    hung = Candidate("attached_resonator", mass, lambda p: p, ((15.0,),), {"place": 7.2}, least=5.0, sure=1.0)
+    assert own(hung, [8.0], [error]).material == told
+
+
 @pytest.mark.parametrize("whole, share", [(False, 1.0 / 3.0), (True, 1.0)])
 def test_a_start_that_turns_promises_what_it_is(whole, share):
     """The data want a third of the start; half the cost falls by 2 s q - s² q with q its size and s the share."""

@@ -58,7 +58,7 @@ def _supports(case):
                          tuple((g, s) for s in SEATED for g in GAPS), where, n, base=False, always="ballast",
                          kin="ballast", plain=("local_ballast", 1))  # fmt: skip
         yield _candidate(physics.AttachedResonator, lambda p, j=j: physics.AttachedResonator(j, **p),
-                         tuple((15.0, f, 0.03) for f in RINGING), where, n)  # fmt: skip
+                         tuple((15.0, f, 0.03) for f in RINGING), where, n, sure=1.0)  # fmt: skip
         if case.rollings:  # for a blow of one strength friction is a damper: it takes trains to call it by its name
             yield _candidate(physics.DryFriction, lambda p, j=j: physics.DryFriction(j, **p), ((1500.0,),), where, n,
                              told_by="passage")  # fmt: skip
