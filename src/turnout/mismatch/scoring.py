@@ -43,13 +43,18 @@ def score_of(case, fit, refit, candidate, settings):
 
 
 def _shown(case, fit, refit, candidate, settings):
-    """Whether the kind of observations that must speak for a candidate, if any, fits better with it by a margin."""
-    gain = sum(
-        o.effective * float(np.sum(np.square(a)) - np.sum(np.square(b))) / fit.scale[o.kind]
-        for o, a, b in zip(case.observations, fit.white, refit.white)
-        if o.kind == candidate.told_by
-    )
-    return not candidate.told_by or 0.5 * gain > settings.margin
+    """Whether the observations that must speak for a candidate, if any, fit better with it by a margin, and those that
+    must not speak against it no worse."""
+
+    def gained(kind):
+        return 0.5 * sum(
+            o.effective * float(np.sum(np.square(a)) - np.sum(np.square(b))) / fit.scale[o.kind]
+            for o, a, b in zip(case.observations, fit.white, refit.white)
+            if o.kind == kind
+        )
+
+    told = not candidate.told_by or gained(candidate.told_by) > settings.margin
+    return told and (not candidate.unopposed or gained(candidate.unopposed) > 0.0)
 
 
 def _usual(case, refit, candidate):

@@ -93,11 +93,13 @@ def _sensors(case):
         name = sensor.name
         where = {"sensor": name}
 
+        struck = "hammer" if any(pair.channel == name for pair in case.pairs.values()) else ""  # it read blows as well
+
         def per(term, starts, name=name, where=where, **more):
             return _candidate(term, lambda p: term(name, **p), starts, where, n, **more)
 
         yield per(physics.SensorGain, ((0.8,), (1.25,), (-1.0,)), twin=f"gain_{name}", twin_sd=0.3,
-                  from_twin=lambda gain: 1.0 + gain, loose=EXACT, exact=True)  # fmt: skip
+                  from_twin=lambda gain: 1.0 + gain, loose=EXACT, exact=True, unopposed=struck)  # fmt: skip
         yield per(physics.MountResonance, tuple((1.0 / f, 5.0) for f in MOUNTINGS), whole=True, kin="channel")
         yield per(physics.TimeOffset, tuple((sign * d,) for d in DELAYS for sign in (1.0, -1.0)), whole=True,
                   loose=EXACT, exact=True, kin="channel")  # fmt: skip
