@@ -90,8 +90,8 @@ def test_no_wheel_is_blamed_where_none_has_a_flat(plan, sound):
 
 @pytest.mark.slow
 def test_too_coarse_a_step_is_answered_numerics_and_carries_no_name(plan):
-    """Gauss's scheme at 1.8 kHz folds what nodes and sleepers excite into the band, see docs/decisions."""
-    case = TrackCase(measured_campaign(plan, (), 7), solver=Track1D(1800.0, "gauss"))
+    """Gauss's scheme at 1.8 kHz folds what four elements per bay excite into the band, see docs/decisions."""
+    case = TrackCase(measured_campaign(plan, (), 7), solver=Track1D(1800.0, "gauss", 4))
     found = diagnose(case)
     assert found.verdict.answer == "numerics" and not found.names
 
