@@ -106,7 +106,7 @@ def _sensors(case):
         yield per(physics.SensorPosition, ((0.15,), (-0.15,), (0.4,), (-0.4,)), even=True,
                   twin=f"seat_{name}", twin_sd=0.3, from_twin=float, exact=True)  # fmt: skip
         yield per(physics.LowPass, ((1 / 500.0,),), kin="channel")
-        yield per(physics.HighPass, ((12.0,),))
+        yield per(physics.HighPass, ((12.0,),), sure=1.0)
         if case.rollings:
             yield per(physics.ClockDrift, tuple((sign * d,) for d in DRIFTS for sign in (1.0, -1.0)), whole=True)
             peak = case.peak(name)
