@@ -176,14 +176,3 @@ def test_a_train_that_looks_like_no_such_train_is_said_and_located(plan):
     assert where.frame == "train" and where.train == "heavy"
     one = [p for p in campaign.passages if p.train == "light"] + [p for p in swapped if p.train == "heavy"][:1]
     assert TrackCase(replace(campaign, passages=tuple(one))).foreign == ()  # one passage may be another train
-
-
-@pytest.mark.slow
-def test_a_gain_that_the_sensor_does_not_have_in_blows_is_not_its_gain(plan):
-    """Trains alone are louder at S3 by a quarter, as over ballast that softens under them; blows are as they were."""
-    struck, rolled = (measured_campaign(plan, terms, 12) for terms in ((), (physics.SensorGain("S3", 1.25),)))
-    families = ("sensor_gain", "local_pad")
-    both = diagnose(TrackCase(rolled, families=families))
-    assert both.names == ("sensor_gain",)
-    trains = diagnose(TrackCase(replace(struck, passages=rolled.passages), families=families))
-    assert "sensor_gain" not in trains.names
