@@ -38,5 +38,5 @@ class PadTemperature(PhysicsTerm):
         more = max(-self.coefficient * (self.temperature - REFERENCE), -0.95)
         if more == 0.0:
             return []
-        pads = [k for j in range(track.support.size) for k in track.support_links(j) if k.tag == "pad"]
+        pads = [track.pad_link(j) for j in range(track.support.size)]
         return [replace(k, stiffness=more * k.stiffness, damping=0.0, tag="pad_temperature") for k in pads]

@@ -132,18 +132,24 @@ class Track:
             found.extend(self.support_links(j))
         return found
 
+    def pad_link(self, j):
+        """The pad of support ``j``."""
+        ends: tuple = ((("rail", j), 1.0),)
+        if self.pad_width and 0 < j < self.support.size - 1:
+            ends = ((("rail", j, -1), 0.25), (("rail", j), 0.5), (("rail", j, 1), 0.25))
+        if self.layers > 1:
+            ends = (*ends, (("sleeper", j), -1.0))
+        return Link(ends, self.pad_stiffness[j], self.pad_damping[j], 0.0, self.pad_loss_factor[j], "pad")
+
     def support_links(self, j):
         """Springs, dampers and masses of support ``j``: what a term scales or takes away."""
-        rail: tuple = ((("rail", j), 1.0),)
-        if self.pad_width and 0 < j < self.support.size - 1:
-            rail = ((("rail", j, -1), 0.25), (("rail", j), 0.5), (("rail", j, 1), 0.25))
-        pad = (self.pad_stiffness[j], self.pad_damping[j], 0.0, self.pad_loss_factor[j], "pad")
+        pad = self.pad_link(j)
         if self.layers == 1:
-            return [Link(rail, *pad)]
+            return [pad]
         sleeper, ballast = ((("sleeper", j), 1.0),), ((("ballast", j), 1.0),)
         bed = (self.ballast_stiffness[j], self.ballast_damping[j], 0.0, self.ballast_loss_factor[j], "ballast")
         links = [
-            Link((*rail, (("sleeper", j), -1.0)), *pad),
+            pad,
             Link(sleeper, mass=self.sleeper_mass[j], tag="sleeper"),
         ]
         if self.layers == 2:

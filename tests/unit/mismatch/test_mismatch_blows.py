@@ -13,6 +13,7 @@ from turnout.errors import SimulationError
 from turnout.mismatch import diagnose
 from turnout.mismatch.finding import finding_row
 from turnout.mismatch.track import Campaign, TrackCase, blows, derivatives
+from turnout.mismatch.track.blow_model import BlowModel
 from turnout.mismatch.track.observing import hammer_observations
 from turnout.mismatch.track.planned import measured_campaign, small_plan
 from turnout.simulate import uniform_track
@@ -106,7 +107,7 @@ def test_a_receptance_follows_the_rail_however_far_it_goes(plan):
     (found,) = case.predict(values, (), [o for o in case.observations if o.name == name])
     track = case.nominal.turnout.track
     softer = replace(track.rail, shear_stiffness=track.rail.shear_stiffness * np.exp(-0.41))
-    model = blows.BlowModel(track.with_(rail=softer), ())
+    model = BlowModel(track.with_(rail=softer), ())
     exact = blows.split(blows.scaled(pair, model.receptance(pair.test.place, model.place_of(pair.sensor))))
     assert np.linalg.norm(found - exact) < 1e-3 * np.linalg.norm(exact)
 

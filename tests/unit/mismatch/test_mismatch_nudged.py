@@ -72,7 +72,7 @@ def test_what_is_no_change_of_links_is_predicted(somewhere, old, new):
 
 def test_links_that_are_others_are_no_small_step(somewhere):
     case, values = somewhere
-    model = case.blow_model(values, (physics.LocalBallast(J, 0.5),), next(iter(case.pairs.values())))
+    model = case.blow_model(values, (physics.LocalBallast(J, 0.5),), next(iter(case.pairs.values()))).model
     assert nudged(model, (physics.LocalBallast(J + 1, 0.5),)) is None
     assert nudged(model, (physics.LocalPad(J, 0.5),)) is None
     ends, impedance = nudged(model, (physics.LocalBallast(J, 0.5),))

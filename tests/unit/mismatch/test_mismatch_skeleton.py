@@ -9,7 +9,8 @@ import pytest
 from turnout import physics
 from turnout.mismatch.track import skeleton
 from turnout.mismatch.track.base_model import COMMON, OWN
-from turnout.mismatch.track.blows import BlowModel
+from turnout.mismatch.track.blow_model import BlowModel
+from turnout.mismatch.track.heard import Heard
 from turnout.mismatch.track.skeleton import matrices_of
 from turnout.simulate import uniform_track
 from turnout.simulate.matrices import assemble
@@ -53,6 +54,14 @@ def test_a_skeleton_does_not_know_which_track_came_first():
     assert np.array_equal(*found)
 
 
+PAIR = SimpleNamespace(test=SimpleNamespace(place=10.7), channel="S2")
+
+
+def heard(model, seat):
+    """Of two blows and two sensors, so that a pair taken for another shows."""
+    return Heard(model, (9.1, 10.7), {"S1": 8.8, "S2": seat}, SimpleNamespace(first=18, last=19))
+
+
 FOLLOWING = [
     physics.LocalBallast(18, 0.3),
     physics.LocalPad(19, 2.5),
@@ -70,7 +79,7 @@ def test_derivatives_by_supports_know_what_follows_them_in_a_term(term):
     rng, track = np.random.default_rng(2), uniform_track(24.0)
     own = {o.field: np.exp(0.2 * rng.normal(size=track.support.size)) for o in OWN}
     track = track.with_(**{field: getattr(track, field) * by for field, by in own.items()})
-    found = BlowModel(track, (term,)).gradient(10.7, 11.6, SimpleNamespace(first=18, last=19))
+    found = heard(BlowModel(track, (term,)), 11.6).gradient(PAIR)
     size = np.abs(found).max(axis=0).max()
 
     def changed(field, where, step):
@@ -95,7 +104,9 @@ def test_the_rails_derivative_is_that_of_a_slightly_stiffer_rail(name):
         rail = replace(track.rail, **{name: getattr(track.rail, name) * np.exp(more)})
         return BlowModel(track.with_(rail=rail), ()).receptance(10.7, 12.3)
 
-    found = BlowModel(track, ()).rail_gradient(10.7, 12.3)[:, ("bending_stiffness", "shear_stiffness").index(name)]
+    found = heard(BlowModel(track, ()), 12.3).rail_gradient(PAIR)[
+        :, ("bending_stiffness", "shear_stiffness").index(name)
+    ]
     exact = (receptance(1e-3) - receptance(-1e-3)) / 2e-3
     assert np.linalg.norm(found - exact) < 0.015 * np.linalg.norm(exact)
 
@@ -108,6 +119,6 @@ def test_the_shear_of_the_file_is_a_share_of_a_rail_that_a_term_softens():
         rail = replace(track.rail, shear_stiffness=track.rail.shear_stiffness * np.exp(more))
         return BlowModel(track.with_(rail=rail), term).receptance(10.7, 12.3)
 
-    found = BlowModel(track, term).rail_gradient(10.7, 12.3)[:, 1]
+    found = heard(BlowModel(track, term), 12.3).rail_gradient(PAIR)[:, 1]
     exact = (receptance(1e-3) - receptance(-1e-3)) / 2e-3
     assert np.linalg.norm(found - exact) < 0.015 * np.linalg.norm(exact)

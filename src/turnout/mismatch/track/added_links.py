@@ -4,6 +4,7 @@ import numpy as np
 from scipy.sparse import lil_array
 
 from turnout.mismatch.track import blows
+from turnout.mismatch.track.blow_model import tangent
 
 
 class AddedLinks:
@@ -23,16 +24,15 @@ class AddedLinks:
         case, fit, chosen = self.case, self.fit, self.chosen
         if not chosen:
             return {}
-        model = case.blow_model(fit.values, fit.terms, pair)
+        heard = case.blow_model(fit.values, fit.terms, pair)
         said = tuple(sorted(pair.conditions.items()))
         if said not in self.known:
-            self.known[said] = _answers(model, pair.conditions, chosen)
+            self.known[said] = _answers(heard.model, pair.conditions, chosen)
         ends, index, answer, owner = self.known[said]
-        place = model.place_of(case.seat(pair.sensor, fit.values, fit.terms))
-        u, v = ((ends @ model.displacement(p).T).T for p in (pair.test.place, place))
+        u, v = (x.T for x in heard.motion(ends, pair))
         change = np.zeros((blows.LINES.size, len(chosen)), dtype=complex)
         np.add.at(change.T, owner, -(answer * (u * v)[:, index]).T)
-        columns = blows.split(blows.scaled(pair, change * case.chain(fit.values, fit.terms, pair)[:, None]))
+        columns = blows.split(blows.scaled(pair, change, case.chain(fit.values, fit.terms, pair)))
         return {(c.key, k): column for (c, k), column in zip(chosen, columns.T)}
 
 
@@ -59,5 +59,5 @@ def _impedances(model, candidate, term, omega):
     """(ends, impedance (n_line,)) of every link that a term adds."""
     if candidate.family == "attached_resonator":
         return [(((("rail", candidate.where["sleeper"]), 1.0),), term.dynamic_stiffness(blows.LINES))]
-    links = [*term.links(model.track), *blows.tangent((term,), model.track)]
+    links = [*term.links(model.track), *tangent((term,), model.track)]
     return [(tuple(m.ends), m.stiffness + 1j * omega * m.damping - omega**2 * m.mass) for m in links]

@@ -33,8 +33,8 @@ class Blows(Case):
         """Exact."""
         index = {n.name: k for k, n in enumerate(self.nuisances)}
         found = [np.zeros((o.data.size, len(self.nuisances))) for o in observations]
-        model_of = self.whole.blow_models(values, terms)
+        heard_by = self.whole.blow_models(values, terms)
         for o, predicted, jacobian in zip(observations, base, found):
             pair = self.whole.pairs[o.name]
-            pair_columns(self.whole, values, terms, pair, model_of(pair), predicted, jacobian, index)
+            pair_columns(self.whole, values, terms, pair, heard_by(pair), predicted, jacobian, index)
         return found

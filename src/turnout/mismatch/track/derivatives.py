@@ -22,12 +22,12 @@ def nuisance_jacobian(case, values, terms, observations, base):
     """Exact for receptances, gains, times; common values of passages by differences, supports' by pseudo-forces."""
     index = {n.name: k for k, n in enumerate(case.nuisances)}
     found = [np.zeros((o.data.size, len(case.nuisances))) for o in observations]
-    model_of = case.blow_models(values, terms)
+    heard_by = case.blow_models(values, terms)
     passages = [(o, p, j) for o, p, j in zip(observations, base, found) if o.name in case.rollings]
     for o, predicted, jacobian in zip(observations, base, found):
         if o.name in case.pairs:
             pair = case.pairs[o.name]
-            pair_columns(case, values, terms, pair, model_of(pair), predicted, jacobian, index)
+            pair_columns(case, values, terms, pair, heard_by(pair), predicted, jacobian, index)
     if passages:
         _common_columns(case, values, terms, passages, index)
     for o, predicted, jacobian in passages:
@@ -39,21 +39,20 @@ def nuisance_jacobian(case, values, terms, observations, base):
     return found
 
 
-def pair_columns(case, values, terms, pair, model, predicted, jacobian, index):
+def pair_columns(case, values, terms, pair, heard, predicted, jacobian, index):
     """Fill the columns of a pair; the track's own values come first among the nuisances."""
-    place = model.place_of(case.seat(pair.sensor, values, terms))
     chain = case.chain(values, terms, pair)
-    block = model.gradient(pair.test.place, place, case.zone) * chain[:, None]
-    jacobian[:, : block.shape[1]] = blows.split(blows.scaled(pair, block))
-    rail = blows.split(blows.scaled(pair, model.rail_gradient(pair.test.place, place) * chain[:, None]))
+    block = blows.scaled(pair, heard.gradient(pair), chain)
+    n, width = block.shape
+    jacobian[:n, :width], jacobian[n:, :width] = block.real, block.imag
+    rail = blows.split(blows.scaled(pair, heard.rail_gradient(pair), chain))
     for k, (name, _) in enumerate(RAIL):
         jacobian[:, index[name]] = rail[:, k]
     gain, seat = f"gain_{pair.channel}", f"seat_{pair.channel}"
     if gain in index:
         jacobian[:, index[gain]] = predicted / (1.0 + values[gain])
     if seat in index:
-        column = model.seat_gradient(pair.test.place, place) * chain
-        jacobian[:, index[seat]] = blows.split(blows.scaled(pair, column))
+        jacobian[:, index[seat]] = blows.split(blows.scaled(pair, heard.seat_gradient(pair), chain))
 
 
 def _common_columns(case, values, terms, passages, index):

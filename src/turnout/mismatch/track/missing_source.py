@@ -94,11 +94,10 @@ def _changes(case, fit, pairs):
 
 def _through(case, fit, pair, support):
     """Receptance from blow to support times that from support to sensor, on ``LINES``, as the channel has it."""
-    model = case.blow_model(fit.values, fit.terms, pair)
-    row = model.matrices.index["rail", support]
-    place = model.place_of(case.seat(pair.sensor, fit.values, fit.terms))
-    chain = case.chain(fit.values, fit.terms, pair)
-    return model.displacement(pair.test.place)[:, row] * model.displacement(place)[:, row] * chain
+    heard = case.blow_model(fit.values, fit.terms, pair)
+    row = heard.model.matrices.index["rail", support]
+    u, v = (heard.model.displacement(place)[:, row] for place in (pair.test.place, heard.seats[pair.channel]))
+    return u * v * case.chain(fit.values, fit.terms, pair)
 
 
 def _receptance(pair, predicted):

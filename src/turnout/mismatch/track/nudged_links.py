@@ -13,18 +13,17 @@ WHAT = ("stiffness", "damping", "mass")
 def moved(case, values, terms, new, observations, predictions):
     """Predictions of a track case with ``new`` terms, a small step from ``terms``: passages are simulated, receptances
     follow the links where these differ by their values alone."""
-    found, model_of, known = [], case.blow_models(values, terms), {}
+    found, heard_by, known = [], case.blow_models(values, terms), {}
     anew = any(a != b and b.kind == "channel" for a, b in zip(terms, new))
     for o, old in zip(observations, predictions):
         if o.name in case.pairs and not anew:
             pair = case.pairs[o.name]
-            model, said = model_of(pair), tuple(sorted(pair.conditions.items()))
+            heard, said = heard_by(pair), tuple(sorted(pair.conditions.items()))
             if said not in known:
-                known[said] = nudged(model, blows.shown(new, pair.conditions))
+                known[said] = nudged(heard.model, blows.shown(new, pair.conditions))
             if known[said] is not None:
-                place = model.place_of(case.seat(pair.sensor, values, terms))
-                change = changed(model, pair.test.place, place, *known[said]) * case.chain(values, terms, pair)
-                found.append(old + blows.split(blows.scaled(pair, change)))
+                change = changed(heard, pair, *known[said])
+                found.append(old + blows.split(blows.scaled(pair, change, case.chain(values, terms, pair))))
                 continue
         found += case.predict(values, new, [o])
     return found
@@ -50,8 +49,8 @@ def nudged(model, terms):
     return csr_array((weights, rows, first), shape=(len(differs), model.matrices.n)), impedance
 
 
-def changed(model, excited, measured, ends, impedance):
-    r"""(n_line,) complex change of a receptance [m/N] by links whose impedance changes by z: :math:`-\sum z\,u_w v_w`,
-    u and v the motion of their ends under unit forces at the two places."""
-    u, v = (ends @ model.displacement(place).T for place in (excited, measured))
+def changed(heard, pair, ends, impedance):
+    r"""(n_line,) complex change of a pair's receptance [m/N] by links whose impedance changes by z:
+    :math:`-\sum z\,u_w v_w`, u and v the motion of their ends under unit forces at blow and sensor."""
+    u, v = heard.motion(ends, pair)
     return -np.sum(impedance * u * v, axis=0)

@@ -8,6 +8,8 @@ import numpy as np
 from turnout.errors import SimulationError
 from turnout.mismatch.track import blows, nudged_links, rolling
 from turnout.mismatch.track.base_model import inner_values, near_rail, track_with, vehicle_with, with_rail
+from turnout.mismatch.track.blow_model import BlowModel
+from turnout.mismatch.track.heard import Heard
 from turnout.physics.term import PhysicsTerm
 
 KEPT = 150  # simulated passages remembered
@@ -27,11 +29,11 @@ class Predicting:
 
     def predict(self, values, terms, observations):
         """Prediction of receptances and passages."""
-        found, model_of = [], self.blow_models(values, terms)
+        found, heard_by = [], self.blow_models(values, terms)
         for o in observations:
             if o.name in self.pairs:
                 pair = self.pairs[o.name]
-                found.append(self._receptance(values, terms, pair, model_of(pair)))
+                found.append(self._receptance(values, terms, pair, heard_by(pair)))
             else:
                 found.append(self.passage_of(values, terms, self.rollings[o.name]))
         return found
@@ -53,15 +55,15 @@ class Predicting:
         return of
 
     def blow_model(self, values, terms, pair):
-        """The track of a hammer pair, remembered."""
+        """The track of a hammer pair as all under its conditions heard it, remembered."""
         under = blows.shown(terms, pair.conditions)
         near = near_rail(values)
-        touched = self._touched(values, terms, pair.conditions)  # solved together: rounding hangs on what else is
-        key = repr(under), tuple(near.values()), inner_values(self.zone, values), touched
+        struck, seats = self._touched(values, terms, pair.conditions)
+        key = repr(under), tuple(near.values()), inner_values(self.zone, values), struck, tuple(seats.items())
         if key not in self._models:
-            made = blows.BlowModel(track_with(self._on_grid(near), self.zone, values), under)
-            self._models[key] = made
-            made.solve(touched)
+            made = BlowModel(track_with(self._on_grid(near), self.zone, values), under)
+            self._models[key] = Heard(made, struck, seats, self.zone)
+            made.solve((*struck, *seats.values()))  # together: rounding hangs on what else is
             while len(self._models) > 8:
                 self._models.popitem(last=False)
         return self._models[key]
@@ -74,11 +76,11 @@ class Predicting:
         return self._railed[key]
 
     def _touched(self, values, terms, conditions):
-        """Places of blows and of the sensors that heard them, of all hammer tests under these conditions."""
+        """Places of blows, and by channel those of the sensors that heard them, of all tests under these conditions."""
         alike = [p for p in self.pairs.values() if p.conditions == conditions]
-        seated = [self.seat(s, values, terms) for s in {p.channel: p.sensor for p in alike}.values()]
-        track = self.track()
-        return *(p.test.place for p in alike), *(s.probe(track).place for s in seated)
+        sensors, track = {p.channel: p.sensor for p in alike}, self.track()
+        seats = {c: self.seat(s, values, terms).probe(track).place for c, s in sensors.items()}
+        return tuple(dict.fromkeys(p.test.place for p in alike)), seats
 
     def seat(self, sensor, values, terms):
         """The sensor where ``values`` and ``terms`` say that it sits."""
@@ -90,10 +92,9 @@ class Predicting:
         factor = blows.channel_factor(terms, pair.sensor, blows.LINES)
         return factor * (1.0 + values.get(f"gain_{pair.channel}", 0.0))
 
-    def _receptance(self, values, terms, pair, model):
-        place = model.place_of(self.seat(pair.sensor, values, terms))
-        h = model.receptance(pair.test.place, place)
-        h = h + model.rail_gradient(pair.test.place, place) @ [values[k] - at for k, at in near_rail(values).items()]
+    def _receptance(self, values, terms, pair, heard):
+        off = [values[k] - at for k, at in near_rail(values).items()]
+        h = heard.receptance(pair) + heard.rail_gradient(pair) @ off
         return blows.split(blows.scaled(pair, h * self.chain(values, terms, pair)))
 
     def passage_of(self, values, terms, made):
