@@ -1,6 +1,7 @@
 """Effects in a measuring channel that are linear: one transfer function serves recordings and receptances."""
 
 import numpy as np
+from scipy.fft import next_fast_len
 
 from turnout.physics.term import PhysicsTerm
 
@@ -22,6 +23,6 @@ class TransferTerm(PhysicsTerm):
         if sensor.name != self.channel_name:
             return signal
         signal = np.asarray(signal, dtype=float)
-        n = signal.size + max(2048, signal.size // 8)
+        n = next_fast_len(signal.size + max(2048, signal.size // 8), real=True)
         frequency = np.fft.rfftfreq(n, 1.0 / rate)
         return np.fft.irfft(np.fft.rfft(signal, n) * self.transfer(frequency), n)[: signal.size]

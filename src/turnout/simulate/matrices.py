@@ -1,6 +1,6 @@
 """Banded mass, damping and stiffness of a track, and the place of every degree of freedom in them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -89,13 +89,16 @@ def assemble(track, terms=()):
     links = track.links()
     for term in terms:
         links.extend(term.links(track))
+    return railed(linked(track, links), track)
+
+
+def linked(track, links):
+    """Matrices of links alone, as the nodes of ``track`` number them: no rail is in them."""
     node, node_index, index = _number(track, links)
     vectors = [link_vector(link, index) for link in links]
     half = max([1 + int(np.max(np.diff(node_index))), *(int(np.ptp(rows)) for rows, _ in vectors)])
     n = max(max(index.values()) + 1, int(node_index[-1]) + 2)
     mass, damping, stiffness, hysteresis = (np.zeros((half + 1, n)) for _ in range(4))
-    rails = tuple(track.rail_between(0.5 * (a + b)) for a, b in pairwise(node))
-    _add_rail(track, rails, node, node_index, mass, damping, stiffness)
     for link, (rows, weights) in zip(links, vectors):
         for a, wa in zip(rows, weights):
             for b, wb in zip(rows, weights):
@@ -104,7 +107,15 @@ def assemble(track, terms=()):
                     damping[b - a, a] += link.damping * wa * wb
                     mass[b - a, a] += link.mass * wa * wb
                     hysteresis[b - a, a] += link.loss_factor * link.stiffness * wa * wb
-    return TrackMatrices(mass, damping, stiffness, hysteresis, node, node_index, index, rails, tuple(links))
+    return TrackMatrices(mass, damping, stiffness, hysteresis, node, node_index, index, (), tuple(links))
+
+
+def railed(matrices, track):
+    """The matrices with the rails of ``track`` in them."""
+    rails = tuple(track.rail_between(0.5 * (a + b)) for a, b in pairwise(matrices.node))
+    mass, damping, stiffness = (x.copy() for x in (matrices.mass, matrices.damping, matrices.stiffness))
+    _add_rail(track, rails, matrices.node, matrices.node_index, mass, damping, stiffness)
+    return replace(matrices, mass=mass, damping=damping, stiffness=stiffness, rails=rails)
 
 
 def _number(track, links):

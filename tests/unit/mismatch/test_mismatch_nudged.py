@@ -11,6 +11,7 @@ from turnout.mismatch.track import TrackCase, blows
 from turnout.mismatch.track.added_links import AddedLinks
 from turnout.mismatch.track.nudged_links import nudged
 from turnout.mismatch.track.planned import measured_campaign, small_plan
+from turnout.mismatch.track.screening import CHANNELS, _pair_channels
 from turnout.simulate import uniform_track
 from turnout.simulate.turnout_track import TurnoutTrack
 
@@ -89,3 +90,26 @@ def test_an_added_link_changes_a_receptance_as_a_track_that_has_it(somewhere):
         for (c, k), found in zip(chosen, added.changes(case.pairs[o.name]).values()):
             (after,) = case.predict(values, (c.term(c.starts[k]),), [o])
             assert np.linalg.norm(found - (after - before)) < 1e-9 * np.linalg.norm(after - before)
+
+
+def test_what_a_channel_does_to_a_receptance_is_what_the_case_predicts(somewhere):
+    """A gain, a lag, a corner: exact. Another seat: but for the rail's correction there, which is that of the old seat;
+    with the rail off its grid by two hundredths it errs by less than that share of the change."""
+    case, values = somewhere
+    values = values | {"rail_shear": 0.02}
+    predicted = case.predict(values, (), case.observations)
+    fit, told = SimpleNamespace(values=values, terms=(), predictions=predicted), set()
+    chosen = [(c, 0) for c in case.candidates if c.family in CHANNELS]
+    for o, old in zip(case.observations, predicted):
+        for c, found in zip(*_heard(case, fit, o, old, chosen)):
+            (after,) = case.predict(values, (c.term(c.starts[0]),), [o])
+            allowed = 0.02 if c.family == "sensor_position" else 1e-9
+            assert np.linalg.norm(found - (after - old)) <= allowed * np.linalg.norm(after - old) + 1e-12, c.key
+            told.add(c.family)
+    assert {"sensor_gain", "sensor_position", "low_pass", "mount_resonance"} <= told
+
+
+def _heard(case, fit, observation, old, chosen):
+    """Candidates on the channel of an observation, and the columns that they are given."""
+    found = _pair_channels(case, fit, observation, old, chosen)
+    return [c for c, k in chosen if (c.key, k) in found], found.values()

@@ -7,6 +7,7 @@ from scipy.sparse import csr_array
 
 from turnout.mismatch.track.base_model import COMMON, OWN
 from turnout.mismatch.track.blows import LINES
+from turnout.mismatch.track.strain_products import by_rail
 
 FIELDS = [o.field for o in OWN]
 OMEGA = 2.0 * np.pi * LINES
@@ -64,17 +65,11 @@ class Heard:
         with :math:`s = \theta_2 - \theta_1`, :math:`a = (w_2 - w_1)/h - (\theta_1 + \theta_2)/2` of each element and P
         its share of shear: the element's two modes (Przemieniecki 1968, ch. 11). Its mass hardly hangs on them.
         """
-        model = self.model
-        h, p, ei, _ = model.matrices.elements
+        matrices = self.model.matrices
+        h, p, ei, _ = matrices.elements
         sheared = 12.0 * ei / (h * (1.0 + p) ** 2)
-        (bent_u, skew_u), (bent_v, skew_v) = (self._strains(u, h) for u in (self._struck, self._seated))
-        whole = _summed(bent_u * (ei / h), bent_v) + _summed(skew_u * sheared, skew_v)
-        return -np.stack([whole, model.own_shear * _summed(skew_u * (sheared * p), skew_v)], axis=-1)
-
-    def _strains(self, u, h):
-        row = self.model.matrices.node_index
-        w, turn = u[..., row], u[..., row + 1]
-        return np.diff(turn), np.diff(w) / h - 0.5 * (turn[..., :-1] + turn[..., 1:])
+        weights = np.array([ei / h, sheared, self.model.own_shear * sheared * p])
+        return by_rail(self._struck, self._seated, matrices.node_index, h, weights)
 
     @cached_property
     def _by_supports(self):

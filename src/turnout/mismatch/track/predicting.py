@@ -92,10 +92,13 @@ class Predicting:
         factor = blows.channel_factor(terms, pair.sensor, blows.LINES)
         return factor * (1.0 + values.get(f"gain_{pair.channel}", 0.0))
 
-    def _receptance(self, values, terms, pair, heard):
+    def receptance(self, values, pair, heard):
+        """(n_line,) receptance of a pair [m/N], with what the rail differs from that of the model."""
         off = [values[k] - at for k, at in near_rail(values).items()]
-        h = heard.receptance(pair) + heard.rail_gradient(pair) @ off
-        return blows.split(blows.scaled(pair, h * self.chain(values, terms, pair)))
+        return heard.receptance(pair) + heard.rail_gradient(pair) @ off
+
+    def _receptance(self, values, terms, pair, heard):
+        return blows.split(blows.scaled(pair, self.receptance(values, pair, heard), self.chain(values, terms, pair)))
 
     def passage_of(self, values, terms, made):
         """(n_sensor * n_time,) what the channels of a passage show, one sensor behind the other."""

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.fft import next_fast_len
 
 from turnout.errors import SimulationError
 from turnout.mismatch.case import Nuisance, Observation
@@ -71,7 +72,7 @@ class Rolling:
 def band_limited(samples, rate, low=LOW, high=HIGH):
     """Rows of ``samples`` between ``low`` and ``high`` [Hz], zero phase, cosine edges of a third."""
     n = samples.shape[-1]
-    size = 1 << int(np.ceil(np.log2(n + rate * 0.25)))
+    size = next_fast_len(n + round(rate * 0.25), real=True)
     passed = gate(np.fft.rfftfreq(size, 1.0 / rate), low, high)
     return np.fft.irfft(np.fft.rfft(samples, size) * passed, size)[..., :n]
 
@@ -97,7 +98,7 @@ def read_at(samples, rate, time):
 def finer(samples, factor=4):
     """Samples at a multiple of the rate by Fourier transform; sample k stays at (k + 1/2) of its own step."""
     n = samples.shape[-1]
-    size = 1 << int(np.ceil(np.log2(n + 64)))
+    size = 2 * next_fast_len((n + 65) // 2, real=True)
     spectrum = np.fft.rfft(samples, size)
     shift = np.exp(2j * np.pi * np.fft.rfftfreq(size) * (0.5 / factor - 0.5))
     padded = np.zeros((*samples.shape[:-1], size * factor // 2 + 1), dtype=complex)

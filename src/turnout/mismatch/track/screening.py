@@ -7,6 +7,7 @@ that all wheels follow; whole-track terms act through the base fit's own derivat
 import numpy as np
 
 from turnout.mismatch.case import Whitened
+from turnout.mismatch.track import blows
 from turnout.mismatch.track.added_links import AddedLinks
 from turnout.mismatch.track.columns import PAD, RAIL, SLEEPER, carried, support_forces
 from turnout.mismatch.track.rolled_waves import Carrier
@@ -38,7 +39,8 @@ def screen_columns(case, fit, observations):
             parts = _passage(case, fit, made, laws) | _paths(case, fit, made, paths)
         else:
             parts = added.changes(case.pairs[o.name])
-        parts |= _channels(case, fit, o, fit.predictions[i], [(c, k) for c, k in chosen if c.family in CHANNELS])
+        channels = _passage_channels if o.name in case.rollings else _pair_channels
+        parts |= channels(case, fit, o, fit.predictions[i], [(c, k) for c, k in chosen if c.family in CHANNELS])
         for key, column in parts.items():
             found[key][i] = column.astype(np.float32)
     for c in case.candidates:
@@ -68,19 +70,27 @@ def _whole(case, fit, candidate, k, observations):
     return found
 
 
-def _channels(case, fit, observation, old, chosen):
-    """A channel's term acts on signals that are known; where a sensor sits is asked of blows alone, whose receptance
-    costs next to nothing."""
-    made, found = case.rollings.get(observation.name), {}
-    clean = None if made is None else case.clean(fit.values, fit.terms, made)
+def _pair_channels(case, fit, observation, old, chosen):
+    """What a channel's term makes of a receptance; that of a sensor elsewhere is read there off the same motion."""
+    pair, found = case.pairs[observation.name], {}
+    heard, track = case.blow_model(fit.values, fit.terms, pair), case.track()
+    here, corrected = heard.receptance(pair), case.receptance(fit.values, pair, heard)
     for c, k in chosen:
-        terms = (*fit.terms, c.term(c.starts[k]))
-        if made is None:
-            if case.pairs[observation.name].channel == c.where["sensor"]:
-                found[c.key, k] = case.predict(fit.values, terms, [observation])[0] - old
-        elif c.family != "sensor_position":
-            rows = old.reshape(len(made.sensors), -1)
-            change = np.zeros_like(rows)
+        if c.where["sensor"] == pair.channel:
+            terms = (*fit.terms, c.term(c.starts[k]))
+            place = case.seat(pair.sensor, fit.values, terms).probe(track).place
+            h = corrected + heard.model.receptance(pair.test.place, place) - here
+            found[c.key, k] = blows.split(blows.scaled(pair, h, case.chain(fit.values, terms, pair))) - old
+    return found
+
+
+def _passage_channels(case, fit, observation, old, chosen):
+    """A channel's term acts on signals that are known; where a sensor sits is asked of blows alone."""
+    made, found = case.rollings[observation.name], {}
+    clean, rows = case.clean(fit.values, fit.terms, made), old.reshape(len(made.sensors), -1)
+    for c, k in chosen:
+        if c.family != "sensor_position":
+            terms, change = (*fit.terms, c.term(c.starts[k])), np.zeros_like(rows)
             for row, sensor in enumerate(made.sensors):
                 if sensor.name == c.where["sensor"]:
                     change[row] = case.shown(fit.values, terms, made, sensor, clean[row]) - rows[row]

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from turnout.simulate.matrices import TrackMatrices, assemble, link_vector
+from turnout.simulate.matrices import TrackMatrices, assemble, link_vector, linked, railed
 
 KEPT = 24
 VALUES = (  # field of a Track, what of the link, tag
@@ -28,15 +28,19 @@ def matrices_of(track, terms=()):
     extra = frozenset(name for link in links for name, _ in link.ends if name[0] not in ("rail", "sleeper"))
     joins = frozenset(tuple(name for name, _ in link.ends) for link in links if len(link.ends) > 1)
     key = (
-        track.rail, track.stretches, track.support.tobytes(), track.elements_per_bay, track.pad_width,
-        track.end_length, track.end_damping, track.pad_loss_factor.tobytes(), track.ballast_loss_factor.tobytes(),
-        extra, joins,
+        track.support.tobytes(), track.elements_per_bay, track.pad_width, track.pad_loss_factor.tobytes(),
+        track.ballast_loss_factor.tobytes(), extra, joins,
     )  # fmt: skip
-    if key not in _known:
-        _known[key] = Skeleton(track, links)
-        while len(_known) > KEPT:
-            _known.popitem(last=False)
-    return _known[key].filled(track, links)
+    return _remembered(_known, key, lambda: Skeleton(track, links)).filled(track, links)
+
+
+def _remembered(known, key, compute):
+    """``compute()`` kept by its key among the last ``KEPT``."""
+    if key not in known:
+        known[key] = compute()
+        while len(known) > KEPT:
+            known.popitem(last=False)
+    return known[key]
 
 
 class FixedLinks:
@@ -61,26 +65,33 @@ class Skeleton:
     def __init__(self, track, links):
         nothing = [replace(k, stiffness=0.0, damping=0.0, mass=0.0, loss_factor=0.0) for k in links]
         track = track.with_(**{name: np.ones(track.support.size) for name, *_ in VALUES})
-        self.base = assemble(track, (FixedLinks(nothing),))
-        self.places = {tag: self._places(track, tag) for tag in ("pad", "ballast", "sleeper")}
+        self.base = linked(track, [*track.links(), *nothing])
+        own = [(j, link) for j in range(track.support.size) for link in track.support_links(j)]
+        self.places = {tag: self._spread([(j, k) for j, k in own if k.tag == tag]) for _, _, tag in VALUES}
+        self.railed, self.entries = OrderedDict(), OrderedDict()
 
-    def _places(self, track, tag):
-        """Diagonal, row, product of weights and support of every entry that links of this tag make."""
+    def _spread(self, owned):
+        """Diagonal, row, product of weights and owner of every entry that links make, ``owned`` (owner, link)."""
         found = []
-        for j in range(track.support.size):
-            for link in track.support_links(j):
-                if link.tag != tag:
-                    continue
-                rows, weights = link_vector(link, self.base.index)
-                found += [
-                    (b - a, a, wa * wb, j) for a, wa in zip(rows, weights) for b, wb in zip(rows, weights) if b >= a
-                ]
-        diagonal, row, weight, support = zip(*found)
-        return np.array(diagonal), np.array(row), np.array(weight), np.array(support)
+        for owner, link in owned:
+            rows, weights = link_vector(link, self.base.index)
+            found += [
+                (b - a, a, wa * wb, owner) for a, wa in zip(rows, weights) for b, wb in zip(rows, weights) if b >= a
+            ]
+        return tuple(map(np.array, zip(*found)))
+
+    def _railed(self, track):
+        """``base`` with the rail of ``track`` in it, remembered."""
+        key = track.rail, track.stretches, track.end_length, track.end_damping
+        return _remembered(self.railed, key, lambda: railed(self.base, track))
+
+    def _entries(self, links):
+        """Where ``links`` of terms come in, remembered."""
+        return _remembered(self.entries, tuple(k.ends for k in links), lambda: self._spread(enumerate(links)))
 
     def filled(self, track, links):
         """TrackMatrices with the values of ``track`` and of further links."""
-        base = self.base
+        base = self._railed(track)
         made = {what: getattr(base, what).copy() for what in ("stiffness", "damping", "mass")}
         hysteresis = base.hysteresis
         for name, what, tag in VALUES:
@@ -88,14 +99,10 @@ class Skeleton:
             np.add.at(made[what], (diagonal, row), weight * (getattr(track, name) - 1.0)[support])
         if any(k.loss_factor for k in links) or track.pad_loss_factor.any() or track.ballast_loss_factor.any():
             return assemble(track, (FixedLinks(links),))  # hysteresis goes with the stiffness: the plain way
-        for link in links:
-            rows, weights = link_vector(link, base.index)
-            for a, wa in zip(rows, weights):
-                for b, wb in zip(rows, weights):
-                    if b >= a:
-                        made["stiffness"][b - a, a] += link.stiffness * wa * wb
-                        made["damping"][b - a, a] += link.damping * wa * wb
-                        made["mass"][b - a, a] += link.mass * wa * wb
+        if links:
+            diagonal, row, weight, which = self._entries(links)
+            for what, matrix in made.items():
+                np.add.at(matrix, (diagonal, row), weight * np.array([getattr(k, what) for k in links])[which])
         found = TrackMatrices(
             made["mass"], made["damping"], made["stiffness"], hysteresis, base.node, base.node_index, base.index,
             base.rails, base.links,
