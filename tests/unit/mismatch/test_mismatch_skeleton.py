@@ -54,12 +54,12 @@ def test_a_skeleton_does_not_know_which_track_came_first():
     assert np.array_equal(*found)
 
 
-PAIR = SimpleNamespace(test=SimpleNamespace(place=10.7), channel="S2")
+PAIR = SimpleNamespace(test=SimpleNamespace(place=10.7), seat=("S", 11.0))
 
 
 def heard(model, seat):
-    """Of two blows and two sensors, so that a pair taken for another shows."""
-    return Heard(model, (9.1, 10.7), {"S1": 8.8, "S2": seat}, SimpleNamespace(first=18, last=19))
+    """Of two blows and a sensor that moved, so that a pair taken for another shows."""
+    return Heard(model, (9.1, 10.7), {("S", 8.0): 8.8, ("S", 11.0): seat}, SimpleNamespace(first=18, last=19))
 
 
 FOLLOWING = [

@@ -28,6 +28,11 @@ class Pair:
     size: np.ndarray
     conditions: dict
 
+    @property
+    def seat(self):
+        """Which sensor it is: a channel's may have moved on with the blows."""
+        return self.channel, self.sensor.place
+
     @cached_property
     def lines(self):
         """(n,) index of its lines in ``LINES``."""

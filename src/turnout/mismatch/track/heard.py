@@ -15,24 +15,24 @@ FACTOR = {"stiffness": -1.0 + 0j * OMEGA, "damping": -1j * OMEGA, "mass": OMEGA*
 
 
 class Heard:
-    """A ``model`` (``BlowModel``), the places that were struck, ``seats`` channel -> place of its sensor, and the
+    """A ``model`` (``BlowModel``), the places that were struck, ``seats`` ``Pair.seat`` -> place of the sensor, and the
     ``zone`` whose supports have values of their own."""
 
     def __init__(self, model, struck, seats, zone):
         self.model, self.seats, self.zone = model, seats, zone
         self.struck = {place: k for k, place in enumerate(dict.fromkeys(struck))}
-        self.column = {channel: k for k, channel in enumerate(seats)}
+        self.column = {seat: k for k, seat in enumerate(seats)}
 
     def _of(self, pair):
-        return self.struck[pair.test.place], self.column[pair.channel]
+        return self.struck[pair.test.place], self.column[pair.seat]
 
     def receptance(self, pair):
         """(n_line,) complex [m/N]."""
-        return self.model.receptance(pair.test.place, self.seats[pair.channel])
+        return self.model.receptance(pair.test.place, self.seats[pair.seat])
 
     def seat_gradient(self, pair):
         """Derivative by the sensor's place on the rail, (n_line,) [1/N]; 0 on a sleeper."""
-        return self.model.seat_gradient(pair.test.place, self.seats[pair.channel])
+        return self.model.seat_gradient(pair.test.place, self.seats[pair.seat])
 
     def rail_gradient(self, pair):
         """Derivatives by the logarithms of the rail's bending and shear stiffness, (n_line, 2)."""

@@ -96,7 +96,7 @@ def _through(case, fit, pair, support):
     """Receptance from blow to support times that from support to sensor, on ``LINES``, as the channel has it."""
     heard = case.blow_model(fit.values, fit.terms, pair)
     row = heard.model.matrices.index["rail", support]
-    u, v = (heard.model.displacement(place)[:, row] for place in (pair.test.place, heard.seats[pair.channel]))
+    u, v = (heard.model.displacement(place)[:, row] for place in (pair.test.place, heard.seats[pair.seat]))
     return u * v * case.chain(fit.values, fit.terms, pair)
 
 

@@ -76,10 +76,10 @@ class Predicting:
         return self._railed[key]
 
     def _touched(self, values, terms, conditions):
-        """Places of blows, and by channel those of the sensors that heard them, of all tests under these conditions."""
+        """Places of blows, and by ``Pair.seat`` those of the sensors that heard them, of all under these conditions."""
         alike = [p for p in self.pairs.values() if p.conditions == conditions]
-        sensors, track = {p.channel: p.sensor for p in alike}, self.track()
-        seats = {c: self.seat(s, values, terms).probe(track).place for c, s in sensors.items()}
+        sensors, track = {p.seat: p.sensor for p in alike}, self.track()
+        seats = {seat: self.seat(s, values, terms).probe(track).place for seat, s in sensors.items()}
         return tuple(dict.fromkeys(p.test.place for p in alike)), seats
 
     def seat(self, sensor, values, terms):
