@@ -11,7 +11,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 .PHONY: help demo test real bench env clean
 help:
 	@sed -n 's/^#   //p' Makefile; echo "make real   the same pipeline on recordings made by others"; \
-	echo "make bench  every measured figure beside its bar"
+	echo "make bench  every measured figure beside its bar"; echo "make clean  takes away what was computed; recordings in raw/ stay"
 
 env: $(STAMP)
 $(STAMP): pyproject.toml
@@ -34,4 +34,4 @@ bench: $(STAMP)
 	$(BIN)/python -m benchmarks
 
 clean:
-	rm -rf results work raw demo real .snakemake
+	rm -rf results work demo real .snakemake

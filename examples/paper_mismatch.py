@@ -153,9 +153,9 @@ hammer meets the unloaded pad: however well the track is calibrated on blows, it
 
 How much stronger the simulation is than the recording. The draw of scatter and roughness was chosen so that the
 pattern is the publication's: right below 40 Hz, too strong above. Of another draw the same effect makes another pattern
-(seed 11: A1 too strong, A4 too weak), which is one more reason not to guess a cause from a band. Passages are compared
+(seed 11: A1 too strong, A4 too weak), which is one more reason not to guess a cause from a band. Spectra are shown
 up to 160 Hz: above, roughness that no simulation knows dominates, so the upper half of the publication's band is not
-looked at.
+looked at. The diagnosis itself asks passages up to 112 Hz only.
 
 ![Power spectral density at A1 and A4](paper_mismatch.svg)
 

@@ -183,7 +183,7 @@ Fit: of the blow never used [%], before → after, and with the best rival.
 - **A5:** {a5}
 - **B1: found.** Blow 1 is named as struck with a hammer of {gain:.0%} sensitivity: its force reads far too large. The
   makers say that it was overloaded on purpose. The double hit (blow 3) is not seen: a ratio of
-  spectra holds for two hits as well. `turnout real` rejects both from the force itself.
+  spectra holds for two hits as well. `make real` rejects both, hits 0 and 2 as it counts, from the force itself.
 - **B2:** {b2}
 """
 

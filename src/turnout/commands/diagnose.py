@@ -4,9 +4,9 @@
   turnout diagnose --turnout tommerup_s1 --sections A7 A8 --budget 10
   turnout diagnose --turnout tommerup_s1 --accept
 
-The newest visit is diagnosed, section by section, and a page is written. An interrupted diagnosis, or one whose
-budget is spent, goes on where it stopped. --accept writes the term that was named into the turnout's track file,
-from then on the simulation contains it; nothing is diagnosed again for that.
+The newest visit is diagnosed, neighbouring sections together, and a page is written. An interrupted diagnosis, or one
+whose budget is spent, goes on where it stopped. --accept writes the term that was named into the turnout's track
+file, from then on the simulation contains it; nothing is diagnosed again for that.
 """
 
 HELP = "say what the simulation of a turnout leaves out"
@@ -16,7 +16,10 @@ def add_arguments(parser):
     """Options of the command."""
     parser.add_argument("--turnout", required=True, help="id in config/turnouts.tsv")
     parser.add_argument("--sections", nargs="+", default=(), help="only these sections")
-    parser.add_argument("--visit", help="day of a campaign, month, or all together: default the newest")
+    parser.add_argument(
+        "--visit",
+        help="YYYY-MM-DD, YYYY-MM, or 'all' together (effects of temperature need several days): default the newest",
+    )
     parser.add_argument("--track", help="file in config/tracks; default: the turnout's own, else its layout's")
     parser.add_argument("--config", default="config", help="configuration folder (%(default)s)")
     parser.add_argument("--raw", default="raw", help="folder of raw files (%(default)s)")

@@ -58,8 +58,10 @@ PAIR = SimpleNamespace(test=SimpleNamespace(place=10.7), seat=("S", 11.0))
 
 
 def heard(model, seat):
-    """Of two blows and a sensor that moved, so that a pair taken for another shows."""
-    return Heard(model, (9.1, 10.7), {("S", 8.0): 8.8, ("S", 11.0): seat}, SimpleNamespace(first=18, last=19))
+    """Of two blows and a sensor that moved, not all of them paired, so that a pair taken for another shows."""
+    first, second = ("S", 8.0), ("S", 11.0)
+    pairs = (9.1, first), (10.7, first), (10.7, second)
+    return Heard(model, pairs, {first: 8.8, second: seat}, SimpleNamespace(first=18, last=19))
 
 
 FOLLOWING = [

@@ -29,7 +29,10 @@ class MismatchSettings:
         2.0, "-", "the same of one channel of one passage: the largest of 55 controls was 1.9, others 1.2", 0.1, 100.0
     )
     threshold: float = setting(
-        12.0, "nats", "held-out gain that no control exceeded, with a reserve of half; see docs/mismatch.md", 0.0
+        12.0,
+        "nats",
+        "evidence that a name needs at least, odds of 160,000 to 1; half above any first control",
+        0.0,
     )
     margin: float = setting(6.0, "nats", "runner-up within this of the best: 'a or b'", 0.0)
     explained: float = setting(0.5, "-", "share of the excess that a name must explain", 0.0, 1.0)
@@ -40,7 +43,11 @@ class MismatchSettings:
         2.0, "-", "mean square on reserved over calibration recordings that withdraws a name", 1.0
     )
     fall: float = setting(
-        1.0, "%", "points of fit on reserved recordings that a name may cost, or two standard errors", 0.0, 100.0
+        1.0,
+        "%",
+        "points of fit that a name may cost on reserved recordings; more withdraw it, if beyond two standard errors",
+        0.0,
+        100.0,
     )
     structure_left: float = setting(
         0.4, "-", "share of what is left that a free law of the state still explains: shape unresolved", 0.0, 1.0

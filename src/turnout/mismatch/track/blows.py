@@ -30,8 +30,8 @@ class Pair:
 
     @property
     def seat(self):
-        """Which sensor it is: a channel's may have moved on with the blows."""
-        return self.channel, self.sensor.place
+        """Which sensor it is: a channel's may have moved on with the blows, or from the rail to a sleeper."""
+        return self.channel, self.sensor.place, self.sensor.mounting
 
     @cached_property
     def lines(self):

@@ -15,16 +15,15 @@ FACTOR = {"stiffness": -1.0 + 0j * OMEGA, "damping": -1j * OMEGA, "mass": OMEGA*
 
 
 class Heard:
-    """A ``model`` (``BlowModel``), the places that were struck, ``seats`` ``Pair.seat`` -> place of the sensor, and the
-    ``zone`` whose supports have values of their own."""
+    """A ``model`` (``BlowModel``), the ``pairs`` (place struck, ``Pair.seat``) that were heard, ``seats`` from the
+    latter to the place of the sensor, and the ``zone`` whose supports have values of their own."""
 
-    def __init__(self, model, struck, seats, zone):
+    def __init__(self, model, pairs, seats, zone):
         self.model, self.seats, self.zone = model, seats, zone
-        self.struck = {place: k for k, place in enumerate(dict.fromkeys(struck))}
-        self.column = {seat: k for k, seat in enumerate(seats)}
+        self.row = {pair: k for k, pair in enumerate(dict.fromkeys(pairs))}
 
     def _of(self, pair):
-        return self.struck[pair.test.place], self.column[pair.seat]
+        return self.row[pair.test.place, pair.seat]
 
     def receptance(self, pair):
         """(n_line,) complex [m/N]."""
@@ -44,20 +43,23 @@ class Heard:
 
     def motion(self, ends, pair):
         """((n_link, n_line), the same) motion of links' ``ends`` (n_link, n) under unit forces at blow and sensor."""
-        row, column = self._of(pair)
-        return ends @ self._struck[row].T, ends @ self._seated[column].T
+        return tuple(ends @ self._moved[place].T for place in self._places[1][:, self._of(pair)])
 
     @cached_property
-    def _struck(self):
-        return np.array([self.model.displacement(place) for place in self.struck])
+    def _places(self):
+        """Index of every place that was struck or where a sensor sat, and (2, n_pair) those of each pair."""
+        ends = [(place, self.seats[seat]) for place, seat in self.row]
+        index = {place: k for k, place in enumerate(dict.fromkeys(p for pair in ends for p in pair))}
+        return index, np.array([[index[p] for p in pair] for pair in ends]).T
 
     @cached_property
-    def _seated(self):
-        return np.array([self.model.displacement(place) for place in self.seats.values()])
+    def _moved(self):
+        """(n_place, n_line, n) of all degrees of freedom under unit forces at the places."""
+        return np.array([self.model.displacement(place) for place in self._places[0]])
 
     @cached_property
     def _by_rail(self):
-        r"""(n_struck, n_sensor, n_line, 2) of
+        r"""(n_pair, n_line, 2) of
 
         .. math:: -\sum_e \frac{EI}{h} s_u s_v + \frac{12 EI}{h (1+P)^2} a_u a_v, \quad
                   -\sum_e \frac{12 EI P}{h (1+P)^2} a_u a_v
@@ -69,22 +71,22 @@ class Heard:
         h, p, ei, _ = matrices.elements
         sheared = 12.0 * ei / (h * (1.0 + p) ** 2)
         weights = np.array([ei / h, sheared, self.model.own_shear * sheared * p])
-        return by_rail(self._struck, self._seated, matrices.node_index, h, weights)
+        return by_rail(self._moved, self._places[1], matrices.node_index, h, weights)
 
     @cached_property
     def _by_supports(self):
-        """(n_struck, n_sensor, n_line, n) of all values."""
+        """(n_pair, n_line, n) of all values."""
         zone, track = self.zone, self.model.track
         inside, n = slice(zone.first, zone.last + 1), zone.last + 1 - zone.first
-        (pad_u, sleeper_u), (pad_v, sleeper_v) = (self._at_supports(u) for u in (self._struck, self._seated))
-        moved = {"pad": (pad_u, pad_v), "ballast": (sleeper_u, sleeper_v), "sleeper": (sleeper_u, sleeper_v)}
-        found = np.empty((len(self.struck), len(self.seats), LINES.size, len(COMMON) + n * len(OWN)), dtype=complex)
-        near = {link: u[:, None, :, inside] * v[None, :, :, inside] for link, (u, v) in moved.items()}
+        first, second = self._places[1]
+        pad, sleeper = (u[first] * u[second] for u in self._at_supports(self._moved))
+        product = {"pad": pad, "ballast": sleeper, "sleeper": sleeper}
+        found = np.empty((len(self.row), LINES.size, len(COMMON) + n * len(OWN)), dtype=complex)
         for k, o in enumerate(OWN):
-            value, (u, v), factor = getattr(track, o.field), moved[o.link], FACTOR[o.what]
-            found[..., _COMMON_OF[o.field]] = _summed(u * value, v) * factor
-            first = len(COMMON) + k * n
-            np.multiply(near[o.link], factor[:, None] * value[inside], out=found[..., first : first + n])
+            value, factor = getattr(track, o.field), FACTOR[o.what]
+            found[..., _COMMON_OF[o.field]] = (product[o.link] @ value) * factor
+            start, by = len(COMMON) + k * n, factor[:, None] * value[inside]
+            np.multiply(product[o.link][..., inside], by, out=found[..., start : start + n])
         if self.model.following:
             found += self._followed(found.shape, n)
         return found
@@ -100,8 +102,9 @@ class Heard:
         first = np.cumsum([0, *(r.size for r in rows)])
         ends = csr_array((np.concatenate(weights), np.concatenate(rows), first), (len(rows), self.model.matrices.n))
         impedance = np.array(changes) @ np.array([FACTOR["stiffness"], FACTOR["damping"], FACTOR["mass"]])
-        u, v = ((ends @ x.reshape(-1, x.shape[-1]).T).T.reshape(*x.shape[:2], -1) for x in (self._struck, self._seated))
-        each = u[:, None] * v[None] * impedance.T
+        moved = (ends @ self._moved.reshape(-1, ends.shape[1]).T).reshape(len(fields), -1, LINES.size)
+        first, second = self._places[1]
+        each = moved[:, first] * moved[:, second] * impedance[:, None]
         common = [(e, _COMMON_OF[field]) for e, field in enumerate(fields)]
         own = [
             (e, len(COMMON) + FIELDS.index(field) * n + support - self.zone.first)
@@ -110,13 +113,7 @@ class Heard:
         ]
         entry, column = np.array([*common, *own]).T
         sums = csr_array((np.ones(entry.size), (entry, column)), (len(fields), shape[-1]))
-        return (sums.T @ each.reshape(-1, len(fields)).T).T.reshape(shape)
+        return (sums.T @ each.reshape(len(fields), -1)).T.reshape(shape)
 
 
 _COMMON_OF = {name: k for k, (name, *_) in enumerate(COMMON)}
-
-
-def _summed(u, v):
-    """(n_struck, n_sensor, n_line) sums over the last axis of products of (n_struck, n_line, m) and (n_sensor, n_line,
-    m)."""
-    return (u.transpose(1, 0, 2) @ v.transpose(1, 2, 0)).transpose(1, 2, 0)

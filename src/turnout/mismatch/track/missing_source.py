@@ -75,8 +75,10 @@ def _wheels(case, fit, made):
 def _changes(case, fit, pairs):
     """A change at each support, of each channel, of all supports, in all tests or in those of one visit."""
     names = tuple(o.name for o, _ in pairs)
-    at = {j: [_through(case, fit, pair, j) for _, pair in pairs] for j in _wide(case)}
-    whole = [sum(h) for h in zip(*at.values())]
+    heard_by, wide = case.blow_models(fit.values, fit.terms), _wide(case)
+    through = [_through(case, fit, pair, heard_by(pair), wide) for _, pair in pairs]
+    at = {j: [h[:, k] for h in through] for k, j in enumerate(wide)}
+    whole = [h.sum(axis=1) for h in through]
     found = {("place", _place(case, j)): at[j] for j in case.zone.supports}
     found["frequency", "track"] = whole
     order = {o.name: k for k, o in enumerate(case.observations)}
@@ -92,12 +94,11 @@ def _changes(case, fit, pairs):
         yield Space(names, columns[:, size > 0.0] / size[size > 0.0], {key: None})
 
 
-def _through(case, fit, pair, support):
-    """Receptance from blow to support times that from support to sensor, on ``LINES``, as the channel has it."""
-    heard = case.blow_model(fit.values, fit.terms, pair)
-    row = heard.model.matrices.index["rail", support]
-    u, v = (heard.model.displacement(place)[:, row] for place in (pair.test.place, heard.seats[pair.seat]))
-    return u * v * case.chain(fit.values, fit.terms, pair)
+def _through(case, fit, pair, heard, supports):
+    """(n_line, n_support) receptance from blow to support times that from support to sensor, as the channel has it."""
+    rows = [heard.model.matrices.index["rail", j] for j in supports]
+    u, v = (heard.model.displacement(place)[:, rows] for place in (pair.test.place, heard.seats[pair.seat]))
+    return u * v * case.chain(fit.values, fit.terms, pair)[:, None]
 
 
 def _receptance(pair, predicted):

@@ -58,12 +58,12 @@ class Predicting:
         """The track of a hammer pair as all under its conditions heard it, remembered."""
         under = blows.shown(terms, pair.conditions)
         near = near_rail(values)
-        struck, seats = self._touched(values, terms, pair.conditions)
-        key = repr(under), tuple(near.values()), inner_values(self.zone, values), struck, tuple(seats.items())
+        heard, seats = self._touched(values, terms, pair.conditions)
+        key = repr(under), tuple(near.values()), inner_values(self.zone, values), heard, tuple(seats.items())
         if key not in self._models:
             made = BlowModel(track_with(self._on_grid(near), self.zone, values), under)
-            self._models[key] = Heard(made, struck, seats, self.zone)
-            made.solve((*struck, *seats.values()))  # together: rounding hangs on what else is
+            self._models[key] = Heard(made, heard, seats, self.zone)
+            made.solve((*(place for place, _ in heard), *seats.values()))  # together: rounding hangs on what else is
             while len(self._models) > 8:
                 self._models.popitem(last=False)
         return self._models[key]
@@ -76,11 +76,11 @@ class Predicting:
         return self._railed[key]
 
     def _touched(self, values, terms, conditions):
-        """Places of blows, and by ``Pair.seat`` those of the sensors that heard them, of all under these conditions."""
+        """(place of the blow, ``Pair.seat``) of all pairs under these conditions, and the places of these seats."""
         alike = [p for p in self.pairs.values() if p.conditions == conditions]
         sensors, track = {p.seat: p.sensor for p in alike}, self.track()
         seats = {seat: self.seat(s, values, terms).probe(track).place for seat, s in sensors.items()}
-        return tuple(dict.fromkeys(p.test.place for p in alike)), seats
+        return tuple((p.test.place, p.seat) for p in alike), seats
 
     def seat(self, sensor, values, terms):
         """The sensor where ``values`` and ``terms`` say that it sits."""

@@ -72,7 +72,7 @@ class Rolling:
 def band_limited(samples, rate, low=LOW, high=HIGH):
     """Rows of ``samples`` between ``low`` and ``high`` [Hz], zero phase, cosine edges of a third."""
     n = samples.shape[-1]
-    size = next_fast_len(n + round(rate * 0.25), real=True)
+    size = next_fast_len(n + round(rate * 0.75), real=True)  # the lower edge rings for half a second
     passed = gate(np.fft.rfftfreq(size, 1.0 / rate), low, high)
     return np.fft.irfft(np.fft.rfft(samples, size) * passed, size)[..., :n]
 

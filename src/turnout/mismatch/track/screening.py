@@ -79,7 +79,7 @@ def _pair_channels(case, fit, observation, old, chosen):
         if c.where["sensor"] == pair.channel:
             terms = (*fit.terms, c.term(c.starts[k]))
             place = case.seat(pair.sensor, fit.values, terms).probe(track).place
-            h = corrected + heard.model.receptance(pair.test.place, place) - here
+            h = corrected + (heard.model.receptance(pair.test.place, place) - here)  # 0 where it stays
             found[c.key, k] = blows.split(blows.scaled(pair, h, case.chain(fit.values, terms, pair))) - old
     return found
 

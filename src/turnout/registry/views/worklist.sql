@@ -148,7 +148,8 @@ select
                 || coalesce(' (' || strftime(h.since_earliest_utc, '%Y-%m-%d') || ' to '
                     || strftime(h.since_latest_utc, '%Y-%m-%d') || ')', ''), '')
             || (case when h.source = 'passage' then '; from passages' else '; from hammer tests' end)
-            || (case when h.band in ('ballast', 'railpad') then '; stiffness changes about twice as much' else '' end)
+            || (case when h.band in ('ballast', 'railpad') then printf('; that is about %.0f %% of stiffness',
+                abs((1 + h.change_pct / 100) ** 2 - 1) * 100) else '' end)
             || coalesce('; acknowledged by ' || h.acknowledged, '')
     end as sentence,
     case

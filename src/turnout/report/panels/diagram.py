@@ -39,9 +39,7 @@ def diagram(sections, states, width=920, height=200):
     ]
     for section, lift in zip(sections, _lifts(sections, px)):
         parts.append(_place(section, states, px, py, lift))
-    parts.append(
-        f'<text class="label" x="24" y="{height - 8}">facing direction → , metres from the first sensor</text>'
-    )
+    parts.append(f'<text class="label" x="24" y="{height - 8}">facing direction → , metres from the switch toe</text>')
     return "".join(parts) + "</svg>"
 
 
