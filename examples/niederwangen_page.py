@@ -151,11 +151,12 @@ if both say none.
 
 {terms}
 
-Gain: held-out log density over the calibrated model less the logarithm of the number of dates [nats]; 12 are asked for.
+Gain: evidence over the calibrated model less the logarithm of the number of dates [nats]; 12 are asked for.
 
 {dates}
 
-The same change at other dates (gain in nats before the logarithm of the number of dates; both runs).
+The same change at other dates: gain of the density with which campaigns are predicted from the others [nats], which
+says more of the date than the evidence above and is larger; both runs.
 
 ## How to read it
 
