@@ -146,7 +146,7 @@ def with_entry(text: str, entry: str) -> str:
 
 def _identity(entry: str) -> tuple[str, ...]:
     """What an entry is about: effect and place, sensor or train."""
-    names = ("term", *SUPPORTS, "place", "channel_name", "train")
+    names = ("term", *SUPPORTS, "place", "start", "end", "channel_name", "train")
     found = []
     for name in names:
         match = re.search(rf"^[ -]*{name}: *(?:{{ *value: *([^,}}]+)|([^\n#]+))", entry, re.MULTILINE)

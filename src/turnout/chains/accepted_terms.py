@@ -36,7 +36,7 @@ class Accepted:
     @property
     def place(self) -> float | None:
         """Where it is [m], None where it has no place."""
-        found = [float(self.fixed[name]) for name in (*SUPPORTS, "place") if name in self.fixed]
+        found = [float(self.fixed[name]) for name in (*SUPPORTS, "place", "start", "end") if name in self.fixed]
         return sum(found) / len(found) if found else None
 
     @property

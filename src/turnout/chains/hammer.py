@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from turnout.chains.hammer_rows import impact_mode_row, impact_row, mode_row, model_row, receptance_row
+from turnout.chains.noted import number
 from turnout.chains.raw_rows import read_or_quarantine, recording_row
 from turnout.config.pattern import compiled
 from turnout.config.turnout import TurnoutConfig
@@ -97,7 +98,8 @@ def _modal_rows(impacts, names, turnout, base, identity, temperature):
 
 def _noted_temperature(recordings):
     """Median of the rail temperatures noted in the files, None without any."""
-    noted = [r.conditions["rail_temperature"] for r in recordings if "rail_temperature" in r.conditions]
+    told = (number(r.conditions, "rail_temperature") for r in recordings)
+    noted = [t for t in told if t is not None]
     return float(np.median(noted)) if noted else None
 
 

@@ -17,7 +17,8 @@ from turnout.chains.mismatch_visits import members_of
 from turnout.chains.raw_rows import quarantine_row
 from turnout.config.build import digest
 from turnout.config.turnout import TurnoutConfig
-from turnout.errors import ReadError, SimulationError
+from turnout.content import sha256_of
+from turnout.errors import ReadError, SimulationError, TurnoutError
 from turnout.fleet.scan import scan
 from turnout.mismatch.diagnose import diagnose
 from turnout.mismatch.track import TrackCase
@@ -46,7 +47,12 @@ def mismatch_unit(unit: Unit, turnout: TurnoutConfig, raw_root, context=None, al
     Sections about which nothing can be said are quarantine rows with the reason; the others have a finding each,
     one row per group of neighbouring sections.
     """
-    return diagnose_visit(unit, turnout, raw_root, context or {}, algo)
+    try:
+        return diagnose_visit(unit, turnout, raw_root, context or {}, algo)
+    except ReadError:
+        raise
+    except TurnoutError as error:  # no track, a vehicle or a configuration that is wrong: this turnout's own affair
+        return {**{name: [] for name in TABLES}, "quarantine": [_nothing(unit, turnout, str(error)[:1000])]}
 
 
 def diagnose_visit(unit, turnout, raw_root, told, algo="", options: Options | None = None) -> dict[str, list[dict]]:
@@ -58,7 +64,8 @@ def diagnose_visit(unit, turnout, raw_root, told, algo="", options: Options | No
     track, accepted = track_of(turnout, options.track)
     units = members_of(unit, scan(turnout, Path(raw_root)).units)
     found = gather(units, turnout, raw_root, track, told)
-    identity = digest([unit.config_hash, [f[:2] for f in unit.files], digest_of_model(turnout, options.track), algo])
+    contents = [[path, _content(Path(raw_root) / path)] for path, *_ in unit.files]
+    identity = digest([unit.config_hash, contents, found.said(), digest_of_model(turnout, options.track), algo])
     about = {"turnout": turnout, "visit": unit.label, "identity": identity, "notes": found.notes}
     rows: dict[str, list[dict]] = {name: [] for name in TABLES}
     members = list(groups(turnout, track, found, options.sections))
@@ -71,6 +78,13 @@ def diagnose_visit(unit, turnout, raw_root, told, algo="", options: Options | No
         rows["quarantine"].append(_nothing(unit, turnout, f"no section can be diagnosed: {said}"[:1000]))
     rows["mismatch_findings"].sort(key=lambda r: (GRAVITY.index(r["verdict"]), -(r["probability"] or 0.0)))
     return rows
+
+
+def _content(path):
+    try:
+        return sha256_of(path)
+    except OSError:  # gone since it was planned: the notes say so
+        return ""
 
 
 def _one(group: Group, turnout, accepted, about, options, number) -> dict[str, list[dict]]:

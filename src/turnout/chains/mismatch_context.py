@@ -5,9 +5,10 @@ import json
 from pathlib import Path
 
 from turnout.chains.accepted_terms import accepted_of
+from turnout.config.parameter_set import read_parameters
 from turnout.config.turnout import TurnoutConfig
 from turnout.content import sha256_of
-from turnout.errors import SimulationError
+from turnout.errors import SimulationError, TurnoutError
 from turnout.fleet.batches import read_results
 from turnout.fleet.state import batch_paths
 from turnout.simulate import load_track
@@ -40,10 +41,26 @@ def digest_of_model(turnout: TurnoutConfig, name: str | None = None) -> str:
         own = track_file(turnout, name)
     except SimulationError:
         return ""
-    used = [own, *sorted((folder / "tracks").glob(f"{turnout.layout}.yaml")), *sorted((folder / "vehicles").glob("*"))]
+    used = [*_extended(own), *sorted((folder / "tracks").glob(f"{turnout.layout}.yaml"))]
+    used += sorted((folder / "vehicles").glob("*"))
     used += sorted(own.parent.glob("*.y*ml")) if name else []
     parts = [[path.name, sha256_of(path)] for path in dict.fromkeys(used) if path.is_file()]
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:16]
+
+
+def _extended(path: Path) -> list[Path]:
+    """A track's file and those that it extends, one after the other."""
+    found = [path]
+    while found[-1].is_file():
+        try:
+            said = read_parameters(found[-1])
+        except TurnoutError:  # the diagnosis says what is wrong with it
+            break
+        base = path.parent / f"{said['extends']}.yaml" if "extends" in said else path
+        if base in found:
+            break
+        found.append(base)
+    return found
 
 
 def mismatch_context(turnout: str, work="work") -> tuple[str, dict[str, dict]]:

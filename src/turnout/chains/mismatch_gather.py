@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from turnout.chains.mismatch_trains import TrainUnknownError, train_of
+from turnout.chains.noted import number
 from turnout.chains.passage import PassageContext, passage_unit, sensors_of
 from turnout.chains.passage_context import known_patterns
 from turnout.config.turnout import TurnoutConfig
@@ -30,6 +31,14 @@ class Gathered:
     passages: list[Passage] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     quarantine: list[dict] = field(default_factory=list)
+
+    def said(self) -> list:
+        """All that notes and the passage stage said of the recordings: another word is another diagnosis."""
+        tests = [[t.name, t.place, t.conditions] for t in self.tests]
+        vehicles: list[Any] = [p.vehicle for p in self.passages]
+        loads = [[float(load) for load in v.static_loads] for v in vehicles]
+        trains = [[p.name, p.train, p.speed, p.direction, p.route, p.conditions] for p in self.passages]
+        return [tests, trains, loads, self.notes]
 
 
 def gather(units: Iterable[Unit], turnout: TurnoutConfig, raw_root, track, told: Mapping[str, dict]) -> Gathered:
@@ -65,7 +74,9 @@ def _test(unit, turnout, raw_root, track, found):
         found.notes.append(wrong)
         return
     campaign = turnout.campaigns[unit.campaign]
-    noted = {} if campaign.rail_temperature is None else {"rail_temperature": campaign.rail_temperature}
+    warm = [campaign.rail_temperature, *(number(r.conditions, "rail_temperature") for r in recordings)]
+    known = [t for t in warm if t is not None]
+    noted = {"rail_temperature": known[0]} if known else {}
     name = f"{unit.section} {unit.campaign}"
     force = turnout.hammer.force[unit.section]
     seated = tuple(_seated(r, place) for r in recordings)
@@ -111,14 +122,18 @@ def _passages(unit, turnout, raw_root, track, tables, found):
     for k, recording in enumerate(recordings):
         row: dict[str, Any] = rows[k] if len(rows) == len(recordings) else {}
         name = unit_id(unit).split("/", 2)[-1] + (f":{k}" if len(recordings) > 1 else "")
-        unsound = {q["place"].split(", ")[-1].split(":")[0] for q in bad if _spoils(q)}
+        unsound = {name for q in bad if _spoils(q) for name in _channels_of(q)}
         unsound |= _misplaced_sensors(turnout, track, found.notes)
+        if row.get("reason") == "two_trains":
+            found.notes.append(f"passage {name}: two trains at the same time, not used")
+            continue
         try:
             train = train_of(row, recording.conditions, Path(turnout.folder) / "vehicles")
         except TrainUnknownError as error:
             found.notes.append(f"passage {name}: {error}")
             continue
-        found.notes += [f"passage {name}: {doubt}" for doubt in train.doubts]
+        forks = any(s.track == "diverging" for s in turnout.sections)
+        found.notes += [f"passage {name}: {d}" for d in train.doubts if forks or not d.startswith("track not known")]
         sound = _sound_channels(recording, turnout, train.route, unsound)
         if gone := sorted(unsound & {c.name for c in recording.channels}):
             found.notes.append(f"passage {name}: channels {', '.join(gone)} not used{_reasons(bad)}")
@@ -130,6 +145,11 @@ def _passages(unit, turnout, raw_root, track, tables, found):
                 name, sound, train.vehicle, train.speed, train.name, train.direction, train.route, _noted(row, sound)
             )
         )
+
+
+def _channels_of(row):
+    """Names of the channels that a quarantine row is about: one, or two that are swapped."""
+    return row["place"].split(", ")[-1].split(":")[0].split(" and ")
 
 
 def _spoils(row):
@@ -152,7 +172,7 @@ def _reasons(bad):
 
 def _noted(row, recording):
     temperature = row.get("rail_temperature_c")
-    temperature = recording.conditions.get("rail_temperature") if temperature is None else temperature
+    temperature = number(recording.conditions, "rail_temperature") if temperature is None else temperature
     return {} if temperature is None else {"rail_temperature": float(temperature)}
 
 

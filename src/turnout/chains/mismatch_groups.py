@@ -28,7 +28,9 @@ def groups(turnout: TurnoutConfig, track: TurnoutTrack, found: Gathered, only: S
     """The cases of a visit, by place; sections without any recording are left out."""
     for route, labels in _neighbours(turnout, only):
         campaign = _campaign(turnout, track, found, route, labels)
-        if campaign is not None:
+        if campaign is not None and route not in ("main", *track.routes):
+            found.notes.append(f"sections {', '.join(labels)}: the track's file has no route {route}; not used")
+        elif campaign is not None:
             yield Group(_measured(turnout, found, campaign, labels), route, campaign)
 
 
@@ -71,8 +73,9 @@ def _campaign(turnout, track, found, route, labels):
     sensors = tuple(s for s in sensors if s.name in heard)
     if not tests and not passages:
         return None
-    own, passages = (track, passages) if route == "main" else _as_main(track, route, passages)
-    return Campaign(own, sensors, tests, tuple(passages), reserved(passages, tests))
+    if route != "main" and route in track.routes:
+        track, passages = _as_main(track, route, passages)
+    return Campaign(track, sensors, tests, tuple(passages), reserved(passages, tests))
 
 
 def _sensors(turnout, labels):
@@ -89,8 +92,6 @@ def _sensors(turnout, labels):
 
 def _as_main(track, route, passages):
     """The turnout seen from another route: its track is the one that blows and trains of the case meet."""
-    if route not in track.routes:
-        return track, [replace(p, route="main") for p in passages]
     own = track.track_of(route)
     seen = replace(track, track=own, tracks={"main": own}, routes={"main": track.routes[route]})
     return seen, [replace(p, route="main") for p in passages]

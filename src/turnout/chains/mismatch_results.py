@@ -85,13 +85,18 @@ class Results:
         raise SimulationError(f"{self.turnout_id}: {wrong}; say which with --finding. There are {there or 'none'}.")
 
     def _rows(self):
+        """The rows kept below ``work`` or those of the registry, whichever are of newer recordings."""
+        kept, registered = self._kept(), self._registered()
+        if not kept and not registered:
+            said = f"{self.turnout_id} has no result below {self.path.parent}, nor in the registry"
+            raise SimulationError(f"{said}: run turnout diagnose --turnout {self.turnout_id} first.")
+        return registered if _newest(registered) > _newest(kept) else kept
+
+    def _kept(self):
         try:
             return decode(self.path.read_text(encoding="utf-8"))["mismatch_findings"]
         except FileNotFoundError:
-            if rows := self._registered():
-                return rows
-            said = f"{self.turnout_id} has no result below {self.path.parent}, nor in the registry"
-            raise SimulationError(f"{said}: run turnout diagnose --turnout {self.turnout_id} first.") from None
+            return []
 
     def _registered(self):
         """Newest findings of the turnout in the registry, where there is one: the fleet's stage left them."""
@@ -101,3 +106,8 @@ class Results:
             cursor = connection.execute("from findings_newest where turnout_id = ?", [self.turnout_id])
             names = [d[0] for d in cursor.description]
             return [dict(zip(names, row)) for row in cursor.fetchall()]
+
+
+def _newest(rows):
+    """Time of the newest finding as text that sorts, "" without any."""
+    return max((str(r["found_at_utc"]).replace("T", " ")[:19] for r in rows), default="")

@@ -71,14 +71,20 @@ def _numbers(found, case, group, about) -> dict:
         "place_low_m": min(places),
         "place_high_m": max(places),
         "n_hammer_tests": len(campaign.hammer),
-        "n_passages": len(campaign.passages),
+        "n_passages": sum(o.kind == "passage" for o in (*case.observations, *case.reserved)),
         "n_sensors": len(campaign.sensors),
         "level_before": float(max(found.base.level.values())),
         "level_after": float(max(fit.level.values())),
         "term_json": json.dumps(terms, sort_keys=True) if terms else None,
         "evidence_json": json.dumps(_evidence(found), sort_keys=True),
-        "notes": "\n".join([*about["notes"], *case.notes][:NOTES_KEPT]) or None,
+        "notes": "\n".join(dict.fromkeys([*case.notes, *_of_others(about, campaign)][:NOTES_KEPT])) or None,
     }
+
+
+def _of_others(about, campaign):
+    """Notes of the visit, those on passages that this group has before those that say nothing of it."""
+    mine = tuple(f"passage {p.name}: " for p in campaign.passages)
+    return sorted(about["notes"], key=lambda note: not note.startswith(mine) if note.startswith("passage ") else False)
 
 
 def _errors(fit):

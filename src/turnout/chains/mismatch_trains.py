@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from turnout.chains.noted import number
 from turnout.errors import ConfigError, SimulationError
 from turnout.simulate import load_vehicle
 
@@ -40,7 +41,7 @@ def train_of(row: Mapping, said: Mapping, folder: Path) -> TrainFound:
     do not fit, with a doubt: flats, dips and polygonal wheels sound like axles, and whoever simulates the passage sees
     whether it is that train.
     """
-    noted = KMH * float(said.get("speed") or 0.0) or row.get("speed_listed_kmh")
+    noted = KMH * (number(said, "speed") or 0.0) or row.get("speed_listed_kmh")
     speed = row.get("speed_kmh") or noted
     names = _types(row, said)
     name = _with_a_file(names, folder)
@@ -61,12 +62,19 @@ def train_of(row: Mapping, said: Mapping, folder: Path) -> TrainFound:
         if not believed:
             raise
         speed, more = float(believed) / KMH, (f"{error}; taken as noted",)
-    direction, route = row.get("direction"), row.get("track")
-    if direction not in ("facing", "trailing"):
-        direction = str(said.get("direction", "facing"))
-    if route not in ("main", "diverging"):
-        route = str(said.get("track", "main"))
-    return TrainFound(name, vehicle, speed, direction, route, (*doubts, *more))
+    direction, way = _one_of(("facing", "trailing"), "direction", row, said)
+    route, road = _one_of(("main", "diverging"), "track", row, said)
+    return TrainFound(name, vehicle, speed, direction, route, (*doubts, *more, *way, *road))
+
+
+def _one_of(known, name, row, said):
+    """(word, doubts): what was heard, else noted, else the first of the ``known`` words, which is said."""
+    for value in (row.get(name), said.get(name)):
+        word = str(value or "").strip().lower()
+        if word in known:
+            return word, ()
+    more = ": a place found may be its mirror image" if name == "direction" else ""
+    return known[0], (f"{name} not known, {known[0]} assumed{more}",)
 
 
 def _types(row, said) -> list[str]:
@@ -86,7 +94,7 @@ def _vehicle(name, heard, row, said, folder, believed):
         one = load_vehicle(name, 0.0, folder)
     except (SimulationError, ConfigError) as error:
         raise TrainUnknownError(f"type {name}: {error}") from None
-    n, units = len(one.wheels), int(said.get("units", 1))
+    n, units = len(one.wheels), max(1, round(number(said, "units") or 1.0))
     wrong: tuple[str, ...] = ()
     if heard and heard % n:
         wrong = (f"{heard} axles heard, {n} in {name}.yaml: wrong vehicle file, another train, or other sensors",)
@@ -104,8 +112,8 @@ def _load_share(name, row, said, folder, units):
     if full <= empty:
         return 0.0, ()
     if row.get("axle_load_t") is None:
-        noted = "load_share" in said
-        return float(said.get("load_share", 0.5)), () if noted else ("load not known, half of the payload assumed",)
+        noted = number(said, "load_share")
+        return (0.5, ("load not known, half of the payload assumed",)) if noted is None else (noted, ())
     share = (0.5 * row["axle_load_t"] * NEWTON_PER_TONNE - empty) / (full - empty)
     inside = -0.3 <= share <= 1.5
     doubts = () if inside else (f"axle load {row['axle_load_t']:.1f} t lies outside the vehicle's",)

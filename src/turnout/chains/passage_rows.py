@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from turnout.chains.noted import number
 from turnout.chains.raw_rows import quarantine_row
 from turnout.errors import ReadError
 from turnout.passage.train_type import UNKNOWN
@@ -50,7 +51,7 @@ def passage_row(passage, identity, listed, load, conditions) -> dict:
         "n_axles": passage.n_axle,
         "direction": passage.direction,
         "track": passage.track,
-        "rail_temperature_c": conditions.get("rail_temperature"),
+        "rail_temperature_c": number(conditions, "rail_temperature"),
         "axle_load_source": "unavailable",
     }
     words = [f.detail or f.reason for f in passage.findings]

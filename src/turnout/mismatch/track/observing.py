@@ -54,7 +54,11 @@ def passage_observations(case):
                     passage.name, passage, tuple(sensors), np.zeros(0), reference, speed
                 )
             continue
-        made, observation = rolling.rolling_of(passage, sensors, reference, speed, case.settings.materiality)
+        try:
+            made, observation = rolling.rolling_of(passage, sensors, reference, speed, case.settings.materiality)
+        except SimulationError as error:
+            case.notes.append(f"passage {passage.name}: {error}")
+            continue
         case.rollings[passage.name] = made
         yield passage.name, with_errors(case, {**values, **dict.fromkeys(_own_of(passage), 0.0)}, made, observation)
 

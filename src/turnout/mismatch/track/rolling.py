@@ -23,6 +23,7 @@ COUPLING = 0.7  # an amplifier's lower corner that no data sheet mentions [Hz]
 EDGE = 0.08  # s kept before the first and behind the last wheel
 # The rail's deflection under the axles: with a dip of 1.5 mm the right train is 0.8 alike, a wrong one at most 0.5
 ALIGNED, ALIKE = 30.0, 0.65  # [Hz], -
+FINE, SLOWEST = 2500.0, 3.0  # samples per second between which a cubic reads true; least number of them in a period
 SPEED_SD, TIME_SD, LOAD_SD = 0.004, 1.5e-3, 0.05
 
 
@@ -210,10 +211,14 @@ def rolling_of(passage, sensors, reference, speed, tolerance):
     step = 1.0 / clock_of(speed)
     time = np.arange(max(0.0, reference - EDGE), min(stop, recording.duration - 0.01), step)
     if time.size < 20:
-        raise SimulationError(f"passage {passage.name!r}: the train lies outside the recording.")
+        raise SimulationError("the train lies outside the recording")
+    if recording.rate < SLOWEST * band_end(speed):
+        raise SimulationError(f"{recording.rate:g} samples per second are too few for {band_end(speed):.0f} Hz")
     rolling = Rolling(passage.name, passage, tuple(sensors), time, reference, speed)
-    data = read_at(limited, recording.rate, time)
-    quiet = read_at(limited, recording.rate, np.arange(0.02, max(0.1, reference - 0.15), step))
+    fold = max(1, int(np.ceil(FINE / recording.rate)))
+    limited, rate = finer(limited, fold) if fold > 1 else limited, fold * recording.rate
+    data = read_at(limited, rate, time)
+    quiet = read_at(limited, rate, np.arange(0.02, max(0.1, reference - 0.15), step))
     return rolling, observed(rolling, data, np.std(quiet, axis=1), tolerance, _topped(recording, sensors, time))
 
 

@@ -26,6 +26,7 @@ from turnout.mismatch.track.rough_rail import Waves
 from turnout.mismatch.track.rough_wheels import heavier
 
 GAIN_SD = 0.02
+WARMTH, SPAN = "pad_temperature", 4.0  # K: pads lose a per cent or so per kelvin, one seat differs by that
 FOLLOWED = 0.15  # ln of unsprung mass: what roughness does near P2 then changes by a fifth of its amplitude
 
 
@@ -52,8 +53,14 @@ class TrackCase(Predicting, Case):
         if not self.observations:
             raise SimulationError("every recording is reserved for the verification: nothing is left to fit.")
         self.nuisances = tuple(self.listed())
-        self.candidates = library(self, families)
+        self.candidates = tuple(c for c in library(self, families) if c.family != WARMTH or self._warmed())
         self.families = families
+
+    def _warmed(self):
+        """Every recording says how warm the rail was, and that differs: else warmth is a name for anything."""
+        seen = [p.conditions for p in self.pairs.values()] + [self.said(made) for made in self.rollings.values()]
+        found = [said.get("rail_temperature") for said in seen]
+        return None not in found and max(found) - min(found) >= SPAN
 
     def _from_blows(self, observations):
         """Values of the nuisances of track and sensors that the hammer tests alone give: where all fits start."""

@@ -1,0 +1,186 @@
+"""What the files of strangers say, or leave unsaid: read as far as it goes, else told, never mistaken."""
+
+from dataclasses import replace
+from datetime import datetime
+from functools import partial
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import small_turnout as small
+
+from turnout.chains import mismatch
+from turnout.chains.accept import with_entry
+from turnout.chains.mismatch_context import digest_of_model, track_of
+from turnout.chains.mismatch_gather import Gathered, _channels_of
+from turnout.chains.mismatch_groups import groups
+from turnout.chains.mismatch_results import Results, diagnose_turnout
+from turnout.chains.mismatch_trains import train_of
+from turnout.chains.mismatch_visits import unit_of
+from turnout.chains.noted import number
+from turnout.config import load_configuration, with_raw
+from turnout.errors import SimulationError
+from turnout.fleet.batches import encode
+from turnout.fleet.scan import scan
+from turnout.mismatch.track import HammerTest, TrackCase
+from turnout.mismatch.track.planned import measured_campaign, small_plan
+from turnout.mismatch.track.rolling import rolling_of
+
+
+@pytest.fixture
+def folder(tmp_path, repository, monkeypatch):
+    """Blows on an even turnout, and two families, so that a diagnosis takes a second."""
+    small.lay_out(tmp_path, repository)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(mismatch, "TrackCase", partial(TrackCase, families=("local_ballast", "sensor_gain")))
+    small.strike(tmp_path)
+    return tmp_path
+
+
+def turnout_in(folder):
+    return with_raw(load_configuration(folder / "config").turnout("t1"), folder / "raw")
+
+
+def train(row, noted, repository):
+    row = {"speed_kmh": 90.0, "train_type": "locomotive", "n_axles": 4} | row
+    return train_of(row, noted, repository / "config" / "vehicles")
+
+
+@pytest.mark.parametrize(
+    ("said", "means"), [("27.8", 27.8), ("27,8", 27.8), (12, 12.0), ("120 km/h", None), (None, None), ("nan", None)]
+)
+def test_a_number_in_the_notes_is_read_or_is_none(said, means):
+    assert number({"speed": said}, "speed") == means
+
+
+def test_a_direction_in_other_letters_is_that_direction_and_one_unheard_is_said(repository):
+    """A sensor alone cannot tell it: taken for the other one, what is before the sensor would be behind it."""
+    found = train({}, {"direction": " Trailing ", "track": "Diverging"}, repository)
+    assert (found.direction, found.route) == ("trailing", "diverging")
+    unheard = train({"direction": "unknown"}, {"direction": "downhill"}, repository)
+    assert unheard.direction == "facing" and any("direction not known" in doubt for doubt in unheard.doubts)
+
+
+def test_swapped_channels_are_two():
+    assert _channels_of({"place": "record 0, A7 and A8"}) == ["A7", "A8"]
+    assert _channels_of({"place": "record 0, A7: 3 of 40"}) == ["A7"]
+
+
+def test_words_where_a_temperature_should_be_cost_the_temperature_alone(folder):
+    small.roll(
+        folder, speeds=(100.0,), change=lambda r: replace(r, conditions={**r.conditions, "rail_temperature": "?"})
+    )
+    assert [f["n_passages"] for f in diagnose_turnout("t1")["mismatch_findings"]] == [1]
+
+
+def test_a_turnout_without_a_track_is_a_row_of_the_fleet(folder):
+    """Not a fault of the program: its neighbours' run is sound."""
+    (folder / "config/tracks/small.yaml").unlink()
+    turnout = turnout_in(folder)
+    unit = unit_of("t1", "2026-07-25", scan(turnout, folder / "raw").units, turnout.hashes["mismatch"])
+    (row,) = mismatch.mismatch_unit(unit, turnout, folder / "raw")["quarantine"]
+    assert row["reason_code"] == "simulation_failed" and "needs a track to simulate" in row["found"]
+
+
+def test_other_notes_are_another_finding(folder):
+    """The same files, a corrected temperature: what an earlier run kept is not the answer."""
+    notes = folder / "raw/t1/campaigns.csv"
+    found = []
+    for temperature in ("11.0", "25.0"):
+        notes.write_text(f"campaign,started_at_utc,rail_temperature_c\n2026-07-25,2026-07-25T09:00:00Z,{temperature}\n")
+        found.append(diagnose_turnout("t1")["mismatch_findings"][0]["finding_id"])
+    assert found[0] != found[1] == diagnose_turnout("t1")["mismatch_findings"][0]["finding_id"]
+
+
+def test_a_track_that_is_extended_counts(folder):
+    tracks = folder / "config/tracks"
+    (tracks / "ground.yaml").write_text((tracks / "small.yaml").read_text())
+    (tracks / "t1.yaml").write_text("extends: ground\n")
+    turnout, before = turnout_in(folder), digest_of_model(turnout_in(folder))
+    with open(tracks / "ground.yaml", "a", encoding="utf-8") as file:
+        file.write("# measured anew\n")
+    assert digest_of_model(turnout) != before
+
+
+def test_a_route_that_the_track_has_not_is_said(folder):
+    """What was struck on the diverging track is not simulated on the rails of the main one."""
+    layout = folder / "config/layouts/small.yaml"
+    layout.write_text(layout.read_text().replace("B: {panel: CP, track: main", "B: {panel: AS, track: diverging"))
+    turnout = turnout_in(folder)
+    tests = [HammerTest(f"{k} x", small.PLACES[k], (), "force", "x", {}) for k in ("A", "B")]
+    found = Gathered(tests, {t.name: t.name[0] for t in tests})
+    made = list(groups(turnout, track_of(turnout)[0], found))
+    assert [g.labels for g in made] == [("A",)]
+    assert found.notes == ["sections B: the track's file has no route diverging; not used"]
+
+
+def test_the_result_of_the_newer_recordings_is_accepted(tmp_path, monkeypatch):
+    def row(name, day):
+        return {"finding_id": name, "found_at_utc": datetime(2026, day, 1), "term_json": "[]"}
+
+    results = Results(tmp_path, "t1")
+    results.path.parent.mkdir(parents=True)
+    results.path.write_text(encode({"mismatch_findings": [row("july", 7)]}))
+    for month, name in ((5, "july"), (10, "other")):
+        monkeypatch.setattr(Results, "_registered", lambda self, month=month: [row("other", month)])
+        assert results.finding()["finding_id"] == name
+
+
+def test_corrugation_further_on_is_another_entry():
+    text = "name: a\nterms:\n  - term: rail_corrugation\n    start: 10\n    end: 14\n"
+    both = with_entry(text, "  - term: rail_corrugation\n    start: 30\n    end: 34\n")
+    assert both.count("rail_corrugation") == 2
+    assert with_entry(both, "  - term: rail_corrugation\n    start: 30\n    end: 34\n").count("rail_corrugation") == 2
+
+
+WARM = {None: (25.0, None), "as warm": (25.0, 27.0), "warmer": (10.0, 25.0)}
+
+
+@pytest.mark.parametrize(("warmth", "offered"), [(None, False), ("as warm", False), ("warmer", True)])
+def test_warmth_is_a_cause_only_where_it_is_known_and_differs(warmth, offered):
+    """A pad softer than its file is no pad that is warm: one temperature cannot tell the two."""
+    campaign = measured_campaign(small_plan((15.0,), passages=False, blows=(21.6, 24.0)), (), 3)
+    tests = tuple(
+        replace(t, conditions={} if w is None else {"rail_temperature": w})
+        for t, w in zip(campaign.hammer, WARM[warmth])
+    )
+    case = TrackCase(replace(campaign, hammer=tests), families=("pad_temperature", "zener_pad"))
+    assert ("pad_temperature" in {c.family for c in case.candidates}) == offered
+    assert "zener_pad" in {c.family for c in case.candidates}
+
+
+@pytest.mark.parametrize("rate", [500.0, 1e3, 1e4])
+def test_slow_loggers_are_read_true(rate):
+    """Three tones within the band, sampled mid-step as recordings are: read where the observation asks, to 1 %."""
+    found, exact = _tones_at(rate)
+    assert np.linalg.norm(found - exact) < 0.01 * np.linalg.norm(exact)
+
+
+def test_loggers_too_slow_for_the_band_are_refused():
+    with pytest.raises(SimulationError, match="200 samples per second are too few for 107 Hz"):
+        _tones_at(200.0)
+
+
+def _tones_at(rate):
+    """(data, what they should be) of a passage at 40 m/s whose sensors show tones, inside, away from its edges."""
+    passage = measured_campaign(small_plan((15.0,), (40.0,), blows=()), (), 5).passages[0]
+    sensors = small_plan().sensors
+    n = round(passage.recording.duration * rate)
+
+    def tones(t):
+        return sum(a * np.sin(2.0 * np.pi * f * t + a) for f, a in ((23.0, 1.0), (61.0, 0.7), (98.0, 1.3)))
+
+    samples = np.tile(tones((np.arange(n) + 0.5) / rate), (len(passage.recording.channels), 1))
+    heard = replace(passage, recording=replace(passage.recording, samples=samples, rate=rate))
+    made, observation = rolling_of(heard, sensors, 0.9, passage.speed, 0.06)
+    data = observation.data.reshape(len(sensors), -1)
+    inside = slice(data.shape[1] // 4, -data.shape[1] // 4)
+    return data[:, inside], np.tile(tones(made.time), (len(sensors), 1))[:, inside]
+
+
+def test_a_note_of_this_group_is_not_cut_off_by_those_of_others():
+    from turnout.chains.mismatch_rows import _of_others
+
+    notes = [f"passage {k}: load not known" for k in range(20)] + ["section C: elsewhere"]
+    campaign = SimpleNamespace(passages=[SimpleNamespace(name="17")])
+    assert _of_others({"notes": notes}, campaign)[:2] == ["passage 17: load not known", "section C: elsewhere"]
