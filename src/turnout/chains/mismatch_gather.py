@@ -7,7 +7,7 @@ from typing import Any
 
 from turnout.chains.mismatch_trains import TrainUnknownError, train_of
 from turnout.chains.noted import number
-from turnout.chains.passage import PassageContext, passage_unit, sensors_of
+from turnout.chains.passage import PassageContext, passage_unit, sensors_of, trains_in
 from turnout.chains.passage_context import known_patterns
 from turnout.config.turnout import TurnoutConfig
 from turnout.errors import ReadError
@@ -19,6 +19,7 @@ from turnout.records import Unit
 HALF_BAY = 0.3  # m: an accelerometer "mid-span" sits this far from the sleeper struck
 OFF = 0.5  # m: a place in the layout further than this from the one in the track's file is somebody's mistake
 TOPS = 0.002  # share of samples at the range that leaves the band of the diagnosis as it is: tops of blows above it
+MOST_ALIKE = 16  # passages of one train kept of a visit: twice as many as a case has of all
 UNSOUND = ("clipped", "dead_channel", "not_finite", "sensor_lost", "channels_swapped")
 
 
@@ -53,11 +54,11 @@ def gather(units: Iterable[Unit], turnout: TurnoutConfig, raw_root, track, told:
     return found
 
 
-def _read(unit, description, raw_root, notes):
+def _read(unit, description, raw_root, notes, longest=None):
     """Recordings of a unit; what cannot be read goes to the notes."""
     for path, *_ in unit.files:
         try:
-            result = read(path, raw_root, description)
+            result = read(path, raw_root, description, longest)
         except ReadError as error:
             notes.append(str(error))
             continue
@@ -118,7 +119,7 @@ def _analysed(unit, turnout, raw_root) -> dict[str, list[dict]]:
 
 def _passages(unit, turnout, raw_root, track, tables, found):
     rows, bad = tables["passages"], tables["quarantine"]
-    recordings = list(_read(unit, turnout.passages.description, raw_root, found.notes))
+    recordings = _trains(unit, turnout, raw_root, found.notes)
     for k, recording in enumerate(recordings):
         row: dict[str, Any] = rows[k] if len(rows) == len(recordings) else {}
         name = unit_id(unit).split("/", 2)[-1] + (f":{k}" if len(recordings) > 1 else "")
@@ -145,6 +146,33 @@ def _passages(unit, turnout, raw_root, track, tables, found):
                 name, sound, train.vehicle, train.speed, train.name, train.direction, train.route, _noted(row, sound)
             )
         )
+        _thin_out(found.passages)
+
+
+def _trains(unit, turnout, raw_root, notes):
+    """The recordings of a unit, those of a logger that never stops cut into trains as the passage stage cuts them."""
+    settings, recordings = turnout.settings["passage"], []
+    for recording in _read(unit, turnout.passages.description, raw_root, notes, settings.longest):
+        try:
+            recordings += [part for part, *_ in trains_in(recording, settings)]
+        except ReadError as error:
+            notes.append(str(error))
+    return recordings
+
+
+def _thin_out(passages):
+    """Of more trains alike than anybody will ask for the one of middling speed goes: a month of them fills a memory."""
+    new = passages[-1]
+    alike = [p for p in passages if _kind(p) == _kind(new)]
+    if len(alike) > MOST_ALIKE:
+        alike.sort(key=lambda p: p.speed)
+        gone = alike[len(alike) // 2]
+        passages[:] = [p for p in passages if p is not gone]
+
+
+def _kind(passage):
+    channels = tuple(c.name for c in passage.recording.channels)
+    return passage.train, passage.route, passage.direction, len(passage.vehicle.wheels), channels
 
 
 def _channels_of(row):

@@ -72,7 +72,7 @@ def profiles_at(listening, motions) -> Profiles:
     step, amplitude, positions = listening.levels.step, listening.levels.amplitude, listening.positions
     ends = np.array([[m.way(t) for t in (listening.begin, listening.end)] for m in motions])
     middle = np.array([m.direction * np.mean(positions) for m in motions])
-    origin, length = ends[:, 0] - middle, ends[:, 1] - ends[:, 0]
+    origin, length = ends[:, 0] - middle, np.maximum(ends[:, 1] - ends[:, 0], 0.0)  # 0: it would have turned back
     n = int((length.max() + LEAD + TAIL) / STEP) + 1
     values = np.zeros((len(positions), len(motions), n))
     edges = np.arange(amplitude.shape[1] + 1) * step

@@ -12,8 +12,8 @@ import small_turnout as small
 from turnout.chains import mismatch
 from turnout.chains.accept import with_entry
 from turnout.chains.mismatch_context import digest_of_model, track_of
-from turnout.chains.mismatch_gather import Gathered, _channels_of
-from turnout.chains.mismatch_groups import groups
+from turnout.chains.mismatch_gather import MOST_ALIKE, Gathered, _channels_of, _thin_out
+from turnout.chains.mismatch_groups import groups, telling
 from turnout.chains.mismatch_results import Results, diagnose_turnout
 from turnout.chains.mismatch_trains import train_of
 from turnout.chains.mismatch_visits import unit_of
@@ -22,9 +22,11 @@ from turnout.config import load_configuration, with_raw
 from turnout.errors import SimulationError
 from turnout.fleet.batches import encode
 from turnout.fleet.scan import scan
-from turnout.mismatch.track import HammerTest, TrackCase
+from turnout.mismatch.track import HammerTest, Passage, TrackCase
 from turnout.mismatch.track.planned import measured_campaign, small_plan
 from turnout.mismatch.track.rolling import rolling_of
+from turnout.readers import read
+from turnout.readers.writing import write
 
 
 @pytest.fixture
@@ -184,3 +186,37 @@ def test_a_note_of_this_group_is_not_cut_off_by_those_of_others():
     notes = [f"passage {k}: load not known" for k in range(20)] + ["section C: elsewhere"]
     campaign = SimpleNamespace(passages=[SimpleNamespace(name="17")])
     assert _of_others({"notes": notes}, campaign)[:2] == ["passage 17: load not known", "section C: elsewhere"]
+
+
+def test_a_month_of_trains_keeps_the_extremes_of_speed_of_each():
+    """Those that a case would choose of all of them are chosen of what is kept."""
+    rng, passages, every = np.random.default_rng(1), [], []
+    for k in range(200):
+        vehicle, heard = SimpleNamespace(wheels=range(8)), SimpleNamespace(channels=())
+        name = ("ic3", "freight")[k % 2]
+        new = Passage(f"{k}", heard, vehicle, float(rng.uniform(20.0, 45.0)), name, "facing", "main", {})
+        every.append(new)
+        passages.append(new)
+        _thin_out(passages)
+    assert len(passages) == 2 * MOST_ALIKE
+    assert {p.name for p in telling(passages)} == {p.name for p in telling(every)}
+
+
+def test_a_logger_that_never_stops_gives_its_trains(folder):
+    """Two trains in one file, 70 s of nothing between and about them: both are used, each as its own."""
+    small.roll(folder, speeds=(80.0, 110.0), vehicle="locomotive")
+    files = sorted((folder / "raw/t1/passages").iterdir())
+    turnout = turnout_in(folder)
+    parts = [read(f"t1/passages/{f.name}", folder / "raw", turnout.passages.description).recordings[0] for f in files]
+    rng, rate = np.random.default_rng(0), parts[0].rate
+
+    def nothing(seconds):
+        return 0.02 * rng.standard_normal((len(parts[0].channels), round(seconds * rate)))
+
+    samples = np.concatenate([nothing(70), parts[0].samples, nothing(70), parts[1].samples, nothing(70)], axis=1)
+    for file in files[1:]:
+        file.unlink()
+    noted = {k: v for k, v in parts[0].conditions.items() if k == "train_type"}
+    write([replace(parts[0], samples=samples, conditions=noted)], files[0], "hdf5", single=True)
+    (row,) = diagnose_turnout("t1")["mismatch_findings"]
+    assert row["n_passages"] == 2, row["notes"]

@@ -1,11 +1,13 @@
 """Combs with a free tooth: what they explain, which row of vehicles they find, and what they refuse to name."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from benchmarks.passage_truth import IC3, PATTERNS, RATE, passing, recording_of, rolling, sensors_for
 
 from turnout.passage.analyse import analyse
-from turnout.passage.comb import STEP, Comb, Profiles, evidence, explained, teeth_of
+from turnout.passage.comb import STEP, Comb, Profiles, evidence, explained, profiles_at, teeth_of
 from turnout.passage.comb_row import likeliest_row
 from turnout.passage.comb_shape import reshaped
 from turnout.passage.listen import listen
@@ -30,6 +32,15 @@ def laid(places, noise=0.0, n=900, seed=0):
     spectra = np.fft.rfft(row[None, None], 1024, axis=2)
     length = np.array([STEP * n - 36.0])
     return Profiles((Motion(1.0),), row[None, None], spectra, np.array([np.sum(row**2)]), length, np.zeros(1))
+
+
+def test_a_motion_that_would_turn_back_within_the_recording_hears_nothing():
+    """A long quiet recording, and a train that brakes so hard that it would roll back: no metres, and no fault."""
+    levels = SimpleNamespace(step=0.01, amplitude=np.abs(np.random.default_rng(0).normal(size=(1, 12_000))))
+    listening = SimpleNamespace(levels=levels, positions=[3.0], begin=0.0, end=120.0)
+    found = profiles_at(listening, [Motion(5.0, 10.0, -0.5), Motion(5.0, 10.0)])
+    assert found.length[0] == 0.0 and found.length[1] == pytest.approx(600.0)
+    assert np.isfinite(found.values).all()
 
 
 def test_the_true_comb_explains_all_and_gives_its_tooth_back():
