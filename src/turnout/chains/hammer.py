@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from turnout.chains.hammer_rows import impact_mode_row, impact_row, mode_row, model_row, receptance_row
-from turnout.chains.noted import number
+from turnout.chains.noted import rail_temperature
 from turnout.chains.raw_rows import read_or_quarantine, recording_row
 from turnout.config.pattern import compiled
 from turnout.config.turnout import TurnoutConfig
@@ -62,7 +62,7 @@ def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root, algo: str = "") ->
     rows["impacts"] = [impact_row(i, base, tests[i.source], ids[i.source]) for i in impacts]
     temperature = campaign.rail_temperature
     if temperature is None:
-        temperature = _noted_temperature(recordings)
+        temperature = rail_temperature(recordings)
     inputs = sorted(r["recording_id"] for r in rows["recordings"])
     identity = {
         "model_id": content_id("model", *inputs, base["section_id"], unit.config_hash, algo),
@@ -94,13 +94,6 @@ def _modal_rows(impacts, names, turnout, base, identity, temperature):
         "impact_modes": [impact_mode_row(e, base, identity, used[e["impact"]][1]) for e in model.per_impact],
         "receptances": [receptance_row(receptance, model, decays[0], base, identity)],
     }
-
-
-def _noted_temperature(recordings):
-    """Median of the rail temperatures noted in the files, None without any."""
-    told = (number(r.conditions, "rail_temperature") for r in recordings)
-    noted = [t for t in told if t is not None]
-    return float(np.median(noted)) if noted else None
 
 
 def _test_number(turnout, unit, path):

@@ -12,6 +12,7 @@ from turnout.errors import SimulationError, TurnoutError
 from turnout.fleet.batches import read_results
 from turnout.fleet.state import batch_paths
 from turnout.simulate import load_track
+from turnout.simulate.parameters import extended
 
 
 def track_file(turnout: TurnoutConfig, name: str | None = None) -> Path:
@@ -49,17 +50,17 @@ def digest_of_model(turnout: TurnoutConfig, name: str | None = None) -> str:
 
 
 def _extended(path: Path) -> list[Path]:
-    """A track's file and those that it extends, one after the other."""
+    """A track's file and those that it extends, one after the other, as far as they can be read: the diagnosis says
+    what is wrong with the rest."""
     found = [path]
-    while found[-1].is_file():
-        try:
-            said = read_parameters(found[-1])
-        except TurnoutError:  # the diagnosis says what is wrong with it
-            break
-        base = path.parent / f"{said['extends']}.yaml" if "extends" in said else path
-        if base in found:
-            break
-        found.append(base)
+    try:
+        while "extends" in (own := read_parameters(found[-1])):
+            base = extended(own, found[-1], path.parent)
+            if base in found:
+                break
+            found.append(base)
+    except (TurnoutError, OSError):
+        pass
     return found
 
 

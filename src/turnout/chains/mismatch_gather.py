@@ -6,13 +6,14 @@ from pathlib import Path
 from typing import Any
 
 from turnout.chains.mismatch_trains import TrainUnknownError, train_of
-from turnout.chains.noted import number
+from turnout.chains.noted import number, rail_temperature
 from turnout.chains.passage import PassageContext, passage_unit, sensors_of, trains_in
 from turnout.chains.passage_context import known_patterns
 from turnout.config.turnout import TurnoutConfig
 from turnout.errors import ReadError
 from turnout.fleet.scan import unit_id
 from turnout.mismatch.track import HammerTest, Passage
+from turnout.passage.other_train import ANOTHER
 from turnout.readers import read
 from turnout.records import Unit
 
@@ -75,9 +76,8 @@ def _test(unit, turnout, raw_root, track, found):
         found.notes.append(wrong)
         return
     campaign = turnout.campaigns[unit.campaign]
-    warm = [campaign.rail_temperature, *(number(r.conditions, "rail_temperature") for r in recordings)]
-    known = [t for t in warm if t is not None]
-    noted = {"rail_temperature": known[0]} if known else {}
+    warm = rail_temperature(recordings) if campaign.rail_temperature is None else campaign.rail_temperature
+    noted = {} if warm is None else {"rail_temperature": warm}
     name = f"{unit.section} {unit.campaign}"
     force = turnout.hammer.force[unit.section]
     seated = tuple(_seated(r, place) for r in recordings)
@@ -125,7 +125,7 @@ def _passages(unit, turnout, raw_root, track, tables, found):
         name = unit_id(unit).split("/", 2)[-1] + (f":{k}" if len(recordings) > 1 else "")
         unsound = {name for q in bad if _spoils(q) for name in _channels_of(q)}
         unsound |= _misplaced_sensors(turnout, track, found.notes)
-        if row.get("reason") == "two_trains":
+        if ANOTHER in (row.get("detail") or ""):
             found.notes.append(f"passage {name}: two trains at the same time, not used")
             continue
         try:

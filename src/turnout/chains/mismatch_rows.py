@@ -77,11 +77,11 @@ def _numbers(found, case, group, about) -> dict:
         "level_after": float(max(fit.level.values())),
         "term_json": json.dumps(terms, sort_keys=True) if terms else None,
         "evidence_json": json.dumps(_evidence(found), sort_keys=True),
-        "notes": "\n".join(dict.fromkeys([*case.notes, *_of_others(about, campaign)][:NOTES_KEPT])) or None,
+        "notes": "\n".join([*dict.fromkeys([*case.notes, *_of_visit(about, campaign)])][:NOTES_KEPT]) or None,
     }
 
 
-def _of_others(about, campaign):
+def _of_visit(about, campaign):
     """Notes of the visit, those on passages that this group has before those that say nothing of it."""
     mine = tuple(f"passage {p.name}: " for p in campaign.passages)
     return sorted(about["notes"], key=lambda note: not note.startswith(mine) if note.startswith("passage ") else False)

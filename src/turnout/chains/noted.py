@@ -1,7 +1,8 @@
 """Numbers that recordings carry as notes, as people write them."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from math import isfinite
+from statistics import median
 
 
 def number(said: Mapping, name: str) -> float | None:
@@ -15,3 +16,9 @@ def number(said: Mapping, name: str) -> float | None:
     except (KeyError, ValueError):
         return None
     return value if isfinite(value) else None
+
+
+def rail_temperature(recordings: Iterable) -> float | None:
+    """Median of the rail temperatures that recordings note [°C], None without any."""
+    told = [t for r in recordings if (t := number(r.conditions, "rail_temperature")) is not None]
+    return median(told) if told else None

@@ -10,6 +10,7 @@ from turnout.passage.motion import Motion
 from turnout.passage.slowness import scan_slowness
 from turnout.records import Rejection
 
+ANOTHER = "another train at about"  # of a finding, in words
 LIKE = 0.25  # least correlation of what is left, among the sensors
 SHARE = 0.1  # of the first train's level that half of the sensors must hear of the second, laid along its own motion
 
@@ -40,7 +41,7 @@ def second_train(heard, passage, settings):
         return []
     speed = 3.6 / scan.slowness[best]
     way = "facing" if speed > 0 else "trailing"
-    return [Rejection("two_trains", strength, LIKE, f"another train at about {abs(speed):.0f} km/h, {way}")]
+    return [Rejection("two_trains", strength, LIKE, f"{ANOTHER} {abs(speed):.0f} km/h, {way}")]
 
 
 def _smooth(heard):

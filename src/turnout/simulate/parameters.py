@@ -25,11 +25,15 @@ def _track_parameters(path, folder, below=()):
         return own
     if path in below:
         raise SimulationError(f"{path}: extends itself by way of {', '.join(p.name for p in below)}.")
-    beside = path.parent / f"{own['extends']}.yaml"
-    beside = beside if beside.is_file() else _file(own["extends"], folder, "tracks")
-    base = _track_parameters(beside, folder, (*below, path))
+    base = _track_parameters(extended(own, path, folder), folder, (*below, path))
     changed = {key: value for key, value in own.content.items() if key != "extends"}
     return ParameterSet({**base.content, **changed}, path, "")
+
+
+def extended(own, path, folder=None):
+    """File of the track that the parameters ``own`` of the file ``path`` extend: beside it, else in ``folder``."""
+    beside = path.parent / f"{own['extends']}.yaml"
+    return beside if beside.is_file() else _file(own["extends"], folder, "tracks")
 
 
 def load_vehicle(name, load=0.5, folder=None, units=1):

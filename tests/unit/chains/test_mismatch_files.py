@@ -9,15 +9,16 @@ import numpy as np
 import pytest
 import small_turnout as small
 
-from turnout.chains import mismatch
+from turnout.chains import mismatch, mismatch_gather
 from turnout.chains.accept import with_entry
+from turnout.chains.accepted_terms import Accepted
 from turnout.chains.mismatch_context import digest_of_model, track_of
 from turnout.chains.mismatch_gather import MOST_ALIKE, Gathered, _channels_of, _thin_out
 from turnout.chains.mismatch_groups import groups, telling
 from turnout.chains.mismatch_results import Results, diagnose_turnout
 from turnout.chains.mismatch_trains import train_of
 from turnout.chains.mismatch_visits import unit_of
-from turnout.chains.noted import number
+from turnout.chains.noted import number, rail_temperature
 from turnout.config import load_configuration, with_raw
 from turnout.errors import SimulationError
 from turnout.fleet.batches import encode
@@ -94,6 +95,35 @@ def test_other_notes_are_another_finding(folder):
     assert found[0] != found[1] == diagnose_turnout("t1")["mismatch_findings"][0]["finding_id"]
 
 
+def test_another_content_of_the_same_size_is_another_finding(folder):
+    """A file put right and copied over the old one: name, size and notes are the same."""
+    (file, _) = sorted((folder / "raw/t1/hammer").rglob("*.h5"))
+    first, size = diagnose_turnout("t1")["mismatch_findings"][0]["finding_id"], file.stat().st_size
+    small.strike(folder, seed=7)
+    assert file.stat().st_size == size
+    assert diagnose_turnout("t1")["mismatch_findings"][0]["finding_id"] != first
+
+
+@pytest.mark.parametrize(("detail", "used"), [("", 1), ("A: clipped; another train at about 80 km/h, facing", 0)])
+def test_of_two_trains_at_once_neither_is_simulated(folder, monkeypatch, detail, used):
+    """Also where another finding comes first."""
+    plain = mismatch_gather.passage_unit
+
+    def found(*arguments, **more):
+        tables = plain(*arguments, **more)
+        tables["passages"][0] |= {"detail": detail, "reason": "clipped" if detail else None}
+        return tables
+
+    monkeypatch.setattr(mismatch_gather, "passage_unit", found)
+    small.roll(folder, speeds=(100.0,))
+    assert diagnose_turnout("t1")["mismatch_findings"][0]["n_passages"] == used
+
+
+def test_the_temperature_in_the_files_is_their_median():
+    recordings = [SimpleNamespace(conditions={"rail_temperature": t}) for t in ("11,5", "?", 14.0, 30)]
+    assert rail_temperature(recordings) == 14.0 and rail_temperature(recordings[1:2]) is None
+
+
 def test_a_track_that_is_extended_counts(folder):
     tracks = folder / "config/tracks"
     (tracks / "ground.yaml").write_text((tracks / "small.yaml").read_text())
@@ -133,6 +163,9 @@ def test_corrugation_further_on_is_another_entry():
     both = with_entry(text, "  - term: rail_corrugation\n    start: 30\n    end: 34\n")
     assert both.count("rail_corrugation") == 2
     assert with_entry(both, "  - term: rail_corrugation\n    start: 30\n    end: 34\n").count("rail_corrugation") == 2
+    accepted = Accepted("rail_corrugation", {"start": 10.0, "end": 14.0}, {"sine": (1e-5, 1e-6)})
+    assert accepted.is_of("rail_corrugation", {"place": 12.0, "wavelength": 0.3})
+    assert not accepted.is_of("rail_corrugation", {"place": 32.0, "wavelength": 0.3})
 
 
 WARM = {None: (25.0, None), "as warm": (25.0, 27.0), "warmer": (10.0, 25.0)}
@@ -158,6 +191,16 @@ def test_slow_loggers_are_read_true(rate):
     assert np.linalg.norm(found - exact) < 0.01 * np.linalg.norm(exact)
 
 
+def test_a_train_outside_its_recording_is_noted_and_the_blows_are_used(monkeypatch):
+    def nowhere(*_):
+        raise SimulationError("the train lies outside the recording")
+
+    monkeypatch.setattr("turnout.mismatch.track.rolling.rolling_of", nowhere)
+    case = TrackCase(measured_campaign(small_plan((15.0,), (40.0,), blows=(24.0,)), (), 5), families=())
+    assert not case.rollings and case.observations
+    assert any("outside the recording" in note for note in case.notes)
+
+
 def test_loggers_too_slow_for_the_band_are_refused():
     with pytest.raises(SimulationError, match="200 samples per second are too few for 107 Hz"):
         _tones_at(200.0)
@@ -181,11 +224,11 @@ def _tones_at(rate):
 
 
 def test_a_note_of_this_group_is_not_cut_off_by_those_of_others():
-    from turnout.chains.mismatch_rows import _of_others
+    from turnout.chains.mismatch_rows import _of_visit
 
     notes = [f"passage {k}: load not known" for k in range(20)] + ["section C: elsewhere"]
     campaign = SimpleNamespace(passages=[SimpleNamespace(name="17")])
-    assert _of_others({"notes": notes}, campaign)[:2] == ["passage 17: load not known", "section C: elsewhere"]
+    assert _of_visit({"notes": notes}, campaign)[:2] == ["passage 17: load not known", "section C: elsewhere"]
 
 
 def test_a_month_of_trains_keeps_the_extremes_of_speed_of_each():

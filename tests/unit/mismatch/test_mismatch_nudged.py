@@ -1,5 +1,6 @@
 """Derivatives of receptances by parameters of terms, without solving the track again."""
 
+from copy import copy
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -113,3 +114,16 @@ def _heard(case, fit, observation, old, chosen):
     """Candidates on the channel of an observation, and the columns that they are given."""
     found = _pair_channels(case, fit, observation, old, chosen)
     return [c for c, k in chosen if (c.key, k) in found], found.values()
+
+
+def test_a_sensor_moved_from_the_rail_to_a_sleeper_is_another_seat(somewhere):
+    """The same channel at the same place, mounted otherwise in the second test: each pair is predicted as if alone."""
+    case, values = somewhere
+    (first, second), found = [o for o in case.observations if ":S1" in o.name][:2], copy(case)
+    sleeper = replace(case.pairs[second.name].sensor, mounting="sleeper")
+    found.pairs = {**case.pairs, second.name: replace(case.pairs[second.name], sensor=sleeper)}
+    found._forget()
+    (alone,), (beside,) = case.predict(values, (), [first]), found.predict(values, (), [first])
+    assert np.allclose(alone, beside, rtol=1e-9)
+    (there,), (moved,) = case.predict(values, (), [second]), found.predict(values, (), [second])
+    assert np.linalg.norm(moved - there) > 0.1 * np.linalg.norm(there)

@@ -23,7 +23,8 @@ COUPLING = 0.7  # an amplifier's lower corner that no data sheet mentions [Hz]
 EDGE = 0.08  # s kept before the first and behind the last wheel
 # The rail's deflection under the axles: with a dip of 1.5 mm the right train is 0.8 alike, a wrong one at most 0.5
 ALIGNED, ALIKE = 30.0, 0.65  # [Hz], -
-FINE, SLOWEST = 2500.0, 3.0  # samples per second between which a cubic reads true; least number of them in a period
+FINE = 2500.0  # samples per second between which a cubic reads 112 Hz to 0.03 %
+SLOWEST = 3.0  # samples in the shortest period of the band, whose edge ends at 1.25 times that: Nyquist asks for 2.5
 SPEED_SD, TIME_SD, LOAD_SD = 0.004, 1.5e-3, 0.05
 
 

@@ -26,7 +26,7 @@ from turnout.mismatch.track.rough_rail import Waves
 from turnout.mismatch.track.rough_wheels import heavier
 
 GAIN_SD = 0.02
-WARMTH, SPAN = "pad_temperature", 4.0  # K: pads lose a per cent or so per kelvin, one seat differs by that
+WARMTH, SPAN = "pad_temperature", 4.0  # K, chosen: at 1 % per kelvin two per cent of frequency
 FOLLOWED = 0.15  # ln of unsprung mass: what roughness does near P2 then changes by a fifth of its amplitude
 
 
