@@ -15,6 +15,8 @@ from turnout.simulate import load_track
 
 # Units in which a small number reads better: SI unit -> (unit, its size)
 SMALLER = {"m": ("mm", 1e-3), "s": ("ms", 1e-3)}
+PLACES = ("place", "start", "end")
+PLACED = {*SUPPORTS, *PLACES}
 HEAD = """# What recordings of this turnout showed to be missing from the track of its layout. Written by
 # `turnout diagnose --accept`; take an entry out again when the cause is repaired.
 extends: {layout}
@@ -42,8 +44,9 @@ def accept(finding, config, turnout_id, track=None, anyway=False) -> tuple[Path,
         text, path = HEAD.format(layout=path.stem), path.with_name(f"{turnout_id}.yaml")
     else:
         text = path.read_text(encoding="utf-8")
+    known = load_track(str(track_file(turnout, track)), folder=path.parent)
     for term in terms:
-        text = with_entry(text, entry_text(term, finding))
+        text = with_entry(text, entry_text(term, finding, known))
     _write(path, text)
     return path, "; ".join(f"{t['term']} ({_values(t)})" for t in terms) + " accepted"
 
@@ -86,11 +89,15 @@ def _write(path, text):
     write_text(path, text)
 
 
-def entry_text(term, finding) -> str:
-    """The YAML of one entry of ``terms``, numbers on one line each as in the rest of the file."""
+def entry_text(term, finding, track) -> str:
+    """The YAML of one entry of ``terms``, numbers on one line each as in the rest of the file; with its route where
+    those of ``track``, a TurnoutTrack, have supports of their own."""
     day = f"{_time(finding['found_at_utc']):%Y-%m-%d}"
     source = f"turnout diagnose, recordings up to {day}, finding {finding['finding_id'][:12]}"
     lines = [f"  - term: {term['term']}"]
+    places = [value for name, value in term["fixed"].items() if name in PLACED and isinstance(value, (int, float))]
+    if any(track.parts_at(place) for place in places):
+        lines.append(f"    route: {finding['route']}")
     for name, value in term["fixed"].items():
         lines.append(f"    {name}: {_fixed(name, value, source)}")
     for name, p in term["parameters"].items():
@@ -105,7 +112,7 @@ def _time(value) -> datetime:
 
 
 def _fixed(name, value, source):
-    if name in SUPPORTS or (name in ("place", "start", "end") and isinstance(value, (int, float))):
+    if name in PLACED and isinstance(value, (int, float)):
         return f'{{value: {value:g}, unit: m, source: "{source}"}}'
     return json.dumps(value, ensure_ascii=False)
 
@@ -139,14 +146,19 @@ def with_entry(text: str, entry: str) -> str:
         return text + "terms:\n" + entry
     starts = [m.start() for m in ENTRY.finditer(found[1])] + [len(found[1])]
     head, old = found[1][: starts[0]], [found[1][a:b] for a, b in pairwise(starts)]
-    kept = [e for e in old if _identity(e) != _identity(entry)]
+    kept = [e for e in old if not _same(_identity(e), _identity(entry))]
     block = head + "".join(e if e.endswith("\n") else e + "\n" for e in kept) + entry
     return text[: found.start(1)] + block + text[found.end(1) :]
 
 
+def _same(one, other) -> bool:
+    """Whether two identities are one effect; one without a route is on all of them."""
+    return one[1:] == other[1:] and (one[0] == other[0] or not (one[0] and other[0]))
+
+
 def _identity(entry: str) -> tuple[str, ...]:
-    """What an entry is about: effect and place, sensor or train."""
-    names = ("term", *SUPPORTS, "place", "start", "end", "channel_name", "train")
+    """What an entry is about: route, effect and place, sensor or train."""
+    names = ("route", "term", *SUPPORTS, *PLACES, "channel_name", "train")
     found = []
     for name in names:
         match = re.search(rf"^[ -]*{name}: *(?:{{ *value: *([^,}}]+)|([^\n#]+))", entry, re.MULTILINE)

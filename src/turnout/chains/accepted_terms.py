@@ -15,18 +15,21 @@ SUPPORTS = ("sleeper", "support", "first", "last")
 # Effects that belong to a wheelset: it leaves with its train, the track's file is no place for it.
 OF_A_WHEELSET = ("wheel_flat", "out_of_round")
 KINDS: dict[str, Any] = {term.name: term for term in physics.TERMS}
-NOT_FIELDS = ("term", "accepted", "finding")
+NOT_FIELDS = ("term", "accepted", "finding", "route")
+ROUTES = ("main", "diverging")
 NEAR = 0.35  # two places closer than this [m] are one support
 
 
 @dataclass(frozen=True)
 class Accepted:
     """One entry of ``terms``: ``family`` of the effect, ``fixed`` fields (places of supports in m), ``values``
-    parameter -> (value, standard error or None) in the parameter's own unit."""
+    parameter -> (value, standard error or None) in the parameter's own unit, ``route`` whose track has it, "" for
+    all."""
 
     family: str
     fixed: Mapping[str, Any]
     values: Mapping[str, tuple[float, float | None]]
+    route: str = ""
 
     @property
     def parameters(self):
@@ -46,6 +49,10 @@ class Accepted:
         parts = [place, *(str(self.fixed[k]) for k in ("channel_name", "train") if self.fixed.get(k))]
         where = ",".join(p for p in parts if p)
         return f"{self.family}[{where}]" if where else self.family
+
+    def is_on(self, route) -> bool:
+        """Whether the track under ``route`` has it."""
+        return self.route in ("", route)
 
     def is_of(self, family, where) -> bool:
         """Whether it is the effect ``family`` at the place, sensor or train in ``where``."""
@@ -95,15 +102,19 @@ def _accepted(entry) -> Accepted:
             values[name] = value, found.prior * abs(value) if found.prior is not None else None
         else:
             fixed[name] = found.value if isinstance(found, Number) else found
+    route = str(entry["route"]) if "route" in entry else ""
+    if route not in ("", *ROUTES):
+        raise SimulationError(f"{where}: no route {route!r}; there are {', '.join(ROUTES)}.")
     missing = names - set(fixed) - set(values) - {f.name for f in fields(KINDS[family]) if f.default is not MISSING}
     if missing:
         raise SimulationError(f"{where}: {family} needs {', '.join(sorted(missing))}.")
-    return Accepted(family, fixed, values)
+    return Accepted(family, fixed, values, route)
 
 
-def terms_on(turnout, track, conditions: Mapping | None = None) -> tuple:
-    """Accepted terms of a ``TurnoutTrack`` on one of its tracks, or a stretch of it, under a recording's conditions."""
-    made = (entry.term(track) for entry in accepted_of(turnout.terms))
+def terms_on(turnout, track, conditions: Mapping | None = None, route: str = "main") -> tuple:
+    """Accepted terms of a ``TurnoutTrack`` on its track under ``route``, or a stretch of it, under a recording's
+    conditions."""
+    made = (entry.term(track) for entry in accepted_of(turnout.terms) if entry.is_on(route))
     return tuple(term.under(conditions or {}) for term in made if term is not None)
 
 

@@ -97,6 +97,7 @@ def _one(group: Group, turnout, accepted, about, options, number) -> dict[str, l
     tell = options.progress(group, *number) if options.progress else None
     try:
         track_case = TrackCase(group.campaign, turnout.settings["mismatch"])
+        accepted = tuple(a for a in accepted if a.is_on(group.route))
         case = GuidedCase(track_case, accepted, options.watch, replay if options.watch.deadline is not None else None)
         rows = finding_tables(diagnose(case, turnout.settings["mismatch"], tell, store), case, group, about)
     except (SimulationError, np.linalg.LinAlgError) as error:

@@ -31,6 +31,7 @@ def write_hammer(request):
     track = _track(request, turnout)
     section = _place(request["section"])
     place, base = located(track, section)
+    _, route = track.locations.get(section, (place, "main"))
     description = None
     if turnout is not None:
         description = turnout.hammer.descriptions[str(section)]
@@ -43,7 +44,7 @@ def write_hammer(request):
             hammer,
             sensors,
             request["blows"],
-            terms_on(track, stretch_of_track(base, place, settings.hammer_half_length), _noted(request)),
+            terms_on(track, stretch_of_track(base, place, settings.hammer_half_length), _noted(request), route),
             seed=1000 * request["seed"] + test,
             rate=rate,
             substeps=settings.substeps,
@@ -76,7 +77,7 @@ def write_passage(request):
         sensors,
         request["direction"],
         request["route"],
-        terms=terms_on(track, track.track_of(request["route"]), _said(vehicle, request)),
+        terms=terms_on(track, track.track_of(request["route"]), _said(vehicle, request), request["route"]),
         seed=request["seed"],
         rate=rate,
         substeps=settings.substeps,

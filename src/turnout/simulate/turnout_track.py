@@ -38,6 +38,10 @@ class TurnoutTrack:
         """The track under ``route``."""
         return self.tracks.get(route, self.track)
 
+    def parts_at(self, place):
+        """Whether the routes have supports of their own at ``place`` [m], as behind a crossing."""
+        return len({track.section[track.nearest_support(place)] for track in self.tracks.values()}) > 1
+
     def surfaces(self, route):
         """Surfaces of ``route``; an unknown one is a SimulationError."""
         if route not in self.routes:

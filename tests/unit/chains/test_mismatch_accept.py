@@ -10,10 +10,12 @@ import pytest
 import small_turnout as small
 
 from turnout import physics
+from turnout.chains import mismatch
 from turnout.chains.accept import accept
-from turnout.chains.accepted_terms import OF_A_WHEELSET, accepted_of, described, terms_on
+from turnout.chains.accepted_terms import OF_A_WHEELSET, Accepted, accepted_of, described, terms_on
 from turnout.chains.guided_case import GuidedCase
 from turnout.chains.mismatch_context import digest_of_model
+from turnout.chains.mismatch_groups import Group
 from turnout.errors import SimulationError
 from turnout.mismatch.track import TrackCase
 from turnout.mismatch.track.planned import measured_campaign, small_plan
@@ -84,6 +86,49 @@ def test_the_same_effect_at_the_same_place_is_replaced_another_is_added(config):
     ]  # fmt: skip
 
 
+def test_behind_the_crossing_an_effect_is_on_the_track_of_its_route_alone(config, repository):
+    shutil.copy(repository / "config/tracks/tommerup.yaml", config / "tracks/t1.yaml")
+    at = {"main": 0.5e-3, "diverging": 1.5e-3}
+    for route, gap in (*at.items(), *at.items()):
+        term = HANGS | {"fixed": {"sleeper": 28.2}, "parameters": {"gap": GAP | {"value": gap}}}
+        accept(finding(term, route=route), config, "t1")
+    accept(finding(HANGS | {"fixed": {"sleeper": 13.8}}, route="main"), config, "t1")
+    track = own(config)
+    for route, gap in at.items():
+        terms = terms_on(track, track.track_of(route), route=route)
+        assert [t.gap for t in terms] == pytest.approx([gap, 1.12e-3])  # the closure's bearers carry both
+    (entry,) = [a for a in accepted_of(track.terms) if a.place == 13.8]
+    assert entry.is_on("main") and entry.is_on("diverging")
+
+
+def test_an_entry_without_a_route_is_replaced_by_the_same_effect_on_one(config, repository):
+    path = config / "tracks/t1.yaml"
+    shutil.copy(repository / "config/tracks/tommerup.yaml", path)
+    term = HANGS | {"fixed": {"sleeper": 28.2}}
+    accept(finding(term, route="main"), config, "t1")
+    path.write_text(path.read_text().replace("    route: main\n    sleeper", "    sleeper"))
+    assert [a.route for a in accepted_of(own(config).terms)] == [""]
+    accept(finding(term, route="main"), config, "t1")
+    assert [a.route for a in accepted_of(own(config).terms)] == ["main"]
+
+
+def test_what_was_accepted_on_the_other_route_is_no_part_of_a_diagnosis(monkeypatch, tmp_path):
+    given = []
+
+    def guided(case, accepted, *others):
+        given.extend(a.route for a in accepted)
+        raise SimulationError("that is all")
+
+    monkeypatch.setattr(mismatch, "TrackCase", lambda *given: None)
+    monkeypatch.setattr(mismatch, "GuidedCase", guided)
+    turnout = SimpleNamespace(id="t1", raw="raw", settings={"mismatch": None})
+    standing = [Accepted("local_pad", {"sleeper": 18.0}, {}, route) for route in ("main", "", "diverging")]
+    about = {"visit": "2026-07-25", "identity": "one", "notes": []}
+    options = mismatch.Options(fits=tmp_path)
+    rows = mismatch._one(Group(("B",), "diverging", None), turnout, standing, about, options, (0, 1))
+    assert given == ["", "diverging"] and "that is all" in rows["quarantine"][0]["found"]
+
+
 @pytest.mark.parametrize("more", [{"verdict": "unknown", "grade": None}, {"verdict": "a_or_b"}, {"grade": None}])
 def test_what_is_not_named_is_refused_unless_asked_for(config, more):
     with pytest.raises(SimulationError, match="--anyway"):
@@ -116,6 +161,7 @@ def test_an_entry_by_hand_that_makes_no_sense_is_named(config):
     for changed, said in (
         (text.replace("term: hanging_sleeper", "term: hanging"), "no effect"),
         (text.replace("    gap:", "    depth:"), "has no 'depth'"),
+        (text.replace("    gap:", "    route: siding\n    gap:"), "no route 'siding'"),
         (without, "needs gap"),
     ):
         path.write_text(changed)
