@@ -124,8 +124,8 @@ class Candidate:
     size, so that a start promises what it is and says nothing of a larger or smaller one.
     ``loose`` is the share by which the size of an effect errs since its law is not quite the one out there; an
     ``exact`` one is what it says (a gain, a lag, a place): nothing that it leaves is due to its shape. ``told_by`` is a
-    kind of observations that must speak for it, too: to all others it is another law; ``unopposed`` one that must not
-    speak against it.
+    kind of observations that must speak for it, too: to all others it is another law; ``unopposed`` names observations
+    that together must not speak against it.
     """
 
     family: str
@@ -148,7 +148,7 @@ class Candidate:
     loose: float = 0.0
     exact: bool = False
     told_by: str = ""
-    unopposed: str = ""
+    unopposed: tuple[str, ...] = ()
     kin: str = ""
     limit: str = ""
     plain: tuple = ()

@@ -46,15 +46,15 @@ def _shown(case, fit, refit, candidate, settings):
     """Whether the observations that must speak for a candidate, if any, fit better with it by a margin, and those that
     must not speak against it no worse."""
 
-    def gained(kind):
+    def gained(heard):
         return 0.5 * sum(
             o.effective * float(np.sum(np.square(a)) - np.sum(np.square(b))) / fit.scale[o.kind]
             for o, a, b in zip(case.observations, fit.white, refit.white)
-            if o.kind == kind
+            if heard(o)
         )
 
-    told = not candidate.told_by or gained(candidate.told_by) > settings.margin
-    return told and (not candidate.unopposed or gained(candidate.unopposed) > 0.0)
+    told = not candidate.told_by or gained(lambda o: o.kind == candidate.told_by) > settings.margin
+    return told and (not candidate.unopposed or gained(lambda o: o.name in candidate.unopposed) > 0.0)
 
 
 def _usual(case, refit, candidate):

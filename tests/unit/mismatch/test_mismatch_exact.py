@@ -49,8 +49,8 @@ def test_a_gain_is_sought_beside_a_lag_of_the_same_channel_and_a_mounting_is_not
 
 
 def with_whites(case, base, candidate, size, share):
-    """Fit 90 nats better, with a candidate of this size and the residuals times the ``share`` of their kind."""
-    white = [share[o.kind] * np.asarray(w) for o, w in zip(case.observations, base.white)]
+    """Fit 90 nats better, with a candidate of this size and the residuals times the ``share`` of their name or kind."""
+    white = [share.get(o.name, share[o.kind]) * np.asarray(w) for o, w in zip(case.observations, base.white)]
     found = replace(base, candidates=(candidate,), psi=np.array([size]), white=white, evidence=base.evidence + 90.0)
     return replace(found, covariance=np.eye(len(base.values) + 1))
 
@@ -77,4 +77,16 @@ def test_a_gain_that_blows_speak_against_is_none(rolled_and_struck, blows, mater
     case, base = rolled_and_struck
     gain = next(c for c in case.candidates if c.family == "sensor_gain")
     better = with_whites(case, base, gain, 1.25, {"hammer": blows, "passage": 0.5})
+    assert bool(score_of(case, base, better, gain, MismatchSettings()).material) == material
+
+
+@pytest.mark.parametrize(("own", "material"), [(1.02, False), (0.98, True)])
+def test_blows_that_other_sensors_read_do_not_speak_on_a_gain(rolled_and_struck, own, material):
+    case, base = rolled_and_struck
+    gain = next(c for c in case.candidates if c.family == "sensor_gain" and c.unopposed)
+    (heard,) = gain.unopposed
+    others = {o.name for o in case.observations if o.kind == "hammer"} - {heard}
+    assert others and case.pairs[heard].channel == gain.where["sensor"]
+    share = dict.fromkeys(others, 3.0 - 2.0 * own) | {heard: own, "hammer": 1.0, "passage": 0.5}
+    better = with_whites(case, base, gain, 1.25, share)
     assert bool(score_of(case, base, better, gain, MismatchSettings()).material) == material

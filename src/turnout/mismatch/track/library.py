@@ -93,7 +93,7 @@ def _sensors(case):
         name = sensor.name
         where = {"sensor": name}
 
-        struck = "hammer" if any(pair.channel == name for pair in case.pairs.values()) else ""  # it read blows as well
+        struck = tuple(pair.name for pair in case.pairs.values() if pair.channel == name)  # blows that it read as well
 
         def per(term, starts, name=name, where=where, **more):
             return _candidate(term, lambda p: term(name, **p), starts, where, n, **more)
