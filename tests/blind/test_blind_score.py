@@ -1,6 +1,7 @@
 """The scorer against tools whose scores are known without it: perfect, silent, random, confidently wrong."""
 
 import json
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from turnout_blind.score.figures import confusion, figures, reliability
 from turnout_blind.score.intervals import clopper_pearson
 from turnout_blind.score.judged import gain_of, judge
 from turnout_blind.score.names import LOCKS, RIGHT, SAME, right_names
+from turnout_blind.score.report import failure_table
 
 SINGLES = ("void", "dip", "flat", "gain", "pad_temperature")
 WHERE = {
@@ -213,3 +215,17 @@ def test_a_second_term_among_the_parameters_is_an_answer_of_its_own():
     assert judged.hits == ("named", "named")
     assert judged.wrong == ()
     assert judged.parameters == ((0.0, True), (pytest.approx(0.01 / 1.3), True))
+
+
+def test_failures_are_alarms_wrong_names_and_what_was_missed_each_in_a_row():
+    def rows(tool):
+        judged, _ = table(tool)
+        return [line.split(" | ")[0].strip("| ")[0] for line in failure_table(judged).splitlines()[2:]]
+
+    judged, _ = table(perfect)
+    assert failure_table(judged) == "None."
+    silent = rows(lambda t: [{"verdict": "none", "probability": 0.9}])
+    assert Counter(silent) == {"s": 50, "d": 20, "o": 20}  # nothing is the answer to controls and the not identifiable
+    unknown = rows(lambda t: [{"verdict": "unknown", "probability": 0.9}])
+    assert Counter(unknown) == {"c": 60, "s": 50, "d": 20, "u": 16}  # and this that to what is outside the library
+    assert len(rows(lambda t: None)) == 166

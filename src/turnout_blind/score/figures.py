@@ -65,7 +65,7 @@ def figures(judged, oracle=None):
     blurred = of["unidentifiable"]
     found = [_share("controls: false alarms", of["control"], lambda j: j.alarm, 100.0 * 2 / 60, "<=")]
     found += [
-        _share("not identifiable: 'a or b' with the truth, or none", blurred, _as_it_should, 100.0),
+        _share("not identifiable: 'a or b' with the truth, or none", blurred, as_it_should, 100.0),
         _share("not identifiable: a wrong name", blurred, lambda j: bool(j.wrong), 0.0, "<="),
     ]
     for what in ("lock", "place", "axle", "sensor"):
@@ -90,7 +90,8 @@ def _share(name, cases, test, bar=None, sense=">="):
     return Share(name, sum(bool(test(j)) for j in cases), len(cases), bar, sense)
 
 
-def _as_it_should(j):
+def as_it_should(j):
+    """Whether what cannot be identified was answered so: nothing, or "a or b" with the truth among them."""
     return j.answered and not j.wrong and (not j.alarm or j.hits[0] == "a_or_b")
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from turnout_blind.reveal import revealed
 from turnout_blind.score.answers import answers_of
-from turnout_blind.score.figures import Share, confusion, figures, reliability, severity
+from turnout_blind.score.figures import Share, as_it_should, confusion, figures, reliability, severity
 from turnout_blind.score.judged import judge
 from turnout_blind.seal import read_commit
 
@@ -47,7 +47,7 @@ def report_of(out, more=None):
         severity_table(severity(judged)),
         "Stated probability and share right, by fifths:",
         "\n".join(f"- {p:.2f}: {share:.2f} of {n}" for p, share, n in reliability(judged)) or "- none stated",
-        "Every failure:",
+        "Alarms, wrong names, clear effects without their name or without a word, no answer:",
         failure_table(judged),
     ]
     if labels_of(out):
@@ -66,18 +66,29 @@ def cost(judged, held, total):
 
 
 def failure_table(judged):
-    """A row per case that went wrong: alarms on controls, wrong names, clear effects missed, no answer."""
+    """A row per case that went wrong: alarms on controls, wrong names, clear effects missed, no answer; what cannot be
+    identified and got any name but a half of "a or b"."""
     lines = [
         "| case | concealed | costs [points] | said first | wrong names | probability |",
         "|---|---|---|---|---|---|",
     ]
     for j in sorted(judged, key=lambda j: (j.stratum, j.kinds, j.rungs)):
-        missed = j.stratum in ("single", "double") and j.clear and not all(j.hits)
-        if not j.answered or j.wrong or missed or (j.stratum == "control" and j.alarm):
+        if _failed(j):
             what = " + ".join(f"{k} {r}" for k, r in zip(j.kinds, j.rungs)) or "nothing"
             sure = "" if j.probability is None else f"{j.probability:.2f}"
             lines.append(f"| {j.case} | {what} | {j.gain:.1f} | {j.said} | {', '.join(j.wrong)} | {sure} |")
     return "\n".join(lines) if len(lines) > 2 else "None."
+
+
+def _failed(j):
+    missed = {
+        "control": j.alarm,
+        "single": j.clear and not all(j.hits),
+        "double": j.clear and not all(j.hits),
+        "outside": j.clear and not j.alarm,
+        "unidentifiable": not as_it_should(j),
+    }
+    return not j.answered or bool(j.wrong) or missed[j.stratum]
 
 
 def ablation_table(out, judged, more=None):
