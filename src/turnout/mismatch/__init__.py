@@ -2,7 +2,8 @@
 
 from turnout.mismatch.case import Candidate, Case, Nuisance, Observation
 from turnout.mismatch.diagnose import Diagnosis, diagnose
-from turnout.mismatch.joint import Fit, fit_jointly
+from turnout.mismatch.fit import Fit
+from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.verdict import Verdict
 
 __all__ = ["Candidate", "Case", "Diagnosis", "Fit", "Nuisance", "Observation", "Verdict", "diagnose", "fit_jointly"]

@@ -1,89 +1,15 @@
 """The joint fit: nuisances and the parameters of a term together, damped, within a trust region."""
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 
 from turnout.errors import SimulationError
+from turnout.mismatch.fit import Fit, terms_of
+from turnout.mismatch.steps import broyden, damped_step, shortened
 
 TRUST_TERM = 0.35  # largest step of a term's parameter as a share of its bounds
 DONE = 0.05  # nats; a smaller gain ends the iteration
 RENEWED = 4  # steps after which a dear Jacobian is made anew
 STALL = 5e-4  # of minus twice the log posterior per sample; a dear fit that gains less ends
-
-
-@dataclass(frozen=True)
-class Fit:
-    """``values`` of nuisances, ``psi`` (n_term,) of the terms; ``residuals`` a list by observation, ``white`` the same
-    whitened, ``jacobian`` whitened too, [] in one that is ``light``; that of a dear case is in single precision.
-
-    ``scale`` noise scale by kind, at least 1; ``cost`` minus twice the log posterior up to a constant;
-    ``covariance`` of nuisances and psi; ``level`` weighted mean square by kind, in units of ``sigma``;
-    ``evidence`` log probability of the data by Laplace's approximation, up to a constant of the case. [nats]
-    """
-
-    values: dict
-    candidates: tuple
-    psi: np.ndarray
-    predictions: list
-    residuals: list
-    jacobian: list
-    scale: dict
-    level: dict
-    cost: float
-    covariance: np.ndarray
-    evaluations: int
-    white: list
-    evidence: float = 0.0
-
-    @property
-    def terms(self):
-        """The terms with their fitted parameters."""
-        return terms_of(self.candidates, self.psi)
-
-    def light(self):
-        """The same fit without its Jacobian, by far the largest part of it."""
-        return replace(self, jacobian=[])
-
-    def with_candidates(self, candidates):
-        """The same fit with these candidates, which carry functions and are not kept on disk."""
-        return replace(self, candidates=tuple(candidates))
-
-    def part(self, candidate):
-        """Where the parameters of ``candidate`` are in ``psi``, a slice."""
-        first = 0
-        for known in self.candidates:
-            last = first + len(known.parameters)
-            if known.key == candidate.key:
-                return slice(first, last)
-            first = last
-        raise KeyError(f"{candidate.key} is not in this fit")
-
-    @property
-    def psi_se(self):
-        """(n_term,) standard errors of the terms' parameters; a size errs by the ``loose`` share of it as well."""
-        found, first = np.sqrt(np.maximum(np.diag(self.covariance)[len(self.values) :], 0.0)), 0
-        for candidate in self.candidates:
-            if candidate.parameters:
-                size = self.psi[first] - candidate.parameters[0].neutral
-                found[first] = np.hypot(found[first], candidate.loose * size)
-            first += len(candidate.parameters)
-        return found
-
-    @property
-    def chi2(self):
-        """Weighted mean square over all observations' effective samples."""
-        return float(sum(self.level.values()) / max(len(self.level), 1))
-
-
-def terms_of(candidates, psi):
-    """Terms of several candidates from their stacked parameters."""
-    terms, first = [], 0
-    for candidate in candidates:
-        last = first + len(candidate.parameters)
-        terms.append(candidate.term(psi[first:last]))
-        first = last
-    return tuple(terms)
 
 
 class Joint:
@@ -244,13 +170,13 @@ def _iterate(joint, theta, predictions, residuals, jacobian, cost, renew):
     frozen = joint.case.frozen_jacobian
     enough, since = max(2.0 * joint.done, STALL * joint.size if frozen else 0.0), 0
     for _ in range(joint.iterations):
-        found = _shorter(joint, theta, _step(joint, theta, residuals, jacobian), cost)
+        found = shortened(joint, theta, damped_step(joint, theta, residuals, jacobian), cost)
         gain = cost - found[3] if found else 0.0
         if found:
             tried, new = found[0], found[1]
             if frozen:
                 moved = tried - theta
-                jacobian = _broyden(jacobian, moved / joint.sd**2, moved, residuals, found[2])
+                jacobian = broyden(jacobian, moved / joint.sd**2, moved, residuals, found[2])
                 jacobian = joint.renewed(tried, new, jacobian)
             theta, predictions, residuals, cost = found
         since += 1
@@ -271,57 +197,6 @@ def _anew(joint, theta, predictions, updated):
         if joint.case.frozen_jacobian:
             return updated
         raise
-
-
-def _shorter(joint, theta, step, cost):
-    """The step, halved until the cost falls; None where it does not."""
-    for halving in range(5):
-        tried = np.clip(theta + step * 0.5**halving, joint.low, joint.high)
-        new = joint.tried(tried)
-        if new is None:
-            continue
-        residuals = joint.residuals(new)
-        new_cost = joint.cost(tried, residuals)
-        if new_cost < cost:
-            return tried, new, residuals, new_cost
-    return None
-
-
-def _step(joint, theta, residuals, jacobian):
-    """Damped step; the noise scale is the one the step itself will leave, else a bad start would trust its priors."""
-    parts = {}
-    for o, j, r in zip(joint.observations, jacobian, residuals):
-        weight = np.sqrt(o.effective)
-        rows, right = weight * j * joint.sd, weight * r
-        old = parts.get(o.kind, (0.0, 0.0, 0.0, 0.0))
-        new = rows.T @ rows, rows.T @ right, float(right @ right), o.n_effective
-        parts[o.kind] = tuple(a + b for a, b in zip(old, new))
-    pull = (joint.mean - theta) / joint.sd
-    step, left = np.zeros(theta.size), {kind: p[2] for kind, p in parts.items()}
-    for _ in range(5):
-        scale = {kind: max(1.0, left[kind] / parts[kind][3]) for kind in parts}
-        normal = np.eye(theta.size) + sum(p[0] / scale[k] for k, p in parts.items())
-        step = np.linalg.solve(normal, pull + sum(p[1] / scale[k] for k, p in parts.items()))
-        left = {k: max(0.0, p[2] - 2.0 * step @ p[1] + step @ p[0] @ step) for k, p in parts.items()}
-    right = pull + sum(p[1] / scale[k] for k, p in parts.items())
-    reach, damping = joint.reach / joint.sd, np.zeros(theta.size)
-    for _ in range(12):  # damp those alone that would leave their trust region: the others move on
-        excess = np.maximum(np.abs(step) / reach - 1.0, 0.0)
-        if excess.max(initial=0.0) < 0.05:
-            break
-        damping += (np.diag(normal) + damping) * excess
-        step = np.linalg.solve(normal + np.diag(damping), right)
-    return joint.sd * np.clip(step, -reach, reach)
-
-
-def _broyden(jacobian, weight, moved, old, new):
-    """Rank-one update that makes the Jacobian say what the last step did to the residuals, in prior deviations."""
-    size = float(weight @ moved)
-    change = [
-        np.outer((a - b - j @ moved).astype(j.dtype), (weight / size).astype(j.dtype))
-        for j, a, b in zip(jacobian, old, new)
-    ]
-    return [j + c for j, c in zip(jacobian, change)]
 
 
 def _finished(joint, theta, predictions, residuals, jacobian, cost):
