@@ -1,10 +1,12 @@
 """A case: conditions, inputs and outputs, a simulator, terms, nuisances. The engine knows nothing else."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
+
+from turnout.mismatch.candidate import Candidate
+from turnout.mismatch.observation import Observation
 
 
 @dataclass(frozen=True)
@@ -23,164 +25,6 @@ class Nuisance:
     bounds: tuple[float, float] = (-np.inf, np.inf)
     meaning: str = ""
     trust: float = 0.7
-
-
-@dataclass(frozen=True)
-class Observation:
-    """One recording under one condition, as a vector the simulator can predict.
-
-    ``data``, ``sigma`` (n,) in the same unit: noise and materiality floor; ``effective`` share of the samples
-    that are independent, 0 to 1. Folds leave out a ``condition``; ``kind`` shares one noise scale. ``cells`` (n,)
-    numbers the time-frequency cell of each sample, -1 for none; ``labels`` frame -> (n_cell,) level of each cell.
-    ``modes`` (n, m) in the unit of the data are errors of this recording's own with unit variance each (roughness
-    of its wheels, tolerance of a model that errs smoothly): they are integrated out, see ``whitened``; in single
-    precision, where they are many, what is whitened is right to 1e-6 of its size.
-    """
-
-    name: str
-    condition: str
-    data: np.ndarray
-    sigma: np.ndarray
-    effective: float = 1.0
-    kind: str = "response"
-    covariates: Mapping[str, float] = field(default_factory=dict)
-    cells: np.ndarray | None = None
-    labels: Mapping[str, np.ndarray] = field(default_factory=dict)
-    modes: np.ndarray | None = None
-
-    def __post_init__(self):
-        data = np.asarray(self.data, dtype=float)
-        sigma = np.broadcast_to(np.asarray(self.sigma, dtype=float), data.shape)
-        if data.ndim != 1 or not np.all(np.isfinite(data)):
-            raise ValueError(f"observation {self.name!r}: data must be one row of finite numbers")
-        if not np.all(sigma > 0.0) or not 0.0 < self.effective <= 1.0:
-            raise ValueError(f"observation {self.name!r}: sigma must be above 0 and effective in 0 to 1")
-        object.__setattr__(self, "data", data)
-        object.__setattr__(self, "sigma", sigma)
-
-    @cached_property
-    def _subspace(self):
-        """Orthonormal directions (n, m) of the modes over sigma, and how much each is shrunk (m,)."""
-        if self.modes is None or not self.modes.shape[1]:
-            return None
-        scaled = self.modes / self.sigma[:, None]
-        power, turn = np.linalg.eigh(scaled.T @ scaled)
-        keep = power > 1e-4
-        power = power[keep]
-        along = (scaled @ turn[:, keep] / np.sqrt(power)).astype(self.modes.dtype)
-        return along, 1.0 - 1.0 / np.sqrt(1.0 + power)
-
-    def whitened(self, values):
-        r"""``values`` (n,) or (n, k) over the standard deviation of all that is random: :math:`C^{-1/2} x`,
-        :math:`C = \mathrm{diag}(\sigma^2) + M M^T` with M the ``modes``.
-
-        >>> o = Observation("a", "a", np.zeros(3), 2.0, modes=np.array([[2.0], [2.0], [2.0]]))
-        >>> [round(float(v), 3) for v in o.whitened(np.array([2.0, 2.0, 2.0]))]  # along the mode: over sqrt(1 + 3)
-        [0.5, 0.5, 0.5]
-        >>> [round(float(v), 3) for v in o.whitened(np.array([2.0, -2.0, 0.0]))]  # across it: over sigma alone
-        [1.0, -1.0, 0.0]
-        """
-        if isinstance(values, Whitened):
-            return np.asarray(values)
-        scaled = values / (self.sigma if values.ndim == 1 else self.sigma[:, None])
-        if self._subspace is None:
-            return scaled
-        along, shrunk = self._subspace
-        inner = along.T @ scaled.astype(along.dtype)
-        inner *= (shrunk if values.ndim == 1 else shrunk[:, None]).astype(along.dtype)
-        return scaled - along @ inner
-
-    @property
-    def n_effective(self):
-        """Number of independent samples."""
-        return self.effective * self.data.size
-
-
-class Whitened(np.ndarray):
-    """Values of an observation that are whitened already."""
-
-    def __new__(cls, values):
-        return np.asarray(values, dtype=float).view(cls)
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """One effect at one place: ``make(psi)`` gives the term for parameter values ``psi`` (dict).
-
-    ``family`` is the name that a verdict may give, ``where`` the place scanned, ``frame`` what it is fixed to,
-    ``scanned`` how many places the family has; ``starts`` are parameter sets that do not depend on the base fit;
-    with ``start_from_base`` off the nuisances, too, start from their priors; ``always``: tried on the cheap
-    observations at every place, whatever the residual promises; families with the same word are alike there;
-    ``least``: distance of the first ``sized`` parameters from neutral below which nobody would act, and which it has to
-    exceed by ``sure`` standard errors of the first; ``even``: the cheap observations hardly tell a value from its
-    mirror image about neutral; ``twin``: nuisance that hides it, which would have ``twin_sd`` with the effect;
-    ``from_twin`` makes the first parameter of it, None: its exponential.
-    ``parameters`` have name, unit, neutral, bounds and prior as ``turnout.physics.Parameter``.
-    One found by a look at the residual has the gain it promises [nats] in ``promise``, starts as it is, from the
-    nuisances ``begin``; ``aside`` is evidence from data that are no observations [nats].
-    ``kin``: laws of one part; where one leads at a place, all with that word are refitted there. ``limit`` is the
-    family that it cannot be told from at the lower bound of its first parameter; ``plain`` is (family, k): where its
-    first parameter does not matter it is that law, of the size of its k-th. ``whole``: its response turns with its
-    size, so that a start promises what it is and says nothing of a larger or smaller one.
-    ``loose`` is the share by which the size of an effect errs since its law is not quite the one out there; an
-    ``exact`` one is what it says (a gain, a lag, a place): nothing that it leaves is due to its shape. ``told_by`` is a
-    kind of observations that must speak for it, too: to all others it is another law; ``unopposed`` names observations
-    that together must not speak against it.
-    """
-
-    family: str
-    parameters: tuple
-    make: Callable[[Mapping[str, float]], object]
-    starts: tuple[tuple[float, ...], ...]
-    where: Mapping[str, object] = field(default_factory=dict)
-    frame: str = ""
-    scanned: int = 1
-    start_from_base: bool = True
-    always: str = ""
-    least: float = 0.0
-    even: bool = False
-    twin: str = ""
-    twin_sd: float = 0.7
-    from_twin: Callable[[float], float] | None = None
-    promise: float | None = None
-    begin: Mapping[str, float] = field(default_factory=dict)
-    aside: float = 0.0
-    loose: float = 0.0
-    exact: bool = False
-    told_by: str = ""
-    unopposed: tuple[str, ...] = ()
-    kin: str = ""
-    limit: str = ""
-    plain: tuple = ()
-    whole: bool = False
-    sized: int = 1
-    sure: float = 0.0
-
-    @property
-    def key(self):
-        """Family and place in one word."""
-        place = ",".join(f"{k}={v}" for k, v in sorted(self.where.items()))
-        return f"{self.family}[{place}]" if place else self.family
-
-    @property
-    def part(self):
-        """(kin, place or sensor): what it is a law of."""
-        return self.kin, self.where.get("place", self.where.get("sensor"))
-
-    @property
-    def neutral(self):
-        """(n_parameter,) values at which the term vanishes."""
-        return np.array([p.neutral for p in self.parameters])
-
-    def mirrored(self, values):
-        """``values`` (n_parameter,) with the first parameter on the other side of neutral."""
-        found = np.array(values, dtype=float)
-        found[0] = 2.0 * self.parameters[0].neutral - found[0]
-        return found
-
-    def term(self, values):
-        """The term with parameters (n_parameter,)."""
-        return self.make({p.name: float(v) for p, v in zip(self.parameters, values)})
 
 
 class Case:

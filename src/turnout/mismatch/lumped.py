@@ -5,7 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from turnout.mismatch.case import Candidate, Case, Nuisance, Observation
+from turnout.mismatch.candidate import Candidate
+from turnout.mismatch.case import Case, Nuisance
+from turnout.mismatch.observation import Observation
 from turnout.physics.term import Parameter
 
 # Law of displacement y and velocity v, each with y and v over their scales, so that a parameter of 1 is as strong

@@ -13,7 +13,7 @@ BLOCKS = 25
 def fit_percent(observations, predictions, centre=True):
     r"""Share of the recordings that is predicted, :math:`100 (1 - \|y - \hat y\| / \|y - \bar y\|)` in units of sigma.
 
-    >>> from turnout.mismatch.case import Observation
+    >>> from turnout.mismatch.observation import Observation
     >>> y = np.array([1.0, -1.0, 1.0, -1.0])
     >>> fit_percent([Observation("a", "a", y, 1.0)], [0.9 * y])
     90.0

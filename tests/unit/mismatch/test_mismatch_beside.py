@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
-from turnout.mismatch.case import Candidate, Case, Observation
+from turnout.mismatch.candidate import Candidate
+from turnout.mismatch.case import Case
 from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.observation import Observation
 from turnout.mismatch.refits import beside
 from turnout.mismatch.scoring import score_of
 from turnout.physics import Parameter

@@ -7,8 +7,10 @@ import pytest
 
 from turnout.errors import SimulationError
 from turnout.mismatch import diagnose
-from turnout.mismatch.case import Candidate, Case, Nuisance, Observation
+from turnout.mismatch.candidate import Candidate
+from turnout.mismatch.case import Case, Nuisance
 from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.observation import Observation
 from turnout.mismatch.track import Campaign, TrackCase
 from turnout.mismatch.track.campaign import Passage
 from turnout.mismatch.track.planned import measured_campaign, small_plan

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
-from turnout.mismatch.case import Candidate, Case, Nuisance, Observation
+from turnout.mismatch.candidate import Candidate
+from turnout.mismatch.case import Case, Nuisance
 from turnout.mismatch.diagnose import diagnose
 from turnout.mismatch.held_out import held_out_score
 from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.locate import attribute
+from turnout.mismatch.observation import Observation
 from turnout.physics import Parameter
 
 

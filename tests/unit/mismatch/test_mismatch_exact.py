@@ -7,8 +7,10 @@ import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch import diagnose
-from turnout.mismatch.case import Candidate, Case, Observation
+from turnout.mismatch.candidate import Candidate
+from turnout.mismatch.case import Case
 from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.observation import Observation
 from turnout.mismatch.scoring import score_of
 from turnout.mismatch.shortlist import _same_place
 from turnout.mismatch.track import TrackCase

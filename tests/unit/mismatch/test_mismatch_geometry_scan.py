@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from turnout import physics
-from turnout.mismatch.case import Case, Observation
+from turnout.mismatch.case import Case
 from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.observation import Observation
 from turnout.mismatch.track.polygons import AMPLITUDES, _evidence
 from turnout.mismatch.track.rail_scan import RailScan
 from turnout.mismatch.track.rough_rail import Waves

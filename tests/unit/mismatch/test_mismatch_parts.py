@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
-from turnout.mismatch.case import Candidate, Nuisance
+from turnout.mismatch.candidate import Candidate
+from turnout.mismatch.case import Nuisance
 from turnout.mismatch.scoring import ODD, _usual
 from turnout.mismatch.shortlist import _fitted_already, _kin
 from turnout.mismatch.verdict import Score, judge

@@ -12,9 +12,10 @@ from turnout.mismatch import diagnose
 from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.scoring import judged
 from turnout.mismatch.track import TrackCase
+from turnout.mismatch.track.alignment import ALIKE, align
 from turnout.mismatch.track.flats import flats
 from turnout.mismatch.track.planned import measured_campaign, small_plan
-from turnout.mismatch.track.rolling import ALIKE, Track1D, align
+from turnout.mismatch.track.roll import Track1D
 from turnout.mismatch.whereabouts import whereabouts
 
 

@@ -7,8 +7,10 @@ import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch import diagnose
-from turnout.mismatch.case import Candidate, Case, Nuisance, Observation
+from turnout.mismatch.candidate import Candidate
+from turnout.mismatch.case import Case, Nuisance
 from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.observation import Observation
 from turnout.mismatch.scout import _seen
 from turnout.mismatch.shortlist import Projector
 from turnout.mismatch.verdict import Score, judge

@@ -5,8 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from turnout.mismatch.case import Case, Nuisance, Observation
+from turnout.mismatch.case import Case, Nuisance
 from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.observation import Observation
 from turnout.mismatch.track.rolling import BLURRED, Rolling, _topped, observed
 from turnout.records import Channel, Recording
 

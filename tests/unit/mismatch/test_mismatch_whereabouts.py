@@ -7,8 +7,9 @@ import pytest
 from scipy.stats import f
 
 from turnout.config.settings.mismatch import MismatchSettings
-from turnout.mismatch.case import Case, Observation
+from turnout.mismatch.case import Case
 from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.observation import Observation
 from turnout.mismatch.spaces import AMPLITUDES, NOISE, Space, evidence, weigh
 from turnout.mismatch.track import quiet
 from turnout.mismatch.verdict import calibrate, judge

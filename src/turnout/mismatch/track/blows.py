@@ -5,7 +5,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from turnout.mismatch.case import Observation
+from turnout.mismatch.observation import Observation
 from turnout.receptance import find_impacts
 
 LINES = np.unique(np.round(np.geomspace(35.0, 900.0, 44) / 2.0) * 2.0)  # [Hz]; two blows' worth of resolution

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from turnout.mismatch.track import rolling
+from turnout.mismatch.track import bands, roll
 from turnout.mismatch.track.base_model import track_with
 from turnout.mismatch.track.rolled_waves import Carrier
 from turnout.mismatch.track.skeleton import matrices_of
@@ -40,7 +40,7 @@ def green(case, values, terms, made):
     under = [t.under(case.said(made)) for t in terms]
     track = track_with(case.track(made.passage.route, under), case.zone, values)
     matrices = matrices_of(track, [t for t in under if t.kind == "matrix"])
-    frequency = np.arange(4.0, 1.3 * rolling.HIGH, 2.0)
+    frequency = np.arange(4.0, 1.3 * bands.HIGH, 2.0)
     places = [case.seat(s, values, terms).probe(track).place for s in made.sensors]
     rows = [matrices.index[kind, j] for j in case.zone.supports for kind in ("rail", "sleeper")]
     h = responses(matrices, frequency, places, rows)
@@ -72,10 +72,10 @@ def carried(case, values, terms, made, forces):
     kind = np.array([k for _, k, _ in forces.values()])
     history = np.array([force for _, _, force in forces.values()])
     history = history - history[:, :1]
-    clock = (np.arange(history.shape[1]) + 0.5) / rolling.RATE
+    clock = (np.arange(history.shape[1]) + 0.5) / bands.RATE
     paths = np.empty((support.size, carrier.behind.size, carrier.way.size))
     for w in range(carrier.behind.size):
-        when = carrier.times(w, rolling.LEAD)
+        when = carrier.times(w, roll.LEAD)
         for k, force in enumerate(history):
             paths[k, w] = np.interp(when, clock, force, 0.0, 0.0) * sag[support[k], :, kind[k]]
     columns = carrier.pressed(history, g[:, :, support, kind]) + carrier.reactions(paths)

@@ -4,7 +4,7 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.case import Case
-from turnout.mismatch.track import blows, rolling
+from turnout.mismatch.track import bands, blows
 from turnout.mismatch.track.base_model import COMMON, RAIL
 from turnout.mismatch.track.columns import FURTHER, columns_of, probes, support_forces
 from turnout.mismatch.track.rough_rail import wave_columns
@@ -86,7 +86,7 @@ def _own_columns(case, values, terms, made, predicted):
 
 def _seat_columns(case, values, terms, made, predicted):
     further = case.marched(values, terms, made, probes(case, values, terms, made))
-    further = rolling.finer(further[len(made.sensors) + 2 * len(case.zone.supports) :])
+    further = bands.finer(further[len(made.sensors) + 2 * len(case.zone.supports) :])
     rows = predicted.reshape(-1, made.time.size)
     for k, sensor in enumerate(made.sensors):
         if not sensor.mounting.startswith("sleeper"):

@@ -8,7 +8,7 @@ import numpy as np
 
 from turnout import physics
 from turnout.errors import SimulationError
-from turnout.mismatch.case import Candidate
+from turnout.mismatch.candidate import Candidate
 from turnout.mismatch.track.strikes import strikes
 
 NAMED = 1  # wheels offered

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from turnout.mismatch.track import rolling
+from turnout.mismatch.track import bands, roll
 from turnout.mismatch.track.columns import green, support_forces
 from turnout.mismatch.track.rolled_waves import shown_by
 
@@ -23,7 +23,7 @@ def latent_force(case, fit):
         rows = residual.reshape(len(made.sensors), -1)
         size = 1 << int(np.ceil(np.log2(2 * rows.shape[1])))
         grid = np.fft.rfftfreq(size, 1.0 / made.clock)
-        inside = np.flatnonzero((grid >= rolling.LOW) & (grid <= made.high))
+        inside = np.flatnonzero((grid >= bands.LOW) & (grid <= made.high))
         nearest = np.clip(np.searchsorted(frequency, grid[inside]), 0, frequency.size - 1)
         spectra.append((made, np.fft.rfft(rows, size)[:, inside].T, g[nearest, :, :, 1], inside, size))
     gains = []
@@ -60,8 +60,8 @@ def _force(r, g, inside, size, n):
 def _append(case, fit, made, parts, force, k):
     _, sleeper = support_forces(case, fit.values, fit.terms, made)
     rate = case.solver.rate
-    time = made.time - made.reference - fit.values[f"time@{made.name}"] + rolling.LEAD
-    y = rolling.read_at(sleeper[k][None], rate, time)[0]
+    time = made.time - made.reference - fit.values[f"time@{made.name}"] + roll.LEAD
+    y = bands.read_at(sleeper[k][None], rate, time)[0]
     place = case.track().support[case.zone.first + k]
     wheels = made.places() - place
     nearest = wheels[np.argmin(np.abs(wheels), axis=0), np.arange(time.size)]

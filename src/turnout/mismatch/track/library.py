@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from turnout import physics
-from turnout.mismatch.case import Candidate
+from turnout.mismatch.candidate import Candidate
 from turnout.mismatch.track.ceiling import LIMIT_SD
 
 LOOSE = 0.15  # share by which sizes err: nine effects of another simulator, opened, had a median of 0.12, rms 0.18

@@ -8,7 +8,7 @@ sensors s: a change of a support, a mass, a loose fastening alike.
 import numpy as np
 
 from turnout.mismatch.spaces import Space
-from turnout.mismatch.track import blows, rolling
+from turnout.mismatch.track import bands, blows
 from turnout.mismatch.track.columns import green
 from turnout.mismatch.track.rolled_waves import Carrier, shown_by
 from turnout.mismatch.track.rough_rail import amplitude_sd
@@ -33,7 +33,7 @@ def _forces(case, fit, made):
     """Harmonics of each sensor over the passage, combined as a force at each support, a channel's fault, or freely."""
     n, n_sensor = made.time.size, len(made.sensors)
     step = made.clock / n
-    lines = step * np.arange(np.ceil(rolling.LOW / step), np.floor(1.1 * made.high / step) + 1)
+    lines = step * np.arange(np.ceil(bands.LOW / step), np.floor(1.1 * made.high / step) + 1)
     turn = 2.0 * np.pi * made.time[:, None] * lines
     one = np.sqrt(2.0 / n) * np.stack([np.cos(turn), np.sin(turn)], axis=-1).reshape(n, -1)
     columns = np.kron(np.eye(n_sensor), one)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.track import blows, rolling
+from turnout.mismatch.track import alignment, blows, rolling
 from turnout.mismatch.track.quiet import disturbances
 from turnout.mismatch.track.rough_wheels import wheel_modes
 from turnout.simulate.sensor import Sensor
@@ -43,8 +43,8 @@ def passage_observations(case):
         except SimulationError as error:
             case.notes.append(f"passage {passage.name}: cannot be simulated: {error}")
             continue
-        reference, speed, likeness = rolling.align(passage, sensors, signals, case.solver.rate)
-        if likeness < rolling.ALIKE:
+        reference, speed, likeness = alignment.align(passage, sensors, signals, case.solver.rate)
+        if likeness < alignment.ALIKE:
             case.notes.append(
                 f"passage {passage.name}: likeness {likeness:.2f} with the simulation of "
                 f"{passage.train or 'its train'}; wrong vehicle file, wrong sensor places or another turnout"

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from turnout.config.settings.mismatch import MismatchSettings
-from turnout.mismatch.track import blows, rolling
+from turnout.mismatch.track import bands, blows, roll, rolling
 from turnout.mismatch.track.library import library
 from turnout.mismatch.track.rough_wheels import wheel_modes
 from turnout.mismatch.track.track_case import TrackCase
@@ -33,7 +33,7 @@ class PlannedCase(TrackCase):
 
     def __init__(self, plan, settings=None, families=None, solver=None):
         self.plan = plan
-        self._prepare(_Intended(plan), settings or MismatchSettings(), solver or rolling.Track1D())
+        self._prepare(_Intended(plan), settings or MismatchSettings(), solver or roll.Track1D())
         for k, (place, temperature) in enumerate(plan.blows):
             test = Planned(f"blows {k + 1}", place=place, visit=f"{temperature:.0f} °C")
             for sensor in plan.sensors:
@@ -43,8 +43,8 @@ class PlannedCase(TrackCase):
         for k, train in enumerate(plan.trains):
             noted = {} if train.temperature is None else {"rail_temperature": train.temperature}
             passage = Planned(f"{train.name} {k + 1}", train.vehicle, train.speed, train.name, conditions=noted)
-            stop = rolling.duration_of(passage, train.speed, plan.sensors) + 0.45 + rolling.EDGE
-            time = np.arange(0.45 - rolling.EDGE, stop, 1.0 / rolling.clock_of(train.speed))
+            stop = rolling.duration_of(passage, train.speed, plan.sensors) + 0.45 + roll.EDGE
+            time = np.arange(0.45 - roll.EDGE, stop, 1.0 / bands.clock_of(train.speed))
             self.rollings[passage.name] = rolling.Rolling(passage.name, passage, plan.sensors, time, 0.45, train.speed)
         self.nuisances = tuple(self.listed())
         self.observations = tuple(self._expected())

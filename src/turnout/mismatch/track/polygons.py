@@ -11,9 +11,9 @@ with the angle integrated out. M is that of the first wheel: all wheels of a tra
 import numpy as np
 
 from turnout import physics
-from turnout.mismatch.case import Candidate
+from turnout.mismatch.candidate import Candidate
+from turnout.mismatch.track.bands import SHORTEST_WAVE
 from turnout.mismatch.track.rolled_waves import Carrier
-from turnout.mismatch.track.rolling import SHORTEST_WAVE
 
 WAVELENGTHS = np.geomspace(SHORTEST_WAVE, 1.0, 100)  # m; neighbours differ by a third of a period over 10 m
 FINER = np.linspace(0.985, 1.015, 13)

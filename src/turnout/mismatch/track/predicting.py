@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.track import blows, nudged_links, rolling
+from turnout.mismatch.track import bands, blows, nudged_links, roll
 from turnout.mismatch.track.base_model import inner_values, near_rail, track_with, vehicle_with, with_rail
 from turnout.mismatch.track.blow_model import BlowModel
 from turnout.mismatch.track.heard import Heard
@@ -85,7 +85,7 @@ class Predicting:
     def seat(self, sensor, values, terms):
         """The sensor where ``values`` and ``terms`` say that it sits."""
         more = values.get(f"seat_{sensor.name}", 0.0)
-        return rolling.seat(replace(sensor, place=sensor.place + more) if more else sensor, terms)
+        return roll.seat(replace(sensor, place=sensor.place + more) if more else sensor, terms)
 
     def chain(self, values, terms, pair):
         """What the channel makes of a receptance, (n_line,) complex."""
@@ -107,15 +107,15 @@ class Predicting:
 
     def shown(self, values, terms, made, sensor, row):
         """What the channel of a sensor shows of the simulated signal ``row``, on the clock of the recording."""
-        rate, time = 4.0 * self.solver.rate, made.time - made.reference - values[f"time@{made.name}"] + rolling.LEAD
+        rate, time = 4.0 * self.solver.rate, made.time - made.reference - values[f"time@{made.name}"] + roll.LEAD
         for term in terms:
             if term.kind == "channel":
                 row = term.under({"name": made.name}).channel(row, rate, sensor)
-        return (1.0 + values[f"gain_{sensor.name}"]) * rolling.read_at(made.limited(row, rate), rate, time)
+        return (1.0 + values[f"gain_{sensor.name}"]) * bands.read_at(made.limited(row, rate), rate, time)
 
     def clean(self, values, terms, made):
         """Simulated signals of the sensors before their channels, four times as fine as the march."""
-        return rolling.finer(self.marched(values, terms, made)[: len(made.sensors)])
+        return bands.finer(self.marched(values, terms, made)[: len(made.sensors)])
 
     def marched(self, values, terms, made, probes=()):
         """Simulated signals of sensors and ``probes`` on the simulation's clock, remembered."""
@@ -147,7 +147,7 @@ class Predicting:
         key = passage.route, inner_values(self.zone, values), repr(terms)
         if key not in self._rolls:
             track = track_with(self.track(passage.route, terms), self.zone, values)
-            self._rolls[key] = rolling.Roll(self.zone.turnout, track, terms, self.solver)
+            self._rolls[key] = roll.Roll(self.zone.turnout, track, terms, self.solver)
             while len(self._rolls) > 12:
                 self._rolls.popitem(last=False)
         return self._rolls[key]
@@ -157,7 +157,7 @@ class Predicting:
         there; 0 where these cannot be simulated."""
         if not self.rollings:
             return None
-        finer = rolling.Track1D(2.0 * self.solver.rate, self.solver.scheme, 2 * (self.solver.elements or 4))
+        finer = roll.Track1D(2.0 * self.solver.rate, self.solver.scheme, 2 * (self.solver.elements or 4))
         made = [self.rollings.get(o.name) for o in self.observations]
         refined = [m and self._refined(fit, m, finer, p) for m, p in zip(made, fit.predictions)]
         return [np.zeros(p.size) if new is None else new - p for new, p in zip(refined, fit.predictions)]

@@ -14,9 +14,9 @@ from dataclasses import replace
 import numpy as np
 
 from turnout import physics
-from turnout.mismatch.case import Candidate
+from turnout.mismatch.candidate import Candidate
 from turnout.mismatch.shortlist import Projector
-from turnout.mismatch.track.rolling import SHORTEST_WAVE
+from turnout.mismatch.track.bands import SHORTEST_WAVE
 
 PLACE_STEP, BEYOND = 0.1, 1.0  # m: between places of a dip tried, and how far beyond the sensors
 LENGTHS, SHARPNESSES = (0.25, 0.4, 0.6, 0.9), (0.2, 0.9)

@@ -11,7 +11,7 @@ with :math:`\tau_n` when it passes the node and T the way between nodes over v.
 
 import numpy as np
 
-from turnout.mismatch.track import rolling
+from turnout.mismatch.track import bands, roll
 from turnout.mismatch.track.base_model import track_with, vehicle_with
 from turnout.mismatch.track.blows import channel_factor
 from turnout.mismatch.track.skeleton import matrices_of
@@ -46,7 +46,7 @@ class Carrier:
         self.carry = carry * np.exp(-2j * np.pi * self.grid[:, None, None] * self.passing)
         self.lines, self.compliance = lines, point + wheel_and_contact(vehicle, lines)
         begin = made.time[0] - made.reference - values[f"time@{made.name}"]
-        gate = rolling.gate(self.grid, rolling.LOW, made.high)
+        gate = bands.gate(self.grid, bands.LOW, made.high)
         shown = shown_by(values, terms, made, self.grid)
         self.clock = (gate * self.rate * np.exp(2j * np.pi * self.grid * begin))[:, None] * shown
 
@@ -93,7 +93,7 @@ class Carrier:
     def _harmonics(self, paths):
         """Spectra of the waves of ``way``, and amplitudes (..., n_wave) of paths (..., n_x) by them."""
         n_x = paths.shape[-1]
-        orders = np.arange(1, min(n_x // 2, int(self.period / rolling.SHORTEST_WAVE)) + 1)
+        orders = np.arange(1, min(n_x // 2, int(self.period / bands.SHORTEST_WAVE)) + 1)
         amplitude = 2.0 / n_x * np.fft.rfft(paths, axis=-1)[..., orders]
         amplitude = amplitude * np.exp(-2j * np.pi * orders * self.start / self.period)  # cosines count from x = 0
         if self.sign < 0.0:
@@ -113,7 +113,7 @@ class Carrier:
     @property
     def way(self):
         """(n_x,) places of the paths of ``reactions``: one period, so that nothing is seen at its ends."""
-        n = 2 * int(np.ceil(self.period / rolling.SHORTEST_WAVE)) + 2
+        n = 2 * int(np.ceil(self.period / bands.SHORTEST_WAVE)) + 2
         return self.start + self.period * np.arange(n) / n
 
     def times(self, w, lead):
@@ -125,12 +125,12 @@ class Carrier:
 
         ``transfer`` (n_line, n_sensor, n_key) are accelerations per force on ``self.lines``.
         """
-        fold = round(rolling.RATE / self.rate)
+        fold = round(bands.RATE / self.rate)
         n = min(histories.shape[1] // fold, self.size)
         slow = histories[:, : n * fold].reshape(-1, n, fold).mean(axis=2)
         spectrum = np.fft.rfft(slow - slow[:, :1], self.size)[:, self.inside]
         spectrum /= np.sinc(self.grid / self.rate)  # what the mean over the block took
-        begin = 0.5 / self.rate - rolling.LEAD
+        begin = 0.5 / self.rate - roll.LEAD
         spectrum = spectrum * np.exp(-2j * np.pi * self.grid * begin) / self.rate
         return self._on_clock(_at(self.grid, self.lines, transfer) * spectrum.T[:, None, :])
 
@@ -160,7 +160,7 @@ def _transfers(case, values, made, terms):
     """Lines, acceleration of the sensors per force on rail nodes (m, n_sensor, n_node), point receptance, nodes."""
     track = track_with(case.track(made.passage.route, terms), case.zone, values)
     matrices = matrices_of(track, [t for t in terms if t.kind == "matrix"])
-    frequency = np.arange(4.0, 1.3 * rolling.HIGH, 2.0)
+    frequency = np.arange(4.0, 1.3 * bands.HIGH, 2.0)
     near = np.flatnonzero((matrices.node >= case.waves.start - 0.3) & (matrices.node <= case.waves.end + 0.3))
     near = near[::STRIDE]
     rows = matrices.node_index[near]

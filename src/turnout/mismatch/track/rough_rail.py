@@ -7,13 +7,13 @@ under the contact force that a wave makes, see ``rolled_waves``.
 import numpy as np
 
 from turnout.mismatch.case import Nuisance
-from turnout.mismatch.track import rolling
+from turnout.mismatch.track import bands
 from turnout.mismatch.track.rolled_waves import Carrier
 from turnout.simulate.roughness import level
 from turnout.simulate.wheel_path import Sampled
 
 REACH = 3.0  # rolling before the first and behind the last sensor that still shakes them [m]
-LONGEST, SHORTEST = 3.0, rolling.SHORTEST_WAVE  # [m]
+LONGEST, SHORTEST = 3.0, bands.SHORTEST_WAVE  # [m]
 STEP = 0.02  # m
 
 

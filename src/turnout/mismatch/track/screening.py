@@ -6,7 +6,7 @@ that all wheels follow; whole-track terms act through the base fit's own derivat
 
 import numpy as np
 
-from turnout.mismatch.case import Whitened
+from turnout.mismatch.observation import Whitened
 from turnout.mismatch.track import blows
 from turnout.mismatch.track.added_links import AddedLinks
 from turnout.mismatch.track.columns import PAD, RAIL, SLEEPER, carried, support_forces

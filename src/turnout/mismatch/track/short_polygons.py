@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from turnout import physics
-from turnout.mismatch.case import Candidate
-from turnout.mismatch.track.rolling import SHORTEST_WAVE
+from turnout.mismatch.candidate import Candidate
+from turnout.mismatch.track.bands import SHORTEST_WAVE
 from turnout.mismatch.track.short_waves import HIGHEST, SHORTEST, TRANSFER, carried_energy
 
 REACH = 1.2  # m; axles of a bogie are 1.8 m apart or more

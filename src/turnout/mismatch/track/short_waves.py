@@ -17,8 +17,8 @@ import numpy as np
 from scipy.signal.windows import tukey
 
 from turnout import physics
-from turnout.mismatch.case import Candidate
-from turnout.mismatch.track import rolling
+from turnout.mismatch.candidate import Candidate
+from turnout.mismatch.track import bands, roll
 from turnout.mismatch.track.base_model import track_with
 from turnout.mismatch.track.rolled_waves import wheel_and_contact
 from turnout.mismatch.track.skeleton import matrices_of
@@ -61,7 +61,7 @@ class Loud:
 def bins(case):
     """(n,) wavelengths that every passage holds, longest first [m]."""
     shortest = max([SHORTEST, *(m.speed / (HIGHEST * m.passage.recording.rate) for m in case.rollings.values())])
-    longest = rolling.SHORTEST_WAVE * np.exp(WIDTH * (AROUND + 1))  # the first bins are background alone
+    longest = bands.SHORTEST_WAVE * np.exp(WIDTH * (AROUND + 1))  # the first bins are background alone
     return longest * np.exp(-np.arange(0.0, np.log(longest / shortest), WIDTH))
 
 
@@ -71,7 +71,7 @@ def loud_of(case, made, wavelengths):
     rows = [recording.index(s.name) for s in made.sensors]
     first, last = (round(t * recording.rate) for t in (made.time[0], made.time[-1]))
     samples = recording.samples[rows][:, max(first, 0) : last]
-    edge = 2.0 * rolling.EDGE * recording.rate / samples.shape[1]
+    edge = 2.0 * roll.EDGE * recording.rate / samples.shape[1]
     n = 1 << int(np.ceil(np.log2(4 * samples.shape[1])))  # finer lines than bins
     power = np.abs(np.fft.rfft(samples * tukey(samples.shape[1], min(edge, 1.0)), n)) ** 2
     frequency = np.arange(power.shape[1]) * recording.rate / n
@@ -118,7 +118,7 @@ def short_waves(case, fit):
     nats = evidence(seen, _apart(case))
     nats[_known(case, wavelengths)] = -np.inf
     k = int(np.argmax(nats))
-    if wavelengths[k] >= rolling.SHORTEST_WAVE or nats[k] < np.log(nats.size) or (kept and not _holds(kept, seen, k)):
+    if wavelengths[k] >= bands.SHORTEST_WAVE or nats[k] < np.log(nats.size) or (kept and not _holds(kept, seen, k)):
         return ()
     return (_candidate(case, fit, wavelengths, k, float(nats[k]), seen),)
 
@@ -160,7 +160,7 @@ def _candidate(case, fit, wavelengths, k, nats, seen):
     where = {"wavelength": round(length, 3), "place": round(float(middle), 2)}
     return Candidate(
         "rail_corrugation", parameters, lambda p: physics.RailCorrugation(a, b, **p), ((amplitude, length),), where,
-        "wavelength", int(np.count_nonzero(wavelengths < rolling.SHORTEST_WAVE)),
+        "wavelength", int(np.count_nonzero(wavelengths < bands.SHORTEST_WAVE)),
         promise=nats - float(np.log(wavelengths.size)), aside=nats, least=LEAST,
     )  # fmt: skip
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from turnout.mismatch.track.rolling import band_limited
+from turnout.mismatch.track.bands import band_limited
 
 LOW, HIGH = 250.0, 900.0  # [Hz]
 BIN, ABOUT, AROUND = 0.002, 0.006, 0.12  # s: of the loudness, of a blow, of the noise that it is compared with

@@ -9,7 +9,7 @@ from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
 from turnout.mismatch.case import Case, Nuisance
 from turnout.mismatch.joint import fit_jointly
-from turnout.mismatch.track import derivatives, rolling
+from turnout.mismatch.track import derivatives, roll, rolling
 from turnout.mismatch.track.base_model import RAIL, SEAT_SD, track_nuisances, with_rail, zone_of
 from turnout.mismatch.track.blows_case import Blows
 from turnout.mismatch.track.ceiling import ceilings, within_range
@@ -40,7 +40,7 @@ class TrackCase(Predicting, Case):
     def __init__(self, campaign, settings=None, families=None, solver=None):
         settings = settings or MismatchSettings()
         self.ceilings = ceilings(campaign, settings.threshold)
-        self._prepare(within_range(campaign, self.ceilings), settings, solver or rolling.Track1D())
+        self._prepare(within_range(campaign, self.ceilings), settings, solver or roll.Track1D())
         found, self.start_values = list(hammer_observations(self)), {}
         self.start_values = self._from_blows([o for _, o in found])
         found += undisturbed(self, list(passage_observations(self)))

@@ -1,0 +1,63 @@
+"""The band of passages: what is kept of a signal, read between its samples, and the clocks that hold it."""
+
+import numpy as np
+from scipy.fft import next_fast_len
+
+SHORTEST_WAVE = 0.3  # of the rail's roughness as modelled [m]
+LOW, HIGH = 5.0, 112.0  # band in which the deterministic part dominates the roughness [Hz]
+RATE = 1800.0  # of the simulation: with Radau IIA 1 to 2 % of the waveform of a band, a third of the materiality floor
+FOLDS = (9, 6, 5)  # steps of the simulation per sample of an observation, the first that holds its band
+
+
+def band_limited(samples, rate, low=LOW, high=HIGH):
+    """Rows of ``samples`` between ``low`` and ``high`` [Hz], zero phase, cosine edges of a third."""
+    n = samples.shape[-1]
+    size = next_fast_len(n + round(rate * 0.75), real=True)  # the lower edge rings for half a second
+    passed = gate(np.fft.rfftfreq(size, 1.0 / rate), low, high)
+    return np.fft.irfft(np.fft.rfft(samples, size) * passed, size)[..., :n]
+
+
+def gate(frequency, low, high):
+    """What ``band_limited`` lets through at each frequency [Hz], 0 to 1."""
+    f = np.asarray(frequency)
+    passed = np.clip((f - 0.67 * low) / (0.33 * low), 0.0, 1.0) * np.clip((1.25 * high - f) / (0.25 * high), 0.0, 1.0)
+    return 0.5 - 0.5 * np.cos(np.pi * passed)
+
+
+def read_at(samples, rate, time):
+    """Band-limited ``samples`` (..., n), sample k at (k + 1/2)/rate, read at ``time`` (m,), 0 outside."""
+    n = samples.shape[-1]
+    place = np.asarray(time) * rate - 0.5
+    k = np.clip(np.floor(place).astype(int), 1, n - 3)
+    s = place - k
+    a, b, c, d = (samples[..., k + i] for i in (-1, 0, 1, 2))
+    value = b + 0.5 * s * (c - a + s * (2.0 * a - 5.0 * b + 4.0 * c - d + s * (3.0 * (b - c) + d - a)))
+    return np.where((place < 0.0) | (place > n - 1), 0.0, value)
+
+
+def finer(samples, factor=4):
+    """Samples at a multiple of the rate by Fourier transform; sample k stays at (k + 1/2) of its own step."""
+    n = samples.shape[-1]
+    size = 2 * next_fast_len((n + 65) // 2, real=True)
+    spectrum = np.fft.rfft(samples, size)
+    shift = np.exp(2j * np.pi * np.fft.rfftfreq(size) * (0.5 / factor - 0.5))
+    padded = np.zeros((*samples.shape[:-1], size * factor // 2 + 1), dtype=complex)
+    padded[..., : spectrum.shape[-1]] = spectrum * shift
+    return factor * np.fft.irfft(padded, size * factor)[..., : n * factor]
+
+
+def band_end(speed):
+    """Upper end of the band of a passage [Hz]: its edge is 1.25 times this, where the shortest wave lies."""
+    return min(HIGH, speed / SHORTEST_WAVE / 1.25)
+
+
+def clock_of(speed):
+    """Samples per second that hold the band of a passage at this speed, a whole part of ``RATE`` [Hz]."""
+    enough = [RATE / fold for fold in FOLDS if RATE / fold > 2.4 * 1.25 * band_end(speed)]
+    return enough[0] if enough else RATE / FOLDS[-1]
+
+
+def limited(recording, sensors, high):
+    """Rows of the ``sensors`` of a recording, in the band that ends at ``high`` [Hz]."""
+    rows = [recording.index(s.name) for s in sensors]
+    return band_limited(recording.samples[rows], recording.rate, high=high)
