@@ -16,6 +16,7 @@ from turnout.mismatch.track.alignment import ALIKE, align
 from turnout.mismatch.track.flats import flats
 from turnout.mismatch.track.planned import measured_campaign, small_plan
 from turnout.mismatch.track.roll import Track1D
+from turnout.mismatch.track.strikes import Strikes
 from turnout.mismatch.whereabouts import whereabouts
 
 
@@ -177,3 +178,17 @@ def test_a_train_that_looks_like_no_such_train_is_said_and_located(plan):
     assert where.frame == "train" and where.train == "heavy"
     one = [p for p in campaign.passages if p.train == "light"] + [p for p in swapped if p.train == "heavy"][:1]
     assert TrackCase(replace(campaign, passages=tuple(one))).foreign == ()  # one passage may be another train
+
+
+@pytest.mark.parametrize(("behind", "offered"), [(2.9, [3, 1]), (3.1, [3])])
+def test_a_wheel_whose_blows_are_nearly_as_loud_is_sized_as_well(plan, monkeypatch, behind, offered):
+    """What blows cannot tell apart the band may: a wheel of three rough ones came before the one with the flat."""
+    case = TrackCase(measured_campaign(plan, (), 7))
+    (made, *_), radius = case.rollings.values(), 0.46
+    train, phases = case.said(made)["train"], ((made.name, 0.5),)
+    nats = {2: 20.0, 0: 20.0 - behind, 5: 20.0 - behind}
+    heard = [Strikes(n, train, wheel, radius, phases) for wheel, n in nats.items()]
+    monkeypatch.setattr("turnout.mismatch.track.flats.strikes", lambda case: heard)
+    monkeypatch.setattr("turnout.mismatch.track.flats._sized", lambda case, fit, struck: (0.03, phases, 5.0))
+    found = flats(case, SimpleNamespace(candidates=()))
+    assert [c.where["axle"] for c in found] == offered

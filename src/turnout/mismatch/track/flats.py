@@ -11,7 +11,7 @@ from turnout.errors import SimulationError
 from turnout.mismatch.candidate import Candidate
 from turnout.mismatch.track.strikes import strikes
 
-NAMED = 1  # wheels offered
+NAMED, CLOSE = 2, 3.0  # wheels offered, and nats of the blows that the second may be behind the first
 LEAST = 3.0  # nats of the blows, less the logarithm of the wheels, below which nobody looks closer
 ABOUT, APART = np.arange(-0.24, 0.25, 0.06), 0.15  # m: phases tried about that of the blows; closer ones look alike
 NEAR = (-0.03, 0.0, 0.03)  # m: and about the best of them
@@ -22,6 +22,7 @@ def flats(case, fit):
     """Candidates of the wheels that most likely carry a flat."""
     found, known = strikes(case), {c.where.get("train") for c in fit.candidates}
     loud = [s for s in found if s.nats > LEAST + np.log(len(found)) and s.train not in known]
+    loud = [s for s in loud if s.nats > loud[0].nats - CLOSE]
     return tuple(_candidate(case, fit, s, len(found)) for s in loud[:NAMED])
 
 
