@@ -10,6 +10,13 @@ from turnout.mismatch.verify import fit_of_reserved
 WINDOW = 0.8  # s of waveform shown
 SEGMENT = 0.5  # s of a piece of Welch's estimate: 2 Hz lines
 TELLS = 0.1  # share of the missing force that a law must explain to be worth a look
+AGAINST = {  # covariate of the missing force -> in words, with its unit
+    "displacement": ("displacement of the sleeper", "m"),
+    "velocity": ("velocity of the sleeper", "m/s"),
+    "position": ("nearest wheel from the sleeper", "m"),
+    "time": ("time of the recording", "s"),
+    "temperature": ("rail temperature", "°C"),
+}
 CORE = (0.1, 0.9)  # shares of the gain between which band and reach are quoted
 
 
@@ -234,6 +241,7 @@ def _latent(found):
     if found.latent.r2[name] < TELLS:
         return []
     centre, mean, error = found.latent.curves[name]
-    label = f"missing force against {name}: it explains {found.latent.r2[name]:.0%}"
-    row = _row("latent", label, (name, ""), found.latent.unit, [centre, mean, mean - 1.96 * error, mean + 1.96 * error])
-    return [row]
+    label = f"missing force against {name}: it explains {100.0 * found.latent.r2[name]:.0f} %"
+    across = AGAINST.get(name, (name, ""))
+    limits = [centre, mean, mean - 1.96 * error, mean + 1.96 * error]
+    return [_row("latent", label, across, found.latent.unit, limits)]

@@ -66,7 +66,7 @@ def curves(row):
     base = {"finding_id": row["finding_id"], "turnout_id": "t1", "channel": "A7", "recording": "p1"}
     lists = {name: np.sin(9 * x + k) + 1.5 for k, name in enumerate(("measured", "before", "after", "rival"))}
     kinds = [("waveform", "time", "s", "m/s²"), ("spectrum", "frequency", "Hz", "(m/s²)²/Hz"),
-             ("receptance", "frequency", "Hz", "m/N"), ("latent", "displacement", "", "N")]  # fmt: skip
+             ("receptance", "frequency", "Hz", "m/N"), ("latent", "displacement of the sleeper", "m", "N")]  # fmt: skip
     return [
         base | lists | {"curve": c, "curve_no": k, "label": f"{c} of p1, never used", "x": x, "x_label": name,
                         "x_unit": unit, "y_unit": y}
@@ -132,6 +132,12 @@ def test_a_named_finding_says_what_where_how_much_and_what_to_check():
     for fit in ("41 %", "78 %", "50 %", "43 %"):
         assert f">{fit}</text>" in text
     assert "--accept" in text and "never used" in text
+
+
+def test_axes_carry_their_units():
+    text = page(named())
+    for label in ("time [s]", "frequency [Hz]", "displacement of the sleeper [m]", "force [N]"):
+        assert label in text
 
 
 def test_one_of_two_says_which_measurement_would_tell():

@@ -36,8 +36,7 @@ def _title(row):
 
 
 def _across(row, x, log):
-    label = f"{row['x_label']} [{row['x_unit']}]" if row["x_unit"] else row["x_label"]
-    return Axis(float(x.min()), float(x.max()), label, "log" if log else "linear")
+    return Axis(float(x.min()), float(x.max()), _named(row), "log" if log else "linear")
 
 
 def _up(row, values, log):
@@ -61,13 +60,18 @@ def _key(chart, names, words):
         x += (6.2 * len(words[name]) + 16) / (chart.width - 76)
 
 
+def _named(row):
+    """Quantity and unit of the horizontal axis."""
+    return f"{row['x_label']} [{row['x_unit']}]" if row["x_unit"] else row["x_label"]
+
+
 def _latent(row):
     """Mean missing force with its 95 % limits over the covariate that explains most."""
     x, mean = np.asarray(row["x"], dtype=float), np.asarray(row["measured"], dtype=float)
     low, high = np.asarray(row["before"], dtype=float), np.asarray(row["after"], dtype=float)
     pad = 0.1 * float(np.ptp(np.concatenate([low, high]))) or 1.0
     chart = Chart(
-        Axis(float(x.min()), float(x.max()), row["x_label"]),
+        Axis(float(x.min()), float(x.max()), _named(row)),
         Axis(float(low.min()) - pad, float(high.max()) + pad, f"force [{row['y_unit']}]"),
         row["label"][:1].upper() + row["label"][1:],
         height=250,
