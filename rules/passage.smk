@@ -7,6 +7,7 @@ rule passage:
     input:
         plan="work/plan/{shard}.json",
         hammer="work/hammer/{shard}.json",
+        learned=RUN.learned,
     output:
         state=update("work/passage/{shard}.json"),
     log:

@@ -81,7 +81,7 @@ REASONS = {
     "dead_channel": "a channel is constant or below its noise floor",
     "sign_reversed": "the force is negative at contact: the sign is reversed",
     "clock_backwards": "the time stamps run backwards",
-    "duplicate": "the same bytes as another file of the campaign",
+    "duplicate": "the same bytes as another file",
     "wrong_time": "the time of the recording contradicts its campaign",
     "double_hit": "the hammer touched the rail twice",
     "overload": "a channel left its range",

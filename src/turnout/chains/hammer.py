@@ -1,5 +1,6 @@
 """Hammer tests of one section and campaign: raw files in, rows of the registry out."""
 
+from collections import Counter
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -7,9 +8,10 @@ import numpy as np
 
 from turnout.chains.hammer_rows import impact_mode_row, impact_row, mode_row, model_row, receptance_row
 from turnout.chains.noted import rail_temperature
-from turnout.chains.raw_rows import read_or_quarantine, recording_row
+from turnout.chains.raw_rows import quarantine_row, read_or_quarantine, recording_row
 from turnout.config.pattern import compiled
 from turnout.config.turnout import TurnoutConfig
+from turnout.errors import ReadError
 from turnout.identify import identify
 from turnout.receptance import find_impacts, receptance_of
 from turnout.records import ModalModel, Rejection, Unit
@@ -55,6 +57,7 @@ def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root, algo: str = "") ->
             recordings += result.recordings
     if not rows["recordings"]:
         return rows
+    recordings = _of_one_rate(recordings, base, rows["quarantine"], ids)
     # all blows of the campaign at once: what is wrong with a whole file shows against the others
     impacts = find_impacts(recordings, force, response, turnout.settings["receptance"])
     names = [f"{ids[impact.source]}:{impact.record}" for impact in impacts]
@@ -65,12 +68,26 @@ def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root, algo: str = "") ->
         temperature = rail_temperature(recordings)
     inputs = sorted(r["recording_id"] for r in rows["recordings"])
     identity = {
-        "model_id": content_id("model", *inputs, base["section_id"], unit.config_hash, algo),
+        "model_id": content_id(
+            "model", *inputs, base["section_id"], unit.config_hash, algo, campaign.started_at, temperature
+        ),
         "measured_at_utc": campaign.started_at,
         "code_version": algo,
         "config_hash": unit.config_hash,
     }
     return rows | _modal_rows(impacts, names, turnout, base, identity, temperature)
+
+
+def _of_one_rate(recordings, base, quarantine, ids):
+    """The recordings of the rate that most have; a quarantine row for each file of another one."""
+    rates = Counter(r.rate for r in recordings)
+    most = max(rates, key=lambda rate: (rates[rate], rate))
+    for path in sorted({r.source for r in recordings if r.rate != most}):
+        rate = next(r.rate for r in recordings if r.source == path)
+        found, remedy = f"{rate:g} Hz, the others {most:g} Hz", "Record all tests of a campaign at one rate"
+        error = ReadError(path, "the file", found, remedy, "wrong_rate")
+        quarantine.append(quarantine_row(error, base, "hammer", "hammer", None, ids[path]))
+    return [r for r in recordings if r.rate == most]
 
 
 def _modal_rows(impacts, names, turnout, base, identity, temperature):

@@ -9,8 +9,7 @@ from turnout.config.parameter_set import read_parameters
 from turnout.config.turnout import TurnoutConfig
 from turnout.content import sha256_of
 from turnout.errors import SimulationError, TurnoutError
-from turnout.fleet.batches import read_results
-from turnout.fleet.state import batch_paths
+from turnout.fleet.current import current_results
 from turnout.simulate import load_track
 from turnout.simulate.parameters import extended
 
@@ -64,12 +63,10 @@ def _extended(path: Path) -> list[Path]:
     return found
 
 
-def mismatch_context(turnout: str, work="work") -> tuple[str, dict[str, dict]]:
+def mismatch_context(turnout: str, settings=None, work="work") -> tuple[str, dict[str, dict]]:
     """(token, tables of each passage unit by its id) as the passage stage left them in ``work``."""
     found = {}
-    for path in batch_paths(sorted((Path(work) / "passage").glob("*.json"))):
-        for result in read_results(path):
-            if result.turnout == turnout:
-                found[result.unit] = {k: result.tables.get(k, []) for k in ("passages", "quarantine")}
+    for result in current_results(work, "passage", turnout):
+        found[result.unit] = {k: result.tables.get(k, []) for k in ("passages", "quarantine")}
     ids = sorted(str(r.get("passage_id")) + str(r.get("status")) for t in found.values() for r in t["passages"])
     return hashlib.sha256(json.dumps(ids).encode()).hexdigest()[:16], found

@@ -5,8 +5,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from turnout.chains import noted
 from turnout.chains.mismatch_trains import TrainUnknownError, train_of
-from turnout.chains.noted import number, rail_temperature
+from turnout.chains.noted import rail_temperature
 from turnout.chains.passage import PassageContext, passage_unit, sensors_of, trains_in
 from turnout.chains.passage_context import known_patterns
 from turnout.config.turnout import TurnoutConfig
@@ -200,7 +201,7 @@ def _reasons(bad):
 
 def _noted(row, recording):
     temperature = row.get("rail_temperature_c")
-    temperature = number(recording.conditions, "rail_temperature") if temperature is None else temperature
+    temperature = noted.temperature(recording.conditions) if temperature is None else temperature
     return {} if temperature is None else {"rail_temperature": float(temperature)}
 
 

@@ -40,7 +40,7 @@ def diagnose_turnout(
         raise SimulationError(f"{turnout_id} has no section {', '.join(unknown)}.")
     label, units = _visit(turnout_id, visits(scan(turnout, Path(raw_root)).units), visit, raw_root)
     unit = unit_of(turnout_id, label, units, turnout.hashes["mismatch"])
-    _, told = mismatch_context(turnout_id, work)
+    _, told = mismatch_context(turnout_id, work=work)
     watch = Watch(None if budget is None else time.monotonic() + budget, bar.simulations if bar else None)
     options = Options(track, tuple(sections), str(Path(work) / "mismatch-fits"), watch, bar.group if bar else None)
     return diagnose_visit(unit, turnout, raw_root, told, fingerprint("turnout.chains.mismatch"), options)

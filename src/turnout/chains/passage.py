@@ -149,18 +149,19 @@ def _one_train(recording, started_at, recording_id, path, turnout, context, rows
     base = {"turnout_id": turnout.id}
     first = float(passage.times[0]) if passage.n_axle else 0.0
     passed_at = started_at + timedelta(seconds=round(first, 3))
-    passage_id = content_id("passage", recording_id, str(recording.record), *name)
     rows["quarantine"] += finding_rows(passage, base, path, recording.record, recording_id)
     listed, _ = listed_trains(turnout.trains)
     match = listed_for(passed_at, passage.n_axle, listed, settings.train_data_tolerance) if passage.n_axle else None
     load = axle_load(recording, passage, context.loads, settings) if passage.n_axle else None
-    identity = {**base, "passage_id": passage_id, "recording_id": recording_id, "passed_at_utc": passed_at}
+    identity = {**base, "recording_id": recording_id, "passed_at_utc": passed_at}
     row = passage_row(passage, identity, match, load, recording.conditions)
     if context.clusters is not None and passage.n_axle:
         row["cluster_id"] = context.clusters.assign(row["train_type"], row["speed_kmh"], row["axle_load_t"])
-    rows["passages"].append(row)
-    if passage.n_axle:
-        rows["passage_fits"] += _fit_rows(recording, passage, sensors, turnout, context, identity, settings)
+    fits = _fit_rows(recording, passage, sensors, turnout, context, identity, settings) if passage.n_axle else []
+    # of all that it says: train data, models, clusters and loads change it as well as the file does
+    passage_id = {"passage_id": content_id("passage", str(recording.record), *name, row, fits)}
+    rows["passages"].append(passage_id | row)
+    rows["passage_fits"] += [passage_id | fit for fit in fits]
 
 
 def _fit_rows(recording, passage, sensors, turnout, context, identity, settings):

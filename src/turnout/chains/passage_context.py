@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
-from datetime import datetime
+import re
+from collections.abc import Callable, Mapping
+from datetime import datetime, timedelta
 from functools import lru_cache
 from pathlib import Path
 
@@ -12,46 +13,60 @@ import numpy as np
 from ruamel.yaml import YAML
 
 from turnout.chains.passage import PassageContext, SectionModel
+from turnout.config.build import digest
 from turnout.config.settings.passage import PassageSettings
 from turnout.content import sha256_of
 from turnout.errors import ConfigError
-from turnout.fleet.batches import read_results
-from turnout.fleet.state import batch_paths
+from turnout.fleet.current import current_results
 from turnout.passage.clusters import Clusters
 from turnout.passage.load import LoadCalibration
 from turnout.passage.patterns import read_patterns
-from turnout.records import ModalModel
+from turnout.records import ModalModel, Unit
+
+LONGEST = timedelta(days=2)  # that one file of a logger that never stops may last
 
 
-def passage_context(turnout: str, work="work", settings: PassageSettings | None = None) -> tuple[str, PassageContext]:
-    """(token, context) of one turnout: the token changes when a model, a pattern, a cluster or a calibration does.
+def passage_context(
+    turnout: str, settings: Mapping | None = None, work="work"
+) -> tuple[Callable[[Unit], str], PassageContext]:
+    """(token, context) of one turnout with these ``settings``, by part: the token of a passage changes when a model it
+    may be fitted with, a pattern, a cluster or a calibration does.
 
     Models are read from what the hammer stage left in ``work``; a passage is fitted with the latest one identified
     before it, so a new campaign changes the scores of later passages only.
     """
-    settings = settings or PassageSettings()
-    models = section_models(turnout, work)
-    clusters = read_clusters(Path(settings.assets) / "clusters.json")
-    loads = read_loads(Path(settings.assets) / "loads.json").get(turnout, {})
-    parts = [sorted(m.model_id for found in models.values() for m in found), _digest(settings.axle_patterns)]
-    parts += [_digest(Path(settings.assets) / name) for name in ("clusters.json", "loads.json")]
-    token = hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:16]
-    return token, PassageContext(models, known_patterns(settings.axle_patterns), clusters, loads)
+    own = settings["passage"] if settings else PassageSettings()
+    models, clusters_file = section_models(turnout, work), Path(own.assets) / "clusters.json"
+    clusters, loads = read_clusters(clusters_file), read_loads(Path(own.assets) / "loads.json").get(turnout, {})
+    parts = [_digest(own.axle_patterns), _digest(clusters_file), repr(sorted(loads.items()))]
+
+    def token(unit: Unit) -> str:
+        used = [[m.model_id for m in near(found, unit.label)] for _, found in sorted(models.items())]
+        return digest([parts, used])[:16]
+
+    return token, PassageContext(models, known_patterns(own.axle_patterns), clusters, loads)
+
+
+def near(models: tuple[SectionModel, ...], label: str) -> tuple[SectionModel, ...]:
+    """Models that the passages of a file may be fitted with, by the time in its name; all where it has none."""
+    stamp = re.search(r"\d{8}T\d{6}Z", label)
+    if not stamp:
+        return models
+    start = datetime.strptime(stamp[0], "%Y%m%dT%H%M%SZ")
+    earlier = [m for m in models if m.measured_at <= start]
+    later = [m for m in models if start < m.measured_at <= start + LONGEST]
+    return (*(earlier[-1:] or models[:1]), *later)
 
 
 def section_models(turnout: str, work="work") -> dict[str, tuple[SectionModel, ...]]:
     """Accepted models of each section, by label, in order of time."""
     found: dict[str, list[SectionModel]] = {}
-    for path in batch_paths(sorted((Path(work) / "hammer").glob("*.json"))):
-        for result in read_results(path):
-            if result.turnout != turnout:
-                continue
-            for row in result.tables.get("models", []):
-                if row["status"] in ("accepted", "second_order_only"):
-                    label = row["section_id"].removeprefix(f"{turnout}/")
-                    found.setdefault(label, []).append(_section_model(row))
-    unique = {label: {m.model_id: m for m in models}.values() for label, models in found.items()}
-    return {label: tuple(sorted(ms, key=lambda m: (m.measured_at, m.model_id))) for label, ms in unique.items()}
+    for result in current_results(work, "hammer", turnout):
+        for row in result.tables.get("models", []):
+            if row["status"] in ("accepted", "second_order_only"):
+                label = row["section_id"].removeprefix(f"{turnout}/")
+                found.setdefault(label, []).append(_section_model(row))
+    return {label: tuple(sorted(ms, key=lambda m: (m.measured_at, m.model_id))) for label, ms in found.items()}
 
 
 def _section_model(row) -> SectionModel:

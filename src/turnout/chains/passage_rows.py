@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from turnout.chains.noted import number
+from turnout.chains.noted import number, temperature
 from turnout.chains.raw_rows import quarantine_row
 from turnout.errors import ReadError
 from turnout.passage.train_type import UNKNOWN
@@ -51,10 +51,13 @@ def passage_row(passage, identity, listed, load, conditions) -> dict:
         "n_axles": passage.n_axle,
         "direction": passage.direction,
         "track": passage.track,
-        "rail_temperature_c": number(conditions, "rail_temperature"),
+        "rail_temperature_c": temperature(conditions),
         "axle_load_source": "unavailable",
     }
     words = [f.detail or f.reason for f in passage.findings]
+    noted = number(conditions, "rail_temperature")
+    if noted is not None and temperature(conditions) is None:
+        words.append(f"rail temperature {noted:g} °C noted, not used")
     if speed is not None:
         row |= {
             "speed_kmh": KMH * float(speed.speed),
@@ -109,7 +112,6 @@ def _listed(row, listed) -> list[str]:
 def fit_row(fit, sensor, model_id, turnout, identity) -> dict:
     """Row of ``passage_fits``; ``fit`` None where the channel is not sound enough to be fitted."""
     row = {
-        "passage_id": identity["passage_id"],
         "section_id": turnout.section_id(sensor.section),
         "channel": sensor.name,
         "model_id": model_id,

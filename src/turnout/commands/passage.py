@@ -36,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
     result = read(path.name, path.parent, turnout.passages.description, settings.longest)
     for error in result.errors:
         print(f"Not used: {error}")
-    _, context = passage_context(turnout.id, args.work, settings)
+    _, context = passage_context(turnout.id, turnout.settings, args.work)
     for whole in (*result.recordings, *result.long):
         for recording, late, name in trains_in(whole, settings):
             _show(recording, late if name else None, turnout, context, settings, args.no_fit)

@@ -54,7 +54,7 @@ def _say(turnout, raw, known, counts) -> None:
     found = scan(turnout, raw)
     noted, wrong = read_notes(turnout, raw)
     for unit, note in zip(found.units, notes_of(noted, found.units)):
-        word = known.judged(Planned(unit, note))
+        word = known.judged(Planned(unit, note), turnout.settings)
         counts["all"] += 1
         if word:
             counts[word] += 1
@@ -72,13 +72,12 @@ class _Known:
         self.tokens: dict = {}
         self.algo: dict[str, str] = {}
 
-    def judged(self, planned) -> str:
+    def judged(self, planned, settings) -> str:
         """ "new", "changed", or "" where its result stands."""
-        from dataclasses import replace
-
         from turnout.fingerprint import fingerprint
         from turnout.fleet.keys import stamp_of
         from turnout.fleet.scan import unit_id
+        from turnout.fleet.shard import with_token
         from turnout.fleet.shards import shard_of
         from turnout.fleet.state import load_state
 
@@ -92,14 +91,14 @@ class _Known:
             return "new"
         if unit.kind not in self.algo:
             self.algo[unit.kind] = fingerprint(module)
-        planned = replace(planned, note=planned.note + self._token(unit))
+        planned = with_token(planned, self._token(unit, settings))
         return "" if (before.stamp, before.algo) == (stamp_of(planned), self.algo[unit.kind]) else "changed"
 
-    def _token(self, unit) -> str:
+    def _token(self, unit, settings):
         """What a stage takes from another one for this turnout: the passages the models of the hammer tests."""
         from turnout.fleet.shard import named
 
         context = STAGES[unit.kind][1]
         if context and (unit.kind, unit.turnout) not in self.tokens:
-            self.tokens[unit.kind, unit.turnout] = named(context)(unit.turnout, work=self.work)[0]
+            self.tokens[unit.kind, unit.turnout] = named(context)(unit.turnout, settings, work=self.work)[0]
         return self.tokens.get((unit.kind, unit.turnout), "")

@@ -22,7 +22,7 @@ import hashlib
 import json
 import math
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass
 from datetime import date, datetime
 from pathlib import Path
@@ -60,12 +60,14 @@ def write_batch(folder: Path, results: Iterable[UnitResult]) -> Path:
     return path
 
 
-def read_results(path: os.PathLike) -> Iterator[UnitResult]:
-    """Results of one batch, sorted by unit."""
+def read_results(path: os.PathLike, units: Container[str] | None = None) -> Iterator[UnitResult]:
+    """Results of one batch, sorted by unit; of the ``units`` alone where given."""
     import pyarrow.parquet as pq
 
     for group in pq.ParquetFile(path).iter_batches(batch_size=64):
         for row in group.to_pylist():
+            if units is not None and row["unit"] not in units:
+                continue
             yield UnitResult(**{**{c: row[c] for c in COLUMNS[:-1]}, "tables": decode(row["rows"])})
 
 

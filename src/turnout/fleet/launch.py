@@ -31,7 +31,8 @@ LAUNCHED = "work/launched"
 @dataclass(frozen=True)
 class Launch:
     """``shards`` take part in this run, ``every_shard`` names all; ``job`` is what a stage job is told;
-    ``diagnose`` whose mismatches are diagnosed: "every" turnout's, those "enabled" in their settings, "" none."""
+    ``diagnose`` whose mismatches are diagnosed: "every" turnout's, those "enabled" in their settings, "" none;
+    ``learned`` are the files of clusters, calibrations and axle patterns that passages are judged with."""
 
     shards: list[str]
     every_shard: list[str]
@@ -40,6 +41,7 @@ class Launch:
     job: dict = field(default_factory=dict)
     diagnose: str = ""
     chains: Mapping[str, str] = field(default_factory=dict)
+    learned: tuple[str, ...] = ()
 
     def threads(self, cores: int | None) -> int:
         """Processes per job when ``cores`` are shared among the shards."""
@@ -70,7 +72,14 @@ def launch(options: Mapping, scan: bool, formats=None, to_si=None) -> Launch:
     names = shard_names(shards, turnouts)
     chains = dict(options.get("chains") or {})
     whose = _diagnosed(options, configuration)
-    return Launch(names, shard_names(shards), turnouts, fleet_hash(configuration), job, whose, chains)
+    learned = _learned(configuration.settings["passage"])
+    return Launch(names, shard_names(shards), turnouts, fleet_hash(configuration), job, whose, chains, learned)
+
+
+def _learned(settings) -> tuple[str, ...]:
+    """Those that are there; settings of a layout or turnout may name others, which are looked at when a job runs."""
+    files = [Path(settings.assets) / name for name in ("clusters.json", "loads.json")] + [Path(settings.axle_patterns)]
+    return tuple(str(path) for path in files if path.is_file())
 
 
 def launched_at() -> datetime | None:

@@ -1,22 +1,26 @@
 """What was noted beside the files of a unit and changes its result: its campaign, the trains of its hour."""
 
 import re
-from collections import defaultdict
-from collections.abc import Sequence
+from bisect import bisect_left, bisect_right
+from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
 
 from turnout.config import TurnoutConfig
 from turnout.config.build import digest
 from turnout.records import Unit
 
-# A train is looked for among those noted within so many hours of its recording.
-HOURS = 1
+AROUND = timedelta(hours=1)  # that the clocks of a logger and of the train data may differ by
+LONGEST = timedelta(days=2)  # that one file of a logger that never stops may last
 
 
 def notes_of(turnout: TurnoutConfig, units: Sequence[Unit]) -> list[str]:
-    """A digest per unit; it changes when the unit's campaign, or a train noted near its time, is corrected."""
+    """A digest per unit; it changes when the unit's campaign, or a train noted within its time, is corrected.
+
+    A file lasts until the next one begins: one of a logger that never stops holds the trains of a day.
+    """
     campaigns: dict[str, str] = {}
-    trains = _by_hour(turnout.trains)
+    trains = sorted(_timed(turnout.trains), key=lambda entry: entry[0])
+    starts = sorted({time for u in units if not u.campaign and (time := _start(u.label))})
     notes = []
     for unit in units:
         if unit.campaign:
@@ -24,24 +28,37 @@ def notes_of(turnout: TurnoutConfig, units: Sequence[Unit]) -> list[str]:
                 campaigns[unit.campaign] = digest(repr(turnout.campaigns[unit.campaign]))[:16]
             notes.append(campaigns[unit.campaign])
         else:
-            notes.append(_near(unit.label, trains))
+            notes.append(_within(_start(unit.label), starts, trains))
     return notes
 
 
-def _by_hour(rows) -> dict[str, list]:
-    """Rows of trains.csv by the hour of their first time column."""
-    hours = defaultdict(list)
+def _timed(rows: Sequence[Mapping]) -> list[tuple[datetime, list]]:
+    """(time, row) of the rows of trains.csv that have one in their first time column."""
+    found = []
     for row in rows:
-        time = next((value for name, value in row.items() if name.endswith("_at_utc")), "")
-        hours[time[:13].replace(" ", "T")].append(sorted((k, str(v)) for k, v in row.items()))
-    return hours
+        said = next((value for name, value in row.items() if name.endswith("_at_utc")), "")
+        try:
+            time = datetime.fromisoformat(str(said).removesuffix("Z")).replace(tzinfo=None)
+        except ValueError:
+            continue
+        found.append((time, sorted((k, str(v)) for k, v in row.items())))
+    return found
 
 
-def _near(label: str, trains: dict[str, list]) -> str:
+def _start(label: str) -> datetime | None:
     stamp = re.search(r"\d{8}T\d{6}Z", label)
-    if not trains or not stamp:
+    try:
+        return datetime.strptime(stamp[0], "%Y%m%dT%H%M%SZ") if stamp else None
+    except ValueError:  # digits that are no time
+        return None
+
+
+def _within(start: datetime | None, starts: list[datetime], trains: list[tuple[datetime, list]]) -> str:
+    """Digest of the trains noted while a file lasts that begins at ``start``, "" without any."""
+    if start is None or not trains:
         return ""
-    time = datetime.strptime(stamp[0], "%Y%m%dT%H%M%SZ")
-    hours = [(time + timedelta(hours=h)).strftime("%Y-%m-%dT%H") for h in range(-HOURS, HOURS + 1)]
-    rows = [row for hour in hours for row in trains.get(hour, ())]
-    return digest(rows)[:16] if rows else ""
+    after = bisect_right(starts, start)
+    end = min(starts[after] if after < len(starts) else start + LONGEST, start + LONGEST)
+    first = bisect_left(trains, start - AROUND, key=lambda entry: entry[0])
+    last = bisect_right(trains, end + AROUND, key=lambda entry: entry[0])
+    return digest([row for _, row in trains[first:last]])[:16] if last > first else ""

@@ -3,7 +3,7 @@
 import os
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
@@ -21,6 +21,7 @@ from turnout.fleet.pool import in_order
 from turnout.fleet.progress import Progress
 from turnout.fleet.scan import unit_id
 from turnout.fleet.state import Known, batch_folder, load_state, remove_orphans
+from turnout.records import Unit
 
 
 @dataclass(frozen=True)
@@ -41,12 +42,16 @@ class Summary:
         return said + "".join(f", {n} {what}" for what, n in more.items() if n)
 
 
+Token = str | Callable[[Unit], str]
+
+
 @dataclass(frozen=True)
 class Stage:
     """What a stage computes: units of ``kind`` by ``compute(unit, turnout, raw_root, algo=...)``.
 
-    ``algo`` is the version of its code, part of every key. ``context(turnout_id)``, where given, returns
-    (token, value): the token enters the key, the value is passed on as ``context=``. ``gather(plan, configuration)``,
+    ``algo`` is the version of its code, part of every key. ``context(turnout_id, settings)``, where given, returns
+    (token, value): the token, or what it says of a unit where it is a function, enters the key; the value is passed on
+    as ``context=``. ``settings`` are those of the turnout, by part. ``gather(plan, configuration)``,
     where given, makes units of the stage's own from a plan file, else they are the plan's. All three may be named,
     "package.module:function", and are then imported when there is something to compute.
     """
@@ -54,7 +59,7 @@ class Stage:
     kind: str
     compute: Callable | str
     algo: str
-    context: Callable[[str], tuple[str, object]] | str | None = None
+    context: Callable[[str, Mapping], tuple[Token, object]] | str | None = None
     gather: Callable[[Path, Configuration], Iterable[Planned]] | str | None = None
 
 
@@ -66,6 +71,11 @@ def named(function: Callable | str) -> Callable:
     if module.partition(".")[0] != "turnout" and os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())
     return getattr(import_module(module), name)
+
+
+def with_token(planned: Planned, token: Token) -> Planned:
+    """The unit as planned, its note with what the stage's context says of it."""
+    return replace(planned, note=planned.note + (token if isinstance(token, str) else token(planned.unit)))
 
 
 def run_shard(
@@ -146,7 +156,7 @@ class _Run:
             if turnout not in turnouts:
                 turnouts[turnout] = self._context(turnout)
             token, value = turnouts[turnout]
-            planned = replace(planned, note=planned.note + token)
+            planned = with_token(planned, token)
             stamp, known = stamp_of(planned), self.state.units.get(name)
             if known and (known.stamp, known.algo) == (stamp, self.stage.algo):
                 continue
@@ -157,8 +167,14 @@ class _Run:
                 todo.append((planned, config, stamp, value))
         return todo, stale
 
-    def _context(self, turnout: str) -> tuple[str, object]:
-        return named(self.stage.context)(turnout) if self.stage.context else ("", None)
+    def _context(self, turnout: str) -> tuple[Token, object]:
+        if not self.stage.context:
+            return "", None
+        try:
+            settings = self.configuration.turnout(turnout).settings
+        except ConfigError:  # its units wait for a plan
+            return "", None
+        return named(self.stage.context)(turnout, settings)
 
     def _turnout(self, planned: Planned, cache: dict) -> TurnoutConfig | None:
         """Configuration with the notes of the raw folder; None where it is not the one of the plan any more."""

@@ -21,7 +21,7 @@ def configuration_rows(configuration: Configuration, raw_root: Path, plans: Iter
     return {
         "turnouts": [_turnout(t) for t in turnouts],
         "sections": [_section(t, s) for t in turnouts for s in t.sections],
-        "events": [_event(e) for e in configuration.events],
+        "events": list({row["event_id"]: row for row in map(_event, configuration.events)}.values()),
         "campaigns": [r for t in turnouts for r in _campaigns(with_raw(t, raw_root), measured.get(t.id, set()))],
         "quarantine": [row for plan in plans for row in _left_out(plan)],
     }
@@ -57,7 +57,9 @@ def _section(turnout: TurnoutConfig, section) -> dict:
 
 def _event(event: Event) -> dict:
     return {
-        "event_id": content_id("event", event.turnout, event.section, event.at, event.kind, event.note),
+        "event_id": content_id(
+            "event", event.turnout, event.section, event.at, event.kind, event.note, sorted(event.resets)
+        ),
         "turnout_id": event.turnout,
         "section_id": f"{event.turnout}/{event.section}" if event.section else None,
         "event_at_utc": event.at.isoformat(),

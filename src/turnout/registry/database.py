@@ -106,7 +106,10 @@ def _create_views(con, root: Path, generation: Generation) -> None:
         con.execute(f'create view "{table}" as {read_live(con, root, table, generation.of(table))}')
     for table in LARGE:
         create_parts(con, root, table, generation.of(table))
-    newest = f"timestamp {literal(generation.newest)}" if generation.newest else "null::timestamp"
+    # a clock that runs ahead is not believed: nothing was measured after the last run
+    ended = con.execute("select max(ended_at_utc)::varchar from runs").fetchall()[0][0]
+    last = generation.newest and min(generation.newest, ended or generation.newest)
+    newest = f"timestamp {literal(last)}" if last else "null::timestamp"
     con.execute(f"create macro newest_measurement() as {newest}")
     con.execute(
         f"create view registry_info as select {generation.number}::bigint as generation, "

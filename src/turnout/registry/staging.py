@@ -8,6 +8,7 @@ import pyarrow as pa
 from turnout.registry.columns import create_table, key, names, tables
 from turnout.registry.intake import Arrival, Refusal
 
+UNIQUE = "unique, and another row has it already"
 MARKS = ", _unit integer, _row integer, _year integer"
 # Rows of the second kind mean nothing without their row of the first.
 CHILDREN = {
@@ -63,9 +64,9 @@ def admit(con: duckdb.DuckDBPyConnection, table: str, gathered: pa.Table, run_id
 
 
 def refuse_orphans(con: duckdb.DuckDBPyConnection, refusals: list[Refusal], arrivals: Mapping[int, Arrival]) -> int:
-    """Take back the rows that belong to a refused model or passage; how many."""
+    """Take back the rows that belong to a refused model or passage, and what is said of them; how many."""
     taken = 0
-    for refusal in refusals:
+    for refusal in list(refusals):
         if refusal.table not in CHILDREN:
             continue
         id_column, children = CHILDREN[refusal.table]
@@ -74,6 +75,12 @@ def refuse_orphans(con: duckdb.DuckDBPyConnection, refusals: list[Refusal], arri
             where = f"from new_{child} where _unit = ? and {id_column} is not distinct from ?"
             taken += con.execute(f"select count(*) {where}", [refusal.unit, parent]).fetchall()[0][0]
             con.execute(f"delete {where}", [refusal.unit, parent])
+            given = arrivals[refusal.unit].tables.get(child, ())
+            refusals[:] = [
+                r
+                for r in refusals
+                if (r.unit, r.table) != (refusal.unit, child) or given[r.row].get(id_column) != parent
+            ]
     return taken
 
 
@@ -110,17 +117,24 @@ def _bad_values(con, table) -> list[Refusal]:
 
 
 def _second_of_a_key(con, table) -> list[Refusal]:
-    """Refusals of all rows but the first, in the order of the units, that share one key."""
+    """Refusals of all rows but the first, in the order of the units, that share one key, chunks before included."""
     keys = key(table)
     quoted = ", ".join(f'"{k}"' for k in keys)
     numbered = f"select _unit, _row, {quoted}, row_number() over (partition by {quoted} order by _unit, _row) as nth"
-    found = con.execute(f"select * exclude nth from ({numbered} from arriving) where nth > 1 order by all").fetchall()
+    later = f"select * exclude nth from ({numbered} from arriving) where nth > 1"
+    there = f"select _unit, _row, {quoted} from arriving semi join new_{table} using ({quoted})"
+    found = con.execute(f"from ({later} union {there}) order by all").fetchall()
     for unit, row, *_ in found:
         con.execute("delete from arriving where _unit = ? and _row = ?", [unit, row])
     return [
-        Refusal(unit, table, row, "+".join(keys), " ".join(map(str, values)), "unique, and another row has it already")
+        Refusal(unit, table, row, "+".join(keys), " ".join(map(str, values)), UNIQUE, reason=_why_twice(table))
         for unit, row, *values in found
     ]
+
+
+def _why_twice(table) -> str:
+    """The same bytes give the same passage; all other ids are of one unit alone."""
+    return "duplicate" if table in ("passages", "passage_fits") else "internal_error"
 
 
 def columns_sql(table: str) -> str:

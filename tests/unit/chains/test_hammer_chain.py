@@ -1,6 +1,7 @@
 """The whole hammer chain against a truth that it never sees: files on disk in, rows out."""
 
 import json
+from dataclasses import replace
 from datetime import date, datetime
 
 import numpy as np
@@ -111,3 +112,25 @@ def test_a_file_copied_under_another_name_counts_once(tmp_path):
     assert len(unit.files) == 3 and len(rows["impacts"]) == 20
     assert [q["reason_code"] for q in rows["quarantine"]] == ["duplicate"]
     assert "A9_1" in rows["quarantine"][0]["found"] and "A9_3" in rows["quarantine"][0]["path"]
+
+
+def test_a_corrected_temperature_makes_another_model_of_the_same_blows(tmp_path):
+    unit, turnout, _ = lay_out(tmp_path)
+    warm = replace(turnout.campaigns[unit.campaign], rail_temperature=22.0)
+    other = replace(turnout, campaigns={**turnout.campaigns, unit.campaign: warm})
+    one, two, again = (hammer_unit(unit, t, tmp_path, algo="1")["models"][0] for t in (turnout, other, turnout))
+    assert one["model_id"] == again["model_id"] != two["model_id"]
+
+
+def test_a_file_at_another_rate_is_left_out_and_the_campaign_goes_on(tmp_path):
+    def slower(test, recordings):
+        if test != 2:
+            return recordings
+        return [replace(r, samples=r.samples[:, ::2], rate=r.rate / 2) for r in recordings]
+
+    unit, turnout, _ = lay_out(tmp_path, change=slower)
+    layout = replace(turnout.hammer.descriptions["A7"], rate=None, n_samples=None)
+    hammer = replace(turnout.hammer, descriptions={**turnout.hammer.descriptions, "A7": layout})
+    rows = hammer_unit(unit, replace(turnout, hammer=hammer), tmp_path, algo="1")
+    assert [(q["reason_code"], q["path"][-7:]) for q in rows["quarantine"]] == [("wrong_rate", "A7_2.h5")]
+    assert {i["test"] for i in rows["impacts"]} == {1, 3} and rows["models"][0]["status"] == "accepted"

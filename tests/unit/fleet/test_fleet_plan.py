@@ -9,6 +9,7 @@ from turnout.errors import ConfigError
 from turnout.fleet.plan import read_plan, read_problems, write_plans
 from turnout.fleet.scan import scan, unit_id
 from turnout.fleet.shards import shard_names, shard_of
+from turnout.fleet.tables import configuration_rows, fleet_hash
 
 LAYOUT = """\
 sections:
@@ -223,3 +224,28 @@ def test_a_few_files_may_go(fleet):
     plans(fleet)
     (fleet / "raw/t1/hammer/2024-05-13/A_1.uff").unlink()
     plans(fleet)
+
+
+def test_a_file_of_a_logger_that_never_stops_holds_the_trains_of_its_day(fleet):
+    add(fleet, "t1/passages/20240514T000000Z.tdms")
+    add(fleet, "t1/passages/20240515T000000Z.tdms")
+    trains = fleet / "raw/t1/trains.csv"
+    notes = []
+    for kind in ("IC3", "freight"):
+        trains.write_text(f"passed_at_utc,type\n20240514T1405,{kind}\n2024-05-15T14:05:00Z,IC3\n")
+        plans(fleet)
+        notes.append({unit_id(p.unit): p.note for p in read_plan(fleet / "work/plan/00of01.json")})
+    changed = {u for u in notes[0] if notes[0][u] != notes[1][u]}
+    assert changed == {"t1/passage/20240514T000000Z.tdms"}
+
+
+def test_an_event_is_another_one_with_other_resets_and_one_where_it_is_noted_twice(fleet):
+    header = "turnout,section,date,kind,resets,note\n"
+    row = "t1,A,2024-05-20,tamping,{},first pass\n"
+    ids = []
+    for resets in ("ballast", "railpad"):
+        (fleet / "config/events.csv").write_text(header + 2 * row.format(resets))
+        configuration = load_configuration(fleet / "config")
+        (event,) = configuration_rows(configuration, fleet / "raw", [])["events"]
+        ids.append((event["event_id"], fleet_hash(configuration)))
+    assert ids[0][0] != ids[1][0] and ids[0][1] != ids[1][1]

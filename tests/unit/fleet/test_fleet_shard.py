@@ -9,6 +9,7 @@ import pytest
 from turnout.config import load_configuration
 from turnout.errors import ReadError, TurnoutError
 from turnout.fleet.batches import read_batch, read_column, read_results
+from turnout.fleet.current import current_results
 from turnout.fleet.plan import write_plans
 from turnout.fleet.shard import Stage, run_shard
 from turnout.fleet.state import State, batch_paths, load_state
@@ -231,7 +232,7 @@ def test_a_context_is_part_of_the_key_and_handed_on(fleet):
         return {}
 
     tokens = {"t0": "a", "t1": "a", "t2": "a"}
-    stage = Stage("hammer", compute, "1", lambda turnout: (tokens[turnout], turnout.upper()))
+    stage = Stage("hammer", compute, "1", lambda turnout, settings: (tokens[turnout], turnout.upper()))
     fleet.run(stage=stage)
     assert seen == [("t0", "T0"), ("t1", "T1"), ("t2", "T2")]
     tokens["t1"] = "b"
@@ -288,3 +289,30 @@ def test_the_verdict_judges_what_is_new_over_the_fleet_and_each_line(tmp_path):
     fleet.put("t3/2024-05-13/A_1.txt", "repaired")
     fleet.run()
     assert verdict([fleet.state], fleet.configuration, output).quarantined == 1
+
+
+def test_results_that_count_are_those_of_the_last_batch_and_of_the_last_number_of_shards(fleet):
+    def told():
+        return [(r.unit, r.algo) for r in current_results(fleet.folder / "work", "hammer", "t1")]
+
+    fleet.run()
+    assert told() == [("t1/hammer/A/2024-05-13", "1")]
+    fleet.run(algo="2", only=["t1"])
+    assert told() == [("t1/hammer/A/2024-05-13", "2")]
+    assert len(batch_paths([fleet.state])) == 2  # what was computed before is still in its batch
+    older = fleet.state.with_name("00of02.json")
+    older.write_bytes(fleet.state.read_bytes())
+    os.utime(older, ns=(0, 0))
+    assert told() == [("t1/hammer/A/2024-05-13", "2")]
+
+
+def test_a_token_may_speak_of_each_unit(fleet):
+    fleet.put("t1/2024-06-13/A_1.txt", "later")
+    newest = ["2024-05-13"]
+    stage = Stage(
+        "hammer", lambda unit, turnout, raw_root, algo, context: {}, "1",
+        lambda turnout, settings: (lambda unit: str(unit.campaign > newest[0]), settings["fleet"].shards),
+    )  # fmt: skip
+    assert fleet.run(stage=stage).processed == 4
+    newest[0] = "2024-06-13"
+    assert fleet.run(stage=stage).processed == 1

@@ -9,6 +9,7 @@ import pytest
 from benchmarks.passage_truth import IC3, PATTERNS, paper_model, rolling, struck_train
 
 from turnout.chains.passage import PassageContext, SectionModel, passage_unit
+from turnout.chains.passage_context import near
 from turnout.config import load_configuration, with_raw
 from turnout.fleet.scan import scan
 from turnout.readers.writing import write
@@ -180,3 +181,35 @@ def test_a_continuous_loggers_file_gives_a_passage_per_train(tmp_path):
     late = [(p["passed_at_utc"] - datetime(2024, 5, 13, 10)).total_seconds() for p in found]
     assert np.diff(late) == pytest.approx(np.diff(starts), abs=0.3)
     assert len(rows["passage_fits"]) == 3 and rows["quarantine"] == [] and len(rows["recordings"]) == 1
+
+
+def test_the_id_of_a_passage_follows_from_all_that_it_says(tmp_path):
+    recording, _ = on_main()
+    listed = "passed_at_utc,train_type\n2024-05-13T10:00:20Z,{}\n"
+    found = {}
+    for kind, names in (("IC3", ("A7",)), ("freight", ("A7",)), ("IC3", ("A7", "SP"))):
+        unit, turnout = lay_out(tmp_path, recording, trains=listed.format(kind))
+        rows = passage_unit(unit, turnout, tmp_path, context(names))
+        (passage,) = rows["passages"]
+        assert {f["passage_id"] for f in rows["passage_fits"]} == {passage["passage_id"]}
+        assert rows["recordings"][0]["passage_id"] == passage["passage_id"]
+        found[kind, names] = passage["passage_id"]
+    assert len(set(found.values())) == 3
+
+
+@pytest.mark.parametrize(("noted", "kept"), [(21.5, 21.5), (85.0, None), (999.0, None)])
+def test_a_thermometer_that_is_broken_costs_its_reading_alone(tmp_path, noted, kept):
+    """85 °C is what a sensor says that was switched on and not yet asked to measure."""
+    recording, _ = on_main()
+    unit, turnout = lay_out(tmp_path, replace(recording, conditions={"rail_temperature": noted}))
+    rows = passage_unit(unit, turnout, tmp_path, context())
+    assert rows["passages"][0]["rail_temperature_c"] == kept and rows["passage_fits"]
+    assert (f"rail temperature {noted:g} °C noted, not used" in str(rows["passages"][0]["detail"])) == (kept is None)
+
+
+def test_only_models_that_a_file_may_be_fitted_with_make_it_stale():
+    models = tuple(SectionModel(f"m{month}", datetime(2024, month, 1), None) for month in (3, 5, 7))
+    at = {"20240513T100000Z.h5": ["m5"], "20240101T000000Z.h5": ["m3"], "20240630T120000Z.h5": ["m5", "m7"]}
+    for label, names in at.items():
+        assert [m.model_id for m in near(models, label)] == names
+    assert near(models, "run 17.h5") == models  # its time is inside

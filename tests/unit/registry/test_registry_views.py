@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import statsmodels.api as sm
+from registry_rows import hammer_result
 
 YEAR = 31557600.0
 CHART = ["turnout_id", "section_id", "band", "source"]
@@ -241,3 +242,11 @@ def test_values_of_the_papers_method_are_in_no_chart(bench, hammer):
         ("paper", 140.0),
     ]
     assert bench.ask("select frequency_hz from epochs") == [(150.0,)]
+
+
+def test_a_clock_that_runs_ahead_does_not_date_the_fleet(bench):
+    """What is asked of the last thirty days is asked of the last run's, not of a year that has not come."""
+    bench.register(hammer_result(), hammer_result(section="A2", day="2099-01-05"))
+    ((newest, ended),) = bench.ask("select newest_measurement(), (select max(ended_at_utc) from runs)")
+    assert newest == ended and newest.year < 2099
+    assert bench.ask("select newest_measurement_at_utc from registry_info") == [(newest,)]

@@ -309,3 +309,24 @@ def test_sql_equals_loops_pandas_and_statsmodels(settings):
             both = pd.concat([found.rename("sql"), oracle.rename("oracle")], axis=1, join="inner").dropna()
             assert len(both) == len(oracle) and np.ptp(oracle) > 0.1
             assert (both["sql"] - both["oracle"]).abs().max() < 1e-8
+
+
+def test_what_is_said_after_the_newest_campaign_counts_now_and_not_on_an_earlier_day(frames):
+    """A monthly fleet is not asked again every morning until its next campaign."""
+    newest = frames["modes"]["measured_at_utc"].max()
+    said = pd.DataFrame(
+        {
+            "acknowledgement_id": ["a"], "turnout_id": ["T00003"], "section_id": ["T00003/S2"], "band": ["railpad"],
+            "action": ["acknowledge"], "by_whom": ["M. Jensen"], "at_utc": [newest + pd.Timedelta("1D")],
+            "until_utc": [pd.NaT], "reason": ["tamping ordered"],
+        }
+    )  # fmt: skip
+    silenced = said.assign(action="suppress", until_utc=newest + pd.Timedelta("30D"))
+    for entered, state, listed in ((said, "plan", [("plan",)]), (silenced, "suppressed", [])):
+        with connect_views(frames | {"acknowledgements": entered}, newest) as con:
+            where = "where section_id = 'T00003/S2' and band = 'railpad'"
+            assert con.execute(f"select state from chart_states {where}").fetchall() == [(state,)]
+            assert con.execute(f"select state from worklist {where}").fetchall() == listed
+            day = newest - pd.Timedelta("10D")
+            before = con.execute(f"select state from worklist(timestamp '{day}') {where}").fetchall()
+            assert before == [("inspect this week",)]

@@ -21,7 +21,7 @@ spoken as (
     left join open_alarms o using (turnout_id, section_id, band, source)
     left join acknowledgements k
         on k.turnout_id = s.turnout_id and coalesce(k.section_id, s.section_id) = s.section_id
-            and coalesce(k.band, s.band) = s.band and k.at_utc <= newest_measurement()
+            and coalesce(k.band, s.band) = s.band
     group by all
 )
 select

@@ -36,7 +36,7 @@ spoken as (
             select max_by(k.by_whom || ': ' || k.reason, k.at_utc) from acknowledgements k
             where k.turnout_id = r.turnout_id and coalesce(k.section_id, r.section_id) = r.section_id
                 and coalesce(k.band, r.band) = r.band and k.action = 'acknowledge'
-                and k.at_utc >= r.raised_at_utc and k.at_utc <= "asof"
+                and k.at_utc >= r.raised_at_utc and (k.at_utc <= "asof" or "asof" >= newest_charted())
         ) as acknowledged
     from raised r
 ),
@@ -92,7 +92,8 @@ heard as (
     where not exists (
         select 1 from acknowledgements k
         where k.turnout_id = e.turnout_id and coalesce(k.section_id, e.section_id) = e.section_id
-            and coalesce(k.band, e.band) = e.band and k.action = 'suppress' and k.at_utc <= "asof"
+            and coalesce(k.band, e.band) = e.band and k.action = 'suppress'
+            and (k.at_utc <= "asof" or "asof" >= newest_charted())
             and coalesce(k.until_utc, timestamp '9999-01-01') > least("asof", newest_charted())
     )
 ),

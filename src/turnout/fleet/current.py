@@ -1,0 +1,33 @@
+"""The results of one turnout that count now, for a stage that builds on another one."""
+
+from collections.abc import Iterator
+from functools import lru_cache
+from pathlib import Path
+
+from turnout.fleet.batches import UnitResult, read_results
+from turnout.fleet.state import batch_folder, load_state
+
+
+def current_results(work, kind: str, turnout: str) -> Iterator[UnitResult]:
+    """Results of the stage ``kind`` below ``work``: of each unit that of the batch which its state names.
+
+    Earlier batches hold what has been computed again since. Where the number of shards was changed, several states
+    know the turnout: the one written last counts.
+    """
+    states = sorted((Path(work) / kind).glob("*.json"), key=lambda p: (p.stat().st_mtime_ns, p.name), reverse=True)
+    for state in states:
+        batches = _batches(state, state.stat().st_mtime_ns).get(turnout)
+        if not batches:
+            continue
+        for name in sorted(batches):
+            yield from read_results(batch_folder(state) / name, batches[name])
+        return
+
+
+@lru_cache(maxsize=256)
+def _batches(state: Path, written: int) -> dict[str, dict[str, frozenset[str]]]:
+    """Turnout -> batch -> its units that count."""
+    found: dict[str, dict[str, set[str]]] = {}
+    for unit, known in load_state(state).units.items():
+        found.setdefault(unit.split("/", 1)[0], {}).setdefault(known.batch, set()).add(unit)
+    return {t: {b: frozenset(units) for b, units in of.items()} for t, of in found.items()}
