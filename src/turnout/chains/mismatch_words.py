@@ -97,9 +97,10 @@ def _wheel(said):
 def _sentence(term, finding) -> str:
     fixed = term["fixed"]
     places = [fixed[k] for k in ("sleeper", "support", "first", "last", "place") if k in fixed]
+    beyond = term["parameters"].get("shift", {"value": 0.0})["value"] if "place" in fixed else 0.0
     words = {name: number_in_words(p["value"], p["unit"]) for name, p in term["parameters"].items()}
     words |= {
-        "place": f"{sum(places) / len(places):.1f} m" if places else "an unknown place",
+        "place": f"{sum(places) / len(places) + beyond:.1f} m" if places else "an unknown place",
         "channel": fixed.get("channel_name") or finding["channel"] or "?",
         "train": finding["train"] or fixed.get("train") or "a train",
         "wheel": _wheel(finding["train"] or fixed.get("train") or "a train"),

@@ -98,8 +98,7 @@ def finding_row(diagnosis, identity):
         "term": verdict.names[0] if verdict.names else None,
         "rival_term": verdict.names[1] if len(verdict.names) > 1 else None,
         "locked_to": term.frame if term else where.get("frame") or (frame.frame if frame else None),
-        "position_m": where.get("place"),
-        "position_se_m": _se(diagnosis, "shift") if term else where.get("place_se"),
+        **_position(diagnosis, term, where),
         "channel": where.get("sensor") or (str(frame.level) if frame and frame.frame == "sensor" else None),
         "band_low_hz": None,
         "band_high_hz": None,
@@ -144,11 +143,14 @@ def parameters(diagnosis):
     ]
 
 
-def _se(diagnosis, name):
-    for entry in parameters(diagnosis):
-        if entry["name"] == name:
-            return entry["se"]
-    return None
+def _position(diagnosis, term, where):
+    """Place [m] and its standard error; of a term that is fitted a ``shift`` beyond the place scanned, with it."""
+    place, se = where.get("place"), where.get("place_se")
+    names = [p.name for p in term.parameters] if term else []
+    if place is not None and "shift" in names:
+        k = diagnosis.fit.part(term).start + names.index("shift")
+        place, se = round(float(place + diagnosis.fit.psi[k]), 3), float(f"{diagnosis.fit.psi_se[k]:.3g}")
+    return {"position_m": place, "position_se_m": se}
 
 
 def _finite(value):

@@ -24,9 +24,10 @@ def refused(verdicts):
 def reconsidered(case, base, fit, verdicts, settings):
     """(verdicts, fit) after a second effect was sought on top of a first one that was refused: both stand where the
     second is named and the first, or a close rival of it, passes with the second in the model."""
-    if len(verdicts) > 1 and _vouches(verdicts[0].scores[0], verdicts[1].scores[0]):
-        pairs = list(_beside_second(case, base, fit, verdicts[0].scores, settings))
-        pairs.sort(key=lambda s: -s.gain)
+    alone = _second_alone(case, fit, settings) if len(verdicts) > 1 else None
+    if alone is not None and _vouches(verdicts[0].scores[0], verdicts[1].scores[0]):
+        pairs = list(_beside_second(case, base, fit, alone, verdicts[0].scores, settings))
+        pairs.sort(key=lambda s: (not s.material, -s.gain))
         best = pairs[0].fit
         consistent = consistent_elsewhere(case, base, pairs[0], settings)
         excess = max(over(case, base, settings), loudest(case, base))
@@ -44,10 +45,20 @@ def _vouches(first, second):
     return first.family != second.family or (len(trains) == 2 and None not in trains)
 
 
-def _beside_second(case, base, fit, scores, settings):
+def _second_alone(case, fit, settings):
+    """The fit with the second effect and nothing else, None where it cannot be simulated: what the first is worth is
+    what the pair gains over it."""
+    second = fit.candidates[1]
+    try:
+        return fit_jointly(case, (second,), fit.psi[fit.part(second)], fit.values, iterations=settings.iterations)
+    except SimulationError:
+        return None
+
+
+def _beside_second(case, base, fit, alone, scores, settings):
     """The first effect's leader and its close rivals, each with what it is worth beside the second effect."""
     leader, second = scores[0], fit.candidates[1]
-    yield _worth(case, base, fit, leader, settings)
+    yield _worth(case, base, fit, alone, leader, settings)
     close = leader.gain - max(settings.margin, TORN * leader.gain)
     for rival in [s for s in scores[1:] if s.gain > max(close, settings.threshold)][:RIVALS]:
         psi = np.concatenate([rival.fit.psi, fit.psi[fit.part(second)]])
@@ -55,13 +66,14 @@ def _beside_second(case, base, fit, scores, settings):
             both = fit_jointly(case, (rival.candidate, second), psi, fit.values, iterations=settings.iterations)
         except SimulationError:
             continue
-        yield _worth(case, base, both, rival, settings)
+        yield _worth(case, base, both, alone, rival, settings)
 
 
-def _worth(case, base, both, score, settings):
-    """The score of a first effect by what the fit with ``both`` gains."""
-    mine, reference = held_out_score(case, both), held_out_score(case, base)
+def _worth(case, base, both, alone, score, settings):
+    """The score of a first effect by what the fit with ``both`` gains over that of the second ``alone``; it explains
+    what the pair does."""
+    mine, reference = held_out_score(case, both), held_out_score(case, alone)
     by_condition = {c: mine[c] - reference[c] for c in reference}
-    gain = both.evidence - base.evidence + score.candidate.aside - np.log(score.candidate.scanned)
+    gain = both.evidence - alone.evidence + score.candidate.aside - np.log(score.candidate.scanned)
     explained, worst = explained_of(case, base, both, settings), min(by_condition.values(), default=0.0)
     return replace(score, gain=gain, fit=both, explained=explained, worst=worst, by_condition=by_condition)

@@ -115,14 +115,19 @@ def _own_columns(case, joint, theta, terms, predictions, own):
 def decoy(observations, predictions, reserved, reserved_predictions, n):
     """Predictions of ``reserved`` by the base model with a filter of ``n`` free taps behind it.
 
-    The taps (on the prediction delayed and advanced) are fitted to ``observations``: what any n free numbers gain.
+    The taps (on the prediction delayed and advanced) are fitted to those of the ``observations`` that are of a kind
+    with the reserved ones: what any n free numbers gain.
     """
+    kinds = {o.kind for o in reserved}
+    seen = [(o, p, np.sqrt(o.effective) / o.sigma) for o, p in zip(observations, predictions) if o.kind in kinds]
+    if not seen:
+        return list(reserved_predictions)
 
     def columns(p):
         shifts = [s for k in range(1, n + 1) for s in (k, -k)][:n]
         return np.column_stack([np.roll(p, s) for s in shifts])
 
-    rows = np.concatenate([columns(p) / o.sigma[:, None] for o, p in zip(observations, predictions)])
-    right = np.concatenate([(o.data - p) / o.sigma for o, p in zip(observations, predictions)])
+    rows = np.concatenate([columns(p) * weight[:, None] for _, p, weight in seen])
+    right = np.concatenate([(o.data - p) * weight for o, p, weight in seen])
     taps = np.linalg.lstsq(rows, right, rcond=None)[0]
     return [p + columns(p) @ taps for p in reserved_predictions]

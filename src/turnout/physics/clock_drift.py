@@ -1,6 +1,6 @@
 """A channel whose clock runs fast or slow."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,10 +9,14 @@ from turnout.physics.term import Parameter, PhysicsTerm
 
 @dataclass(frozen=True)
 class ClockDrift(PhysicsTerm):
-    r"""The channel shows :math:`y(t(1+\epsilon))`: its lag grows through the record. A hammer test is too short."""
+    r"""The channel shows :math:`y(t(1+\epsilon))`: its lag grows through the record. A hammer test is too short.
+
+    ``start`` is the time of the signal's first sample since the record's start [s].
+    """
 
     channel_name: str
     drift: float
+    start: float = 0.0
 
     name = "clock_drift"
     left_out = "the clock of channel {channel_name} is off by a share of {drift:.2e}"
@@ -28,6 +32,10 @@ class ClockDrift(PhysicsTerm):
         """One in a thousand."""
         return cls("A", 1e-3)
 
+    def under(self, conditions):
+        """With the time at which this recording's signal starts."""
+        return replace(self, start=float(conditions.get("start", 0.0)))
+
     def channel(self, signal, rate, sensor):
         """The signal read at the wrong times, cubic between samples."""
         self.check()
@@ -36,4 +44,4 @@ class ClockDrift(PhysicsTerm):
         from scipy.interpolate import CubicSpline
 
         t = np.arange(np.size(signal))
-        return CubicSpline(t, signal)(np.clip(t * (1.0 + self.drift), 0.0, t[-1]))
+        return CubicSpline(t, signal)(np.clip(t + self.drift * (self.start * rate + t), 0.0, t[-1]))

@@ -1,6 +1,6 @@
 """Mains or traction current in a channel."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,12 +9,16 @@ from turnout.physics.term import Parameter, PhysicsTerm
 
 @dataclass(frozen=True)
 class Hum(PhysicsTerm):
-    r"""A line at the mains' frequency, :math:`a \sin 2\pi f t + b \cos 2\pi f t`, before, with and after the train."""
+    r"""A line at the mains' frequency, :math:`a \sin 2\pi f t + b \cos 2\pi f t`, before, with and after the train.
+
+    ``start`` is the time of the signal's first sample since the record's start [s].
+    """
 
     channel_name: str
     sine: float
     cosine: float = 0.0
     frequency: float = 50.0
+    start: float = 0.0
 
     name = "hum"
     left_out = "channel {channel_name} hums at {frequency:.1f} Hz with an amplitude of {amplitude:.3g} m/s²"
@@ -35,10 +39,14 @@ class Hum(PhysicsTerm):
         """What was left out, in words."""
         return self.left_out.format(**vars(self), amplitude=float(np.hypot(self.sine, self.cosine)))
 
+    def under(self, conditions):
+        """With the time at which this recording's signal starts."""
+        return replace(self, start=float(conditions.get("start", 0.0)))
+
     def channel(self, signal, rate, sensor):
         """The signal with the line on it."""
         self.check()
         if sensor.name != self.channel_name:
             return signal
-        phase = 2.0 * np.pi * self.frequency * np.arange(np.size(signal)) / rate
+        phase = 2.0 * np.pi * self.frequency * (self.start + np.arange(np.size(signal)) / rate)
         return signal + self.sine * np.sin(phase) + self.cosine * np.cos(phase)

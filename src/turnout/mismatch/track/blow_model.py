@@ -82,15 +82,13 @@ class BlowModel:
     def receptance(self, excited, measured):
         """(n_line,) complex [m/N]."""
         h = self.moved(excited, measured)
-        if not isinstance(measured, tuple) and abs(excited - measured) < 1e-9:
-            h = h + self.matrices.compliance(float(excited))
-        return h
+        return h if isinstance(measured, tuple) else h + self.matrices.compliance(float(excited), float(measured))
 
     def seat_gradient(self, excited, measured, way=0.01):
         """Derivative by the sensor's place on the rail, (n_line,) [1/N]; 0 on a sleeper."""
         if isinstance(measured, tuple):
             return np.zeros(LINES.size, dtype=complex)
-        return (self.moved(excited, measured + way) - self.moved(excited, measured - way)) / (2.0 * way)
+        return (self.receptance(excited, measured + way) - self.receptance(excited, measured - way)) / (2.0 * way)
 
     @cached_property
     def rows(self):

@@ -14,6 +14,7 @@ GAPS = (1.3e-4, 3e-4, 7e-4, 1.6e-3)  # below the first a train closes it at once
 SEATED = (0.0, 0.4)  # share of the bed that still bears: nothing, or nearly a half
 MOUNTINGS = tuple(np.geomspace(150.0, 1500.0, 12))  # a width at Q = 5 apart [Hz]
 DELAYS = (1e-4, 2.5e-4, *np.arange(5e-4, 5.6e-3, 5e-4))  # a quarter of a turn at 500 Hz apart [s]
+LIMITS = (0.8, 0.6, 0.4, 0.25)  # of the peak that a channel shows, where it may clip
 DRIFTS = (2.5e-4, 5e-4, 1e-3, 2e-3, 4e-3)  # a sensor is passed within some seconds
 RINGING = tuple(np.geomspace(90.0, 500.0, 6))  # a hung mass shows over half an octave [Hz]
 BENDING = tuple(np.geomspace(85.0, 760.0, 20))  # two widths of the resonance apart [Hz]
@@ -111,11 +112,19 @@ def _sensors(case):
             yield per(physics.ClockDrift, tuple((sign * d,) for d in DRIFTS for sign in (1.0, -1.0)), whole=True)
             peak = case.peak(name)
             if peak > 0.0:
-                yield per(physics.Clipping, ((0.6 * peak,),), loose=0.0)  # neutral is no limit: a share of infinity
+                yield _clipping(per, peak)
                 least = case.settings.materiality * peak
                 yield per(physics.Hum, ((0.1 * peak, 0.0),), least=least, sized=2)
     for name, ceiling in case.ceilings.items():
         yield _clipped(name, ceiling)
+
+
+def _clipping(per, peak):
+    """A limit within the channel's own peak [m/s²]: twice that is none."""
+    bounds, prior = (0.01 * peak, 2.0 * peak), (0.6 * peak, 0.4 * peak)
+    limit = replace(physics.Clipping.parameters[0], neutral=2.0 * peak, bounds=bounds, prior=prior)
+    starts = tuple((share * peak,) for share in LIMITS)
+    return replace(per(physics.Clipping, starts, loose=0.0, whole=True), parameters=(limit,))
 
 
 def _clipped(name, ceiling):

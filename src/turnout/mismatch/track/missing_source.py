@@ -41,7 +41,7 @@ def _forces(case, fit, made):
     g = g * shown_by(fit.values, fit.terms, made, frequency)[:, :, None, None]
     g = g[np.clip(np.searchsorted(frequency, lines), 0, frequency.size - 1), :, :, 0]
     parts, size = {("clock", made.name): None}, one.shape[1]
-    for k, j in enumerate(case.zone.supports):
+    for k, j in enumerate(case.zone.supports if n_sensor > 1 else ()):  # one sensor hears no place
         seen = g[:, :, k] / np.sqrt(np.mean(np.abs(g[:, :, k]) ** 2, axis=1))[:, None]
         parts["place", _place(case, j)] = np.concatenate([_turned(row) for row in seen.T])
     for s, sensor in enumerate(made.sensors):

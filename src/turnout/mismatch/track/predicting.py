@@ -107,10 +107,11 @@ class Predicting:
 
     def shown(self, values, terms, made, sensor, row):
         """What the channel of a sensor shows of the simulated signal ``row``, on the clock of the recording."""
-        rate, time = 4.0 * self.solver.rate, made.time - made.reference - values[f"time@{made.name}"] + roll.LEAD
+        start = made.reference + values[f"time@{made.name}"] - roll.LEAD
+        rate, time = 4.0 * self.solver.rate, made.time - start
         for term in terms:
             if term.kind == "channel":
-                row = term.under({"name": made.name}).channel(row, rate, sensor)
+                row = term.under({"name": made.name, "start": start}).channel(row, rate, sensor)
         return (1.0 + values[f"gain_{sensor.name}"]) * bands.read_at(made.limited(row, rate), rate, time)
 
     def clean(self, values, terms, made):

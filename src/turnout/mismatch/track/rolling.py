@@ -10,6 +10,7 @@ from turnout.mismatch.observation import Observation
 from turnout.mismatch.track.bands import band_end, band_limited, clock_of, finer, limited, read_at
 from turnout.mismatch.track.roll import EDGE
 
+CLEAR, MARGIN, SHORTEST_QUIET = 5.0, 0.02, 0.1  # m, s, s: of what is heard as a channel's own noise
 BLURRED = 0.03  # s about a sample at the range
 COUPLING = 0.7  # an amplifier's lower corner that no data sheet mentions [Hz]
 FINE = 2500.0  # samples per second between which a cubic reads 112 Hz to 0.03 %
@@ -72,8 +73,19 @@ def rolling_of(passage, sensors, reference, speed, tolerance):
     fold = max(1, int(np.ceil(FINE / recording.rate)))
     kept, rate = finer(kept, fold) if fold > 1 else kept, fold * recording.rate
     data = read_at(kept, rate, time)
-    quiet = read_at(kept, rate, np.arange(0.02, max(0.1, reference - 0.15), step))
-    return rolling, observed(rolling, data, np.std(quiet, axis=1), tolerance, _topped(recording, sensors, time))
+    noise = np.zeros(len(sensors))
+    for start, end in _without_wheels(rolling):
+        if end - start >= SHORTEST_QUIET:
+            noise = np.std(read_at(kept, rate, np.arange(start, end, step)), axis=1)
+            break
+    return rolling, observed(rolling, data, noise, tolerance, _topped(recording, sensors, time))
+
+
+def _without_wheels(rolling):
+    """(start, end) of the times before and after the train, no wheel within ``CLEAR`` of a sensor [s]."""
+    far, passage = CLEAR / rolling.speed, rolling.passage
+    behind = rolling.reference + duration_of(passage, rolling.speed, rolling.sensors) + far
+    return (MARGIN, rolling.reference - far), (behind, passage.recording.duration - MARGIN)
 
 
 def _topped(recording, sensors, time):

@@ -165,7 +165,8 @@ class TrackCase(Predicting, Case):
         """Dips, corrugation and wheels, as the residual and the loudness of passages suggest them."""
         from turnout.mismatch.track.geometry_scan import geometry_scan
 
-        found = geometry_scan(self, fit, self.families) if self.rollings else ()
+        rolled = any(o.name in self.rollings for o in self.observations)
+        found = geometry_scan(self, fit, self.families) if rolled else ()
         return tuple(replace(c, loose=LOOSE) for c in found)
 
     def screen(self, fit):

@@ -1,0 +1,264 @@
+"""Small cases in which a statement would be wrong although every part of it looks right."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from turnout import physics
+from turnout.config.settings.mismatch import MismatchSettings
+from turnout.mismatch.candidate import Candidate
+from turnout.mismatch.case import Case, Nuisance
+from turnout.mismatch.finding import finding_row
+from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.locate import attribute
+from turnout.mismatch.observation import Observation
+from turnout.mismatch.scoring import judged, score_of
+from turnout.mismatch.together import reconsidered
+from turnout.mismatch.track import TrackCase
+from turnout.mismatch.track.blow_model import BlowModel
+from turnout.mismatch.track.library import _sensors
+from turnout.mismatch.track.missing_source import _forces, missing_sources
+from turnout.mismatch.track.planned import measured_campaign, small_plan
+from turnout.mismatch.track.predicting import Predicting
+from turnout.mismatch.track.rolling import Rolling, rolling_of
+from turnout.mismatch.verify import decoy, fit_percent
+from turnout.physics import Parameter
+from turnout.simulate.track import uniform_track
+
+
+class Alike(Case):
+    """Two shapes of which one is 0.62 like the other; only that other is there."""
+
+    def __init__(self):
+        rng = np.random.default_rng(3)
+        shapes = np.linalg.qr(rng.normal(size=(300, 2)))[0].T * np.sqrt(300)
+        self.shape = {"there": shapes[0], "like it": 0.62 * shapes[0] + np.sqrt(1.0 - 0.62**2) * shapes[1]}
+        self.observations = tuple(
+            Observation(f"o{k}", f"day {k}", shapes[0] + 0.7 * rng.normal(size=300), 1.0) for k in range(2)
+        )
+        self.nuisances = (Nuisance("offset", "-", 0.0, 0.1),)
+        self.control_level = {"response": 0.5}
+        size = (Parameter("size", "-", 0.0, (-5.0, 5.0), "", "made up 2026", (0.0, 1.0)),)
+        self.candidates = tuple(
+            Candidate(name, size, lambda p, name=name: (name, p["size"]), ((0.5,),), {"place": float(k)}, least=0.02)
+            for k, name in enumerate(("like it", "there"))
+        )
+
+    def predict(self, values, terms, observations):
+        return [values["offset"] + sum((a * self.shape[n] for n, a in terms), np.zeros(300)) for _ in observations]
+
+
+def test_a_first_effect_is_not_credited_with_what_the_second_explains():
+    """Alone it leaves most and is refused. Beside the second it is 0.0: what the pair gains is the second's."""
+    case, settings = Alike(), MismatchSettings()
+    like, there = case.candidates
+    base = fit_jointly(case)
+    first = fit_jointly(case, (like,), [0.5])
+    refused, _ = judged(case, base, [score_of(case, base, first, like, settings)], settings)
+    pair = fit_jointly(case, (like, there), [*first.psi, 0.5], first.values)
+    second, _ = judged(case, first, [score_of(case, first, pair, there, settings)], settings)
+    assert (refused.answer, second.answer) == ("unknown", "named")
+    verdicts, fit = reconsidered(case, base, pair, [refused, second], settings)
+    assert [v.answer for v in verdicts] == ["unknown"] and fit is base
+
+
+def test_a_loud_train_is_found_though_each_of_its_axles_is_a_frame_of_its_own():
+    """Two nepers of log energy are 8.7 dB; 36 cells of either train err by 0.5 / sqrt(72) each, 0.4 dB."""
+    rng, cells = np.random.default_rng(0), []
+    for train in ("ic3", "freight"):
+        cells += [(train, a, s, p) for _ in range(2) for a in range(4) for s in "ABC" for p in range(6)]
+    labels = {
+        "place": [str(p) for *_, p in cells],
+        "sensor": [s for _, _, s, _ in cells],
+        "train": [t for t, *_ in cells],
+        "wheel": [f"{t}, axle {a + 1}" for t, a, *_ in cells],
+    }
+    labels = {name: np.array(levels, dtype=object) for name, levels in labels.items()}
+    energy = 0.5 * rng.normal(size=len(cells)) + 2.0 * np.array([t == "freight" for t, *_ in cells])
+    found = {f.frame: f for f in attribute(energy, labels)}
+    assert found["train"].level == "freight" and found["train"].q < 0.01
+    assert found["train"].effect == pytest.approx(8.7, abs=1.2)
+
+
+@pytest.mark.parametrize("place", [12.0, 12.07, 12.2])
+def test_the_receptance_under_the_hammer_is_no_other_a_micrometre_beside_it(place):
+    """The rail between two nodes gives under its own blow, wherever the sensor sits between them."""
+    model = BlowModel(uniform_track(24.0), ())
+    here, beside = (model.receptance(place, place + way) for way in (0.0, 1e-6))
+    assert np.max(np.abs(beside / here - 1.0)) < 1e-5
+
+
+def test_the_seat_of_a_sensor_beside_the_blow_has_the_derivative_of_its_receptance():
+    model, way = BlowModel(uniform_track(24.0), ()), 1e-3
+    difference = (model.receptance(12.2, 12.26 + way) - model.receptance(12.2, 12.26 - way)) / (2.0 * way)
+    assert np.allclose(model.seat_gradient(12.2, 12.26, 1e-3), difference, rtol=1e-9)
+    nodes_alone = (model.moved(12.2, 12.26 + way) - model.moved(12.2, 12.26 - way)) / (2.0 * way)
+    assert np.max(np.abs(nodes_alone / difference - 1.0)) > 0.05  # what would be left out
+
+
+def shown(reference, term):
+    """What a channel with ``term`` shows of a train that comes ``reference`` seconds after its recorder starts."""
+    time = np.arange(reference - 0.08, reference + 1.0, 1.0 / 360.0)
+    sensor = SimpleNamespace(name="A", place=20.0)
+    made = Rolling("p", SimpleNamespace(), (sensor,), time, reference, 30.0)
+    case = SimpleNamespace(solver=SimpleNamespace(rate=1800.0))
+    row = np.cos(2.0 * np.pi * 20.0 * np.arange(14400) / 7200.0)
+    return time, Predicting.shown(case, {"time@p": 0.0, "gain_A": 0.0}, (term,), made, sensor, row), row
+
+
+@pytest.mark.parametrize("reference", [0.45, 0.457, 1.237])
+def test_a_hum_keeps_its_phase_on_the_recorders_clock_whenever_the_train_comes(reference):
+    time, with_hum, _ = shown(reference, physics.Hum("A", 0.8, 0.6))
+    _, without, _ = shown(reference, physics.Hum("A", 0.0, 0.0))
+    hum = 0.8 * np.sin(2.0 * np.pi * 50.0 * time) + 0.6 * np.cos(2.0 * np.pi * 50.0 * time)
+    # the signal's samples lie at the middle of their steps of 1/7200 s: 1.3 degrees at 50 Hz
+    assert np.allclose((with_hum - without)[20:-20], hum[20:-20], atol=0.05)
+
+
+def test_a_clock_that_drifts_is_late_by_the_time_since_the_record_began():
+    """A share of 1e-3 five seconds into the record: the train is seen 5 ms early, and little more at its end."""
+    time, drifted, _ = shown(5.0, physics.ClockDrift("A", 1e-3))
+    _, sound, _ = shown(5.0, physics.ClockDrift("A", 0.0))
+    lags = np.arange(-8e-3, 8.1e-3, 2.5e-4)
+    middle = slice(60, -60)
+    fits = [np.sum((np.interp(time + lag, time, sound) - drifted)[middle] ** 2) for lag in lags]
+    assert lags[int(np.argmin(fits))] == pytest.approx(5.4e-3, abs=5e-4)  # 5 ms, and half a second of the train's own
+
+
+class Topped(Case):
+    """A channel whose swings of 10 are cut at 6, in two recordings."""
+
+    def __init__(self):
+        rng, time = np.random.default_rng(1), np.arange(2000) / 1000.0
+        self.true = 10.0 * np.sin(2.0 * np.pi * 7.0 * time) * np.exp(-(((time - 1.0) / 0.4) ** 2))
+        data = [np.clip(self.true, -6.0, 6.0) + 0.1 * rng.normal(size=time.size) for _ in range(2)]
+        sigma = 0.1 + 0.06 * np.abs(self.true)
+        self.observations = tuple(Observation(f"o{k}", f"day {k}", d, sigma) for k, d in enumerate(data))
+        self.sensor = SimpleNamespace(name="A", place=3.0, mounting="rail head")
+        self.candidates = tuple(c for c in _library_of(self.sensor, 6.2) if c.family == "clipping")
+
+    def predict(self, values, terms, observations):
+        found = self.true
+        for term in terms:
+            found = term.channel(found, 1000.0, self.sensor)
+        return [found for _ in observations]
+
+
+def _library_of(sensor, peak):
+    """The library's candidates of one channel that shows no more than ``peak``."""
+    made = SimpleNamespace(
+        campaign=SimpleNamespace(sensors=(sensor,)), pairs={}, rollings={"p": None}, ceilings={},
+        settings=MismatchSettings(), peak=lambda name: peak,
+    )  # fmt: skip
+    return _sensors(made)
+
+
+def test_a_limit_is_found_from_any_start_of_the_library():
+    """1 m/s² of limit moves the cut tops, a fifth of the samples, by ten of their errors."""
+    case = Topped()
+    (candidate,) = case.candidates
+    base = fit_jointly(case)
+    for start in candidate.starts:
+        fit = fit_jointly(case, (candidate,), start, iterations=12)
+        assert fit.psi[0] == pytest.approx(6.0, abs=0.05) and fit.evidence - base.evidence > 100.0
+    assert np.array_equal(
+        candidate.term(candidate.neutral).channel(case.true, 1.0, case.sensor), np.clip(case.true, -12.4, 12.4)
+    )
+
+
+def test_the_decoy_learns_from_recordings_like_those_it_has_to_predict():
+    """Passages two samples late are mended by two taps; blows that fit already must not stand in their way."""
+    rng = np.random.default_rng(0)
+
+    def late(k):
+        p = np.convolve(rng.normal(size=820), np.hanning(9), "same")[10:-10]
+        return Observation(f"p{k}", "c", np.roll(p, 2), 0.1, 0.35, "passage"), p
+
+    def blow(k):
+        p = rng.normal(size=80)
+        return Observation(f"b{k}", "h", p, 0.03, 0.7, "hammer"), p
+
+    passages, (reserved, simulated) = [late(k) for k in range(3)], late(9)
+    for seen in (passages, passages + [blow(k) for k in range(32)]):
+        made = decoy([o for o, _ in seen], [p for _, p in seen], [reserved], [simulated], 4)
+        assert fit_percent([reserved], made) > 85.0 > 20.0 > fit_percent([reserved], [simulated])
+    alone = [blow(1)]
+    assert decoy([o for o, _ in alone], [p for _, p in alone], [reserved], [simulated], 4) == [simulated]
+
+
+def dip(place, shift):
+    """A diagnosis that names a dip at ``place`` of the grid, ``shift`` beyond it, and a misplaced sensor."""
+    parameters = physics.SurfaceDip.parameters
+    candidate = Candidate(
+        "surface_dip", parameters, lambda p: physics.SurfaceDip(place, **p), (), {"place": place}, "place"
+    )
+    other = Candidate("sensor_position", physics.SensorPosition.parameters,
+                      lambda p: physics.SensorPosition("S1", **p), (), {"sensor": "S1"}, "sensor")  # fmt: skip
+    names = [p.name for p in parameters]
+    psi = np.array([*({"shift": shift, "depth": 4e-4, "length": 0.4}.get(n, 0.5) for n in names), 0.7])
+    se = np.array([*(0.03 if n == "shift" else 0.01 for n in names), 0.2])
+    fit = SimpleNamespace(
+        candidates=(candidate, other), psi=psi, psi_se=se, terms=(candidate.term(psi[:-1]), other.term(psi[-1:])),
+        part=lambda c: slice(0, len(names)) if c is candidate else slice(len(names), None),
+    )  # fmt: skip
+    verdict = SimpleNamespace(answer="named", names=("surface_dip",), grade="A", probability=0.97, reason="")
+    check = SimpleNamespace(before=1.0, after=2.0, rival=1.0, decoy=1.0, n=1)
+    return SimpleNamespace(fit=fit, verdict=verdict, verification=check, frames=(), where=None)
+
+
+def test_a_dip_is_reported_where_it_was_fitted_and_not_where_it_was_looked_for():
+    row = finding_row(dip(23.0, 0.25), {})
+    assert (row["position_m"], row["position_se_m"]) == (23.25, 0.03)
+
+
+def test_the_error_of_a_sensors_place_is_none_of_a_sleepers():
+    found = dip(23.0, 0.25)
+    hangs = Candidate("hanging_sleeper", physics.HangingSleeper.parameters,
+                      lambda p: physics.HangingSleeper(4, **p), (), {"place": 23.4, "sleeper": 4}, "place")  # fmt: skip
+    found.fit.candidates = (hangs, found.fit.candidates[1])
+    found.fit.psi, found.fit.psi_se = np.array([1e-3, 0.0, 0.7]), np.array([1e-4, 0.1, 0.2])
+    row = finding_row(found, {})
+    assert (row["position_m"], row["position_se_m"]) == (23.4, None)
+
+
+@pytest.fixture(scope="module")
+def rolled():
+    return TrackCase(measured_campaign(small_plan((15.0,), blows=(24.0,)), (), 7))
+
+
+def test_noise_is_not_measured_while_the_train_comes(rolled):
+    """The same passage with its start cut off, to a twentieth of a second before the first wheel: what the sensors
+    show then is the train, and a channel is no noisier for it."""
+    made = next(iter(rolled.rollings.values()))
+    passage, sigma = made.passage, []
+    for cut in (0.0, made.reference - 0.05):
+        first = round(cut * passage.recording.rate)
+        recording = SimpleNamespace(**vars(passage.recording))
+        recording.samples = passage.recording.samples[:, first:]
+        recording.duration = recording.samples.shape[1] / passage.recording.rate
+        recording.index = passage.recording.index
+        shorter = SimpleNamespace(**vars(passage))
+        shorter.recording = recording
+        _, seen = rolling_of(shorter, made.sensors, made.reference - cut, made.speed, 0.05)
+        sigma.append(np.median(seen.sigma.reshape(len(made.sensors), -1), axis=1))
+    assert np.all(sigma[1] < 1.3 * sigma[0])
+
+
+def test_one_sensor_cannot_tell_a_place_from_its_own_channel(rolled):
+    fit = fit_jointly(rolled, iterations=0)
+    passages = [s for s in missing_sources(rolled, fit) if any(kind == "sensor" for kind, _ in s.parts)]
+    assert any(kind == "place" for s in passages for kind, _ in s.parts)
+    name, made = next(iter(rolled.rollings.items()))
+    one = Rolling(name, made.passage, made.sensors[:1], made.time, made.reference, made.speed)
+    kinds = {kind for kind, _ in _forces(rolled, fit, one).parts}
+    assert kinds == {"clock", "sensor"}
+
+
+def test_passages_that_are_all_reserved_suggest_nothing_and_stop_nothing():
+    """Waves of the rail that no fitted recording depends on have no size."""
+    campaign = measured_campaign(small_plan((15.0,), blows=(24.0,)), (), 7)
+    case = TrackCase(replace(campaign, reserved=tuple(p.name for p in campaign.passages)))
+    assert case.rollings and not any(o.name in case.rollings for o in case.observations)
+    assert case.further(fit_jointly(case, iterations=0)) == ()
