@@ -13,6 +13,7 @@ from turnout.simulate import load_vehicle
 PATTERN = 0.4  # m rms between axles heard and those of the vehicle's file: half of a short bogie is 0.9
 LEAST_REACH = 0.03  # share by which the vehicle's axle distances may correct the speed found
 LEAST_HEARD = 0.6  # share of a noted train's axles: a flat or a dip adds axles and hides some, it does not halve them
+WRONG_AXLES = "axles heard"
 NEWTON_PER_TONNE = 9806.65
 KMH = 3.6
 
@@ -49,10 +50,10 @@ def train_of(row: Mapping, said: Mapping, folder: Path) -> TrainFound:
         missing = "speed" if name else "type"
         raise TrainUnknownError(f"the train's {missing} is not known ({row.get('detail') or 'no axles found'})")
     believed = noted if name in _types({**row, "train_type": None}, said) else None
-    if believed and name != names[0]:  # the speed heard is that of another train's axle distances
-        speed = believed
-    speed = float(speed) / KMH
     vehicle, doubts = _vehicle(name, row.get("n_axles") or None, row, said, folder, bool(believed))
+    if believed and (name != names[0] or any(WRONG_AXLES in d for d in doubts)):
+        speed = believed  # the one heard is that of another train's axle distances, or of bangs between the axles
+    speed = float(speed) / KMH
     try:
         speed, turned = _by_its_axles(name, vehicle, row, speed)
         more: tuple[str, ...] = (f"{name} runs the other way round",) if turned else ()
@@ -97,7 +98,7 @@ def _vehicle(name, heard, row, said, folder, believed):
     n, units = len(one.wheels), max(1, round(number(said, "units") or 1.0))
     wrong: tuple[str, ...] = ()
     if heard and heard % n:
-        wrong = (f"{heard} axles heard, {n} in {name}.yaml: wrong vehicle file, another train, or other sensors",)
+        wrong = (f"{heard} {WRONG_AXLES}, {n} in {name}.yaml: wrong vehicle file, another train, or other sensors",)
         if not believed or heard < LEAST_HEARD * n * units:
             raise TrainUnknownError(*wrong)
     elif heard:

@@ -23,7 +23,8 @@ class Candidate:
     nuisances ``begin``; ``aside`` is evidence from data that are no observations [nats].
     ``kin``: laws of one part; where one leads at a place, all with that word are refitted there. ``limit`` is the
     family that it cannot be told from at the lower bound of its first parameter; ``plain`` is (family, k): where its
-    first parameter does not matter it is that law, of the size of its k-th. ``whole``: its response turns with its
+    first parameter does not matter it is that law, of the size of its k-th; ``open_as`` is the family that shows the
+    same where its first parameter is only known from below. ``whole``: its response turns with its
     size, so that a start promises what it is and says nothing of a larger or smaller one.
     ``loose`` is the share by which the size of an effect errs since its law is not quite the one out there; an
     ``exact`` one is what it says (a gain, a lag, a place): nothing that it leaves is due to its shape. ``told_by`` is a
@@ -55,6 +56,7 @@ class Candidate:
     kin: str = ""
     limit: str = ""
     plain: tuple = ()
+    open_as: str = ""
     whole: bool = False
     sized: int = 1
     sure: float = 0.0

@@ -36,7 +36,7 @@ class Case:
     ``control_level`` the weighted mean square by kind that cases without an effect reach, else that of the settings;
     ``cell_level`` the same for one channel of one recording, by kind;
     ``disturbed`` recordings not used, since something else than the known inputs shows in them (``track.quiet``);
-    ``foreign`` trains, no recording of which looks as their description has it.
+    ``foreign`` trains, most recordings of which do not look as their description has it.
     """
 
     observations: tuple[Observation, ...] = ()

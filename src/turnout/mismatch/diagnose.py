@@ -12,7 +12,7 @@ from turnout.mismatch.locate import attribute, cell_energies
 from turnout.mismatch.refits import kept, scored, to_the_end, with_derivatives
 from turnout.mismatch.scoring import judged, latent_of, over
 from turnout.mismatch.together import reconsidered, refused
-from turnout.mismatch.verdict import Verdict
+from turnout.mismatch.verdict import Verdict, opened
 from turnout.mismatch.verify import decoy, fit_of_reserved, fit_percent
 from turnout.mismatch.whereabouts import Whereabouts, whereabouts
 
@@ -107,6 +107,8 @@ def diagnose(case, settings=None, progress=None, store=None):
             break
     if refused(verdicts):
         verdicts, fit = reconsidered(case, base, fit, verdicts, settings)
+    if len(verdicts) == 1:
+        verdicts = [opened(verdicts[0], settings)]
     rival, leader = _rival(verdicts[0]), next((s for s in verdicts[0].scores[:1] if s.gain > settings.threshold), None)
     where = whereabouts(case, base, leader) if verdicts[0].answer == "unknown" else None
     return Diagnosis(

@@ -1,9 +1,10 @@
 """The one answer: none, named, a or b, unknown, numerics - with its probability and what it rests on."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+OPEN = 0.5  # of a size; one that errs by more has no upper end
 WEAK = 2.0  # thresholds; below it a name that held-out recordings refuse is no evidence that anything is missing
 TORN = 0.2  # of the gain; a condition that loses more than this, and half a threshold, speaks against the name
 VERDICTS = ("none", "named", "a_or_b", "unknown", "numerics")
@@ -43,6 +44,14 @@ class Score:
         size = np.linalg.norm(self.own[0][:sized] - self.candidate.neutral[:sized]) if known else np.inf
         open_by = self.candidate.sure * float(self.own[1][0]) if self.candidate.sure else 0.0
         return size - open_by >= self.candidate.least
+
+    @property
+    def is_open(self):
+        """Its size is only known from below, and beyond it is what ``open_as`` names."""
+        if not self.candidate.open_as:
+            return False
+        sizes, errors = self.own
+        return bool(errors[0] > OPEN * abs(sizes[0] - self.candidate.neutral[0]))
 
     def is_limit_of(self, other):
         """``other`` is at the bound, within its standard error, where it cannot be told from this at the same place."""
@@ -143,6 +152,19 @@ def objected(worst, gain, settings):
     return worst < -max(0.5 * settings.threshold, TORN * gain)
 
 
+def opened(verdict, settings):
+    """A name whose size has no upper end, as that or what shows the same beyond it: a gap that no train closes, or no
+    ballast at all. Others stay."""
+    if verdict.answer != "named" or not verdict.scores[0].is_open:
+        return verdict
+    names, probabilities = (verdict.names[0], verdict.scores[0].candidate.open_as), dict(verdict.posterior)
+    sure = calibrate(probabilities, names, settings.certainty("a_or_b"), settings)
+    reason = f"the size of {names[0]} is known from below alone"
+    return replace(
+        verdict, answer="a_or_b", names=names, grade="", probability=sure, posterior=probabilities, reason=reason
+    )
+
+
 def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, disturbed=False, foreign=()):
     """Verdict from scored candidates.
 
@@ -161,7 +183,7 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
     disturbed : bool
         Something that is no train shakes the sensors in some recordings; these are not among those fitted.
     foreign : tuple of str
-        Trains, no recording of which is among those fitted, since none looks like its vehicle file.
+        Trains, most recordings of which are not among those fitted, since they do not look like its vehicle file.
     """
     ranked = sorted(scores, key=lambda s: -s.gain)
     probabilities = posterior(scores, excess, settings)
@@ -179,7 +201,7 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
         if disturbed:
             return verdict("unknown", reason="something shakes all sensors while no wheel is near")
         if foreign:
-            return verdict("unknown", reason=f"no passage of {', '.join(foreign)} looks like its vehicle file")
+            return verdict("unknown", reason=f"most passages of {', '.join(foreign)} do not look like its vehicle file")
         return verdict("none", reason="nothing above the thresholds")
     best = found[0]
     if excess > 1.0 and best.explained < settings.explained:

@@ -64,6 +64,14 @@ def test_a_direction_in_other_letters_is_that_direction_and_one_unheard_is_said(
     assert unheard.direction == "facing" and any("direction not known" in doubt for doubt in unheard.doubts)
 
 
+def test_bangs_between_the_axles_do_not_tell_the_speed(repository):
+    """A long flat is heard as six axles of eight, and 74 km/h: the notes' 90 is believed. Four of four are heard."""
+    said = {"speed": 25.0, "train_type": "ic3"}
+    for heard, speed in ((6, 25.0), (8, 74.0 / 3.6)):
+        row = {"train_type": "ic3", "n_axles": heard, "speed_kmh": 74.0}
+        assert train(row, said, repository).speed == pytest.approx(speed)
+
+
 def test_swapped_channels_are_two():
     assert _channels_of({"place": "record 0, A7 and A8"}) == ["A7", "A8"]
     assert _channels_of({"place": "record 0, A7: 3 of 40"}) == ["A7"]

@@ -13,7 +13,7 @@ from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.observation import Observation
 from turnout.mismatch.scout import _seen
 from turnout.mismatch.shortlist import Projector
-from turnout.mismatch.verdict import Score, judge
+from turnout.mismatch.verdict import Score, judge, opened
 from turnout.physics import Parameter
 
 AMOUNT = (Parameter("amount", "-", 0.0, (-9.0, 9.0), "share of a shape", "made up 2026"),)
@@ -139,3 +139,13 @@ def test_a_twin_goes_back_with_its_effect_even_where_nothing_is_learnt_of_it():
     fit = SimpleNamespace(covariance=np.diag([1e-2, 1e-4, 1e-2]), values=values)
     moved = SimpleNamespace(twin="seat_A1")
     assert _seen(case, fit, moved) == {"seat_A1": 0.0, "gain_A1": 0.03}
+
+
+@pytest.mark.parametrize("error, names", [(3e-3, ("hanging_sleeper", "local_ballast")), (1e-4, ("hanging_sleeper",))])
+def test_a_gap_that_no_train_closes_may_be_no_ballast_at_all(error, names):
+    """2.5 ± 3 mm has no upper end: what lies beneath was never touched, and nobody can say whether it is there."""
+    here, settings = {"sleeper": 7, "place": 4.2}, MismatchSettings()
+    gap = Candidate("hanging_sleeper", GAP, lambda p: p, ((1e-3, 0.0),), here, open_as="local_ballast")
+    verdict = opened(judge([own(gap, [2.5e-3, 0.04], [error, 0.01])], 2.0, settings), settings)
+    assert verdict.names == names and verdict.answer == ("named" if len(names) == 1 else "a_or_b")
+    assert bool(verdict.grade) == (len(names) == 1) and verdict.probability > 0.9

@@ -57,7 +57,7 @@ def _supports(case):
                              twin=f"{alike}_{j}", kin=alike, limit=LIMIT.get(term.name, ""))  # fmt: skip
         yield _candidate(physics.HangingSleeper, lambda p, j=j: physics.HangingSleeper(j, **p),
                          tuple((g, s) for s in SEATED for g in GAPS), where, n, base=False, always="ballast",
-                         kin="ballast", plain=("local_ballast", 1))  # fmt: skip
+                         kin="ballast", plain=("local_ballast", 1), open_as="local_ballast")  # fmt: skip
         yield _candidate(physics.AttachedResonator, lambda p, j=j: physics.AttachedResonator(j, **p),
                          tuple((15.0, f, 0.03) for f in RINGING), where, n, sure=1.0)  # fmt: skip
         if case.rollings:  # for a blow of one strength friction is a damper: it takes trains to call it by its name

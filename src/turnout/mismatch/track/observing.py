@@ -85,12 +85,13 @@ def undisturbed(case, found):
 
 
 def foreign(case):
-    """Trains of which no passage looks like their vehicle file, though several came and another train's do."""
+    """Trains of which more passages do not look like their vehicle file than do, though several came: another train's
+    do, or not all of its own are alike."""
     came = Counter(p.train for p in case.campaign.passages if p.train)
-    known = {case.said(made)["train"] for made in case.rollings.values()}
+    known = Counter(case.said(made)["train"] for made in case.rollings.values())
     shaken = {d.name for d in case.disturbed}
     left = {p.train for p in case.campaign.passages if p.name in shaken}
-    return tuple(t for t, n in came.items() if known and n > 1 and t not in known and t not in left)
+    return tuple(t for t, n in came.items() if known and n > 1 and n - known[t] > known[t] and t not in left)
 
 
 def _own_of(passage):
