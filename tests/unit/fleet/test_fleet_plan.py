@@ -6,6 +6,7 @@ import pytest
 
 from turnout.config import load_configuration
 from turnout.errors import ConfigError
+from turnout.fleet.launch import launch
 from turnout.fleet.plan import read_plan, read_problems, write_plans
 from turnout.fleet.scan import scan, unit_id
 from turnout.fleet.shards import shard_names, shard_of
@@ -249,3 +250,13 @@ def test_an_event_is_another_one_with_other_resets_and_one_where_it_is_noted_twi
         (event,) = configuration_rows(configuration, fleet / "raw", [])["events"]
         ids.append((event["event_id"], fleet_hash(configuration)))
     assert ids[0][0] != ids[1][0] and ids[0][1] != ids[1][1]
+
+
+def test_what_passages_are_judged_with_is_an_input_of_their_jobs_once_it_is_there(fleet, monkeypatch, repository):
+    """Clusters that `turnout trains` makes are looked at by the next run, for the rule has them as input."""
+    monkeypatch.chdir(fleet)
+    assert launch({}, scan=False).learned == ()
+    (fleet / "config/passages").mkdir()
+    (fleet / "config/passages/clusters.json").write_text("{}")
+    assert launch({}, scan=False).learned == ("config/passages/clusters.json",)
+    assert "learned=RUN.learned" in (repository / "rules/passage.smk").read_text()
