@@ -106,9 +106,10 @@ def _create_views(con, root: Path, generation: Generation) -> None:
         con.execute(f'create view "{table}" as {read_live(con, root, table, generation.of(table))}')
     for table in LARGE:
         create_parts(con, root, table, generation.of(table))
-    # a clock that runs ahead is not believed: nothing was measured after the last run
-    ended = con.execute("select max(ended_at_utc)::varchar from runs").fetchall()[0][0]
-    last = generation.newest and min(generation.newest, ended or generation.newest)
+    # a logger's clock that runs ahead is not believed: nothing was measured after the last run and the last campaign
+    known = "greatest((select max(ended_at_utc) from runs), (select max(started_at_utc) from campaigns))"
+    until = con.execute(f"select {known}::varchar").fetchall()[0][0]
+    last = generation.newest and min(generation.newest, until or generation.newest)
     newest = f"timestamp {literal(last)}" if last else "null::timestamp"
     con.execute(f"create macro newest_measurement() as {newest}")
     con.execute(

@@ -6,6 +6,8 @@ import pytest
 import statsmodels.api as sm
 from registry_rows import hammer_result
 
+from turnout.fleet.batches import UnitResult
+
 YEAR = 31557600.0
 CHART = ["turnout_id", "section_id", "band", "source"]
 # SQL and the oracle do the same arithmetic in another order; 1e-8 is asked of every view.
@@ -246,7 +248,17 @@ def test_values_of_the_papers_method_are_in_no_chart(bench, hammer):
 
 def test_a_clock_that_runs_ahead_does_not_date_the_fleet(bench):
     """What is asked of the last thirty days is asked of the last run's, not of a year that has not come."""
-    bench.register(hammer_result(), hammer_result(section="A2", day="2099-01-05"))
+    passage = {"turnout_id": "t1", "passage_id": "p", "recording_id": "r", "passed_at_utc": "2099-01-05T10:00:00"}
+    passage |= {"status": "accepted", "n_axles": 8, "track": "main", "axle_load_source": "unavailable"}
+    late = UnitResult("t1/passage/20990105T100000Z.h5", "t1", "passage", "k", "1", "ok", {"passages": [passage]})
+    bench.register(hammer_result(), late)
     ((newest, ended),) = bench.ask("select newest_measurement(), (select max(ended_at_utc) from runs)")
     assert newest == ended and newest.year < 2099
     assert bench.ask("select newest_measurement_at_utc from registry_info") == [(newest,)]
+
+
+def test_campaigns_are_believed_where_the_clock_of_the_server_is_late(bench):
+    """A campaign's date is written down by people."""
+    campaign = {"campaign_id": "t1/2098-01-05", "turnout_id": "t1", "started_at_utc": "2098-01-05T10:00:00"}
+    bench.register(hammer_result(day="2098-01-05"), tables={"campaigns": [campaign]})
+    assert str(bench.ask("select newest_measurement()")[0][0]) == "2098-01-05 10:00:00"
