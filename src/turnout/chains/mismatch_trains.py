@@ -13,7 +13,6 @@ from turnout.simulate import load_vehicle
 PATTERN = 0.4  # m rms between axles heard and those of the vehicle's file: half of a short bogie is 0.9
 LEAST_REACH = 0.03  # share by which the vehicle's axle distances may correct the speed found
 LEAST_HEARD = 0.6  # share of a noted train's axles: a flat or a dip adds axles and hides some, it does not halve them
-WRONG_AXLES = "axles heard"
 NEWTON_PER_TONNE = 9806.65
 KMH = 3.6
 
@@ -50,8 +49,8 @@ def train_of(row: Mapping, said: Mapping, folder: Path) -> TrainFound:
         missing = "speed" if name else "type"
         raise TrainUnknownError(f"the train's {missing} is not known ({row.get('detail') or 'no axles found'})")
     believed = noted if name in _types({**row, "train_type": None}, said) else None
-    vehicle, doubts = _vehicle(name, row.get("n_axles") or None, row, said, folder, bool(believed))
-    if believed and (name != names[0] or any(WRONG_AXLES in d for d in doubts)):
+    vehicle, doubts, wrong = _vehicle(name, row.get("n_axles") or None, row, said, folder, bool(believed))
+    if believed and (name != names[0] or wrong):
         speed = believed  # the one heard is that of another train's axle distances, or of bangs between the axles
     speed = float(speed) / KMH
     try:
@@ -65,7 +64,7 @@ def train_of(row: Mapping, said: Mapping, folder: Path) -> TrainFound:
         speed, more = float(believed) / KMH, (f"{error}; taken as noted",)
     direction, way = _one_of(("facing", "trailing"), "direction", row, said)
     route, road = _one_of(("main", "diverging"), "track", row, said)
-    return TrainFound(name, vehicle, speed, direction, route, (*doubts, *more, *way, *road))
+    return TrainFound(name, vehicle, speed, direction, route, (*doubts, *wrong, *more, *way, *road))
 
 
 def _one_of(known, name, row, said):
@@ -91,6 +90,7 @@ def _with_a_file(names, folder) -> str:
 
 
 def _vehicle(name, heard, row, said, folder, believed):
+    """(vehicle, doubts on its load, what is wrong with the axles heard), the latter two in words."""
     try:
         one = load_vehicle(name, 0.0, folder)
     except (SimulationError, ConfigError) as error:
@@ -98,13 +98,13 @@ def _vehicle(name, heard, row, said, folder, believed):
     n, units = len(one.wheels), max(1, round(number(said, "units") or 1.0))
     wrong: tuple[str, ...] = ()
     if heard and heard % n:
-        wrong = (f"{heard} {WRONG_AXLES}, {n} in {name}.yaml: wrong vehicle file, another train, or other sensors",)
+        wrong = (f"{heard} axles heard, {n} in {name}.yaml: wrong vehicle file, another train, or other sensors",)
         if not believed or heard < LEAST_HEARD * n * units:
             raise TrainUnknownError(*wrong)
     elif heard:
         units = heard // n
     share, doubts = _load_share(name, row, said, folder, units)
-    return load_vehicle(name, share, folder, units), (*doubts, *wrong)
+    return load_vehicle(name, share, folder, units), doubts, wrong
 
 
 def _load_share(name, row, said, folder, units):

@@ -2,6 +2,8 @@
 
 import json
 
+from turnout.mismatch.verdict import NO_UPPER_END
+
 # What the simulation lacked, in words; {place}, {channel}, {train}, {wheel} and every parameter with its unit.
 SENTENCES = {
     "hanging_sleeper": "The sleeper at {place} hangs {gap} above its ballast",
@@ -117,4 +119,4 @@ def _said(term) -> str:
         return turned
     name, vague = OPEN.get(term["term"], ("", ""))
     known = term["parameters"].get(name)
-    return vague if known and known["se"] > 0.5 * abs(known["value"]) else SENTENCES[term["term"]]
+    return vague if known and known["se"] > NO_UPPER_END * abs(known["value"]) else SENTENCES[term["term"]]

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Callable, Mapping
-from datetime import datetime, timedelta
+from datetime import datetime
 from functools import lru_cache
 from pathlib import Path
 
@@ -18,12 +17,11 @@ from turnout.config.settings.passage import PassageSettings
 from turnout.content import sha256_of
 from turnout.errors import ConfigError
 from turnout.fleet.current import current_results
+from turnout.fleet.notes import LONGEST, start_of
 from turnout.passage.clusters import Clusters
 from turnout.passage.load import LoadCalibration
 from turnout.passage.patterns import read_patterns
 from turnout.records import ModalModel, Unit
-
-LONGEST = timedelta(days=2)  # that one file of a logger that never stops may last
 
 
 def passage_context(
@@ -49,10 +47,9 @@ def passage_context(
 
 def near(models: tuple[SectionModel, ...], label: str) -> tuple[SectionModel, ...]:
     """Models that the passages of a file may be fitted with, by the time in its name; all where it has none."""
-    stamp = re.search(r"\d{8}T\d{6}Z", label)
-    if not stamp:
+    start = start_of(label)
+    if start is None:
         return models
-    start = datetime.strptime(stamp[0], "%Y%m%dT%H%M%SZ")
     earlier = [m for m in models if m.measured_at <= start]
     later = [m for m in models if start < m.measured_at <= start + LONGEST]
     return (*(earlier[-1:] or models[:1]), *later)

@@ -20,7 +20,7 @@ def notes_of(turnout: TurnoutConfig, units: Sequence[Unit]) -> list[str]:
     """
     campaigns: dict[str, str] = {}
     trains = sorted(_timed(turnout.trains), key=lambda entry: entry[0])
-    starts = sorted({time for u in units if not u.campaign and (time := _start(u.label))})
+    starts = sorted({time for u in units if not u.campaign and (time := start_of(u.label))})
     notes = []
     for unit in units:
         if unit.campaign:
@@ -28,7 +28,7 @@ def notes_of(turnout: TurnoutConfig, units: Sequence[Unit]) -> list[str]:
                 campaigns[unit.campaign] = digest(repr(turnout.campaigns[unit.campaign]))[:16]
             notes.append(campaigns[unit.campaign])
         else:
-            notes.append(_within(_start(unit.label), starts, trains))
+            notes.append(_within(start_of(unit.label), starts, trains))
     return notes
 
 
@@ -45,7 +45,8 @@ def _timed(rows: Sequence[Mapping]) -> list[tuple[datetime, list]]:
     return found
 
 
-def _start(label: str) -> datetime | None:
+def start_of(label: str) -> datetime | None:
+    """When a passage file begins, by its name; None where that holds no time."""
     stamp = re.search(r"\d{8}T\d{6}Z", label)
     try:
         return datetime.strptime(stamp[0], "%Y%m%dT%H%M%SZ") if stamp else None

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-OPEN = 0.5  # of a size; one that errs by more has no upper end
+NO_UPPER_END = 0.5  # of a size; one that errs by more is known from below alone: 95 % reach beyond twice of it
 WEAK = 2.0  # thresholds; below it a name that held-out recordings refuse is no evidence that anything is missing
 TORN = 0.2  # of the gain; a condition that loses more than this, and half a threshold, speaks against the name
 VERDICTS = ("none", "named", "a_or_b", "unknown", "numerics")
@@ -51,7 +51,7 @@ class Score:
         if not self.candidate.open_as:
             return False
         sizes, errors = self.own
-        return bool(errors[0] > OPEN * abs(sizes[0] - self.candidate.neutral[0]))
+        return bool(errors[0] > NO_UPPER_END * abs(sizes[0] - self.candidate.neutral[0]))
 
     def is_limit_of(self, other):
         """``other`` is at the bound, within its standard error, where it cannot be told from this at the same place."""

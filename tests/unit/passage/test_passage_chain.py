@@ -212,4 +212,5 @@ def test_only_models_that_a_file_may_be_fitted_with_make_it_stale():
     at = {"20240513T100000Z.h5": ["m5"], "20240101T000000Z.h5": ["m3"], "20240630T120000Z.h5": ["m5", "m7"]}
     for label, names in at.items():
         assert [m.model_id for m in near(models, label)] == names
-    assert near(models, "run 17.h5") == models  # its time is inside
+    for label in ("run 17.h5", "20241399T250000Z.h5"):  # its time is inside; digits that are no time
+        assert near(models, label) == models

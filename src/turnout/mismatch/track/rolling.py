@@ -10,7 +10,8 @@ from turnout.mismatch.observation import Observation
 from turnout.mismatch.track.bands import band_end, band_limited, clock_of, finer, limited, read_at
 from turnout.mismatch.track.roll import EDGE
 
-CLEAR, MARGIN, SHORTEST_QUIET = 5.0, 0.02, 0.1  # m, s, s: of what is heard as a channel's own noise
+# m, s, s: of what is heard as a channel's own noise; 4.2 m before a wheel it is that, 1.4 m before six times as loud
+CLEAR, MARGIN, SHORTEST_QUIET = 5.0, 0.02, 0.1
 BLURRED = 0.03  # s about a sample at the range
 COUPLING = 0.7  # an amplifier's lower corner that no data sheet mentions [Hz]
 FINE = 2500.0  # samples per second between which a cubic reads 112 Hz to 0.03 %
