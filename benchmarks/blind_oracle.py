@@ -2,8 +2,9 @@
 
     python -m benchmarks.blind_oracle SET [--cases T1234abcd ...] [--clear 30] [--workers 2]
 
-SET is a revealed set. Writes SET/oracle.json, {case: fit [%]}, and SET/oracle_detail.json; goes on where it stopped. A
-case whose effects the library does not hold has no oracle. Errors of a case are its result and stop nothing.
+SET is a revealed set. Writes SET/oracle.json, {case: [fit without, fit with the true effect]} [%], and
+SET/oracle_detail.json; goes on where it stopped. A case whose effects the library does not hold has no oracle, nor has
+one of a wheel, which comes at another angle to every passage. Errors of a case are its result and stop nothing.
 ``--clear`` takes so many clear singles in the order of their ids, which are hashes: a sample that nobody has drawn.
 """
 
@@ -126,7 +127,7 @@ def main():
             case, result = done.result()
             found[case] = result
             detail.write_text(json.dumps(found, indent=1, sort_keys=True) + "\n")
-            known = {c: r["oracle"] for c, r in found.items() if r.get("oracle") is not None}
+            known = {c: (r["before"], r["oracle"]) for c, r in found.items() if r.get("oracle") is not None}
             (out / "oracle.json").write_text(json.dumps(known, indent=1, sort_keys=True) + "\n")
             print(case, result, flush=True)
 

@@ -75,7 +75,7 @@ def table(tool, **more):
 
 
 def test_a_perfect_tool_meets_every_bar():
-    judged, found = table(perfect, oracle={j["case"]: 52.0 for j in truths()})
+    judged, found = table(perfect, oracle={j["case"]: (20.0, 52.0) for j in truths()})
     assert [f.name for f in found.values() if f.met is False] == []
     assert found["what: top-1 (clear singles)"].share == 100.0
     assert found["where: axle right (clear singles)"].n == 10
@@ -84,6 +84,17 @@ def test_a_perfect_tool_meets_every_bar():
     assert found["probability: worst fifth, stated from seen"].met
     assert all(set(counts) <= {"none", "unknown", "a_or_b", "hanging_sleeper", "surface_dip", "wheel_flat",
                                "sensor_gain", "pad_temperature"} for counts in confusion(judged).values())  # fmt: skip
+
+
+def test_bars_are_also_held_against_effects_that_the_tool_itself_could_have_gained_by():
+    """Where the true effect gains 2 or 4 points: only the latter count, whatever the tool says of its own fit."""
+    oracle = {f"s{i}": (20.0, 22.0 if i % 2 else 24.0) for i in range(40)}
+    silent = table(lambda t: [{"verdict": "none", "probability": 0.9}], oracle=oracle)[1]
+    found = table(lambda t: perfect(t) if t["case"] != "s0" else [{"verdict": "none"}], oracle=oracle)[1]
+    name = "what: top-1 (singles whose oracle gains over 3 points)"
+    assert (silent[name].k, silent[name].n) == (0, 20)
+    assert (found[name].k, found[name].n) == (19, 20)
+    assert found["what: top-1 (clear singles)"].n == 50
 
 
 def test_a_silent_tool_raises_no_alarm_and_finds_nothing():

@@ -18,6 +18,7 @@ from turnout.mismatch.whereabouts import Whereabouts, whereabouts
 
 # Share of the first effect's evidence that a law of not quite its shape leaves: sizes are right to a fifth.
 SHAPE = 0.05
+APART = 0.02  # the same to one sensor or train, by a law of the whole track, which all sensors and trains show
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ def diagnose(case, settings=None, progress=None, store=None):
         promising = None if refused(verdicts) else {s.family for s in scores if s.gain > settings.threshold}
         scores = scored(case, fit, settings, tell, store, effect, promising)
         verdict, best = judged(case, fit, scores, settings)
-        if effect and (verdict.answer != "named" or best.gain < _shape_of(verdicts[0].scores[0])):
+        if effect and (verdict.answer != "named" or best.gain < _shape_of(verdicts[0].scores[0], best)):
             break
         verdicts.append(verdict)
         if verdict.answer == "none" or best is None or best.gain <= settings.threshold:
@@ -129,9 +130,12 @@ def _with_its_errors(case, fit, settings, store):
         return case, fit
 
 
-def _shape_of(score):
+def _shape_of(first, second):
     """Evidence that a law of not quite the shape out there may leave to another name. [nats]"""
-    return 0.0 if score.candidate.exact else SHAPE * score.gain
+    if first.candidate.exact:
+        return 0.0
+    apart = not first.candidate.where and {"sensor", "train"} & set(second.candidate.where)
+    return (APART if apart else SHAPE) * first.gain
 
 
 def _own_numerics(case, base, settings):

@@ -22,7 +22,7 @@ def judged_set(out, more=None, label=None):
 
 
 def oracle_of(out):
-    """{case: held-out fit with the true effect [%]} from ``out``/oracle.json, {} where nobody has made them."""
+    """{case: held-out fit (without, with) the true effect [%]} from ``out``/oracle.json, {} where there is none."""
     path = Path(out) / "oracle.json"
     return json.loads(path.read_text()) if path.exists() else {}
 

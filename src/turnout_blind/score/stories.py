@@ -38,7 +38,13 @@ def tell(out, folder, cases=None, more=None, oracle=None, effects=()):
     parts = []
     for case in cases or choose(list(judged.values())):
         name = f"blind_story_{case}.svg"
-        draw(truths[case], rows[case], (oracle or {}).get(case), Path(folder) / name, load_effects(*effects))
+        draw(
+            truths[case],
+            rows[case],
+            (oracle or {}).get(case, (None, None))[1],
+            Path(folder) / name,
+            load_effects(*effects),
+        )
         parts.append(f"### {_title(truths[case])}\n\n{words(truths[case], rows[case])}\n\n![{case}]({name})")
     return "\n\n".join(parts)
 

@@ -25,12 +25,15 @@ SHAPES = {"wave": np.sin(9.0 * X), "ramp": X - 0.5}
 class Shapes(Case):
     """A wave of 200 with a ramp of 0.28 beneath it, noise of 0.1."""
 
-    def __init__(self, exact):
+    def __init__(self, exact, where=None):
         data = 200.0 * SHAPES["wave"] + 0.28 * SHAPES["ramp"] + 0.1 * np.random.default_rng(6).normal(size=X.size)
         self.observations = (Observation("all", "all", data, np.full(X.size, 0.1)),)
         starts = (100.0,), (0.3,)
         self.candidates = tuple(
-            Candidate(n, AMOUNT, lambda p, n=n: (n, p["amount"]), starts, {"shape": n}, exact=exact) for n in SHAPES
+            Candidate(
+                n, AMOUNT, lambda p, n=n: (n, p["amount"]), starts, (where or {}).get(n, {"shape": n}), exact=exact
+            )
+            for n in SHAPES
         )
 
     def predict(self, values, terms, observations):
@@ -41,6 +44,16 @@ class Shapes(Case):
 def test_a_second_effect_needs_a_share_of_the_first_only_where_its_law_may_be_off(exact, names):
     """The ramp is worth 200 ln(1 + 2.8^2 / 12) = 100 nats, the wave 200 ln(2000^2 / 3.3) = 2,800: 28 times as many."""
     assert diagnose(Shapes(exact)).names == names
+
+
+@pytest.mark.parametrize(("where", "names"), [("train", 2), ("sensor", 2), ("place", 1)])
+def test_what_one_sensor_or_train_shows_is_less_likely_the_shape_of_a_law_of_the_whole_track(where, names):
+    """The ramp is worth a 28th of the wave: beyond a fiftieth, within a twentieth."""
+    assert len(diagnose(Shapes(False, {"wave": {}, "ramp": {where: 1.0}})).names) == names
+
+
+def test_what_one_sensor_shows_may_be_the_shape_of_an_effect_at_a_place():
+    assert diagnose(Shapes(False, {"wave": {"place": 7.2}, "ramp": {"sensor": "A"}})).names == ("wave",)
 
 
 def test_a_gain_is_sought_beside_a_lag_of_the_same_channel_and_a_mounting_is_not():

@@ -24,7 +24,7 @@ LEAST = {
     "high_pass": 2.0, "sensor_gain": 0.04, "sensor_position": 0.05, "time_offset": 5e-5, "clock_drift": 2e-4,
     "local_pad": 0.15, "local_ballast": 0.15, "hanging_sleeper": 5e-5, "surface_dip": 3e-5, "pad_temperature": 1e-3,
     "unsprung_mass": 0.07, "contact_stiffness": 0.1, "rail_shear": 0.9, "mount_resonance": 1 / 2000.0,
-    "zener_pad": 0.15, "dry_friction": 500.0, "attached_resonator": 5.0,
+    "zener_pad": 0.1, "dry_friction": 500.0, "attached_resonator": 5.0,
     "ballast_hardening": 0.3, "pad_preload": 500.0, "low_pass": 1 / 2000.0, "sleeper_mode": 0.05,
     "ballast_inertia": 20.0,
 }  # fmt: skip
