@@ -18,7 +18,8 @@ from turnout.mismatch.whereabouts import Whereabouts, whereabouts
 
 # Share of the first effect's evidence that a law of not quite its shape leaves: sizes are right to a fifth.
 SHAPE = 0.05
-APART = 0.02  # the same to one sensor or train, by a law of the whole track, which all sensors and trains show
+APART = 0.02  # the same to a name for other recordings: what one sensor shows wrong is not what all do, or one train
+FRAMES = {("", "sensor"), ("", "train"), ("sensor", ""), ("sensor", "train"), ("train", "sensor")}  # those apart
 
 
 @dataclass(frozen=True)
@@ -134,8 +135,13 @@ def _shape_of(first, second):
     """Evidence that a law of not quite the shape out there may leave to another name. [nats]"""
     if first.candidate.exact:
         return 0.0
-    apart = not first.candidate.where and {"sensor", "train"} & set(second.candidate.where)
-    return (APART if apart else SHAPE) * first.gain
+    return (APART if (_frame(first), _frame(second)) in FRAMES else SHAPE) * first.gain
+
+
+def _frame(score):
+    """ "sensor", "train", "" for the whole track, or "place"."""
+    where = score.candidate.where
+    return next((k for k in ("sensor", "train") if k in where), "place" if where else "")
 
 
 def _own_numerics(case, base, settings):

@@ -10,17 +10,19 @@ TRUST_TERM = 0.35  # largest step of a term's parameter as a share of its bounds
 DONE = 0.05  # nats; a smaller gain ends the iteration
 RENEWED = 4  # steps after which a dear Jacobian is made anew
 STALL = 5e-4  # of minus twice the log posterior per sample; a dear fit that gains less ends
+FINE = 1e-4  # the same where the verdict rests on it
 
 
 class Joint:
     """Least squares of a case with some candidates in it; holds what does not change between steps."""
 
-    def __init__(self, case, candidates=(), observations=None, iterations=6, done=DONE):
+    def __init__(self, case, candidates=(), observations=None, iterations=6, done=DONE, stall=STALL):
         self.case, self.candidates = case, tuple(candidates)
         self.observations = tuple(case.observations if observations is None else observations)
         self.parameters = [p for c in self.candidates for p in c.parameters]
-        self.iterations, self.evaluations, self.done = iterations, 0, done
-        self.size = sum(o.n_effective for o in self.observations)
+        self.iterations, self.evaluations = iterations, 0
+        size = sum(o.n_effective for o in self.observations)
+        self.enough = max(2.0 * done, stall * size if case.frozen_jacobian else 0.0)
         priors = [(n.mean, n.sd) for n in case.nuisances] + [_prior(p) for p in self.parameters]
         self.mean, self.sd = (np.array(v, dtype=float) for v in zip(*priors)) if priors else (np.zeros(0),) * 2
         bounds = [n.bounds for n in case.nuisances] + [p.bounds for p in self.parameters]
@@ -136,17 +138,20 @@ def cost_at(case, candidates, psi, values):
     return joint.cost(theta, joint.residuals(joint.predict(theta)))
 
 
-def fit_jointly(case, candidates=(), start=None, values=None, keep=None, observations=None, iterations=6, done=DONE):
+def fit_jointly(
+    case, candidates=(), start=None, values=None, keep=None, observations=None, iterations=6, done=DONE, stall=STALL
+):
     r"""Maximum of the posterior of nuisances and term parameters together.
 
     .. math:: \min_{\eta,\psi} \sum_k n_k \left[\ln s_k^2 + \overline{r^2}_k / s_k^2\right]
               + \sum (\eta - \mu)^2 / \sigma_\eta^2, \quad s_k \ge 1
 
     Damped Gauss-Newton: a step is cut to 0.7 prior standard deviations of any nuisance and halved until the cost
-    falls, until a step gains less than ``done`` nats. ``start`` (n_term,) of psi; ``values`` of the nuisances;
-    ``keep`` a Jacobian whose nuisance columns are used instead of new ones and then updated by Broyden's formula.
+    falls, until a step gains less than ``done`` nats, or in a dear case ``stall`` of the cost per sample. ``start``
+    (n_term,) of psi; ``values`` of the nuisances; ``keep`` a Jacobian whose nuisance columns are used instead of new
+    ones and then updated by Broyden's formula.
     """
-    joint = Joint(case, candidates, observations, iterations, done)
+    joint = Joint(case, candidates, observations, iterations, done, stall)
     psi = np.array([p.neutral for p in joint.parameters]) if start is None else np.asarray(start, dtype=float)
     known = {**case.start_values, **(values or {})}
     first = [known.get(n.name, n.mean) for n in case.nuisances]
@@ -168,7 +173,7 @@ def _iterate(joint, theta, predictions, residuals, jacobian, cost, renew):
     """Steps until nothing is gained; a dear Jacobian is updated, and made anew after every ``renew`` steps (0: never)
     and before the last: on a long way it comes to point elsewhere."""
     frozen = joint.case.frozen_jacobian
-    enough, since = max(2.0 * joint.done, STALL * joint.size if frozen else 0.0), 0
+    enough, since = joint.enough, 0
     for _ in range(joint.iterations):
         found = shortened(joint, theta, damped_step(joint, theta, residuals, jacobian), cost)
         gain = cost - found[3] if found else 0.0

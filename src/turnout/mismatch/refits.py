@@ -6,12 +6,13 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.held_out import held_out_score
-from turnout.mismatch.joint import Joint, cost_at, fit_jointly
+from turnout.mismatch.joint import FINE, STALL, Joint, cost_at, fit_jointly
 from turnout.mismatch.scoring import score_of
 from turnout.mismatch.shortlist import Entry, shortlist
 
 HELD = 0.5  # of what the cheap observations gained; a refit that holds less has not come to its end
 PROMISING = 0.5  # of the threshold, which laws of a part must gain before its other laws are asked
+NEARLY = 0.5  # of the threshold, from which a leader is fitted to its end
 ROUNDS = 3  # of steps for a leader; one that still gains afterwards is far from any law
 FAR = 4.0  # thresholds promised by the cheap observations, beyond which the base fit's derivatives point elsewhere
 HALVINGS = 4  # of a start that costs more than nothing; a sixteenth of it is a straight line
@@ -38,7 +39,7 @@ def scored(case, fit, settings, tell, store, effect, promising):
         ranked = _same_law_beside(case, fit, ranked, settings, store, effect)
         material = [s for s in ranked if s.material][:2]
         close = min(material[0].gain - settings.margin, HELD * material[0].gain) if material else 0.0
-        leaders = [s for s in material if s.gain > max(settings.threshold, close)]
+        leaders = [s for s in material if s.gain > max(NEARLY * settings.threshold, close)]
         polished = [_polished(case, fit, s, settings, store, effect) for s in leaders]
         ranked = sorted([*polished, *(s for s in ranked if all(s is not x for x in leaders))], key=lambda s: -s.gain)
         ranked = beside(case, fit, ranked, settings)
@@ -124,7 +125,7 @@ def _ended(case, fit, settings):
     """Continued until a round of steps gains less than a name needs; each begins with new derivatives."""
     for _ in range(ROUNDS):
         try:
-            before, fit = fit, to_the_end(case, fit, settings)
+            before, fit = fit, to_the_end(case, fit, settings, FINE)
         except SimulationError:
             break
         if fit.evidence - before.evidence < settings.threshold:
@@ -132,9 +133,9 @@ def _ended(case, fit, settings):
     return fit
 
 
-def to_the_end(case, fit, settings):
+def to_the_end(case, fit, settings, stall=STALL):
     """The fit continued from where it is, with derivatives of its own."""
-    return fit_jointly(case, fit.candidates, fit.psi, fit.values, iterations=settings.iterations)
+    return fit_jointly(case, fit.candidates, fit.psi, fit.values, iterations=settings.iterations, stall=stall)
 
 
 def with_derivatives(case, fit, settings):

@@ -46,14 +46,18 @@ def test_a_second_effect_needs_a_share_of_the_first_only_where_its_law_may_be_of
     assert diagnose(Shapes(exact)).names == names
 
 
-@pytest.mark.parametrize(("where", "names"), [("train", 2), ("sensor", 2), ("place", 1)])
-def test_what_one_sensor_or_train_shows_is_less_likely_the_shape_of_a_law_of_the_whole_track(where, names):
+WHOLE, SENSOR, TRAIN, PLACE = {}, {"sensor": "A"}, {"train": "railcar"}, {"place": 7.2}
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "names"),
+    [(WHOLE, SENSOR, 2), (WHOLE, TRAIN, 2), (WHOLE, PLACE, 1), (SENSOR, WHOLE, 2), (SENSOR, TRAIN, 2),
+     (SENSOR, PLACE, 1), (TRAIN, SENSOR, 2), (TRAIN, WHOLE, 1), (PLACE, SENSOR, 1), (PLACE, TRAIN, 1),
+     (PLACE, WHOLE, 1)],
+)  # fmt: skip
+def test_what_other_recordings_show_is_less_likely_the_shape_of_the_first(first, second, names):
     """The ramp is worth a 28th of the wave: beyond a fiftieth, within a twentieth."""
-    assert len(diagnose(Shapes(False, {"wave": {}, "ramp": {where: 1.0}})).names) == names
-
-
-def test_what_one_sensor_shows_may_be_the_shape_of_an_effect_at_a_place():
-    assert diagnose(Shapes(False, {"wave": {"place": 7.2}, "ramp": {"sensor": "A"}})).names == ("wave",)
+    assert len(diagnose(Shapes(False, {"wave": first, "ramp": second})).names) == names
 
 
 def test_a_gain_is_sought_beside_a_lag_of_the_same_channel_and_a_mounting_is_not():

@@ -5,8 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from turnout.config.settings.mismatch import MismatchSettings
+from turnout.mismatch import refits
 from turnout.mismatch.case import Case, Nuisance
-from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.joint import FINE, STALL, fit_jointly
 from turnout.mismatch.observation import Observation
 from turnout.mismatch.track.rolling import BLURRED, Rolling, _topped, observed
 from turnout.records import Channel, Recording
@@ -38,6 +40,18 @@ def test_a_dear_jacobian_is_made_anew_on_a_long_way():
     updated = fit_jointly(Bent(True), keep=first, iterations=25)
     assert renewed.cost == pytest.approx(full.cost, abs=0.2)
     assert updated.cost > full.cost + 1.0
+
+
+def test_a_dear_fit_on_which_the_verdict_rests_goes_on_for_less(monkeypatch):
+    """Twenty of the cost per sample are 1,200 in all, which ends it early; leaders go on for a fifth of others'."""
+    early, late = (fit_jointly(Bent(True), iterations=25, stall=s) for s in (20.0, FINE))
+    assert early.cost > late.cost + 1.0
+    assert fit_jointly(Bent(False), iterations=25, stall=20.0).cost == pytest.approx(late.cost, abs=0.2)  # cheap: none
+    asked = []
+    monkeypatch.setattr(refits, "fit_jointly", lambda *a, stall=STALL, **k: asked.append(stall) or late)
+    refits._ended(Bent(True), early, MismatchSettings())
+    refits.to_the_end(Bent(True), early, MismatchSettings())
+    assert asked == [FINE, STALL] and FINE < STALL
 
 
 def test_where_a_channel_was_at_its_range_the_passage_says_no_more_than_its_size():

@@ -21,11 +21,14 @@ class Predicting:
 
     def _forget(self):
         """Nothing simulated is remembered any more."""
-        self._simulated, self._rolls, self._models = OrderedDict(), OrderedDict(), OrderedDict()
+        self._simulated, self._rolls, self._models, self._filed = OrderedDict(), OrderedDict(), OrderedDict(), {}
 
     def track(self, route="main", terms=()):
-        """The kept part of the base track under a route; ``terms`` that change the rail change that of its file."""
-        return (self.nominal if _rails(terms) else self.zone).turnout.track_of(route)
+        """The kept part of the base track under a route; what ``terms`` change of the rail is as in its file."""
+        own = tuple(sorted({t.name for t in terms} & set(self.rail)))
+        if own and own not in self._filed:
+            self._filed[own] = with_rail(self.nominal, {n: 0.0 if n in own else v for n, v in self.rail.items()})
+        return (self._filed[own] if own else self.zone).turnout.track_of(route)
 
     def predict(self, values, terms, observations):
         """Prediction of receptances and passages."""
@@ -172,11 +175,6 @@ class Predicting:
             return predicted
         finally:
             self.solver, self._simulated, self._rolls = kept
-
-
-def _rails(terms):
-    """One of the terms is another rail."""
-    return any(type(t).rail is not PhysicsTerm.rail for t in terms)
 
 
 def _moves(term):
