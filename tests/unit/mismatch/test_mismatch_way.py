@@ -51,7 +51,7 @@ def test_a_dear_fit_on_which_the_verdict_rests_goes_on_for_less(monkeypatch):
     monkeypatch.setattr(refits, "fit_jointly", lambda *a, stall=STALL, **k: asked.append(stall) or late)
     refits._ended(Bent(True), early, MismatchSettings())
     refits.to_the_end(Bent(True), early, MismatchSettings())
-    assert asked == [FINE, STALL] and FINE < STALL
+    assert set(asked[:-1]) == {FINE} and asked[-1] == STALL > FINE
 
 
 def test_where_a_channel_was_at_its_range_the_passage_says_no_more_than_its_size():
