@@ -51,7 +51,7 @@ WHOLE, SENSOR, TRAIN, PLACE = {}, {"sensor": "A"}, {"train": "railcar"}, {"place
 
 @pytest.mark.parametrize(
     ("first", "second", "names"),
-    [(WHOLE, SENSOR, 2), (WHOLE, TRAIN, 2), (WHOLE, PLACE, 1), (SENSOR, WHOLE, 2), (SENSOR, TRAIN, 2),
+    [(WHOLE, SENSOR, 2), (WHOLE, TRAIN, 2), (WHOLE, PLACE, 1), (SENSOR, WHOLE, 1), (SENSOR, TRAIN, 2),
      (SENSOR, PLACE, 1), (TRAIN, SENSOR, 2), (TRAIN, WHOLE, 1), (PLACE, SENSOR, 1), (PLACE, TRAIN, 1),
      (PLACE, WHOLE, 1)],
 )  # fmt: skip
