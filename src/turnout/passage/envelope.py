@@ -64,7 +64,11 @@ def _edges(frequency, low, high, width=0.2):
 
 
 def levels(samples, rate: float, step: float, bands=BANDS) -> Levels:
-    """Levels of all channels; the quiet level of a band is the median of the quieter fifth of 50 ms blocks."""
+    """Levels of all channels; the quiet level of a band is the median of the quieter fifth of 50 ms blocks.
+
+    A bin is the whole number of samples next to ``step``; the ``step`` of the result is how long that really is.
+    """
+    step = max(round(step * rate), 1) / rate
     powers = band_powers(samples, rate, step, bands)
     floor = quiet_level(powers, max(round(0.05 / step), 1))[..., None]
     values = np.log1p(powers / floor).mean(axis=1)

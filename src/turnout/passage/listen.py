@@ -16,8 +16,8 @@ QUIET_BLOCK = 0.05  # s
 def listen(samples, rate: float, positions, step: float) -> Listening | None:
     """``Listening`` of the channels (n_sensor, n_sample), None where nothing is louder than the quiet parts."""
     found = levels(samples, rate, step)
-    per_bin = max(round(step * rate), 1)
-    n = found.n_bin
+    step, n = found.step, found.n_bin
+    per_bin = round(step * rate)
     slow = samples[:, : n * per_bin].reshape(samples.shape[0], n, per_bin).mean(axis=2)
     slow = slow - np.median(slow, axis=1, keepdims=True)
     active = heard_bins(found.values.mean(axis=0), step)
