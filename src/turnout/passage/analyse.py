@@ -52,6 +52,7 @@ def analyse(recording: Recording, sensors, patterns, settings) -> Passage:
     if not used:
         return Passage("rejected", (*findings, Rejection("no_train", 0.0, 1.0, "no channel can be used")))
     samples = np.array([recording.signal(s.name) for s in used])
+    samples = samples - np.median(samples, axis=1, keepdims=True)  # a zero offset is no vibration
     heard = listen(samples, recording.rate, [s.position for s in used], settings.envelope_step)
     if heard is None:
         return Passage("rejected", (*findings, Rejection("no_train", 0.0, None, "nothing stands out of the noise")))

@@ -79,6 +79,8 @@ def fit_channel(samples, rate: float, axle_times, speed: float, model: ModalMode
     -------
     ChannelFit
     """
+    samples = np.asarray(samples, dtype=float)
+    samples = samples - np.median(samples)  # the filters start from zero: an offset would ring in them as a blow
     part, expected = _cut(samples, rate, axle_times, settings)
     if expected.size < 2:
         return ChannelFit(REJECTED, "fewer than two wheels with a whole window in the recording")
@@ -128,7 +130,7 @@ def _cut(samples, rate, axle_times, settings):
     expected = np.sort(np.asarray(axle_times, dtype=float)) * rate - start
     room = settings.time_search * rate
     inside = (expected > room + 2) & (expected < stop - start - settings.score_window * rate)
-    return np.asarray(samples[start:stop], dtype=float), expected[inside]
+    return samples[start:stop], expected[inside]
 
 
 def _quiet(samples, rate, axle_times, speed):
