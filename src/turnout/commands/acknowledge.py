@@ -29,7 +29,8 @@ def run(args: argparse.Namespace) -> int:
     from pathlib import Path
 
     from turnout.config import load_configuration
-    from turnout.config.acknowledgements import acknowledgement, append_acknowledgement, faults
+    from turnout.config.acknowledgements import COLUMNS, acknowledgement, faults
+    from turnout.config.append import append_csv, one_line, taken_back
     from turnout.errors import ConfigError, ConfigErrors
 
     turnout, _, label = args.place.partition("/")
@@ -38,10 +39,14 @@ def run(args: argparse.Namespace) -> int:
     action = "suppress" if args.suppress_until else "acknowledge"
     cells = dict(turnout=turnout, section=label, band=args.band, action=action, by=args.by, at=at)
     cells |= dict(until=args.suppress_until, reason=args.reason)
+    cells = {column: one_line(said) for column, said in cells.items()}
     if wrong := list(faults(cells, read.ids, read.variants)):
         raise ConfigErrors([ConfigError("acknowledge", column, *said) for column, *said in wrong])
-    row = acknowledgement(cells)
     path = Path(args.configuration) / "acknowledgements.csv"
-    append_acknowledgement(path, row)
+    with taken_back(path):
+        append_csv(path, cells, COLUMNS)
+        after = load_configuration(args.configuration)
+        if acknowledgement(cells) not in after.acknowledgements:
+            raise ConfigErrors(after.warnings)
     print(f"{path}: {action} {args.place} {args.band or 'both resonances'}. It counts from the next run.")
     return 0

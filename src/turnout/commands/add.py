@@ -25,22 +25,15 @@ def run(args: argparse.Namespace) -> int:
     from pathlib import Path
 
     from turnout.config import load_configuration
-    from turnout.config.table import ROW, append_row
-    from turnout.errors import ConfigErrors
+    from turnout.config.append import append_tsv, taken_back
+    from turnout.config.table import ROW
     from turnout.readers.formats import FORMATS
     from turnout.readers.units import to_si
 
     path = Path(args.configuration) / "turnouts.tsv"
-    before = path.read_bytes() if path.exists() else None
-    append_row(path, {column: getattr(args, column) for column in ROW})
-    try:
+    with taken_back(path):
+        append_tsv(path, {column: getattr(args, column) for column in ROW}, tuple(ROW))
         turnout = load_configuration(args.configuration, FORMATS, to_si).turnout(args.turnout)
-    except ConfigErrors:
-        if before is None:
-            path.unlink()
-        else:
-            path.write_bytes(before)
-        raise
     labels = ", ".join(s.label for s in turnout.sections)
     print(f"{path}: added {turnout.id} with the sections {labels}.")
     for kind, what in (("hammer tests", turnout.hammer), ("passages", turnout.passages)):

@@ -45,26 +45,18 @@ def run(args: argparse.Namespace) -> int:
 
 def _enter(args) -> int:
     """Append the line and read the configuration again; a line that is refused is taken back."""
-    import csv
-    import io
     from pathlib import Path
 
     from turnout.config import load_configuration
-    from turnout.errors import TurnoutError
+    from turnout.config.append import append_csv, taken_back
+    from turnout.config.events import COLUMNS
 
     path = Path(args.configuration) / "events.csv"
-    before = path.read_text(encoding="utf-8-sig") if path.exists() else "turnout,section,date,kind,resets,note\n"
     turnout, _, label = args.place.partition("/")
-    header = [title.strip() for title in before.splitlines()[0].split(",")]
     given = dict(turnout=turnout, section=label, date=args.date, kind=args.kind, resets=args.resets, note=args.note)
-    line = io.StringIO()
-    csv.writer(line, lineterminator="\n").writerow([given.get(title, "") for title in header])
-    path.write_text(before + ("" if before.endswith("\n") else "\n") + line.getvalue(), encoding="utf-8")
-    try:
+    with taken_back(path):
+        append_csv(path, given, COLUMNS)
         load_configuration(args.configuration)
-    except TurnoutError:
-        path.write_text(before, encoding="utf-8")
-        raise
     print(f"{path}: {args.kind} at {args.place}, {args.date}. It counts from the next run.")
     return 0
 

@@ -1,16 +1,14 @@
 """config/acknowledgements.csv: who has seen an alarm, or silences it until a date, and why."""
 
-import csv
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from datetime import datetime
 from pathlib import Path
 
-from turnout.config.document import Place
+from turnout.config.csv_table import TableFault, read_csv, unreadable
 from turnout.config.events import wrong_place, wrong_time
 from turnout.config.keys import suggestion
-from turnout.config.table import TOO_MANY, read_csv
 from turnout.errors import ConfigError
 
 COLUMNS = ("turnout", "section", "band", "action", "by", "at", "until", "reason")
@@ -28,24 +26,27 @@ def read_acknowledgements(
     """
     if not Path(path).exists():
         return [], []
+    try:
+        table = read_csv(Path(path), name, COLUMNS, needed=6)
+    except TableFault as fault:
+        return [], [fault.error]
+    if table.faults:  # a title that is not understood may be the end of a silence: no row counts
+        return [], [fault.error for fault in table.faults]
     rows: list[dict] = []
     errors: list[ConfigError] = []
-    try:
-        for line, cells in read_csv(path, COLUMNS[:6]):
-            found = list(faults(cells, known, variants or {}))
-            errors += [cells.place(name, line, column).error(*said) for column, *said in found]
-            if not found:
-                rows.append(acknowledgement(cells))
-    except (ValueError, UnicodeDecodeError) as error:
-        errors.append(Place(name, 1, 1).error(str(error), f"Write the header {','.join(COLUMNS)} in UTF-8"))
+    for line, cells in table.rows:
+        found = list(faults(cells, known, variants or {}))
+        errors += [cells.place(name, line, column).error(*said) for column, *said in found]
+        if not found:
+            rows.append(acknowledgement(cells))
     return rows, errors
 
 
 def faults(cells: Mapping, known, variants) -> Iterator[tuple[str, str, str]]:
     """(column, what was found, what to write) of everything in a row that cannot be used."""
     said = {column: cells.get(column, "") for column in COLUMNS}
-    if TOO_MANY in cells:
-        yield TOO_MANY, "more cells than columns", "Put a text with commas in double quotes"
+    if no_row := unreadable(cells):
+        yield no_row
         return
     if not said["turnout"]:
         yield "turnout", "turnout is empty", "Write the id of the turnout"
@@ -91,22 +92,6 @@ def acknowledgement(cells: Mapping) -> dict:
 
 def _time(text: str) -> datetime:
     return datetime.fromisoformat(text.removesuffix("Z"))
-
-
-def append_acknowledgement(path: Path, row: dict) -> None:
-    """Add a row at the end of the file; a new file gets the header. ``row`` is what ``acknowledgement`` gives."""
-    path = Path(path)
-    new = not path.exists()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    ended = new or path.read_text(encoding="utf-8-sig").endswith("\n")
-    cells = [row["turnout_id"], row["section_id"], row["band"], row["action"], row["by_whom"]]
-    cells += [row[k].isoformat(timespec="minutes") if row[k] else "" for k in ("at_utc", "until_utc")]
-    with open(path, "a", encoding="utf-8", newline="") as stream:
-        stream.write("" if ended else "\n")
-        writer = csv.writer(stream, lineterminator="\n")
-        if new:
-            writer.writerow(COLUMNS)
-        writer.writerow([cell or "" for cell in [*cells, row["reason"]]])
 
 
 def _id(row: dict) -> str:

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
-from turnout.config.document import Place
+from turnout.config.csv_table import TableFault, read_csv, unreadable
 from turnout.config.keys import suggestion
-from turnout.config.table import TOO_MANY, read_csv
 from turnout.errors import ConfigError
 
 # Which resonance is another one afterwards, where the row does not say.
@@ -45,22 +44,23 @@ def read_events(path: Path, name: str, known, variants) -> tuple[list[Event], li
     if not path.exists():
         return [], []
     events: list[Event] = []
-    errors: list[ConfigError] = []
     try:
-        for line, cells in read_csv(path, COLUMNS[:4]):
-            found = list(_wrong(cells, known, variants))
-            errors += [cells.place(name, line, column).error(*said) for column, *said in found]
-            if not found:
-                events.append(_event(cells))
-    except (ValueError, UnicodeDecodeError) as error:
-        errors.append(Place(name, 1, 1).error(str(error), f"Write the header {','.join(COLUMNS)} in UTF-8"))
+        table = read_csv(path, name, COLUMNS, needed=4)
+    except TableFault as fault:
+        return [], [fault.error]
+    errors = [fault.error for fault in table.faults]
+    for line, cells in table.rows:
+        found = list(_wrong(cells, known, variants))
+        errors += [cells.place(name, line, column).error(*said) for column, *said in found]
+        if not found:
+            events.append(_event(cells))
     return sorted(events, key=lambda e: (e.at, e.turnout, e.section or "", e.kind)), errors
 
 
 def _wrong(cells, known, variants) -> Iterator[tuple[str, str, str]]:
     """(column, what was found, what to write) of everything in a row that cannot be used."""
-    if TOO_MANY in cells:
-        yield TOO_MANY, "more cells than columns", "Put a text with commas in double quotes"
+    if no_row := unreadable(cells):
+        yield no_row
         return
     yield from wrong_place(cells, known, variants)
     if wrong := wrong_time(cells["date"]):

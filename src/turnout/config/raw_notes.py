@@ -1,18 +1,20 @@
 """What was noted beside the raw files of a turnout: campaigns.csv and trains.csv."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from datetime import date as day
 from datetime import datetime
 from pathlib import Path
 
+from turnout.config.csv_table import Cells, TableFault, read_csv, unreadable
+from turnout.config.document import Place
 from turnout.config.events import wrong_time
 from turnout.config.frozen import Frozen
-from turnout.config.table import TOO_MANY, read_csv
 from turnout.config.turnout import Campaign
 from turnout.errors import ReadError
 
 COLUMNS = ("campaign", "started_at_utc", "rail_temperature_c", "hammer_id", "tip", "operator")
+TRAINS = ("passed_at_utc", "train_type", "speed_kmh", "axle_load_t", "track", "n_axles")
 
 
 def read_campaigns(path: Path, name: str) -> tuple[dict[str, Campaign], list[ReadError]]:
@@ -20,23 +22,15 @@ def read_campaigns(path: Path, name: str) -> tuple[dict[str, Campaign], list[Rea
 
     A row whose temperature is empty is sound: the temperature is None.
     """
-    campaigns, errors = {}, []
-    try:
-        for line, cells in read_csv(path, COLUMNS[:2]):
-            try:
-                campaign = _campaign(cells)
-                if campaign.date in campaigns:
-                    raise _Wrong("campaign", f"campaign {campaign.date} for the second time", "Keep one of them")
-                campaigns[campaign.date] = campaign
-            except _Wrong as wrong:
-                column, found, remedy = wrong.args
-                place = cells.place(name, line, column)
-                errors.append(ReadError(name, str(place), found, remedy, reason="unreadable"))
-    except FileNotFoundError:
-        return {}, []
-    except (ValueError, UnicodeDecodeError) as error:
-        remedy = f"Write the header {','.join(COLUMNS)} in UTF-8"
-        return {}, [ReadError(name, "line 1", str(error), remedy, reason="unreadable")]
+    campaigns: dict[str, Campaign] = {}
+
+    def keep(cells: Cells) -> None:
+        campaign = _campaign(cells)
+        if campaign.date in campaigns:
+            raise _Wrong("campaign", f"campaign {campaign.date} for the second time", "Keep one of them")
+        campaigns[campaign.date] = campaign
+
+    errors = _each_row(path, name, COLUMNS, 2, keep)
     return campaigns, errors
 
 
@@ -57,22 +51,51 @@ def unnoted(date: str) -> Campaign:
 
 
 def read_trains(path: Path, name: str) -> tuple[tuple[dict[str, str], ...], list[ReadError]]:
-    """Rows of trains.csv as text, in the file's order; without the file there are none."""
-    try:
-        return tuple(cells for _, cells in read_csv(path, ())), []
-    except FileNotFoundError:
-        return (), []
-    except (ValueError, UnicodeDecodeError) as error:
-        return (), [ReadError(name, "line 1", str(error), "Write a CSV with a header in UTF-8", reason="unreadable")]
+    """Rows of trains.csv as text, in the file's order, and an error for each without a time; further columns are kept.
+
+    Without the file there are none.
+    """
+    trains: list[Cells] = []
+
+    def keep(cells: Cells) -> None:
+        said = cells["passed_at_utc"]
+        if wrong := wrong_time(said):
+            raise _Wrong("passed_at_utc", f"passed_at_utc is {said!r}{wrong[0]}", wrong[1])
+        trains.append(cells)
+
+    errors = _each_row(path, name, TRAINS, 1, keep, free=True)
+    return tuple(trains), errors
 
 
 class _Wrong(Exception):
     """Column, what was found, what to write."""
 
 
+def _each_row(path, name, known, needed, keep: Callable[[Cells], None], free=False) -> list[ReadError]:
+    """``keep`` every row; an error for each that cannot be used, and for what is wrong with the header."""
+    try:
+        table = read_csv(path, name, known, needed, free)
+    except FileNotFoundError:
+        return []
+    except TableFault as fault:
+        return [_error(fault.place, fault.found, fault.remedy)]
+    errors = [_error(fault.place, fault.found, fault.remedy) for fault in table.faults]
+    for line, cells in table.rows:
+        try:
+            if no_row := unreadable(cells):
+                raise _Wrong(*no_row)
+            keep(cells)
+        except _Wrong as wrong:
+            column, found, remedy = wrong.args
+            errors.append(_error(cells.place(name, line, column), found, remedy))
+    return errors
+
+
+def _error(place: Place, found: str, remedy: str) -> ReadError:
+    return ReadError(place.path, str(place), found, remedy, reason="unreadable")
+
+
 def _campaign(cells: Mapping) -> Campaign:
-    if TOO_MANY in cells:
-        raise _Wrong(TOO_MANY, "more cells than columns", "Put a text with commas in double quotes")
     try:
         date = day.fromisoformat(cells["campaign"]).isoformat()
     except ValueError:

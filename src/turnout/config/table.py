@@ -1,7 +1,5 @@
 """config/turnouts.tsv: one row per turnout, read with the place of every cell."""
 
-import csv
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -11,7 +9,6 @@ from turnout.config.document import Place
 from turnout.config.keys import Key, problem, suggestion
 from turnout.errors import ConfigError
 
-TOO_MANY = "cells beyond the header"
 ID = r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}"
 ROW = {
     "turnout": Key("text", "id: letters, digits, _ and -", required=True, pattern=ID),
@@ -148,70 +145,3 @@ def leads_out(path: str) -> bool:
     (False, True, True)
     """
     return PurePosixPath(path).is_absolute() or ".." in PurePosixPath(path).parts or "\\" in path
-
-
-def append_row(path: Path, values: dict[str, str]) -> str:
-    """Add one row, in the columns the table has; a new table gets all columns. Returns the line written."""
-    if not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text("\t".join(ROW) + "\n", encoding="utf-8")
-    text = path.read_text(encoding="utf-8-sig")
-    header = next(line for line in text.splitlines() if line.strip() and not line.startswith("#")).split("\t")
-    header = [title.strip() for title in header]
-    if missing := [title for title, value in values.items() if value and title not in header]:
-        place = Place(str(path), 1, 1)
-        raise place.error(f"no column {missing[0]!r}", "Add it to the header, or leave the value out")
-    cells = [re.sub(r"\s+", " ", str(values.get(title) or "")).strip() for title in header]
-    line = "\t".join(cells)
-    with path.open("a", encoding="utf-8", newline="") as stream:
-        stream.write(("" if text.endswith("\n") or not text else "\n") + line + "\n")
-    return line
-
-
-class Cells(dict):
-    """One row of a CSV: text by column; ``starts`` are the columns of the line at which its cells begin."""
-
-    starts: dict[str, int]
-
-    def place(self, name: str, line: int, column: str) -> Place:
-        """Where the cell of ``column`` starts; the start of the line where it has no such cell."""
-        return Place(name, line, self.starts.get(column, 1))
-
-
-def read_csv(path: Path, needed: tuple[str, ...]) -> Iterator[tuple[int, Cells]]:
-    """``(line number, {column: text})`` of a CSV with a header; ValueError where a needed column is missing.
-
-    Cells beyond the header stand under ``TOO_MANY``.
-    """
-    with open(path, encoding="utf-8-sig", newline="") as stream:
-        lines = stream.read().splitlines(keepends=True)
-    seen = [""]
-
-    def remembered() -> Iterator[str]:
-        for text in lines:
-            seen[0] = text
-            yield text
-
-    reader = csv.DictReader(remembered(), restkey=TOO_MANY, restval="")
-    titles = reader.fieldnames = [t.strip() for t in reader.fieldnames or ()]
-    for title in needed:
-        if title not in titles:
-            raise ValueError(f"no column {title!r}; the header has {', '.join(titles) or 'nothing'}")
-    for found in reader:
-        cells = Cells({k: v if k == TOO_MANY else v.strip() for k, v in found.items()})
-        cells.starts = dict(zip([*titles, TOO_MANY], _starts(seen[0])))
-        yield reader.line_num, cells
-
-
-def _starts(line: str) -> Iterator[int]:
-    """Columns, from 1, at which the cells of a line of CSV begin.
-
-    >>> list(_starts('a,"b,c",d'))
-    [1, 3, 9]
-    """
-    quoted = False
-    yield 1
-    for column, letter in enumerate(line, 1):
-        quoted ^= letter == '"'
-        if letter == "," and not quoted:
-            yield column + 1

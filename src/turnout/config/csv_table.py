@@ -1,0 +1,149 @@
+"""Tables that people keep as CSV (events, acknowledgements, campaigns, trains), read with the place of every cell."""
+
+import csv
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+
+from turnout.config.document import Place
+from turnout.config.keys import suggestion
+
+TOO_MANY = "cells beyond the header"
+BROKEN = "a line that is no row"
+
+
+class TableFault(Exception):
+    """What is wrong with a table as a whole: where, what was found, what to write; ``error`` is its ConfigError."""
+
+    def __init__(self, place: Place, found: str, remedy: str):
+        super().__init__(found)
+        self.place, self.found, self.remedy = place, found, remedy
+        self.error = place.error(found, remedy)
+
+
+class Cells(dict):
+    """One row of a CSV: text by column. ``text`` is its line, ``titles`` are those of the header."""
+
+    text = ""
+    titles: tuple[str, ...] = ()
+
+    def place(self, name: str, line: int, column: str) -> Place:
+        """Where the cell of ``column`` starts; the start of the line where it has no such cell."""
+        return Place(name, line, dict(zip((*self.titles, TOO_MANY), _starts(self.text))).get(column, 1))
+
+
+@dataclass(frozen=True)
+class CsvTable:
+    """``rows`` are (line, cells); ``faults`` are those of the header that leave the rows readable."""
+
+    rows: tuple[tuple[int, Cells], ...]
+    faults: tuple[TableFault, ...]
+
+
+def read_csv(path: Path, name: str, known: tuple[str, ...], needed: int, free: bool = False) -> CsvTable:
+    """A CSV whose header has the first ``needed`` of the ``known`` titles, and no others than these.
+
+    Where others are ``free`` they are refused only if they look like a known title that is missing. Errors call the
+    file ``name``: TableFault where it is not UTF-8 or a needed title is missing, FileNotFoundError where it is not.
+    A row is one line: a quote that is not closed costs its own row (``unreadable``), not the rows below it.
+    """
+    lines = [(n, line) for n, line in enumerate(_text(path, name).split("\n"), 1) if line.strip()]
+    first, header = lines[0] if lines else (1, "")
+    titles = _titles(header)
+    for title in known[:needed]:
+        if title not in titles:
+            found = f"no column {title!r}; the header has {', '.join(titles) or 'nothing'}"
+            raise TableFault(Place(name, first, 1), found, f"Write the header {','.join(known)}, with commas between")
+    faults = [
+        TableFault(Place(name, first, start), *fault)
+        for (k, title), start in zip(enumerate(titles), _starts(header))
+        if (fault := _title_fault(title, titles, k, known, free))
+    ]
+    return CsvTable(tuple((n, _cells(line, titles)) for n, line in lines[1:]), tuple(faults))
+
+
+def unreadable(cells: Mapping) -> tuple[str, str, str] | None:
+    """(column, what was found, what to write) where a line is no row of its table.
+
+    >>> unreadable(_cells('tamping,"machine 09-3X', ("kind", "note")))[1]
+    'a double quote that is not closed in its line'
+    """
+    if BROKEN in cells:
+        return BROKEN, cells[BROKEN], "Write each row in one line; double quotes go around a whole cell"
+    if TOO_MANY in cells:
+        return TOO_MANY, "more cells than columns", "Put a text with commas in double quotes"
+    return None
+
+
+def header_of(path: Path, name: str) -> tuple[str, ...]:
+    """Titles of a CSV; TableFault where it has none or is not UTF-8."""
+    lines = [(n, line) for n, line in enumerate(_text(path, name).split("\n"), 1) if line.strip()]
+    if not lines:
+        raise TableFault(Place(name, 1, 1), "an empty table", "Write its header, or remove the file")
+    return _titles(lines[0][1])
+
+
+def _text(path: Path, name: str) -> str:
+    data = Path(path).read_bytes()
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        column = error.start - data.rfind(b"\n", 0, error.start)
+        raise TableFault(Place(name, line, column), "a byte that is not UTF-8", "Save the file as UTF-8") from None
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def _titles(header: str) -> tuple[str, ...]:
+    """Stripped titles; a spreadsheet's empty columns on the right are none."""
+    try:
+        titles = [title.strip() for title in next(csv.reader([header], strict=True), [])]
+    except csv.Error:
+        titles = [title.strip() for title in header.split(",")]
+    while titles and not titles[-1]:
+        titles.pop()
+    return tuple(titles)
+
+
+def _title_fault(title, titles, k, known, free) -> tuple[str, str] | None:
+    """(what was found, what to write) of the ``k``-th title where it cannot be used."""
+    if title in titles[:k]:
+        return f"column {title!r} for the second time", "Keep one of them"
+    if title in known:
+        return None
+    missing = [t for t in known if t not in titles]
+    if free and not get_close_matches(title, missing, cutoff=0.7):
+        return None
+    return f"unknown column {title!r}", suggestion(title, known)
+
+
+def _cells(line: str, titles: tuple[str, ...]) -> Cells:
+    cells = Cells(dict.fromkeys(titles, ""))
+    cells.text, cells.titles = line, titles
+    try:
+        found = [cell.strip() for cell in next(csv.reader([line], strict=True))]
+    except csv.Error as error:
+        open_quote = "unexpected end" in str(error)
+        cells[BROKEN] = "a double quote that is not closed in its line" if open_quote else str(error)
+        return cells
+    while len(found) > len(titles) and not found[-1]:
+        found.pop()
+    cells.update(zip(titles, found))
+    if len(found) > len(titles):
+        cells[TOO_MANY] = ",".join(found[len(titles) :])
+    return cells
+
+
+def _starts(line: str) -> Iterator[int]:
+    """Columns, from 1, at which the cells of a line of CSV begin.
+
+    >>> list(_starts('a,"b,c",d'))
+    [1, 3, 9]
+    """
+    quoted = False
+    yield 1
+    for column, letter in enumerate(line, 1):
+        quoted ^= letter == '"'
+        if letter == "," and not quoted:
+            yield column + 1

@@ -1,0 +1,156 @@
+"""Tables that people keep: what is not understood in them is said, and no row gets lost in another."""
+
+import pytest
+
+from turnout.cli import main
+from turnout.config import load_configuration
+from turnout.config.acknowledgements import read_acknowledgements
+from turnout.config.events import read_events
+from turnout.config.raw_notes import read_campaigns, read_trains
+
+HEADER = "turnout,section,date,kind,resets,note\n"
+
+
+def events(folder, text):
+    path = folder / "events.csv"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    found, errors = read_events(path, "config/events.csv", None, {})
+    return [(e.turnout, e.resets, e.note) for e in found], [str(e) for e in errors]
+
+
+def test_an_unknown_title_of_the_events_is_an_error(tmp_path):
+    _, errors = events(tmp_path, "turnout,section,date,kind,reset,note\nt1,,2025-01-01,sensor_change,none,same type\n")
+    assert errors == [
+        "config/events.csv, line 1, column 27: unknown column 'reset'. "
+        "Did you mean 'resets'? Allowed: date, kind, note, resets, section, turnout."
+    ]
+
+
+def test_a_title_that_comes_twice_is_an_error(tmp_path):
+    _, errors = events(tmp_path, "turnout,section,date,kind,note,note\n")
+    assert errors == ["config/events.csv, line 1, column 32: column 'note' for the second time. Keep one of them."]
+
+
+def test_a_quote_that_is_not_closed_takes_no_other_row_with_it(tmp_path):
+    rows = 't2,,2025-11-05,tamping,,"machine 09-3X\nt1,A7,2025-11-06,pad_exchange,,"a, b"\n'
+    found, errors = events(tmp_path, HEADER + rows)
+    assert found == [("t1", ("railpad",), "a, b")]
+    assert len(errors) == 1 and "line 2, column 1: a double quote that is not closed in its line" in errors[0]
+
+
+def test_letters_behind_a_closed_quote_are_an_error(tmp_path):
+    found, errors = events(tmp_path, HEADER + 't2,,2025-11-05,tamping,,"machine" 09\n')
+    assert not found and "line 2, column 1: ',' expected after '\"'. Write each row in one line" in errors[0]
+
+
+def test_a_byte_that_is_not_utf8_is_said_with_line_and_column(tmp_path):
+    found, errors = events(tmp_path, (HEADER + "t1,,2025-11-05,tamping,,Århus\n").encode("latin-1"))
+    assert not found
+    assert errors == ["config/events.csv, line 2, column 25: a byte that is not UTF-8. Save the file as UTF-8."]
+
+
+def test_what_a_spreadsheet_leaves_behind_is_no_error(tmp_path):
+    text = '\ufeff"turnout",section,date,kind,resets,note,,\r\n\r\nt1,,2025-11-05,tamping,,a\u2028b,,\r\n'
+    assert events(tmp_path, text) == ([("t1", ("ballast",), "a\u2028b")], [])
+
+
+def test_a_silence_without_its_end_does_not_count(tmp_path):
+    path = tmp_path / "acknowledgements.csv"
+    path.write_text("turnout,section,band,action,by,at,untill,reason\nt1,,,suppress,me,2026-01-01,2026-02-01,x\n")
+    rows, errors = read_acknowledgements(path)
+    assert rows == [] and "unknown column 'untill'. Did you mean 'until'?" in str(errors[0])
+
+
+def test_a_temperature_under_another_title_is_said_and_the_other_cells_are_used(tmp_path):
+    path = tmp_path / "campaigns.csv"
+    path.write_text("campaign,started_at_utc,rail_temp_c\n2024-05-13,2024-05-13T09:30,18.5\n")
+    campaigns, errors = read_campaigns(path, "t1/campaigns.csv")
+    assert list(campaigns) == ["2024-05-13"]
+    assert "line 1, column 25: unknown column 'rail_temp_c'. Did you mean 'rail_temperature_c'?" in str(errors[0])
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("passed_at_utc;train_type\n2024-05-13T10:00;IC3\n", "line 1, column 1: no column 'passed_at_utc'"),
+        ("passed_at_utc,axle_load\n", "unknown column 'axle_load'. Did you mean 'axle_load_t'?"),
+        ("passed_at_utc,speed\n", "unknown column 'speed'. Did you mean 'speed_kmh'?"),
+        ("passed_at_utc\n2024-05-13 noon\n", "line 2, column 1: passed_at_utc is '2024-05-13 noon'. Write YYYY"),
+        ("passed_at_utc\n2024-05-13T10:00+02:00\n", "with a time zone. Write the time in UTC"),
+        ("passed_at_utc,train_type\n2024-05-13T10:00,IC3,x\n", "line 2, column 22: more cells than columns"),
+    ],
+)
+def test_trains_that_cannot_be_used_are_said(tmp_path, text, said):
+    path = tmp_path / "trains.csv"
+    path.write_text(text)
+    trains, errors = read_trains(path, "t1/trains.csv")
+    assert trains == () and len(errors) == 1 and said in str(errors[0])
+
+
+def test_trains_may_have_further_columns(tmp_path):
+    path = tmp_path / "trains.csv"
+    path.write_text("train_number,passed_at_utc,train_type\n814,2024-05-13T10:00:00Z,IC3\n")
+    trains, errors = read_trains(path, "t1/trains.csv")
+    assert [dict(t) for t in trains] == [
+        {"train_number": "814", "passed_at_utc": "2024-05-13T10:00:00Z", "train_type": "IC3"}
+    ] and not errors
+
+
+@pytest.fixture
+def config(tmp_path, repository, monkeypatch):
+    import shutil
+
+    shutil.copytree(repository / "config", tmp_path / "config")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path / "config"
+
+
+EVENT = ["events", "tommerup_s1", "tamping", "2026-04-02"]
+SAID = ["acknowledge", "tommerup_s1", "--by", "M. Jensen", "--reason", "seen", "--at", "2026-03-01"]
+ADD = ["add", "new", "tommerup"]
+ACKNOWLEDGED = "turnout,section,band,action,by,at,until,reason\n"
+
+
+@pytest.mark.parametrize(
+    ("command", "table", "content", "said"),
+    [
+        (EVENT, "events.csv", (HEADER + "tommerup_s1,,2025-11-05,tamping,,Århus\n").encode("latin-1"), "not UTF-8"),
+        (EVENT, "events.csv", b"", "an empty table. Write its header"),
+        ([*EVENT, "--resets", "none"], "events.csv", b"turnout,section,date,kind\n", "no column 'resets' for 'none'"),
+        ([*EVENT, "--note", "hi"], "events.csv", b"turnout,section,date,kind,resets\n", "no column 'note' for 'hi'"),
+        (SAID, "acknowledgements.csv", (ACKNOWLEDGED + "# Århus\n").encode("latin-1"), "not UTF-8"),
+        (SAID, "acknowledgements.csv", b"", "an empty table. Write its header"),
+        (SAID, "acknowledgements.csv", ACKNOWLEDGED.replace("until", "untill").encode(), "unknown column 'untill'"),
+        ([*SAID, "--suppress-until", "2026-05-01"], "acknowledgements.csv", b"turnout,section,band,action,by,at,reason",
+         "no column 'until' for '2026-05-01'"),
+        (ADD, "turnouts.tsv", "turnout\tlayout\tname\nx\ttommerup\tÅrhus\n".encode("latin-1"), "not UTF-8"),
+        (ADD, "turnouts.tsv", b"# nothing yet\n", "an empty table. Write a header"),
+        (["add", "#x", "tommerup"], "turnouts.tsv", b"turnout\tlayout\na\ttommerup\n", "no turnout '#x'"),
+    ],
+)  # fmt: skip
+def test_a_command_says_what_is_wrong_with_a_table_and_leaves_it_alone(config, capsys, command, table, content, said):
+    (config / "events.csv").unlink()
+    (config / table).write_bytes(content)
+    assert main(command) == 2
+    err = capsys.readouterr().err
+    assert said in err and table in err
+    assert (config / table).read_bytes() == content
+
+
+def test_a_refused_first_event_leaves_no_file(config):
+    (config / "events.csv").unlink()
+    assert main(["events", "nowhere", "tamping", "2026-04-02"]) == 2 and not (config / "events.csv").exists()
+
+
+def test_a_row_is_entered_by_the_header_of_its_table(config):
+    (config / "events.csv").write_bytes(b'"note","date",kind,section,turnout\r\n,2025-04-02,grinding,A8,tommerup_s1')
+    (config / "acknowledgements.csv").write_text("reason,until,at,by,action,band,section,turnout\n")
+    assert main([*EVENT, "--note", "machine\n09-3X, night"]) == 0
+    assert main([*SAID, "--suppress-until", "2026-05-01", "--band", "ballast"]) == 0
+    read = load_configuration(config)
+    assert [(e.kind, e.note) for e in read.events] == [("grinding", ""), ("tamping", "machine 09-3X, night")]
+    (row,) = read.acknowledgements
+    assert (row["band"], row["by_whom"], row["reason"], row["action"]) == ("ballast", "M. Jensen", "seen", "suppress")
+    assert (
+        (config / "events.csv").read_bytes().endswith(b'\r\n"machine 09-3X, night",2026-04-02,tamping,,tommerup_s1\r\n')
+    )
