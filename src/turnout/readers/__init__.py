@@ -1,7 +1,10 @@
 """Raw files of ten kinds -> ``Recording`` in SI units, or a reason why not."""
 
+import logging
+from contextlib import contextmanager
 from dataclasses import replace
 
+from turnout.errors import TurnoutError
 from turnout.readers.description import describe
 from turnout.readers.formats import FORMATS, detect
 from turnout.readers.places import load
@@ -9,6 +12,7 @@ from turnout.records import LongRecording, RawDescription, ReadResult, Recording
 
 __all__ = ["FORMATS", "read"]
 
+LOG = logging.getLogger("turnout.readers")
 
 HELD = 32 * 2**20  # bytes: a file up to this size is read whole, whatever its length in time
 
@@ -56,14 +60,28 @@ def read(path, root, description: RawDescription, longest: float | None = None, 
     source = load(path, root)
     source = replace(source, stay=longest is not None and source.size > held)
     before = source.state()
-    raw = _format(source, description).read_raw(source)
-    digest = source.sha256()
-    recordings, errors = describe(raw, description, source, longest)
+    with _named(source):
+        raw = _format(source, description).read_raw(source)
+        digest = source.sha256()
+        recordings, errors = describe(raw, description, source, longest)
     if source.state() != before:
         raise source.error("the file", "it changed while it was read", "Start again when its copying has ended")
     held_back = tuple(r for r in recordings if isinstance(r, LongRecording))
     whole = tuple(r for r in recordings if isinstance(r, Recording))
     return ReadResult(recordings=whole, errors=errors, sha256=digest, long=held_back)
+
+
+@contextmanager
+def _named(source):
+    """Whatever a reader did not foresee costs this file alone, and names it; the traceback is in the log."""
+    try:
+        yield
+    except (TurnoutError, MemoryError, OSError):
+        raise
+    except Exception as error:
+        LOG.exception("%s: not foreseen by the reader", source.name)
+        found = f"it cannot be read ({type(error).__name__}: {' '.join(str(error).split())[:200]})"
+        raise source.error("the file", found) from error
 
 
 def _format(source, description):

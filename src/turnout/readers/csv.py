@@ -3,7 +3,8 @@
 What is recognised: separators comma, semicolon, tab; a decimal comma where the separator is not a comma; head lines
 with or without ``#``: ``rate`` (or ``fs``, ``sample_rate`` ..., in Hz) or ``dt`` [s], ``started_at``, ``n_records``,
 ``n_samples``, conditions; units in brackets behind the names ("force [N]", "force (N)") or in a line of their own; a
-column ``time`` or ``t`` [s]; a column ``record`` that numbers the records. Without names the channels are "0", "1" ...
+column ``time`` or ``t`` in s, ms or µs; a column ``record`` that numbers the records. Without names the channels are
+"0", "1" ...
 
 The last line must end with a line break: without it nobody can tell a cut number from a whole one.
 """
@@ -16,6 +17,8 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import csv
 
+from turnout.readers.clock import PART
+from turnout.readers.precision import TEXT
 from turnout.readers.raw import COPY_AGAIN, RawFile, RawRecord
 from turnout.readers.stamps import moment
 from turnout.readers.stored import Column
@@ -23,6 +26,7 @@ from turnout.readers.variables import COUNT, RATE, START, STEP, TIME, Facts
 
 NOTE = re.compile(r"^#?\s*([A-Za-z_][\w .]*?)\s*[:=,;\t]\s*(.*)$")
 NAME_WITH_UNIT = re.compile(r"^(.*?)\s*[\[(]([^\[\]]*)[\])]$")
+SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "µs": 1e-6, "us": 1e-6}
 NOTES = {*RATE, *STEP, *START, *COUNT, "n_samples"}
 
 
@@ -46,23 +50,29 @@ def read_raw(source) -> RawFile:
 def _head(data, source):
     """(notes, names, units, offset of the first number, separator)."""
     notes: dict[str, float | str] = {}
-    before: list[list[str]] = []
+    before: list[str] = []
     position = 0
     while position < len(data):
         end = data.find(b"\n", position)
         end = len(data) if end < 0 else end
         line = data[position:end].decode("utf-8-sig", "replace").strip("\r\n")
-        separator = max(("\t", ";", ","), key=line.count)
-        cells = [cell.strip().strip('"') for cell in line.split(separator)]
+        # a comma is the decimal mark where another separator stands
+        separator = next((s for s in ("\t", ";") if s in line), ",")
+        cells = _cells(line, separator)
         if line.strip() and all(_is_number(cell) or cell == "" for cell in cells) and any(cells):
-            return notes, *_names(before, len(cells)), position, separator
+            names, units = _names([_cells(text, separator) for text in before], cells)
+            return notes, names, units, position, separator
         match = NOTE.match(line.strip())
         if match and (line.startswith("#") or match[1].strip().lower() in NOTES):
             notes[match[1].strip()] = _value(match[2].strip(separator + " "))
         elif line.strip():
-            before.append(cells)
+            before.append(line)
         position = end + 1
     raise source.error("line 1", "no line of numbers follows", COPY_AGAIN, reason="empty")
+
+
+def _cells(line, separator):
+    return [cell.strip().strip('"') for cell in line.split(separator)]
 
 
 def _is_number(cell):
@@ -76,14 +86,20 @@ def _is_number(cell):
 def _value(text):
     """A number where the text begins with one ("51200 Hz"), else the text."""
     first = text.split()[0] if text.split() else ""
-    return float(first) if first and _is_number(first) and "-" not in first[1:].lower().replace("e-", "") else text
+    dated = "-" in first[1:].lower().replace("e-", "")
+    return float(first.replace(",", ".")) if first and _is_number(first) and not dated else text
 
 
-def _names(lines, count):
-    """(names, units) out of the lines between head and numbers: names, and perhaps a line of units."""
-    lines = [line for line in lines if len(line) >= count]
+def _names(lines, cells):
+    """(names, units) out of the lines between head and the first numbers ``cells``: names, and perhaps units.
+
+    A separator behind the last number, as in "1;2;", makes a column without a name.
+    """
+    count, open_end = len(cells), not cells[-1]
+    lines = [line + [""] * open_end for line in lines if len(line) >= count - open_end]
     if not lines:
-        return [str(i) for i in range(count)], [""] * count
+        names = [str(i) for i in range(count)]
+        return [*names[:-1], ""] if open_end and count > 1 else names, [""] * count
     names, units = lines[0][:count], [""] * count
     if len(lines) > 1:
         units = [cell.strip("[]() ") for cell in lines[1][:count]]
@@ -175,6 +191,9 @@ def _records(columns, names, units, facts, source):
     number = columns[lower.index("record")] if "record" in lower else None
     time = next((i for i, name in enumerate(lower) if name in TIME), None)
     kept = [i for i, name in enumerate(lower) if name != "record" and i != time]
+    if len(kept) > 1 and not names[kept[-1]] and _is_empty(columns[kept[-1]]):
+        kept.pop()
+    seconds = None if time is None else columns[time] * _second(units[time], source)
     n_row = len(columns[0])
     edges = [0, n_row]
     if number is not None:
@@ -192,9 +211,22 @@ def _records(columns, names, units, facts, source):
         yield RawRecord(
             names=tuple(names[i] for i in kept),
             samples=[columns[i] if isinstance(columns[i], Column) else columns[i][a:b] for i in kept],
-            rate=facts.rate(),
+            **facts.rated(TEXT),
             units=tuple(units[i] for i in kept),
             started_at=moment(start),
             conditions=facts.conditions(k, n),
-            time=None if time is None else columns[time][a:b],
+            time=None if seconds is None else seconds[a:b],
         )
+
+
+def _is_empty(column):
+    return all(np.isnan(column[a : a + PART]).all() for a in range(0, len(column), PART))
+
+
+def _second(unit, source):
+    """How many seconds a number in the time column is."""
+    name = unit.strip().replace("\u03bc", "µ")
+    if name not in SECONDS:
+        remedy = f"Export the time in one of {', '.join(SECONDS)[2:]}"
+        raise source.error("the time column", f"its unit {unit!r} is not known", remedy, reason="unit_unknown")
+    return SECONDS[name]

@@ -9,6 +9,7 @@ import pyarrow as pa
 from pyarrow import csv
 
 from turnout.errors import ReadError
+from turnout.readers.precision import TEXT, step_precision
 from turnout.readers.raw import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, number_or_text
 from turnout.readers.stamps import moment
 from turnout.readers.variables import Facts
@@ -88,6 +89,7 @@ def _record(source, start, stop, head, separator, k, n):
         names=tuple(names),
         samples=columns,
         rate=1.0 / step if step > 0 else None,
+        rate_tolerance=max(step_precision(step), TEXT),
         units=tuple(units[:count]) if len(units) >= count else ("",) * count,
         started_at=moment(f"{date}T{clock[:15]}"),
         conditions={name: number_or_text(head[name]) for name in CONDITIONS if name in head},

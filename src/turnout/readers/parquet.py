@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from turnout.readers.precision import TEXT
 from turnout.readers.raw import COPY_AGAIN, RawFile, RawRecord
 from turnout.readers.stamps import moment
 from turnout.readers.stored import Column
@@ -44,7 +45,7 @@ def read_raw(source) -> RawFile:
             RawRecord(
                 names=tuple(names),
                 samples=[columns[name] if rows else columns[name][part] for name in names],
-                rate=facts.rate(),
+                **facts.rated(TEXT),
                 units=tuple(units[name] for name in names),
                 started_at=moment(facts.one(START, k, n)),
                 conditions=facts.conditions(k, n),

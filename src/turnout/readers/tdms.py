@@ -1,15 +1,17 @@
 """National Instruments TDMS: each group with samples is a record.
 
 npTDMS gives what it finds of a cut-off file in silence. The lead-ins of the segments say how long the file must be, and
-``wf_samples`` how long a channel; both are compared.
+``wf_samples`` how long a channel is at least; both are compared.
 """
 
 import struct
 from contextlib import nullcontext
 
 import nptdms
+import numpy as np
 
 from turnout.errors import ReadError
+from turnout.readers.precision import TEXT, step_precision
 from turnout.readers.raw import COPY_AGAIN, RawFile, RawRecord
 from turnout.readers.stamps import moment
 from turnout.readers.stored import Column
@@ -76,22 +78,24 @@ def _sound_record(group, k, n, names, damaged, properties, source):
         raise source.error(where, found, COPY_AGAIN, reason="truncated")
     for channel in channels:
         promised = Facts(channel.properties, source).number(("wf_samples",))
-        if channel.path in damaged or (promised and len(channel) != promised):
+        # of a channel that was written in several goes it counts the last one's samples
+        if channel.path in damaged or (promised and len(channel) < promised):
             found = f"ends after {len(channel)}{f' of {promised:g}' if promised else ''} samples"
             place = f"{where}, channel {channel.name!r}"
             raise source.error(place, found, COPY_AGAIN, reason="truncated")
-    steps = {Facts(c.properties, source).number(("wf_increment",)) for c in channels}
-    if len(steps) > 1:
-        found = f"its channels have different steps: {sorted(s or 0 for s in steps)} s"
+    steps = [Facts(c.properties, source).number(("wf_increment",)) or 0.0 for c in channels]
+    if not np.allclose(steps, steps[0], rtol=TEXT, atol=0.0):
+        found = f"its channels have different steps: {sorted(set(steps))} s"
         raise source.error(where, found, "Record all channels of a group at one rate", reason="wrong_rate")
-    step = steps.pop()
+    step = steps[0]
+    stated = {"rate": 1.0 / step, "rate_tolerance": step_precision(step)} if step else None
     with source.parsed_by("npTDMS", where):
         samples = [_numbers(c, source.stay) for c in channels]
     facts = Facts({**properties, **group.properties, **channels[0].properties}, source)
     return RawRecord(
         names=tuple(c.name for c in channels),
         samples=samples,
-        rate=1.0 / step if step else facts.rate(),
+        **(stated or facts.rated()),
         units=tuple(str(c.properties.get("unit_string", "") or "") for c in channels),
         started_at=moment(facts.one(("wf_start_time", *START), 0, 1)),
         conditions=facts.conditions(0, 1),

@@ -23,6 +23,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from turnout.errors import ReadError
+from turnout.readers.precision import EXACT, SINGLE, single_precision, step_precision
 from turnout.readers.raw import CONDITIONS, RawFile, RawRecord
 from turnout.readers.stamps import moment
 from turnout.readers.stored import ARRAYS
@@ -82,6 +83,14 @@ class Facts:
         if rate is None and (step := self.number(STEP)):
             return 1.0 / step
         return rate
+
+    def rated(self, least: float = EXACT) -> dict:
+        """``rate`` [Hz] and ``rate_tolerance`` of a RawRecord; ``least`` is the precision that the format can have."""
+        rate, step = self.number(RATE), self.number(STEP)
+        if rate is None and step:
+            return {"rate": 1.0 / step, "rate_tolerance": max(step_precision(step), least)}
+        stated = SINGLE if rate is not None and single_precision(rate) else EXACT
+        return {"rate": rate, "rate_tolerance": max(stated, least)}
 
     def conditions(self, k, n):
         """What was noted beside the samples."""
@@ -211,7 +220,7 @@ def _settled(names, samples, units, facts, k, n):
     return RawRecord(
         names=tuple(names),
         samples=samples,
-        rate=facts.rate(),
+        **facts.rated(),
         units=tuple(units),
         started_at=moment(facts.one(START, k, n)),
         conditions=facts.conditions(k, n),

@@ -1,0 +1,133 @@
+"""Numbers as people print them: decimal commas, rounded steps, units of time, one separator too many."""
+
+from dataclasses import replace
+
+import nptdms
+import numpy as np
+import pytest
+
+from turnout.errors import ReadError
+from turnout.readers import FORMATS, read
+from turnout.records import RawChannel, RawDescription
+
+RATES = (44100, 65536, 48000, 30000, 16384, 12000, 51200, 20000)
+X = np.random.default_rng(0).normal(size=(50, 2))
+NAMED = RawDescription(
+    (RawChannel("force", "force", "force", unit="N"), RawChannel("rail", "acc", "acceleration", unit="m/s²"))
+)
+
+
+def comma(value):
+    return f"{value:.4f}".replace(".", ",")
+
+
+def sound(root, name, text, description=NAMED, rate=20000.0):
+    """The only recording of a text file, with the numbers that were printed and the rate."""
+    (root / name).write_text(text, encoding="utf-8")
+    result = read(name, root, description)
+    assert result.errors == ()
+    (recording,) = result.recordings
+    np.testing.assert_allclose(recording.samples, X.T.round(4), atol=1e-12)
+    assert recording.rate == rate
+    return recording
+
+
+@pytest.mark.parametrize("separator", [";", "\t"])
+@pytest.mark.parametrize("end", ["", ";"])
+def test_a_decimal_comma_is_no_separator(separator, end, tmp_path):
+    """Numbers with four digits behind the comma, so that every line holds more commas than separators."""
+    end = separator if end else ""
+    rows = "".join(f"{comma(a)}{separator}{comma(b)}{end}\n" for a, b in X)
+    head = f"# rate: 20000,0\nforce{separator}acc{end}\n"
+    sound(tmp_path, "a.csv", head + rows)
+    sound(tmp_path, "a.csv", head + rows, replace(NAMED, rate=20000.0))
+
+
+@pytest.mark.parametrize("names", ["force;acc\n", "force;acc;\n", ""])
+def test_a_separator_behind_the_last_number_is_no_channel(names, tmp_path):
+    by_index = tuple(replace(c, source=i) for i, c in enumerate(NAMED.channels))
+    rows = "".join(f"{a:.4f};{b:.4f};\n" for a, b in X)
+    sound(tmp_path, "a.csv", "rate: 20000\n" + names + rows, NAMED if names else replace(NAMED, channels=by_index))
+
+
+def test_an_unnamed_column_with_numbers_is_still_a_channel_that_the_layout_does_not_know(tmp_path):
+    rows = "".join(f"{a:.4f};{b:.4f};{7 if k == 30 else ''}\n" for k, (a, b) in enumerate(X))
+    (tmp_path / "a.csv").write_text("rate: 20000\nforce;acc;\n" + rows)
+    (error,) = read("a.csv", tmp_path, NAMED).errors
+    assert error.reason == "channel_unknown"
+
+
+@pytest.mark.parametrize(("unit", "second"), [("s", 1.0), ("ms", 1e3), ("µs", 1e6), ("\u03bcs", 1e6), ("us", 1e6)])
+def test_a_time_column_in_its_unit_gives_the_rate(unit, second, tmp_path):
+    rows = "".join(f"{second * k / 20000:.9g};{a:.4f};{b:.4f}\n" for k, (a, b) in enumerate(X))
+    sound(tmp_path, "a.csv", f"time [{unit}];force;acc\n" + rows)
+    sound(tmp_path, "a.csv", f"t;force;acc\n({unit});(N);(m/s²)\n" + rows, replace(NAMED, rate=20000.0))
+
+
+def test_a_time_column_in_another_unit_is_refused(tmp_path):
+    rows = "".join(f"{k / 72e6:.12g};{a:.4f};{b:.4f}\n" for k, (a, b) in enumerate(X))
+    (tmp_path / "a.csv").write_text("time [h];force;acc\n" + rows)
+    with pytest.raises(ReadError) as caught:
+        read("a.csv", tmp_path, NAMED)
+    expected = "a.csv, the time column: its unit 'h' is not known. Export the time in one of s, sec, ms, µs, us."
+    assert str(caught.value) == expected and caught.value.reason == "unit_unknown"
+
+
+@pytest.mark.parametrize("rate", RATES)
+@pytest.mark.parametrize("promised", [True, False])
+def test_a_step_printed_with_seven_digits_is_the_whole_rate(rate, promised, tmp_path):
+    """Its last digit is worth up to 5e-7 of it: 44100 Hz reads as 44099.9957."""
+    wanted = replace(NAMED, rate=float(rate)) if promised else NAMED
+    rows = "".join(f"{a:.4f};{b:.4f}\n" for a, b in X)
+    sound(tmp_path, "a.csv", f"dt = {1 / rate:.6E}\nforce;acc\n" + rows, wanted, rate)
+    sound(tmp_path, "a.lvm", lvm(f"{1 / rate:.6E}"), wanted, rate)
+    np.savez(tmp_path / "a.npz", force=X[:, 0], acc=X[:, 1], dt=np.float32(1 / rate))
+    assert read("a.npz", tmp_path, wanted).recordings[0].rate == rate
+    np.savez(tmp_path / "b.npz", force=X[:, 0], acc=X[:, 1], fs=np.float32(rate))
+    assert read("b.npz", tmp_path, wanted).recordings[0].rate == rate
+
+
+def lvm(step):
+    columns = [("Channels", 2), ("Samples", 50, 50), ("Y_Unit_Label", "N", "m/s^2"), ("Delta_X", step, step)]
+    head = "".join("\t".join(map(str, row)) + "\n" for row in columns)
+    rows = "".join(f"\t{a:.4f}\t{b:.4f}\n" for a, b in X)
+    first = "LabVIEW Measurement\t\nSeparator\tTab\nX_Columns\tNo\n***End_of_Header***\t\n\t\n"
+    return f"{first}{head}***End_of_Header***\t\t\nX_Value\tforce\tacc\tComment\n{rows}"
+
+
+@pytest.mark.parametrize("step", ["5E-05", "5.000000E-05", "0.00005"])
+def test_a_round_step_is_not_taken_for_another_cut_off(step, tmp_path):
+    rows = "".join(f"{a:.4f};{b:.4f}\n" for a, b in X)
+    (tmp_path / "a.csv").write_text(f"dt = {step}\nforce;acc\n" + rows)
+    for rate, errors in ((20000.0, 0), (20001.0, 1), (17000.0, 1)):
+        assert len(read("a.csv", tmp_path, replace(NAMED, rate=rate)).errors) == errors
+
+
+def test_tdms_of_several_writes_counts_the_samples_of_the_last_one(tmp_path):
+    """LabVIEW writes a waveform per loop; its properties are those of the last. Steps of one rate may differ by
+    rounding, and be of single precision."""
+    steps = {"force": float(np.float32(1 / 44100)), "acc": 1 / 44100}
+    with nptdms.TdmsWriter(str(tmp_path / "a.tdms")) as writer:
+        for part in np.split(X, 5):
+            writer.write_segment(
+                [
+                    nptdms.ChannelObject("test", name, x, properties={"wf_increment": steps[name], "wf_samples": 10})
+                    for name, x in zip(("force", "acc"), part.T)
+                ]
+            )
+    result = read("a.tdms", tmp_path, replace(NAMED, rate=44100.0))
+    assert result.errors == ()
+    np.testing.assert_array_equal(result.recordings[0].samples, X.T)
+    (error,) = read("a.tdms", tmp_path, replace(NAMED, rate=44101.0)).errors
+    assert error.reason == "wrong_rate"
+
+
+def test_what_a_reader_did_not_foresee_names_its_file(tmp_path, monkeypatch):
+    (tmp_path / "a.csv").write_text("force;acc\n1.5;2.5\n")
+    monkeypatch.setattr(type(FORMATS["csv"]), "read_raw", lambda *_: [][3])
+    with pytest.raises(ReadError) as caught:
+        read("a.csv", tmp_path, NAMED)
+    assert caught.value.path == "a.csv" and "IndexError: list index out of range" in str(caught.value)
+    monkeypatch.setattr(type(FORMATS["csv"]), "read_raw", lambda *_: open("/nowhere/at/all"))
+    with pytest.raises(FileNotFoundError):
+        read("a.csv", tmp_path, NAMED)
