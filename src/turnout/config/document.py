@@ -97,9 +97,11 @@ def leaves(tree: Branch, prefix: str = "") -> Iterator[tuple[str, Leaf]]:
             yield prefix + name, value
 
 
-def _tree(node, path, constructor):
+def _tree(node, path, constructor, above=()):
     place = Place(path, node.start_mark.line + 1, node.start_mark.column + 1)
     if node.id == "mapping":
+        if any(node is other for other in above):
+            raise place.error("an anchor whose content holds the anchor itself", "Write the values out there")
         branch = Branch(place)
         for key, value in node.value:
             key_place = Place(path, key.start_mark.line + 1, key.start_mark.column + 1)
@@ -107,7 +109,7 @@ def _tree(node, path, constructor):
             if name in branch:
                 first = branch.key_places[name].line
                 raise key_place.error(f"{name!r} for the second time, first in line {first}", "Keep one of them")
-            branch.put(name, _tree(value, path, constructor), key_place)
+            branch.put(name, _tree(value, path, constructor, (*above, node)), key_place)
         return branch
     if node.id == "sequence":
         return Leaf(tuple(_scalar(item, path, constructor) for item in node.value), place)

@@ -8,7 +8,7 @@ from pathlib import Path
 from turnout.config.document import load, plain
 from turnout.config.events import COLUMNS as EVENT_COLUMNS
 from turnout.config.events import RESETS
-from turnout.config.keys import Each, Group, Key
+from turnout.config.keys import Each, Elsewhere, Group, Key
 from turnout.config.layout_keys import layout_keys
 from turnout.config.pattern import FIELDS
 from turnout.config.settings import parts
@@ -18,7 +18,8 @@ from turnout.config.table import ROW
 WIDTH = 112
 HEAD = """\
 # Method settings. Every key is optional: a default holds for what is left out.
-# Values may be changed here, for one layout ('settings:' in its file) or one turnout (in its override).
+# Values may be changed here, for one layout ('settings:' in its file) or one turnout (in its override); what is used
+# once for all turnouts (fleet, trend, passage.cluster_maximum and passage.cluster_seed) is changed here alone.
 # The comments are made by `turnout config generate`, which keeps changed values; `turnout check` checks them.
 """
 JSON_TYPE = {"text": "string", "number": "number", "integer": "integer", "flag": "boolean"}
@@ -87,7 +88,9 @@ def schema(keys: dict, title: str, whole: bool) -> str:
 
 def _object(keys: dict, whole: bool) -> dict:
     found = {"type": "object", "additionalProperties": False}
-    found["properties"] = {name: _property(rule, whole) for name, rule in keys.items()}
+    found["properties"] = {
+        name: _property(rule, whole) for name, rule in keys.items() if not isinstance(rule, Elsewhere)
+    }
     if whole and (required := [name for name, rule in keys.items() if rule.required]):
         found["required"] = required
     return found

@@ -57,6 +57,14 @@ class Group:
     fragment: bool = False
 
 
+@dataclass(frozen=True)
+class Elsewhere:
+    """A name that is understood, but only in the ``file`` that holds for the whole fleet."""
+
+    file: str
+    required: bool = False
+
+
 def suggestion(name: str, allowed) -> str:
     """What to write instead of an unknown ``name``.
 
@@ -105,7 +113,11 @@ def check(spec: dict, tree: Branch, whole: bool = True) -> Iterator[ConfigError]
         rule = spec.get(name)
         if rule is None:
             misspelt.update(get_close_matches(name, spec, n=1))
-            yield tree.key_places[name].error(f"unknown key {name!r}", suggestion(name, spec))
+            allowed = [known for known, rule in spec.items() if not isinstance(rule, Elsewhere)]
+            yield tree.key_places[name].error(f"unknown key {name!r}", suggestion(name, allowed))
+        elif isinstance(rule, Elsewhere):
+            whose = f"{name!r} holds for the whole fleet and would be ignored here"
+            yield tree.key_places[name].error(whose, f"It belongs into {rule.file}: move it there")
         elif isinstance(rule, Key):
             if isinstance(value, Branch):
                 yield value.place.error(f"names under {name!r}", f"Write {_wanted(rule)}")

@@ -1,6 +1,6 @@
 """What config/layouts/<name>.yaml and config/overrides/<id>.yaml may say."""
 
-from turnout.config.keys import Each, Group, Key
+from turnout.config.keys import Each, Elsewhere, Group, Key
 from turnout.config.settings_keys import settings_keys
 
 LABEL = r"[A-Za-z][A-Za-z0-9-]*"
@@ -56,12 +56,30 @@ SECTION = {
 }  # fmt: skip
 
 
-def layout_keys() -> dict:
-    """Everything a layout or an override may say; settings included."""
+# Settings that are used once for all turnouts: a whole part, or some of its keys.
+FLEET_WIDE: dict[str, tuple[str, ...]] = {"fleet": (), "trend": (), "passage": ("cluster_maximum", "cluster_seed")}
+
+
+def layout_keys(merged: bool = False) -> dict:
+    """Everything a layout or an override may say, settings of its own included; ``merged``: with those of the fleet."""
     return {
         "description": Key("text", "what this layout is, for people"),
         "sections": Each(SECTION, LABEL, "one entry per monitored section", required=True),
         "hammer": Group(HAMMER, "how the hammer tests lie on the disk"),
         "passages": Group(PASSAGES, "how the recordings of train passages lie on the disk"),
-        "settings": Group(settings_keys(), "method settings of config.yaml that differ here"),
+        "settings": Group(
+            settings_keys() if merged else _own_settings(), "method settings of config.yaml that differ here"
+        ),
     }
+
+
+def _own_settings() -> dict:
+    """The settings' keys; those that hold for the whole fleet stand there as belonging elsewhere."""
+    found: dict = dict(settings_keys())
+    for part, names in FLEET_WIDE.items():
+        if names:
+            spec = found[part].spec | {name: Elsewhere("config.yaml") for name in names}
+            found[part] = Group(spec, found[part].meaning)
+        else:
+            found[part] = Elsewhere("config.yaml")
+    return found

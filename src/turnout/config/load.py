@@ -13,6 +13,7 @@ from turnout.config.frozen import Frozen
 from turnout.config.keys import check, suggestion
 from turnout.config.layout_keys import layout_keys
 from turnout.config.meaning import check_meaning
+from turnout.config.pairs import check_ranges
 from turnout.config.raw_notes import Campaigns, read_campaigns, read_trains
 from turnout.config.settings_keys import settings_keys
 from turnout.config.table import Row, read_table
@@ -82,7 +83,9 @@ def load_configuration(folder: Path | str = "config", formats=None, to_si=None) 
     formats nor the units of channels are checked.
     """
     reading = _Reading(Path(folder), formats, to_si)
+    reading.misnamed()
     settings = reading.document(reading.folder / "config.yaml", settings_keys())
+    reading.errors += check_ranges(settings)
     rows, errors = read_table(reading.folder / "turnouts.tsv", reading.name("turnouts.tsv"))
     reading.errors += errors
     variants = reading.variants(rows, settings)
@@ -112,6 +115,15 @@ class _Reading:
     def name(self, *parts: str) -> str:
         """How errors call a file: its path with the name of the configuration folder in front."""
         return "/".join((self.folder.name, *parts))
+
+    def misnamed(self) -> None:
+        """An error for every file that would be read if it ended in .yaml, and is not."""
+        for parts in ((), ("layouts",), ("overrides",)):
+            for path in sorted(self.folder.joinpath(*parts).glob("*")):
+                if path.suffix.lower() in (".yml", ".yaml") and path.suffix != ".yaml":
+                    place = Place(self.name(*parts, path.name), 1, 1)
+                    remedy = f"Rename it to {path.stem}.yaml, or take it away"
+                    self.errors.append(place.error(f"it ends in {path.suffix} and would not be read", remedy))
 
     def document(self, path: Path, spec: dict, whole: bool = False) -> Branch:
         """Checked YAML file; an absent one is empty, an unsound one adds errors and is empty."""
@@ -156,7 +168,7 @@ class _Reading:
         self.errors.append(row.place("layout").error(f"no layout {name!r}", suggestion(name, there)))
 
     def _wrong(self, tree: Branch) -> bool:
-        found = list(check_meaning(tree, self.to_si)) + list(self._formats(tree))
+        found = [*check_meaning(tree, self.to_si), *self._formats(tree), *check_ranges(tree["settings"])]
         self.errors += found
         return bool(found)
 
@@ -191,7 +203,7 @@ class _Reading:
             return self.shared[key]
         tree = merge(self.shared[key].tree, self.document(override, layout_keys()))
         before = len(self.errors)
-        self.errors += check(layout_keys(), tree)
+        self.errors += check(layout_keys(merged=True), tree)
         if len(self.errors) == before:
             self._wrong(tree)
         return Variant(tree)

@@ -129,6 +129,56 @@ WRONG = {
         {"events": "turnout,section,date,kind,resets,note\nt1,,2025-01-01,tamping,,by machine, twice\n"},
         "more cells than columns. Put a text with commas in double quotes",
     ),
+    "trend of one turnout": (
+        {"override": ("t1.yaml", "settings:\n  trend:\n    target_percent: 0.5\n")},
+        "config/overrides/t1.yaml, line 2, column 3: 'trend' holds for the whole fleet and would be ignored here. "
+        "It belongs into config.yaml: move it there.",
+    ),
+    "shards of one layout": (
+        layout("hammer:\n", "settings: {fleet: {shards: 8}}\nhammer:\n"),
+        "config/layouts/main.yaml, line 7, column 12: 'fleet' holds for the whole fleet",
+    ),
+    "clusters of one turnout": (
+        {"override": ("t1.yaml", "settings: {passage: {cluster_maximum: 3}}")},
+        "config/overrides/t1.yaml, line 1, column 22: 'cluster_maximum' holds for the whole fleet",
+    ),
+    "unknown part of one turnout": (
+        {"override": ("t1.yaml", "settings: {trends: {}}")},
+        "unknown key 'trends'. Allowed: identify, mismatch, passage, receptance, simulate.",
+    ),
+    "override that is not read": (
+        {"override": ("t1.yml", "hammer: {rate: 1}")},
+        "config/overrides/t1.yml, line 1, column 1: it ends in .yml and would not be read. Rename it to t1.yaml",
+    ),
+    "trends that no alarm can follow": (
+        {"settings": "trend: {single_share: 0}"},
+        "config/config.yaml, line 1, column 23: single_share is 0. Write a number from 0.1 to 1",
+    ),
+    "range upside down": (
+        {"settings": "identify:\n  ballast_low: 400\n  ballast_high: 300\n"},
+        "config/config.yaml, line 2, column 16: identify.ballast_low is 400, and ballast_high is 300 in "
+        "config/config.yaml, line 3, column 17. Write a ballast_low below ballast_high.",
+    ),
+    "range upside down with a default": (
+        {"settings": "passage: {speed_maximum: 12}"},
+        "line 1, column 26: passage.speed_minimum is 15.0, and speed_maximum is 12. Write",
+    ),
+    "range upside down for one turnout": (
+        {
+            "settings": "receptance: {agreement_high: 500}",
+            "override": ("t1.yaml", "settings: {receptance: {agreement_low: 600}}"),
+        },
+        "config/overrides/t1.yaml, line 1, column 40: receptance.agreement_low is 600, and agreement_high is 500 in "
+        "config/config.yaml, line 1, column 30",
+    ),
+    "bands that are no pairs": (
+        {"settings": "identify: {extra_bands: [900, 1100, 1200]}"},
+        "line 1, column 25: extra_bands is [900, 1100, 1200]. Write pairs",
+    ),
+    "anchor within itself": (
+        {"settings": "trend: &a\n  target_percent: *a\n"},
+        "config/config.yaml, line 1, column 8: an anchor whose content holds the anchor itself. Write the values",
+    ),
 }
 
 
@@ -220,3 +270,20 @@ def test_a_wrong_option_is_said(repository, monkeypatch, capsys, command, words)
 
     monkeypatch.chdir(repository)
     assert main(command) == 2 and words in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("parts", [("config.yml",), ("layouts", "other.yml"), ("layouts", "other.YAML")])
+def test_a_file_that_would_not_be_read_is_an_error(tmp_path, parts):
+    configuration(tmp_path)
+    tmp_path.joinpath("config", *parts).write_text(LAYOUT)
+    with pytest.raises(ConfigErrors, match=rf"config/{'/'.join(parts)}, line 1, column 1: it ends in \.[yY]"):
+        load_configuration(tmp_path / "config", FORMATS, to_si)
+
+
+def test_what_holds_for_the_fleet_is_not_offered_to_a_layout(repository):
+    import json
+
+    schema = json.loads((repository / "config/schema/override.json").read_text())
+    settings = schema["properties"]["settings"]["properties"]
+    assert "receptance" in settings and not {"trend", "fleet"} & set(settings)
+    assert "cluster_seed" not in settings["passage"]["properties"]

@@ -58,6 +58,7 @@ class TrendSettings:
         0.75,
         "",
         "largest share of the threshold that one campaign can bring: one bad campaign is no alarm",
+        minimum=0.1,
         maximum=1.0,
     )
     detectable_probability: float = setting(
