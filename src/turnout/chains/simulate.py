@@ -1,14 +1,15 @@
 """Simulated hammer tests and passages as raw files, with the channels a turnout's configuration promises."""
 
 import json
+import math
 from dataclasses import asdict, replace
-from datetime import datetime
 from pathlib import Path
 
 import numpy as np
 
 from turnout.chains.accepted_terms import terms_on
 from turnout.chains.mismatch_context import track_file
+from turnout.chains.simulate_request import check_request, section_channels, time_of
 from turnout.config.load import load_configuration
 from turnout.config.settings.simulate import SimulateSettings
 from turnout.errors import SimulationError
@@ -27,14 +28,13 @@ def write_hammer(request):
     ``request`` holds the options of `turnout simulate hammer`: track, section, tests, blows, turnout, config, raw,
     out, format, at, temperature, truth, seed.
     """
+    check_request(request)
     turnout, settings = _turnout(request)
     track = _track(request, turnout)
     section = _place(request["section"])
     place, base = located(track, section)
     _, route = track.locations.get(section, (place, "main"))
-    description = None
-    if turnout is not None:
-        description = turnout.hammer.descriptions[str(section)]
+    description = None if turnout is None else section_channels(turnout, section)
     hammer, sensors = _hammer_channels(description, place)
     rate = description.rate if description and description.rate else settings.rate
     for test in range(1, request["tests"] + 1):
@@ -52,10 +52,10 @@ def write_hammer(request):
             pretrigger=settings.hammer_pretrigger,
             half_length=settings.hammer_half_length,
             scheme=settings.scheme,
-            started_at=_time(request),
+            started_at=time_of(request),
             conditions=_noted(request),
         )
-        day = _time(request).date().isoformat()
+        day = time_of(request).date().isoformat()
         name = f"hammer/{day}/{section}_{test}.{_ending(request['format'])}"
         path = _write(request, turnout, name, recordings, description)
         peak = max(float(r.samples[0].max()) for r in recordings)
@@ -64,6 +64,7 @@ def write_hammer(request):
 
 def write_passage(request):
     """Simulate the passage of a request and write it; yields (path, what it holds)."""
+    check_request(request)
     turnout, settings = _turnout(request)
     track = _track(request, turnout)
     vehicle = load_vehicle(request["vehicle"], request["load"], units=request["units"])
@@ -85,11 +86,11 @@ def write_passage(request):
         tail=settings.tail,
         entry=settings.entry,
         scheme=settings.scheme,
-        started_at=_time(request),
+        started_at=time_of(request),
         conditions=_noted(request),
         truth=True,
     )
-    name = f"passages/{_time(request):%Y%m%dT%H%M%SZ}.{_ending(request['format'])}"
+    name = f"passages/{time_of(request):%Y%m%dT%H%M%SZ}.{_ending(request['format'])}"
     path = _write(request, turnout, name, [recording], description)
     if request.get("truth"):
         _write_truth(Path(request["truth"]) / Path(path).with_suffix(".json").name, recording, truth)
@@ -132,16 +133,10 @@ def _track(request, turnout):
 
 def _place(section):
     try:
-        return float(section)
+        place = float(section)
     except ValueError:
         return section
-
-
-def _time(request):
-    try:
-        return datetime.fromisoformat(request["at"])
-    except ValueError:
-        raise SimulationError(f"--at {request['at']!r} is not a time; write it as 2024-05-13T09:00:00.") from None
+    return place if math.isfinite(place) else section
 
 
 def _noted(request):
@@ -199,7 +194,10 @@ def _write(request, turnout, name, recordings, description):
     path = Path(request["out"]) if request.get("out") else folder / name
     if path.parent != Path():
         path.parent.mkdir(parents=True, exist_ok=True)
-    return write([replace(r, source="") for r in recordings], path, request["format"], description)
+    try:
+        return write([replace(r, source="") for r in recordings], path, request["format"], description)
+    except ValueError as error:
+        raise SimulationError(f"{path} cannot be written as {request['format']}: {error}.") from None
 
 
 def _write_truth(path, recording, truth):

@@ -15,13 +15,20 @@ def add_arguments(parser):
     """Options of the command."""
     kinds = parser.add_subparsers(dest="kind", metavar="kind", required=True)
     hammer = kinds.add_parser("hammer", help="blows of a hammer at one section")
-    hammer.add_argument("--section", required=True, help="location of the track file, or a place in metres")
-    hammer.add_argument("--tests", type=int, default=1, help="tests, one file each (default 1)")
+    hammer.add_argument(
+        "--section", required=True, help="location of the track file, or, without --turnout, a place in metres"
+    )
+    hammer.add_argument("--tests", type=int, default=1, help="tests, one file each; --out takes one (default 1)")
     hammer.add_argument("--blows", type=int, default=10, help="blows per test (default 10)")
     passage = kinds.add_parser("passage", help="one train over the turnout")
     passage.add_argument("--vehicle", default="ic3", help="file in config/vehicles, or its path (default ic3)")
     passage.add_argument("--speed", type=float, default=160.0, help="km/h (default 160)")
-    passage.add_argument("--load", type=float, default=0.5, help="share of the payload, 0 to 1 (default 0.5)")
+    passage.add_argument(
+        "--load",
+        type=float,
+        default=0.5,
+        help="share of the payload, 0 (empty) to 1 (full), overloaded up to 1.5 (default 0.5)",
+    )
     passage.add_argument("--units", type=int, default=1, help="coupled units (default 1)")
     passage.add_argument("--route", default="main", help="route of the track file (default main)")
     passage.add_argument("--direction", choices=("facing", "trailing"), default="facing")
@@ -35,7 +42,7 @@ def add_arguments(parser):
         sub.add_argument("--truth", help="folder for what is true; the pipeline does not read it")
         sub.add_argument("--out", help="file to write instead of a place below --raw")
         sub.add_argument("--format", default="hdf5", help="format of the file (default hdf5)")
-        sub.add_argument("--at", default="2024-05-13T09:00:00", help="UTC time of the first sample")
+        sub.add_argument("--at", default="2024-05-13T09:00:00", help="time of the first sample in UTC, without a zone")
         sub.add_argument("--temperature", type=float, help="rail temperature to note [°C]")
         sub.add_argument("--seed", type=int, default=0)
     figures = kinds.add_parser("figures", help="the figures of docs/simulation.md")

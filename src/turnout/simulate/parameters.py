@@ -37,7 +37,7 @@ def extended(own, path, folder=None):
 
 
 def load_vehicle(name, load=0.5, folder=None, units=1):
-    """``Vehicle`` called ``name``; ``load`` from 0 (empty) to 1 (full), ``units`` coupled one behind the other.
+    """``Vehicle`` called ``name``; ``load`` from 0 (empty) to 1 (full) or 1.5, ``units`` coupled one behind the other.
 
     A file with ``compose`` is a train of other files' vehicles, front first; a locomotive has no payload.
     """

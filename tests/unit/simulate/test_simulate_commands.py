@@ -48,13 +48,25 @@ def test_a_simulated_passage_keeps_its_truth_apart(tmp_path, monkeypatch, capsys
     assert not any("peak" in name for name in samples.files)
 
 
+HAMMER = ["simulate", "hammer", "--section", "A7"]
+
+
 @pytest.mark.parametrize(
     ("command", "said"),
     [
         (["simulate", "passage", "--speed", "0"], "speed must be above 0"),
         (["simulate", "passage", "--vehicle", "tgv"], "no file config/vehicles/tgv.yaml"),
         (["simulate", "hammer", "--section", "B9"], "no location 'B9'"),
-        (["simulate", "hammer", "--section", "A7", "--at", "yesterday"], "'yesterday' is not a time"),
+        ([*HAMMER, "--at", "yesterday"], "--at: 'yesterday' is not a time in UTC. Write YYYY-MM-DD"),
+        ([*HAMMER, "--at", "2024-05-13T09:00:00+02:00"], "with a time zone. Write the time in UTC, without a zone"),
+        ([*HAMMER, "--tests", "2", "--out", "a.h5"], "--out: one file for 2 tests. Write --tests 1, or leave out"),
+        ([*HAMMER, "--format", "nix"], "--format: 'nix'. Allowed: csv, hdf5"),
+        ([*HAMMER, "--blows", "0"], "--blows: 0. Write a whole number of at least 1"),
+        ([*HAMMER, "--tests", "0"], "--tests: 0. Write a whole number of at least 1"),
+        ([*HAMMER, "--seed", "-1"], "--seed: -1. Write a whole number of at least 0"),
+        ([*HAMMER, "--format", "wav", "--blows", "2"], "cannot be written as wav: a WAV file holds one record, not 2"),
+        (["simulate", "passage", "--units", "0"], "--units: 0. Write a whole number of at least 1"),
+        (["simulate", "hammer", "--section", "nan"], "no location 'nan'"),
         (["calibrate", "--section", "A7"], "either hammer tests or --modes"),
         (["calibrate", "--section", "A7", "--modes", "ballast"], "not of the form"),
     ],
@@ -63,3 +75,27 @@ def test_wrong_commands_say_what_is_wrong(tmp_path, monkeypatch, capsys, command
     monkeypatch.chdir(tmp_path)
     assert main(command) == 2
     assert said in capsys.readouterr().err
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+def test_a_place_in_metres_is_none_of_a_turnouts_sections(tmp_path, repository, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    folder = str(repository / "config")
+    assert main(["simulate", "hammer", "--section", "3.0", "--turnout", "tommerup_s1", "--config", folder]) == 2
+    assert "--section: 3.0 is no section of tommerup_s1, whose raw files" in capsys.readouterr().err
+    assert not (tmp_path / "raw").exists()
+
+
+def test_a_time_in_utc_is_stored_as_it_is_said(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main([*HAMMER, "--blows", "1", "--at", "2024-05-13T09:00:00Z", "--out", "a.h5"]) == 0
+    quantities = {"hammer": "force", "acc_1": "acceleration", "acc_2": "acceleration"}
+    channels = tuple(RawChannel(name, name, quantity) for name, quantity in quantities.items())
+    (recording,) = read("a.h5", tmp_path, RawDescription(channels)).recordings
+    assert recording.started_at.isoformat() == "2024-05-13T09:00:00"
+
+
+def test_the_help_tells_the_loads_that_are_simulated(capsys):
+    with pytest.raises(SystemExit):
+        main(["simulate", "passage", "--help"])
+    assert "0 (empty) to 1 (full), overloaded up to 1.5" in " ".join(capsys.readouterr().out.split())
