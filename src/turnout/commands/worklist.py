@@ -67,9 +67,9 @@ def _write(stream, names, rows):
 def _date(text):
     from datetime import datetime
 
+    from turnout.config.events import wrong_time
     from turnout.errors import ConfigError
 
-    try:
-        return datetime.fromisoformat(text.removesuffix("Z"))
-    except ValueError:
-        raise ConfigError("--asof", "date", repr(text), "Write YYYY-MM-DD or YYYY-MM-DDTHH:MM in UTC") from None
+    if wrong := wrong_time(text):
+        raise ConfigError("--asof", "date", f"{text!r}{wrong[0]}", wrong[1])
+    return datetime.fromisoformat(text.removesuffix("Z"))
