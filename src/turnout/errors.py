@@ -36,6 +36,18 @@ class ReadError(TurnoutError):
         self.path, self.where, self.found, self.remedy, self.reason = str(path), where, found, remedy, reason
 
 
+class PartlyComputed(Exception):
+    """Faults of the program on some records of a unit: ``tables`` holds the rows of all others.
+
+    ``faults`` are (path, record, exception), one per record that could not be computed.
+    """
+
+    def __init__(self, tables, faults):
+        path, record, error = faults[0]
+        super().__init__(f"{path}, record {record}: {type(error).__name__}: {error}")
+        self.tables, self.faults = tables, faults
+
+
 class ConfigError(TurnoutError):
     """A configuration file says something that cannot be used.
 

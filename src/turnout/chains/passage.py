@@ -8,7 +8,7 @@ from datetime import datetime, timedelta
 from turnout.chains.passage_rows import finding_rows, fit_row, passage_row
 from turnout.chains.raw_rows import quarantine_row, read_or_quarantine, recording_row
 from turnout.config.turnout import PassageConfig, TurnoutConfig
-from turnout.errors import ReadError
+from turnout.errors import PartlyComputed, ReadError
 from turnout.passage.analyse import analyse
 from turnout.passage.channel_fit import fit_channel
 from turnout.passage.continuous import cut_passages
@@ -62,8 +62,14 @@ def passage_unit(
         Without one no model is fitted and every train is of unknown type.
     algo : str
         Version of the code.
+
+    Raises
+    ------
+    PartlyComputed
+        With the rows of the other records, where one met a fault of the program.
     """
     context = context or PassageContext()
+    faults: list[tuple] = []
     base = {"turnout_id": unit.turnout}
     rows: dict[str, list[dict]] = {"recordings": [], "passages": [], "passage_fits": [], "quarantine": []}
     description = _described(turnout).description
@@ -90,8 +96,14 @@ def passage_unit(
                 rows["quarantine"].append(
                     quarantine_row(error, base, "passage", "passage", recording.record, recording_id)
                 )
+            except (MemoryError, OSError):
+                raise
+            except Exception as error:
+                faults.append((path, recording.record, error))
         first = rows["passages"][0]["passage_id"] if rows["passages"] else None
         rows["recordings"].append(recording_row(result, path, size, description, base, "passage", passage_id=first))
+    if faults:
+        raise PartlyComputed(rows, faults)
     return rows
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from turnout.config import TurnoutConfig
-from turnout.errors import ReadError
+from turnout.errors import PartlyComputed, ReadError
 from turnout.fleet.batches import UnitResult, encode
 from turnout.fleet.scan import unit_id
 from turnout.records import Unit
@@ -23,12 +23,16 @@ def guarded(
 ) -> UnitResult:
     """Result of ``compute(unit, turnout, raw_root, algo=algo)``.
 
-    A ReadError becomes a quarantine row. Any other exception is a fault of the program: a quarantine row with
-    reason internal_error, and its traceback in the log; with ``strict`` it is raised. Faults of the machine
-    (disk full, out of memory) are always raised.
+    A ReadError becomes a quarantine row, and so does each record that PartlyComputed names. Any other exception is
+    a fault of the program: a quarantine row with reason internal_error, and its traceback in the log; with
+    ``strict`` it is raised. Faults of the machine (disk full, out of memory) are always raised.
     """
     try:
-        tables = compute(unit, turnout, raw_root, algo=algo, **more)
+        tables, faults = _computed(compute, unit, turnout, raw_root, algo=algo, **more)
+        if strict and faults:
+            raise faults[0][2]
+        rows = [_fault(unit, error, path, record) for path, record, error in faults]
+        tables = {**tables, "quarantine": [*tables.get("quarantine", ()), *rows]} if rows else tables
         encode(tables)
     except ReadError as error:
         tables = {
@@ -39,9 +43,16 @@ def guarded(
     except Exception as error:
         if strict or (isinstance(error, OSError) and error.errno in MACHINE):
             raise
-        LOG.error("%s: internal error\n%s", unit_id(unit), traceback.format_exc())
         tables = {"quarantine": [_fault(unit, error)]}
     return UnitResult(unit_id(unit), unit.turnout, unit.kind, key, algo, status_of(tables), tables)
+
+
+def _computed(compute, *args, **more):
+    """(tables, faults): faults of single records leave the rows of the others."""
+    try:
+        return compute(*args, **more), ()
+    except PartlyComputed as part:
+        return part.tables, part.faults
 
 
 def status_of(tables: dict[str, list[dict]]) -> str:
@@ -58,10 +69,10 @@ def status_of(tables: dict[str, list[dict]]) -> str:
     return "partly" if any(rows for table, rows in tables.items() if table != "quarantine") else "quarantined"
 
 
-def quarantine_row(unit: Unit, path: str, reason: str, where: str, found: str, remedy: str) -> dict:
-    """Row of ``quarantine`` for a unit as a whole."""
-    return {
-        "quarantine_id": content_id("quarantine", path, "None", unit.kind, reason, found),
+def quarantine_row(unit: Unit, path: str, reason: str, where: str, found: str, remedy: str, record=None) -> dict:
+    """Row of ``quarantine`` for a unit as a whole, or for one record of it."""
+    row = {
+        "quarantine_id": content_id("quarantine", path, str(record), unit.kind, reason, found),
         "turnout_id": unit.turnout,
         "section_id": f"{unit.turnout}/{unit.section}" if unit.section else None,
         "kind": unit.kind,
@@ -72,13 +83,15 @@ def quarantine_row(unit: Unit, path: str, reason: str, where: str, found: str, r
         "found": found,
         "remedy": remedy,
     }
+    return row if record is None else row | {"record": record}
 
 
-def _fault(unit: Unit, error: Exception) -> dict:
+def _fault(unit: Unit, error: Exception, path: str | None = None, record: int | None = None) -> dict:
     """Where in the program it happened, without the machine's paths, so that the row is the same everywhere."""
+    LOG.error("%s: internal error\n%s", unit_id(unit), "".join(traceback.format_exception(error)))
     frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename != __file__]
     trace = " < ".join(f"{Path(f.filename).name}:{f.lineno} {f.name}" for f in reversed(frames[-6:]))
     found = f"{type(error).__name__}: {error}"[:500]
     remedy = "Report it with the log of the run; the unit is tried again when its files or the program change"
-    path = unit.files[0][0] if unit.files else unit.turnout
-    return quarantine_row(unit, path, "internal_error", trace, found, remedy)
+    path = path or (unit.files[0][0] if unit.files else unit.turnout)
+    return quarantine_row(unit, path, "internal_error", trace, found, remedy, record)

@@ -22,6 +22,7 @@ from turnout.passage.train_type import UNKNOWN
 from turnout.records import Recording, Rejection
 
 SHORT_SPAN, PLACE_ALONE = 10.0, 0.3  # m: sensors closer together than this, and how far off each may hear a wheel
+SHORTEST = 0.1  # s: two blocks over which a level is taken
 CLEAR = 1.5  # least ratio between accepted and refused peaks of an unknown train
 
 
@@ -51,6 +52,9 @@ def analyse(recording: Recording, sensors, patterns, settings) -> Passage:
     used, lost = (used, lost) if used else (lost, [])
     if not used:
         return Passage("rejected", (*findings, Rejection("no_train", 0.0, 1.0, "no channel can be used")))
+    if recording.duration < SHORTEST:
+        text = f"only {recording.duration:.3f} s were recorded"
+        return Passage("rejected", (*findings, Rejection("no_train", recording.duration, SHORTEST, text)))
     samples = np.array([recording.signal(s.name) for s in used])
     samples = samples - np.median(samples, axis=1, keepdims=True)  # a zero offset is no vibration
     heard = listen(samples, recording.rate, [s.position for s in used], settings.envelope_step)

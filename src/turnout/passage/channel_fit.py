@@ -11,6 +11,7 @@ from turnout.passage.basis import band_pass, filtered, wheel_basis
 from turnout.passage.direction import DirectionTest, direction_test
 from turnout.passage.nulls import NullBand, null_bases, null_scores
 from turnout.passage.scores import Scores, common_delay, delay_power, forecast, leave_one_out_null, score
+from turnout.passage.soundness import converter_step
 from turnout.passage.timing import ImpactTimes, impact_times
 from turnout.passage.wheels import joint_fit
 from turnout.passage.whiten import whitener
@@ -87,9 +88,12 @@ def fit_channel(samples, rate: float, axle_times, speed: float, model: ModalMode
     through = band_pass(settings.band_low, settings.band_high, settings.filter_order, rate)
     data = filtered(part, through)
     quiet = _quiet(samples, rate, axle_times, speed)
+    least = converter_step(samples) / np.sqrt(12.0)  # a record that is quiet within one step has this noise at least
+    if not least > 0.0:
+        return ChannelFit(REJECTED, "it never changes")
     basis = _basis(model, rate, settings)
     late = common_delay(delay_power(data, expected, basis, settings))
-    times, test = _impacts(part, expected + late, quiet, speed, model, rate, settings)
+    times, test = _impacts(part, expected + late, quiet, speed, model, rate, settings, least)
     scores = score(data, expected, basis, settings)
     null = NullBand.of(null_scores(data, expected, _bases(model.order, rate, settings), settings)) if nulls else None
     beside = {
@@ -98,6 +102,7 @@ def fit_channel(samples, rate: float, axle_times, speed: float, model: ModalMode
     found = joint_fit(data, times.times, basis)
     offset = _offset(samples, rate, axle_times)
     noise = float(np.std(filtered(quiet, through)[int(0.02 * rate) :])) if quiet.size > 0.1 * rate else float("nan")
+    noise = max(noise, least * np.sqrt(2.0 * (min(settings.band_high, rate / 2) - settings.band_low) / rate))
     window = np.concatenate([data[int(t) : int(t + settings.score_window * rate)] for t in expected + late])
     status, detail = _judged(scores, null, test, settings)
     return ChannelFit(
@@ -141,9 +146,10 @@ def _quiet(samples, rate, axle_times, speed):
     return before if before.size >= after.size else after
 
 
-def _impacts(part, expected, quiet, speed, model, rate, settings) -> tuple[ImpactTimes, DirectionTest]:
+def _impacts(part, expected, quiet, speed, model, rate, settings, least) -> tuple[ImpactTimes, DirectionTest]:
     """Impact times and the test of the jump's direction, both on whitened data."""
     taps, noise = whitener(quiet[: int(rate)] if quiet.size > 0.1 * rate else np.diff(part[: int(rate)]))
+    noise = max(noise, least)
     basis = wheel_basis(model, taps, rate)
     white = filtered(part, taps)
     spread = max(min(settings.place_error / speed, settings.time_search) * rate, 1.0)

@@ -71,7 +71,24 @@ def clipped_share(samples, limit: float | None, run: int = 3) -> tuple[float, fl
 
 
 def silent_from(samples, rate: float, block: float = 0.05) -> float | None:
-    """Time from which a channel is constant up to its end [s], None where it lives to the end."""
+    """Time from which a channel is constant up to its end [s], None where it lives to the end.
+
+    A sensor that already stood there before the train, within one step of its converter, is quiet and not lost.
+
+    >>> y = np.sin(np.arange(100.0))
+    >>> silent_from(np.r_[y, np.full(900, 0.1)], 1000.0), silent_from(np.r_[np.zeros(60), y, np.zeros(900)], 1000.0)
+    (0.1, None)
+    """
     changes = np.flatnonzero(np.diff(samples))
     last = (changes[-1] + 1) / rate if changes.size else 0.0
-    return float(last) if len(samples) / rate - last > block else None
+    if len(samples) / rate - last <= block:
+        return None
+    start = samples[: max(int(block * rate), 1)]
+    quiet = np.mean(np.abs(start - samples[-1]) < 1.5 * converter_step(samples)) > 0.9
+    return None if changes.size and quiet else float(last)
+
+
+def converter_step(samples) -> float:
+    """Smallest change from one sample to the next: a converter's step, or next to nothing; 0 where nothing changes."""
+    change = np.abs(np.diff(samples))
+    return float(np.min(change, where=change > 0, initial=np.inf)) if change.any() else 0.0

@@ -9,6 +9,8 @@ from benchmarks.passage_truth import PATTERNS, paper_model, struck_train
 
 from turnout.chains.passage import PassageContext, SectionModel, passage_unit
 from turnout.config import load_configuration, with_raw
+from turnout.errors import PartlyComputed
+from turnout.fleet.guard import guarded
 from turnout.fleet.scan import scan
 from turnout.passage.continuous import cut_passages
 from turnout.readers.writing import write
@@ -76,3 +78,71 @@ def test_a_zero_offset_changes_nothing(channels, tmp_path):
 def test_a_zero_offset_at_the_start_of_a_continuous_record_is_no_passage(settings):
     quiet = 0.02 * np.random.default_rng(3).standard_normal((3, 400_000))
     assert list(cut_passages([quiet + 9.81], 20000.0, settings)) == []
+
+
+def coarse(samples, codes, noisy_end=False):
+    """Samples of a converter whose range to the peak has so many codes; the last code may be the next one."""
+    step = np.abs(samples).max(axis=-1, keepdims=True) / codes
+    rounded = np.round(samples / step) * step
+    if noisy_end:
+        rounded[..., -1:] = step
+    return rounded
+
+
+@pytest.mark.parametrize("codes", [100, 300, 1000])
+def test_a_converter_that_rounds_the_quiet_to_zero_has_lost_no_sensor(codes, tmp_path):
+    """90 dB between peak and noise: before and after the train every sample is the same code."""
+    sound = on_main(snr_db=90.0)
+    rows = rows_of(tmp_path, replace(sound, samples=coarse(sound.samples, codes)))
+    (passage,) = rows["passages"]
+    assert (passage["status"], passage["n_axles"], passage["train_type"]) == ("accepted", 8, "IC3")
+    assert passage["speed_kmh"] == pytest.approx(3.6 * 44.4, rel=3e-3)
+    assert [f["status"] for f in rows["passage_fits"]] == ["accepted", "accepted"] and rows["quarantine"] == []
+
+
+@pytest.mark.parametrize("noisy_end", [False, True])
+def test_a_channel_without_noise_is_fitted_with_that_of_its_converter(noisy_end, tmp_path):
+    sound = on_main()
+    samples = sound.samples.copy()
+    samples[3] = coarse(on_main(90.0).samples[3], 40, noisy_end)
+    rows = rows_of(tmp_path, replace(sound, samples=samples))
+    assert {f["channel"]: f["status"] for f in rows["passage_fits"]} == {"A7": "accepted", "SP": "accepted"}
+    assert rows["passages"][0]["status"] == "accepted"
+
+
+@pytest.mark.parametrize("n_sample", [2, 100, 400, 800, 1999])
+def test_the_rest_of_a_record_is_said_to_be_too_short_and_costs_no_other_train(n_sample, tmp_path):
+    sound = on_main()
+    rest = replace(sound, samples=sound.samples[:, 5:][:, :n_sample], started_at=STARTED + timedelta(seconds=60))
+    rows = rows_of(tmp_path, sound, rest)
+    assert [p["status"] for p in rows["passages"]] == ["accepted", "rejected"]
+    (row,) = rows["quarantine"]
+    assert (row["reason_code"], row["record"], row["threshold"]) == ("no_train", 1, 0.1)
+    assert row["found"] == f"only {n_sample / 20000:.3f} s were recorded"
+
+
+def test_a_fault_of_the_program_costs_one_record(tmp_path, monkeypatch):
+    """The second of three trains meets one: its row says so, names file and record, and the others stay."""
+    sound = on_main()
+    later = [replace(sound, started_at=STARTED + timedelta(seconds=60.0 * k)) for k in range(3)]
+    calls = []
+
+    def failing(recording, *_):
+        calls.append(recording.record)
+        if recording.record == 1:
+            raise ZeroDivisionError("in the toy")
+
+    monkeypatch.setattr("turnout.chains.passage.axle_load", failing)
+    with pytest.raises(PartlyComputed) as caught:
+        rows_of(tmp_path, *later)
+    assert calls == [0, 1, 2]
+    assert [p["status"] for p in caught.value.tables["passages"]] == ["accepted", "accepted"]
+    turnout = with_raw(load_configuration("config").turnout("tommerup_s1"), tmp_path)
+    unit = scan(turnout, tmp_path).units[0]
+    result = guarded(passage_unit, unit, turnout, tmp_path, "key", "1", False)
+    assert result.status == "internal_error" and len(result.tables["passages"]) == 2
+    (row,) = result.tables["quarantine"]
+    assert (row["reason_code"], row["record"], row["path"]) == ("internal_error", 1, unit.files[0][0])
+    assert row["found"] == "ZeroDivisionError: in the toy" and "passage.py" in row["place"]
+    with pytest.raises(ZeroDivisionError):
+        guarded(passage_unit, unit, turnout, tmp_path, "key", "1", True)
