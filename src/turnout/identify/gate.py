@@ -19,8 +19,8 @@ def passed_share(receptance, frequency: float, damping: float) -> tuple[float, f
 
 
 def residues_of_receptance(receptance, frequency, damping) -> np.ndarray | None:
-    r"""Residues R of the accelerance :math:`\sum_m \frac12\left(\frac{R_m}{i\omega - s_m} +
-    \frac{\bar R_m}{i\omega - \bar s_m}\right) + d_0 + d_1 \omega^2` by least squares over the lines that passed.
+    r"""Residues R of the accelerance :math:`\sum_m \frac12\left(\frac{R_m}{p - s_m} +
+    \frac{\bar R_m}{p - \bar s_m}\right) + d_0 + d_1 p^2` by least squares over the lines that passed; :math:`p = i\omega + a` behind an exponential window.
 
     Parameters
     ----------
@@ -38,12 +38,11 @@ def residues_of_receptance(receptance, frequency, damping) -> np.ndarray | None:
     unknowns = 2 * len(frequency) + 2
     if np.count_nonzero(use) < 2 * unknowns:
         return None
-    omega = 2.0 * np.pi * receptance.frequency[use]
-    accelerance = -(omega**2) * receptance.h1[use]
+    p = 2j * np.pi * receptance.frequency[use] + receptance.decay
+    accelerance = p**2 * receptance.h1[use]
     s = continuous_pole(np.asarray(frequency), np.asarray(damping))
-    plus, minus = 0.5 / (1j * omega[:, None] - s), 0.5 / (1j * omega[:, None] - s.conj())
-    top = omega.max()
-    columns = np.hstack([plus + minus, 1j * (plus - minus), np.ones((len(omega), 1)), (omega[:, None] / top) ** 2])
+    plus, minus = 0.5 / (p[:, None] - s), 0.5 / (p[:, None] - s.conj())
+    columns = np.hstack([plus + minus, 1j * (plus - minus), np.ones((len(p), 1)), (p[:, None] / abs(p).max()) ** 2])
     design = np.vstack([columns.real, columns.imag])
     solution = np.linalg.lstsq(design, np.concatenate([accelerance.real, accelerance.imag]), rcond=None)[0]
     return solution[: len(s)] + 1j * solution[len(s) : 2 * len(s)]

@@ -83,6 +83,7 @@ def receptance_of(impacts: Sequence[Impact], settings: ReceptanceSettings | None
         n=n,
         valid_to=float(np.median([i.band_edge for i in used])),
         gate=settings.gate,
+        decay=settings.exponential_window,
     )
 
 

@@ -9,12 +9,13 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Receptance:
-    """Averaged frequency response of one section, with what can be trusted of it.
+    r"""Averaged frequency response of one section, with what can be trusted of it.
 
     All arrays are (n_frequency,); ``frequency`` [Hz] is above 0. ``h1``, ``h2``, ``hv`` complex [m/N];
     ``coherence`` with its two-sided 95 % limits ``coherence_low``, ``coherence_high`` and the one-sided lower
     limit ``gate_level`` that the gate compares; ``passed`` bool; ``n`` number of averaged impacts;
-    ``valid_to`` [Hz] is the hammer's band edge.
+    ``valid_to`` [Hz] is the hammer's band edge. Behind an exponential window of ``decay`` [1/s] the responses are those
+    at :math:`i\omega + a`: every resonance looks damped by so much more.
     """
 
     frequency: np.ndarray
@@ -29,3 +30,4 @@ class Receptance:
     n: int
     valid_to: float
     gate: str = "limit"
+    decay: float = 0.0

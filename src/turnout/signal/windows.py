@@ -16,17 +16,18 @@ def force_window(n_sample: int, contact_end: int, taper: int) -> np.ndarray:
 
 
 def exponential_window(n_sample: int, onset: int, decay: float, rate: float) -> np.ndarray:
-    r"""Window :math:`e^{-a (t - t_0)}` for response *and* force alike.
+    r"""Window :math:`e^{-a (t - t_0)}` for response *and* force alike, 1 up to :math:`t_0`.
 
-    The windowed pair obeys :math:`A_w(i\omega) = A(i\omega + a)`: the ratio of the two spectra is the frequency
-    response taken on a line that lies ``decay`` to the right of the imaginary axis. Hence its scale is right
-    as it stands, every pole appears shifted by -a (``correct_poles``), and displacement follows from
-    acceleration by :math:`(i\omega + a)^2`, not by :math:`-\omega^2`.
+    Nothing but noise is ahead of the blow, and must not become louder. The windowed pair obeys
+    :math:`A_w(i\omega) = A(i\omega + a)`: the ratio of the two spectra is the frequency response taken on a line that
+    lies ``decay`` to the right of the imaginary axis. Hence its scale is right as it stands, every pole appears shifted
+    by -a (``correct_poles``), and displacement follows from acceleration by :math:`(i\omega + a)^2`, not by
+    :math:`-\omega^2`.
 
     Parameters
     ----------
     n_sample, onset : int
-        Length, and the sample at which the window is 1.
+        Length, and the last sample at which the window is 1.
     decay : float
         a, 0 or more, else ValueError. [1/s]
     rate : float
@@ -34,12 +35,12 @@ def exponential_window(n_sample: int, onset: int, decay: float, rate: float) -> 
 
     Examples
     --------
-    >>> print(exponential_window(3, 0, np.log(2.0), 1.0))
-    [1.   0.5  0.25]
+    >>> print(exponential_window(4, 1, np.log(2.0), 1.0))
+    [1.   1.   0.5  0.25]
     """
     if decay < 0.0:
         raise ValueError(f"a window must decay, got a rate of {decay} 1/s")
-    return np.exp(-decay * (np.arange(n_sample) - onset) / rate)
+    return np.exp(-decay * np.maximum(np.arange(n_sample) - onset, 0) / rate)
 
 
 def correct_poles(poles: np.ndarray | complex, decay: float) -> np.ndarray:

@@ -4,27 +4,29 @@ import numpy as np
 import pytest
 
 from turnout.config.settings.identify import IdentifySettings
+from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.identify import identify
 from turnout.identify.gate import passed_share, residues_of_receptance
 from turnout.identify.poles import continuous_pole
 from turnout.published import hammer_test, published_model
-from turnout.records import Receptance
+from turnout.receptance import find_impacts, receptance_of
+from turnout.records import Channel, Receptance, Recording
 
 SETTINGS = IdentifySettings(null_draws=10)
 FREQUENCY = np.arange(5.0, 1500.0, 5.0)
 
 
-def accelerance(model, residue):
-    omega = 2.0 * np.pi * FREQUENCY[:, None]
+def accelerance(model, residue, p):
     s = continuous_pole(model.frequency, model.damping)
-    return 0.5 * (residue / (1j * omega - s) + residue.conj() / (1j * omega - s.conj())).sum(axis=1)
+    return 0.5 * (residue / (p[:, None] - s) + residue.conj() / (p[:, None] - s.conj())).sum(axis=1)
 
 
-def receptance(model, passed, residue=None):
+def receptance(model, passed, residue=None, decay=0.0):
     residue = model.residue if residue is None else residue
-    h = -accelerance(model, residue) / (2.0 * np.pi * FREQUENCY) ** 2
+    p = 2j * np.pi * FREQUENCY + decay
+    h = accelerance(model, residue, p) / p**2
     level = np.where(passed, 0.95, 0.3)
-    return Receptance(FREQUENCY, h, h, h, level, level, level, level, passed, 10, 1500.0)
+    return Receptance(FREQUENCY, h, h, h, level, level, level, level, passed, 10, 1500.0, decay=decay)
 
 
 def test_a_gate_that_stops_the_railpad_band_leaves_a_second_order_model():
@@ -58,11 +60,35 @@ def test_the_share_counts_the_lines_of_the_half_power_band():
     assert passed_share(receptance(model, FREQUENCY > 0.0), 2000.0, 0.1)[0] == 0.0
 
 
-def test_residues_of_an_exact_receptance_are_found_with_a_rotated_phase():
+@pytest.mark.parametrize("decay", [0.0, 30.0, 100.0])
+def test_residues_of_an_exact_receptance_are_found_with_a_rotated_phase(decay):
+    """Behind an exponential window the response is that on a line to the right of the imaginary axis."""
     model = published_model("OT")
     residue = model.residue * np.exp(0.4j)
-    found = residues_of_receptance(receptance(model, FREQUENCY < 900.0, residue), model.frequency, model.damping)
+    exact = receptance(model, FREQUENCY < 900.0, residue, decay)
+    found = residues_of_receptance(exact, model.frequency, model.damping)
     np.testing.assert_allclose(found, residue, rtol=1e-8)
+
+
+def test_the_response_to_a_unit_impulse_does_not_depend_on_the_exponential_window():
+    """The same ten blows at 60 dB: residues and b of their model as without a window, to 1 %."""
+    test, found = hammer_test("SP", 10, 3, snr_db=60, duration=0.25, pre_trigger=5e-3), []
+    channels = Channel("h", "force"), Channel("r", "acceleration")
+    recordings = [
+        Recording(np.stack(pair), test.rate, channels, record=i)
+        for i, pair in enumerate(zip(test.force, test.acceleration))
+    ]
+    for decay in (0.0, 30.0, 100.0):
+        settings = ReceptanceSettings(exponential_window=decay)
+        blows = [i for i in find_impacts(recordings, "h", "r", settings) if i.accepted]
+        curve = receptance_of(blows, settings)
+        model = identify([i.decay for i in blows], test.rate, SETTINGS, curve)
+        assert model.diagnostics["scale"].startswith("unit impulse")
+        modes = [m.frequency for m in model.modes], [m.damping for m in model.modes]
+        found.append((residues_of_receptance(curve, *modes), model.b))
+    for residue, b in found[1:]:
+        np.testing.assert_allclose(residue, found[0][0], rtol=1e-2)
+        np.testing.assert_allclose(b, found[0][1], atol=1e-2 * np.abs(found[0][1]).max())
 
 
 def test_too_few_lines_give_no_residues():

@@ -53,6 +53,12 @@ def test_exponential_window_shifts_a_pole_and_correction_brings_it_back():
         exponential_window(3, 0, -1.0, RATE)
 
 
+def test_exponential_window_makes_nothing_ahead_of_the_blow_larger():
+    window = exponential_window(2000, 1000, 100.0, RATE)
+    assert (window[:1001] == 1.0).all()
+    assert window[-1] == pytest.approx(np.exp(-100.0 * 999 / RATE))
+
+
 def test_force_window_leaves_the_contact_alone():
     window = force_window(50, 20, 8)
     assert (window[:21] == 1.0).all() and (window[28:] == 0.0).all() and (np.diff(window) <= 0.0).all()
