@@ -2,6 +2,7 @@
 
 turnout worklist                      the list of the newest measurement
 turnout worklist --asof 2026-03-01    the list as it would have been then
+turnout worklist --all                everything, not only what a person can act on in a day
 turnout worklist --csv list.csv
 """
 
@@ -10,6 +11,9 @@ import csv
 
 from turnout.commands.query import opened
 
+CHARTS = """
+    select count(*), count(*) filter (state = 'suppressed'), count(*) filter (state = 'not measured'), newest_charted()
+    from chart_states"""
 HELP = "tomorrow's list: what to inspect, what to plan, where nothing can be said"
 
 
@@ -17,6 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Where the registry lies, the date asked about and where to write."""
     parser.add_argument("--registry", default="results/registry", help="folder of the registry (%(default)s)")
     parser.add_argument("--asof", metavar="DATE", help="as it was then: YYYY-MM-DD, UTC")
+    parser.add_argument("--all", action="store_true", help="every row; open alarms are never left out anyway")
     parser.add_argument("--csv", metavar="FILE", help="write comma-separated values there, '-' = standard output")
 
 
@@ -25,25 +30,35 @@ def run(args: argparse.Namespace) -> int:
     from turnout.registry.database import open_registry
 
     with open_registry(args.registry) as con:
-        if args.asof:
-            cursor = con.execute("select * from worklist(?::timestamp)", [_date(args.asof)])
-        else:
-            cursor = con.execute("select * from worklist")
+        asof = "?::timestamp" if args.asof else "greatest(newest_measurement(), today_utc())"
+        question = f"select * from worklist({asof}{', most := 1000000000' if args.all else ''}) order by rank"
+        cursor = con.execute(question, [_date(args.asof)] if args.asof else [])
         names = [d[0] for d in cursor.description]
         rows = cursor.fetchall()
+        known = con.execute(CHARTS).fetchall()[0]
     if args.csv:
         with opened(args.csv) as stream:
             _write(stream, names, rows)
     else:
-        print(as_text([dict(zip(names, row)) for row in rows]))
+        print(as_text([dict(zip(names, row)) for row in rows], *known))
     return 0
 
 
-def as_text(rows) -> str:
-    """The list for a terminal: one paragraph per row."""
+def as_text(rows, n_charts=0, n_silenced=0, n_unmeasured=0, newest=None) -> str:
+    """The list for a terminal: one paragraph per row, what it leaves out, and on what it rests."""
+    if not n_charts:
+        return "No chart has been computed yet: the list comes with the first trend of the pipeline."
+    text = [_paragraph(row) for row in rows]
     if not rows:
-        return "Nothing to do: no chart in alarm, none that drifts, none that cannot tell."
-    return "\n".join(_paragraph(row) for row in rows)
+        text = ["Nothing to do: no chart in alarm, none that drifts, none that cannot tell."]
+    if rows and rows[0]["n_in_all"] > len(rows):
+        text.append(f"... and {rows[0]['n_in_all'] - len(rows)} more: turnout worklist --all")
+    left = [(n_silenced, "silenced by somebody"), (n_unmeasured, "not measured for too long")]
+    parts = [f"{n} {word}" for n, word in left if n]
+    text.append(
+        f"Of {n_charts} charts, newest campaign {newest:%Y-%m-%d}" + (": " + ", ".join(parts) if parts else "") + "."
+    )
+    return "\n".join(text)
 
 
 def _paragraph(row) -> str:

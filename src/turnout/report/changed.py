@@ -16,7 +16,9 @@ SHOWN = {
         select turnout_id, section_id, band, measured_at_utc, expected_low_hz, expected_high_hz, state
         from charts where source = 'hammer')""",
     "chart_states": "chart_states",
-    "worklist": "worklist",
+    "worklist": """(
+        select * exclude (rank, n_in_all)
+        from worklist(greatest(newest_measurement(), today_utc()), most := 1000000000))""",
 }
 MARK = '<meta name="turnout-content" content="{}">'
 MARKED = re.compile(re.escape(MARK).replace(r"\{\}", "([0-9a-f]+)"))

@@ -31,7 +31,9 @@ ROWS = {
         from charts where source = 'hammer' and {OF_SOME} order by section_id, band, measured_at_utc""",
     "chart_states": f"select * from chart_states where {OF_SOME}",
     "mismatches": f"select * from findings_newest where {OF_SOME} and verdict <> 'none' order by level_before desc",
-    "worklist": f"select * from worklist where {OF_SOME} order by rank",
+    "worklist": f"""
+        select * from worklist(greatest(newest_measurement(), today_utc()), most := 1000000000)
+        where {OF_SOME} order by rank""",
 }
 TURNOUTS = f"""
     with models as (

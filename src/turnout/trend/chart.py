@@ -8,7 +8,7 @@ from turnout.trend.cusum import cusum
 from turnout.trend.epochs import by_epoch, spread_out
 from turnout.trend.prepared import Prepared, first_epoch, stacked
 from turnout.trend.residuals import learning, of_sections, of_turnouts
-from turnout.trend.threshold import threshold_for
+from turnout.trend.threshold import run_lengths, threshold_for
 
 SIBLING_ROUNDS = 3
 
@@ -104,6 +104,12 @@ def _siblings_without_alarm(p, window, settled, summing, settings):
     return sections, sums, before
 
 
+def _thresholds(length, allowance):
+    """(n_chart,) thresholds that give each chart its run ``length`` with its ``allowance``."""
+    pairs, where = np.unique(np.column_stack([length, allowance]), axis=0, return_inverse=True)
+    return np.array([threshold_for(float(n), float(k)) for n, k in pairs] or [0.0])[where.ravel()]
+
+
 class _Summing:
     """Standardise residuals and sum them, for the sections first and then for the turnouts."""
 
@@ -123,12 +129,9 @@ class _Summing:
         fresh = np.diff(epoch, axis=1, prepend=0) > 0
         sums = {"z": z, "extra": extra}
         k = self.allowance[part]
-        for name, sign, length in (("down", 1.0, settings.run_length_loss), ("up", -1.0, settings.run_length_gain)):
-            h = np.where(
-                k == settings.allowance_large,
-                threshold_for(length, settings.allowance_large),
-                threshold_for(length, settings.allowance_small),
-            )
+        bands = p.charts["band"].to_numpy()[part]
+        for name, sign in (("down", 1.0), ("up", -1.0)):
+            h = _thresholds(run_lengths(bands, name, settings), k)
             limit = settings.single_share * h[:, None] + k[:, None] + extra
             sums[f"threshold_{name}"] = h
             sums[name], sums[f"{name}_open"], sums[f"{name}_began"] = cusum(

@@ -3,6 +3,7 @@
 import numpy as np
 
 from turnout.trend.panel import days
+from turnout.trend.visits import truth
 
 
 def epochs_of(charts, time, events) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -58,7 +59,7 @@ def _mark(reset, charts, time, events):
             continue
         touched = np.zeros(hit.size, dtype=bool)
         for flag in ("ballast", "railpad"):
-            if _truth(getattr(event, f"resets_{flag}")):
+            if truth(getattr(event, f"resets_{flag}")):
                 touched |= chosen[flag][hit]
         if isinstance(event.section_id, str) and event.section_id:
             touched &= section[hit] == event.section_id
@@ -67,11 +68,6 @@ def _mark(reset, charts, time, events):
         column = np.sum(filled[hit] < at, axis=1)
         column = np.where(column >= last, reset.shape[1] - 1, column)
         reset[hit, column] = np.maximum(reset[hit, column], at)
-
-
-def _truth(flag) -> bool:
-    """A flag from a CSV or from the registry: true only when it says so."""
-    return flag is True or str(flag).strip().lower() in ("true", "1", "yes")
 
 
 def by_epoch(values, mask, epoch, n_epoch) -> tuple[np.ndarray, np.ndarray]:

@@ -66,4 +66,4 @@ def evaluate(modes, events, settings, as_of=None):
     -------
     Charts
     """
-    return next(evaluate_panels([panel_of(modes, settings, as_of)], events, settings))
+    return next(evaluate_panels([panel_of(modes, settings, as_of, events)], events, settings))

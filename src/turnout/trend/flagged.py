@@ -7,11 +7,10 @@ import pandas as pd
 
 from turnout.trend.change import find_change
 from turnout.trend.drift import discoveries
-from turnout.trend.forecast import forecast
+from turnout.trend.forecast import RECENT, forecast
 from turnout.trend.panel import WHOLE, timestamps
 from turnout.trend.prepared import first_epoch
 
-RECENT = 8
 COLUMNS = {
     "direction": object,
     "statistic_ratio": float,

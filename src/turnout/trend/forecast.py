@@ -6,12 +6,13 @@ import numpy as np
 from scipy import stats
 
 YEAR = 365.25
+RECENT = 8  # values whose mean says where a chart is now
 SETTLING_YEARS = np.geomspace(0.05, 10.0, 40)
 
 
 @dataclass(frozen=True)
 class Forecast:
-    """``verdict``: line, line_or_settling, settling, no_limit or too_short.
+    """``verdict``: line, line_or_settling, settling, no_limit, too_short or reached.
 
     ``slope`` and ``slope_error`` [%/a] by generalised least squares; ``not_before`` and ``not_after`` [a after
     the last value] are the ends of the interval of the crossing, nan where there is none. ``not_after`` is given
@@ -28,6 +29,8 @@ class Forecast:
     @property
     def sentence(self) -> str:
         """The forecast in words: the earliest date, never one date alone, or why there is none."""
+        if self.verdict == "reached":
+            return "the limit is reached"
         if self.verdict == "too_short":
             return "too early for a date"
         if self.verdict == "settling":
@@ -127,8 +130,9 @@ def crossing(coefficient, covariance, freedom, limit, level) -> tuple[float, flo
 def forecast(time, values, memory, settings) -> Forecast:
     """When the values reach ``settings.limit_percent``, with the interval of ``settings.interval_level``.
 
-    A line against a settling curve by AIC: where the curve wins there is no date, since a line through a curve
-    that settles promises a date that never comes; where neither wins by 2 there is no latest date.
+    Where the mean of the last ``RECENT`` values is beyond it already that is the answer, whatever they do. Else a line
+    against a settling curve by AIC: where the curve wins there is no date, since a line through a curve that settles
+    promises a date that never comes; where neither wins by 2 there is no latest date.
 
     Parameters
     ----------
@@ -138,6 +142,8 @@ def forecast(time, values, memory, settings) -> Forecast:
         AR(1) coefficient at the usual spacing.
     """
     nan = float("nan")
+    if time.size and values[-RECENT:].mean() <= settings.limit_percent:
+        return Forecast("reached", nan, nan, 0.0, nan, nan)
     if time.size < 12 or time[-1] - time[0] < settings.drift_days:
         return Forecast("too_short", nan, nan, nan, nan, nan)
     coefficient, covariance, rss, freedom = line(time, values, memory)

@@ -2,7 +2,7 @@
 
 import logging
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -58,10 +58,10 @@ def update(registry_dir, settings, digests=None, as_of=None, acknowledgements=No
     """
     with open_registry(registry_dir) as con:
         events = con.execute("select * from events order by event_at_utc, event_id").df()
-        if as_of is not None:
-            events = events[days(events["event_at_utc"]) <= days([as_of])[0]]
         parts, newest = _parts(con, settings, as_of)
-        prepared = [prepare(_panel(con, part, newest, settings), events, settings) for part in parts]
+        now = newest if as_of is not None else max(newest, days([datetime.now(UTC).replace(tzinfo=None)])[0])
+        events = events[days(events["event_at_utc"]) <= now]  # work that is planned resets nothing yet
+        prepared = [prepare(_panel(con, part, newest, events, settings), events, settings) for part in parts]
     years, tables = _tables(prepared, settings)
     rows = {name: table.num_rows for name, table in tables.items()}
     rows["charts"] = sum(part.num_rows for found in years.values() for part in found)
@@ -133,7 +133,7 @@ def _parts(con, settings, as_of):
     return [part.reset_index(drop=True) for _, part in charts.groupby(number, sort=True)], newest
 
 
-def _panel(con, charts, newest, settings):
+def _panel(con, charts, newest, events, settings):
     """Rows of the turnouts of one part, their chart as a number."""
     con.register("_part", charts.assign(chart=np.arange(len(charts), dtype=np.int32)))
     names = ("frequency_hz", "frequency_se_hz", "rail_temperature_c")
@@ -148,4 +148,4 @@ def _panel(con, charts, newest, settings):
     con.unregister("_part")
     time = np.asarray(rows["us"], dtype=float) / (DAY * 1e6)
     frequency, error, temperature = (np.asarray(rows[n], dtype=float) for n in names)
-    return lay_out(charts, np.asarray(rows["chart"]), time, frequency, error, temperature, newest, settings)
+    return lay_out(charts, np.asarray(rows["chart"]), time, frequency, error, temperature, newest, settings, events)

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-DAY = 86400.0
+from turnout.trend.visits import DAY, campaigns_of, keys_of, truth, unique_of
+
 CHART = ["turnout_id", "band", "source", "section_id"]
 WHOLE = "*"
 
@@ -82,11 +83,12 @@ def believable(time, settings) -> tuple[np.ndarray, float]:
     return good, float(np.max(time, where=good, initial=-np.inf))
 
 
-def panel_of(modes, settings, as_of=None) -> Panel:
+def panel_of(modes, settings, as_of=None, events=None) -> Panel:
     """Lay rows of the table ``modes`` out as charts x campaigns.
 
     ``modes`` is a DataFrame with the columns of that table (``source`` may be missing: hammer). Values of one
-    turnout and source within ``campaign_gap_hours`` are one campaign. ``as_of`` is a time after which rows do
+    turnout and source within ``campaign_gap_hours`` of the first are one campaign, but what was measured after a
+    resetting one of the ``events`` is another than what was measured before. ``as_of`` is a time after which rows do
     not count yet (a wrong clock, or a look back). Of two values of one chart in one campaign the later counts.
     Values from passages come by the week, as the view ``passage_values`` makes them.
     """
@@ -102,10 +104,10 @@ def panel_of(modes, settings, as_of=None) -> Panel:
         return rows[name].to_numpy(dtype=float, na_value=np.nan) if name in rows else np.full(len(rows), np.nan)
 
     frequency, error, temperature = (column(n) for n in ("frequency_hz", "frequency_se_hz", "rail_temperature_c"))
-    return lay_out(charts, chart, time, frequency, error, temperature, newest, settings)
+    return lay_out(charts, chart, time, frequency, error, temperature, newest, settings, events)
 
 
-def lay_out(charts, chart, time, frequency, error, temperature, newest, settings) -> Panel:
+def lay_out(charts, chart, time, frequency, error, temperature, newest, settings, events=None) -> Panel:
     """The panel of rows whose chart is known by number.
 
     ``charts`` has the columns of ``CHART``, sorted by them; ``chart, time, frequency, error, temperature`` are
@@ -128,7 +130,8 @@ def lay_out(charts, chart, time, frequency, error, temperature, newest, settings
         frequency, error, temperature = frequency[use], error[use], temperature[use]
     visits = charts["visits"].to_numpy()
     n_visits = int(visits.max()) + 1 if len(visits) else 0
-    column, starts = _campaigns(visits[chart], time, settings.campaign_gap_hours / 24.0, n_visits)
+    works = _works(charts, events)
+    column, starts = campaigns_of(visits[chart], time, settings.campaign_gap_hours / 24.0, n_visits, works)
     order = _later_last(chart, column, starts.shape[1], time)
     cell = (chart[order], column[order])
 
@@ -163,32 +166,16 @@ def _charts(rows):
             names.append(np.asarray(unique, dtype=object))
     sizes = [max(len(n), 1) for n in names]
     key = np.ravel_multi_index([np.asarray(c, dtype=np.int64) for c in codes], sizes) if len(rows) else np.zeros(0, int)
-    unique, chart = _unique(key)
+    unique, chart = unique_of(key)
     parts = np.unravel_index(unique, sizes)
     return pd.DataFrame({n: v[p] for n, v, p in zip(CHART, names, parts)}, columns=CHART), chart
 
 
-def _unique(key):
-    """``np.unique(key, return_inverse=True)`` by hashing: the rows are many, the charts few."""
-    code, unique = pd.factorize(key)
-    order = np.argsort(unique, kind="stable")
-    rank = np.empty_like(order)
-    rank[order] = np.arange(order.size)
-    return np.asarray(unique)[order], rank[code]
-
-
-def _campaigns(visits, time, gap, n_visits):
-    """Number of the campaign of each row within its turnout, and (n_visits, n_campaign) times they started."""
-    if not time.size:
-        return np.zeros(0, dtype=np.int64), np.zeros((n_visits, 0))
-    stamp, row = _unique(visits * 2**40 + np.round((time + 2e6) * DAY).astype(np.int64))
-    visit, moment = stamp >> 40, (stamp & (2**40 - 1)) / DAY - 2e6
-    new_turnout = np.diff(visit, prepend=-1) != 0
-    new = new_turnout | (np.diff(moment, prepend=0.0) > gap)
-    running = np.cumsum(new) - 1
-    first = np.zeros(n_visits, dtype=np.int64)
-    first[visit[new_turnout]] = running[new_turnout]
-    number = running - first[visit]
-    starts = np.full((n_visits, int(number.max()) + 1), np.nan)
-    starts[visit[new], number[new]] = moment[new]
-    return number[row], starts
+def _works(charts, events):
+    """Sorted keys of the resetting ``events`` of every row of visits, as ``keys_of`` makes them."""
+    if events is None or not len(events):
+        return np.zeros(0, dtype=np.int64)
+    resets = events[[truth(b) or truth(r) for b, r in zip(events["resets_ballast"], events["resets_railpad"])]]
+    rows = charts[["turnout_id", "visits"]].drop_duplicates().astype({"turnout_id": object})
+    both = rows.merge(resets[["turnout_id", "event_at_utc"]].astype({"turnout_id": object}), on="turnout_id")
+    return np.sort(keys_of(both["visits"].to_numpy(dtype=np.int64), days(both["event_at_utc"])))

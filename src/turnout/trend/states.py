@@ -7,7 +7,7 @@ from turnout.trend.drift import slopes, span
 from turnout.trend.panel import WHOLE, timestamps
 from turnout.trend.prepared import first_epoch
 from turnout.trend.residuals import RESOLUTION
-from turnout.trend.threshold import detectable_shift
+from turnout.trend.threshold import detectable_shift, run_lengths
 
 YEAR = 365.25
 
@@ -31,7 +31,8 @@ def campaigns_a_year(p) -> np.ndarray:
 def change_seen(charts, chart, allowance, campaigns, settings) -> np.ndarray:
     """Detectable change [%] of the charts numbered ``chart`` with their ``allowance`` and ``campaigns`` a year."""
     p = charts.prepared
-    keys = np.column_stack([charts.threshold_down[chart], np.round(allowance, 2), campaigns])
+    harmful = np.minimum(charts.threshold_down, charts.threshold_up)[chart]
+    keys = np.column_stack([harmful, np.round(allowance, 2), campaigns])
     unique, where = np.unique(keys, axis=0, return_inverse=True)
     shift = [detectable_shift(float(h), float(k), int(n), settings.detectable_probability) for h, k, n in unique]
     scale = p.spread * charts.guard * charts.widening
@@ -41,9 +42,9 @@ def change_seen(charts, chart, allowance, campaigns, settings) -> np.ndarray:
 def chart_status(charts, settings) -> pd.DataFrame:
     """One row per chart: its state today, why, the change it can see, its slope.
 
-    States in the order in which they are decided: ``not_measured`` (too long ago), ``alarm``, ``cannot_tell``
-    (values that never change; too few temperatures), ``learning`` (baseline or level after an event not
-    complete), ``cannot_tell`` (detectable change above the target), ``ok``.
+    States in the order in which they are decided: ``alarm``, which no silence ends; ``not_measured`` (too long
+    ago), ``cannot_tell`` (values that never change; too few temperatures), ``learning`` (baseline or level after an
+    event not complete), ``cannot_tell`` (detectable change above the target), ``ok``.
     """
     p = charts.prepared
     n_section = len(p.panel.charts)
@@ -63,12 +64,13 @@ def chart_status(charts, settings) -> pd.DataFrame:
     status["n_learned"] = mask_count(charts, present)
     status["n_needed"] = charts.learn
     status["complete"] = p.baseline.complete
-    status["run_length_down"] = settings.run_length_loss
-    status["run_length_up"] = settings.run_length_gain
+    for way in ("down", "up"):
+        status[f"run_length_{way}"] = run_lengths(p.charts["band"], way, settings)
     status["without_temperature"] = p.baseline.without_temperature
     status["detectable_pct"] = detectable
     status["stale_after_days"] = stale_after(p, settings)
     status["target_pct"] = settings.target_percent
+    status["worklist_rows"] = settings.worklist_rows
     status["drift_pct_per_year"] = np.where(short, np.nan, slope)
     status["drift_se_pct_per_year"] = np.where(short, np.nan, error)
     status["drift_p"] = np.where(short, np.nan, p_value)
@@ -119,9 +121,9 @@ def _states(charts, settings, status, last, present):
     rules = [
         (~np.isfinite(last) & whole, "cannot_tell", "too_few_sections"),
         (~np.isfinite(last), "not_measured", "never"),
+        (open_now & ~p.pending & ~(p.baseline.complete & stuck & ~whole), "alarm", "threshold_crossed"),
         (old, "not_measured", "too_long_ago"),
         (p.baseline.complete & stuck & ~whole, "cannot_tell", "constant"),
-        (open_now & ~p.pending, "alarm", "threshold_crossed"),
         (~p.baseline.complete & cold, "cannot_tell", "no_temperature"),
         (~p.baseline.complete & whole & (p.baseline.count == 0), "cannot_tell", "too_few_sections"),
         (~p.baseline.complete, "learning", "baseline"),

@@ -8,6 +8,7 @@ from turnout.trend.epochs import by_epoch
 from turnout.trend.panel import timestamps
 from turnout.trend.prepared import first_epoch
 from turnout.trend.states import campaigns_a_year, change_seen
+from turnout.trend.threshold import run_lengths
 
 KEYS = ["turnout_id", "section_id", "band", "source"]
 STATES = np.array(
@@ -151,7 +152,7 @@ def alarm_rows(charts, settings) -> pd.DataFrame:
     ``began_at_utc`` is the last campaign at which the sum stood at 0: the change came after it. An alarm closes
     when its sum is back at 0 or an event starts a new epoch.
     """
-    parts = [_alarms(charts, "down", settings.run_length_loss), _alarms(charts, "up", settings.run_length_gain)]
+    parts = [_alarms(charts, way, run_lengths(charts.prepared.charts["band"], way, settings)) for way in ("down", "up")]
     rows = pd.concat(parts, ignore_index=True)
     return rows.sort_values(["raised_at_utc", *KEYS, "direction"], kind="stable", ignore_index=True)
 
@@ -179,7 +180,7 @@ def _alarms(charts, direction, run_length):
         began_at_utc=timestamps(np.where(began >= 0, p.time[chart, np.maximum(began, 0)], np.nan)),
         statistic=getattr(charts, direction)[chart, campaign],
         threshold=getattr(charts, f"threshold_{direction}")[chart],
-        run_length=run_length,
+        run_length=run_length[chart],
         closed_at_utc=timestamps(np.where(gone, p.time[chart, held], np.nan)),
         closed_by=np.where(gone, np.where(by_event, "event", "recovered"), np.array(None, dtype=object)),
     )

@@ -93,3 +93,14 @@ def detectable_shift(threshold, allowance, campaigns, probability=0.9) -> float:
         return alarm_probability(shift, threshold, allowance, campaigns) - probability
 
     return float(brentq(miss, 0.0, 2.0 * (threshold + allowance) + 4.0, xtol=1e-4))
+
+
+def run_lengths(bands, direction, settings) -> np.ndarray:
+    """(n_chart,) campaigns between false alarms: fewer for the harmful way, down for stiffness, up for acceleration.
+
+    >>> from turnout.config.settings.trend import TrendSettings
+    >>> run_lengths(np.array(["ballast", "amplitude"], dtype=object), "down", TrendSettings())
+    array([ 5600., 56000.])
+    """
+    harmful = (np.asarray(bands) == "amplitude") == (direction == "up")
+    return np.where(harmful, settings.run_length_loss, settings.run_length_gain)

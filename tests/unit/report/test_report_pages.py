@@ -131,7 +131,7 @@ def test_a_fleet_without_data_has_a_page(tmp_path):
     register([], tmp_path / "registry", read=read_results)
     with open_registry(tmp_path / "registry") as connection:
         assert write_pages(connection, tmp_path / "pages", progress=False) == 1
-    assert "Nothing to do" in " ".join(read(tmp_path / "pages" / "index.html").words)
+    assert "No chart has been computed yet" in " ".join(read(tmp_path / "pages" / "index.html").words)
 
 
 @pytest.fixture

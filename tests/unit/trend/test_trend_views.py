@@ -189,7 +189,7 @@ def test_an_acknowledged_alarm_is_planned_and_a_suppressed_one_silent_but_both_s
         assert row["state"] == "plan" and "M. Jensen: tamping ordered" in row["sentence"]
         states = con.execute("select state from chart_states where section_id = 'T00003/S2'").fetchall()
         assert states == [("plan",)]
-    silenced = said.assign(action="suppress", until_utc=newest + pd.Timedelta("30D"), band=None)
+    silenced = said.assign(action="suppress", until_utc=pd.Timestamp("2999-01-01"), band=None)
     with connect_views(frames | {"acknowledgements": silenced}, newest) as con:
         assert con.execute("select * from worklist where section_id = 'T00003/S2'").df().empty
         assert con.execute("select count(*) from alarms where section_id = 'T00003/S2'").fetchall()[0][0] >= 1
@@ -321,7 +321,7 @@ def test_what_is_said_after_the_newest_campaign_counts_now_and_not_on_an_earlier
             "until_utc": [pd.NaT], "reason": ["tamping ordered"],
         }
     )  # fmt: skip
-    silenced = said.assign(action="suppress", until_utc=newest + pd.Timedelta("30D"))
+    silenced = said.assign(action="suppress", until_utc=pd.Timestamp("2999-01-01"))
     for entered, state, listed in ((said, "plan", [("plan",)]), (silenced, "suppressed", [])):
         with connect_views(frames | {"acknowledgements": entered}, newest) as con:
             where = "where section_id = 'T00003/S2' and band = 'railpad'"

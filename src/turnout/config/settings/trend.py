@@ -12,7 +12,7 @@ class TrendSettings:
     campaign_gap_hours: float = setting(
         36.0,
         "h",
-        "values of one turnout closer together than this belong to one campaign; a campaign may last into the night",
+        "values within this of a campaign's first belong to it: it may last into the night; work that resets ends it",
         minimum=0.0,
     )
     earliest_year: int = setting(1990, "", "an older time stamp is a clock that was never set", minimum=1900)
@@ -76,4 +76,6 @@ class TrendSettings:
         0.8, "", "level of the interval of the time to the limit", minimum=0.5, maximum=0.99
     )
     horizon_years: float = setting(20.0, "a", "a limit reached later than this counts as no limit", minimum=1.0)
-    worklist_rows: int = setting(20, "", "rows a person can act on in a day", minimum=1)
+    worklist_rows: int = setting(
+        20, "", "rows of the list, what a person can act on in a day; open alarms are listed beyond it", minimum=1
+    )

@@ -1,6 +1,9 @@
 -- One row per chart: what it says at the newest measurement, in the words of the worklist.
 -- inspect this week: an open alarm. plan: an acknowledged alarm, or a drift among the discoveries of the fleet
--- (false-discovery rate 10 %). suppressed: somebody silenced it, with a reason and an end.
+-- (false-discovery rate 10 %), also where the chart is too noisy to see the target within a year. suppressed: somebody
+-- silenced it, with a reason and an end, a day at which it comes back.
+create or replace macro today_utc() as make_timestamp(epoch_us(now()));
+
 create or replace view chart_states as
 with open_alarms as (
     select turnout_id, section_id, band, source, max(raised_at_utc) as raised_at_utc
@@ -15,7 +18,7 @@ spoken as (
             where k.action = 'acknowledge' and k.at_utc >= o.raised_at_utc
         ) as acknowledged,
         max_by(k.by_whom || ': ' || k.reason, k.at_utc) filter (
-            where k.action = 'suppress' and coalesce(k.until_utc, timestamp '9999-01-01') > newest_measurement()
+            where k.action = 'suppress' and coalesce(k.until_utc, timestamp '9999-01-01') > today_utc()
         ) as suppressed
     from chart_status s
     left join open_alarms o using (turnout_id, section_id, band, source)
@@ -29,7 +32,8 @@ select
     case
         when p.suppressed is not null and s.state in ('alarm', 'ok') then 'suppressed'
         when s.state = 'alarm' and p.acknowledged is null then 'inspect this week'
-        when s.state = 'alarm' or (s.state = 'ok' and s.forecast is not null) then 'plan'
+        when s.state = 'alarm' then 'plan'
+        when (s.state = 'ok' or s.reason = 'too_noisy') and s.forecast is not null then 'plan'
         else replace(s.state, '_', ' ')
     end as state,
     s.reason, p.raised_at_utc, p.acknowledged, p.suppressed, s.direction, s.statistic_ratio, s.change_kind,

@@ -74,9 +74,9 @@ judged as (
         case
             when last_at_utc is null and is_whole then 'too_few_sections'
             when last_at_utc is null then 'never'
+            when in_alarm and not (complete and is_stuck) then 'threshold_crossed'
             when is_old then 'too_long_ago'
             when complete and is_stuck then 'constant'
-            when in_alarm then 'threshold_crossed'
             when not complete and 2 * n_cold > n_campaigns then 'no_temperature'
             when not complete and is_whole and n_baseline = 0 then 'too_few_sections'
             when not complete then 'baseline'

@@ -2,9 +2,21 @@
 -- corrected_pct: 100 (f / f0 - 1) - b (T - T0) - level of the epoch. residual_pct: the same minus the median of the
 -- other sections of the turnout, where the chart uses them and three are there, minus their usual difference.
 -- Sections in alarm are nobody's sibling, nor are those that learn their level, except of others that learn too.
+-- A campaign may last into the next day: a value belongs to the last campaign that began before it.
 -- needs: chart_values
 create or replace macro mode_residuals(since) as table
-with corrected as (
+with valued as (
+    select c.turnout_id, c.section_id, c.band, c.source, c.measured_at_utc, m.frequency_hz, m.rail_temperature_c
+    from chart_values m
+    asof join charts c
+        on m.turnout_id = c.turnout_id and m.section_id = c.section_id and m.band = c.band and m.source = c.source
+            and m.measured_at_utc >= c.measured_at_utc
+    where c.measured_at_utc >= since and m.frequency_hz > 0
+    qualify row_number() over (
+        partition by c.turnout_id, c.section_id, c.band, c.source, c.measured_at_utc order by m.measured_at_utc desc
+    ) = 1
+),
+corrected as (
     select
         c.turnout_id, c.section_id, c.band, c.source, c.measured_at_utc, c.epoch, c.state,
         m.frequency_hz, b.with_siblings, b.sibling_shift_pct,
@@ -13,7 +25,7 @@ with corrected as (
             - b.slope_pct_per_c * (m.rail_temperature_c - b.rail_temperature_c) - b.level_pct as corrected_pct
     from charts c
     join baselines b using (turnout_id, section_id, band, source, epoch)
-    join chart_values m using (turnout_id, section_id, band, source, measured_at_utc)
+    join valued m using (turnout_id, section_id, band, source, measured_at_utc)
     where c.measured_at_utc >= since and m.rail_temperature_c is not null
 ),
 together as (

@@ -5,7 +5,9 @@ select
     turnout_id, section_id, band, source, change_pct, change_low_pct, change_high_pct,
     forecast_slope_pct_per_year as slope_pct_per_year, forecast_slope_se_pct_per_year as slope_se_pct_per_year,
     forecast, not_before_utc, not_after_utc,
-    case forecast
+    case coalesce(case when band = 'amplitude' then 'none' end, forecast)
+        when 'none' then 'no limit is set for accelerations'
+        when 'reached' then 'the limit is reached'
         when 'settling' then 'no date: the values settle'
         when 'too_short' then 'too early for a date'
         when 'no_limit' then 'no limit in sight'

@@ -1,8 +1,9 @@
--- One row per thing to do, at most twenty, the most certain first: the list of the morning after `asof`.
+-- One row per thing to do: every open alarm, the largest change first (by the end of its interval nearer to none), and
+-- what else there is up to `trend.worklist_rows` rows in all, or `most`; n_in_all counts what there would be without an end.
 -- asof at or after the newest measurement uses everything; an earlier one uses only what was measured by then
 -- (change and date then come from the sums alone, and a slow drift is not among the plans).
 -- needs: chart_states, cannot_see, chart_status_at
-create or replace macro worklist("asof") as table
+create or replace macro worklist("asof", most := null) as table
 with then_status as (select * from chart_status_at("asof")),
 recent as (
     select
@@ -45,6 +46,11 @@ alarmed as (
         r.turnout_id, r.section_id, r.band, r.source,
         case when r.acknowledged is null then 'inspect this week' else 'plan' end as state,
         r.direction, r.raised_at_utc, r.ratio, r.acknowledged,
+        case
+            when least("asof", newest_charted()) - s.last_measured_at_utc
+                > to_microseconds((86400e6 * c.stale_after_days)::bigint)
+            then s.last_measured_at_utc
+        end as not_since_utc,
         s.change_pct is not null and "asof" >= s.last_measured_at_utc as told,
         case when told then s.change_pct else r.change_pct end as change_pct,
         case when told then s.change_low_pct else r.change_pct - r.half end as low_pct,
@@ -55,6 +61,7 @@ alarmed as (
         null::varchar as why
     from spoken r
     left join chart_states s using (turnout_id, section_id, band, source)
+    left join chart_status c using (turnout_id, section_id, band, source)
 ),
 drifting as (
     select
@@ -82,6 +89,11 @@ silent as (
             where a.turnout_id = c.turnout_id and a.section_id = c.section_id and a.band = c.band
                 and a.source = c.source
         )
+        and not exists (
+            select 1 from drifting d
+            where d.turnout_id = c.turnout_id and d.section_id = c.section_id and d.band = c.band
+                and d.source = c.source
+        )
 ),
 everything as (
     select * from alarmed union all by name select * from drifting union all by name select * from silent
@@ -94,7 +106,7 @@ heard as (
         where k.turnout_id = e.turnout_id and coalesce(k.section_id, e.section_id) = e.section_id
             and coalesce(k.band, e.band) = e.band and k.action = 'suppress'
             and (k.at_utc <= "asof" or "asof" >= newest_charted())
-            and coalesce(k.until_utc, timestamp '9999-01-01') > least("asof", newest_charted())
+            and coalesce(k.until_utc, timestamp '9999-01-01') > "asof"
     )
 ),
 listed as (
@@ -151,6 +163,7 @@ select
             || (case when h.source = 'passage' then '; from passages' else '; from hammer tests' end)
             || (case when h.band in ('ballast', 'railpad') then printf('; that is about %.0f %% of stiffness',
                 abs((1 + h.change_pct / 100) ** 2 - 1) * 100) else '' end)
+            || coalesce('; not measured since ' || strftime(h.not_since_utc, '%Y-%m-%d'), '')
             || coalesce('; acknowledged by ' || h.acknowledged, '')
     end as sentence,
     case
@@ -180,7 +193,7 @@ select
         when h.band = 'amplitude' then 'running surface, fastenings and voids; the mounting of the sensor'
         else 'the section'
     end as look_at,
-    t.name, t.line, t.km
+    t.name, t.line, t.km, count(*) over () as n_in_all
 from listed h
 left join chart_status s
     on s.turnout_id = h.turnout_id and s.section_id = h.section_id and s.band = h.band and s.source = h.source
@@ -192,9 +205,11 @@ cross join fleet f
 window importance as (
     order by
         case h.state when 'inspect this week' then 0 when 'plan' then 1 when 'cannot tell' then 2 else 3 end,
+        case when h.low_pct * h.high_pct < 0 then 0 else least(abs(h.low_pct), abs(h.high_pct)) end desc nulls last,
         h.ratio desc nulls last, h.turnout_id, h.sections, h.band, h.source
 )
-qualify rank <= 20
+qualify rank <= coalesce(most, (select max(worklist_rows) from chart_status), 20) or h.state = 'inspect this week'
 order by rank;
 
-create or replace view worklist as select * from worklist(newest_measurement());
+-- What is silenced until a day comes back on that day, measured or not.
+create or replace view worklist as select * from worklist(greatest(newest_measurement(), today_utc()));

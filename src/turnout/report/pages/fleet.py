@@ -31,6 +31,8 @@ def fleet_page(source, template, shared):
         count={key: counts[state] for state, key in STATES.items()},
         n_quarantined=sum(r["rows"] for r in reasons),
         worklist=[_work(w) for w in worklist],
+        n_more=worklist[0]["n_in_all"] - len(worklist) if worklist else 0,
+        n_charts=counts.total(),
         turnouts=[_line(t, states.get(t["turnout_id"], {})) for t in turnouts],
         reasons=[r | {"meaning": REASONS.get(r["reason"], "")} for r in reasons],
         **shared,

@@ -44,11 +44,19 @@ def history_panel(band, modes, charts, events, width=462):
         f"{m['damping_ratio']:.4f}, n = {m['n_impacts']}, {_temperature(m['rail_temperature_c'])}"
         for m, e in zip(modes, error)
     ]
-    alarmed = {c["measured_at_utc"] for c in charts if c["state"].startswith("alarm")}
+    alarmed = _alarmed(modes, charts)
     for style, chosen in (("point", False), ("alarm", True)):
-        some = [i for i, m in enumerate(modes) if (m["measured_at_utc"] in alarmed) == chosen]
+        some = np.flatnonzero(alarmed == chosen)
         chart.points(time[some], frequency[some], style, 3.0, low[some], high[some], [labels[i] for i in some])
     return chart.svg()
+
+
+def _alarmed(modes, charts):
+    """Whether each value's campaign is in alarm: the last one that began before it, for one may last two days."""
+    rows = sorted(charts, key=lambda c: c["measured_at_utc"])
+    began = np.array([_seconds(c["measured_at_utc"]) for c in rows])
+    of = np.searchsorted(began, [_seconds(m["measured_at_utc"]) for m in modes], side="right") - 1
+    return np.array([k >= 0 and rows[k]["state"].startswith("alarm") for k in of], dtype=bool)
 
 
 def _seconds(when):

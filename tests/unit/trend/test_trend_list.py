@@ -1,0 +1,214 @@
+"""The list of the morning: nothing that is open goes missing, what is planned or silenced ends on its day."""
+
+from dataclasses import replace
+from datetime import datetime, timedelta
+
+import numpy as np
+import pandas as pd
+import pytest
+from benchmarks.trend_fleet import Fleet, drift, modes
+from benchmarks.trend_registry import small_registry
+
+from turnout.registry.database import open_registry
+from turnout.registry.derived import publish
+from turnout.report.panels.history import history_panel
+from turnout.trend import candidates, chart_rows, chart_status, describe_flagged, evaluate, panel_of
+from turnout.trend.forecast import forecast
+from turnout.trend.nightly import update
+from turnout.trend.rows import arrow_rows
+from turnout.trend.tables import alarm_rows, baseline_rows
+from turnout.trend.views import connect_views
+
+ONE = (1, 4)
+
+
+def work(turnout, at, section=None):
+    return pd.DataFrame(
+        {
+            "event_id": ["e"], "turnout_id": [turnout], "section_id": [section], "event_at_utc": [pd.Timestamp(at)],
+            "kind": ["tamping"], "resets_ballast": [True], "resets_railpad": [True],
+        }
+    )  # fmt: skip
+
+
+def viewed(rows, settings, events=None, **more):
+    rows = rows.astype({k: object for k in ("turnout_id", "section_id", "band", "source")})
+    charts = evaluate(rows, events, settings)
+    status = chart_status(charts, settings)
+    frames = {
+        "modes": rows.assign(method="joint"), "charts": chart_rows(charts), "alarms": alarm_rows(charts, settings),
+        "baselines": baseline_rows(charts, settings),
+        "chart_status": describe_flagged(status, candidates(charts, status, settings), settings), **more,
+    }  # fmt: skip
+    frames |= {} if events is None else {"events": events}
+    return connect_views(frames, rows["measured_at_utc"].max())
+
+
+def fallen(weeks=120):
+    """Three turnouts of eight sections; one section falls by 4 % a year from week 60 on."""
+    fleet, which = Fleet(turnouts=3, weeks=weeks, phi=0.1), np.zeros((3, 8), bool)
+    which[ONE] = True
+    return modes(fleet, 3, drift(fleet, which, -4.0, 60))
+
+
+def test_a_fresh_collapse_comes_before_old_drifts_and_no_open_alarm_is_cut(settings):
+    fleet, which = Fleet(turnouts=30, weeks=156, phi=0.1), np.zeros((30, 8), bool)
+    which[:25, 4] = True
+    change = np.array(np.broadcast_to(drift(fleet, which, -1.5, 60), (30, 8, 156)))
+    change[27, 2, -2:] -= 30.0
+    with viewed(modes(fleet, 3, change), settings) as con:
+        rows = con.execute("select sections, turnout_id, state, n_in_all from worklist order by rank").fetchall()
+        short = con.execute("select count(*) from worklist(newest_measurement(), most := 3)").fetchall()[0][0]
+    inspect = [r for r in rows if r[2] == "inspect this week"]
+    assert rows[0][:2] == ("S2", "T00027")
+    assert len(inspect) > 20 and {r[1] for r in inspect} >= {f"T{n:05d}" for n in range(25)}
+    assert short == len(inspect) and rows[0][3] >= len(rows)
+
+
+def test_an_open_alarm_does_not_end_because_nobody_measures(settings):
+    rows = fallen()
+    then = rows["measured_at_utc"].max() - pd.Timedelta(weeks=20)
+    silent = rows[(rows["turnout_id"] != "T00001") | (rows["measured_at_utc"] <= then)]
+    question = "select state, sentence from worklist({}) where section_id = 'T00001/S4'"
+    with viewed(silent, settings) as con:
+        for asof in ("newest_measurement()", "newest_measurement() - interval 1 day"):
+            ((state, sentence),) = con.execute(question.format(asof)).fetchall()
+            assert state == "inspect this week" and f"not measured since {then:%Y-%m-%d}" in sentence
+    with viewed(rows, settings) as con:
+        assert "not measured since" not in con.execute(question.format("newest_measurement()")).fetchall()[0][1]
+
+
+@pytest.mark.parametrize(
+    ("days", "state"), [(400, "inspect this week"), (-40000, "inspect this week"), (0, "learning")]
+)
+def test_work_that_is_planned_resets_nothing_yet(tmp_path, settings, days, state):
+    """An event of tomorrow, of before the first campaign, and of today: the last has come after the last campaign."""
+    small_registry(tmp_path, fallen())
+    at = pd.Timestamp.now("UTC").tz_localize(None).floor("s") + pd.Timedelta(days=days)
+    publish(tmp_path, {"events": arrow_rows("events", work("T00001", at))})
+    update(tmp_path, settings)
+    with open_registry(tmp_path) as con:
+        assert con.execute("select state from chart_states where section_id = 'T00001/S4'").fetchall() == [(state,)]
+
+
+def before_and_after_a_night(hours):
+    """Two turnouts every four weeks; the first gains 5 % in a night, measured the day before and ``hours`` later."""
+    fleet = Fleet(turnouts=2, weeks=200, phi=0.1, every=4, band="ballast", frequency=150.0)
+    rows = modes(fleet, 3, None)
+    day = sorted(rows["measured_at_utc"].unique())[40]
+    after = rows[rows["measured_at_utc"] == day].assign(measured_at_utc=day + pd.Timedelta(hours=hours))
+    rows, at = pd.concat([rows, after], ignore_index=True), day + pd.Timedelta(hours=14)
+    rows.loc[(rows["measured_at_utc"] > at) & (rows["section_id"] == "T00000/S0"), "frequency_hz"] *= 1.05
+    return rows, work("T00000", at, "T00000/S0")
+
+
+@pytest.mark.parametrize("hours", [24, 40])
+def test_a_test_before_and_one_after_work_are_two_campaigns(settings, hours):
+    rows, events = before_and_after_a_night(hours)
+    with viewed(rows, settings, events) as con:
+        found = con.execute("select section_id, change_pct, change_se_pct from change_since_event('tamping', 28)").df()
+    one = found.set_index("section_id").loc["T00000/S0"]
+    assert one["change_pct"] == pytest.approx(5.0, abs=3.0 * one["change_se_pct"]) and one["change_se_pct"] < 1.5
+
+
+def test_who_measures_daily_has_campaigns_and_not_one(settings):
+    """36 hours from the first value: two days make a campaign."""
+    rows = modes(Fleet(turnouts=1, weeks=60, phi=0.1), 3, None)
+    weeks = rows["measured_at_utc"].rank(method="dense").astype(int) - 1
+    daily = rows.assign(measured_at_utc=pd.Timestamp("2020-01-01") + pd.to_timedelta(weeks, unit="D"))
+    assert panel_of(daily, settings).time.shape == (1, 30)
+
+
+def test_a_drift_is_planned_though_its_chart_is_too_noisy(settings):
+    """Every six weeks, 1.2 % of scatter: the target is not seen within a year, half a percent a year is in six."""
+    fleet = Fleet(turnouts=12, weeks=312, phi=0.0, every=6, sigma=1.2, campaign=0.3, band="ballast", frequency=150.0)
+    weeks, change = np.arange(0, 312, 6), np.zeros((12, 8, 52))
+    change[:8, 2, :] = -0.7 / 52.0 * np.clip(weeks - 52, 0, None)
+    with viewed(modes(fleet, 5, change), settings) as con:
+        noisy = con.execute(
+            "select section_id from chart_status where reason = 'too_noisy' and drift_q <= 0.1"
+        ).fetchall()
+        most = "worklist(newest_measurement(), most := 1000)"
+        listed = con.execute(f"select section_id, state from {most}").fetchall()
+        blind = con.execute(f"select turnout_id, sections from {most} where state = 'cannot tell'").fetchall()
+    assert noisy and {(section, "plan") for (section,) in noisy} <= set(listed)
+    assert not [s for (s,) in noisy if any(t == s[:6] and s[7:] in labels.split(", ") for t, labels in blind)]
+
+
+def test_what_is_silenced_comes_back_on_its_day(settings):
+    rows = fallen()
+    newest = rows["measured_at_utc"].max()
+    said = pd.DataFrame(
+        {
+            "acknowledgement_id": ["a"], "turnout_id": ["T00001"], "section_id": [None], "band": [None],
+            "action": ["suppress"], "by_whom": ["M. Jensen"], "at_utc": [newest], "reason": ["renewal ordered"],
+            "until_utc": [newest + pd.Timedelta("3D")],
+        }
+    )  # fmt: skip
+    with viewed(rows, settings, acknowledgements=said) as con:
+        seen = {d: con.execute(f"select count(*) from worklist(newest_measurement() + interval {d} day) "
+                               "where section_id = 'T00001/S4'").fetchall()[0][0] for d in (0, 2, 3, 4000)}  # fmt: skip
+        assert seen == {0: 0, 2: 0, 3: 1, 4000: 1}
+        assert con.execute("select state from chart_states where section_id = 'T00001/S4'").fetchall() == [
+            ("inspect this week",)
+        ]
+
+
+def test_sections_measured_the_day_after_are_of_the_same_campaign(settings):
+    """S4 to S7 a day after S0 to S3: the residuals in SQL have all eight, and the same as in one day."""
+    rows = fallen()
+    late = rows.assign(
+        measured_at_utc=rows["measured_at_utc"]
+        + pd.to_timedelta(np.where(rows["section_id"].str[-1].astype(int) >= 4, 24, 0), unit="h")
+    )
+    question = "select section_id, residual_pct from mode_residuals(timestamp '2016-01-01') order by all"
+    found = [connection.execute(question).df() for connection in (viewed(rows, settings), viewed(late, settings))]
+    pd.testing.assert_frame_equal(*found)
+
+
+def test_the_list_in_words_says_what_it_rests_on_and_what_it_leaves_out(tmp_path, settings, capsys):
+    from turnout.cli import main
+
+    rows = fallen()
+    newest = rows["measured_at_utc"].max()
+    silent = (rows["turnout_id"] == "T00002") & (rows["measured_at_utc"] > newest - pd.Timedelta(weeks=20))
+    small_registry(tmp_path, rows[~silent])
+    update(tmp_path, replace(settings, worklist_rows=1))
+    assert main(["worklist", "--registry", str(tmp_path)]) == 0
+    told = capsys.readouterr().out
+    assert "INSPECT THIS WEEK: T00001" in told
+    # eight sections and the turnout's median, three times; T00002 is silent
+    assert f"Of 27 charts, newest campaign {newest:%Y-%m-%d}: 9 not measured for too long." in told
+
+
+def test_without_a_trend_nobody_is_told_that_there_is_nothing_to_do(tmp_path, capsys):
+    from turnout.cli import main
+
+    small_registry(tmp_path, fallen(weeks=3))
+    assert main(["worklist", "--registry", str(tmp_path)]) == 0
+    assert "Nothing to do" not in (told := capsys.readouterr().out) and "No chart has been computed yet" in told
+
+
+@pytest.mark.parametrize(
+    ("slope", "weeks", "verdict"), [(-12.0, 104, "reached"), (-40.0, 20, "reached"), (-1.0, 104, "line")]
+)
+def test_a_limit_that_is_passed_has_no_date(settings, slope, weeks, verdict):
+    """A straight fall of 12 %/a over two years stands at -24 %, one of 40 %/a over 20 weeks at -15 %; limit -5 %."""
+    time = 7.0 * np.arange(weeks)
+    values = slope * time / 365.25 + np.random.default_rng(2).normal(0.0, 0.1, weeks)
+    assert forecast(time, values, 0.0, settings).verdict == verdict
+
+
+def test_points_of_a_campaign_of_two_days_are_all_red():
+    day = datetime(2020, 3, 1)
+    chart = {"expected_low_hz": None, "expected_high_hz": None}
+    charts = [
+        chart | {"measured_at_utc": day + timedelta(7 * n), "state": s} for n, s in enumerate(("ok", "alarm_down"))
+    ]
+    mode = {"frequency_se_hz": 1.0, "damping_ratio": 0.1, "n_impacts": 5, "rail_temperature_c": 15.0}
+    modes_ = [
+        mode | {"measured_at_utc": day + timedelta(7 * n, hours=h), "frequency_hz": 150.0 + n}
+        for n, h in ((0, 24), (1, 0), (1, 24))
+    ]
+    svg = history_panel("ballast", modes_, charts, [])
+    assert svg.count('class="alarm"') == 2 and svg.count('class="point"') == 1
