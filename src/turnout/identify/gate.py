@@ -20,7 +20,9 @@ def passed_share(receptance, frequency: float, damping: float) -> tuple[float, f
 
 def residues_of_receptance(receptance, frequency, damping) -> np.ndarray | None:
     r"""Residues R of the accelerance :math:`\sum_m \frac12\left(\frac{R_m}{p - s_m} +
-    \frac{\bar R_m}{p - \bar s_m}\right) + d_0 + d_1 p^2` by least squares over the lines that passed; :math:`p = i\omega + a` behind an exponential window.
+    \frac{\bar R_m}{p - \bar s_m}\right) + d_0 + d_1 p^2` by least squares over the lines that passed.
+
+    :math:`p = i\omega + a`, with the decay a of the receptance's exponential window.
 
     Parameters
     ----------

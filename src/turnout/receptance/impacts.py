@@ -13,6 +13,7 @@ from turnout.receptance.cut import cut_blows
 from turnout.receptance.decay import judge_decay, judge_second_contact
 from turnout.receptance.flat_top import judge_tops
 from turnout.receptance.overload import overload
+from turnout.receptance.repeats import judge_repeats, repeated
 from turnout.records import Impact, Recording, Rejection
 
 
@@ -53,11 +54,13 @@ def find_impacts(
     settings = settings or ReceptanceSettings()
     cuts = cut_blows(recordings, force, response, settings)
     sound = [c for c in cuts if not c.rejections]
+    judge_repeats(sound)
     for cut in sound:
         _measure(cut, settings)
     pulses = [c.force[c.contact.onset : c.contact.end + 1] for c in sound]
     for cut, edge in zip(sound, _edges(sound, pulses)):
         cut.band_edge = edge
+    sound = [c for c in sound if not repeated(c)]
     judge_against_median(sound, settings)
     judge_tops(sound, settings.deviation)
     for rate in sorted({c.rate for c in sound}):
@@ -84,10 +87,20 @@ def _measure(cut, settings):
         cut.rejections.append(Rejection("sign_reversed", contact.peak, 0.0, (
             f"{cut.channels[0].name} reads {contact.peak:.4g} N at contact: a hammer can only push")))  # fmt: skip
     cut.contact, cut.contact_end = contact, contact.end
+    _judge_start(cut, settings)
     if (found := overload(cut, contact)) is not None:
         cut.rejections.append(found)
     judge_second_contact(cut, settings)
     judge_decay(cut, settings)
+
+
+def _judge_start(cut, settings):
+    """Reject a blow that had begun before its record: the force that is missing was answered all the same."""
+    contact, at_start = cut.contact, cut.polarity * float(cut.force[0])
+    least = max(settings.contact_level * abs(contact.peak), 5.0 * contact.noise_force)
+    if contact.onset == 0 and at_start > least:
+        detail = f"the record starts with {at_start:.4g} N: the blow had begun before it"
+        cut.rejections.append(Rejection("late", at_start, least, detail))
 
 
 def _significant_zero(cut, contact):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from turnout.receptance import find_impacts
+from turnout.receptance import find_impacts, receptance_of
 
 RATE = 20_000.0
 
@@ -106,11 +106,58 @@ def test_a_noisy_blow_is_rejected_and_an_evenly_noisy_test_is_not(hammer):
 def test_late_and_cut_off_records_are_rejected(hammer):
     recordings = hammer.recordings(4)
     late = hammer.samples(hammer.force(start=0.19))
-    short = recordings[0].samples[:, :600]  # 30 ms, of which 23 ms decay: the ballast mode keeps e^-4 of itself
+    short = hammer.recordings(1)[0].samples[:, :600]  # 30 ms, of which 23 ms decay: the ballast mode keeps e^-4 of itself
     impacts = hammer.impacts([*recordings, hammer.recording(late, 8), hammer.recording(short, 9)])
     assert [reasons(i) for i in impacts] == [[]] * 4 + [["late"], ["cut_off"]]
     # An exponential window ends the leakage that a cut-off record would bring.
     assert hammer.impacts([*recordings, hammer.recording(short, 9)], exponential_window=100.0)[-1].accepted
+
+
+@pytest.mark.parametrize("begun", [2, 6, 14, 20])
+def test_a_blow_that_had_begun_before_its_record_is_rejected(hammer, begun):
+    """The response to the force that is missing is there; at 14 of 30 samples H1 would be wrong by four fifths."""
+    sound = hammer.recordings(4, noise=(1e-5, 1e-5))
+    cut_short = hammer.samples(hammer.force(start=5e-3), (1e-5, 1e-5))[:, 100 + begun :]
+    impacts = hammer.impacts([*sound, hammer.recording(cut_short, 9)])
+    assert [reasons(i)[:1] for i in impacts] == [[]] * 4 + [["late"]]
+    first = 5000.0 * np.sin(np.pi * begun / 30)
+    (late,) = [r for r in impacts[-1].rejections if r.reason == "late"]
+    assert late.value == pytest.approx(first, abs=30.0)
+    assert late.detail == f"the record starts with {late.value:.4g} N: the blow had begun before it"
+
+
+def test_a_blow_at_the_very_start_of_its_record_is_whole(hammer):
+    recordings = [hammer.recording(r.samples[:, 100:], k) for k, r in enumerate(hammer.recordings(5))]
+    assert all(i.accepted for i in hammer.impacts(recordings))
+
+
+@pytest.mark.parametrize("digits", [None, "single", "text", "16 bit"])
+def test_the_same_test_exported_twice_counts_once(hammer, digits):
+    """In another format, under another header, cut at another place: the samples are the same to their rounding."""
+    sound = hammer.recordings(5)
+    again = []
+    for r in sound:
+        samples = r.samples[:, 40:]
+        if digits == "single":
+            samples = samples.astype(np.float32).astype(float)
+        elif digits == "text":
+            samples = np.array([[float(f"{x:.6g}") for x in row] for row in samples])
+        elif digits == "16 bit":
+            step = 1.2 * np.abs(samples).max(axis=1, keepdims=True) / 2**15
+            samples = step * np.round(samples / step)
+        again.append(hammer.recording(samples, r.record, "again.csv"))
+    alone, both = hammer.impacts(sound), hammer.impacts([*sound, *again])
+    assert [reasons(i) for i in both] == [[]] * 5 + [["duplicate"]] * 5
+    assert both[5].rejections[0].detail == "the same samples as record 0 of test.uff"
+    assert [i.peak for i in both[:5]] == [i.peak for i in alone]
+    assert receptance_of(both).n == 5
+
+
+def test_blows_alike_are_no_repeats(hammer):
+    """Equal forces and 80 dB between peak and noise: what tells them apart is their noise."""
+    force = hammer.force()
+    recordings = [hammer.recording(hammer.samples(force, (1e-4, 1e-4)), k) for k in range(6)]
+    assert all(i.accepted for i in hammer.impacts(recordings))
 
 
 def test_one_blow_alone_is_measured_and_not_compared(hammer):
