@@ -9,7 +9,7 @@ import numpy as np
 
 from turnout.chains.accepted_terms import terms_on
 from turnout.chains.mismatch_context import track_file
-from turnout.chains.simulate_request import check_request, section_channels, time_of
+from turnout.chains.simulate_request import check_request, ending_of, section_channels, time_of, with_format
 from turnout.config.load import load_configuration
 from turnout.config.settings.simulate import SimulateSettings
 from turnout.errors import SimulationError
@@ -18,7 +18,6 @@ from turnout.simulate import Hammer, Sensor, load_track, load_vehicle, simulate_
 from turnout.simulate.hammer import hammer_sensors, located
 from turnout.simulate.turnout_track import stretch_of_track
 
-ENDINGS = {"uff58": "uff", "uff58b": "uff", "hdf5": "h5", "mat73": "mat", "rcmdx": "rcmdx"}
 NOISE = {"acceleration": 0.05, "force": 2.0, "velocity": 1e-6, "displacement": 1e-9}
 
 
@@ -28,6 +27,7 @@ def write_hammer(request):
     ``request`` holds the options of `turnout simulate hammer`: track, section, tests, blows, turnout, config, raw,
     out, format, at, temperature, truth, seed.
     """
+    request = with_format(request)
     check_request(request)
     turnout, settings = _turnout(request)
     track = _track(request, turnout)
@@ -56,7 +56,7 @@ def write_hammer(request):
             conditions=_noted(request),
         )
         day = time_of(request).date().isoformat()
-        name = f"hammer/{day}/{section}_{test}.{_ending(request['format'])}"
+        name = f"hammer/{day}/{section}_{test}.{ending_of(request['format'])}"
         path = _write(request, turnout, name, recordings, description)
         peak = max(float(r.samples[0].max()) for r in recordings)
         yield path, f"{len(recordings)} blows at {place:.2f} m, highest force {peak / 1e3:.1f} kN"
@@ -64,6 +64,7 @@ def write_hammer(request):
 
 def write_passage(request):
     """Simulate the passage of a request and write it; yields (path, what it holds)."""
+    request = with_format(request)
     check_request(request)
     turnout, settings = _turnout(request)
     track = _track(request, turnout)
@@ -90,7 +91,7 @@ def write_passage(request):
         conditions=_noted(request),
         truth=True,
     )
-    name = f"passages/{time_of(request):%Y%m%dT%H%M%SZ}.{_ending(request['format'])}"
+    name = f"passages/{time_of(request):%Y%m%dT%H%M%SZ}.{ending_of(request['format'])}"
     path = _write(request, turnout, name, [recording], description)
     if request.get("truth"):
         _write_truth(Path(request["truth"]) / Path(path).with_suffix(".json").name, recording, truth)
@@ -148,10 +149,6 @@ def _said(vehicle, request):
     """What accepted terms depend on: temperature, axle loads, train."""
     loads = tuple(2.0 * float(load) for load in vehicle.static_loads)
     return {"axle_loads": loads, "train": vehicle.name.lower(), **_noted(request)}
-
-
-def _ending(format_name):
-    return ENDINGS.get(format_name, format_name)
 
 
 def _sensor(channel, place):

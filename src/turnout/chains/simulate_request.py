@@ -1,12 +1,14 @@
 """What `turnout simulate` is asked for, checked before anything is simulated."""
 
 from datetime import datetime
+from pathlib import Path
 
 from turnout.config.events import wrong_time
 from turnout.config.keys import suggestion
 from turnout.errors import ConfigError
 from turnout.readers.writing import WRITERS
 
+ENDINGS = {"uff58": "uff", "uff58b": "uff", "hdf5": "h5", "mat73": "mat", "rcmdx": "rcmdx"}
 WHOLE = {"tests": 1, "blows": 1, "units": 1, "seed": 0}
 
 
@@ -26,6 +28,31 @@ def check_request(request) -> None:
         raise _wrong("out", f"one file for {request['tests']} tests", "Write --tests 1, or leave out --out")
     if wrong := wrong_time(request["at"]):
         raise _wrong("at", f"{request['at']!r} is not a time in UTC{wrong[0]}", wrong[1])
+
+
+def with_format(request) -> dict:
+    """The request with the format that the ending of its file says, where none is named; HDF5 where nothing does.
+
+    >>> with_format({"format": None, "out": "a.npz"})["format"], with_format({"format": None, "out": None})["format"]
+    ('npz', 'hdf5')
+    """
+    if request["format"] or not request.get("out"):
+        return {**request, "format": request["format"] or "hdf5"}
+    ending = Path(request["out"]).suffix.lstrip(".").lower()
+    known = {ending_of(name): name for name in reversed(WRITERS)} | {"hdf5": "hdf5", "hdf": "hdf5"}
+    if ending not in known:
+        remedy = f"Write one of .{', .'.join(sorted(known))}, or say --format"
+        raise _wrong("out", f"{request['out']!r}, whose ending is no format", remedy)
+    return {**request, "format": known[ending]}
+
+
+def ending_of(format_name: str) -> str:
+    """Ending of files of a format.
+
+    >>> ending_of("hdf5")
+    'h5'
+    """
+    return ENDINGS.get(format_name, format_name)
 
 
 def time_of(request) -> datetime:

@@ -41,7 +41,7 @@ def add_arguments(parser):
         sub.add_argument("--raw", default="raw", help="folder of raw files (default raw)")
         sub.add_argument("--truth", help="folder for what is true; the pipeline does not read it")
         sub.add_argument("--out", help="file to write instead of a place below --raw")
-        sub.add_argument("--format", default="hdf5", help="format of the file (default hdf5)")
+        sub.add_argument("--format", help="format of the file (default: by the ending of --out, else hdf5)")
         sub.add_argument("--at", default="2024-05-13T09:00:00", help="time of the first sample in UTC, without a zone")
         sub.add_argument("--temperature", type=float, help="rail temperature to note [°C]")
         sub.add_argument("--seed", type=int, default=0)

@@ -35,8 +35,6 @@ def test_a_simulated_passage_keeps_its_truth_apart(tmp_path, monkeypatch, capsys
         "locomotive",
         "--speed",
         "140",
-        "--format",
-        "npz",
         "--truth",
         "truth",
     ]
@@ -61,6 +59,7 @@ HAMMER = ["simulate", "hammer", "--section", "A7"]
         ([*HAMMER, "--at", "2024-05-13T09:00:00+02:00"], "with a time zone. Write the time in UTC, without a zone"),
         ([*HAMMER, "--tests", "2", "--out", "a.h5"], "--out: one file for 2 tests. Write --tests 1, or leave out"),
         ([*HAMMER, "--format", "nix"], "--format: 'nix'. Allowed: csv, hdf5"),
+        ([*HAMMER, "--out", "a.xlsx"], "--out: 'a.xlsx', whose ending is no format. Write one of .csv, .h5"),
         ([*HAMMER, "--blows", "0"], "--blows: 0. Write a whole number of at least 1"),
         ([*HAMMER, "--tests", "0"], "--tests: 0. Write a whole number of at least 1"),
         ([*HAMMER, "--seed", "-1"], "--seed: -1. Write a whole number of at least 0"),
