@@ -12,6 +12,8 @@ from turnout.records import Mode
 class ImpactEstimates:
     """One mode in several blows: ``impact`` (n,) numbers, ``estimate`` and ``error`` (n, 2) of ln f [Hz] and zeta.
 
+    An error of nan is one that nobody knows, and becomes None.
+
     ``strength`` (n,) is the norm of each decay; ``bound`` (2,) the Cramér-Rao bound, None where unknown;
     ``choice`` (2,) the error of the choice among explanations, which all blows share.
     """
@@ -34,8 +36,8 @@ class ImpactEstimates:
                 "band": self.band,
                 "frequency": float(frequency[i]),
                 "damping": float(self.estimate[i, 1]),
-                "frequency_se": float(frequency[i] * self.error[i, 0]),
-                "damping_se": float(self.error[i, 1]),
+                "frequency_se": _known(frequency[i] * self.error[i, 0]),
+                "damping_se": _known(self.error[i, 1]),
             }
             for i in range(len(self.impact))
         ]
@@ -54,16 +56,20 @@ class ImpactEstimates:
             band=self.band,
             frequency=f,
             damping=zeta.mean,
-            frequency_se=f * log_f.se,
-            damping_se=zeta.se,
+            frequency_se=_known(f * log_f.se),
+            damping_se=_known(zeta.se),
             frequency_sd=f * log_f.spread,
             damping_sd=zeta.spread,
-            frequency_low=float(np.exp(log_f.low)),
-            frequency_high=float(np.exp(log_f.high)),
-            damping_low=zeta.low,
-            damping_high=zeta.high,
+            frequency_low=_known(np.exp(log_f.low)),
+            frequency_high=_known(np.exp(log_f.high)),
+            damping_low=_known(zeta.low),
+            damping_high=_known(zeta.high),
             frequency_crb=None if self.bound is None else f * float(self.bound[0]),
             damping_crb=None if self.bound is None else float(self.bound[1]),
             energy=self.energy,
             n=log_f.n,
         )
+
+
+def _known(value) -> float | None:
+    return None if np.isnan(value) else float(value)

@@ -78,8 +78,9 @@ def _estimates(found, records, index, settings, receptance):
                 detail = f"{band} mode: share of its half-power band that passes the gate; lowest level {level:.2f}"
                 rejections.append(Rejection("low_coherence", share, settings.gate_share, detail))
                 continue
-        spread = theta.std(axis=0, ddof=1) if len(theta) > 1 else np.zeros(2)
-        error = np.broadcast_to(np.maximum(spread, 1e-12), theta.shape)
+        # of one blow nobody knows the spread
+        spread = np.maximum(theta.std(axis=0, ddof=1), 1e-12) if len(theta) > 1 else np.full(2, np.nan)
+        error = np.broadcast_to(spread, theta.shape)
         estimates.append(ImpactEstimates(band, index[use], theta, error, np.ones_like(strength[use])))
     return estimates, rejections
 

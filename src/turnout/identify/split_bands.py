@@ -5,9 +5,13 @@ from scipy.signal import butter, sosfilt, sosfiltfilt
 
 from turnout.identify.era import era
 
+TOP = 0.45  # of the sampling rate: no filter has its edge beyond
 
-def split(records, rate: float, settings) -> tuple[np.ndarray, np.ndarray]:
+
+def split(records, rate: float, settings) -> tuple[np.ndarray, ...]:
     """Records below and above the split frequency, (n, n_sample) each; filtered over their whole length.
+
+    At a low rate the upper band ends earlier, and without room for it there is only the lower one.
 
     Butterworth low-pass at ``split_frequency`` and band-pass from there to ``paper_band_high``, forwards and
     backwards if ``paper_zero_phase``. The paper names neither filter nor order nor phase.
@@ -17,10 +21,12 @@ def split(records, rate: float, settings) -> tuple[np.ndarray, np.ndarray]:
     Barkhordari et al., section on model validation: 10-200 Hz and 200-800 Hz.
     """
     order, edge = settings.paper_filter_order, settings.split_frequency
-    low = butter(order, edge, fs=rate, output="sos")
-    high = butter(order, [edge, settings.paper_band_high], btype="band", fs=rate, output="sos")
+    top = min(settings.paper_band_high, TOP * rate)
+    filters = [butter(order, min(edge, top), fs=rate, output="sos")]
+    if top > edge:
+        filters.append(butter(order, [edge, top], btype="band", fs=rate, output="sos"))
     through = sosfiltfilt if settings.paper_zero_phase else sosfilt
-    return tuple(through(sos, np.asarray(records, dtype=float), axis=-1) for sos in (low, high))
+    return tuple(through(sos, np.asarray(records, dtype=float), axis=-1) for sos in filters)
 
 
 def second_order_mode(decay, rate: float) -> tuple[float, float]:

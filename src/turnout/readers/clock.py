@@ -127,6 +127,27 @@ def settled_rate(record, promised, where, source):
     return float(whole) if unique and abs(rate - whole) <= rate * tolerance else float(rate)
 
 
+def starts_of(moments, time_zone):
+    """[(record, naive UTC)] of [(record, time stamp)] of one file, in its order.
+
+    Of an hour that comes twice in autumn the first is meant, unless a record would then begin before the one in front.
+
+    >>> from datetime import datetime
+    >>> stamps = enumerate([datetime(2024, 10, 27, 2, 55), datetime(2024, 10, 27, 2, 5)])
+    >>> [f"{start:%H:%M}" for _, start in starts_of(stamps, "Europe/Copenhagen")]
+    ['00:55', '01:05']
+    """
+    found, latest = [], None
+    for record, moment in moments:
+        start = started_at(moment, time_zone)
+        if start is not None and latest is not None and start < latest and moment.tzinfo is None:
+            second = started_at(moment.replace(fold=1), time_zone)
+            start = second if second is not None and second >= latest else start
+        found.append((record, start))
+        latest = start if latest is None or (start is not None and start > latest) else latest
+    return found
+
+
 def check_order(starts, source):
     """{record: ReadError} for each record that began before the one in front of it."""
     errors: dict[int, ReadError] = {}

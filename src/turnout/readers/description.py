@@ -7,7 +7,7 @@ import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.channels import mappings
-from turnout.readers.clock import check_order, check_time, settled_rate, started_at
+from turnout.readers.clock import check_order, check_time, settled_rate, starts_of
 from turnout.readers.long_record import Soundness, Stretches, fault
 from turnout.readers.raw import COPY_AGAIN
 from turnout.records import LongRecording, RawDescription, Recording
@@ -25,11 +25,8 @@ def describe(raw, description: RawDescription, source, longest=None):
     if not raw.records and not raw.expected:
         raise source.error("the file", "it holds no record", COPY_AGAIN, reason="empty")
     recordings, errors = [], []
-    starts = [
-        (k, started_at(record.started_at, description.time_zone))
-        for k, record in enumerate(raw.records)
-        if not isinstance(record, ReadError)
-    ]
+    stamps = [(k, record.started_at) for k, record in enumerate(raw.records) if not isinstance(record, ReadError)]
+    starts = starts_of(stamps, description.time_zone)
     backwards = check_order(starts, source)
     for k, record in enumerate(raw.records):
         try:

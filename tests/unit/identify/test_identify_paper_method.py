@@ -5,6 +5,7 @@ import pytest
 
 from turnout.config.settings.identify import IdentifySettings
 from turnout.identify import identify
+from turnout.identify.split_bands import band_modes, split
 from turnout.published import LOCATIONS, hammer_test
 
 SETTINGS = IdentifySettings(null_draws=10, paper_bias_tests=8)
@@ -71,3 +72,27 @@ def test_settings_choose_the_method():
     test = hammer_test("SP", 3, 5)
     model = identify(test.decays(), test.rate, IdentifySettings(method="paper", null_draws=10, paper_bias_tests=2))
     assert model.method == "paper"
+
+
+@pytest.mark.parametrize(("rate", "bands"), [(1600.0, 2), (1500.0, 2), (1280.0, 2), (400.0, 1)])
+def test_at_a_low_rate_the_upper_band_ends_below_half_of_it(rate, bands):
+    """Decays of 60 Hz and, where it fits, of 350 Hz: order 2 finds each in its band, whatever the filter's top."""
+    k = np.arange(int(0.5 * rate)) / rate
+    wanted = [(60.0, 0.05), (350.0, 0.05)][:bands]
+    lead = np.zeros(int(0.05 * rate))
+    records = sum(np.exp(-z * 2 * np.pi * f * k) * np.cos(2 * np.pi * f * k) for f, z in wanted)
+    found = band_modes([np.r_[lead, records]], [len(lead)], len(k), rate, SETTINGS)[:, 0]
+    assert found[:bands, 0] == pytest.approx([f for f, _ in wanted], rel=0.05)
+    assert np.isnan(found[bands:]).all()
+    # 0.45 of the rate is left to the upper band, and nothing above the split where that is no more
+    assert len(split([records], rate, SETTINGS)) == bands
+
+
+def test_one_blow_has_no_standard_error():
+    test = hammer_test("CP A7", 1, 4, pre_trigger=0.01)
+    leads = [y[:k] for y, k in zip(test.acceleration, test.decay_start, strict=True)]
+    model = identify(test.decays(), test.rate, SETTINGS, method="paper", leads=leads)
+    assert model.modes and all(m.n == 1 for m in model.modes)
+    for mode in model.modes:
+        assert (mode.frequency_se, mode.damping_se, mode.frequency_low, mode.damping_high) == (None,) * 4
+    assert all(row["frequency_se"] is None and row["damping_se"] is None for row in model.per_impact)

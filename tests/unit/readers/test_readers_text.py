@@ -131,3 +131,20 @@ def test_what_a_reader_did_not_foresee_names_its_file(tmp_path, monkeypatch):
     monkeypatch.setattr(type(FORMATS["csv"]), "read_raw", lambda *_: open("/nowhere/at/all"))
     with pytest.raises(FileNotFoundError):
         read("a.csv", tmp_path, NAMED)
+
+
+def test_the_hour_that_comes_twice_in_autumn_is_told_by_the_order_of_the_records(tmp_path):
+    """Summer time ends in Copenhagen on 2024-10-27 at 01:00 UTC: 02:05 after 02:55 is ten minutes later."""
+    told = ("02:30", "02:55", "02:05", "02:20", "03:10")
+    rail = RawDescription((NAMED.channels[1],), kind="passage", rate=20000.0, time_zone="Europe/Copenhagen")
+    stamps = np.array([f"2024-10-27T{clock}:00" for clock in told])
+    numbered = {f"record_{k:03d}": X[:, 1:].T for k in range(5)}
+    np.savez(tmp_path / "a.npz", channels=["acc"], started_at=stamps, **numbered)
+    result = read("a.npz", tmp_path, rail)
+    assert result.errors == ()
+    expected = ["00:30", "00:55", "01:05", "01:20", "02:10"]
+    assert [f"{r.started_at:%H:%M}" for r in result.recordings] == expected
+    stamps[3] = "2024-10-27T01:20:00"  # this hour came once
+    np.savez(tmp_path / "b.npz", channels=["acc"], started_at=stamps, **numbered)
+    (error,) = read("b.npz", tmp_path, rail).errors
+    assert (error.reason, error.where) == ("clock_backwards", "record 4")
