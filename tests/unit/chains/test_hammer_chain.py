@@ -10,9 +10,11 @@ import pytest
 from turnout.chains.hammer import hammer_unit
 from turnout.config import load_configuration, with_raw
 from turnout.demo.hammer import hammer_test
+from turnout.fleet.guard import guarded
 from turnout.fleet.scan import scan
 from turnout.published.models import published_model
 from turnout.published.response import paper_response
+from turnout.readers import read
 from turnout.readers.writing import write
 
 DAY = date(2024, 5, 13)
@@ -112,6 +114,39 @@ def test_a_file_copied_under_another_name_counts_once(tmp_path):
     assert len(unit.files) == 3 and len(rows["impacts"]) == 20
     assert [q["reason_code"] for q in rows["quarantine"]] == ["duplicate"]
     assert "A9_1" in rows["quarantine"][0]["found"] and "A9_3" in rows["quarantine"][0]["path"]
+
+
+def test_a_test_exported_again_in_another_format_counts_once(tmp_path):
+    """Other bytes, the same blows, and a name that is a test of its own: every one is named with its original."""
+    unit, turnout, _ = lay_out(tmp_path, n_test=2)
+    once = hammer_unit(unit, turnout, tmp_path, algo="1")
+    folder = tmp_path / "tommerup_s1" / "hammer" / DAY.isoformat()
+    recordings = read("A7_1.h5", folder, replace(turnout.hammer.descriptions["A7"], n_records=None)).recordings
+    write(recordings, folder / "A7_3.uff", "uff58")
+    twice = hammer_unit(scan(turnout, tmp_path).units[0], turnout, tmp_path, algo="1")
+    again = [i for i in twice["impacts"] if i["test"] == 3]
+    assert all("A7_1.h5" in i["detail"] for i in again)
+    assert [i["reason"] for i in again] == ["duplicate"] * 10
+    assert twice["models"][0]["n_impacts_used"] == once["models"][0]["n_impacts_used"]
+
+
+def test_a_file_that_no_reader_foresaw_costs_itself_alone(tmp_path):
+    unit, turnout, _ = lay_out(tmp_path, n_test=2)
+    folder = tmp_path / "tommerup_s1" / "hammer" / DAY.isoformat()
+    (folder / "A7_3.csv").write_text("# rate: 20000,0\nforce;acc\n1;2\n3;4\n")
+    unit = scan(turnout, tmp_path).units[0]
+    result = guarded(hammer_unit, unit, turnout, tmp_path, "key", "1", False)
+    assert result.status == "partly" and len(result.tables["impacts"]) == 20
+    assert {q["path"][-8:] for q in result.tables["quarantine"]} == {"A7_3.csv"}
+
+
+def test_the_decay_of_an_exponential_window_stands_beside_its_receptance(tmp_path):
+    unit, turnout, _ = lay_out(tmp_path, n_test=2)
+    for decay in (0.0, 50.0):
+        own = replace(turnout.settings["receptance"], exponential_window=decay)
+        windowed = replace(turnout, settings={**turnout.settings, "receptance": own})
+        (row,) = hammer_unit(unit, windowed, tmp_path, algo="1")["receptances"]
+        assert row["window_decay_per_s"] == decay
 
 
 def test_a_corrected_temperature_makes_another_model_of_the_same_blows(tmp_path):

@@ -106,7 +106,8 @@ def test_a_noisy_blow_is_rejected_and_an_evenly_noisy_test_is_not(hammer):
 def test_late_and_cut_off_records_are_rejected(hammer):
     recordings = hammer.recordings(4)
     late = hammer.samples(hammer.force(start=0.19))
-    short = hammer.recordings(1)[0].samples[:, :600]  # 30 ms, of which 23 ms decay: the ballast mode keeps e^-4 of itself
+    # 30 ms, of which 23 ms decay: the ballast mode keeps e^-4 of itself
+    short = hammer.recordings(1)[0].samples[:, :600]
     impacts = hammer.impacts([*recordings, hammer.recording(late, 8), hammer.recording(short, 9)])
     assert [reasons(i) for i in impacts] == [[]] * 4 + [["late"], ["cut_off"]]
     # An exponential window ends the leakage that a cut-off record would bring.
