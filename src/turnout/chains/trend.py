@@ -7,6 +7,7 @@ from pathlib import Path
 from turnout.config import load_configuration
 from turnout.fleet.atomic import write_text
 from turnout.registry.database import open_registry
+from turnout.registry.day import list_day
 from turnout.trend.nightly import update
 
 
@@ -34,7 +35,7 @@ def trend_job(generation, state, worklist, configuration) -> dict:
     said = [dict(row) for row in read.acknowledgements]
     done = update(registry, read.settings["trend"], before.get("digests"), acknowledgements=said)
     with open_registry(registry) as con:
-        rows = con.execute("select * from worklist").df()
+        rows = con.execute(f"select * from worklist({list_day()}) order by rank").df()
     write_text(worklist, rows.to_csv(index=False, lineterminator="\n"))
     newest = done.newest.isoformat() if done.newest else None
     now = {"rows": done.rows, "generation": done.generation, "newest": newest, "digests": done.digests}

@@ -13,7 +13,7 @@ from turnout.commands.query import opened
 
 CHARTS = """
     select count(*), count(*) filter (state = 'suppressed'), count(*) filter (state = 'not measured'), newest_charted()
-    from chart_states"""
+    from chart_states_on({})"""
 HELP = "tomorrow's list: what to inspect, what to plan, where nothing can be said"
 
 
@@ -28,14 +28,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the list, or write it as comma-separated values."""
     from turnout.registry.database import open_registry
+    from turnout.registry.day import list_day
 
     with open_registry(args.registry) as con:
-        asof = "?::timestamp" if args.asof else "greatest(newest_measurement(), today_utc())"
+        asof = "?::timestamp" if args.asof else list_day()
         question = f"select * from worklist({asof}{', most := 1000000000' if args.all else ''}) order by rank"
         cursor = con.execute(question, [_date(args.asof)] if args.asof else [])
         names = [d[0] for d in cursor.description]
         rows = cursor.fetchall()
-        known = con.execute(CHARTS).fetchall()[0]
+        known = con.execute(CHARTS.format(asof if not args.asof else list_day())).fetchall()[0]
     if args.csv:
         with opened(args.csv) as stream:
             _write(stream, names, rows)

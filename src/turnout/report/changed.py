@@ -15,10 +15,10 @@ SHOWN = {
     "charts": """(
         select turnout_id, section_id, band, measured_at_utc, expected_low_hz, expected_high_hz, state
         from charts where source = 'hammer')""",
-    "chart_states": "chart_states",
+    "chart_states": "chart_states_on(:today)",
     "worklist": """(
         select * exclude (rank, n_in_all)
-        from worklist(greatest(newest_measurement(), today_utc()), most := 1000000000))""",
+        from worklist(:today, most := 1000000000))""",
 }
 MARK = '<meta name="turnout-content" content="{}">'
 MARKED = re.compile(re.escape(MARK).replace(r"\{\}", "([0-9a-f]+)"))
@@ -47,6 +47,7 @@ def contents(source):
     sql = f"""
         select turnout_id, md5($code || string_agg(kind || ' ' || n || ' ' || total, ',' order by kind)) as content
         from ({" union all ".join(parts)}) semi join turnouts using (turnout_id) group by turnout_id"""
+    sql = sql.replace(":today", source.day)
     rows = source.connection.execute(sql, {"code": fingerprint("turnout.report.job")}).fetchall()
     return dict(rows)
 

@@ -2,6 +2,7 @@
 
 from collections import defaultdict
 
+from turnout.registry.day import list_day
 from turnout.report.trains import train_rows
 
 # One row per section of the newest model, whatever it says.
@@ -29,10 +30,10 @@ ROWS = {
     "charts": f"""
         select turnout_id, section_id, band, measured_at_utc, expected_low_hz, expected_high_hz, state
         from charts where source = 'hammer' and {OF_SOME} order by section_id, band, measured_at_utc""",
-    "chart_states": f"select * from chart_states where {OF_SOME}",
+    "chart_states": f"select * from chart_states_on(:today) where {OF_SOME}",
     "mismatches": f"select * from findings_newest where {OF_SOME} and verdict <> 'none' order by level_before desc",
     "worklist": f"""
-        select * from worklist(greatest(newest_measurement(), today_utc()), most := 1000000000)
+        select * from worklist(:today, most := 1000000000)
         where {OF_SOME} order by rank""",
 }
 TURNOUTS = f"""
@@ -65,7 +66,7 @@ class FleetSource:
     """Rows as dictionaries: ``turnouts()``, ``reasons()``, ``states()``, ``worklist()`` of the fleet, ``of_some``."""
 
     def __init__(self, connection):
-        self.connection = connection
+        self.connection, self.day = connection, list_day()
         found = connection.execute("select view_name from duckdb_views() where database_name = current_database()")
         self.there = {row[0] for row in found.fetchall()}
 
@@ -79,12 +80,12 @@ class FleetSource:
 
     def states(self):
         """Charts by turnout and state, none before the first trend."""
-        sql = "select turnout_id, state, count(*) as n from chart_states group by all order by all"
+        sql = "select turnout_id, state, count(*) as n from chart_states_on(:today) group by all order by all"
         return self._fetch(sql) if self.has("chart_states") else []
 
     def worklist(self):
         """Tomorrow's list, empty before the first trend."""
-        return self._fetch("select * from worklist order by rank") if self.has("worklist") else []
+        return self._fetch("select * from worklist(:today) order by rank") if self.has("worklist") else []
 
     def has(self, kind):
         """Whether the registry has rows of ``kind``: those of the trend come with its first run."""
@@ -104,7 +105,7 @@ class FleetSource:
         return frame.astype(object).where(frame.notna(), None).to_dict("records")
 
     def _fetch(self, sql, parameters=None):
-        cursor = self.connection.execute(sql, parameters or {})
+        cursor = self.connection.execute(sql.replace(":today", self.day), parameters or {})
         names = [d[0] for d in cursor.description]
         return [dict(zip(names, row)) for row in cursor.fetchall()]
 

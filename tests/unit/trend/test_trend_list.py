@@ -149,9 +149,11 @@ def test_what_is_silenced_comes_back_on_its_day(settings):
         seen = {d: con.execute(f"select count(*) from worklist(newest_measurement() + interval {d} day) "
                                "where section_id = 'T00001/S4'").fetchall()[0][0] for d in (0, 2, 3, 4000)}  # fmt: skip
         assert seen == {0: 0, 2: 0, 3: 1, 4000: 1}
-        assert con.execute("select state from chart_states where section_id = 'T00001/S4'").fetchall() == [
-            ("inspect this week",)
-        ]
+        states = (
+            "select state from chart_states_on(newest_measurement() + interval {} day) where section_id = 'T00001/S4'"
+        )
+        assert con.execute(states.format(2)).fetchall() == [("suppressed",)]
+        assert con.execute(states.format(3)).fetchall() == [("inspect this week",)]
 
 
 def test_sections_measured_the_day_after_are_of_the_same_campaign(settings):

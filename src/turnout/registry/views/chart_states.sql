@@ -1,10 +1,8 @@
--- One row per chart: what it says at the newest measurement, in the words of the worklist.
+-- One row per chart: what it says at the newest campaign, in the words of the worklist, on the day `asof` at or after it.
 -- inspect this week: an open alarm. plan: an acknowledged alarm, or a drift among the discoveries of the fleet
 -- (false-discovery rate 10 %), also where the chart is too noisy to see the target within a year. suppressed: somebody
 -- silenced it, with a reason and an end, a day at which it comes back.
-create or replace macro today_utc() as make_timestamp(epoch_us(now()));
-
-create or replace view chart_states as
+create or replace macro chart_states_on("asof") as table
 with open_alarms as (
     select turnout_id, section_id, band, source, max(raised_at_utc) as raised_at_utc
     from alarms
@@ -18,7 +16,7 @@ spoken as (
             where k.action = 'acknowledge' and k.at_utc >= o.raised_at_utc
         ) as acknowledged,
         max_by(k.by_whom || ': ' || k.reason, k.at_utc) filter (
-            where k.action = 'suppress' and coalesce(k.until_utc, timestamp '9999-01-01') > today_utc()
+            where k.action = 'suppress' and coalesce(k.until_utc, timestamp '9999-01-01') > "asof"
         ) as suppressed
     from chart_status s
     left join open_alarms o using (turnout_id, section_id, band, source)
@@ -42,3 +40,6 @@ select
     s.last_measured_at_utc, s.n_campaigns
 from chart_status s
 join spoken p using (turnout_id, section_id, band, source);
+
+-- One row per chart: what it says at the newest measurement, in the words of the worklist.
+create or replace view chart_states as select * from chart_states_on(newest_measurement());

@@ -60,7 +60,7 @@ alarmed as (
         case when told then s.since_latest_utc end as since_latest_utc,
         null::varchar as why
     from spoken r
-    left join chart_states s using (turnout_id, section_id, band, source)
+    left join chart_states_on("asof") s using (turnout_id, section_id, band, source)
     left join chart_status c using (turnout_id, section_id, band, source)
 ),
 drifting as (
@@ -68,7 +68,7 @@ drifting as (
         turnout_id, section_id, band, source, 'plan' as state, direction, null::timestamp as raised_at_utc,
         statistic_ratio as ratio, null::varchar as acknowledged, change_pct, change_low_pct as low_pct,
         change_high_pct as high_pct, since_at_utc, since_earliest_utc, since_latest_utc, null::varchar as why
-    from chart_states s
+    from chart_states_on("asof") s
     where state = 'plan' and "asof" >= newest_charted()
         and not exists (
             select 1 from alarmed a
@@ -211,5 +211,4 @@ window importance as (
 qualify rank <= coalesce(most, (select max(worklist_rows) from chart_status), 20) or h.state = 'inspect this week'
 order by rank;
 
--- What is silenced until a day comes back on that day, measured or not.
-create or replace view worklist as select * from worklist(greatest(newest_measurement(), today_utc()));
+create or replace view worklist as select * from worklist(newest_measurement());

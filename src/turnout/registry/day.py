@@ -1,0 +1,8 @@
+"""The day a list is made for: views have no clock, who asks them has."""
+
+from datetime import UTC, datetime
+
+
+def list_day() -> str:
+    """SQL of the time a list of today is asked for: that of the newest measurement where that is later."""
+    return f"greatest(newest_measurement(), timestamp '{datetime.now(UTC):%Y-%m-%d}')"
