@@ -1,7 +1,9 @@
 """Forty revealed cases, kept without their recordings: their seals hold, and their seeds make them again."""
 
+import io
 import json
 import platform
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from turnout_blind.score.answers import answers_of
 from turnout_blind.score.figures import Share, figures
 from turnout_blind.score.judged import judge
 
+ZIP64 = 45  # version of the format that reading needs
 SMALL = 120e3  # bytes of the kept set
 
 
@@ -46,6 +49,13 @@ def test_rungs_of_the_ladders_show_more_and_more(held):
     assert all(max(t["visible"].values()) == 0.0 for t in verify_kept(held).values() if not t["effects"])
 
 
+def archives_as_sealed():
+    """Whether archives of numpy say in the head of a member that it may be long, as they do since Python 3.11.4."""
+    file = io.BytesIO()
+    np.savez(file, a=0.0)
+    return ZipFile(file).infolist()[0].extract_version == ZIP64
+
+
 @pytest.fixture(scope="module")
 def again(held, tmp_path_factory):
     """(id, folder of cases, truth) of the first control, made once more from its seed."""
@@ -60,6 +70,10 @@ def test_a_case_made_again_is_the_one_that_was_sealed(held, again):
     made_on = json.loads(held["set"]).get("made_on")
     if made_on not in (None, platform.machine()):
         pytest.skip(f"sealed on {made_on}: another processor rounds otherwise")
+    if not archives_as_sealed():
+        pytest.skip(
+            "this Python writes the heads of archives otherwise: bytes cannot be compared (sealed: 3.11.4 or later)"
+        )
     case, folder, truth = again
     verify_recordings(held, case, folder)
     assert truth["visible"] == json.loads(held["truths"][case])["visible"]

@@ -14,7 +14,7 @@ from turnout.registry.register import register
 # DuckDB writes its storage version behind the magic bytes of the main header; 64 was written by all of 0.9.2 to 1.2.
 MAGIC, OLDEST_READ_BY_1_2 = b"DUCK", 64 + 3
 ARGUMENTS = {
-    "section": "'t1/A7'", "resonance": "'ballast'", "days": "365", "asof": "timestamp '2026-01-01'",
+    "section": "'t1/A7'", "resonance": "'ballast'", "days": "365", "asof": "timestamp '2026-01-01'", "most": "20",
     "event_kind": "'tamping'", "kind_of_event": "'tamping'", "turnout": "'t1'", "from_utc": "'2026-01-01'",
     "to_utc": "'2026-02-01'", "since": "timestamp '2025-01-01'", "k": "1.0", "h": "5.0", "target_pct": "1.5",
     "base_days": "365", "at_most": "20", "above": "0.0003", "kind_of_class": "'speed'",
