@@ -36,12 +36,12 @@ def run(args: argparse.Namespace) -> int:
         cursor = con.execute(question, [_date(args.asof)] if args.asof else [])
         names = [d[0] for d in cursor.description]
         rows = cursor.fetchall()
-        known = con.execute(CHARTS.format(asof if not args.asof else list_day())).fetchall()[0]
+        known = con.execute(CHARTS.format(list_day())).fetchall()[0]
     if args.csv:
         with opened(args.csv) as stream:
             _write(stream, names, rows)
     else:
-        print(as_text([dict(zip(names, row)) for row in rows], *known))
+        print(as_text([dict(zip(names, row)) for row in rows], *(known[:1] if args.asof else known)))
     return 0
 
 
@@ -54,6 +54,8 @@ def as_text(rows, n_charts=0, n_silenced=0, n_unmeasured=0, newest=None) -> str:
         text = ["Nothing to do: no chart in alarm, none that drifts, none that cannot tell."]
     if rows and rows[0]["n_in_all"] > len(rows):
         text.append(f"... and {rows[0]['n_in_all'] - len(rows)} more: turnout worklist --all")
+    if newest is None:  # a list of another day: what is silenced or not measured is said of today alone
+        return "\n".join(text)
     left = [(n_silenced, "silenced by somebody"), (n_unmeasured, "not measured for too long")]
     parts = [f"{n} {word}" for n, word in left if n]
     text.append(

@@ -175,7 +175,9 @@ def _works(charts, events):
     """Sorted keys of the resetting ``events`` of every row of visits, as ``keys_of`` makes them."""
     if events is None or not len(events):
         return np.zeros(0, dtype=np.int64)
-    resets = events[[truth(b) or truth(r) for b, r in zip(events["resets_ballast"], events["resets_railpad"])]]
+    flags = zip(events["resets_ballast"], events["resets_railpad"])
+    resetting = np.array([truth(ballast) or truth(railpad) for ballast, railpad in flags])
+    resets = events[resetting & events["event_at_utc"].notna().to_numpy()]
     rows = charts[["turnout_id", "visits"]].drop_duplicates().astype({"turnout_id": object})
     both = rows.merge(resets[["turnout_id", "event_at_utc"]].astype({"turnout_id": object}), on="turnout_id")
     return np.sort(keys_of(both["visits"].to_numpy(dtype=np.int64), days(both["event_at_utc"])))

@@ -54,6 +54,20 @@ def test_a_dear_fit_on_which_the_verdict_rests_goes_on_for_less(monkeypatch):
     assert set(asked[:-1]) == {FINE} and asked[-1] == STALL > FINE
 
 
+@pytest.mark.parametrize(("gain", "ended"), [(5.0, 0), (8.0, 1), (20.0, 1)])
+def test_what_comes_near_a_name_is_fitted_to_its_end_as_leaders_are(monkeypatch, gain, ended):
+    """A name needs 12 nats; from half of them on the fit goes on to its end."""
+    score, asked = SimpleNamespace(gain=gain, material=True, family="a"), []
+    monkeypatch.setattr(
+        refits, "shortlist", lambda *a: [SimpleNamespace(rival=False, candidate=SimpleNamespace(key="a"))]
+    )
+    monkeypatch.setattr(refits, "_tried", lambda *a: score)
+    monkeypatch.setattr(refits, "_polished", lambda *a: asked.append(a) or score)
+    monkeypatch.setattr(refits, "_checked", lambda case, fit, s: s)
+    refits.scored(Bent(True), None, MismatchSettings(), lambda *a: None, {}, 0, None)
+    assert len(asked) == ended
+
+
 def test_where_a_channel_was_at_its_range_the_passage_says_no_more_than_its_size():
     rate, n = 4000.0, 4000
     samples = 3.0 * np.sin(2 * np.pi * 20.0 * np.arange(n) / rate) * np.ones((2, 1))

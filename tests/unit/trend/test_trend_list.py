@@ -111,6 +111,12 @@ def test_a_test_before_and_one_after_work_are_two_campaigns(settings, hours):
     assert one["change_pct"] == pytest.approx(5.0, abs=3.0 * one["change_se_pct"]) and one["change_se_pct"] < 1.5
 
 
+def test_work_without_a_date_splits_nothing(settings):
+    rows, events = before_and_after_a_night(24)
+    undated = events.assign(event_at_utc=pd.NaT)
+    assert panel_of(rows, settings, events=undated).time.shape == panel_of(rows, settings).time.shape
+
+
 def test_who_measures_daily_has_campaigns_and_not_one(settings):
     """36 hours from the first value: two days make a campaign."""
     rows = modes(Fleet(turnouts=1, weeks=60, phi=0.1), 3, None)
@@ -181,6 +187,8 @@ def test_the_list_in_words_says_what_it_rests_on_and_what_it_leaves_out(tmp_path
     assert "INSPECT THIS WEEK: T00001" in told
     # eight sections and the turnout's median, three times; T00002 is silent
     assert f"Of 27 charts, newest campaign {newest:%Y-%m-%d}: 9 not measured for too long." in told
+    assert main(["worklist", "--registry", str(tmp_path), "--asof", f"{newest:%Y-%m-%d}"]) == 0
+    assert "INSPECT THIS WEEK" in (then := capsys.readouterr().out) and "Of 27 charts" not in then
 
 
 def test_without_a_trend_nobody_is_told_that_there_is_nothing_to_do(tmp_path, capsys):
