@@ -28,11 +28,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the list, or write it as comma-separated values."""
     from turnout.registry.database import open_registry
-    from turnout.registry.day import list_day
+    from turnout.registry.day import list_day, whole_list
 
     with open_registry(args.registry) as con:
         asof = "?::timestamp" if args.asof else list_day()
-        question = f"select * from worklist({asof}{', most := 1000000000' if args.all else ''}) order by rank"
+        rows_of = whole_list(asof) if args.all else f"worklist({asof})"
+        question = f"select * from {rows_of} order by rank"
         cursor = con.execute(question, [_date(args.asof)] if args.asof else [])
         names = [d[0] for d in cursor.description]
         rows = cursor.fetchall()

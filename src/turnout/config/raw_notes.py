@@ -15,6 +15,7 @@ from turnout.errors import ReadError
 
 COLUMNS = ("campaign", "started_at_utc", "rail_temperature_c", "hammer_id", "tip", "operator")
 TRAINS = ("passed_at_utc", "train_type", "speed_kmh", "axle_load_t", "track", "n_axles")
+TRAIN_RANGES = {"speed_kmh": (1, 400), "axle_load_t": (0.1, 60), "n_axles": (1, 2000)}
 
 
 def read_campaigns(path: Path, name: str) -> tuple[dict[str, Campaign], list[ReadError]]:
@@ -51,9 +52,9 @@ def unnoted(date: str) -> Campaign:
 
 
 def read_trains(path: Path, name: str) -> tuple[tuple[dict[str, str], ...], list[ReadError]]:
-    """Rows of trains.csv as text, in the file's order, and an error for each without a time; further columns are kept.
+    """Rows of trains.csv as text, in the file's order, and an error for each that cannot be used.
 
-    Without the file there are none.
+    Further columns are kept; without the file there are no rows.
     """
     trains: list[Cells] = []
 
@@ -61,6 +62,10 @@ def read_trains(path: Path, name: str) -> tuple[tuple[dict[str, str], ...], list
         said = cells["passed_at_utc"]
         if wrong := wrong_time(said):
             raise _Wrong("passed_at_utc", f"passed_at_utc is {said!r}{wrong[0]}", wrong[1])
+        for column, (low, high) in TRAIN_RANGES.items():
+            _in_range(cells.get(column, ""), column, low, high)
+        if (track := cells.get("track", "")) not in ("", "main", "diverging"):
+            raise _Wrong("track", f"track is {track!r}", "Write main or diverging, or nothing")
         trains.append(cells)
 
     errors = _each_row(path, name, TRAINS, 1, keep, free=True)
@@ -108,17 +113,20 @@ def _campaign(cells: Mapping) -> Campaign:
         found = f"started_at_utc {said!r} is not on the campaign's day {date}"
         raise _Wrong("started_at_utc", found, "Correct the one or the other")
     noted = {k: cells.get(k, "") for k in ("hammer_id", "tip", "operator")}
-    return Campaign(date, started, _temperature(cells.get("rail_temperature_c", "")), **noted)
+    temperature = _in_range(cells.get("rail_temperature_c", ""), "rail_temperature_c", -50, 80)
+    return Campaign(date, started, temperature, **noted)
 
 
-def _temperature(text: str) -> float | None:
+def _in_range(text: str, column: str, low: float, high: float) -> float | None:
+    """The number in a cell, None for an empty one."""
     if not text:
         return None
     try:
         value = float(text)
     except ValueError:
         value = math.nan
-    if not -50 <= value <= 80:
-        remedy = "Write a number from -50 to 80 °C, or nothing where it was not noted"
-        raise _Wrong("rail_temperature_c", f"rail_temperature_c is {text!r}", remedy)
+    if not low <= value <= high:
+        unit = " °C" if column.endswith("_c") else ""
+        remedy = f"Write a number from {low} to {high}{unit}, or nothing where it was not noted"
+        raise _Wrong(column, f"{column} is {text!r}", remedy)
     return value

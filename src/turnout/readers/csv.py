@@ -6,9 +6,12 @@ with or without ``#``: ``rate`` (or ``fs``, ``sample_rate`` ..., in Hz) or ``dt`
 column ``time`` or ``t`` in s, ms or µs; a column ``record`` that numbers the records. Without names the channels are
 "0", "1" ...
 
+The text is UTF-8, UTF-16 with its mark, or, where a line of the head is neither, Windows-1252.
+
 The last line must end with a line break: without it nobody can tell a cut number from a whole one.
 """
 
+import codecs
 import io
 import re
 from itertools import pairwise
@@ -32,19 +35,35 @@ NOTES = {*RATE, *STEP, *START, *COUNT, "n_samples"}
 
 def read_raw(source) -> RawFile:
     """Records of a text file."""
-    data = source.mapped if source.stay else source.data
+    wide = source.head[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+    stay = source.stay and not wide
+    data = source.mapped if stay else _in_utf8(source) if wide else source.data
     if data[-1:] not in (b"\n", b"\r"):
         found = "the last line has no line break: its last number may be cut"
-        line = source.data.count(b"\n") + 1
+        line = data[:].count(b"\n") + 1
         raise source.error(
             f"line {line}", found, f"{COPY_AGAIN}, or add the line break if it is whole", reason="truncated"
         )
     head, names, units, at, separator = _head(data, source)
-    read = _staying if source.stay and "record" not in [name.strip().lower() for name in names] else _table
+    read = _staying if stay and "record" not in [name.strip().lower() for name in names] else _table
     columns = read(source, data, at, separator, names)
     facts = Facts(head, source)
     records = tuple(_records(columns, names, units, facts, source))
     return RawFile(records, facts.count(COUNT))
+
+
+def _in_utf8(source):
+    """The text of a file that a spreadsheet saved as "Unicode", in UTF-8."""
+    with source.parsed_by("Python", "the text in UTF-16"):
+        return source.data.decode("utf-16").encode()
+
+
+def _line_of(data):
+    """One line as text: UTF-8, or what older loggers of the west write."""
+    try:
+        return data.decode("utf-8-sig").strip("\r\n")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", "replace").strip("\r\n")
 
 
 def _head(data, source):
@@ -55,7 +74,7 @@ def _head(data, source):
     while position < len(data):
         end = data.find(b"\n", position)
         end = len(data) if end < 0 else end
-        line = data[position:end].decode("utf-8-sig", "replace").strip("\r\n")
+        line = _line_of(data[position:end])
         # a comma is the decimal mark where another separator stands
         separator = next((s for s in ("\t", ";") if s in line), ",")
         cells = _cells(line, separator)

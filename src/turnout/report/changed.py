@@ -3,6 +3,7 @@
 import re
 
 from turnout.fingerprint import fingerprint
+from turnout.registry.day import whole_list
 
 # What a page is made of. A result's id stands for its models, modes, impacts, receptances and passages: it is a
 # hash of the raw files, the configuration and the code that they were computed from.
@@ -16,9 +17,7 @@ SHOWN = {
         select turnout_id, section_id, band, measured_at_utc, expected_low_hz, expected_high_hz, state
         from charts where source = 'hammer')""",
     "chart_states": "chart_states_on(:today)",
-    "worklist": """(
-        select * exclude (rank, n_in_all)
-        from worklist(:today, most := 1000000000))""",
+    "worklist": f"(select * exclude (rank, n_in_all) from {whole_list(':today')})",
 }
 MARK = '<meta name="turnout-content" content="{}">'
 MARKED = re.compile(re.escape(MARK).replace(r"\{\}", "([0-9a-f]+)"))

@@ -2,7 +2,7 @@
 
 from collections import defaultdict
 
-from turnout.registry.day import list_day
+from turnout.registry.day import list_day, whole_list
 from turnout.report.trains import train_rows
 
 # One row per section of the newest model, whatever it says.
@@ -32,9 +32,7 @@ ROWS = {
         from charts where source = 'hammer' and {OF_SOME} order by section_id, band, measured_at_utc""",
     "chart_states": f"select * from chart_states_on(:today) where {OF_SOME}",
     "mismatches": f"select * from findings_newest where {OF_SOME} and verdict <> 'none' order by level_before desc",
-    "worklist": f"""
-        select * from worklist(:today, most := 1000000000)
-        where {OF_SOME} order by rank""",
+    "worklist": f"select * from {whole_list(':today')} where {OF_SOME} order by rank",
 }
 TURNOUTS = f"""
     with models as (

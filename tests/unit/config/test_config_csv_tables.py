@@ -78,6 +78,10 @@ def test_a_temperature_under_another_title_is_said_and_the_other_cells_are_used(
         ("passed_at_utc\n2024-05-13 noon\n", "line 2, column 1: passed_at_utc is '2024-05-13 noon'. Write YYYY"),
         ("passed_at_utc\n2024-05-13T10:00+02:00\n", "with a time zone. Write the time in UTC"),
         ("passed_at_utc,train_type\n2024-05-13T10:00,IC3,x\n", "line 2, column 22: more cells than columns"),
+        ("passed_at_utc,speed_kmh\n2024-05-13T10:00,16O\n", "column 18: speed_kmh is '16O'. Write a number from 1"),
+        ("passed_at_utc,axle_load_t\n2024-05-13T10:00,22500\n", "axle_load_t is '22500'. Write a number from 0.1"),
+        ("passed_at_utc,n_axles\n2024-05-13T10:00,-8\n", "n_axles is '-8'. Write a number from 1 to 2000"),
+        ("passed_at_utc,track\n2024-05-13T10:00,left\n", "track is 'left'. Write main or diverging, or nothing"),
     ],
 )
 def test_trains_that_cannot_be_used_are_said(tmp_path, text, said):

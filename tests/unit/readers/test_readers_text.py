@@ -148,3 +148,22 @@ def test_the_hour_that_comes_twice_in_autumn_is_told_by_the_order_of_the_records
     np.savez(tmp_path / "b.npz", channels=["acc"], started_at=stamps, **numbered)
     (error,) = read("b.npz", tmp_path, rail).errors
     assert (error.reason, error.where) == ("clock_backwards", "record 4")
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "cp1252"])
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_text_is_read_in_the_encodings_that_loggers_and_spreadsheets_write(encoding, end, tmp_path):
+    """The squared metre is one byte in Windows' own code, two in UTF-8; UTF-16 has a zero behind most letters."""
+    channels = (RawChannel("force", "force", "force"), RawChannel("rail", "acc", "acceleration"))
+    rows = "".join(f"{a:.4f};{b:.4f}{end}" for a, b in X)
+    text = f"rate: 20000{end}force [N];acc [m/s²]{end}" + rows
+    (tmp_path / "a.csv").write_bytes(text.encode(encoding))
+    result = read("a.csv", tmp_path, RawDescription(channels))
+    assert result.errors == ()
+    np.testing.assert_allclose(result.recordings[0].samples, X.T.round(4), atol=1e-12)
+
+
+def test_half_a_letter_of_utf16_is_said(tmp_path):
+    (tmp_path / "a.csv").write_bytes("force,acc\n1,2\n".encode("utf-16")[:-1])
+    with pytest.raises(ReadError, match="the text in UTF-16"):
+        read("a.csv", tmp_path, NAMED)

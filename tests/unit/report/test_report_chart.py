@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from turnout.report.chart import BOTTOM, LEFT, RIGHT, TOP, Axis, Chart
+from turnout.report.panels.receptance import receptance_panel
 from turnout.report.strokes import drawn
 from turnout.report.ticks import linear_ticks, log_ticks, time_ticks
 
@@ -96,3 +97,13 @@ def test_a_short_curve_and_one_that_turns_back_are_drawn_whole():
     assert len(drawn(np.arange(10.0), np.arange(10.0))[0]) == 10
     back = np.concatenate([np.linspace(0, 1, 500), np.linspace(1, 0, 500)])
     assert len(drawn(back, back)[0]) == 1000
+
+
+@pytest.mark.parametrize(("decay", "said"), [(None, False), (0.0, False), (25.0, True)])
+def test_a_curve_behind_an_exponential_window_says_so(decay, said):
+    n = 40
+    row = dict.fromkeys(("h1_real_m_n", "h1_imag_m_n", "h2_abs_m_n"), np.full(n, 1e-9)) | {
+        "frequency_hz": np.linspace(0.0, 1000.0, n), "passed": np.ones(n, dtype=bool), "n_impacts": 7,
+        "valid_to_hz": None, "window_decay_per_s": decay,
+    }  # fmt: skip
+    assert ("exp(-25/s t)" in receptance_panel(row, [])) is said

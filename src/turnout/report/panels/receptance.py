@@ -23,7 +23,7 @@ def receptance_panel(row, modes):
     chart = Chart(
         Axis(*SPAN, "frequency [Hz]", "log"),
         Axis(np.quantile(shown, 0.005) / 1.5, shown.max() * 1.6, "receptance [m/N]", "log"),
-        f"Receptance, H1 with H1-H2 bracket, n = {row['n_impacts']} impacts",
+        f"Receptance, H1 with H1-H2 bracket, n = {row['n_impacts']} impacts{_window(row)}",
     )
     passed = np.asarray(row["passed"], dtype=bool)
     _grey_out(chart, frequency, passed, row)
@@ -49,6 +49,12 @@ def coherence_panel(row):
     chart.line(frequency, row["coherence"], "curve", "coherence")
     chart.line(SPAN, [0.8, 0.8], "limit", "required 0.8")
     return chart.svg()
+
+
+def _window(row):
+    """What an exponential window did to the curve; nothing to say without one."""
+    decay = row.get("window_decay_per_s")
+    return f"; a window exp(-{decay:g}/s t) adds to its damping, not to the model's" if decay else ""
 
 
 def _grey_out(chart, frequency, passed, row):
