@@ -114,6 +114,7 @@ REASONS = {
     "channels_swapped": "channels arrive in the wrong order",
     "clock_drift": "the loggers' clocks drift apart",
     "sensor_lost": "a sensor fell silent during the recording",
+    "interference": "electrical pulses on all channels at the same moment, cut out",
     "simulation_failed": "the simulation could not be completed",
     "internal_error": "a fault of this program, with its traceback",
 }

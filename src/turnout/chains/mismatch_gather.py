@@ -15,6 +15,7 @@ from turnout.errors import ReadError
 from turnout.fleet.scan import unit_id
 from turnout.mismatch.track import HammerTest, Passage
 from turnout.passage.other_train import ANOTHER
+from turnout.passage.pulses import without_pulses
 from turnout.readers import read
 from turnout.records import Unit
 
@@ -152,10 +153,10 @@ def _passages(unit, turnout, raw_root, track, tables, found):
 
 def _trains(unit, turnout, raw_root, notes):
     """The recordings of a unit, those of a logger that never stops cut into trains as the passage stage cuts them."""
-    settings, recordings = turnout.settings["passage"], []
+    settings, sensors, recordings = turnout.settings["passage"], sensors_of(turnout), []
     for recording in _read(unit, turnout.passages.description, raw_root, notes, settings.longest):
         try:
-            recordings += [part for part, *_ in trains_in(recording, settings)]
+            recordings += [without_pulses(part, sensors)[0] for part, *_ in trains_in(recording, settings)]
         except ReadError as error:
             notes.append(str(error))
     return recordings

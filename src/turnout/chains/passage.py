@@ -14,6 +14,7 @@ from turnout.passage.channel_fit import fit_channel
 from turnout.passage.continuous import cut_passages
 from turnout.passage.findings import PassageSensor
 from turnout.passage.load import axle_load
+from turnout.passage.pulses import without_pulses
 from turnout.passage.train_data import listed_for, listed_trains
 from turnout.records import ModalModel, Recording, Unit
 from turnout.registry.ids import content_id
@@ -158,6 +159,7 @@ def _one_train(recording, started_at, recording_id, path, turnout, context, rows
     if not sensors:
         return
     passage = analyse(recording, sensors, context.patterns, settings)
+    recording, _ = without_pulses(recording, sensors)  # for loads and fits
     base = {"turnout_id": turnout.id}
     first = float(passage.times[0]) if passage.n_axle else 0.0
     passed_at = started_at + timedelta(seconds=round(first, 3))

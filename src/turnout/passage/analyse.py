@@ -13,6 +13,7 @@ from turnout.passage.listen import hearing, listen, narrowed, track_taken
 from turnout.passage.motion import Motion
 from turnout.passage.order import wrong_channels, wrong_places
 from turnout.passage.other_train import second_train
+from turnout.passage.pulses import without_pulses
 from turnout.passage.silence import fell_silent
 from turnout.passage.slowness import pair_likeness, refine_slowness, scan_slowness
 from turnout.passage.soundness import channel_states
@@ -44,9 +45,10 @@ def analyse(recording: Recording, sensors, patterns, settings) -> Passage:
     Passage
         "rejected" where no axle was found, "partly" where something is wrong and part of it is sound.
     """
+    recording, pulses = without_pulses(recording, sensors)
     states = {s.name: s for s in channel_states(recording)}
     known = {s.name: s for s in sensors}
-    findings = [f for s in states.values() if s.name in known for f in s.findings]
+    findings = [*pulses, *(f for s in states.values() if s.name in known for f in s.findings)]
     used = [known[name] for name, state in states.items() if name in known and state.usable and state.until is None]
     lost = [known[name] for name, state in states.items() if name in known and state.until is not None]
     used, lost = (used, lost) if used else (lost, [])
