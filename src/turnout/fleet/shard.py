@@ -2,7 +2,6 @@
 
 import os
 import sys
-import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -13,14 +12,15 @@ from filelock import FileLock
 
 from turnout.config import Configuration, TurnoutConfig, with_raw
 from turnout.errors import ConfigError
-from turnout.fleet.batches import UnitResult, write_batch
+from turnout.fleet.batches import UnitResult
 from turnout.fleet.guard import guarded
 from turnout.fleet.keys import key_of, stamp_of
+from turnout.fleet.ledger import Ledger
 from turnout.fleet.plan import Planned, read_plan
 from turnout.fleet.pool import in_order
 from turnout.fleet.progress import Progress
 from turnout.fleet.scan import unit_id
-from turnout.fleet.state import Known, batch_folder, load_state, remove_orphans
+from turnout.fleet.state import Known
 from turnout.records import Unit
 
 
@@ -95,8 +95,8 @@ def run_shard(
     ----------
     plan, state : path
         work/plan/<shard>.json, read after the lock is held, and work/<stage>/<shard>.json, whose batches lie in
-        work/<stage>/<shard>/. Results count once the state file names their batch; it is written in one step,
-        at every checkpoint and at the end, so a kill at any time loses a checkpoint's work and nothing else.
+        work/<stage>/<shard>/. There lies the checkpoint, too, from which the next job goes on where this one is
+        killed or fails; the state file, which others read, is written in one step at the end.
     stage : Stage
         What is computed.
     threads : int
@@ -117,33 +117,29 @@ class _Run:
     """One call of ``run_shard``."""
 
     def __init__(self, path: Path, stage: Stage, configuration: Configuration, raw_root: Path, threads, strict):
-        self.path, self.folder = path, batch_folder(path)
+        self.name = f"{stage.kind} {path.stem}"
         self.stage, self.configuration, self.raw_root = stage, configuration, raw_root
         self.threads, self.strict = threads, strict
-        self.limits = configuration.settings["fleet"]
-        self.state = load_state(path)
-        self.waiting: list[tuple[UnitResult, str]] = []
-        self.saved_at = time.monotonic()
+        self.ledger = Ledger(path, configuration.settings["fleet"])
+        self.state = self.ledger.state
 
     def bring_up(self, planned: list[Planned], only: Sequence[str] | None) -> Summary:
         """Compute what is missing, write batches and state."""
-        remove_orphans(self.state, self.folder)
         wanted = {unit_id(p.unit): p for p in planned if p.unit.kind == self.stage.kind}
         todo, stale = self._todo(wanted, only)
-        name = f"{self.stage.kind} {self.path.stem}"
         if todo:
             # before processes are forked: each of them would import it anew
             self.compute = named(self.stage.compute)
-        progress, bad, faults = Progress(name, len(todo)), 0, 0
+        progress, bad, faults = Progress(self.name, len(todo)), 0, 0
         for result, stamp in in_order(self._compute, todo, self.threads):
             progress.step(result.status != "ok")
             bad += result.status != "ok"
             faults += result.status == "internal_error"
-            self._keep(result, stamp)
+            self.ledger.keep(result, stamp)
         progress.close()
         vanished = self._withdraw_vanished(wanted)
-        self._checkpoint()
-        return Summary(name, len(wanted), len(todo), bad, faults, vanished, stale)
+        self.ledger.close()
+        return Summary(self.name, len(wanted), len(todo), bad, faults, vanished, stale)
 
     def _todo(self, wanted: dict[str, Planned], only) -> tuple[list[tuple], int]:
         """(planned, turnout, stamp, context) of every unit to compute, sorted; and how many wait for a plan."""
@@ -202,12 +198,6 @@ class _Run:
         call = partial(guarded, self.compute, planned.unit, turnout, self.raw_root, key)
         return call(self.stage.algo, self.strict, **more), stamp
 
-    def _keep(self, result: UnitResult, stamp: str) -> None:
-        self.waiting.append((result, stamp))
-        late = time.monotonic() - self.saved_at >= self.limits.checkpoint_time
-        if late or len(self.waiting) >= self.limits.checkpoint_units:
-            self._checkpoint()
-
     def _withdraw_vanished(self, wanted: Iterable[str]) -> int:
         """Count units whose files are all gone. Their rows stay; of a unit that only ever was in quarantine
         nothing is left to repair: an empty result takes its rows out of the list of open ones. A stage that gathers
@@ -217,15 +207,5 @@ class _Run:
             known = self.state.units[name]
             if known.status == "quarantined":
                 turnout, kind, _ = name.split("/", 2)
-                self.waiting.append((UnitResult(name, turnout, kind, "vanished", known.algo, "vanished", {}), ""))
+                self.ledger.keep(UnitResult(name, turnout, kind, "vanished", known.algo, "vanished", {}), "")
         return 0 if self.stage.gather else len(gone)
-
-    def _checkpoint(self) -> None:
-        if self.waiting:
-            batch = write_batch(self.folder, [result for result, _ in self.waiting]).name
-            self.state.batches = [b for b in self.state.batches if b != batch] + [batch]
-            for result, stamp in self.waiting:
-                self.state.units[result.unit] = Known(stamp, result.key, result.algo, result.status, batch)
-            self.waiting.clear()
-        self.state.save(self.path)
-        self.saved_at = time.monotonic()

@@ -8,6 +8,8 @@ from pathlib import Path
 from turnout.errors import TurnoutError
 from turnout.fleet.atomic import write_text
 
+CHECKPOINT = "state.json"
+
 
 @dataclass(frozen=True)
 class Known:
@@ -36,6 +38,7 @@ class State:
 
 def load_state(path: Path) -> State:
     """State in ``path``, empty where there is none; TurnoutError where somebody else changed the file."""
+    shard = Path(path).parent if Path(path).name == CHECKPOINT else batch_folder(path)
     try:
         content = json.loads(Path(path).read_text(encoding="utf-8"))
         units = {unit: Known(*values) for unit, values in content["units"].items()}
@@ -43,7 +46,25 @@ def load_state(path: Path) -> State:
     except FileNotFoundError:
         return State()
     except (ValueError, KeyError, TypeError) as error:
-        raise TurnoutError(f"{path}: not a state file ({error}). Delete it: its shard is then computed anew.") from None
+        remedy = f"Delete {shard}.json and the folder {shard}: the shard is then computed anew."
+        raise TurnoutError(f"{path}: not a state file ({error}). {remedy}") from None
+
+
+def last_state(path: Path) -> State:
+    """Where the last job of a shard got to, whether it came to its end or not; ``path`` is its state file.
+
+    The state file alone speaks where an earlier version wrote it, that knew no checkpoints.
+    """
+    checkpoint = checkpoint_of(path)
+    return load_state(checkpoint if checkpoint.exists() else path)
+
+
+def checkpoint_of(state: Path) -> Path:
+    """What a job goes on from: work/hammer/00of01.json -> work/hammer/00of01/state.json.
+
+    Snakemake does not know it. The state file is its output, which it takes back or deletes where the job fails.
+    """
+    return batch_folder(state) / CHECKPOINT
 
 
 def batch_folder(state: Path) -> Path:

@@ -1,0 +1,44 @@
+"""What a shard keeps while it computes: results wait for their batch, which counts once the checkpoint names it."""
+
+import time
+from pathlib import Path
+
+from turnout.config.settings.fleet import FleetSettings
+from turnout.fleet.batches import UnitResult, write_batch
+from turnout.fleet.state import Known, batch_folder, checkpoint_of, last_state, remove_orphans
+
+
+class Ledger:
+    """State of one shard, kept at ``path`` when its job comes to an end and in its checkpoint before.
+
+    A kill or a fault at any moment loses what waits for a batch, and nothing else.
+    """
+
+    def __init__(self, path: Path, limits: FleetSettings):
+        self.path, self.folder, self.limits = path, batch_folder(path), limits
+        self.state = last_state(path)
+        self._waiting: list[tuple[UnitResult, str]] = []
+        self._saved_at = time.monotonic()
+        remove_orphans(self.state, self.folder)
+
+    def keep(self, result: UnitResult, stamp: str) -> None:
+        """Take a result in; ``stamp`` tells what it was computed from."""
+        self._waiting.append((result, stamp))
+        late = time.monotonic() - self._saved_at >= self.limits.checkpoint_time
+        if late or len(self._waiting) >= self.limits.checkpoint_units:
+            self._checkpoint()
+
+    def close(self) -> None:
+        """Write what still waits, then the state file: the job has come to its end."""
+        self._checkpoint()
+        self.state.save(self.path)
+
+    def _checkpoint(self) -> None:
+        if self._waiting:
+            batch = write_batch(self.folder, [result for result, _ in self._waiting]).name
+            self.state.batches = [b for b in self.state.batches if b != batch] + [batch]
+            for result, stamp in self._waiting:
+                self.state.units[result.unit] = Known(stamp, result.key, result.algo, result.status, batch)
+            self._waiting.clear()
+        self.state.save(checkpoint_of(self.path))
+        self._saved_at = time.monotonic()
