@@ -1,6 +1,9 @@
 """What all stages share. A stage is one rule file that appends its name to STAGES, and one include line."""
 
+from pathlib import Path
+
 from turnout.fingerprint import fingerprint
+from turnout.fleet.postponed import read_postponed
 
 # Stages whose results go into the registry, in order, and the files that a whole run makes.
 STAGES, TARGETS = [], []
@@ -19,12 +22,24 @@ def stage_params(stage, own):
         "chain": function,
         "algo": fingerprint(code) if ours else function,
         "job": RUN.job,
+        "again": jobs_that_left_units(stage),
     }
 
 
+def jobs_that_left_units(stage):
+    """For a shard, a number that grows with each job that left units for the next one: it makes that one run."""
+
+    def of_shard(wildcards):
+        return read_postponed(Path("work") / stage / f"{wildcards.shard}.json")[0]
+
+    return of_shard
+
+
 def shard_states(wildcards):
-    """State files of all stages and of the shards that take part."""
-    return expand("work/{stage}/{shard}.json", stage=STAGES, shard=RUN.shards)
+    """State files of all stages and of the shards that take part; where no stage may run, those that are there."""
+    states = expand("work/{stage}/{shard}.json", stage=STAGES, shard=RUN.shards)
+    only = workflow.dag_settings.allowed_rules
+    return [state for state in states if not only or Path(state).exists()]
 
 
 def shard_threads():

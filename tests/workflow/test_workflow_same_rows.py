@@ -11,7 +11,8 @@ import toy_fleet as toy
 from turnout.config import load_configuration
 from turnout.fleet.batches import read_results
 from turnout.fleet.plan import write_plans
-from turnout.fleet.shard import Stage, run_shard
+from turnout.fleet.shard import run_shard
+from turnout.fleet.stage import Stage
 from turnout.fleet.state import batch_paths
 from turnout.fleet.tables import configuration_rows, fleet_hash
 from turnout.registry.register import register

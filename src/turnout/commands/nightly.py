@@ -1,10 +1,11 @@
 """Run the whole workflow unattended: one run at a time, remains of a killed one cleared, one line at the end.
 
-  0 2 * * *   cd /srv/turnouts && turnout nightly --limit-hours 6 >> logs/nightly.log 2>&1
+  0 2 * * *   cd /srv/turnouts && mkdir -p logs && turnout nightly --limit-hours 6 >> logs/nightly.log 2>&1
   turnout nightly --profile profiles/slurm
   turnout nightly -- --config accept_vanished=true
 
-The exit code is 0 only where every job ran and the results may be trusted; the registry is published either way.
+The exit code is 0 only where every job ran and the results may be trusted. The registry is published either way,
+without the shards whose jobs died; a run that reached its limit goes on in the next night and is published then.
 """
 
 import argparse

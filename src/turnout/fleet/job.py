@@ -10,7 +10,8 @@ from turnout.config import load_configuration
 from turnout.errors import TurnoutError
 from turnout.fleet.batches import read_results
 from turnout.fleet.launch import launched_at
-from turnout.fleet.shard import Stage, Summary, run_shard
+from turnout.fleet.shard import Summary, run_shard
+from turnout.fleet.stage import Stage
 from turnout.fleet.state import batch_paths
 from turnout.fleet.tables import configuration_rows
 from turnout.fleet.verdict import Verdict, verdict

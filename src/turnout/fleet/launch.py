@@ -24,7 +24,7 @@ OPTIONS = {
     "chains": "for each stage module:function, instead of the program's own",
 }
 PLANS = "work/plan"
-# When the newest run began, UTC; no rule knows of it, so that it makes nothing run again.
+# When the newest run began that came as far as its jobs, UTC; no rule knows of it: it makes nothing run again.
 LAUNCHED = "work/launched"
 
 
@@ -66,9 +66,10 @@ def launch(options: Mapping, scan: bool, formats=None, to_si=None) -> Launch:
         "strict": _flag(options, "strict"),
     }
     if scan:
-        write_text(Path(LAUNCHED), datetime.now(UTC).replace(tzinfo=None).isoformat(timespec="seconds"))
+        began = datetime.now(UTC).replace(tzinfo=None)
         raw, accept = Path(job["raw"]), _flag(options, "accept_vanished")
         write_plans(configuration, raw, Path(PLANS), shards, turnouts, accept)
+        write_text(Path(LAUNCHED), began.isoformat(timespec="seconds"))
     names = shard_names(shards, turnouts)
     chains = dict(options.get("chains") or {})
     whose = _diagnosed(options, configuration)

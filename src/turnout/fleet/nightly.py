@@ -5,6 +5,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,8 @@ from turnout.fleet.state import CHECKPOINT, last_state
 
 JOB_NAMES = "turnouts"
 TOO_LATE = 124
+GENERATION = Path("results/registry/_generation.json")
+PUBLISHING = ("all", "register", "verdict", "trend", "report")
 
 
 @dataclass(frozen=True)
@@ -29,20 +32,22 @@ class Night:
     processed: int
     quarantined: int
     vanished: int
+    published: bool = True
 
     def __str__(self):
         said = {0: "sound", TOO_LATE: "stopped at the time limit"}.get(self.code, f"failed with exit code {self.code}")
         return (
             f"{said}: {self.units} units known, {self.processed} processed, "
             f"{self.quarantined} of these with rows in quarantine, {self.vanished} vanished"
+            + ("" if self.published else "; the registry was not published")
         )
 
 
 def nightly(options: Sequence[str], profile: str, limit: float | None = None, work: Path = Path("work")) -> Night:
     """Run the workflow once, with ``options`` handed on to Snakemake.
 
-    ``profile`` is a folder of profiles/; ``limit`` [s] ends a run that hangs. TurnoutError where another run is
-    still going on.
+    ``profile`` is a folder of profiles/; ``limit`` [s] ends a run that hangs. Where jobs die, what the others have
+    computed is published without theirs. TurnoutError where another run is still going on.
     """
     work.mkdir(exist_ok=True)
     lock = FileLock(work / ".nightly.lock")
@@ -51,7 +56,7 @@ def nightly(options: Sequence[str], profile: str, limit: float | None = None, wo
             _refuse_beside_another()
             _clear(options, Path(profile).name)
             before = _batches(work)
-            code = _snakemake([*options, "--workflow-profile", profile, "--rerun-incomplete"], limit)
+            code = _run([*options, "--workflow-profile", profile, "--rerun-incomplete"], limit, work)
             return _night(code, before, work)
     except Timeout:
         found = f"{work / '.nightly.lock'} is held: another nightly run is going on"
@@ -81,6 +86,22 @@ def _clear(options: Sequence[str], profile: str) -> None:
         left = [line.split()[0] for line in queue.stdout.splitlines() if line.split()[1].startswith(JOB_NAMES)]
         if left:
             subprocess.run(["scancel", *left], check=False)
+
+
+def _run(options: Sequence[str], limit: float | None, work: Path) -> int:
+    """Exit code of Snakemake; where jobs died so that the registry had to wait for them, it goes out all the same."""
+    began, launched, generation = time.monotonic(), _changed_at(work / "launched"), _changed_at(GENERATION)
+    code = _snakemake(options, limit)
+    had_jobs, registered = _changed_at(work / "launched") != launched, _changed_at(GENERATION) != generation
+    if code not in (0, TOO_LATE) and had_jobs and not registered:
+        left = None if limit is None else max(0.0, began + limit - time.monotonic())
+        _snakemake([*options, "--allowed-rules", *PUBLISHING], left)
+    return code
+
+
+def _changed_at(path: Path) -> int:
+    """Time of change of a file [ns], 0 where there is none."""
+    return path.stat().st_mtime_ns if path.exists() else 0
 
 
 def _snakemake(options: Sequence[str], limit: float | None) -> int:
@@ -118,4 +139,6 @@ def _night(code: int, before: set, work: Path) -> Night:
             if (path, known.batch) not in before:
                 processed += 1
                 quarantined += known.status not in ("ok", "vanished")
-    return Night(code, units, processed, quarantined, vanished)
+    newest = max(map(_changed_at, _states(work)), default=0)
+    published = code == 0 or 0 < newest <= _changed_at(GENERATION)
+    return Night(code, units, processed, quarantined, vanished, published)

@@ -10,6 +10,7 @@ from turnout.config import Configuration
 from turnout.errors import TurnoutError
 from turnout.fleet.atomic import write_text
 from turnout.fleet.batches import read_column
+from turnout.fleet.postponed import read_postponed
 from turnout.fleet.state import batch_paths
 
 
@@ -32,9 +33,10 @@ class Verdict:
 def judge(states: Iterable[Path], configuration: Configuration, judged: Iterable[str] = ()) -> Verdict:
     """Judge all batches that ``states`` name, those ``judged`` before left out.
 
-    Complaints: an internal error anywhere; and over the fleet or over one line a share of units in quarantine
-    above ``quarantine_share``, where there are at least ``quarantine_units`` of them.
+    Complaints: an internal error anywhere; a unit that the machine failed; and over the fleet or over one line a
+    share of units in quarantine above ``quarantine_share``, where there are at least ``quarantine_units`` of them.
     """
+    states = list(states)
     limits, before = configuration.settings["fleet"], set(judged)
     status, names, lines = {}, [], {}
     for path in batch_paths(states):
@@ -53,6 +55,9 @@ def judge(states: Iterable[Path], configuration: Configuration, judged: Iterable
         complaints.append(
             f"{first}: query the quarantine table for reason_code 'internal_error', report it with the log"
         )
+    if postponed := [met for state in states for met in read_postponed(state)[1].items()]:
+        first = f"{len(postponed)} units wait for the next run, first {': '.join(postponed[0])}"
+        complaints.append(f"{first}: look after the disk or the network they lie on")
     total, wrong = Counter(lines.values()), Counter(lines[unit] for unit in bad)
     groups = [("the fleet", len(status), len(bad))]
     groups += [(f"line {line!r}", total[line], wrong[line]) for line in sorted(total) if line and len(total) > 1]

@@ -52,6 +52,31 @@ def test_what_a_job_that_did_not_come_to_its_end_has_kept_counts(tmp_path, monke
     assert (night.code, night.units, night.processed) == (1, 1, 1)
 
 
+def test_where_jobs_die_what_the_others_computed_is_published(tmp_path, monkeypatch):
+    """The first run fails with its jobs and does not reach the registry, the second one may only publish."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "snakemake.py").write_text(
+        "import sys\nfrom pathlib import Path\n"
+        "from turnout.fleet.state import State\n"
+        "Path('said').open('a').write(' '.join(sys.argv[1:]) + '\\n')\n"
+        "if '--allowed-rules' in sys.argv and Path('publish').exists():\n"
+        "    Path('results/registry').mkdir(parents=True)\n"
+        "    Path('results/registry/_generation.json').write_text('')\n"
+        "elif Path('begins').exists():\n"
+        "    Path('work/launched').write_text('now')\n"
+        "    State().save(Path('work/hammer/00of01.json'))\n"
+        "raise SystemExit(1)\n"
+    )
+    assert "the registry was not published" in str(nightly([], "p"))
+    assert len((tmp_path / "said").read_text().splitlines()) == 1  # no job was tried: nothing to publish
+    (tmp_path / "begins").touch()
+    assert "the registry was not published" in str(nightly([], "p"))
+    (tmp_path / "publish").touch()
+    night = nightly([], "p")
+    assert (night.code, night.published) == (1, True)
+    assert "--rerun-incomplete --allowed-rules all register" in (tmp_path / "said").read_text().splitlines()[-1]
+
+
 def test_a_run_that_somebody_started_by_hand_is_not_robbed_of_its_lock(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "snakemake").write_text("import time\nprint('up', flush=True)\ntime.sleep(60)\n")

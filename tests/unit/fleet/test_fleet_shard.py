@@ -9,10 +9,13 @@ import pytest
 
 from turnout.config import load_configuration
 from turnout.errors import ReadError, TurnoutError
+from turnout.fleet import keys
 from turnout.fleet.batches import read_batch, read_column, read_results
 from turnout.fleet.current import current_results
 from turnout.fleet.plan import write_plans
-from turnout.fleet.shard import Stage, run_shard
+from turnout.fleet.postponed import read_postponed
+from turnout.fleet.shard import run_shard
+from turnout.fleet.stage import Stage
 from turnout.fleet.state import State, batch_paths, checkpoint_of, last_state, load_state
 from turnout.fleet.verdict import judge, verdict
 
@@ -41,6 +44,10 @@ def length(unit, turnout, raw_root, algo=""):
             raise ZeroDivisionError("in the toy")
         if text == "full":
             raise OSError(errno.ENOSPC, "No space left on device")
+        if text == "bad sector":
+            raise OSError(errno.EIO, "Input/output error")
+        if text == "too large":
+            raise MemoryError
         rows["recordings"].append({"path": path, "n_samples": len(text), "kind": "hammer"})
     return rows
 
@@ -145,6 +152,47 @@ def test_strict_raises(fleet):
     fleet.put("t1/2024-05-13/A_1.txt", "bug")
     with pytest.raises(ZeroDivisionError):
         fleet.run(strict=True)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_fault_of_the_machine_leaves_its_unit_for_the_next_run_and_the_others_go_on(fleet, threads):
+    fleet.put("t0/2024-05-13/A_1.txt", "bad sector")
+    fleet.put("t1/2024-05-13/A_1.txt", "too large")
+    said = str(fleet.run(threads=threads))
+    assert said == "hammer 00of01: 3 known, 1 processed, 0 quarantined, 2 postponed"
+    assert set(fleet.lengths()) == {"t2/hammer/A/2024-05-13"}
+    jobs, units = read_postponed(fleet.state)
+    assert jobs == 1 and units == {
+        "t0/hammer/A/2024-05-13": "OSError: [Errno 5] Input/output error", "t1/hammer/A/2024-05-13": "MemoryError: ",
+    }  # fmt: skip
+    (complaint,) = judge([fleet.state], fleet.configuration).complaints
+    assert "2 units wait for the next run, first t0/hammer/A/2024-05-13: OSError: [Errno 5]" in complaint
+
+    fleet.put("t0/2024-05-13/A_1.txt", "readable")
+    assert fleet.run(only=["t0"]).processed == 1
+    assert read_postponed(fleet.state) == (2, {"t1/hammer/A/2024-05-13": "MemoryError: "})
+    fleet.put("t1/2024-05-13/A_1.txt", "smaller")
+    assert fleet.run().processed == 1
+    assert read_postponed(fleet.state) == (2, {}) and judge([fleet.state], fleet.configuration).complaints == ()
+
+
+def test_a_sector_that_cannot_be_read_for_the_key_is_its_units_affair_alone(fleet, monkeypatch):
+    fleet.run()
+    os.utime(fleet.raw / "t0/2024-05-13/A_1.txt", (1, 1))
+    sound = keys.sha256_of
+
+    def bad(path):
+        if "t0" in str(path):
+            raise OSError(errno.EIO, "Input/output error")
+        return sound(path)
+
+    monkeypatch.setattr(keys, "sha256_of", bad)
+    fleet.put("t1/2024-05-13/A_2.txt", "new")
+    summary = fleet.run()
+    assert (summary.processed, summary.postponed) == (1, 1) and len(fleet.lengths()) == 3
+    monkeypatch.undo()
+    summary = fleet.run()
+    assert (summary.processed, summary.postponed) == (0, 0)
 
 
 @pytest.mark.parametrize("threads", [1, 2])
