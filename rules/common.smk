@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from turnout.content import sha256_of
 from turnout.fingerprint import fingerprint
 from turnout.fleet.postponed import read_postponed
 
@@ -22,8 +23,19 @@ def stage_params(stage, own):
         "chain": function,
         "algo": fingerprint(code) if ours else function,
         "job": RUN.job,
+        "plan": plan_content,
         "again": jobs_that_left_units(stage),
     }
+
+
+def plan_content(wildcards):
+    """What the plan of a shard says: a job that read an older one runs again, whatever the clocks say."""
+    return sha256_of(f"work/plan/{wildcards.shard}.json")
+
+
+def contents(paths):
+    """The same for files that people or other programs may change while a job runs."""
+    return [sha256_of(path) for path in paths]
 
 
 def jobs_that_left_units(stage):

@@ -32,6 +32,7 @@ rule mismatch:
     params:
         **stage_params("mismatch", "turnout.chains.mismatch:mismatch_unit"),
         kind="mismatch",
+        models=contents(MODELS),
         context="turnout.chains.mismatch_context:mismatch_context",
         gather=f"turnout.chains.mismatch_visits:{RUN.diagnose or 'enabled'}_visit",
     script:

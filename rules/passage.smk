@@ -21,6 +21,7 @@ rule passage:
     params:
         **stage_params("passage", "turnout.chains.passage:passage_unit"),
         kind="passage",
+        learned=contents(RUN.learned),
         context="turnout.chains.passage_context:passage_context",
     script:
         "../scripts/stage.py"

@@ -73,13 +73,17 @@ def launch(options: Mapping, scan: bool, formats=None, to_si=None) -> Launch:
     names = shard_names(shards, turnouts)
     chains = dict(options.get("chains") or {})
     whose = _diagnosed(options, configuration)
-    learned = _learned(configuration.settings["passage"])
+    learned = _learned(configuration)
     return Launch(names, shard_names(shards), turnouts, fleet_hash(configuration), job, whose, chains, learned)
 
 
-def _learned(settings) -> tuple[str, ...]:
-    """Those that are there; settings of a layout or turnout may name others, which are looked at when a job runs."""
-    files = [Path(settings.assets) / name for name in ("clusters.json", "loads.json")] + [Path(settings.axle_patterns)]
+def _learned(configuration: Configuration) -> tuple[str, ...]:
+    """Those that the settings of any turnout name and that are there, each once."""
+    files: dict[Path, None] = {}
+    for settings in _different(configuration):
+        own = settings["passage"]
+        named = Path(own.assets) / "clusters.json", Path(own.assets) / "loads.json", Path(own.axle_patterns)
+        files |= dict.fromkeys(named)
     return tuple(str(path) for path in files if path.is_file())
 
 
@@ -95,8 +99,13 @@ def _diagnosed(options: Mapping, configuration: Configuration) -> str:
     """Whose mismatches are diagnosed: by the option, else by ``mismatch: enabled`` of any turnout."""
     if "diagnose" in options:
         return "every" if _flag(options, "diagnose") else ""
-    different = {id(v): v for v in configuration.variants.values()}.values()
-    return "enabled" if any(v.parts["settings"]["mismatch"].enabled for v in different) else ""
+    return "enabled" if any(settings["mismatch"].enabled for settings in _different(configuration)) else ""
+
+
+def _different(configuration: Configuration) -> list[Mapping]:
+    """Settings by part, each once though many turnouts share them."""
+    variants = {id(v): v for v in configuration.variants.values()}.values()
+    return [variant.parts["settings"] for variant in variants]
 
 
 def _turnouts(said, configuration: Configuration) -> tuple[str, ...] | None:
