@@ -11,6 +11,7 @@ without the shards whose jobs died; a run that reached its limit goes on in the 
 import argparse
 
 HELP = "run the whole workflow unattended"
+INTERRUPTED = 130
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,6 +26,9 @@ def run(args: argparse.Namespace) -> int:
     from turnout.fleet.nightly import nightly
 
     limit = None if args.limit_hours is None else 3600.0 * args.limit_hours
-    night = nightly(args.options, args.profile, limit)
+    try:
+        night = nightly(args.options, args.profile, limit)
+    except KeyboardInterrupt:
+        return INTERRUPTED
     print(night)
     return night.code

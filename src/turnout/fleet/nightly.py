@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -47,12 +48,13 @@ def nightly(options: Sequence[str], profile: str, limit: float | None = None, wo
     """Run the workflow once, with ``options`` handed on to Snakemake.
 
     ``profile`` is a folder of profiles/; ``limit`` [s] ends a run that hangs. Where jobs die, what the others have
-    computed is published without theirs. TurnoutError where another run is still going on.
+    computed is published without theirs. A signal that ends this process ends Snakemake first. TurnoutError where
+    another run is still going on.
     """
     work.mkdir(exist_ok=True)
     lock = FileLock(work / ".nightly.lock")
     try:
-        with lock.acquire(timeout=0):
+        with lock.acquire(timeout=0), _signals_raise():
             _refuse_beside_another()
             _clear(options, Path(profile).name)
             before = _batches(work)
@@ -61,6 +63,21 @@ def nightly(options: Sequence[str], profile: str, limit: float | None = None, wo
     except Timeout:
         found = f"{work / '.nightly.lock'} is held: another nightly run is going on"
         raise TurnoutError(f"{found}. Wait for it, or end it.") from None
+
+
+@contextmanager
+def _signals_raise():
+    """SIGTERM and SIGHUP raise SystemExit, as Ctrl-C raises KeyboardInterrupt, so that what was begun is ended."""
+
+    def end(number, frame):
+        raise SystemExit(128 + number)
+
+    before = {number: signal.signal(number, end) for number in (signal.SIGTERM, signal.SIGHUP)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _refuse_beside_another() -> None:
@@ -82,8 +99,10 @@ def _clear(options: Sequence[str], profile: str) -> None:
     shutil.rmtree(Path(".snakemake") / "backups", ignore_errors=True)
     shutil.rmtree(Path(".snakemake") / "locks", ignore_errors=True)
     if profile == "slurm" and shutil.which("scancel"):
-        queue = subprocess.run(["squeue", "--me", "-h", "-o", "%i %j"], capture_output=True, text=True, check=False)
-        left = [line.split()[0] for line in queue.stdout.splitlines() if line.split()[1].startswith(JOB_NAMES)]
+        asked = ["squeue", "--me", "-h", "-o", "%i %j %Z"]  # number, name, folder
+        queue = subprocess.run(asked, capture_output=True, text=True, check=False)
+        jobs = [line.split(maxsplit=2) for line in queue.stdout.splitlines()]
+        left = [job[0] for job in jobs if job[1].startswith(JOB_NAMES) and job[2:] == [os.getcwd()]]
         if left:
             subprocess.run(["scancel", *left], check=False)
 
@@ -105,18 +124,29 @@ def _changed_at(path: Path) -> int:
 
 
 def _snakemake(options: Sequence[str], limit: float | None) -> int:
-    """Exit code of Snakemake in a process group of its own, so that the limit ends its jobs, too."""
+    """Exit code of Snakemake in a process group of its own, so that the limit or a signal ends its jobs, too."""
     process = subprocess.Popen([sys.executable, "-m", "snakemake", *options], start_new_session=True)
     try:
         return process.wait(limit)
     except subprocess.TimeoutExpired:
-        os.killpg(process.pid, signal.SIGTERM)
-        try:
-            process.wait(60)
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
+        _end(process)
         return TOO_LATE
+    except BaseException:
+        _end(process)
+        raise
+
+
+def _end(process: subprocess.Popen) -> None:
+    """End a process and its group: asked first, killed after a minute or when somebody loses patience."""
+    try:
+        os.killpg(process.pid, signal.SIGTERM)
+        process.wait(60)
+    except (subprocess.TimeoutExpired, ProcessLookupError):
+        pass
+    finally:
+        with suppress(ProcessLookupError):  # Snakemake and all its jobs have ended
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
 
 
 def _states(work: Path) -> list[Path]:

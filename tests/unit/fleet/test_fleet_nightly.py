@@ -1,7 +1,10 @@
 """The unattended run: one at a time, and what a killed one left is cleared."""
 
+import os
+import signal
 import subprocess
 import sys
+import time
 
 import pytest
 from filelock import FileLock
@@ -23,6 +26,49 @@ def test_a_run_that_hangs_is_ended_and_said(tmp_path, monkeypatch):
     monkeypatch.setattr(module.sys, "executable", sys.executable)
     night = nightly([], "profiles/default", limit=1.0, work=tmp_path / "work")
     assert night.code == TOO_LATE and "stopped at the time limit" in str(night)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_ends_the_run_and_its_jobs(tmp_path, number):
+    """Snakemake and its job leave their process numbers and wait; the job does not listen to SIGTERM."""
+    (tmp_path / "snakemake.py").write_text(
+        "import os, signal, subprocess, sys, time\nfrom pathlib import Path\n"
+        "if sys.argv[1:] == ['job']:\n    signal.signal(signal.SIGTERM, signal.SIG_IGN)\n"
+        "else:\n    subprocess.Popen([sys.executable, __file__, 'job'])\n"
+        "with open('pids', 'a') as stream:\n    stream.write(f'{os.getpid()}\\n')\n"
+        "time.sleep(600)\n"
+    )
+    night = [sys.executable, "-m", "turnout.cli", "nightly"]
+    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    run = subprocess.Popen(night, cwd=tmp_path, env=os.environ | {"PYTHONPATH": path}, stderr=subprocess.PIPE)
+    pids = tmp_path / "pids"
+    while not pids.exists() or len(pids.read_text().splitlines()) < 2:
+        assert run.poll() is None, run.stderr.read()
+        time.sleep(0.1)
+    run.send_signal(number)
+    assert run.wait() == 128 + number and run.stderr.read() == b""
+    for pid in map(int, pids.read_text().split()):
+        assert not _lives(pid)
+
+
+def _lives(pid):
+    try:
+        return open(f"/proc/{pid}/stat").read().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def test_only_jobs_of_this_folder_are_cancelled(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "snakemake.py").write_text("")
+    queue = f"11 turnouts-aa {tmp_path}\n12 turnouts-bb /another place\n13 other {tmp_path}\n14 turnouts-cc\n"
+    (tmp_path / "queue").write_text(queue)
+    for name, does in (("squeue", "cat queue"), ("scancel", 'echo "$@" > cancelled')):
+        (tmp_path / name).write_text(f"#!/bin/sh\n{does}\n")
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    nightly([], "profiles/slurm")
+    assert (tmp_path / "cancelled").read_text() == "11\n"
 
 
 def test_remains_of_a_killed_run_are_cleared(tmp_path, monkeypatch):
