@@ -16,13 +16,14 @@ from turnout.fleet.state import batch_paths
 
 @dataclass(frozen=True)
 class Verdict:
-    """Units that are new since the last sound run; ``complaints`` is empty for a sound one."""
+    """Units that are new since they were last judged; ``complaints`` is empty for a sound run, ``batches`` are all
+    that the states name."""
 
     units: int
     quarantined: int
     internal_errors: int
     complaints: tuple[str, ...]
-    judged: tuple[str, ...]
+    batches: tuple[str, ...]
 
     def __str__(self):
         said = f"{self.units} units computed, {self.quarantined} with rows in quarantine"
@@ -69,12 +70,19 @@ def judge(states: Iterable[Path], configuration: Configuration, judged: Iterable
 
 
 def verdict(states: Iterable[Path], configuration: Configuration, output: Path) -> Verdict:
-    """Judge what is new since ``output`` was last written, and write it; TurnoutError, nothing written, if unsound."""
+    """Judge what ``output`` does not name yet, and write it; TurnoutError, nothing written, if unsound.
+
+    Nights with too few units to be judged add up. A run over some turnouts forgets nothing of the others.
+    """
     output = Path(output)
     judged = json.loads(output.read_text(encoding="utf-8"))["judged"] if output.exists() else ()
     found = judge(states, configuration, judged)
     if found.complaints:
         raise TurnoutError(f"the registry is up to date, but {found}")
-    content = {"units": found.units, "quarantined": found.quarantined, "judged": found.judged}
+    here = set(found.batches)
+    kept = [name for name in judged if name in here or (output.parent / name).exists()]
+    enough = found.units >= configuration.settings["fleet"].quarantine_units
+    named = list(dict.fromkeys([*kept, *(found.batches if enough else ())]))
+    content = {"units": found.units, "quarantined": found.quarantined, "judged": named}
     write_text(output, json.dumps(content, indent=1) + "\n")
     return found

@@ -364,6 +364,34 @@ def test_the_verdict_judges_what_is_new_over_the_fleet_and_each_line(tmp_path):
     assert verdict([fleet.state], fleet.configuration, output).quarantined == 1
 
 
+def test_small_nights_add_up_until_they_can_be_judged(tmp_path):
+    fleet = Fleet(tmp_path, 1, "fleet: {quarantine_units: 5, quarantine_share: 0.3}\n")
+    output = tmp_path / "work/verdict.json"
+    for night in range(4):
+        fleet.put(f"t0/2024-06-{night + 1:02d}/A_1.txt", "damaged")
+        fleet.run()
+        if night < 3:
+            assert verdict([fleet.state], fleet.configuration, output).units == night + 2
+    with pytest.raises(TurnoutError, match="4 of 5 new units of the fleet have rows in quarantine"):
+        verdict([fleet.state], fleet.configuration, output)
+
+
+def test_a_run_over_some_turnouts_forgets_no_verdict_on_the_others(fleet):
+    settings = "fleet: {quarantine_units: 1, quarantine_share: 0.3}\n"
+    (fleet.folder / "config/config.yaml").write_text(settings)
+    fleet.run()
+    other = fleet.state.with_name("01of02.json")
+    shutil.copy(fleet.state, other)
+    shutil.copytree(fleet.state.with_suffix(""), other.with_suffix(""))
+    output = fleet.folder / "work/verdict.json"
+    assert verdict([fleet.state, other], fleet.configuration, output).units == 3
+    assert verdict([other], fleet.configuration, output).units == 0
+    assert verdict([fleet.state, other], fleet.configuration, output).units == 0
+    shutil.rmtree(other.with_suffix(""))
+    verdict([fleet.state], fleet.configuration, output)
+    assert len(json.loads(output.read_text())["judged"]) == 1  # of batches that are gone nothing is kept
+
+
 def test_results_that_count_are_those_of_the_last_batch_and_of_the_last_number_of_shards(fleet):
     def told():
         return [(r.unit, r.algo) for r in current_results(fleet.folder / "work", "hammer", "t1")]
