@@ -18,6 +18,7 @@ without one was left by a killed job.
 """
 
 import base64
+import errno
 import hashlib
 import json
 import math
@@ -85,6 +86,22 @@ def read_batch(path: os.PathLike) -> Iterator[tuple[str, str, list[dict]]]:
         for table, rows in result.tables.items():
             if rows:
                 yield result.unit, table, rows
+
+
+def is_sound(path: os.PathLike) -> bool:
+    """Whether a batch is there and whole to its end; what stands in its columns is not looked at."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        pq.read_metadata(path)
+    except (pa.ArrowException, FileNotFoundError):
+        return False
+    except OSError as error:
+        if error.errno == errno.EIO:
+            return False
+        raise  # of the machine: the batch may be sound
+    return True
 
 
 def read_column(path: os.PathLike, *names: str) -> list[tuple]:

@@ -9,10 +9,12 @@ from turnout import __version__
 from turnout.config import load_configuration
 from turnout.errors import TurnoutError
 from turnout.fleet.batches import read_results
+from turnout.fleet.current import DamagedBatch
 from turnout.fleet.launch import launched_at
+from turnout.fleet.postponed import ask_again
 from turnout.fleet.shard import Summary, run_shard
 from turnout.fleet.stage import Stage
-from turnout.fleet.state import batch_paths
+from turnout.fleet.state import batch_paths, state_of
 from turnout.fleet.tables import configuration_rows
 from turnout.fleet.verdict import Verdict, verdict
 
@@ -23,10 +25,14 @@ def stage_job(plan, state, log, params, threads: int) -> Summary:
     stage = Stage(params.kind, params.chain, params.algo, params.get("context"), params.get("gather"))
     job = params.job
     configuration = load_configuration(job["configuration"])
-    summary = run_shard(
-        Path(plan), Path(state), stage, configuration, Path(job["raw"]),
-        threads=threads, only=job["only"] or None, strict=job["strict"],
-    )  # fmt: skip
+    try:
+        summary = run_shard(
+            Path(plan), Path(state), stage, configuration, Path(job["raw"]),
+            threads=threads, only=job["only"] or None, strict=job["strict"],
+        )  # fmt: skip
+    except DamagedBatch as error:
+        ask_again(state_of(error.batch))
+        raise
     _say(summary)
     return summary
 

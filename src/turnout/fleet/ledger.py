@@ -1,11 +1,14 @@
 """What a shard keeps while it computes: results wait for their batch, which counts once the checkpoint names it."""
 
+import logging
 import time
 from pathlib import Path
 
 from turnout.config.settings.fleet import FleetSettings
-from turnout.fleet.batches import UnitResult, write_batch
+from turnout.fleet.batches import UnitResult, is_sound, write_batch
 from turnout.fleet.state import Known, batch_folder, checkpoint_of, last_state, remove_orphans
+
+LOG = logging.getLogger("turnout.fleet")
 
 
 class Ledger:
@@ -17,9 +20,17 @@ class Ledger:
     def __init__(self, path: Path, limits: FleetSettings):
         self.path, self.folder, self.limits = path, batch_folder(path), limits
         self.state = last_state(path)
+        self._drop_damaged()
         self._waiting: list[tuple[UnitResult, str]] = []
         self._saved_at = time.monotonic()
         remove_orphans(self.state, self.folder)
+
+    def _drop_damaged(self) -> None:
+        damaged = {name for name in self.state.batches if not is_sound(self.folder / name)}
+        if damaged:
+            n_unit = self.state.forget(damaged)
+            names = ", ".join(str(self.folder / name) for name in sorted(damaged))
+            LOG.warning("%s cannot be read: %d units are computed again where their files are there", names, n_unit)
 
     def keep(self, result: UnitResult, stamp: str) -> None:
         """Take a result in; ``stamp`` tells what it was computed from."""

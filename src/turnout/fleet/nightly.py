@@ -16,7 +16,7 @@ from filelock import FileLock, Timeout
 from turnout.errors import TurnoutError
 from turnout.fleet.plan import read_plan
 from turnout.fleet.scan import unit_id
-from turnout.fleet.state import CHECKPOINT, last_state
+from turnout.fleet.state import CHECKPOINT, last_state, state_of
 
 JOB_NAMES = "turnouts"
 TOO_LATE = 124
@@ -151,7 +151,7 @@ def _end(process: subprocess.Popen) -> None:
 
 def _states(work: Path) -> list[Path]:
     """State files, those that a job which did not come to its end has yet to write, too."""
-    begun = {p.parent.with_name(f"{p.parent.name}.json") for p in work.glob(f"*/*of*/{CHECKPOINT}")}
+    begun = {state_of(p) for p in work.glob(f"*/*of*/{CHECKPOINT}")}
     return sorted(begun.union(p for p in work.glob("*/*of*.json") if p.parent.name != "plan"))
 
 

@@ -1,4 +1,4 @@
-"""Units that met a fault of the machine: they have no result, and the file that notes them asks for the next try."""
+"""Units that met a fault of the machine have no result; the file that notes them asks for the shard's next job."""
 
 import json
 from collections.abc import Mapping
@@ -18,9 +18,9 @@ class Postponed:
 
 
 def read_postponed(state: Path) -> tuple[int, dict[str, str]]:
-    """(how many jobs of a shard left units for the next one, {unit: what it met}); ``state`` is its state file.
+    """(how often the next job of a shard was asked for, {unit: what it met}); ``state`` is its state file.
 
-    The number is a parameter of the shard's job: one more makes it run again, though no plan has changed.
+    The number is a parameter of that job: one more makes it run again, though no plan has changed.
     """
     try:
         content = json.loads(_path(state).read_text(encoding="utf-8"))
@@ -33,7 +33,17 @@ def note_postponed(state: Path, units: Mapping[str, str]) -> None:
     """Note the ``units`` that the job of a shard leaves; without any, and none before, there is no file."""
     jobs, before = read_postponed(state)
     if units or before:
-        write_text(_path(state), json.dumps({"jobs": jobs + bool(units), "units": dict(units)}, indent=1) + "\n")
+        _write(state, jobs + bool(units), units)
+
+
+def ask_again(state: Path) -> None:
+    """Let the job of a shard run again, though no unit of it was left: one of its batches is damaged."""
+    jobs, units = read_postponed(state)
+    _write(state, jobs + 1, units)
+
+
+def _write(state: Path, jobs: int, units: Mapping[str, str]) -> None:
+    write_text(_path(state), json.dumps({"jobs": jobs, "units": dict(units)}, indent=1) + "\n")
 
 
 def _path(state: Path) -> Path:

@@ -1,7 +1,7 @@
 """What a shard has computed: per unit the key of its result and the batch that holds it."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -28,6 +28,13 @@ class State:
 
     units: dict[str, Known] = field(default_factory=dict)
     batches: list[str] = field(default_factory=list)
+
+    def forget(self, batches: Collection[str]) -> int:
+        """Drop ``batches`` and the units that count by them, which are new from now on; how many units."""
+        before = len(self.units)
+        self.units = {unit: known for unit, known in self.units.items() if known.batch not in batches}
+        self.batches = [b for b in self.batches if b not in batches]
+        return before - len(self.units)
 
     def save(self, path: Path) -> None:
         """Write it in one step: the results of a batch count from now on."""
@@ -70,6 +77,11 @@ def checkpoint_of(state: Path) -> Path:
 def batch_folder(state: Path) -> Path:
     """Folder of the batches of a state file: work/hammer/00of01.json -> work/hammer/00of01."""
     return Path(state).with_suffix("")
+
+
+def state_of(batch: Path) -> Path:
+    """State file of the shard that a batch, or its checkpoint, belongs to."""
+    return batch.parent.with_name(f"{batch.parent.name}.json")
 
 
 def batch_paths(states: Iterable[Path]) -> list[Path]:

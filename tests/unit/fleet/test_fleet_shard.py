@@ -4,6 +4,7 @@ import errno
 import json
 import os
 import shutil
+import sys
 
 import pytest
 
@@ -11,7 +12,8 @@ from turnout.config import load_configuration
 from turnout.errors import ReadError, TurnoutError
 from turnout.fleet import keys
 from turnout.fleet.batches import read_batch, read_column, read_results
-from turnout.fleet.current import current_results
+from turnout.fleet.current import DamagedBatch, current_results
+from turnout.fleet.job import stage_job
 from turnout.fleet.plan import write_plans
 from turnout.fleet.postponed import read_postponed
 from turnout.fleet.shard import run_shard
@@ -362,6 +364,46 @@ def test_the_verdict_judges_what_is_new_over_the_fleet_and_each_line(tmp_path):
     fleet.put("t3/2024-05-13/A_1.txt", "repaired")
     fleet.run()
     assert verdict([fleet.state], fleet.configuration, output).quarantined == 1
+
+
+@pytest.mark.parametrize("damage", ["cut", "gone"])
+def test_the_units_of_a_damaged_batch_are_computed_again(fleet, damage, caplog):
+    fleet.run()
+    fleet.put("t1/2024-06-13/A_1.txt", "later")
+    fleet.run()
+    before, (first, second) = fleet.lengths(), batch_paths([fleet.state])
+    if damage == "cut":
+        first.write_bytes(first.read_bytes()[:-20])
+    else:
+        first.unlink()
+    output = fleet.folder / "work/verdict.json"
+    with pytest.raises(TurnoutError, match=rf"{first} cannot be read"):
+        verdict([fleet.state], fleet.configuration, output)
+    assert read_postponed(fleet.state) == (1, {})  # so that the job runs, whatever its plan says
+    assert fleet.run().processed == 3
+    assert str(first) in caplog.text and "3 units are computed again" in caplog.text
+    assert fleet.lengths() == before and second in batch_paths([fleet.state])
+    verdict([fleet.state], fleet.configuration, output)
+    assert fleet.run().processed == 0
+
+
+def test_a_stage_that_builds_on_a_damaged_batch_asks_for_it_again(fleet, monkeypatch):
+    class Params(dict):
+        __getattr__ = dict.__getitem__
+
+    fleet.run()
+    (batch,) = batch_paths([fleet.state])
+    batch.unlink()
+    monkeypatch.chdir(fleet.folder)
+    monkeypatch.setattr("turnout.fleet.job._log_to", lambda log: None)
+    module = type(sys)("upon_hammer")
+    module.models = lambda turnout, settings: ("", list(current_results("work", "hammer", turnout)))
+    monkeypatch.setitem(sys.modules, "upon_hammer", module)
+    job = {"configuration": "config", "raw": "raw", "only": [], "strict": False}
+    params = Params(kind="hammer", chain="x:y", algo="1", job=job, context="upon_hammer:models")
+    with pytest.raises(DamagedBatch, match="cannot be read"):
+        stage_job("work/plan/00of01.json", "work/passage/00of01.json", "log", params, 1)
+    assert read_postponed(fleet.state) == (1, {})
 
 
 def test_small_nights_add_up_until_they_can_be_judged(tmp_path):
