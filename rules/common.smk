@@ -1,4 +1,8 @@
-"""What all stages share. A stage is one rule file that appends its name to STAGES, and one include line."""
+"""What all stages share. A stage is one rule file that appends its name to STAGES, and one include line.
+
+The output of a stage is a mark that its job came to its end. What it has computed lies beside it, out of the reach of
+Snakemake, which deletes the output of a job that fails.
+"""
 
 from pathlib import Path
 
@@ -47,11 +51,11 @@ def jobs_that_left_units(stage):
     return of_shard
 
 
-def shard_states(wildcards):
-    """State files of all stages and of the shards that take part; where no stage may run, those that are there."""
-    states = expand("work/{stage}/{shard}.json", stage=STAGES, shard=RUN.shards)
+def shards_done(wildcards):
+    """Marks of all stages and of the shards that take part; where no stage may run, those that are there."""
+    marks = expand("work/{stage}/{shard}.done", stage=STAGES, shard=RUN.shards)
     only = workflow.dag_settings.allowed_rules
-    return [state for state in states if not only or Path(state).exists()]
+    return [mark for mark in marks if not only or Path(mark).exists()]
 
 
 def shard_threads():

@@ -17,10 +17,10 @@ MODELS = [
 rule mismatch:
     input:
         plan="work/plan/{shard}.json",
-        passage="work/passage/{shard}.json",
+        passage="work/passage/{shard}.done",
         models=MODELS,
     output:
-        state=update("work/mismatch/{shard}.json"),
+        done="work/mismatch/{shard}.done",
     log:
         "logs/mismatch/{shard}.log",
     benchmark:

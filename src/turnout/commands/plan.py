@@ -79,13 +79,13 @@ class _Known:
         from turnout.fleet.scan import unit_id
         from turnout.fleet.shards import shard_of
         from turnout.fleet.stage import with_token
-        from turnout.fleet.state import last_state
+        from turnout.fleet.state import load_state
 
         unit = planned.unit
         module, _ = STAGES[unit.kind]
         path = self.work / unit.kind / f"{shard_of(unit.turnout, self.shards)}.json"
         if path not in self.states:
-            self.states[path] = last_state(path).units
+            self.states[path] = load_state(path).units
         before = self.states[path].get(unit_id(unit))
         if before is None:
             return "new"

@@ -1,4 +1,4 @@
-"""What a shard keeps while it computes: results wait for their batch, which counts once the checkpoint names it."""
+"""What a shard keeps while it computes: results wait for their batch, which counts once the state file names it."""
 
 import logging
 import time
@@ -6,20 +6,20 @@ from pathlib import Path
 
 from turnout.config.settings.fleet import FleetSettings
 from turnout.fleet.batches import UnitResult, is_sound, write_batch
-from turnout.fleet.state import Known, batch_folder, checkpoint_of, last_state, remove_orphans
+from turnout.fleet.state import Known, batch_folder, load_state, remove_orphans
 
 LOG = logging.getLogger("turnout.fleet")
 
 
 class Ledger:
-    """State of one shard, kept at ``path`` when its job comes to an end and in its checkpoint before.
+    """State of one shard, written to ``path`` at every checkpoint.
 
     A kill or a fault at any moment loses what waits for a batch, and nothing else.
     """
 
     def __init__(self, path: Path, limits: FleetSettings):
         self.path, self.folder, self.limits = path, batch_folder(path), limits
-        self.state = last_state(path)
+        self.state = load_state(path)
         self._drop_damaged()
         self._waiting: list[tuple[UnitResult, str]] = []
         self._saved_at = time.monotonic()
@@ -37,19 +37,15 @@ class Ledger:
         self._waiting.append((result, stamp))
         late = time.monotonic() - self._saved_at >= self.limits.checkpoint_time
         if late or len(self._waiting) >= self.limits.checkpoint_units:
-            self._checkpoint()
+            self.checkpoint()
 
-    def close(self) -> None:
-        """Write what still waits, then the state file: the job has come to its end."""
-        self._checkpoint()
-        self.state.save(self.path)
-
-    def _checkpoint(self) -> None:
+    def checkpoint(self) -> None:
+        """Write what waits; it counts from now on."""
         if self._waiting:
             batch = write_batch(self.folder, [result for result, _ in self._waiting]).name
             self.state.batches = [b for b in self.state.batches if b != batch] + [batch]
             for result, stamp in self._waiting:
                 self.state.units[result.unit] = Known(stamp, result.key, result.algo, result.status, batch)
             self._waiting.clear()
-        self.state.save(checkpoint_of(self.path))
+        self.state.save(self.path)
         self._saved_at = time.monotonic()

@@ -16,7 +16,7 @@ from filelock import FileLock, Timeout
 from turnout.errors import TurnoutError
 from turnout.fleet.plan import read_plan
 from turnout.fleet.scan import unit_id
-from turnout.fleet.state import CHECKPOINT, last_state, state_of
+from turnout.fleet.state import load_state
 
 JOB_NAMES = "turnouts"
 TOO_LATE = 124
@@ -150,20 +150,18 @@ def _end(process: subprocess.Popen) -> None:
 
 
 def _states(work: Path) -> list[Path]:
-    """State files, those that a job which did not come to its end has yet to write, too."""
-    begun = {state_of(p) for p in work.glob(f"*/*of*/{CHECKPOINT}")}
-    return sorted(begun.union(p for p in work.glob("*/*of*.json") if p.parent.name != "plan"))
+    return sorted(p for p in work.glob("*/*of*.json") if p.parent.name != "plan")
 
 
 def _batches(work: Path) -> set[tuple[Path, str]]:
-    return {(path, batch) for path in _states(work) for batch in last_state(path).batches}
+    return {(path, batch) for path in _states(work) for batch in load_state(path).batches}
 
 
 def _night(code: int, before: set, work: Path) -> Night:
     planned = {unit_id(p.unit) for plan in sorted((work / "plan").glob("*.json")) for p in read_plan(plan)}
     units = processed = quarantined = vanished = 0
     for path in _states(work):
-        for name, known in last_state(path).units.items():
+        for name, known in load_state(path).units.items():
             units += 1
             vanished += name not in planned
             if (path, known.batch) not in before:

@@ -68,8 +68,8 @@ def run_shard(
     ----------
     plan, state : path
         work/plan/<shard>.json, read after the lock is held, and work/<stage>/<shard>.json, whose batches lie in
-        work/<stage>/<shard>/. There lies the checkpoint, too, from which the next job goes on where this one is
-        killed or fails; the state file, which others read, is written in one step at the end.
+        work/<stage>/<shard>/. Results count once the state file names their batch; it is written in one step,
+        at every checkpoint and at the end, so a kill at any time loses a checkpoint's work and nothing else.
     stage : Stage
         What is computed.
     threads : int
@@ -107,7 +107,7 @@ class _Run:
         statuses = self._compute_all(todo)
         vanished = self._withdraw_vanished(wanted)
         n_postponed = self._note_postponed(wanted, {unit_id(planned.unit) for planned, *_ in todo})
-        self.ledger.close()
+        self.ledger.checkpoint()
         done, faults = statuses.total(), statuses["internal_error"]
         return Summary(
             self.name, len(wanted), done, done - statuses["ok"], faults, vanished, stale, n_postponed,

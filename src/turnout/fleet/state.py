@@ -1,14 +1,13 @@
 """What a shard has computed: per unit the key of its result and the batch that holds it."""
 
 import json
+import os
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from turnout.errors import TurnoutError
 from turnout.fleet.atomic import write_text
-
-CHECKPOINT = "state.json"
 
 
 @dataclass(frozen=True)
@@ -45,7 +44,6 @@ class State:
 
 def load_state(path: Path) -> State:
     """State in ``path``, empty where there is none; TurnoutError where somebody else changed the file."""
-    shard = Path(path).parent if Path(path).name == CHECKPOINT else batch_folder(path)
     try:
         content = json.loads(Path(path).read_text(encoding="utf-8"))
         units = {unit: Known(*values) for unit, values in content["units"].items()}
@@ -53,25 +51,21 @@ def load_state(path: Path) -> State:
     except FileNotFoundError:
         return State()
     except (ValueError, KeyError, TypeError) as error:
-        remedy = f"Delete {shard}.json and the folder {shard}: the shard is then computed anew."
+        remedy = f"Delete it and {mark_of(path)}: its shard is then computed anew."
         raise TurnoutError(f"{path}: not a state file ({error}). {remedy}") from None
 
 
-def last_state(path: Path) -> State:
-    """Where the last job of a shard got to, whether it came to its end or not; ``path`` is its state file.
+def mark_of(state: Path) -> Path:
+    """What Snakemake knows of a state: work/hammer/00of01.json -> work/hammer/00of01.done.
 
-    The state file alone speaks where an earlier version wrote it, that knew no checkpoints.
+    It deletes the output of a job that fails; what the job has kept until then must stay.
     """
-    checkpoint = checkpoint_of(path)
-    return load_state(checkpoint if checkpoint.exists() else path)
+    return Path(state).with_suffix(".done")
 
 
-def checkpoint_of(state: Path) -> Path:
-    """What a job goes on from: work/hammer/00of01.json -> work/hammer/00of01/state.json.
-
-    Snakemake does not know it. The state file is its output, which it takes back or deletes where the job fails.
-    """
-    return batch_folder(state) / CHECKPOINT
+def state_of_mark(mark: os.PathLike) -> Path:
+    """work/hammer/00of01.done -> work/hammer/00of01.json."""
+    return Path(mark).with_suffix(".json")
 
 
 def batch_folder(state: Path) -> Path:
@@ -80,7 +74,7 @@ def batch_folder(state: Path) -> Path:
 
 
 def state_of(batch: Path) -> Path:
-    """State file of the shard that a batch, or its checkpoint, belongs to."""
+    """State file of the shard that a batch belongs to."""
     return batch.parent.with_name(f"{batch.parent.name}.json")
 
 

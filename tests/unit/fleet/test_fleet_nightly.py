@@ -87,12 +87,12 @@ def test_it_is_said_in_one_line():
     )
 
 
-def test_what_a_job_that_did_not_come_to_its_end_has_kept_counts(tmp_path, monkeypatch):
+def test_what_a_job_that_did_not_come_to_its_end_has_kept_is_counted(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "snakemake.py").write_text(
         "from pathlib import Path\nfrom turnout.fleet.state import Known, State\n"
         "known = {'t1/hammer/A/1': Known('', '', '1', 'ok', 'b')}\n"
-        "State(known, ['b']).save(Path('work/hammer/00of01/state.json'))\nraise SystemExit(1)\n"
+        "State(known, ['b']).save(Path('work/hammer/00of01.json'))\nraise SystemExit(1)\n"
     )
     night = nightly([], "profiles/default", work=tmp_path / "work")
     assert (night.code, night.units, night.processed) == (1, 1, 1)

@@ -18,7 +18,7 @@ from turnout.fleet.plan import write_plans
 from turnout.fleet.postponed import read_postponed
 from turnout.fleet.shard import run_shard
 from turnout.fleet.stage import Stage
-from turnout.fleet.state import State, batch_paths, checkpoint_of, last_state, load_state
+from turnout.fleet.state import State, batch_paths, load_state
 from turnout.fleet.verdict import judge, verdict
 
 LAYOUT = """\
@@ -204,29 +204,9 @@ def test_a_full_disk_fails_the_job_and_keeps_what_was_done(tmp_path, threads):
     with pytest.raises(OSError, match="No space left"):
         fleet.run(threads=threads)
     fleet.put("t2/2024-05-13/A_1.txt", "room")
-    assert set(last_state(fleet.state).units) == {"t0/hammer/A/2024-05-13", "t1/hammer/A/2024-05-13"}
+    assert set(fleet.lengths()) == {"t0/hammer/A/2024-05-13", "t1/hammer/A/2024-05-13"}
     assert fleet.run().processed == 2
     assert set(fleet.lengths()) == {f"t{i}/hammer/A/2024-05-13" for i in range(4)}
-
-
-@pytest.mark.parametrize("before", [None, b"the state file of the night before"])
-def test_what_a_job_computed_before_it_failed_is_kept_though_snakemake_takes_its_output_back(tmp_path, before):
-    """A backlog longer than the limit of a night comes to its end after some nights."""
-    fleet = Fleet(tmp_path, 4, "fleet: {checkpoint_units: 1}\n")
-    fleet.put("t2/2024-05-13/A_1.txt", "full")
-    with pytest.raises(OSError, match="No space left"):
-        fleet.run()
-    fleet.state.unlink(missing_ok=True)
-    if before:
-        fleet.state.write_bytes(before)
-    fleet.put("t2/2024-05-13/A_1.txt", "room")
-    assert fleet.run().processed == 2 and CALLS == ["t2/A/2024-05-13", "t3/A/2024-05-13"]
-
-
-def test_a_state_file_of_a_version_without_checkpoints_is_gone_on_from(fleet):
-    fleet.run()
-    checkpoint_of(fleet.state).unlink()
-    assert fleet.run().processed == 0 and load_state(checkpoint_of(fleet.state)) == load_state(fleet.state)
 
 
 def test_a_full_disk_while_writing_loses_nothing(fleet, monkeypatch):
@@ -269,7 +249,7 @@ def test_a_kill_between_batch_and_state_leaves_an_orphan_that_is_cleared(fleet, 
     folder = fleet.state.with_suffix("")
     assert len(list(folder.glob("batch-*"))) == 2 and len(load_state(fleet.state).batches) == 1
     assert fleet.run().processed == 1
-    assert {p.name for p in folder.iterdir()} == {"state.json", *load_state(fleet.state).batches}
+    assert {p.name for p in folder.iterdir()} == set(load_state(fleet.state).batches)
 
 
 def test_vanished_units_keep_their_rows_and_open_quarantine_is_withdrawn(fleet):
@@ -324,11 +304,10 @@ def test_a_row_that_cannot_be_written_is_a_fault_of_its_unit(fleet):
 
 def test_a_spoilt_state_file_is_said(fleet):
     fleet.run()
-    checkpoint_of(fleet.state).write_text("{")
-    with pytest.raises(TurnoutError, match=r"not a state file .* Delete (.*/00of01)\.json and the folder \1: "):
+    fleet.state.write_text("{")
+    with pytest.raises(TurnoutError, match=r"not a state file .* Delete it and .*00of01\.done: its shard is then"):
         fleet.run()
     fleet.state.unlink()
-    shutil.rmtree(fleet.state.with_suffix(""))
     assert fleet.run().processed == 3
 
 
@@ -402,7 +381,7 @@ def test_a_stage_that_builds_on_a_damaged_batch_asks_for_it_again(fleet, monkeyp
     job = {"configuration": "config", "raw": "raw", "only": [], "strict": False}
     params = Params(kind="hammer", chain="x:y", algo="1", job=job, context="upon_hammer:models")
     with pytest.raises(DamagedBatch, match="cannot be read"):
-        stage_job("work/plan/00of01.json", "work/passage/00of01.json", "log", params, 1)
+        stage_job("work/plan/00of01.json", "work/passage/00of01.done", "log", params, 1)
     assert read_postponed(fleet.state) == (1, {})
 
 
