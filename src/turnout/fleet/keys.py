@@ -22,8 +22,8 @@ def key_of(planned: Planned, raw_root: Path) -> str:
 
 
 def _content(path: str) -> str | None:
-    """sha256 of a file's bytes; None where it is gone or may not be read."""
+    """sha256 of a file's bytes; None where it is gone, OSError where it cannot be read."""
     try:
         return sha256_of(path)
-    except (FileNotFoundError, PermissionError, IsADirectoryError):
+    except (FileNotFoundError, IsADirectoryError):
         return None

@@ -2,7 +2,7 @@
 
 import errno
 
-ONE_FILE = {errno.EIO, errno.ESTALE, errno.EREMOTEIO, errno.ETIMEDOUT, errno.ENOMEM}
+ONE_FILE = {errno.EIO, errno.ESTALE, errno.EREMOTEIO, errno.ETIMEDOUT, errno.ENOMEM, errno.EACCES}
 EVERY_FILE = {errno.ENOSPC, errno.EDQUOT, errno.EMFILE, errno.ENFILE}
 
 
@@ -14,7 +14,8 @@ def of_the_machine(error: BaseException) -> bool:
 def passing(error: BaseException) -> bool:
     """Whether the unit that met ``error`` is left for the next run while the others go on.
 
-    A bad sector, a server that does not answer, a file too large for the memory of this moment.
+    A bad sector, a server that does not answer, a file that may not be read or is too large for the memory of this
+    moment.
 
     >>> passing(OSError(errno.EIO, "Input/output error")), passing(OSError(errno.ENOSPC, "No space left on device"))
     (True, False)

@@ -36,6 +36,10 @@ class RawFolder:
         except OSError as error:
             self._cannot(inside, "file", error)
             return None
+        # neither size nor time changes when reading is allowed again: until then the file is none
+        if status.st_mode & 0o444 != 0o444 and not os.access(entry.path, os.R_OK):
+            self._leave_out(inside, "file", "may not be read", "Allow reading it")
+            return None
         return f"{self.raw}/{inside}", status.st_size, status.st_mtime_ns
 
     def _collect(self, folder: str, inside: str, way: tuple[str, ...]) -> None:

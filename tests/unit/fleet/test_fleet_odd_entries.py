@@ -93,6 +93,17 @@ def test_a_file_that_may_not_be_looked_at_is_a_problem(fleet):
     assert [(p.path, p.found) for p in folder.problems] == [("t1/hammer/A_1.uff", "Permission denied")]
 
 
+def test_a_file_that_may_not_be_read_is_new_once_it_may(fleet, monkeypatch):
+    """Its permission changes neither its size nor its time: the plan has to."""
+    path = fleet / f"raw/t1/{DAY}/A_1.uff"
+    path.chmod(0o600)
+    monkeypatch.setattr("turnout.fleet.raw_folder.os.access", lambda path, mode: "t1" not in path)  # we may be root
+    turnouts, problems = planned(fleet)
+    assert turnouts == ["t2"] and problems == [(f"t1/{DAY}/A_1.uff", "file", "may not be read")]
+    path.chmod(0o644)
+    assert planned(fleet) == (["t1", "t2"], [])
+
+
 def test_notes_that_cannot_be_read_are_a_problem(fleet):
     (fleet / "raw/t1/campaigns.csv").mkdir()
     turnouts, problems = planned(fleet)

@@ -178,6 +178,16 @@ def test_a_fault_of_the_machine_leaves_its_unit_for_the_next_run_and_the_others_
     assert read_postponed(fleet.state) == (2, {}) and judge([fleet.state], fleet.configuration).complaints == ()
 
 
+def test_a_file_that_is_closed_after_it_was_planned_is_read_once_it_is_open(fleet, monkeypatch):
+    def closed(path):
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr(keys, "sha256_of", closed)
+    assert fleet.run().postponed == 3
+    monkeypatch.undo()
+    assert fleet.run().processed == 3
+
+
 def test_a_sector_that_cannot_be_read_for_the_key_is_its_units_affair_alone(fleet, monkeypatch):
     fleet.run()
     os.utime(fleet.raw / "t0/2024-05-13/A_1.txt", (1, 1))
