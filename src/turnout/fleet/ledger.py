@@ -21,7 +21,7 @@ class Ledger:
         self.path, self.folder, self.limits = path, batch_folder(path), limits
         self.state = load_state(path)
         self._drop_damaged()
-        self._waiting: list[tuple[UnitResult, str]] = []
+        self._waiting: list[tuple[UnitResult, str, str]] = []
         self._saved_at = time.monotonic()
         remove_orphans(self.state, self.folder)
 
@@ -32,9 +32,9 @@ class Ledger:
             names = ", ".join(str(self.folder / name) for name in sorted(damaged))
             LOG.warning("%s cannot be read: %d units are computed again where their files are there", names, n_unit)
 
-    def keep(self, result: UnitResult, stamp: str) -> None:
-        """Take a result in; ``stamp`` tells what it was computed from."""
-        self._waiting.append((result, stamp))
+    def keep(self, result: UnitResult, stamp: str, contents: str = "") -> None:
+        """Take a result in; ``stamp`` and ``contents`` tell what it was computed from."""
+        self._waiting.append((result, stamp, contents))
         late = time.monotonic() - self._saved_at >= self.limits.checkpoint_time
         if late or len(self._waiting) >= self.limits.checkpoint_units:
             self.checkpoint()
@@ -42,10 +42,11 @@ class Ledger:
     def checkpoint(self) -> None:
         """Write what waits; it counts from now on."""
         if self._waiting:
-            batch = write_batch(self.folder, [result for result, _ in self._waiting]).name
+            batch = write_batch(self.folder, [result for result, *_ in self._waiting]).name
             self.state.batches = [b for b in self.state.batches if b != batch] + [batch]
-            for result, stamp in self._waiting:
-                self.state.units[result.unit] = Known(stamp, result.key, result.algo, result.status, batch)
+            for result, stamp, contents in self._waiting:
+                known = Known(stamp, result.key, result.algo, result.status, batch, contents)
+                self.state.units[result.unit] = known
             self._waiting.clear()
         self.state.save(self.path)
         self._saved_at = time.monotonic()

@@ -3,7 +3,7 @@
 import logging
 import traceback
 from collections import Counter
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Collection, Container, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -14,7 +14,7 @@ from turnout.config import Configuration, TurnoutConfig, with_raw
 from turnout.errors import ConfigError
 from turnout.fleet.batches import UnitResult
 from turnout.fleet.guard import guarded
-from turnout.fleet.keys import key_of, stamp_of
+from turnout.fleet.keys import contents_of, key_of, short, stamp_of
 from turnout.fleet.ledger import Ledger
 from turnout.fleet.machine import passing
 from turnout.fleet.plan import Planned, read_plan
@@ -105,6 +105,7 @@ class _Run:
             # before processes are forked: each of them would import it anew
             self.compute = named(self.stage.compute)
         statuses = self._compute_all(todo)
+        self.ledger.checkpoint()
         vanished = self._withdraw_vanished(wanted)
         n_postponed = self._note_postponed(wanted, {unit_id(planned.unit) for planned, *_ in todo})
         self.ledger.checkpoint()
@@ -158,13 +159,15 @@ class _Run:
 
     def _same_content(self, name: str, planned: Planned, stamp: str, known: Known | None) -> bool:
         """Whether only times changed; the state then notes the new ones."""
+        if known is None or known.algo != self.stage.algo:
+            return False
         try:
-            if known is None or known.algo != self.stage.algo or known.key != key_of(planned, self.raw_root):
-                return False
+            contents = contents_of(planned, self.raw_root)
         except OSError:  # met again, and told, when it is computed
             return False
-        self.state.units[name] = replace(known, stamp=stamp)
-        return True
+        if same := known.key == key_of(planned, contents):
+            self.state.units[name] = replace(known, stamp=stamp, contents=short(contents))
+        return same
 
     def _compute_all(self, todo: list[tuple]) -> Counter[str]:
         """Keep every result; how many there are of each status."""
@@ -175,20 +178,20 @@ class _Run:
                 self.postponed[found.unit] = found.met
                 progress.step(False)
                 continue
-            result, stamp = found
+            result, stamp, contents = found
             statuses[result.status] += 1
             progress.step(result.status != "ok")
-            self.ledger.keep(result, stamp)
+            self.ledger.keep(result, stamp, contents)
         progress.close()
         return statuses
 
-    def _compute(self, task: tuple) -> tuple[UnitResult, str] | Postponed:
+    def _compute(self, task: tuple) -> tuple[UnitResult, str, str] | Postponed:
         planned, turnout, stamp, value = task
         more = {"context": value} if self.stage.context else {}
         try:
-            key = key_of(planned, self.raw_root)
-            call = partial(guarded, self.compute, planned.unit, turnout, self.raw_root, key)
-            return call(self.stage.algo, self.strict, **more), stamp
+            contents = contents_of(planned, self.raw_root)
+            call = partial(guarded, self.compute, planned.unit, turnout, self.raw_root, key_of(planned, contents))
+            return call(self.stage.algo, self.strict, **more), stamp, short(contents)
         except (OSError, MemoryError) as error:
             if self.strict or not passing(error):
                 raise
@@ -202,14 +205,25 @@ class _Run:
         note_postponed(self.path, left | self.postponed)
         return len(self.postponed)
 
-    def _withdraw_vanished(self, wanted: Iterable[str]) -> int:
-        """Count units whose files are all gone. Their rows stay; of a unit that only ever was in quarantine
-        nothing is left to repair: an empty result takes its rows out of the list of open ones. A stage that gathers
-        its own units looks at some of them only: none has vanished for that."""
+    def _withdraw_vanished(self, wanted: Collection[str]) -> int:
+        """Count units whose files are all gone. Their rows stay; an empty result takes them back of a unit that only
+        ever was in quarantine, for nothing is left to repair, and of one whose files were moved to others, for they
+        would count twice. A stage that gathers its own units looks at some of them only: none has vanished for that."""
         gone = [name for name in self.state.units if name not in wanted]
+        held = self._held(wanted) if gone and not self.stage.gather else {}
         for name in gone:
-            known = self.state.units[name]
-            if known.status == "quarantined":
-                turnout, kind, _ = name.split("/", 2)
+            known, (turnout, kind, _) = self.state.units[name], name.split("/", 2)
+            contents = set(known.contents.split())
+            moved = contents and contents <= held.get(turnout, set())
+            if known.status == "quarantined" or (moved and known.status != "vanished"):
                 self.ledger.keep(UnitResult(name, turnout, kind, "vanished", known.algo, "vanished", {}), "")
         return 0 if self.stage.gather else len(gone)
+
+    def _held(self, wanted: Collection[str]) -> dict[str, set[str]]:
+        """Turnout -> contents of the files from which its units that are there have rows."""
+        held: dict[str, set[str]] = {}
+        for name in wanted:
+            known = self.state.units.get(name)
+            if known and known.status in ("ok", "partly"):
+                held.setdefault(name.split("/", 1)[0], set()).update(known.contents.split())
+        return held

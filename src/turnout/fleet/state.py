@@ -12,13 +12,15 @@ from turnout.fleet.atomic import write_text
 
 @dataclass(frozen=True)
 class Known:
-    """``stamp``: names, sizes and times it was computed from; ``key``: the same by content; ``batch``: file name."""
+    """``stamp``: names, sizes and times it was computed from; ``key``: the same by content; ``batch``: file name;
+    ``contents``: of its files whatever they are called, "" in states of earlier versions."""
 
     stamp: str
     key: str
     algo: str
     status: str
     batch: str
+    contents: str = ""
 
 
 @dataclass
@@ -37,7 +39,7 @@ class State:
 
     def save(self, path: Path) -> None:
         """Write it in one step: the results of a batch count from now on."""
-        units = {u: [k.stamp, k.key, k.algo, k.status, k.batch] for u, k in sorted(self.units.items())}
+        units = {u: [k.stamp, k.key, k.algo, k.status, k.batch, k.contents] for u, k in sorted(self.units.items())}
         lines = ",\n".join(f"{json.dumps(u, ensure_ascii=False)}:{json.dumps(v)}" for u, v in units.items())
         write_text(path, f'{{"batches":{json.dumps(self.batches)},"units":{{\n{lines}\n}}}}\n')
 
