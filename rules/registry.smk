@@ -18,6 +18,7 @@ rule register:
         runtime=60,
     params:
         code=fingerprint("turnout.registry.register"),
+        again=attempts("register"),
         stages=STAGES,
         shards=RUN.every_shard,
         configuration=RUN.fleet_hash,
@@ -41,6 +42,7 @@ rule verdict:
         mem_mb=500,
         runtime=10,
     params:
+        again=attempts("verdict"),
         job=RUN.job,
     script:
         "../scripts/verdict.py"

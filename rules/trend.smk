@@ -23,6 +23,7 @@ rule trend:
         runtime=60,
     params:
         code=fingerprint("turnout.trend.nightly"),
+        again=attempts("trend"),
         configuration=RUN.fleet_hash,
         acknowledgements=contents(ACKNOWLEDGED),
         job=RUN.job,

@@ -3,6 +3,8 @@
 import logging
 
 from turnout.chains.trend import trend_job
+from turnout.fleet.attempt import attempt
 
 logging.basicConfig(filename=snakemake.log[0], filemode="w", level="INFO", format="%(levelname)s %(message)s")
-print(trend_job(snakemake.input.registry, *snakemake.output, snakemake.params.job["configuration"])["rows"])
+with attempt("trend", snakemake.params.again):
+    print(trend_job(snakemake.input.registry, *snakemake.output, snakemake.params.job["configuration"])["rows"])

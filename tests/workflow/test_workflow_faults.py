@@ -56,6 +56,19 @@ def test_a_unit_that_cannot_be_read_is_tried_again_every_night_until_it_can(flee
     assert "Nothing to be done" in run(fleet).stdout
 
 
+def test_a_registration_that_failed_is_tried_again_though_nothing_is_new(fleet):
+    toy.add_raw(fleet, "T00002", n_section=1, n_campaign=1, first=1)
+    recordings = fleet / "results/registry/recordings"
+    recordings.rename(fleet / "away")
+    recordings.write_text("in the way of its folder")
+    assert run(fleet).returncode != 0
+    recordings.unlink()
+    (fleet / "away").rename(recordings)
+    assert run(fleet).returncode == 0
+    assert sum("2024-02-01" in repr(row) for row in toy.rows(fleet)["recordings"]) == 1
+    assert "Nothing to be done" in run(fleet).stdout
+
+
 def test_a_job_that_dies_holds_back_nothing_but_what_it_has_not_computed(fleet):
     for turnout in ("T00000", "T00001", "T00003"):
         toy.add_raw(fleet, turnout, n_section=1, n_campaign=1, first=1)
@@ -67,8 +80,8 @@ def test_a_job_that_dies_holds_back_nothing_but_what_it_has_not_computed(fleet):
     night = [sys.executable, "-m", "turnout.cli", "nightly", "--profile", profile, "--", *options]
     done = subprocess.run(night, cwd=fleet, env=toy.environment(), text=True, capture_output=True, check=False)
     assert done.returncode != 0 and "not published" not in done.stdout
-    assert sum("2024-02-01" in repr(row) for row in toy.rows(fleet)["recordings"]) == 2
+    assert sum("2024-02-01" in repr(row) for row in toy.rows(fleet)["recordings"]) == 3
     (fleet / "killer").unlink()
     done = run(fleet)  # no plan has changed since
     assert done.returncode == 0 and re.search(r"hammer 02of03: 4 known, 1 processed", done.stdout), done.stdout
-    assert sum("2024-02-01" in repr(row) for row in toy.rows(fleet)["recordings"]) == 3
+    assert sum("2024-02-01" in repr(row) for row in toy.rows(fleet)["recordings"]) == 4

@@ -9,6 +9,7 @@ from turnout import __version__
 from turnout.config import load_configuration
 from turnout.errors import TurnoutError
 from turnout.fleet.atomic import write_text
+from turnout.fleet.attempt import attempt
 from turnout.fleet.batches import read_results
 from turnout.fleet.current import DamagedBatch
 from turnout.fleet.launch import launched_at
@@ -45,9 +46,10 @@ def stage_job(plan, mark, log, params, threads: int) -> Summary:
 def verdict_job(marks, output, log, params) -> Verdict:
     """Judge the run; SystemExit with 1 where it is not sound."""
     _log_to(log)
+    states = [state_of_mark(mark) for mark in marks]
     try:
-        states = [state_of_mark(mark) for mark in marks]
-        found = verdict(states, load_configuration(params.job["configuration"]), Path(output))
+        with attempt("verdict", params.again):
+            found = verdict(states, load_configuration(params.job["configuration"]), Path(output))
     except TurnoutError as error:
         _say(error)
         raise SystemExit(1) from None
@@ -62,10 +64,11 @@ def register_job(register, generation, log, params) -> None:
     plans = [Path("work/plan") / f"{shard}.json" for shard in params.shards]
     states = [Path("work") / stage / f"{shard}.json" for stage in params.stages for shard in params.shards]
     tables = configuration_rows(configuration, Path(params.job["raw"]), plans)
-    done = register(
-        batch_paths(states), Path(generation).parent, read=read_results, tables=tables,
-        config_hash=params.configuration, code_version=__version__, started_at=launched_at(),
-    )  # fmt: skip
+    with attempt("register", params.again):
+        done = register(
+            batch_paths(states), Path(generation).parent, read=read_results, tables=tables,
+            config_hash=params.configuration, code_version=__version__, started_at=launched_at(),
+        )  # fmt: skip
     os.utime(generation)
     for batch, fault in done.faults.items():
         logging.getLogger("turnout.fleet").warning("%s: %s", batch, fault)
