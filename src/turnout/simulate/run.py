@@ -148,7 +148,8 @@ def _paths(prepared, vehicle, drive, n_step):
     length = float(vehicle.wheel_places[-1])
     ends = (drive.start - drive.direction * length, drive.start + drive.direction * way)
     low, high = min(ends) - 0.1, max(ends) + 0.1
-    term_parts = [part for term in prepared.terms for part in term.paths(prepared.track, vehicle)]
+    rolls = drive.thrown is None  # a hammer falls on the rail's head whatever wheels find there
+    term_parts = [part for term in prepared.terms for part in term.paths(prepared.track, vehicle)] if rolls else []
     pieces: list[np.ndarray] = []
     known: dict[tuple, int] = {}
     path_of: dict[tuple, int] = {}
