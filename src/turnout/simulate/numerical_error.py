@@ -59,7 +59,7 @@ def numerical_error(case, bands=BANDS):
 
     The finer runs keep the recorded rate: two steps are averaged into one sample.
     """
-    options = dict(case.options)
+    options = _unprepared(case.options)
     rate, substeps = options.get("rate", 20e3), options.pop("substeps", 1)
     options["rate"] = rate
     bare = _bare(case.sensors)
@@ -93,12 +93,19 @@ def compare(coarse, fine, rate, bands=BANDS):
 def end_error(case, extra=30.0, bands=BANDS):
     """Relative waveform difference to the same track, longer by ``extra`` [m] of its last supports at both ends."""
     smooth = replace(case.track, roughness_level=None) if isinstance(case.track, TurnoutTrack) else case.track
-    options = {name: value for name, value in case.options.items() if name not in ("roughness", "prepared")}
+    options = {name: value for name, value in _unprepared(case.options).items() if name != "roughness"}
     rate = options.get("rate", 20e3)
     bare = _bare(case.sensors)
     tracks = smooth, _lengthened(smooth, extra)
     runs = [simulate_passage(track, case.vehicle, case.speed, bare, **options) for track in tracks]
     return compare(runs[0].samples, runs[1].samples, rate, bands)[0]
+
+
+def _unprepared(options):
+    """The options for another track or step: terms and scheme of what was prepared stay."""
+    rest = {name: value for name, value in options.items() if name != "prepared"}
+    prepared = options.get("prepared")
+    return rest if prepared is None else rest | {"terms": prepared.terms, "scheme": prepared.scheme_name}
 
 
 def _bare(sensors):

@@ -83,7 +83,7 @@ def simulate_passage(
         Length over which wheels roll from their stand-in track onto the modelled one; 0: they must stay on the
         modelled track all the time. [m]
     prepared : Prepared
-        Of ``prepare_passage``, shared among trains, speeds and paths; its terms count.
+        Of ``prepare_passage`` with this rate, shared among trains, speeds and paths; its terms and scheme count.
     truth : bool
         Also return the PassageTruth.
 
@@ -92,7 +92,8 @@ def simulate_passage(
     Recording or (Recording, PassageTruth)
         Acceleration [m/s²] down positive; sample k is the mean over the time step around (k + 1/2) / rate.
 
-    Errors: SimulationError for a speed of zero, an unknown route, a sensor outside, a wheel that leaves the track.
+    Errors: SimulationError for a speed of zero, an unknown route, a sensor outside, a wheel that leaves the track, a
+    track prepared for another rate.
 
     Examples
     --------
@@ -114,6 +115,7 @@ def simulate_passage(
     turnout = track if isinstance(track, TurnoutTrack) else TurnoutTrack(track, {route: ((),)})
     turnout.surfaces(route)
     prepared = prepared or prepare_passage(turnout, terms, rate, substeps, scheme, route)
+    prepared.check_step(rate, substeps)
     for term in prepared.terms:
         vehicle = term.vehicle(vehicle)
     sensors, sign = tuple(sensors), 1 if direction == "facing" else -1

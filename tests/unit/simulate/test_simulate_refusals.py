@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 
 from turnout.errors import ConfigError, SimulationError
-from turnout.simulate import Sensor, car, load_track, load_vehicle, simulate_hammer, simulate_passage, uniform_track
+from turnout.simulate import (
+    Sensor,
+    car,
+    load_track,
+    load_vehicle,
+    prepare_passage,
+    simulate_hammer,
+    simulate_passage,
+    uniform_track,
+)
 from turnout.simulate.law import PowerLaw, TableLaw
 from turnout.simulate.link import Link
 from turnout.simulate.matrices import assemble
@@ -109,6 +118,10 @@ def test_a_body_on_nothing_is_refused():
         (lambda: simulate_passage(TRACK, car(), 30.0, SENSOR, "sideways"), "neither 'facing' nor 'trailing'"),
         (lambda: simulate_passage(TRACK, car(), 30.0, [Sensor("Z", 40.0)]), "'Z' at 40.000 m is outside"),
         (lambda: simulate_passage(TurnoutTrack(TRACK), car(), 30.0, SENSOR, route="siding"), "no route 'siding'"),
+        (
+            lambda: simulate_passage(TRACK, car(), 30.0, SENSOR, prepared=prepare_passage(TRACK, rate=10e3)),
+            r"for steps of 0\.0001 s, but 20000\.0 Hz with 1 per sample ask for 5e-05 s",
+        ),
         (lambda: simulate_hammer(TRACK, "A7"), "no location 'A7'"),
         (lambda: load_vehicle("tgv"), "no file config/vehicles/tgv.yaml; there are .*coach"),
         (lambda: load_vehicle("ic3", load=7.0), "load 7.0"),
