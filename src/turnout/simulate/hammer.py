@@ -87,14 +87,14 @@ def simulate_hammer(
     pulse : callable or None
         A given force [N] of time [s] instead of the hammer's mass and tip.
     prepared : Prepared
-        Of ``prepare_hammer``, to share one factorisation among tests.
+        Of ``prepare_hammer`` with this rate, to share one factorisation among tests; its terms and scheme count.
 
     Returns
     -------
     tuple of Recording
         kind "hammer"; force and acceleration are means over the same step, so their ratio has no delay.
 
-    Errors: SimulationError for a place outside the track.
+    Errors: SimulationError for a place outside the track and a track prepared for another rate.
 
     Examples
     --------
@@ -109,10 +109,11 @@ def simulate_hammer(
     place, _ = located(track, location)
     sensors = hammer_sensors(place) if sensors is None else tuple(sensors)
     prepared = prepared or prepare_hammer(track, location, terms, rate, substeps, half_length, scheme)
+    prepared.check_step(rate, substeps)
     rng = np.random.default_rng(seed)
-    probes = [seated(sensor, terms).probe(prepared.track) for sensor in sensors]
+    probes = [seated(sensor, prepared.terms).probe(prepared.track) for sensor in sensors]
     channels = (replace(hammer.force, place=place), *sensors)
-    channel_terms = [term for term in terms if term.kind == "channel"]
+    channel_terms = [term for term in prepared.terms if term.kind == "channel"]
     recordings = []
     for record in range(n_blows):
         velocity = hammer.velocity * np.exp(hammer.velocity_spread * rng.normal())
