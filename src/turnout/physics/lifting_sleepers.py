@@ -43,6 +43,11 @@ class LiftingSleepers(PhysicsTerm):
         """Eleven sleepers whose rail, bent upwards, carries most of their weight."""
         return cls(15, 25, 1.0, dead_load=400.0)
 
+    @property
+    def withheld(self):
+        """Share of the ballast that is missing above where it lifts off."""
+        return self.share
+
     def ports(self, track):
         """One port at each sleeper."""
         self.check()
@@ -51,7 +56,8 @@ class LiftingSleepers(PhysicsTerm):
         return tuple(self._port(track, j) for j in range(self.first, self.last + 1))
 
     def _port(self, track, j):
-        k, c = self.share * track.ballast_stiffness[j], self.share * track.ballast_damping[j]
-        lift = -self.dead_load / track.ballast_stiffness[j]
+        ballast = track.ballast_link(j)
+        k, c = self.share * ballast.stiffness, self.share * ballast.damping
+        lift = -self.dead_load / ballast.stiffness
         law = TableLaw((lift - 1.0, lift - ONSET, lift, lift + 1.0), (k, k * ONSET, 0.0, 0.0), (-c, -c, 0.0, 0.0))
-        return Port(((("sleeper", j), 1.0),), law, label=f"lift of sleeper {j}")
+        return Port(ballast.ends, law, label=f"lift of sleeper {j}")

@@ -141,20 +141,26 @@ class Track:
             ends = (*ends, (("sleeper", j), -1.0))
         return Link(ends, self.pad_stiffness[j], self.pad_damping[j], 0.0, self.pad_loss_factor[j], "pad")
 
+    def ballast_link(self, j):
+        """The ballast under sleeper ``j``: to the ground, or to the ballast's mass with 3 layers."""
+        if self.layers == 1:
+            raise SimulationError(f"{self.name}: a track of one layer has no ballast under support {j}.")
+        ends: tuple = ((("sleeper", j), 1.0),)
+        if self.layers == 3:
+            ends = (*ends, (("ballast", j), -1.0))
+        values = self.ballast_stiffness[j], self.ballast_damping[j], 0.0, self.ballast_loss_factor[j]
+        return Link(ends, *values, "ballast")
+
     def support_links(self, j):
         """Springs, dampers and masses of support ``j``: what a term scales or takes away."""
         pad = self.pad_link(j)
         if self.layers == 1:
             return [pad]
-        sleeper, ballast = ((("sleeper", j), 1.0),), ((("ballast", j), 1.0),)
-        bed = (self.ballast_stiffness[j], self.ballast_damping[j], 0.0, self.ballast_loss_factor[j], "ballast")
-        links = [
-            pad,
-            Link(sleeper, mass=self.sleeper_mass[j], tag="sleeper"),
-        ]
+        links = [pad, Link(((("sleeper", j), 1.0),), mass=self.sleeper_mass[j], tag="sleeper"), self.ballast_link(j)]
         if self.layers == 2:
-            return [*links, Link(sleeper, *bed)]
-        links += [Link((*sleeper, (("ballast", j), -1.0)), *bed), Link(ballast, mass=self.ballast_mass[j])]
+            return links
+        ballast = ((("ballast", j), 1.0),)
+        links.append(Link(ballast, mass=self.ballast_mass[j]))
         links.append(Link(ballast, self.subgrade_stiffness[j], self.subgrade_damping[j], tag="subgrade"))
         if j and (self.bay_shear_stiffness[j] or self.bay_shear_damping[j]):
             ends = (*ballast, (("ballast", j - 1), -1.0))
