@@ -77,6 +77,25 @@ def test_ballast_inertia_is_a_heavier_and_more_damped_sleeper():
     assert np.allclose(with_term(physics.BallastInertia(200.0, 30e3)), expected, rtol=1e-9)
 
 
+@pytest.mark.parametrize("layers", [2, 3])
+def test_a_track_that_radiates_less_takes_power_at_every_point(layers):
+    """A passive structure takes power wherever it is shaken: Im H < 0 at every driving point. 8 kN s/m, less 30."""
+    subgrade = {"ballast_mass": 300.0, "subgrade_stiffness": 78e6, "subgrade_damping": 8e3} if layers == 3 else {}
+    track = uniform_track(12.0, ballast_damping=8e3, layers=layers, **subgrade)
+    matrices = assemble(track, (physics.BallastInertia(50.0, -3e4),))
+    points = [(kind, j) for kind in ("rail", "sleeper") for j in range(21)]
+    rows = [matrices.index[point] for point in points]
+    driven = np.einsum("fii->fi", responses(matrices, np.linspace(20.0, 600.0, 30), points, rows))
+    assert np.max(driven.imag) < 0.0
+
+
+def test_radiation_with_three_layers_is_that_of_a_heavier_ballast_on_a_stronger_damper():
+    base = TRACK.with_(layers=3, ballast_mass=300.0, subgrade_stiffness=78e6, subgrade_damping=31e3)
+    other = base.with_(ballast_mass=500.0, subgrade_damping=61e3)
+    found = receptance(assemble(base, (physics.BallastInertia(200.0, 30e3),)), F, 12.0, 12.0)
+    assert np.allclose(found, receptance(assemble(other), F, 12.0, 12.0), rtol=1e-9)
+
+
 def test_a_sleeper_mode_far_above_the_band_adds_its_mass():
     """Below its resonance the modal mass moves with the sleeper: error (f/f0)² with f/f0 = 30/800."""
     expected = receptance(assemble(TRACK.with_(sleeper_mass=180.0)), F[:1], 12.0, 12.0)

@@ -6,6 +6,7 @@ import pytest
 from turnout.errors import SimulationError
 from turnout.physics import (
     BallastHardening,
+    BallastInertia,
     HangingSleeper,
     LiftingSleepers,
     LocalBallast,
@@ -60,6 +61,8 @@ def energy(prepared, duration):
         (TWO, (HANGS, LocalBallast(J, 0.3))),
         (TWO, (LocalBallast(J, 0.05), HANGS)),
         (TWO, (LiftingSleepers(10, 14, 1.0, 400.0), LocalBallast(J, 0.05))),
+        (TWO, (BallastInertia(0.0, -3e4), LocalBallast(J, 0.05))),
+        (TWO, (HANGS, BallastInertia(0.0, -3e4))),
         (TWO, (PadPreload(-3e3, 9e4), LocalPad(J, 0.05))),
         (TWO, (LocalPad(J, 0.05), PadTemperature(0.04, 40.0))),
         (THREE, (HANGS,)),
