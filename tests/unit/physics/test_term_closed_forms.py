@@ -1,5 +1,7 @@
 """Each term against a closed form or a published number of its own."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -178,6 +180,17 @@ def test_a_sleeper_that_is_partly_seated_keeps_that_share_of_its_ballast_within_
         assert -90e6 * y - port.law.force(y) == pytest.approx(-0.3 * 90e6 * y)
     beyond = 0.3 * 90e6 * 1.5e-3 + 0.7 * 90e6 * 0.5e-3  # the rest joins where the gap closes
     assert -90e6 * 1.5e-3 - port.law.force(1.5e-3) == pytest.approx(-beyond)
+
+
+def test_ballast_under_sleepers_that_lift_presses_or_lets_go_in_every_state():
+    """What the sleeper feels is max(0, W + k y + c v) - W: above 0 with its load, however fast it leaves."""
+    position, velocity = np.meshgrid(np.linspace(-3e-4, 3e-4, 41), np.linspace(-0.3, 0.3, 31))
+    for term, share in ((physics.LiftingSleepers(0, 40, 1.0, 400.0), 1.0), (physics.LiftingSleepers(0, 40, 0.4), 0.4)):
+        for y, v in zip(position, velocity):
+            state = SimpleNamespace(track=TRACK, sleeper_position=y, sleeper_velocity=v)
+            linear = 90e6 * y + 80e3 * v
+            left = np.maximum(0.0, term.dead_load + linear) - term.dead_load
+            assert linear - term.force(state) == pytest.approx(share * left + (1.0 - share) * linear, abs=1e-6)
 
 
 def test_hardening_doubles_the_tangent_at_the_deflection_of_duffings_law():
