@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from turnout.errors import SimulationError
+from turnout.simulate.additions import links_of
 from turnout.simulate.rail import element_mass, element_stiffness, local_compliance, shape_functions
 
 ORDER = {"sleeper": 0, "ballast": 1}
@@ -92,10 +93,7 @@ def assemble(track, terms=()):
     """Matrices of ``track`` with the rails that ``terms`` change and the links that they add."""
     for term in terms:
         track = term.rail(track)
-    links = track.links()
-    for term in terms:
-        links.extend(term.links(track))
-    return railed(linked(track, links), track)
+    return railed(linked(track, [*track.links(), *links_of(terms, track)]), track)
 
 
 def linked(track, links):
