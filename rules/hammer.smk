@@ -7,7 +7,7 @@ rule hammer:
     input:
         plan="work/plan/{shard}.json",
     output:
-        state=update("work/hammer/{shard}.json"),
+        done="work/hammer/{shard}.done",
     log:
         "logs/hammer/{shard}.log",
     benchmark:

@@ -17,10 +17,10 @@ MODELS = [
 rule mismatch:
     input:
         plan="work/plan/{shard}.json",
-        passage="work/passage/{shard}.json",
+        passage="work/passage/{shard}.done",
         models=MODELS,
     output:
-        state=update("work/mismatch/{shard}.json"),
+        done="work/mismatch/{shard}.done",
     log:
         "logs/mismatch/{shard}.log",
     benchmark:
@@ -32,6 +32,7 @@ rule mismatch:
     params:
         **stage_params("mismatch", "turnout.chains.mismatch:mismatch_unit"),
         kind="mismatch",
+        models=contents(MODELS),
         context="turnout.chains.mismatch_context:mismatch_context",
         gather=f"turnout.chains.mismatch_visits:{RUN.diagnose or 'enabled'}_visit",
     script:

@@ -6,10 +6,10 @@ STAGES.append("passage")
 rule passage:
     input:
         plan="work/plan/{shard}.json",
-        hammer="work/hammer/{shard}.json",
+        hammer="work/hammer/{shard}.done",
         learned=RUN.learned,
     output:
-        state=update("work/passage/{shard}.json"),
+        done="work/passage/{shard}.done",
     log:
         "logs/passage/{shard}.log",
     benchmark:
@@ -21,6 +21,7 @@ rule passage:
     params:
         **stage_params("passage", "turnout.chains.passage:passage_unit"),
         kind="passage",
+        learned=contents(RUN.learned),
         context="turnout.chains.passage_context:passage_context",
     script:
         "../scripts/stage.py"

@@ -5,7 +5,7 @@ TARGETS += ["results/registry/_generation.json", "work/verdict.json"]
 
 rule register:
     input:
-        states=shard_states,
+        done=shards_done,
         plans=expand("work/plan/{shard}.json", shard=RUN.shards),
     output:
         update("results/registry/_generation.json"),
@@ -29,7 +29,7 @@ rule register:
 rule verdict:
     input:
         "results/registry/_generation.json",
-        states=shard_states,
+        done=shards_done,
     output:
         update("work/verdict.json"),
     log:

@@ -3,13 +3,14 @@
 from pathlib import Path
 
 TARGETS += ["work/trend.json", "results/worklist.csv"]
-ACKNOWLEDGED = Path(RUN.job["configuration"]) / "acknowledgements.csv"
+SILENCED = Path(RUN.job["configuration"]) / "acknowledgements.csv"
+ACKNOWLEDGED = [str(SILENCED)] if SILENCED.exists() else []
 
 
 rule trend:
     input:
         registry="results/registry/_generation.json",
-        acknowledged=[str(ACKNOWLEDGED)] if ACKNOWLEDGED.exists() else [],
+        acknowledged=ACKNOWLEDGED,
     output:
         state=update("work/trend.json"),
         worklist="results/worklist.csv",
@@ -23,6 +24,7 @@ rule trend:
     params:
         code=fingerprint("turnout.trend.nightly"),
         configuration=RUN.fleet_hash,
+        acknowledgements=contents(ACKNOWLEDGED),
         job=RUN.job,
     script:
         "../scripts/trend_update.py"

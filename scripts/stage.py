@@ -1,4 +1,4 @@
-"""Rule of any stage: the plan of one shard in, its new units computed, its state out."""
+"""Rule of any stage: the plan of one shard in, its new units computed, its mark out."""
 
 from turnout.one_thread import one_thread
 
@@ -6,4 +6,4 @@ one_thread()
 
 from turnout.fleet.job import stage_job  # noqa: E402
 
-stage_job(snakemake.input.plan, snakemake.output.state, snakemake.log[0], snakemake.params, snakemake.threads)
+stage_job(snakemake.input.plan, snakemake.output.done, snakemake.log[0], snakemake.params, snakemake.threads)

@@ -2,4 +2,4 @@
 
 from turnout.fleet.job import verdict_job
 
-verdict_job(snakemake.input.states, snakemake.output[0], snakemake.log[0], snakemake.params)
+verdict_job(snakemake.input.done, snakemake.output[0], snakemake.log[0], snakemake.params)

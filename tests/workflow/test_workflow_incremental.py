@@ -2,10 +2,12 @@
 
 import os
 import re
+import time
 
 import pytest
 import toy_fleet as toy
 
+from turnout.fleet.shards import shard_of
 from turnout.registry.database import open_registry
 
 SHARDS = 3
@@ -54,6 +56,15 @@ def test_one_new_file_is_one_unit_of_one_shard(fleet):
     assert len(re.findall(r"^localrule hammer:|^rule hammer:", done.stdout, re.M)) == 1
     after = toy.rows(fleet)["recordings"]
     assert [r for r in after if any("A1_2.npz" in str(v) for v in r)] and len(after) > len(before)
+
+
+def test_a_plan_that_a_job_has_not_read_is_looked_at_though_its_mark_is_younger(fleet):
+    """As after a file that came, and was planned, while the job ran; or where a clock ran ahead."""
+    (fleet / "raw/T00001/hammer/2024-01-01/A1_3.npz").write_bytes(toy.raw_bytes(4712, fleet))
+    tomorrow = time.time() + 86400
+    os.utime(fleet / f"work/hammer/{shard_of('T00001', SHARDS)}.done", (tomorrow, tomorrow))
+    assert said(toy.run(fleet, shards=SHARDS))["processed"] == 1
+    assert "Nothing to be done" in toy.run(fleet, shards=SHARDS).stdout
 
 
 def test_a_new_row_computes_its_turnout_and_changes_no_other_row(fleet):

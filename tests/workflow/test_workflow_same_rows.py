@@ -11,9 +11,11 @@ import toy_fleet as toy
 from turnout.config import load_configuration
 from turnout.fleet.batches import read_results
 from turnout.fleet.plan import write_plans
-from turnout.fleet.shard import Stage, run_shard
+from turnout.fleet.shard import run_shard
+from turnout.fleet.stage import Stage
 from turnout.fleet.state import batch_paths
 from turnout.fleet.tables import configuration_rows, fleet_hash
+from turnout.registry.database import open_registry
 from turnout.registry.register import register
 
 ALGO = "toy_fleet:unit"
@@ -70,6 +72,18 @@ def test_the_engine_with_two_cores_and_seven_shards_changes_no_byte(fleet, undis
     toy.forget(fleet)
     toy.run(fleet, shards=7, cores=2, check=False)
     assert toy.data_files(fleet) == undisturbed
+
+
+def test_a_campaign_moved_to_its_right_day_counts_once(tmp_path):
+    folder = toy.make(tmp_path, n_turnout=1, n_section=1)
+    without_engine(folder, shards=1, threads=1)
+    campaigns = folder / "raw/T00000/hammer"
+    (campaigns / "2024-01-01").rename(campaigns / "2024-01-02")
+    without_engine(folder, shards=1, threads=1)
+    with open_registry(folder / "results/registry") as connection:
+        for table in ("recordings_current", "impacts_current"):
+            asked = f"select distinct campaign_id from {table}"
+            assert connection.execute(asked).fetchall() == [("T00000/2024-01-02",)]
 
 
 def test_kills_at_random_moments_change_no_byte(fleet, undisturbed):

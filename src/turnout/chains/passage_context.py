@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from bisect import bisect_right
 from collections.abc import Callable, Mapping
 from datetime import datetime
 from functools import lru_cache
@@ -46,13 +47,13 @@ def passage_context(
 
 
 def near(models: tuple[SectionModel, ...], label: str) -> tuple[SectionModel, ...]:
-    """Models that the passages of a file may be fitted with, by the time in its name; all where it has none."""
+    """Of ``models`` in order of time, those that the passages of a file may be fitted with, by the time in its name;
+    all where it has none."""
     start = start_of(label)
     if start is None:
         return models
-    earlier = [m for m in models if m.measured_at <= start]
-    later = [m for m in models if start < m.measured_at <= start + LONGEST]
-    return (*(earlier[-1:] or models[:1]), *later)
+    now, end = (bisect_right(models, time, key=lambda m: m.measured_at) for time in (start, start + LONGEST))
+    return (*(models[now - 1 : now] if now else models[:1]), *models[now:end])
 
 
 def section_models(turnout: str, work="work") -> dict[str, tuple[SectionModel, ...]]:

@@ -1,15 +1,17 @@
 """Run the whole workflow unattended: one run at a time, remains of a killed one cleared, one line at the end.
 
-  0 2 * * *   cd /srv/turnouts && turnout nightly --limit-hours 6 >> logs/nightly.log 2>&1
+  0 2 * * *   cd /srv/turnouts && mkdir -p logs && turnout nightly --limit-hours 6 >> logs/nightly.log 2>&1
   turnout nightly --profile profiles/slurm
   turnout nightly -- --config accept_vanished=true
 
-The exit code is 0 only where every job ran and the results may be trusted; the registry is published either way.
+The exit code is 0 only where every job ran and the results may be trusted. The registry is published either way,
+without the shards whose jobs died; a run that reached its limit goes on in the next night and is published then.
 """
 
 import argparse
 
 HELP = "run the whole workflow unattended"
+INTERRUPTED = 130
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,6 +26,9 @@ def run(args: argparse.Namespace) -> int:
     from turnout.fleet.nightly import nightly
 
     limit = None if args.limit_hours is None else 3600.0 * args.limit_hours
-    night = nightly(args.options, args.profile, limit)
+    try:
+        night = nightly(args.options, args.profile, limit)
+    except KeyboardInterrupt:
+        return INTERRUPTED
     print(night)
     return night.code

@@ -77,8 +77,8 @@ class _Known:
         from turnout.fingerprint import fingerprint
         from turnout.fleet.keys import stamp_of
         from turnout.fleet.scan import unit_id
-        from turnout.fleet.shard import with_token
         from turnout.fleet.shards import shard_of
+        from turnout.fleet.stage import with_token
         from turnout.fleet.state import load_state
 
         unit = planned.unit
@@ -96,7 +96,7 @@ class _Known:
 
     def _token(self, unit, settings):
         """What a stage takes from another one for this turnout: the passages the models of the hammer tests."""
-        from turnout.fleet.shard import named
+        from turnout.fleet.stage import named
 
         context = STAGES[unit.kind][1]
         if context and (unit.kind, unit.turnout) not in self.tokens:

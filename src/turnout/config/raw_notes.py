@@ -80,8 +80,10 @@ def _each_row(path, name, known, needed, keep: Callable[[Cells], None], free=Fal
     """``keep`` every row; an error for each that cannot be used, and for what is wrong with the header."""
     try:
         table = read_csv(path, name, known, needed, free)
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return []
+    except OSError as error:
+        return [_error(Place(name, 1, 1), str(error.strerror), "Put a file there that may be read")]
     except TableFault as fault:
         return [_error(fault.place, fault.found, fault.remedy)]
     errors = [_error(fault.place, fault.found, fault.remedy) for fault in table.faults]

@@ -18,6 +18,7 @@ without one was left by a killed job.
 """
 
 import base64
+import errno
 import hashlib
 import json
 import math
@@ -56,19 +57,28 @@ def write_batch(folder: Path, results: Iterable[UnitResult]) -> Path:
     digest = hashlib.sha256(json.dumps(rows).encode()).hexdigest()[:24]
     path = Path(folder) / f"batch-{digest}.parquet"
     table = pa.Table.from_arrays([_strings(values) for values in zip(*rows)], names=list(COLUMNS))
-    write_atomic(path, lambda stream: pq.write_table(table, stream, compression="zstd", row_group_size=64))
+    # small groups, for a stage that builds on another one wants the few units of one turnout
+    write_atomic(path, lambda stream: pq.write_table(table, stream, compression="zstd", row_group_size=8))
     return path
 
 
 def read_results(path: os.PathLike, units: Container[str] | None = None) -> Iterator[UnitResult]:
-    """Results of one batch, sorted by unit; of the ``units`` alone where given."""
+    """Results of one batch, sorted by unit; of the ``units`` alone where given: the others' rows stay packed."""
     import pyarrow.parquet as pq
 
-    for group in pq.ParquetFile(path).iter_batches(batch_size=64):
-        for row in group.to_pylist():
-            if units is not None and row["unit"] not in units:
-                continue
-            yield UnitResult(**{**{c: row[c] for c in COLUMNS[:-1]}, "tables": decode(row["rows"])})
+    file = pq.ParquetFile(path)
+    groups = list(range(file.num_row_groups))
+    if units is not None:
+        groups = [k for k in groups if any(name in units for name in _units(file.read_row_group(k, columns=["unit"])))]
+    for group in file.iter_batches(batch_size=64, row_groups=groups):
+        for i, name in enumerate(_units(group)):
+            if units is None or name in units:
+                row = {column: group.column(column)[i].as_py() for column in COLUMNS}
+                yield UnitResult(**{column: row[column] for column in COLUMNS[:-1]}, tables=decode(row["rows"]))
+
+
+def _units(rows) -> list[str]:
+    return rows.column("unit").to_pylist()
 
 
 def read_batch(path: os.PathLike) -> Iterator[tuple[str, str, list[dict]]]:
@@ -85,6 +95,22 @@ def read_batch(path: os.PathLike) -> Iterator[tuple[str, str, list[dict]]]:
         for table, rows in result.tables.items():
             if rows:
                 yield result.unit, table, rows
+
+
+def is_sound(path: os.PathLike) -> bool:
+    """Whether a batch is there and whole to its end; what stands in its columns is not looked at."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        pq.read_metadata(path)
+    except (pa.ArrowException, FileNotFoundError):
+        return False
+    except OSError as error:
+        if error.errno == errno.EIO:
+            return False
+        raise  # of the machine: the batch may be sound
+    return True
 
 
 def read_column(path: os.PathLike, *names: str) -> list[tuple]:

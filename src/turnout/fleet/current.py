@@ -4,8 +4,17 @@ from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 
+from turnout.errors import TurnoutError
 from turnout.fleet.batches import UnitResult, read_results
 from turnout.fleet.state import batch_folder, load_state
+
+
+class DamagedBatch(TurnoutError):
+    """Results that another stage builds on cannot be read; ``batch`` is their file."""
+
+    def __init__(self, batch: Path, error: Exception):
+        super().__init__(f"{batch} cannot be read ({error}). The next run computes its units again.")
+        self.batch = batch
 
 
 def current_results(work, kind: str, turnout: str) -> Iterator[UnitResult]:
@@ -20,8 +29,17 @@ def current_results(work, kind: str, turnout: str) -> Iterator[UnitResult]:
         if not batches:
             continue
         for name in sorted(batches):
-            yield from read_results(batch_folder(state) / name, batches[name])
+            yield from _read(batch_folder(state) / name, batches[name])
         return
+
+
+def _read(batch: Path, units: frozenset[str]) -> Iterator[UnitResult]:
+    import pyarrow as pa
+
+    try:
+        yield from read_results(batch, units)
+    except (OSError, pa.ArrowException) as error:
+        raise DamagedBatch(batch, error) from None
 
 
 @lru_cache(maxsize=256)

@@ -1,6 +1,5 @@
 """One unit, computed so that nothing it meets stops the fleet."""
 
-import errno
 import logging
 import traceback
 from collections.abc import Callable
@@ -9,13 +8,12 @@ from pathlib import Path
 from turnout.config import TurnoutConfig
 from turnout.errors import PartlyComputed, ReadError
 from turnout.fleet.batches import UnitResult, encode
+from turnout.fleet.machine import of_the_machine
 from turnout.fleet.scan import unit_id
 from turnout.records import Unit
 from turnout.registry.ids import content_id
 
 LOG = logging.getLogger("turnout.fleet")
-# A full disk or a lost mount is nobody's result: the job fails, and is tried again.
-MACHINE = {errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ESTALE}
 
 
 def guarded(
@@ -25,7 +23,7 @@ def guarded(
 
     A ReadError becomes a quarantine row, and so does each record that PartlyComputed names. Any other exception is
     a fault of the program: a quarantine row with reason internal_error, and its traceback in the log; with
-    ``strict`` it is raised. Faults of the machine (disk full, out of memory) are always raised.
+    ``strict`` it is raised. Faults of the machine (bad sector, disk full, out of memory) are always raised.
     """
     try:
         tables, faults = _computed(compute, unit, turnout, raw_root, algo=algo, **more)
@@ -38,10 +36,8 @@ def guarded(
         tables = {
             "quarantine": [quarantine_row(unit, error.path, error.reason, error.where, error.found, error.remedy)]
         }
-    except MemoryError:
-        raise
     except Exception as error:
-        if strict or (isinstance(error, OSError) and error.errno in MACHINE):
+        if strict or of_the_machine(error):
             raise
         tables = {"quarantine": [_fault(unit, error)]}
     return UnitResult(unit_id(unit), unit.turnout, unit.kind, key, algo, status_of(tables), tables)

@@ -8,33 +8,46 @@ from pathlib import Path
 from turnout import __version__
 from turnout.config import load_configuration
 from turnout.errors import TurnoutError
+from turnout.fleet.atomic import write_text
 from turnout.fleet.batches import read_results
+from turnout.fleet.current import DamagedBatch
 from turnout.fleet.launch import launched_at
-from turnout.fleet.shard import Stage, Summary, run_shard
-from turnout.fleet.state import batch_paths
+from turnout.fleet.postponed import ask_again
+from turnout.fleet.shard import Summary, run_shard
+from turnout.fleet.stage import Stage
+from turnout.fleet.state import batch_paths, state_of, state_of_mark
 from turnout.fleet.tables import configuration_rows
 from turnout.fleet.verdict import Verdict, verdict
 
 
-def stage_job(plan, state, log, params, threads: int) -> Summary:
-    """Run one stage of one shard; ``params`` holds kind, chain, algo, job and, where needed, context and gather."""
+def stage_job(plan, mark, log, params, threads: int) -> Summary:
+    """Run one stage of one shard and leave its ``mark``, beside which its state lies.
+
+    ``params`` holds kind, chain, algo, job and, where needed, context and gather.
+    """
     _log_to(log)
     stage = Stage(params.kind, params.chain, params.algo, params.get("context"), params.get("gather"))
     job = params.job
     configuration = load_configuration(job["configuration"])
-    summary = run_shard(
-        Path(plan), Path(state), stage, configuration, Path(job["raw"]),
-        threads=threads, only=job["only"] or None, strict=job["strict"],
-    )  # fmt: skip
+    try:
+        summary = run_shard(
+            Path(plan), state_of_mark(mark), stage, configuration, Path(job["raw"]),
+            threads=threads, only=job["only"] or None, strict=job["strict"],
+        )  # fmt: skip
+    except DamagedBatch as error:
+        ask_again(state_of(error.batch))
+        raise
     _say(summary)
+    write_text(mark, f"{summary}\n")
     return summary
 
 
-def verdict_job(states, output, log, params) -> Verdict:
+def verdict_job(marks, output, log, params) -> Verdict:
     """Judge the run; SystemExit with 1 where it is not sound."""
     _log_to(log)
     try:
-        found = verdict([Path(s) for s in states], load_configuration(params.job["configuration"]), Path(output))
+        states = [state_of_mark(mark) for mark in marks]
+        found = verdict(states, load_configuration(params.job["configuration"]), Path(output))
     except TurnoutError as error:
         _say(error)
         raise SystemExit(1) from None

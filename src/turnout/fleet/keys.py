@@ -1,6 +1,7 @@
 """From what a unit is computed: quickly by names, sizes and times of its files, surely by their content."""
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 from turnout.config.build import digest
@@ -14,16 +15,29 @@ def stamp_of(planned: Planned) -> str:
     return digest([unit.config_hash, planned.note, unit.files])
 
 
-def key_of(planned: Planned, raw_root: Path) -> str:
-    """Digest of configuration, note, and name and content of each file; a file that is gone counts as None."""
+def contents_of(planned: Planned, raw_root: Path) -> list[str | None]:
+    """sha256 of each file of a unit, None for one that is gone; OSError where one cannot be read."""
+    return [_content(os.path.join(raw_root, path)) for path, *_ in planned.unit.files]
+
+
+def key_of(planned: Planned, contents: Sequence[str | None]) -> str:
+    """Digest of configuration, note, and name and content of each file."""
     unit = planned.unit
-    contents = [[path, _content(os.path.join(raw_root, path))] for path, *_ in unit.files]
-    return digest([unit.config_hash, planned.note, contents])
+    files = [[path, content] for (path, *_), content in zip(unit.files, contents, strict=True)]
+    return digest([unit.config_hash, planned.note, files])
+
+
+def short(contents: Sequence[str | None]) -> str:
+    """The contents as a state keeps them: enough to tell the files of one turnout; "" where one was gone.
+
+    >>> short(["e3b0c44298fc1c149afbf4c8996fb924", "0123456789abcdef0123456789abcdef"])
+    'e3b0c44298fc1c14 0123456789abcdef'
+    """
+    return " ".join(c[:16] for c in contents if c) if all(contents) else ""
 
 
 def _content(path: str) -> str | None:
-    """sha256 of a file's bytes; None where it is gone or may not be read."""
     try:
         return sha256_of(path)
-    except (FileNotFoundError, PermissionError, IsADirectoryError):
+    except (FileNotFoundError, IsADirectoryError):
         return None

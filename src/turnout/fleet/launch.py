@@ -24,7 +24,7 @@ OPTIONS = {
     "chains": "for each stage module:function, instead of the program's own",
 }
 PLANS = "work/plan"
-# When the newest run began, UTC; no rule knows of it, so that it makes nothing run again.
+# When the newest run began that came as far as its jobs, UTC; no rule knows of it: it makes nothing run again.
 LAUNCHED = "work/launched"
 
 
@@ -66,19 +66,24 @@ def launch(options: Mapping, scan: bool, formats=None, to_si=None) -> Launch:
         "strict": _flag(options, "strict"),
     }
     if scan:
-        write_text(Path(LAUNCHED), datetime.now(UTC).replace(tzinfo=None).isoformat(timespec="seconds"))
+        began = datetime.now(UTC).replace(tzinfo=None)
         raw, accept = Path(job["raw"]), _flag(options, "accept_vanished")
         write_plans(configuration, raw, Path(PLANS), shards, turnouts, accept)
+        write_text(Path(LAUNCHED), began.isoformat(timespec="seconds"))
     names = shard_names(shards, turnouts)
     chains = dict(options.get("chains") or {})
     whose = _diagnosed(options, configuration)
-    learned = _learned(configuration.settings["passage"])
+    learned = _learned(configuration)
     return Launch(names, shard_names(shards), turnouts, fleet_hash(configuration), job, whose, chains, learned)
 
 
-def _learned(settings) -> tuple[str, ...]:
-    """Those that are there; settings of a layout or turnout may name others, which are looked at when a job runs."""
-    files = [Path(settings.assets) / name for name in ("clusters.json", "loads.json")] + [Path(settings.axle_patterns)]
+def _learned(configuration: Configuration) -> tuple[str, ...]:
+    """Those that the settings of any turnout name and that are there, each once."""
+    files: dict[Path, None] = {}
+    for settings in _different(configuration):
+        own = settings["passage"]
+        named = Path(own.assets) / "clusters.json", Path(own.assets) / "loads.json", Path(own.axle_patterns)
+        files |= dict.fromkeys(named)
     return tuple(str(path) for path in files if path.is_file())
 
 
@@ -94,8 +99,13 @@ def _diagnosed(options: Mapping, configuration: Configuration) -> str:
     """Whose mismatches are diagnosed: by the option, else by ``mismatch: enabled`` of any turnout."""
     if "diagnose" in options:
         return "every" if _flag(options, "diagnose") else ""
-    different = {id(v): v for v in configuration.variants.values()}.values()
-    return "enabled" if any(v.parts["settings"]["mismatch"].enabled for v in different) else ""
+    return "enabled" if any(settings["mismatch"].enabled for settings in _different(configuration)) else ""
+
+
+def _different(configuration: Configuration) -> list[Mapping]:
+    """Settings by part, each once though many turnouts share them."""
+    variants = {id(v): v for v in configuration.variants.values()}.values()
+    return [variant.parts["settings"] for variant in variants]
 
 
 def _turnouts(said, configuration: Configuration) -> tuple[str, ...] | None:

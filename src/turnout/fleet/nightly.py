@@ -5,7 +5,9 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +20,8 @@ from turnout.fleet.state import load_state
 
 JOB_NAMES = "turnouts"
 TOO_LATE = 124
+GENERATION = Path("results/registry/_generation.json")
+PUBLISHING = ("all", "register", "verdict", "trend", "report")
 
 
 @dataclass(frozen=True)
@@ -29,33 +33,51 @@ class Night:
     processed: int
     quarantined: int
     vanished: int
+    published: bool = True
 
     def __str__(self):
         said = {0: "sound", TOO_LATE: "stopped at the time limit"}.get(self.code, f"failed with exit code {self.code}")
         return (
             f"{said}: {self.units} units known, {self.processed} processed, "
             f"{self.quarantined} of these with rows in quarantine, {self.vanished} vanished"
+            + ("" if self.published else "; the registry was not published")
         )
 
 
 def nightly(options: Sequence[str], profile: str, limit: float | None = None, work: Path = Path("work")) -> Night:
     """Run the workflow once, with ``options`` handed on to Snakemake.
 
-    ``profile`` is a folder of profiles/; ``limit`` [s] ends a run that hangs. TurnoutError where another run is
-    still going on.
+    ``profile`` is a folder of profiles/; ``limit`` [s] ends a run that hangs. Where jobs die, what the others have
+    computed is published without theirs. A signal that ends this process ends Snakemake first. TurnoutError where
+    another run is still going on.
     """
     work.mkdir(exist_ok=True)
     lock = FileLock(work / ".nightly.lock")
     try:
-        with lock.acquire(timeout=0):
+        with lock.acquire(timeout=0), _signals_raise():
             _refuse_beside_another()
             _clear(options, Path(profile).name)
             before = _batches(work)
-            code = _snakemake([*options, "--workflow-profile", profile, "--rerun-incomplete"], limit)
+            code = _run([*options, "--workflow-profile", profile, "--rerun-incomplete"], limit, work)
             return _night(code, before, work)
     except Timeout:
         found = f"{work / '.nightly.lock'} is held: another nightly run is going on"
         raise TurnoutError(f"{found}. Wait for it, or end it.") from None
+
+
+@contextmanager
+def _signals_raise():
+    """SIGTERM and SIGHUP raise SystemExit, as Ctrl-C raises KeyboardInterrupt, so that what was begun is ended."""
+
+    def end(number, frame):
+        raise SystemExit(128 + number)
+
+    before = {number: signal.signal(number, end) for number in (signal.SIGTERM, signal.SIGHUP)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _refuse_beside_another() -> None:
@@ -77,25 +99,54 @@ def _clear(options: Sequence[str], profile: str) -> None:
     shutil.rmtree(Path(".snakemake") / "backups", ignore_errors=True)
     shutil.rmtree(Path(".snakemake") / "locks", ignore_errors=True)
     if profile == "slurm" and shutil.which("scancel"):
-        queue = subprocess.run(["squeue", "--me", "-h", "-o", "%i %j"], capture_output=True, text=True, check=False)
-        left = [line.split()[0] for line in queue.stdout.splitlines() if line.split()[1].startswith(JOB_NAMES)]
+        asked = ["squeue", "--me", "-h", "-o", "%i %j %Z"]  # number, name, folder
+        queue = subprocess.run(asked, capture_output=True, text=True, check=False)
+        jobs = [line.split(maxsplit=2) for line in queue.stdout.splitlines()]
+        left = [job[0] for job in jobs if job[1].startswith(JOB_NAMES) and job[2:] == [os.getcwd()]]
         if left:
             subprocess.run(["scancel", *left], check=False)
 
 
+def _run(options: Sequence[str], limit: float | None, work: Path) -> int:
+    """Exit code of Snakemake; where jobs died so that the registry had to wait for them, it goes out all the same."""
+    began, launched, generation = time.monotonic(), _changed_at(work / "launched"), _changed_at(GENERATION)
+    code = _snakemake(options, limit)
+    had_jobs, registered = _changed_at(work / "launched") != launched, _changed_at(GENERATION) != generation
+    if code not in (0, TOO_LATE) and had_jobs and not registered:
+        left = None if limit is None else max(0.0, began + limit - time.monotonic())
+        _snakemake([*options, "--allowed-rules", *PUBLISHING], left)
+    return code
+
+
+def _changed_at(path: Path) -> int:
+    """Time of change of a file [ns], 0 where there is none."""
+    return path.stat().st_mtime_ns if path.exists() else 0
+
+
 def _snakemake(options: Sequence[str], limit: float | None) -> int:
-    """Exit code of Snakemake in a process group of its own, so that the limit ends its jobs, too."""
+    """Exit code of Snakemake in a process group of its own, so that the limit or a signal ends its jobs, too."""
     process = subprocess.Popen([sys.executable, "-m", "snakemake", *options], start_new_session=True)
     try:
         return process.wait(limit)
     except subprocess.TimeoutExpired:
-        os.killpg(process.pid, signal.SIGTERM)
-        try:
-            process.wait(60)
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
+        _end(process)
         return TOO_LATE
+    except BaseException:
+        _end(process)
+        raise
+
+
+def _end(process: subprocess.Popen) -> None:
+    """End a process and its group: asked first, killed after a minute or when somebody loses patience."""
+    try:
+        os.killpg(process.pid, signal.SIGTERM)
+        process.wait(60)
+    except (subprocess.TimeoutExpired, ProcessLookupError):
+        pass
+    finally:
+        with suppress(ProcessLookupError):  # Snakemake and all its jobs have ended
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
 
 
 def _states(work: Path) -> list[Path]:
@@ -116,4 +167,6 @@ def _night(code: int, before: set, work: Path) -> Night:
             if (path, known.batch) not in before:
                 processed += 1
                 quarantined += known.status not in ("ok", "vanished")
-    return Night(code, units, processed, quarantined, vanished)
+    newest = max(map(_changed_at, _states(work)), default=0)
+    published = code == 0 or 0 < newest <= _changed_at(GENERATION)
+    return Night(code, units, processed, quarantined, vanished, published)

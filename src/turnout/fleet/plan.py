@@ -112,7 +112,7 @@ def _refuse_if_gone(settings, raw_root: Path, gone: list[str], known: int) -> No
     if len(gone) > max(settings.vanished_files, settings.vanished_share * known):
         found = f"{len(gone)} known files are gone, first {gone[0]}"
         remedy = (
-            "Nothing was changed. Mount the disk again; if they are meant to be gone, run once with "
-            "--config accept_vanished=true"
+            "Nothing was changed. Mount the disk again, or allow reading it; if they are meant to be gone, run once "
+            "with --config accept_vanished=true"
         )
         raise ConfigError(str(raw_root), "raw root", found, remedy)

@@ -1,24 +1,16 @@
 """The raw folder of one turnout: which files make which unit, and which files no pattern knows."""
 
-import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from datetime import datetime
 from functools import lru_cache
-from operator import attrgetter
 from pathlib import Path
 
 from turnout.config import TurnoutConfig
 from turnout.config.pattern import compiled
 from turnout.errors import ReadError
+from turnout.fleet.raw_folder import RawFolder
 from turnout.records import Unit
-
-NOTES = ("campaigns.csv", "trains.csv")
-# Names that upload programs give to files they have not finished, and notes for people.
-UNFINISHED = (".tmp", ".part", ".partial", ".crdownload", ".filepart")
-FOR_PEOPLE = ("README", "README.txt", "README.md", "Thumbs.db", "desktop.ini")
-
-_name = attrgetter("name")
 
 
 @dataclass
@@ -34,10 +26,8 @@ def scan(turnout: TurnoutConfig, raw_root: Path) -> Scan:
     found, names = Scan(), _names(turnout)
     by_unit: dict[tuple, list] = {}
     matched, unmatched = set(), []
-    root = os.path.join(raw_root, turnout.raw)
-    files: list[tuple[str, os.DirEntry]] = []
-    _collect(root, "", os.path.realpath(raw_root), turnout.raw, files, found.problems)
-    for inside, entry in files:
+    folder = RawFolder(raw_root, turnout.raw)
+    for inside, entry in folder.files:
         for kind, expression in names:
             if match := expression.fullmatch(inside):
                 matched.add(kind)
@@ -49,10 +39,10 @@ def scan(turnout: TurnoutConfig, raw_root: Path) -> Scan:
         else:
             unmatched.append(inside)
     for (kind, label, section, campaign), files in sorted(by_unit.items(), key=lambda item: item[0][:2]):
-        entries = tuple(sorted(e for e in [_stat(turnout.raw, *file) for file in files] if e[1] >= 0))
+        entries = tuple(sorted(e for e in [folder.stat(*file) for file in files] if e))
         if entries:
             found.units.append(Unit(turnout.id, kind, label, entries, turnout.hashes[kind], section, campaign))
-    found.problems += _strangers(turnout, unmatched, matched, names)
+    found.problems += [*folder.problems, *_strangers(turnout, unmatched, matched, names)]
     return found
 
 
@@ -105,42 +95,6 @@ def _in_the_calendar(text: str, form: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _collect(folder: str, inside: str, root: str, raw: str, files: list, problems: list) -> None:
-    """Append ``(path below the turnout's folder, entry)`` of every file, depth first, sorted."""
-    try:
-        with os.scandir(folder) as listing:
-            entries = sorted(listing, key=_name)
-    except (FileNotFoundError, NotADirectoryError):
-        return
-    except PermissionError as error:
-        problems.append(ReadError(f"{raw}/{inside}", "folder", str(error.strerror), "Allow reading it"))
-        return
-    for entry in entries:
-        name = entry.name
-        if name.startswith(".") or name.endswith(UNFINISHED) or (not inside and name in (*NOTES, *FOR_PEOPLE)):
-            continue
-        if entry.is_symlink() and not _within(os.path.realpath(entry.path), root):
-            said = "leads out of the raw root", "Put the file itself below the raw root", "outside_root"
-            problems.append(ReadError(f"{raw}/{inside}{name}", "link", *said))
-        elif entry.is_dir():
-            _collect(entry.path, f"{inside}{name}/", root, raw, files, problems)
-        else:
-            files.append((inside + name, entry))
-
-
-def _within(path: str, root: str) -> bool:
-    return path == root or path.startswith(root + os.sep)
-
-
-def _stat(raw: str, inside: str, entry: os.DirEntry) -> tuple[str, int, int]:
-    """(path below the raw root, size, time of change [ns]); size -1 for a file that went away meanwhile."""
-    try:
-        status = entry.stat()
-    except FileNotFoundError:
-        return f"{raw}/{inside}", -1, 0
-    return f"{raw}/{inside}", status.st_size, status.st_mtime_ns
 
 
 def _strangers(turnout, unmatched: list[str], matched: set, names: Iterable) -> Iterator[ReadError]:

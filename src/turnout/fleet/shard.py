@@ -1,32 +1,37 @@
 """One stage of one shard: compute the units whose key changed, keep the results of all others."""
 
-import os
-import sys
-import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import logging
+import traceback
+from collections import Counter
+from collections.abc import Collection, Container, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 
 from filelock import FileLock
 
 from turnout.config import Configuration, TurnoutConfig, with_raw
 from turnout.errors import ConfigError
-from turnout.fleet.batches import UnitResult, write_batch
+from turnout.fleet.batches import UnitResult
 from turnout.fleet.guard import guarded
-from turnout.fleet.keys import key_of, stamp_of
+from turnout.fleet.keys import contents_of, key_of, short, stamp_of
+from turnout.fleet.ledger import Ledger
+from turnout.fleet.machine import passing
 from turnout.fleet.plan import Planned, read_plan
 from turnout.fleet.pool import in_order
+from turnout.fleet.postponed import Postponed, note_postponed, read_postponed
 from turnout.fleet.progress import Progress
 from turnout.fleet.scan import unit_id
-from turnout.fleet.state import Known, batch_folder, load_state, remove_orphans
-from turnout.records import Unit
+from turnout.fleet.stage import Stage, Token, named, with_token
+from turnout.fleet.state import Known
+
+LOG = logging.getLogger("turnout.fleet")
 
 
 @dataclass(frozen=True)
 class Summary:
-    """What a shard job did; ``stale`` units wait for a new plan because the configuration changed after it."""
+    """What a shard job did; ``stale`` units wait for a new plan because the configuration changed after it,
+    ``postponed`` ones for the next run because the machine failed them."""
 
     shard: str
     known: int = 0
@@ -35,47 +40,15 @@ class Summary:
     internal_errors: int = 0
     vanished: int = 0
     stale: int = 0
+    postponed: int = 0
 
     def __str__(self):
         said = f"{self.shard}: {self.known} known, {self.processed} processed, {self.quarantined} quarantined"
-        more = {"internal errors": self.internal_errors, "vanished": self.vanished, "waiting for a plan": self.stale}
+        more = {
+            "internal errors": self.internal_errors, "postponed": self.postponed,
+            "vanished": self.vanished, "waiting for a plan": self.stale,
+        }  # fmt: skip
         return said + "".join(f", {n} {what}" for what, n in more.items() if n)
-
-
-Token = str | Callable[[Unit], str]
-
-
-@dataclass(frozen=True)
-class Stage:
-    """What a stage computes: units of ``kind`` by ``compute(unit, turnout, raw_root, algo=...)``.
-
-    ``algo`` is the version of its code, part of every key. ``context(turnout_id, settings)``, where given, returns
-    (token, value): the token, or what it says of a unit where it is a function, enters the key; the value is passed on
-    as ``context=``. ``settings`` are those of the turnout, by part. ``gather(plan, configuration)``,
-    where given, makes units of the stage's own from a plan file, else they are the plan's. All three may be named,
-    "package.module:function", and are then imported when there is something to compute.
-    """
-
-    kind: str
-    compute: Callable | str
-    algo: str
-    context: Callable[[str, Mapping], tuple[Token, object]] | str | None = None
-    gather: Callable[[Path, Configuration], Iterable[Planned]] | str | None = None
-
-
-def named(function: Callable | str) -> Callable:
-    """The function that "package.module:name" names; a module of one's own lies in the folder of the run."""
-    if callable(function):
-        return function
-    module, _, name = function.partition(":")
-    if module.partition(".")[0] != "turnout" and os.getcwd() not in sys.path:
-        sys.path.append(os.getcwd())
-    return getattr(import_module(module), name)
-
-
-def with_token(planned: Planned, token: Token) -> Planned:
-    """The unit as planned, its note with what the stage's context says of it."""
-    return replace(planned, note=planned.note + (token if isinstance(token, str) else token(planned.unit)))
 
 
 def run_shard(
@@ -117,33 +90,29 @@ class _Run:
     """One call of ``run_shard``."""
 
     def __init__(self, path: Path, stage: Stage, configuration: Configuration, raw_root: Path, threads, strict):
-        self.path, self.folder = path, batch_folder(path)
+        self.path, self.name = path, f"{stage.kind} {path.stem}"
         self.stage, self.configuration, self.raw_root = stage, configuration, raw_root
         self.threads, self.strict = threads, strict
-        self.limits = configuration.settings["fleet"]
-        self.state = load_state(path)
-        self.waiting: list[tuple[UnitResult, str]] = []
-        self.saved_at = time.monotonic()
+        self.ledger = Ledger(path, configuration.settings["fleet"])
+        self.state = self.ledger.state
+        self.postponed: dict[str, str] = {}
 
     def bring_up(self, planned: list[Planned], only: Sequence[str] | None) -> Summary:
         """Compute what is missing, write batches and state."""
-        remove_orphans(self.state, self.folder)
         wanted = {unit_id(p.unit): p for p in planned if p.unit.kind == self.stage.kind}
         todo, stale = self._todo(wanted, only)
-        name = f"{self.stage.kind} {self.path.stem}"
         if todo:
             # before processes are forked: each of them would import it anew
             self.compute = named(self.stage.compute)
-        progress, bad, faults = Progress(name, len(todo)), 0, 0
-        for result, stamp in in_order(self._compute, todo, self.threads):
-            progress.step(result.status != "ok")
-            bad += result.status != "ok"
-            faults += result.status == "internal_error"
-            self._keep(result, stamp)
-        progress.close()
+        statuses = self._compute_all(todo)
+        self.ledger.checkpoint()
         vanished = self._withdraw_vanished(wanted)
-        self._checkpoint()
-        return Summary(name, len(wanted), len(todo), bad, faults, vanished, stale)
+        n_postponed = self._note_postponed(wanted, {unit_id(planned.unit) for planned, *_ in todo})
+        self.ledger.checkpoint()
+        done, faults = statuses.total(), statuses["internal_error"]
+        return Summary(
+            self.name, len(wanted), done, done - statuses["ok"], faults, vanished, stale, n_postponed,
+        )  # fmt: skip
 
     def _todo(self, wanted: dict[str, Planned], only) -> tuple[list[tuple], int]:
         """(planned, turnout, stamp, context) of every unit to compute, sorted; and how many wait for a plan."""
@@ -190,42 +159,71 @@ class _Run:
 
     def _same_content(self, name: str, planned: Planned, stamp: str, known: Known | None) -> bool:
         """Whether only times changed; the state then notes the new ones."""
-        if known is None or known.algo != self.stage.algo or known.key != key_of(planned, self.raw_root):
+        if known is None or known.algo != self.stage.algo:
             return False
-        self.state.units[name] = replace(known, stamp=stamp)
-        return True
+        try:
+            contents = contents_of(planned, self.raw_root)
+        except OSError:  # met again, and told, when it is computed
+            return False
+        if same := known.key == key_of(planned, contents):
+            self.state.units[name] = replace(known, stamp=stamp, contents=short(contents))
+        return same
 
-    def _compute(self, task: tuple) -> tuple[UnitResult, str]:
+    def _compute_all(self, todo: list[tuple]) -> Counter[str]:
+        """Keep every result; how many there are of each status."""
+        progress = Progress(self.name, len(todo))
+        statuses: Counter[str] = Counter()
+        for found in in_order(self._compute, todo, self.threads):
+            if isinstance(found, Postponed):
+                self.postponed[found.unit] = found.met
+                progress.step(False)
+                continue
+            result, stamp, contents = found
+            statuses[result.status] += 1
+            progress.step(result.status != "ok")
+            self.ledger.keep(result, stamp, contents)
+        progress.close()
+        return statuses
+
+    def _compute(self, task: tuple) -> tuple[UnitResult, str, str] | Postponed:
         planned, turnout, stamp, value = task
         more = {"context": value} if self.stage.context else {}
-        key = key_of(planned, self.raw_root)
-        call = partial(guarded, self.compute, planned.unit, turnout, self.raw_root, key)
-        return call(self.stage.algo, self.strict, **more), stamp
+        try:
+            contents = contents_of(planned, self.raw_root)
+            call = partial(guarded, self.compute, planned.unit, turnout, self.raw_root, key_of(planned, contents))
+            return call(self.stage.algo, self.strict, **more), stamp, short(contents)
+        except (OSError, MemoryError) as error:
+            if self.strict or not passing(error):
+                raise
+            LOG.warning("%s: left for the next run\n%s", unit_id(planned.unit), traceback.format_exc())
+            return Postponed(unit_id(planned.unit), f"{type(error).__name__}: {error}")
 
-    def _keep(self, result: UnitResult, stamp: str) -> None:
-        self.waiting.append((result, stamp))
-        late = time.monotonic() - self.saved_at >= self.limits.checkpoint_time
-        if late or len(self.waiting) >= self.limits.checkpoint_units:
-            self._checkpoint()
+    def _note_postponed(self, wanted: Container[str], tried: Container[str]) -> int:
+        """Note the units that the machine failed, those of turnouts that were not asked for as before; how many."""
+        before = read_postponed(self.path)[1]
+        left = {unit: met for unit, met in before.items() if unit in wanted and unit not in tried}
+        note_postponed(self.path, left | self.postponed)
+        return len(self.postponed)
 
-    def _withdraw_vanished(self, wanted: Iterable[str]) -> int:
-        """Count units whose files are all gone. Their rows stay; of a unit that only ever was in quarantine
-        nothing is left to repair: an empty result takes its rows out of the list of open ones. A stage that gathers
-        its own units looks at some of them only: none has vanished for that."""
+    def _withdraw_vanished(self, wanted: Collection[str]) -> int:
+        """Count units whose files are all gone. Their rows stay; an empty result takes them back of a unit that only
+        ever was in quarantine, for nothing is left to repair, and of one whose files were moved to others, for they
+        would count twice. A stage that gathers its own units looks at some of them only: none has vanished for that."""
         gone = [name for name in self.state.units if name not in wanted]
+        held = self._held(wanted) if gone and not self.stage.gather else {}
         for name in gone:
-            known = self.state.units[name]
-            if known.status == "quarantined":
-                turnout, kind, _ = name.split("/", 2)
-                self.waiting.append((UnitResult(name, turnout, kind, "vanished", known.algo, "vanished", {}), ""))
+            known, (turnout, kind, _) = self.state.units[name], name.split("/", 2)
+            contents = set(known.contents.split())
+            moved = contents and contents <= held.get(turnout, set())
+            if known.status == "quarantined" or (moved and known.status != "vanished"):
+                self.ledger.keep(UnitResult(name, turnout, kind, "vanished", known.algo, "vanished", {}), "")
         return 0 if self.stage.gather else len(gone)
 
-    def _checkpoint(self) -> None:
-        if self.waiting:
-            batch = write_batch(self.folder, [result for result, _ in self.waiting]).name
-            self.state.batches = [b for b in self.state.batches if b != batch] + [batch]
-            for result, stamp in self.waiting:
-                self.state.units[result.unit] = Known(stamp, result.key, result.algo, result.status, batch)
-            self.waiting.clear()
-        self.state.save(self.path)
-        self.saved_at = time.monotonic()
+    def _held(self, wanted: Collection[str]) -> dict[str, set[str]]:
+        """Turnout -> contents of the files from which its units that are there have rows."""
+        held: dict[str, set[str]] = {}
+        for name in wanted:
+            known = self.state.units.get(name)
+            if known and known.status in ("ok", "partly"):
+                held.setdefault(name.split("/", 1)[0], set()).update(known.contents.split())
+        return held

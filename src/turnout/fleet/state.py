@@ -1,7 +1,8 @@
 """What a shard has computed: per unit the key of its result and the batch that holds it."""
 
 import json
-from collections.abc import Iterable
+import os
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -11,13 +12,15 @@ from turnout.fleet.atomic import write_text
 
 @dataclass(frozen=True)
 class Known:
-    """``stamp``: names, sizes and times it was computed from; ``key``: the same by content; ``batch``: file name."""
+    """``stamp``: names, sizes and times it was computed from; ``key``: the same by content; ``batch``: file name;
+    ``contents``: of its files whatever they are called, "" in states of earlier versions."""
 
     stamp: str
     key: str
     algo: str
     status: str
     batch: str
+    contents: str = ""
 
 
 @dataclass
@@ -27,9 +30,16 @@ class State:
     units: dict[str, Known] = field(default_factory=dict)
     batches: list[str] = field(default_factory=list)
 
+    def forget(self, batches: Collection[str]) -> int:
+        """Drop ``batches`` and the units that count by them, which are new from now on; how many units."""
+        before = len(self.units)
+        self.units = {unit: known for unit, known in self.units.items() if known.batch not in batches}
+        self.batches = [b for b in self.batches if b not in batches]
+        return before - len(self.units)
+
     def save(self, path: Path) -> None:
         """Write it in one step: the results of a batch count from now on."""
-        units = {u: [k.stamp, k.key, k.algo, k.status, k.batch] for u, k in sorted(self.units.items())}
+        units = {u: [k.stamp, k.key, k.algo, k.status, k.batch, k.contents] for u, k in sorted(self.units.items())}
         lines = ",\n".join(f"{json.dumps(u, ensure_ascii=False)}:{json.dumps(v)}" for u, v in units.items())
         write_text(path, f'{{"batches":{json.dumps(self.batches)},"units":{{\n{lines}\n}}}}\n')
 
@@ -43,12 +53,31 @@ def load_state(path: Path) -> State:
     except FileNotFoundError:
         return State()
     except (ValueError, KeyError, TypeError) as error:
-        raise TurnoutError(f"{path}: not a state file ({error}). Delete it: its shard is then computed anew.") from None
+        remedy = f"Delete it and {mark_of(path)}: its shard is then computed anew."
+        raise TurnoutError(f"{path}: not a state file ({error}). {remedy}") from None
+
+
+def mark_of(state: Path) -> Path:
+    """What Snakemake knows of a state: work/hammer/00of01.json -> work/hammer/00of01.done.
+
+    It deletes the output of a job that fails; what the job has kept until then must stay.
+    """
+    return Path(state).with_suffix(".done")
+
+
+def state_of_mark(mark: os.PathLike) -> Path:
+    """work/hammer/00of01.done -> work/hammer/00of01.json."""
+    return Path(mark).with_suffix(".json")
 
 
 def batch_folder(state: Path) -> Path:
     """Folder of the batches of a state file: work/hammer/00of01.json -> work/hammer/00of01."""
     return Path(state).with_suffix("")
+
+
+def state_of(batch: Path) -> Path:
+    """State file of the shard that a batch belongs to."""
+    return batch.parent.with_name(f"{batch.parent.name}.json")
 
 
 def batch_paths(states: Iterable[Path]) -> list[Path]:

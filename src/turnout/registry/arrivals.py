@@ -20,6 +20,18 @@ def token(path) -> str:
     return f"{path.name}:{path.stat().st_size}"
 
 
+def present(paths: Sequence[PathLike], faults: dict[str, str]) -> tuple[list[PathLike], list[str]]:
+    """(paths, tokens) of the batches that are there; the others are noted in ``faults`` under their path."""
+    there, tokens = [], []
+    for path in paths:
+        try:
+            tokens.append(token(path))
+            there.append(path)
+        except OSError as error:
+            faults[fspath(path)] = _said(error)
+    return there, tokens
+
+
 def fresh(tokens: Sequence[str], consumed: Sequence[str]) -> list[int]:
     """Places of the batches that are new, or newer than they were: in the order of writing, the last word counts.
 
@@ -82,7 +94,11 @@ def _guarded(path, read, rank, faults):
         for result in read(path):
             yield result.unit, rank, result
     except (OSError, pa.ArrowException, ValueError, KeyError, TypeError) as error:
-        faults[fspath(path)] = f"{type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
+        faults[fspath(path)] = _said(error)
+
+
+def _said(error: Exception) -> str:
+    return f"{type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
 
 
 def _with_method(tables):

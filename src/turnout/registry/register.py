@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from os import PathLike, fspath
 from pathlib import Path
 
-from turnout.registry.arrivals import chunks, fresh, merged, of_tables, token
+from turnout.registry.arrivals import chunks, fresh, merged, of_tables, present
 from turnout.registry.generation import check_schemas, load
 from turnout.registry.lock import locked
 from turnout.registry.registration import Registered, Registration
@@ -54,9 +54,9 @@ def register(
     with locked(root, patience):
         before = load(root)
         check_schemas(before)
-        tokens, count = [token(p) for p in batches], 0
         faults: dict[str, str] = {}
-        unread = [batches[i] for i in fresh(tokens, before.consumed)]
+        there, tokens = present(batches, faults)
+        unread, count = [there[i] for i in fresh(tokens, before.consumed)], 0
         registration = Registration(root, before)
         with _without_collection():
             for chunk in chunks(merged(unread, read, faults)):
@@ -64,7 +64,7 @@ def register(
                 registration.take(chunk)
         registration.replace_whole(tables or {})
         registration.take(of_tables(tables or {}, count))
-        consumed = [t for t, p in zip(tokens, batches) if fspath(p) not in faults]
+        consumed = [t for t, p in zip(tokens, there) if fspath(p) not in faults]
         about = {"code_version": code_version, "config_hash": config_hash, "started_at_utc": began}
         return registration.finish(consumed, faults, about)
 

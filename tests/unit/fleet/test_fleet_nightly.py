@@ -1,7 +1,10 @@
 """The unattended run: one at a time, and what a killed one left is cleared."""
 
+import os
+import signal
 import subprocess
 import sys
+import time
 
 import pytest
 from filelock import FileLock
@@ -25,6 +28,49 @@ def test_a_run_that_hangs_is_ended_and_said(tmp_path, monkeypatch):
     assert night.code == TOO_LATE and "stopped at the time limit" in str(night)
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_ends_the_run_and_its_jobs(tmp_path, number):
+    """Snakemake and its job leave their process numbers and wait; the job does not listen to SIGTERM."""
+    (tmp_path / "snakemake.py").write_text(
+        "import os, signal, subprocess, sys, time\nfrom pathlib import Path\n"
+        "if sys.argv[1:] == ['job']:\n    signal.signal(signal.SIGTERM, signal.SIG_IGN)\n"
+        "else:\n    subprocess.Popen([sys.executable, __file__, 'job'])\n"
+        "with open('pids', 'a') as stream:\n    stream.write(f'{os.getpid()}\\n')\n"
+        "time.sleep(600)\n"
+    )
+    night = [sys.executable, "-m", "turnout.cli", "nightly"]
+    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    run = subprocess.Popen(night, cwd=tmp_path, env=os.environ | {"PYTHONPATH": path}, stderr=subprocess.PIPE)
+    pids = tmp_path / "pids"
+    while not pids.exists() or len(pids.read_text().splitlines()) < 2:
+        assert run.poll() is None, run.stderr.read()
+        time.sleep(0.1)
+    run.send_signal(number)
+    assert run.wait() == 128 + number and run.stderr.read() == b""
+    for pid in map(int, pids.read_text().split()):
+        assert not _lives(pid)
+
+
+def _lives(pid):
+    try:
+        return open(f"/proc/{pid}/stat").read().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def test_only_jobs_of_this_folder_are_cancelled(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "snakemake.py").write_text("")
+    queue = f"11 turnouts-aa {tmp_path}\n12 turnouts-bb /another place\n13 other {tmp_path}\n14 turnouts-cc\n"
+    (tmp_path / "queue").write_text(queue)
+    for name, does in (("squeue", "cat queue"), ("scancel", 'echo "$@" > cancelled')):
+        (tmp_path / name).write_text(f"#!/bin/sh\n{does}\n")
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    nightly([], "profiles/slurm")
+    assert (tmp_path / "cancelled").read_text() == "11\n"
+
+
 def test_remains_of_a_killed_run_are_cleared(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "snakemake.py").write_text("")
@@ -39,6 +85,42 @@ def test_it_is_said_in_one_line():
     assert (
         said == "failed with exit code 1: 100 units known, 7 processed, 2 of these with rows in quarantine, 3 vanished"
     )
+
+
+def test_what_a_job_that_did_not_come_to_its_end_has_kept_is_counted(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "snakemake.py").write_text(
+        "from pathlib import Path\nfrom turnout.fleet.state import Known, State\n"
+        "known = {'t1/hammer/A/1': Known('', '', '1', 'ok', 'b')}\n"
+        "State(known, ['b']).save(Path('work/hammer/00of01.json'))\nraise SystemExit(1)\n"
+    )
+    night = nightly([], "profiles/default", work=tmp_path / "work")
+    assert (night.code, night.units, night.processed) == (1, 1, 1)
+
+
+def test_where_jobs_die_what_the_others_computed_is_published(tmp_path, monkeypatch):
+    """The first run fails with its jobs and does not reach the registry, the second one may only publish."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "snakemake.py").write_text(
+        "import sys\nfrom pathlib import Path\n"
+        "from turnout.fleet.state import State\n"
+        "Path('said').open('a').write(' '.join(sys.argv[1:]) + '\\n')\n"
+        "if '--allowed-rules' in sys.argv and Path('publish').exists():\n"
+        "    Path('results/registry').mkdir(parents=True)\n"
+        "    Path('results/registry/_generation.json').write_text('')\n"
+        "elif Path('begins').exists():\n"
+        "    Path('work/launched').write_text('now')\n"
+        "    State().save(Path('work/hammer/00of01.json'))\n"
+        "raise SystemExit(1)\n"
+    )
+    assert "the registry was not published" in str(nightly([], "p"))
+    assert len((tmp_path / "said").read_text().splitlines()) == 1  # no job was tried: nothing to publish
+    (tmp_path / "begins").touch()
+    assert "the registry was not published" in str(nightly([], "p"))
+    (tmp_path / "publish").touch()
+    night = nightly([], "p")
+    assert (night.code, night.published) == (1, True)
+    assert "--rerun-incomplete --allowed-rules all register" in (tmp_path / "said").read_text().splitlines()[-1]
 
 
 def test_a_run_that_somebody_started_by_hand_is_not_robbed_of_its_lock(tmp_path, monkeypatch):

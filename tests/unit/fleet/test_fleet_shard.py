@@ -3,15 +3,21 @@
 import errno
 import json
 import os
+import shutil
+import sys
 
 import pytest
 
 from turnout.config import load_configuration
 from turnout.errors import ReadError, TurnoutError
+from turnout.fleet import keys
 from turnout.fleet.batches import read_batch, read_column, read_results
-from turnout.fleet.current import current_results
+from turnout.fleet.current import DamagedBatch, current_results
+from turnout.fleet.job import stage_job
 from turnout.fleet.plan import write_plans
-from turnout.fleet.shard import Stage, run_shard
+from turnout.fleet.postponed import read_postponed
+from turnout.fleet.shard import run_shard
+from turnout.fleet.stage import Stage
 from turnout.fleet.state import State, batch_paths, load_state
 from turnout.fleet.verdict import judge, verdict
 
@@ -40,6 +46,10 @@ def length(unit, turnout, raw_root, algo=""):
             raise ZeroDivisionError("in the toy")
         if text == "full":
             raise OSError(errno.ENOSPC, "No space left on device")
+        if text == "bad sector":
+            raise OSError(errno.EIO, "Input/output error")
+        if text == "too large":
+            raise MemoryError
         rows["recordings"].append({"path": path, "n_samples": len(text), "kind": "hammer"})
     return rows
 
@@ -147,6 +157,57 @@ def test_strict_raises(fleet):
 
 
 @pytest.mark.parametrize("threads", [1, 2])
+def test_a_fault_of_the_machine_leaves_its_unit_for_the_next_run_and_the_others_go_on(fleet, threads):
+    fleet.put("t0/2024-05-13/A_1.txt", "bad sector")
+    fleet.put("t1/2024-05-13/A_1.txt", "too large")
+    said = str(fleet.run(threads=threads))
+    assert said == "hammer 00of01: 3 known, 1 processed, 0 quarantined, 2 postponed"
+    assert set(fleet.lengths()) == {"t2/hammer/A/2024-05-13"}
+    jobs, units = read_postponed(fleet.state)
+    assert jobs == 1 and units == {
+        "t0/hammer/A/2024-05-13": "OSError: [Errno 5] Input/output error", "t1/hammer/A/2024-05-13": "MemoryError: ",
+    }  # fmt: skip
+    (complaint,) = judge([fleet.state], fleet.configuration).complaints
+    assert "2 units wait for the next run, first t0/hammer/A/2024-05-13: OSError: [Errno 5]" in complaint
+
+    fleet.put("t0/2024-05-13/A_1.txt", "readable")
+    assert fleet.run(only=["t0"]).processed == 1
+    assert read_postponed(fleet.state) == (2, {"t1/hammer/A/2024-05-13": "MemoryError: "})
+    fleet.put("t1/2024-05-13/A_1.txt", "smaller")
+    assert fleet.run().processed == 1
+    assert read_postponed(fleet.state) == (2, {}) and judge([fleet.state], fleet.configuration).complaints == ()
+
+
+def test_a_file_that_is_closed_after_it_was_planned_is_read_once_it_is_open(fleet, monkeypatch):
+    def closed(path):
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr(keys, "sha256_of", closed)
+    assert fleet.run().postponed == 3
+    monkeypatch.undo()
+    assert fleet.run().processed == 3
+
+
+def test_a_sector_that_cannot_be_read_for_the_key_is_its_units_affair_alone(fleet, monkeypatch):
+    fleet.run()
+    os.utime(fleet.raw / "t0/2024-05-13/A_1.txt", (1, 1))
+    sound = keys.sha256_of
+
+    def bad(path):
+        if "t0" in str(path):
+            raise OSError(errno.EIO, "Input/output error")
+        return sound(path)
+
+    monkeypatch.setattr(keys, "sha256_of", bad)
+    fleet.put("t1/2024-05-13/A_2.txt", "new")
+    summary = fleet.run()
+    assert (summary.processed, summary.postponed) == (1, 1) and len(fleet.lengths()) == 3
+    monkeypatch.undo()
+    summary = fleet.run()
+    assert (summary.processed, summary.postponed) == (0, 0)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
 def test_a_full_disk_fails_the_job_and_keeps_what_was_done(tmp_path, threads):
     fleet = Fleet(tmp_path, 4, "fleet: {checkpoint_units: 1}\n")
     fleet.put("t2/2024-05-13/A_1.txt", "full")
@@ -155,6 +216,7 @@ def test_a_full_disk_fails_the_job_and_keeps_what_was_done(tmp_path, threads):
     fleet.put("t2/2024-05-13/A_1.txt", "room")
     assert set(fleet.lengths()) == {"t0/hammer/A/2024-05-13", "t1/hammer/A/2024-05-13"}
     assert fleet.run().processed == 2
+    assert set(fleet.lengths()) == {f"t{i}/hammer/A/2024-05-13" for i in range(4)}
 
 
 def test_a_full_disk_while_writing_loses_nothing(fleet, monkeypatch):
@@ -212,6 +274,51 @@ def test_vanished_units_keep_their_rows_and_open_quarantine_is_withdrawn(fleet):
     assert fleet.run().quarantined == 1
 
 
+def test_a_measurement_that_was_moved_counts_once_and_one_that_was_deleted_stays(fleet):
+    """A folder of the wrong day is renamed, one file goes to the day it belongs to, one is deleted on purpose."""
+    fleet.put("t1/2024-05-14/A_2.txt", "belongs to the day before")
+    fleet.run()
+    (fleet.raw / "t0/2024-05-13").rename(fleet.raw / "t0/2024-05-31")
+    (fleet.raw / "t1/2024-05-14/A_2.txt").rename(fleet.raw / "t1/2024-05-13/A_2.txt")
+    (fleet.raw / "t2/2024-05-13/A_1.txt").unlink()
+    assert fleet.run().vanished == 3
+    assert fleet.lengths() == {
+        "t0/hammer/A/2024-05-13": [], "t0/hammer/A/2024-05-31": [9],
+        "t1/hammer/A/2024-05-13": [9, 25], "t1/hammer/A/2024-05-14": [],
+        "t2/hammer/A/2024-05-13": [9],
+    }  # fmt: skip
+    n_batch = len(batch_paths([fleet.state]))
+    fleet.run()
+    assert len(batch_paths([fleet.state])) == n_batch  # withdrawn once
+    (fleet.raw / "t0/2024-05-31").rename(fleet.raw / "t0/2024-05-13")
+    fleet.run()
+    assert fleet.lengths()["t0/hammer/A/2024-05-13"] == [9] and fleet.lengths()["t0/hammer/A/2024-05-31"] == []
+
+
+def test_a_measurement_that_was_moved_counts_once_though_the_job_was_killed_before_it_knew(fleet, monkeypatch):
+    fleet.run()
+    (fleet.raw / "t0/2024-05-13").rename(fleet.raw / "t0/2024-05-31")
+
+    def killed(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("turnout.fleet.shard._Run._withdraw_vanished", killed)
+    with pytest.raises(KeyboardInterrupt):
+        fleet.run()
+    monkeypatch.undo()
+    assert fleet.run().processed == 0
+    assert fleet.lengths()["t0/hammer/A/2024-05-13"] == [] and fleet.lengths()["t0/hammer/A/2024-05-31"] == [9]
+
+
+def test_a_measurement_that_was_moved_to_where_it_cannot_be_read_stays(fleet):
+    """The unit that holds the file now gives no row: those that there are are not taken back."""
+    fleet.run()
+    fleet.put("t0/2024-05-31/A_2.txt", "damaged")
+    (fleet.raw / "t0/2024-05-13/A_1.txt").rename(fleet.raw / "t0/2024-05-31/A_1.txt")
+    fleet.run()
+    assert fleet.lengths()["t0/hammer/A/2024-05-13"] == [9]
+
+
 def test_a_file_that_vanishes_during_the_run_is_a_row_or_an_error_of_its_unit_alone(fleet):
     write_plans(fleet.configuration, fleet.raw, fleet.plan.parent, 1)
     (fleet.raw / "t0/2024-05-13/A_1.txt").unlink()
@@ -253,8 +360,10 @@ def test_a_row_that_cannot_be_written_is_a_fault_of_its_unit(fleet):
 def test_a_spoilt_state_file_is_said(fleet):
     fleet.run()
     fleet.state.write_text("{")
-    with pytest.raises(TurnoutError, match="not a state file"):
+    with pytest.raises(TurnoutError, match=r"not a state file .* Delete it and .*00of01\.done: its shard is then"):
         fleet.run()
+    fleet.state.unlink()
+    assert fleet.run().processed == 3
 
 
 def test_a_batch_reads_as_it_was_written(fleet):
@@ -289,6 +398,74 @@ def test_the_verdict_judges_what_is_new_over_the_fleet_and_each_line(tmp_path):
     fleet.put("t3/2024-05-13/A_1.txt", "repaired")
     fleet.run()
     assert verdict([fleet.state], fleet.configuration, output).quarantined == 1
+
+
+@pytest.mark.parametrize("damage", ["cut", "gone"])
+def test_the_units_of_a_damaged_batch_are_computed_again(fleet, damage, caplog):
+    fleet.run()
+    fleet.put("t1/2024-06-13/A_1.txt", "later")
+    fleet.run()
+    before, (first, second) = fleet.lengths(), batch_paths([fleet.state])
+    if damage == "cut":
+        first.write_bytes(first.read_bytes()[:-20])
+    else:
+        first.unlink()
+    output = fleet.folder / "work/verdict.json"
+    with pytest.raises(TurnoutError, match=rf"{first} cannot be read"):
+        verdict([fleet.state], fleet.configuration, output)
+    assert read_postponed(fleet.state) == (1, {})  # so that the job runs, whatever its plan says
+    assert fleet.run().processed == 3
+    assert str(first) in caplog.text and "3 units are computed again" in caplog.text
+    assert fleet.lengths() == before and second in batch_paths([fleet.state])
+    verdict([fleet.state], fleet.configuration, output)
+    assert fleet.run().processed == 0
+
+
+def test_a_stage_that_builds_on_a_damaged_batch_asks_for_it_again(fleet, monkeypatch):
+    class Params(dict):
+        __getattr__ = dict.__getitem__
+
+    fleet.run()
+    (batch,) = batch_paths([fleet.state])
+    batch.unlink()
+    monkeypatch.chdir(fleet.folder)
+    monkeypatch.setattr("turnout.fleet.job._log_to", lambda log: None)
+    module = type(sys)("upon_hammer")
+    module.models = lambda turnout, settings: ("", list(current_results("work", "hammer", turnout)))
+    monkeypatch.setitem(sys.modules, "upon_hammer", module)
+    job = {"configuration": "config", "raw": "raw", "only": [], "strict": False}
+    params = Params(kind="hammer", chain="x:y", algo="1", job=job, context="upon_hammer:models")
+    with pytest.raises(DamagedBatch, match="cannot be read"):
+        stage_job("work/plan/00of01.json", "work/passage/00of01.done", "log", params, 1)
+    assert read_postponed(fleet.state) == (1, {})
+
+
+def test_small_nights_add_up_until_they_can_be_judged(tmp_path):
+    fleet = Fleet(tmp_path, 1, "fleet: {quarantine_units: 5, quarantine_share: 0.3}\n")
+    output = tmp_path / "work/verdict.json"
+    for night in range(4):
+        fleet.put(f"t0/2024-06-{night + 1:02d}/A_1.txt", "damaged")
+        fleet.run()
+        if night < 3:
+            assert verdict([fleet.state], fleet.configuration, output).units == night + 2
+    with pytest.raises(TurnoutError, match="4 of 5 new units of the fleet have rows in quarantine"):
+        verdict([fleet.state], fleet.configuration, output)
+
+
+def test_a_run_over_some_turnouts_forgets_no_verdict_on_the_others(fleet):
+    settings = "fleet: {quarantine_units: 1, quarantine_share: 0.3}\n"
+    (fleet.folder / "config/config.yaml").write_text(settings)
+    fleet.run()
+    other = fleet.state.with_name("01of02.json")
+    shutil.copy(fleet.state, other)
+    shutil.copytree(fleet.state.with_suffix(""), other.with_suffix(""))
+    output = fleet.folder / "work/verdict.json"
+    assert verdict([fleet.state, other], fleet.configuration, output).units == 3
+    assert verdict([other], fleet.configuration, output).units == 0
+    assert verdict([fleet.state, other], fleet.configuration, output).units == 0
+    shutil.rmtree(other.with_suffix(""))
+    verdict([fleet.state], fleet.configuration, output)
+    assert len(json.loads(output.read_text())["judged"]) == 1  # of batches that are gone nothing is kept
 
 
 def test_results_that_count_are_those_of_the_last_batch_and_of_the_last_number_of_shards(fleet):

@@ -2,7 +2,7 @@
 
 import csv
 from dataclasses import replace
-from datetime import datetime
+from datetime import datetime, timedelta
 
 import numpy as np
 import pytest
@@ -207,10 +207,26 @@ def test_a_thermometer_that_is_broken_costs_its_reading_alone(tmp_path, noted, k
     assert (f"rail temperature {noted:g} °C noted, not used" in str(rows["passages"][0]["detail"])) == (kept is None)
 
 
+class Counted:
+    """A model that counts how often one looks at its time."""
+
+    looks = 0
+
+    def __init__(self, time):
+        self.time = time
+
+    @property
+    def measured_at(self):
+        Counted.looks += 1
+        return self.time
+
+
 def test_only_models_that_a_file_may_be_fitted_with_make_it_stale():
     models = tuple(SectionModel(f"m{month}", datetime(2024, month, 1), None) for month in (3, 5, 7))
     at = {"20240513T100000Z.h5": ["m5"], "20240101T000000Z.h5": ["m3"], "20240630T120000Z.h5": ["m5", "m7"]}
     for label, names in at.items():
         assert [m.model_id for m in near(models, label)] == names
+    counted = tuple(Counted(datetime(2020, 1, 1) + timedelta(weeks=k)) for k in range(200))
+    assert near(counted, "20230101T000000Z.h5") == counted[156:157] and Counted.looks < 40  # not one after the other
     for label in ("run 17.h5", "20241399T250000Z.h5"):  # its time is inside; digits that are no time
         assert near(models, label) == models

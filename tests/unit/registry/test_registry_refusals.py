@@ -172,6 +172,15 @@ def test_a_half_written_batch_does_not_stop_the_others(bench, hammer):
     assert bench.ask("select count(*) from modes_current") == [(2,)]
 
 
+def test_a_batch_that_is_gone_does_not_stop_the_others(bench, hammer):
+    gone = bench.batch(hammer(section="A1"))
+    bench.batch(hammer(section="A2"))
+    gone.unlink()
+    done = bench.register()
+    assert list(done.faults) == [str(gone)] and "No such file" in done.faults[str(gone)]
+    assert bench.ask("select section_id from modes_current") == [("t1/A2",)]
+
+
 def test_every_double_of_every_table_refuses_nan_and_infinity():
     connection, tried = connect(), 0
     for table, columns in tables().items():

@@ -1,0 +1,52 @@
+"""What a shard keeps while it computes: results wait for their batch, which counts once the state file names it."""
+
+import logging
+import time
+from pathlib import Path
+
+from turnout.config.settings.fleet import FleetSettings
+from turnout.fleet.batches import UnitResult, is_sound, write_batch
+from turnout.fleet.state import Known, batch_folder, load_state, remove_orphans
+
+LOG = logging.getLogger("turnout.fleet")
+
+
+class Ledger:
+    """State of one shard, written to ``path`` at every checkpoint.
+
+    A kill or a fault at any moment loses what waits for a batch, and nothing else.
+    """
+
+    def __init__(self, path: Path, limits: FleetSettings):
+        self.path, self.folder, self.limits = path, batch_folder(path), limits
+        self.state = load_state(path)
+        self._drop_damaged()
+        self._waiting: list[tuple[UnitResult, str, str]] = []
+        self._saved_at = time.monotonic()
+        remove_orphans(self.state, self.folder)
+
+    def _drop_damaged(self) -> None:
+        damaged = {name for name in self.state.batches if not is_sound(self.folder / name)}
+        if damaged:
+            n_unit = self.state.forget(damaged)
+            names = ", ".join(str(self.folder / name) for name in sorted(damaged))
+            LOG.warning("%s cannot be read: %d units are computed again where their files are there", names, n_unit)
+
+    def keep(self, result: UnitResult, stamp: str, contents: str = "") -> None:
+        """Take a result in; ``stamp`` and ``contents`` tell what it was computed from."""
+        self._waiting.append((result, stamp, contents))
+        late = time.monotonic() - self._saved_at >= self.limits.checkpoint_time
+        if late or len(self._waiting) >= self.limits.checkpoint_units:
+            self.checkpoint()
+
+    def checkpoint(self) -> None:
+        """Write what waits; it counts from now on."""
+        if self._waiting:
+            batch = write_batch(self.folder, [result for result, *_ in self._waiting]).name
+            self.state.batches = [b for b in self.state.batches if b != batch] + [batch]
+            for result, stamp, contents in self._waiting:
+                known = Known(stamp, result.key, result.algo, result.status, batch, contents)
+                self.state.units[result.unit] = known
+            self._waiting.clear()
+        self.state.save(self.path)
+        self._saved_at = time.monotonic()

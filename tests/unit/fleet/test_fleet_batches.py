@@ -1,0 +1,32 @@
+"""Reading a batch: the units asked for, and nothing of the others."""
+
+import pyarrow.parquet as pq
+
+from turnout.fleet.batches import UnitResult, read_results, write_batch
+
+
+def results(n):
+    return [
+        UnitResult(f"t{i:02d}/hammer/A", f"t{i:02d}", "hammer", "k", "1", "ok", {"models": [{"model_id": str(i)}]})
+        for i in range(n)
+    ]
+
+
+def test_units_that_were_asked_for_come_in_order_and_as_written(tmp_path):
+    written = results(100)
+    batch = write_batch(tmp_path, reversed(written))
+    assert list(read_results(batch)) == written
+    assert list(read_results(batch, {"t70/hammer/A", "t03/hammer/A", "t99/hammer/B"})) == [written[3], written[70]]
+
+
+def test_the_rows_of_other_units_stay_packed(tmp_path):
+    """A stage reads every batch that holds a unit of its turnout: bytes of other turnouts' rows must not cost it."""
+    written = results(100)
+    batch = write_batch(tmp_path, written)
+    last = pq.read_metadata(batch).row_group(pq.read_metadata(batch).num_row_groups - 1)
+    rows = last.column(last.num_columns - 1)
+    start = rows.dictionary_page_offset or rows.data_page_offset
+    content = bytearray(batch.read_bytes())
+    content[start : start + rows.total_compressed_size] = bytes(rows.total_compressed_size)
+    batch.write_bytes(content)
+    assert list(read_results(batch, {"t03/hammer/A"})) == [written[3]]

@@ -1,0 +1,74 @@
+"""What the machine does to single units and to whole jobs holds nothing else back. One fleet, test by test."""
+
+import re
+import subprocess
+import sys
+
+import pytest
+import toy_fleet as toy
+
+from turnout.fleet.shards import shard_of
+
+SHARDS = 3
+CHAIN = '''"""The toy chain, on a machine that has a bad sector or ends a process while a file says so."""
+import errno, os
+from pathlib import Path
+import toy_fleet
+def unit(unit, turnout, raw_root, algo=""):
+    if Path("bad_sector").exists() and unit.turnout == "T00001":
+        raise OSError(errno.EIO, "Input/output error")
+    if Path("killer").exists() and unit.turnout == "T00003":
+        os._exit(9)
+    return toy_fleet.unit(unit, turnout, raw_root, algo)
+'''
+
+
+# One fleet goes through the tests of this file in their order: workers take whole files.
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory):
+    folder = toy.make(tmp_path_factory.mktemp("faulty"), n_turnout=6, n_section=1)
+    assert len({shard_of(f"T{i:05d}", SHARDS) for i in range(6)}) > 1
+    (folder / "faulty.py").write_text(CHAIN)
+    return folder
+
+
+def run(fleet):
+    return toy.run(fleet, chain="faulty:unit", shards=SHARDS, check=False)
+
+
+def measured(fleet):
+    return {t for row in toy.rows(fleet)["recordings"] for t in row if re.fullmatch(r"T\d{5}", str(t))}
+
+
+def test_a_unit_that_cannot_be_read_is_tried_again_every_night_until_it_can(fleet):
+    (fleet / "bad_sector").touch()
+    for _ in range(2):
+        done = run(fleet)
+        assert done.returncode != 0 and "1 units wait for the next run, first T00001/hammer/A1" in done.stdout
+        assert "1 postponed" in done.stdout
+        assert measured(fleet) == {f"T{i:05d}" for i in (0, 2, 3, 4, 5)}
+    (fleet / "bad_sector").unlink()
+    done = run(fleet)
+    assert done.returncode == 0, done.stdout
+    assert len(measured(fleet)) == 6
+    assert "Nothing to be done" in run(fleet).stdout
+
+
+def test_a_job_that_dies_holds_back_nothing_but_what_it_has_not_computed(fleet):
+    for turnout in ("T00000", "T00001", "T00003"):
+        toy.add_raw(fleet, turnout, n_section=1, n_campaign=1, first=1)
+    assert shard_of("T00000", SHARDS) != shard_of("T00001", SHARDS) == shard_of("T00003", SHARDS)
+    (fleet / "config/config.yaml").write_text("fleet: {checkpoint_units: 1}\n")
+    (fleet / "killer").touch()
+    options = toy.command(chain="faulty:unit", shards=SHARDS)[3:]
+    profile = str(toy.REPOSITORY / "profiles/default")
+    night = [sys.executable, "-m", "turnout.cli", "nightly", "--profile", profile, "--", *options]
+    done = subprocess.run(night, cwd=fleet, env=toy.environment(), text=True, capture_output=True, check=False)
+    assert done.returncode != 0 and "not published" not in done.stdout
+    assert sum("2024-02-01" in repr(row) for row in toy.rows(fleet)["recordings"]) == 2
+    (fleet / "killer").unlink()
+    done = run(fleet)  # no plan has changed since
+    assert done.returncode == 0 and re.search(r"hammer 02of03: 4 known, 1 processed", done.stdout), done.stdout
+    assert sum("2024-02-01" in repr(row) for row in toy.rows(fleet)["recordings"]) == 3
