@@ -13,7 +13,7 @@ from turnout.chains import mismatch, mismatch_gather
 from turnout.chains.accept import with_entry
 from turnout.chains.accepted_terms import Accepted
 from turnout.chains.mismatch_context import digest_of_model, track_of
-from turnout.chains.mismatch_gather import MOST_ALIKE, Gathered, _channels_of, _thin_out
+from turnout.chains.mismatch_gather import MOST_ALIKE, Gathered, _channels_of, _thin_out, gather
 from turnout.chains.mismatch_groups import groups, telling
 from turnout.chains.mismatch_results import Results, diagnose_turnout
 from turnout.chains.mismatch_trains import train_of
@@ -26,7 +26,7 @@ from turnout.fleet.scan import scan
 from turnout.mismatch.track import HammerTest, Passage, TrackCase
 from turnout.mismatch.track.planned import measured_campaign, small_plan
 from turnout.mismatch.track.rolling import rolling_of
-from turnout.readers import read
+from turnout.readers import HELD, read
 from turnout.readers.writing import write
 
 
@@ -253,8 +253,9 @@ def test_a_month_of_trains_keeps_the_extremes_of_speed_of_each():
     assert {p.name for p in telling(passages)} == {p.name for p in telling(every)}
 
 
-def test_a_logger_that_never_stops_gives_its_trains(folder):
-    """Two trains in one file, 70 s of nothing between and about them: both are used, each as its own."""
+@pytest.fixture
+def logged(folder):
+    """Two trains in one file, 70 s of nothing between and about them."""
     small.roll(folder, speeds=(80.0, 110.0), vehicle="locomotive")
     files = sorted((folder / "raw/t1/passages").iterdir())
     turnout = turnout_in(folder)
@@ -269,5 +270,33 @@ def test_a_logger_that_never_stops_gives_its_trains(folder):
         file.unlink()
     noted = {k: v for k, v in parts[0].conditions.items() if k == "train_type"}
     write([replace(parts[0], samples=samples, conditions=noted)], files[0], "hdf5", single=True)
-    (row,) = diagnose_turnout("t1")["mismatch_findings"]
-    assert row["n_passages"] == 2, row["notes"]
+    return folder
+
+
+def gathered(folder):
+    turnout = turnout_in(folder)
+    units = [u for u in scan(turnout, folder / "raw").units if u.kind == "passage"]
+    return gather(units, turnout, folder / "raw", track_of(turnout)[0], {})
+
+
+@pytest.mark.parametrize("held", [HELD, 0])
+def test_a_logger_that_never_stops_gives_its_trains(logged, monkeypatch, held):
+    """Both are used, each as its own; also of a file so large that it is not read as a whole."""
+    monkeypatch.setattr(mismatch_gather, "read", partial(read, held=held))
+    found = gathered(logged)
+    assert [round(3.6 * p.speed, -1) for p in found.passages] == [80.0, 110.0], found.notes
+    assert len({p.name for p in found.passages}) == 2 and not [n for n in found.notes if "trains in it" in n]
+
+
+def test_rows_that_may_be_those_of_other_trains_are_not_used_and_that_is_said(logged, monkeypatch):
+    """The passage stage lost the first of two: its only row would give either train the other's speed and load."""
+    plain = mismatch_gather.passage_unit
+
+    def lost(*arguments, **more):
+        tables = plain(*arguments, **more)
+        return {**tables, "passages": tables["passages"][1:]}
+
+    monkeypatch.setattr(mismatch_gather, "passage_unit", lost)
+    found = gathered(logged)
+    assert not found.passages and len([n for n in found.notes if "speed is not known" in n]) == 2
+    assert [n for n in found.notes if "2 trains in it, 1 where passages were analysed" in n]
