@@ -112,7 +112,7 @@ def diagnose(case, settings=None, progress=None, store=None):
     if len(verdicts) == 1:
         verdicts = [opened(verdicts[0], settings)]
     rival, leader = _rival(verdicts[0]), next((s for s in verdicts[0].scores[:1] if s.gain > settings.threshold), None)
-    where = whereabouts(case, base, leader) if verdicts[0].answer == "unknown" else None
+    where = whereabouts(case, base, leader, verdicts[0].cause) if verdicts[0].answer == "unknown" else None
     return Diagnosis(
         tuple(verdicts), base, fit, frames, _verified(case, base, fit, rival), latent_of(case, base), {},
         scores, where,

@@ -80,7 +80,7 @@ class TrackCase(Predicting, Case):
         self.nominal, self._railed = zone_of(campaign.turnout, campaign.places()), {}
         self._recentre({})
         self.trains = tuple(dict.fromkeys(p.train or p.name for p in campaign.passages))
-        self.pairs, self.rollings, self.strange, self.notes = {}, {}, {}, []
+        self.pairs, self.rollings, self.strange, self.unlike, self.notes = {}, {}, {}, [], []
         self.waves = self._waves()
 
     def _recentre(self, values):
