@@ -64,7 +64,8 @@ def headline(finding) -> str:
     if finding["verdict"] in ("named", "a_or_b") and terms:
         said = "; ".join(_sentence(term, finding) for term in terms)
         if finding["verdict"] == "named":
-            return said + "."
+            more = json.loads(finding["evidence_json"] or "{}").get("reason")
+            return f"{said}. {more[:1].upper()}{more[1:]}." if more else f"{said}."
         other = (finding["rival_term"] or "").replace("_", " ")
         return f"{said}, or it is {other}: these recordings cannot tell the two apart."
     low, high = finding["place_low_m"], finding["place_high_m"]

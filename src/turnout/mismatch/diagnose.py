@@ -11,7 +11,7 @@ from turnout.mismatch.latent import Latent
 from turnout.mismatch.locate import attribute, cell_energies
 from turnout.mismatch.refits import kept, scored, to_the_end, with_derivatives
 from turnout.mismatch.scoring import judged, latent_of, over
-from turnout.mismatch.together import reconsidered, refused
+from turnout.mismatch.together import reconsidered, refused, told_beside
 from turnout.mismatch.verdict import Verdict, opened
 from turnout.mismatch.verify import decoy, fit_of_reserved, fit_percent
 from turnout.mismatch.whereabouts import Whereabouts, whereabouts
@@ -92,6 +92,7 @@ def diagnose(case, settings=None, progress=None, store=None):
         scores = scored(case, fit, settings, tell, store, effect, promising)
         verdict, best = judged(case, fit, scores, settings)
         if effect and (verdict.answer != "named" or best.gain < _shape_of(verdicts[0].scores[0], best)):
+            verdicts[0] = told_beside(verdicts[0], verdict)
             break
         verdicts.append(verdict)
         if verdict.answer == "none" or best is None or best.gain <= settings.threshold:

@@ -62,7 +62,7 @@ def sentence(diagnosis):
     if verdict.answer == "a_or_b":
         other = verdict.names[1].replace("_", " ")
         return f"{words[0]} Or {other}: these recordings cannot tell them apart."
-    return " ".join(words)
+    return " ".join([*words, f"But {verdict.reason}."] if verdict.reason else words)
 
 
 def place_in_words(diagnosis):

@@ -14,7 +14,7 @@ from turnout.mismatch.finding import finding_row
 from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.locate import attribute
 from turnout.mismatch.observation import Observation
-from turnout.mismatch.scoring import judged, score_of
+from turnout.mismatch.scoring import explained_of, judged, score_of
 from turnout.mismatch.together import reconsidered
 from turnout.mismatch.track import TrackCase
 from turnout.mismatch.track.blow_model import BlowModel
@@ -23,6 +23,7 @@ from turnout.mismatch.track.missing_source import _forces, missing_sources
 from turnout.mismatch.track.planned import measured_campaign, small_plan
 from turnout.mismatch.track.predicting import Predicting
 from turnout.mismatch.track.rolling import Rolling, rolling_of
+from turnout.mismatch.verdict import Score
 from turnout.mismatch.verify import decoy, fit_percent
 from turnout.physics import Parameter
 from turnout.simulate.track import uniform_track
@@ -62,6 +63,38 @@ def test_a_first_effect_is_not_credited_with_what_the_second_explains():
     assert (refused.answer, second.answer) == ("unknown", "named")
     verdicts, fit = reconsidered(case, base, pair, [refused, second], settings)
     assert [v.answer for v in verdicts] == ["unknown"] and fit is base
+
+
+class OneLoud(Case):
+    """A channel at twice what it is in controls in one recording, all else at their level."""
+
+    def __init__(self):
+        labels = {"sensor": np.array(["S1"], dtype=object)}
+        self.observations = (
+            Observation("p", "p", np.zeros(100), 1.0, kind="passage", cells=np.zeros(100, int), labels=labels),
+        )
+        self.control_level, self.cell_level = {"passage": 0.7, "hammer": 0.9}, {"passage": 2.0}
+
+
+def with_squares(square, hammer):
+    """A fit that leaves these mean squares in the loud channel and in blows."""
+    level, white = {"passage": 0.5, "hammer": hammer}, [np.full(100, np.sqrt(square))]
+    psi, part = np.array([0.4]), lambda candidate: slice(0, 1)
+    return SimpleNamespace(level=level, white=white, candidates=(), psi=psi, psi_se=0.1 * psi, part=part)
+
+
+@pytest.mark.parametrize(("after", "answer", "grade"), [(4.0, "unknown", ""), (2.2, "named", "B"), (1.9, "named", "A")])
+def test_a_channel_that_raises_the_alarm_is_asked_for_again(after, answer, grade):
+    """A name of 13 nats that leaves the channel as loud as it was explains nothing of what was heard."""
+    case, settings = OneLoud(), MismatchSettings()
+    factor = Parameter("factor", "-", 1.0, (0.05, 20.0), "", "made up 2026")
+    pad = Candidate("local_pad", (factor,), lambda p: p, ((0.4,),), {"place": 3.0})
+    base, refit = with_squares(4.0, 0.5), with_squares(after, 0.45)
+    share = explained_of(case, base, refit, settings)
+    assert share == pytest.approx(min(1.0, (4.0 - after) / 2.0))
+    verdict, _ = judged(case, base, [Score(pad, 13.0, 0.0, share, refit)], settings)
+    assert (verdict.answer, verdict.grade) == (answer, grade)
+    assert judged(case, base, [], settings)[0].answer == "unknown"
 
 
 def test_a_loud_train_is_found_though_each_of_its_axles_is_a_frame_of_its_own():

@@ -52,6 +52,14 @@ def test_an_effect_that_no_name_fits_keeps_the_first_one_refused_too():
     assert found.fit is found.base
 
 
+def test_what_shows_beside_a_name_and_gets_none_is_told():
+    """A ripple that no candidate has takes nothing from the ramp, but with the ramp not all is said."""
+    found = diagnose(Shapes(("wave", "ramp"), ramp=2.5, ripple=0.12))
+    assert found.names == ("ramp",) and found.verdict.grade == "B"
+    assert found.verdict.reason.startswith("something else shows beside it")
+    assert diagnose(Shapes(("wave", "ramp"), ramp=2.5)).verdict.reason == ""
+
+
 class Trains(Shapes):
     """Two trains with a wave each, seen twenty times over the noise; ``told`` whether candidates say of which train."""
 

@@ -134,6 +134,13 @@ def test_a_named_finding_says_what_where_how_much_and_what_to_check():
     assert "--accept" in text and "never used" in text
 
 
+def test_what_shows_beside_a_name_stands_in_its_sentence():
+    reason = "something else shows beside it: above the level of controls, and no candidate helps"
+    row = named() | {"evidence_json": json.dumps(EVIDENCE | {"reason": reason})}
+    said = "hangs 1.1 mm above its ballast. Something else shows beside it: above the level of controls"
+    assert said in headline(row) and "above its ballast." in headline(named())
+
+
 def test_axes_carry_their_units():
     text = page(named())
     for label in ("time [s]", "frequency [Hz]", "displacement of the sleeper [m]", "force [N]"):
