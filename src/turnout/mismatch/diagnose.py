@@ -81,7 +81,7 @@ def diagnose(case, settings=None, progress=None, store=None):
     tell = progress or (lambda done, total, what: None)
     base = kept(store, "base", lambda: fit_jointly(case, iterations=settings.base_iterations))
     case, base = _with_its_errors(case, base, settings, store)
-    frames = tuple(attribute(*cell_energies(case.observations, base.residuals), settings.permutations))
+    frames = tuple(attribute(*cell_energies(case.observations, base.residuals)))
     numerics = _own_numerics(case, base, settings)
     if numerics:
         verdict = Verdict("numerics", reason=numerics, probability=1.0)

@@ -12,7 +12,6 @@ from turnout.mismatch.candidate import Candidate
 from turnout.mismatch.case import Case, Nuisance
 from turnout.mismatch.finding import finding_row
 from turnout.mismatch.joint import fit_jointly
-from turnout.mismatch.locate import attribute
 from turnout.mismatch.observation import Observation
 from turnout.mismatch.scoring import explained_of, judged, score_of
 from turnout.mismatch.together import reconsidered
@@ -95,24 +94,6 @@ def test_a_channel_that_raises_the_alarm_is_asked_for_again(after, answer, grade
     verdict, _ = judged(case, base, [Score(pad, 13.0, 0.0, share, refit)], settings)
     assert (verdict.answer, verdict.grade) == (answer, grade)
     assert judged(case, base, [], settings)[0].answer == "unknown"
-
-
-def test_a_loud_train_is_found_though_each_of_its_axles_is_a_frame_of_its_own():
-    """Two nepers of log energy are 8.7 dB; 36 cells of either train err by 0.5 / sqrt(72) each, 0.4 dB."""
-    rng, cells = np.random.default_rng(0), []
-    for train in ("ic3", "freight"):
-        cells += [(train, a, s, p) for _ in range(2) for a in range(4) for s in "ABC" for p in range(6)]
-    labels = {
-        "place": [str(p) for *_, p in cells],
-        "sensor": [s for _, _, s, _ in cells],
-        "train": [t for t, *_ in cells],
-        "wheel": [f"{t}, axle {a + 1}" for t, a, *_ in cells],
-    }
-    labels = {name: np.array(levels, dtype=object) for name, levels in labels.items()}
-    energy = 0.5 * rng.normal(size=len(cells)) + 2.0 * np.array([t == "freight" for t, *_ in cells])
-    found = {f.frame: f for f in attribute(energy, labels)}
-    assert found["train"].level == "freight" and found["train"].q < 0.01
-    assert found["train"].effect == pytest.approx(8.7, abs=1.2)
 
 
 @pytest.mark.parametrize("place", [12.0, 12.07, 12.2])
