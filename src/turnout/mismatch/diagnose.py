@@ -1,6 +1,6 @@
 """The ten steps, from a case to a verdict with everything it rests on."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -52,6 +52,11 @@ class Diagnosis:
     def verdict(self):
         """The verdict on the first effect."""
         return self.verdicts[0]
+
+    @property
+    def probability(self):
+        """Of all that is stated: that of the least sure verdict."""
+        return min(v.probability for v in self.verdicts)
 
     @property
     def names(self):
@@ -110,8 +115,7 @@ def diagnose(case, settings=None, progress=None, store=None):
             break
     if refused(verdicts):
         verdicts, fit = reconsidered(case, base, fit, verdicts, settings)
-    if len(verdicts) == 1:
-        verdicts = [opened(verdicts[0], settings)]
+    verdicts = [_as_it_ends(v, case, fit, settings) for v in verdicts]
     rival, leader = _rival(verdicts[0]), next((s for s in verdicts[0].scores[:1] if s.gain > settings.threshold), None)
     where = whereabouts(case, base, leader, verdicts[0].cause) if verdicts[0].answer == "unknown" else None
     return Diagnosis(
@@ -130,6 +134,14 @@ def _with_its_errors(case, fit, settings, store):
         return new, kept(store, key, lambda: to_the_end(new, fit, settings), fit.candidates)
     except SimulationError:
         return case, fit
+
+
+def _as_it_ends(verdict, case, fit, settings):
+    """A name as the last fit has it: graded by what that leaves, "a or b" where its size has no upper end there."""
+    if verdict.answer != "named":
+        return verdict
+    own, grade = replace(verdict.scores[0], fit=fit), "A" if over(case, fit, settings) <= 1.0 else "B"
+    return opened(replace(verdict, grade=grade, scores=(own, *verdict.scores[1:])), settings)
 
 
 def _shape_of(first, second):

@@ -58,11 +58,12 @@ def sentence(diagnosis):
         return f"The simulation is not fine enough to be compared: {verdict.reason}."
     if verdict.answer == "unknown":
         return f"Something is missing {place_in_words(diagnosis)}: {verdict.reason}."
-    words = [f"What the model left out: {t.sentence()}." for t in diagnosis.fit.terms]
-    if verdict.answer == "a_or_b":
-        other = verdict.names[1].replace("_", " ")
-        return f"{words[0]} Or {other}: these recordings cannot tell them apart."
-    return " ".join([*words, f"But {verdict.reason}."] if verdict.reason else words)
+    words = []
+    for term, own in zip(diagnosis.fit.terms, diagnosis.verdicts):
+        words.append(f"What the model left out: {term.sentence()}.")
+        if own.answer == "a_or_b":
+            words.append(f"Or {own.names[1].replace('_', ' ')}: these recordings cannot tell them apart.")
+    return " ".join([*words, f"But {verdict.reason}."] if verdict.answer == "named" and verdict.reason else words)
 
 
 def place_in_words(diagnosis):
@@ -102,7 +103,7 @@ def finding_row(diagnosis, identity):
         "channel": where.get("sensor"),
         "band_low_hz": None,
         "band_high_hz": None,
-        "probability": round(verdict.probability, 4),
+        "probability": round(diagnosis.probability, 4),
         "p_value": next((f.q for f in diagnosis.frames if f.frame == locked), None),
         "fit_before_pct": _finite(check.before),
         "fit_after_pct": _finite(check.after),

@@ -161,7 +161,7 @@ def opened(verdict, settings):
         return verdict
     names, probabilities = (verdict.names[0], verdict.scores[0].candidate.open_as), dict(verdict.posterior)
     sure = calibrate(probabilities, names, settings.certainty("a_or_b"), settings)
-    reason = f"the size of {names[0]} is known from below alone"
+    reason = "; ".join(filter(None, [f"the size of {names[0]} is known from below alone", verdict.reason]))
     return replace(
         verdict, answer="a_or_b", names=names, grade="", probability=sure, posterior=probabilities, reason=reason
     )

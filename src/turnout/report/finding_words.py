@@ -107,7 +107,9 @@ def _sure(finding, evidence):
         words += "; some structure is left, its shape is not resolved"
     if evidence.get("reason"):
         words += f"; {evidence['reason']}"
-    return words
+    stated = [evidence, *evidence["beside"]] if evidence.get("beside") else []
+    each = ", ".join(f"{s['term'].replace('_', ' ')} {s['probability']:.2f}" for s in stated if s["term"])
+    return f"{words}; each by itself: {each}" if each else words
 
 
 def answer(finding) -> str:

@@ -85,7 +85,9 @@ def diagnosed(answer, candidates, frames):
         answer=answer, names=tuple(c.family for c in candidates), grade="", probability=0.9, reason=""
     )
     check = SimpleNamespace(before=1.0, after=None, rival=None, decoy=None, n=1)
-    return SimpleNamespace(fit=fit, verdict=verdict, verification=check, frames=frames, where=None)
+    return SimpleNamespace(
+        fit=fit, verdict=verdict, verdicts=(verdict,), probability=0.9, verification=check, frames=frames, where=None
+    )  # fmt: skip
 
 
 def test_a_row_has_no_place_from_a_frame_of_the_residual():

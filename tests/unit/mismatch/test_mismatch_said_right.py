@@ -219,7 +219,9 @@ def dip(place, shift):
     )  # fmt: skip
     verdict = SimpleNamespace(answer="named", names=("surface_dip",), grade="A", probability=0.97, reason="")
     check = SimpleNamespace(before=1.0, after=2.0, rival=1.0, decoy=1.0, n=1)
-    return SimpleNamespace(fit=fit, verdict=verdict, verification=check, frames=(), where=None)
+    return SimpleNamespace(
+        fit=fit, verdict=verdict, verdicts=(verdict,), probability=0.97, verification=check, frames=(), where=None
+    )  # fmt: skip
 
 
 def test_a_dip_is_reported_where_it_was_fitted_and_not_where_it_was_looked_for():
