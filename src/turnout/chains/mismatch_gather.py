@@ -172,8 +172,8 @@ def _passage(name, recording, row: Mapping[str, Any], turnout, track, bad, notes
     if not sound.channels:
         notes.append(f"passage {name}: no sound channel on the {train.route} track")
         return None
-    said = _noted(row, sound)
-    return Passage(name, sound, train.vehicle, train.speed, train.name, train.direction, train.route, said)
+    way = train.direction, train.route
+    return Passage(name, sound, train.vehicle, train.speed, train.name, *way, _noted(row, sound), train.load_sd)
 
 
 def _trains(unit, turnout, raw_root, notes):

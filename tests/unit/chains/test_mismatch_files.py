@@ -23,11 +23,14 @@ from turnout.config import load_configuration, with_raw
 from turnout.errors import SimulationError
 from turnout.fleet.batches import encode
 from turnout.fleet.scan import scan
+from turnout.mismatch.case import Nuisance
 from turnout.mismatch.track import HammerTest, Passage, TrackCase
+from turnout.mismatch.track.base_model import vehicle_with
 from turnout.mismatch.track.planned import measured_campaign, small_plan
-from turnout.mismatch.track.rolling import rolling_of
+from turnout.mismatch.track.rolling import rolling_nuisances, rolling_of
 from turnout.readers import HELD, read
 from turnout.readers.writing import write
+from turnout.simulate import load_vehicle
 
 
 @pytest.fixture
@@ -70,6 +73,23 @@ def test_bangs_between_the_axles_do_not_tell_the_speed(repository):
     for heard, speed in ((6, 25.0), (8, 74.0 / 3.6)):
         row = {"train_type": "ic3", "n_axles": heard, "speed_kmh": 74.0}
         assert train(row, said, repository).speed == pytest.approx(speed)
+
+
+@pytest.mark.parametrize("known", [{"axle_load_t": 14.0}, {"load_share": 0.4}, {}])
+def test_a_load_that_nobody_knows_is_as_open_as_from_empty_to_full(repository, known):
+    """Uniform between: its standard deviation is half of the way over the root of 3. Known loads are known to 5 %."""
+    folder = repository / "config/vehicles"
+    row = {"train_type": "freight", "n_axles": None} | {k: v for k, v in known.items() if k == "axle_load_t"}
+    found = train(row, {k: v for k, v in known.items() if k == "load_share"}, repository)
+    passage = Passage("p", None, found.vehicle, found.speed, load_sd=found.load_sd)
+    load = next(n for n in rolling_nuisances(passage) if n.name == "load@p")
+    if known:
+        assert load == Nuisance("load@p", "-", 0.0, 0.05, "p")
+        return
+    half, full = (load_vehicle("freight", share, folder) for share in (0.5, 1.0))
+    heavier = vehicle_with(half, {}, "freight", np.sqrt(3.0) * load.sd)  # as far as the assumption goes
+    assert np.sum(heavier.static_loads) == pytest.approx(np.sum(full.static_loads), rel=1e-6)
+    assert load.sd > 0.2 and load.bounds == (-2.0 * load.sd, 2.0 * load.sd)
 
 
 def test_swapped_channels_are_two():

@@ -8,6 +8,7 @@ from turnout.errors import SimulationError
 from turnout.mismatch.case import Nuisance
 from turnout.mismatch.observation import Observation
 from turnout.mismatch.track.bands import band_end, band_limited, clock_of, finer, limited, read_at
+from turnout.mismatch.track.campaign import LOAD_SD
 from turnout.mismatch.track.roll import EDGE
 
 # m, s, s: of what is heard as a channel's own noise; 4.2 m before a wheel it is that, 1.4 m before six times as loud
@@ -16,7 +17,8 @@ BLURRED = 0.03  # s about a sample at the range
 COUPLING = 0.7  # an amplifier's lower corner that no data sheet mentions [Hz]
 FINE = 2500.0  # samples per second between which a cubic reads 112 Hz to 0.03 %
 SLOWEST = 3.0  # samples in the shortest period of the band, whose edge ends at 1.25 times that: Nyquist asks for 2.5
-SPEED_SD, TIME_SD, LOAD_SD = 0.004, 1.5e-3, 0.05
+SPEED_SD, TIME_SD = 0.004, 1.5e-3
+ASSUMED = 2.0  # prior sd of a load that nobody knows, between which it lies: a seventh beyond empty and full
 
 
 @dataclass(frozen=True)
@@ -160,5 +162,10 @@ def _cells(rolling):
 
 def rolling_nuisances(passage):
     """Time, speed and load of one passage; owned by all its sensors, so named by the passage."""
-    parts = (("time", "s", TIME_SD), ("speed", "-", SPEED_SD), ("load", "-", LOAD_SD))
-    return [Nuisance(f"{what}@{passage.name}", unit, 0.0, sd, passage.name) for what, unit, sd in parts]
+    reach = np.inf if passage.load_sd <= LOAD_SD else ASSUMED * passage.load_sd
+    parts = (
+        ("time", "s", TIME_SD, np.inf),
+        ("speed", "-", SPEED_SD, np.inf),
+        ("load", "-", passage.load_sd, reach),
+    )
+    return [Nuisance(f"{what}@{passage.name}", unit, 0.0, sd, passage.name, (-a, a)) for what, unit, sd, a in parts]
