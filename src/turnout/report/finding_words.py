@@ -129,7 +129,7 @@ def check(finding) -> str:
 
 
 def rivals(finding) -> list[dict]:
-    """What else was tried: name, nats gained on what was left out of the fit, share of the excess explained."""
+    """What else was tried: name, evidence over the base model [nats], share of the excess explained."""
     evidence = json.loads(finding["evidence_json"] or "{}")
     return [
         {

@@ -133,7 +133,7 @@ def test_a_named_finding_says_what_where_how_much_and_what_to_check():
         assert words in text
     for fit in ("41 %", "78 %", "50 %", "43 %"):
         assert f">{fit}</text>" in text
-    assert "--accept" in text and "never used" in text
+    assert "--accept" in text and "never used" in text and "evidence [nats]" in text
 
 
 def test_what_shows_beside_a_name_stands_in_its_sentence():

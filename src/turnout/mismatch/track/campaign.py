@@ -42,7 +42,7 @@ class Passage:
 @dataclass(frozen=True)
 class Campaign:
     """``turnout`` a TurnoutTrack; ``sensors`` by name with place and mounting; ``reserved`` names of tests and
-    passages that only the verification reads."""
+    passages that no fit reads: they may withdraw a name, and verify it."""
 
     turnout: object
     sensors: tuple[Sensor, ...]
