@@ -35,13 +35,13 @@ def groups(turnout: TurnoutConfig, track: TurnoutTrack, found: Gathered, only: S
 
 
 def _neighbours(turnout, only):
-    """(route, labels) of sections that follow each other within ``GAP``, all of ``only`` together where given."""
+    """(route, labels) of sections that follow each other within ``GAP``, or of ``only`` these, all together."""
     for route in ("main", "diverging"):
         mine = [s for s in turnout.sections if _route(s) == route and (not only or s.label in only)]
         mine.sort(key=lambda s: s.position)
         part: list = []
         for section in mine:
-            if part and section.position - part[-1].position > GAP:
+            if part and not only and section.position - part[-1].position > GAP:
                 yield route, tuple(s.label for s in part)
                 part = []
             part.append(section)

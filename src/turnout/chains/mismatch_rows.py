@@ -77,8 +77,14 @@ def _numbers(found, case, group, about) -> dict:
         "level_after": float(max(fit.level.values())),
         "term_json": json.dumps(terms, sort_keys=True) if terms else None,
         "evidence_json": json.dumps(_evidence(found), sort_keys=True),
-        "notes": "\n".join([*dict.fromkeys([*case.notes, *_of_visit(about, campaign)])][:NOTES_KEPT]) or None,
+        "notes": "\n".join(_kept([*dict.fromkeys([*case.notes, *_of_visit(about, campaign)])])) or None,
     }
+
+
+def _kept(notes):
+    """The first notes, and how many more there are."""
+    more = len(notes) - NOTES_KEPT
+    return [*notes[:NOTES_KEPT], *([f"and {more} more"] if more > 0 else [])]
 
 
 def _of_visit(about, campaign):

@@ -14,7 +14,7 @@ from turnout.chains.accept import with_entry
 from turnout.chains.accepted_terms import Accepted
 from turnout.chains.mismatch_context import digest_of_model, track_of
 from turnout.chains.mismatch_gather import MOST_ALIKE, Gathered, _channels_of, _thin_out, gather
-from turnout.chains.mismatch_groups import groups, telling
+from turnout.chains.mismatch_groups import _neighbours, groups, telling
 from turnout.chains.mismatch_results import Results, diagnose_turnout
 from turnout.chains.mismatch_trains import train_of
 from turnout.chains.mismatch_visits import unit_of
@@ -27,7 +27,7 @@ from turnout.mismatch.case import Nuisance
 from turnout.mismatch.track import HammerTest, Passage, TrackCase
 from turnout.mismatch.track.base_model import vehicle_with
 from turnout.mismatch.track.planned import measured_campaign, small_plan
-from turnout.mismatch.track.rolling import rolling_nuisances, rolling_of
+from turnout.mismatch.track.rolling import FEWEST, Rolling, observed, rolling_nuisances, rolling_of
 from turnout.readers import HELD, read
 from turnout.readers.writing import write
 from turnout.simulate import load_vehicle
@@ -257,6 +257,34 @@ def test_a_note_of_this_group_is_not_cut_off_by_those_of_others():
     notes = [f"passage {k}: load not known" for k in range(20)] + ["section C: elsewhere"]
     campaign = SimpleNamespace(passages=[SimpleNamespace(name="17")])
     assert _of_visit({"notes": notes}, campaign)[:2] == ["passage 17: load not known", "section C: elsewhere"]
+
+
+def test_notes_that_are_cut_off_are_counted():
+    from turnout.chains.mismatch_rows import NOTES_KEPT, _kept
+
+    notes = [f"note {k}" for k in range(NOTES_KEPT + 3)]
+    assert _kept(notes) == [*notes[:NOTES_KEPT], "and 3 more"]
+    assert _kept(notes[:NOTES_KEPT]) == notes[:NOTES_KEPT]
+
+
+def test_a_passage_of_the_fewest_samples_is_an_observation():
+    """Fewer than those over which its amplitude is taken: then it is taken over all of them."""
+    rng, time = np.random.default_rng(0), np.arange(FEWEST) / 300.0
+    vehicle = SimpleNamespace(wheel_places=np.zeros(1), static_loads=[1e5])
+    passage = Passage("p", None, vehicle, 30.0, "x")
+    sensors = tuple(SimpleNamespace(name=f"S{k}", place=0.6 * k) for k in range(2))
+    data = rng.normal(size=(2, FEWEST))
+    found = observed(Rolling("p", passage, sensors, time, 0.04, 30.0), data, np.zeros(2), 0.06)
+    assert found.data.size == 2 * FEWEST and np.all(found.sigma > 0.02 * np.std(data, axis=1).min())
+
+
+def test_sections_that_are_asked_for_are_diagnosed_together():
+    """13 m apart they are two groups of a turnout, and one where somebody asks for just these."""
+    places = {"A": 2.0, "B": 15.0, "C": 40.0}
+    sections = [SimpleNamespace(label=n, position=x, track="main") for n, x in places.items()]
+    turnout = SimpleNamespace(sections=sections)
+    assert list(_neighbours(turnout, ())) == [("main", ("A",)), ("main", ("B",)), ("main", ("C",))]
+    assert list(_neighbours(turnout, ("A", "B"))) == [("main", ("A", "B"))]
 
 
 def test_a_month_of_trains_keeps_the_extremes_of_speed_of_each():

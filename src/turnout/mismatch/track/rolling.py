@@ -17,6 +17,7 @@ BLURRED = 0.03  # s about a sample at the range
 COUPLING = 0.7  # an amplifier's lower corner that no data sheet mentions [Hz]
 FINE = 2500.0  # samples per second between which a cubic reads 112 Hz to 0.03 %
 SLOWEST = 3.0  # samples in the shortest period of the band, whose edge ends at 1.25 times that: Nyquist asks for 2.5
+FEWEST, AROUND = 20, 31  # samples of a passage, and those over which its amplitude is taken
 SPEED_SD, TIME_SD = 0.004, 1.5e-3
 ASSUMED = 2.0  # prior sd of a load that nobody knows, between which it lies: a seventh beyond empty and full
 
@@ -68,7 +69,7 @@ def rolling_of(passage, sensors, reference, speed, tolerance):
     stop = reference + duration_of(passage, speed, sensors) + EDGE
     step = 1.0 / clock_of(speed)
     time = np.arange(max(0.0, reference - EDGE), min(stop, recording.duration - 0.01), step)
-    if time.size < 20:
+    if time.size < FEWEST:
         raise SimulationError("the train lies outside the recording")
     if recording.rate < SLOWEST * band_end(speed):
         raise SimulationError(f"{recording.rate:g} samples per second are too few for {band_end(speed):.0f} Hz")
@@ -107,7 +108,8 @@ def _topped(recording, sensors, time):
 def observed(rolling, data, noise, tolerance, topped=None):
     """Observation of (n_sensor, n) samples with ``noise`` (n_sensor,) and a materiality floor; where ``topped`` they
     say no more than their own size."""
-    wide = np.array([np.convolve(row**2, np.ones(31) / 31, mode="same") for row in data])
+    width = min(AROUND, data.shape[1])
+    wide = np.array([np.convolve(row**2, np.ones(width) / width, mode="same") for row in data])
     floor = 0.02 * np.sqrt(np.mean(data**2, axis=1)) + 1e-9
     sigma = np.sqrt((noise**2 + floor**2)[:, None] + tolerance**2 * wide)
     if topped is not None and topped.any():
