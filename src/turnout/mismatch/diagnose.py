@@ -10,7 +10,7 @@ from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.latent import Latent
 from turnout.mismatch.locate import attribute, cell_energies
 from turnout.mismatch.refits import kept, scored, to_the_end, with_derivatives
-from turnout.mismatch.scoring import judged, latent_of, over
+from turnout.mismatch.scoring import heard, judged, latent_of, over
 from turnout.mismatch.together import reconsidered, refused, told_beside
 from turnout.mismatch.verdict import Verdict, opened
 from turnout.mismatch.verify import decoy, fit_of_reserved, fit_percent
@@ -140,7 +140,7 @@ def _as_it_ends(verdict, case, fit, settings):
     """A name as the last fit has it: graded by what that leaves, "a or b" where its size has no upper end there."""
     if verdict.answer != "named":
         return verdict
-    own, grade = replace(verdict.scores[0], fit=fit), "A" if over(case, fit, settings) <= 1.0 else "B"
+    own, grade = replace(verdict.scores[0], fit=fit), "A" if heard(case, fit, settings) <= 1.0 else "B"
     return opened(replace(verdict, grade=grade, scores=(own, *verdict.scores[1:])), settings)
 
 

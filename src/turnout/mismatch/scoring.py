@@ -12,10 +12,16 @@ FEWEST = 6  # like parts that make a spread
 
 
 def explained_of(case, fit, refit, settings):
-    """Share of the excess over the level of controls that ``refit`` takes away, 1 where there is none."""
+    """Share of the excess over the level of controls that ``refit`` takes away, 1 where there is none.
+
+    Of a first effect that of the loudest channel counts where no kind has any; beside a name it may be what the name
+    left, which is no matter of a second effect.
+    """
     control = _control(case, fit, settings)
-    before = _excess(case, fit, control)
-    return 1.0 - _excess(case, refit, control) / before if before > 0.0 else 1.0
+    before, after = _excess(fit.level, control), _excess(refit.level, control)
+    if before == 0.0 and not fit.candidates:
+        before, after = (max(0.0, loudest(case, f) - 1.0) for f in (fit, refit))
+    return 1.0 - after / before if before > 0.0 else 1.0
 
 
 def _control(case, fit, settings):
@@ -23,10 +29,8 @@ def _control(case, fit, settings):
     return {kind: case.control_level.get(kind, settings.control_level) for kind in fit.level}
 
 
-def _excess(case, fit, control):
-    """Mean squares above what controls reach: of each kind, and of the loudest channel of one recording."""
-    kinds = sum(max(0.0, fit.level[kind] - control[kind]) for kind in fit.level)
-    return kinds + max([0.0, *(square - usual for square, usual in _channels(case, fit))])
+def _excess(level, control):
+    return sum(max(0.0, level[kind] - control[kind]) for kind in level)
 
 
 def score_of(case, fit, refit, candidate, settings):
@@ -80,14 +84,19 @@ def _usual(case, refit, candidate):
 
 
 def over(case, fit, settings):
-    """Weighted mean square over the level of controls, the largest of the kinds and of single channels."""
+    """Weighted mean square over the level of controls, the largest of the kinds."""
     control = _control(case, fit, settings)
-    kinds = [fit.level[kind] / control[kind] for kind in fit.level]
-    return max([*kinds, *(square / usual for square, usual in _channels(case, fit))])
+    return max(fit.level[kind] / control[kind] for kind in fit.level)
 
 
-def _channels(case, fit):
-    """(mean square of the loudest channel, what it is in controls) of every recording of the kinds that tell."""
+def heard(case, fit, settings):
+    """What of ``fit`` stands most above the level of controls: a kind, or one channel of one recording."""
+    return max(over(case, fit, settings), loudest(case, fit))
+
+
+def loudest(case, fit):
+    """Largest mean square of one channel in one recording over what it is in controls, of the kinds that tell."""
+    found = [0.0]
     for o, white in zip(case.observations, fit.white):
         if o.kind not in case.cell_level or o.cells is None or "sensor" not in o.labels:
             continue
@@ -96,13 +105,14 @@ def _channels(case, fit):
         channel = code[o.cells[inside]]
         count = np.maximum(np.bincount(channel, minlength=level.size), 1)
         square = np.bincount(channel, np.asarray(white)[inside] ** 2, minlength=level.size)
-        yield float(np.max(square / count)), case.cell_level[o.kind]
+        found.append(float(np.max(square / count)) / case.cell_level[o.kind])
+    return max(found)
 
 
 def judged(case, fit, scored, settings):
     """(Verdict on the ``scored`` candidates on top of ``fit``, the Score that it names or would have, or None)."""
     best = max((s for s in scored if s.material), key=lambda s: s.gain, default=None)
-    excess = over(case, fit, settings)
+    excess = heard(case, fit, settings)
     scored = tuple(s for s in scored if s.material)
     if best is None:
         return judge([], excess, settings, disturbed=bool(case.disturbed), foreign=case.foreign), None

@@ -10,7 +10,7 @@ import numpy as np
 from turnout.errors import SimulationError
 from turnout.mismatch.held_out import held_out_score
 from turnout.mismatch.joint import fit_jointly
-from turnout.mismatch.scoring import consistent_elsewhere, explained_of, over, structure_left
+from turnout.mismatch.scoring import consistent_elsewhere, explained_of, heard, over, structure_left
 from turnout.mismatch.verdict import TORN, judge
 
 RIVALS = 2  # that are fitted anew beside the second effect
@@ -38,7 +38,7 @@ def reconsidered(case, base, fit, verdicts, settings):
         pairs.sort(key=lambda s: (not s.material, -s.gain))
         best = pairs[0].fit
         consistent = consistent_elsewhere(case, base, pairs[0], settings)
-        excess, left = over(case, base, settings), over(case, best, settings)
+        excess, left = heard(case, base, settings), over(case, best, settings)
         found = judge(pairs, excess, settings, consistent, structure_left(case, best), left, bool(case.disturbed))
         if found.answer in ("named", "a_or_b"):
             return [found, *verdicts[1:]], found.scores[0].fit

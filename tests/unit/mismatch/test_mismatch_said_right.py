@@ -13,7 +13,7 @@ from turnout.mismatch.case import Case, Nuisance
 from turnout.mismatch.finding import finding_row
 from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.observation import Observation
-from turnout.mismatch.scoring import explained_of, judged, score_of
+from turnout.mismatch.scoring import explained_of, heard, judged, score_of
 from turnout.mismatch.together import reconsidered
 from turnout.mismatch.track import TrackCase
 from turnout.mismatch.track.blow_model import BlowModel
@@ -92,8 +92,15 @@ def test_a_channel_that_raises_the_alarm_is_asked_for_again(after, answer, grade
     share = explained_of(case, base, refit, settings)
     assert share == pytest.approx(min(1.0, (4.0 - after) / 2.0))
     verdict, _ = judged(case, base, [Score(pad, 13.0, 0.0, share, refit)], settings)
-    assert (verdict.answer, verdict.grade) == (answer, grade)
+    assert verdict.answer == answer
+    assert ("A" if heard(case, refit, settings) <= 1.0 else "B") == (grade or "B")
     assert judged(case, base, [], settings)[0].answer == "unknown"
+
+
+def test_what_a_name_leaves_in_a_channel_is_not_asked_of_a_second_effect():
+    """A mounting not quite of its shape leaves its channel loud; a flat beside it has nothing to do with that."""
+    first, both = (SimpleNamespace(**{**vars(with_squares(4.0, 0.5)), "candidates": c}) for c in ("m", "mf"))
+    assert explained_of(OneLoud(), first, both, MismatchSettings()) == 1.0
 
 
 @pytest.mark.parametrize("place", [12.0, 12.07, 12.2])
