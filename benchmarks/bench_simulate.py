@@ -158,10 +158,10 @@ def accuracy():
     )
     report = numerical_error(case)
     for k, (low, high) in enumerate(report.bands):
-        title = f"own error {low:.0f}-{high:.0f} Hz: dt/2, waveform, worst sensor"
+        title = f"own error {low:.0f}-{high:.0f} Hz: step, waveform, worst sensor"
         yield Bar(title, 100 * report.step[:, k].max(), 2.0, "%")
         mesh, level = 100 * report.mesh[:, k].max(), np.abs(report.level_mesh[:, k]).max()
-        yield Bar(f"own error {low:.0f}-{high:.0f} Hz: h/2, waveform", mesh, None, "%", note=f"level {level:.2f} dB")
+        yield Bar(f"own error {low:.0f}-{high:.0f} Hz: mesh, waveform", mesh, None, "%", note=f"level {level:.2f} dB")
     yield Bar("own error: absorbing ends, 5-1000 Hz, worst band", 100 * end_error(case).max(), None, "%")
 
 

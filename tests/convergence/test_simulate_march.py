@@ -177,8 +177,8 @@ def test_sleepers_that_lift_are_those_on_ballast_that_only_presses():
 
 @pytest.mark.parametrize("scheme", ["radau", "midpoint"])
 def test_plain_numpy_marches_the_same(scheme):
-    """Two wheels on two surfaces, a flat, a kink, hanging sleepers, fading ends: agreement to rounding."""
-    terms = (HangingSleeper(12, 2e-4), HangingSleeper(13, 1e-4))
+    """Two wheels on two surfaces, a flat, a kink, sleepers that hang or lift, fading ends: agreement to rounding."""
+    terms = (HangingSleeper(12, 2e-4), HangingSleeper(13, 1e-4), LiftingSleepers(9, 10, 1.0, 100.0))
     prepared = prepare(uniform_track(15.0, end_length=3.0, end_damping=300.0), 1e-4, scheme, terms)
     surfaces = (
         (Kink(7.6, 1e-3, 0.4, 0.6),),

@@ -62,6 +62,9 @@ def _refuse(finding, turnout_id, anyway):
         raise SimulationError(f"{said}, but no parameter differs from having no effect; --anyway accepts it.")
     if (finding["verdict"] != "named" or finding["grade"] not in ("A", "B")) and not anyway:
         raise SimulationError(f"{said}, not named with grade A or B; --anyway accepts it all the same.")
+    either = next((t for t in json.loads(finding["term_json"]) if t.get("or")), None)
+    if either and not anyway:
+        raise SimulationError(f"{said}; {either['term']} may as well be {either['or']}; --anyway accepts it.")
 
 
 def _material(term):

@@ -50,6 +50,11 @@ class Accepted:
         where = ",".join(p for p in parts if p)
         return f"{self.family}[{where}]" if where else self.family
 
+    @property
+    def told(self) -> dict:
+        """The entry in plain numbers: family, fixed fields with places in m, parameters in their own units."""
+        return {"term": self.family, **self.fixed, **{name: value for name, (value, _) in self.values.items()}}
+
     def is_on(self, route) -> bool:
         """Whether the track under ``route`` has it."""
         return self.route in ("", route)
@@ -65,17 +70,22 @@ class Accepted:
         return all(where.get(k) in (None, v) for k, v in said.items())
 
     def term(self, track, values: Mapping[str, float] | None = None):
-        """The term on a track of ``turnout.simulate``; None where the place is not on that track."""
+        """The term on a track of ``turnout.simulate``, of a range what lies on that track; None where nothing does."""
         chosen = {name: value for name, (value, _) in self.values.items()} | dict(values or {})
         given: dict[str, Any] = {}
+        if not self._reaches(track):
+            return None
         for name, value in self.fixed.items():
-            if name in SUPPORTS:
-                index = int(track.nearest_support(value))
-                if abs(float(track.support[index]) - value) > NEAR:
-                    return None
-                value = index
-            given[name] = value
+            given[name] = int(track.nearest_support(value)) if name in SUPPORTS else value
         return KINDS[self.family](**given, **chosen)
+
+    def _reaches(self, track):
+        """Whether any support of the effect is on the track."""
+        low, high = float(track.support[0]) - NEAR, float(track.support[-1]) + NEAR
+        if "first" in self.fixed and "last" in self.fixed:
+            return self.fixed["first"] <= high and self.fixed["last"] >= low
+        places = [self.fixed[name] for name in SUPPORTS if name in self.fixed]
+        return all(abs(float(track.support[track.nearest_support(x)]) - x) <= NEAR for x in places)
 
 
 def accepted_of(entries) -> tuple[Accepted, ...]:
@@ -101,14 +111,25 @@ def _accepted(entry) -> Accepted:
             value = entry.number(name, known[name].unit)
             values[name] = value, found.prior * abs(value) if found.prior is not None else None
         else:
-            fixed[name] = found.value if isinstance(found, Number) else found
+            fixed[name] = _fixed(entry, name)
     route = str(entry["route"]) if "route" in entry else ""
     if route not in ("", *ROUTES):
         raise SimulationError(f"{where}: no route {route!r}; there are {', '.join(ROUTES)}.")
     missing = names - set(fixed) - set(values) - {f.name for f in fields(KINDS[family]) if f.default is not MISSING}
     if missing:
         raise SimulationError(f"{where}: {family} needs {', '.join(sorted(missing))}.")
+    if fixed.get("first", 0.0) > fixed.get("last", 0.0):
+        raise SimulationError(f"{where}: {family} from {fixed['first']} m back to {fixed['last']} m.")
     return Accepted(family, fixed, values, route)
+
+
+def _fixed(entry, name):
+    """Value of a field that is not fitted: a place in m, with its unit or without; anything else as it stands."""
+    found = entry[name]
+    if name in (*SUPPORTS, "place", "start", "end"):
+        plain = isinstance(found, int | float) and not isinstance(found, bool)
+        return found if plain else entry.number(name, "m")
+    return found.value if isinstance(found, Number) else found
 
 
 def terms_on(turnout, track, conditions: Mapping | None = None, route: str = "main") -> tuple:

@@ -1,6 +1,7 @@
 """Hammer tests of one section and campaign: raw files in, rows of the registry out."""
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -60,7 +61,7 @@ def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root, algo: str = "") ->
     recordings = _of_one_rate(recordings, base, rows["quarantine"], ids)
     # all blows of the campaign at once: what is wrong with a whole file shows against the others
     impacts = find_impacts(recordings, force, response, turnout.settings["receptance"])
-    names = [f"{ids[impact.source]}:{impact.record}" for impact in impacts]
+    impacts, receptance, model = _identified(impacts, turnout)
     tests = {path: _test_number(turnout, unit, path) for path in ids}
     rows["impacts"] = [impact_row(i, base, tests[i.source], ids[i.source]) for i in impacts]
     temperature = campaign.rail_temperature
@@ -75,42 +76,58 @@ def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root, algo: str = "") ->
         "code_version": algo,
         "config_hash": unit.config_hash,
     }
-    return rows | _modal_rows(impacts, names, turnout, base, identity, temperature)
+    used = [i for i in impacts if i.accepted]
+    counts = len(used), len(impacts) - len(used)
+    names = [f"{ids[i.source]}:{i.record}" for i in used]
+    if receptance is None:
+        return rows | {"models": [model_row(model, base, identity, counts, None)], "modes": []}
+    return rows | {
+        "models": [model_row(model, base, identity, counts, _lowest(receptance, model))],
+        "modes": [mode_row(mode, base, identity, temperature) for mode in model.modes],
+        "impact_modes": [impact_mode_row(e, base, identity, names[e["impact"]]) for e in model.per_impact],
+        "receptances": [receptance_row(receptance, model, used[0].decay, base, identity)],
+    }
 
 
 def _of_one_rate(recordings, base, quarantine, ids):
     """The recordings of the rate that most have; a quarantine row for each file of another one."""
-    rates = Counter(r.rate for r in recordings)
+    rates = Counter(_rounded(r.rate) for r in recordings)
     most = max(rates, key=lambda rate: (rates[rate], rate))
-    for path in sorted({r.source for r in recordings if r.rate != most}):
-        rate = next(r.rate for r in recordings if r.source == path)
+    for path in sorted({r.source for r in recordings if _rounded(r.rate) != most}):
+        rate = next(r.rate for r in recordings if r.source == path and _rounded(r.rate) != most)
         found, remedy = f"{rate:g} Hz, the others {most:g} Hz", "Record all tests of a campaign at one rate"
         error = ReadError(path, "the file", found, remedy, "wrong_rate")
         quarantine.append(quarantine_row(error, base, "hammer", "hammer", None, ids[path]))
-    return [r for r in recordings if r.rate == most]
+    same = [r for r in recordings if _rounded(r.rate) == most]
+    rate = float(np.median([r.rate for r in same]))
+    return [r if r.rate == rate else replace(r, rate=rate) for r in same]
 
 
-def _modal_rows(impacts, names, turnout, base, identity, temperature):
-    """Rows of models, modes, impact_modes and receptances."""
-    used = [(impact, name) for impact, name in zip(impacts, names) if impact.accepted]
-    settings, n_rejected = turnout.settings["identify"], len(impacts) - len(used)
+def _rounded(rate):
+    """A clock that was printed gives its rate to six digits, whatever those behind them say."""
+    return float(f"{rate:.6g}")
+
+
+def _identified(impacts, turnout):
+    """(impacts, receptance, model); blows that the model does not describe are rejected, and the others asked again.
+
+    Without enough blows there is no receptance, and the model says so.
+    """
     needed = turnout.settings["receptance"].minimum_impacts
-    if len(used) < needed:
-        model = _too_few(len(used), needed, impacts)
-        return {"models": [model_row(model, base, identity, (len(used), n_rejected), None)], "modes": []}
-    accepted = [impact for impact, _ in used]
-    receptance = receptance_of(accepted, turnout.settings["receptance"])
-    decays = [impact.decay for impact in accepted]
-    leads: dict[str, Any] = (
-        {"leads": [i.acceleration[: i.decay_start] for i in accepted]} if settings.method == "paper" else {}
-    )
-    model = identify(decays, accepted[0].rate, settings, receptance, **leads)
-    return {
-        "models": [model_row(model, base, identity, (len(used), n_rejected), _lowest(receptance, model))],
-        "modes": [mode_row(mode, base, identity, temperature) for mode in model.modes],
-        "impact_modes": [impact_mode_row(e, base, identity, used[e["impact"]][1]) for e in model.per_impact],
-        "receptances": [receptance_row(receptance, model, decays[0], base, identity)],
-    }
+    settings = turnout.settings["identify"]
+    while True:
+        used = [i for i in impacts if i.accepted]
+        if len(used) < needed:
+            return impacts, None, _too_few(len(used), needed, impacts)
+        receptance = receptance_of(used, turnout.settings["receptance"])
+        leads: dict[str, Any] = {}
+        if settings.method == "paper":
+            leads = {"leads": [i.acceleration[: i.decay_start] for i in used]}
+        model = identify([i.decay for i in used], used[0].rate, settings, receptance, **leads)
+        dropped = {id(used[k]): rejection for k, rejection in model.diagnostics.get("dropped_impacts", ())}
+        if not dropped:
+            return impacts, receptance, model
+        impacts = [replace(i, rejections=(dropped[id(i)],)) if id(i) in dropped else i for i in impacts]
 
 
 def _test_number(turnout, unit, path):

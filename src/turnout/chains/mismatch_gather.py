@@ -17,7 +17,7 @@ from turnout.mismatch.track import HammerTest, Passage
 from turnout.passage.other_train import ANOTHER
 from turnout.passage.pulses import without_pulses
 from turnout.readers import read
-from turnout.records import Unit
+from turnout.records import LongRecording, Recording, Unit
 
 HALF_BAY = 0.3  # m: an accelerometer "mid-span" sits this far from the sleeper struck
 OFF = 0.5  # m: a place in the layout further than this from the one in the track's file is somebody's mistake
@@ -58,7 +58,7 @@ def gather(units: Iterable[Unit], turnout: TurnoutConfig, raw_root, track, told:
 
 
 def _read(unit, description, raw_root, notes, longest=None):
-    """Recordings of a unit; what cannot be read goes to the notes."""
+    """Recordings of a unit, those that stay in their file as well; what cannot be read goes to the notes."""
     for path, *_ in unit.files:
         try:
             result = read(path, raw_root, description, longest)
@@ -66,7 +66,8 @@ def _read(unit, description, raw_root, notes, longest=None):
             notes.append(str(error))
             continue
         notes += [str(e) for e in result.errors]
-        yield from result.recordings
+        everything: list[Recording | LongRecording] = [*result.recordings, *result.long]
+        yield from sorted(everything, key=lambda r: r.record)
 
 
 def _test(unit, turnout, raw_root, track, found):
@@ -120,46 +121,70 @@ def _analysed(unit, turnout, raw_root) -> dict[str, list[dict]]:
 
 
 def _passages(unit, turnout, raw_root, track, tables, found):
+    """The trains of a unit, each with its row of the passage stage; with none, which is said, where these are more or
+    fewer: nobody could tell whose they are."""
     rows, bad = tables["passages"], tables["quarantine"]
-    recordings = _trains(unit, turnout, raw_root, found.notes)
-    for k, recording in enumerate(recordings):
-        row: dict[str, Any] = rows[k] if len(rows) == len(recordings) else {}
-        name = unit_id(unit).split("/", 2)[-1] + (f":{k}" if len(recordings) > 1 else "")
-        unsound = {name for q in bad if _spoils(q) for name in _channels_of(q)}
-        unsound |= _misplaced_sensors(turnout, track, found.notes)
-        if ANOTHER in (row.get("detail") or ""):
-            found.notes.append(f"passage {name}: two trains at the same time, not used")
-            continue
-        try:
-            train = train_of(row, recording.conditions, Path(turnout.folder) / "vehicles")
-        except TrainUnknownError as error:
-            found.notes.append(f"passage {name}: {error}")
-            continue
-        forks = any(s.track == "diverging" for s in turnout.sections)
-        found.notes += [f"passage {name}: {d}" for d in train.doubts if forks or not d.startswith("track not known")]
-        sound = _sound_channels(recording, turnout, train.route, unsound)
-        if gone := sorted(unsound & {c.name for c in recording.channels}):
-            found.notes.append(f"passage {name}: channels {', '.join(gone)} not used{_reasons(bad)}")
-        if not sound.channels:
-            found.notes.append(f"passage {name}: no sound channel on the {train.route} track")
-            continue
-        found.passages.append(
-            Passage(
-                name, sound, train.vehicle, train.speed, train.name, train.direction, train.route, _noted(row, sound)
-            )
-        )
+    own, n = _taken(unit, turnout, raw_root, track, rows, bad)
+    if n != len(rows):
+        own, _ = _taken(unit, turnout, raw_root, track, [{}] * n, bad)
+        said = f"{n} trains in it, {len(rows)} where passages were analysed: what was found of them there is not used"
+        own.notes.insert(0, f"{_name(unit)}: {said}")
+    found.notes += [note for note in own.notes if note not in found.notes]
+    for passage in own.passages:
+        found.passages.append(passage)
         _thin_out(found.passages)
+
+
+def _name(unit):
+    return unit_id(unit).split("/", 2)[-1]
+
+
+def _taken(unit, turnout, raw_root, track, rows, bad):
+    """(Gathered of a unit's trains, how many these are); a day of a logger never is in memory as a whole."""
+    own, n = Gathered(), 0
+    for recording in _trains(unit, turnout, raw_root, own.notes):
+        name = _name(unit) + (f":{n}" if len(rows) > 1 else "")
+        passage = _passage(name, recording, rows[n] if n < len(rows) else {}, turnout, track, bad, own.notes)
+        n += 1
+        if passage is not None:
+            own.passages.append(passage)
+            _thin_out(own.passages)
+    return own, n
+
+
+def _passage(name, recording, row: Mapping[str, Any], turnout, track, bad, notes):
+    """Passage of a train, None where it cannot be used; why not, and what is doubtful, goes to the notes."""
+    unsound = {name for q in bad if _spoils(q) for name in _channels_of(q)}
+    unsound |= _misplaced_sensors(turnout, track, notes)
+    if ANOTHER in (row.get("detail") or ""):
+        notes.append(f"passage {name}: two trains at the same time, not used")
+        return None
+    try:
+        train = train_of(row, recording.conditions, Path(turnout.folder) / "vehicles")
+    except TrainUnknownError as error:
+        notes.append(f"passage {name}: {error}")
+        return None
+    forks = any(s.track == "diverging" for s in turnout.sections)
+    notes += [f"passage {name}: {d}" for d in train.doubts if forks or not d.startswith("track not known")]
+    sound = _sound_channels(recording, turnout, train.route, unsound)
+    if gone := sorted(unsound & {c.name for c in recording.channels}):
+        notes.append(f"passage {name}: channels {', '.join(gone)} not used{_reasons(bad)}")
+    if not sound.channels:
+        notes.append(f"passage {name}: no sound channel on the {train.route} track")
+        return None
+    way = train.direction, train.route
+    return Passage(name, sound, train.vehicle, train.speed, train.name, *way, _noted(row, sound), train.load_sd)
 
 
 def _trains(unit, turnout, raw_root, notes):
     """The recordings of a unit, those of a logger that never stops cut into trains as the passage stage cuts them."""
-    settings, sensors, recordings = turnout.settings["passage"], sensors_of(turnout), []
+    settings, sensors = turnout.settings["passage"], sensors_of(turnout)
     for recording in _read(unit, turnout.passages.description, raw_root, notes, settings.longest):
         try:
-            recordings += [without_pulses(part, sensors)[0] for part, *_ in trains_in(recording, settings)]
+            for part, *_ in trains_in(recording, settings):
+                yield without_pulses(part, sensors)[0]
         except ReadError as error:
             notes.append(str(error))
-    return recordings
 
 
 def _thin_out(passages):

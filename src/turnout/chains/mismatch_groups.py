@@ -11,7 +11,7 @@ from turnout.simulate import Sensor, TurnoutTrack
 GAP = 6.0  # m: sections further apart than this do not hear the same sleeper
 MOST_PASSAGES = 8  # of one case: each is simulated hundreds of times, and more of the same kind tell little more
 MOST_AXLES = 96  # of all of them: the time of a simulation goes with the axles
-RESERVED_EVERY = 5  # of so many recordings one is read by the verification alone
+RESERVED_EVERY = 5  # of so many recordings one is kept back from all fits
 FEWEST_TO_RESERVE = 4
 
 
@@ -35,13 +35,13 @@ def groups(turnout: TurnoutConfig, track: TurnoutTrack, found: Gathered, only: S
 
 
 def _neighbours(turnout, only):
-    """(route, labels) of sections that follow each other within ``GAP``, all of ``only`` together where given."""
+    """(route, labels) of sections that follow each other within ``GAP``, or of ``only`` these, all together."""
     for route in ("main", "diverging"):
         mine = [s for s in turnout.sections if _route(s) == route and (not only or s.label in only)]
         mine.sort(key=lambda s: s.position)
         part: list = []
         for section in mine:
-            if part and section.position - part[-1].position > GAP:
+            if part and not only and section.position - part[-1].position > GAP:
                 yield route, tuple(s.label for s in part)
                 part = []
             part.append(section)
@@ -129,7 +129,7 @@ def _extremes_first(members):
 
 
 def reserved(passages, tests) -> tuple[str, ...]:
-    """Names that only the verification reads: of passages in order of speed every fifth, else of the tests."""
+    """Names that no fit reads: of passages in order of speed every fifth, else of the tests."""
     items = sorted(passages, key=lambda p: p.speed) or sorted(tests, key=lambda t: t.place)
     if len(items) < FEWEST_TO_RESERVE:
         return ()

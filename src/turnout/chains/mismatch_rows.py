@@ -61,8 +61,8 @@ def _numbers(found, case, group, about) -> dict:
     campaign, fit = group.campaign, found.fit
     places = [s.place for s in campaign.sensors] + [t.place for t in campaign.hammer]
     terms = [
-        described(t, c, se, case.track())
-        for t, c, se in zip(fit.terms, fit.candidates, _errors(fit))
+        described(t, c, se, case.track()) | _said_of(v)
+        for t, c, se, v in zip(fit.terms, fit.candidates, _errors(fit), found.verdicts)
     ]  # fmt: skip
     return {
         "visit": about["visit"],
@@ -77,8 +77,14 @@ def _numbers(found, case, group, about) -> dict:
         "level_after": float(max(fit.level.values())),
         "term_json": json.dumps(terms, sort_keys=True) if terms else None,
         "evidence_json": json.dumps(_evidence(found), sort_keys=True),
-        "notes": "\n".join([*dict.fromkeys([*case.notes, *_of_visit(about, campaign)])][:NOTES_KEPT]) or None,
+        "notes": "\n".join(_kept([*dict.fromkeys([*case.notes, *_of_visit(about, campaign)])])) or None,
     }
+
+
+def _kept(notes):
+    """The first notes, and how many more there are."""
+    more = len(notes) - NOTES_KEPT
+    return [*notes[:NOTES_KEPT], *([f"and {more} more"] if more > 0 else [])]
 
 
 def _of_visit(about, campaign):
@@ -95,17 +101,30 @@ def _errors(fit):
         first += len(candidate.parameters)
 
 
+def _said_of(verdict) -> dict:
+    """Probability of a term of its own, and the family that it may be as well, if there is one."""
+    other = {"or": verdict.names[1]} if len(verdict.names) > 1 else {}
+    return {"probability": _plain(verdict.probability), **other}
+
+
 def _evidence(found) -> dict:
-    """Frames, probabilities and nats by condition: what the verdict rests on."""
-    best = found.verdict.scores[:4]
+    """Frames, and what each verdict rests on: that on the first effect, those on others ``beside`` it."""
     frames = [
         {"frame": f.frame, "level": str(f.level), "effect_db": _plain(f.effect), "q": _plain(f.q), "n": f.n}
         for f in found.frames[:6]
     ]
+    first, *others = (_rests_on(v) for v in found.verdicts)
+    return {"frames": frames, **first, "beside": others}
+
+
+def _rests_on(verdict) -> dict:
+    """Probabilities, rivals, and nats by condition."""
+    best = verdict.scores[:4]
     return {
-        "reason": found.verdict.reason,
-        "frames": frames,
-        "posterior": {k: _plain(v) for k, v in _largest(found.verdict.posterior)},
+        "term": verdict.names[0] if verdict.names else None,
+        "probability": _plain(verdict.probability),
+        "reason": verdict.reason,
+        "posterior": {k: _plain(v) for k, v in _largest(verdict.posterior)},
         "ranking": [{"family": s.family, "nats": _plain(s.gain), "explained": _plain(s.explained)} for s in best],
         "by_condition": {k: _plain(v) for k, v in best[0].by_condition.items()} if best else {},
     }

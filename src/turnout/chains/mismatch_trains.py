@@ -8,6 +8,7 @@ import numpy as np
 
 from turnout.chains.noted import number
 from turnout.errors import ConfigError, SimulationError
+from turnout.mismatch.track.campaign import LOAD_SD
 from turnout.simulate import load_vehicle
 
 PATTERN = 0.4  # m rms between axles heard and those of the vehicle's file: half of a short bogie is 0.9
@@ -19,7 +20,8 @@ KMH = 3.6
 
 @dataclass(frozen=True)
 class TrainFound:
-    """``vehicle`` of ``turnout.simulate`` called ``name``, ``speed`` [m/s], and ``doubts`` in words."""
+    """``vehicle`` of ``turnout.simulate`` called ``name``, ``speed`` [m/s], ``doubts`` in words, and the standard
+    deviation ``load_sd`` of its sprung mass, as a share of it."""
 
     name: str
     vehicle: object
@@ -27,6 +29,7 @@ class TrainFound:
     direction: str
     route: str
     doubts: tuple[str, ...] = ()
+    load_sd: float = LOAD_SD
 
 
 class TrainUnknownError(Exception):
@@ -49,7 +52,7 @@ def train_of(row: Mapping, said: Mapping, folder: Path) -> TrainFound:
         missing = "speed" if name else "type"
         raise TrainUnknownError(f"the train's {missing} is not known ({row.get('detail') or 'no axles found'})")
     believed = noted if name in _types({**row, "train_type": None}, said) else None
-    vehicle, doubts, wrong = _vehicle(name, row.get("n_axles") or None, row, said, folder, bool(believed))
+    vehicle, load_sd, doubts, wrong = _vehicle(name, row.get("n_axles") or None, row, said, folder, bool(believed))
     if believed and (name != names[0] or wrong):
         speed = believed  # the one heard is that of another train's axle distances, or of bangs between the axles
     speed = float(speed) / KMH
@@ -64,7 +67,7 @@ def train_of(row: Mapping, said: Mapping, folder: Path) -> TrainFound:
         speed, more = float(believed) / KMH, (f"{error}; taken as noted",)
     direction, way = _one_of(("facing", "trailing"), "direction", row, said)
     route, road = _one_of(("main", "diverging"), "track", row, said)
-    return TrainFound(name, vehicle, speed, direction, route, (*doubts, *wrong, *more, *way, *road))
+    return TrainFound(name, vehicle, speed, direction, route, (*doubts, *wrong, *more, *way, *road), load_sd)
 
 
 def _one_of(known, name, row, said):
@@ -90,7 +93,7 @@ def _with_a_file(names, folder) -> str:
 
 
 def _vehicle(name, heard, row, said, folder, believed):
-    """(vehicle, doubts on its load, what is wrong with the axles heard), the latter two in words."""
+    """(vehicle, ``load_sd``, doubts on its load, what is wrong with the axles heard), the latter two in words."""
     try:
         one = load_vehicle(name, 0.0, folder)
     except (SimulationError, ConfigError) as error:
@@ -103,22 +106,32 @@ def _vehicle(name, heard, row, said, folder, believed):
             raise TrainUnknownError(*wrong)
     elif heard:
         units = heard // n
-    share, doubts = _load_share(name, row, said, folder, units)
-    return load_vehicle(name, share, folder, units), doubts, wrong
+    share, load_sd, doubts = _load_share(name, row, said, folder, units)
+    return load_vehicle(name, share, folder, units), load_sd, doubts, wrong
 
 
 def _load_share(name, row, said, folder, units):
-    """Share of the payload that gives the measured axle load, half of it where none is known."""
-    empty, full = (float(np.mean(load_vehicle(name, s, folder, units).static_loads)) for s in (0.0, 1.0))
+    """(share of the payload that gives the measured axle load, ``load_sd``, doubts); where none is known half of it, as
+    likely empty as full and as anything between."""
+    vehicles = [load_vehicle(name, s, folder, units) for s in (0.0, 1.0)]
+    empty, full = (float(np.mean(v.static_loads)) for v in vehicles)
     if full <= empty:
-        return 0.0, ()
+        return 0.0, LOAD_SD, ()
     if row.get("axle_load_t") is None:
         noted = number(said, "load_share")
-        return (0.5, ("load not known, half of the payload assumed",)) if noted is None else (noted, ())
+        if noted is not None:
+            return noted, LOAD_SD, ()
+        light, heavy = (_sprung(v) for v in vehicles)
+        return 0.5, (heavy - light) / (heavy + light) / np.sqrt(3.0), ("load not known, half of the payload assumed",)
     share = (0.5 * row["axle_load_t"] * NEWTON_PER_TONNE - empty) / (full - empty)
     inside = -0.3 <= share <= 1.5
     doubts = () if inside else (f"axle load {row['axle_load_t']:.1f} t lies outside the vehicle's",)
-    return float(np.clip(share, 0.0, 1.5)), doubts
+    return float(np.clip(share, 0.0, 1.5)), LOAD_SD, doubts
+
+
+def _sprung(vehicle):
+    """Mass of all but the wheelsets [kg]."""
+    return sum(b.mass for k, b in enumerate(vehicle.bodies) if k not in set(vehicle.wheels))
 
 
 def _by_its_axles(name, vehicle, row, speed):

@@ -62,15 +62,18 @@ def headline(finding) -> str:
     """One sentence: what the simulation left out, or what is known instead."""
     terms = json.loads(finding["term_json"] or "[]")
     if finding["verdict"] in ("named", "a_or_b") and terms:
-        said = "; ".join(_sentence(term, finding) for term in terms)
-        if finding["verdict"] == "named":
-            return said + "."
-        other = (finding["rival_term"] or "").replace("_", " ")
-        return f"{said}, or it is {other}: these recordings cannot tell the two apart."
+        rivals = [finding["rival_term"] if finding["verdict"] == "a_or_b" else None, *(None for _ in terms[1:])]
+        said = "; ".join(_sentence(t, finding) + _or(t.get("or", rival)) for t, rival in zip(terms, rivals))
+        more = json.loads(finding["evidence_json"] or "{}").get("reason") if finding["verdict"] == "named" else ""
+        return f"{said}. {more[:1].upper()}{more[1:]}." if more else f"{said}."
     low, high = finding["place_low_m"], finding["place_high_m"]
     if finding["verdict"] == "unknown":
         return f"Something is missing {_somewhere(finding, low, high)}, and no known effect explains it."
     return finding["sentence"] or ""
+
+
+def _or(other) -> str:
+    return f", or it is {other.replace('_', ' ')}: these recordings cannot tell the two apart" if other else ""
 
 
 def _somewhere(finding, low, high):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from turnout.chains.accepted_terms import terms_on
+from turnout.chains.accepted_terms import accepted_of, terms_on
 from turnout.chains.mismatch_context import track_file
 from turnout.chains.simulate_request import check_request, ending_of, section_channels, time_of, with_format
 from turnout.config.load import load_configuration
@@ -38,7 +38,7 @@ def write_hammer(request):
     hammer, sensors = _hammer_channels(description, place)
     rate = description.rate if description and description.rate else settings.rate
     for test in range(1, request["tests"] + 1):
-        recordings = simulate_hammer(
+        recordings, blows = simulate_hammer(
             track,
             section,
             hammer,
@@ -54,10 +54,12 @@ def write_hammer(request):
             scheme=settings.scheme,
             started_at=time_of(request),
             conditions=_noted(request),
+            truth=True,
         )
         day = time_of(request).date().isoformat()
         name = f"hammer/{day}/{section}_{test}.{ending_of(request['format'])}"
         path = _write(request, turnout, name, recordings, description)
+        _write_truth(request, path, track, route, recordings[0], {"blows": [_struck(b) for b in blows]})
         peak = max(float(r.samples[0].max()) for r in recordings)
         yield path, f"{len(recordings)} blows at {place:.2f} m, highest force {peak / 1e3:.1f} kN"
 
@@ -93,10 +95,11 @@ def write_passage(request):
     )
     name = f"passages/{time_of(request):%Y%m%dT%H%M%SZ}.{ending_of(request['format'])}"
     path = _write(request, turnout, name, [recording], description)
-    if request.get("truth"):
-        _write_truth(Path(request["truth"]) / Path(path).with_suffix(".json").name, recording, truth)
-    if request.get("truth_file"):
-        _write_truth(Path(request["truth_file"]), recording, truth)
+    forces = {
+        "peak_force_n": truth.force.max(axis=1).round(1).tolist(),
+        "contact_lost": bool(np.any(truth.force <= 0.0)),
+    }
+    _write_truth(request, path, track, request["route"], recording, forces)
     peak = truth.force.max()
     yield path, f"{len(vehicle.wheels)} axles, {recording.duration:.2f} s, highest wheel force {peak / 1e3:.0f} kN"
 
@@ -197,12 +200,25 @@ def _write(request, turnout, name, recordings, description):
         raise SimulationError(f"{path} cannot be written as {request['format']}: {error}.") from None
 
 
-def _write_truth(path, recording, truth):
-    path.parent.mkdir(parents=True, exist_ok=True)
+def _struck(blow):
+    return {
+        "place_m": round(blow.place, 4),
+        "speed_m_s": round(blow.speed, 4),
+        "peak_force_n": round(blow.peak_force, 1),
+    }
+
+
+def _write_truth(request, path, track, route, recording, more):
+    """What is true of the file at ``path``, where the request says that it is wanted and whereto."""
+    wanted = [Path(request["truth"]) / Path(path).with_suffix(".json").name] if request.get("truth") else []
+    wanted += [Path(request["truth_file"])] if request.get("truth_file") else []
     content = {
-        "conditions": {k: v for k, v in recording.conditions.items()},
-        "peak_force_n": truth.force.max(axis=1).round(1).tolist(),
-        "contact_lost": bool(np.any(truth.force <= 0.0)),
+        "track": track.name,
+        "effects": [a.told for a in accepted_of(track.terms) if a.is_on(route)],
+        "conditions": dict(recording.conditions),
+        **more,
         "channels": [asdict(c) for c in recording.channels],
     }
-    path.write_text(json.dumps(content, indent=1, default=str) + "\n", encoding="utf-8")
+    for place in wanted:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_text(json.dumps(content, indent=1, default=str) + "\n", encoding="utf-8")

@@ -5,7 +5,8 @@
   turnout simulate figures --out docs/gallery
 
 With --turnout the channels are those of the turnout's configuration and the file goes to its raw folder, where the
-pipeline finds it; what is true of it goes to a file of the same name below --truth.
+pipeline finds it; what is true of it goes to a file of the same name below --truth: the track and its effects, where
+each blow fell and how hard, or the wheels' forces.
 """
 
 HELP = "simulate a hammer test or a train passage"

@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError
 
-from turnout.errors import ConfigError
+from turnout.errors import ConfigError, SimulationError
 
 # Unit: (SI unit, factor)
 UNITS = {
@@ -79,9 +80,15 @@ class ParameterSet(Mapping):
     def __init__(self, content, path, place):
         self.content, self.path, self.place = content, str(path), place
 
+    def error(self, key, found, remedy):
+        """A ``ConfigError`` at ``key`` of this mapping, or at the mapping itself where ``key`` is None."""
+        inside = f"[{key}]" if isinstance(key, int) else f".{key}"
+        place = f"{self.place}{inside if key is not None else ''}".lstrip(".")
+        return ConfigError(self.path, place or "the file", found, remedy)
+
     def __getitem__(self, key):
         if key not in self.content:
-            raise ConfigError(self.path, self.place, f"the key {key!r} is missing", f"Give {key!r} there")
+            raise self.error(None, f"the key {key!r} is missing", f"Give {key!r} there")
         return self.content[key]
 
     def __iter__(self):
@@ -103,28 +110,67 @@ class ParameterSet(Mapping):
             return default
         found = self[key]
         if not isinstance(found, Number):
-            raise ConfigError(
-                self.path, f"{self.place}.{key}", f"{found!r} has no unit and source", "Write value, unit and source"
-            )
+            raise self.error(key, f"{_said(found)} has no unit and source", "Write value, unit and source")
         if found.unit != unit:
-            raise ConfigError(
-                self.path, f"{self.place}.{key}", f"the unit {found.unit!r} is not one of {unit!r}", "Correct the unit"
-            )
+            raise self.error(key, f"the unit {found.unit!r} is not one of {unit!r}", "Correct the unit")
         return found.value
+
+    def count(self, key, default, least=1):
+        """Whole number at ``key``, at least ``least``; ``default`` where it is not given."""
+        found = self.get(key, default)
+        if not isinstance(found, int) or isinstance(found, bool) or found < least:
+            remedy = f"Write a whole number of at least {least}, without unit and source"
+            raise self.error(key, f"{_said(found)} is no such number", remedy)
+        return found
+
+    def part(self, key):
+        """The mapping at ``key``."""
+        found = self[key]
+        if not isinstance(found, ParameterSet):
+            raise self.error(key, f"{_said(found)} instead of names with values", "Write 'name: value' lines below it")
+        return found
+
+    def maybe(self, key):
+        """The mapping at ``key``, an empty one where it is not given."""
+        return ParameterSet({}, self.path, self.place) if self.get(key) is None else self.part(key)
+
+    def listed(self, key):
+        """The list at ``key`` as a set whose keys are 0, 1, 2 ...; an empty one where it is not given."""
+        found = [] if self.get(key) is None else self[key]
+        if not isinstance(found, list):
+            raise self.error(key, f"{_said(found)} instead of a list", "Write each entry with a dash before it")
+        return ParameterSet(dict(enumerate(found)), self.path, f"{self.place}.{key}".lstrip("."))
+
+    def parts(self, key):
+        """The mappings listed at ``key``."""
+        listed = self.listed(key)
+        return [listed.part(k) for k in listed]
+
+    def make(self, kind, *values, **named):
+        """``kind(*values, **named)``; what it refuses is a ``ConfigError`` that names this place."""
+        try:
+            return kind(*values, **named)
+        except SimulationError as error:
+            raise self.error(None, str(error).rstrip("."), "Correct the value") from None
 
     def only(self, *allowed):
         """Refuse keys that are not in ``allowed``."""
         for key in self.content:
             if key not in allowed:
-                raise ConfigError(
-                    self.path, self.place, f"unknown key {key!r}", f"Use one of {', '.join(sorted(allowed))}"
-                )
+                raise self.error(None, f"unknown key {key!r}", f"Use one of {', '.join(sorted(allowed))}")
         return self
 
     def numbers(self):
         """(place, Number) of every number below here."""
         for key, value in self.content.items():
             yield from _numbers(value, f"{self.place}.{key}" if self.place else str(key))
+
+
+def _said(found):
+    """What stands in a file, in an error's words."""
+    if isinstance(found, Number):
+        return f"{found.value:g} {found.unit}"
+    return "a mapping" if isinstance(found, ParameterSet) else repr(found)
 
 
 def _numbers(value, place):
@@ -184,6 +230,9 @@ def _parse_number(entry, path, place, sources):
         raise ConfigError(path, place, "an estimate without a prior", "Give its relative standard deviation as prior")
     unit, factor = UNITS[entry["unit"]]
     try:
-        return Number(factor * float(entry["value"]), unit, str(source), None if prior is None else float(prior))
+        found = Number(factor * float(entry["value"]), unit, str(source), None if prior is None else float(prior))
     except (TypeError, ValueError):
         raise ConfigError(path, place, f"{entry['value']!r} is not a number", "Write a number") from None
+    if not isfinite(found.value):
+        raise ConfigError(path, place, f"{entry['value']!r} is not finite", "Write a number")
+    return found

@@ -10,6 +10,7 @@ from turnout.identify.mixed import degrees_of_freedom
 from turnout.identify.significance import columns_chi_squared
 
 PROBABILITY = 1e-3
+CHANCE = 1e-2
 NEAR_HARMONIC = 0.06
 HARMONICS = 5
 
@@ -52,6 +53,27 @@ def hum_frequencies(table, n: int, rate: float, settings) -> tuple[float, ...]:
             ):
                 found.append(float(harmonic))
     return tuple(found)
+
+
+def of_the_blow(frequency: float, theta, decays, rate: float) -> bool:
+    """Whether what sounds at ``frequency`` [Hz] beside the modes ``theta`` (n_mode, 2) begins with every blow alike.
+
+    Hum does not know when the hammer falls: its phases lie anywhere, those of a lightly damped mode agree (Rayleigh's
+    test at ``CHANCE``; three blows or fewer cannot tell).
+
+    References
+    ----------
+    Zar 1999, Biostatistical Analysis, eq. 27.4: probability of the mean resultant length by chance.
+    """
+    n_decay, n = decays.shape
+    theta = theta[np.abs(np.exp(theta[:, 0]) / frequency - 1.0) > NEAR_HARMONIC]
+    if n_decay < 4 or not len(theta):
+        return False
+    at = linearise(theta[None], decays, rate, Background(0, (frequency,)).columns(n, rate))
+    cosine, sine = at.coefficient[:, 2 * len(theta) : 2 * len(theta) + 2].T
+    resultant = abs(np.sum(np.exp(1j * np.arctan2(sine, cosine))))
+    chance = np.exp(np.sqrt(1 + 4 * n_decay + 4 * (n_decay**2 - resultant**2)) - (1 + 2 * n_decay))
+    return bool(chance < CHANCE)
 
 
 def needed_background(theta, decays, rate, most: Background) -> Background:

@@ -10,6 +10,7 @@ from turnout.identify.select import Selection
 from turnout.records import Rejection
 
 MAIN_BANDS = ("ballast", "railpad")
+EDGE = 0.1  # how far beside its band, of its frequency, a mode may still be meant by it: pads soften so much in summer
 
 
 @dataclass
@@ -51,11 +52,35 @@ def _strongest(choice, selection, settings):
         inside = [m for m in inside if m not in selection.unfit and m not in choice.modes.values()]
         if inside:
             choice.modes[band] = max(inside, key=lambda m: significance[m])
+    _across_edges(choice, frequency, damping, significance, selection.unfit, settings)
     for m in sorted(set(range(len(frequency))) - set(choice.modes.values())):
         bands = [band for band, low, high in settings.bands() if low <= frequency[m] < high]
         reason = f"weaker than the {bands[0]} mode of its band" if bands else "outside all bands"
         reason, *limits = selection.unfit.get(m, (reason,))
         choice.rejected_modes.append(_entry(selection, m, reason + "; kept in the fit", *limits))
+
+
+def _across_edges(choice, frequency, damping, significance, unfit, settings):
+    """Give an empty main band a mode that lies just beside it, where the band next door has another one for itself.
+
+    A soft pad's resonance may fall below the edge by a hertz, and would hide that of the ballast there.
+    """
+    edges = {band: (low, high) for band, low, high in settings.bands()}
+    for band, beside in zip(MAIN_BANDS, MAIN_BANDS[::-1]):
+        if band in choice.modes or beside not in choice.modes:
+            continue
+        (low, high), (floor, top) = edges[band], edges[beside]
+        there = [m for m in range(len(frequency)) if floor <= frequency[m] < top and m not in unfit]
+        beyond = np.maximum(low / frequency, frequency / high) - 1.0
+        pairs = [
+            (m, other)
+            for m in there
+            for other in there
+            if beyond[m] < min(damping[m], EDGE) and (frequency[m] > frequency[other]) == (low >= top) and m != other
+        ]
+        if pairs:
+            best = max(pairs, key=lambda pair: significance[list(pair)].sum())
+            choice.modes[band], choice.modes[beside] = best
 
 
 def _gate(choice, selection, settings, receptance):

@@ -28,13 +28,14 @@ def residues_of_receptance(receptance, frequency, damping) -> np.ndarray | None:
     ----------
     receptance : Receptance
     frequency, damping : (n_mode,) arrays
-        Known modes. [Hz], [-]
+        Known modes, with those that nobody names: what is left out here goes into the residues of the others.
+        [Hz], [-]
 
     Returns
     -------
     (n_mode,) array of complex, or None
         Of the response :math:`\mathrm{Re} \sum R e^{st}` to a unit impulse [m/s² per N s]; None if fewer than
-        four lines per unknown passed.
+        two lines per unknown passed.
     """
     use = receptance.passed & np.isfinite(receptance.h1)
     unknowns = 2 * len(frequency) + 2

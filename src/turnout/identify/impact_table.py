@@ -7,12 +7,14 @@ import numpy as np
 from turnout.identify.summary import summarise
 from turnout.records import Mode
 
+NEXT_TO_NOTHING = 1e-12
+
 
 @dataclass(frozen=True)
 class ImpactEstimates:
     """One mode in several blows: ``impact`` (n,) numbers, ``estimate`` and ``error`` (n, 2) of ln f [Hz] and zeta.
 
-    An error of nan is one that nobody knows, and becomes None.
+    An error of nan is one that nobody knows, and becomes None; all that blows differ by counts as their spread then.
 
     ``strength`` (n,) is the norm of each decay; ``bound`` (2,) the Cramér-Rao bound, None where unknown;
     ``choice`` (2,) the error of the choice among explanations, which all blows share.
@@ -49,6 +51,7 @@ class ImpactEstimates:
         own estimate, and weighing by it would favour one side.
         """
         error = np.median(self.error * self.strength[:, None], axis=0) / self.strength[:, None]
+        error = np.nan_to_num(error, nan=NEXT_TO_NOTHING) if len(error) > 1 else error
         log_f = summarise(self.estimate[:, 0], error[:, 0], confidence, self.choice[0])
         zeta = summarise(self.estimate[:, 1], error[:, 1], confidence, self.choice[1])
         f = float(np.exp(log_f.mean))

@@ -10,10 +10,11 @@ from turnout.identify.choice import choice_error
 from turnout.identify.decays import common_length
 from turnout.identify.gate import residues_of_receptance
 from turnout.identify.impact_table import ImpactEstimates
+from turnout.identify.mixed import LOWEST_DAMPING
 from turnout.identify.noise import whiten
 from turnout.identify.odd_blow import odd_blows
 from turnout.identify.select import select_modes
-from turnout.records import ModalModel
+from turnout.records import ModalModel, Rejection
 
 
 def identify_joint(decays, rate: float, settings, receptance=None, leads=None) -> ModalModel:
@@ -26,6 +27,7 @@ def identify_joint(decays, rate: float, settings, receptance=None, leads=None) -
         return no_decays(rate, "joint", dropped)
     selection, records, index, dropped = _select_without_odd_blows(records, index, dropped, rate, settings)
     choice = choose_bands(selection, settings, receptance)
+    estimates, modes = _named(selection, choice, records, index, rate, settings)
     told = fit_diagnostics(selection, index, dropped)
     rest = {
         "rejections": tuple(choice.rejections),
@@ -34,8 +36,6 @@ def identify_joint(decays, rate: float, settings, receptance=None, leads=None) -
     }
     if choice.status == "rejected":
         return no_model(rate, "joint", diagnostics=told, **rest)
-    estimates = _estimates(selection, choice, records, index, rate, settings)
-    modes = tuple(e.mode(settings.confidence) for e in estimates)
     residues, scale = _residues(modes, choice, selection, receptance)
     return assemble(
         estimates,
@@ -64,6 +64,20 @@ def _select_without_odd_blows(records, index, dropped, rate, settings):
     return selection, records, index, dropped
 
 
+def _named(selection, choice, records, index, rate, settings):
+    """(estimates, modes) of the bands chosen; one whose mean over the blows is not damped is taken from ``choice``."""
+    found = []
+    for e in _estimates(selection, choice, records, index, rate, settings) if choice.modes else ():
+        mode = e.mode(settings.confidence)
+        if mode.damping > LOWEST_DAMPING:
+            found.append((e, mode))
+            continue
+        del choice.modes[e.band]
+        detail = f"{e.band} mode at {mode.frequency:.0f} Hz: damping, mean over its blows"
+        choice.rejections.append(Rejection("not_identified", mode.damping, LOWEST_DAMPING, detail))
+    return [e for e, _ in found], tuple(mode for _, mode in found)
+
+
 def _estimates(selection, choice, records, index, rate, settings):
     fit = selection.fit
     white = whiten(records, selection.whitening)
@@ -89,8 +103,18 @@ def _estimates(selection, choice, records, index, rate, settings):
 
 def _residues(modes, choice, selection, receptance):
     """From the receptance per unit impulse where there is one, else of the mean decay."""
+    named = [(m.frequency, m.damping) for m in modes]
     if receptance is not None:
-        residues = residues_of_receptance(receptance, [m.frequency for m in modes], [m.damping for m in modes])
-        if residues is not None:
-            return residues, "unit impulse [m/s² per N s]"
+        for all_modes in (named + _unnamed(choice, selection, receptance), named):
+            residues = residues_of_receptance(receptance, *np.transpose(all_modes))
+            if residues is not None:
+                return residues[: len(named)], "unit impulse [m/s² per N s]"
     return selection.amplitude.mean(axis=0)[list(choice.modes.values())], "mean decay [m/s²]"
+
+
+def _unnamed(choice, selection, receptance):
+    """(frequency [Hz], damping) of the fit's other modes that lie among the lines that passed."""
+    lines = receptance.frequency[receptance.passed]
+    pairs = [(float(np.exp(f)), float(damping)) for f, damping in selection.fit.mean]
+    rest = [pairs[m] for m in range(len(pairs)) if m not in choice.modes.values()]
+    return [(f, damping) for f, damping in rest if len(lines) and lines[0] < f < lines[-1] and 0.0 < damping < 0.95]

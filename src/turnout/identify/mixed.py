@@ -8,6 +8,7 @@ from turnout.identify.linearise import Linearisation, linearise
 
 LARGEST_STEP = np.array([0.2, 0.15])
 PRINCIPAL = 8
+RIDGE = 1e-10  # keeps two modes that are nearly one invertible; what tells modes apart is 1e-6 and more
 LOWEST_DAMPING, HIGHEST_DAMPING = 1e-5, 0.95
 
 
@@ -140,10 +141,8 @@ def fit_mixed(start, decays, rate, drift, theta=None, iterations=12, tolerance=0
     ----------
     Lindstrom and Bates 1990, Nonlinear mixed effects models for repeated measures data.
     """
-    settled = True
-    if theta is None:
-        mean, settled = fit_common(start, decays, rate, drift, tolerance=tolerance * np.sqrt(len(decays)))
-        theta = np.repeat(mean[None], len(decays), axis=0)
+    if theta is None:  # not from shared modes fitted first: to those the spread between blows looks like a twin
+        theta = np.repeat(np.asarray(start, dtype=float)[None], len(decays), axis=0)
     n_decay, n_mode = theta.shape[:2]
     dof = degrees_of_freedom(decays, n_mode, len(drift))
     for count in range(1, iterations + 1):
@@ -160,7 +159,7 @@ def fit_mixed(start, decays, rate, drift, theta=None, iterations=12, tolerance=0
         drawn = _inside(drawn.reshape(theta.shape), theta)
         change = np.max(np.abs((drawn - theta).reshape(n_decay, -1)) / np.sqrt(own + spread))
         result = MixedFit(
-            centre.reshape(n_mode, 2), theta, free.reshape(theta.shape), covariance, spread, sigma2, at, settled
+            centre.reshape(n_mode, 2), theta, free.reshape(theta.shape), covariance, spread, sigma2, at, True
         )
         theta = drawn
         if change < tolerance and count > 1:
@@ -183,7 +182,7 @@ def _scaled(matrix):
 def _inverse(matrix):
     diagonal, scaled = _scaled(matrix)
     size = matrix.shape[-1]
-    return np.linalg.inv(scaled + 1e-12 * np.eye(size)) / (diagonal[..., :, None] * diagonal[..., None, :])
+    return np.linalg.inv(scaled + RIDGE * np.eye(size)) / (diagonal[..., :, None] * diagonal[..., None, :])
 
 
 def _solve(matrix, vector):

@@ -60,7 +60,7 @@ def _edges(band, settings):
 
 
 def _estimates(found, records, index, settings, receptance):
-    """Second-order estimates of each band over the blows; equal errors, for the procedure states none."""
+    """Second-order estimates of each band over the blows, without errors, for the procedure states none."""
     strength = np.linalg.norm(records, axis=1)
     estimates, rejections = [], []
     for band, values in zip(("ballast", "railpad"), found, strict=True):
@@ -78,9 +78,7 @@ def _estimates(found, records, index, settings, receptance):
                 detail = f"{band} mode: share of its half-power band that passes the gate; lowest level {level:.2f}"
                 rejections.append(Rejection("low_coherence", share, settings.gate_share, detail))
                 continue
-        # of one blow nobody knows the spread
-        spread = np.maximum(theta.std(axis=0, ddof=1), 1e-12) if len(theta) > 1 else np.full(2, np.nan)
-        error = np.broadcast_to(spread, theta.shape)
+        error = np.full_like(theta, np.nan)
         estimates.append(ImpactEstimates(band, index[use], theta, error, np.ones_like(strength[use])))
     return estimates, rejections
 

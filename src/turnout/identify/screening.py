@@ -12,7 +12,7 @@ from turnout.identify.significance import common_probability, mode_chi_squared, 
 HOPELESS = 0.01
 LISTED_PRESENCE = 0.2
 # Within a tenth of the errors of single blows a fit says as much about its modes as to the last digit.
-SEARCH = {"iterations": 12, "tolerance": 0.1}
+SEARCH = {"iterations": 24, "tolerance": 0.1}
 
 
 def rejection(candidate, reason, value, limit) -> dict:

@@ -5,13 +5,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.stats import chi2
 
-from turnout.identify.background import Background, highest_drift, hum_frequencies
+from turnout.identify.background import Background, highest_drift, hum_frequencies, of_the_blow
 from turnout.identify.explanation import criterion, explain, polished
 from turnout.identify.hankel import hankel_rows
 from turnout.identify.likely_poles import DAMPING, likely_poles
 from turnout.identify.linearise import linearise
 from turnout.identify.mixed import MixedFit
-from turnout.identify.screening import mode_failures, reappearing
+from turnout.identify.screening import mode_failures, reappearing, start_of
 from turnout.identify.significance import mode_chi_squared
 from turnout.identify.stabilise import Stabilisation, candidates, stabilisation
 
@@ -72,6 +72,7 @@ def select_modes(decays, rate, settings) -> Selection:
     found = candidates(table, settings.pole_tolerance, settings.damping_maximum)
     kept, rejected = reappearing(found, rate, settings)
     hum = hum_frequencies(table, n, rate, settings)
+    hum = tuple(f for f in hum if not of_the_blow(f, start_of(kept), decays, rate))
     most = Background(highest_drift(n, rate, settings), hum)
     told = explain(kept, decays, rate, Background(min(BUILD_DRIFT, most.drift_degree), hum), settings, most)
     told_all = [told]

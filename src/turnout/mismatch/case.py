@@ -30,8 +30,8 @@ class Nuisance:
 class Case:
     """Base of all cases: give it observations, nuisances, candidates and override ``predict``.
 
-    ``reserved`` are observations that nothing but the final verification reads. ``frozen_jacobian`` tells the
-    engine that a prediction is dear: the nuisances' derivatives are then kept and updated by Broyden's formula, but
+    ``reserved`` are observations that no fit reads: they may withdraw a name, and verify it. ``frozen_jacobian`` tells
+    the engine that a prediction is dear: the nuisances' derivatives are then kept and updated by Broyden's formula, but
     for observations that are ``cheap``. ``start_values`` are values of nuisances where fits start, else their means;
     ``control_level`` the weighted mean square by kind that cases without an effect reach, else that of the settings;
     ``cell_level`` the same for one channel of one recording, by kind;

@@ -1,6 +1,6 @@
 """The ten steps, from a case to a verdict with everything it rests on."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -10,8 +10,8 @@ from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.latent import Latent
 from turnout.mismatch.locate import attribute, cell_energies
 from turnout.mismatch.refits import kept, scored, to_the_end, with_derivatives
-from turnout.mismatch.scoring import judged, latent_of, over
-from turnout.mismatch.together import reconsidered, refused
+from turnout.mismatch.scoring import heard, judged, latent_of, over
+from turnout.mismatch.together import reconsidered, refused, told_beside
 from turnout.mismatch.verdict import Verdict, opened
 from turnout.mismatch.verify import decoy, fit_of_reserved, fit_percent
 from turnout.mismatch.whereabouts import Whereabouts, whereabouts
@@ -54,6 +54,11 @@ class Diagnosis:
         return self.verdicts[0]
 
     @property
+    def probability(self):
+        """Of all that is stated: that of the least sure verdict."""
+        return min(v.probability for v in self.verdicts)
+
+    @property
     def names(self):
         """Families named, in order of discovery."""
         return tuple(v.names[0] for v in self.verdicts if v.answer == "named")
@@ -81,7 +86,7 @@ def diagnose(case, settings=None, progress=None, store=None):
     tell = progress or (lambda done, total, what: None)
     base = kept(store, "base", lambda: fit_jointly(case, iterations=settings.base_iterations))
     case, base = _with_its_errors(case, base, settings, store)
-    frames = tuple(attribute(*cell_energies(case.observations, base.residuals), settings.permutations))
+    frames = tuple(attribute(*cell_energies(case.observations, base.residuals)))
     numerics = _own_numerics(case, base, settings)
     if numerics:
         verdict = Verdict("numerics", reason=numerics, probability=1.0)
@@ -92,6 +97,7 @@ def diagnose(case, settings=None, progress=None, store=None):
         scores = scored(case, fit, settings, tell, store, effect, promising)
         verdict, best = judged(case, fit, scores, settings)
         if effect and (verdict.answer != "named" or best.gain < _shape_of(verdicts[0].scores[0], best)):
+            verdicts[0] = told_beside(verdicts[0], verdict)
             break
         verdicts.append(verdict)
         if verdict.answer == "none" or best is None or best.gain <= settings.threshold:
@@ -109,10 +115,9 @@ def diagnose(case, settings=None, progress=None, store=None):
             break
     if refused(verdicts):
         verdicts, fit = reconsidered(case, base, fit, verdicts, settings)
-    if len(verdicts) == 1:
-        verdicts = [opened(verdicts[0], settings)]
+    verdicts = [_as_it_ends(v, case, fit, settings) for v in verdicts]
     rival, leader = _rival(verdicts[0]), next((s for s in verdicts[0].scores[:1] if s.gain > settings.threshold), None)
-    where = whereabouts(case, base, leader) if verdicts[0].answer == "unknown" else None
+    where = whereabouts(case, base, leader, verdicts[0].cause) if verdicts[0].answer == "unknown" else None
     return Diagnosis(
         tuple(verdicts), base, fit, frames, _verified(case, base, fit, rival), latent_of(case, base), {},
         scores, where,
@@ -129,6 +134,14 @@ def _with_its_errors(case, fit, settings, store):
         return new, kept(store, key, lambda: to_the_end(new, fit, settings), fit.candidates)
     except SimulationError:
         return case, fit
+
+
+def _as_it_ends(verdict, case, fit, settings):
+    """A name as the last fit has it: graded by what that leaves, "a or b" where its size has no upper end there."""
+    if verdict.answer != "named":
+        return verdict
+    own, grade = replace(verdict.scores[0], fit=fit), "A" if heard(case, fit, settings) <= 1.0 else "B"
+    return opened(replace(verdict, grade=grade, scores=(own, *verdict.scores[1:])), settings)
 
 
 def _shape_of(first, second):

@@ -58,11 +58,12 @@ def sentence(diagnosis):
         return f"The simulation is not fine enough to be compared: {verdict.reason}."
     if verdict.answer == "unknown":
         return f"Something is missing {place_in_words(diagnosis)}: {verdict.reason}."
-    words = [f"What the model left out: {t.sentence()}." for t in diagnosis.fit.terms]
-    if verdict.answer == "a_or_b":
-        other = verdict.names[1].replace("_", " ")
-        return f"{words[0]} Or {other}: these recordings cannot tell them apart."
-    return " ".join(words)
+    words = []
+    for term, own in zip(diagnosis.fit.terms, diagnosis.verdicts):
+        words.append(f"What the model left out: {term.sentence()}.")
+        if own.answer == "a_or_b":
+            words.append(f"Or {own.names[1].replace('_', ' ')}: these recordings cannot tell them apart.")
+    return " ".join([*words, f"But {verdict.reason}."] if verdict.answer == "named" and verdict.reason else words)
 
 
 def place_in_words(diagnosis):
@@ -90,20 +91,20 @@ def finding_row(diagnosis, identity):
     verdict, check = diagnosis.verdict, diagnosis.verification
     term = next(iter(diagnosis.fit.candidates), None) if verdict.answer in ("named", "a_or_b") else None
     where = term.where if term else acts(diagnosis.where)
-    frame = diagnosis.frames[0] if diagnosis.frames and diagnosis.frames[0].q < 0.05 else None
+    locked = term.frame if term else where.get("frame")
     return {
         **identity,
         "verdict": verdict.answer,
         "grade": verdict.grade or None,
         "term": verdict.names[0] if verdict.names else None,
         "rival_term": verdict.names[1] if len(verdict.names) > 1 else None,
-        "locked_to": term.frame if term else where.get("frame") or (frame.frame if frame else None),
+        "locked_to": locked,
         **_position(diagnosis, term, where),
-        "channel": where.get("sensor") or (str(frame.level) if frame and frame.frame == "sensor" else None),
+        "channel": where.get("sensor"),
         "band_low_hz": None,
         "band_high_hz": None,
-        "probability": round(verdict.probability, 4),
-        "p_value": frame.q if frame else None,
+        "probability": round(diagnosis.probability, 4),
+        "p_value": next((f.q for f in diagnosis.frames if f.frame == locked), None),
         "fit_before_pct": _finite(check.before),
         "fit_after_pct": _finite(check.after),
         "fit_rival_pct": _finite(check.rival),

@@ -1,13 +1,23 @@
-"""What a mismatch is locked to: residual energy by frame, against permutations, with the false discovery rate."""
+r"""What a mismatch is locked to: residual energy by frame, with the false discovery rate.
 
-from dataclasses import dataclass
+Cells of one sensor, one axle or one passage are alike, and sensors, bays and wheels of a sound turnout differ in level.
+So a level stands out only by what the other levels of its frame do not differ by among themselves: Grubbs' test on
+their means, right for any dependence of the cells within a level.
+"""
+
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import t as student
+
+FEWEST_CELLS = 8
+FEWEST = 3  # levels; of two nobody can say which is the odd one
+THIN = 0.5  # of the median number of cells; the mean of a level with fewer scatters more than the others'
 
 
 @dataclass(frozen=True)
 class Frame:
-    """One frame's share: ``level`` stands out with ``effect`` [dB] over the rest; ``p`` by permutation, ``q``
+    """One frame's share: ``level`` stands out with ``effect`` [dB] over the rest; ``p`` by Grubbs' test, ``q``
     after Benjamini and Hochberg over all frames; ``share`` of the variance of log energy; ``n`` cells."""
 
     frame: str
@@ -40,12 +50,15 @@ def cell_energies(observations, residuals):
     return np.concatenate(energy), {name: np.concatenate(v) for name, v in labels.items()}
 
 
-def attribute(energy, labels, permutations=499, seed=0, excess=None):
+def attribute(energy, labels):
     r"""Frames in order of evidence.
 
-    The statistic of a frame is the largest standardised mean of its levels,
-    :math:`\max_l \sqrt{n_l}\,(\bar e_l - \bar e) / s`, after the means of the other frames' levels are taken off
-    (two-way); its null comes from shuffling the cells. ``excess`` (n,) replaces the log energy.
+    After the means of the other frames' levels are taken off (two-way), the largest of the means of L levels is held
+    against the others', with their mean m and standard deviation s:
+
+    .. math:: t = \frac{m_{max} - m}{s \sqrt{1 + 1/(L-1)}}, \qquad p = \min(1,\; L\, P(T_{L-2} > t))
+
+    p is 1 where fewer than ``FEWEST`` levels have cells enough to be compared.
 
     Parameters
     ----------
@@ -57,57 +70,60 @@ def attribute(energy, labels, permutations=499, seed=0, excess=None):
     Returns
     -------
     list of Frame
+
+    References
+    ----------
+    Grubbs 1950, Sample criteria for testing outlying observations.
     """
-    rng = np.random.default_rng(seed)
-    value = np.asarray(energy if excess is None else excess, dtype=float)
-    found = []
-    for name in labels:
-        keep = np.array([level is not None for level in labels[name]], dtype=bool)
-        levels, code = np.unique(labels[name][keep].astype(str), return_inverse=True)
-        if levels.size < 2 or keep.sum() < 8:
+    energy, found = np.asarray(energy, dtype=float), []
+    codes = {name: np.unique(values.astype(str), return_inverse=True)[1] for name, values in labels.items()}
+    for name, values in labels.items():
+        keep = np.array([level is not None for level in values], dtype=bool)
+        _, first, code = np.unique(values[keep].astype(str), return_index=True, return_inverse=True)
+        if first.size < 2 or keep.sum() < FEWEST_CELLS:
             continue
-        e = _without_others(value[keep], name, {k: v[keep] for k, v in labels.items()})
+        e = _without_others(energy[keep], name, {k: c[keep] for k, c in codes.items()})
         count = np.bincount(code)
-        spread = max(float(e.std()), 1e-12)
-
-        def statistic(order, e=e, code=code, count=count, spread=spread):
-            mean = np.bincount(code, e[order]) / count
-            return (mean - e.mean()) * np.sqrt(count) / spread
-
-        seen = statistic(np.arange(e.size))
-        top = int(np.argmax(seen))
-        null = [float(statistic(rng.permutation(e.size)).max()) for _ in range(permutations)]
-        p = (1 + sum(n >= seen[top] for n in null)) / (permutations + 1)
-        inside = e[code == top].mean()
-        share = float(
-            np.sum(count * (np.bincount(code, e) / count - e.mean()) ** 2) / max(np.sum((e - e.mean()) ** 2), 1e-12)
-        )
-        rest = e[code != top].mean() if levels.size > 1 else 0.0
-        level = labels[name][keep][np.flatnonzero(code == top)[0]]
-        found.append((name, level, 10.0 / np.log(10.0) * (inside - rest), share, p, int(keep.sum())))
-    corrected = benjamini_hochberg([f[4] for f in found])
-    frames = [Frame(f[0], f[1], float(f[2]), f[3], f[4], q, f[5]) for f, q in zip(found, corrected)]
-    return sorted(frames, key=lambda f: (f.q, -f.share))
+        mean = np.bincount(code, e) / count
+        seen = np.flatnonzero(count >= THIN * np.median(count))
+        top = seen[int(np.argmax(mean[seen]))]
+        share = float(np.sum(count * (mean - e.mean()) ** 2) / max(np.sum((e - e.mean()) ** 2), 1e-12))
+        effect = 10.0 / np.log(10.0) * (mean[top] - e[code != top].mean())
+        p = outlying(mean[seen])
+        found.append(Frame(name, values[keep][first[top]], float(effect), share, p, 1.0, int(keep.sum())))
+    corrected = benjamini_hochberg([f.p for f in found])
+    return sorted((replace(f, q=q) for f, q in zip(found, corrected)), key=lambda f: (f.q, -f.share))
 
 
-def _without_others(e, name, labels):
+def outlying(means):
+    """Chance that the largest of ``means`` (n,) stands out as it does, or further, where all are alike.
+
+    >>> round(outlying(np.array([0.0, 0.1, -0.1, 3.0])), 3), outlying(np.array([0.0, 3.0]))
+    (0.003, 1.0)
+    """
+    if means.size < FEWEST:
+        return 1.0
+    rest = np.delete(means, int(np.argmax(means)))
+    spread = max(float(np.std(rest, ddof=1)), 1e-12) * np.sqrt(1.0 + 1.0 / rest.size)
+    return min(1.0, means.size * float(student.sf((means.max() - rest.mean()) / spread, rest.size - 1)))
+
+
+def _without_others(e, name, codes):
     """Log energy with the level means of all other frames taken off, two sweeps; not of those whose every level lies
     within one of this frame, as the axles of a train do: they would take it along."""
     e = e - e.mean()
     for _ in range(2):
-        for other, values in labels.items():
-            if other == name or _nested(values, labels[name]):
+        for other, code in codes.items():
+            if other == name or _nested(code, codes[name]) or np.unique(code).size >= e.size // 2:
                 continue
-            _, code = np.unique(values.astype(str), return_inverse=True)
-            if code.max() + 1 >= e.size // 2:
-                continue
-            e = e - (np.bincount(code, e) / np.bincount(code))[code]
+            count = np.bincount(code)
+            e = e - (np.bincount(code, e) / np.maximum(count, 1))[code]
     return e
 
 
 def _nested(inner, outer):
-    pairs = {*zip(inner.astype(str), outer.astype(str))}
-    return len(pairs) == len({level for level, _ in pairs})
+    pairs = np.unique(inner.astype(np.int64) * (outer.max() + 1) + outer)
+    return pairs.size == np.unique(inner).size
 
 
 def benjamini_hochberg(p):

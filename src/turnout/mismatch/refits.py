@@ -42,8 +42,29 @@ def scored(case, fit, settings, tell, store, effect, promising):
         leaders = [s for s in material if s.gain > max(NEARLY * settings.threshold, close)]
         polished = [_polished(case, fit, s, settings, store, effect) for s in leaders]
         ranked = sorted([*polished, *(s for s in ranked if all(s is not x for x in leaders))], key=lambda s: -s.gain)
+        ranked = _owed(case, fit, ranked, settings, store, effect)
         ranked = beside(case, fit, ranked, settings)
     return tuple(_checked(case, fit, s) for s in ranked)
+
+
+def _owed(case, fit, ranked, settings, store, effect):
+    """The scores without what ``fit`` itself reaches from the leader's nuisances: it had stopped short of that."""
+    leader = ranked[0]
+    if leader.gain <= settings.threshold:
+        return ranked
+    key = f"{effect}:back:{leader.candidate.key}:{len(fit.candidates)}:{tuple(np.round(leader.fit.psi, 12))}"
+    back = kept(store, key, lambda: _back(case, fit, leader.fit.values, settings), fit.candidates)
+    short = max(0.0, back.evidence - fit.evidence) if back is not None else 0.0
+    return [replace(s, gain=s.gain - short) for s in ranked]
+
+
+def _back(case, fit, values, settings):
+    """``fit`` made again from other nuisances, to its end; None where the simulation cannot go there."""
+    try:
+        start = fit_jointly(case, fit.candidates, fit.psi, values, iterations=settings.iterations, stall=FINE)
+        return _ended(case, start, settings).light()
+    except SimulationError:
+        return None
 
 
 def _same_law_beside(case, fit, ranked, settings, store, effect):

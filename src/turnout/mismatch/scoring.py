@@ -12,10 +12,16 @@ FEWEST = 6  # like parts that make a spread
 
 
 def explained_of(case, fit, refit, settings):
-    """Share of the excess over the level of controls that ``refit`` takes away, 1 where there is none."""
+    """Share of the excess over the level of controls that ``refit`` takes away, 1 where there is none.
+
+    Of a first effect that of the loudest channel counts where no kind has any; beside a name it may be what the name
+    left, which is no matter of a second effect.
+    """
     control = _control(case, fit, settings)
-    before = _excess(fit.level, control)
-    return 1.0 - _excess(refit.level, control) / before if before > 0.0 else 1.0
+    before, after = _excess(fit.level, control), _excess(refit.level, control)
+    if before == 0.0 and not fit.candidates:
+        before, after = (max(0.0, loudest(case, f) - 1.0) for f in (fit, refit))
+    return 1.0 - after / before if before > 0.0 else 1.0
 
 
 def _control(case, fit, settings):
@@ -83,6 +89,11 @@ def over(case, fit, settings):
     return max(fit.level[kind] / control[kind] for kind in fit.level)
 
 
+def heard(case, fit, settings):
+    """What of ``fit`` stands most above the level of controls: a kind, or one channel of one recording."""
+    return max(over(case, fit, settings), loudest(case, fit))
+
+
 def loudest(case, fit):
     """Largest mean square of one channel in one recording over what it is in controls, of the kinds that tell."""
     found = [0.0]
@@ -101,7 +112,7 @@ def loudest(case, fit):
 def judged(case, fit, scored, settings):
     """(Verdict on the ``scored`` candidates on top of ``fit``, the Score that it names or would have, or None)."""
     best = max((s for s in scored if s.material), key=lambda s: s.gain, default=None)
-    excess = max(over(case, fit, settings), loudest(case, fit))
+    excess = heard(case, fit, settings)
     scored = tuple(s for s in scored if s.material)
     if best is None:
         return judge([], excess, settings, disturbed=bool(case.disturbed), foreign=case.foreign), None

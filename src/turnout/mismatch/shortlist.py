@@ -9,6 +9,7 @@ from turnout.mismatch.absorbed import absorbed
 from turnout.mismatch.joint import Joint
 
 NEAR = 0.95  # m: one bay and a half
+ALIKE = 1.5  # m: two bays, of any sleepers; a second of the same kind there is what the first one's shape leaves
 HOPELESS = 0.1  # of the leader's estimated gain; what promises less is not refitted, but the second is
 
 
@@ -98,7 +99,8 @@ def _same_place(candidate, accepted):
     if candidate.exact and accepted.exact:
         return False
     a, b = candidate.where, accepted.where
-    near = "place" in a and "place" in b and abs(a["place"] - b["place"]) < NEAR
+    reach = ALIKE if candidate.family == accepted.family else NEAR
+    near = "place" in a and "place" in b and abs(a["place"] - b["place"]) < reach
     return near or any(k in a and a[k] == b.get(k) for k in ("sensor", "train"))
 
 

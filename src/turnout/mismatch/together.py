@@ -10,7 +10,7 @@ import numpy as np
 from turnout.errors import SimulationError
 from turnout.mismatch.held_out import held_out_score
 from turnout.mismatch.joint import fit_jointly
-from turnout.mismatch.scoring import consistent_elsewhere, explained_of, loudest, over, structure_left
+from turnout.mismatch.scoring import consistent_elsewhere, explained_of, heard, over, structure_left
 from turnout.mismatch.verdict import TORN, judge
 
 RIVALS = 2  # that are fitted anew beside the second effect
@@ -19,6 +19,14 @@ RIVALS = 2  # that are fitted anew beside the second effect
 def refused(verdicts):
     """Whether the first verdict, on an effect that was found, is "unknown"."""
     return bool(verdicts) and verdicts[0].answer == "unknown"
+
+
+def told_beside(first, second):
+    """The ``first`` verdict, a name, with the reason of a ``second`` on what shows beside it, which got none: it does
+    not take the name away, but nobody should think that all is said."""
+    if first.answer != "named" or second.answer != "unknown":
+        return first
+    return replace(first, reason=f"something else shows beside it: {second.reason}")
 
 
 def reconsidered(case, base, fit, verdicts, settings):
@@ -30,8 +38,7 @@ def reconsidered(case, base, fit, verdicts, settings):
         pairs.sort(key=lambda s: (not s.material, -s.gain))
         best = pairs[0].fit
         consistent = consistent_elsewhere(case, base, pairs[0], settings)
-        excess = max(over(case, base, settings), loudest(case, base))
-        left = over(case, best, settings)
+        excess, left = heard(case, base, settings), over(case, best, settings)
         found = judge(pairs, excess, settings, consistent, structure_left(case, best), left, bool(case.disturbed))
         if found.answer in ("named", "a_or_b"):
             return [found, *verdicts[1:]], found.scores[0].fit

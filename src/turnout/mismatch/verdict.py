@@ -72,7 +72,8 @@ class Score:
 @dataclass(frozen=True)
 class Verdict:
     """``answer`` of ``VERDICTS``; ``names`` the families (two for a or b); ``grade`` "A" or "B"; ``probability``
-    of the answer; ``posterior`` over families, "none" and "unknown"; ``scores`` best of each family; ``reason``."""
+    of the answer; ``posterior`` over families, "none" and "unknown"; ``scores`` best of each family; ``reason``, and
+    ``cause`` "clock" or "train" where it is recordings that are not among those fitted, "" elsewhere."""
 
     answer: str
     names: tuple[str, ...] = ()
@@ -81,6 +82,7 @@ class Verdict:
     posterior: dict = field(default_factory=dict)
     scores: tuple = ()
     reason: str = ""
+    cause: str = ""
 
 
 def posterior(scores, excess, settings):
@@ -159,7 +161,7 @@ def opened(verdict, settings):
         return verdict
     names, probabilities = (verdict.names[0], verdict.scores[0].candidate.open_as), dict(verdict.posterior)
     sure = calibrate(probabilities, names, settings.certainty("a_or_b"), settings)
-    reason = f"the size of {names[0]} is known from below alone"
+    reason = "; ".join(filter(None, [f"the size of {names[0]} is known from below alone", verdict.reason]))
     return replace(
         verdict, answer="a_or_b", names=names, grade="", probability=sure, posterior=probabilities, reason=reason
     )
@@ -188,21 +190,25 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
     ranked = sorted(scores, key=lambda s: -s.gain)
     probabilities = posterior(scores, excess, settings)
 
-    def verdict(answer, names=(), grade="", reason=""):
+    def verdict(answer, names=(), grade="", reason="", cause=""):
         if answer == "unknown":
             _withdraw(probabilities)
-        sure = calibrate(probabilities, names or (answer,), settings.certainty(answer, disturbed), settings)
-        return Verdict(answer, tuple(names), grade, sure, probabilities, tuple(ranked), reason)
+        sure = calibrate(probabilities, names or (answer,), settings.certainty(answer, cause == "clock"), settings)
+        return Verdict(answer, tuple(names), grade, sure, probabilities, tuple(ranked), reason, cause)
 
-    found = [s for s in ranked if s.gain > settings.threshold and s.material]
-    if not found:
+    def no_name(but=""):
         if excess > 1.0:
             return verdict("unknown", reason="above the level of controls, and no candidate helps")
         if disturbed:
-            return verdict("unknown", reason="something shakes all sensors while no wheel is near")
+            return verdict("unknown", reason="something shakes all sensors while no wheel is near", cause="clock")
         if foreign:
-            return verdict("unknown", reason=f"most passages of {', '.join(foreign)} do not look like its vehicle file")
-        return verdict("none", reason="nothing above the thresholds")
+            said = f"most passages of {', '.join(foreign)} do not look like its vehicle file"
+            return verdict("unknown", reason=said, cause="train")
+        return verdict("none", reason=f"nothing above the thresholds{but}")
+
+    found = [s for s in ranked if s.gain > settings.threshold and s.material]
+    if not found:
+        return no_name()
     best = found[0]
     if excess > 1.0 and best.explained < settings.explained:
         return verdict("unknown", reason=f"the best candidate explains {best.explained:.0%} of the excess")
@@ -210,8 +216,8 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
         return verdict("unknown", reason=f"{best.family} leaves {left:.0f} times the level of controls")
     weak = best.gain < WEAK * settings.threshold
     torn = objected(best.worst, best.gain, settings)
-    if (torn or not consistent) and weak and excess <= 1.0 and not disturbed:
-        return verdict("none", reason=f"nothing above the thresholds but {best.family}, which does not hold elsewhere")
+    if (torn or not consistent) and weak and excess <= 1.0:
+        return no_name(f" but {best.family}, which does not hold elsewhere")
     if not consistent:
         return verdict("unknown", reason=f"{best.family} does not hold on conditions it was not fitted to")
     if structure > settings.structure_left and left > 1.0:

@@ -41,15 +41,16 @@ class Whereabouts:
         )
 
 
-def whereabouts(case, fit, refused=None):
+def whereabouts(case, fit, refused=None, cause=""):
     """Whereabouts of what ``fit`` leaves; ``refused`` is the Score of the best candidate that got no name, or None.
 
-    None where the case has no spaces to look into, or none of them holds more than sound recordings leave.
+    Where recordings that were not fitted are the ``cause`` of the verdict, they say where. None where the case has no
+    spaces to look into, or none of them holds more than sound recordings leave.
     """
-    if case.disturbed:
+    if cause == "clock":
         names = ", ".join(d.name for d in case.disturbed)
         return Whereabouts("clock", names, max(d.louder for d in case.disturbed))
-    if case.foreign and refused is None:
+    if cause == "train":
         return Whereabouts("train", case.foreign[0], 0.0, train=case.foreign[0])
     floor = {o.kind: case.control_level.get(o.kind, 1.0) for o in case.observations}
     witnesses = sorted(_alone(case, weigh(case, fit, floor)), key=lambda w: -w.nats)

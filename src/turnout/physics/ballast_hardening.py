@@ -38,12 +38,9 @@ class BallastHardening(PhysicsTerm):
         self.check()
         if self.hardening == 0.0 or track.layers == 1:
             return ()
-        shape = WAY * (WAY / UNIT) ** 2
-        return tuple(
-            Port(
-                ((("sleeper", j), 1.0),),
-                TableLaw(tuple(WAY), tuple(self.hardening * track.ballast_stiffness[j] * shape), (0.0,) * WAY.size),
-                label=f"hardening under sleeper {j}",
-            )
-            for j in range(self.first, self.last + 1)
-        )
+        return tuple(self._port(track.ballast_link(j), j) for j in range(self.first, self.last + 1))
+
+    def _port(self, ballast, j):
+        force = self.hardening * ballast.stiffness * (WAY * (WAY / UNIT) ** 2)
+        law = TableLaw(tuple(WAY), tuple(force), (0.0,) * WAY.size)
+        return Port(ballast.ends, law, label=f"hardening under sleeper {j}")

@@ -10,7 +10,11 @@ SOURCE = "Wolf 1994, Foundation vibration analysis using simple physical models:
 
 @dataclass(frozen=True)
 class BallastInertia(PhysicsTerm):
-    r"""A cone of ground under every sleeper: :math:`\Delta K(\omega) = i\omega c - \omega^2 m`."""
+    r"""A cone of ground under every sleeper: :math:`\Delta K(\omega) = i\omega c - \omega^2 m`.
+
+    With 3 layers it is under the ballast's mass, beside the subgrade. A negative c takes nine tenths of the damper
+    there at most: less than none would give energy.
+    """
 
     mass: float
     damping: float = 0.0
@@ -30,11 +34,13 @@ class BallastInertia(PhysicsTerm):
         return cls(200.0, 3e4)
 
     def links(self, track):
-        """Mass and damper on every sleeper."""
+        """Mass and damper under every sleeper, or every ballast mass."""
         self.check()
         if track.layers == 1 or (self.mass == 0.0 and self.damping == 0.0):
             return []
+        lowest = "ballast" if track.layers == 3 else "sleeper"
+        there = track.subgrade_damping if track.layers == 3 else track.ballast_damping
         return [
-            Link(((("sleeper", j), 1.0),), damping=self.damping, mass=self.mass, tag="ballast_inertia")
-            for j in range(track.support.size)
+            Link((((lowest, j), 1.0),), damping=max(self.damping, -0.9 * c), mass=self.mass, tag="ballast_inertia")
+            for j, c in enumerate(there)
         ]

@@ -16,8 +16,8 @@ class HangingSleeper(PhysicsTerm):
 
     The base simulation has :math:`-k_b y - c_b \dot y` under every sleeper; this gives it back within the gap, but for
     the share s of the sleeper that is ``seated``: voids grow from partial ones.
-    y is the sleeper's position below where it hangs unloaded. A hammer's blow moves it by micrometres both ways:
-    there it is a free sleeper. A lift by more than the gap is left to the base.
+    y is the sleeper's position below where it hangs unloaded, with 3 layers above the ballast's mass. A hammer's blow
+    moves it by micrometres both ways: there it is a free sleeper. A lift by more than the gap is left to the base.
     """
 
     sleeper: int
@@ -51,13 +51,18 @@ class HangingSleeper(PhysicsTerm):
         """0.3 mm under sleeper 20."""
         return cls(20, 3e-4)
 
+    @property
+    def withheld(self):
+        """Share of the ballast that is missing within the gap."""
+        return 1.0 - self.seated
+
     def ports(self, track):
         """One port at the sleeper; none where the gap is closed."""
         self.check()
         if self.gap == 0.0:
             return ()
-        hangs = 1.0 - self.seated
-        k, c = hangs * track.ballast_stiffness[self.sleeper], hangs * track.ballast_damping[self.sleeper]
+        ballast = track.ballast_link(self.sleeper)
+        k, c = self.withheld * ballast.stiffness, self.withheld * ballast.damping
         onset = min(ONSET, 0.5 * self.gap)
         way: tuple[float, ...] = (
             -self.gap - onset,
@@ -72,4 +77,4 @@ class HangingSleeper(PhysicsTerm):
             way, withheld = (*way[:2], 0.0, *way[4:]), (*withheld[:2], 0.0, *withheld[4:])
         viscous = (0.0, -0.5 * c, *(-c,) * (len(way) - 4), -0.5 * c, 0.0)
         law = TableLaw(way, withheld, viscous)
-        return (Port(((("sleeper", self.sleeper), 1.0),), law, label=f"gap under sleeper {self.sleeper}"),)
+        return (Port(ballast.ends, law, label=f"gap under sleeper {self.sleeper}"),)

@@ -3,9 +3,7 @@
 from dataclasses import dataclass
 
 from turnout.physics.term import Parameter, PhysicsTerm
-from turnout.simulate.law import Port, TableLaw
-
-ONSET = 1e-5  # way over which the ballast's damping goes [m]
+from turnout.simulate.law import LiftLaw, Port
 
 
 @dataclass(frozen=True)
@@ -14,9 +12,10 @@ class LiftingSleepers(PhysicsTerm):
 
     .. math:: R = \max(0,\, W + k_b y + c_b \dot y) - W, \qquad \text{base: } R = k_b y + c_b \dot y
 
-    y is the sleeper's position below where it rests unloaded. W is what presses it there, its own weight and that of
-    a bay of rail: 1.8 kN, which 90 MN/m carry on 20 µm. ``share`` of the pull is taken away, 1: all of it. Every
-    sleeper is a port in one system: choose those near the sensors.
+    y is the sleeper's position below where it rests unloaded, with 3 layers above the ballast's mass. The whole sum
+    says whether there is contact: by y alone the damper would hold what leaves. W is what presses the sleeper, its own
+    weight and that of a bay of rail: 1.8 kN, which 90 MN/m carry on 20 µm. ``share`` of the pull is taken away, 1: all
+    of it. Every sleeper is a port in one system: choose those near the sensors.
     """
 
     first: int
@@ -43,6 +42,11 @@ class LiftingSleepers(PhysicsTerm):
         """Eleven sleepers whose rail, bent upwards, carries most of their weight."""
         return cls(15, 25, 1.0, dead_load=400.0)
 
+    @property
+    def withheld(self):
+        """Share of the ballast that is missing above where it lifts off."""
+        return self.share
+
     def ports(self, track):
         """One port at each sleeper."""
         self.check()
@@ -51,7 +55,6 @@ class LiftingSleepers(PhysicsTerm):
         return tuple(self._port(track, j) for j in range(self.first, self.last + 1))
 
     def _port(self, track, j):
-        k, c = self.share * track.ballast_stiffness[j], self.share * track.ballast_damping[j]
-        lift = -self.dead_load / track.ballast_stiffness[j]
-        law = TableLaw((lift - 1.0, lift - ONSET, lift, lift + 1.0), (k, k * ONSET, 0.0, 0.0), (-c, -c, 0.0, 0.0))
-        return Port(((("sleeper", j), 1.0),), law, label=f"lift of sleeper {j}")
+        ballast = track.ballast_link(j)
+        law = LiftLaw(*(self.share * value for value in (ballast.stiffness, ballast.damping, self.dead_load)))
+        return Port(ballast.ends, law, label=f"lift of sleeper {j}")

@@ -18,6 +18,7 @@ class LocalBallast(PhysicsTerm):
     name = "local_ballast"
     left_out = "the ballast under sleeper {sleeper} has {factor:.2f} times its stiffness"
     kind = "matrix"
+    scales = True
     frame = "place"
     parameters = (
         Parameter("factor", "-", 1.0, (0.05, 8.0), "ballast stiffness over that of the base model",

@@ -18,6 +18,7 @@ class LocalPad(PhysicsTerm):
     name = "local_pad"
     left_out = "the pad on sleeper {sleeper} has {factor:.2f} times its stiffness"
     kind = "matrix"
+    scales = True
     frame = "place"
     parameters = (
         Parameter("factor", "-", 1.0, (0.05, 8.0), "pad stiffness over that of the base model",

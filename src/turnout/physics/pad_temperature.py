@@ -17,6 +17,7 @@ class PadTemperature(PhysicsTerm):
     name = "pad_temperature"
     left_out = "pads lose a share of {coefficient:.4f} of their stiffness per kelvin"
     kind = "matrix"
+    scales = True
     frame = "condition"
     parameters = (
         Parameter("coefficient", "1/K", 0.0, (-0.01, 0.04), "relative loss of stiffness per kelvin",

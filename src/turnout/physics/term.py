@@ -35,6 +35,7 @@ class PhysicsTerm:
     left_out = ""
     kind = ""
     parameters: tuple[Parameter, ...] = ()
+    scales = False  # whether its links are a multiple of the track's own springs, on which other terms then build
 
     @classmethod
     def example(cls):
@@ -48,6 +49,11 @@ class PhysicsTerm:
     def ports(self, track):
         """Scalar forces that matrices cannot hold: a list of ``turnout.simulate.law.Port``."""
         return ()
+
+    @property
+    def withheld(self):
+        """Share of a sleeper's ballast that its ports take away."""
+        return 0.0
 
     def paths(self, track, vehicle):
         """Parts of a wheel's path: callables (x, wheel) -> dip [m]. An attribute ``wheel`` restricts a part to

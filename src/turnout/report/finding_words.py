@@ -107,7 +107,9 @@ def _sure(finding, evidence):
         words += "; some structure is left, its shape is not resolved"
     if evidence.get("reason"):
         words += f"; {evidence['reason']}"
-    return words
+    stated = [evidence, *evidence["beside"]] if evidence.get("beside") else []
+    each = ", ".join(f"{s['term'].replace('_', ' ')} {s['probability']:.2f}" for s in stated if s["term"])
+    return f"{words}; each by itself: {each}" if each else words
 
 
 def answer(finding) -> str:
@@ -127,7 +129,7 @@ def check(finding) -> str:
 
 
 def rivals(finding) -> list[dict]:
-    """What else was tried: name, nats gained on what was left out of the fit, share of the excess explained."""
+    """What else was tried: name, evidence over the base model [nats], share of the excess explained."""
     evidence = json.loads(finding["evidence_json"] or "{}")
     return [
         {

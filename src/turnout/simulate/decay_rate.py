@@ -44,7 +44,7 @@ def track_decay_rate(matrices, place, spacing, bands=BANDS, lines_per_band=8):
         frequency = np.geomspace(centre / edge, centre * edge, lines_per_band)
         u = responses(matrices, frequency, [place], np.concatenate([rows for rows, _ in weights]))[:, 0]
         h = np.einsum("fnk,nk->nf", u.reshape(len(frequency), len(weights), 4), [w for _, w in weights])
-        h[0] += matrices.compliance(place)
+        h += np.array([[matrices.compliance(place, position)] for position in x])
         energy = np.mean(np.abs(h * frequency**2) ** 2, axis=1)
         middle = 0.5 * (x[1:] + x[:-1])
         width = np.diff(np.concatenate([[x[0]], middle, [x[-1] + 0.5 * (x[-1] - x[-2])]]))

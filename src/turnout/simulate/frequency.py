@@ -81,8 +81,8 @@ def responses(matrices, frequency, places, rows=None, pivoted=False):
 def receptance(matrices, frequency, excited, measured):
     r"""Receptance :math:`H = b_m^T (K + iH_s + i\omega C - \omega^2 M)^{-1} b_e` [m/N], (n_frequency,).
 
-    ``excited`` and ``measured`` are places on the rail [m] or names of degrees of freedom. On the rail at the
-    same place the compliance within the element is added, so that the point may lie between nodes.
+    ``excited`` and ``measured`` are places on the rail [m] or names of degrees of freedom. Between two places of the
+    rail in one element its own compliance is added, so that both may lie between nodes.
 
     References
     ----------
@@ -104,9 +104,14 @@ def receptance(matrices, frequency, excited, measured):
     """
     rows, weights = matrices.weights(measured)
     h = responses(matrices, frequency, [excited], rows)[:, 0] @ weights
-    if not isinstance(excited, tuple) and excited == measured:
-        h = h + matrices.compliance(float(excited))
-    return h
+    return h + _within_element(matrices, excited, measured)
+
+
+def _within_element(matrices, excited, measured):
+    """What the motion of nodes leaves out between two places of the rail in one element [m/N]."""
+    if isinstance(excited, tuple) or isinstance(measured, tuple):
+        return 0.0
+    return matrices.compliance(float(excited), float(measured))
 
 
 def receptance_gradient(matrices, frequency, excited, measured, parameters):
@@ -134,9 +139,7 @@ def receptance_gradient(matrices, frequency, excited, measured, parameters):
     omega = 2.0 * np.pi * np.asarray(frequency, dtype=float)
     both = responses(matrices, frequency, [excited, measured])
     rows, weights = matrices.weights(measured)
-    h = both[:, 0][:, rows] @ weights
-    if not isinstance(excited, tuple) and excited == measured:
-        h = h + matrices.compliance(float(excited))
+    h = both[:, 0][:, rows] @ weights + _within_element(matrices, excited, measured)
     gradient = np.zeros((omega.size, len(parameters)), dtype=complex)
     for k, (kind, links) in enumerate(parameters):
         factor = {"stiffness": -1.0 + 0.0 * omega, "damping": -1j * omega, "mass": omega**2}.get(kind)

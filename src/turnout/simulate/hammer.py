@@ -1,6 +1,7 @@
 """A hammer test: blows of an instrumented hammer on the rail, recorded like measured ones."""
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,6 +38,14 @@ class Hammer:
     name: str = "086D50"
 
 
+class Struck(NamedTuple):
+    """What is true of one blow: its ``place`` [m], the hammer's ``speed`` [m/s], the ``peak_force`` [N]."""
+
+    place: float
+    speed: float
+    peak_force: float
+
+
 def hammer_sensors(location, spacing=0.6):
     """The two accelerometers of a test at ``location`` [m]: rail head at the sleeper and mid-span."""
     head = Sensor("acc_1", location, "rail head at sleeper", noise=0.05, limit=5e3, resolution=0.01)
@@ -61,6 +70,7 @@ def simulate_hammer(
     conditions=None,
     prepared=None,
     scheme="radau",
+    truth=False,
 ):
     """Recordings of a hammer test, one per blow, channel 0 the force [N], down positive as the accelerations.
 
@@ -84,17 +94,19 @@ def simulate_hammer(
         Of each recording [Hz, s, s].
     substeps : int
         Time steps per sample.
+    truth : bool
+        Return (recordings, tuple of ``Struck``), one per blow.
     pulse : callable or None
         A given force [N] of time [s] instead of the hammer's mass and tip.
     prepared : Prepared
-        Of ``prepare_hammer``, to share one factorisation among tests.
+        Of ``prepare_hammer`` with this rate, to share one factorisation among tests; its terms and scheme count.
 
     Returns
     -------
     tuple of Recording
         kind "hammer"; force and acceleration are means over the same step, so their ratio has no delay.
 
-    Errors: SimulationError for a place outside the track.
+    Errors: SimulationError for a place outside the track and a track prepared for another rate.
 
     Examples
     --------
@@ -105,20 +117,22 @@ def simulate_hammer(
     >>> bool(1.0 < blow.signal("hammer").sum() / blow.rate / (5.5 * 1.2) < 2.0)
     True
     """
-    hammer = hammer or Hammer()
+    hammer, blows = hammer or Hammer(), []
     place, _ = located(track, location)
     sensors = hammer_sensors(place) if sensors is None else tuple(sensors)
     prepared = prepared or prepare_hammer(track, location, terms, rate, substeps, half_length, scheme)
+    prepared.check_step(rate, substeps)
     rng = np.random.default_rng(seed)
-    probes = [seated(sensor, terms).probe(prepared.track) for sensor in sensors]
+    probes = [seated(sensor, prepared.terms).probe(prepared.track) for sensor in sensors]
     channels = (replace(hammer.force, place=place), *sensors)
-    channel_terms = [term for term in terms if term.kind == "channel"]
+    channel_terms = [term for term in prepared.terms if term.kind == "channel"]
     recordings = []
     for record in range(n_blows):
         velocity = hammer.velocity * np.exp(hammer.velocity_spread * rng.normal())
         hit = place + hammer.place_spread * float(np.clip(rng.normal(), -2.0, 2.0))
         clean = _blow(prepared, hammer, velocity, hit, probes, duration - pretrigger, pulse)
         clean = clean[:, : substeps * (clean.shape[1] // substeps)].reshape(len(channels), -1, substeps).mean(axis=2)
+        blows.append(Struck(hit, float(velocity), float(clean[0].max())))
         before = np.zeros((len(channels), round(pretrigger * rate)))
         clean = np.concatenate([before, clean], axis=1)
         samples = [
@@ -131,7 +145,7 @@ def simulate_hammer(
                 np.array(samples), rate, tuple(c.channel() for c in channels), "hammer", "", record, started_at, noted
             )
         )
-    return tuple(recordings)
+    return (tuple(recordings), tuple(blows)) if truth else tuple(recordings)
 
 
 def prepare_hammer(track, location, terms=(), rate=20e3, substeps=1, half_length=30.0, scheme="radau"):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from turnout.simulate.compiled import kernel
-from turnout.simulate.law import FRICTION, GAP, LINEAR, POWER
+from turnout.simulate.law import FRICTION, GAP, LIFT, LINEAR, POWER
 
 
 @kernel
@@ -32,6 +32,9 @@ def law_force(kind, numbers, i, table, first, last, d, rate):
     if kind == FRICTION:
         value = np.tanh(rate / numbers[i, 1])
         return numbers[i, 0] * value, 0.0, numbers[i, 0] * (1.0 - value * value) / numbers[i, 1]
+    if kind == LIFT:
+        pull = -(numbers[i, 2] + numbers[i, 0] * d + numbers[i, 1] * rate)
+        return (pull, -numbers[i, 0], -numbers[i, 1]) if pull > 0.0 else (0.0, 0.0, 0.0)
     k = first
     while k < last - 2 and table[0, k + 1] <= d:
         k += 1

@@ -6,7 +6,7 @@ import numpy as np
 
 from turnout.errors import SimulationError
 
-POWER, GAP, TABLE, LINEAR, FRICTION = range(5)
+POWER, GAP, TABLE, LINEAR, FRICTION, LIFT = range(6)
 
 
 @dataclass(frozen=True)
@@ -136,6 +136,28 @@ class FrictionLaw:
     def force(self, d, rate=0.0):
         """Force [N]."""
         return self.limit * np.tanh(np.asarray(rate) / self.slip_rate) + 0.0 * np.asarray(d)
+
+
+@dataclass(frozen=True)
+class LiftLaw:
+    r"""What a spring and damper under a ``load`` W would pull, :math:`F = \max(0, -(W + k d + c\dot d))`.
+
+    Beside that spring and damper it leaves :math:`\max(0, W + k d + c\dot d) - W`: contact that only presses.
+    """
+
+    stiffness: float
+    damping: float
+    load: float
+    kind = LIFT
+
+    @property
+    def numbers(self):
+        """The three numbers of the law in the order in which the compiled march takes them."""
+        return self.stiffness, self.damping, self.load
+
+    def force(self, d, rate=0.0):
+        """Force [N]."""
+        return np.maximum(0.0, -(self.load + self.stiffness * np.asarray(d) + self.damping * np.asarray(rate)))
 
 
 @dataclass(frozen=True)

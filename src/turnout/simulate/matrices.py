@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from turnout.errors import SimulationError
+from turnout.simulate.additions import links_of
 from turnout.simulate.rail import element_mass, element_stiffness, local_compliance, shape_functions
 
 ORDER = {"sleeper": 0, "ballast": 1}
@@ -54,7 +55,7 @@ class TrackMatrices:
         if not self.node[0] <= x <= self.node[-1]:
             a, b = self.node[[0, -1]]
             raise SimulationError(f"place {x:.3f} m is outside the track from {a:.3f} m to {b:.3f} m.")
-        e = self._element(x)
+        e = self.element_at(x)
         h, p = self.elements[0][e], self.elements[1][e]
         i, j = self.node_index[e], self.node_index[e + 1]
         return np.array([i, i + 1, j, j + 1]), shape_functions((x - self.node[e]) / h, h, p)
@@ -62,12 +63,13 @@ class TrackMatrices:
     def compliance(self, x, other=None):
         """Compliance within the element between ``x`` and ``other`` [m/N], by default ``x`` itself; 0 where the other
         lies in another element."""
-        e, other = self._element(x), x if other is None else other
+        e, other = self.element_at(x), x if other is None else other
         h = self.node[e + 1] - self.node[e]
         shares = (x - self.node[e]) / h, (other - self.node[e]) / h
         return float(local_compliance(*shares, h, self.rails[e])) if 0.0 <= shares[1] <= 1.0 else 0.0
 
-    def _element(self, x):
+    def element_at(self, x):
+        """Index of the element at ``x`` [m]; on a node the one behind it."""
         return min(int(np.searchsorted(self.node, x, side="right")) - 1, self.node.size - 2)
 
     def weights(self, place):
@@ -91,10 +93,7 @@ def assemble(track, terms=()):
     """Matrices of ``track`` with the rails that ``terms`` change and the links that they add."""
     for term in terms:
         track = term.rail(track)
-    links = track.links()
-    for term in terms:
-        links.extend(term.links(track))
-    return railed(linked(track, links), track)
+    return railed(linked(track, [*track.links(), *links_of(terms, track)]), track)
 
 
 def linked(track, links):

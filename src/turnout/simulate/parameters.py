@@ -4,8 +4,8 @@ from pathlib import Path
 
 from turnout.config.parameter_set import ParameterSet, read_parameters
 from turnout.errors import SimulationError
+from turnout.simulate.track_file import turnout_track
 from turnout.simulate.train import train
-from turnout.simulate.turnout_track import turnout_track
 from turnout.simulate.vehicle import coupled
 
 REPOSITORY = Path(__file__).resolve().parents[3]
@@ -47,9 +47,9 @@ def load_vehicle(name, load=0.5, folder=None, units=1):
         return train(parameters, load, units)
     parameters.only("name", "title", "compose", "sources")
     parts = []
-    for entry in parameters["compose"]:
-        part = load_vehicle(entry["vehicle"], load, folder or path.parent)
-        parts += [part] * int(entry.get("count", 1))
+    for entry in parameters.parts("compose"):
+        part = load_vehicle(entry.only("vehicle", "count")["vehicle"], load, folder or path.parent)
+        parts += [part] * entry.count("count", 1)
     made = coupled(str(parameters["name"]), parts * units)
     return made.with_(conditions={"load_share": float(load), "units": int(units)})
 

@@ -12,6 +12,8 @@ from turnout.simulate.sensor import measured, seated
 from turnout.simulate.turnout_track import TurnoutTrack
 from turnout.simulate.wheel_path import check_path
 
+CLOSE = 1e-6  # m, what places are rounded to
+
 
 @dataclass(frozen=True)
 class PassageTruth:
@@ -81,9 +83,9 @@ def simulate_passage(
         Further ones of this train: WheelFlat, OutOfRound ...
     entry : float
         Length over which wheels roll from their stand-in track onto the modelled one; 0: they must stay on the
-        modelled track all the time. [m]
+        modelled track all the time. Sensors lie no nearer to the track's ends than this and ``Drive.margin``. [m]
     prepared : Prepared
-        Of ``prepare_passage``, shared among trains, speeds and paths; its terms count.
+        Of ``prepare_passage`` with this rate, shared among trains, speeds and paths; its terms and scheme count.
     truth : bool
         Also return the PassageTruth.
 
@@ -92,7 +94,8 @@ def simulate_passage(
     Recording or (Recording, PassageTruth)
         Acceleration [m/s²] down positive; sample k is the mean over the time step around (k + 1/2) / rate.
 
-    Errors: SimulationError for a speed of zero, an unknown route, a sensor outside, a wheel that leaves the track.
+    Errors: SimulationError for a speed of zero, an unknown route, a sensor outside or where wheels are not yet on the
+    modelled track, a wheel that leaves the track, a track prepared for another rate.
 
     Examples
     --------
@@ -114,15 +117,18 @@ def simulate_passage(
     turnout = track if isinstance(track, TurnoutTrack) else TurnoutTrack(track, {route: ((),)})
     turnout.surfaces(route)
     prepared = prepared or prepare_passage(turnout, terms, rate, substeps, scheme, route)
+    prepared.check_step(rate, substeps)
     for term in prepared.terms:
         vehicle = term.vehicle(vehicle)
     sensors, sign = tuple(sensors), 1 if direction == "facing" else -1
     if not sensors:
         raise SimulationError("a passage without sensors records nothing.")
-    probes = [seated(sensor, prepared.terms).probe(prepared.track) for sensor in sensors]
+    seats = [seated(sensor, prepared.terms) for sensor in sensors]
+    probes = [seat.probe(prepared.track) for seat in seats]
     drive, duration = _drive(
         turnout, vehicle, speed, sensors, sign, route, roughness, seed, lead, tail, irregularities, entry
     )
+    _check_carried(seats, prepared.track, drive)
     outcome = run(prepared, duration, probes, vehicle, drive, forces=truth)
     rng = np.random.default_rng([seed, 1])
     clean = _mean_of(outcome.signals, substeps)
@@ -161,6 +167,20 @@ def _drive(turnout, vehicle, speed, sensors, sign, route, level, seed, lead, tai
     rough = turnout.rolling(track.start - 5.0, track.end + 5.0, seed, level)
     surfaces = tuple((*parts, *rough, *irregularities) for parts in turnout.surfaces(route))
     return Drive(start, speed, sign, surfaces, entry), way / speed
+
+
+def _check_carried(seats, track, drive):
+    """Refuse sensors where the track does not yet, or no more, carry the whole of a wheel: they record faded loads."""
+    if drive.entry == 0.0:
+        return
+    first, last = track.start + drive.margin + drive.entry, track.end - drive.margin - drive.entry
+    for seat in seats:
+        if not first - CLOSE <= seat.place <= last + CLOSE:
+            raise SimulationError(
+                f"sensor {seat.name!r} at {seat.place:.3f} m: wheels are wholly on the modelled track, which goes from "
+                f"{track.start:.3f} m to {track.end:.3f} m, only between {first:.3f} m and {last:.3f} m. Lengthen the "
+                f"track or shorten the entry of {drive.entry:g} m."
+            )
 
 
 def _mean_of(signals, substeps):

@@ -3,6 +3,7 @@
 import numpy as np
 
 from turnout.errors import SimulationError
+from turnout.simulate.additions import ports_of
 from turnout.simulate.law import TABLE
 from turnout.simulate.state import PortArrays
 
@@ -18,7 +19,7 @@ def contact_ports(vehicle, surfaces, start, direction):
 
 def fixed_ports(prepared):
     """Ports that the terms of a prepared track add."""
-    return [port for term in prepared.terms for port in term.ports(prepared.track)]
+    return ports_of(prepared.terms, prepared.track)
 
 
 def port_arrays(prepared, contacts, fixed, path_of):

@@ -40,6 +40,14 @@ class Prepared:
         solve(lower, upper, inverse_pivot, x, 0, x.size)
         return x
 
+    def check_step(self, rate, substeps):
+        """Refuse with SimulationError a ``rate`` [Hz] and ``substeps`` per sample for which this was not prepared."""
+        if not abs(self.dt * rate * substeps - 1.0) < 1e-9:
+            raise SimulationError(
+                f"the track is prepared for steps of {self.dt:.9g} s, but {rate!r} Hz with {substeps!r} per sample "
+                f"ask for {1.0 / (rate * substeps):.9g} s: prepare it with the same rate and substeps."
+            )
+
 
 def prepare(track, dt=5e-5, scheme="radau", terms=(), decay=WINDOW_DECAY, matrices=None):
     """Assemble and factorise ``track`` with the matrix entries of ``terms`` for steps of ``dt`` [s].

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from turnout.errors import SimulationError
+from turnout.simulate.between_nodes import bending, lies_between_nodes, rail_loads, recorded
 from turnout.simulate.bodies import stand_in_of, vehicle_arrays
 from turnout.simulate.march import CONVERGED, LEFT_TRACK, march
 from turnout.simulate.port_system import place_ports
@@ -94,7 +95,8 @@ def run(prepared, duration, probes=(), vehicle=None, drive=None, pulses=(), forc
     arrays = _run_arrays(prepared, drive, use_stand_in, paths, path_start, probes, pulses, n_step, tolerance)
     motion = _initial(prepared, vehicle, drive, ports, arrays, stand_in)
     signals = np.zeros((len(probes), n_step))
-    kept = np.zeros((len(order), n_step if forces else 0))
+    between = [k for k, probe in enumerate(probes) if lies_between_nodes(prepared.matrices, probe.place)]
+    kept = np.zeros((len(order), n_step if forces or between else 0))
     status, step, port, value, iterations = marcher(
         prepared.arrays, prepared.scheme, bodies, ports, arrays, motion, n_step, signals, kept
     )
@@ -105,7 +107,12 @@ def run(prepared, duration, probes=(), vehicle=None, drive=None, pulses=(), forc
     time = (np.arange(n_step) + 0.5) * prepared.dt
     shape = (len(vehicle.wheels), len(drive.surfaces)) if vehicle else (0, 1)
     surface = by_port[: len(contacts)].reshape(*shape, kept.shape[1])
-    return Outcome(time, signals, surface.sum(axis=1), surface, by_port[len(contacts) :], iterations / n_step, motion)
+    force = surface.sum(axis=1)
+    for loads in _loads(prepared, vehicle, drive, pulses, arrays, force) if between else ():
+        for k in between:
+            bent = bending(prepared.matrices, probes[k].place, loads)
+            signals[k] += recorded(bent, probes[k].order, prepared.dt, loads.from_rest)
+    return Outcome(time, signals, force, surface, by_port[len(contacts) :], iterations / n_step, motion)
 
 
 def _nobody():
@@ -141,7 +148,8 @@ def _paths(prepared, vehicle, drive, n_step):
     length = float(vehicle.wheel_places[-1])
     ends = (drive.start - drive.direction * length, drive.start + drive.direction * way)
     low, high = min(ends) - 0.1, max(ends) + 0.1
-    term_parts = [part for term in prepared.terms for part in term.paths(prepared.track, vehicle)]
+    rolls = drive.thrown is None  # a hammer falls on the rail's head whatever wheels find there
+    term_parts = [part for term in prepared.terms for part in term.paths(prepared.track, vehicle)] if rolls else []
     pieces: list[np.ndarray] = []
     known: dict[tuple, int] = {}
     path_of: dict[tuple, int] = {}
@@ -189,6 +197,21 @@ def _run_arrays(prepared, drive, use_stand_in, paths, path_start, probes, pulses
         float(tolerance),
         CLUSTER_CUT,
     )
+
+
+def _loads(prepared, vehicle, drive, pulses, arrays, force):
+    """What presses the rail itself: the wheels, and the pulses that do not act on a named degree of freedom."""
+    found = []
+    if vehicle is not None:
+        place = drive.start - drive.direction * np.asarray(vehicle.wheel_places)
+        ramp = arrays.ramp if arrays.stand_in else None
+        found.append(rail_loads(place, arrays.speed, force, prepared.dt, drive.thrown is not None, ramp))
+    on_rail = [k for k, (place, _) in enumerate(pulses) if not isinstance(place, tuple)]
+    if on_rail:
+        place = np.array([float(pulses[k][0]) for k in on_rail])
+        known = arrays.known_force[on_rail] @ prepared.scheme.quadrature
+        found.append(rail_loads(place, 0.0, known, prepared.dt, True))
+    return found
 
 
 def _initial(prepared, vehicle, drive, ports, arrays, stand_in):

@@ -39,12 +39,15 @@ def train(parameters, load=0.5, units=1):
     wheels: list[int] = []
     for unit in range(units):
         _add_unit(p, load, unit * length, bodies, suspensions, wheels)
+    if not wheels:
+        raise p.error(None, "a train without wheels", "List 'cars' and the 'bogies' or 'axles' below them")
     front = min(bodies[w].place for w in wheels)
     bodies = [Body(b.name, b.mass, b.inertia, b.place - front) for b in bodies]
-    wheel = p["wheel"]
-    contact = PowerLaw(wheel.number("contact", "N/m^1.5"))
+    wheel = p.part("wheel").only("radius", "contact")
+    contact = wheel.make(PowerLaw, wheel.number("contact", "N/m^1.5"))
     noted = {"load_share": float(load), "units": int(units)}
-    return Vehicle(
+    return p.make(
+        Vehicle,
         str(p["name"]),
         tuple(bodies),
         tuple(suspensions),
@@ -58,22 +61,25 @@ def train(parameters, load=0.5, units=1):
 
 
 def _add_unit(p, load, offset, bodies, suspensions, wheels):
-    bogies, axles, cars = p.get("bogies") or [], p.get("axles") or [], p["cars"]
+    bogies, axles, cars = (p.parts(name) for name in ("bogies", "axles", "cars"))
     carriers = [("bogie", b) for b in bogies] + [("axle", a) for a in axles]
-    names = {str(entry["label"]): k for k, (_, entry) in enumerate(carriers)}
-    users = {label: sum(label in map(str, car["rests_on"]) for car in cars) for label in names}
+    names = {str(entry.only("label", "type", "centre")["label"]): k for k, (_, entry) in enumerate(carriers)}
+    users = {label: sum(label in _rests_on(car) for car in cars) for label in names}
     # Bodies in order of place keep a car's rows together, so that uncoupled cars are blocks of their own.
     order = sorted(range(len(carriers)), key=lambda k: carriers[k][1].number("centre", "m"))
     placed, at = {}, {}
     pending = sorted(cars, key=lambda c: c.number("centre", "m"))
     for entry in pending:
-        kind = p["car_types"][str(entry["type"])]
-        mass = 0.5 * (kind.number("mass", "kg") + load * kind.number("payload", "kg", default=0.0))
-        share = mass / (0.5 * kind.number("mass", "kg"))
+        kind = _kind(p, "car_types", entry, CAR_UNITS)
+        empty = kind.number("mass", "kg")
+        if not empty > 0.0:
+            raise kind.error("mass", f"{empty:g} kg is no mass of a car", "Write what it weighs empty")
+        mass = 0.5 * (empty + load * kind.number("payload", "kg", default=0.0))
+        share = mass / (0.5 * empty)
         car_index = len(bodies)
         centre = offset + entry.number("centre", "m")
         bodies.append(Body(str(entry["type"]), mass, 0.5 * share * kind.number("inertia", "kg m²"), centre))
-        for label in map(str, entry["rests_on"]):
+        for label in _rests_on(entry):
             if label not in names:
                 raise SimulationError(f"{p['name']}: a car rests on {label!r}; there are {', '.join(names)}.")
             k = names[label]
@@ -88,19 +94,30 @@ def _add_unit(p, load, offset, bodies, suspensions, wheels):
     wheels.sort(key=lambda w: bodies[w].place)
 
 
+def _rests_on(car):
+    """Labels of the bogies and axles below a car."""
+    return [str(label) for label in car.only("type", "rests_on", "centre").listed("rests_on").values()]
+
+
+def _kind(p, table, entry, keys):
+    """The type of a car, bogie or axle: its values in ``table``."""
+    return p.part(table).part(str(entry["type"])).only(*keys)
+
+
 def _add_carrier(p, kind, entry, offset, bodies, suspensions, wheels):
     """Add a bogie or axle; returns its body and the half of the springs on top of it."""
     place = offset + entry.number("centre", "m")
     if kind == "axle":
-        values = {name: p["axle_types"][str(entry["type"])].number(name, unit) for name, unit in AXLE_UNITS.items()}
+        table = _kind(p, "axle_types", entry, AXLE_UNITS)
+        values = {name: table.number(name, unit) for name, unit in AXLE_UNITS.items()}
         wheels.append(len(bodies))
         bodies.append(Body("wheel", 0.5 * values["wheelset_mass"], None, place))
         return len(bodies) - 1, 0.5 * values["suspension_stiffness"], 0.5 * values["suspension_damping"]
-    table = p["bogie_types"][str(entry["type"])]
+    table = _kind(p, "bogie_types", entry, (*BOGIE_UNITS, "axles"))
     values = {name: table.number(name, unit) for name, unit in BOGIE_UNITS.items()}
     bogie = len(bodies)
     bodies.append(Body("bogie", 0.5 * values["mass"], 0.5 * values["inertia"], place))
-    for side in np.linspace(-0.5, 0.5, int(table.get("axles", 2))):
+    for side in np.linspace(-0.5, 0.5, table.count("axles", 2)):
         lever = side * values["base"]
         suspensions.append(
             Suspension(bogie, len(bodies), lever, 0.5 * values["primary_stiffness"], 0.5 * values["primary_damping"])

@@ -20,6 +20,9 @@ class Dip:
     depth: float
     length: float
 
+    def __post_init__(self):
+        _check_length("dip", self.place, self.length)
+
     def __call__(self, x, wheel=0):
         return self.depth * np.exp(-np.abs(np.asarray(x) - self.place) / self.length)
 
@@ -31,6 +34,9 @@ class Cosine:
     place: float
     depth: float
     length: float
+
+    def __post_init__(self):
+        _check_length("cosine", self.place, self.length)
 
     def __call__(self, x, wheel=0):
         part = np.clip((np.asarray(x) - self.place) / self.length, -0.5, 0.5)
@@ -53,6 +59,11 @@ class Kink:
     depth: float
     length: float
     share: float = 0.5
+
+    def __post_init__(self):
+        _check_length("kink", self.place, self.length)
+        if not 0.0 < self.share < 1.0:
+            raise SimulationError(f"kink at {self.place:.3f} m: share {self.share!r} is not between 0 and 1.")
 
     @property
     def angle(self):
@@ -95,6 +106,9 @@ class Corrugation:
     end: float
     amplitude: float
     wavelength: float
+
+    def __post_init__(self):
+        _check_length("corrugation", self.start, self.wavelength)
 
     def __call__(self, x, wheel=0):
         x = np.asarray(x, dtype=float)
@@ -165,6 +179,11 @@ class Sampled:
 
     def __call__(self, x, wheel=0):
         return uniform_spline(self.dip, self.start, self.step, x)
+
+
+def _check_length(kind, place, length):
+    if not length > 0.0:
+        raise SimulationError(f"{kind} at {place:.3f} m: a length of {length!r} m is none.")
 
 
 def check_path(parts, start, end, step=0.005, limit=1e-3):

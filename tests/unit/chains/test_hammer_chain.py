@@ -88,6 +88,41 @@ def test_one_dead_channel_costs_one_file_and_says_what_to_do(tmp_path):
     assert rows["models"][0]["status"] == "accepted" and len(rows["impacts"]) == 20
 
 
+def test_a_blow_that_the_modes_do_not_describe_is_rejected_in_its_row_and_in_all_that_is_counted(tmp_path):
+    """A resonance of 1350 Hz at half of the peak rings in one blow of ten alone: it was struck elsewhere, or loose."""
+
+    def change(_, recordings):
+        first = recordings[0]
+        samples, row = first.samples.copy(), first.index(next(c.name for c in first.channels if c.quantity != "force"))
+        top = int(np.argmax(np.abs(samples[row])))
+        t = np.arange(samples.shape[1] - top) / first.rate
+        ring = 0.5 * np.abs(samples[row]).max() * np.exp(-60.0 * t) * np.sin(2 * np.pi * 1350.0 * t)
+        samples[row, top:] += ring
+        return [replace(first, samples=samples), *recordings[1:]]
+
+    unit, turnout, _ = lay_out(tmp_path, "A7", n_test=1, change=change)
+    rows = hammer_unit(unit, turnout, tmp_path, algo="1")
+    odd = [i for i in rows["impacts"] if i["record"] == 0]
+    assert [(i["status"], i["reason"]) for i in odd] == [("rejected", "odd_one_out")]
+    used = {i["impact_id"] for i in rows["impacts"] if i["status"] == "accepted"}
+    (model,) = rows["models"]
+    assert (model["n_impacts_used"], model["n_impacts_rejected"]) == (len(used), 10 - len(used))
+    assert {r["n_impacts"] for r in (*rows["modes"], *rows["receptances"])} == {len(used)}
+    assert {r["impact_id"] for r in rows["impact_modes"]} == used
+
+
+def test_rates_that_differ_in_the_digits_of_a_printed_clock_are_one_rate(tmp_path):
+    rates = iter([20000.0, 20000.000000004, 20000.0000013])
+    unit, turnout, _ = lay_out(
+        tmp_path, "A7", change=lambda _, rs: (lambda r: [replace(x, rate=r) for x in rs])(next(rates))
+    )
+    said = dict(turnout.hammer.descriptions) | {"A7": replace(turnout.hammer.descriptions["A7"], rate=None)}
+    turnout = replace(turnout, hammer=replace(turnout.hammer, descriptions=said))
+    rows = hammer_unit(unit, turnout, tmp_path, algo="1")
+    assert rows["quarantine"] == [] and len(rows["impacts"]) == 30
+    assert rows["models"][0]["sampling_rate_hz"] == pytest.approx(20000.0, rel=1e-9)
+
+
 def test_a_reversed_force_is_named(tmp_path):
     from turnout.demo import faults
 

@@ -16,7 +16,7 @@ from turnout.chains.accepted_terms import OF_A_WHEELSET, Accepted, accepted_of, 
 from turnout.chains.guided_case import GuidedCase
 from turnout.chains.mismatch_context import digest_of_model
 from turnout.chains.mismatch_groups import Group
-from turnout.errors import SimulationError
+from turnout.errors import SimulationError, TurnoutError
 from turnout.mismatch.track import TrackCase
 from turnout.mismatch.track.planned import measured_campaign, small_plan
 from turnout.simulate import load_track, simulate_hammer
@@ -161,11 +161,11 @@ def test_an_entry_by_hand_that_makes_no_sense_is_named(config):
     for changed, said in (
         (text.replace("term: hanging_sleeper", "term: hanging"), "no effect"),
         (text.replace("    gap:", "    depth:"), "has no 'depth'"),
-        (text.replace("    gap:", "    route: siding\n    gap:"), "no route 'siding'"),
+        (text.replace("    gap:", "    route: siding\n    gap:"), "'siding' is no route"),
         (without, "needs gap"),
     ):
         path.write_text(changed)
-        with pytest.raises(SimulationError, match=said):
+        with pytest.raises(TurnoutError, match=said):
             accepted_of(own(config).terms)
 
 

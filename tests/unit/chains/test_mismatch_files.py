@@ -13,8 +13,8 @@ from turnout.chains import mismatch, mismatch_gather
 from turnout.chains.accept import with_entry
 from turnout.chains.accepted_terms import Accepted
 from turnout.chains.mismatch_context import digest_of_model, track_of
-from turnout.chains.mismatch_gather import MOST_ALIKE, Gathered, _channels_of, _thin_out
-from turnout.chains.mismatch_groups import groups, telling
+from turnout.chains.mismatch_gather import MOST_ALIKE, Gathered, _channels_of, _thin_out, gather
+from turnout.chains.mismatch_groups import _neighbours, groups, telling
 from turnout.chains.mismatch_results import Results, diagnose_turnout
 from turnout.chains.mismatch_trains import train_of
 from turnout.chains.mismatch_visits import unit_of
@@ -23,11 +23,14 @@ from turnout.config import load_configuration, with_raw
 from turnout.errors import SimulationError
 from turnout.fleet.batches import encode
 from turnout.fleet.scan import scan
+from turnout.mismatch.case import Nuisance
 from turnout.mismatch.track import HammerTest, Passage, TrackCase
+from turnout.mismatch.track.base_model import vehicle_with
 from turnout.mismatch.track.planned import measured_campaign, small_plan
-from turnout.mismatch.track.rolling import rolling_of
-from turnout.readers import read
+from turnout.mismatch.track.rolling import FEWEST, Rolling, observed, rolling_nuisances, rolling_of
+from turnout.readers import HELD, read
 from turnout.readers.writing import write
+from turnout.simulate import load_vehicle
 
 
 @pytest.fixture
@@ -70,6 +73,23 @@ def test_bangs_between_the_axles_do_not_tell_the_speed(repository):
     for heard, speed in ((6, 25.0), (8, 74.0 / 3.6)):
         row = {"train_type": "ic3", "n_axles": heard, "speed_kmh": 74.0}
         assert train(row, said, repository).speed == pytest.approx(speed)
+
+
+@pytest.mark.parametrize("known", [{"axle_load_t": 14.0}, {"load_share": 0.4}, {}])
+def test_a_load_that_nobody_knows_is_as_open_as_from_empty_to_full(repository, known):
+    """Uniform between: its standard deviation is half of the way over the root of 3. Known loads are known to 5 %."""
+    folder = repository / "config/vehicles"
+    row = {"train_type": "freight", "n_axles": None} | {k: v for k, v in known.items() if k == "axle_load_t"}
+    found = train(row, {k: v for k, v in known.items() if k == "load_share"}, repository)
+    passage = Passage("p", None, found.vehicle, found.speed, load_sd=found.load_sd)
+    load = next(n for n in rolling_nuisances(passage) if n.name == "load@p")
+    if known:
+        assert load == Nuisance("load@p", "-", 0.0, 0.05, "p")
+        return
+    half, full = (load_vehicle("freight", share, folder) for share in (0.5, 1.0))
+    heavier = vehicle_with(half, {}, "freight", np.sqrt(3.0) * load.sd)  # as far as the assumption goes
+    assert np.sum(heavier.static_loads) == pytest.approx(np.sum(full.static_loads), rel=1e-6)
+    assert load.sd > 0.2 and load.bounds == (-2.0 * load.sd, 2.0 * load.sd)
 
 
 def test_swapped_channels_are_two():
@@ -239,6 +259,34 @@ def test_a_note_of_this_group_is_not_cut_off_by_those_of_others():
     assert _of_visit({"notes": notes}, campaign)[:2] == ["passage 17: load not known", "section C: elsewhere"]
 
 
+def test_notes_that_are_cut_off_are_counted():
+    from turnout.chains.mismatch_rows import NOTES_KEPT, _kept
+
+    notes = [f"note {k}" for k in range(NOTES_KEPT + 3)]
+    assert _kept(notes) == [*notes[:NOTES_KEPT], "and 3 more"]
+    assert _kept(notes[:NOTES_KEPT]) == notes[:NOTES_KEPT]
+
+
+def test_a_passage_of_the_fewest_samples_is_an_observation():
+    """Fewer than those over which its amplitude is taken: then it is taken over all of them."""
+    rng, time = np.random.default_rng(0), np.arange(FEWEST) / 300.0
+    vehicle = SimpleNamespace(wheel_places=np.zeros(1), static_loads=[1e5])
+    passage = Passage("p", None, vehicle, 30.0, "x")
+    sensors = tuple(SimpleNamespace(name=f"S{k}", place=0.6 * k) for k in range(2))
+    data = rng.normal(size=(2, FEWEST))
+    found = observed(Rolling("p", passage, sensors, time, 0.04, 30.0), data, np.zeros(2), 0.06)
+    assert found.data.size == 2 * FEWEST and np.all(found.sigma > 0.02 * np.std(data, axis=1).min())
+
+
+def test_sections_that_are_asked_for_are_diagnosed_together():
+    """13 m apart they are two groups of a turnout, and one where somebody asks for just these."""
+    places = {"A": 2.0, "B": 15.0, "C": 40.0}
+    sections = [SimpleNamespace(label=n, position=x, track="main") for n, x in places.items()]
+    turnout = SimpleNamespace(sections=sections)
+    assert list(_neighbours(turnout, ())) == [("main", ("A",)), ("main", ("B",)), ("main", ("C",))]
+    assert list(_neighbours(turnout, ("A", "B"))) == [("main", ("A", "B"))]
+
+
 def test_a_month_of_trains_keeps_the_extremes_of_speed_of_each():
     """Those that a case would choose of all of them are chosen of what is kept."""
     rng, passages, every = np.random.default_rng(1), [], []
@@ -253,8 +301,9 @@ def test_a_month_of_trains_keeps_the_extremes_of_speed_of_each():
     assert {p.name for p in telling(passages)} == {p.name for p in telling(every)}
 
 
-def test_a_logger_that_never_stops_gives_its_trains(folder):
-    """Two trains in one file, 70 s of nothing between and about them: both are used, each as its own."""
+@pytest.fixture
+def logged(folder):
+    """Two trains in one file, 70 s of nothing between and about them."""
     small.roll(folder, speeds=(80.0, 110.0), vehicle="locomotive")
     files = sorted((folder / "raw/t1/passages").iterdir())
     turnout = turnout_in(folder)
@@ -269,5 +318,33 @@ def test_a_logger_that_never_stops_gives_its_trains(folder):
         file.unlink()
     noted = {k: v for k, v in parts[0].conditions.items() if k == "train_type"}
     write([replace(parts[0], samples=samples, conditions=noted)], files[0], "hdf5", single=True)
-    (row,) = diagnose_turnout("t1")["mismatch_findings"]
-    assert row["n_passages"] == 2, row["notes"]
+    return folder
+
+
+def gathered(folder):
+    turnout = turnout_in(folder)
+    units = [u for u in scan(turnout, folder / "raw").units if u.kind == "passage"]
+    return gather(units, turnout, folder / "raw", track_of(turnout)[0], {})
+
+
+@pytest.mark.parametrize("held", [HELD, 0])
+def test_a_logger_that_never_stops_gives_its_trains(logged, monkeypatch, held):
+    """Both are used, each as its own; also of a file so large that it is not read as a whole."""
+    monkeypatch.setattr(mismatch_gather, "read", partial(read, held=held))
+    found = gathered(logged)
+    assert [round(3.6 * p.speed, -1) for p in found.passages] == [80.0, 110.0], found.notes
+    assert len({p.name for p in found.passages}) == 2 and not [n for n in found.notes if "trains in it" in n]
+
+
+def test_rows_that_may_be_those_of_other_trains_are_not_used_and_that_is_said(logged, monkeypatch):
+    """The passage stage lost the first of two: its only row would give either train the other's speed and load."""
+    plain = mismatch_gather.passage_unit
+
+    def lost(*arguments, **more):
+        tables = plain(*arguments, **more)
+        return {**tables, "passages": tables["passages"][1:]}
+
+    monkeypatch.setattr(mismatch_gather, "passage_unit", lost)
+    found = gathered(logged)
+    assert not found.passages and len([n for n in found.notes if "speed is not known" in n]) == 2
+    assert [n for n in found.notes if "2 trains in it, 1 where passages were analysed" in n]

@@ -40,15 +40,23 @@ def test_a_signal_ends_the_run_and_its_jobs(tmp_path, number):
     )
     night = [sys.executable, "-m", "turnout.cli", "nightly"]
     path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
-    run = subprocess.Popen(night, cwd=tmp_path, env=os.environ | {"PYTHONPATH": path}, stderr=subprocess.PIPE)
+    run = subprocess.Popen(
+        night, cwd=tmp_path, env=os.environ | {"PYTHONPATH": path}, stderr=subprocess.PIPE, preexec_fn=_listens
+    )
     pids = tmp_path / "pids"
     while not pids.exists() or len(pids.read_text().splitlines()) < 2:
         assert run.poll() is None, run.stderr.read()
         time.sleep(0.1)
     run.send_signal(number)
-    assert run.wait() == 128 + number and run.stderr.read() == b""
+    assert run.wait(60) == 128 + number and run.stderr.read() == b""
     for pid in map(int, pids.read_text().split()):
         assert not _lives(pid)
+
+
+def _listens():
+    """What is started in the background, as a suite may be, ignores what its terminal sends."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
 
 
 def _lives(pid):

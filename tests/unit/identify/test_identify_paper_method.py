@@ -96,3 +96,14 @@ def test_one_blow_has_no_standard_error():
     for mode in model.modes:
         assert (mode.frequency_se, mode.damping_se, mode.frequency_low, mode.damping_high) == (None,) * 4
     assert all(row["frequency_se"] is None and row["damping_se"] is None for row in model.per_impact)
+
+
+def test_the_spread_of_blows_is_theirs_and_no_blow_has_an_error_of_its_own():
+    """The procedure states no error: what blows differ by is all spread, never none."""
+    _, model = paper("CP A7", spread=0.02)
+    for mode in model.modes:
+        own = [row for row in model.per_impact if row["band"] == mode.band]
+        assert {row["frequency_se"] for row in own} == {None}
+        logs = np.log([row["frequency"] for row in own])
+        assert mode.frequency_sd / mode.frequency == pytest.approx(logs.std(ddof=1), rel=1e-6)
+        assert mode.frequency_se == pytest.approx(mode.frequency_sd / np.sqrt(len(own)), rel=1e-6)

@@ -50,12 +50,11 @@ class _Still:
 def test_repeated_tests_find_the_same_modes_or_say_that_they_cannot(section):
     """Neither drift nor weak modes take the place of the ballast mode in one test and not in the next."""
     models = [identify(test_of_ten_blows(section, [3, k]), RATE, SETTINGS) for k in range(3)]
-    assert all(m.diagnostics["drift_degree"] < 0 for m in models)
     for band in ("ballast", "railpad"):
         found = [m.mode(band) for m in models if m.mode(band) is not None]
         frequency = np.array([mode.frequency for mode in found])
-        # Another mode would be off by 30 % or more; ten blows know the ballast mode to at most 5 %.
-        assert np.ptp(frequency) < 0.15 * frequency.mean()
+        # Another mode would be off by 30 % or more; ten blows know the ballast mode to some 2 %.
+        assert np.ptp(frequency) < 0.06 * frequency.mean()
         assert len(found) >= 2
         for model in models:
             doubts = [m["reason"] for m in model.rejected_modes if "uncertain" in m["reason"]]

@@ -79,6 +79,18 @@ def test_a_reserved_recording_that_is_not_there_is_named(plan):
         TrackCase(replace(campaign, reserved=(campaign.hammer[0].name,)))
 
 
+def test_fits_start_from_tests_that_are_not_kept_back(plan):
+    """What a reserved test shows does not matter, be it three times as much."""
+    campaign, starts = measured_campaign(replace(plan, blows=plan.blows[:2]), seed=1), []
+    kept = campaign.hammer[1]
+    for factor in (1.0, 3.0):
+        size = [[1.0 if c.name == kept.force else factor] for c in kept.recordings[0].channels]
+        louder = tuple(replace(r, samples=np.array(size) * r.samples) for r in kept.recordings)
+        struck = (campaign.hammer[0], replace(kept, recordings=louder))
+        starts.append(TrackCase(replace(campaign, hammer=struck, reserved=(kept.name,)), families=()).start_values)
+    assert starts[0] == starts[1] and any(starts[0].values())
+
+
 def test_channels_without_blows_are_left_out_and_said(plan):
     campaign = measured_campaign(replace(plan, blows=plan.blows[:2]), seed=1)
     silent = replace(campaign.hammer[0], recordings=campaign.hammer[0].recordings[:1])

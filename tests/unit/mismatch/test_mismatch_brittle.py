@@ -103,4 +103,4 @@ def test_wheels_that_were_never_heard_are_not_called_polygonal():
     z, apart = louder([nothing], np.arange(20, 40), np.exp(-0.04 * np.arange(60)))
     assert apart == 0 and np.all(np.isneginf(z)) and z.shape == (4, 20)
     slow = SimpleNamespace(speed=30.0, passage=SimpleNamespace(recording=SimpleNamespace(rate=100.0)))
-    assert short_polygons(SimpleNamespace(rollings={"a": slow}, reserved=()), None) == ()
+    assert short_polygons(SimpleNamespace(fitted=lambda: [slow]), None) == ()

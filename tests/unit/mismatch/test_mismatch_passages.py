@@ -8,10 +8,11 @@ import pytest
 
 from turnout import physics
 from turnout.config.settings.mismatch import MismatchSettings
+from turnout.errors import SimulationError
 from turnout.mismatch import diagnose
 from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.scoring import judged
-from turnout.mismatch.track import TrackCase
+from turnout.mismatch.track import TrackCase, rolling
 from turnout.mismatch.track.alignment import ALIKE, align
 from turnout.mismatch.track.flats import flats
 from turnout.mismatch.track.planned import measured_campaign, small_plan
@@ -174,13 +175,28 @@ def test_a_train_that_looks_like_no_such_train_is_said_and_located(plan):
     assert case.foreign == ("heavy",) and len([n for n in case.notes if "likeness" in n]) == 2
     verdict, _ = judged(case, SimpleNamespace(level={"passage": 0.1}, white=[]), (), MismatchSettings())
     assert verdict.answer == "unknown" and "heavy" in verdict.reason
-    where = whereabouts(case, None)
+    where = whereabouts(case, None, cause=verdict.cause)
     assert where.frame == "train" and where.train == "heavy"
     one = [p for p in campaign.passages if p.train == "light"] + [p for p in swapped if p.train == "heavy"][:1]
     assert TrackCase(replace(campaign, passages=tuple(one))).foreign == ()  # one passage may be another train
     sound = [replace(p, name=f"{p.name} again") for p in campaign.passages if p.train == "heavy"][:1]
     most = TrackCase(replace(campaign, passages=(*swapped, *sound)))
     assert most.foreign == ("heavy",)  # a polygon that lifts its wheels is heard at some speeds and not at others
+
+
+def test_a_train_that_could_not_be_looked_at_is_no_train_of_another_file(sound, monkeypatch):
+    """Recordings that end too early, or have too few samples, are no word on the wheels that came: no alarm."""
+    plain = rolling.rolling_of
+
+    def cut_short(passage, *more):
+        if passage.train == "heavy":
+            raise SimulationError("the train lies outside the recording")
+        return plain(passage, *more)
+
+    monkeypatch.setattr(rolling, "rolling_of", cut_short)
+    case = TrackCase(sound[0].campaign, families=())
+    assert len([n for n in case.notes if "outside the recording" in n]) == 2
+    assert case.rollings and case.foreign == ()
 
 
 @pytest.mark.parametrize(("behind", "offered"), [(2.9, [3, 1]), (3.1, [3])])

@@ -9,7 +9,7 @@ import pytest
 from turnout import physics
 from turnout.mismatch.track import TrackCase
 from turnout.mismatch.track.planned import measured_campaign, small_plan
-from turnout.mismatch.track.short_waves import LOUD, SPREAD, Loud, evidence, short_waves
+from turnout.mismatch.track.short_waves import LOUD, SPREAD, Loud, _holds, evidence, short_waves
 from turnout.simulate.wheel_path import Corrugation
 
 
@@ -65,6 +65,16 @@ def test_corrugation_in_the_tracks_file_is_not_found_again():
     campaign = replace(measured_campaign(plan, (true,), 7), turnout=known.turnout)
     case = TrackCase(campaign)
     assert short_waves(case, SimpleNamespace(candidates=(), values={n.name: n.mean for n in case.nuisances})) == ()
+
+
+def test_what_one_half_of_the_passages_does_not_show_is_no_finding():
+    """By the line in each; where an equal wave is in all it holds."""
+
+    def seen(*levels):
+        return [Loud("p", "t", 30.0, np.exp(np.full((2, 1), x)), np.ones((2, 1)), np.ones(2, bool)) for x in levels]
+
+    assert _holds(seen(2.0, 1.5, 1.8, 1.2), 0)
+    assert not _holds(seen(2.0, 0.4, 1.8, 0.5), 0) and not _holds(seen(0.4, 2.0, 0.5, 1.8), 0)
 
 
 def test_the_evidence_is_that_of_a_loudness_integrated_out():

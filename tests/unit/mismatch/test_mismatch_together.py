@@ -5,15 +5,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from turnout.chains.mismatch_rows import _evidence
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch import diagnose
 from turnout.mismatch.candidate import Candidate
 from turnout.mismatch.case import Case, Nuisance
+from turnout.mismatch.diagnose import _as_it_ends
 from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.observation import Observation
 from turnout.mismatch.scout import _seen
-from turnout.mismatch.shortlist import Projector
-from turnout.mismatch.verdict import Score, judge, opened
+from turnout.mismatch.shortlist import Projector, _same_place
+from turnout.mismatch.verdict import Score, Verdict, judge, opened
 from turnout.physics import Parameter
 
 AMOUNT = (Parameter("amount", "-", 0.0, (-9.0, 9.0), "share of a shape", "made up 2026"),)
@@ -50,6 +52,21 @@ def test_an_effect_that_no_name_fits_keeps_the_first_one_refused_too():
     found = diagnose(Shapes(("wave", "ramp", "bowl"), ripple=1.5, ramp=2.5))
     assert found.verdict.answer == "unknown" and not found.names
     assert found.fit is found.base
+
+
+def test_what_shows_beside_a_name_and_gets_none_is_told():
+    """A ripple that no candidate has takes nothing from the ramp, but with the ramp not all is said."""
+    found = diagnose(Shapes(("wave", "ramp"), ramp=2.5, ripple=0.12))
+    assert found.names == ("ramp",) and found.verdict.grade == "B"
+    assert found.verdict.reason.startswith("something else shows beside it")
+    assert diagnose(Shapes(("wave", "ramp"), ramp=2.5)).verdict.reason == ""
+
+
+def test_a_name_is_graded_by_what_the_last_fit_leaves():
+    """Alone the ramp leaves twice the level of controls; with the wave no more than they do."""
+    found = diagnose(Shapes(("wave", "ramp"), ramp=2.5, wave=0.2))
+    assert [(v.names, v.grade) for v in found.verdicts] == [(("ramp",), "A"), (("wave",), "A")]
+    assert found.probability == min(v.probability for v in found.verdicts)
 
 
 class Trains(Shapes):
@@ -149,3 +166,35 @@ def test_a_gap_that_no_train_closes_may_be_no_ballast_at_all(error, names):
     verdict = opened(judge([own(gap, [2.5e-3, 0.04], [error, 0.01])], 2.0, settings), settings)
     assert verdict.names == names and verdict.answer == ("named" if len(names) == 1 else "a_or_b")
     assert bool(verdict.grade) == (len(names) == 1) and verdict.probability > 0.9
+
+
+@pytest.mark.parametrize("error, answer", [(3e-3, "a_or_b"), (1e-4, "named")])
+def test_a_second_gap_that_no_train_closes_may_be_no_ballast_either(error, answer):
+    """Sure of its size when it was named, not in the fit with both."""
+    settings = MismatchSettings()
+    gap = Candidate("hanging_sleeper", GAP, lambda p: p, ((1e-3, 0.0),), {"place": 4.2}, open_as="local_ballast")
+    second = judge([own(gap, [2.5e-3, 0.04], [1e-4, 0.01])], 2.0, settings)
+    both = SimpleNamespace(
+        psi=np.array([0.3, 2.5e-3, 0.04]), psi_se=np.array([0.02, error, 0.01]), part=lambda _: slice(1, 3),
+        level={"passage": 0.8}, white=[],
+    )  # fmt: skip
+    case = SimpleNamespace(control_level={"passage": 0.7}, cell_level={}, observations=())
+    stated = _as_it_ends(second, case, both, settings)
+    assert (stated.answer, stated.grade) == (answer, "B" if answer == "named" else "")
+
+
+def test_a_second_of_a_kind_two_bays_on_is_the_shape_of_the_first():
+    def at(family, place):
+        return Candidate(family, FACTOR, lambda p: p, ((0.4,),), {"place": place})
+
+    first = at("local_ballast", 4.2)
+    assert _same_place(at("local_ballast", 5.4), first) and not _same_place(at("local_pad", 5.4), first)
+    assert not _same_place(at("local_ballast", 6.0), first) and _same_place(at("local_pad", 4.8), first)
+
+
+def test_the_evidence_of_a_row_has_an_entry_for_each_verdict():
+    rows = (("a", 0.97, "x"), ("b", 0.7, "y"))
+    first, second = (Verdict("named", (n,), "A", p, reason=r) for n, p, r in rows)
+    said = _evidence(SimpleNamespace(verdicts=(first, second), frames=()))
+    assert (said["term"], said["probability"], said["reason"]) == ("a", 0.97, "x")
+    assert [(e["term"], e["probability"], e["reason"]) for e in said["beside"]] == [("b", 0.7, "y")]

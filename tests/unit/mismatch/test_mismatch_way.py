@@ -11,6 +11,7 @@ from turnout.mismatch.case import Case, Nuisance
 from turnout.mismatch.joint import FINE, STALL, fit_jointly
 from turnout.mismatch.observation import Observation
 from turnout.mismatch.track.rolling import BLURRED, Rolling, _topped, observed
+from turnout.mismatch.verdict import Score
 from turnout.records import Channel, Recording
 
 
@@ -64,8 +65,22 @@ def test_what_comes_near_a_name_is_fitted_to_its_end_as_leaders_are(monkeypatch,
     monkeypatch.setattr(refits, "_tried", lambda *a: score)
     monkeypatch.setattr(refits, "_polished", lambda *a: asked.append(a) or score)
     monkeypatch.setattr(refits, "_checked", lambda case, fit, s: s)
+    monkeypatch.setattr(refits, "_owed", lambda case, fit, ranked, *a: ranked)
     refits.scored(Bent(True), None, MismatchSettings(), lambda *a: None, {}, 0, None)
     assert len(asked) == ended
+
+
+def test_what_the_fit_without_an_effect_had_not_come_to_is_no_evidence_for_the_effect():
+    """A leader with 20 nats of its own, fitted to its end, on top of a fit that had stopped long before: from the
+    leader's nuisances that one comes to its end as well, and what it owed goes off."""
+    early, late = (fit_jointly(Bent(True), iterations=25, stall=s) for s in (20.0, FINE))
+    owed = late.evidence - early.evidence
+    assert owed > MismatchSettings().threshold
+    scores = [Score(SimpleNamespace(key=k), owed + g, 0.0, 1.0, late) for k, g in (("a", 20.0), ("b", 3.0))]
+    found = refits._owed(Bent(True), early, scores, MismatchSettings(), {}, 0)
+    assert [s.gain for s in found] == pytest.approx([20.0, 3.0], abs=0.5)
+    silent = [Score(SimpleNamespace(key="a"), 11.0, 0.0, 1.0, late)]
+    assert refits._owed(Bent(True), early, silent, MismatchSettings(), {}, 0) == silent  # nobody is named: not asked
 
 
 def test_where_a_channel_was_at_its_range_the_passage_says_no_more_than_its_size():

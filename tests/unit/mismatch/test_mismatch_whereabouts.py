@@ -154,8 +154,25 @@ def test_another_train_makes_an_unknown_of_nothing_else():
     settings = MismatchSettings()
     assert judge([], 0.5, settings).answer == "none"
     verdict = judge([], 0.5, settings, disturbed=True)
-    assert verdict.answer == "unknown"
+    assert (verdict.answer, verdict.cause) == ("unknown", "clock")
     assert verdict.probability > judge([], 5.0, settings).probability
+
+
+def test_recordings_that_were_not_fitted_say_where_only_if_they_are_the_reason():
+    """What the sensors show beyond controls is in the recordings that were fitted: a force at a place, whatever shook
+    the sensors in another one, and whoever came in a third."""
+    rng, settings = np.random.default_rng(8), MismatchSettings()
+    case = Places(0.5 * rng.normal(size=(3, 40)) + 4.0 * np.outer([0.2, 0.5, 1.0], rng.normal(size=40)))
+    case.disturbed, case.foreign = (quiet.Disturbance("p7", "before", 16.0, 1e-9),), ("freight",)
+    fit = fit_jointly(case)
+    for disturbed, foreign in ((True, ()), (False, ("freight",))):
+        verdict = judge([], 5.0, settings, disturbed=disturbed, foreign=foreign)
+        assert (verdict.answer, verdict.cause) == ("unknown", "")
+        assert verdict.probability == judge([], 5.0, settings).probability
+        assert whereabouts(case, fit, None, verdict.cause).place == 2.0
+    assert judge([], 0.5, settings, foreign=("freight",)).cause == "train"
+    assert whereabouts(case, fit, None, "clock").frame == "clock"
+    assert whereabouts(case, fit, None, "train").train == "freight"
 
 
 def test_passages_with_different_sensors_are_compared_by_those_they_share():

@@ -1,5 +1,7 @@
 """Each term against a closed form or a published number of its own."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -75,6 +77,25 @@ def test_ballast_inertia_is_a_heavier_and_more_damped_sleeper():
     other = TRACK.with_(sleeper_mass=350.0, ballast_damping=110e3)
     expected = receptance(assemble(other), F, 12.0, 12.0)
     assert np.allclose(with_term(physics.BallastInertia(200.0, 30e3)), expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("layers", [2, 3])
+def test_a_track_that_radiates_less_takes_power_at_every_point(layers):
+    """A passive structure takes power wherever it is shaken: Im H < 0 at every driving point. 8 kN s/m, less 30."""
+    subgrade = {"ballast_mass": 300.0, "subgrade_stiffness": 78e6, "subgrade_damping": 8e3} if layers == 3 else {}
+    track = uniform_track(12.0, ballast_damping=8e3, layers=layers, **subgrade)
+    matrices = assemble(track, (physics.BallastInertia(50.0, -3e4),))
+    points = [(kind, j) for kind in ("rail", "sleeper") for j in range(21)]
+    rows = [matrices.index[point] for point in points]
+    driven = np.einsum("fii->fi", responses(matrices, np.linspace(20.0, 600.0, 30), points, rows))
+    assert np.max(driven.imag) < 0.0
+
+
+def test_radiation_with_three_layers_is_that_of_a_heavier_ballast_on_a_stronger_damper():
+    base = TRACK.with_(layers=3, ballast_mass=300.0, subgrade_stiffness=78e6, subgrade_damping=31e3)
+    other = base.with_(ballast_mass=500.0, subgrade_damping=61e3)
+    found = receptance(assemble(base, (physics.BallastInertia(200.0, 30e3),)), F, 12.0, 12.0)
+    assert np.allclose(found, receptance(assemble(other), F, 12.0, 12.0), rtol=1e-9)
 
 
 def test_a_sleeper_mode_far_above_the_band_adds_its_mass():
@@ -159,6 +180,17 @@ def test_a_sleeper_that_is_partly_seated_keeps_that_share_of_its_ballast_within_
         assert -90e6 * y - port.law.force(y) == pytest.approx(-0.3 * 90e6 * y)
     beyond = 0.3 * 90e6 * 1.5e-3 + 0.7 * 90e6 * 0.5e-3  # the rest joins where the gap closes
     assert -90e6 * 1.5e-3 - port.law.force(1.5e-3) == pytest.approx(-beyond)
+
+
+def test_ballast_under_sleepers_that_lift_presses_or_lets_go_in_every_state():
+    """What the sleeper feels is max(0, W + k y + c v) - W: above 0 with its load, however fast it leaves."""
+    position, velocity = np.meshgrid(np.linspace(-3e-4, 3e-4, 41), np.linspace(-0.3, 0.3, 31))
+    for term, share in ((physics.LiftingSleepers(0, 40, 1.0, 400.0), 1.0), (physics.LiftingSleepers(0, 40, 0.4), 0.4)):
+        for y, v in zip(position, velocity):
+            state = SimpleNamespace(track=TRACK, sleeper_position=y, sleeper_velocity=v)
+            linear = 90e6 * y + 80e3 * v
+            left = np.maximum(0.0, term.dead_load + linear) - term.dead_load
+            assert linear - term.force(state) == pytest.approx(share * left + (1.0 - share) * linear, abs=1e-6)
 
 
 def test_hardening_doubles_the_tangent_at_the_deflection_of_duffings_law():

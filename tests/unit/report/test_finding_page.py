@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 from jinja2 import Environment, PackageLoader
 
+from turnout.chains.accept import _refuse
 from turnout.chains.mismatch_words import headline
+from turnout.errors import SimulationError
 from turnout.report.finding_words import answer, check, facts, parameters
 from turnout.report.pages.finding import finding_page
 from turnout.report.panels.finding_place import Drawing, marked_place
@@ -131,7 +133,33 @@ def test_a_named_finding_says_what_where_how_much_and_what_to_check():
         assert words in text
     for fit in ("41 %", "78 %", "50 %", "43 %"):
         assert f">{fit}</text>" in text
-    assert "--accept" in text and "never used" in text
+    assert "--accept" in text and "never used" in text and "evidence [nats]" in text
+
+
+def test_what_shows_beside_a_name_stands_in_its_sentence():
+    reason = "something else shows beside it: above the level of controls, and no candidate helps"
+    row = named() | {"evidence_json": json.dumps(EVIDENCE | {"reason": reason})}
+    said = "hangs 1.1 mm above its ballast. Something else shows beside it: above the level of controls"
+    assert said in headline(row) and "above its ballast." in headline(named())
+
+
+PAD = {"term": "local_pad", "fixed": {"sleeper": 8.4}, "probability": 0.97,
+       "parameters": {"factor": {"value": 0.3, "se": 0.02, "unit": "-"}}}  # fmt: skip
+
+
+def test_of_two_effects_each_says_how_sure_it_is_and_what_else_it_may_be():
+    gap = GAP | {"probability": 0.8, "or": "local_ballast"}
+    first, second = ({"term": t["term"], "probability": t["probability"], "reason": ""} for t in (PAD, gap))
+    row = named(probability=0.8) | {
+        "term_json": json.dumps([PAD, gap]), "evidence_json": json.dumps(EVIDENCE | first | {"beside": [second]})
+    }  # fmt: skip
+    said = headline(row)
+    assert "at 8.4 m is 0.3 times as stiff" in said
+    assert said.endswith("above its ballast, or it is local ballast: these recordings cannot tell the two apart.")
+    sure = dict(facts(row))["How sure"]
+    assert sure.startswith("probability 0.80") and "local pad 0.97, hanging sleeper 0.80" in sure
+    with pytest.raises(SimulationError, match="hanging_sleeper may as well be local_ballast"):
+        _refuse(row, "t1", False)
 
 
 def test_axes_carry_their_units():

@@ -4,7 +4,17 @@ import numpy as np
 import pytest
 
 from turnout.errors import ConfigError, SimulationError
-from turnout.simulate import Sensor, car, load_track, load_vehicle, simulate_hammer, simulate_passage, uniform_track
+from turnout.physics import SensorPosition
+from turnout.simulate import (
+    Sensor,
+    car,
+    load_track,
+    load_vehicle,
+    prepare_passage,
+    simulate_hammer,
+    simulate_passage,
+    uniform_track,
+)
 from turnout.simulate.law import PowerLaw, TableLaw
 from turnout.simulate.link import Link
 from turnout.simulate.matrices import assemble
@@ -109,6 +119,10 @@ def test_a_body_on_nothing_is_refused():
         (lambda: simulate_passage(TRACK, car(), 30.0, SENSOR, "sideways"), "neither 'facing' nor 'trailing'"),
         (lambda: simulate_passage(TRACK, car(), 30.0, [Sensor("Z", 40.0)]), "'Z' at 40.000 m is outside"),
         (lambda: simulate_passage(TurnoutTrack(TRACK), car(), 30.0, SENSOR, route="siding"), "no route 'siding'"),
+        (
+            lambda: simulate_passage(TRACK, car(), 30.0, SENSOR, prepared=prepare_passage(TRACK, rate=10e3)),
+            r"for steps of 0\.0001 s, but 20000\.0 Hz with 1 per sample ask for 5e-05 s",
+        ),
         (lambda: simulate_hammer(TRACK, "A7"), "no location 'A7'"),
         (lambda: load_vehicle("tgv"), "no file config/vehicles/tgv.yaml; there are .*coach"),
         (lambda: load_vehicle("ic3", load=7.0), "load 7.0"),
@@ -137,3 +151,26 @@ def test_a_parameter_file_is_refused_with_file_and_place(tmp_path, text, said):
     with pytest.raises(ConfigError, match=said) as caught:
         load_vehicle(str(path))
     assert "wrong.yaml" in str(caught.value)
+
+
+@pytest.mark.parametrize(("direction", "place"), [("facing", 8.9), ("trailing", 15.1)])
+@pytest.mark.parametrize("mounting", ["rail web", "sleeper"])
+def test_a_sensor_where_wheels_are_not_yet_on_the_track_is_refused_with_both_limits(direction, place, mounting):
+    sensors = [*SENSOR, Sensor("B", place, mounting)]
+    with pytest.raises(SimulationError, match=rf"'B' at {place:.3f} m.* only between 9\.000 m and 15\.000 m"):
+        simulate_passage(TRACK, car(), 30.0, sensors, direction)
+
+
+def test_it_counts_where_a_sensor_really_sits():
+    with pytest.raises(SimulationError, match=r"'A' at 8\.900 m"):
+        simulate_passage(TRACK, car(), 30.0, [Sensor("A", 9.4)], terms=(SensorPosition("A", -0.5),))
+
+
+def test_a_sensor_at_the_limit_records_what_one_in_the_middle_does():
+    """A uniform track does not know where it is: the highest deflection under a wheel agrees to 1 %, the wheel's own
+    stand-in behind the limit; 3 m from the end it is a hundredth."""
+    sensors = [Sensor(name, x, quantity="displacement", cutoff=None) for name, x in zip("ABC", (9.0, 18.0, 27.0))]
+    wheel = lone_wheels(600.0, (0.0,), pressing=50e3)
+    track = uniform_track(36.0, end_length=9.0, end_damping=400.0)
+    peak = simulate_passage(track, wheel, 44.0, sensors, rate=10e3, lead=0.25, tail=0.1).samples.max(axis=1)
+    assert peak == pytest.approx(peak[1], rel=0.01)

@@ -5,6 +5,7 @@ from scipy.sparse import lil_array
 
 from turnout.mismatch.track import blows
 from turnout.mismatch.track.blow_model import tangent
+from turnout.simulate.additions import left, links_of
 
 
 class AddedLinks:
@@ -39,8 +40,9 @@ class AddedLinks:
 def _answers(model, conditions, chosen):
     """(ends (n_end, n), which end each link has, z / (1 + z g) of each (n_line, n_link), candidate of each link)."""
     omega, known, index, impedance, owner = 2.0 * np.pi * blows.LINES, {}, [], [], []
+    track = left(model.track, links_of(model.terms, model.track))
     for i, (c, k) in enumerate(chosen):
-        for ends, z in _impedances(model, c, c.term(c.starts[k]).under(conditions), omega):
+        for ends, z in _impedances(track, c, c.term(c.starts[k]).under(conditions), omega):
             index.append(known.setdefault(ends, len(known)))
             impedance.append(z)
             owner.append(i)
@@ -55,9 +57,9 @@ def _answers(model, conditions, chosen):
     return weights.tocsr(), index, z / (1.0 + z * own[:, index]), np.array(owner, dtype=int)
 
 
-def _impedances(model, candidate, term, omega):
+def _impedances(track, candidate, term, omega):
     """(ends, impedance (n_line,)) of every link that a term adds."""
     if candidate.family == "attached_resonator":
         return [(((("rail", candidate.where["sleeper"]), 1.0),), term.dynamic_stiffness(blows.LINES))]
-    links = [*term.links(model.track), *tangent((term,), model.track)]
+    links = [*term.links(track), *tangent((term,), track)]
     return [(tuple(m.ends), m.stiffness + 1j * omega * m.damping - omega**2 * m.mass) for m in links]

@@ -7,6 +7,7 @@ import numpy as np
 from turnout.mismatch.track.base_model import OWN
 from turnout.mismatch.track.blows import LINES
 from turnout.mismatch.track.skeleton import FixedLinks, matrices_of
+from turnout.simulate.additions import links_of, ports_of
 from turnout.simulate.frequency import responses
 from turnout.simulate.link import Link
 from turnout.simulate.matrices import link_vector
@@ -21,13 +22,12 @@ SHARE = 1e-3  # of a support's value, by which what follows it is found
 def tangent(terms, track):
     """Links of the terms' ports as a blow finds them: their secant over a micrometre and the rate that they leave."""
     found = []
-    for term in terms:
-        for port in term.ports(track):
-            law, d = port.law, -port.gap
-            k = (float(law.force(d + SWING, 0.0)) - float(law.force(d - SWING, 0.0))) / (2.0 * SWING)
-            rate = HELD + (FREE - HELD) * np.exp(-abs(_against(law, d, FREE)) / HOLDING)
-            c = _against(law, d, rate) / rate
-            found.append(Link(port.ends, k, c, tag="tangent"))
+    for port in ports_of(terms, track):
+        law, d = port.law, -port.gap
+        k = (float(law.force(d + SWING, 0.0)) - float(law.force(d - SWING, 0.0))) / (2.0 * SWING)
+        rate = HELD + (FREE - HELD) * np.exp(-abs(_against(law, d, FREE)) / HOLDING)
+        c = _against(law, d, rate) / rate
+        found.append(Link(port.ends, k, c, tag="tangent"))
     return found
 
 
@@ -114,4 +114,4 @@ class BlowModel:
     def links(self, terms, track=None):
         """Links of ``terms`` on this track or another, tangents of their ports behind."""
         track = track or self.track
-        return [*(link for term in terms for link in term.links(track)), *tangent(terms, track)]
+        return [*links_of(terms, track), *tangent(terms, track)]

@@ -7,6 +7,8 @@ from turnout.errors import SimulationError
 from turnout.records import Recording
 from turnout.simulate.sensor import Sensor
 
+LOAD_SD = 0.05  # of all that is sprung, where its load was measured or noted
+
 
 @dataclass(frozen=True)
 class HammerTest:
@@ -23,7 +25,8 @@ class HammerTest:
 
 @dataclass(frozen=True)
 class Passage:
-    """One train: ``vehicle`` of ``turnout.simulate``, ``speed`` [m/s] as noted, ``train`` its type or number."""
+    """One train: ``vehicle`` of ``turnout.simulate``, ``speed`` [m/s] as noted, ``train`` its type or number;
+    ``load_sd`` is the standard deviation of its sprung mass, as a share of the vehicle's."""
 
     name: str
     recording: Recording
@@ -33,12 +36,13 @@ class Passage:
     direction: str = "facing"
     route: str = "main"
     conditions: Mapping = field(default_factory=dict)
+    load_sd: float = LOAD_SD
 
 
 @dataclass(frozen=True)
 class Campaign:
     """``turnout`` a TurnoutTrack; ``sensors`` by name with place and mounting; ``reserved`` names of tests and
-    passages that only the verification reads."""
+    passages that no fit reads: they may withdraw a name, and verify it."""
 
     turnout: object
     sensors: tuple[Sensor, ...]

@@ -45,6 +45,7 @@ def passage_observations(case):
             continue
         reference, speed, likeness = alignment.align(passage, sensors, signals, case.solver.rate)
         if likeness < alignment.ALIKE:
+            case.unlike.append(passage)
             case.notes.append(
                 f"passage {passage.name}: likeness {likeness:.2f} with the simulation of "
                 f"{passage.train or 'its train'}; wrong vehicle file, wrong sensor places or another turnout"
@@ -86,12 +87,12 @@ def undisturbed(case, found):
 
 def foreign(case):
     """Trains of which more passages do not look like their vehicle file than do, though several came: another train's
-    do, or not all of its own are alike."""
-    came = Counter(p.train for p in case.campaign.passages if p.train)
+    do, or not all of its own are alike. What could not be looked at, or not simulated, says nothing of its train."""
+    unlike = Counter(p.train for p in case.unlike if p.train)
     known = Counter(case.said(made)["train"] for made in case.rollings.values())
     shaken = {d.name for d in case.disturbed}
     left = {p.train for p in case.campaign.passages if p.name in shaken}
-    return tuple(t for t, n in came.items() if known and n > 1 and n - known[t] > known[t] and t not in left)
+    return tuple(t for t, n in unlike.items() if known and n + known[t] > 1 and n > known[t] and t not in left)
 
 
 def _own_of(passage):

@@ -6,6 +6,7 @@ import numpy as np
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.track import bands, blows, roll, rolling
+from turnout.mismatch.track.campaign import LOAD_SD
 from turnout.mismatch.track.library import library
 from turnout.mismatch.track.rough_wheels import wheel_modes
 from turnout.mismatch.track.track_case import TrackCase
@@ -26,6 +27,7 @@ class Planned:
     conditions: object = None
     place: float = 0.0
     visit: str = ""
+    load_sd: float = LOAD_SD
 
 
 class PlannedCase(TrackCase):

@@ -8,6 +8,7 @@ from turnout.errors import SimulationError
 from turnout.mismatch.case import Nuisance
 from turnout.mismatch.observation import Observation
 from turnout.mismatch.track.bands import band_end, band_limited, clock_of, finer, limited, read_at
+from turnout.mismatch.track.campaign import LOAD_SD
 from turnout.mismatch.track.roll import EDGE
 
 # m, s, s: of what is heard as a channel's own noise; 4.2 m before a wheel it is that, 1.4 m before six times as loud
@@ -16,7 +17,9 @@ BLURRED = 0.03  # s about a sample at the range
 COUPLING = 0.7  # an amplifier's lower corner that no data sheet mentions [Hz]
 FINE = 2500.0  # samples per second between which a cubic reads 112 Hz to 0.03 %
 SLOWEST = 3.0  # samples in the shortest period of the band, whose edge ends at 1.25 times that: Nyquist asks for 2.5
-SPEED_SD, TIME_SD, LOAD_SD = 0.004, 1.5e-3, 0.05
+FEWEST, AROUND = 20, 31  # samples of a passage, and those over which its amplitude is taken
+SPEED_SD, TIME_SD = 0.004, 1.5e-3
+ASSUMED = 2.0  # prior sd of a load that nobody knows, between which it lies: a seventh beyond empty and full
 
 
 @dataclass(frozen=True)
@@ -66,7 +69,7 @@ def rolling_of(passage, sensors, reference, speed, tolerance):
     stop = reference + duration_of(passage, speed, sensors) + EDGE
     step = 1.0 / clock_of(speed)
     time = np.arange(max(0.0, reference - EDGE), min(stop, recording.duration - 0.01), step)
-    if time.size < 20:
+    if time.size < FEWEST:
         raise SimulationError("the train lies outside the recording")
     if recording.rate < SLOWEST * band_end(speed):
         raise SimulationError(f"{recording.rate:g} samples per second are too few for {band_end(speed):.0f} Hz")
@@ -105,7 +108,8 @@ def _topped(recording, sensors, time):
 def observed(rolling, data, noise, tolerance, topped=None):
     """Observation of (n_sensor, n) samples with ``noise`` (n_sensor,) and a materiality floor; where ``topped`` they
     say no more than their own size."""
-    wide = np.array([np.convolve(row**2, np.ones(31) / 31, mode="same") for row in data])
+    width = min(AROUND, data.shape[1])
+    wide = np.array([np.convolve(row**2, np.ones(width) / width, mode="same") for row in data])
     floor = 0.02 * np.sqrt(np.mean(data**2, axis=1)) + 1e-9
     sigma = np.sqrt((noise**2 + floor**2)[:, None] + tolerance**2 * wide)
     if topped is not None and topped.any():
@@ -160,5 +164,10 @@ def _cells(rolling):
 
 def rolling_nuisances(passage):
     """Time, speed and load of one passage; owned by all its sensors, so named by the passage."""
-    parts = (("time", "s", TIME_SD), ("speed", "-", SPEED_SD), ("load", "-", LOAD_SD))
-    return [Nuisance(f"{what}@{passage.name}", unit, 0.0, sd, passage.name) for what, unit, sd in parts]
+    reach = np.inf if passage.load_sd <= LOAD_SD else ASSUMED * passage.load_sd
+    parts = (
+        ("time", "s", TIME_SD, np.inf),
+        ("speed", "-", SPEED_SD, np.inf),
+        ("load", "-", passage.load_sd, reach),
+    )
+    return [Nuisance(f"{what}@{passage.name}", unit, 0.0, sd, passage.name, (-a, a)) for what, unit, sd, a in parts]

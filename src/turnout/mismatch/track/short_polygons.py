@@ -41,21 +41,21 @@ class Slots:
 
 def short_polygons(case, fit):
     """The likeliest wheel with short waves as a candidate, () where all may be round."""
-    if not case.rollings:
+    mades = sorted(case.fitted(), key=lambda m: m.speed)
+    if not mades:
         return ()
-    lengths = wavelengths(case.rollings.values())
+    lengths = wavelengths(mades)
     tried = np.flatnonzero((lengths < SHORTEST_WAVE) & (lengths > lengths.min(initial=np.inf) * np.exp(FAR)))
     if not tried.size:
         return ()
-    reserved, found, n = {o.name for o in case.reserved}, [], 0
+    found, n = [], 0
     for train in case.trains:
-        slots = [slots_of(m, lengths) for m in case.rollings.values() if case.said(m)["train"] == train]
-        seen, kept = ([s for s in slots if (s.made.name in reserved) == left_out] for left_out in (False, True))
+        seen = [slots_of(m, lengths) for m in mades if case.said(m)["train"] == train]
         if seen and seen[0].level.shape[1] >= WHEELS:
             z, apart = louder(seen, tried, lengths)
             n += z.shape[0]
             w, k = np.unravel_index(int(np.argmax(z)), z.shape)
-            if apart and (not kept or louder(kept, tried, lengths)[0][w, k] > 0.5 * z[w, k]):
+            if apart and _holds([louder(half, tried, lengths)[0][w, k] for half in (seen[::2], seen[1::2]) if half]):
                 found.append((evidence(z[w, k], apart), train, int(w), int(tried[k]), seen))
     if not found:
         return ()
@@ -64,6 +64,11 @@ def short_polygons(case, fit):
     if nats < np.log(scanned):
         return ()
     return (_candidate(case, fit, train, wheel, lengths, k, nats, scanned, seen),)
+
+
+def _holds(levels):
+    """Either half of a train's passages shows at least half of what the other does."""
+    return min(levels) > 0.5 * max(levels)
 
 
 def wavelengths(mades):

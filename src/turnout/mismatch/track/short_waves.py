@@ -58,9 +58,9 @@ class Loud:
         return np.log(self.power / self.usual)
 
 
-def bins(case):
+def bins(mades):
     """(n,) wavelengths that every passage holds, longest first [m]."""
-    shortest = max([SHORTEST, *(m.speed / (HIGHEST * m.passage.recording.rate) for m in case.rollings.values())])
+    shortest = max([SHORTEST, *(m.speed / (HIGHEST * m.passage.recording.rate) for m in mades)])
     longest = bands.SHORTEST_WAVE * np.exp(WIDTH * (AROUND + 1))  # the first bins are background alone
     return longest * np.exp(-np.arange(0.0, np.log(longest / shortest), WIDTH))
 
@@ -105,20 +105,19 @@ def evidence(passages, apart):
 
 def short_waves(case, fit):
     """The likeliest short corrugation as a candidate, () where sound rail is likelier or nothing could tell."""
-    mades = [m for m in case.rollings.values() if m.passage.train]
+    mades = sorted((m for m in case.fitted() if m.passage.train), key=lambda m: m.speed)
     if any(c.family == "rail_corrugation" for c in fit.candidates) or not _telling(mades):
         return ()
-    wavelengths, reserved = bins(case), {o.name for o in case.reserved}
+    wavelengths = bins(mades)
     if wavelengths.size <= 2 * AROUND:
         return ()
-    louds = [loud_of(case, m, wavelengths) for m in mades]
-    seen, kept = ([p for p in louds if (p.name in reserved) == left_out] for left_out in (False, True))
-    if not _telling([case.rollings[p.name] for p in seen]) or not all(len(p.power) for p in louds):
+    seen = [loud_of(case, m, wavelengths) for m in mades]
+    if not all(len(p.power) for p in seen):
         return ()
     nats = evidence(seen, _apart(case))
     nats[_known(case, wavelengths)] = -np.inf
     k = int(np.argmax(nats))
-    if wavelengths[k] >= bands.SHORTEST_WAVE or nats[k] < np.log(nats.size) or (kept and not _holds(kept, seen, k)):
+    if wavelengths[k] >= bands.SHORTEST_WAVE or nats[k] < np.log(nats.size) or not _holds(seen, k):
         return ()
     return (_candidate(case, fit, wavelengths, k, float(nats[k]), seen),)
 
@@ -142,10 +141,11 @@ def _known(case, wavelengths):
     return np.any(np.abs(np.log(wavelengths[:, None] / known)) < (LINE + 0.5) * WIDTH, axis=1)
 
 
-def _holds(kept, seen, k):
-    """Passages left out show at least half of the line: what does not predict them is no finding."""
-    levels = [np.mean([p.above[:, k].mean() for p in passages]) for passages in (kept, seen)]
-    return levels[0] > 0.5 * levels[1]
+def _holds(seen, k):
+    """Of the passages in order of speed every other one shows at least half of the line that the rest does, and the
+    other way round: what does not predict the rest is no finding."""
+    levels = [np.mean([p.above[:, k].mean() for p in half]) for half in (seen[::2], seen[1::2])]
+    return min(levels) > 0.5 * max(levels)
 
 
 def _candidate(case, fit, wavelengths, k, nats, seen):

@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from turnout.physics.term import PhysicsTerm
+from turnout.simulate.additions import links_of
 from turnout.simulate.matrices import TrackMatrices, assemble, link_vector, linked, railed
 
 KEPT = 24
@@ -22,7 +24,7 @@ def matrices_of(track, terms=()):
     """``assemble(track, terms)`` for a track of two layers, in a twentieth of the time once its like is known."""
     for term in terms:
         track = term.rail(track)
-    links = [link for term in terms for link in term.links(track)]
+    links = links_of(terms, track)
     if track.layers != 2:
         return assemble(track, (FixedLinks(links),))
     extra = frozenset(name for link in links for name, _ in link.ends if name[0] not in ("rail", "sleeper"))
@@ -43,7 +45,7 @@ def _remembered(known, key, compute):
     return known[key]
 
 
-class FixedLinks:
+class FixedLinks(PhysicsTerm):
     """Links that are known already, as a term: matrix entries and nothing else."""
 
     def __init__(self, links):
@@ -52,10 +54,6 @@ class FixedLinks:
     def links(self, track):
         """The links, whatever the track."""
         return self._links
-
-    def rail(self, track):
-        """The track as it is."""
-        return track
 
 
 class Skeleton:

@@ -41,13 +41,12 @@ class TrackCase(Predicting, Case):
         settings = settings or MismatchSettings()
         self.ceilings = ceilings(campaign, settings.threshold)
         self._prepare(within_range(campaign, self.ceilings), settings, solver or roll.Track1D())
-        found, self.start_values = list(hammer_observations(self)), {}
-        self.start_values = self._from_blows([o for _, o in found])
+        found, self.start_values, reserved = list(hammer_observations(self)), {}, set(campaign.reserved)
+        self.start_values = self._from_blows([o for name, o in found if name not in reserved])
         found += undisturbed(self, list(passage_observations(self)))
         self.foreign = foreign(self)
         if not found:
             raise SimulationError("nothing to diagnose: " + "; ".join(self.notes))
-        reserved = set(campaign.reserved)
         self.observations = tuple(o for name, o in found if name not in reserved)
         self.reserved = tuple(o for name, o in found if name in reserved)
         if not self.observations:
@@ -80,7 +79,7 @@ class TrackCase(Predicting, Case):
         self.nominal, self._railed = zone_of(campaign.turnout, campaign.places()), {}
         self._recentre({})
         self.trains = tuple(dict.fromkeys(p.train or p.name for p in campaign.passages))
-        self.pairs, self.rollings, self.strange, self.notes = {}, {}, {}, []
+        self.pairs, self.rollings, self.strange, self.unlike, self.notes = {}, {}, {}, [], []
         self.waves = self._waves()
 
     def _recentre(self, values):
@@ -89,6 +88,10 @@ class TrackCase(Predicting, Case):
         self.rail = {name: values.get(name, 0.0) for name, _ in RAIL}
         self.zone = with_rail(self.nominal, self.rail)
         self._forget()
+
+    def fitted(self):
+        """``Rolling`` of each passage that is fitted: all that may suggest a candidate, or speak against one."""
+        return [self.rollings[o.name] for o in self.observations if o.name in self.rollings]
 
     def peak(self, channel):
         """Largest value a channel showed in the passages, 0 where it showed none. [m/s²]"""

@@ -1,0 +1,63 @@
+r"""What a sensor between two nodes shows beyond their motion: its own element bends under a load on it.
+
+.. math:: w(x, t) = N(x)^T u(t) + \sum_i l(x, x_i(t)) \, F_i(t)
+
+with l of ``rail.local_compliance``, as a wheel feels it; 0 on a node and for loads in other elements.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnout.simulate.kernels import ramp_at
+from turnout.simulate.rail import local_compliance
+
+ON_NODE = 1e-9  # m, what places are rounded to
+
+
+@dataclass(frozen=True)
+class RailLoads:
+    """Forces on the rail: ``place`` [m] and ``force`` [N], (n_load, n_step + 2), at the middle of every step, of one
+    before the first and of one behind the last. ``from_rest``: they begin at time 0, before it nothing moves.
+    ``ramp``: where the track fades in for them, None: nowhere."""
+
+    place: np.ndarray
+    force: np.ndarray
+    from_rest: bool
+    ramp: np.ndarray | None = None
+
+
+def rail_loads(place, speed, force, dt, from_rest, ramp=None):
+    """``RailLoads`` of forces (n_load, n_step) [N] that roll from ``place`` (n_load,) [m] with ``speed`` [m/s]; behind
+    the end they go straight on."""
+    force = np.column_stack([force[:, :1], force])
+    force = np.column_stack([force, 2.0 * force[:, -1] - force[:, -2]])
+    time = (np.arange(force.shape[1]) - 0.5) * dt
+    return RailLoads(place[:, None] + speed * time, force, from_rest, ramp)
+
+
+def lies_between_nodes(matrices, place):
+    """Whether a place, a number [m] or a name, is on the rail between two nodes."""
+    return not isinstance(place, tuple) and float(np.min(np.abs(matrices.node - place))) > ON_NODE
+
+
+def bending(matrices, x, loads):
+    """(n_step + 2,) deflection [m] at ``x`` [m] of its element, both ends clamped, under the loads that are on it."""
+    e = matrices.element_at(x)
+    first, last = matrices.node[e : e + 2]
+    inside = np.flatnonzero((loads.place > first) & (loads.place < last))
+    at, h, n = loads.place.ravel()[inside], last - first, loads.force.shape[1]
+    bent = local_compliance((x - first) / h, (at - first) / h, h, matrices.rails[e]) * loads.force.ravel()[inside]
+    if loads.ramp is not None and not loads.ramp[1] <= first < last <= loads.ramp[2]:
+        bent = bent * np.array([ramp_at(loads.ramp, True, place)[0] for place in at])
+    return np.bincount(inside % n, bent, n)
+
+
+def recorded(deflection, order, dt, from_rest):
+    """(n_step,) mean over each step of a deflection (n_step + 2,) [m], its rate or, ``order`` 2, its acceleration."""
+    if order == 0:
+        return deflection[1:-1]
+    ends = np.diff(deflection) / dt if order == 2 else 0.5 * (deflection[1:] + deflection[:-1])
+    if from_rest:
+        ends[0] = 0.0
+    return np.diff(ends) / dt

@@ -1,0 +1,158 @@
+"""Files of tracks and vehicles: what is misspelt, without its unit or impossible is refused with file and place."""
+
+from copy import deepcopy
+from types import SimpleNamespace
+
+import pytest
+
+from turnout.errors import ConfigError, TurnoutError
+from turnout.simulate import load_track, load_vehicle
+from turnout.simulate.parameters import REPOSITORY
+
+TRACK = (REPOSITORY / "config/tracks/tommerup.yaml").read_text(encoding="utf-8")
+VEHICLE = (REPOSITORY / "config/vehicles/ic3.yaml").read_text(encoding="utf-8")
+LEVEL = '  level: {value: 3, unit: dB, source: "estimate: a main line some years after grinding", prior: 1.0}'
+STRETCH = "stretches:\n  - {from: {value: %s, unit: m, source: x}, to: {value: %s, unit: m, source: x}, rail: *rail}\n"
+
+
+def refused(load, path, text, said):
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ConfigError, match=said) as caught:
+        load(str(path))
+    assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("  level:", "  levle:", r"roughness: unknown key 'levle'\. Use one of level"),
+        ("roughness:\n" + LEVEL, "roughness: 3", "roughness: 3 instead of names with values"),
+        ("share: {value: 0.55", "shaer: {value: 0.55", r"routes\.main\[1\]: unknown key 'shaer'"),
+        ("share: {value: 0.55", "share: {value: 1.0", r"routes\.main\[1\]: kink at 26.700 m: share 1.0 is not between"),
+        ("length: {value: 1.2", "lenght: {value: 1.2", r"routes\.main\[0\]: unknown key 'lenght'"),
+        ("length: {value: 1.2", "length: {value: 0", r"routes\.main\[0\]: cosine at 4.500 m: a length of 0.0 m"),
+        ("{kind: cosine, ", "{", r"routes\.main\[0\]: the key 'kind' is missing"),
+        ("kind: cosine", "kind: sine", r"routes\.main\[0\]\.kind: no path of kind 'sine'\. Write one of sections, dip"),
+        ("place: {value: 4.5", "depth_: {value: 4.5", r"unknown key 'depth_'"),
+        ("route: diverging}\n  ASM", "route: divering}\n  ASM",
+         r"locations\.A9\.route: 'divering' is no route of this track\. Write one of main, diverging"),
+        ("panel: CP\n    route: main", "panel: CP\n    route: mian", r"sections\[4\]\.route: 'mian'"),
+        ("damping: {value: 20, unit: N s/m²", "damping: {value: 20, unit: kN s/m",
+         r"rail\.damping: the unit 'N s/m' is not one of 'N s/m²'"),
+        ("spacing: {value: 0.6", "spacing: {value: 0", "spacing: 0 m does not divide a track of 102 m"),
+        ("from: {value: -46", "from: {value: 46", r"sections\[0\]: from 46 m to -1.5 m is no stretch"),
+        ("elements_per_bay: 4", "elements_per_bay: 4.5", r"elements_per_bay: 4.5 .* whole number of at least 1"),
+        ("elements_per_bay: 4", 'elements_per_bay: {value: 4, unit: "-", source: x}', "without unit and source"),
+        ("layers: 2", "layers: 3", "tommerup: 3 layers need ballast_mass above 0"),
+        ("mass: {value: 60.2", "mass: {value: .nan", r"rail\.mass: nan is not finite"),
+        ("roughness:\n", "scatter: {pad_stiffness: 0.1}\nroughness:\n", r"scatter\.pad_stiffness: 0\.1 has no unit"),
+        ("roughness:\n", "scatter: {pad_stiffness: {value: 9, unit: MN/m, source: x}}\nroughness:\n",
+         r"scatter\.pad_stiffness: the unit 'N/m' is not one of '-'"),
+        ("roughness:\n", 'scatter: {ballast_mass: {value: 9, unit: "%", source: x}}\nroughness:\n',
+         r"scatter\.ballast_mass: scatter of a value that is not given\. Give 'ballast_mass' in 'support'"),
+        ("roughness:\n", STRETCH % (26.03, 26.09) + "roughness:\n", "middle of no element.* as an element, 0.15 m"),
+        ("roughness:\n", "terms:\n  - {term: hum, route: mian}\nroughness:\n", r"terms\[0\]\.route: 'mian'"),
+        ("    - &joint", "    - {kind: sections, places: [1.0, 2.0], dips: [0.0, 0.001]}\n    - &joint",
+         r"routes\.main\[2\]\.places\[0\]: 1.0 has no unit and source"),
+    ],
+)  # fmt: skip
+def test_a_track_file_is_refused_with_its_place_and_what_to_write(tmp_path, old, new, said):
+    assert old in TRACK
+    refused(load_track, tmp_path / "t.yaml", TRACK.replace(old, new, 1), said)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("payload: {value: 4.6", "paylaod: {value: 4.6", r"car_types\.end_car: unknown key 'paylaod'"),
+        ("contact: {value: 93", "contcat: {value: 93", "wheel: unknown key 'contcat'"),
+        ("{label: b1,", "{label: b1, lable: b2,", r"bogies\[0\]: unknown key 'lable'"),
+        ("type: end_car", "type: endcar", "car_types: the key 'endcar' is missing"),
+        ("base: {value: 2.7", "axles: 2.5\n    base: {value: 2.7", r"bogie_types\.end_bogie\.axles: 2\.5"),
+        ("mass: {value: 24.6", "mass: {value: 0", r"car_types\.end_car\.mass: 0 kg is no mass of a car"),
+        ("rests_on: [b1, b2]", "rests_on: 3", r"cars\[0\]\.rests_on: 3 instead of a list"),
+    ],
+)
+def test_a_vehicle_file_is_refused_with_its_place(tmp_path, old, new, said):
+    assert old in VEHICLE
+    refused(load_vehicle, tmp_path / "v.yaml", VEHICLE.replace(old, new, 1), said)
+
+
+def number(value, unit):
+    return {"value": value, "unit": unit, "source": "made up"}
+
+
+PLACES = {"from": number(0, "m"), "to": number(6, "m")}
+RAIL = {
+    "youngs_modulus": number(210, "GPa"), "second_moment": number(3037, "cm⁴"), "area": number(76.7, "cm²"),
+    "mass": number(60.2, "kg/m"), "shear_modulus": number(81, "GPa"), "shear_coefficient": number(0.4, "-"),
+    "density": number(7850, "kg/m³"), "damping": number(20, "N s/m²"),
+}  # fmt: skip
+SUPPORT = {
+    "pad_stiffness": number(300, "MN/m"), "pad_damping": number(30, "kN s/m"), "sleeper_mass": number(150, "kg"),
+    "ballast_stiffness": number(90, "MN/m"), "ballast_damping": number(80, "kN s/m"),
+}  # fmt: skip
+SMALL_TRACK = {
+    "name": "small", "layers": 2, "elements_per_bay": 4, "extent": PLACES, "spacing": number(0.6, "m"),
+    "absorbing_end": {"length": number(1, "m"), "rate": number(400, "1/s")}, "rail": RAIL, "support": SUPPORT,
+    "sections": [{"label": "a", "route": "main", **PLACES, "pad_stiffness": number(200, "MN/m")}],
+    "stretches": [{**PLACES, "rail": RAIL}], "scatter": {"pad_stiffness": number(10, "%")},
+    "roughness": {"level": number(3, "dB")}, "locations": {"A": {"place": number(3, "m"), "route": "main"}},
+    "routes": {"main": {
+        "common": [{"kind": "kink", "place": number(3, "m"), "depth": number(1, "mm"), "length": number(1, "m")}],
+        "surfaces": [[{"kind": "sections", "places": [number(1, "m"), number(2, "m")],
+                       "dips": [number(0, "m"), number(1, "mm")]}]],
+    }},
+    "terms": [{"term": "hum", "route": "main"}],
+}  # fmt: skip
+BOGIE = {
+    "mass": number(3, "t"), "inertia": number(3, "t m²"), "base": number(2.5, "m"), "wheelset_mass": number(1.5, "t"),
+    "primary_stiffness": number(2, "MN/m"), "primary_damping": number(10, "kN s/m"), "axles": 2,
+    "secondary_stiffness": number(1, "MN/m"), "secondary_damping": number(40, "kN s/m"),
+}  # fmt: skip
+SMALL_VEHICLE = {
+    "name": "small", "length": number(20, "m"), "bogie_types": {"b": BOGIE},
+    "wheel": {"radius": number(0.46, "m"), "contact": number(93, "GN/m^1.5")},
+    "car_types": {"c": {"mass": number(30, "t"), "payload": number(5, "t"), "inertia": number(900, "t m²")}},
+    "bogies": [{"label": k, "type": "b", "centre": number(x, "m")} for k, x in (("b1", 3), ("b2", 17))],
+    "cars": [{"type": "c", "rests_on": ["b1", "b2"], "centre": number(10, "m")}],
+}  # fmt: skip
+
+
+def spoilt(content):
+    """``content`` with one entry after the other, at every depth, replaced by what does not belong there."""
+
+    def places(inside, way=()):
+        items = inside.items() if isinstance(inside, dict) else enumerate(inside) if isinstance(inside, list) else ()
+        for key, value in items:
+            yield (*way, key)
+            yield from () if isinstance(value, dict) and "value" in value else places(value, (*way, key))
+
+    for way in places(content):
+        for wrong in (None, 3, -1.5, "three", [], [3], {}, {"a": 3}, number(0, "m"), number(-1, "kg")):
+            other = deepcopy(content)
+            inside = other
+            for key in way[:-1]:
+                inside = inside[key]
+            inside[way[-1]] = wrong
+            yield way, wrong, other
+
+
+@pytest.mark.parametrize(
+    ("load", "content"), [(load_track, SMALL_TRACK), (load_vehicle, SMALL_VEHICLE)], ids=["track", "vehicle"]
+)
+def test_whatever_stands_in_a_file_loads_or_is_refused_in_words(tmp_path, monkeypatch, load, content):
+    """Never with a traceback: a YAML reader makes numbers, text, lists, mappings and nothing of what people write."""
+    path, parsed = tmp_path / "file.yaml", [content]
+    path.write_text("", encoding="utf-8")
+    reader = SimpleNamespace(load=lambda text: deepcopy(parsed[-1]))  # the true one takes twenty times as long
+    monkeypatch.setattr("turnout.config.parameter_set.YAML", lambda typ: reader)
+    load(str(path))
+    for way, wrong, other in spoilt(content):
+        parsed.append(other)
+        try:
+            load(str(path))
+        except TurnoutError:
+            continue
+        except Exception as error:
+            raise AssertionError(f"{'.'.join(map(str, way))} = {wrong!r}") from error

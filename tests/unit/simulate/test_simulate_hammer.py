@@ -1,0 +1,45 @@
+"""A blow: what of the track and of its terms the hammer meets."""
+
+import numpy as np
+import pytest
+
+from turnout.errors import SimulationError
+from turnout.physics import TERMS, LocalBallast, SensorGain, SensorPosition, SurfaceDip
+from turnout.simulate import Hammer, Sensor, prepare_hammer, simulate_hammer, uniform_track
+
+TRACK, MASS, VELOCITY = uniform_track(30.0), 5.5, 1.2
+HAMMER = Hammer(MASS, VELOCITY, velocity_spread=0.0, place_spread=0.0, force=Sensor("hammer", 15.0, "hammer", "force"))
+SHORT = {"n_blows": 1, "duration": 0.05, "pretrigger": 0.005}
+
+
+def blow(**options):
+    return simulate_hammer(TRACK, 15.0, HAMMER, **SHORT, **options)[0].samples
+
+
+def test_a_free_mass_gives_the_rail_at_most_twice_its_momentum_whatever_wheels_roll_on():
+    """It bounces off a track at rest with at most the speed it came with; 1 % for the anti-alias filter."""
+    paths = tuple(term.example() for term in TERMS if term.kind == "path")
+    found, bare = blow(terms=(SurfaceDip(15.0, -1e-3, 0.6), *paths)), blow()
+    assert len(paths) >= 5
+    assert 1.0 < found[0].sum() / 20e3 / (MASS * VELOCITY) < 2.02
+    assert np.array_equal(found, bare)
+
+
+def test_the_terms_of_a_prepared_track_count_in_its_channels_too():
+    """A gain of 3 is three times the signal, to rounding: these channels have no converter."""
+    quiet = [Sensor("A", 15.0), Sensor("B", 15.6)]
+    terms = (LocalBallast(25, 0.3), SensorPosition("B", 0.15))
+    by_gain = [
+        blow(sensors=quiet, prepared=prepare_hammer(TRACK, 15.0, (*terms, SensorGain("A", gain))))
+        for gain in (1.0, 3.0)
+    ]
+    assert np.allclose(by_gain[1][1], 3.0 * by_gain[0][1], rtol=1e-9, atol=1e-9)
+    assert np.array_equal(blow(sensors=quiet, terms=(*terms, SensorGain("A", 3.0))), by_gain[1])
+
+
+@pytest.mark.parametrize(("rate", "substeps"), [(10e3, 1), (20e3, 2), (19.2e3, 1)])
+def test_a_track_prepared_for_another_step_is_refused(rate, substeps):
+    prepared = prepare_hammer(TRACK, 15.0, rate=rate, substeps=substeps)
+    with pytest.raises(SimulationError, match=r"prepared for steps of \S+ s, but 20000\.0 Hz .* ask for 5e-05 s"):
+        blow(prepared=prepared)
+    assert blow(prepared=prepared, rate=rate, substeps=substeps).shape[1] == round(0.05 * rate)
