@@ -170,7 +170,7 @@ class FrfCase(Case):
         start = (float(np.log(f)), float(np.clip(np.log(zeta), -7.9, -1.6)), *map(float, shape))
         where = f"{f:.0f} Hz"
         return Candidate("mode", tuple(own), lambda p: Effect("mode", where, dict(p)), (start,), {"near": where},
-                         "frequency", scanned)  # fmt: skip
+                         "frequency", scanned, exact=True)  # fmt: skip
 
     def frequencies(self, values, terms):
         """(n_mode,) [Hz]."""

@@ -40,7 +40,8 @@ def test_what_was_left_out_is_found_or_said_to_be_unknown(shared_data):
     assert damping == pytest.approx(0.20, abs=0.02)
     assert found["A1"][2].verification.after > found["A1"][2].verification.before + 30.0
     assert said["A2"][0] == "unknown"
-    assert any(f.frame == "frequency" and f.q < 0.05 for f in found["A2"][2].frames)
+    most = max(found["A2"][2].frames, key=lambda f: f.share)
+    assert most.frame == "frequency" and most.level in ("449 Hz", "566 Hz")  # the thirds of an octave beside 477 Hz
     assert said["A3"] == ("named", ("mode",)) and real_frfs.mode_found(found["A3"][2])[0] < 60.0
     beam = found["A4"][2]
     assert said["A4"] == ("named", ("shear_and_rotation",)) and beam.verdict.grade == "B"
