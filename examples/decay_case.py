@@ -232,4 +232,4 @@ def _nuisances(priors):
             sd = next(s for top, s in OPEN if band <= top)
             name = f"{direction}_{band:.0f}"
             mean, sd = priors.get(name, (0.0, sd))
-            yield Nuisance(name, "ln", mean, sd, meaning="error of the model in this band", trust=3.0)
+            yield Nuisance(name, "ln", mean, sd, meaning="error of the model in this band", bends=False)

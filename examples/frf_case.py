@@ -9,6 +9,7 @@ from turnout.mismatch import Candidate, Case, Nuisance, Observation
 from turnout.physics import Parameter
 
 SOURCE = "Ewins 2000, Modal Testing, chapters 2 and 4"
+STEP = 0.7  # largest, in prior standard deviations: longer ones jump from one sharp resonance to the next
 TOLERANCE = 0.05  # share of a response, over a tenth of an octave, that is nobody's business
 INDEPENDENT = 0.25  # neighbouring lines of one blow err together
 SOFT = 25.0  # about where a body hangs on its suspension [Hz]
@@ -89,18 +90,20 @@ class FrfCase(Case):
         for r, peak in enumerate(peaks):
             f, zeta, shape = self.read_off(peak)
             if r == 0 or not self.beam:
-                yield Nuisance(f"log_frequency_{r}", "ln(Hz)", float(np.log(f)), 0.01)
-            yield Nuisance(f"log_damping_{r}", "ln", float(np.log(zeta)), 0.5)
+                yield Nuisance(f"log_frequency_{r}", "ln(Hz)", float(np.log(f)), 0.01, trust=STEP)
+            yield Nuisance(f"log_damping_{r}", "ln", float(np.log(zeta)), 0.5, trust=STEP)
+            widest = float(np.max(np.abs(shape)))
             for s, value in enumerate(shape):
-                yield Nuisance(f"shape_{r}_{s}", "kg^-1/2", float(value), 0.3 * float(np.max(np.abs(shape))), trust=2.0)
+                yield Nuisance(f"shape_{r}_{s}", "kg^-1/2", float(value), 0.3 * widest, trust=2.0, bends=False)
         for r in range(self.rigid):
-            yield Nuisance(f"log_frequency_rigid{r}", "ln(Hz)", float(np.log(SOFT)), 0.4)
+            yield Nuisance(f"log_frequency_rigid{r}", "ln(Hz)", float(np.log(SOFT)), 0.4, trust=STEP)
             shape = self.stiff_shape(r)
+            widest = float(np.max(np.abs(shape)))
             for s, value in enumerate(shape):
-                yield Nuisance(f"shape_rigid{r}_{s}", "kg^-1/2", value, 0.5 * float(np.max(np.abs(shape))), trust=2.0)
+                yield Nuisance(f"shape_rigid{r}_{s}", "kg^-1/2", value, 0.5 * widest, trust=2.0, bends=False)
         for o in (*self.observations, *self.reserved):
-            yield Nuisance(f"hammer@{o.name}", "-", 0.0, 0.05, o.name)
-            yield Nuisance(f"stretch@{o.name}", "-", 0.0, 5e-4, o.name)
+            yield Nuisance(f"hammer@{o.name}", "-", 0.0, 0.05, o.name, trust=STEP)
+            yield Nuisance(f"stretch@{o.name}", "-", 0.0, 5e-4, o.name, trust=STEP)
 
     def read_off(self, about, share=1.0 / 6.0):
         """(frequency, damping ratio, shape (n_place,)) of the highest line within ``share`` octaves of ``about``."""

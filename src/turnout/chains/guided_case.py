@@ -9,12 +9,11 @@ import numpy as np
 
 from turnout.errors import SimulationError, TurnoutError
 from turnout.mismatch.case import Nuisance
-from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.joint import CHEAP_STEPS, fit_jointly
 
 WIDE = 0.5  # prior sd of an accepted value on its next visit, as a share of its way from neutral: it may well grow
 NO_LIMIT = 100.0  # times a value, beyond which its neutral one stands for "no limit at all"
 LEAST_ERRORS = 3.0  # and at least so many of its standard errors
-STEPS = 12  # of the fits to hammer tests alone that give the start
 STEP = 0.02  # of the prior sd, for derivatives
 
 
@@ -62,8 +61,8 @@ class GuidedCase:
         if cheap is None:
             return self.case.start_values
         means = {n.name: n.mean for n in cheap.nuisances}
-        roughly = fit_jointly(cheap.roughened(), values=means, iterations=STEPS)
-        return {**self.case.start_values, **fit_jointly(cheap, values=roughly.values, iterations=STEPS).values}
+        roughly = fit_jointly(cheap.roughened(), values=means, iterations=CHEAP_STEPS)
+        return {**self.case.start_values, **fit_jointly(cheap, values=roughly.values, iterations=CHEAP_STEPS).values}
 
     def __getattr__(self, name):
         if "case" not in self.__dict__:  # a copy that is being made

@@ -14,7 +14,8 @@ class Nuisance:
     """A number of the base model that is not exactly known, free under a normal prior.
 
     ``mean`` and ``sd`` of the prior in ``unit``; ``owner`` is the observation it belongs to, None where shared;
-    ``trust`` the largest step in prior standard deviations: undamped steps diverged on voids.
+    ``trust`` the largest step in prior standard deviations; it ``bends`` where the base model may have bent it to hide
+    an effect, as it may what the track is made of.
     """
 
     name: str
@@ -24,7 +25,8 @@ class Nuisance:
     owner: str | None = None
     bounds: tuple[float, float] = (-np.inf, np.inf)
     meaning: str = ""
-    trust: float = 0.7
+    trust: float = 3.0
+    bends: bool = True
 
 
 class Case:

@@ -6,7 +6,7 @@ import numpy as np
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
-from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.joint import CHEAP_STEPS, fit_jointly
 from turnout.mismatch.latent import Latent
 from turnout.mismatch.locate import attribute, cell_energies
 from turnout.mismatch.refits import kept, scored, to_the_end, with_derivatives
@@ -83,6 +83,8 @@ def diagnose(case, settings=None, progress=None, store=None):
     Diagnosis
     """
     settings, store = settings or MismatchSettings(), {} if store is None else store
+    if not case.frozen_jacobian:
+        settings = replace(settings, base_iterations=CHEAP_STEPS, iterations=CHEAP_STEPS)
     tell = progress or (lambda done, total, what: None)
     base = kept(store, "base", lambda: fit_jointly(case, iterations=settings.base_iterations))
     case, base = _with_its_errors(case, base, settings, store)

@@ -4,10 +4,11 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.fit import Fit, terms_of
-from turnout.mismatch.steps import broyden, damped_step, shortened
+from turnout.mismatch.steps import Steps, broyden
 
 TRUST_TERM = 0.35  # largest step of a term's parameter as a share of its bounds
 DONE = 0.05  # nats; a smaller gain ends the iteration
+CHEAP_STEPS = 60  # at most, of a fit to cheap observations alone: some valleys are long
 RENEWED = 4  # steps after which a dear Jacobian is made anew
 STALL = 5e-4  # of minus twice the log posterior per sample; a dear fit that gains less ends
 FINE = 1e-4  # the same where the verdict rests on it
@@ -146,10 +147,10 @@ def fit_jointly(
     .. math:: \min_{\eta,\psi} \sum_k n_k \left[\ln s_k^2 + \overline{r^2}_k / s_k^2\right]
               + \sum (\eta - \mu)^2 / \sigma_\eta^2, \quad s_k \ge 1
 
-    Damped Gauss-Newton: a step is cut to 0.7 prior standard deviations of any nuisance and halved until the cost
-    falls, until a step gains less than ``done`` nats, or in a dear case ``stall`` of the cost per sample. ``start``
-    (n_term,) of psi; ``values`` of the nuisances; ``keep`` a Jacobian whose nuisance columns are used instead of new
-    ones and then updated by Broyden's formula.
+    Gauss-Newton steps, damped ever more until the cost falls (Levenberg and Marquardt), until a step gains less than
+    ``done`` nats, or in a dear case ``stall`` of the cost per sample. ``start`` (n_term,) of psi; ``values`` of the
+    nuisances; ``keep`` a Jacobian whose nuisance columns are used instead of new ones and then updated by Broyden's
+    formula.
     """
     joint = Joint(case, candidates, observations, iterations, done, stall)
     psi = np.array([p.neutral for p in joint.parameters]) if start is None else np.asarray(start, dtype=float)
@@ -173,9 +174,9 @@ def _iterate(joint, theta, predictions, residuals, jacobian, cost, renew):
     """Steps until nothing is gained; a dear Jacobian is updated, and made anew after every ``renew`` steps (0: never)
     and before the last: on a long way it comes to point elsewhere."""
     frozen = joint.case.frozen_jacobian
-    enough, since = joint.enough, 0
+    enough, since, damping = joint.enough, 0, 0.0
     for _ in range(joint.iterations):
-        found = shortened(joint, theta, damped_step(joint, theta, residuals, jacobian), cost)
+        found, damping = Steps(joint, theta, residuals, jacobian).taken(cost, damping)
         gain = cost - found[3] if found else 0.0
         if found:
             tried, new = found[0], found[1]

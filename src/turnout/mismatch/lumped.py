@@ -50,7 +50,7 @@ def law_candidates(without=()):
             starts = ((0.05,), (0.5 if bounds[0] < 0.0 else 0.2,))
             found.append(
                 Candidate(name, (parameter,), lambda psi, n=name, k=kind: LawTerm(n, k, psi["amount"]), starts,
-                          frame="amplitude")
+                          frame="amplitude", kin="oscillator")
             )  # fmt: skip
     return tuple(found)
 

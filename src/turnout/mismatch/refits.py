@@ -173,7 +173,7 @@ def _refit(case, fit, candidate, start, back, far, settings):
     candidates = (*fit.candidates, candidate)
     values = {**fit.values, **back}
     if not candidate.start_from_base and not back:  # what the base may have bent goes back to its prior
-        values |= {n.name: n.mean for n in case.nuisances if n.owner is None and n.trust < 1.0}
+        values |= {n.name: n.mean for n in case.nuisances if n.owner is None and n.bends}
     try:
         psi = _best_start(case, candidates, psi, values)
         if candidate.start_from_base and not back:

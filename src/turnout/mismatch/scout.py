@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.joint import CHEAP_STEPS, fit_jointly
 from turnout.mismatch.shortlist import Projector, amplified
 
-STEPS, GLANCE, GLANCED = 15, 4, 5
+GLANCE, GLANCED = 4, 5
 BLIND = 0.999  # of the prior standard deviation is left: nothing was learnt
 ENOUGH = 0.5  # nats; a step that gains less ends a scout's fit
 
@@ -39,8 +39,8 @@ def scout(case, fit, settings, families=None):
         return []
     held, n = fit.candidates, fit.psi.size
     rough = cheap.roughened()
-    first = fit_jointly(rough, held, fit.psi, iterations=STEPS, done=ENOUGH)
-    base = fit_jointly(cheap, held, first.psi, first.values, iterations=STEPS, done=ENOUGH)
+    first = fit_jointly(rough, held, fit.psi, iterations=CHEAP_STEPS, done=ENOUGH)
+    base = fit_jointly(cheap, held, first.psi, first.values, iterations=CHEAP_STEPS, done=ENOUGH)
     entries = _ranked(case, rough, first, held) + _ranked(case, cheap, base, held)
     found, glances = [], {}
     for family, members in _by_family(entries).items():
@@ -130,10 +130,10 @@ def _fitted(rough, cheap, candidates, psi, hopeless):
     the broad fit costs as much as the ``hopeless`` one without the effect: it was asked on no other promise."""
     try:
         first = fit_jointly(
-            rough, candidates, psi, {n.name: n.mean for n in rough.nuisances}, iterations=STEPS, done=ENOUGH
+            rough, candidates, psi, {n.name: n.mean for n in rough.nuisances}, iterations=CHEAP_STEPS, done=ENOUGH
         )
         if first.cost > hopeless:
             return None
-        return fit_jointly(cheap, candidates, first.psi, first.values, iterations=STEPS, done=ENOUGH)
+        return fit_jointly(cheap, candidates, first.psi, first.values, iterations=CHEAP_STEPS, done=ENOUGH)
     except SimulationError:
         return None

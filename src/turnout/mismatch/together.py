@@ -46,10 +46,11 @@ def reconsidered(case, base, fit, verdicts, settings):
 
 
 def _vouches(first, second):
-    """Two of one kind do not vouch for one another: they can mend nearly any shape. Those of two trains do: there is no
-    recording that shows both."""
+    """Two of one kind, or laws of one part, do not vouch for one another: they can mend nearly any shape. Those of two
+    trains do: there is no recording that shows both."""
     trains = {s.candidate.where.get("train") for s in (first, second)}
-    return first.family != second.family or (len(trains) == 2 and None not in trains)
+    alike = first.family == second.family or (first.candidate.kin and first.candidate.part == second.candidate.part)
+    return not alike or (len(trains) == 2 and None not in trains)
 
 
 def _second_alone(case, fit, settings):

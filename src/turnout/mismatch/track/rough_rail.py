@@ -35,7 +35,7 @@ class Waves:
 
     def nuisances(self):
         """One amplitude per wave [m]."""
-        return [Nuisance(n, "m", 0.0, float(sd), trust=3.0) for n, sd in zip(self.names, self.sd)]
+        return [Nuisance(n, "m", 0.0, float(sd), bends=False) for n, sd in zip(self.names, self.sd)]
 
     def fade(self, x):
         """(n,) 0 to 1: the waves come and go at both ends."""

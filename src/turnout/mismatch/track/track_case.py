@@ -8,7 +8,7 @@ import numpy as np
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
 from turnout.mismatch.case import Case, Nuisance
-from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.joint import CHEAP_STEPS, fit_jointly
 from turnout.mismatch.track import derivatives, roll, rolling
 from turnout.mismatch.track.base_model import RAIL, SEAT_SD, track_nuisances, with_rail, zone_of
 from turnout.mismatch.track.blows_case import Blows
@@ -66,10 +66,10 @@ class TrackCase(Predicting, Case):
         self.nuisances, self.observations = tuple(self.listed()), tuple(observations)
         if not observations:
             return {}
-        roughly = fit_jointly(Blows(self).roughened(), iterations=12)
+        roughly = fit_jointly(Blows(self).roughened(), iterations=CHEAP_STEPS)
         self.start_values = roughly.values
         self._recentre(roughly.values)
-        found = fit_jointly(Blows(self), values=roughly.values, iterations=12).values
+        found = fit_jointly(Blows(self), values=roughly.values, iterations=CHEAP_STEPS).values
         self._recentre(found)
         return found
 
@@ -113,7 +113,7 @@ class TrackCase(Predicting, Case):
         """All nuisances of track, trains, sensors, waves and passages."""
         yield from track_nuisances(self.zone, self.trains)
         for sensor in self.campaign.sensors:
-            yield Nuisance(f"gain_{sensor.name}", "-", 0.0, GAIN_SD, meaning="gain of a sensor less one", trust=3.0)
+            yield Nuisance(f"gain_{sensor.name}", "-", 0.0, GAIN_SD, meaning="gain of a sensor less one", bends=False)
             if not sensor.mounting.startswith("sleeper"):
                 yield Nuisance(f"seat_{sensor.name}", "m", 0.0, SEAT_SD, meaning="place of a sensor less its file's")
         if self.waves:
