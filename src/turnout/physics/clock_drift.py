@@ -24,7 +24,7 @@ class ClockDrift(PhysicsTerm):
     frame = "clock"
     parameters = (
         Parameter("drift", "-", 0.0, (-5e-3, 5e-3), "relative error of the sampling rate",
-                  "IEEE 1139:2008, quartz oscillators: 1e-4 to 1e-6; failing ones more"),
+                  "IEEE 1139:2008, quartz oscillators: 1e-4 to 1e-6; failing ones more", (0.0, 1e-3)),
     )  # fmt: skip
 
     @classmethod

@@ -17,7 +17,7 @@ class ContactStiffness(PhysicsTerm):
     frame = "train"
     parameters = (
         Parameter("factor", "-", 1.0, (0.1, 5.0), "contact constant over that of nominal profiles",
-                  "Thompson 2009, Railway noise and vibration, ch. 3"),
+                  "Thompson 2009, Railway noise and vibration, ch. 3", (1.0, 0.5)),
     )  # fmt: skip
 
     @classmethod

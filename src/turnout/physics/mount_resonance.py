@@ -21,7 +21,7 @@ class MountResonance(TransferTerm):
     name = "mount_resonance"
     left_out = "the mounting of channel {channel_name} resonates at {frequency:.0f} Hz with Q {quality:.1f}"
     parameters = (
-        Parameter("period", "s", 0.0, (0.0, 1 / 80.0), "period of the mounting's resonance", SOURCE),
+        Parameter("period", "s", 0.0, (0.0, 1 / 80.0), "period of the mounting's resonance", SOURCE, (0.002, 0.002)),
         Parameter("quality", "-", 10.0, (1.5, 80.0), "sharpness of the resonance", SOURCE),
     )
 

@@ -21,7 +21,7 @@ class PadTemperature(PhysicsTerm):
     frame = "condition"
     parameters = (
         Parameter("coefficient", "1/K", 0.0, (-0.01, 0.04), "relative loss of stiffness per kelvin",
-                  "Othman 2022, Extrica 22293: rail pads lose up to 53 % when warm"),
+                  "Othman 2022, Extrica 22293: rail pads lose up to 53 % when warm", (0.005, 0.01)),
     )  # fmt: skip
 
     @classmethod

@@ -41,8 +41,8 @@ class RailCorrugation(PhysicsTerm):
     kind = "path"
     frame = "wavelength"
     parameters = (
-        Parameter("sine", "m", 0.0, (-3e-4, 3e-4), "amplitude in phase with the start", SOURCE),
-        Parameter("cosine", "m", 0.0, (-3e-4, 3e-4), "amplitude a quarter wave ahead", SOURCE),
+        Parameter("sine", "m", 0.0, (-3e-4, 3e-4), "amplitude in phase with the start", SOURCE, (0.0, 6e-5)),
+        Parameter("cosine", "m", 0.0, (-3e-4, 3e-4), "amplitude a quarter wave ahead", SOURCE, (0.0, 6e-5)),
         Parameter("wavelength", "m", 0.3, (0.02, 1.5), "length of a wave", SOURCE),
     )
 

@@ -22,7 +22,7 @@ class SensorGain(TransferTerm):
     left_out = "channel {channel_name} shows {gain:.3f} times the true signal"
     parameters = (
         Parameter("gain", "-", 1.0, (-5.0, 5.0), "shown signal over true signal",
-                  "ISO 16063-21:2003, comparison calibration: 1 to 5 % when new", (1.0, 2.5)),
+                  "ISO 16063-21:2003, comparison calibration: 1 to 5 % when new", (1.0, 0.5)),
     )  # fmt: skip
 
     @classmethod

@@ -18,7 +18,7 @@ class SensorPosition(PhysicsTerm):
     frame = "sensor"
     parameters = (
         Parameter("shift", "m", 0.0, (-1.2, 1.2), "true place minus described place",
-                  "EN 13848-1:2019, position along the track known to 10 m by trains, to 0.1 m by tape"),
+                  "EN 13848-1:2019, position along the track known to 10 m by trains, to 0.1 m by tape", (0.0, 0.3)),
     )  # fmt: skip
 
     @classmethod

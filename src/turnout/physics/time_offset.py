@@ -23,7 +23,7 @@ class TimeOffset(TransferTerm):
     frame = "clock"
     parameters = (
         Parameter("delay", "s", 0.0, (-6e-3, 6e-3), "lag behind the other channels",
-                  "IEEE 1588:2008 clocks keep 1 µs; unsynchronised recorders lose some ms"),
+                  "IEEE 1588:2008 clocks keep 1 µs; unsynchronised recorders lose some ms", (0.0, 2e-3)),
     )  # fmt: skip
 
     @classmethod

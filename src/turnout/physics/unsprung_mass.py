@@ -18,7 +18,8 @@ class UnsprungMass(PhysicsTerm):
     frame = "train"
     parameters = (
         Parameter("factor", "-", 1.0, (0.4, 2.5), "unsprung mass over that of the vehicle file",
-                  "Jenkins et al. 1974, The effect of track and vehicle parameters on wheel/rail vertical forces"),
+                  "Jenkins et al. 1974, The effect of track and vehicle parameters on wheel/rail vertical forces",
+                  (1.0, 0.3)),
     )  # fmt: skip
 
     @classmethod

@@ -27,7 +27,9 @@ class WheelFlat(PhysicsTerm):
     left_out = "wheel {number} of {who} has a flat of {length:.3f} m"
     kind = "path"
     frame = "wheel"
-    parameters = (Parameter("length", "m", 0.0, (0.0, 0.15), "length of the flat along the tread", SOURCE),)
+    parameters = (
+        Parameter("length", "m", 0.0, (0.0, 0.15), "length of the flat along the tread", SOURCE, (0.04, 0.04)),
+    )
 
     @classmethod
     def example(cls):

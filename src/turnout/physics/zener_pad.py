@@ -27,7 +27,15 @@ class ZenerPad(PhysicsTerm):
     kind = "matrix"
     frame = "frequency"
     parameters = (
-        Parameter("ratio", "-", 0.0, (0.0, 10.0), "stiffness of the branch over the pad's static stiffness", SOURCE),
+        Parameter(
+            "ratio",
+            "-",
+            0.0,
+            (0.0, 10.0),
+            "stiffness of the branch over the pad's static stiffness",
+            SOURCE,
+            (0.5, 1.0),
+        ),
     )
 
     @classmethod
