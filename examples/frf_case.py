@@ -102,7 +102,7 @@ class FrfCase(Case):
             for s, value in enumerate(shape):
                 yield Nuisance(f"shape_rigid{r}_{s}", "kg^-1/2", value, 0.5 * widest, trust=2.0, bends=False)
         for o in (*self.observations, *self.reserved):
-            yield Nuisance(f"hammer@{o.name}", "-", 0.0, 0.05, o.name, trust=STEP)
+            yield Nuisance(f"hammer@{o.name}", "-", 0.0, 0.05, o.name, (-0.2, 0.2), trust=STEP)
             yield Nuisance(f"stretch@{o.name}", "-", 0.0, 5e-4, o.name, trust=STEP)
 
     def read_off(self, about, share=1.0 / 6.0):
@@ -134,6 +134,10 @@ class FrfCase(Case):
         near = (frequency > 2.0 * SOFT) & (frequency < 3.0 * SOFT)
         return self._shape(np.mean(h[:, :, near].real, axis=2), rank)
 
+    def cheap(self, observation):
+        """All are: their derivatives are made anew at every step."""
+        return True
+
     def _candidates(self):
         whole = self.whole[0]
         low, high = max(0.25 * self.frequency[0], whole[0]), min(4.0 * self.frequency[-1], whole[-1])
@@ -158,7 +162,11 @@ class FrfCase(Case):
         yield _one("structural_damping", "", [_number("share", "-", 0.0, 1.0, (0.5, 0.5))], ((0.5,),), self)
         if self.beam:
             yield _one(
-                "shear_and_rotation", "", [_number("slenderness", "-", 0.0, 2e-3, (3e-4, 5e-4))], ((3e-4,),), self
+                "shear_and_rotation",
+                "",
+                [_number("slenderness", "-", 0.0, 2e-3, (3e-4, 5e-4))],
+                ((2e-5,), (1e-4,), (3e-4,)),
+                self,
             )
             mass = [_number("share", "-", 0.0, 0.5, (0.05, 0.1)), _number("place", "-", 0.0, 0.5, (0.25, 0.2), 0.25)]
             yield _one("point_mass", "", mass, ((0.05, 0.03), (0.05, 0.22), (0.05, 0.36), (0.05, 0.5)), self)

@@ -26,12 +26,12 @@ SHAPES = {"wave": np.sin(9.0 * X), "ramp": X - 0.5, "ripple": np.sin(40.0 * X), 
 class Shapes(Case):
     """Sums of shapes of the ``known`` kinds in three conditions, under noise of 0.1."""
 
-    def __init__(self, known, **true):
+    def __init__(self, known, kin="", **true):
         rng = np.random.default_rng(11)
         data = [sum(a * SHAPES[n] for n, a in true.items()) + 0.1 * rng.normal(size=X.size) for _ in range(3)]
         self.observations = tuple(Observation(f"o{k}", f"day {k}", d, np.full(X.size, 0.1)) for k, d in enumerate(data))
         self.candidates = tuple(
-            Candidate(n, AMOUNT, lambda p, n=n: (n, p["amount"]), ((0.5,),), {"shape": n}) for n in known
+            Candidate(n, AMOUNT, lambda p, n=n: (n, p["amount"]), ((0.5,),), {"shape": n}, kin=kin) for n in known
         )
 
     def predict(self, values, terms, observations):
@@ -45,6 +45,12 @@ def test_two_effects_of_which_either_leaves_too_much_are_both_named():
     for candidate, size in zip(found.fit.candidates, found.fit.psi):
         assert size == pytest.approx({"wave": 1.2, "ramp": 2.5}[candidate.family], abs=0.06)  # four standard errors
     assert all(v.answer == "named" for v in found.verdicts)
+
+
+def test_two_laws_of_one_part_do_not_vouch_for_one_another():
+    """The same, of laws that act on one part: two of them mend nearly any shape, so what is missing stays unknown."""
+    found = diagnose(Shapes(("wave", "ramp", "bowl"), kin="spring", wave=1.2, ramp=2.5))
+    assert found.verdict.answer == "unknown" and not found.names
 
 
 def test_an_effect_that_no_name_fits_keeps_the_first_one_refused_too():
