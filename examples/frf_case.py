@@ -161,13 +161,8 @@ class FrfCase(Case):
                             ((-0.5,), (0.5,)), where, "condition", n)  # fmt: skip
         yield _one("structural_damping", "", [_number("share", "-", 0.0, 1.0, (0.5, 0.5))], ((0.5,),), self)
         if self.beam:
-            yield _one(
-                "shear_and_rotation",
-                "",
-                [_number("slenderness", "-", 0.0, 2e-3, (3e-4, 5e-4))],
-                ((2e-5,), (1e-4,), (3e-4,)),
-                self,
-            )
+            slender = [_number("slenderness", "-", 0.0, 2e-3, (3e-4, 5e-4))]
+            yield _one("shear_and_rotation", "", slender, ((2e-5,), (1e-4,), (3e-4,)), self)
             mass = [_number("share", "-", 0.0, 0.5, (0.05, 0.1)), _number("place", "-", 0.0, 0.5, (0.25, 0.2), 0.25)]
             yield _one("point_mass", "", mass, ((0.05, 0.03), (0.05, 0.22), (0.05, 0.36), (0.05, 0.5)), self)
             yield _one("tension", "", [_number("tension", "-", -5.0, 5.0, (0.0, 2.0))], ((1.0,), (-1.0,)), self)

@@ -201,9 +201,10 @@ def nothing_known(d):
         return (
             f"said to be unknown: {reason}. The fit of the blow never used is {check.before:.1f} %, best of series A."
         )
+    told = "a finding that we cannot check" if check.after > check.before else "a name that the blow never used refuses"
     return (
-        f"a finding that we cannot check. The fit of the blow never used goes from {check.before:.2f} to "
-        f"{check.after:.2f} %; gains of sensor and hammer only show as ratios, so reciprocity cannot settle it."
+        f"{told}: its fit goes from {check.before:.1f} to {check.after:.1f} %. Resonances above the band there are:\n"
+        f"  the makers print some up to {PRINTED[-1]:.0f} Hz."
     )
 
 
@@ -227,6 +228,7 @@ def page(found):
     f, zeta = mode_found(found["A1"][2])
     b2 = found["B2"][2]
     blow = next(t for t in found["B1"][2].fit.terms if t.kind == "blow_gain")
+    struck = 1.0 + blow.values["gain"] + found["B1"][2].fit.values["hammer@blow 1"]
     head = ["", "left out", "answer", "in words", "residual is largest at", "fit", "rival"]
     told = "found." if "mode" in b2.verdict.names else "said to be unknown, and placed; "
     if "mode" in b2.verdict.names:
@@ -236,7 +238,7 @@ def page(found):
     return PAGE.format(
         cases=table(head, rows(found)), f=f, zeta=zeta, published=PUBLISHED[477][0], printed=PUBLISHED[477][1],
         low=mode_found(found["A3"][2])[0], a2=where(found["A2"][2]),
-        a4=plain_beam(found["A4"][2]), a5=nothing_known(found["A5"][2]), gain=1.0 + blow.values["gain"], b2=told,
+        a4=plain_beam(found["A4"][2]), a5=nothing_known(found["A5"][2]), gain=struck, b2=told,
     )  # fmt: skip
 
 
