@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from turnout.errors import SimulationError
+from turnout.mismatch.alone import hangs_on
 from turnout.mismatch.held_out import held_out_score
 from turnout.mismatch.joint import FINE, STALL, Joint, cost_at, fit_jointly
 from turnout.mismatch.scoring import score_of
@@ -44,7 +45,7 @@ def scored(case, fit, settings, tell, store, effect, promising):
         ranked = sorted([*polished, *(s for s in ranked if all(s is not x for x in leaders))], key=lambda s: -s.gain)
         ranked = _owed(case, fit, ranked, settings, store, effect)
         ranked = beside(case, fit, ranked, settings)
-    return tuple(_checked(case, fit, s) for s in ranked)
+    return tuple(_checked(case, fit, s, settings) for s in ranked)
 
 
 def _owed(case, fit, ranked, settings, store, effect):
@@ -133,13 +134,14 @@ def _polished(case, fit, score, settings, store, effect):
     return score_of(case, fit, refit, score.candidate, settings)
 
 
-def _checked(case, fit, score):
+def _checked(case, fit, score, settings):
     """A leader of a dear case with its gain condition by condition, each left out in turn."""
     if not case.frozen_jacobian or not score.fit.jacobian:
         return score
     mine, reference = held_out_score(case, score.fit), held_out_score(case, fit)
     by_condition = {c: mine[c] - reference[c] for c in reference}
-    return replace(score, worst=min(by_condition.values(), default=0.0), by_condition=by_condition)
+    alone = hangs_on(case, score.fit, score.candidate, by_condition, settings) if score.material else ""
+    return replace(score, worst=min(by_condition.values(), default=0.0), by_condition=by_condition, alone=alone)
 
 
 def _ended(case, fit, settings):

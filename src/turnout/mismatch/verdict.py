@@ -14,7 +14,8 @@ VERDICTS = ("none", "named", "a_or_b", "unknown", "numerics")
 class Score:
     """A candidate after its joint refit: ``gain`` in held-out log density over the base model less the log of the
     places scanned [nats], ``worst`` the least gain of a fold, ``explained`` share of the excess, ``fit``; ``usual``: of
-    a size by which like parts of this very case differ anyway, or not shown by those who would have to."""
+    a size by which like parts of this very case differ anyway, or not shown by those who would have to; ``alone`` the
+    one condition that it hangs on (``alone.hangs_on``)."""
 
     candidate: object
     gain: float
@@ -23,6 +24,7 @@ class Score:
     fit: object
     by_condition: dict = field(default_factory=dict)
     usual: bool = False
+    alone: str = ""
 
     @property
     def own(self):
@@ -215,13 +217,15 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
     if left > settings.leftover:
         return verdict("unknown", reason=f"{best.family} leaves {left:.0f} times the level of controls")
     weak = best.gain < WEAK * settings.threshold
-    torn = objected(best.worst, best.gain, settings)
+    torn = bool(best.alone) or objected(best.worst, best.gain, settings)
     if (torn or not consistent) and weak and excess <= 1.0:
         return no_name(f" but {best.family}, which does not hold elsewhere")
     if not consistent:
         return verdict("unknown", reason=f"{best.family} does not hold on conditions it was not fitted to")
     if structure > settings.structure_left and left > 1.0:
         return verdict("unknown", reason=f"a free law still explains {structure:.0%} of what {best.family} leaves")
+    if best.alone:
+        return verdict("unknown", reason=f"{best.family} hangs on {best.alone} alone, which others do not confirm")
     if torn:
         return verdict("unknown", reason=f"{best.family} makes one condition worse by {-best.worst:.0f} nats")
     plain = next((s for s in found[1:] if best.gain - s.gain < settings.margin and s.is_plain_form_of(best)), None)

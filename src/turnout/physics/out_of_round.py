@@ -31,8 +31,8 @@ class OutOfRound(PhysicsTerm):
     kind = "path"
     frame = "wheel"
     parameters = (
-        Parameter("cosine", "m", 0.0, (-1e-3, 1e-3), "amplitude in phase with the place", SOURCE, (0.0, 2e-4)),
-        Parameter("sine", "m", 0.0, (-1e-3, 1e-3), "amplitude a quarter wave on", SOURCE, (0.0, 2e-4)),
+        Parameter("cosine", "m", 0.0, (-1e-3, 1e-3), "amplitude in phase with the place", SOURCE),
+        Parameter("sine", "m", 0.0, (-1e-3, 1e-3), "amplitude a quarter wave on", SOURCE),
         Parameter("turned", "-", 0.0, (-0.03, 0.03), "radius beyond that given, relative", SOURCE, (0.0, 0.005)),
     )
 

@@ -27,7 +27,7 @@ class ZenerPad(PhysicsTerm):
     kind = "matrix"
     frame = "frequency"
     parameters = (
-        Parameter("ratio", "-", 0.0, (0.0, 10.0), "stiffness of the branch over the static one", SOURCE, (0.5, 1.0)),
+        Parameter("ratio", "-", 0.0, (0.0, 10.0), "stiffness of the branch over the pad's static stiffness", SOURCE),
     )
 
     @classmethod

@@ -1,0 +1,47 @@
+"""Whether a name hangs on one recording alone, though others should show the same as plainly."""
+
+import numpy as np
+
+from turnout.errors import SimulationError
+
+AS_PLAIN = 0.5  # of the energy that the effect has in the recordings that speak for it
+
+
+def hangs_on(case, fit, candidate, by_condition, settings):
+    """The condition whose gain alone passes for a name where all others' together does not, "" elsewhere.
+
+    What is there shows wherever it acts: a gain of one hammer test that its repetition does not share is that test's.
+    Nobody is refused for a condition that nothing else could confirm.
+
+    Parameters
+    ----------
+    case, fit : Case, Fit
+        The fit has ``candidate`` in it.
+    candidate : Candidate
+    by_condition : dict
+        Condition -> gain when it is left out. [nats]
+    settings : MismatchSettings
+    """
+    top = max(by_condition, key=by_condition.get, default="")
+    if not top or by_condition[top] <= settings.threshold:
+        return ""
+    if sum(by_condition.values()) - by_condition[top] >= settings.threshold:
+        return ""
+    shown = plainness(case, fit, candidate)
+    least = AS_PLAIN * shown.get(top, np.inf)
+    return top if any(c != top and energy >= least for c, energy in shown.items()) else ""
+
+
+def plainness(case, fit, candidate):
+    """Condition -> weighted energy of what ``candidate`` changes in it at the nuisances of ``fit``; {} where the
+    simulation cannot go without it."""
+    others = tuple(t for c, t in zip(fit.candidates, fit.terms) if c.key != candidate.key)
+    try:
+        without = case.predict(fit.values, others, case.observations)
+    except SimulationError:
+        return {}
+    found = {}
+    for o, p, q in zip(case.observations, fit.predictions, without):
+        energy = o.effective * float(np.sum(o.whitened(p - q) ** 2))
+        found[o.condition] = found.get(o.condition, 0.0) + energy
+    return found

@@ -1,0 +1,73 @@
+"""A gain of one recording that its like do not share is that recording's own."""
+
+import numpy as np
+import pytest
+
+from turnout.config.settings.mismatch import MismatchSettings
+from turnout.errors import SimulationError
+from turnout.mismatch.alone import hangs_on, plainness
+from turnout.mismatch.candidate import Candidate
+from turnout.mismatch.case import Case
+from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.observation import Observation
+from turnout.mismatch.verdict import Score, judge
+from turnout.physics import Parameter
+
+SIZE = (Parameter("size", "-", 0.0, (-9.0, 9.0), "of a bump", "made up 2026"),)
+BUMP = np.sin(np.linspace(0.0, 6.0, 200))
+
+
+class Days(Case):
+    """A bump in three recordings, ``loud`` times as large in each; the second has half as many independent samples."""
+
+    def __init__(self, loud):
+        self.loud = dict(zip("abc", loud))
+        self.observations = tuple(
+            Observation(n, n, s * BUMP, np.full(BUMP.size, 0.1), 0.5 if n == "b" else 1.0) for n, s in self.loud.items()
+        )
+        self.candidates = (Candidate("bump", SIZE, lambda p: p["size"], ((0.5,),)),)
+
+    def predict(self, values, terms, observations):
+        if not terms and self.loud["c"] < 0.0:
+            raise SimulationError("cannot go without")
+        return [sum(terms) * self.loud[o.name] * BUMP for o in observations]
+
+
+def fitted(loud):
+    case = Days(loud)
+    return case, fit_jointly(case, case.candidates, [0.5], iterations=20)
+
+
+def test_plainness_is_the_energy_of_the_change():
+    case, fit = fitted((1.0, 2.0, 3.0))
+    size = float(fit.psi[0])
+    for name, energy in plainness(case, fit, case.candidates[0]).items():
+        share = 0.5 if name == "b" else 1.0
+        by_hand = share * np.sum((case.loud[name] * size * BUMP / 0.1) ** 2)
+        assert energy == pytest.approx(by_hand, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "loud, gains, alone",
+    [
+        ((1.0, 2.0, 1.0), {"a": 20.0, "b": 1.0, "c": 2.0}, "a"),  # b has twice the energy and does not say so
+        ((1.0, 0.9, 0.7), {"a": 20.0, "b": 1.0, "c": 2.0}, ""),  # b and c show 0.41 and 0.49 of the energy of a
+        ((1.0, 2.0, 1.0), {"a": 20.0, "b": 1.0, "c": 12.0}, ""),  # the others bear it out
+        ((1.0, 2.0, 1.0), {"a": 11.0, "b": 1.0, "c": -3.0}, ""),  # it does not hang on a, which would not do
+        ((1.0, 2.0, 1.0), {}, ""),
+        ((1.0, 2.0, -1.0), {"a": 20.0, "b": 1.0, "c": 2.0}, ""),  # it cannot be said without
+    ],
+)
+def test_what_one_recording_says_and_its_like_do_not(loud, gains, alone):
+    case, fit = fitted(loud)
+    assert hangs_on(case, fit, case.candidates[0], gains, MismatchSettings()) == alone
+
+
+@pytest.mark.parametrize("gain, answer", [(20.0, "none"), (60.0, "unknown")])
+def test_it_gets_no_name(gain, answer):
+    candidate = Candidate("bump", (), lambda p: None, ())
+    score = Score(candidate, gain, 0.0, 1.0, None, {"a": gain}, alone="a")
+    said = judge([score], 0.8, MismatchSettings())
+    assert said.answer == answer and not said.names
+    assert "bump" in said.reason
+    assert judge([Score(candidate, gain, 0.0, 1.0, None)], 0.8, MismatchSettings()).names == ("bump",)
