@@ -11,7 +11,8 @@ def hangs_on(case, fit, candidate, by_condition, settings):
     """The condition whose gain alone passes for a name where all others' together does not, "" elsewhere.
 
     What is there shows wherever it acts: a gain of one hammer test that its repetition does not share is that test's.
-    Nobody is refused for a condition that nothing else could confirm.
+    Nobody is refused for a condition that nothing else could confirm, nor for a train, which comes at another speed and
+    with another roughness each time.
 
     Parameters
     ----------
@@ -23,7 +24,7 @@ def hangs_on(case, fit, candidate, by_condition, settings):
     settings : MismatchSettings
     """
     top = max(by_condition, key=by_condition.get, default="")
-    if not top or by_condition[top] <= settings.threshold:
+    if not top or by_condition[top] <= settings.threshold or "train" in candidate.where:
         return ""
     if sum(by_condition.values()) - by_condition[top] >= settings.threshold:
         return ""

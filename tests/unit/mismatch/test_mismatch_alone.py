@@ -1,5 +1,7 @@
 """A gain of one recording that its like do not share is that recording's own."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -61,6 +63,8 @@ def test_plainness_is_the_energy_of_the_change():
 def test_what_one_recording_says_and_its_like_do_not(loud, gains, alone):
     case, fit = fitted(loud)
     assert hangs_on(case, fit, case.candidates[0], gains, MismatchSettings()) == alone
+    of_a_train = replace(case.candidates[0], where={"train": "ic3"})
+    assert hangs_on(case, fit, of_a_train, gains, MismatchSettings()) == ""
 
 
 @pytest.mark.parametrize("gain, answer", [(20.0, "none"), (60.0, "unknown")])
