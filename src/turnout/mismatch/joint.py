@@ -4,7 +4,7 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.fit import Fit, terms_of
-from turnout.mismatch.steps import Steps, broyden
+from turnout.mismatch.steps import FIRST, Steps, broyden
 
 TRUST_TERM = 0.35  # largest step of a term's parameter as a share of its bounds
 DONE = 0.05  # nats; a smaller gain ends the iteration
@@ -186,7 +186,7 @@ def _iterate(joint, theta, predictions, residuals, jacobian, cost, renew):
                 jacobian = joint.renewed(tried, new, jacobian)
             theta, predictions, residuals, cost = found
         since += 1
-        if gain < enough and (since == 1 or not (frozen and renew)):
+        if gain < enough and not (found and damping > FIRST) and (since == 1 or not (frozen and renew)):
             break
         if not frozen or 0 < renew <= since or (renew and gain < enough):
             jacobian, since = _anew(joint, theta, predictions, jacobian), 0

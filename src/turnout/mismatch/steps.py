@@ -5,6 +5,7 @@ import numpy as np
 
 TRIES = 8  # of one step, each more damped than the last
 MORE, LESS = 6.0, 0.2  # factors on the damping after a step that failed, and after one that was taken
+HELD = 1e12  # of the diagonal: this one does not move
 FIRST, LEAST = 1e-2, 1e-4  # of the diagonal: the first damping, and one that is as good as none
 
 
@@ -30,16 +31,18 @@ class Steps:
             left = {k: max(0.0, p[2] - 2.0 * step @ p[1] + step @ p[0] @ step) for k, p in parts.items()}
 
     def damped(self, damping):
-        """(n,) step with ``damping`` times the diagonal added to it; what would leave its trust region is damped alone
-        and the others move on."""
+        """(n,) step with ``damping`` times the diagonal added to it; what would leave its trust region is damped alone,
+        what is at its bound and would go beyond stays there, and the others move on."""
         joint, diagonal = self.joint, np.diag(self.normal)
         reach, more = joint.reach / joint.sd, np.full(self.theta.size, damping)
+        lowest, highest = self.theta <= joint.low, self.theta >= joint.high
         for _ in range(12):
             step = np.linalg.solve(self.normal + np.diag(diagonal * more), self.right)
+            held = ((lowest & (step < 0.0)) | (highest & (step > 0.0))) & (more < HELD)
             excess = np.maximum(np.abs(step) / reach - 1.0, 0.0)
-            if excess.max(initial=0.0) < 0.05:
+            if excess.max(initial=0.0) < 0.05 and not held.any():
                 break
-            more += (1.0 + more) * excess
+            more = np.where(held, HELD, more + (1.0 + more) * excess)
         return joint.sd * np.clip(step, -reach, reach)
 
     def promised(self, step):
