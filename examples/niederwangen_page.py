@@ -176,7 +176,7 @@ says more of the date than the evidence above and is larger; both runs.
 - **Noise.** From rail to rail {spread_v:.2f} vertical, {spread_l:.2f} lateral (median of the logarithm's sd); from
   section to section in the first campaign {repeat_v:.2f} and {repeat_l:.2f}, taken as how well one campaign repeats,
   smooth over half an octave.
-- **What stays open.** S3 rose in the cold campaign and fell back. With 2015-09 left out more damping of the rail is named,
+- **What stays open.** S3 rose in the cold campaign and fell back. With 2015-09 left out rail damping is named,
   by little (table); with 2013-07 left out nothing reaches 12 nats; and the campaign left out is predicted worse with
   it: nothing is said. Another campaign in the cold would settle it.
 - **What was changed after a look.** Two things. The errors that bands share were first a share of independent bands

@@ -4,15 +4,16 @@ import numpy as np
 
 from turnout.errors import SimulationError
 
-AS_PLAIN = 0.5  # of the energy that the effect has in the recordings that speak for it
+CONFIRMED = 0.5  # of what the others should gain by their share of the energy of the effect
 
 
 def hangs_on(case, fit, candidate, by_condition, settings):
-    """The condition whose gain alone passes for a name where all others' together does not, "" elsewhere.
+    r"""The condition whose gain alone passes for a name where all others' together does not, "" elsewhere.
 
-    What is there shows wherever it acts: a gain of one hammer test that its repetition does not share is that test's.
-    Nobody is refused for a condition that nothing else could confirm, nor for a train, which comes at another speed and
-    with another roughness each time.
+    What is there shows wherever it acts, as plainly as its energy E there: all others together should gain
+    :math:`g E_{others} / E`. A gain of one hammer test that its repetition does not share is that test's. Nobody is
+    refused where the others' should be less than the margin, since they could not confirm it, nor for a train, which
+    comes at another speed and with another roughness each time.
 
     Parameters
     ----------
@@ -26,11 +27,13 @@ def hangs_on(case, fit, candidate, by_condition, settings):
     top = max(by_condition, key=by_condition.get, default="")
     if not top or by_condition[top] <= settings.threshold or "train" in candidate.where:
         return ""
-    if sum(by_condition.values()) - by_condition[top] >= settings.threshold:
+    others = sum(by_condition.values()) - by_condition[top]
+    if others >= settings.threshold:
         return ""
     shown = plainness(case, fit, candidate)
-    least = AS_PLAIN * shown.get(top, np.inf)
-    return top if any(c != top and energy >= least for c, energy in shown.items()) else ""
+    mine = shown.pop(top, np.inf)
+    due = by_condition[top] * sum(shown.values()) / mine if mine > 0.0 else 0.0
+    return top if due > settings.margin and others < CONFIRMED * due else ""
 
 
 def plainness(case, fit, candidate):

@@ -11,7 +11,7 @@ from turnout.mismatch.latent import Latent
 from turnout.mismatch.locate import attribute, cell_energies
 from turnout.mismatch.refits import kept, scored, to_the_end, with_derivatives
 from turnout.mismatch.scoring import heard, judged, latent_of, over
-from turnout.mismatch.together import reconsidered, refused, told_beside
+from turnout.mismatch.together import needed, reconsidered, refused, told_beside
 from turnout.mismatch.verdict import Verdict, opened
 from turnout.mismatch.verify import decoy, fit_of_reserved, fit_percent
 from turnout.mismatch.whereabouts import Whereabouts, whereabouts
@@ -117,6 +117,8 @@ def diagnose(case, settings=None, progress=None, store=None):
             break
     if refused(verdicts):
         verdicts, fit = reconsidered(case, base, fit, verdicts, settings)
+    else:
+        verdicts, fit = needed(case, base, fit, verdicts, settings)
     verdicts = [_as_it_ends(v, case, fit, settings) for v in verdicts]
     rival, leader = _rival(verdicts[0]), next((s for s in verdicts[0].scores[:1] if s.gain > settings.threshold), None)
     where = whereabouts(case, base, leader, verdicts[0].cause) if verdicts[0].answer == "unknown" else None

@@ -63,7 +63,7 @@ def _back(case, fit, values, settings):
     """``fit`` made again from other nuisances, to its end; None where the simulation cannot go there."""
     try:
         start = fit_jointly(case, fit.candidates, fit.psi, values, iterations=settings.iterations, stall=FINE)
-        return _ended(case, start, settings).light()
+        return ended(case, start, settings).light()
     except SimulationError:
         return None
 
@@ -130,7 +130,7 @@ def _tried(case, fit, entry, settings, store, effect, best=0.0):
 def _polished(case, fit, score, settings, store, effect):
     """A leader refitted to the end, with derivatives of its own: the verdict rests on these."""
     key = f"{effect}:polished:{score.candidate.key}:{len(fit.candidates)}:{tuple(np.round(score.fit.psi, 12))}"
-    refit = kept(store, key, lambda: _ended(case, score.fit, settings), score.fit.candidates)
+    refit = kept(store, key, lambda: ended(case, score.fit, settings), score.fit.candidates)
     return score_of(case, fit, refit, score.candidate, settings)
 
 
@@ -144,7 +144,7 @@ def _checked(case, fit, score, settings):
     return replace(score, worst=min(by_condition.values(), default=0.0), by_condition=by_condition, alone=alone)
 
 
-def _ended(case, fit, settings):
+def ended(case, fit, settings):
     """Continued until a round of steps gains less than a name needs; each begins with new derivatives."""
     for _ in range(ROUNDS):
         try:

@@ -10,6 +10,7 @@ import numpy as np
 from turnout.errors import SimulationError
 from turnout.mismatch.held_out import held_out_score
 from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.refits import ended
 from turnout.mismatch.scoring import consistent_elsewhere, explained_of, heard, over, structure_left
 from turnout.mismatch.verdict import TORN, judge
 
@@ -43,6 +44,25 @@ def reconsidered(case, base, fit, verdicts, settings):
         if found.answer in ("named", "a_or_b"):
             return [found, *verdicts[1:]], found.scores[0].fit
     return verdicts[:1], base
+
+
+def needed(case, base, fit, verdicts, settings):
+    """(verdicts, fit) without a first name that is worth no name beside the second: what it had taken for itself before
+    the second was found. Both stay where each is worth one."""
+    if [v.answer for v in verdicts] != ["named", "named"]:
+        return verdicts, fit
+    alone = _second_alone(case, fit, settings)
+    alone = ended(case, alone, settings) if alone is not None else None
+    first, second = (v.scores[0] for v in verdicts)
+    if alone is None or _gained(fit, alone, first.candidate) > settings.threshold:
+        return verdicts, fit
+    own = replace(second, fit=alone, gain=_gained(alone, base, second.candidate))
+    return [replace(verdicts[1], scores=(own, *verdicts[1].scores[1:]))], alone
+
+
+def _gained(fit, without, candidate):
+    """Evidence for a candidate by the fits with and without it. [nats]"""
+    return fit.evidence - without.evidence + candidate.aside - np.log(candidate.scanned)
 
 
 def _vouches(first, second):
@@ -82,6 +102,6 @@ def _worth(case, base, both, alone, score, settings):
     what the pair does."""
     mine, reference = held_out_score(case, both), held_out_score(case, alone)
     by_condition = {c: mine[c] - reference[c] for c in reference}
-    gain = both.evidence - alone.evidence + score.candidate.aside - np.log(score.candidate.scanned)
+    gain = _gained(both, alone, score.candidate)
     explained, worst = explained_of(case, base, both, settings), min(by_condition.values(), default=0.0)
     return replace(score, gain=gain, fit=both, explained=explained, worst=worst, by_condition=by_condition)

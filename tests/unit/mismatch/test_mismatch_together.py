@@ -15,6 +15,7 @@ from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.observation import Observation
 from turnout.mismatch.scout import _seen
 from turnout.mismatch.shortlist import Projector, _same_place
+from turnout.mismatch.together import needed
 from turnout.mismatch.verdict import Score, Verdict, judge, opened
 from turnout.physics import Parameter
 
@@ -204,3 +205,17 @@ def test_the_evidence_of_a_row_has_an_entry_for_each_verdict():
     said = _evidence(SimpleNamespace(verdicts=(first, second), frames=()))
     assert (said["term"], said["probability"], said["reason"]) == ("a", 0.97, "x")
     assert [(e["term"], e["probability"], e["reason"]) for e in said["beside"]] == [("b", 0.7, "y")]
+
+
+def test_a_first_name_that_the_second_leaves_nothing_to_is_dropped():
+    """A ramp alone is in the recordings; a bowl that was named before it, which is half a ramp, is worth nothing beside
+    it. Where both are there both stay."""
+    settings = MismatchSettings()
+    for true, left in (({"ramp": 2.5}, ("ramp",)), ({"ramp": 2.5, "bowl": 2.5}, ("bowl", "ramp"))):
+        case = Shapes(("ramp", "bowl"), **true)
+        pair = case.candidates[::-1]
+        fit = fit_jointly(case, pair, [0.1, 0.1], iterations=20)
+        verdicts = [Verdict("named", (c.family,), "A", 0.97, {}, (Score(c, 50.0, 0.0, 1.0, fit),)) for c in pair]
+        found, last = needed(case, fit_jointly(case), fit, verdicts, settings)
+        assert tuple(v.names[0] for v in found) == left == tuple(c.family for c in last.candidates)
+    assert last.psi == pytest.approx([2.5, 2.5], abs=0.15)

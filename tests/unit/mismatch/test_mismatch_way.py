@@ -50,7 +50,7 @@ def test_a_dear_fit_on_which_the_verdict_rests_goes_on_for_less(monkeypatch):
     assert fit_jointly(Bent(False), iterations=25, stall=20.0).cost == pytest.approx(late.cost, abs=0.2)  # cheap: none
     asked = []
     monkeypatch.setattr(refits, "fit_jointly", lambda *a, stall=STALL, **k: asked.append(stall) or late)
-    refits._ended(Bent(True), early, MismatchSettings())
+    refits.ended(Bent(True), early, MismatchSettings())
     refits.to_the_end(Bent(True), early, MismatchSettings())
     assert set(asked[:-1]) == {FINE} and asked[-1] == STALL > FINE
 
