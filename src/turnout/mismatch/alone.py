@@ -4,16 +4,15 @@ import numpy as np
 
 from turnout.errors import SimulationError
 
-CONFIRMED = 0.5  # of what the others should gain by their share of the energy of the effect
+AS_PLAIN, WITNESSES = 0.5, 2  # of the energy that the effect has in the recording that speaks for it; so many others
 
 
 def hangs_on(case, fit, candidate, by_condition, settings):
-    r"""The condition whose gain alone passes for a name where all others' together does not, "" elsewhere.
+    """The condition whose gain alone passes for a name where all others' together does not, "" elsewhere.
 
-    What is there shows wherever it acts, as plainly as its energy E there: all others together should gain
-    :math:`g E_{others} / E`. A gain of one hammer test that its repetition does not share is that test's. Nobody is
-    refused where the others' should be less than the margin, since they could not confirm it, nor for a train, which
-    comes at another speed and with another roughness each time.
+    What is there shows wherever it acts: a gain of one recording that others, which show the effect at least half as
+    plainly, do not share is that recording's. It takes two such others, since nuisances may take one's share; and
+    trains are not asked, which come at another speed and with another roughness each time.
 
     Parameters
     ----------
@@ -31,9 +30,8 @@ def hangs_on(case, fit, candidate, by_condition, settings):
     if others >= settings.threshold:
         return ""
     shown = plainness(case, fit, candidate)
-    mine = shown.pop(top, np.inf)
-    due = by_condition[top] * sum(shown.values()) / mine if mine > 0.0 else 0.0
-    return top if due > settings.margin and others < CONFIRMED * due else ""
+    least = AS_PLAIN * shown.pop(top, np.inf)
+    return top if sum(energy >= least for energy in shown.values()) >= WITNESSES else ""
 
 
 def plainness(case, fit, candidate):
