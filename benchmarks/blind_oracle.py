@@ -31,6 +31,8 @@ def oracle(folder, case, truth):
     began = time.process_time()
     (campaign,) = campaigns_of(folder, case)
     made = TrackCase(campaign)
+    if not made.reserved:
+        raise TurnoutError("none of the recordings left out can be used, so no fit can be told")
     base = fit = fit_jointly(made, iterations=STEPS)
     for effect in truth["effects"]:
         fit = _with(made, fit, effect) or fit
