@@ -6,6 +6,7 @@ import numpy as np
 TRIES = 8  # of one step, each more damped than the last
 MORE, LESS = 6.0, 0.2  # factors on the damping after a step that failed, and after one that was taken
 HELD = 1e12  # of the diagonal: this one does not move
+SETTLED = 0.1  # of what is enough to go on; a step that promises less is not tried
 FIRST, LEAST = 1e-2, 1e-4  # of the diagonal: the first damping, and one that is as good as none
 
 
@@ -56,7 +57,7 @@ class Steps:
         joint = self.joint
         for _ in range(TRIES):
             step = self.damped(damping)
-            if self.promised(step) < 0.1 * joint.enough:
+            if self.promised(step) < SETTLED * joint.enough:
                 break
             tried = np.clip(self.theta + step, joint.low, joint.high)
             new = joint.tried(tried)
