@@ -222,8 +222,8 @@ changed* (0.93) and S2 *cannot tell* (0.37), the other grades were the same.
   and then "most sections rose" and "{reference} fell while everything else rose" cannot be told apart except by
   parsimony. Minus twice the log evidence of that model: {shared} (lower is better). What decides is the size of
   the numbers themselves: the lateral decay rate of {reference} is the same before and after within ×{low:.2f} to
-  ×{high:.2f} in all bands from 125 to 2000 Hz, while other sections rose up to ×{largest:.0f}. A campaign effect
-  that {reference} cancelled in every band is possible and not credible.
+  ×{high:.2f}, temperature not taken out, in all bands from 125 to 2000 Hz, while other sections rose up to
+  ×{largest:.0f}. A campaign effect that {reference} cancelled in every band is possible and not credible.
 {open_cases}
 - A step is looked for once per section. A second change in a section, or one that faded, shows as scatter.
 - *No change* is a statement about what could be seen: the intervals in the table below are its resolution.

@@ -102,25 +102,27 @@ def draw(measured, found, path):
             axis.fill_between(x, np.exp(-2.0 * sd), np.exp(2.0 * sd), color="0.85", lw=0, label="±2 sd")
             for values, campaign, mark in zip(factor, m.campaigns[1:], "ovs"):
                 axis.plot(x, np.exp(values), mark, ms=3, label=campaign)
-            if conclusion(runs)[0] == "changed":
-                _draw_term(axis, x, case, d, direction)
+            said = conclusion(runs)[0]
+            if said == "changed":
+                said += f", {_draw_term(axis, x, case, d, direction)}"
             axis.set_yscale("log")
-            axis.set_title(f"{m.section} {direction}: {conclusion(runs)[0]}", fontsize=9)
+            axis.set_title(f"{m.section} {direction}: {said}", fontsize=9)
         row[0].set_ylabel("recorded / calibrated")
     for axis in axes[-1]:
         axis.set_xticks(x[::2], [f"{b:.0f}" for b in BANDS[::2]], rotation=60)
         axis.set_xlabel("third-octave band [Hz]")
-    axes[0, 0].legend(ncols=2, fontsize=7)
+    keys = {label: line for axis in axes.flat for line, label in zip(*axis.get_legend_handles_labels())}
+    figure.legend(keys.values(), keys.keys(), loc="outside upper center", ncols=len(keys), fontsize=8)
     save(figure, path)
 
 
 def _draw_term(axis, x, case, diagnosis, direction):
-    """The leading change's own factor at the temperature of the left-out campaign."""
+    """Draw the leading change's own factor at the temperature of the left-out campaign; returns its name."""
     score, o = diagnosis.verdict.scores[0], next(r for r in case.reserved if r.kind == direction)
     change = Change(score.family, score.candidate.where["since"], tuple(score.fit.psi[-_n(score) :]))
     with_it, without = (case.logarithm(score.fit.values, terms, o) for terms in ((change,), ()))
-    axis.plot(x, np.exp(with_it - without), color="black", lw=1, label=score.family.replace("_", " "))
-    axis.legend(fontsize=7)
+    axis.plot(x, np.exp(with_it - without), color="black", lw=1, label="the change that leads")
+    return score.family.replace("_", " ")
 
 
 PAGE = """# Bern-Niederwangen: what was changed at the track, by diagnosis

@@ -98,6 +98,7 @@ def draw_arrow(case, diagnosis, path):
         axis.semilogy(time, 1e3 * np.maximum.reduceat(np.abs(row), edges), lw=1, label=name)
     axis.set_xlabel("time [s]")
     axis.set_ylabel("largest in 0.3 s [mV]")
+    axis.set_ylim(top=1.25 * axis.get_ylim()[1])  # room for the legend
     axis.legend(loc="upper left", ncols=3)
     save(figure, path)
 

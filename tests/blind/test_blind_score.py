@@ -81,7 +81,7 @@ def test_a_perfect_tool_meets_every_bar():
     assert found["where: axle right (clear singles)"].n == 10
     assert found["parameters: median error"].value == 0.0
     assert found["held-out fit: gap to the oracle closed, median"].value == pytest.approx(100.0 * 30 / 32)
-    assert found["probability: worst fifth, stated from seen"].met
+    assert found["probability: worst fifth of the scale, stated from seen"].met
     assert all(set(counts) <= {"none", "unknown", "a_or_b", "hanging_sleeper", "surface_dip", "wheel_flat",
                                "sensor_gain", "pad_temperature"} for counts in confusion(judged).values())  # fmt: skip
 
@@ -108,7 +108,7 @@ def test_a_silent_tool_raises_no_alarm_and_finds_nothing():
     assert found["parameters: median error"].n == 0
     assert found["parameters: median error"].met is None  # nothing measured is not a bar met
     # 0.9 said of "none" in 166 cases, right in 60 controls and 16 that nobody can tell: 76/166.
-    assert found["probability: worst fifth, stated from seen"].value == pytest.approx(abs(0.9 - 76 / 166))
+    assert found["probability: worst fifth of the scale, stated from seen"].value == pytest.approx(abs(0.9 - 76 / 166))
 
 
 def test_a_tool_that_never_answers_is_not_a_silent_one():
@@ -139,7 +139,7 @@ def test_a_confidently_wrong_tool_fails_where_it_should():
     assert found["what: a wrong name (clear singles)"].share == 100.0
     assert found["not identifiable: a wrong name"].met is False
     assert found["two effects: one right and none wrong"].k == 0
-    assert found["probability: worst fifth, stated from seen"].value > 0.9
+    assert found["probability: worst fifth of the scale, stated from seen"].value > 0.9
 
 
 def test_a_wrong_place_axle_train_or_sensor_is_seen():

@@ -65,7 +65,7 @@ def _tell_modes(beams):
             frequency = f"{at.mean:.2f} ± {(at.high - at.low) / 2:.2f}"
             ratio = f"{100 * d.mean:.3f} ± {50 * (d.high - d.low):.3f}"
             print(f"{said:>15} {frequency:>22} {zeta:>19} {ratio:>20} {at.n:>4}")
-    print("± is the 95 % t interval of the mean over n responses.")
+    print("± is the 95 % t interval of the mean over n responses, as if independent; those of one sensor are not.")
 
 
 def _tell_uff(folder):

@@ -84,7 +84,8 @@ def _passage_forces(recording, truth):
         near = np.abs(truth.wheel_place[wheel] - 26.7) < 1.6
         bottom.plot(truth.wheel_place[wheel, near], truth.force[wheel, near] / 1e3, lw=0.8, label=f"wheel {wheel + 1}")
     bottom.set(xlabel="place [m]", ylabel="contact force [kN]", title="every wheel at the crossing (nose at 26.7 m)")
-    bottom.legend(ncol=4)
+    bottom.set_ylim(0.0, 1.3 * bottom.get_ylim()[1])  # room for the legend
+    bottom.legend(ncol=4, loc="upper center")
     return figure
 
 

@@ -8,6 +8,8 @@ import numpy as np
 from turnout_blind.score.intervals import clopper_pearson
 from turnout_blind.score.judged import CLEAR
 
+FEWEST = 5  # cases of an interval of probabilities that is held against its bar
+
 
 @dataclass(frozen=True)
 class Share:
@@ -129,9 +131,14 @@ def _values(judged, oracle):
             gaps.append(100.0 * (after - before) / (best - before))
     yield Value("held-out fit: gap to the oracle closed, median", _median(gaps), len(gaps), 80.0, ">=", "%")
     yield Share("held-out fit: fell by over a point", sum(fell), len(fell), 0.0, "<=")
-    worst = [abs(stated - share) for stated, share, n in reliability(judged) if n >= 5]
+    worst = [abs(stated - share) for stated, share, n in reliability(judged) if n >= FEWEST]
     n = sum(j.probability is not None for j in judged)
-    yield Value("probability: worst fifth, stated from seen", max(worst, default=float("nan")), n if worst else 0, 0.1)
+    yield Value(
+        "probability: worst fifth of the scale, stated from seen",
+        max(worst, default=float("nan")),
+        n if worst else 0,
+        0.1,
+    )
 
 
 def _median(values):
@@ -139,7 +146,7 @@ def _median(values):
 
 
 def reliability(judged):
-    """(mean stated probability, share right, n) for each fifth of the probabilities that has cases."""
+    """(mean stated probability, share right, n) for each interval of 0.2 of the probabilities that has cases."""
     stated = [(j.probability, j.probably_right) for j in judged if j.probability is not None]
     found = []
     for low in np.arange(5) / 5.0:

@@ -70,7 +70,7 @@ def _side_by_side(judged):
 
 
 def draw_reliability(judged, path):
-    """Share right against stated probability, by fifths, with 95 % intervals."""
+    """Share right against stated probability, by intervals of 0.2, with 95 % intervals."""
     plt = pyplot()
     figure, axis = plt.subplots(figsize=(4.2, 3.8), layout="constrained")
     axis.plot([0, 1], [0, 1], color="0.6", lw=1)
@@ -78,22 +78,30 @@ def draw_reliability(judged, path):
     for stated, share, n in reliability(judged):
         low, high = clopper_pearson(round(share * n), n)
         axis.errorbar(stated, share, [[share - low], [high - share]], fmt="o", color="C0", capsize=3)
-        axis.annotate(f"n = {n}", (stated, share), xytext=(5, -10), textcoords="offset points", fontsize=8)
+        axis.annotate(f"n = {n}", (stated, share), xytext=(-6, -4), textcoords="offset points", fontsize=8, ha="right")
     axis.set_xlim(0, 1.02)
-    axis.set_ylim(-0.02, 1.05)
+    axis.set_ylim(-0.08, 1.05)
     axis.set_xlabel("stated probability")
     axis.set_ylabel("share right")
     axis.legend(loc="upper left")
     return save(figure, path)
 
 
-def spectrum(rows, rate):
-    """(frequency [Hz], density) of the rows (n_sensor, n), Hann-windowed halves overlapping by half."""
+def spectrum(rows, rate, window="hann"):
+    """(frequency [Hz], density) of the rows (n_sensor, n), windowed pieces of 0.25 s overlapping by half.
+
+    A blow at the start of a piece wants the window "boxcar": others take it away.
+    """
     from scipy import signal
 
-    return signal.welch(rows, rate, nperseg=min(rows.shape[1], int(rate / 4.0)), axis=1)
+    return signal.welch(rows, rate, window, nperseg=min(rows.shape[1], int(rate / 4.0)), axis=1)
+
+
+def changes(before, after):
+    """(n_sensor,) change of each row, relative to itself."""
+    return np.linalg.norm(after - before, axis=1) / np.linalg.norm(before, axis=1)
 
 
 def furthest(before, after):
     """Index of the row that changes most, relative to itself."""
-    return int(np.argmax(np.linalg.norm(after - before, axis=1) / np.linalg.norm(before, axis=1)))
+    return int(np.argmax(changes(before, after)))

@@ -45,7 +45,7 @@ def report_of(out, more=None):
         confusion_table(confusion(judged)),
         "Along the ladder (points of held-out fit that the effect costs: what was said; * = the right name among it):",
         severity_table(severity(judged)),
-        "Stated probability and share right, by fifths:",
+        "Stated probability and share right, by intervals of 0.2:",
         "\n".join(f"- {p:.2f}: {share:.2f} of {n}" for p, share, n in reliability(judged)) or "- none stated",
         "Alarms, wrong names, clear effects without their name or without a word, no answer:",
         failure_table(judged),

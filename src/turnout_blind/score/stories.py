@@ -12,7 +12,7 @@ from turnout_blind.reveal import revealed
 from turnout_blind.run import strike
 from turnout_blind.score.answers import answers_of
 from turnout_blind.score.judged import judge
-from turnout_blind.score.pictures import furthest, outcome, pyplot, save, spectrum
+from turnout_blind.score.pictures import changes, furthest, outcome, pyplot, save, spectrum
 from turnout_blind.strata import CasePlan
 
 
@@ -82,10 +82,10 @@ def draw(truth, rows, oracle, path, effects):
     plan = CasePlan(truth["stratum"], tuple((e["kind"], e["rung"]) for e in truth["effects"]), tuple(truth["seed"]))
     _, site, world, _ = stage(plan, effects)
     figure, axes = plt.subplots(2, 2, figsize=(8.5, 5.6), layout="constrained")
-    for axis, (title, before, after, top) in zip(axes[0], (_blow(site, world), _train(site, world))):
+    for axis, (title, before, after, top, window) in zip(axes[0], (_blow(site, world), _train(site, world))):
         k = furthest(before, after)
         for signals, label in ((before, "without"), (after, "with")):
-            f, density = spectrum(_shown(site, world if label == "with" else site.world, signals, title), RATE)
+            f, density = spectrum(signals, RATE, window)
             axis.semilogy(f, np.sqrt(density[k]), lw=1, label=f"{label} the effect")
         axis.set_xlim(0.0, top)
         inside = (f > 5.0) & (f < top)
@@ -100,22 +100,38 @@ def draw(truth, rows, oracle, path, effects):
 
 
 def _blow(site, world):
-    sides = []
-    for w in (site.world, world):
-        warm = site.temperatures[1]
-        _, a, _ = strike(w, sensor_places(site, w), site.blows[0], [0.005], [0.95], 0.25, warm, tip=site.tip)
-        sides.append(a)
-    return "a blow", *sides, 900.0
+    """(title, without, with, top [Hz], window) of a blow at the place whose sensors show the effect most."""
+
+    def sides(place):
+        for w in (site.world, world):
+            warm = site.temperatures[1]
+            _, a, _ = strike(w, sensor_places(site, w), place, [0.005], [0.95], 0.25, warm, tip=site.tip)
+            yield _shown(site, w, a, "hammer")
+
+    place, before, after = _plainest((x, *sides(x)) for x in site.blows)
+    return f"a blow at {place:.1f} m", before, after, 900.0, "boxcar"
 
 
 def _train(site, world):
-    k = next(i for i, p in enumerate(site.passages) if p.train == "loaded")
-    return "a loaded train", *(passage_motion(site, w, k, np.random.default_rng(k)) for w in (site.world, world)), 250.0
+    """(title, without, with, top [Hz], window) of the passage whose sensors show the effect most."""
+
+    def sides(k):
+        for w in (site.world, world):
+            yield _shown(site, w, passage_motion(site, w, k, np.random.default_rng(k)), "passage")
+
+    k, before, after = _plainest((k, *sides(k)) for k in range(len(site.passages)))
+    p = site.passages[k]
+    return f"{p.train}, {3.6 * p.speed:.0f} km/h", before, after, 250.0, "hann"
 
 
-def _shown(site, world, motion, title):
-    """Through the sensors' faults."""
-    kind, rows = "hammer" if title == "a blow" else "passage", []
+def _plainest(shown):
+    """The (what, without, with) that differs most."""
+    return max(shown, key=lambda s: changes(*s[1:]).max())
+
+
+def _shown(site, world, motion, kind):
+    """Through the sensors' faults, as the recorder of a "hammer" test or a "passage" has it."""
+    rows = []
     for x, chain in zip(motion, site.chains):
         for fault in world.channels.get(chain.name, ()):
             x = fault(kind, np.random.default_rng(0))(x, 1.0 / STEP)
@@ -125,6 +141,7 @@ def _shown(site, world, motion, title):
 
 def _map(axis, truth, rows, site):
     """Sensors, blows, what was there (filled) and what was said (open) along the rail."""
+    axis.set_xlim(min(site.sensors) - 2.5, max(site.sensors) + 2.5)
     axis.plot(site.sensors, np.zeros(len(site.sensors)), "^", color="0.4", label="sensor")
     axis.plot(site.blows, np.zeros(len(site.blows)), "v", color="0.7", label="blow")
     for name, x in zip(site.names(), site.sensors):
@@ -133,18 +150,25 @@ def _map(axis, truth, rows, site):
         x = effect["where"].get("position", truth["sensors"].get(effect["where"].get("sensor")))
         if x is not None:
             axis.plot(x, 1.0, "o", color="black")
-            axis.annotate(effect["kind"], (x, 1.0), xytext=(5, 5), textcoords="offset points", fontsize=8)
+            _note(axis, x, 1.0, effect["kind"])
     for row in rows or ():
         x = row.get("position_m")
         x = truth["sensors"].get(row.get("channel")) if x is None else x
         if x is not None:
             axis.plot(x, 2.0, "o", mfc="none", color="C3")
-            axis.annotate(str(row.get("term") or row["verdict"]), (x, 2.0), xytext=(5, 5), textcoords="offset points",
-                          fontsize=8)  # fmt: skip
+            _note(axis, x, 2.0, str(row.get("term") or row["verdict"]))
     axis.set_yticks([0, 1, 2], ["track", "concealed", "said"])
-    axis.set_ylim(-0.8, 2.8)
-    axis.set_xlim(min(site.sensors) - 2.5, max(site.sensors) + 2.5)
+    axis.set_ylim(-0.8, 3.2)
     axis.set_xlabel("place [m]")
+    axis.legend(loc="upper left", ncols=2, fontsize=7)
+
+
+def _note(axis, x, y, words):
+    """Beside the point, towards the middle of the axis."""
+    low, high = axis.get_xlim()
+    side = "right" if x > 0.5 * (low + high) else "left"
+    axis.annotate(words.replace("_", " "), (x, y), xytext=(-5 if side == "right" else 5, 5),
+                  textcoords="offset points", fontsize=8, ha=side)  # fmt: skip
 
 
 def _bars(axis, rows, oracle):

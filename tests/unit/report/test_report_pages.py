@@ -19,6 +19,7 @@ from turnout.readers.writing import write
 from turnout.registry.database import open_registry
 from turnout.registry.register import register
 from turnout.report.job import report_job
+from turnout.report.pages.turnout import line_of
 from turnout.report.write import write_pages
 
 DAYS = (date(2024, 5, 13), date(2024, 6, 17))
@@ -113,6 +114,13 @@ def test_the_resonance_on_the_page_is_the_registrys_with_its_interval_and_n(page
     assert f"{frequency:.1f} ± {half:.1f}" in words
     # the paper's 99.4 Hz with its blow-to-blow spread of 0.6 %
     assert abs(frequency - 99.4) < 1.0
+
+
+def test_a_line_without_a_change_says_of_which_sections_and_resonance_it_speaks():
+    silent = {"state": "cannot tell", "sections": "A8", "band": "railpad", "change_pct": None, "sentence": "too little"}
+    told = silent | {"state": "inspect this week", "change_pct": -9.2, "sentence": "railpad resonance of A8 fell"}
+    assert line_of(silent)["words"] == "A8, railpad: too little"
+    assert line_of(told)["words"] == told["sentence"]
 
 
 def test_what_was_not_used_is_named_with_its_reason_and_remedy(pages):

@@ -65,7 +65,7 @@ class TrendSettings:
         0.9, "", "the detectable change is seen within a year with this probability", minimum=0.5, maximum=0.999
     )
     not_measured_days: float = setting(
-        90.0, "d", "older than this (or three of its own intervals) a chart is not measured", minimum=1.0
+        90.0, "d", "older than this and than three of its own intervals a chart is not measured", minimum=1.0
     )
     false_discovery: float = setting(
         0.1, "", "expected share of false names among the drifts reported", minimum=0.001, maximum=0.5

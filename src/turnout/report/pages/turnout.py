@@ -32,7 +32,7 @@ def turnout_page(rows, turnout, template, shared):
         place=_place(turnout),
         latest=day(max((m["measured_at_utc"] for m in models.values()), default=None)),
         diagram=diagram(rows["sections"], states) if rows["sections"] else "",
-        findings=[_finding(w) for w in rows["worklist"]],
+        findings=[line_of(w) for w in rows["worklist"]],
         mismatches=[m["sentence"] for m in rows["mismatches"]],
         summary=[_summary(s, models.get(s["section_id"]), _of(rows, "modes", s)) for s in rows["sections"]],
         sections=[_section(rows, s, models, states) for s in rows["sections"]],
@@ -48,8 +48,10 @@ def _of(rows, kind, section):
     return [r for r in rows[kind] if r["section_id"] == section["section_id"]]
 
 
-def _finding(work):
-    return {"state": work["state"], "badge": badge(work["state"]), "words": work["sentence"]}
+def line_of(work):
+    """A row of the list as a line of the page; a sentence without a change does not say of what it speaks."""
+    of = "" if work["change_pct"] is not None else f"{work['sections']}, {work['band']}: "
+    return {"state": work["state"], "badge": badge(work["state"]), "words": of + work["sentence"]}
 
 
 def _place(turnout):
