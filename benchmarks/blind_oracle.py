@@ -1,19 +1,25 @@
 """Fits with the true effect, by the same engine on the same recordings left out: what a perfect name would gain.
 
-    python -m benchmarks.blind_oracle SET [--cases T1234abcd ...] [--clear 30] [--workers 2]
+    python -m benchmarks.blind_oracle SET [--clear 30] [--workers 2]
+    python -m benchmarks.blind_oracle SET --cases T1234abcd ...
 
-SET is a revealed set. Writes SET/oracle.json, {case: [fit without, fit with the true effect]} [%], and
-SET/oracle_detail.json; goes on where it stopped. A case whose effects the library does not hold has no oracle, nor has
-one of a wheel, which comes at another angle to every passage. Errors of a case are its result and stop nothing.
-``--clear`` takes so many clear singles in the order of their ids, which are hashes: a sample that nobody has drawn.
+SET is a revealed set, judged by this very tool. Writes SET/oracle.json: hashes of tool and set, and ``fits`` {case: fit
+without, fit with the true effect} [%], null where there is none, with the reason; goes on where it stopped, and asks
+again what failed. All clear singles are asked, or with ``--clear`` so many of them in the order of their ids, which are
+hashes: a sample that nobody has drawn. A case whose effect the library does not hold has no oracle, nor has one of a
+wheel, which comes at another angle to every passage. ``--cases`` prints the chosen ones and writes nothing.
 """
 
 import argparse
 import json
+import sys
 import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
+from tqdm import tqdm
+
+import turnout
 from benchmarks.blind_bridge import campaigns_of
 from turnout.errors import TurnoutError
 from turnout.mismatch.joint import cost_at, fit_jointly
@@ -21,6 +27,8 @@ from turnout.mismatch.track.track_case import TrackCase
 from turnout.mismatch.verify import fit_percent, predict_reserved
 from turnout_blind.score.judged import BAY, CLEAR, gain_of
 from turnout_blind.score.names import SAME, right_names
+from turnout_blind.score.report import provenance
+from turnout_blind.seal import digest_of_folder
 
 STEPS = 15
 STARTS = 2  # beside the truth itself: scans of phase and frequency have dozens
@@ -46,17 +54,23 @@ def oracle(folder, case, truth):
 
 
 def _with(case, fit, effect):
-    """The best fit with this effect in it, where it is, from the truth itself and from the likeliest starts."""
-    found = []
+    """The best fit with this effect in it, where it is, from the truth itself and from the likeliest starts; what
+    nuisances may have bent to take the effect's place starts at its prior as well."""
+    found = {}
+    unbent = fit.values | {n.name: n.mean for n in case.nuisances if n.owner is None and n.bends}
     for candidate in _candidates(case, effect):
-        for start in (_told(candidate, effect), *_likeliest(case, fit, candidate)):
+        told = _told(candidate, effect)
+        starts = [(told, fit.values), (told, unbent), *((s, fit.values) for s in _likeliest(case, fit, candidate))]
+        for start, values in starts:
+            key = repr(candidate.term(start)), values is unbent
             try:
-                found.append(
-                    fit_jointly(case, (*fit.candidates, candidate), [*fit.psi, *start], fit.values, iterations=STEPS)
-                )
+                if key not in found:
+                    found[key] = fit_jointly(
+                        case, (*fit.candidates, candidate), [*fit.psi, *start], values, iterations=STEPS
+                    )
             except TurnoutError:  # it cannot be simulated from here
                 continue
-    return min(found, key=lambda f: f.cost, default=None)
+    return min(found.values(), key=lambda f: f.cost, default=None)
 
 
 def _likeliest(case, fit, candidate):
@@ -91,13 +105,14 @@ def _told(candidate, effect):
 
 
 def clear_singles(truths):
-    """Cases of one effect that costs more than 3 points of held-out fit and has a name, by id."""
+    """Cases of one effect that costs more than 3 points of held-out fit and can have an oracle, by id."""
     return [
         case
         for case, truth in sorted(truths.items())
         if truth["stratum"] == "single"
         and gain_of(truth["visible"]) > CLEAR
         and right_names(truth["effects"][0]["kind"])
+        and "axle" not in truth["effects"][0].get("where", {})
     ]
 
 
@@ -109,29 +124,45 @@ def _job(job):
         return case, {"error": f"{type(error).__name__}: {error}"[:300]}
 
 
+def asked(out, truths, clear, workers):
+    """Ask the clear singles that have no answer yet, or failed, and write each answer as it comes."""
+    path, origin = out / "oracle.json", provenance(json.loads((out / "diagnosis.json").read_text()))
+    mine = digest_of_folder(Path(turnout.__file__).parent)
+    if mine != origin["tool_sha256"]:
+        sys.exit(
+            f"{out}/diagnosis.json: judged by tool {origin['tool_sha256'][:16]}, this is {mine[:16]}. Run that one."
+        )
+    held = json.loads(path.read_text()) if path.exists() else {}
+    fits = held["fits"] if {k: held.get(k) for k in origin} == origin else {}
+    chosen = clear_singles(truths)[:clear]
+    for case, result in told(out, [c for c in chosen if fits.get(c, {}).get("oracle") is None], truths, workers):
+        fits[case] = result
+        path.write_text(json.dumps(origin | {"asked": chosen, "fits": fits}, indent=1, sort_keys=True) + "\n")
+
+
+def told(out, cases, truths, workers):
+    """(case, result) as they come."""
+    with ProcessPoolExecutor(workers) as pool:
+        jobs = [pool.submit(_job, (out / "cases" / case, case, truths[case])) for case in cases]
+        for done in tqdm(as_completed(jobs), "oracle", len(jobs), unit="case", disable=not sys.stderr.isatty()):
+            yield done.result()
+
+
 def main():
     """Fit and write, case by case."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("set")
-    parser.add_argument("--cases", nargs="+")
-    parser.add_argument("--clear", type=int, help="so many of the clear singles")
+    parser.add_argument("--cases", nargs="+", help="these, printed and not kept")
+    parser.add_argument("--clear", type=int, help="so many of the clear singles; all where it is not given")
     parser.add_argument("--workers", type=int, default=1)
     args = parser.parse_args()
     out = Path(args.set)
     truths = {p.stem: json.loads(p.read_text()) for p in sorted((out / "revealed").glob("T*.json"))}
-    detail = out / "oracle_detail.json"
-    found = json.loads(detail.read_text()) if detail.exists() else {}
-    chosen = args.cases or (truths if args.clear is None else clear_singles(truths)[: args.clear])
-    wanted = [c for c in chosen if c not in found and truths[c]["stratum"] in ("single", "double")]
-    with ProcessPoolExecutor(args.workers) as pool:
-        jobs = [pool.submit(_job, (out / "cases" / case, case, truths[case])) for case in wanted]
-        for done in as_completed(jobs):
-            case, result = done.result()
-            found[case] = result
-            detail.write_text(json.dumps(found, indent=1, sort_keys=True) + "\n")
-            known = {c: (r["before"], r["oracle"]) for c, r in found.items() if r.get("oracle") is not None}
-            (out / "oracle.json").write_text(json.dumps(known, indent=1, sort_keys=True) + "\n")
+    if args.cases:
+        for case, result in told(out, args.cases, truths, args.workers):
             print(case, result, flush=True)
+    else:
+        asked(out, truths, args.clear, args.workers)
 
 
 if __name__ == "__main__":

@@ -26,10 +26,11 @@ def diagnose_set(
     """Write ``out``/findings/<case>.json and ``out``/diagnosis.json; returns the latter's content.
 
     A case that has its run is not run again (but a failed one if ``again``), unless the tool has changed: then
-    BlindError. A case on which the tool fails, or that exceeds ``timeout`` seconds of the clock or ``cpu`` of the
-    processor, has no rows and the end of what was said; it never stops the others, and the scorer counts it as
-    silence. ``only``: these cases; ``workers`` of them at a time; ``progress`` wraps the cases as they end. With a
-    ``label`` it is an ablation: another command on the same cases, kept below ``out``/ablations/<label>.
+    BlindError; so it is for another command, and once the set is open. A case on which the tool fails, or that exceeds
+    ``timeout`` seconds of the clock or ``cpu`` of the processor, has no rows and the end of what was said; it never
+    stops the others, and the scorer counts it as silence. ``only``: these cases; ``workers`` of them at a time;
+    ``progress`` wraps the cases as they end. With a ``label`` it is an ablation: another command on the same cases,
+    kept below ``out``/ablations/<label>.
     """
     out, sealed = Path(out).resolve(), read_commit(out)
     tool, home = Path(turnout.__file__).parent, home_of(out, label)
@@ -37,10 +38,15 @@ def diagnose_set(
     held = json.loads(record.read_text()) if record.exists() else {"tool_sha256": frozen, "cases": {}}
     if held["tool_sha256"] != frozen:
         raise BlindError(record, "tool_sha256", "the tool has changed since the first case", "Diagnose a set made anew")
+    if held.get("command", command) != command:
+        raise BlindError(record, "command", "another command than that of the first case", "Judge all by one command")
+    open_truth = out / "revealed"
+    if label is None and open_truth.exists():
+        raise BlindError(open_truth, "truth", "this set is open", "Judge a set made anew, or an ablation")
     held |= {"commit_sha256": digest((out / "commit.json").read_bytes()), "command": command}
     held |= {"budget": {"wall_s": timeout, "cpu_s": cpu}}
     (home / "findings").mkdir(parents=True, exist_ok=True)
-    with Hidden(truth, _generators()) as hidden:
+    with Hidden(truth, [*_generators(), *([open_truth] if open_truth.exists() else [])]) as hidden:
         held |= {"isolation": hidden.how, "canary": hidden.canary}
         waiting = [case for case in sorted(only or sealed["cases"]) if _waits(held["cases"].get(case), again)]
         with ThreadPoolExecutor(workers) as pool:  # threads: each waits for a process, none can bring down the others
@@ -120,12 +126,12 @@ def _result(status, code, cpu, wall, said, rows):
 
 
 def _are_rows(path):
-    """Whether the file holds a list of objects with a verdict."""
+    """Whether the file holds a list of objects with a verdict, one at least: no rows are no answer."""
     try:
         found = json.loads(path.read_text())
     except (OSError, ValueError):
         return False
-    return isinstance(found, list) and all(isinstance(r, dict) and r.get("verdict") for r in found)
+    return isinstance(found, list) and bool(found) and all(isinstance(r, dict) and r.get("verdict") for r in found)
 
 
 def printed(text):

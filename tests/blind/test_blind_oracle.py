@@ -45,11 +45,16 @@ def test_an_oracle_starts_from_the_truth_within_the_bounds():
 
 
 def test_a_sample_of_clear_singles_is_drawn_by_id_alone():
-    def truth(stratum, share, kind="pad"):
-        return {"stratum": stratum, "visible": {"hammer_pct": 0.0, "passage_pct": share}, "effects": [{"kind": kind}]}
+    def truth(stratum, share, kind="pad", **where):
+        return {
+            "stratum": stratum,
+            "visible": {"hammer_pct": 0.0, "passage_pct": share},
+            "effects": [{"kind": kind, "where": where}],
+        }
 
     truths = {"T3": truth("single", 60.0), "T1": truth("single", 40.0), "T2": truth("single", 5.0)}
     truths |= {"T0": truth("double", 60.0), "T4": truth("outside", 60.0), "T5": truth("single", 60.0, "squeal")}
+    truths |= {"T6": truth("single", 60.0, "flat", train="railcar", axle=3)}
     assert clear_singles(truths) == ["T1", "T3"]
 
 
@@ -71,4 +76,4 @@ def test_rows_of_the_bridge_are_read_by_the_scorer():
     judged = judge(truth, answers_of(rows))
     assert judged.hits == ("named",) and judged.located == {"lock": True, "place": True}
     assert judged.fits == (40.0, 48.0)
-    assert judged.parameters == ((pytest.approx(0.02 / 0.33), True),)
+    assert judged.parameters == ((pytest.approx(0.02 / 0.67), True),)

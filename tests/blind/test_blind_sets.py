@@ -178,19 +178,39 @@ def test_a_tool_that_fails_is_counted_and_not_hidden(copy):
 
 
 @pytest.mark.skipif(not method(), reason="nothing here can hide a folder from this user")
-def test_rows_are_taken_from_what_the_tool_prints(copy):
+def test_rows_are_taken_from_what_the_tool_prints(copy, tmp_path):
     """It prints notes, then its row, in the folder of the case; anything else is a failure with its words kept."""
     out, truth = copy
     one, other = (c.name for c in cases(out))
-    held = diagnose_set(out, truth, "{python} -c 'import os; print(os.listdir())'", [one], say=lambda line: None)
+    tool, row = tmp_path / "tool.py", 'print(5)\nprint("{\\n\\"verdict\\": \\"none\\"}")\nprint("page: x.html")'
+    tool.write_text("import os; print(os.listdir())")
+    held = diagnose_set(out, truth, f"{{python}} {tool}", [one], say=lambda line: None)
     assert held["cases"][one]["status"] == "failed"  # a list of Python's is no JSON
     assert held["cases"][one]["said"].startswith("printed no rows; [")
-    row = "print('{{\\n'+chr(34)+'verdict'+chr(34)+': '+chr(34)+'none'+chr(34)+'}}'); print('page: x.html')"
-    held = diagnose_set(out, truth, f'{{python}} -c "print(5); {row}"', [other], say=lambda line: None)
+    tool.write_text(row)
+    held = diagnose_set(out, truth, f"{{python}} {tool}", [other], say=lambda line: None)
     assert held["cases"][other]["status"] == "answered"
     assert json.loads((out / "findings" / f"{other}.json").read_text()) == [{"verdict": "none"}]
-    held = diagnose_set(out, truth, f'{{python}} -c "{row}"', say=lambda line: None, again=True)
+    held = diagnose_set(out, truth, f"{{python}} {tool}", say=lambda line: None, again=True)
     assert {run["status"] for run in held["cases"].values()} == {"answered"}
+
+
+@pytest.mark.skipif(not method(), reason="nothing here can hide a folder from this user")
+def test_a_set_is_judged_by_one_command_with_rows_and_before_it_is_open(copy):
+    """An empty list says nothing; another command, or a judgement of an open set, is refused."""
+    out, truth = copy
+    one, other = (c.name for c in cases(out))
+    held = diagnose_set(out, truth, "{python} -c 'print([])'", [one], say=lambda line: None)
+    assert held["cases"][one]["status"] == "failed"
+    with pytest.raises(BlindError, match="another command"):
+        diagnose_set(out, truth, "{python} -c 'print(1)'", [other], say=lambda line: None)
+    reveal(out, truth)
+    with pytest.raises(BlindError, match="this set is open"):
+        diagnose_set(out, truth, "{python} -c 'print([])'", [other], say=lambda line: None)
+    spy = f"{{python}} -c 'import os; print(os.listdir(\"{out}/revealed\"))'"
+    held = diagnose_set(out, truth, spy, [one], say=lambda line: None, label="spy")
+    if held["isolation"] == "unshare":
+        assert held["cases"][one]["said"] == "[]"
 
 
 @pytest.mark.skipif(not method(), reason="nothing here can hide a folder from this user")

@@ -2,7 +2,7 @@
 
 import json
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 
 @dataclass(frozen=True)
@@ -40,12 +40,34 @@ def answers_of(rows):
 
 
 def _answers(row):
-    """The answer of a row, and one for each further term that its parameters say was found with it."""
-    yield _answer(row)
-    terms = [entry.get("term") for entry in _entries(row.get("parameters_json"))[1]]
-    for term in dict.fromkeys(t for t in terms if t and t not in (row.get("term"), row.get("rival_term"))):
-        if row["verdict"] == "named":
+    """The answer of a row, and one for each further term that it says was found with it: of ``term_json``, or where
+    that is not there, of the names that its parameters bear."""
+    found = json.loads(row.get("term_json") or "[]")
+    first = _answer(row)
+    yield replace(first, parameters=_values(found[0])) if found and row["verdict"] == "named" else first
+    if found:
+        yield from (_further(term) for term in found[1:])
+    elif row["verdict"] == "named":
+        terms = [entry.get("term") for entry in _entries(row.get("parameters_json"))[1]]
+        for term in dict.fromkeys(t for t in terms if t and t != row.get("term")):
             yield Answer("named", (term,), parameters=_parameters(row["parameters_json"], term)[1])
+
+
+def _further(term):
+    """The answer that a further term is, where and how large."""
+    fixed = term.get("fixed", {})
+    places = [fixed[k] for k in ("place", "position", "sleeper", "support") if k in fixed]
+    ends = [fixed[k] for k in ("first", "last", "start", "end") if k in fixed]
+    position = float(places[0]) if places else sum(ends) / 2.0 if len(ends) == 2 else None
+    axle = fixed["wheel"] + 1 if "wheel" in fixed else None
+    return Answer(
+        "named", (term["term"],), None, position, fixed.get("channel_name"), fixed.get("train"), axle,
+        parameters=_values(term),
+    )  # fmt: skip
+
+
+def _values(term):
+    return {name: (p.get("value"), p.get("se")) for name, p in term.get("parameters", {}).items()}
 
 
 def _answer(row):

@@ -8,7 +8,7 @@ import numpy as np
 from turnout_blind.score.intervals import clopper_pearson
 from turnout_blind.score.judged import CLEAR
 
-FEWEST = 5  # cases of an interval of probabilities that is held against its bar
+FEWEST = 5  # cases of a group of probabilities that is held against its bar
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,9 @@ def figures(judged, oracle=None):
         s: [j for j in judged if j.stratum == s] for s in ("control", "single", "double", "outside", "unidentifiable")
     }
     clear = [j for j in of["single"] if j.clear]
-    gained = [j for j in of["single"] if _gained(j, oracle or {}) > CLEAR]
+    oracle = oracle or {}
+    asked = [j for j in of["single"] if j.case in oracle]
+    gained = [j for j in asked if _gained(j, oracle) > CLEAR]
     seen = [j for j in of["outside"] if j.clear]
     blurred = of["unidentifiable"]
     found = [_share("controls: false alarms", of["control"], lambda j: j.alarm, 100.0 * 2 / 60, "<=")]
@@ -74,17 +76,19 @@ def figures(judged, oracle=None):
     ]
     found += _where_and_what(clear, "clear singles")
     found += _where_and_what(gained, "singles whose oracle gains over 3 points") if oracle else []
+    found += [_share("the oracle itself falls by over a point", asked, lambda j: _gained(j, oracle) < -1.0)]
     found += [
         _share("what: a wrong name (clear singles)", clear, lambda j: bool(j.wrong)),
         _share("what: a wrong name (all singles)", of["single"], lambda j: bool(j.wrong)),
         _share("outside the library: detected (clear)", seen, lambda j: j.alarm),
-        _share("outside the library: lock right (clear)", seen, lambda j: j.located["lock"], 90.0),
+        _share("outside the library: located (clear)", seen, lambda j: all(j.located.values())),
+        _share("outside the library: located (all)", of["outside"], lambda j: all(j.located.values()), 90.0),
         _share("outside the library: named wrongly", of["outside"], lambda j: bool(j.wrong), 10.0, "<="),
-        _share("two effects: both right", of["double"], lambda j: all(h == "named" for h in j.hits), 60.0),
+        _share("two effects: both right", of["double"], _both_right, 60.0),
         _share("two effects: one right and none wrong", of["double"], _one_right, 90.0),
         _share("cases without an answer", judged, lambda j: not j.answered, 0.0, "<="),
     ]
-    return [*found, *_values(judged, oracle or {})]
+    return [*found, *_parameters(judged), *_held_out(judged, gained, oracle), _calibration(judged)]
 
 
 def _share(name, cases, test, bar=None, sense=">="):
@@ -110,50 +114,69 @@ def as_it_should(j):
     return j.answered and not j.wrong and (not j.alarm or j.hits[0] == "a_or_b")
 
 
+def _both_right(j):
+    return all(h == "named" and there for h, there in zip(j.hits, j.placed))
+
+
 def _one_right(j):
-    return any(h == "named" for h in j.hits) and not j.wrong
+    return any(h == "named" and there for h, there in zip(j.hits, j.placed)) and not j.wrong
 
 
-def _values(judged, oracle):
+def _parameters(judged):
     compared = [p for j in judged for p in j.parameters]
     covered = [c for _, c in compared if c is not None]
     errors = [100.0 * e for e, _ in compared]
     yield Share("parameters: inside the 95 % interval", sum(covered), len(covered), 85.0)
     yield Value("parameters: median error", _median(errors), len(errors), 20.0, "<=", "%")
-    gaps, fell = [], []
-    for j in judged:
-        before, after = j.fits
-        if j.stratum != "single" or not j.clear or before is None or after is None:
-            continue
-        fell.append(after < before - 1.0)
-        best = oracle.get(j.case, (before, before))[1]
-        if best - before > 1.0:
-            gaps.append(100.0 * (after - before) / (best - before))
-    yield Value("held-out fit: gap to the oracle closed, median", _median(gaps), len(gaps), 80.0, ">=", "%")
-    yield Share("held-out fit: fell by over a point", sum(fell), len(fell), 0.0, "<=")
+
+
+def _held_out(judged, gained, oracle):
+    """What names gain on recordings left out. Silence closes no gap. A named model without a fit of its own counts as
+    fallen. The standard errors that the bar speaks of are not in the rows; a point stands for them."""
+    closed = {j.case: _closed(j, *oracle[j.case]) for j in gained}
+    named = [closed[j.case] for j in gained if j.fits[1] is not None]
+    yield Value(
+        "held-out fit: gap to the oracle closed, median", _median(closed.values()), len(closed), 80.0, ">=", "%"
+    )
+    yield Value("held-out fit: the same where the tool gave a fit", _median(named), len(named), unit="%")
+    told = [j for j in judged if "named" in j.hits or j.wrong or j.fits[1] is not None]
+    told = [j for j in told if j.fits[0] is not None]
+    yield _share("held-out fit: fell by over a point", told, _fell, 0.0, "<=")
+
+
+def _closed(j, before, best):
+    after = j.fits[1] if j.fits[1] is not None else j.fits[0] if j.fits[0] is not None else before
+    return 100.0 * (after - before) / (best - before)
+
+
+def _fell(j):
+    before, after = j.fits
+    return after is None or after < before - 1.0
+
+
+def _calibration(judged):
     worst = [abs(stated - share) for stated, share, n in reliability(judged) if n >= FEWEST]
     n = sum(j.probability is not None for j in judged)
-    yield Value(
-        "probability: worst fifth of the scale, stated from seen",
-        max(worst, default=float("nan")),
-        n if worst else 0,
-        0.1,
-    )
+    name = "probability: worst fifth, stated from seen"
+    return Value(name, max(worst, default=float("nan")), n if worst else 0, 0.1)
 
 
 def _median(values):
-    return float(np.median(values)) if values else float("nan")
+    return float(np.median(list(values))) if values else float("nan")
 
 
 def reliability(judged):
-    """(mean stated probability, share right, n) for each interval of 0.2 of the probabilities that has cases."""
-    stated = [(j.probability, j.probably_right) for j in judged if j.probability is not None]
-    found = []
-    for low in np.arange(5) / 5.0:
-        inside = [(p, r) for p, r in stated if low <= p < low + 0.2 or (low == 0.8 and p == 1.0)]
-        if inside:
-            found.append((float(np.mean([p for p, _ in inside])), float(np.mean([r for _, r in inside])), len(inside)))
-    return found
+    """(mean stated probability, share right, n) of five groups, equal in number but for ties, which stay together."""
+    stated = sorted((j.probability, j.probably_right) for j in judged if j.probability is not None)
+    if not stated:
+        return []
+    p, right = np.array(stated, dtype=float).T
+    edges = np.unique(np.quantile(p, np.arange(1, 5) / 5.0, method="inverted_cdf"))
+    group = np.searchsorted(edges, p)
+    return [
+        (float(p[group == g].mean()), float(right[group == g].mean()), int((group == g).sum()))
+        for g in np.unique(group)
+    ]
 
 
 def confusion(judged):

@@ -8,12 +8,14 @@ from turnout_blind.score.names import right_locks, right_names, same_parameters
 
 BAY = 0.6  # a place is right within one bay [m]
 LEVEL = 46.0  # what controls leave unexplained of a passage never used [% of its norm]; roughness, mostly
+NEUTRAL = {"factor": 1.0, "gain": 1.0}  # no effect; 0 elsewhere
 CLEAR = 3.0  # points of held-out fit that an effect must cost to be counted as there to be found
 
 
 @dataclass(frozen=True)
 class Judged:
-    """``hits`` per effect: "named", "a_or_b" or ""; ``wrong`` names asserted; the rest as the bars ask."""
+    """``hits`` per effect: "named", "a_or_b" or ""; ``placed`` per effect: where it was said right; ``wrong`` answers
+    with a name and no right one; the rest as the bars ask."""
 
     case: str
     stratum: str
@@ -23,6 +25,7 @@ class Judged:
     answered: bool
     alarm: bool
     hits: tuple
+    placed: tuple
     first: bool
     wrong: tuple
     said: str
@@ -58,16 +61,29 @@ def judge(truth, answers, more=None):
     right = [right_names(k, more) for k in kinds]
     hits = tuple(_hit(names, loud) for names in right)
     allowed = {n for names in right for n in names}
-    wrong = tuple(a.names[0] for a in loud if a.verdict == "named" and a.names[0] not in allowed)
+    wrong = _wrong(right, loud)
     first = bool(loud) and loud[0].verdict == "named" and loud[0].names[0] in allowed
-    probability, sound = _probability(truth, answers, loud, allowed)
+    probability, sound = _probability(truth, answers, loud, bool(allowed), wrong)
     ahead = loud[0] if loud else (answers or [None])[0]
     return Judged(
         truth["case"], truth["stratum"], kinds, tuple(e["rung"] for e in effects), gain_of(truth["visible"]),
-        answers is not None, bool(loud), hits, first, wrong, _said(answers, loud), _located(effects, right, loud),
+        bool(answers), bool(loud), hits, tuple(all(_where(e, n, loud).values()) for e, n in zip(effects, right)), first,
+        wrong, _said(answers, loud), _located(effects, right, loud),
         tuple(_compared(effects, right, loud)), probability, sound,
         (None, None) if ahead is None else (ahead.before, ahead.after),
     )  # fmt: skip
+
+
+def _wrong(right, loud):
+    """Names of the answers that fit no effect, or only one that has its name already."""
+    free, wrong = list(right), []
+    for answer in (a for a in loud if a.names):
+        fits = next((names for names in free if set(answer.names) & set(names)), None)
+        if fits is None:
+            wrong.append(answer.names[0])
+        else:
+            free.remove(fits)
+    return tuple(wrong)
 
 
 def _hit(names, loud):
@@ -78,15 +94,16 @@ def _hit(names, loud):
 
 
 def _said(answers, loud):
-    if answers is None:
+    if not answers:
         return "no answer"
     if not loud:
         return "none"
     return loud[0].names[0] if loud[0].verdict == "named" else loud[0].verdict
 
 
-def _probability(truth, answers, loud, allowed):
-    """Stated probability of the first answer, and whether it was right; "none" is where nothing clear was there."""
+def _probability(truth, answers, loud, known, wrong):
+    """Stated probability of the answer, and whether all of it was right; "none" is where nothing clear was there,
+    "unknown" where the effects are not ``known`` to a library."""
     if not answers:
         return None, None
     ahead = loud[0] if loud else answers[0]
@@ -96,8 +113,8 @@ def _probability(truth, answers, loud, allowed):
         hidden = gain_of(truth["visible"]) <= CLEAR
         return ahead.probability, truth["stratum"] in ("control", "unidentifiable") or hidden
     if ahead.verdict == "unknown":
-        return ahead.probability, bool(truth["effects"]) and not allowed
-    return ahead.probability, bool(set(ahead.names) & allowed)
+        return ahead.probability, bool(truth["effects"]) and not known
+    return ahead.probability, not wrong
 
 
 def _best(names, loud):
@@ -106,25 +123,31 @@ def _best(names, loud):
 
 
 def _located(effects, right, loud):
-    """{"lock", "place", "axle", "sensor"}: True or False for each that the first effect has."""
+    """{"lock", "place", "axle", "sensor"}: True or False for each that the one effect has."""
     if len(effects) != 1:
         return {}
-    effect, answer, found = effects[0], _best(right[0], loud), {}
-    where = effect["where"]
-    found["lock"] = answer is not None and answer.lock in right_locks(effect["kind"], effect["locked_to"])
+    effect, answer = effects[0], _best(right[0], loud)
+    lock = answer is not None and answer.lock in right_locks(effect["kind"], effect["locked_to"])
+    return {"lock": lock, **_where(effect, right[0], loud)}
+
+
+def _where(effect, names, loud):
+    """{"place", "axle", "sensor"}: True or False for each that an effect of the right ``names`` has."""
+    answer, where, found = _best(names, loud), effect["where"], {}
     if effect["locked_to"] in ("place", "amplitude") and "position" in where:
         near = answer is not None and answer.position is not None
         found["place"] = near and abs(answer.position - where["position"]) <= BAY
     if "axle" in where:
         same = answer is not None and answer.axle == where["axle"]
-        found["axle"] = same and answer.train in (None, where["train"])
+        found["axle"] = same and answer.train == where["train"]
     if "sensor" in where:
         found["sensor"] = answer is not None and answer.sensor == where["sensor"]
     return found
 
 
 def _compared(effects, right, loud):
-    """(relative error, whether the 95 % interval covers, or None without a standard error) per parameter named."""
+    """(error over the size of the effect, whether the 95 % interval covers, or None without a standard error) per
+    parameter named."""
     for effect, names in zip(effects, right):
         answer = next((a for a in loud if a.verdict == "named" and set(a.names) & set(names)), None)
         for own, theirs in same_parameters(effect).items():
@@ -133,4 +156,4 @@ def _compared(effects, right, loud):
             value, se = answer.parameters[theirs]
             truth = effect["parameters"][own]
             covers = None if se is None else abs(value - truth) <= 1.96 * se
-            yield abs(value - truth) / abs(truth), covers
+            yield abs(value - truth) / abs(truth - NEUTRAL.get(own, 0.0)), covers

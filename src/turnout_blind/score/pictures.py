@@ -70,7 +70,7 @@ def _side_by_side(judged):
 
 
 def draw_reliability(judged, path):
-    """Share right against stated probability, by intervals of 0.2, with 95 % intervals."""
+    """Share right against stated probability, by fifths of the cases, with 95 % intervals."""
     plt = pyplot()
     figure, axis = plt.subplots(figsize=(4.2, 3.8), layout="constrained")
     axis.plot([0, 1], [0, 1], color="0.6", lw=1)

@@ -7,7 +7,7 @@ from turnout_blind.reveal import revealed
 from turnout_blind.score.answers import answers_of
 from turnout_blind.score.figures import Share, as_it_should, confusion, figures, reliability, severity
 from turnout_blind.score.judged import judge
-from turnout_blind.seal import read_commit
+from turnout_blind.seal import BlindError, read_commit
 
 KEY = (
     "controls: false alarms", "what: top-1 (clear singles)", "what: a wrong name (all singles)",
@@ -21,10 +21,37 @@ def judged_set(out, more=None, label=None):
     return [judge(truths[case], answers_of(rows[case]), more) for case in sorted(truths) if case in held["cases"]], held
 
 
+def provenance(held):
+    """Hashes of the tool and of the set that a diagnosis, and an oracle beside it, are of."""
+    return {name: held[name] for name in ("tool_sha256", "commit_sha256")}
+
+
 def oracle_of(out):
-    """{case: held-out fit (without, with) the true effect [%]} from ``out``/oracle.json, {} where there is none."""
+    """{case: held-out fit (without, with) the true effect [%]} from ``out``/oracle.json, {} where there is none.
+
+    Errors: BlindError where another tool, or of another set, has been asked.
+    """
     path = Path(out) / "oracle.json"
-    return json.loads(path.read_text()) if path.exists() else {}
+    if not path.exists():
+        return {}
+    told, held = json.loads(path.read_text()), json.loads((Path(out) / "diagnosis.json").read_text())
+    if provenance(held) != {name: told.get(name) for name in provenance(held)}:
+        raise BlindError(path, "tool_sha256", "not the tool and set of diagnosis.json", "Ask the oracle with that tool")
+    return {case: (r["before"], r["oracle"]) for case, r in told["fits"].items() if r.get("oracle") is not None}
+
+
+def oracle_words(out):
+    """How many were asked, and what had no answer; nothing where nobody asked."""
+    path = Path(out) / "oracle.json"
+    if not path.exists():
+        return []
+    told = json.loads(path.read_text())
+    left = {c: told["fits"].get(c, {}).get("error", "no such candidate") for c in told["asked"]}
+    left = {c: why for c, why in left.items() if c not in oracle_of(out)}
+    why = "; ".join(f"{c}: {reason}" for c, reason in left.items())
+    return [
+        f"Oracle: {len(told['asked'])} clear singles asked, {len(left)} without an answer{f' ({why})' if why else ''}."
+    ]
 
 
 def labels_of(out):
@@ -40,18 +67,19 @@ def report_of(out, more=None):
     judged, held = judged_set(out, more)
     parts = [
         cost(judged, held, len(read_commit(out)["cases"])),
+        *oracle_words(out),
         figure_table(figures(judged, oracle_of(out))),
         "What was said first, by what was concealed:",
         confusion_table(confusion(judged)),
         "Along the ladder (points of held-out fit that the effect costs: what was said; * = the right name among it):",
         severity_table(severity(judged)),
-        "Stated probability and share right, by intervals of 0.2:",
+        "Stated probability and share right, by fifths of the cases:",
         "\n".join(f"- {p:.2f}: {share:.2f} of {n}" for p, share, n in reliability(judged)) or "- none stated",
         "Alarms, wrong names, clear effects without their name or without a word, no answer:",
         failure_table(judged),
     ]
     if labels_of(out):
-        parts += ["Ablations, on the same cases:", ablation_table(out, judged, more)]
+        parts += ["Ablations, each over its own cases:", ablation_table(out, judged, more)]
     return "\n\n".join(parts) + "\n"
 
 
