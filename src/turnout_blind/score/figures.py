@@ -76,7 +76,9 @@ def figures(judged, oracle=None):
     ]
     found += _where_and_what(clear, "clear singles")
     found += _where_and_what(gained, "singles whose oracle gains over 3 points") if oracle else []
-    found += [_share("the oracle itself falls by over a point", asked, lambda j: _gained(j, oracle) < -1.0)]
+    found += [_share("the oracle itself falls by over a point", asked, lambda j: _gained(j, oracle) < -1.0)][
+        : len(oracle)
+    ]
     found += [
         _share("what: a wrong name (clear singles)", clear, lambda j: bool(j.wrong)),
         _share("what: a wrong name (all singles)", of["single"], lambda j: bool(j.wrong)),

@@ -78,7 +78,7 @@ def draw_reliability(judged, path):
     for stated, share, n in reliability(judged):
         low, high = clopper_pearson(round(share * n), n)
         axis.errorbar(stated, share, [[share - low], [high - share]], fmt="o", color="C0", capsize=3)
-        axis.annotate(f"n = {n}", (stated, share), xytext=(-6, -4), textcoords="offset points", fontsize=8, ha="right")
+        axis.annotate(f"n = {n}", (stated, low), xytext=(0, -12), textcoords="offset points", fontsize=8, ha="center")
     axis.set_xlim(0, 1.02)
     axis.set_ylim(-0.08, 1.05)
     axis.set_xlabel("stated probability")
