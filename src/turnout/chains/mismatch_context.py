@@ -23,7 +23,7 @@ def track_file(turnout: TurnoutConfig, name: str | None = None) -> Path:
         if (folder / f"{stem}.yaml").is_file():
             return folder / f"{stem}.yaml"
     said = name or f"{turnout.id}.yaml nor {turnout.layout}"
-    raise SimulationError(f"{turnout.id}: no file {folder}/{said}.yaml; a diagnosis needs a track to simulate.")
+    raise SimulationError(f"{turnout.id}: no file {folder}/{said}.yaml; without a track nothing can be simulated.")
 
 
 def track_of(turnout: TurnoutConfig, name: str | None = None):

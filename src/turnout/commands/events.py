@@ -78,5 +78,5 @@ def _effect(registry) -> int:
             f"{before} and {after} campaigns)" + (f"; {held}" if verdict == "stiffer" else "")
         )
     if not rows:
-        print("No event has campaigns on both sides yet.")
+        print("No event that resets a resonance has campaigns on both sides yet; of others ask change_since_event().")
     return 0

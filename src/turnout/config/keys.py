@@ -152,7 +152,7 @@ def _wanted(key: Key) -> str:
     if key.choices:
         return "one of " + ", ".join(map(str, key.choices))
     said = SAID.get(key.kind, "a name, or a number counted from 0")
-    unit = f" {key.unit}" if key.unit else ""
+    unit = f" {key.unit}" if key.unit not in ("", None, "-", "1") else ""
     if key.above is not None:
         said += f" above {key.above:g}{unit}"
     elif key.minimum is not None and key.maximum is not None:

@@ -1,4 +1,4 @@
-"""Settings that are the two ends of a range: the low one must lie below the high one."""
+"""Settings that are two ends: the low one lies below the high one, and neighbouring ranges do not overlap."""
 
 from collections.abc import Iterator
 
@@ -7,6 +7,7 @@ from turnout.config.settings_keys import settings_keys
 from turnout.errors import ConfigError
 
 ENDS = (("_low", "_high"), ("_minimum", "_maximum"))
+BESIDE = (("identify", "ballast_high", "railpad_low"),)  # one range ends before the next begins, or where it does
 
 
 def ends_of_ranges() -> Iterator[tuple[str, str, str]]:
@@ -24,13 +25,14 @@ def ends_of_ranges() -> Iterator[tuple[str, str, str]]:
 
 def check_ranges(settings: Branch) -> Iterator[ConfigError]:
     """An error for every range of ``settings`` whose low end is not below its high end; keys are sound."""
-    for part, low, high in ends_of_ranges():
+    for part, low, high in (*ends_of_ranges(), *BESIDE):
         written = settings.get(part, {})
         leaves = [written[name] for name in (low, high) if name in written]
         values = [
             written[name].value if name in written else settings_keys()[part].spec[name].default for name in (low, high)
         ]
-        if leaves and not values[0] < values[1]:
+        meet = (part, low, high) in BESIDE and values[0] == values[1]
+        if leaves and not (values[0] < values[1] or meet):
             beside = f" in {leaves[1].place.path}, {leaves[1].place}" if len(leaves) > 1 else ""
             found = f"{part}.{low} is {values[0]}, and {high} is {values[1]}{beside}"
             yield leaves[0].place.error(found, f"Write a {low} below {high}")

@@ -114,6 +114,8 @@ def _mixture(points, settings):
     d = points.shape[1]
     floor = FLOOR[:d]
     scaled = points / floor
+    if len(points) == 1:  # one passage has no spread of its own
+        return [(1.0, points[0], np.diag(floor**2))]
     best, lowest, worse = None, np.inf, 0
     for k in range(1, min(settings.cluster_maximum, max(len(points) // (5 * d), 1)) + 1):
         mixture = GaussianMixture(k, n_init=3, random_state=settings.cluster_seed, reg_covar=1.0).fit(scaled)

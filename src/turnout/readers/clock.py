@@ -109,7 +109,7 @@ def settled_rate(record, promised, where, source):
         rate, tolerance, _ = rate_of_time(record.time)
     if rate is None:
         if promised is None:
-            remedy = "Give the rate in the layout (fs_hz in turnouts.tsv)"
+            remedy = "Give the rate in the layout, or as hammer_rate_hz or passage_rate_hz in turnouts.tsv"
             raise source.error(
                 where, "neither the file nor the layout says the sampling rate", remedy, reason="wrong_rate"
             )

@@ -55,7 +55,7 @@ def _count_errors(raw, description, source):
             return
     if description.n_records is not None and there > description.n_records:
         found = f"it holds {there} records, {there - description.n_records} more than the layout promises"
-        remedy = "Correct n_records in the layout, or find out whether two tests share one file"
+        remedy = "Correct records in the layout, or find out whether two tests share one file"
         yield source.error(f"record {description.n_records + 1}", found, remedy, reason="wrong_length")
 
 
@@ -104,7 +104,7 @@ def _sample_count(record, where, promised, source):
         raise source.error(where, found, COPY_AGAIN, reason="truncated")
     if promised is not None and shortest > promised:
         found = f"it has {shortest} samples instead of {promised}"
-        remedy = "Correct n_samples in the layout, or find out why the logger was set differently"
+        remedy = "Correct samples in the layout, or find out why the logger was set differently"
         raise source.error(where, found, remedy, reason="wrong_length")
     if shortest < TOO_SHORT:
         raise source.error(

@@ -246,7 +246,7 @@ def test_a_file_that_cannot_be_read_is_said(soft):
 def test_a_turnout_without_a_track_is_said(soft, capsys):
     (soft / "config/tracks/small.yaml").unlink()
     assert main(["diagnose", "--turnout", "t1"]) == 2
-    assert "a diagnosis needs a track to simulate" in capsys.readouterr().err
+    assert "without a track nothing can be simulated" in capsys.readouterr().err
 
 
 def test_the_rows_fit_the_registry(soft, tmp_path):

@@ -171,6 +171,11 @@ WRONG = {
         "config/overrides/t1.yaml, line 1, column 40: receptance.agreement_low is 600, and agreement_high is 500 in "
         "config/config.yaml, line 1, column 30",
     ),
+    "bands that overlap": (
+        {"settings": "identify: {ballast_high: 600}"},
+        "line 1, column 26: identify.ballast_high is 600, and railpad_low is 300.0. Write a ballast_high "
+        "below railpad_low",
+    ),
     "bands that are no pairs": (
         {"settings": "identify: {extra_bands: [900, 1100, 1200]}"},
         "line 1, column 25: extra_bands is [900, 1100, 1200]. Write pairs",

@@ -89,6 +89,15 @@ def test_strangers_belong_to_no_cluster_and_unknown_types_to_none(settings):
     assert clusters.assign("IC3", 160.0, None) == clusters.assign("IC3", 160.0, 12.0)
 
 
+def test_a_train_that_passed_once_has_a_cluster_and_costs_the_others_nothing(settings):
+    rows, _ = night(np.random.default_rng(6), 200)
+    alone = {"train_type": "measuring train", "speed_kmh": 60.0, "axle_load_t": 15.0}
+    clusters, others = fit_clusters([*rows, alone], settings), fit_clusters(rows, settings)
+    assert len(clusters.clusters) == len(others.clusters) + 1
+    assert clusters.assign("measuring train", 60.0, 15.0) is not None
+    assert clusters.assign("measuring train", 120.0, 15.0) is None
+
+
 def test_a_document_comes_back_as_it_went(settings):
     rows, _ = night(np.random.default_rng(6), 200)
     clusters = fit_clusters(rows, settings)

@@ -179,7 +179,7 @@ def test_more_records_than_promised(tmp_path, in_si, hammer_test):
     path = write(hammer_test, tmp_path / "a.npz", "npz")
     error = only_error(path.name, tmp_path, replace(in_si, n_records=3), 4)
     assert error.reason == "wrong_length"
-    assert "a.npz, record 4: it holds 4 records, 1 more than the layout promises. Correct n_records" in str(error)
+    assert "a.npz, record 4: it holds 4 records, 1 more than the layout promises. Correct records in" in str(error)
 
 
 def test_fewer_samples_than_promised_cost_that_record(tmp_path, in_si, hammer_test):
@@ -196,7 +196,7 @@ def test_more_samples_than_promised(tmp_path, in_si, hammer_test):
     path = write(hammer_test[:1], tmp_path / "a.npz", "npz")
     error = only_error(path.name, tmp_path, replace(in_si, n_samples=300), 0)
     assert error.reason == "wrong_length"
-    assert "record 1 of 1: it has 301 samples instead of 300. Correct n_samples in the layout" in str(error)
+    assert "record 1 of 1: it has 301 samples instead of 300. Correct samples in the layout" in str(error)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
