@@ -135,12 +135,12 @@ def asked(out, truths, clear, workers):
     held = json.loads(path.read_text()) if path.exists() else {}
     fits = held["fits"] if {k: held.get(k) for k in origin} == origin else {}
     chosen = clear_singles(truths)[:clear]
-    for case, result in told(out, [c for c in chosen if fits.get(c, {}).get("oracle") is None], truths, workers):
+    for case, result in answers(out, [c for c in chosen if fits.get(c, {}).get("oracle") is None], truths, workers):
         fits[case] = result
         path.write_text(json.dumps(origin | {"asked": chosen, "fits": fits}, indent=1, sort_keys=True) + "\n")
 
 
-def told(out, cases, truths, workers):
+def answers(out, cases, truths, workers):
     """(case, result) as they come."""
     with ProcessPoolExecutor(workers) as pool:
         jobs = [pool.submit(_job, (out / "cases" / case, case, truths[case])) for case in cases]
@@ -159,7 +159,7 @@ def main():
     out = Path(args.set)
     truths = {p.stem: json.loads(p.read_text()) for p in sorted((out / "revealed").glob("T*.json"))}
     if args.cases:
-        for case, result in told(out, args.cases, truths, args.workers):
+        for case, result in answers(out, args.cases, truths, args.workers):
             print(case, result, flush=True)
     else:
         asked(out, truths, args.clear, args.workers)

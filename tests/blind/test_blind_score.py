@@ -328,3 +328,14 @@ def test_an_oracle_by_another_tool_is_refused(tmp_path):
     (tmp_path / "oracle.json").write_text(json.dumps(told | {"tool_sha256": "c" * 64}))
     with pytest.raises(BlindError, match="Ask the oracle with that tool"):
         oracle_of(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("wheel", "train", "right"), [(2, "railcar", True), (3, "railcar", False), (2, "loaded", False)]
+)
+def test_the_axle_of_a_second_effect_is_counted_from_one(wheel, train, right):
+    """``term_json`` counts wheels from 0, a campaign its axles from 1: the concealed flat is on axle 3."""
+    flat = {"term": "wheel_flat", "fixed": {"wheel": wheel, "train": train}, "parameters": {}}
+    gap = {"term": "hanging_sleeper", "fixed": {"sleeper": 4.2}, "parameters": {}}
+    rows = [{"verdict": "named", "term": "hanging_sleeper", "position_m": 4.2, "term_json": json.dumps([gap, flat])}]
+    assert judge(truth("d", "double", "void", "flat"), answers_of(rows)).placed == (True, right)

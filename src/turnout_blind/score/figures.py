@@ -75,10 +75,9 @@ def figures(judged, oracle=None):
         _share("not identifiable: a wrong name", blurred, lambda j: bool(j.wrong), 0.0, "<="),
     ]
     found += _where_and_what(clear, "clear singles")
-    found += _where_and_what(gained, "singles whose oracle gains over 3 points") if oracle else []
-    found += [_share("the oracle itself falls by over a point", asked, lambda j: _gained(j, oracle) < -1.0)][
-        : len(oracle)
-    ]
+    if oracle:
+        found += _where_and_what(gained, "singles whose oracle gains over 3 points")
+        found += [_share("the oracle itself falls by over a point", asked, lambda j: _gained(j, oracle) < -1.0)]
     found += [
         _share("what: a wrong name (clear singles)", clear, lambda j: bool(j.wrong)),
         _share("what: a wrong name (all singles)", of["single"], lambda j: bool(j.wrong)),

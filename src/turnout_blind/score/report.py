@@ -45,9 +45,8 @@ def oracle_words(out):
     path = Path(out) / "oracle.json"
     if not path.exists():
         return []
-    told = json.loads(path.read_text())
-    left = {c: told["fits"].get(c, {}).get("error", "no such candidate") for c in told["asked"]}
-    left = {c: why for c, why in left.items() if c not in oracle_of(out)}
+    told, known = json.loads(path.read_text()), oracle_of(out)
+    left = {c: told["fits"].get(c, {}).get("error", "no such candidate") for c in told["asked"] if c not in known}
     why = "; ".join(f"{c}: {reason}" for c, reason in left.items())
     return [
         f"Oracle: {len(told['asked'])} clear singles asked, {len(left)} without an answer{f' ({why})' if why else ''}."
