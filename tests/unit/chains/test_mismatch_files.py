@@ -110,7 +110,7 @@ def test_a_turnout_without_a_track_is_a_row_of_the_fleet(folder):
     turnout = turnout_in(folder)
     unit = unit_of("t1", "2026-07-25", scan(turnout, folder / "raw").units, turnout.hashes["mismatch"])
     (row,) = mismatch.mismatch_unit(unit, turnout, folder / "raw")["quarantine"]
-    assert row["reason_code"] == "simulation_failed" and "needs a track to simulate" in row["found"]
+    assert row["reason_code"] == "simulation_failed" and "without a track nothing can be simulated" in row["found"]
 
 
 def test_other_notes_are_another_finding(folder):
