@@ -97,6 +97,7 @@ REASONS = {
     "wrong_time": "the time of the recording contradicts its campaign",
     "double_hit": "the hammer touched the rail twice",
     "overload": "a channel left its range",
+    "out_of_scale": "a value that no such measurement has: the unit or the scale is wrong",
     "weak": "the blow is much weaker than the others of its test",
     "noisy": "the level before the blow is too high",
     "late": "the blow is not where the trigger promises, had begun before the record, or too little decay is left",

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import replace
+from datetime import timedelta
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from turnout.chains.hammer_rows import impact_mode_row, impact_row, mode_row, model_row, receptance_row
 from turnout.chains.noted import rail_temperature
-from turnout.chains.raw_rows import quarantine_row, read_or_quarantine, recording_row
+from turnout.chains.raw_rows import contradiction, quarantine_row, read_or_quarantine, recording_row
 from turnout.config.pattern import compiled
 from turnout.config.turnout import TurnoutConfig
 from turnout.errors import ReadError
@@ -18,13 +19,18 @@ from turnout.receptance import find_impacts, receptance_of
 from turnout.records import ModalModel, Rejection, Unit
 from turnout.registry.ids import content_id
 
+# A campaign may go on into the night after its day, and a clock may show local time.
+OTHER_CAMPAIGN = timedelta(days=2)
+REFILE = "It is used. Move it to its day's campaign if it is another's; a logger's clock that was wrong does no harm"
+
 
 def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root, algo: str = "") -> dict[str, list[dict]]:
     """Rows by table for one section and campaign.
 
-    A file that cannot be read, or one damaged record of a sound file, becomes a quarantine row; the rest is
-    used. An impact that is not good enough becomes a row with its reason. Too few impacts, a failed gate or
-    no stable mode give a model row with status "rejected".
+    A file that cannot be read, or one damaged record of a sound file, becomes a quarantine row; the rest is used,
+    and so is a file whose own time is not its campaign's, with a row that says so. An impact that is not good enough
+    becomes a row with its reason. Too few impacts, a failed gate or no stable mode give a model row with status
+    "rejected".
 
     Parameters
     ----------
@@ -54,6 +60,9 @@ def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root, algo: str = "") ->
         result = read_or_quarantine(path, raw_root, description, base, rows["quarantine"], "hammer", ids)
         if result is not None:
             ids[path] = result.sha256[:32]
+            wrong = contradiction(path, result.recordings, campaign.started_at, OTHER_CAMPAIGN, REFILE)
+            if wrong is not None:
+                rows["quarantine"].append(quarantine_row(wrong, base, "hammer", "hammer", None, ids[path]))
             rows["recordings"].append(recording_row(result, path, size, description, base, "hammer"))
             recordings += result.recordings
     if not rows["recordings"]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 
 from turnout.chains.passage_rows import finding_rows, fit_row, passage_row
-from turnout.chains.raw_rows import quarantine_row, read_or_quarantine, recording_row
+from turnout.chains.raw_rows import contradiction, quarantine_row, read_or_quarantine, recording_row
 from turnout.config.turnout import PassageConfig, TurnoutConfig
 from turnout.errors import PartlyComputed, ReadError
 from turnout.passage.analyse import analyse
@@ -18,6 +18,10 @@ from turnout.passage.pulses import without_pulses
 from turnout.passage.train_data import listed_for, listed_trains
 from turnout.records import ModalModel, Recording, Unit
 from turnout.registry.ids import content_id
+
+# Names in local time differ by less.
+OTHER_TIME = timedelta(days=1)
+RENAME = "Nobody can tell which is right. Rename it, or export it anew with the right time"
 
 
 @dataclass(frozen=True)
@@ -48,7 +52,8 @@ def passage_unit(
 ) -> dict[str, list[dict]]:
     """Rows by table (recordings, passages, passage_fits, quarantine) for one passage file.
 
-    A file that cannot be read, or that holds no train, is a quarantine row; a channel that is clipped, dead,
+    A file that cannot be read, that holds no train, or whose name contradicts the time in it, is a quarantine row; a
+    channel that is clipped, dead,
     swapped or lost is one too, and the passage is used as far as it is sound.
 
     Parameters
@@ -80,7 +85,12 @@ def passage_unit(
         if result is None:
             continue
         recording_id = result.sha256[:32]
-        for recording in sorted((*result.recordings, *result.long), key=lambda r: r.record):
+        everything = sorted((*result.recordings, *result.long), key=lambda r: r.record)
+        wrong = contradiction(path, everything, _time_in(unit.label), OTHER_TIME, RENAME)
+        if wrong is not None:
+            rows["quarantine"].append(quarantine_row(wrong, base, "passage", "passage", None, recording_id))
+            continue
+        for recording in everything:
             started_at = recording.started_at or _time_in(unit.label)
             if started_at is None:
                 remedy = "Put the time in its name as YYYYMMDDTHHMMSSZ, or record it in the file"
@@ -172,8 +182,9 @@ def _one_train(recording, started_at, recording_id, path, turnout, context, rows
     if context.clusters is not None and passage.n_axle:
         row["cluster_id"] = context.clusters.assign(row["train_type"], row["speed_kmh"], row["axle_load_t"])
     fits = _fit_rows(recording, passage, sensors, turnout, context, identity, settings) if passage.n_axle else []
-    # of all that it says: train data, models, clusters and loads change it as well as the file does
-    passage_id = {"passage_id": content_id("passage", str(recording.record), *name, row, fits)}
+    # of all that it says: train data, models, clusters and loads change it as well as the file does; and of where it
+    # lies, so that a copy's row stays when its original's is taken back
+    passage_id = {"passage_id": content_id("passage", path, str(recording.record), *name, row, fits)}
     rows["passages"].append(passage_id | row)
     rows["passage_fits"] += [passage_id | fit for fit in fits]
 

@@ -1,5 +1,7 @@
 """A raw file on its way in: its row, or the quarantine rows that say why it or a part of it is not used."""
 
+from collections.abc import Iterable
+from datetime import datetime, timedelta
 from typing import cast
 
 from turnout.errors import ReadError
@@ -27,6 +29,20 @@ def read_or_quarantine(path, raw_root, description, base, quarantine, kind, know
             quarantine.append(quarantine_row(twice, base, kind, "read", None, recording_id))
             return None
     return result if result.recordings or result.long else None
+
+
+def contradiction(
+    path: str, recordings: Iterable, named: datetime | None, apart: timedelta, remedy: str
+) -> ReadError | None:
+    """What is wrong where the first time that a file notes lies further than ``apart`` from the one it is filed under.
+
+    None where both agree, or one of them is not known.
+    """
+    told = min((r.started_at for r in recordings if r.started_at is not None), default=None)
+    if named is None or told is None or abs(told - named) <= apart:
+        return None
+    found = f"says it was recorded on {told:%Y-%m-%d %H:%M}, and is filed under {named:%Y-%m-%d %H:%M}"
+    return ReadError(path, "the file", found, remedy, "wrong_time")
 
 
 def quarantine_row(error: ReadError, base, kind, stage, record=None, recording_id=None) -> dict:

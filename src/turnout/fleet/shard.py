@@ -13,6 +13,7 @@ from filelock import FileLock
 from turnout.config import Configuration, TurnoutConfig, with_raw
 from turnout.errors import ConfigError
 from turnout.fleet.batches import UnitResult
+from turnout.fleet.copies import copies, copy_result, original_of
 from turnout.fleet.guard import guarded
 from turnout.fleet.keys import contents_of, key_of, short, stamp_of
 from turnout.fleet.ledger import Ledger
@@ -106,6 +107,7 @@ class _Run:
             self.compute = named(self.stage.compute)
         statuses = self._compute_all(todo)
         self.ledger.checkpoint()
+        self._set_copies_aside(wanted)
         vanished = self._withdraw_vanished(wanted)
         n_postponed = self._note_postponed(wanted, {unit_id(planned.unit) for planned, *_ in todo})
         self.ledger.checkpoint()
@@ -126,15 +128,26 @@ class _Run:
                 turnouts[turnout] = self._context(turnout)
             token, value = turnouts[turnout]
             planned = with_token(planned, token)
-            stamp, known = stamp_of(planned), self.state.units.get(name)
-            if known and (known.stamp, known.algo) == (stamp, self.stage.algo):
+            stamp = stamp_of(planned)
+            if self._is_known(name, stamp) and self._still_a_copy(name, wanted, token):
                 continue
             config = self._turnout(planned, turnouts)
             if config is None:
                 stale += 1
-            elif not self._same_content(name, planned, stamp, known):
+            elif not self._same_content(name, planned, stamp, self.state.units.get(name)):
                 todo.append((planned, config, stamp, value))
         return todo, stale
+
+    def _is_known(self, name: str, stamp: str) -> bool:
+        known = self.state.units.get(name)
+        return known is not None and (known.stamp, known.algo) == (stamp, self.stage.algo)
+
+    def _still_a_copy(self, name: str, wanted: dict[str, Planned], token: Token) -> bool:
+        """True for what is no copy, and for one whose original is as it was."""
+        original = original_of(self.state.units[name])
+        return original is None or (
+            original in wanted and self._is_known(original, stamp_of(with_token(wanted[original], token)))
+        )
 
     def _context(self, turnout: str) -> tuple[Token, object]:
         if not self.stage.context:
@@ -204,6 +217,16 @@ class _Run:
         left = {unit: met for unit, met in before.items() if unit in wanted and unit not in tried}
         note_postponed(self.path, left | self.postponed)
         return len(self.postponed)
+
+    def _set_copies_aside(self, wanted: dict[str, Planned]) -> None:
+        """Rows of a unit whose files all lie in another one of its turnout, too, give way to one that says so."""
+        if self.stage.gather:
+            return
+        present = {name: known for name, known in self.state.units.items() if name in wanted}
+        for name, original in copies(present).items():
+            there = [path for path, *_ in wanted[original].unit.files]
+            result = copy_result(wanted[name].unit, original, there, self.stage.algo)
+            self.ledger.keep(result, present[name].stamp, present[name].contents)
 
     def _withdraw_vanished(self, wanted: Collection[str]) -> int:
         """Count units whose files are all gone. Their rows stay; an empty result takes them back of a unit that only

@@ -30,6 +30,7 @@ from turnout.readers.variables import COUNT, RATE, START, STEP, TIME, Facts
 NOTE = re.compile(r"^#?\s*([A-Za-z_][\w .]*?)\s*[:=,;\t]\s*(.*)$")
 NAME_WITH_UNIT = re.compile(r"^(.*?)\s*[\[(]([^\[\]]*)[\])]$")
 SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "µs": 1e-6, "us": 1e-6}
+SCALES = {"kHz": 1e3, "khz": 1e3, "MHz": 1e6, "ms": 1e-3, "µs": 1e-6, "\u03bcs": 1e-6, "us": 1e-6}
 NOTES = {*RATE, *STEP, *START, *COUNT, "n_samples"}
 
 
@@ -103,10 +104,12 @@ def _is_number(cell):
 
 
 def _value(text):
-    """A number where the text begins with one ("51200 Hz"), else the text."""
-    first = text.split()[0] if text.split() else ""
+    """A number where the text begins with one ("51200 Hz", "12,8 kHz"), in Hz or s, else the text."""
+    first, *rest = text.split() or [""]
     dated = "-" in first[1:].lower().replace("e-", "")
-    return float(first.replace(",", ".")) if first and _is_number(first) and not dated else text
+    if not first or not _is_number(first) or dated:
+        return text
+    return float(first.replace(",", ".")) * SCALES.get(rest[0].strip("[]()") if rest else "", 1.0)
 
 
 def _names(lines, cells):
@@ -191,8 +194,8 @@ class Rows:
 
 def _options(data, at, separator, width):
     """How pyarrow reads the numbers from byte ``at`` on."""
-    first = data[at : at + 4096]
-    point = "," if separator != "," and b"," in first and b"." not in first else "."
+    comma, dot = data.find(b",", at), data.find(b".", at)
+    point = "," if separator != "," and 0 <= comma and (dot < 0 or comma < dot) else "."
     converting = csv.ConvertOptions(
         column_types={str(i): pa.float64() for i in range(width)},
         decimal_point=point,

@@ -16,6 +16,9 @@ from turnout.receptance.overload import overload
 from turnout.receptance.repeats import judge_repeats, repeated
 from turnout.records import Impact, Recording, Rejection
 
+# Far above any hammer and below what newtons become when they are taken for kilonewtons [N].
+HARDEST = 1e6
+
 
 def find_impacts(
     recordings: Sequence[Recording], force: str, response: str, settings: ReceptanceSettings | None = None
@@ -88,6 +91,9 @@ def _measure(cut, settings):
             f"{cut.channels[0].name} reads {contact.peak:.4g} N at contact: a hammer can only push")))  # fmt: skip
     cut.contact, cut.contact_end = contact, contact.end
     _judge_start(cut, settings)
+    if abs(contact.peak) > HARDEST:
+        cut.rejections.append(Rejection("out_of_scale", contact.peak, HARDEST, (
+            f"{contact.peak:.4g} N: no hammer strikes so hard, its unit or scale is wrong")))  # fmt: skip
     if (found := overload(cut, contact)) is not None:
         cut.rejections.append(found)
     judge_second_contact(cut, settings)

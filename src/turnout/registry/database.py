@@ -12,6 +12,7 @@ from turnout.errors import RegistryError
 from turnout.registry.columns import literal, tables
 from turnout.registry.generation import Generation, load, sync_folder
 from turnout.registry.ids import content_id
+from turnout.registry.newest import newest_that_counts
 from turnout.registry.parquet import read_live
 from turnout.registry.settled import LARGE, create_parts
 from turnout.registry.staging import connect
@@ -109,7 +110,8 @@ def _create_views(con, root: Path, generation: Generation) -> None:
     # a logger's clock that runs ahead is not believed: nothing was measured after the last run and the last campaign
     known = "greatest((select max(ended_at_utc) from runs), (select max(started_at_utc) from campaigns))"
     until = con.execute(f"select {known}::varchar").fetchall()[0][0]
-    last = generation.newest and min(generation.newest, until or generation.newest)
+    counted = newest_that_counts(con, root, generation)
+    last = counted and min(counted, until or counted)
     newest = f"timestamp {literal(last)}" if last else "null::timestamp"
     con.execute(f"create macro newest_measurement() as {newest}")
     con.execute(

@@ -51,11 +51,6 @@ class Generation:
         """Live files of one table, all years or those given, sorted by path."""
         return [f for f in self.files if f.table == table and (years is None or f.year in years)]
 
-    @property
-    def newest(self) -> str | None:
-        """Time of the newest measurement, ISO."""
-        return max((f.newest for f in self.files if f.newest), default=None)
-
     def to_json(self) -> str:
         """Text of the generation file; equal generations give equal bytes."""
         return json.dumps({"format": FORMAT} | asdict(self), indent=1, sort_keys=True) + "\n"

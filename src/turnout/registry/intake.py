@@ -29,7 +29,6 @@ class Refusal:
     value: str
     asked: str
     number: float | None = None
-    reason: str = "internal_error"
 
     def __str__(self):
         return f"{self.table}, row {self.row + 1}, column {self.column}: {self.value}, must be {self.asked}"

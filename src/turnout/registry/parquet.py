@@ -14,6 +14,9 @@ from turnout.registry.generation import DataFile, schema_hash, sync_folder
 # with small groups; large files are larger by a tenth with them, and hardly faster.
 SMALL_GROUP, LARGE_GROUP, SMALL_FILE = 16_384, 122_880, 250_000
 
+# Tables of measurements, and the id by which a row of them is taken back.
+MEASURED = {"models": "model_id", "modes": "model_id", "passages": "passage_id", "passage_fits": "passage_id"}
+
 
 def folder_of(table: str, year: int | None) -> str:
     """Where the files of a table lie: by year, small tables and undated rows beside them.
@@ -129,7 +132,7 @@ def _sync_and_hash(path: Path) -> str:
 def _newest(con, table, path) -> str | None:
     """Time of the newest measurement in the file; small tables hold no measurements."""
     time = time_column(table)
-    if time is None or table not in ("modes", "models", "passages", "passage_fits"):
+    if time is None or table not in MEASURED:
         return None
     found = con.execute(f"select max({time})::varchar from read_parquet({literal(str(path))})").fetchall()
     return found[0][0]

@@ -7,10 +7,7 @@ from turnout.registry.columns import names
 from turnout.registry.ids import content_id
 from turnout.registry.intake import Arrival, Refusal
 
-REMEDIES = {
-    "internal_error": "This is a fault of the stage that made the row, not of the measurement: report it with this",
-    "duplicate": "Another file of this turnout holds the same recording: delete one of them",
-}
+REMEDY = "This is a fault of the stage that made the row, not of the measurement: report it with this"
 _LONGEST = 2000
 
 
@@ -31,10 +28,10 @@ def quarantine_of(refusal: Refusal, arrival: Arrival) -> dict:
         "record": record if isinstance(record, int) and record >= 0 else None,
         "recording_id": _text(row.get("recording_id")),
         "stage": "register",
-        "reason_code": refusal.reason,
+        "reason_code": "internal_error",
         "place": f"{refusal.table}, row {refusal.row + 1}, column {refusal.column}",
         "found": f"{refusal.value}, must be {refusal.asked}; row: {whole}"[:_LONGEST],
-        "remedy": REMEDIES[refusal.reason],
+        "remedy": REMEDY,
         "measured_value": number if number is not None and math.isfinite(number) else None,
     }
 

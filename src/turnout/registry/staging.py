@@ -127,14 +127,8 @@ def _second_of_a_key(con, table) -> list[Refusal]:
     for unit, row, *_ in found:
         con.execute("delete from arriving where _unit = ? and _row = ?", [unit, row])
     return [
-        Refusal(unit, table, row, "+".join(keys), " ".join(map(str, values)), UNIQUE, reason=_why_twice(table))
-        for unit, row, *values in found
+        Refusal(unit, table, row, "+".join(keys), " ".join(map(str, values)), UNIQUE) for unit, row, *values in found
     ]
-
-
-def _why_twice(table) -> str:
-    """The same bytes give the same passage; all other ids are of one unit alone."""
-    return "duplicate" if table in ("passages", "passage_fits") else "internal_error"
 
 
 def columns_sql(table: str) -> str:

@@ -105,11 +105,23 @@ def stale_after(p, settings) -> np.ndarray:
     return np.maximum(settings.not_measured_days, 3.0 * np.nan_to_num(p.interval))
 
 
+def _newest_of_sections(p, last) -> np.ndarray:
+    """Last measurement of any section of a whole turnout's chart, its own of any other. [d]"""
+    newest = last.copy()
+    for whole, members in enumerate(_members(p.panel.charts["group"].to_numpy()), start=len(p.panel.charts)):
+        newest[whole] = np.max(last[members])
+    return newest
+
+
 def _states(charts, settings, status, last, present):
     """The state and the reason of every chart; the first that applies."""
     p = charts.prepared
     as_of = p.panel.as_of
-    old = as_of - last > stale_after(p, settings)
+    stale = stale_after(p, settings)
+    old = as_of - last > stale
+    whole = status["section_id"].to_numpy() == WHOLE
+    # sections are measured, but too few of them without an alarm for the median of the others
+    unjudged = whole & old & (as_of - _newest_of_sections(p, last) <= stale)
     open_now = _last(charts.down_open) | _last(charts.up_open)
     stuck = ~np.isfinite(charts.sigma).any(axis=1) | ~(p.spread > 0.0)
     stuck[: len(p.panel.charts)] |= never_changes(p.panel.frequency)
@@ -117,11 +129,11 @@ def _states(charts, settings, status, last, present):
     learned = status["n_learned"].to_numpy()
     relearn = p.baseline.complete & (p.pending | ((p.epoch[:, -1] > first_epoch(p)) & (learned < charts.learn)))
     blind = ~(status["detectable_pct"].to_numpy() <= settings.target_percent)
-    whole = status["section_id"].to_numpy() == WHOLE
     rules = [
         (~np.isfinite(last) & whole, "cannot_tell", "too_few_sections"),
         (~np.isfinite(last), "not_measured", "never"),
         (open_now & ~p.pending & ~(p.baseline.complete & stuck & ~whole), "alarm", "threshold_crossed"),
+        (unjudged, "cannot_tell", "too_few_sections"),
         (old, "not_measured", "too_long_ago"),
         (p.baseline.complete & stuck & ~whole, "cannot_tell", "constant"),
         (~p.baseline.complete & cold, "cannot_tell", "no_temperature"),

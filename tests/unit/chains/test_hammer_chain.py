@@ -123,6 +123,32 @@ def test_rates_that_differ_in_the_digits_of_a_printed_clock_are_one_rate(tmp_pat
     assert rows["models"][0]["sampling_rate_hz"] == pytest.approx(20000.0, rel=1e-9)
 
 
+def test_a_file_of_another_day_is_used_and_said(tmp_path):
+    """Its logger's clock may have been wrong, and its data are not."""
+
+    def change(test, recordings):
+        return [replace(r, started_at=datetime(2010, 1, 1)) for r in recordings] if test == 2 else recordings
+
+    unit, turnout, _ = lay_out(tmp_path, "A7", change=change)
+    rows = hammer_unit(unit, turnout, tmp_path, algo="1")
+    assert [(q["reason_code"], "A7_2" in q["path"]) for q in rows["quarantine"]] == [("wrong_time", True)]
+    assert len(rows["impacts"]) == 30 and rows["models"][0]["measured_at_utc"] == datetime(2024, 5, 13, 9)
+
+
+def test_a_force_that_no_hammer_has_is_named(tmp_path):
+    """Newtons that were exported as kilonewtons."""
+
+    def change(_, recordings):
+        return [
+            replace(r, samples=r.samples * [[1e3 if c.quantity == "force" else 1.0] for c in r.channels])
+            for r in recordings
+        ]
+
+    unit, turnout, _ = lay_out(tmp_path, "A7", n_test=1, change=change)
+    rows = hammer_unit(unit, turnout, tmp_path, algo="1")
+    assert {i["reason"] for i in rows["impacts"]} == {"out_of_scale"} and rows["models"][0]["status"] == "rejected"
+
+
 def test_a_reversed_force_is_named(tmp_path):
     from turnout.demo import faults
 

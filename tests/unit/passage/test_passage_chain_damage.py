@@ -61,6 +61,16 @@ def same(found, expected, but=()):
             assert one[name] == (pytest.approx(value, rel=1e-6, abs=1e-9) if close else value), name
 
 
+@pytest.mark.parametrize(("late", "used"), [(timedelta(hours=-14), True), (timedelta(days=-365), False)])
+def test_a_file_whose_time_contradicts_its_name_is_dated_by_neither(late, used, tmp_path):
+    """Local time in the name is no contradiction; a year is."""
+    rows = rows_of(tmp_path, replace(on_main(), started_at=STARTED + late))
+    assert [p["passed_at_utc"] - STARTED - late < timedelta(minutes=1) for p in rows["passages"]] == [True] * used
+    assert [q["reason_code"] for q in rows["quarantine"]] == ["wrong_time"] * (not used)
+    if not used:
+        assert rows["quarantine"][0]["found"].startswith("says it was recorded on 2023-05-14 10:00, and is filed under")
+
+
 @pytest.mark.parametrize("channels", [["A7"], list(PLACES)])
 def test_a_zero_offset_changes_nothing(channels, tmp_path):
     """9.81 m/s² is what a sensor that also measures the standing weight leaves on a channel."""

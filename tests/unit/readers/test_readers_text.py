@@ -43,6 +43,19 @@ def test_a_decimal_comma_is_no_separator(separator, end, tmp_path):
     sound(tmp_path, "a.csv", head + rows, replace(NAMED, rate=20000.0))
 
 
+def test_a_decimal_comma_behind_a_long_silence_is_one(tmp_path):
+    silence = "0;0\n" * 2000
+    rows = "".join(f"{comma(a)};{comma(b)}\n" for a, b in X)
+    (tmp_path / "a.csv").write_text("rate: 20000\nforce;acc\n" + silence + rows)
+    (recording,) = read("a.csv", tmp_path, NAMED).recordings
+    np.testing.assert_allclose(recording.samples[:, 2000:], X.T.round(4), atol=1e-12)
+
+
+@pytest.mark.parametrize("head", ["rate: 12.8 kHz", "fs: 12,8 kHz", "rate: 12800 Hz", "dt: 78.125 µs", "rate; 12800"])
+def test_a_rate_is_read_with_its_unit(head, tmp_path):
+    sound(tmp_path, "a.csv", f"{head}\nforce;acc\n" + "".join(f"{a:.4f};{b:.4f}\n" for a, b in X), rate=12800.0)
+
+
 @pytest.mark.parametrize("names", ["force;acc\n", "force;acc;\n", ""])
 def test_a_separator_behind_the_last_number_is_no_channel(names, tmp_path):
     by_index = tuple(replace(c, source=i) for i, c in enumerate(NAMED.channels))

@@ -220,7 +220,7 @@ def test_a_derived_table_with_a_bad_row_is_refused_whole(tmp_path, rows, said):
 
 
 @pytest.mark.parametrize("size", [1, 1024])
-def test_a_recording_that_lies_there_twice_is_one_passage_and_a_quarantine_row(bench, monkeypatch, size):
+def test_an_id_that_two_units_give_is_one_passage_and_a_quarantine_row(bench, monkeypatch, size):
     """In the same chunk of units or in another one: the second is left out by name, and all else is registered."""
     monkeypatch.setattr("turnout.registry.register.chunks", partial(chunks, size=size))
     passage = {"turnout_id": "t1", "passage_id": "p", "recording_id": "r", "passed_at_utc": "2026-01-05T10:00:00"}
@@ -236,5 +236,5 @@ def test_a_recording_that_lies_there_twice_is_one_passage_and_a_quarantine_row(b
     assert done.n_refused == 1 and bench.ask("select count(*) from passages") == [(1,)]
     assert bench.ask("select count(*) from passage_fits") == [(1,)]
     said = bench.ask("select reason_code, place, remedy from quarantine_open")
-    assert [(code, place) for code, place, _ in said] == [("duplicate", "passages, row 1, column passage_id")]
-    assert "delete one of them" in said[0][2]
+    assert [(code, place) for code, place, _ in said] == [("internal_error", "passages, row 1, column passage_id")]
+    assert "fault of the stage" in said[0][2]

@@ -257,6 +257,16 @@ def test_a_clock_that_runs_ahead_does_not_date_the_fleet(bench):
     assert bench.ask("select newest_measurement_at_utc from registry_info") == [(newest,)]
 
 
+def test_a_date_that_was_corrected_dates_the_fleet_no_more(bench):
+    """The first entry said 2097; the file of the right day has taken its place."""
+    campaign = {"campaign_id": "t1/2097-01-05", "turnout_id": "t1", "started_at_utc": "2097-01-05T10:00:00"}
+    wrong = hammer_result(day="2097-01-05")
+    bench.register(wrong, hammer_result(day="2026-01-05"), tables={"campaigns": [campaign]})
+    assert str(bench.ask("select newest_measurement()")[0][0]) == "2097-01-05 10:00:00"
+    bench.register(UnitResult(wrong.unit, "t1", "hammer", "withdrawn", "1", "vanished", {}), tables={"campaigns": []})
+    assert str(bench.ask("select newest_measurement()")[0][0]) == "2026-01-05 10:00:00"
+
+
 def test_campaigns_are_believed_where_the_clock_of_the_server_is_late(bench):
     """A campaign's date is written down by people."""
     campaign = {"campaign_id": "t1/2098-01-05", "turnout_id": "t1", "started_at_utc": "2098-01-05T10:00:00"}

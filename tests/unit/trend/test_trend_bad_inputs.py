@@ -119,6 +119,19 @@ def test_a_campaign_with_a_wrong_clock_is_shown_and_left_out(settings, stamp):
     assert len(wrong) == 8 and (wrong["measured_at_utc"] == pd.Timestamp(stamp)).all() and wrong["z"].isna().all()
 
 
+def test_a_turnout_whose_sections_are_in_alarm_is_not_called_unmeasured(settings):
+    """Every week is measured; only three of the eight sections are left for the median of those without an alarm."""
+    fleet = Fleet(turnouts=1, weeks=130, phi=0.0, campaign=0.3)
+    three, two = (np.arange(8) < 3)[None, :], np.isin(np.arange(8), (3, 4))[None, :]
+    rows = modes(fleet, 1, step(fleet, three, -12.0, 70) + step(fleet, two, -12.0, 95))
+    status, _ = status_of(rows, settings)
+    (whole,) = status[status["section_id"] == "*"].to_dict("records")
+    assert (status[status["section_id"] != "*"]["state"] == "alarm").sum() == 5
+    assert (whole["state"], whole["reason"]) == ("cannot_tell", "too_few_sections")
+    late, _ = status_of(rows, settings, as_of=rows["measured_at_utc"].max() + pd.Timedelta(days=200))
+    assert set(late[late["section_id"] == "*"]["reason"]) == {"too_long_ago"}
+
+
 def test_missing_campaigns_do_not_wake_the_chart(settings):
     # Taking a third of the campaigns of every section away must not raise alarms in a sound turnout.
     rows = modes(Fleet(turnouts=40, weeks=156, phi=0.2, missing=0.33), 3)

@@ -9,10 +9,14 @@ select
     case
         when reason = 'never' then 'not measured by then'
         when reason = 'too_long_ago' then 'last measured ' || strftime(last_measured_at_utc, '%Y-%m-%d')
+            || coalesce('; the campaign of '
+                || strftime(case when set_aside_at_utc > last_measured_at_utc then set_aside_at_utc end, '%Y-%m-%d')
+                || ' waits for a second one: so long after all others, its clock may be wrong', '')
         when reason = 'constant' then 'the value never changes: stuck or copied'
         when reason = 'no_temperature' then
             without_temperature || ' of ' || n_campaigns || ' campaigns have no rail temperature'
-        when reason = 'too_few_sections' then 'too few sections are measured in the same campaigns for their median'
+        when reason = 'too_few_sections' then
+            'too few sections are measured, or are without an alarm, in the same campaigns for their median'
         when reason = 'baseline' then n_baseline || ' campaigns so far; a baseline needs a whole year and at least twelve'
         when reason = 'after_event' then n_learned || ' of ' || n_needed || ' campaigns since the event'
         when band = 'amplitude' and coalesce(detectable_pct < 50, false) then
@@ -26,5 +30,8 @@ select
         else 'cannot see any change within a year: the values scatter too much'
     end as why,
     detectable_pct, target_pct, n_campaigns, last_measured_at_utc
-from chart_status_at(coalesce("asof", newest_measurement()))
+from chart_status_at(coalesce("asof", newest_measurement())) left join (
+    select turnout_id, section_id, band, source, max(measured_at_utc) as set_aside_at_utc
+    from charts where state = 'wrong_time' and measured_at_utc <= coalesce("asof", newest_measurement()) group by all
+) a using (turnout_id, section_id, band, source)
 where state not in ('alarm', 'ok') or detectable_pct is null or detectable_pct > target_pct;

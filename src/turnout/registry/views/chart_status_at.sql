@@ -54,6 +54,9 @@ known as (
         a.turnout_id is not null and p.turnout_id is null as in_alarm,
         c.epoch > c.first_epoch as is_later, b.detectable_pct, s.target_pct, s.section_id = '*' as is_whole,
         "asof" - c.last_at_utc > to_microseconds((86400e6 * s.stale_after_days)::bigint) as is_old,
+        s.section_id = '*' and "asof" - max(c.last_at_utc) filter (s.section_id <> '*')
+            over (partition by s.turnout_id, s.band, s.source)
+            <= to_microseconds((86400e6 * s.stale_after_days)::bigint) as has_sections,
         s.section_id <> '*' and (
             coalesce(len(v.hz) >= 8 and list_max(v.hz) - list_min(v.hz) < 0.001, false)
             or not coalesce(b.sd_pct > 0.1 / b.frequency_hz, b.sd_pct > 0, false)
@@ -75,6 +78,7 @@ judged as (
             when last_at_utc is null and is_whole then 'too_few_sections'
             when last_at_utc is null then 'never'
             when in_alarm and not (complete and is_stuck) then 'threshold_crossed'
+            when is_old and has_sections then 'too_few_sections'
             when is_old then 'too_long_ago'
             when complete and is_stuck then 'constant'
             when not complete and 2 * n_cold > n_campaigns then 'no_temperature'
