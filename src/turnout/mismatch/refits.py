@@ -16,6 +16,7 @@ PROMISING = 0.5  # of the threshold, which laws of a part must gain before its o
 NEARLY = 0.5  # of the threshold, from which a leader is fitted to its end
 ROUNDS = 3  # of steps for a leader; one that still gains afterwards is far from any law
 FAR = 4.0  # thresholds promised by the cheap observations, beyond which the base fit's derivatives point elsewhere
+FARTHER = 2.0  # times its promise, from which a law is begun again that gained too little: the base holds part of it
 HALVINGS = 4  # of a start that costs more than nothing; a sixteenth of it is a straight line
 
 
@@ -121,10 +122,33 @@ def _tried(case, fit, entry, settings, store, effect, best=0.0):
     if refit is None:
         return None
     score = score_of(case, fit, refit, candidate, settings)
+    whole_track = candidate.scanned == 1 and candidate.start_from_base
+    if case.frozen_jacobian and whole_track and score.gain < settings.threshold:
+        score = max(score, _from_farther(case, fit, entry, score, settings, store, key), key=lambda s: s.gain)
     worth = max(settings.threshold, HELD * best if of_channel else 0.0)
     if case.frozen_jacobian and score.gain < HELD * entry.promised and entry.promised > worth:
         return _polished(case, fit, score, settings, store, effect)
     return score
+
+
+def _from_farther(case, fit, entry, score, settings, store, key):
+    """Score of the entry begun at more than it promised: where the common values of the base fit have taken a part of
+    what the whole track has, a small size costs less than none and a large one more, until these come back. ``score``
+    where the simulation cannot go there."""
+    candidate = entry.candidate
+    first, start = candidate.parameters[0], np.array(entry.start, dtype=float)
+    start[0] = np.clip(first.neutral + FARTHER * (start[0] - first.neutral), *first.bounds)
+    psi, values = np.concatenate([fit.psi, start]), {**fit.values, **entry.values}
+
+    def made():
+        try:
+            both = (*fit.candidates, candidate)
+            return fit_jointly(case, both, psi, values, fit.jacobian, iterations=settings.iterations).light()
+        except SimulationError:
+            return None
+
+    refit = kept(store, f"{key}:farther", made, (*fit.candidates, candidate))
+    return score if refit is None else score_of(case, fit, refit, candidate, settings)
 
 
 def _polished(case, fit, score, settings, store, effect):
