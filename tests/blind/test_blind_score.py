@@ -324,7 +324,11 @@ def test_an_oracle_by_another_tool_is_refused(tmp_path):
     (tmp_path / "diagnosis.json").write_text(json.dumps(held))
     (tmp_path / "oracle.json").write_text(json.dumps(told))
     assert oracle_of(tmp_path) == {"s0": (20.0, 30.0)}
-    assert oracle_words(tmp_path) == ["Oracle: 2 clear singles asked, 1 without an answer (s1: no)."]
+    assert oracle_words(tmp_path) == [
+        "Oracle: 2 of 2 clear singles asked, in the order of their ids, 1 without an answer (s1: no)."
+    ]
+    (tmp_path / "oracle.json").write_text(json.dumps(told | {"asked": ["s0", "s1", "s2"]}))
+    assert "2 of 3 clear singles asked, in the order of their ids (1 not yet), 1 without" in oracle_words(tmp_path)[0]
     (tmp_path / "oracle.json").write_text(json.dumps(told | {"tool_sha256": "c" * 64}))
     with pytest.raises(BlindError, match="Ask the oracle with that tool"):
         oracle_of(tmp_path)

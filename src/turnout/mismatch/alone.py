@@ -1,10 +1,11 @@
-"""Whether a name hangs on one recording alone, though others should show the same as plainly."""
+"""Whether a name hangs on one recording alone, though others should show it as plainly, or on the blows at one spot."""
 
 import numpy as np
 
 from turnout.errors import SimulationError
 
 AS_PLAIN, WITNESSES = 0.5, 2  # of the energy that the effect has in the recording that speaks for it; so many others
+SPOTS = 3  # at which the hammer fell; of fewer none can be called the odd one
 
 
 def hangs_on(case, fit, candidate, by_condition, settings):
@@ -12,7 +13,8 @@ def hangs_on(case, fit, candidate, by_condition, settings):
 
     What is there shows wherever it acts: a gain of one recording that others, which show the effect at least half as
     plainly, do not share is that recording's. It takes two such others, since nuisances may take one's share; and
-    trains are not asked, which come at another speed and with another roughness each time.
+    trains are not asked, which come at another speed and with another roughness each time. Blows at one spot are one
+    witness however often they are repeated: they share the spot's fittings, the twist of the rail and the mark on it.
 
     Parameters
     ----------
@@ -23,6 +25,8 @@ def hangs_on(case, fit, candidate, by_condition, settings):
         Condition -> gain when it is left out. [nats]
     settings : MismatchSettings
     """
+    if spot := _one_spot(case.struck(), by_condition, settings.threshold):
+        return spot
     top = max(by_condition, key=by_condition.get, default="")
     if not top or by_condition[top] <= settings.threshold or "train" in candidate.where:
         return ""
@@ -32,6 +36,19 @@ def hangs_on(case, fit, candidate, by_condition, settings):
     shown = plainness(case, fit, candidate)
     least = AS_PLAIN * shown.pop(top, np.inf)
     return top if sum(energy >= least for energy in shown.values()) >= WITNESSES else ""
+
+
+def _one_spot(struck, by_condition, threshold):
+    """The spot whose blows pass for a name where all else together does not, in words, "" without one."""
+    gains = {}
+    for condition, gain in by_condition.items():
+        if condition in struck:
+            gains[struck[condition]] = gains.get(struck[condition], 0.0) + gain
+    if len(gains) < SPOTS:
+        return ""
+    top = max(gains, key=gains.get)
+    others = sum(by_condition.values()) - gains[top]
+    return f"all blows at {top:g} m" if gains[top] > threshold > others else ""
 
 
 def plainness(case, fit, candidate):

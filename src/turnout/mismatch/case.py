@@ -108,6 +108,10 @@ class Case:
         """The same case with broad, independent errors: its optimum has a wide basin."""
         return self
 
+    def struck(self):
+        """Condition -> where the hammer fell [m], for those that are hammer tests."""
+        return {}
+
     def renewed(self, fit):
         """The same case with errors of its observations as the model of ``fit`` makes them; itself where they stay."""
         return self

@@ -96,7 +96,8 @@ def diagnose(case, settings=None, progress=None, store=None):
     verdicts, fit, scores = [], base, ()
     for effect in range(settings.effects):
         promising = None if refused(verdicts) else {s.family for s in scores if s.gain > settings.threshold}
-        scores = scored(case, fit, settings, tell, store, effect, promising)
+        scores, fit = scored(case, fit, settings, tell, store, effect, promising)
+        base = base if effect else fit
         verdict, best = judged(case, fit, scores, settings)
         if effect and (verdict.answer != "named" or best.gain < _shape_of(verdicts[0].scores[0], best)):
             verdicts[0] = told_beside(verdicts[0], verdict)

@@ -21,7 +21,24 @@ HALVINGS = 4  # of a start that costs more than nothing; a sixteenth of it is a 
 
 
 def scored(case, fit, settings, tell, store, effect, promising):
-    """Best Score of each family, all refitted jointly on top of ``fit``."""
+    """(best Score of each family, ``fit``), all refitted jointly on top of ``fit``. Where that proves to have stopped a
+    threshold short of its end, it is continued from the leader's nuisances and all are asked again on top of it."""
+    ranked = _ranked(case, fit, settings, tell, store, effect, promising)
+    further = _owed(case, fit, ranked, settings, store, effect)
+    if further is not None and further.evidence - fit.evidence > settings.threshold:
+        fit, effect = further, f"{effect}:again"
+        ranked = _ranked(case, fit, settings, tell, store, effect, promising)
+        further = _owed(case, fit, ranked, settings, store, effect)
+    if further is not None:  # what it owes is no evidence
+        short = max(0.0, further.evidence - fit.evidence)
+        ranked = [replace(s, gain=s.gain - short) for s in ranked]
+    if case.frozen_jacobian and ranked:
+        ranked = beside(case, fit, ranked, settings)
+    return tuple(_checked(case, fit, s, settings) for s in ranked), fit
+
+
+def _ranked(case, fit, settings, tell, store, effect, promising):
+    """Best Score of each family on top of ``fit``, leaders fitted to their end."""
     plan = shortlist(case, fit, settings, promising)
     scores, best = {}, -np.inf
     for done, entry in enumerate(plan):
@@ -44,27 +61,23 @@ def scored(case, fit, settings, tell, store, effect, promising):
         leaders = [s for s in material if s.gain > max(NEARLY * settings.threshold, close)]
         polished = [_polished(case, fit, s, settings, store, effect) for s in leaders]
         ranked = sorted([*polished, *(s for s in ranked if all(s is not x for x in leaders))], key=lambda s: -s.gain)
-        ranked = _owed(case, fit, ranked, settings, store, effect)
-        ranked = beside(case, fit, ranked, settings)
-    return tuple(_checked(case, fit, s, settings) for s in ranked)
+    return ranked
 
 
 def _owed(case, fit, ranked, settings, store, effect):
-    """The scores without what ``fit`` itself reaches from the leader's nuisances: it had stopped short of that."""
+    """``fit`` made again from the leader's nuisances, to its end; None where nobody leads, the case is no dear one or
+    the simulation cannot go there."""
+    if not case.frozen_jacobian or not ranked or ranked[0].gain <= settings.threshold:
+        return None
     leader = ranked[0]
-    if leader.gain <= settings.threshold:
-        return ranked
     key = f"{effect}:back:{leader.candidate.key}:{len(fit.candidates)}:{tuple(np.round(leader.fit.psi, 12))}"
-    back = kept(store, key, lambda: _back(case, fit, leader.fit.values, settings), fit.candidates)
-    short = max(0.0, back.evidence - fit.evidence) if back is not None else 0.0
-    return [replace(s, gain=s.gain - short) for s in ranked]
+    return kept(store, key, lambda: _back(case, fit, leader.fit.values, settings), fit.candidates)
 
 
 def _back(case, fit, values, settings):
-    """``fit`` made again from other nuisances, to its end; None where the simulation cannot go there."""
     try:
         start = fit_jointly(case, fit.candidates, fit.psi, values, iterations=settings.iterations, stall=FINE)
-        return ended(case, start, settings).light()
+        return ended(case, start, settings)
     except SimulationError:
         return None
 

@@ -46,10 +46,13 @@ def oracle_words(out):
     if not path.exists():
         return []
     told, known = json.loads(path.read_text()), oracle_of(out)
-    left = {c: told["fits"].get(c, {}).get("error", "no such candidate") for c in told["asked"] if c not in known}
+    asked = {c: told["fits"][c].get("error", "no such candidate") for c in told["asked"] if c in told["fits"]}
+    left = {c: why for c, why in asked.items() if c not in known}
     why = "; ".join(f"{c}: {reason}" for c, reason in left.items())
+    waiting = len(told["asked"]) - len(asked)
     return [
-        f"Oracle: {len(told['asked'])} clear singles asked, {len(left)} without an answer{f' ({why})' if why else ''}."
+        f"Oracle: {len(asked)} of {len(told['asked'])} clear singles asked, in the order of their ids"
+        f"{f' ({waiting} not yet)' if waiting else ''}, {len(left)} without an answer{f' ({why})' if why else ''}."
     ]
 
 

@@ -68,6 +68,43 @@ def test_what_one_recording_says_and_its_like_do_not(loud, gains, alone):
     assert hangs_on(case, fit, of_a_train, gains, MismatchSettings()) == ""
 
 
+class Struck(Days):
+    """Two campaigns of blows at each of these spots [m], and a train."""
+
+    def __init__(self, *spots):
+        super().__init__((1.0, 1.0, 1.0))
+        self.spots = spots
+
+    def struck(self):
+        return {f"{spot} {year}": spot for spot in self.spots for year in (2025, 2026)}
+
+
+@pytest.mark.parametrize(
+    ("gains", "alone"),
+    [
+        (
+            (0.5, -1.0, 7.0, 6.0, 1.0, 0.5, 1.5),
+            "all blows at 4.2 m",
+        ),  # 13 against 2.5; neither campaign is a name alone
+        ((3.5, 4.0, 7.0, 6.0, 1.0, 0.5, 4.0), ""),  # 13 of others, of whom none would do alone
+        ((0.5, -1.0, 5.0, 6.0, 1.0, 0.5, 1.5), ""),  # 11 are no name: it does not hang on them
+        ((0.5, -1.0, 7.0, 6.0, 1.0, 0.5, 12.0), ""),  # the train bears it out
+    ],
+)
+def test_blows_at_one_spot_are_one_witness(gains, alone):
+    conditions = [f"{spot} {year}" for spot in (2.1, 4.2, 9.0) for year in (2025, 2026)]
+    by_condition = dict(zip([*conditions, "railcar"], gains))
+    case = Struck(2.1, 4.2, 9.0)
+    assert hangs_on(case, None, Days((1.0, 1.0, 1.0)).candidates[0], by_condition, MismatchSettings()) == alone
+
+
+def test_of_two_spots_neither_is_the_odd_one():
+    case, fit = fitted((1.0, 1.0, 1.0))
+    of_two = Struck(2.1, 4.2)
+    gains = {"2.1 2025": 0.5, "2.1 2026": -1.0, "4.2 2025": 7.0, "4.2 2026": 6.0, "railcar": 1.0}
+    assert hangs_on(of_two, fit, case.candidates[0], gains, MismatchSettings()) == ""
+
+
 @pytest.mark.parametrize("gain, answer", [(20.0, "none"), (60.0, "unknown")])
 def test_it_gets_no_name(gain, answer):
     candidate = Candidate("bump", (), lambda p: None, ())

@@ -73,20 +73,6 @@ def test_derivatives_of_passages_are_those_beside_the_term(sound, term):
 
 
 @pytest.mark.slow
-def test_no_support_that_is_asked_is_the_last_with_values_of_its_own(sound):
-    """Else it bears what the scatter of all others beyond it does to the recordings: pads there were named in sound
-    track."""
-    case, _ = sound
-    own = {
-        int(tail)
-        for kind, _, tail in (n.name.rpartition("_") for n in case.nuisances)
-        if kind == "pad" and tail.isdigit()
-    }
-    asked = {c.where["sleeper"] for c in case.candidates if c.family in ("local_pad", "attached_resonator")}
-    assert len(asked) > 5
-    assert {min(asked) - k for k in (1, 2, 3)} | {max(asked) + k for k in (1, 2, 3)} <= own
-
-
 def test_a_flat_is_found_on_its_wheel_with_the_place_where_it_strikes(plan):
     flat = physics.WheelFlat(2, 0.07, 0.43, 1.1, "heavy")
     case = TrackCase(measured_campaign(plan, (flat,), 7))

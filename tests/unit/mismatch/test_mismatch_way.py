@@ -65,22 +65,39 @@ def test_what_comes_near_a_name_is_fitted_to_its_end_as_leaders_are(monkeypatch,
     monkeypatch.setattr(refits, "_tried", lambda *a: score)
     monkeypatch.setattr(refits, "_polished", lambda *a: asked.append(a) or score)
     monkeypatch.setattr(refits, "_checked", lambda case, fit, s, settings: s)
-    monkeypatch.setattr(refits, "_owed", lambda case, fit, ranked, *a: ranked)
+    monkeypatch.setattr(refits, "_owed", lambda *a: None)
     refits.scored(Bent(True), None, MismatchSettings(), lambda *a: None, {}, 0, None)
     assert len(asked) == ended
 
 
-def test_what_the_fit_without_an_effect_had_not_come_to_is_no_evidence_for_the_effect():
-    """A leader with 20 nats of its own, fitted to its end, on top of a fit that had stopped long before: from the
-    leader's nuisances that one comes to its end as well, and what it owed goes off."""
-    early, late = (fit_jointly(Bent(True), iterations=25, stall=s) for s in (20.0, FINE))
+@pytest.mark.parametrize(("stall", "again"), [(20.0, True), (0.05, False)])
+def test_what_the_fit_without_an_effect_had_not_come_to_is_no_evidence_for_the_effect(monkeypatch, stall, again):
+    """A leader with 20 nats of its own, fitted to its end, on top of a fit that had stopped before: from the leader's
+    nuisances that one comes to its end as well. What it owed goes off, and where that is more than a name needs, all
+    are asked again on top of the better fit."""
+    early, late = (fit_jointly(Bent(True), iterations=25, stall=s) for s in (stall, FINE))
     owed = late.evidence - early.evidence
-    assert owed > MismatchSettings().threshold
-    scores = [Score(SimpleNamespace(key=k), owed + g, 0.0, 1.0, late) for k, g in (("a", 20.0), ("b", 3.0))]
-    found = refits._owed(Bent(True), early, scores, MismatchSettings(), {}, 0)
+    assert (owed > MismatchSettings().threshold) == again
+    asked = []
+
+    def ranked(case, fit, *_):
+        asked.append(fit.evidence)
+        debt = late.evidence - fit.evidence
+        return [Score(SimpleNamespace(key=k), debt + g, 0.0, 1.0, late) for k, g in (("a", 20.0), ("b", 3.0))]
+
+    monkeypatch.setattr(refits, "_ranked", ranked)
+    monkeypatch.setattr(refits, "beside", lambda case, fit, found, settings: found)
+    monkeypatch.setattr(refits, "_checked", lambda case, fit, s, settings: s)
+    found, fit = refits.scored(Bent(True), early, MismatchSettings(), lambda *a: None, {}, 0, None)
     assert [s.gain for s in found] == pytest.approx([20.0, 3.0], abs=0.5)
+    assert len(asked) == 1 + again and fit.evidence == pytest.approx(asked[-1])
+    assert fit.evidence == pytest.approx(late.evidence, abs=0.5 if again else MismatchSettings().threshold)
+
+
+def test_a_fit_is_not_made_again_where_nobody_would_be_named():
+    late = fit_jointly(Bent(True), iterations=25, stall=FINE)
     silent = [Score(SimpleNamespace(key="a"), 11.0, 0.0, 1.0, late)]
-    assert refits._owed(Bent(True), early, silent, MismatchSettings(), {}, 0) == silent  # nobody is named: not asked
+    assert refits._owed(Bent(True), late, silent, MismatchSettings(), {}, 0) is None
 
 
 def test_where_a_channel_was_at_its_range_the_passage_says_no_more_than_its_size():

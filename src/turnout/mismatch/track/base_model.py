@@ -46,20 +46,17 @@ RAIL = (("rail_bending", 0.015), ("rail_shear", 0.12))
 RAIL_STEP = 0.05  # of their logarithms; derivatives by pads err by 8 % over 0.12
 WHEELS_SD = 0.06  # ln unsprung mass: reprofiling takes a tenth of it; 42 of another simulator: 0.054
 SEAT_SD = 0.02  # a sensor's place is known to this [m]
-ASKED = 1.9  # supports this far beyond sensors and blows are asked for effects [m]
-REACH = 3.7  # as far as here they have values of their own: the outermost asked must not bear the scatter of the rest
+REACH = 1.9  # supports this far beyond sensors and blows have values of their own [m]
 MARGIN = 18.0  # track kept beyond them [m]
 
 
 @dataclass(frozen=True)
 class Zone:
-    """Supports ``first`` to ``last`` (inclusive) of the kept track lie among sensors and blows or near them; ``asked``
-    are those at which an effect can have its place."""
+    """Supports ``first`` to ``last`` (inclusive) of the kept track lie among sensors and blows."""
 
     turnout: object
     first: int
     last: int
-    asked: range
 
     @property
     def supports(self):
@@ -80,13 +77,8 @@ def zone_of(turnout, places):
     tracks = {name: cut(track) for name, track in turnout.tracks.items()}
     smaller = replace(turnout, track=cut(turnout.track), tracks=tracks)
     support = smaller.track.support
-
-    def within(reach):
-        inside = np.flatnonzero((support >= low - reach) & (support <= high + reach))
-        return range(int(inside[0]), int(inside[-1]) + 1)
-
-    own = within(REACH)
-    return Zone(smaller, own[0], own[-1], within(ASKED))
+    inside = np.flatnonzero((support >= low - REACH) & (support <= high + REACH))
+    return Zone(smaller, int(inside[0]), int(inside[-1]))
 
 
 def with_rail(zone, values):

@@ -48,10 +48,9 @@ def _candidate(term, make, starts, where=None, scanned=1, base=True, parameters=
 
 
 def _supports(case):
-    """One place per support of the zone that is asked."""
-    places, asked = case.track().support, case.zone.asked
-    n = len(asked)
-    for j in asked:  # ballast first: what hangs looks like soft ballast to a hammer
+    """One place per support of the zone."""
+    places, n = case.track().support, len(case.zone.supports)
+    for j in case.zone.supports:  # ballast first: what hangs looks like soft ballast to a hammer
         where = {"sleeper": j, "place": round(float(places[j]), 3)}
         for term, alike in ((physics.LocalBallast, "ballast"), (physics.LocalPad, "pad")):
             yield _candidate(term, lambda p, j=j, t=term: t(j, **p), ((0.4,), (2.5,)), where, n, always=alike,
@@ -65,7 +64,7 @@ def _supports(case):
             yield _candidate(physics.DryFriction, lambda p, j=j: physics.DryFriction(j, **p), ((1500.0,),), where, n,
                              told_by="passage")  # fmt: skip
         for half in STRETCHES if case.rollings else ():
-            if j - half in asked and j + half in asked:
+            if case.zone.first <= j - half and j + half <= case.zone.last:
                 yield _candidate(physics.BallastHardening,
                                  lambda p, a=j - half, b=j + half: physics.BallastHardening(a, b, **p), ((2.0,),),
                                  {**where, "sleepers": 2 * half + 1}, len(STRETCHES) * n, kin="ballast")  # fmt: skip

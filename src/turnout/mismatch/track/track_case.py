@@ -89,6 +89,10 @@ class TrackCase(Predicting, Case):
         self.zone = with_rail(self.nominal, self.rail)
         self._forget()
 
+    def struck(self):
+        """Condition -> where the hammer fell [m], for those that are hammer tests."""
+        return {o.condition: self.pairs[o.name].test.place for o in self.observations if o.name in self.pairs}
+
     def fitted(self):
         """``Rolling`` of each passage that is fitted: all that may suggest a candidate, or speak against one."""
         return [self.rollings[o.name] for o in self.observations if o.name in self.rollings]
