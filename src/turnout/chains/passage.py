@@ -53,8 +53,7 @@ def passage_unit(
     """Rows by table (recordings, passages, passage_fits, quarantine) for one passage file.
 
     A file that cannot be read, that holds no train, or whose name contradicts the time in it, is a quarantine row; a
-    channel that is clipped, dead,
-    swapped or lost is one too, and the passage is used as far as it is sound.
+    channel that is clipped, dead, swapped or lost is one too, and the passage is used as far as it is sound.
 
     Parameters
     ----------

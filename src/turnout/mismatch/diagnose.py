@@ -6,10 +6,11 @@ import numpy as np
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
+from turnout.mismatch.ends import kept, to_the_end, with_derivatives
 from turnout.mismatch.joint import CHEAP_STEPS, fit_jointly
 from turnout.mismatch.latent import Latent
 from turnout.mismatch.locate import attribute, cell_energies
-from turnout.mismatch.refits import kept, scored, to_the_end, with_derivatives
+from turnout.mismatch.refits import scored
 from turnout.mismatch.scoring import heard, judged, latent_of, over
 from turnout.mismatch.together import needed, reconsidered, refused, told_beside
 from turnout.mismatch.verdict import Verdict, opened

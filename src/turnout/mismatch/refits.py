@@ -6,15 +6,15 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.alone import hangs_on
+from turnout.mismatch.ends import ended, kept
 from turnout.mismatch.held_out import held_out_score
-from turnout.mismatch.joint import FINE, STALL, Joint, cost_at, fit_jointly
+from turnout.mismatch.joint import FINE, Joint, cost_at, fit_jointly
 from turnout.mismatch.scoring import score_of
 from turnout.mismatch.shortlist import Entry, shortlist
 
 HELD = 0.5  # of what the cheap observations gained; a refit that holds less has not come to its end
 PROMISING = 0.5  # of the threshold, which laws of a part must gain before its other laws are asked
 NEARLY = 0.5  # of the threshold, from which a leader is fitted to its end
-ROUNDS = 3  # of steps for a leader; one that still gains afterwards is far from any law
 FAR = 4.0  # thresholds promised by the cheap observations, beyond which the base fit's derivatives point elsewhere
 FARTHER = 2.0  # times its promise, from which a law is begun again that gained too little: the base holds part of it
 HALVINGS = 4  # of a start that costs more than nothing; a sixteenth of it is a straight line
@@ -181,31 +181,6 @@ def _checked(case, fit, score, settings):
     return replace(score, worst=min(by_condition.values(), default=0.0), by_condition=by_condition, alone=alone)
 
 
-def ended(case, fit, settings):
-    """Continued until a round of steps gains less than a name needs; each begins with new derivatives."""
-    for _ in range(ROUNDS):
-        try:
-            before, fit = fit, to_the_end(case, fit, settings, FINE)
-        except SimulationError:
-            break
-        if fit.evidence - before.evidence < settings.threshold:
-            break
-    return fit
-
-
-def to_the_end(case, fit, settings, stall=STALL):
-    """The fit continued from where it is, with derivatives of its own."""
-    return fit_jointly(case, fit.candidates, fit.psi, fit.values, iterations=settings.iterations, stall=stall)
-
-
-def with_derivatives(case, fit, settings):
-    """The fit, continued if it has no derivatives; as it is where the simulation fails beside it."""
-    try:
-        return fit if fit.jacobian else to_the_end(case, fit, settings)
-    except SimulationError:
-        return fit
-
-
 def _refit(case, fit, candidate, start, back, far, settings):
     """Joint refit from this start; None where the simulation cannot go there."""
     psi = np.concatenate([fit.psi, start])
@@ -262,12 +237,3 @@ def _sobered(case, candidates, psi, fit):
             pass
         psi[-n] = neutral + 0.5 * (psi[-n] - neutral)
     return psi
-
-
-def kept(store, key, compute, candidates=()):
-    """A fit by its key, computed where the store lacks it; stores hold fits without their candidates' functions."""
-    if key not in store:
-        fit = compute()
-        store[key] = fit.with_candidates(()) if fit is not None else None
-    fit = store[key]
-    return None if fit is None else fit.with_candidates(candidates)

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from turnout.errors import SimulationError
+from turnout.mismatch.ends import ended
 from turnout.mismatch.held_out import held_out_score
 from turnout.mismatch.joint import fit_jointly
-from turnout.mismatch.refits import ended
 from turnout.mismatch.scoring import consistent_elsewhere, explained_of, heard, over, structure_left
 from turnout.mismatch.verdict import TORN, judge
 

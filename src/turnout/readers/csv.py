@@ -194,8 +194,9 @@ class Rows:
 
 def _options(data, at, separator, width):
     """How pyarrow reads the numbers from byte ``at`` on."""
-    comma, dot = data.find(b",", at), data.find(b".", at)
-    point = "," if separator != "," and 0 <= comma and (dot < 0 or comma < dot) else "."
+    dot = data.find(b".", at)
+    commas = separator != "," and data.find(b",", at, dot if dot >= 0 else len(data)) >= 0
+    point = "," if commas else "."
     converting = csv.ConvertOptions(
         column_types={str(i): pa.float64() for i in range(width)},
         decimal_point=point,

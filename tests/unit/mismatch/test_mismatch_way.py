@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
-from turnout.mismatch import refits
+from turnout.mismatch import ends, refits
 from turnout.mismatch.case import Case, Nuisance
 from turnout.mismatch.joint import FINE, STALL, fit_jointly
 from turnout.mismatch.observation import Observation
@@ -49,9 +49,9 @@ def test_a_dear_fit_on_which_the_verdict_rests_goes_on_for_less(monkeypatch):
     assert early.cost > late.cost + 1.0
     assert fit_jointly(Bent(False), iterations=25, stall=20.0).cost == pytest.approx(late.cost, abs=0.2)  # cheap: none
     asked = []
-    monkeypatch.setattr(refits, "fit_jointly", lambda *a, stall=STALL, **k: asked.append(stall) or late)
-    refits.ended(Bent(True), early, MismatchSettings())
-    refits.to_the_end(Bent(True), early, MismatchSettings())
+    monkeypatch.setattr(ends, "fit_jointly", lambda *a, stall=STALL, **k: asked.append(stall) or late)
+    ends.ended(Bent(True), early, MismatchSettings())
+    ends.to_the_end(Bent(True), early, MismatchSettings())
     assert set(asked[:-1]) == {FINE} and asked[-1] == STALL > FINE
 
 
@@ -92,6 +92,38 @@ def test_what_the_fit_without_an_effect_had_not_come_to_is_no_evidence_for_the_e
     assert [s.gain for s in found] == pytest.approx([20.0, 3.0], abs=0.5)
     assert len(asked) == 1 + again and fit.evidence == pytest.approx(asked[-1])
     assert fit.evidence == pytest.approx(late.evidence, abs=0.5 if again else MismatchSettings().threshold)
+
+
+@pytest.mark.parametrize(
+    ("scanned", "promised", "gain", "begun"),
+    [(1, 3.0, 5.0, 6.0), (1, 7.0, 5.0, 9.0), (1, 3.0, 13.0, None), (30, 3.0, 5.0, None)],
+)
+def test_a_law_of_the_whole_track_that_gains_too_little_is_begun_again_farther_out(
+    monkeypatch, scanned, promised, gain, begun
+):
+    """At twice its promise or at its bound, 9, and what gains more counts; what has a name or a place is left alone."""
+    candidate = SimpleNamespace(
+        key="a",
+        scanned=scanned,
+        start_from_base=True,
+        frame="place",
+        parameters=(SimpleNamespace(neutral=0.0, bounds=(-9.0, 9.0)),),
+    )
+    fit = SimpleNamespace(candidates=(), psi=np.zeros(0), values={}, jacobian=[])
+    starts = []
+
+    def fitted(case, candidates, psi, *_, **__):
+        starts.append(float(psi[-1]))
+        return SimpleNamespace(gain=18.0, light=lambda: made, with_candidates=lambda c: made)
+
+    made = SimpleNamespace(gain=18.0, with_candidates=lambda c: made)
+    first = SimpleNamespace(gain=gain, with_candidates=lambda c: first)
+    monkeypatch.setattr(refits, "fit_jointly", fitted)
+    monkeypatch.setattr(refits, "_refit", lambda *a: first)
+    monkeypatch.setattr(refits, "score_of", lambda case, fit, refit, *a: SimpleNamespace(gain=refit.gain))
+    entry = SimpleNamespace(candidate=candidate, start=(promised,), values={}, promised=0.0)
+    score = refits._tried(Bent(True), fit, entry, MismatchSettings(), {}, 0)
+    assert starts == ([] if begun is None else [begun]) and score.gain == (gain if begun is None else 18.0)
 
 
 def test_a_fit_is_not_made_again_where_nobody_would_be_named():

@@ -254,6 +254,22 @@ def test_a_look_back_equals_what_that_night_said(con, frames, settings, day):
     assert len(told) >= 40 or day < "2017"
 
 
+def test_a_look_back_on_a_turnout_in_alarm_does_not_call_it_unmeasured(frames, settings):
+    """Five of eight sections in alarm leave too few for the median, though every week is measured."""
+    fleet = Fleet(turnouts=1, weeks=130, phi=0.0, campaign=0.3)
+    three, two = (np.arange(8) < 3)[None, :], np.isin(np.arange(8), (3, 4))[None, :]
+    rows = modes(fleet, 1, step(fleet, three, -12.0, 70) + step(fleet, two, -12.0, 95))
+    rows = rows.astype({"turnout_id": object, "section_id": object, "band": object, "source": object})
+    given = {"modes": rows.assign(method="joint"), "events": frames["events"].iloc[:0]}
+    newest = rows["measured_at_utc"].max()
+    now, then = (frames_at(given, settings, day) for day in (newest, newest - pd.Timedelta(days=15)))
+    with connect_views(now, newest, rounded=False) as connection:
+        asked = "select state, reason from chart_status_at(?) where section_id = '*'"
+        found = connection.execute(asked, [(newest - pd.Timedelta(days=15)).to_pydatetime()]).fetchall()
+    night = then["chart_status"][then["chart_status"]["section_id"] == "*"][["state", "reason"]]
+    assert found == [("cannot_tell", "too_few_sections")] == list(night.itertuples(index=False, name=None))
+
+
 @pytest.mark.parametrize("day", ["2017-01-20", "2017-08-21", "2018-11-06"])
 def test_the_list_of_an_earlier_day_is_the_list_of_that_night(con, frames, settings, day):
     then = pd.Timestamp(day)
