@@ -306,8 +306,21 @@ def test_a_fall_counts_wherever_a_name_was_given():
     sound = judge(
         truth("s", "single", "void"), answers_of([row(truth("s", "single", "void")["effects"][0], "hanging_sleeper")])
     )
-    found = {f.name: f for f in figures([alarm, mute, sound])}["held-out fit: fell by over a point"]
+    found = {f.name: f for f in figures([alarm, mute, sound])}["held-out fit: fell by more than its standard error"]
     assert (found.k, found.n) == (2, 3)
+
+
+@pytest.mark.parametrize(
+    ("after", "error", "fallen"), [(47.0, 2.5, 1), (47.0, 3.5, 0), (49.5, 0.4, 1), (48.5, None, 1)]
+)
+def test_a_fall_is_held_against_the_standard_error_that_the_row_states(after, error, fallen):
+    """The point stands in where none is stated."""
+    fits = {"fit_before_pct": 50.0, "fit_after_pct": after, "fit_gain_se_pct": error}
+    rows = [row(truth("s", "single", "void")["effects"][0], "hanging_sleeper", **fits)]
+    named = judge(truth("s", "single", "void"), answers_of(rows))
+    found = {f.name: f for f in figures([named])}
+    assert found["held-out fit: fell by more than its standard error"].k == fallen
+    assert found["held-out fit: fell by over a point"].k == (after < 49.0)
 
 
 def test_fifths_hold_equal_numbers_and_ties_stay_together():

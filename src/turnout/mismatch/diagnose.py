@@ -14,7 +14,7 @@ from turnout.mismatch.refits import scored
 from turnout.mismatch.scoring import heard, judged, latent_of, over
 from turnout.mismatch.together import needed, reconsidered, refused, told_beside
 from turnout.mismatch.verdict import Verdict, opened
-from turnout.mismatch.verify import decoy, fit_of_reserved, fit_percent
+from turnout.mismatch.verify import decoy, fit_of_reserved, fit_percent, gain_error
 from turnout.mismatch.whereabouts import Whereabouts, whereabouts
 
 # Share of the first effect's evidence that a law of not quite its shape leaves: sizes are right to a fifth.
@@ -25,13 +25,15 @@ FRAMES = {("", "sensor"), ("", "train"), ("sensor", "train"), ("train", "sensor"
 
 @dataclass(frozen=True)
 class Verification:
-    """Fit [%] on ``n`` reserved recordings ``before``, ``after`` with the named term, with ``rival`` and ``decoy``."""
+    """Fit [%] on ``n`` reserved recordings ``before``, ``after`` with the named term, with ``rival`` and ``decoy``;
+    ``error`` is the standard error of ``after`` less ``before``."""
 
     n: int
     before: float
     after: float | None = None
     rival: float | None = None
     decoy: float | None = None
+    error: float | None = None
 
 
 @dataclass(frozen=True)
@@ -195,4 +197,6 @@ def _verified(case, base, fit, rival):
         return Verification(n, first)
     free = decoy(case.observations, base.predictions, case.reserved, before, fit.psi.size)
     other = fit_of_reserved(case, rival.fit)[1] if rival else None
-    return Verification(n, first, fit_of_reserved(case, fit)[1], other, fit_percent(case.reserved, free))
+    after, reached = fit_of_reserved(case, fit)
+    error = None if after is None else gain_error(case.reserved, before, after)
+    return Verification(n, first, reached, other, fit_percent(case.reserved, free), error)

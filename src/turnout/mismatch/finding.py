@@ -109,6 +109,7 @@ def finding_row(diagnosis, identity):
         "fit_after_pct": _finite(check.after),
         "fit_rival_pct": _finite(check.rival),
         "fit_decoy_pct": _finite(check.decoy),
+        "fit_gain_se_pct": _finite(check.error),
         "n_held_out": check.n,
         "parameters_json": json.dumps(parameters(diagnosis), sort_keys=True) if term else None,
         "train": in_train(where),

@@ -35,6 +35,25 @@ def fit_of_reserved(case, fit):
     return found, fit_percent(case.reserved, found)
 
 
+def gain_error(observations, before, after):
+    r"""Standard error of ``fit_percent`` of ``after`` less that of ``before``, in points.
+
+    Jackknife over ``BLOCKS`` stretches of each observation (Efron and Stein 1981): with the gain :math:`d_i` of all
+    stretches but one, :math:`\sqrt{(m - 1) / m \sum (d_i - \bar d)^2}`. Both miss the same roughness, so that the
+    gain is known better than either fit.
+    """
+    sums = np.array([_squares(o, b, a) for o, b, a in zip(observations, before, after)]).transpose(1, 0, 2)
+    missed_before, missed_after, total = (np.sum(s) - s.ravel() for s in sums)
+    gain = 100.0 * (np.sqrt(missed_before / total) - np.sqrt(missed_after / total))
+    return float(np.sqrt((gain.size - 1) * np.var(gain)))
+
+
+def _squares(o, before, after):
+    """(3, BLOCKS) weighted sums of squares of what ``before`` and ``after`` miss, and of the recording."""
+    parts = (o.data - before, o.data - after, o.data - np.mean(o.data))
+    return [[o.effective * float(np.sum(b)) for b in np.array_split((p / o.sigma) ** 2, BLOCKS)] for p in parts]
+
+
 def falls(observations, before, after, points):
     """Whether ``after`` fits worse than ``before`` by more than ``points`` of fit and than two standard errors.
 

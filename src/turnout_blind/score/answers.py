@@ -19,6 +19,7 @@ class Answer:
     probability: float | None = None
     before: float | None = None
     after: float | None = None
+    gain_error: float | None = None
     parameters: dict = field(default_factory=dict)
 
     @property
@@ -82,7 +83,7 @@ def _answer(row):
         row["verdict"], names if row["verdict"] in ("named", "a_or_b") else (), row.get("locked_to"),
         row.get("position_m"), row.get("channel") or where.get("sensor"), train,
         None if axle is None else int(axle), row.get("probability"), row.get("fit_before_pct"),
-        row.get("fit_after_pct"), parameters,
+        row.get("fit_after_pct"), row.get("fit_gain_se_pct"), parameters,
     )  # fmt: skip
 
 

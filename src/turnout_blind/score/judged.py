@@ -34,6 +34,7 @@ class Judged:
     probability: float | None = None
     probably_right: bool | None = None
     fits: tuple = (None, None)
+    gain_error: float | None = None
 
     @property
     def clear(self):
@@ -70,7 +71,7 @@ def judge(truth, answers, more=None):
         bool(answers), bool(loud), hits, tuple(all(_where(e, n, loud).values()) for e, n in zip(effects, right)), first,
         wrong, _said(answers, loud), _located(effects, right, loud),
         tuple(_compared(effects, right, loud)), probability, sound,
-        (None, None) if ahead is None else (ahead.before, ahead.after),
+        (None, None) if ahead is None else (ahead.before, ahead.after), ahead and ahead.gain_error,
     )  # fmt: skip
 
 

@@ -96,7 +96,7 @@ def fit_panel(finding):
     chart = Chart(
         Axis(0.4, len(entries) + 0.6, "", "names", tuple(e[0] for e in entries)),
         Axis(low, 100.0, "fit [%]"),
-        f"Fit on recordings never used, n = {finding['n_held_out']}",
+        f"Fit on recordings never used, n = {finding['n_held_out']}{_gain(finding)}",
         height=250,
     )
     for k, (_, value, style) in enumerate(entries, start=1):
@@ -108,6 +108,12 @@ def fit_panel(finding):
             f'text-anchor="middle">{value:.0f} %</text>'
         )
     return chart.svg()
+
+
+def _gain(finding):
+    """What the term gains with its standard error, in words; "" where that is not known."""
+    before, after, error = (finding.get(k) for k in ("fit_before_pct", "fit_after_pct", "fit_gain_se_pct"))
+    return "" if None in (before, after, error) else f": {after - before:+.1f} ± {error:.1f} points"
 
 
 def history_of_parameter(rows):
