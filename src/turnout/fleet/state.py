@@ -6,14 +6,21 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from filelock import FileLock
+
 from turnout.errors import TurnoutError
 from turnout.fleet.atomic import write_text
+
+# Of a unit: its rows count; all its files are gone and it has no rows.
+WITH_ROWS, VANISHED = ("ok", "partly"), "vanished"
+ELSEWHERE = "-"
 
 
 @dataclass(frozen=True)
 class Known:
     """``stamp``: names, sizes and times it was computed from; ``key``: the same by content; ``batch``: file name;
-    ``contents``: of its files whatever they are called, "" in states of earlier versions."""
+    ``contents``: of its files in their order, a - before those that count elsewhere, "" in states of earlier
+    versions."""
 
     stamp: str
     key: str
@@ -21,6 +28,11 @@ class Known:
     status: str
     batch: str
     contents: str = ""
+
+    @property
+    def counted(self) -> list[str]:
+        """Contents of the files that its rows come from."""
+        return [content for content in self.contents.split() if not content.startswith(ELSEWHERE)]
 
 
 @dataclass
@@ -55,6 +67,12 @@ def load_state(path: Path) -> State:
     except (ValueError, KeyError, TypeError) as error:
         remedy = f"Delete it and {mark_of(path)}: its shard is then computed anew."
         raise TurnoutError(f"{path}: not a state file ({error}). {remedy}") from None
+
+
+def locked(state: Path) -> FileLock:
+    """The lock of whoever writes a state."""
+    state.parent.mkdir(parents=True, exist_ok=True)
+    return FileLock(state.parent / f".{state.stem}.lock")
 
 
 def mark_of(state: Path) -> Path:

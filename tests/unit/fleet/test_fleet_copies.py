@@ -2,6 +2,9 @@
 
 import shutil
 
+import pytest
+from length_fleet import CALLS
+
 from turnout.fleet.state import batch_paths
 
 
@@ -42,3 +45,72 @@ def test_the_same_file_at_two_turnouts_is_no_copy(fleet):
     fleet.put("t1/2024-05-13/A_1.txt", "turnout 0")
     fleet.run()
     assert fleet.lengths()["t1/hammer/A/2024-05-13"] == [9]
+
+
+FIRST, SECOND = "t0/hammer/A/2024-05-13", "t0/hammer/A/2024-05-31"
+
+
+def share_a_file(fleet):
+    """Two campaigns of one section, each with a test of its own, and the first test of the first in the second, too."""
+    fleet.put("t0/2024-05-13/A_2.txt", "of the first day")
+    fleet.put("t0/2024-05-31/A_2.txt", "turnout 0")
+    fleet.put("t0/2024-05-31/A_3.txt", "of the second")
+
+
+def duplicates(fleet, unit):
+    rows = fleet.rows()[unit].get("quarantine", [])
+    return [(row["path"], row["place"], row["found"]) for row in rows if row["reason_code"] == "duplicate"]
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_of_two_campaigns_that_share_a_file_the_first_keeps_it_and_the_second_its_others(fleet, threads):
+    share_a_file(fleet)
+    fleet.run(threads=threads)
+    assert fleet.lengths()[FIRST] == [9, 16] and duplicates(fleet, FIRST) == []
+    assert fleet.lengths()[SECOND] == [13]
+    assert duplicates(fleet, SECOND) == [("t0/2024-05-31/A_2.txt", "the file", "same bytes as t0/2024-05-13/A_1.txt")]
+    n_batch = len(batch_paths([fleet.state]))
+    assert fleet.run().processed == 0 and CALLS == [] and len(batch_paths([fleet.state])) == n_batch
+
+
+def test_a_file_that_two_campaigns_shared_counts_in_the_second_once_it_is_gone_from_the_first(fleet):
+    share_a_file(fleet)
+    fleet.run()
+    (fleet.raw / "t0/2024-05-13/A_1.txt").unlink()
+    fleet.run()
+    assert fleet.lengths()[FIRST] == [16] and fleet.lengths()[SECOND] == [9, 13]
+    assert duplicates(fleet, SECOND) == []
+    assert fleet.run().processed == 0
+
+
+def test_a_shared_file_counts_once_though_the_job_was_killed_before_it_knew(fleet, monkeypatch):
+    share_a_file(fleet)
+
+    def killed(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("turnout.fleet.shard.copies", killed)
+    with pytest.raises(KeyboardInterrupt):
+        fleet.run()
+    monkeypatch.undo()
+    assert fleet.lengths()[SECOND] == [9, 13]
+    fleet.run()
+    assert CALLS == ["t0/A/2024-05-31"] and fleet.lengths()[SECOND] == [13]
+
+
+def test_a_campaign_of_nothing_but_files_of_two_others_gives_no_row_of_its_own(fleet):
+    share_a_file(fleet)
+    fleet.put("t0/2024-06-13/A_1.txt", "of the second")
+    fleet.put("t0/2024-06-13/A_2.txt", "of the first day")
+    fleet.run()
+    assert fleet.lengths()["t0/hammer/A/2024-06-13"] == []
+    said = "same bytes as t0/2024-05-31/A_3.txt, t0/2024-05-13/A_2.txt"
+    assert duplicates(fleet, "t0/hammer/A/2024-06-13") == [("t0/2024-06-13/A_1.txt", "the whole unit", said)]
+    assert fleet.run().processed == 0
+
+
+def test_a_file_that_is_shared_with_a_campaign_without_rows_counts(fleet):
+    share_a_file(fleet)
+    fleet.put("t0/2024-05-13/A_2.txt", "damaged")
+    fleet.run()
+    assert fleet.lengths()[FIRST] == [] and fleet.lengths()[SECOND] == [9, 13]
