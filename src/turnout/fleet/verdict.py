@@ -9,7 +9,7 @@ from pathlib import Path
 from turnout.config import Configuration
 from turnout.config.settings.fleet import FleetSettings
 from turnout.errors import TurnoutError
-from turnout.fleet.atomic import write_text
+from turnout.fleet.atomic import read_json, write_text
 from turnout.fleet.batches import read_column
 from turnout.fleet.postponed import ask_again, read_postponed
 from turnout.fleet.state import batch_paths, state_of
@@ -98,7 +98,7 @@ def verdict(states: Iterable[Path], configuration: Configuration, output: Path) 
     Nights with too few units to be judged add up. A run over some turnouts forgets nothing of the others.
     """
     output = Path(output)
-    judged = json.loads(output.read_text(encoding="utf-8"))["judged"] if output.exists() else ()
+    judged = read_json(output, {"judged": []})["judged"]
     found = judge(states, configuration, judged)
     for batch in found.damaged:
         ask_again(state_of(batch))

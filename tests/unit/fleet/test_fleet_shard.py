@@ -235,9 +235,10 @@ def test_a_row_that_cannot_be_written_is_a_fault_of_its_unit(fleet):
     )
 
 
-def test_a_spoilt_state_file_is_said(fleet):
+@pytest.mark.parametrize("content", ['{"batches":[],"unit":{\n\n}}\n', "no JSON\n}}\n"])
+def test_a_state_file_that_somebody_else_wrote_is_said(fleet, content):
     fleet.run()
-    fleet.state.write_text("{")
+    fleet.state.write_text(content)
     with pytest.raises(TurnoutError, match=r"not a state file .* Delete it and .*00of01\.done: its shard is then"):
         fleet.run()
     fleet.state.unlink()
