@@ -121,6 +121,17 @@ def test_a_campaign_that_was_moved_to_a_turnout_of_another_shard_counts_there_al
     assert "Nothing to be done" in toy.run(fleet, shards=SHARDS).stdout
 
 
+def test_work_files_that_were_cut_are_made_again_and_nothing_is_computed(fleet):
+    before, shard = toy.rows(fleet), shard_of("T00000", SHARDS)
+    for name in (f"hammer/{shard}.json", f"plan/{shard}.json", "verdict.json", "attempts/register"):
+        path = fleet / "work" / name
+        path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    done = toy.run(fleet, shards=SHARDS)
+    assert said(done)["processed"] == 0 and re.search(rf"{shard}\.json is cut", done.stdout)
+    assert toy.rows(fleet) == before
+    assert "Nothing to be done" in toy.run(fleet, shards=SHARDS).stdout
+
+
 @pytest.mark.parametrize(
     "option, words",
     [

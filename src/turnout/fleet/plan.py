@@ -36,7 +36,8 @@ def write_plans(
     """Scan the raw folders and write ``folder``/<shard>.json where the content changed; names of the shards.
 
     ``turnouts`` limits the scan to their shards, and to those whose plan is cut. Nothing in a plan changes without
-    meaning: no time of scan, no absolute path. ConfigError where so many known files are gone that a disk must be missing.
+    meaning: no time of scan, no absolute path. ConfigError where so many known files are gone that a disk must be
+    missing.
     """
     for turnout in turnouts or ():
         configuration.turnout(turnout)

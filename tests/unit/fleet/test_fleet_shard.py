@@ -3,7 +3,6 @@
 import errno
 import json
 import os
-import shutil
 import sys
 
 import pytest
@@ -254,31 +253,6 @@ def test_a_batch_reads_as_it_was_written(fleet):
     assert read_column(path, "turnout", "status") == [("t0", "ok"), ("t1", "ok"), ("t2", "ok")]
 
 
-def test_the_verdict_judges_what_is_new_over_the_fleet_and_each_line(tmp_path):
-    fleet = Fleet(tmp_path, 10, "fleet: {quarantine_units: 5, quarantine_share: 0.3}\n")
-    fleet.run()
-    output = tmp_path / "work/verdict.json"
-    assert verdict([fleet.state], fleet.configuration, output).units == 10
-    for i in (1, 3):  # both of line 1
-        fleet.put(f"t{i}/2024-05-13/A_1.txt", "damaged")
-    fleet.run()
-    judged = json.loads(output.read_text())["judged"]
-    found = judge([fleet.state], fleet.configuration, judged)
-    assert (found.units, found.quarantined, found.complaints) == (2, 2, ())  # too few to judge
-    for i in (5, 7, 9):
-        fleet.put(f"t{i}/2024-05-13/A_1.txt", "good again")
-    fleet.run()
-    with pytest.raises(TurnoutError, match="2 of 5 new units of the fleet have rows in quarantine, 40 %, above"):
-        verdict([fleet.state], fleet.configuration, output)
-    everything = judge([fleet.state], fleet.configuration)
-    assert everything.complaints == (
-        "2 of 5 new units of line 'line 1' have rows in quarantine, 40 %, above the limit of 30 %",
-    )
-    fleet.put("t3/2024-05-13/A_1.txt", "repaired")
-    fleet.run()
-    assert verdict([fleet.state], fleet.configuration, output).quarantined == 1
-
-
 @pytest.mark.parametrize("damage", ["cut", "gone"])
 def test_the_units_of_a_damaged_batch_are_computed_again(fleet, damage, caplog):
     fleet.run()
@@ -317,34 +291,6 @@ def test_a_stage_that_builds_on_a_damaged_batch_asks_for_it_again(fleet, monkeyp
     with pytest.raises(DamagedBatch, match="cannot be read"):
         stage_job("work/plan/00of01.json", "work/passage/00of01.done", "log", params, 1)
     assert read_postponed(fleet.state) == (1, {})
-
-
-def test_small_nights_add_up_until_they_can_be_judged(tmp_path):
-    fleet = Fleet(tmp_path, 1, "fleet: {quarantine_units: 5, quarantine_share: 0.3}\n")
-    output = tmp_path / "work/verdict.json"
-    for night in range(4):
-        fleet.put(f"t0/2024-06-{night + 1:02d}/A_1.txt", "damaged")
-        fleet.run()
-        if night < 3:
-            assert verdict([fleet.state], fleet.configuration, output).units == night + 2
-    with pytest.raises(TurnoutError, match="4 of 5 new units of the fleet have rows in quarantine"):
-        verdict([fleet.state], fleet.configuration, output)
-
-
-def test_a_run_over_some_turnouts_forgets_no_verdict_on_the_others(fleet):
-    settings = "fleet: {quarantine_units: 1, quarantine_share: 0.3}\n"
-    (fleet.folder / "config/config.yaml").write_text(settings)
-    fleet.run()
-    other = fleet.state.with_name("01of02.json")
-    shutil.copy(fleet.state, other)
-    shutil.copytree(fleet.state.with_suffix(""), other.with_suffix(""))
-    output = fleet.folder / "work/verdict.json"
-    assert verdict([fleet.state, other], fleet.configuration, output).units == 3
-    assert verdict([other], fleet.configuration, output).units == 0
-    assert verdict([fleet.state, other], fleet.configuration, output).units == 0
-    shutil.rmtree(other.with_suffix(""))
-    verdict([fleet.state], fleet.configuration, output)
-    assert len(json.loads(output.read_text())["judged"]) == 1  # of batches that are gone nothing is kept
 
 
 def test_results_that_count_are_those_of_the_last_batch_and_of_the_last_number_of_shards(fleet):
