@@ -11,17 +11,13 @@ from turnout.fleet.postponed import ask_again
 from turnout.fleet.scan import unit_id
 from turnout.fleet.state import VANISHED, WITH_ROWS, Known, load_state, locked
 
-
-def held(units: Mapping[str, Known], wanted: Collection[str]) -> set[str]:
-    """Contents of the files from which units that are there have rows."""
-    there = (units[name] for name in wanted if name in units)
-    return {content for known in there if known.status in WITH_ROWS for content in known.counted}
+Units = Mapping[str, Known]
 
 
-def moved(units: Mapping[str, Known], wanted: Collection[str], held: Collection[str]) -> list[str]:
-    """Units that are gone though all that they held is ``held`` by others."""
-    gone = (name for name in units if name not in wanted and units[name].status != VANISHED)
-    return [name for name in gone if units[name].counted and all(c in held for c in units[name].counted)]
+def moved(units: Units, wanted: Collection[str]) -> list[str]:
+    """Units that are gone while others of the same state have rows from all the files that they held."""
+    held = _holders({content for name in _gone(units, wanted) for content in units[name].counted}, [(units, wanted)])
+    return [name for name in _gone(units, wanted) if all(held[content] for content in units[name].counted)]
 
 
 def withdrawn(name: str, known: Known) -> UnitResult:
@@ -30,27 +26,61 @@ def withdrawn(name: str, known: Known) -> UnitResult:
     return UnitResult(name, turnout, kind, VANISHED, known.algo, VANISHED, {})
 
 
-def withdraw_moved(work: Path, stages: Iterable[str], shards: Collection[str], limits: FleetSettings) -> int:
+def withdraw_moved(work: Path, stages: Iterable[str], shards: Iterable[str], limits: FleetSettings) -> int:
     """Withdraw what was moved to a turnout of another shard, once the jobs of all are done; how many units.
 
-    The shard is asked for again, so that the stages which build on its results do without them, too.
+    The shard is asked for again, so that the stages which build on its results do without them, too. A stage that
+    gathers its own units looks at some of them only: one of them has moved when no file of it is left at its turnout.
     """
     plans = {shard: work / "plan" / f"{shard}.json" for shard in shards}
     wanted = {shard: {unit_id(p.unit) for p in read_plan(plan)} for shard, plan in plans.items() if plan.exists()}
-    return sum(_withdraw_of(work / stage, wanted, limits) for stage in stages)
+    kinds = {_kind(name) for names in wanted.values() for name in names}
+    states = [work / stage / f"{shard}.json" for stage in stages for shard in wanted]
+    units = {state: load_state(state).units for state in states}
+    gone = {state: _gone(units[state], wanted[state.stem]) for state in states}
+    asked = {content for state in states for name in gone[state] for content in units[state][name].counted}
+    holders = _holders(asked, [(units[state], wanted[state.stem]) for state in states])
 
+    def has_moved(name: str, known: Known) -> bool:
+        by = [holders[content] for content in known.counted]
+        return all(by) and (_kind(name) in kinds or _turnout(name) not in set().union(*by))
 
-def _withdraw_of(folder: Path, wanted: Mapping[str, set[str]], limits: FleetSettings) -> int:
-    """The same for one stage; ``wanted`` are the units that are there, by shard."""
-    units = {shard: load_state(folder / f"{shard}.json").units for shard in wanted}
-    everywhere = set().union(*(held(units[shard], wanted[shard]) for shard in wanted))
-    left = {shard: names for shard in wanted if (names := moved(units[shard], wanted[shard], everywhere))}
-    for shard, names in left.items():
-        state = folder / f"{shard}.json"
-        ask_again(state)  # first: who is killed in between has asked once too often, not once too seldom
-        with locked(state):
-            ledger = Ledger(state, limits)
-            for name in names:
-                ledger.keep(withdrawn(name, units[shard][name]), "")
-            ledger.checkpoint()
+    left = {s: {n: units[s][n] for n in gone[s] if has_moved(n, units[s][n])} for s in states}
+    for state in states:
+        _withdraw(state, left[state], limits)
     return sum(map(len, left.values()))
+
+
+def _withdraw(state: Path, left: Units, limits: FleetSettings) -> None:
+    if not left:
+        return
+    ask_again(state)  # first: who is killed in between has asked once too often, not once too seldom
+    with locked(state):
+        ledger = Ledger(state, limits)
+        for name, known in left.items():
+            ledger.keep(withdrawn(name, known), "")
+        ledger.checkpoint()
+
+
+def _gone(units: Units, wanted: Collection[str]) -> list[str]:
+    return [n for n, known in units.items() if n not in wanted and known.status != VANISHED and known.counted]
+
+
+def _holders(asked: Collection[str], places: Iterable[tuple[Units, Collection[str]]]) -> dict[str, set[str]]:
+    """Content -> turnouts with a unit that is there and has rows from it."""
+    holders: dict[str, set[str]] = {content: set() for content in asked}
+    for units, wanted in places:
+        for name in wanted if asked else ():
+            known = units.get(name)
+            for content in known.counted if known and known.status in WITH_ROWS else ():
+                if content in holders:
+                    holders[content].add(_turnout(name))
+    return holders
+
+
+def _turnout(name: str) -> str:
+    return name.split("/", 1)[0]
+
+
+def _kind(name: str) -> str:
+    return name.split("/", 2)[1]

@@ -14,7 +14,7 @@ from turnout.fleet.guard import guarded
 from turnout.fleet.keys import contents_of, key_of, short
 from turnout.fleet.ledger import Ledger
 from turnout.fleet.machine import passing
-from turnout.fleet.moved import held, moved, withdrawn
+from turnout.fleet.moved import moved, withdrawn
 from turnout.fleet.plan import Planned, read_plan
 from turnout.fleet.pool import in_order
 from turnout.fleet.postponed import Postponed, note_postponed, read_postponed
@@ -174,7 +174,7 @@ class _Run:
         gone = [name for name in units if name not in wanted]
         left = {name for name in gone if units[name].status == "quarantined"}
         if gone and not self.stage.gather:
-            left.update(moved(units, wanted, held(units, wanted)))
+            left.update(moved(units, wanted))
         for name in sorted(left):
             self.ledger.keep(withdrawn(name, units[name]), "")
         return 0 if self.stage.gather else len(gone)

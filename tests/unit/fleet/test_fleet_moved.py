@@ -1,11 +1,13 @@
 """A measurement whose files were moved counts at its new place alone."""
 
+from dataclasses import replace
+
 import pytest
 from length_fleet import CALLS, Fleet, length
 
 from turnout.fleet.batches import read_results
 from turnout.fleet.moved import withdraw_moved
-from turnout.fleet.plan import write_plans
+from turnout.fleet.plan import Planned, read_plan, write_plans
 from turnout.fleet.postponed import read_postponed
 from turnout.fleet.shard import run_shard
 from turnout.fleet.shards import shard_of
@@ -74,19 +76,26 @@ def test_a_campaign_that_was_moved_to_another_turnout_counts_there_alone(fleet):
 class TwoShards(Fleet):
     """t0 to t3 are of one shard, t4 of the other; what their jobs leave, in any order, is looked through."""
 
+    stages = {"hammer": None}
+
     def night(self, order):
         CALLS.clear()
         write_plans(self.configuration, self.raw, self.plan.parent, 2)
-        for name in order:
-            state, plan = self.state.with_name(f"{name}.json"), self.plan.with_name(f"{name}.json")
-            run_shard(plan, state, Stage("hammer", length, "1"), self.configuration, self.raw)
+        for kind, gather in self.stages.items():
+            for name in order:
+                stage = Stage(kind, length, "1", gather=gather)
+                plan = self.plan.with_name(f"{name}.json")
+                run_shard(plan, self.state_of(kind, name), stage, self.configuration, self.raw)
         return self.look_through()
 
     def look_through(self):
-        return withdraw_moved(self.folder / "work", ["hammer"], SHARDS, self.configuration.settings["fleet"])
+        return withdraw_moved(self.folder / "work", self.stages, SHARDS, self.configuration.settings["fleet"])
 
-    def lengths(self):
-        states = [self.state.with_name(f"{name}.json") for name in SHARDS]
+    def state_of(self, kind, shard):
+        return self.folder / "work" / kind / f"{shard}.json"
+
+    def lengths(self, kind="hammer"):
+        states = [self.state_of(kind, name) for name in SHARDS]
         tables = {r.unit: r.tables for path in batch_paths(states) for r in read_results(path)}
         return {u: [r["n_samples"] for r in t.get("recordings", [])] for u, t in tables.items()}
 
@@ -141,3 +150,29 @@ def test_a_campaign_that_was_moved_to_where_it_cannot_be_read_stays_though_of_an
     fleet.put("t4/2024-05-31/A_2.txt", "damaged")
     assert fleet.night(SHARDS) == 0
     assert fleet.lengths()["t0/hammer/A/2024-05-13"] == [9]
+
+
+def visit_of(plan, configuration):
+    """The newest campaign of each turnout, as a stage of its own looks at it."""
+    newest = {p.unit.turnout: p.unit for p in sorted(read_plan(plan), key=lambda p: p.unit.label)}
+    for unit in newest.values():
+        own = configuration.turnout(unit.turnout).hashes["mismatch"]
+        yield Planned(replace(unit, kind="mismatch", label=unit.campaign, config_hash=own, section=None, campaign=None))
+
+
+def test_what_was_found_from_a_visit_that_was_moved_is_withdrawn_and_of_an_older_visit_stays(tmp_path):
+    fleet = TwoShards(tmp_path, 5)
+    fleet.stages = {"hammer": None, "mismatch": visit_of}
+    fleet.put("t0/2024-06-13/A_1.txt", "wrongly filed")
+    fleet.put("t1/2024-06-13/A_1.txt", "rightly filed")
+    fleet.night(SHARDS)
+    (fleet.raw / "t0/2024-06-13").rename(fleet.raw / "t4/2024-06-13")
+    fleet.put("t1/2024-07-13/A_1.txt", "newer")
+    assert fleet.night(SHARDS) == 2
+    found = fleet.lengths("mismatch")
+    assert {unit: found[unit] for unit in found if not unit.startswith(("t2", "t3"))} == {
+        "t0/mismatch/2024-06-13": [], "t0/mismatch/2024-05-13": [9],
+        "t1/mismatch/2024-06-13": [13], "t1/mismatch/2024-07-13": [5],
+        "t4/mismatch/2024-05-13": [9], "t4/mismatch/2024-06-13": [13],
+    }  # fmt: skip
+    assert fleet.night(SHARDS) == 0
