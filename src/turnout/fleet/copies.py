@@ -30,7 +30,7 @@ def copies(units: Mapping[str, Known]) -> dict[str, dict[str, str]]:
     """Copy -> {content: unit in which it counts}, of units that have rows, within one turnout and kind.
 
     A unit whose every file lies in another one, too, is a copy as a whole. Of others that share files, and of two that
-    hold the same, the first by name keeps them.
+    hold the same, the first by name keeps them. What a unit was computed without before is not forgotten.
 
     >>> units = {name: Known("", "", "", "ok", "", held) for name, held in
     ...          {"t/passage/b": "1", "t/passage/a": "1 3", "t/passage/c": "2 3", "u/passage/a": "1"}.items()}
@@ -42,17 +42,26 @@ def copies(units: Mapping[str, Known]) -> dict[str, dict[str, str]]:
     for name, contents in held.items():
         for content in contents:
             holders.setdefault((_folder(name), content), set()).add(name)
-    found: dict[str, dict[str, str]] = {}
-    for name in sorted(held):
-        if held[name]:
-            others = set.intersection(*(holders[_folder(name), content] for content in held[name]))
-            originals = [o for o in sorted(others) if held[name] < held[o] or (held[name] == held[o] and o < name)]
-            found |= {name: dict.fromkeys(sorted(held[name]), originals[0])} if originals else {}
+    found = _whole_copies(held, holders)
     whole = set(found)
     for (_, content), names in sorted(holders.items()):
         first, *later = sorted(names - whole)
         for name in later:
             found.setdefault(name, {})[content] = first
+    for name, counts_in in found.items():
+        for content in units[name].elsewhere:
+            if there := holders.get((_folder(name), content), set()) - whole:
+                counts_in[content] = min(there)
+    return found
+
+
+def _whole_copies(held: Mapping[str, frozenset[str]], holders: Mapping) -> dict[str, dict[str, str]]:
+    found = {}
+    for name in sorted(name for name in held if held[name]):
+        others = set.intersection(*(holders[_folder(name), content] for content in held[name]))
+        originals = [o for o in sorted(others) if held[name] < held[o] or (held[name] == held[o] and o < name)]
+        if originals:
+            found[name] = dict.fromkeys(sorted(held[name]), originals[0])
     return found
 
 
@@ -62,7 +71,7 @@ def originals(
     """Path -> original, of the files of a unit whose content ``counts_in`` another one."""
     return {
         path: Original(other, _path_of(content, wanted[other].unit, units[other]))
-        for (path, *_), content in zip(wanted[name].unit.files, units[name].contents.split())
+        for (path, *_), content in zip(wanted[name].unit.files, units[name].held)
         if (other := counts_in.get(content))
     }
 
@@ -99,7 +108,7 @@ def _row(unit: Unit, path: str, what: str, originals: str) -> dict:
 
 def _path_of(content: str, unit: Unit, known: Known) -> str:
     """Where ``unit`` holds a content; its first file where its files were exchanged since it was computed."""
-    held = (path for (path, *_), held in zip(unit.files, known.contents.split()) if held == content)
+    held = (path for (path, *_), held in zip(unit.files, known.held) if held == content)
     return next(held, unit.files[0][0])
 
 

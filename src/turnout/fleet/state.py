@@ -35,6 +35,16 @@ class Known:
     contents: str = ""
 
     @property
+    def held(self) -> list[str]:
+        """Contents of all its files, in their order."""
+        return [content.removeprefix(ELSEWHERE) for content in self.contents.split()]
+
+    @property
+    def elsewhere(self) -> list[str]:
+        """Contents of the files that count in other units."""
+        return [c.removeprefix(ELSEWHERE) for c in self.contents.split() if c.startswith(ELSEWHERE)]
+
+    @property
     def counted(self) -> list[str]:
         """Contents of the files that its rows come from."""
         return [content for content in self.contents.split() if not content.startswith(ELSEWHERE)]

@@ -1,9 +1,10 @@
 """The same bytes twice in one turnout's folder count once, at every moment."""
 
+import random
 import shutil
 
 import pytest
-from length_fleet import CALLS
+from length_fleet import CALLS, Fleet
 
 from turnout.fleet.state import batch_paths
 
@@ -114,3 +115,37 @@ def test_a_file_that_is_shared_with_a_campaign_without_rows_counts(fleet):
     fleet.put("t0/2024-05-13/A_2.txt", "damaged")
     fleet.run()
     assert fleet.lengths()[FIRST] == [] and fleet.lengths()[SECOND] == [9, 13]
+
+
+def test_a_campaign_that_shares_one_more_file_leaves_out_both(fleet):
+    share_a_file(fleet)
+    fleet.put("t0/2024-05-31/A_4.txt", "a third one")
+    fleet.run()
+    assert fleet.lengths()[SECOND] == [13, 11]
+    fleet.put("t0/2024-05-01/A_1.txt", "of the second")
+    fleet.put("t0/2024-05-01/A_2.txt", "of an earlier day")
+    fleet.run()
+    assert fleet.lengths()[SECOND] == [11] and fleet.lengths()[FIRST] == [9, 16]
+    assert [found for *_, found in duplicates(fleet, SECOND)] == [
+        "same bytes as t0/2024-05-13/A_1.txt", "same bytes as t0/2024-05-01/A_1.txt",
+    ]  # fmt: skip
+    assert fleet.run().processed == 0 and CALLS == []
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_whatever_is_copied_and_deleted_in_any_order_counts_once(tmp_path, seed):
+    """Four campaigns of up to three files, of six contents that differ in length; ten nights of changes."""
+    fleet, draw = Fleet(tmp_path, 1), random.Random(seed)
+    places = [f"t0/2024-0{month}-13/A_{test}.txt" for month in (5, 6, 7, 8) for test in (1, 2, 3)]
+    for _ in range(10):
+        for name in draw.sample(places, 3):
+            if draw.random() < 0.3:
+                (fleet.raw / name).unlink(missing_ok=True)
+            else:
+                fleet.put(name, "x" * draw.randint(1, 6))
+        fleet.run()
+        files = list(fleet.raw.glob("t0/*/*.txt"))
+        days = {path.parent.name for path in files}
+        counted = [n for unit, found in fleet.lengths().items() if unit.rsplit("/", 1)[1] in days for n in set(found)]
+        assert sorted(counted) == sorted({path.stat().st_size for path in files})
+        assert fleet.run().processed == 0 and CALLS == []
