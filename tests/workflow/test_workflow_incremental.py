@@ -101,6 +101,37 @@ def test_one_turnout_alone_leaves_the_others_for_later(fleet):
     assert "Nothing to be done" in toy.run(fleet, shards=SHARDS).stdout
 
 
+def current(fleet, turnout):
+    """Paths of the recordings of a turnout that count."""
+    with open_registry(fleet / "results/registry") as connection:
+        question = "select path from recordings_current where turnout_id = ? order by path"
+        return [path for (path,) in connection.execute(question, [turnout]).fetchall()]
+
+
+def test_a_campaign_that_was_moved_to_a_turnout_of_another_shard_counts_there_alone(fleet):
+    assert shard_of("T00000", SHARDS) != shard_of("T00003", SHARDS)
+    assert len(current(fleet, "T00003")) == 2
+    (fleet / "raw/T00003/hammer/2024-01-01").rename(fleet / "raw/T00000/hammer/2024-03-01")
+    assert said(toy.run(fleet, shards=SHARDS))["processed"] == 2
+    assert current(fleet, "T00003") == []
+    assert [path for path in current(fleet, "T00000") if "2024-03-01" in path] == [
+        f"T00000/hammer/2024-03-01/A{k}_1.npz" for k in (1, 2)
+    ]
+    assert said(toy.run(fleet, shards=SHARDS))["processed"] == 0  # what builds on the old place is asked again
+    assert "Nothing to be done" in toy.run(fleet, shards=SHARDS).stdout
+
+
+def test_work_files_that_were_cut_are_made_again_and_nothing_is_computed(fleet):
+    before, shard = toy.rows(fleet), shard_of("T00000", SHARDS)
+    for name in (f"hammer/{shard}.json", f"plan/{shard}.json", "verdict.json", "attempts/register"):
+        path = fleet / "work" / name
+        path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    done = toy.run(fleet, shards=SHARDS)
+    assert said(done)["processed"] == 0 and re.search(rf"{shard}\.json is cut", done.stdout)
+    assert toy.rows(fleet) == before
+    assert "Nothing to be done" in toy.run(fleet, shards=SHARDS).stdout
+
+
 @pytest.mark.parametrize(
     "option, words",
     [

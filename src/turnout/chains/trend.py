@@ -5,7 +5,7 @@ import logging
 from pathlib import Path
 
 from turnout.config import load_configuration
-from turnout.fleet.atomic import write_text
+from turnout.fleet.atomic import read_json, write_text
 from turnout.registry.database import open_registry
 from turnout.registry.day import list_day
 from turnout.trend.nightly import update
@@ -19,7 +19,7 @@ def trend_job(generation, state, worklist, configuration) -> dict:
     generation : path
         ``_generation.json`` of the registry.
     state : path
-        What the last update wrote, JSON; a new one is put in its place. It may be missing.
+        What the last update wrote, JSON; a new one is put in its place. It may be missing, or cut.
     worklist : path
         The list as CSV.
     configuration : path
@@ -27,7 +27,7 @@ def trend_job(generation, state, worklist, configuration) -> dict:
         used is a warning in the log and in ``state``; the others count.
     """
     registry, state = Path(generation).parent, Path(state)
-    before = json.loads(state.read_text(encoding="utf-8")) if state.exists() else {}
+    before = read_json(state, {})
     read = load_configuration(configuration)
     warnings = [str(warning) for warning in read.warnings]
     for warning in warnings:

@@ -16,13 +16,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print what is sound and each problem; exit code 1 where a raw file is left out or unsound."""
+    """Print what is sound and each problem; exit code 1 where there is one, though no turnout meets it yet."""
     from pathlib import Path
 
     from turnout.config import load_configuration
-    from turnout.config.load import read_notes
     from turnout.errors import ConfigError
-    from turnout.fleet.scan import scan
     from turnout.readers.formats import FORMATS
     from turnout.readers.units import to_si
 
@@ -30,19 +28,47 @@ def run(args: argparse.Namespace) -> int:
         print("\n".join(f"{name:<10} {' '.join(f.extensions):<24} {f.meaning}" for name, f in FORMATS.items()))
         return 0
     configuration = load_configuration(args.configuration, FORMATS, to_si)
+    faults = [*_faults(configuration, FORMATS, to_si)]
     layouts = {row.values["layout"] for row in configuration.rows.values()}
     n_events = len(configuration.events)
     n_said = len(configuration.acknowledgements)
     counts = f"{len(configuration.ids)} turnouts, {len(layouts)} layouts, {n_events} events, {n_said} acknowledgements"
-    print(f"{args.configuration}: {counts}, {'sound' if not configuration.warnings else 'with faults'}.")
-    for warning in configuration.warnings:
-        print(f"  does not count: {warning}")
+    print(f"{args.configuration}: {counts}, {'with faults' if faults else 'sound'}.")
+    for fault in faults:
+        print(f"  {fault}")
     raw = Path(args.raw or "raw")
     if not raw.is_dir() and args.raw:
         raise ConfigError(args.raw, "--raw", "no such folder", "Write the folder that holds those of the turnouts")
     if not raw.is_dir():
         print(f"{raw}: no such folder, file names not checked.")
-        return 1 if configuration.warnings else 0
+        return 1 if faults else 0
+    return 1 if _left_out(configuration, raw) or faults else 0
+
+
+def _faults(configuration, formats, to_si):
+    """Each fault that stops no turnout, and what it does stop."""
+    from turnout.config.load import faults_of_unused_layouts
+    from turnout.errors import ConfigError, TurnoutError
+    from turnout.simulate import load_track
+
+    for warning in configuration.warnings:
+        yield f"does not count: {warning}"
+    for error in faults_of_unused_layouts(configuration, formats, to_si):
+        yield f"used by no turnout: {error}"
+    for path in sorted((configuration.folder / "tracks").glob("*.yaml")):
+        try:
+            load_track(str(path), folder=path.parent)
+        except ConfigError as error:
+            yield f"no simulation: {error}"
+        except TurnoutError as error:
+            yield f"no simulation: {path}: {error}"
+
+
+def _left_out(configuration, raw) -> int:
+    """Print how many raw files there are and each that is left out or unsound; how many of these."""
+    from turnout.config.load import read_notes
+    from turnout.fleet.scan import scan
+
     n_units = n_files = 0
     problems = []
     for turnout in map(configuration.turnout, configuration.ids):
@@ -53,4 +79,4 @@ def run(args: argparse.Namespace) -> int:
     print(f"{raw}: {n_files} files in {n_units} units, {len(problems)} left out or unsound.")
     for problem in problems:
         print(f"  {problem}")
-    return 1 if problems or configuration.warnings else 0
+    return len(problems)

@@ -14,6 +14,7 @@ from turnout.commands.query import opened
 CHARTS = """
     select count(*), count(*) filter (state = 'suppressed'), count(*) filter (state = 'not measured'), newest_charted()
     from chart_states_on({})"""
+FIRST = "select min(measured_at_utc) from charts where state <> 'wrong_time'"
 HELP = "tomorrow's list: what to inspect, what to plan, where nothing can be said"
 
 
@@ -31,10 +32,11 @@ def run(args: argparse.Namespace) -> int:
     from turnout.registry.day import list_day, whole_list
 
     with open_registry(args.registry) as con:
+        day = [_day(args.asof, con)] if args.asof else []
         asof = "?::timestamp" if args.asof else list_day()
         rows_of = whole_list(asof) if args.all else f"worklist({asof})"
         question = f"select * from {rows_of} order by rank"
-        cursor = con.execute(question, [_date(args.asof)] if args.asof else [])
+        cursor = con.execute(question, day)
         names = [d[0] for d in cursor.description]
         rows = cursor.fetchall()
         known = con.execute(CHARTS.format(list_day())).fetchall()[0]
@@ -83,7 +85,8 @@ def _write(stream, names, rows):
     writer.writerows(rows)
 
 
-def _date(text):
+def _day(text, con):
+    """The time that ``--asof`` means; ConfigError where it is none, or nothing had been measured by then."""
     from datetime import datetime
 
     from turnout.config.events import wrong_time
@@ -91,4 +94,9 @@ def _date(text):
 
     if wrong := wrong_time(text):
         raise ConfigError("--asof", "date", f"{text!r}{wrong[0]}", wrong[1])
-    return datetime.fromisoformat(text.removesuffix("Z"))
+    day = datetime.fromisoformat(text.removesuffix("Z"))
+    ((first,),) = con.execute(FIRST).fetchall()
+    if first is not None and day < first:
+        found = f"{text!r}: nothing was measured by then, the first measurement is of {first:%Y-%m-%d %H:%M} UTC"
+        raise ConfigError("--asof", "date", found, "Ask for a later day")
+    return day

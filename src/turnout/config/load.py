@@ -103,6 +103,17 @@ def load_configuration(folder: Path | str = "config", formats=None, to_si=None) 
     )
 
 
+def faults_of_unused_layouts(configuration: Configuration, formats=None, to_si=None) -> list[ConfigError]:
+    """What is wrong with the layouts that no turnout follows; nothing depends on them until one does."""
+    reading = _Reading(configuration.folder, formats, to_si)
+    settings = reading.document(reading.folder / "config.yaml", settings_keys())
+    used = {row.values["layout"] for row in configuration.rows.values()}
+    for path in sorted((reading.folder / "layouts").glob("*.yaml")):
+        if path.stem not in used:
+            reading.layout_of(path, settings)
+    return reading.errors
+
+
 class _Reading:
     """One pass over the configuration, collecting errors."""
 
@@ -144,17 +155,15 @@ class _Reading:
     def layout(self, row: Row, settings: Branch) -> Branch | None:
         """Layout of a row over the settings of config.yaml; None where it cannot be used."""
         name = row.values["layout"]
+        path = self.folder / "layouts" / f"{name}.yaml"
         if name not in self.layouts:
-            self.layouts[name] = self._layout(name, row, settings)
-        elif self.layouts[name] is None and not (self.folder / "layouts" / f"{name}.yaml").exists():
+            self.layouts[name] = self.layout_of(path, settings) if path.exists() else None
+        if self.layouts[name] is None and not path.exists():
             self._unknown(name, row)
         return self.layouts[name]
 
-    def _layout(self, name: str, row: Row, settings: Branch) -> Branch | None:
-        path = self.folder / "layouts" / f"{name}.yaml"
-        if not path.exists():
-            self._unknown(name, row)
-            return None
+    def layout_of(self, path: Path, settings: Branch) -> Branch | None:
+        """The layout in a file over the settings of config.yaml; None where it cannot be used."""
         tree = self.document(path, layout_keys(), whole=True)
         if not tree:
             return None

@@ -1,5 +1,10 @@
-"""Write a file so that a reader sees the old one or the new one, never a part."""
+"""Write a file so that a reader sees the old one or the new one, never a part; and tell a part where there is one.
 
+A full disk, a power failure or a copy that was broken off may leave the beginning of a file all the same.
+"""
+
+import json
+import logging
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -34,7 +39,28 @@ def write_if_changed(path: os.PathLike, text: str) -> bool:
     (True, False)
     """
     path = Path(path)
-    if path.exists() and path.read_text(encoding="utf-8") == text:
+    if path.exists() and path.read_bytes() == text.encode():
         return False
     write_text(path, text)
     return True
+
+
+def is_cut(path: os.PathLike, end: str) -> bool:
+    """Whether a file is there and lacks its last line ``end``; only the end of it is read."""
+    try:
+        with open(path, "rb") as stream:
+            stream.seek(max(0, stream.seek(0, os.SEEK_END) - len(end.encode())))
+            return stream.read() != end.encode()
+    except FileNotFoundError:
+        return False
+
+
+def read_json(path: os.PathLike, otherwise):
+    """What a JSON file of ``work/`` says; ``otherwise`` where there is none, and where it is cut, with a warning."""
+    try:
+        return json.loads(Path(path).read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return otherwise
+    except ValueError as error:
+        logging.getLogger("turnout.fleet").warning("%s is cut or no JSON (%s): it is made again", path, error)
+        return otherwise

@@ -14,9 +14,13 @@ FOLDER = Path("work/attempts")
 
 
 def attempts(job: str) -> int:
-    """How often ``job`` was begun without coming to its end."""
-    path = FOLDER / job
-    return int(path.read_text(encoding="utf-8")) if path.exists() else 0
+    """How often ``job`` was begun without coming to its end; a number it never was where the file is cut."""
+    try:
+        return int((FOLDER / job).read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return 0
+    except ValueError:
+        return -1
 
 
 @contextmanager

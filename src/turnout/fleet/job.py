@@ -13,6 +13,7 @@ from turnout.fleet.attempt import attempt
 from turnout.fleet.batches import read_results
 from turnout.fleet.current import DamagedBatch
 from turnout.fleet.launch import launched_at
+from turnout.fleet.moved import withdraw_moved
 from turnout.fleet.postponed import ask_again
 from turnout.fleet.shard import Summary, run_shard
 from turnout.fleet.stage import Stage
@@ -58,13 +59,15 @@ def verdict_job(marks, output, log, params) -> Verdict:
 
 
 def register_job(register, generation, log, params) -> None:
-    """Hand every shard's batches to ``register``, those of shards that take no part in this run, too."""
+    """Hand every shard's batches to ``register``, those of shards that take no part in this run, too; before that, what
+    was moved from a turnout to one of another shard is withdrawn at its old place."""
     _log_to(log)
     configuration = load_configuration(params.job["configuration"])
     plans = [Path("work/plan") / f"{shard}.json" for shard in params.shards]
     states = [Path("work") / stage / f"{shard}.json" for stage in params.stages for shard in params.shards]
     tables = configuration_rows(configuration, Path(params.job["raw"]), plans)
     with attempt("register", params.again):
+        withdraw_moved(Path("work"), params.stages, params.shards, configuration.settings["fleet"])
         done = register(
             batch_paths(states), Path(generation).parent, read=read_results, tables=tables,
             config_hash=params.configuration, code_version=__version__, started_at=launched_at(),

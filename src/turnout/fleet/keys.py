@@ -1,12 +1,13 @@
 """From what a unit is computed: quickly by names, sizes and times of its files, surely by their content."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from pathlib import Path
 
 from turnout.config.build import digest
 from turnout.content import sha256_of
 from turnout.fleet.plan import Planned
+from turnout.fleet.state import ELSEWHERE
 
 
 def stamp_of(planned: Planned) -> str:
@@ -27,13 +28,16 @@ def key_of(planned: Planned, contents: Sequence[str | None]) -> str:
     return digest([unit.config_hash, planned.note, files])
 
 
-def short(contents: Sequence[str | None]) -> str:
-    """The contents as a state keeps them: enough to tell the files of one turnout; "" where one was gone.
+def short(contents: Sequence[str | None], elsewhere: Container[int] = ()) -> str:
+    """The contents as a state keeps them: enough to tell the files of a fleet; "" where one was gone.
 
-    >>> short(["e3b0c44298fc1c149afbf4c8996fb924", "0123456789abcdef0123456789abcdef"])
-    'e3b0c44298fc1c14 0123456789abcdef'
+    The files whose numbers are in ``elsewhere`` count elsewhere.
+
+    >>> short(["e3b0c44298fc1c149afbf4c8996fb924", "0123456789abcdef0123456789abcdef"], {1})
+    'e3b0c44298fc1c14 -0123456789abcdef'
     """
-    return " ".join(c[:16] for c in contents if c) if all(contents) else ""
+    marks = [ELSEWHERE if k in elsewhere else "" for k in range(len(contents))]
+    return " ".join(mark + c[:16] for mark, c in zip(marks, contents) if c) if all(contents) else ""
 
 
 def _content(path: str) -> str | None:

@@ -10,7 +10,9 @@ from turnout.config.keys import suggestion
 from turnout.errors import ConfigError
 from turnout.fleet.atomic import write_text
 from turnout.fleet.plan import write_plans
+from turnout.fleet.postponed import ask_again
 from turnout.fleet.shards import shard_names
+from turnout.fleet.state import is_cut_state, states_below
 from turnout.fleet.tables import fleet_hash
 
 OPTIONS = {
@@ -69,6 +71,9 @@ def launch(options: Mapping, scan: bool, formats=None, to_si=None) -> Launch:
         began = datetime.now(UTC).replace(tzinfo=None)
         raw, accept = Path(job["raw"]), _flag(options, "accept_vanished")
         write_plans(configuration, raw, Path(PLANS), shards, turnouts, accept)
+        for state in states_below(Path(PLANS).parent):
+            if state.stem in shard_names(shards) and is_cut_state(state):
+                ask_again(state)
         write_text(Path(LAUNCHED), began.isoformat(timespec="seconds"))
     names = shard_names(shards, turnouts)
     chains = dict(options.get("chains") or {})

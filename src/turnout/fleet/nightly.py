@@ -14,9 +14,9 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from turnout.errors import TurnoutError
-from turnout.fleet.plan import read_plan
+from turnout.fleet.plan import is_cut_plan, read_plan
 from turnout.fleet.scan import unit_id
-from turnout.fleet.state import load_state
+from turnout.fleet.state import load_state, states_below
 
 JOB_NAMES = "turnouts"
 TOO_LATE = 124
@@ -150,24 +150,21 @@ def _end(process: subprocess.Popen) -> None:
         process.wait()
 
 
-def _states(work: Path) -> list[Path]:
-    return sorted(p for p in work.glob("*/*of*.json") if p.parent.name != "plan")
-
-
 def _batches(work: Path) -> set[tuple[Path, str]]:
-    return {(path, batch) for path in _states(work) for batch in load_state(path).batches}
+    return {(path, batch) for path in states_below(work) for batch in load_state(path).batches}
 
 
 def _night(code: int, before: set, work: Path) -> Night:
-    planned = {unit_id(p.unit) for plan in sorted((work / "plan").glob("*.json")) for p in read_plan(plan)}
+    plans = [plan for plan in sorted((work / "plan").glob("*.json")) if not is_cut_plan(plan)]
+    planned = {unit_id(p.unit) for plan in plans for p in read_plan(plan)}
     units = processed = quarantined = vanished = 0
-    for path in _states(work):
+    for path in states_below(work):
         for name, known in load_state(path).units.items():
             units += 1
             vanished += name not in planned
             if (path, known.batch) not in before:
                 processed += 1
                 quarantined += known.status not in ("ok", "vanished")
-    newest = max(map(_changed_at, _states(work)), default=0)
+    newest = max(map(_changed_at, states_below(work)), default=0)
     published = code == 0 or 0 < newest <= _changed_at(GENERATION)
     return Night(code, units, processed, quarantined, vanished, published)

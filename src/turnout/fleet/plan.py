@@ -8,11 +8,13 @@ from pathlib import Path
 from turnout.config import Configuration, TurnoutConfig
 from turnout.config.load import read_notes
 from turnout.errors import ConfigError, ReadError
-from turnout.fleet.atomic import write_if_changed
+from turnout.fleet.atomic import is_cut, write_if_changed
 from turnout.fleet.notes import notes_of
 from turnout.fleet.scan import scan
 from turnout.fleet.shards import shard_names, shard_of
 from turnout.records import Unit
+
+END = "\n]}\n"
 
 
 @dataclass(frozen=True)
@@ -33,12 +35,14 @@ def write_plans(
 ) -> list[str]:
     """Scan the raw folders and write ``folder``/<shard>.json where the content changed; names of the shards.
 
-    ``turnouts`` limits the scan to their shards. Nothing in a plan changes without meaning: no time of scan, no
-    absolute path. ConfigError where so many known files are gone that a disk must be missing.
+    ``turnouts`` limits the scan to their shards, and to those whose plan is cut. Nothing in a plan changes without
+    meaning: no time of scan, no absolute path. ConfigError where so many known files are gone that a disk must be
+    missing.
     """
     for turnout in turnouts or ():
         configuration.turnout(turnout)
-    names = shard_names(shards, turnouts)
+    asked = set(shard_names(shards, turnouts))
+    names = [n for n in shard_names(shards) if n in asked or is_cut_plan(Path(folder) / f"{n}.json")]
     members: dict[str, list[str]] = {name: [] for name in names}
     for turnout in sorted(configuration.ids):
         members.get(shard_of(turnout, shards), []).append(turnout)
@@ -47,7 +51,7 @@ def write_plans(
         path = Path(folder) / f"{name}.json"
         entries = [_entry(configuration.turnout(t), Path(raw_root)) for t in members[name]]
         texts[path] = _text(name, entries)
-        before = path.read_text(encoding="utf-8") if path.exists() else ""
+        before = path.read_text(encoding="utf-8") if path.exists() and not is_cut_plan(path) else ""
         if before and before != texts[path]:
             files = _paths(json.loads(before)["turnouts"])
             gone += sorted(files - _paths(entries))
@@ -59,6 +63,11 @@ def write_plans(
     for path, text in texts.items():
         write_if_changed(path, text)
     return names
+
+
+def is_cut_plan(path: Path) -> bool:
+    """Whether a plan file is there of which the end is missing."""
+    return is_cut(path, END)
 
 
 def read_plan(path: Path) -> Iterator[Planned]:
@@ -101,7 +110,7 @@ def _problem(error: ReadError) -> list[str]:
 def _text(shard: str, entries: list[dict]) -> str:
     """One line per turnout, so that two plans can be compared by eye."""
     lines = ",\n".join(json.dumps(e, ensure_ascii=False, separators=(",", ":")) for e in entries)
-    return f'{{"shard":"{shard}","turnouts":[\n{lines}\n]}}\n'
+    return f'{{"shard":"{shard}","turnouts":[\n{lines}{END}'
 
 
 def _paths(entries: list[dict]) -> set[str]:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from turnout.fleet.atomic import write_text
+from turnout.fleet.atomic import read_json, write_text
 from turnout.fleet.state import batch_folder
 
 
@@ -22,11 +22,8 @@ def read_postponed(state: Path) -> tuple[int, dict[str, str]]:
 
     The number is a parameter of that job: one more makes it run again, though no plan has changed.
     """
-    try:
-        content = json.loads(_path(state).read_text(encoding="utf-8"))
-        return content["jobs"], content["units"]
-    except (FileNotFoundError, ValueError):
-        return 0, {}
+    content = read_json(_path(state), {"jobs": 0, "units": {}})
+    return content["jobs"], content["units"]
 
 
 def note_postponed(state: Path, units: Mapping[str, str]) -> None:

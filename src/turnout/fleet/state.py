@@ -1,19 +1,31 @@
 """What a shard has computed: per unit the key of its result and the batch that holds it."""
 
 import json
+import logging
 import os
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from filelock import FileLock
+
 from turnout.errors import TurnoutError
-from turnout.fleet.atomic import write_text
+from turnout.fleet.atomic import is_cut, write_text
+from turnout.fleet.batches import is_sound, read_column
+
+LOG = logging.getLogger("turnout.fleet")
+
+# Of a unit: its rows count; all its files are gone and it has no rows.
+WITH_ROWS, VANISHED = ("ok", "partly"), "vanished"
+ELSEWHERE = "-"
+END = "\n}}\n"
 
 
 @dataclass(frozen=True)
 class Known:
     """``stamp``: names, sizes and times it was computed from; ``key``: the same by content; ``batch``: file name;
-    ``contents``: of its files whatever they are called, "" in states of earlier versions."""
+    ``contents``: of its files in their order, a - before those that count elsewhere, "" in states of earlier
+    versions."""
 
     stamp: str
     key: str
@@ -21,6 +33,21 @@ class Known:
     status: str
     batch: str
     contents: str = ""
+
+    @property
+    def held(self) -> list[str]:
+        """Contents of all its files, in their order."""
+        return [content.removeprefix(ELSEWHERE) for content in self.contents.split()]
+
+    @property
+    def elsewhere(self) -> list[str]:
+        """Contents of the files that count in other units."""
+        return [c.removeprefix(ELSEWHERE) for c in self.contents.split() if c.startswith(ELSEWHERE)]
+
+    @property
+    def counted(self) -> list[str]:
+        """Contents of the files that its rows come from."""
+        return [content for content in self.contents.split() if not content.startswith(ELSEWHERE)]
 
 
 @dataclass
@@ -41,11 +68,15 @@ class State:
         """Write it in one step: the results of a batch count from now on."""
         units = {u: [k.stamp, k.key, k.algo, k.status, k.batch, k.contents] for u, k in sorted(self.units.items())}
         lines = ",\n".join(f"{json.dumps(u, ensure_ascii=False)}:{json.dumps(v)}" for u, v in units.items())
-        write_text(path, f'{{"batches":{json.dumps(self.batches)},"units":{{\n{lines}\n}}}}\n')
+        write_text(path, f'{{"batches":{json.dumps(self.batches)},"units":{{\n{lines}{END}')
 
 
 def load_state(path: Path) -> State:
-    """State in ``path``, empty where there is none; TurnoutError where somebody else changed the file."""
+    """State in ``path``, empty where there is none, from its batches where the file is cut; TurnoutError where somebody
+    else changed it."""
+    if is_cut_state(path):
+        LOG.warning("%s is cut: it is made again from its batches", path)
+        return _from_batches(batch_folder(path))
     try:
         content = json.loads(Path(path).read_text(encoding="utf-8"))
         units = {unit: Known(*values) for unit, values in content["units"].items()}
@@ -57,12 +88,41 @@ def load_state(path: Path) -> State:
         raise TurnoutError(f"{path}: not a state file ({error}). {remedy}") from None
 
 
+def is_cut_state(path: Path) -> bool:
+    """Whether a state file is there of which the end is missing."""
+    return is_cut(path, END)
+
+
+def _from_batches(folder: Path) -> State:
+    """The state that the batches of a shard tell: of a unit in two of them the one written last counts.
+
+    It lacks what no batch holds: the job of the shard reads its raw files, and computes none of which the key is known.
+    """
+    written = sorted(folder.glob("batch-*.parquet"), key=lambda path: (path.stat().st_mtime_ns, path.name))
+    state = State(batches=[path.name for path in written])
+    for path in filter(is_sound, written):
+        rows = read_column(path, "unit", "key", "algo", "status")
+        state.units |= {unit: Known("", key, algo, status, path.name) for unit, key, algo, status in rows}
+    return state
+
+
+def locked(state: Path) -> FileLock:
+    """The lock of whoever writes a state."""
+    state.parent.mkdir(parents=True, exist_ok=True)
+    return FileLock(state.parent / f".{state.stem}.lock")
+
+
 def mark_of(state: Path) -> Path:
     """What Snakemake knows of a state: work/hammer/00of01.json -> work/hammer/00of01.done.
 
     It deletes the output of a job that fails; what the job has kept until then must stay.
     """
     return Path(state).with_suffix(".done")
+
+
+def states_below(work: Path) -> list[Path]:
+    """State files of all stages and shards, of earlier numbers of shards, too."""
+    return sorted(p for p in work.glob("*/*of*.json") if p.parent.name != "plan")
 
 
 def state_of_mark(mark: os.PathLike) -> Path:

@@ -9,24 +9,27 @@ from pathlib import Path
 from turnout.config import Configuration
 from turnout.config.settings.fleet import FleetSettings
 from turnout.errors import TurnoutError
-from turnout.fleet.atomic import write_text
+from turnout.fleet.atomic import read_json, write_text
 from turnout.fleet.batches import read_column
 from turnout.fleet.postponed import ask_again, read_postponed
 from turnout.fleet.state import batch_paths, state_of
 
+SAID_BEFORE = "said before; it ends when they are mended, or when enough newer units are sound by themselves"
 IN_QUARANTINE, FAULTS = ("partly", "quarantined"), ("internal_error",)
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """Units that are new since they were last judged; ``complaints`` is empty for a sound run, ``batches`` are all
-    that the states name, ``damaged`` those that cannot be read."""
+    """Units that are new since they were last judged; ``complaints`` is empty for a sound run, and ``unsound`` tells
+    whether one of them is about units; ``batches`` are all that the states name, ``damaged`` those that cannot be
+    read."""
 
     units: int
     quarantined: int
     internal_errors: int
     complaints: tuple[str, ...]
     batches: tuple[str, ...]
+    unsound: bool = False
     damaged: tuple[Path, ...] = ()
 
     def __str__(self):
@@ -53,9 +56,10 @@ def judge(states: Iterable[Path], configuration: Configuration, judged: Iterable
             lines[unit] = str(row.values.get("line", "")) if row else ""
     again = "the next run computes its units again"
     complaints = [f"{path} cannot be read ({why}): {again}" for path, why in damaged.items()]
-    complaints += [*_faults(status), *_waiting(states), *_shares(status, lines, configuration.settings["fleet"])]
+    of_units = [*_faults(status), *_shares(status, lines, configuration.settings["fleet"])]
+    complaints += [*_waiting(states), *of_units]
     n_bad, n_fault = (sum(found in of for found in status.values()) for of in (IN_QUARANTINE, FAULTS))
-    return Verdict(len(status), n_bad, n_fault, tuple(complaints), tuple(names), tuple(damaged))
+    return Verdict(len(status), n_bad, n_fault, tuple(complaints), tuple(names), bool(of_units), tuple(damaged))
 
 
 def _faults(status: Mapping[str, str]) -> Iterator[str]:
@@ -93,21 +97,33 @@ def _read(path: Path, damaged: dict[Path, str]) -> list[tuple]:
 
 
 def verdict(states: Iterable[Path], configuration: Configuration, output: Path) -> Verdict:
-    """Judge what ``output`` does not name yet, and write it; TurnoutError, nothing written, if unsound.
+    """Judge what ``output`` does not name yet, and write it; TurnoutError, ``output`` as it was, if unsound.
 
-    Nights with too few units to be judged add up. A run over some turnouts forgets nothing of the others.
+    Nights with too few units to be judged add up. Units that were found wrong are judged again, with what came since,
+    until there are enough newer ones to be judged by themselves: a small fleet would else be unsound for months, until
+    its bad units are a small share of all. A run over some turnouts forgets nothing of the others.
     """
-    output = Path(output)
-    judged = json.loads(output.read_text(encoding="utf-8"))["judged"] if output.exists() else ()
-    found = judge(states, configuration, judged)
+    output, states, enough = Path(output), list(states), configuration.settings["fleet"].quarantine_units
+    doubts = output.with_name("doubts.json")  # not in the output: Snakemake puts that of a failed job back
+    judged, said = read_json(output, {"judged": []})["judged"], read_json(doubts, {"told": [], "doubted": []})
+    told, doubted = said["told"], said["doubted"]
+    found = newer = judge(states, configuration, [*judged, *told, *doubted])
+    if newer.units >= enough:
+        told, doubted = [*told, *doubted], []
+    else:
+        found = judge(states, configuration, [*judged, *told])
     for batch in found.damaged:
         ask_again(state_of(batch))
     if found.complaints:
-        raise TurnoutError(f"the registry is up to date, but {found}")
+        again = f"\n{SAID_BEFORE}: so far there are {newer.units} of {enough}" if doubted and found.unsound else ""
+        if found.unsound:
+            doubted = doubted or [name for name in found.batches if name not in {*judged, *told}]
+            write_text(doubts, json.dumps({"told": told, "doubted": doubted}, indent=1) + "\n")
+        raise TurnoutError(f"the registry is up to date, but {found}{again}")
     here = set(found.batches)
-    kept = [name for name in judged if name in here or (output.parent / name).exists()]
-    enough = found.units >= configuration.settings["fleet"].quarantine_units
-    named = list(dict.fromkeys([*kept, *(found.batches if enough else ())]))
+    kept = [name for name in [*judged, *told] if name in here or (output.parent / name).exists()]
+    named = list(dict.fromkeys([*kept, *(found.batches if found.units >= enough else ())]))
     content = {"units": found.units, "quarantined": found.quarantined, "judged": named}
     write_text(output, json.dumps(content, indent=1) + "\n")
+    doubts.unlink(missing_ok=True)
     return found

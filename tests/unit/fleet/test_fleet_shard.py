@@ -3,99 +3,21 @@
 import errno
 import json
 import os
-import shutil
 import sys
 
 import pytest
+from length_fleet import CALLS, Fleet
 
-from turnout.config import load_configuration
-from turnout.errors import ReadError, TurnoutError
+from turnout.errors import TurnoutError
 from turnout.fleet import keys
 from turnout.fleet.batches import read_batch, read_column, read_results
 from turnout.fleet.current import DamagedBatch, current_results
 from turnout.fleet.job import stage_job
 from turnout.fleet.plan import write_plans
 from turnout.fleet.postponed import read_postponed
-from turnout.fleet.shard import run_shard
 from turnout.fleet.stage import Stage
 from turnout.fleet.state import State, batch_paths, load_state
 from turnout.fleet.verdict import judge, verdict
-
-LAYOUT = """\
-sections: {A: {panel: CP, track: main, position: 1}}
-hammer:
-  files: "{campaign}/{section}_{test}.txt"
-  force: force
-  response: rail
-  channels:
-    force: {source: 0, quantity: force}
-    rail: {source: 1, quantity: acceleration}
-"""
-CALLS = []
-
-
-def length(unit, turnout, raw_root, algo=""):
-    """Rows from the length of each file; what a file says may go wrong."""
-    CALLS.append(f"{unit.turnout}/{unit.label}")
-    rows = {"recordings": [], "quarantine": []}
-    for path, *_ in unit.files:
-        text = (raw_root / path).read_text()
-        if text == "damaged":
-            raise ReadError(path, "byte 0", "damage", "Copy it again", reason="unreadable")
-        if text == "bug":
-            raise ZeroDivisionError("in the toy")
-        if text == "full":
-            raise OSError(errno.ENOSPC, "No space left on device")
-        if text == "bad sector":
-            raise OSError(errno.EIO, "Input/output error")
-        if text == "too large":
-            raise MemoryError
-        rows["recordings"].append({"path": path, "n_samples": len(text), "kind": "hammer"})
-    return rows
-
-
-class Fleet:
-    """One shard with turnouts t0, t1, ... of one section."""
-
-    def __init__(self, folder, n_turnout=3, settings=""):
-        self.folder, self.raw = folder, folder / "raw"
-        (folder / "config/layouts").mkdir(parents=True)
-        (folder / "config/layouts/main.yaml").write_text(LAYOUT)
-        (folder / "config/config.yaml").write_text(settings)
-        lines = ["turnout\tlayout\tline", *(f"t{i}\tmain\tline {i % 2}" for i in range(n_turnout))]
-        (folder / "config/turnouts.tsv").write_text("\n".join(lines) + "\n")
-        for i in range(n_turnout):
-            self.put(f"t{i}/2024-05-13/A_1.txt", f"turnout {i}")
-        self.state = folder / "work/hammer/00of01.json"
-        self.plan = folder / "work/plan/00of01.json"
-
-    def put(self, name, text):
-        path = self.raw / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text)
-
-    @property
-    def configuration(self):
-        return load_configuration(self.folder / "config")
-
-    def run(self, algo="1", plan=True, stage=None, **more):
-        CALLS.clear()
-        if plan:
-            write_plans(self.configuration, self.raw, self.plan.parent, 1)
-        stage = stage or Stage("hammer", length, algo)
-        return run_shard(self.plan, self.state, stage, self.configuration, self.raw, **more)
-
-    def rows(self):
-        """{unit: tables} as the registry would see it: the later batch counts."""
-        return {r.unit: r.tables for path in batch_paths([self.state]) for r in read_results(path)}
-
-    def lengths(self):
-        return {u: [r["n_samples"] for r in t.get("recordings", [])] for u, t in self.rows().items()}
-
-
-@pytest.fixture
-def fleet(tmp_path):
-    return Fleet(tmp_path)
 
 
 def test_first_run_then_nothing_then_one(fleet):
@@ -274,90 +196,6 @@ def test_vanished_units_keep_their_rows_and_open_quarantine_is_withdrawn(fleet):
     assert fleet.run().quarantined == 1
 
 
-def test_a_measurement_that_was_moved_counts_once_and_one_that_was_deleted_stays(fleet):
-    """A folder of the wrong day is renamed, one file goes to the day it belongs to, one is deleted on purpose."""
-    fleet.put("t1/2024-05-14/A_2.txt", "belongs to the day before")
-    fleet.run()
-    (fleet.raw / "t0/2024-05-13").rename(fleet.raw / "t0/2024-05-31")
-    (fleet.raw / "t1/2024-05-14/A_2.txt").rename(fleet.raw / "t1/2024-05-13/A_2.txt")
-    (fleet.raw / "t2/2024-05-13/A_1.txt").unlink()
-    assert fleet.run().vanished == 3
-    assert fleet.lengths() == {
-        "t0/hammer/A/2024-05-13": [], "t0/hammer/A/2024-05-31": [9],
-        "t1/hammer/A/2024-05-13": [9, 25], "t1/hammer/A/2024-05-14": [],
-        "t2/hammer/A/2024-05-13": [9],
-    }  # fmt: skip
-    n_batch = len(batch_paths([fleet.state]))
-    fleet.run()
-    assert len(batch_paths([fleet.state])) == n_batch  # withdrawn once
-    (fleet.raw / "t0/2024-05-31").rename(fleet.raw / "t0/2024-05-13")
-    fleet.run()
-    assert fleet.lengths()["t0/hammer/A/2024-05-13"] == [9] and fleet.lengths()["t0/hammer/A/2024-05-31"] == []
-
-
-def test_a_measurement_that_was_moved_counts_once_though_the_job_was_killed_before_it_knew(fleet, monkeypatch):
-    fleet.run()
-    (fleet.raw / "t0/2024-05-13").rename(fleet.raw / "t0/2024-05-31")
-
-    def killed(*_):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("turnout.fleet.shard._Run._withdraw_vanished", killed)
-    with pytest.raises(KeyboardInterrupt):
-        fleet.run()
-    monkeypatch.undo()
-    assert fleet.run().processed == 0
-    assert fleet.lengths()["t0/hammer/A/2024-05-13"] == [] and fleet.lengths()["t0/hammer/A/2024-05-31"] == [9]
-
-
-def test_a_measurement_that_was_moved_to_where_it_cannot_be_read_stays(fleet):
-    """The unit that holds the file now gives no row: those that there are are not taken back."""
-    fleet.run()
-    fleet.put("t0/2024-05-31/A_2.txt", "damaged")
-    (fleet.raw / "t0/2024-05-13/A_1.txt").rename(fleet.raw / "t0/2024-05-31/A_1.txt")
-    fleet.run()
-    assert fleet.lengths()["t0/hammer/A/2024-05-13"] == [9]
-
-
-def test_a_copy_is_said_and_counts_once_its_original_is_gone(fleet):
-    """A file exported under a second name, and then the first one deleted: it counts once, at every moment."""
-    fleet.run()
-    day, other = fleet.raw / "t0/2024-05-13", fleet.raw / "t0/2024-05-31"
-    shutil.copytree(day, other)
-    assert fleet.run().processed == 1
-    first, second = "t0/hammer/A/2024-05-13", "t0/hammer/A/2024-05-31"
-    assert fleet.lengths()[first] == [9] and fleet.lengths()[second] == []
-    (said,) = fleet.rows()[second]["quarantine"]
-    assert said["reason_code"] == "duplicate" and said["path"].endswith("2024-05-31/A_1.txt")
-    assert said["found"] == "same bytes as t0/2024-05-13/A_1.txt"
-    n_batch = len(batch_paths([fleet.state]))
-    assert fleet.run().processed == 0 and len(batch_paths([fleet.state])) == n_batch
-    shutil.rmtree(day)
-    assert fleet.run().processed == 1
-    assert fleet.lengths()[first] == [] and fleet.lengths()[second] == [9]
-    assert fleet.run().processed == 0 and fleet.lengths()[second] == [9]
-
-
-def test_a_copy_whose_original_is_measured_anew_counts_for_itself(fleet):
-    """And one that holds more than the other is no copy of it."""
-    shutil.copytree(fleet.raw / "t0/2024-05-13", fleet.raw / "t0/2024-05-31")
-    fleet.run()
-    assert fleet.lengths()["t0/hammer/A/2024-05-31"] == []
-    fleet.put("t0/2024-05-13/A_1.txt", "measured anew")
-    fleet.run()
-    assert fleet.lengths()["t0/hammer/A/2024-05-13"] == [13] and fleet.lengths()["t0/hammer/A/2024-05-31"] == [9]
-    fleet.put("t0/2024-05-13/A_1.txt", "turnout 0")
-    fleet.put("t0/2024-05-31/A_2.txt", "and more")
-    fleet.run()
-    assert fleet.lengths()["t0/hammer/A/2024-05-13"] == [] and fleet.lengths()["t0/hammer/A/2024-05-31"] == [9, 8]
-
-
-def test_the_same_file_at_two_turnouts_is_no_copy(fleet):
-    fleet.put("t1/2024-05-13/A_1.txt", "turnout 0")
-    fleet.run()
-    assert fleet.lengths()["t1/hammer/A/2024-05-13"] == [9]
-
-
 def test_a_file_that_vanishes_during_the_run_is_a_row_or_an_error_of_its_unit_alone(fleet):
     write_plans(fleet.configuration, fleet.raw, fleet.plan.parent, 1)
     (fleet.raw / "t0/2024-05-13/A_1.txt").unlink()
@@ -396,9 +234,10 @@ def test_a_row_that_cannot_be_written_is_a_fault_of_its_unit(fleet):
     )
 
 
-def test_a_spoilt_state_file_is_said(fleet):
+@pytest.mark.parametrize("content", ['{"batches":[],"unit":{\n\n}}\n', "no JSON\n}}\n"])
+def test_a_state_file_that_somebody_else_wrote_is_said(fleet, content):
     fleet.run()
-    fleet.state.write_text("{")
+    fleet.state.write_text(content)
     with pytest.raises(TurnoutError, match=r"not a state file .* Delete it and .*00of01\.done: its shard is then"):
         fleet.run()
     fleet.state.unlink()
@@ -412,31 +251,6 @@ def test_a_batch_reads_as_it_was_written(fleet):
         (f"t{i}/hammer/A/2024-05-13", "recordings", 1) for i in range(3)
     ]
     assert read_column(path, "turnout", "status") == [("t0", "ok"), ("t1", "ok"), ("t2", "ok")]
-
-
-def test_the_verdict_judges_what_is_new_over_the_fleet_and_each_line(tmp_path):
-    fleet = Fleet(tmp_path, 10, "fleet: {quarantine_units: 5, quarantine_share: 0.3}\n")
-    fleet.run()
-    output = tmp_path / "work/verdict.json"
-    assert verdict([fleet.state], fleet.configuration, output).units == 10
-    for i in (1, 3):  # both of line 1
-        fleet.put(f"t{i}/2024-05-13/A_1.txt", "damaged")
-    fleet.run()
-    judged = json.loads(output.read_text())["judged"]
-    found = judge([fleet.state], fleet.configuration, judged)
-    assert (found.units, found.quarantined, found.complaints) == (2, 2, ())  # too few to judge
-    for i in (5, 7, 9):
-        fleet.put(f"t{i}/2024-05-13/A_1.txt", "good again")
-    fleet.run()
-    with pytest.raises(TurnoutError, match="2 of 5 new units of the fleet have rows in quarantine, 40 %, above"):
-        verdict([fleet.state], fleet.configuration, output)
-    everything = judge([fleet.state], fleet.configuration)
-    assert everything.complaints == (
-        "2 of 5 new units of line 'line 1' have rows in quarantine, 40 %, above the limit of 30 %",
-    )
-    fleet.put("t3/2024-05-13/A_1.txt", "repaired")
-    fleet.run()
-    assert verdict([fleet.state], fleet.configuration, output).quarantined == 1
 
 
 @pytest.mark.parametrize("damage", ["cut", "gone"])
@@ -477,34 +291,6 @@ def test_a_stage_that_builds_on_a_damaged_batch_asks_for_it_again(fleet, monkeyp
     with pytest.raises(DamagedBatch, match="cannot be read"):
         stage_job("work/plan/00of01.json", "work/passage/00of01.done", "log", params, 1)
     assert read_postponed(fleet.state) == (1, {})
-
-
-def test_small_nights_add_up_until_they_can_be_judged(tmp_path):
-    fleet = Fleet(tmp_path, 1, "fleet: {quarantine_units: 5, quarantine_share: 0.3}\n")
-    output = tmp_path / "work/verdict.json"
-    for night in range(4):
-        fleet.put(f"t0/2024-06-{night + 1:02d}/A_1.txt", "damaged")
-        fleet.run()
-        if night < 3:
-            assert verdict([fleet.state], fleet.configuration, output).units == night + 2
-    with pytest.raises(TurnoutError, match="4 of 5 new units of the fleet have rows in quarantine"):
-        verdict([fleet.state], fleet.configuration, output)
-
-
-def test_a_run_over_some_turnouts_forgets_no_verdict_on_the_others(fleet):
-    settings = "fleet: {quarantine_units: 1, quarantine_share: 0.3}\n"
-    (fleet.folder / "config/config.yaml").write_text(settings)
-    fleet.run()
-    other = fleet.state.with_name("01of02.json")
-    shutil.copy(fleet.state, other)
-    shutil.copytree(fleet.state.with_suffix(""), other.with_suffix(""))
-    output = fleet.folder / "work/verdict.json"
-    assert verdict([fleet.state, other], fleet.configuration, output).units == 3
-    assert verdict([other], fleet.configuration, output).units == 0
-    assert verdict([fleet.state, other], fleet.configuration, output).units == 0
-    shutil.rmtree(other.with_suffix(""))
-    verdict([fleet.state], fleet.configuration, output)
-    assert len(json.loads(output.read_text())["judged"]) == 1  # of batches that are gone nothing is kept
 
 
 def test_results_that_count_are_those_of_the_last_batch_and_of_the_last_number_of_shards(fleet):

@@ -102,6 +102,22 @@ def test_the_list_on_the_terminal_says_where_what_and_how_sure(registry, capsys,
     assert "YYYY-MM-DD" in capsys.readouterr().err
 
 
+def test_a_list_of_a_day_before_the_first_measurement_says_so(registry, rows, capsys, tmp_path):
+    from turnout.cli import main
+
+    root, _ = registry
+    first = rows["measured_at_utc"].min()
+    for more in ([], ["--all"], ["--csv", str(tmp_path / "list.csv")]):
+        assert main(["worklist", "--registry", str(root), "--asof", "1999-12-31", *more]) == 2
+        said = capsys.readouterr()
+        assert (
+            f"'1999-12-31': nothing was measured by then, the first measurement is of {first:%Y-%m-%d %H:%M}"
+            in said.err
+        )
+        assert said.out == "" and not (tmp_path / "list.csv").exists()
+    assert main(["worklist", "--registry", str(root), "--asof", f"{first:%Y-%m-%dT%H:%M:%S}"]) == 0
+
+
 def test_tables_go_out_as_files_that_others_read(registry, tmp_path, capsys):
     from turnout.cli import main
 

@@ -1,0 +1,139 @@
+"""A work file of which a full disk or a power failure left a part is made again, and nothing is computed for it."""
+
+import json
+
+import pytest
+from length_fleet import CALLS
+
+from turnout.chains.trend import trend_job
+from turnout.fleet.attempt import attempt, attempts
+from turnout.fleet.launch import launch
+from turnout.fleet.nightly import _night
+from turnout.fleet.plan import read_plan, write_plans
+from turnout.fleet.postponed import read_postponed
+from turnout.fleet.state import batch_paths
+from turnout.fleet.verdict import verdict
+
+PARTS = [0.0, 0.3, 0.7, 0.95]
+
+
+def cut(path, share):
+    """Only the first ``share`` of a file is left."""
+    content = path.read_bytes()
+    path.write_bytes(content[: int(share * len(content))])
+
+
+@pytest.mark.parametrize("share", PARTS)
+def test_a_state_is_made_again_from_its_batches(fleet, share, caplog):
+    fleet.run()
+    fleet.put("t1/2024-05-13/A_1.txt", "measured anew")
+    fleet.put("t1/2024-06-13/A_1.txt", "and later")
+    fleet.run()
+    before, rows = fleet.state.read_bytes(), fleet.rows()
+    cut(fleet.state, share)
+    assert fleet.rows() == rows  # whoever reads it before its job has run
+    assert fleet.run().processed == 0 and CALLS == []
+    assert fleet.state.read_bytes() == before and fleet.rows() == rows
+    assert str(fleet.state) in caplog.text and "made again" in caplog.text
+
+
+def test_of_a_cut_state_the_batch_of_a_unit_counts_that_was_written_last(fleet):
+    fleet.run()
+    for text in ("measured anew", "measured once more", "turnout 1"):
+        fleet.put("t1/2024-05-13/A_1.txt", text)
+        fleet.run()
+    cut(fleet.state, 0.5)
+    assert fleet.run().processed == 0
+    assert fleet.lengths()["t1/hammer/A/2024-05-13"] == [9]
+
+
+def test_a_cut_state_with_a_cut_batch_costs_the_units_of_that_batch_alone(fleet):
+    fleet.run()
+    fleet.put("t1/2024-06-13/A_1.txt", "later")
+    fleet.run()
+    before, (_, second) = fleet.lengths(), batch_paths([fleet.state])
+    cut(fleet.state, 0.5)
+    cut(second, 0.9)
+    assert fleet.run().processed == 1 and CALLS == ["t1/A/2024-06-13"]
+    assert fleet.lengths() == before
+
+
+def test_the_job_of_a_cut_state_is_asked_for_though_no_plan_has_changed(fleet, monkeypatch):
+    fleet.run()
+    monkeypatch.chdir(fleet.folder)
+    launch({}, scan=True)
+    assert read_postponed(fleet.state) == (0, {})
+    cut(fleet.state, 0.5)
+    launch({}, scan=False)  # one job of a run
+    assert read_postponed(fleet.state) == (0, {})
+    launch({}, scan=True)
+    assert read_postponed(fleet.state) == (1, {})
+    fleet.run()
+    launch({}, scan=True)
+    assert read_postponed(fleet.state) == (1, {})
+
+
+@pytest.mark.parametrize("share", PARTS)
+def test_a_plan_is_made_again_though_its_shard_was_not_asked_for(fleet, share):
+    fleet.put("t0/2024-05-13/Ä_1.txt", "of which the name takes two bytes")
+    folder = fleet.plan.parent
+    write_plans(fleet.configuration, fleet.raw, folder, 2)
+    whole = {path: path.read_bytes() for path in folder.iterdir()}
+    for path in whole:
+        cut(path, share)
+        write_plans(fleet.configuration, fleet.raw, folder, 2, turnouts=["t0"])
+        assert {path: path.read_bytes() for path in folder.iterdir()} == whole
+
+
+def test_a_run_that_cannot_plan_says_what_it_did_though_a_plan_is_cut(fleet):
+    fleet.run()
+    cut(fleet.plan, 0.5)
+    assert _night(1, set(), fleet.folder / "work").units == 3
+
+
+def test_a_plan_that_is_whole_is_told_from_a_cut_one_at_every_byte(fleet):
+    write_plans(fleet.configuration, fleet.raw, fleet.plan.parent, 1)
+    content = fleet.plan.read_bytes()
+    for length in range(len(content)):
+        fleet.plan.write_bytes(content[:length])
+        write_plans(fleet.configuration, fleet.raw, fleet.plan.parent, 1)
+        assert fleet.plan.read_bytes() == content
+    assert len(list(read_plan(fleet.plan))) == 3
+
+
+@pytest.mark.parametrize("left", [b"", bytes(1)])  # nothing, or a block that was never written
+def test_a_cut_number_of_attempts_asks_for_its_job(tmp_path, monkeypatch, left):
+    monkeypatch.chdir(tmp_path)
+    with attempt("register", attempts("register")):
+        pass
+    seen = attempts("register")
+    (tmp_path / "work/attempts/register").write_bytes(left)
+    again = attempts("register")
+    assert again != seen
+    with attempt("register", again):
+        pass
+    assert attempts("register") == again
+
+
+@pytest.mark.parametrize("share", PARTS)
+def test_a_cut_verdict_judges_all_units_again(fleet, share):
+    (fleet.folder / "config/config.yaml").write_text("fleet: {quarantine_units: 1}\n")
+    fleet.run()
+    output = fleet.folder / "work/verdict.json"
+    assert verdict([fleet.state], fleet.configuration, output).units == 3
+    assert verdict([fleet.state], fleet.configuration, output).units == 0
+    cut(output, share)
+    assert verdict([fleet.state], fleet.configuration, output).units == 3
+    assert len(json.loads(output.read_text())["judged"]) == 1
+
+
+@pytest.mark.parametrize("share", PARTS)
+def test_a_cut_state_of_the_trend_writes_every_year_again(fleet, share, monkeypatch):
+    from turnout.registry.register import register
+
+    root, state = fleet.folder / "registry", fleet.folder / "work/trend.json"
+    register([], root, read=iter)
+    names = (root / "_generation.json", state, fleet.folder / "worklist.csv", fleet.folder / "config")
+    done = trend_job(*names)
+    cut(state, share)
+    assert trend_job(*names) == done == json.loads(state.read_text())
