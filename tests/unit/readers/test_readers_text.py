@@ -77,6 +77,18 @@ def test_a_time_column_in_its_unit_gives_the_rate(unit, second, tmp_path):
     sound(tmp_path, "a.csv", f"t;force;acc\n({unit});(N);(m/s²)\n" + rows, replace(NAMED, rate=20000.0))
 
 
+@pytest.mark.parametrize("title", ["Zeit", "Zeit [s]", "Tid (s)", "temps", "idő [s]"])
+def test_a_time_column_of_another_language_is_held_against_the_promised_rate(title, tmp_path):
+    """Ignored as a channel, it would let a test of half the promised rate pass with all frequencies doubled."""
+    rows = "".join(f"{k / 10000:.9g};{a:.4f};{b:.4f}\n" for k, (a, b) in enumerate(X))
+    sound(tmp_path, "a.csv", f"{title};force;acc\n" + rows, rate=10000.0)
+    name = title.split(" ")[0]
+    ignored = replace(NAMED, rate=20000.0, channels=(*NAMED.channels, RawChannel("time", name, "ignored")))
+    for description in (ignored, replace(NAMED, rate=20000.0)):
+        (error,) = read("a.csv", tmp_path, description).errors
+        assert error.reason == "wrong_rate" and "10000" in error.found
+
+
 def test_a_time_column_in_another_unit_is_refused(tmp_path):
     rows = "".join(f"{k / 72e6:.12g};{a:.4f};{b:.4f}\n" for k, (a, b) in enumerate(X))
     (tmp_path / "a.csv").write_text("time [h];force;acc\n" + rows)
