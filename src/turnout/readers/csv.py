@@ -1,10 +1,9 @@
 """Text with separated columns: a head of ``name: value`` lines, a line of names, then numbers.
 
 What is recognised: separators comma, semicolon, tab; a decimal comma where the separator is not a comma; head lines
-with or without ``#``: ``rate`` (or ``fs``, ``sample_rate`` ..., in Hz) or ``dt`` [s], ``started_at``, ``n_records``,
+with or without ``#``: ``rate`` (or ``fs``, ``sample rate [Hz]`` ...) or ``dt`` [s], ``started_at``, ``n_records``,
 ``n_samples``, conditions; units in brackets behind the names ("force [N]", "force (N)") or in a line of their own; a
-column of time (``readers.time_column``); a column ``record`` that numbers the records. Without names the channels are
-"0", "1" ...
+column of time (``time_column``); a column ``record`` that numbers the records. Without names channels are "0", "1" ...
 
 The text is UTF-8, UTF-16 with its mark, or, where a line of the head is neither, Windows-1252.
 
@@ -28,7 +27,7 @@ from turnout.readers.stored import Column
 from turnout.readers.time_column import seconds_per_number, time_column
 from turnout.readers.variables import COUNT, RATE, START, STEP, Facts
 
-NOTE = re.compile(r"^#?\s*([A-Za-z_][\w .]*?)\s*[:=,;\t]\s*(.*)$")
+NOTE = re.compile(r"^#?\s*([A-Za-z_][\w .]*?)\s*([\[(][^\])]*[\])])?\s*[:=,;\t]\s*(.*)$")
 NAME_WITH_UNIT = re.compile(r"^(.*?)\s*[\[(]([^\[\]]*)[\])]$")
 SCALES = {"kHz": 1e3, "khz": 1e3, "MHz": 1e6, "ms": 1e-3, "µs": 1e-6, "\u03bcs": 1e-6, "us": 1e-6}
 NOTES = {*RATE, *STEP, *START, *COUNT, "n_samples"}
@@ -84,12 +83,18 @@ def _head(data, source):
             names, units = _names([_cells(text, separator) for text in before], cells)
             return notes, names, units, position, separator
         match = NOTE.match(line.strip())
-        if match and (line.startswith("#") or match[1].strip().lower() in NOTES):
-            notes[match[1].strip()] = _value(match[2].strip(separator + " "))
+        name = match[1].strip() if match else ""
+        plain = name.lower().replace(" ", "_")
+        if match and (line.startswith("#") or plain in NOTES):
+            value = match[3].strip(separator + " ")
+            notes[plain if plain in NOTES else name] = _value(f"{value} {match[2]}" if match[2] else value)
         elif line.strip():
             before.append(line)
         position = end + 1
-    raise source.error("line 1", "no line of numbers follows", COPY_AGAIN, reason="empty")
+    if len(before) < 2:
+        raise source.error("line 1", "no line of numbers follows", COPY_AGAIN, reason="empty")
+    said = f"no line of numbers; the last line reads {before[-1][:60]!r}"
+    raise source.error("the file", said, "Export numbers between semicolons, tabs or commas, the time in seconds")
 
 
 def _cells(line, separator):
