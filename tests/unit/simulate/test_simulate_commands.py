@@ -25,6 +25,17 @@ def test_a_simulated_hammer_test_is_read_back_and_has_sound_impacts(tmp_path, re
     assert sum(i.accepted for i in impacts) >= 2
 
 
+def test_a_simulation_never_takes_the_place_of_a_raw_file_of_a_turnout(tmp_path, repository, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "raw" / "tommerup_s1" / "hammer" / "2024-05-13" / "A7_1.h5"
+    path.parent.mkdir(parents=True)
+    path.write_bytes(b"measured")
+    command = ["simulate", "hammer", "--section", "A7", "--turnout", "tommerup_s1", "--blows", "1"]
+    assert main([*command, "--config", str(repository / "config"), "--raw", "raw"]) == 2
+    assert path.read_bytes() == b"measured"
+    assert "A7_1.h5 is there already and may be a measurement" in capsys.readouterr().err
+
+
 def test_a_simulated_passage_keeps_its_truth_apart(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     out = tmp_path / "one.npz"
