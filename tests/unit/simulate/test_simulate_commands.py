@@ -10,6 +10,7 @@ from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.readers import read
 from turnout.receptance import find_impacts
 from turnout.records import RawChannel, RawDescription
+from turnout.simulate.calibrate import Calibration
 
 
 def test_a_simulated_hammer_test_is_read_back_and_has_sound_impacts(tmp_path, repository, monkeypatch):
@@ -132,3 +133,14 @@ def test_the_help_tells_the_loads_that_are_simulated(capsys):
     with pytest.raises(SystemExit):
         main(["simulate", "passage", "--help"])
     assert "0 (empty) to 1 (full), overloaded up to 1.5" in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.parametrize(("reduced", "warned"), [(0.2, False), (241.4, True)])
+def test_a_calibration_that_does_not_meet_its_test_says_that_its_intervals_mean_nothing(reduced, warned):
+    """Five parameters are always found, with a narrow ±, be the test of another track altogether."""
+    band = {(40.0, 100.0): 0.6}
+    found = Calibration(
+        "M1", {"pad_stiffness": 3e8}, {"pad_stiffness": 0.012}, np.eye(1), {"pad_stiffness": True}, (), band, band,
+        reduced, 1600, None,
+    )  # fmt: skip
+    assert ("neither values nor ± mean anything" in str(found)) is warned
