@@ -3,7 +3,9 @@
 from dataclasses import replace
 from pathlib import Path
 
+from turnout.errors import SimulationError
 from turnout.mismatch.distinguish import cheapest_addition, distinguishability
+from turnout.mismatch.track.library import library
 from turnout.mismatch.track.planned import Plan, Train
 from turnout.mismatch.track.planned_case import PlannedCase
 from turnout.simulate import Sensor, load_track, load_vehicle
@@ -16,7 +18,10 @@ def planned_matrix(track, sensors, blows, temperatures, trains, speeds, families
     """(Distinguishability, advice) of a plan: places [m], temperatures [°C], vehicle files, speeds [km/h].
 
     ``config`` is the folder whose tracks and vehicles are meant, that of the place it is run in by default.
+    SimulationError where nothing is planned, or an effect of ``families`` is none that such a plan could show.
     """
+    if not blows and not trains:
+        raise SimulationError("nothing is planned: give --blows, --trains or both.")
     tracks, cars = (_folder(config, kind) for kind in ("tracks", "vehicles"))
     turnout = load_track(track, folder=tracks)
     points = tuple((x, t) for x in blows for t in temperatures)
@@ -39,7 +44,11 @@ def _folder(config, kind):
 
 
 def _matrix(plan, families):
-    return distinguishability(PlannedCase(plan, families=families))
+    case = PlannedCase(plan, families=families)
+    if families and (unknown := sorted({*families} - {c.family for c in case.candidates})):
+        known = ", ".join(sorted({c.family for c in library(case)}))
+        raise SimulationError(f"no effect {unknown[0]!r} in such a campaign; there are {known}.")
+    return distinguishability(case)
 
 
 def _additions(plan, sensors, temperatures):

@@ -23,7 +23,10 @@ def track_file(turnout: TurnoutConfig, name: str | None = None) -> Path:
         if (folder / f"{stem}.yaml").is_file():
             return folder / f"{stem}.yaml"
     said = name or f"{turnout.id}.yaml nor {turnout.layout}"
-    raise SimulationError(f"{turnout.id}: no file {folder}/{said}.yaml; without a track nothing can be simulated.")
+    raise SimulationError(
+        f"{turnout.id}: no file {folder}/{said}.yaml; without a track nothing can be simulated "
+        "(docs/simulation.md, 'A track of your own')."
+    )
 
 
 def track_of(turnout: TurnoutConfig, name: str | None = None):

@@ -192,6 +192,8 @@ def _passage_sensors(description, track):
 def _write(request, turnout, name, recordings, description):
     folder = Path(request["raw"]) / (turnout.raw if turnout is not None else "simulated")
     path = Path(request["out"]) if request.get("out") else folder / name
+    if turnout is not None and not request.get("out") and path.exists():
+        raise SimulationError(f"{path} is there already and may be a measurement: give another --at, or --out.")
     if path.parent != Path():
         path.parent.mkdir(parents=True, exist_ok=True)
     try:

@@ -45,7 +45,12 @@ def add_arguments(parser):
         sub.add_argument("--format", help="format of the file (default: by the ending of --out, else hdf5)")
         sub.add_argument("--at", default="2024-05-13T09:00:00", help="time of the first sample in UTC, without a zone")
         sub.add_argument("--temperature", type=float, help="rail temperature to note [°C]")
-        sub.add_argument("--seed", type=int, default=0)
+        sub.add_argument(
+            "--seed",
+            type=int,
+            default=0,
+            help="of noise, supports' scatter and the rail's roughness: trains over one rail share it (default 0)",
+        )
     figures = kinds.add_parser("figures", help="the figures of docs/simulation.md")
     figures.add_argument("--out", default="docs/gallery", help="folder (default docs/gallery)")
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from difflib import get_close_matches
 
+from turnout.errors import ReadError
 from turnout.readers.units import IGNORED, conversion, to_si
 from turnout.records import Channel, RawChannel
 
@@ -21,8 +22,9 @@ def mappings(record, channels, where, source):
     """One Mapping per wanted channel, in the layout's order; ReadError where file and layout disagree.
 
     ``RawChannel.limit`` and ``resolution`` are in SI already. Channels with the quantity "ignored" are in the file
-    but not wanted.
+    but not wanted; nobody misses one that is not there.
     """
+    channels = [c for c in channels if c.quantity != IGNORED or _is_there(record, c.source, where, source)]
     indices = [index_of(record, channel.source, where, source) for channel in channels]
     if len(set(indices)) < len(indices):
         twice = next(i for i in indices if indices.count(i) > 1)
@@ -64,6 +66,14 @@ def index_of(record, wanted, where, source):
         f"{count} channels are called {wanted!r}" if count > 1 else f"there is no channel {wanted!r}; there are {there}"
     )
     raise source.error(where, found, hint, reason="channel_missing")
+
+
+def _is_there(record, wanted, where, source):
+    try:
+        index_of(record, wanted, where, source)
+    except ReadError:
+        return False
+    return True
 
 
 def _mapping(index, file_unit, raw: RawChannel, where, source):

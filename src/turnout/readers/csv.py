@@ -1,10 +1,9 @@
 """Text with separated columns: a head of ``name: value`` lines, a line of names, then numbers.
 
 What is recognised: separators comma, semicolon, tab; a decimal comma where the separator is not a comma; head lines
-with or without ``#``: ``rate`` (or ``fs``, ``sample_rate`` ..., in Hz) or ``dt`` [s], ``started_at``, ``n_records``,
+with or without ``#``: ``rate`` (or ``fs``, ``sample rate [Hz]`` ...) or ``dt`` [s], ``started_at``, ``n_records``,
 ``n_samples``, conditions; units in brackets behind the names ("force [N]", "force (N)") or in a line of their own; a
-column ``time`` or ``t`` in s, ms or µs; a column ``record`` that numbers the records. Without names the channels are
-"0", "1" ...
+column of time (``time_column``); a column ``record`` that numbers the records. Without names channels are "0", "1" ...
 
 The text is UTF-8, UTF-16 with its mark, or, where a line of the head is neither, Windows-1252.
 
@@ -25,11 +24,11 @@ from turnout.readers.precision import TEXT
 from turnout.readers.raw import COPY_AGAIN, RawFile, RawRecord
 from turnout.readers.stamps import moment
 from turnout.readers.stored import Column
-from turnout.readers.variables import COUNT, RATE, START, STEP, TIME, Facts
+from turnout.readers.time_column import seconds_per_number, time_column
+from turnout.readers.variables import COUNT, RATE, START, STEP, Facts
 
-NOTE = re.compile(r"^#?\s*([A-Za-z_][\w .]*?)\s*[:=,;\t]\s*(.*)$")
+NOTE = re.compile(r"^#?\s*([A-Za-z_][\w .]*?)\s*([\[(][^\])]*[\])])?\s*[:=,;\t]\s*(.*)$")
 NAME_WITH_UNIT = re.compile(r"^(.*?)\s*[\[(]([^\[\]]*)[\])]$")
-SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "µs": 1e-6, "us": 1e-6}
 SCALES = {"kHz": 1e3, "khz": 1e3, "MHz": 1e6, "ms": 1e-3, "µs": 1e-6, "\u03bcs": 1e-6, "us": 1e-6}
 NOTES = {*RATE, *STEP, *START, *COUNT, "n_samples"}
 
@@ -47,9 +46,10 @@ def read_raw(source) -> RawFile:
         )
     head, names, units, at, separator = _head(data, source)
     read = _staying if stay and "record" not in [name.strip().lower() for name in names] else _table
-    columns = read(source, data, at, separator, names)
+    time = time_column(names, units)
+    columns = read(source, data, at, separator, names, time)
     facts = Facts(head, source)
-    records = tuple(_records(columns, names, units, facts, source))
+    records = tuple(_records(columns, names, units, time, facts, source))
     return RawFile(records, facts.count(COUNT))
 
 
@@ -83,12 +83,18 @@ def _head(data, source):
             names, units = _names([_cells(text, separator) for text in before], cells)
             return notes, names, units, position, separator
         match = NOTE.match(line.strip())
-        if match and (line.startswith("#") or match[1].strip().lower() in NOTES):
-            notes[match[1].strip()] = _value(match[2].strip(separator + " "))
+        name = match[1].strip() if match else ""
+        plain = name.lower().replace(" ", "_")
+        if match and (line.startswith("#") or plain in NOTES):
+            value = match[3].strip(separator + " ")
+            notes[plain if plain in NOTES else name] = _value(f"{value} {match[2]}" if match[2] else value)
         elif line.strip():
             before.append(line)
         position = end + 1
-    raise source.error("line 1", "no line of numbers follows", COPY_AGAIN, reason="empty")
+    if len(before) < 2:
+        raise source.error("line 1", "no line of numbers follows", COPY_AGAIN, reason="empty")
+    said = f"no line of numbers; the last line reads {before[-1][:60]!r}"
+    raise source.error("the file", said, "Export numbers between semicolons, tabs or commas, the time in seconds")
 
 
 def _cells(line, separator):
@@ -131,7 +137,7 @@ def _names(lines, cells):
     return names, units
 
 
-def _table(source, data, at, separator, names):
+def _table(source, data, at, separator, names, time):
     """Columns of numbers."""
     options = _options(data, at, separator, len(names))
     with source.parsed_by("pyarrow", f"the numbers after line {_line(data, at)}"):
@@ -139,10 +145,9 @@ def _table(source, data, at, separator, names):
     return [column.to_numpy(zero_copy_only=False) for column in table.columns]
 
 
-def _staying(source, data, at, separator, names):
+def _staying(source, data, at, separator, names, time):
     """Columns that read on when they are asked; a time column is read at once."""
     options = _options(data, at, separator, len(names))
-    time = next((i for i, name in enumerate(names) if name.strip().lower() in TIME), None)
     rows = Rows(source.path, at, options)
     with source.parsed_by("pyarrow", f"the numbers after line {_line(data, at)}"):
         read = rows.scan(time)
@@ -208,15 +213,14 @@ def _options(data, at, separator, width):
     return {"read_options": reading, "parse_options": parsing, "convert_options": converting}
 
 
-def _records(columns, names, units, facts, source):
+def _records(columns, names, units, time, facts, source):
     """The records: all rows, or one per number in the column ``record``."""
     lower = [name.strip().lower() for name in names]
     number = columns[lower.index("record")] if "record" in lower else None
-    time = next((i for i, name in enumerate(lower) if name in TIME), None)
     kept = [i for i, name in enumerate(lower) if name != "record" and i != time]
     if len(kept) > 1 and not names[kept[-1]] and _is_empty(columns[kept[-1]]):
         kept.pop()
-    seconds = None if time is None else columns[time] * _second(units[time], source)
+    seconds = None if time is None else columns[time] * seconds_per_number(units[time], source)
     n_row = len(columns[0])
     edges = [0, n_row]
     if number is not None:
@@ -244,12 +248,3 @@ def _records(columns, names, units, facts, source):
 
 def _is_empty(column):
     return all(np.isnan(column[a : a + PART]).all() for a in range(0, len(column), PART))
-
-
-def _second(unit, source):
-    """How many seconds a number in the time column is."""
-    name = unit.strip().replace("\u03bc", "µ")
-    if name not in SECONDS:
-        remedy = f"Export the time in one of {', '.join(SECONDS)[2:]}"
-        raise source.error("the time column", f"its unit {unit!r} is not known", remedy, reason="unit_unknown")
-    return SECONDS[name]

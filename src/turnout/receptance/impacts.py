@@ -88,7 +88,8 @@ def _measure(cut, settings):
         cut.rejections.append(Rejection("dead_channel", 0.0, None, f"{cut.channels[1].name} is constant"))
     if cut.polarity < 0:
         cut.rejections.append(Rejection("sign_reversed", contact.peak, 0.0, (
-            f"{cut.channels[0].name} reads {contact.peak:.4g} N at contact: a hammer can only push")))  # fmt: skip
+            f"{cut.channels[0].name} reads {contact.peak:.4g} N at contact: a hammer can only push; "
+            "its sign is reversed, or it is another channel")))  # fmt: skip
     cut.contact, cut.contact_end = contact, contact.end
     _judge_start(cut, settings)
     if abs(contact.peak) > HARDEST:

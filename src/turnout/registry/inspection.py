@@ -25,7 +25,8 @@ def check(registry_dir: PathLike, hashes: bool = True) -> list[str]:
     generation = load(root)
     problems = [p for file in generation.files for p in _check_file(root, file, hashes)]
     if is_behind(root, generation):
-        problems.append(f"{DATABASE} is not of generation {generation.number}: run 'turnout registry relocate'.")
+        wanted = f"generation {generation.number} with this program's views"
+        problems.append(f"{DATABASE} is not of {wanted}: run 'turnout registry relocate'.")
     lost = orphans(root, generation)
     if lost:
         problems.append(f"{len(lost)} files are on no list, the first {lost[0]}: run 'turnout registry vacuum'.")

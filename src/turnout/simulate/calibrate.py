@@ -37,6 +37,9 @@ class Measured:
     measured: float
 
 
+MET = 4.0  # chi-squared per degree of freedom: what is left is twice what errors of test and model leave
+
+
 @dataclass(frozen=True)
 class Calibration:
     """``values`` and ``sd`` (posterior, relative) by parameter; ``covariance`` of their logarithms, in order.
@@ -67,6 +70,8 @@ class Calibration:
         for (low, high), left in self.misfit.items():
             before = self.misfit_before[low, high]
             lines.append(f"  {low:.0f}-{high:.0f} Hz: misfit {100 * before:.1f} % before, {100 * left:.1f} % after")
+        if self.reduced > MET:
+            lines.append("  The track's model does not meet this test: neither values nor ± mean anything.")
         return "\n".join(lines)
 
 

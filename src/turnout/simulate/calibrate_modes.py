@@ -42,7 +42,7 @@ def with_section(turnout, label, **values):
 
     if not any(label in track.section for track in (turnout.track, *turnout.tracks.values())):
         known = sorted({*turnout.track.section} - {""})
-        raise SimulationError(f"{turnout.name}: no section {label!r}; there are {', '.join(known)}.")
+        raise SimulationError(f"{turnout.name}: no section {label!r}; there are {', '.join(known) or 'none'}.")
     tracks = {name: changed(track) for name, track in turnout.tracks.items()}
     return replace(turnout, track=changed(turnout.track), tracks=tracks)
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from turnout.cli import main
 from turnout.mismatch.distinguish import distinguishability
 from turnout.mismatch.track.planned import small_plan
 from turnout.mismatch.track.planned_case import PlannedCase
@@ -47,3 +48,15 @@ def test_passages_below_160_hz_are_blind_to_frequency_dependent_pads_and_blows_a
     assert ratio["mount_resonance"] < 5.0 < blows["mount_resonance"]
     # the rail's own waves, and each wheel's, take part of what a dip does; a hammer does not roll over it
     assert ratio["surface_dip"] > 100.0 and "surface_dip" not in blows
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ([], "nothing is planned: give --blows, --trains or both."),
+        (["--blows", "24.6", "--families", "hanging_slepper"], "no effect 'hanging_slepper' in such a campaign; there"),
+    ],
+)
+def test_a_plan_that_can_show_nothing_is_refused_in_a_sentence(more, said, capsys):
+    assert main(["distinguish", "--sensors", "23.4", *more]) == 2
+    assert said in capsys.readouterr().err

@@ -128,6 +128,13 @@ def test_an_unknown_channel_must_be_named_even_to_be_ignored(tmp_path, in_si):
     assert [c.name for c in recording.channels] == ["force", "rail"]
 
 
+def test_nobody_misses_a_channel_that_is_not_wanted(tmp_path, in_si):
+    name = archive(tmp_path, fs=51200.0, force=saw(), rail=saw(), units=["N", "m/s²"])
+    known = (*in_si.channels, RawChannel("web", "web", "ignored"))
+    (recording,) = read(name, tmp_path, replace(in_si, channels=known)).recordings
+    assert [c.name for c in recording.channels] == ["force", "rail"]
+
+
 def test_a_channel_named_twice(tmp_path, in_si):
     name = archive(tmp_path, fs=51200.0, force=saw(), units=["N"])
     channels = (RawChannel("force", "force", "force"), RawChannel("again", 0, "force"))

@@ -51,7 +51,10 @@ def test_a_decimal_comma_behind_a_long_silence_is_one(tmp_path):
     np.testing.assert_allclose(recording.samples[:, 2000:], X.T.round(4), atol=1e-12)
 
 
-@pytest.mark.parametrize("head", ["rate: 12.8 kHz", "fs: 12,8 kHz", "rate: 12800 Hz", "dt: 78.125 µs", "rate; 12800"])
+@pytest.mark.parametrize(
+    "head",
+    ["rate: 12.8 kHz", "fs: 12,8 kHz", "rate: 12800 Hz", "dt: 78.125 µs", "rate; 12800", "Sampling rate [kHz];12,8"],
+)
 def test_a_rate_is_read_with_its_unit(head, tmp_path):
     sound(tmp_path, "a.csv", f"{head}\nforce;acc\n" + "".join(f"{a:.4f};{b:.4f}\n" for a, b in X), rate=12800.0)
 
@@ -75,6 +78,29 @@ def test_a_time_column_in_its_unit_gives_the_rate(unit, second, tmp_path):
     rows = "".join(f"{second * k / 20000:.9g};{a:.4f};{b:.4f}\n" for k, (a, b) in enumerate(X))
     sound(tmp_path, "a.csv", f"time [{unit}];force;acc\n" + rows)
     sound(tmp_path, "a.csv", f"t;force;acc\n({unit});(N);(m/s²)\n" + rows, replace(NAMED, rate=20000.0))
+
+
+@pytest.mark.parametrize("title", ["Zeit", "Zeit [s]", "Tid (s)", "temps", "idő [s]"])
+def test_a_time_column_of_another_language_is_held_against_the_promised_rate(title, tmp_path):
+    """Ignored as a channel, it would let a test of half the promised rate pass with all frequencies doubled."""
+    rows = "".join(f"{k / 10000:.9g};{a:.4f};{b:.4f}\n" for k, (a, b) in enumerate(X))
+    sound(tmp_path, "a.csv", f"{title};force;acc\n" + rows, rate=10000.0)
+    name = title.split(" ")[0]
+    ignored = replace(NAMED, rate=20000.0, channels=(*NAMED.channels, RawChannel("time", name, "ignored")))
+    for description in (ignored, replace(NAMED, rate=20000.0)):
+        (error,) = read("a.csv", tmp_path, description).errors
+        assert error.reason == "wrong_rate" and "10000" in error.found
+
+
+@pytest.mark.parametrize("row", ["08:00:00.5;1,0;2,0", "1.000,5;2,0", "1.0  2.0"])
+def test_a_table_in_which_no_line_is_numbers_alone_is_quoted(row, tmp_path):
+    """A clock, marks for thousands, spaces between: the copy is whole, another one will not help."""
+    (tmp_path / "a.csv").write_text("force;acc\n" + f"{row}\n" * 50)
+    with pytest.raises(ReadError) as caught:
+        read("a.csv", tmp_path, NAMED)
+    said = f"no line of numbers; the last line reads '{row}'"
+    remedy = "Export numbers between semicolons, tabs or commas, the time in seconds"
+    assert str(caught.value) == f"a.csv, the file: {said}. {remedy}."
 
 
 def test_a_time_column_in_another_unit_is_refused(tmp_path):

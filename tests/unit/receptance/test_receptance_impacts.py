@@ -56,6 +56,7 @@ def test_a_reversed_hammer_is_named_on_every_blow(hammer):
     recordings = [replace(r, samples=r.samples * [[-1], [1]]) for r in hammer.recordings(4)]
     for impact in hammer.impacts(recordings):
         assert reasons(impact) == ["sign_reversed"] and impact.peak < 0
+        assert impact.rejections[0].detail.endswith("its sign is reversed, or it is another channel")
 
 
 def test_records_without_a_usable_blow_say_why(hammer):

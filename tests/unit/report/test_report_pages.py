@@ -2,6 +2,7 @@
 
 import re
 import shutil
+from dataclasses import replace
 from datetime import date
 from html.parser import HTMLParser
 
@@ -20,6 +21,7 @@ from turnout.registry.database import open_registry
 from turnout.registry.register import register
 from turnout.report.job import report_job
 from turnout.report.pages.turnout import line_of
+from turnout.report.panels.diagram import diagram
 from turnout.report.write import write_pages
 
 DAYS = (date(2024, 5, 13), date(2024, 6, 17))
@@ -27,7 +29,8 @@ DAYS = (date(2024, 5, 13), date(2024, 6, 17))
 
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory, repository):
-    """(folder of pages, open registry) of tommerup_s1 with two sections and two campaigns; the second SP is cut off."""
+    """(folder of pages, open registry) of tommerup_s1 with two sections and two campaigns; the second SP is cut off,
+    and the hammer at a third section, OT, is reversed."""
     root = tmp_path_factory.mktemp("fleet")
     raw, notes = root / "raw", ["campaign,started_at_utc,rail_temperature_c"]
     rng = np.random.default_rng(3)
@@ -38,6 +41,9 @@ def pages(tmp_path_factory, repository):
         for section in ("A7", "SP"):
             recordings, _ = hammer_test(paper_response(section, 1.0, 1.0), 12.0, day, 1, rng)
             write(recordings, folder / f"{section}_1.npz", "npz")
+    recordings, _ = hammer_test(paper_response("OT", 1.0, 1.0), 12.0, day, 1, rng)
+    reversed_force = [replace(r, samples=r.samples * [[-1.0], [1.0]]) for r in recordings]
+    write(reversed_force, folder / "OT_1.npz", "npz")
     (folder / "SP_1.npz").write_bytes((folder / "SP_1.npz").read_bytes()[:5000])
     (raw / "tommerup_s1" / "campaigns.csv").write_text("\n".join(notes) + "\n")
     configuration = load_configuration(repository / "config")
@@ -132,7 +138,24 @@ def test_what_was_not_used_is_named_with_its_reason_and_remedy(pages):
 def test_a_section_without_measurements_says_so(pages):
     folder, _ = pages
     words = " ".join(read(folder / "turnouts" / "tommerup_s1.html").words)
-    assert "No model yet." in words and "not measured" in words
+    assert "Not measured yet, or nothing could be read." in words and "not measured" in words
+    assert "Latest hammer test, none" not in words
+
+
+def test_a_section_whose_test_was_rejected_says_why_without_a_click(pages):
+    text = (pages[0] / "turnouts" / "tommerup_s1.html").read_text()
+    own = text[text.index('<h2 id="OT"') : text.index('<h2 id="SP"')]
+    assert "No model yet." in own and "Latest hammer test, 2024-06-17: 0 of 10 impacts accepted" in own
+    assert "<details" not in own
+
+
+def test_the_diverging_track_leaves_the_main_one_at_the_switch_toe():
+    """Without a sensor at the switch panel it did so beside the first sensor, wherever that was."""
+    one = {"section_id": "t/A", "label": "A", "panel": "CP", "track": "main", "position_m": 24.0}
+    rows = [one, one | {"position_m": 26.0}]
+    main, branch = re.findall(r'class="rail" d="M([\d.]+)', diagram(rows, {}))
+    left, right = 20.0, 900.0  # -4 m and 30 m
+    assert float(main) == left and float(branch) == pytest.approx(left + (right - left) * 4.0 / 34.0, abs=0.1)
 
 
 def test_a_fleet_without_data_has_a_page(tmp_path):

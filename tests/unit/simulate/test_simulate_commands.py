@@ -10,6 +10,7 @@ from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.readers import read
 from turnout.receptance import find_impacts
 from turnout.records import RawChannel, RawDescription
+from turnout.simulate.calibrate import Calibration
 
 
 def test_a_simulated_hammer_test_is_read_back_and_has_sound_impacts(tmp_path, repository, monkeypatch):
@@ -23,6 +24,17 @@ def test_a_simulated_hammer_test_is_read_back_and_has_sound_impacts(tmp_path, re
     assert len(result.recordings) == 3 and not result.errors
     impacts = find_impacts(result.recordings, "force", "rail", ReceptanceSettings())
     assert sum(i.accepted for i in impacts) >= 2
+
+
+def test_a_simulation_never_takes_the_place_of_a_raw_file_of_a_turnout(tmp_path, repository, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "raw" / "tommerup_s1" / "hammer" / "2024-05-13" / "A7_1.h5"
+    path.parent.mkdir(parents=True)
+    path.write_bytes(b"measured")
+    command = ["simulate", "hammer", "--section", "A7", "--turnout", "tommerup_s1", "--blows", "1"]
+    assert main([*command, "--config", str(repository / "config"), "--raw", "raw"]) == 2
+    assert path.read_bytes() == b"measured"
+    assert "A7_1.h5 is there already and may be a measurement" in capsys.readouterr().err
 
 
 def test_a_simulated_passage_keeps_its_truth_apart(tmp_path, monkeypatch, capsys):
@@ -121,3 +133,14 @@ def test_the_help_tells_the_loads_that_are_simulated(capsys):
     with pytest.raises(SystemExit):
         main(["simulate", "passage", "--help"])
     assert "0 (empty) to 1 (full), overloaded up to 1.5" in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.parametrize(("reduced", "warned"), [(0.2, False), (241.4, True)])
+def test_a_calibration_that_does_not_meet_its_test_says_that_its_intervals_mean_nothing(reduced, warned):
+    """Five parameters are always found, with a narrow ±, be the test of another track altogether."""
+    band = {(40.0, 100.0): 0.6}
+    found = Calibration(
+        "M1", {"pad_stiffness": 3e8}, {"pad_stiffness": 0.012}, np.eye(1), {"pad_stiffness": True}, (), band, band,
+        reduced, 1600, None,
+    )  # fmt: skip
+    assert ("neither values nor ± mean anything" in str(found)) is warned

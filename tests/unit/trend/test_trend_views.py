@@ -346,3 +346,12 @@ def test_what_is_said_after_the_newest_campaign_counts_now_and_not_on_an_earlier
             day = newest - pd.Timedelta("10D")
             before = con.execute(f"select state from worklist(timestamp '{day}') {where}").fetchall()
             assert before == [("inspect this week",)]
+
+
+@pytest.mark.parametrize(("n", "words"), [(1, "1 campaign with a rail temperature"), (2, "2 campaigns with a rail")])
+def test_a_baseline_counts_campaigns_with_a_rail_temperature_and_says_so(frames, n, words):
+    """One campaign of two without a temperature reads as a mistake where "1 campaigns so far" is all that is said."""
+    status = frames["chart_status"].assign(state="learning", reason="baseline", n_baseline=n)
+    with connect_views(frames | {"chart_status": status}, frames["modes"]["measured_at_utc"].max()) as con:
+        (why, *_) = con.execute("select distinct why from cannot_see()").fetchall()
+    assert why[0].startswith(words) and why[0].endswith("so far; a baseline needs a whole year and at least twelve")

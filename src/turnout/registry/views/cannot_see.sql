@@ -17,7 +17,8 @@ select
             without_temperature || ' of ' || n_campaigns || ' campaigns have no rail temperature'
         when reason = 'too_few_sections' then
             'too few sections are measured, or are without an alarm, in the same campaigns for their median'
-        when reason = 'baseline' then n_baseline || ' campaigns so far; a baseline needs a whole year and at least twelve'
+        when reason = 'baseline' then n_baseline || case when n_baseline = 1 then ' campaign' else ' campaigns' end
+            || ' with a rail temperature so far; a baseline needs a whole year and at least twelve'
         when reason = 'after_event' then n_learned || ' of ' || n_needed || ' campaigns since the event'
         when band = 'amplitude' and coalesce(detectable_pct < 50, false) then
             printf('smallest change seen within a year: %.1f %% of acceleration; asked for: %.1f %%',

@@ -101,7 +101,7 @@ def _section(rows, section, models, states):
         "position": f"{section['position_m']:.1f}" if section["position_m"] is not None else "–",
         "open": states.get(key) in ("inspect this week", "plan"),
         "when": day(model["measured_at_utc"]) if model else "none",
-        "history": history or "<p>No model yet.</p>",
+        "history": history or f"<p>{'No model yet' if model else 'Not measured yet, or nothing could be read'}.</p>",
         "panels": _panels(rows, section, model, receptance, modes) if model and receptance else "",
         "detail": model["detail"] if model else "",
     }

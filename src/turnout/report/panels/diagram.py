@@ -16,8 +16,8 @@ STYLE = {
 def diagram(sections, states, width=920, height=200):
     """``sections`` rows of ``sections``; ``states`` maps section_id to a state of the worklist."""
     positions = [s["position_m"] or 0.0 for s in sections]
-    low, high = min(positions) - 4.0, max(positions) + 4.0
-    toe = min([s["position_m"] or 0.0 for s in sections if s["panel"] == "SP"] or [low + (high - low) * 0.2])
+    toe = 0.0  # positions count from it
+    low, high = min([toe, *positions]) - 4.0, max([toe, *positions]) + 4.0
 
     def px(metres):
         return 20 + (width - 40) * (metres - low) / (high - low)
@@ -39,7 +39,7 @@ def diagram(sections, states, width=920, height=200):
     ]
     for section, lift in zip(sections, _lifts(sections, px)):
         parts.append(_place(section, states, px, py, lift))
-    parts.append(f'<text class="label" x="24" y="{height - 8}">facing direction → , metres from the switch toe</text>')
+    parts.append(f'<text class="label" x="24" y="{height - 8}">facing direction →, metres from the switch toe</text>')
     return "".join(parts) + "</svg>"
 
 

@@ -14,14 +14,14 @@ MAIN, SPREAD = 92.0, 58.0
 
 
 class Drawing:
-    """Places [m] along the turnout to pixels; the diverging track leaves the main one at the first switch panel."""
+    """Places [m] along the turnout to pixels; the diverging track leaves the main one at the switch toe."""
+
+    toe = 0.0  # places count from it
 
     def __init__(self, sections):
-        positions = [s["position_m"] or 0.0 for s in sections]
-        self.low, self.high = min(positions) - 4.0, max(positions) + 4.0
         self.branches = any(s["track"] == "diverging" for s in sections)
-        toes = [s["position_m"] or 0.0 for s in sections if s["panel"] == "SP"]
-        self.toe = min(toes or [self.low + 0.2 * (self.high - self.low)])
+        shown = [s["position_m"] or 0.0 for s in sections] + [self.toe] * self.branches
+        self.low, self.high = min(shown) - 4.0, max(shown) + 4.0
         self.parts: list[str] = []
 
     def px(self, metres):
@@ -75,7 +75,7 @@ class Drawing:
 
     def svg(self):
         """The whole drawing."""
-        legend = f'<text class="label" x="24" y="{HEIGHT - 6}">facing direction → , metres from the switch toe</text>'
+        legend = f'<text class="label" x="24" y="{HEIGHT - 6}">facing direction →, metres from the switch toe</text>'
         return (
             f'<svg class="diagram" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" role="img" '
             f'aria-label="The turnout and what was found">{"".join(self.parts)}{legend}</svg>'
