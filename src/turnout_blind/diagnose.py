@@ -40,6 +40,8 @@ def diagnose_set(
         raise BlindError(record, "tool_sha256", "the tool has changed since the first case", "Diagnose a set made anew")
     if held.get("command", command) != command:
         raise BlindError(record, "command", "another command than that of the first case", "Judge all by one command")
+    if label is None and (sealed.get("examines") or frozen) != frozen:
+        raise BlindError(out / "commit.json", "examines", "made for another tool than this", "Make a set for this one")
     open_truth = out / "revealed"
     if label is None and open_truth.exists():
         raise BlindError(open_truth, "truth", "this set is open", "Judge a set made anew, or an ablation")

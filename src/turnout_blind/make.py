@@ -5,13 +5,13 @@ import os
 import platform
 import secrets
 import shutil
-import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
+import turnout
 from turnout_blind.campaign import make_case
 from turnout_blind.effect import load_effects
-from turnout_blind.seal import SET, BlindError, commit, digest, digest_of_folder, write_truth
+from turnout_blind.seal import SET, BlindError, commit, digest, digest_of_folder, seed_for, write_truth
 from turnout_blind.strata import case_id, plan_cases
 
 
@@ -22,8 +22,10 @@ def make_set(out, truth, seed=None, full=True, folders=(), only=None, limit=None
     ----------
     out, truth : path
         Folders; ``truth`` must not lie inside ``out``, which is what the tool is given.
-    seed : int or None
-        The same seed gives the same recordings; None draws one. The nonces are always drawn anew.
+    seed : int, "tool" or None
+        The same seed gives the same recordings and seals, also of a set that was lost; None draws one. "tool": that of
+        the tool as it is installed, by the hash of its sources. Such a set exists no earlier than the tool that it
+        examines and no other tool is let in; nobody chose it, and everybody can make it.
     full : bool
         All strata, or the fast tier of 40.
     folders : iterable of path
@@ -43,10 +45,12 @@ def make_set(out, truth, seed=None, full=True, folders=(), only=None, limit=None
         raise BlindError(truth, "--truth", "inside the folder that the tool is given", "Choose a folder beside it")
     if (out / "commit.json").exists():
         raise BlindError(out, "cases", "a set is there already", "Choose another folder, or remove it")
-    about = _begun(truth, seed, full, folders, only, limit)
+    examines = digest_of_folder(Path(turnout.__file__).parent) if seed == "tool" else None
+    about = _begun(truth, seed_for(examines) if examines else seed, full, folders, only, limit)
     seed = about["seed"]
     plans = plan_cases(seed, load_effects(*folders), full, only)[:limit]
-    jobs = [(out / "cases", truth, case_id(seed, k), plan, tuple(map(str, folders))) for k, plan in enumerate(plans)]
+    folders = tuple(map(str, folders))
+    jobs = [(out / "cases", truth, case_id(seed, k), plan, folders, seed) for k, plan in enumerate(plans)]
     waiting = [job for job in jobs if not _made(job)]
     with ProcessPoolExecutor(workers) as pool:
         running = [pool.submit(_make, job) for job in waiting]
@@ -55,7 +59,7 @@ def make_set(out, truth, seed=None, full=True, folders=(), only=None, limit=None
     shutil.rmtree(out / "unfinished", ignore_errors=True)
     truths = {"set": digest((truth / SET).read_bytes())}
     truths |= {job[2]: digest((truth / f"{job[2]}.json").read_bytes()) for job in jobs}
-    return commit(out, truths)
+    return commit(out, truths, examines)
 
 
 def _begun(truth, seed, full, folders, only, limit):
@@ -64,7 +68,8 @@ def _begun(truth, seed, full, folders, only, limit):
     wanted |= {"generator_sha256": digest_of_folder(Path(__file__).parent, "*.py"), "made_on": platform.machine()}
     path = truth / SET
     if not path.exists():
-        write_truth(truth, "set", {"seed": secrets.randbits(63) if seed is None else int(seed), **wanted})
+        seed = secrets.randbits(63) if seed is None else int(seed)
+        write_truth(truth, "set", {"seed": seed, **wanted}, seed)
         return json.loads(path.read_bytes())
     held = json.loads(path.read_bytes())
     other = [k for k, v in wanted.items() if held[k] != v] + (["seed"] if seed not in (None, held["seed"]) else [])
@@ -74,17 +79,17 @@ def _begun(truth, seed, full, folders, only, limit):
 
 
 def _made(job):
-    cases, truth, case, _, _ = job
+    cases, truth, case, *_ = job
     return (cases / case).is_dir() and (truth / f"{case}.json").exists()
 
 
 def _make(job):
     """A case: built aside, its truth written, then put in its place, so that a half-made one is never taken for one."""
-    cases, truth, case, plan, folders = job
-    began, aside = time.process_time(), cases.parent / "unfinished"
+    cases, truth, case, plan, folders, seed = job
+    aside = cases.parent / "unfinished"
     shutil.rmtree(aside / case, ignore_errors=True)
     made = make_case(aside, case, plan, load_effects(*folders))
-    write_truth(truth, case, {**made, "cpu_s": round(time.process_time() - began, 2)})
+    write_truth(truth, case, made, seed)
     cases.mkdir(parents=True, exist_ok=True)
     shutil.rmtree(cases / case, ignore_errors=True)
     os.replace(aside / case, cases / case)

@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import secrets
 from pathlib import Path
 
 from turnout.errors import TurnoutError
@@ -35,9 +34,16 @@ def digest_of_folder(folder, pattern="*"):
     return whole.hexdigest()
 
 
-def write_truth(folder, name, content, nonce=None):
-    """Write ``content`` with a nonce of 16 bytes as ``name``.json; returns the SHA-256 of the file."""
-    data = json.dumps({**content, "nonce": nonce or secrets.token_hex(16)}, indent=1, sort_keys=True).encode() + b"\n"
+def seed_for(tool_sha256):
+    """Seed of the set that examines this very tool: it exists no earlier than the tool, and nobody chose it."""
+    return int(digest(f"turnout blind {tool_sha256}".encode())[:15], 16)
+
+
+def write_truth(folder, name, content, seed):
+    """Write ``content`` with a nonce of 16 bytes, which follows from the set's ``seed``, as ``name``.json; returns the
+    SHA-256 of the file."""
+    nonce = digest(f"nonce {seed} {name}".encode())[:32]
+    data = json.dumps({**content, "nonce": nonce}, indent=1, sort_keys=True).encode() + b"\n"
     Path(folder).mkdir(parents=True, exist_ok=True)
     (Path(folder) / f"{name}.json").write_bytes(data)
     return digest(data)
@@ -50,8 +56,9 @@ def files_of(case):
     }
 
 
-def commit(out, truths):
-    """Write commit.json: ``truths`` are {case: SHA-256 of its truth, "set": of set.json}; returns its own SHA-256."""
+def commit(out, truths, examines=None):
+    """Write commit.json: ``truths`` are {case: SHA-256 of its truth, "set": of set.json}; ``examines`` the hash of the
+    tool that the set was made for, None where for any; returns its own SHA-256."""
     out = Path(out)
     package = Path(__file__).parent
     cases = {c: {"truth_sha256": truths[c], "files": files_of(out / "cases" / c)} for c in sorted(truths) if c != "set"}
@@ -59,6 +66,7 @@ def commit(out, truths):
         "format": FORMAT,
         "set_sha256": truths["set"],
         "generator_sha256": digest_of_folder(package, "*.py"),
+        "examines": examines,
         "cases": cases,
     }
     data = json.dumps(content, indent=1, sort_keys=True).encode() + b"\n"

@@ -16,7 +16,10 @@ def add_arguments(parser):
     """Options of the command."""
     steps = parser.add_subparsers(dest="step", metavar="step", required=True)
     make = steps.add_parser("make", help="make a set and seal its truth")
-    make.add_argument("--seed", type=int, help="the same seed gives the same recordings (default: drawn)")
+    make.add_argument(
+        "--seed", type=_seed,
+        help="the same seed gives the same set; 'tool': that of the tool as it is, which nobody chose (default: drawn)",
+    )  # fmt: skip
     make.add_argument("--fast", action="store_true", help="the fast tier of 40 cases")
     make.add_argument("--effects", action="append", default=[], help="folder with effects of your own")
     make.add_argument("--only", help="kinds to keep beside the controls, by commas")
@@ -50,6 +53,10 @@ def add_arguments(parser):
 def run(args):
     """Take the step."""
     return {"make": _make, "diagnose": _diagnose, "reveal": _reveal, "score": _score, "keep": _keep}[args.step](args)
+
+
+def _seed(text):
+    return text if text == "tool" else int(text)
 
 
 def _truth(args):

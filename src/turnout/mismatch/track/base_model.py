@@ -47,16 +47,19 @@ RAIL_STEP = 0.05  # of their logarithms; derivatives by pads err by 8 % over 0.1
 WHEELS_SD = 0.06  # ln unsprung mass: reprofiling takes a tenth of it; 42 of another simulator: 0.054
 SEAT_SD = 0.02  # a sensor's place is known to this [m]
 REACH = 1.9  # supports this far beyond sensors and blows have values of their own [m]
+ASKED = 0.7  # and this far laws of their own: the outermost ones are given what all beyond them differ by [m]
 MARGIN = 18.0  # track kept beyond them [m]
 
 
 @dataclass(frozen=True)
 class Zone:
-    """Supports ``first`` to ``last`` (inclusive) of the kept track lie among sensors and blows."""
+    """Supports ``first`` to ``last`` (inclusive) of the kept track lie among sensors and blows; those of ``asked`` may
+    have an effect."""
 
     turnout: object
     first: int
     last: int
+    asked: range
 
     @property
     def supports(self):
@@ -77,8 +80,8 @@ def zone_of(turnout, places):
     tracks = {name: cut(track) for name, track in turnout.tracks.items()}
     smaller = replace(turnout, track=cut(turnout.track), tracks=tracks)
     support = smaller.track.support
-    inside = np.flatnonzero((support >= low - REACH) & (support <= high + REACH))
-    return Zone(smaller, int(inside[0]), int(inside[-1]))
+    inside, asked = (np.flatnonzero((support >= low - r) & (support <= high + r)) for r in (REACH, ASKED))
+    return Zone(smaller, int(inside[0]), int(inside[-1]), range(int(asked[0]), int(asked[-1]) + 1))
 
 
 def with_rail(zone, values):

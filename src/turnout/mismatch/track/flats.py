@@ -43,9 +43,10 @@ def _candidate(case, fit, struck, wheels):
 def _sized(case, fit, struck):
     """(length [m], phases, nats) at which the simulated flat explains most of the band, loss of contact included."""
     phases = _turned(case, fit, struck, struck.phases, ABOUT, MIDDLING)
-    length, _ = _longest(case, fit, struck, phases)
-    phases = _turned(case, fit, struck, phases, NEAR, length)
     length, gain = _longest(case, fit, struck, phases)
+    if gain > 0.0:  # else none of any length explains anything
+        phases = _turned(case, fit, struck, phases, NEAR, length)
+        length, gain = _longest(case, fit, struck, phases)
     return length, phases, max(gain, 0.0)
 
 

@@ -48,9 +48,9 @@ def _candidate(term, make, starts, where=None, scanned=1, base=True, parameters=
 
 
 def _supports(case):
-    """One place per support of the zone."""
-    places, n = case.track().support, len(case.zone.supports)
-    for j in case.zone.supports:  # ballast first: what hangs looks like soft ballast to a hammer
+    """One place per support that is asked."""
+    places, n = case.track().support, len(case.zone.asked)
+    for j in case.zone.asked:  # ballast first: what hangs looks like soft ballast to a hammer
         where = {"sleeper": j, "place": round(float(places[j]), 3)}
         for term, alike in ((physics.LocalBallast, "ballast"), (physics.LocalPad, "pad")):
             yield _candidate(term, lambda p, j=j, t=term: t(j, **p), ((0.4,), (2.5,)), where, n, always=alike,

@@ -10,7 +10,7 @@ from turnout.simulate.prepare import prepare
 from turnout.simulate.run import Drive, run
 
 ELEMENTS = 2  # per bay: 0.2 to 0.5 % of the waveform below 112 Hz from four, which 1.8 kHz misses by 0.4 to 1 %
-DECAY = 12.0  # of a force's effect along the rail, as exponent: 1e-5 of it is left out
+DECAY = 8.0  # of a force's effect along the rail within a step, as exponent: 3e-6 of the waveform, 6 % faster than 12
 LEAD = 0.25  # s of rolling before the first wheel reaches the first sensor
 EDGE = 0.08  # s kept before the first and behind the last wheel
 

@@ -23,17 +23,17 @@ RING = 0.35  # s that the track rings on
 
 class Carrier:
     """Waves of one passage on the track that ``values`` and ``terms`` give, as its sensors show them where they sit;
-    ``node`` (n,) places where forces are carried [m]."""
+    ``node`` (n,) places where forces are carried, to ``beyond`` the free waves' ends [m]."""
 
-    def __init__(self, case, values, made, terms=()):
+    def __init__(self, case, values, made, terms=(), beyond=0.0):
         terms = [t.under(case.said(made)) for t in terms]
         self.made, waves, vehicle = made, case.waves, _vehicle(values, made, terms)
-        lines, transfer, point, self.node = _transfers(case, values, made, terms)
+        lines, transfer, point, self.node = _transfers(case, values, made, terms, beyond)
         self.speed = made.speed * (1.0 + values[f"speed@{made.name}"])
         self.sign = 1.0 if made.passage.direction == "facing" else -1.0
         self.first = self.sign * min(self.sign * s.place for s in made.sensors)
         self.behind = vehicle.wheel_places / self.speed
-        span = (waves.end - waves.start) / self.speed + self.behind[-1] + RING
+        span = (waves.end - waves.start + 2.0 * beyond) / self.speed + self.behind[-1] + RING
         self.rate = made.clock
         size = 1 << int(np.ceil(np.log2(self.rate * max(span, made.time[-1] - made.time[0] + RING))))
         self.size, self.period, self.start = size, waves.length, waves.start
@@ -156,12 +156,13 @@ def shown_by(values, terms, made, frequency):
     return np.column_stack(factors)
 
 
-def _transfers(case, values, made, terms):
+def _transfers(case, values, made, terms, beyond):
     """Lines, acceleration of the sensors per force on rail nodes (m, n_sensor, n_node), point receptance, nodes."""
     track = track_with(case.track(made.passage.route, terms), case.zone, values)
     matrices = matrices_of(track, [t for t in terms if t.kind == "matrix"])
     frequency = np.arange(4.0, 1.3 * bands.HIGH, 2.0)
-    near = np.flatnonzero((matrices.node >= case.waves.start - 0.3) & (matrices.node <= case.waves.end + 0.3))
+    beyond += 0.3
+    near = np.flatnonzero((matrices.node >= case.waves.start - beyond) & (matrices.node <= case.waves.end + beyond))
     near = near[::STRIDE]
     rows = matrices.node_index[near]
     seated = [case.seat(s, values, terms) for s in made.sensors]

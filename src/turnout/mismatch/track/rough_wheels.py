@@ -14,6 +14,8 @@ from turnout.mismatch.track.rough_rail import amplitude_sd
 TURNED = 1.5e-5  # m; each of the first three harmonics of wheels in service, Johansson 2006, Vehicle System Dynamics 44
 WHEEL_LEVEL = -2.0  # dB on the limit curve of rails: disc-braked wheels
 KEPT = 0.02  # share of a sample's own variance below which a mode is not worth keeping
+FAINT = 0.1  # of that: single waves fainter than this are left out before they are put together
+BEYOND = 6.0  # m before and behind the rail's free waves, from where lightly damped track still carries a wheel's noise
 
 
 def wheel_modes(case, values, made, sigma):
@@ -21,19 +23,35 @@ def wheel_modes(case, values, made, sigma):
 
     In single precision: a long train over many sensors has a thousand modes of ten thousand samples each.
     """
-    waves, circumference = case.waves, 2.0 * np.pi * made.passage.vehicle.radius
-    sd = amplitude_sd(waves.lengths, waves.length, WHEEL_LEVEL)
-    # out of round: the variance of an harmonic is spread over the waves up to half an order beside it
-    turned = np.clip(np.round(circumference / waves.lengths), 1, 99) <= 3
-    per_order = circumference / waves.length
-    sd[turned] = np.maximum(sd[turned], TURNED * np.sqrt(per_order))
-    carrier = Carrier(case, values, made)
-    spectra = carrier.spectra(waves.lengths, np.ones(carrier.node.size))
-    wheels = [carrier.shown(spectra, carrier.wheel(w)) * np.repeat(sd, 2) for w in range(carrier.behind.size)]
-    modes = np.concatenate([w.astype(np.float32) for w in wheels], axis=1)
-    scaled = modes / sigma[:, None].astype(np.float32)
+    waves, scale = case.waves, sigma[:, None].astype(np.float32)
+    wheel, carrier = _amplitudes(waves, made.passage.vehicle.radius), Carrier(case, values, made, beyond=BEYOND)
+    both, modes = np.hypot(wheel, waves.sd[::2]), []
+    for envelope, sd in zip(_stretches(waves, carrier.node), (wheel, both, both)):
+        spectra = carrier.spectra(waves.lengths, envelope)
+        for w in range(carrier.behind.size):
+            columns = (carrier.shown(spectra, carrier.wheel(w)) * np.repeat(sd, 2)).astype(np.float32)
+            modes.append(columns[:, np.sum((columns / scale) ** 2, axis=0) > FAINT * KEPT])
+    modes = np.concatenate(modes, axis=1)
+    scaled = modes / scale
     power, turn = np.linalg.eigh(scaled.T @ scaled)
     return modes @ turn[:, power > KEPT]
+
+
+def _amplitudes(waves, radius):
+    """(n_length,) standard deviation of the waves of a wheel [m]."""
+    sd, circumference = amplitude_sd(waves.lengths, waves.length, WHEEL_LEVEL), 2.0 * np.pi * radius
+    # out of round: the variance of an harmonic is spread over the waves up to half an order beside it
+    turned = np.clip(np.round(circumference / waves.lengths), 1, 99) <= 3
+    sd[turned] = np.maximum(sd[turned], TURNED * np.sqrt(circumference / waves.length))
+    return sd
+
+
+def _stretches(waves, node):
+    """Envelopes (n_node,) of where the rail's waves are free, of what lies before and of what lies behind: there the
+    roughness of the rail is each wheel's own error as well."""
+    inside = (node >= waves.start - 0.3) & (node <= waves.end + 0.3)
+    left, ahead = 1.0 - waves.fade(node), node < 0.5 * (waves.start + waves.end)
+    return inside.astype(float), left * ahead, left * ~ahead
 
 
 def heavier(case, fit):

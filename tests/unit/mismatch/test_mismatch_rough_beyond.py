@@ -1,0 +1,50 @@
+"""Rail as rough as sound rail is, beyond the stretch of free waves, is no mismatch where the track carries far."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from turnout import physics
+from turnout.mismatch.track import TrackCase
+from turnout.mismatch.track.base_model import ASKED
+from turnout.mismatch.track.observing import with_errors
+from turnout.mismatch.track.planned import measured_campaign, small_plan
+from turnout.simulate.roughness import level
+
+
+@pytest.fixture(scope="module")
+def lightly_damped():
+    """A case, values of a track that carries far, and a heavy train at 144 km/h with the errors that it has there."""
+    case = TrackCase(measured_campaign(small_plan((15.0,), blows=(24.0,)), (), 7))
+    values = {n.name: case.start_values.get(n.name, n.mean) for n in case.nuisances}
+    values |= {"ballast_damping": -1.6, "pad_damping": -0.7}
+    (seen,) = (o for o in case.observations if o.name == "heavy 2")
+    return case, values, with_errors(case, values, case.rollings[seen.name], seen)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("behind", "wavelength"), [(False, 0.36), (True, 0.3)])
+def test_rough_rail_beyond_the_free_waves_is_an_error_that_the_passage_knows(lightly_damped, behind, wavelength):
+    """All that ISO 3095 allows in the third octave, in one line, is one standard deviation of what the errors hold: no
+    sample may stand out by two. Without them some do by more than three, with a mean square near the level of controls.
+    """
+    case, values, seen = lightly_damped
+    allowed = np.sqrt(2.0) * 1e-6 * 10.0 ** (float(level(np.array([wavelength]), 0.0)[0]) / 20.0)
+    a, b = (case.waves.end + 0.5, case.waves.end + 4.5) if behind else (case.waves.start - 4.5, case.waves.start - 0.5)
+    rough = physics.RailCorrugation(a, b, allowed, 0.0, wavelength)
+    plain, with_it = (case.predict(values, terms, [seen])[0] for terms in ((), (rough,)))
+    squares = [o.whitened(with_it - plain) ** 2 for o in (replace(seen, modes=None), seen)]
+    assert np.mean(squares[0]) > 0.5 and np.max(squares[0]) > 9.0
+    assert np.max(squares[1]) < 4.0
+
+
+def test_no_law_is_asked_more_than_a_bay_beyond_what_was_measured(lightly_damped):
+    """What lies farther out cannot be told from all that lies beyond it; it has values of its own, no names."""
+    case, _, _ = lightly_damped
+    measured = case.campaign.places()
+    asked = [c.where["place"] for c in case.candidates if "sleeper" in c.where]
+    free = case.track().support[list(case.zone.supports)]
+    assert min(asked) >= min(measured) - ASKED and max(asked) <= max(measured) + ASKED
+    assert free.min() < min(asked) and free.max() > max(asked)
+    assert {"local_pad", "local_ballast", "hanging_sleeper"} <= {c.family for c in case.candidates}
