@@ -29,7 +29,7 @@ class HighPass(TransferTerm):
 
     def transfer(self, frequency):
         """High-pass; 1 at its neutral value, at 0 Hz too."""
-        f = np.asarray(frequency, dtype=float)
+        f = np.asarray(frequency)
         if self.corner == 0.0:
             return np.ones(f.shape, dtype=complex)
         return 1j * f / (1j * f + self.corner)

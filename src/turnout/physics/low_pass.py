@@ -33,5 +33,5 @@ class LowPass(TransferTerm):
 
     def transfer(self, frequency):
         """The filter's response."""
-        ratio = np.asarray(frequency, dtype=float) * self.period
+        ratio = np.asarray(frequency) * self.period
         return 1.0 / (1.0 + 1j * np.sqrt(2.0) * ratio - ratio**2)

@@ -37,5 +37,5 @@ class MountResonance(TransferTerm):
 
     def transfer(self, frequency):
         """Acceleration shown over acceleration of the rail."""
-        ratio = np.asarray(frequency, dtype=float) * self.period
+        ratio = np.asarray(frequency) * self.period
         return 1.0 / (1.0 - ratio**2 + 1j * ratio / self.quality)

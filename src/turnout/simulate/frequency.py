@@ -23,8 +23,7 @@ def _solve_lines(mass, damping, stiffness, hysteresis, omega, right, keep, width
         w = omega[line]
         for k in range(half + 1):
             for i in range(n):
-                real = stiffness[k, i] - w * w * mass[k, i]
-                system[k, i] = complex(real, w * damping[k, i] + hysteresis[k, i])
+                system[k, i] = stiffness[k, i] - w * w * mass[k, i] + 1j * (w * damping[k, i] + hysteresis[k, i])
         if width == 4:
             worst = max(worst, factorise4(system, lower, upper, pivot, n))
             system[:, n:] = 0.0
@@ -56,13 +55,14 @@ def _solve_pivoted(matrices, omega, right):
 
 
 def responses(matrices, frequency, places, rows=None, pivoted=False):
-    """(n_line, n_place, n) complex displacement of all degrees of freedom, or of ``rows``, under unit forces.
+    r"""(n_line, n_place, n) complex displacement of all degrees of freedom, or of ``rows``, under unit forces.
 
-    ``places`` are numbers (rail at x [m]) or names of degrees of freedom; ``frequency`` [Hz], 0 allowed.
+    ``places`` are numbers (rail at x [m]) or names of degrees of freedom; ``frequency`` [Hz], 0 allowed. A complex one,
+    :math:`f - i \sigma / 2 \pi`, is that of signals weighted by :math:`e^{-\sigma t}` (Laplace transform).
     Without pivoting unless a factor grows beyond 1e6 or ``pivoted`` asks for it.
     """
-    omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequency, dtype=float))
-    if not (np.all(np.isfinite(omega)) and np.all(omega >= 0.0)):
+    omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequency, dtype=complex))
+    if not (np.all(np.isfinite(omega)) and np.all(omega.real >= 0.0)):
         raise SimulationError(f"frequencies must not be negative, got {frequency!r}.")
     right = np.zeros((len(places), matrices.n))
     for k, place in enumerate(places):

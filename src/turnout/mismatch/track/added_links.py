@@ -39,7 +39,7 @@ class AddedLinks:
 
 def _answers(model, conditions, chosen):
     """(ends (n_end, n), which end each link has, z / (1 + z g) of each (n_line, n_link), candidate of each link)."""
-    omega, known, index, impedance, owner = 2.0 * np.pi * blows.LINES, {}, [], [], []
+    omega, known, index, impedance, owner = 2.0 * np.pi * blows.SHIFTED, {}, [], [], []
     track = left(model.track, links_of(model.terms, model.track))
     for i, (c, k) in enumerate(chosen):
         for ends, z in _impedances(track, c, c.term(c.starts[k]).under(conditions), omega):
@@ -60,6 +60,6 @@ def _answers(model, conditions, chosen):
 def _impedances(track, candidate, term, omega):
     """(ends, impedance (n_line,)) of every link that a term adds."""
     if candidate.family == "attached_resonator":
-        return [(((("rail", candidate.where["sleeper"]), 1.0),), term.dynamic_stiffness(blows.LINES))]
+        return [(((("rail", candidate.where["sleeper"]), 1.0),), term.dynamic_stiffness(blows.SHIFTED))]
     links = [*term.links(track), *tangent((term,), track)]
     return [(tuple(m.ends), m.stiffness + 1j * omega * m.damping - omega**2 * m.mass) for m in links]

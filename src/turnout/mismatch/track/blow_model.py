@@ -5,7 +5,7 @@ from functools import cached_property
 import numpy as np
 
 from turnout.mismatch.track.base_model import OWN
-from turnout.mismatch.track.blows import LINES
+from turnout.mismatch.track.blows import LINES, SHIFTED
 from turnout.mismatch.track.skeleton import FixedLinks, matrices_of
 from turnout.simulate.additions import links_of, ports_of
 from turnout.simulate.frequency import responses
@@ -60,7 +60,7 @@ class BlowModel:
         """Remember the displacements under unit forces at these places: together they need one factorisation."""
         new = [p for p in dict.fromkeys(places) if p not in self.by_place]
         if new:
-            found = responses(self.matrices, LINES, new)
+            found = responses(self.matrices, SHIFTED, new)
             self.by_place |= {p: found[:, k] for k, p in enumerate(new)}
 
     def displacement(self, place):

@@ -6,11 +6,11 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from turnout.mismatch.track.base_model import COMMON, OWN
-from turnout.mismatch.track.blows import LINES
+from turnout.mismatch.track.blows import LINES, SHIFTED
 from turnout.mismatch.track.strain_products import by_rail
 
 FIELDS = [o.field for o in OWN]
-OMEGA = 2.0 * np.pi * LINES
+OMEGA = 2.0 * np.pi * SHIFTED
 FACTOR = {"stiffness": -1.0 + 0j * OMEGA, "damping": -1j * OMEGA, "mass": OMEGA**2 + 0j}
 
 

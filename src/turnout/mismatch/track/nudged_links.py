@@ -40,7 +40,7 @@ def nudged(model, terms):
         return None
     differs = [(a, b) for a, b in zip(old, new) if a != b]
     values = np.array([[getattr(b, w) - getattr(a, w) for w in WHAT] for a, b in differs]).reshape(-1, 3)
-    omega = 2.0 * np.pi * blows.LINES
+    omega = 2.0 * np.pi * blows.SHIFTED
     impedance = values @ np.array([np.ones(omega.size), 1j * omega, -(omega**2)])
     vectors = [link_vector(a, model.matrices.index) for a, _ in differs]
     first = np.cumsum([0, *(rows.size for rows, _ in vectors)])

@@ -92,7 +92,7 @@ class Predicting:
 
     def chain(self, values, terms, pair):
         """What the channel makes of a receptance, (n_line,) complex."""
-        factor = blows.channel_factor(terms, pair.sensor, blows.LINES)
+        factor = blows.channel_factor(terms, pair.sensor, blows.SHIFTED)
         return factor * (1.0 + values.get(f"gain_{pair.channel}", 0.0))
 
     def receptance(self, values, pair, heard):
