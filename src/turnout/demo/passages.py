@@ -76,6 +76,7 @@ def make_passage(job):
         direction=truth["direction"],
         route=truth["track"],
         seed=crc32(repr(seed).encode()),
+        rail_seed=crc32(f"{scenario.turnout} {truth['track']}".encode()),
         started_at=moment,
         conditions={"rail_temperature": round(truth["rail_temperature_c"], 1)},
     )

@@ -38,7 +38,8 @@ class Case:
     ``control_level`` the weighted mean square by kind that cases without an effect reach, else that of the settings;
     ``cell_level`` the same for one channel of one recording, by kind;
     ``disturbed`` recordings not used, since something else than the known inputs shows in them (``track.quiet``);
-    ``foreign`` trains, most recordings of which do not look as their description has it.
+    ``foreign`` trains, most recordings of which do not look as their description has it; ``measured`` the first and the
+    last place where anything was [m].
     """
 
     observations: tuple[Observation, ...] = ()
@@ -51,6 +52,7 @@ class Case:
     cell_level: Mapping[str, float] = {}
     disturbed: tuple = ()
     foreign: tuple = ()
+    measured = (-np.inf, np.inf)
 
     def cheap(self, observation):
         """Derivatives of this observation cost next to nothing."""

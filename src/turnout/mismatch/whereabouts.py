@@ -12,7 +12,8 @@ EXPLAINS = 0.25  # share of the excess from which a refused candidate is heard a
 @dataclass(frozen=True)
 class Whereabouts:
     """``frame`` and ``level`` of the strongest witness with its evidence ``nats``; ``place`` with its interval ``low``
-    to ``high`` [m], ``sensor``, ``train`` and ``axle`` where it has them; ``others`` frame -> nats of the next best."""
+    to ``high`` [m], ``sensor``, ``train`` and ``axle`` where it has them; ``others`` frame -> nats of the next best;
+    ``measured`` first and last place of sensors and blows [m]: beyond them nothing tells one place from another."""
 
     frame: str
     level: object
@@ -24,8 +25,13 @@ class Whereabouts:
     train: str | None = None
     axle: int | None = None
     others: dict = field(default_factory=dict)
+    measured: tuple = (float("-inf"), float("inf"))
 
     def __str__(self):
+        if self.place is not None and not self.measured[0] <= self.place <= self.measured[1]:
+            before = self.place < self.measured[0]
+            end = self.measured[0] if before else self.measured[1]
+            return f"{'before' if before else 'beyond'} {end:.1f} m, how far cannot be told"
         if self.place is not None:
             return f"at {self.place:.1f} m, between {self.low:.1f} and {self.high:.1f} m"
         if self.axle is not None:
@@ -56,8 +62,8 @@ def whereabouts(case, fit, refused=None, cause=""):
     witnesses = sorted(_alone(case, weigh(case, fit, floor)), key=lambda w: -w.nats)
     heard = refused is not None and refused.explained >= EXPLAINS
     if heard and (not witnesses or refused.gain > witnesses[0].nats):
-        return _of_candidate(refused)
-    return _of_witnesses(witnesses) if witnesses else None
+        return replace(_of_candidate(refused), measured=case.measured)
+    return replace(_of_witnesses(witnesses), measured=case.measured) if witnesses else None
 
 
 def _alone(case, witnesses):

@@ -40,6 +40,7 @@ def simulate_passage(
     roughness=None,
     terms=(),
     seed=0,
+    rail_seed=None,
     rate=20e3,
     substeps=1,
     lead=1.0,
@@ -69,12 +70,11 @@ def simulate_passage(
     route : str
         Route of the turnout: "main", "diverging".
     roughness : float or None
-        Level above the limit curve of ISO 3095 [dB]; None: as the turnout says. The rail's roughness follows
-        from ``seed`` alone, the same for all trains of the same seed.
+        Level above the limit curve of ISO 3095 [dB]; None: as the turnout says.
     terms : sequence of PhysicsTerm
         Effects added to the base model.
-    seed : int
-        Of roughness and noise.
+    seed, rail_seed : int, int or None
+        Of the noise, and of the rail's roughness (None: ``seed``): trains over one rail share the latter.
     rate, substeps : float, int
         Samples per second [Hz] and time steps per sample.
     lead, tail : float
@@ -126,8 +126,9 @@ def simulate_passage(
     seats = [seated(sensor, prepared.terms) for sensor in sensors]
     probes = [seat.probe(prepared.track) for seat in seats]
     drive, duration = _drive(
-        turnout, vehicle, speed, sensors, sign, route, roughness, seed, lead, tail, irregularities, entry
-    )
+        turnout, vehicle, speed, sensors, sign, route, roughness, seed if rail_seed is None else rail_seed, lead, tail,
+        irregularities, entry,
+    )  # fmt: skip
     _check_carried(seats, prepared.track, drive)
     outcome = run(prepared, duration, probes, vehicle, drive, forces=truth)
     rng = np.random.default_rng([seed, 1])

@@ -14,7 +14,7 @@ from turnout.mismatch.spaces import AMPLITUDES, NOISE, Space, evidence, weigh
 from turnout.mismatch.track import quiet
 from turnout.mismatch.verdict import calibrate, judge
 from turnout.mismatch.verify import falls
-from turnout.mismatch.whereabouts import whereabouts
+from turnout.mismatch.whereabouts import Whereabouts, whereabouts
 
 N, K = 60, 6
 
@@ -185,3 +185,16 @@ def test_passages_with_different_sensors_are_compared_by_those_they_share():
     assert louder == pytest.approx(10.0 * np.log10(4.0))  # S3, which no other passage has, says nothing
     assert p == pytest.approx(f.sf(4.0, 50.0, 50.0) ** 2)  # both sensors
     assert quiet.louder_than(*quiet._comparable(levels, "c")) == (0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("place", "said"),
+    [
+        (3.6, "at 3.6 m, between 3.0 and 4.2 m"),
+        (0.6, "before 2.4 m, how far cannot be told"),
+        (9.0, "beyond 8.1 m, how far cannot be told"),
+    ],
+)
+def test_a_place_beyond_what_was_measured_is_not_said_to_a_metre(place, said):
+    found = Whereabouts("place", place, 40.0, place, place - 0.6, place + 0.6, measured=(2.4, 8.1))
+    assert str(found) == said

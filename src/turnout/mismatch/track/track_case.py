@@ -126,6 +126,12 @@ class TrackCase(Predicting, Case):
             yield from rolling.rolling_nuisances(made.passage)
 
     @property
+    def measured(self):
+        """First and last place of sensors and blows [m]."""
+        places = self.campaign.places()
+        return min(places), max(places)
+
+    @property
     def control_level(self):
         """What controls reach, by kind."""
         return {"hammer": self.settings.hammer_control, "passage": self.settings.passage_control}
