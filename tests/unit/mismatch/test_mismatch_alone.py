@@ -87,7 +87,9 @@ class Struck(Days):
             "all blows at 4.2 m",
         ),  # 13 against 2.5; neither campaign is a name alone
         ((3.5, 4.0, 7.0, 6.0, 1.0, 0.5, 4.0), ""),  # 13 of others, of whom none would do alone
-        ((0.5, -1.0, 5.0, 6.0, 1.0, 0.5, 1.5), ""),  # 11 are no name: it does not hang on them
+        ((0.5, -1.0, 5.0, 6.0, 1.0, 0.5, 1.5), "all blows at 4.2 m"),  # 11, half a name, against 2.5
+        ((0.5, -1.0, 5.0, 6.0, 4.0, 1.5, 1.5), ""),  # 11 are no name and the others say half of one
+        ((0.5, -1.0, 2.5, 3.0, 1.0, 0.5, 1.5), ""),  # nor does it hang on 5.5
         ((0.5, -1.0, 7.0, 6.0, 1.0, 0.5, 12.0), ""),  # the train bears it out
     ],
 )
