@@ -1,0 +1,41 @@
+"""Sound panels of a real turnout's track file, lightly damped ones and the crossing among them, are no mismatch."""
+
+import numpy as np
+import pytest
+
+from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.track import Campaign, TrackCase
+from turnout.mismatch.track.campaign import HammerTest, Passage
+from turnout.simulate import Sensor, load_track, load_vehicle, simulate_hammer, simulate_passage
+from turnout.simulate.hammer import Hammer
+
+SPEEDS = (39.0, 43.0)  # m/s; the faster, the nearer to frequencies that the track carries far
+RECORD = 0.17  # s of a hammer record, 0.12 of them after the blow: some blows would be rejected as cut off with less
+
+
+def measured(places, seed):
+    """Blows at the first place and two trains over one rail; the owner's file is the very track."""
+    turnout = load_track("tommerup")
+    sensors = tuple(Sensor(f"S{x:g}", x, noise=0.05) for x in places)
+    blows = simulate_hammer(turnout, places[0], Hammer(place_spread=0.004), sensors, 5, seed=seed, duration=RECORD)
+    passages = []
+    for k, speed in enumerate(SPEEDS):
+        train = load_vehicle("ic3", 0.5)
+        recording = simulate_passage(
+            turnout, train, speed, sensors, seed=seed + k, rail_seed=seed, rate=5e3, lead=0.6, tail=0.4
+        )
+        passages.append(Passage(f"ic3 {k}", recording, train, speed, "ic3"))
+    return Campaign(turnout, sensors, (HammerTest("blows", places[0], blows),), tuple(passages))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("places", "seed"), [((3.6,), 1), ((13.8,), 7), ((24.6, 26.4), 7)])
+def test_what_the_base_model_leaves_of_sound_panels_is_what_it_leaves_of_controls(places, seed):
+    """Switch, closure and crossing panel; by the settings' levels, which come from another generator's plain track."""
+    case = TrackCase(measured(places, seed))
+    assert len(case.rollings) == len(SPEEDS)
+    base = fit_jointly(case, iterations=case.settings.base_iterations)
+    assert base.level["hammer"] < case.settings.hammer_control
+    assert base.level["passage"] < case.settings.passage_control
+    worst = [np.max(np.mean(np.reshape(w, (len(places), -1)) ** 2, axis=1)) for w in base.white[-len(SPEEDS) :]]
+    assert max(worst) < case.settings.cell_control
