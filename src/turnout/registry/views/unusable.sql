@@ -1,0 +1,85 @@
+-- One row per section under the hammer, and per turnout under trains ('*'), of which nothing could be used since the last
+-- test that gave a model or the last passage that counted, or ever. Of passages it takes ten in a row after a good one:
+-- single ones are rejected every day. Source is empty for a turnout none of whose files belongs to any test or passage.
+-- needs: models_current, impacts_current, passages_current, results_current, quarantine_open
+create or replace macro unusable("asof" := null) as table
+with unread as (
+    select
+        q.turnout_id, coalesce(q.section_id, '*') as section_id, q.kind, q.result_id, q.path, q.reason_code,
+        case q.kind
+            when 'hammer' then coalesce(c.started_at_utc, try_cast(split_part(r.label, '/', -1) as timestamp))
+            else try_strptime(regexp_extract(r.label, '\d{8}T\d{6}'), '%Y%m%dT%H%M%S')
+        end as at_utc
+    from quarantine_open q
+    join results_current r using (result_id)
+    left join campaigns c on c.campaign_id = q.turnout_id || '/' || split_part(r.label, '/', -1)
+    where q.kind in ('hammer', 'passage')
+),
+tried as (
+    select
+        turnout_id, section_id, 'hammer' as source, result_id, measured_at_utc as at_utc, status <> 'rejected' as is_used,
+        reason
+    from models_current
+    union all
+    select turnout_id, '*', 'passage', result_id, passed_at_utc, status <> 'rejected', reason from passages_current
+    union all
+    select turnout_id, case kind when 'hammer' then section_id else '*' end, kind, result_id, at_utc, false, reason_code
+    from unread
+),
+known as (
+    select * from tried where coalesce(at_utc <= "asof", "asof" >= newest_measurement(), true)
+),
+last_used as (
+    select turnout_id, section_id, source, max(at_utc) filter (is_used) as used_at_utc
+    from known
+    group by all
+),
+failed as (
+    select
+        turnout_id, section_id, source, any_value(used_at_utc) as used_at_utc, count(distinct result_id) as n,
+        max(at_utc) as at_utc, coalesce(max_by(result_id, at_utc), min(result_id)) as result_id,
+        mode(reason order by reason) as usual_reason, max_by(reason, at_utc) as reason
+    from known join last_used using (turnout_id, section_id, source)
+    where not is_used and coalesce(at_utc > used_at_utc, used_at_utc is null)
+    group by turnout_id, section_id, source
+    having source = 'hammer' or any_value(used_at_utc) is null or count(distinct result_id) >= 10
+),
+blows as (
+    select
+        result_id, section_id, count(*) as n, count(*) filter (status = 'rejected') as n_rejected,
+        mode(reason order by reason) filter (status = 'rejected') as reason
+    from impacts_current semi join failed using (result_id)
+    group by result_id, section_id
+),
+files as (
+    select result_id, count(distinct path) as n, mode(reason_code order by reason_code) as reason
+    from unread semi join failed using (result_id)
+    group by result_id
+)
+select
+    f.turnout_id, f.section_id, f.source, f.used_at_utc, f.n, f.at_utc,
+    case f.source when 'hammer' then 'no hammer test' else 'no passage' end
+        || ' could be used ' || coalesce('since ' || strftime(f.used_at_utc, '%Y-%m-%d'), 'yet')
+        || ' (' || f.n || ' tried); '
+        || case
+            when f.source = 'passage' then 'most often: ' || f.usual_reason
+            else coalesce(strftime(f.at_utc, '%Y-%m-%d') || ': ', '') || coalesce(
+                nullif(concat_ws(', ',
+                    b.n_rejected || ' of ' || b.n || ' blows rejected (' || b.reason || ')',
+                    d.n || case when d.n = 1 then ' file' else ' files' end || ' in quarantine (' || d.reason || ')'
+                ), ''),
+                f.reason)
+        end as why
+from failed f
+left join blows b on f.source = 'hammer' and b.result_id = f.result_id and b.section_id = f.section_id
+left join files d on d.result_id = f.result_id
+union all by name
+select
+    turnout_id, '*' as section_id, count(distinct path) as n,
+    'nothing was read: ' || count(distinct path)
+        || case when count(distinct path) = 1 then ' entry' else ' entries' end
+        || ' in quarantine (' || mode(reason_code order by reason_code) || ')' as why
+from quarantine_open
+where kind = 'configuration' and turnout_id not in (select turnout_id from tried)
+    and coalesce("asof" >= newest_measurement(), true)
+group by turnout_id;
