@@ -2,9 +2,10 @@
 
 What is recognised: separators comma, semicolon, tab; a decimal comma where the separator is not a comma; head lines
 with or without ``#``: ``rate`` (or ``fs``, ``sample rate [Hz]``, ``Abtastrate`` ...) or ``dt`` [s], ``started_at``,
-``n_records``, ``n_samples``, conditions; a line that says another frequency than the layout's rate, in words that are not
-known, is an error unless they are those of a filter; units in brackets behind the names ("force [N]", "force (N)") or in a line of their own; a
-column of time (``time_column``); a column ``record`` that numbers the records. Without names channels are "0", "1" ...
+``n_records``, ``n_samples``, conditions; a line that says another frequency than the layout's rate, in words that are
+not known, is an error unless they are those of a filter; units in brackets behind the names ("force [N]", "force
+(N)") or in a line of their own; a column of time (``time_column``); a column ``record`` that numbers the records.
+Without names channels are "0", "1" ...
 
 The text is UTF-8, UTF-16 with its mark, or, where a line of the head is neither, Windows-1252.
 
