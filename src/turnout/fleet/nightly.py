@@ -200,10 +200,8 @@ def _rejected(processed: Collection[str]) -> list[str]:
     """Those of the units whose hammer test gave no model, as far as the registry has them."""
     if not processed or not GENERATION.exists():
         return []
-    sql = (
-        "select unit_id from results_current semi join "
-        "(from models_current where status = 'rejected') using (result_id) where unit_id in (select unnest(?))"
-    )
+    unit = "turnout_id || '/hammer/' || split_part(section_id, '/', -1) || '/' || split_part(campaign_id, '/', -1)"
+    sql = f"select {unit} as unit from models_current where status = 'rejected' and unit in (select unnest(?))"
     try:
         with open_registry(GENERATION.parent) as connection:
             return [row[0] for row in connection.execute(sql, [list(processed)]).fetchall()]

@@ -29,7 +29,7 @@ def connect_views(frames, newest, rounded=True) -> duckdb.DuckDBPyConnection:
             con.register(table, pa.Table.from_pylist([], schema=arrow_schema(table)))
     stamp = timestamps(days([newest]))[0]
     con.execute(f"create macro newest_measurement() as timestamp '{stamp}'")
-    for table in ("models", "modes", "impacts", "passages", "passage_fits", "results"):
+    for table in ("models", "modes", "impacts", "passages", "passage_fits"):
         con.execute(f"create view {table}_current as select * from {table}")
     con.execute("create view quarantine_open as select * from quarantine")
     for name in view_files():

@@ -60,6 +60,15 @@ def test_sections_that_failed_alike_are_one_row_and_the_view_of_a_registry_witho
     assert bench.ask("select count(*) from worklist") == [(1,)]
 
 
+def test_a_file_that_fails_again_in_the_same_way_stays_on_the_list(bench):
+    """Its row in quarantine is the one of the first result, which another has superseded."""
+    bench.register(quarantined_result(key="first"))
+    once = bench.ask(LIST)
+    bench.register(quarantined_result(key="again"))
+    assert bench.ask("select count(*) from results_current where kind = 'hammer'") == [(1,)]
+    assert bench.ask(LIST) == once != []
+
+
 @pytest.mark.parametrize(("n", "listed"), [(9, 0), (10, 1)])
 def test_ten_passages_in_a_row_that_did_not_count_are_on_the_list_and_single_ones_are_not(bench, n, listed):
     bench.register(
