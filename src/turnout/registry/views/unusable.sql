@@ -34,7 +34,8 @@ known as (
 last_used as (
     select turnout_id, section_id, source, max(at_utc) filter (is_used) as used_at_utc
     from known
-    group by all
+    group by turnout_id, section_id, source
+    having coalesce(max(at_utc) filter (not is_used) > max(at_utc) filter (is_used), max(at_utc) filter (is_used) is null)
 ),
 failed as (
     select
