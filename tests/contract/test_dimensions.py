@@ -94,7 +94,7 @@ def recordings(u):
 
 
 def settings(u):
-    units = {"s": u(s=1), "1/s": u(s=-1), "Hz": u(s=-1)}
+    units = {"s": u(s=1), "1/s": u(s=-1), "Hz": u(s=-1), "N": u(n=1)}
     default = ReceptanceSettings()
     fields = default.__dataclass_fields__
     changed = {

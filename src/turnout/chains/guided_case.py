@@ -18,7 +18,11 @@ STEP = 0.02  # of the prior sd, for derivatives
 
 
 class BudgetSpentError(TurnoutError):
-    """The time that a diagnosis was given is up; what is done is kept."""
+    """The time that a diagnosis was given is up; what is done is kept, ``rows`` by table of the groups that are."""
+
+    def __init__(self, done=0, count=1, rows=None):
+        super().__init__(f"the time given is up, {done} of {count} groups done; the same command goes on from there.")
+        self.done, self.rows = done, rows or {}
 
 
 @dataclass
@@ -35,7 +39,7 @@ class Watch:
         if self.tell is not None:
             self.tell(self.count)
         if self.deadline is not None and self.count > 1 and time.monotonic() > self.deadline:
-            raise BudgetSpentError("the time given is up; what is done is kept, the same command goes on from there.")
+            raise BudgetSpentError
 
 
 class GuidedCase:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from turnout.chains.checkpoint import Checkpoint, Replay
-from turnout.chains.guided_case import GuidedCase, Watch
+from turnout.chains.guided_case import BudgetSpentError, GuidedCase, Watch
 from turnout.chains.mismatch_context import digest_of_model, track_of
 from turnout.chains.mismatch_gather import gather
 from turnout.chains.mismatch_groups import Group, groups
@@ -26,6 +26,7 @@ from turnout.records import Unit
 
 FITS = "work/mismatch-fits"
 TABLES = ("mismatch_findings", "mismatch_parameters", "mismatch_curves", "quarantine")
+UNFINISHED = "the time given was up with {} of {} groups done; the same command goes on from there"
 GRAVITY = ("named", "a_or_b", "unknown", "numerics", "none")
 
 
@@ -58,7 +59,8 @@ def mismatch_unit(unit: Unit, turnout: TurnoutConfig, raw_root, context=None, al
 def diagnose_visit(unit, turnout, raw_root, told, algo="", options: Options | None = None) -> dict[str, list[dict]]:
     """Rows by table of one visit; ``told`` are the passage stage's tables by unit, {} to analyse them here.
 
-    SimulationError where the turnout has no track to simulate or no section has a recording that can be used.
+    SimulationError where the turnout has no track to simulate or no section has a recording that can be used;
+    BudgetSpentError, with the rows of the groups that are done, where the time is up before the last of them.
     """
     options = options or Options()
     track, accepted = track_of(turnout, options.track)
@@ -70,12 +72,22 @@ def diagnose_visit(unit, turnout, raw_root, told, algo="", options: Options | No
     rows: dict[str, list[dict]] = {name: [] for name in TABLES}
     members = list(groups(turnout, track, found, options.sections))
     for k, group in enumerate(members):
-        own = _one(group, turnout, accepted, about, options, (k, len(members)))
+        try:
+            own = _one(group, turnout, accepted, about, options, (k, len(members)))
+        except BudgetSpentError:
+            left = [_nothing(unit, turnout, UNFINISHED.format(k, len(members)), g) for g in members[k:]]
+            raise BudgetSpentError(
+                k, len(members), _graver_first(rows | {"quarantine": rows["quarantine"] + left})
+            ) from None
         for table, more in own.items():
             rows[table] += more
     if not members:
         said = "; ".join(found.notes) or "neither a hammer test nor a passage"
         rows["quarantine"].append(_nothing(unit, turnout, f"no section can be diagnosed: {said}"[:1000]))
+    return _graver_first(rows)
+
+
+def _graver_first(rows):
     rows["mismatch_findings"].sort(key=lambda r: (GRAVITY.index(r["verdict"]), -(r["probability"] or 0.0)))
     return rows
 

@@ -9,6 +9,11 @@ chart is off the list until the date. Both are lines of config/acknowledgements.
 
 import argparse
 
+OPEN = """
+    select 1 from alarms
+    where closed_at_utc is null and turnout_id = $1 and section_id = coalesce($2, section_id)
+        and band = coalesce($3, band) and raised_at_utc <= $4
+    limit 1"""
 HELP = "say that an alarm has been seen, or silence it until a date"
 
 
@@ -20,6 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--reason", required=True, help="why")
     parser.add_argument("--suppress-until", metavar="DATE", default="", help="silence it until then, YYYY-MM-DD")
     parser.add_argument("--at", default="", help="when it was said, UTC; now if not given")
+    parser.add_argument("--registry", default="results/registry", help="where open alarms are looked up (%(default)s)")
     parser.add_argument("--configuration", default="config", help="folder of the configuration (%(default)s)")
 
 
@@ -49,4 +55,19 @@ def run(args: argparse.Namespace) -> int:
         if acknowledgement(cells) not in after.acknowledgements:
             raise ConfigErrors(after.warnings)
     print(f"{path}: {action} {args.place} {args.band or 'both resonances'}. It counts from the next run.")
+    if action == "acknowledge" and _no_alarm(args.registry, acknowledgement(cells)):
+        print(f"Note: no alarm is open there in {args.registry} that was raised by then: nothing on the list changes.")
     return 0
+
+
+def _no_alarm(registry, row):
+    """Whether there is a registry, and no open alarm in it of which the row of ``acknowledgements`` speaks."""
+    from pathlib import Path
+
+    from turnout.registry.database import DATABASE, open_registry
+
+    if not (Path(registry) / DATABASE).exists():
+        return False
+    with open_registry(registry) as con:
+        asked = [row[name] for name in ("turnout_id", "section_id", "band", "at_utc")]
+        return not con.execute(OPEN, asked).fetchall()

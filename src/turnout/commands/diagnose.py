@@ -5,8 +5,9 @@
   turnout diagnose --turnout tommerup_s1 --accept
 
 The newest visit is diagnosed, neighbouring sections together, and a page is written. An interrupted diagnosis, or one
-whose budget is spent, goes on where it stopped. --accept writes the term that was named into the turnout's track
-file, from then on the simulation contains it; nothing is diagnosed again for that.
+whose budget is spent, goes on where it stopped; the groups that are done have their findings by then. --accept writes
+the term that was named into the turnout's track file, from then on the simulation contains it; nothing is diagnosed
+again for that.
 """
 
 HELP = "say what the simulation of a turnout leaves out"
@@ -35,21 +36,32 @@ def add_arguments(parser):
 
 def run(args):
     """Diagnose and print, or accept what was found."""
-    import json
-
     from turnout.chains.mismatch_results import Results
 
     results = Results(args.work, args.turnout, args.registry)
     if args.accept:
         return _accept(args, results)
-    rows = _diagnosed(args)
-    results.keep(rows)
+    from turnout.chains.guided_case import BudgetSpentError
+
+    try:
+        _show(args, results, _diagnosed(args))
+    except BudgetSpentError as spent:
+        if spent.done:  # an older result of all groups is worth more than none of any
+            _show(args, results, spent.rows)
+        raise
+    return 0
+
+
+def _show(args, results, rows):
+    """Keep, draw and print the rows."""
+    import json
+
     from turnout.report.findings import write_own_page
 
+    results.keep(rows)
     page = write_own_page(rows, args.config, args.turnout, args.pages)
     print(json.dumps(rows["mismatch_findings"], default=str, indent=1) if args.json else _words(rows))
     print(f"page: {page}")
-    return 0
 
 
 def _diagnosed(args):

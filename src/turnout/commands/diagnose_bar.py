@@ -4,6 +4,7 @@ import sys
 import time
 
 PAUSE = 20.0  # s between two lines in a log
+USUAL = "neighbouring sections together; a group takes a minute to ten, more with many axles"
 
 
 class DiagnoseBar:
@@ -13,6 +14,7 @@ class DiagnoseBar:
         self.stream = stream or sys.stderr
         self.bar = None
         self.said, self.next_line, self.what = "", time.monotonic() + PAUSE, ""
+        self.began = None
 
     def __enter__(self):
         if self.stream.isatty():
@@ -28,6 +30,7 @@ class DiagnoseBar:
 
     def group(self, group, number, count):
         """Called when a group begins; returns the callable for its joint fits."""
+        self._plan(number, count)
         self.said = f"{'+'.join(group.labels)} ({number + 1} of {count})"
         self.what = "base fit"
         if self.bar is not None:
@@ -41,6 +44,18 @@ class DiagnoseBar:
                 self.bar.update(done - self.bar.n)
 
         return fits
+
+    def _plan(self, number, count):
+        """How much there is to do, then how far it is: whoever has little time must know before."""
+        if self.began is None:
+            self.began = time.monotonic()
+            text = f"{count} {'group' if count == 1 else 'groups'}: {USUAL}"
+        else:
+            text = f"{number} of {count} groups done, {(time.monotonic() - self.began) / 60.0:.1f} minutes so far"
+        if self.bar is not None:
+            self.bar.write(text, file=self.stream)
+        else:
+            print(text, file=self.stream, flush=True)
 
     def simulations(self, count):
         """Called at every prediction."""

@@ -37,21 +37,22 @@ def run(args: argparse.Namespace) -> int:
     with open_registry(args.registry) as con:
         for name in args.only or USUAL:
             try:
-                n = _write(con, name, folder, args.format)
+                path, n = _write(con, name, folder, args.format)
             except duckdb.CatalogException:
                 raise RegistryError(f"no table or view {name!r}. 'turnout query --list' names them.") from None
-            print(f"{folder / name}: {n} rows")
+            print(f"{path}: {n} rows")
     return 0
 
 
-def _write(con, name, folder, form) -> int:
-    """One table or view; a Delta table is replaced by a new version, the others by a new file."""
+def _write(con, name, folder, form):
+    """Where one table or view went, and its rows; a Delta table is replaced by a new version, others by a new file."""
     quoted = '"' + name.replace('"', '""') + '"'
     if form == "delta":
-        return _delta(con, quoted, folder / name)
-    path = str(folder / f"{name}.{form}").replace("'", "''")
+        return folder / name, _delta(con, quoted, folder / name)
+    path = folder / f"{name}.{form}"
+    written = str(path).replace("'", "''")
     options = "format parquet, compression zstd" if form == "parquet" else "format csv, header"
-    return con.execute(f"copy (select * from {quoted}) to '{path}' ({options})").fetchall()[0][0]
+    return path, con.execute(f"copy (select * from {quoted}) to '{written}' ({options})").fetchall()[0][0]
 
 
 def _delta(con, quoted, path) -> int:

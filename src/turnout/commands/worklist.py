@@ -50,13 +50,13 @@ def run(args: argparse.Namespace) -> int:
 
 def as_text(rows, n_charts=0, n_silenced=0, n_unmeasured=0, newest=None) -> str:
     """The list for a terminal: one paragraph per row, what it leaves out, and on what it rests."""
-    if not n_charts:
-        return "No chart has been computed yet: the list comes with the first trend of the pipeline."
     text = [_paragraph(row) for row in rows]
-    if not rows:
+    if not rows and n_charts:
         text = ["Nothing to do: no chart in alarm, none that drifts, none that cannot tell."]
     if rows and rows[0]["n_in_all"] > len(rows):
         text.append(f"... and {rows[0]['n_in_all'] - len(rows)} more: turnout worklist --all")
+    if not n_charts:
+        return "\n".join([*text, "No chart has been computed yet: alarms and plans come with the first trend."])
     if newest is None:  # a list of another day: what is silenced or not measured is said of today alone
         return "\n".join(text)
     left = [(n_silenced, "silenced by somebody"), (n_unmeasured, "not measured for too long")]

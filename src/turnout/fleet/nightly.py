@@ -6,27 +6,33 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Collection, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+import duckdb
 from filelock import FileLock, Timeout
 
-from turnout.errors import TurnoutError
+from turnout.errors import RegistryError, TurnoutError
 from turnout.fleet.plan import is_cut_plan, read_plan
 from turnout.fleet.scan import unit_id
 from turnout.fleet.state import load_state, states_below
+from turnout.registry.database import open_registry
 
 JOB_NAMES = "turnouts"
 TOO_LATE = 124
+WORST = 3
+LOOK = 'turnout query "from quarantine_open" and "from rejected"'
 GENERATION = Path("results/registry/_generation.json")
 PUBLISHING = ("all", "register", "verdict", "trend", "report")
 
 
 @dataclass(frozen=True)
 class Night:
-    """What a run did; ``code`` is 0 only where all went well."""
+    """What a run did; ``code`` is 0 only where all went well. ``worst`` are the turnouts of which most was not used,
+    with the number of units."""
 
     code: int
     units: int
@@ -34,12 +40,17 @@ class Night:
     quarantined: int
     vanished: int
     published: bool = True
+    rejected: int = 0
+    worst: tuple[tuple[str, int], ...] = ()
 
     def __str__(self):
         said = {0: "sound", TOO_LATE: "stopped at the time limit"}.get(self.code, f"failed with exit code {self.code}")
         return (
             f"{said}: {self.units} units known, {self.processed} processed, "
-            f"{self.quarantined} of these with rows in quarantine, {self.vanished} vanished"
+            f"{self.quarantined} of these with rows in quarantine, "
+            + (f"{self.rejected} hammer test{'s' * (self.rejected > 1)} rejected, " if self.rejected else "")
+            + f"{self.vanished} vanished"
+            + (f"; worst: {', '.join(f'{t} ({n})' for t, n in self.worst)}, see {LOOK}" if self.worst else "")
             + ("" if self.published else "; the registry was not published")
         )
 
@@ -49,8 +60,9 @@ def nightly(options: Sequence[str], profile: str, limit: float | None = None, wo
 
     ``profile`` is a folder of profiles/; ``limit`` [s] ends a run that hangs. Where jobs die, what the others have
     computed is published without theirs. A signal that ends this process ends Snakemake first. TurnoutError where
-    another run is still going on.
+    there is no such profile, or another run is still going on.
     """
+    _refuse_no_profile(Path(profile))
     work.mkdir(exist_ok=True)
     lock = FileLock(work / ".nightly.lock")
     try:
@@ -63,6 +75,15 @@ def nightly(options: Sequence[str], profile: str, limit: float | None = None, wo
     except Timeout:
         found = f"{work / '.nightly.lock'} is held: another nightly run is going on"
         raise TurnoutError(f"{found}. Wait for it, or end it.") from None
+
+
+def _refuse_no_profile(profile: Path) -> None:
+    """TurnoutError before anything begins: Snakemake would only ask for cores."""
+    if not any(profile.glob("config*.yaml")):
+        there = sorted(str(p.parent) for p in profile.parent.glob("*/config*.yaml"))
+        found = "holds no config.yaml" if profile.is_dir() else "there is no such folder"
+        remedy = f"Give one of {', '.join(there)}" if there else "Run it in the folder of the Snakefile"
+        raise TurnoutError(f"{profile}, the profile: {found}. {remedy}.")
 
 
 @contextmanager
@@ -157,14 +178,32 @@ def _batches(work: Path) -> set[tuple[Path, str]]:
 def _night(code: int, before: set, work: Path) -> Night:
     plans = [plan for plan in sorted((work / "plan").glob("*.json")) if not is_cut_plan(plan)]
     planned = {unit_id(p.unit) for plan in plans for p in read_plan(plan)}
-    units = processed = quarantined = vanished = 0
+    units = vanished = 0
+    processed, quarantined = [], []
     for path in states_below(work):
         for name, known in load_state(path).units.items():
             units += 1
             vanished += name not in planned
             if (path, known.batch) not in before:
-                processed += 1
-                quarantined += known.status not in ("ok", "vanished")
+                processed.append(name)
+                quarantined += [name] if known.status not in ("ok", "vanished") else []
     newest = max(map(_changed_at, states_below(work)), default=0)
     published = code == 0 or 0 < newest <= _changed_at(GENERATION)
-    return Night(code, units, processed, quarantined, vanished, published)
+    rejected = _rejected(processed)
+    by_turnout = Counter(name.partition("/")[0] for name in {*quarantined, *rejected})
+    worst = sorted(by_turnout.items(), key=lambda item: (-item[1], item[0]))[:WORST]
+    counts = len(processed), len(quarantined), vanished
+    return Night(code, units, *counts, published, len(rejected), tuple(worst))
+
+
+def _rejected(processed: Collection[str]) -> list[str]:
+    """Those of the units whose hammer test gave no model, as far as the registry has them."""
+    if not processed or not GENERATION.exists():
+        return []
+    unit = "turnout_id || '/hammer/' || split_part(section_id, '/', -1) || '/' || split_part(campaign_id, '/', -1)"
+    sql = f"select {unit} as unit from models_current where status = 'rejected' and unit in (select unnest(?))"
+    try:
+        with open_registry(GENERATION.parent) as connection:
+            return [row[0] for row in connection.execute(sql, [list(processed)]).fetchall()]
+    except (RegistryError, duckdb.Error):  # the line of a night that failed must come all the same
+        return []

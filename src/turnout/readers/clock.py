@@ -98,6 +98,17 @@ def check_time(time, where, source):
         )
 
 
+def _refuse_another(unclear, promised, source):
+    """ReadError where a file names frequencies in words that nobody understood, none of them the promised rate."""
+    if unclear and all(abs(frequency - promised) > 1e-3 * promised for _, frequency in unclear):
+        line = unclear[0][0][:60]
+        found = f"{line!r} may be a sampling rate, and the layout's is {promised:.9g} Hz"
+        remedy = (
+            f"Correct the rate in the layout; if that line means something else, write 'rate: {promised:.9g}' above it"
+        )
+        raise source.error("the head", found, remedy, reason="wrong_rate")
+
+
 def settled_rate(record, promised, where, source):
     """The promised rate if the file's agrees with it to the file's precision, the file's where none is promised.
 
@@ -113,6 +124,7 @@ def settled_rate(record, promised, where, source):
             raise source.error(
                 where, "neither the file nor the layout says the sampling rate", remedy, reason="wrong_rate"
             )
+        _refuse_another(record.unclear, promised, source)
         return float(promised)
     if not isfinite(rate) or rate <= 0:
         raise source.error(where, f"the sampling rate is {rate!r} Hz", reason="wrong_rate")

@@ -1,9 +1,11 @@
 """Text with separated columns: a head of ``name: value`` lines, a line of names, then numbers.
 
 What is recognised: separators comma, semicolon, tab; a decimal comma where the separator is not a comma; head lines
-with or without ``#``: ``rate`` (or ``fs``, ``sample rate [Hz]`` ...) or ``dt`` [s], ``started_at``, ``n_records``,
-``n_samples``, conditions; units in brackets behind the names ("force [N]", "force (N)") or in a line of their own; a
-column of time (``time_column``); a column ``record`` that numbers the records. Without names channels are "0", "1" ...
+with or without ``#``: ``rate`` (or ``fs``, ``sample rate [Hz]``, ``Abtastrate`` ...) or ``dt`` [s], ``started_at``,
+``n_records``, ``n_samples``, conditions; a line that says another frequency than the layout's rate, in words that are
+not known, is an error unless they are those of a filter; units in brackets behind the names ("force [N]", "force
+(N)") or in a line of their own; a column of time (``time_column``); a column ``record`` that numbers the records.
+Without names channels are "0", "1" ...
 
 The text is UTF-8, UTF-16 with its mark, or, where a line of the head is neither, Windows-1252.
 
@@ -12,7 +14,6 @@ The last line must end with a line break: without it nobody can tell a cut numbe
 
 import codecs
 import io
-import re
 from itertools import pairwise
 
 import numpy as np
@@ -20,17 +21,13 @@ import pyarrow as pa
 from pyarrow import csv
 
 from turnout.readers.clock import PART
+from turnout.readers.csv_head import head_of
 from turnout.readers.precision import TEXT
 from turnout.readers.raw import COPY_AGAIN, RawFile, RawRecord
 from turnout.readers.stamps import moment
 from turnout.readers.stored import Column
 from turnout.readers.time_column import seconds_per_number, time_column
-from turnout.readers.variables import COUNT, RATE, START, STEP, Facts
-
-NOTE = re.compile(r"^#?\s*([A-Za-z_][\w .]*?)\s*([\[(][^\])]*[\])])?\s*[:=,;\t]\s*(.*)$")
-NAME_WITH_UNIT = re.compile(r"^(.*?)\s*[\[(]([^\[\]]*)[\])]$")
-SCALES = {"kHz": 1e3, "khz": 1e3, "MHz": 1e6, "ms": 1e-3, "µs": 1e-6, "\u03bcs": 1e-6, "us": 1e-6}
-NOTES = {*RATE, *STEP, *START, *COUNT, "n_samples"}
+from turnout.readers.variables import COUNT, START, Facts
 
 
 def read_raw(source) -> RawFile:
@@ -44,12 +41,12 @@ def read_raw(source) -> RawFile:
         raise source.error(
             f"line {line}", found, f"{COPY_AGAIN}, or add the line break if it is whole", reason="truncated"
         )
-    head, names, units, at, separator = _head(data, source)
+    head, names, units, at, separator, unclear = head_of(data, source)
     read = _staying if stay and "record" not in [name.strip().lower() for name in names] else _table
     time = time_column(names, units)
     columns = read(source, data, at, separator, names, time)
     facts = Facts(head, source)
-    records = tuple(_records(columns, names, units, time, facts, source))
+    records = tuple(_records(columns, names, units, time, facts, source, unclear))
     return RawFile(records, facts.count(COUNT))
 
 
@@ -57,84 +54,6 @@ def _in_utf8(source):
     """The text of a file that a spreadsheet saved as "Unicode", in UTF-8."""
     with source.parsed_by("Python", "the text in UTF-16"):
         return source.data.decode("utf-16").encode()
-
-
-def _line_of(data):
-    """One line as text: UTF-8, or what older loggers of the west write."""
-    try:
-        return data.decode("utf-8-sig").strip("\r\n")
-    except UnicodeDecodeError:
-        return data.decode("cp1252", "replace").strip("\r\n")
-
-
-def _head(data, source):
-    """(notes, names, units, offset of the first number, separator)."""
-    notes: dict[str, float | str] = {}
-    before: list[str] = []
-    position = 0
-    while position < len(data):
-        end = data.find(b"\n", position)
-        end = len(data) if end < 0 else end
-        line = _line_of(data[position:end])
-        # a comma is the decimal mark where another separator stands
-        separator = next((s for s in ("\t", ";") if s in line), ",")
-        cells = _cells(line, separator)
-        if line.strip() and all(_is_number(cell) or cell == "" for cell in cells) and any(cells):
-            names, units = _names([_cells(text, separator) for text in before], cells)
-            return notes, names, units, position, separator
-        match = NOTE.match(line.strip())
-        name = match[1].strip() if match else ""
-        plain = name.lower().replace(" ", "_")
-        if match and (line.startswith("#") or plain in NOTES):
-            value = match[3].strip(separator + " ")
-            notes[plain if plain in NOTES else name] = _value(f"{value} {match[2]}" if match[2] else value)
-        elif line.strip():
-            before.append(line)
-        position = end + 1
-    if len(before) < 2:
-        raise source.error("line 1", "no line of numbers follows", COPY_AGAIN, reason="empty")
-    said = f"no line of numbers; the last line reads {before[-1][:60]!r}"
-    raise source.error("the file", said, "Export numbers between semicolons, tabs or commas, the time in seconds")
-
-
-def _cells(line, separator):
-    return [cell.strip().strip('"') for cell in line.split(separator)]
-
-
-def _is_number(cell):
-    try:
-        float(cell.replace(",", "."))
-    except ValueError:
-        return False
-    return True
-
-
-def _value(text):
-    """A number where the text begins with one ("51200 Hz", "12,8 kHz"), in Hz or s, else the text."""
-    first, *rest = text.split() or [""]
-    dated = "-" in first[1:].lower().replace("e-", "")
-    if not first or not _is_number(first) or dated:
-        return text
-    return float(first.replace(",", ".")) * SCALES.get(rest[0].strip("[]()") if rest else "", 1.0)
-
-
-def _names(lines, cells):
-    """(names, units) out of the lines between head and the first numbers ``cells``: names, and perhaps units.
-
-    A separator behind the last number, as in "1;2;", makes a column without a name.
-    """
-    count, open_end = len(cells), not cells[-1]
-    lines = [line + [""] * open_end for line in lines if len(line) >= count - open_end]
-    if not lines:
-        names = [str(i) for i in range(count)]
-        return [*names[:-1], ""] if open_end and count > 1 else names, [""] * count
-    names, units = lines[0][:count], [""] * count
-    if len(lines) > 1:
-        units = [cell.strip("[]() ") for cell in lines[1][:count]]
-    for i, name in enumerate(names):
-        if match := NAME_WITH_UNIT.match(name):
-            names[i], units[i] = match[1], match[2]
-    return names, units
 
 
 def _table(source, data, at, separator, names, time):
@@ -213,7 +132,7 @@ def _options(data, at, separator, width):
     return {"read_options": reading, "parse_options": parsing, "convert_options": converting}
 
 
-def _records(columns, names, units, time, facts, source):
+def _records(columns, names, units, time, facts, source, unclear):
     """The records: all rows, or one per number in the column ``record``."""
     lower = [name.strip().lower() for name in names]
     number = columns[lower.index("record")] if "record" in lower else None
@@ -243,6 +162,7 @@ def _records(columns, names, units, time, facts, source):
             started_at=moment(start),
             conditions=facts.conditions(k, n),
             time=None if seconds is None else seconds[a:b],
+            unclear=unclear,
         )
 
 

@@ -28,8 +28,8 @@ def load(path, root) -> Source:
         with resolved.open("rb") as file:
             head, size = file.read(HEAD), os.fstat(file.fileno()).st_size
     except (FileNotFoundError, NotADirectoryError) as error:
-        again = "Start again when the file is back, or plan anew without it"
-        raise ReadError(name, "the path", "there is no such file any more", again, reason="vanished") from error
+        again = "Correct the path; if it was there before, start again when it is back, or plan anew without it"
+        raise ReadError(name, "the path", "there is no such file", again, reason="vanished") from error
     except OSError as error:
         found = f"the file cannot be opened ({error.strerror})"
         raise ReadError(name, "the path", found, "Correct its permissions or copy it again") from error

@@ -106,7 +106,8 @@ class RawRecord:
     ``samples`` holds one (n_sample,) array or ``Column`` per name, in ``units`` ("" where the file does not say).
     ``rate`` [Hz] is None where the file does not say; ``rate_tolerance`` is the relative precision with which
     its format can state it. ``started_at`` is aware where the format says the zone, naive where it does not.
-    ``time`` [s] is the file's own time column, ``aliases`` are further names by which a channel may be asked for.
+    ``time`` [s] is the file's own time column, ``aliases`` are further names by which a channel may be asked for,
+    ``unclear`` are lines that name a frequency [Hz] in words that nobody understood.
     """
 
     names: tuple[str, ...]
@@ -118,6 +119,7 @@ class RawRecord:
     conditions: Mapping = field(default_factory=lambda: NOTHING)
     time: np.ndarray | None = None
     aliases: tuple[tuple[str, ...], ...] = ()
+    unclear: tuple[tuple[str, float], ...] = ()
 
     def __post_init__(self):
         object.__setattr__(self, "units", tuple(self.units) or ("",) * len(self.names))

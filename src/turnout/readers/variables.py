@@ -28,7 +28,13 @@ from turnout.readers.raw import CONDITIONS, RawFile, RawRecord
 from turnout.readers.stamps import moment
 from turnout.readers.stored import ARRAYS
 
-RATE = ("rate", "fs", "f_s", "rate_hz", "fs_hz", "sample_rate", "samplerate", "sampling_rate", "sampling_frequency")
+RATE = (
+    "rate", "fs", "f_s", "rate_hz", "fs_hz", "sample_rate", "samplerate", "samplingrate", "sampling_rate",
+    "sample_frequency", "sampling_frequency", "abtastrate", "abtastfrequenz", "samplingsfrekvens", "samplingfrekvens",
+    "samplingsrate", "frequence_d_echantillonnage", "taux_d_echantillonnage", "cadence_d_echantillonnage",
+    "frecuencia_de_muestreo", "tasa_de_muestreo", "velocidad_de_muestreo", "frequenza_di_campionamento",
+    "velocita_di_campionamento",
+)  # fmt: skip
 STEP = ("dt", "delta_t", "sample_interval", "wf_increment")
 TIME = ("time", "t", "time_s")
 NAMES = ("channels", "channel_names", "names", "labels")

@@ -7,6 +7,8 @@ from turnout.records import Rejection
 
 # The end of a record is judged over a period of the slowest mode.
 TAIL = 0.01
+# Several further contacts, one nearly as hard as the first and this late [ms], may be quick blows of a machine.
+AS_HARD, AS_LATE = 0.7, 60.0
 
 
 def judge_second_contact(cut, settings):
@@ -27,6 +29,8 @@ def judge_second_contact(cut, settings):
     words = (
         f"further contacts: {len(further)}, the largest {largest.share:.3f} of the first and {delay:+.1f} ms from it"
     )
+    if len(further) > 1 and largest.share > AS_HARD and abs(delay) > AS_LATE:
+        words += "; where each is a blow of its own, set receptance.separation below the time between them"
     last = max(cut.contact.end, *(c.end for c in further))
     remaining = _remaining(cut, last + 1 + round(settings.decay_gap * cut.rate), settings)
     end = min(c.onset for c in further) - round(settings.decay_gap * cut.rate)

@@ -60,6 +60,7 @@ def find_impacts(
     judge_repeats(sound)
     for cut in sound:
         _measure(cut, settings)
+    _judge_scale(sound, settings.softest_blow)
     pulses = [c.force[c.contact.onset : c.contact.end + 1] for c in sound]
     for cut, edge in zip(sound, _edges(sound, pulses)):
         cut.band_edge = edge
@@ -99,6 +100,18 @@ def _measure(cut, settings):
         cut.rejections.append(found)
     judge_second_contact(cut, settings)
     judge_decay(cut, settings)
+
+
+def _judge_scale(cuts, softest):
+    """Reject a test whose blows are too soft for any hammer on a track; a single soft one is weak, not out of scale."""
+    peaks = [abs(c.contact.peak) for c in cuts]
+    median = float(np.median(peaks)) if cuts else np.inf
+    if median >= softest:
+        return
+    for cut, peak in zip(cuts, peaks):
+        cut.rejections.insert(0, Rejection("out_of_scale", peak, softest, (
+            f"{peak:.4g} N, the test's median is {median:.4g} N: no hammer is so soft on a track, its unit or scale "
+            "is wrong (kN read as N?); for a small hammer set receptance.softest_blow")))  # fmt: skip
 
 
 def _judge_start(cut, settings):

@@ -40,8 +40,11 @@ class Axis:
             return [(k, escape(name)) for k, name in enumerate(self.names, start=1)]
         if self.scale == "time":
             return [(t, say_day(t)) for t in time_ticks(self.low, self.high)]
-        values = log_ticks(self.low, self.high) if self.scale == "log" else linear_ticks(self.low, self.high)
-        return [(v, say_number(v)) for v in values]
+        if self.scale == "log":
+            return [(v, say_number(v)) for v in log_ticks(self.low, self.high)]
+        values = linear_ticks(self.low, self.high)
+        step = values[1] - values[0] if len(values) > 1 else None
+        return [(v, say_number(v, step)) for v in values]
 
 
 @dataclass

@@ -85,6 +85,11 @@ class FleetSource:
         """Tomorrow's list, empty before the first trend."""
         return self._fetch("select * from worklist(:today) order by rank") if self.has("worklist") else []
 
+    def listed(self):
+        """How many rows of each state the whole list has."""
+        sql = f"select state, count(*) as n from {whole_list(':today')} group by state"
+        return {row["state"]: row["n"] for row in self._fetch(sql)} if self.has("worklist") else {}
+
     def has(self, kind):
         """Whether the registry has rows of ``kind``: those of the trend come with its first run."""
         return kind not in TREND_VIEWS or kind in self.there

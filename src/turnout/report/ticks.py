@@ -21,7 +21,8 @@ def linear_ticks(low, high, about=5):
     step = min((s * magnitude for s in (1, 2, 5, 10)), key=lambda s: abs(s - raw))
     first = math.ceil(low / step - 1e-9)
     last = math.floor(high / step + 1e-9)
-    return [round(k * step, 12) for k in range(first, last + 1)]
+    decimals = max(12, 3 - math.floor(math.log10(step)))
+    return [round(k * step, decimals) for k in range(first, last + 1)]
 
 
 def log_ticks(low, high):
@@ -57,20 +58,23 @@ def time_ticks(low, high, about=6):
     return ticks
 
 
-def say_number(value):
-    """A tick's number, as short as it can be.
+def say_number(value, step=None):
+    """A tick's number, as short as it can be, with the digits that tell it from the next one, ``step`` away.
 
     >>> say_number(0.2), say_number(1500.0), say_number(1e-9), say_number(0.0)
     ('0.2', '1500', '10⁻⁹', '0')
+    >>> say_number(530.00002, step=1e-5)
+    '530.00002'
     """
     if value == 0:
         return "0"
     exponent = math.floor(math.log10(abs(value)) + 1e-12)
+    needed = exponent - math.floor(math.log10(step) + 1e-12) + 1 if step else 0
     if -4 <= exponent <= 4:
-        return f"{value:.6g}"
+        return f"{value:.{max(6, needed)}g}"
     mantissa = value / 10.0**exponent
     power = "10" + str(exponent).translate(SUPERSCRIPTS)
-    return power if abs(mantissa - 1) < 1e-9 else f"{mantissa:.3g}·{power}"
+    return power if abs(mantissa - 1) < 1e-9 and needed <= 3 else f"{mantissa:.{max(3, needed)}g}·{power}"
 
 
 def say_day(seconds):

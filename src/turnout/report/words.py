@@ -1,5 +1,6 @@
 """Numbers and states as people read them: never a number without its interval and its n."""
 
+import math
 from functools import cache
 
 from scipy.stats import t as student
@@ -26,10 +27,12 @@ def student_quantile(n):
 
 
 def with_interval(value, standard_error, n, digits=1):
-    """A value with the half width of its 95 % t interval.
+    """A value with the half width of its 95 % t interval, which has one significant digit at least.
 
     >>> with_interval(154.55, 0.4, 30)
     '154.6 ± 0.8'
+    >>> with_interval(154.55, 0.004, 30)
+    '154.550 ± 0.008'
     >>> with_interval(0.19321, None, 1, 3)
     '0.193 ± ?'
     >>> with_interval(None, None, 0)
@@ -37,9 +40,12 @@ def with_interval(value, standard_error, n, digits=1):
     """
     if value is None:
         return "none"
-    if standard_error is None or n < 2:
+    if not standard_error or n < 2:  # one of nothing was smaller than the registry's resolution
         return f"{value:.{digits}f} ± ?"
-    return f"{value:.{digits}f} ± {student_quantile(n) * standard_error:.{digits}f}"
+    half = student_quantile(n) * standard_error
+    if 2.0 * half < 10.0**-digits:
+        digits = -math.floor(math.log10(half))
+    return f"{value:.{digits}f} ± {half:.{digits}f}"
 
 
 def day(when):

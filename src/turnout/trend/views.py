@@ -11,7 +11,7 @@ from turnout.trend.rows import arrow_rows
 NAMES = (
     "epochs", "resonance_drift",
     "passage_values", "chart_values", "mode_residuals", "cusum", "change_since_event", "maintenance_effect",
-    "chart_status_at", "cannot_see", "time_to_threshold", "chart_states", "worklist",
+    "chart_status_at", "unusable", "cannot_see", "time_to_threshold", "chart_states", "worklist",
 )  # fmt: skip
 
 
@@ -29,8 +29,9 @@ def connect_views(frames, newest, rounded=True) -> duckdb.DuckDBPyConnection:
             con.register(table, pa.Table.from_pylist([], schema=arrow_schema(table)))
     stamp = timestamps(days([newest]))[0]
     con.execute(f"create macro newest_measurement() as timestamp '{stamp}'")
-    for table in ("modes", "passages", "passage_fits"):
+    for table in ("models", "modes", "impacts", "passages", "passage_fits"):
         con.execute(f"create view {table}_current as select * from {table}")
+    con.execute("create view quarantine_open as select * from quarantine")
     for name in view_files():
         if name in NAMES:
             con.execute(view_files()[name])

@@ -135,18 +135,33 @@ def test_a_file_of_another_day_is_used_and_said(tmp_path):
     assert len(rows["impacts"]) == 30 and rows["models"][0]["measured_at_utc"] == datetime(2024, 5, 13, 9)
 
 
-def test_a_force_that_no_hammer_has_is_named(tmp_path):
-    """Newtons that were exported as kilonewtons."""
+@pytest.mark.parametrize("factor", [1e3, 1e-3])
+def test_a_force_that_no_hammer_has_is_named(tmp_path, factor):
+    """Newtons that are called kilonewtons, and kilonewtons that are called newtons."""
 
     def change(_, recordings):
         return [
-            replace(r, samples=r.samples * [[1e3 if c.quantity == "force" else 1.0] for c in r.channels])
+            replace(r, samples=r.samples * [[factor if c.quantity == "force" else 1.0] for c in r.channels])
             for r in recordings
         ]
 
     unit, turnout, _ = lay_out(tmp_path, "A7", n_test=1, change=change)
     rows = hammer_unit(unit, turnout, tmp_path, algo="1")
     assert {i["reason"] for i in rows["impacts"]} == {"out_of_scale"} and rows["models"][0]["status"] == "rejected"
+    assert all("scale" in i["detail"] for i in rows["impacts"])
+
+
+def test_a_small_hammer_is_believed_where_the_configuration_says_so(tmp_path):
+    def change(_, recordings):
+        return [
+            replace(r, samples=r.samples * [[1e-3 if c.quantity == "force" else 1.0] for c in r.channels])
+            for r in recordings
+        ]
+
+    unit, turnout, _ = lay_out(tmp_path, "A7", n_test=1, change=change)
+    settings = {**turnout.settings, "receptance": replace(turnout.settings["receptance"], softest_blow=0.0)}
+    rows = hammer_unit(unit, replace(turnout, settings=settings), tmp_path, algo="1")
+    assert rows["models"][0]["status"] == "accepted"
 
 
 def test_a_reversed_force_is_named(tmp_path):

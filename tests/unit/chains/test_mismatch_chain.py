@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import small_turnout as small
 
-from turnout.chains import mismatch
+from turnout.chains import mismatch, mismatch_groups
 from turnout.chains.accept import accept
 from turnout.chains.guided_case import BudgetSpentError
 from turnout.chains.mismatch_context import track_of
@@ -137,6 +137,21 @@ def test_a_spent_budget_keeps_what_is_done(soft):
     assert whole.groups == [(("A", "B"), 0, 1)] and whole.fits[-1][0] == whole.fits[-1][1] and whole.count > 3
     second = diagnose_turnout("t1", bar=again)
     assert second["mismatch_findings"] == first["mismatch_findings"] and not again.fits
+
+
+def test_a_spent_budget_shows_the_groups_that_are_done(soft, monkeypatch, capsys):
+    """Two groups, of which the first was finished before."""
+    monkeypatch.setattr(mismatch_groups, "GAP", 0.1)
+    assert main(["diagnose", "--turnout", "t1", "--budget", "0"]) == 2
+    assert "0 of 2 groups done" in capsys.readouterr().err and not (soft / "results").exists()
+    (first,) = diagnose_turnout("t1", sections=("A",))["mismatch_findings"]
+    assert main(["diagnose", "--turnout", "t1", "--budget", "0"]) == 2
+    told = capsys.readouterr()
+    assert first["sentence"] in told.out and "nothing can be said of sections B: the time given was up" in told.out
+    assert "1 of 2 groups done; the same command goes on from there" in told.err
+    assert "2 groups: neighbouring sections together; a group takes a minute to ten" in told.err
+    page = (soft / "results/pages/findings/t1.html").read_text()
+    assert "with 1 of 2 groups done" in page
 
 
 def test_small_budgets_one_after_the_other_reach_the_same_end(soft):

@@ -14,6 +14,13 @@ from turnout.fleet import nightly as module
 from turnout.fleet.nightly import TOO_LATE, Night, nightly
 
 
+@pytest.fixture(autouse=True)
+def profiles(tmp_path):
+    for name in ("profiles/default", "profiles/slurm", "p"):
+        (tmp_path / name).mkdir(parents=True)
+        (tmp_path / name / "config.yaml").write_text("cores: 1\n")
+
+
 def test_two_at_once_are_one_too_many(tmp_path):
     with FileLock(tmp_path / ".nightly.lock"), pytest.raises(TurnoutError, match="another nightly run is going on"):
         nightly([], "profiles/default", work=tmp_path)
@@ -86,6 +93,43 @@ def test_remains_of_a_killed_run_are_cleared(tmp_path, monkeypatch):
         (tmp_path / ".snakemake" / name).mkdir(parents=True)
     assert nightly([], "profiles/default", work=tmp_path / "work").code == 0
     assert list((tmp_path / ".snakemake").iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("profile", "there"), [("nosuch", "p"), ("profiles/nosuch", "profiles/default, profiles/slurm")]
+)
+def test_a_profile_that_is_not_there_is_said_before_anything_begins(tmp_path, monkeypatch, profile, there):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(TurnoutError, match=f"{profile}, the profile: there is no such folder. Give one of {there}"):
+        nightly([], profile)
+    assert not (tmp_path / "work").exists()
+
+
+def test_the_three_turnouts_of_which_most_was_not_used_are_named(tmp_path, monkeypatch):
+    """Quarantine from the states, rejected tests from the registry; the units of one turnout come from both."""
+    from turnout.fleet.batches import UnitResult, read_results, write_batch
+    from turnout.registry.register import register
+
+    monkeypatch.chdir(tmp_path)
+    rejected = {
+        "model_id": "0" * 32, "turnout_id": "t4", "section_id": "t4/A", "campaign_id": "t4/2026-01-05",
+        "measured_at_utc": "2026-01-05T10:00:00", "method": "joint", "status": "rejected", "code_version": "1",
+        "config_hash": "c",
+    }  # fmt: skip
+    (tmp_path / "batches").mkdir()
+    result = UnitResult("t4/hammer/A/2026-01-05", "t4", "hammer", "k", "1", "ok", {"models": [rejected]})
+    register([write_batch(tmp_path / "batches", [result])], tmp_path / "results/registry", read=read_results)
+    bad = {"t1": 1, "t2": 3, "t3": 0, "t4": 1, "t5": 2}
+    known = {f"{t}/hammer/B/{k}": "quarantined" for t, n in bad.items() for k in range(n)}
+    known |= {"t4/hammer/A/2026-01-05": "ok", "t3/hammer/A/1": "ok"}
+    (tmp_path / "snakemake.py").write_text(
+        "from pathlib import Path\nfrom turnout.fleet.state import Known, State\n"
+        f"known = {{u: Known('', '', '1', s, 'b') for u, s in {known!r}.items()}}\n"
+        "State(known, ['b']).save(Path('work/hammer/00of01.json'))\n"
+    )
+    said = str(nightly([], "p"))
+    assert "9 processed, 7 of these with rows in quarantine, 1 hammer test rejected" in said and "\n" not in said
+    assert 'worst: t2 (3), t4 (2), t5 (2), see turnout query "from quarantine_open" and "from rejected"' in said
 
 
 def test_it_is_said_in_one_line():

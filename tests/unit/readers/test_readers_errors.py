@@ -68,7 +68,10 @@ def test_a_link_in_a_circle_is_refused(tmp_path, in_si):
 def test_a_vanished_file(tmp_path, in_si):
     error = refusal("A7_1.uff", tmp_path, in_si)
     assert error.reason == "vanished"
-    found = "there is no such file any more. Start again when the file is back, or plan anew without it."
+    found = (
+        "there is no such file. Correct the path; if it was there before, start again when it is back, or plan anew "
+        "without it."
+    )
     assert str(error) == f"A7_1.uff, the path: {found}"
 
 

@@ -59,6 +59,33 @@ def test_a_rate_is_read_with_its_unit(head, tmp_path):
     sound(tmp_path, "a.csv", f"{head}\nforce;acc\n" + "".join(f"{a:.4f};{b:.4f}\n" for a, b in X), rate=12800.0)
 
 
+WORDS = ("Abtastrate", "Abtastfrequenz", "Fréquence d'échantillonnage", "Frecuencia de muestreo",
+         "Frequenza di campionamento", "Samplingsfrekvens", "# Taux d’échantillonnage")  # fmt: skip
+ROWS = "".join(f"{a:.4f};{b:.4f}\n" for a, b in X)
+
+
+@pytest.mark.parametrize("word", WORDS)
+def test_a_rate_in_another_language_is_read_and_held_against_the_layout(word, tmp_path):
+    text = f"{word}: 10000 Hz\nforce;acc\n{ROWS}"
+    sound(tmp_path, "a.csv", text, rate=10000.0)
+    (error,) = read("a.csv", tmp_path, replace(NAMED, rate=20000.0)).errors
+    assert error.reason == "wrong_rate" and "10000 Hz instead of 20000 Hz" in error.found
+
+
+@pytest.mark.parametrize("line", ["Vzorkovací kmitočet: 10 kHz", "# taktning [Hz];10000", "Mintavétel 10000 Hz"])
+def test_a_frequency_that_nobody_understood_is_no_licence_for_another_rate(line, tmp_path):
+    text = f"{line}\nforce;acc\n{ROWS}"
+    sound(tmp_path, "a.csv", text, replace(NAMED, rate=10000.0), rate=10000.0)
+    (error,) = read("a.csv", tmp_path, replace(NAMED, rate=20000.0)).errors
+    assert error.reason == "wrong_rate" and line in error.found and "20000 Hz" in error.found
+    sound(tmp_path, "b.csv", f"rate: 20000\n{text}", replace(NAMED, rate=20000.0))
+
+
+@pytest.mark.parametrize("line", ["Tiefpass: 8000 Hz", "Filter 10 kHz", "sensor: 0.5-10000 Hz", "Bandbreite: 8 kHz"])
+def test_the_frequency_of_a_filter_is_no_rate(line, tmp_path):
+    sound(tmp_path, "a.csv", f"{line}\nforce;acc\n{ROWS}", replace(NAMED, rate=20000.0))
+
+
 @pytest.mark.parametrize("names", ["force;acc\n", "force;acc;\n", ""])
 def test_a_separator_behind_the_last_number_is_no_channel(names, tmp_path):
     by_index = tuple(replace(c, source=i) for i, c in enumerate(NAMED.channels))

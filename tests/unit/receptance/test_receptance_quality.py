@@ -52,6 +52,16 @@ def test_policy_of_double_hits(hammer):
     assert not dropped.accepted and "of the decay is left" in dropped.rejections[0].detail
 
 
+def test_quick_blows_of_a_machine_are_said_to_be_separable(hammer):
+    """Six even blows 150 ms apart: one with further contacts, unless blows may follow each other so soon."""
+    many = sum(hammer.force(start=5e-3 + 0.15 * k, n=round(0.9 * RATE)) for k in range(6))
+    recording = [hammer.recording(hammer.samples(many))]
+    (one,) = hammer.impacts(recording)
+    (said,) = one.notes
+    assert "further contacts: 5" in said.detail and "set receptance.separation below" in said.detail
+    assert [i.accepted for i in hammer.impacts(recording, separation=0.1)] == [True] * 6
+
+
 def test_a_second_hit_after_the_decay_ends_the_record_and_no_more(hammer):
     late = hammer.samples(hammer.force() + hammer.force(peak=300.0, start=90e-3))
     (cut,) = hammer.impacts([hammer.recording(late)])

@@ -70,6 +70,20 @@ def test_ticks_lie_inside_and_are_evenly_spaced(low, high):
     assert 2 <= len(ticks) <= 12 and np.ptp(steps) <= 2e-12 + 1e-9 * steps[0]
 
 
+@pytest.mark.parametrize(("low", "high"), [(530.0, 530.00005), (-1e-3, 1e-3), (123456.0, 123460.0), (1e-9, 1.0004e-9)])
+def test_no_two_ticks_say_the_same(low, high):
+    """Each text, read back, is its tick to a tenth of the step."""
+    ticks = Axis(low, high).ticks()
+    texts = [text for _, text in ticks]
+    assert len(ticks) >= 3 and len(set(texts)) == len(texts)
+    back = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
+    read = []
+    for text in texts:
+        mantissa, _, power = text.rpartition("10" if set(text) & set("⁰¹²³⁴⁵⁶⁷⁸⁹") else "\0")
+        read.append(float(mantissa.rstrip("·") or 1) * 10.0 ** int(power.translate(back)) if _ else float(text))
+    assert read == pytest.approx([v for v, _ in ticks], abs=0.1 * (ticks[1][0] - ticks[0][0]))
+
+
 def test_logarithmic_ticks_are_one_two_five():
     assert all(str(int(t / 10 ** np.floor(np.log10(t)) + 0.5)) in "125" for t in log_ticks(30.0, 1600.0))
 

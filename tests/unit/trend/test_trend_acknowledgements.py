@@ -4,11 +4,15 @@ import shutil
 from datetime import datetime
 from types import SimpleNamespace
 
+import pandas as pd
 import pytest
 
 from turnout.cli import main
 from turnout.config import load_configuration
 from turnout.config.acknowledgements import read_acknowledgements
+from turnout.registry.derived import publish
+from turnout.registry.register import register
+from turnout.trend.rows import arrow_rows
 
 SECTIONS = {"T1": SimpleNamespace(tree={"sections": {"A": None}})}
 HEADER = "turnout,section,band,action,by,at,until,reason\n"
@@ -36,6 +40,27 @@ def test_an_alarm_is_acknowledged_and_silenced_by_command(configuration):
     assert (first["action"], second["action"]) == ("acknowledge", "suppress")
     assert second["until_utc"] == datetime(2026, 5, 1) and second["section_id"] is None and second["band"] is None
     assert first["acknowledgement_id"] != second["acknowledgement_id"]
+
+
+def test_an_acknowledgement_of_no_alarm_is_said(configuration, tmp_path, capsys):
+    """An alarm of the ballast, open since February: only the one said after it, of its band, changes the list."""
+    turnout, label = place_of(configuration)
+    alarm = {
+        "alarm_id": "a", "turnout_id": turnout, "section_id": f"{turnout}/{label}", "band": "ballast",
+        "source": "hammer", "direction": "down", "raised_at_utc": pd.Timestamp("2026-02-01"),
+    }  # fmt: skip
+    register([], tmp_path / "registry", read=iter)
+    publish(tmp_path / "registry", {"alarms": arrow_rows("alarms", pd.DataFrame([alarm]))})
+    said = ["--by", "me", "--reason", "seen", "--configuration", str(configuration)]
+    said += ["--registry", str(tmp_path / "registry")]
+    for place, at, band, changes in (
+        (f"{turnout}/{label}", "2026-03-01", [], True),
+        (turnout, "2026-03-02", ["--band", "ballast"], True),
+        (turnout, "2026-03-03", ["--band", "railpad"], False),
+        (turnout, "2026-01-03", [], False),
+    ):
+        assert main(["acknowledge", place, "--at", at, *band, *said]) == 0
+        assert ("nothing on the list changes" in capsys.readouterr().out) is not changes
 
 
 def test_no_file_means_that_nobody_has_said_anything(tmp_path):

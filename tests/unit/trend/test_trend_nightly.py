@@ -128,6 +128,7 @@ def test_tables_go_out_as_files_that_others_read(registry, tmp_path, capsys):
         main(["export", str(tmp_path / "out"), "--format", "csv", "--only", "worklist", "--registry", str(root)]) == 0
     )
     assert pd.read_csv(tmp_path / "out" / "worklist.csv")["rank"].tolist()[0] == 1
+    assert f"{tmp_path / 'out' / 'worklist.csv'}: " in capsys.readouterr().out
     assert main(["export", str(tmp_path), "--only", "nonsense", "--registry", str(root)]) == 2
     assert "no table or view 'nonsense'" in capsys.readouterr().err
 

@@ -21,6 +21,10 @@ class ReceptanceSettings:
         0.05, "1", "in a record with many blows, less than this share of a usual peak is the hammer being handled",
         minimum=0.01, maximum=0.5,
     )  # fmt: skip
+    softest_blow: float = setting(
+        50.0, "N", "a test whose median blow is softer has a wrong unit (kN for N?); 0 for small hammers on beams",
+        minimum=0.0, maximum=1e5,
+    )  # fmt: skip
     contact_level: float = setting(
         0.02, "1", "contact is where the force exceeds this share of its peak", minimum=0.005, maximum=0.2
     )

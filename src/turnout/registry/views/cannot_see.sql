@@ -1,7 +1,7 @@
 -- One row per chart that cannot answer at a date, and why: too noisy for the target, learning, never warm or cold
--- enough, not measured. detectable_pct is the smallest change of frequency that it shows within a year with 90 %;
+-- enough, not measured; and one of band 'all' where no newer recording could be used. detectable_pct is the smallest change of frequency that it shows within a year with 90 %;
 -- in stiffness about twice as much (one degree of freedom).
--- needs: chart_status_at
+-- needs: chart_status_at, unusable
 create or replace macro cannot_see("asof" := null) as table
 select
     turnout_id, section_id, band, source,
@@ -35,4 +35,7 @@ from chart_status_at(coalesce("asof", newest_measurement())) left join (
     select turnout_id, section_id, band, source, max(measured_at_utc) as set_aside_at_utc
     from charts where state = 'wrong_time' and measured_at_utc <= coalesce("asof", newest_measurement()) group by all
 ) a using (turnout_id, section_id, band, source)
-where state not in ('alarm', 'ok') or detectable_pct is null or detectable_pct > target_pct;
+where state not in ('alarm', 'ok') or detectable_pct is null or detectable_pct > target_pct
+union all by name
+select turnout_id, section_id, 'all' as band, source, 'cannot tell' as state, why, used_at_utc as last_measured_at_utc
+from unusable(coalesce("asof", newest_measurement()));

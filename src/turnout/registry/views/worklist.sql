@@ -83,7 +83,7 @@ silent as (
         null::double as high_pct, null::timestamp as since_at_utc, null::timestamp as since_earliest_utc,
         null::timestamp as since_latest_utc, why
     from cannot_see("asof") c
-    where section_id <> '*' and state in ('learning', 'cannot tell')
+    where (section_id <> '*' or band = 'all') and state in ('learning', 'cannot tell')
         and not exists (
             select 1 from alarmed a
             where a.turnout_id = c.turnout_id and a.section_id = c.section_id and a.band = c.band
@@ -117,13 +117,15 @@ listed as (
     union all by name
     select
         turnout_id, case when count(*) = 1 then min(section_id) end as section_id,
-        string_agg(split_part(section_id, '/', -1), ', ' order by section_id) as sections, band, source, state,
+        case min(section_id)
+            when '*' then 'whole turnout' else string_agg(split_part(section_id, '/', -1), ', ' order by section_id)
+        end as sections, band, source, state,
         (case when count(distinct why) = 1 then '' else split_part(min(section_id), '/', -1) || ': ' end)
             || min_by(why, section_id)
             || (case when count(distinct why) = 1 then '' else '; the others alike' end) as why
     from heard
     where why is not null
-    group by turnout_id, band, source, state
+    group by turnout_id, band, source, state, case band when 'all' then why end
 ),
 fleet as (
     select
@@ -184,6 +186,7 @@ select
     m.last_work as last_maintenance,
     case
         when h.state = 'learning' then 'nothing: measure again as planned'
+        when h.band = 'all' then 'what was rejected: turnout query "from rejected where turnout_id = ''' || h.turnout_id || '''"'
         when h.state = 'cannot tell' then 'the measurement: more impacts per campaign, rail temperature, sensor'
         when h.section_id = '*' then 'what all sections share: thermometer, hammer and method first, then drainage'
         when h.band = 'ballast' and h.direction = 'down' then 'voids and wet or fouled ballast under these sleepers'
@@ -205,6 +208,7 @@ cross join fleet f
 window importance as (
     order by
         case h.state when 'inspect this week' then 0 when 'plan' then 1 when 'cannot tell' then 2 else 3 end,
+        h.band = 'all' desc,
         case when h.low_pct * h.high_pct < 0 then 0 else least(abs(h.low_pct), abs(h.high_pct)) end desc nulls last,
         h.ratio desc nulls last, h.turnout_id, h.sections, h.band, h.source
 )

@@ -14,6 +14,7 @@ STATES = {
     "suppressed": "suppressed",
     "ok": "ok",
 }
+LISTED = ("inspect this week", "plan", "learning", "cannot tell")
 
 
 def fleet_page(source, template, shared):
@@ -24,11 +25,13 @@ def fleet_page(source, template, shared):
     for row in source.states():
         states.setdefault(row["turnout_id"], {})[row["state"]] = row["n"]
         counts[row["state"]] += row["n"]
+    listed = source.listed()
+    shown = counts | {state: listed.get(state, 0) for state in LISTED}
     return template.render(
         n_turnouts=len(turnouts),
         n_sections=sum(t["n_sections"] for t in turnouts),
         latest=day(max((t["latest"] for t in turnouts if t["latest"]), default=None)),
-        count={key: counts[state] for state, key in STATES.items()},
+        count={key: shown.get(state, 0) for state, key in STATES.items()},
         n_quarantined=sum(r["rows"] for r in reasons),
         worklist=[_work(w) for w in worklist],
         n_more=worklist[0]["n_in_all"] - len(worklist) if worklist else 0,
