@@ -12,7 +12,7 @@ from turnout.mismatch.latent import Latent
 from turnout.mismatch.locate import attribute, cell_energies
 from turnout.mismatch.refits import scored
 from turnout.mismatch.scoring import heard, judged, latent_of, over
-from turnout.mismatch.together import needed, reconsidered, refused, told_beside
+from turnout.mismatch.together import needed, reconsidered, refused, told_beside, unconfirmed
 from turnout.mismatch.verdict import Verdict, opened
 from turnout.mismatch.verify import decoy, fit_of_reserved, fit_percent, gain_error
 from turnout.mismatch.whereabouts import Whereabouts, whereabouts
@@ -34,6 +34,11 @@ class Verification:
     rival: float | None = None
     decoy: float | None = None
     error: float | None = None
+
+    @property
+    def fell(self):
+        """The named model foretells the reserved recordings worse, by more than the difference's standard error."""
+        return self.error is not None and self.after < self.before - self.error
 
 
 @dataclass(frozen=True)
@@ -124,10 +129,13 @@ def diagnose(case, settings=None, progress=None, store=None):
     else:
         verdicts, fit = needed(case, base, fit, verdicts, settings)
     verdicts = [_as_it_ends(v, case, fit, settings) for v in verdicts]
-    rival, leader = _rival(verdicts[0]), next((s for s in verdicts[0].scores[:1] if s.gain > settings.threshold), None)
+    check = _verified(case, base, fit, _rival(verdicts[0]))
+    if len(verdicts) == 1 and check.fell:
+        verdicts[0] = unconfirmed(verdicts[0], settings)
+    leader = next((s for s in verdicts[0].scores[:1] if s.gain > settings.threshold), None)
     where = whereabouts(case, base, leader, verdicts[0].cause) if verdicts[0].answer == "unknown" else None
     return Diagnosis(
-        tuple(verdicts), base, fit, frames, _verified(case, base, fit, rival), latent_of(case, base), {},
+        tuple(verdicts), base, fit, frames, check, latent_of(case, base), {},
         scores, where,
     )  # fmt: skip
 

@@ -12,7 +12,7 @@ from turnout.mismatch.ends import ended
 from turnout.mismatch.held_out import held_out_score
 from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.scoring import consistent_elsewhere, explained_of, heard, over, structure_left
-from turnout.mismatch.verdict import TORN, judge
+from turnout.mismatch.verdict import TORN, calibrate, judge, withdraw
 
 RIVALS = 2  # that are fitted anew beside the second effect
 
@@ -105,3 +105,15 @@ def _worth(case, base, both, alone, score, settings):
     gain = _gained(both, alone, score.candidate)
     explained, worst = explained_of(case, base, both, settings), min(by_condition.values(), default=0.0)
     return replace(score, gain=gain, fit=both, explained=explained, worst=worst, by_condition=by_condition)
+
+
+def unconfirmed(verdict, settings):
+    """A name of grade B that foretells recordings never used worse than nothing does: unknown. Others stay."""
+    if verdict.answer != "named" or verdict.grade != "B":
+        return verdict
+    probabilities = dict(verdict.posterior)
+    withdraw(probabilities)
+    sure = calibrate(probabilities, ("unknown",), settings.certainty("unknown"), settings)
+    said = {"answer": "unknown", "names": (), "grade": "", "probability": sure, "posterior": probabilities}
+    reason = f"{verdict.names[0]} leaves more than sound turnouts do and foretells recordings never used worse"
+    return replace(verdict, **said, reason=reason)

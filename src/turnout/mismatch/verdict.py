@@ -116,7 +116,7 @@ def posterior(scores, excess, settings):
     return {name: float(v / total) for name, v in scaled.items()}
 
 
-def _withdraw(probabilities):
+def withdraw(probabilities):
     """A test beyond the score has refused the best name: "unknown" changes places with what stood above it."""
     top = max(probabilities, key=probabilities.get)
     probabilities[top], probabilities["unknown"] = probabilities["unknown"], probabilities[top]
@@ -194,7 +194,7 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
 
     def verdict(answer, names=(), grade="", reason="", cause=""):
         if answer == "unknown":
-            _withdraw(probabilities)
+            withdraw(probabilities)
         sure = calibrate(probabilities, names or (answer,), settings.certainty(answer, cause == "clock"), settings)
         return Verdict(answer, tuple(names), grade, sure, probabilities, tuple(ranked), reason, cause)
 
