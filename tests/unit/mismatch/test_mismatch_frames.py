@@ -8,6 +8,7 @@ from scipy.stats import binom
 
 from turnout import physics
 from turnout.mismatch.candidate import Candidate
+from turnout.mismatch.diagnose import Verification
 from turnout.mismatch.finding import finding_row
 from turnout.mismatch.locate import Frame, attribute
 from turnout.report.finding_words import facts
@@ -84,7 +85,7 @@ def diagnosed(answer, candidates, frames):
     verdict = SimpleNamespace(
         answer=answer, names=tuple(c.family for c in candidates), grade="", probability=0.9, reason=""
     )
-    check = SimpleNamespace(before=1.0, after=None, rival=None, decoy=None, n=1)
+    check = Verification(1, 1.0)
     return SimpleNamespace(
         fit=fit, verdict=verdict, verdicts=(verdict,), probability=0.9, verification=check, frames=frames, where=None
     )  # fmt: skip

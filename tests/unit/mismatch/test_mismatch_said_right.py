@@ -10,6 +10,7 @@ from turnout import physics
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.candidate import Candidate
 from turnout.mismatch.case import Case, Nuisance
+from turnout.mismatch.diagnose import Verification
 from turnout.mismatch.finding import finding_row
 from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.observation import Observation
@@ -225,7 +226,7 @@ def dip(place, shift):
         part=lambda c: slice(0, len(names)) if c is candidate else slice(len(names), None),
     )  # fmt: skip
     verdict = SimpleNamespace(answer="named", names=("surface_dip",), grade="A", probability=0.97, reason="")
-    check = SimpleNamespace(before=1.0, after=2.0, rival=1.0, decoy=1.0, n=1)
+    check = Verification(1, 1.0, 2.0, 1.0, 1.0, 0.5)
     return SimpleNamespace(
         fit=fit, verdict=verdict, verdicts=(verdict,), probability=0.97, verification=check, frames=(), where=None
     )  # fmt: skip
