@@ -35,7 +35,8 @@ def _order(finding):
 
 def _finding(finding, rows, number):
     curves = [c for c in rows["mismatch_curves"] if c["finding_id"] == finding["finding_id"]]
-    changed = finding["term_json"] is not None
+    named = finding["verdict"] in ("named", "a_or_b")
+    changed = ("what was left out" if named else "what was refused") if finding["term_json"] is not None else ""
     drawn = [(c["curve"], curve_panel(c, changed)) for c in sorted(curves, key=lambda c: c["curve_no"])]
     return {
         "number": number,
@@ -45,7 +46,8 @@ def _finding(finding, rows, number):
         "badge": BADGES[finding["verdict"]],
         "answer": answer(finding),
         "quiet": finding["verdict"] == "none",
-        "acceptable": finding["term_json"] is not None,
+        "acceptable": named and finding["term_json"] is not None,
+        "changed": changed,
         "facts": facts(finding),
         "check": check(finding),
         "parameters": parameters(finding),

@@ -13,8 +13,8 @@ TITLES = {
 WIDE = 944
 
 
-def curve_panel(row, changed=True):
-    """One row of ``mismatch_curves``; ``changed``: a term was found, so that there is an after."""
+def curve_panel(row, changed="what was left out"):
+    """One row of ``mismatch_curves``; ``changed``: what is in the simulation after, "" where there is no after."""
     if row["curve"] == "latent":
         return _latent(row)
     x = np.asarray(row["x"], dtype=float)
@@ -23,7 +23,7 @@ def curve_panel(row, changed=True):
     log = row["curve"] != "waveform"
     chart = Chart(_across(row, x, log), _up(row, values, log), _title(row),
                   width=WIDE if row["curve"] == "waveform" else 462, height=250)  # fmt: skip
-    words = {"measured": "measured", "before": "simulated before", "after": "simulated with what was left out"}
+    words = {"measured": "measured", "before": "simulated before", "after": f"simulated with {changed}"}
     for name in names:
         chart.line(x, values[name], f"curve-{name}", words[name])
     _key(chart, names, words)
