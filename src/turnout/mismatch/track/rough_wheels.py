@@ -50,8 +50,8 @@ def _stretches(waves, node):
     """Envelopes (n_node,) of where the rail's waves are free, of what lies before and of what lies behind: there the
     roughness of the rail is each wheel's own error as well."""
     inside = (node >= waves.start - 0.3) & (node <= waves.end + 0.3)
-    left, ahead = 1.0 - waves.fade(node), node < 0.5 * (waves.start + waves.end)
-    return inside.astype(float), left * ahead, left * ~ahead
+    outside, ahead = 1.0 - waves.fade(node), node < 0.5 * (waves.start + waves.end)
+    return inside.astype(float), outside * ahead, outside * ~ahead
 
 
 def heavier(case, fit):
