@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from turnout.config.legible import legible
 from turnout.errors import ConfigError
 
 
@@ -49,20 +50,12 @@ def load(path: Path, name: str | None = None) -> Branch:
     """The mapping in the YAML file ``path``; errors call the file ``name``; ConfigError where it is no YAML."""
     from ruamel.yaml import YAML
     from ruamel.yaml.error import MarkedYAMLError
-    from ruamel.yaml.reader import ReaderError
 
     name = name or str(path)
     yaml = YAML(typ="safe", pure=True)
     try:
-        node = yaml.compose(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        found = f"cannot be read: {error.strerror}"
-        raise ConfigError(name, "line 1", found, "Put a file of that name there, or take it away") from None
-    except UnicodeDecodeError as error:
-        raise ConfigError(name, f"byte {error.start}", "a byte that is not UTF-8", "Save the file as UTF-8") from None
-    except ReaderError as error:
-        found = f"the character {chr(error.character)!r}, which no YAML file may hold"
-        raise ConfigError(name, f"character {error.position + 1}", found, "Take it away") from None
+        with legible(name, "line 1"):
+            node = yaml.compose(Path(path).read_text(encoding="utf-8"))
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         place = Place(name, mark.line + 1, mark.column + 1) if mark else Place(name, 1, 1)

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError
-from ruamel.yaml.reader import ReaderError
 
+from turnout.config.legible import legible
 from turnout.errors import ConfigError, SimulationError
 
 # Unit: (SI unit, factor)
@@ -192,17 +192,10 @@ def read_parameters(path):
     """
     path = Path(path)
     try:
-        content = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise ConfigError(path, "the file", "does not exist", "Give the path of a parameter file") from None
-    except OSError as error:
-        found = f"cannot be read: {error.strerror}"
-        raise ConfigError(path, "the file", found, "Put a file of that name there, or take it away") from None
-    except UnicodeDecodeError as error:
-        raise ConfigError(path, f"byte {error.start}", "a byte that is not UTF-8", "Save the file as UTF-8") from None
-    except ReaderError as error:
-        found = f"the character {chr(error.character)!r}, which no YAML file may hold"
-        raise ConfigError(path, f"character {error.position + 1}", found, "Take it away") from None
+        with legible(path, "the file"):
+            if not path.exists():
+                raise ConfigError(path, "the file", "does not exist", "Give the path of a parameter file")
+            content = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
     except MarkedYAMLError as error:
         mark = error.problem_mark
         place = f"line {mark.line + 1}, column {mark.column + 1}" if mark else "the file"
