@@ -8,11 +8,10 @@ import numpy as np
 from turnout.chains.accepted_terms import described
 from turnout.chains.guided_case import visit_of
 from turnout.chains.mismatch_curves import band_of, band_of_blows, best_shown, curve_rows, passages_shown, reach_of
-from turnout.chains.mismatch_words import headline
+from turnout.chains.mismatch_words import Z95, headline, otherwise
 from turnout.mismatch.finding import finding_row
 from turnout.registry.ids import content_id
 
-Z95 = 1.959964
 NOTES_KEPT = 12
 
 
@@ -27,7 +26,7 @@ def finding_tables(found, case, group, about) -> dict[str, list[dict]]:
     low, high = band or (row["band_low_hz"], row["band_high_hz"])
     row |= {"band_low_hz": low, "band_high_hz": high, "wheel_within_m": reach}
     row |= _numbers(found, case, group, about)
-    row["sentence"] = headline(row)
+    row["sentence"] = " ".join(filter(None, [headline(row), *map(otherwise, surface_told(case, found.fit))]))
     key = {"finding_id": row["finding_id"], "turnout_id": row["turnout_id"]}
     return {
         "mismatch_findings": [row],
@@ -139,7 +138,8 @@ def _plain(value):
 
 
 def parameter_rows(found, case, row) -> list[dict]:
-    """Rows of ``mismatch_parameters``: of what was found, and of what was accepted before, as it is now."""
+    """Rows of ``mismatch_parameters``: of what was found, and of what the track's file has, as it is now: effects that
+    were accepted before, and uncertain numbers of the running surface."""
     base = {k: row[k] for k in ("finding_id", "turnout_id", "found_at_utc")}
     rows = []
     for term in json.loads(row["term_json"] or "[]"):
@@ -151,7 +151,15 @@ def parameter_rows(found, case, row) -> list[dict]:
         a = v["accepted"]
         channel = a.fixed.get("channel_name")
         rows.append(_parameter(a.family, a.place, channel, v["name"], v["value"], v["se"], v["unit"], True))
+    for s in surface_told(case, found.fit):
+        rows.append(_parameter(s["term"], s["place"], None, s["name"], s["value"], s["se"], s["unit"], True))
     return [{**base, "parameter_no": k, **r} for k, r in enumerate(rows)]
+
+
+def surface_told(case, fit) -> list[dict]:
+    """What recordings say of uncertain numbers of the running surface in the track's file."""
+    surface = getattr(case, "surface", None)
+    return list(surface.told(case, fit)) if surface else []
 
 
 def _place(fixed):

@@ -40,6 +40,8 @@ SENTENCES = {
 OPEN = {"hanging_sleeper": ("gap", "The sleeper at {place} hangs above its ballast, and no train here closes the gap")}
 # And where it is below 0.
 REVERSED = {"sensor_gain": ("gain", "Sensor {channel} has the wrong polarity: it reads {gain} times what it should")}
+OTHERWISE = 2.0  # standard deviations of what the file says of itself
+Z95 = 1.959964
 MILLI = {"m": "mm", "s": "ms"}
 PERCENT = {"1/K": "% per kelvin"}
 
@@ -70,6 +72,24 @@ def headline(finding) -> str:
     if finding["verdict"] == "unknown":
         return f"Something is missing {_somewhere(finding, low, high)}, and no known effect explains it."
     return finding["sentence"] or ""
+
+
+def otherwise(told) -> str:
+    """A sentence on a number of the running surface that is not what the track's file has; "" where it may be.
+
+    >>> depth = {"term": "running_surface_kink", "place": 26.7, "name": "depth", "unit": "m", "filed": 1e-3}
+    >>> otherwise({**depth, "value": 4e-3, "se": 1e-4, "off": 2.8})
+    'The depth of the kink at 26.7 m is 4 mm (3.8 to 4.2 mm), its file has 1 mm.'
+    >>> otherwise({**depth, "value": 1.3e-3, "se": 1e-4, "off": 0.5})
+    ''
+    """
+    if told["off"] < OTHERWISE:
+        return ""
+    half = Z95 * told["se"]
+    values = told["value"], told["value"] - half, told["value"] + half, told["filed"]
+    now, low, high, filed = (number_in_words(v, told["unit"], 3) for v in values)
+    what = f"{told['name']} of the {told['term'].removeprefix('running_surface_')} at {told['place']:.1f} m"
+    return f"The {what} is {now} ({low.removesuffix(' mm')} to {high}), its file has {filed}."
 
 
 def _or(other) -> str:

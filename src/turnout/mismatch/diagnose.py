@@ -11,8 +11,8 @@ from turnout.mismatch.joint import CHEAP_STEPS, fit_jointly
 from turnout.mismatch.latent import Latent
 from turnout.mismatch.locate import attribute, cell_energies
 from turnout.mismatch.refits import scored
-from turnout.mismatch.scoring import heard, judged, latent_of, over
-from turnout.mismatch.together import needed, reconsidered, refused, told_beside, unconfirmed
+from turnout.mismatch.scoring import heard, judged, latent_of, over, over_reserved
+from turnout.mismatch.together import needed, reconsidered, refused, told_beside, unconfirmed, unforetold
 from turnout.mismatch.verdict import Verdict, opened
 from turnout.mismatch.verify import decoy, fit_of_reserved, fit_percent, gain_error
 from turnout.mismatch.whereabouts import Whereabouts, whereabouts
@@ -20,13 +20,17 @@ from turnout.mismatch.whereabouts import Whereabouts, whereabouts
 # Share of the first effect's evidence that a law of not quite its shape leaves: sizes are right to a fifth.
 SHAPE = 0.05
 APART = 0.02  # the same to a name for other recordings: what one sensor shows wrong is not what all do, or one train
+# Level of controls, times: where more is left of recordings never used, nothing agrees. Controls leave 0.4 to 0.6 of it
+# there, as in those that were fitted; trains of a kind that was not among those may leave more.
+UNFORETOLD = 2.0
 FRAMES = {("", "sensor"), ("", "train"), ("sensor", "train"), ("train", "sensor")}  # those apart
 
 
 @dataclass(frozen=True)
 class Verification:
     """Fit [%] on ``n`` reserved recordings ``before``, ``after`` with the named term, with ``rival`` and ``decoy``;
-    ``error`` is the standard error of ``after`` less ``before``."""
+    ``error`` is the standard error of ``after`` less ``before``, ``over`` the weighted mean square left without a term
+    over the level of controls."""
 
     n: int
     before: float
@@ -34,6 +38,7 @@ class Verification:
     rival: float | None = None
     decoy: float | None = None
     error: float | None = None
+    over: float = 0.0
 
     @property
     def fell(self):
@@ -100,7 +105,9 @@ def diagnose(case, settings=None, progress=None, store=None):
     numerics = _own_numerics(case, base, settings)
     if numerics:
         verdict = Verdict("numerics", reason=numerics, probability=1.0)
-        return Diagnosis((verdict,), base, base, frames, _verified(case, base, base, None), latent_of(case, base))
+        return Diagnosis(
+            (verdict,), base, base, frames, _verified(case, base, base, None, settings), latent_of(case, base)
+        )
     verdicts, fit, scores = [], base, ()
     for effect in range(settings.effects):
         promising = None if refused(verdicts) else {s.family for s in scores if s.gain > settings.threshold}
@@ -129,11 +136,13 @@ def diagnose(case, settings=None, progress=None, store=None):
     else:
         verdicts, fit = needed(case, base, fit, verdicts, settings)
     verdicts = [_as_it_ends(v, case, fit, settings) for v in verdicts]
-    check = _verified(case, base, fit, _rival(verdicts[0]))
+    check = _verified(case, base, fit, _rival(verdicts[0]), settings)
     if len(verdicts) == 1 and check.fell:
         verdicts[0] = unconfirmed(verdicts[0], settings)
     leader = next((s for s in verdicts[0].scores[:1] if s.gain > settings.threshold), None)
     where = whereabouts(case, base, leader, verdicts[0].cause) if verdicts[0].answer == "unknown" else None
+    if check.over > UNFORETOLD:
+        verdicts[0] = unforetold(verdicts[0], settings)
     return Diagnosis(
         tuple(verdicts), base, fit, frames, check, latent_of(case, base), {},
         scores, where,
@@ -195,16 +204,17 @@ def _rival(verdict):
     return others[0] if others else None
 
 
-def _verified(case, base, fit, rival):
+def _verified(case, base, fit, rival, settings):
     if not case.reserved:
         return Verification(0, float("nan"))
     n, (before, first) = len(case.reserved), fit_of_reserved(case, base)
     if before is None:
         return Verification(n, float("nan"))
+    over_control = over_reserved(case, before, settings)
     if fit is base:
-        return Verification(n, first)
+        return Verification(n, first, over=over_control)
     free = decoy(case.observations, base.predictions, case.reserved, before, fit.psi.size)
     other = fit_of_reserved(case, rival.fit)[1] if rival else None
     after, reached = fit_of_reserved(case, fit)
     error = None if after is None else gain_error(case.reserved, before, after)
-    return Verification(n, first, reached, other, fit_percent(case.reserved, free), error)
+    return Verification(n, first, reached, other, fit_percent(case.reserved, free), error, over_control)

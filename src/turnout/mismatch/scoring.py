@@ -89,6 +89,16 @@ def over(case, fit, settings):
     return max(fit.level[kind] / control[kind] for kind in fit.level)
 
 
+def over_reserved(case, predictions, settings):
+    """The same of what ``predictions`` leave of the reserved recordings; 0 where there are none."""
+    total: dict = {}
+    for o, p in zip(case.reserved, predictions):
+        square, n = total.get(o.kind, (0.0, 0.0))
+        total[o.kind] = square + o.effective * float(np.sum(o.whitened(o.data - p) ** 2)), n + o.n_effective
+    control = {kind: case.control_level.get(kind, settings.control_level) for kind in total}
+    return max((square / n / control[kind] for kind, (square, n) in total.items()), default=0.0)
+
+
 def heard(case, fit, settings):
     """What of ``fit`` stands most above the level of controls: a kind, or one channel of one recording."""
     return max(over(case, fit, settings), loudest(case, fit))

@@ -111,9 +111,20 @@ def unconfirmed(verdict, settings):
     """A name of grade B that foretells recordings never used worse than nothing does: unknown. Others stay."""
     if verdict.answer != "named" or verdict.grade != "B":
         return verdict
+    reason = f"{verdict.names[0]} leaves more than sound turnouts do and foretells recordings never used worse"
+    return _unknown(verdict, reason, settings)
+
+
+def unforetold(verdict, settings):
+    """Nothing missing, by recordings that were fitted, but those never used are not foretold: unknown. Others stay."""
+    if verdict.answer != "none":
+        return verdict
+    return _unknown(verdict, "recordings that were never used are not foretold as in sound turnouts", settings)
+
+
+def _unknown(verdict, reason, settings):
     probabilities = dict(verdict.posterior)
     withdraw(probabilities)
     sure = calibrate(probabilities, ("unknown",), settings.certainty("unknown"), settings)
     said = {"answer": "unknown", "names": (), "grade": "", "probability": sure, "posterior": probabilities}
-    reason = f"{verdict.names[0]} leaves more than sound turnouts do and foretells recordings never used worse"
     return replace(verdict, **said, reason=reason)

@@ -2,10 +2,9 @@
 
 import json
 
-from turnout.chains.mismatch_words import headline, number_in_words
+from turnout.chains.mismatch_words import Z95, headline, number_in_words
 
-__all__ = ["answer", "check", "facts", "headline", "parameters", "rivals"]
-Z95 = 1.959964
+__all__ = ["answer", "check", "facts", "filed", "headline", "parameters", "rivals"]
 ANSWERS = {
     "none": "nothing is missing",
     "named": "named",
@@ -20,17 +19,23 @@ def parameters(finding) -> list[dict]:
     found = []
     for term in json.loads(finding["term_json"] or "[]"):
         for name, p in term["parameters"].items():
-            half = Z95 * p["se"]
-            low, high = p["value"] - half, p["value"] + half
-            found.append(
-                {
-                    "effect": term["term"].replace("_", " "),
-                    "name": name,
-                    "value": number_in_words(p["value"], p["unit"], 3),
-                    "interval": f"{number_in_words(low, p['unit'], 3)} to {number_in_words(high, p['unit'], 3)}",
-                }
-            )
+            low, high = p["value"] - Z95 * p["se"], p["value"] + Z95 * p["se"]
+            found.append(_parameter(term["term"], None, name, p["value"], low, high, p["unit"]))
     return found
+
+
+def filed(rows) -> list[dict]:
+    """The same of what the track's file has and the visit estimated anew; ``rows`` of ``mismatch_parameters``."""
+    names = ("term", "position_m", "parameter", "value", "value_low", "value_high", "unit")
+    return [_parameter(*(row[name] for name in names)) for row in rows if row["accepted"]]
+
+
+def _parameter(term, place, name, value, low, high, unit):
+    digits = 4 if unit == "m" and abs(value) >= 10.0 else 3  # a place along the turnout, to a centimetre
+    effect = term.replace("_", " ") + (f" at {place:.1f} m" if place is not None else "")
+    ends = [number_in_words(end, unit, digits) for end in (low, high) if end is not None]
+    interval = " to ".join(ends) if len(ends) == 2 else "–"
+    return {"effect": effect, "name": name, "value": number_in_words(value, unit, digits), "interval": interval}
 
 
 def facts(finding) -> list[tuple[str, str]]:

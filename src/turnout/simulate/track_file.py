@@ -67,7 +67,8 @@ def turnout_track(parameters, seed=0):
         _route_of(entry, routes)
     rough = p.maybe("roughness").only("level")
     level = rough.number("level", "dB") if rough else None
-    return TurnoutTrack(tracks[first], routes, level, _locations(p, routes), tuple(p.numbers()), tracks, terms)
+    places, numbers, spreads = _locations(p, routes), tuple(p.numbers()), dict(_spreads(p.maybe("routes")))
+    return TurnoutTrack(tracks[first], routes, level, places, numbers, tracks, terms, spreads)
 
 
 def _routes(p):
@@ -85,6 +86,31 @@ def _surfaces(routes, name):
     if not surfaces:
         raise route.error(None, "a route without a surface", "List its surfaces, or the parts of its only one")
     return tuple((*common, *(_path(part) for part in surfaces.parts(k))) for k in surfaces)
+
+
+def _spreads(routes):
+    """(part, field -> relative standard deviation) of every part that has a prior; the largest one of a list."""
+    for entry in _entries(routes):
+        spread: dict[str, float] = {}
+        for place, number in entry.numbers():
+            name = place.removeprefix(f"{entry.place}.").split("[")[0]
+            if number.prior:
+                spread[name] = max(number.prior, spread.get(name, 0.0))
+        if spread:
+            yield _path(entry), spread
+
+
+def _entries(routes):
+    """The entry of every part of every route."""
+    for name in routes:
+        if isinstance(routes[name], list):
+            yield from routes.parts(name)
+            continue
+        route = routes.part(name)
+        surfaces = route.listed("surfaces")
+        yield from route.parts("common")
+        for k in surfaces:
+            yield from surfaces.parts(k)
 
 
 def _locations(p, routes):

@@ -17,6 +17,7 @@ class TurnoutTrack:
     (place [m], route); ``numbers`` the parameters with unit, source and prior as read. ``tracks`` holds the track
     of a route that has rails of its own, as behind a crossing. ``terms`` are the entries of effects that recordings
     showed to be missing from the base track, as read; ``turnout.chains.accepted_terms`` makes terms of them.
+    ``spreads`` has for parts of routes the relative standard deviation of each number with a prior, by its field.
     """
 
     track: Track
@@ -26,6 +27,7 @@ class TurnoutTrack:
     numbers: tuple = ()
     tracks: dict = field(default_factory=dict)
     terms: tuple = ()
+    spreads: dict = field(default_factory=dict)
 
     @property
     def name(self):

@@ -1,10 +1,15 @@
 """A name whose shape stays unresolved and that foretells recordings never used worse is no name."""
 
+import numpy as np
 import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
-from turnout.mismatch.diagnose import Verification
-from turnout.mismatch.together import unconfirmed
+from turnout.mismatch.case import Case, Nuisance
+from turnout.mismatch.diagnose import Verification, diagnose
+from turnout.mismatch.finding import sentence
+from turnout.mismatch.observation import Observation
+from turnout.mismatch.scoring import over_reserved
+from turnout.mismatch.together import unconfirmed, unforetold
 from turnout.mismatch.verdict import Verdict
 
 POSTERIOR = {"pad_preload": 0.8, "none": 0.15, "unknown": 0.05}
@@ -35,3 +40,52 @@ def test_a_name_of_grade_b_becomes_unknown_with_the_probability_of_that():
 @pytest.mark.parametrize("verdict", [Verdict("named", ("dip",), "A", 0.97), Verdict("none"), Verdict("a_or_b")])
 def test_other_answers_stay(verdict):
     assert unconfirmed(verdict, MismatchSettings()) is verdict
+
+
+def test_nothing_is_missing_no_longer_where_what_was_never_used_is_not_foretold():
+    settings = MismatchSettings()
+    found = unforetold(Verdict("none", probability=0.9, posterior={"none": 0.9, "unknown": 0.1}), settings)
+    assert found.answer == "unknown" and "never used" in found.reason
+    assert found.posterior["unknown"] == pytest.approx(found.probability)
+    named = Verdict("named", ("dip",), "A", 0.97)
+    assert unforetold(named, settings) is named
+
+
+def test_what_is_left_of_reserved_recordings_is_held_against_the_level_of_controls():
+    """Two recordings of one kind, errors of 3 and 1 sigma: a mean square of 5 over a level of 0.5; of the other 1."""
+    rows = [Observation(f"o{k}", "c", np.zeros(40), 0.1, 0.5, kind) for k, kind in enumerate("aab")]
+    case = with_reserved(rows, {"a": 0.5, "b": 1.0})
+    predictions = [np.full(40, 0.3), np.full(40, -0.1), np.full(40, 0.1)]
+    assert over_reserved(case, predictions, MismatchSettings()) == pytest.approx(5.0 / 0.5)
+    assert over_reserved(with_reserved((), {}), [], MismatchSettings()) == 0.0
+
+
+def with_reserved(rows, level):
+    case = Case()
+    case.reserved, case.control_level = tuple(rows), level
+    return case
+
+
+class Line(Case):
+    """Readings of a line through the origin, whose slope is a nuisance."""
+
+    control_level = {"reading": 1.0}
+
+    def __init__(self, reserved):
+        self.x, rng = np.arange(1.0, 41.0), np.random.default_rng(5)
+        self.observations = tuple(
+            Observation(f"o{k}", f"c{k}", 2.0 * self.x + 0.1 * rng.normal(size=40), 0.1, 1.0, "reading")
+            for k in range(3)
+        )
+        own = Observation("kept", "c9", reserved * self.x + 0.1 * rng.normal(size=40), 0.1, 1.0, "reading")
+        self.reserved, self.nuisances = (own,), (Nuisance("slope", "-", 0.0, 10.0),)
+
+    def predict(self, values, terms, observations):
+        return [values["slope"] * self.x for _ in observations]
+
+
+@pytest.mark.parametrize(("slope", "answer"), [(2.0, "none"), (2.03, "unknown")])
+def test_a_diagnosis_says_so(slope, answer):
+    found = diagnose(Line(slope))
+    assert found.verdict.answer == answer
+    assert ("never used" in sentence(found)) is (answer == "unknown")

@@ -213,7 +213,7 @@ def test_what_was_accepted_is_shown_over_the_visits():
         for day in (1, 12, 25)
     ]  # fmt: skip
     text = page(finding("none"), parameters=rows)
-    assert "hanging sleeper, gap: 3 visits" in text and "Accepted before, estimated anew" in text
+    assert "hanging sleeper, gap: 3 visits" in text and "In the track file, estimated anew" in text
 
 
 def test_why_nothing_can_be_said_stands_on_the_page():

@@ -67,6 +67,11 @@ class Campaign:
             if name not in names:
                 raise SimulationError(f"reserved {name!r} is no recording; there are {', '.join(names)}.")
 
+    def sensors_of(self, passage):
+        """The sensors that recorded a passage."""
+        names = {c.name for c in passage.recording.channels}
+        return tuple(s for s in self.sensors if s.name in names)
+
     def places(self):
         """Places of sensors and blows [m]."""
         return [s.place for s in self.sensors] + [t.place for t in self.hammer]

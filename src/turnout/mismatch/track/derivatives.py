@@ -8,6 +8,9 @@ from turnout.mismatch.track import bands, blows
 from turnout.mismatch.track.base_model import COMMON, RAIL
 from turnout.mismatch.track.columns import FURTHER, columns_of, probes, support_forces
 from turnout.mismatch.track.rough_rail import wave_columns
+from turnout.mismatch.track.running_surface import STEP as SURFACE_STEP
+
+STEP = 0.04  # of a logarithm
 
 
 def own_jacobian(case, values, terms, observation, predicted, names):
@@ -56,13 +59,13 @@ def pair_columns(case, values, terms, pair, heard, predicted, jacobian, index):
 
 
 def _common_columns(case, values, terms, passages, index):
-    names = [name for name, *_ in COMMON] + [f"wheels_{train}" for train in case.trains]
-    for name in names:
+    shared = [name for name, *_ in COMMON] + [f"wheels_{train}" for train in case.trains]
+    for name, step in (*((name, STEP) for name in shared), *((name, SURFACE_STEP) for name in case.surface.names)):
         for o, predicted, jacobian in passages:
             made = case.rollings[o.name]
             if name.startswith("wheels_") and name != f"wheels_{made.passage.train or made.passage.name}":
                 continue
-            jacobian[:, index[name]] = _difference(case, values, terms, made, predicted, name, 0.04)
+            jacobian[:, index[name]] = _difference(case, values, terms, made, predicted, name, step)
 
 
 def _difference(case, values, terms, made, predicted, name, step):

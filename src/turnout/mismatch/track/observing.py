@@ -9,6 +9,7 @@ from turnout.errors import SimulationError
 from turnout.mismatch.track import alignment, blows, rolling
 from turnout.mismatch.track.quiet import disturbances
 from turnout.mismatch.track.rough_wheels import wheel_modes
+from turnout.mismatch.track.seating import aligned, seated
 from turnout.simulate.sensor import Sensor
 
 FAR = 8.0  # m from blow to sensor: a model's tolerance is so wide there that a receptance says a thirtieth
@@ -33,17 +34,18 @@ def passage_observations(case):
     if not case.campaign.passages:
         return
     values = {n.name: 0.0 for n in case.listed()} | case.start_values
+    found = seated(case, values)
+    case.start_values, values = {**case.start_values, **found}, {**values, **found}
     for passage in case.campaign.passages:
-        sensors = [s for s in case.campaign.sensors if s.name in {c.name for c in passage.recording.channels}]
+        sensors = case.campaign.sensors_of(passage)
         if not sensors:
             case.notes.append(f"passage {passage.name}: none of the sensors recorded it")
             continue
         try:
-            signals = case.roll(values, (), passage)(passage, passage.vehicle, passage.speed, sensors)
+            reference, speed, likeness = aligned(case, values, passage)
         except SimulationError as error:
             case.notes.append(f"passage {passage.name}: cannot be simulated: {error}")
             continue
-        reference, speed, likeness = alignment.align(passage, sensors, signals, case.solver.rate)
         if likeness < alignment.ALIKE:
             case.unlike.append(passage)
             case.notes.append(
@@ -52,7 +54,7 @@ def passage_observations(case):
             )
             if likeness > TIMED:
                 case.strange[passage.name] = rolling.Rolling(
-                    passage.name, passage, tuple(sensors), np.zeros(0), reference, speed
+                    passage.name, passage, sensors, np.zeros(0), reference, speed
                 )
             continue
         try:

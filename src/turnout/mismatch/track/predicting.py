@@ -127,14 +127,15 @@ class Predicting:
         train = made.passage.train or made.passage.name
         own = values[f"wheels_{train}"], values[f"speed@{made.name}"], values[f"load@{made.name}"]
         path = self.waves.path(values)
-        shape = path[0].dip.tobytes() if path else b""
+        shape, surfaces = path[0].dip.tobytes() if path else b"", self.surface.surfaces(made.passage.route, values)
         seats = tuple(values.get(f"seat_{s.name}", 0.0) for s in made.sensors)
-        key = made.name, inner_values(self.zone, values), own, seats, shape, repr(under), len(probes)
+        key = made.name, inner_values(self.zone, values), own, seats, shape, surfaces, repr(under), len(probes)
         if key not in self._simulated:
             vehicle = vehicle_with(made.passage.vehicle, values, train, own[2])
             roll = self.roll(values, under, made.passage)
             sensors = [replace(s, place=s.place + more) for s, more in zip(made.sensors, seats)]
-            signals = roll(made.passage, vehicle, made.speed * (1.0 + own[1]), sensors, probes, path, made.sensors)
+            rolled = tuple((*parts, *path) for parts in surfaces)
+            signals = roll(made.passage, vehicle, made.speed * (1.0 + own[1]), sensors, probes, rolled, made.sensors)
             self._simulated[key] = signals
             while len(self._simulated) > KEPT:
                 self._simulated.popitem(last=False)

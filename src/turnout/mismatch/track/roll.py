@@ -35,9 +35,9 @@ class Roll:
         matrices = matrices_of(track, self.terms)
         self.prepared = prepare(track, 1.0 / settings.rate, settings.scheme, self.terms, DECAY, matrices)
 
-    def __call__(self, passage, vehicle, speed, sensors, probes=(), path=(), described=None):
-        """(n_sensor + n_probe, n) signals of the march; time 0: first wheel ``LEAD`` before the first sensor where it
-        is ``described`` to be."""
+    def __call__(self, passage, vehicle, speed, sensors, probes=(), surfaces=None, described=None):
+        """(n_sensor + n_probe, n) signals of the march over ``surfaces``, by default the file's; time 0: first wheel
+        ``LEAD`` before the first sensor where it is ``described`` to be."""
         for term in self.terms:
             vehicle = term.vehicle(vehicle)
         sign = 1 if passage.direction == "facing" else -1
@@ -45,8 +45,7 @@ class Roll:
         start = sign * (places.min() - speed * LEAD)
         way = np.ptp(places) + float(vehicle.wheel_places[-1]) + speed * (LEAD + 2.0 * EDGE)
         seats = [seat(s, self.terms).probe(self.track) for s in sensors]
-        surfaces = tuple((*parts, *path) for parts in self.turnout.surfaces(passage.route))
-        drive = Drive(start, speed, sign, surfaces, path_step=0.01)
+        drive = Drive(start, speed, sign, surfaces or self.turnout.surfaces(passage.route), path_step=0.01)
         outcome = run(self.prepared, way / speed, [*seats, *probes], vehicle, drive, forces=False, tolerance=1e-3)
         return outcome.signals
 

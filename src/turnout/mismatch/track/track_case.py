@@ -24,6 +24,7 @@ from turnout.mismatch.track.observing import (
 from turnout.mismatch.track.predicting import Predicting
 from turnout.mismatch.track.rough_rail import Waves
 from turnout.mismatch.track.rough_wheels import heavier
+from turnout.mismatch.track.running_surface import RunningSurface
 
 GAIN_SD = 0.02
 WARMTH, SPAN = "pad_temperature", 4.0  # K, chosen: at 1 % per kelvin two per cent of frequency
@@ -81,6 +82,7 @@ class TrackCase(Predicting, Case):
         self.trains = tuple(dict.fromkeys(p.train or p.name for p in campaign.passages))
         self.pairs, self.rollings, self.strange, self.unlike, self.notes = {}, {}, {}, [], []
         self.waves = self._waves()
+        self.surface = self.waves and RunningSurface(self.nominal.turnout, self.waves)
 
     def _recentre(self, values):
         """The track gets the rail of ``values``, about which receptances are straight in what it may differ by; nothing
@@ -122,6 +124,7 @@ class TrackCase(Predicting, Case):
                 yield Nuisance(f"seat_{sensor.name}", "m", 0.0, SEAT_SD, meaning="place of a sensor less its file's")
         if self.waves:
             yield from self.waves.nuisances()
+            yield from self.surface.nuisances()
         for made in self.rollings.values():
             yield from rolling.rolling_nuisances(made.passage)
 

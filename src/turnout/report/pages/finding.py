@@ -1,6 +1,6 @@
 """The page of a turnout's mismatches: understood in one minute, evidence below."""
 
-from turnout.report.finding_words import answer, check, facts, headline, parameters, rivals
+from turnout.report.finding_words import answer, check, facts, filed, headline, parameters, rivals
 from turnout.report.panels.finding_curves import curve_panel, fit_panel, history_of_parameter
 from turnout.report.panels.finding_place import place_panel
 from turnout.report.words import day
@@ -51,7 +51,7 @@ def _finding(finding, rows, number):
         "facts": facts(finding),
         "check": check(finding),
         "parameters": parameters(finding),
-        "accepted": [p for p in _of(rows, finding) if p["accepted"]],
+        "filed": filed(_of(rows, finding)),
         "rivals": rivals(finding),
         "wide": "".join(svg for curve, svg in drawn if curve == "waveform"),
         "panels": "".join([*(svg for curve, svg in drawn if curve != "waveform"), fit_panel(finding)]),

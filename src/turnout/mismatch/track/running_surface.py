@@ -1,0 +1,112 @@
+"""Blade, nose and joints as the track's file has them: each number is known as well as its prior says, a nuisance.
+
+A nose that is an estimate may be half as deep again. What that does to a passage is no effect that the model left out.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from turnout.mismatch.case import Nuisance
+from turnout.mismatch.track.rough_wheels import BEYOND
+
+PLACES = ("place", "start", "end")  # known to a share of their distance from the origin, all else to a factor
+LENGTHS = ("length", "wavelength")
+STEP = 0.02  # m, or of a factor's logarithm: over which a passage's derivative is taken
+MOVED = 0.3  # of its own length a part may move in one step of a fit: beyond, its derivative says nothing
+LEAST = 1e-6  # m: a part that is nowhere deeper is not there
+TELLS = 0.5  # of the prior's standard deviation: a number that is known no better than that is the file's
+
+
+@dataclass(frozen=True)
+class Unsure:
+    """A number of a part: ``field`` of ``part``, off by a factor, a place by a way [m], with relative ``spread``."""
+
+    name: str
+    part: object
+    field: str
+    spread: float
+
+    @property
+    def nuisance(self):
+        """Its prior."""
+        said = f"{self.field} of the {type(self.part).__name__.lower()} at {_where(self.part):.2f} m"
+        if self.field in PLACES:
+            sd = self.spread * abs(getattr(self.part, self.field))
+            trust = min(3.0, MOVED * _values(self.part, LENGTHS)[0] / sd)
+            return Nuisance(self.name, "m", 0.0, sd, meaning=f"{said} less its file's", trust=trust, bends=False)
+        most = 6.0 * self.spread if self.field != "share" else -0.05 - np.log(self.part.share)
+        bounds = (-6.0 * self.spread, most)
+        return Nuisance(self.name, "-", 0.0, self.spread, None, bounds, f"ln {said}", bends=False)
+
+    def moved(self, by):
+        """Its value where it is off by ``by``; of a profile all values."""
+        value = getattr(self.part, self.field)
+        if self.field in PLACES:
+            return value + by
+        factor = float(np.exp(by))
+        return tuple(factor * v for v in value) if isinstance(value, tuple) else factor * value
+
+    def told(self, by, error):
+        """What a fit that has it off by ``by`` with standard ``error`` says of it; of a profile its factor."""
+        profile = isinstance(getattr(self.part, self.field), tuple)
+        value, filed = (float(np.exp(by)), 1.0) if profile else (self.moved(by), getattr(self.part, self.field))
+        return {
+            "term": f"running_surface_{type(self.part).__name__.lower()}",
+            "place": _where(self.part),
+            "name": self.field,
+            "value": value,
+            "se": error if self.field in PLACES else value * error,
+            "unit": "-" if profile or self.field == "share" else "m",
+            "filed": filed,
+            "off": abs(by) / self.nuisance.sd,
+        }
+
+
+class RunningSurface:
+    """The routes of ``turnout``; numbers of what lies within ``BEYOND`` of the rail's free ``waves`` may be off.
+
+    ``unsure`` are these numbers, ``names`` of their nuisances.
+    """
+
+    def __init__(self, turnout, waves):
+        x = np.arange(waves.start - BEYOND, waves.end + BEYOND, 0.02)
+        near = [part for part in turnout.spreads if np.max(np.abs(part(x, 0))) > LEAST]
+        listed = [(k, part, *of) for k, part in enumerate(near) for of in turnout.spreads[part].items()]
+        self.turnout = turnout
+        self.unsure = [Unsure(f"surface_{k}_{f}", part, f, s) for k, part, f, s in listed if _may_move(part, f)]
+        self.names = tuple(u.name for u in self.unsure)
+
+    def nuisances(self):
+        """Of every number that may be off."""
+        return [u.nuisance for u in self.unsure]
+
+    def surfaces(self, route, values):
+        """Surfaces of ``route``, each a tuple of parts, with the numbers that ``values`` have."""
+        changes: dict = {}
+        for u in self.unsure:
+            if values[u.name]:
+                changes.setdefault(u.part, {})[u.field] = u.moved(values[u.name])
+        changed = {part: replace(part, **to) for part, to in changes.items()}
+        return tuple(tuple(changed.get(part, part) for part in parts) for parts in self.turnout.surfaces(route))
+
+    def told(self, case, fit):
+        """What ``fit`` says of the numbers that its recordings tell more of than the file does, a dict each."""
+        index = {n.name: k for k, n in enumerate(case.nuisances)}
+        for u in self.unsure:
+            error = float(np.sqrt(fit.covariance[index[u.name], index[u.name]]))
+            if error < TELLS * u.nuisance.sd:
+                yield u.told(fit.values[u.name], error)
+
+
+def _may_move(part, field):
+    """Whether a number that has a prior can be off: a place at the origin is known to a share of nothing."""
+    return field != "places" and (field not in PLACES or getattr(part, field) != 0.0)
+
+
+def _where(part):
+    return (*_values(part, PLACES), *getattr(part, "places", ()))[0]
+
+
+def _values(part, fields):
+    return [getattr(part, f) for f in fields if hasattr(part, f)]

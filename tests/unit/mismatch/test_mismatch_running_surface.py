@@ -1,0 +1,128 @@
+"""A nose that is not quite the track file's is no mismatch: its numbers are known as well as their priors say."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ruamel.yaml import YAML
+
+from turnout.chains.mismatch_rows import surface_told
+from turnout.chains.mismatch_words import otherwise
+from turnout.config.parameter_set import read_parameters
+from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.track import TrackCase
+from turnout.mismatch.track.planned import measured_campaign, small_plan
+from turnout.mismatch.track.rough_rail import Waves
+from turnout.mismatch.track.running_surface import RunningSurface
+from turnout.simulate.track_file import turnout_track
+from turnout.simulate.wheel_path import Dip, Kink, Sections
+
+TOMMERUP = Path(__file__).parents[3] / "config" / "tracks" / "tommerup.yaml"
+PLAN = small_plan((15.0,), blows=(24.0,))
+NOSE, JOINT, FAR = Kink(25.2, 0.8e-3, 1.0, 0.55), Dip(14.5, 3e-4, 0.15), Dip(45.0, 3e-4, 0.15)
+SPREADS = {NOSE: {"place": 0.02, "depth": 0.5, "length": 0.3, "share": 0.2}, JOINT: {"depth": 0.5}, FAR: {"depth": 0.5}}
+FILED = replace(PLAN.turnout, routes={"main": ((NOSE, JOINT, FAR),)}, spreads=SPREADS)
+TRUE = replace(NOSE, place=25.6, depth=1.3e-3, length=0.9)
+WAVES = Waves([s.place for s in PLAN.sensors], 0.0)
+
+
+@pytest.fixture(scope="module")
+def campaign():
+    """Two trains at two speeds over the ``TRUE`` nose, held against the one that the file has."""
+    true = replace(PLAN.turnout, routes={"main": ((TRUE, JOINT, FAR),)})
+    return replace(measured_campaign(replace(PLAN, turnout=true), (), 7), turnout=FILED)
+
+
+def test_numbers_with_a_prior_may_be_off_where_they_can_be_heard():
+    surface = RunningSurface(FILED, WAVES)
+    assert surface.names == (*(f"surface_0_{f}" for f in SPREADS[NOSE]), "surface_1_depth")
+    known = {n.name: n for n in surface.nuisances()}
+    assert known["surface_0_place"].sd == pytest.approx(0.02 * 25.2) and known["surface_0_place"].unit == "m"
+    assert known["surface_0_depth"].sd == 0.5 and known["surface_0_depth"].unit == "-"
+    assert known["surface_0_place"].trust * known["surface_0_place"].sd < 0.5 * NOSE.length
+    assert 0.55 * np.exp(known["surface_0_share"].bounds[1]) < 1.0
+
+
+def test_a_surface_has_the_numbers_that_it_is_given():
+    surface = RunningSurface(FILED, WAVES)
+    values = dict.fromkeys(surface.names, 0.0)
+    assert surface.surfaces("main", values) == FILED.surfaces("main")
+    values |= {"surface_0_place": 0.15, "surface_0_depth": np.log(1.3 / 0.8), "surface_0_length": np.log(0.9)}
+    ((nose, joint, far),) = surface.surfaces("main", values)
+    assert (joint, far) == (JOINT, FAR)
+    assert [nose.place, nose.depth, nose.length, nose.share] == pytest.approx([25.35, 1.3e-3, 0.9, 0.55])
+
+
+def test_a_measured_profile_may_be_off_by_a_factor_and_a_place_at_the_origin_not():
+    profile, blade = Sections((23.0, 24.0, 25.0), (0.0, 1e-3, 0.0)), Kink(0.0, 1e-3, 1.0)
+    spreads = {profile: {"places": 0.1, "dips": 0.2}, blade: {"place": 0.2}}
+    surface = RunningSurface(
+        replace(FILED, routes={"main": ((profile, blade),)}, spreads=spreads), Waves([3.0, 24.0], 0.0)
+    )
+    assert surface.names == ("surface_0_dips",)
+    ((changed, _),) = surface.surfaces("main", {"surface_0_dips": np.log(1.5)})
+    assert changed.dips == pytest.approx((0.0, 1.5e-3, 0.0)) and changed.places == profile.places
+
+
+def number(value, unit, prior=None):
+    return {"value": value, "unit": unit, "source": "a drawing"} | ({"prior": prior} if prior else {})
+
+
+def test_priors_are_those_of_the_track_file(tmp_path):
+    """Of parts listed, common to several surfaces, and on one of them; a number without a prior is certain."""
+    content = YAML(typ="safe").load(TOMMERUP.read_text(encoding="utf-8"))
+    content.pop("locations")
+    dips = [number(0.0, "mm", 0.1), number(1.0, "mm", 0.2)]
+    profile = {"kind": "sections", "places": [number(25.0, "m"), number(26.0, "m")], "dips": dips}
+    nose = {
+        "kind": "kink",
+        "place": number(25.2, "m"),
+        "depth": number(0.8, "mm", 0.5),
+        "length": number(1.0, "m", 0.3),
+    }
+    certain = {"kind": "dip", "place": number(14.5, "m"), "depth": number(0.3, "mm"), "length": number(0.15, "m")}
+    content["routes"] = {"main": [nose], "diverging": {"common": [certain], "surfaces": [[profile], [nose]]}}
+    path = tmp_path / "t.yaml"
+    YAML().dump(content, path)
+    found = turnout_track(read_parameters(path)).spreads
+    expected = {"Kink": {"depth": 0.5, "length": 0.3}, "Sections": {"dips": 0.2}}
+    assert {type(part).__name__: spread for part, spread in found.items()} == expected
+
+
+@pytest.mark.slow
+def test_a_rough_search_finds_the_nose_from_where_no_straight_step_does(campaign):
+    """0.4 m further, 10 ms at 40 m/s: more than a period at 112 Hz. The search is to come within a tenth of the
+    shortest wave of 30 Hz of the truth, and all trains look like themselves then."""
+    case = TrackCase(campaign)
+    found = {u.name: u.moved(case.start_values[u.name]) for u in case.surface.unsure}
+    assert abs(found["surface_0_place"] - TRUE.place) < 0.1
+    assert found["surface_0_depth"] == pytest.approx(TRUE.depth, rel=0.3)
+    assert len(case.rollings) == len(PLAN.trains) and not case.unlike
+    certain = TrackCase(replace(campaign, turnout=replace(FILED, spreads={})))
+    assert not set(found) & set(certain.start_values)
+
+
+@pytest.mark.slow
+def test_a_nose_within_its_prior_is_found_as_it_is_and_leaves_what_a_sound_track_leaves(campaign):
+    """Place, depth and length of the true nose lie within three standard errors; with the file's numbers for certain
+    the same recordings are left with five times as much, and the answer was a dip."""
+    case = TrackCase(campaign)
+    fit = fit_jointly(case, iterations=15)
+    told = {(t["term"], t["name"]): t for t in surface_told(case, fit)}
+    for field in ("place", "depth", "length"):
+        t = told["running_surface_kink", field]
+        assert abs(t["value"] - getattr(TRUE, field)) < 3.0 * t["se"]
+    depth = told["running_surface_kink", "depth"]
+    assert depth["filed"] == NOSE.depth and depth["se"] < 0.1 * NOSE.depth
+    assert ("running_surface_dip", "depth") not in told  # 3.5 m before the free waves: nothing here tells its depth
+    certain = fit_jointly(TrackCase(replace(campaign, turnout=replace(FILED, spreads={}))), iterations=15)
+    assert certain.level["passage"] > 5.0 * fit.level["passage"]
+    assert fit.level["passage"] < case.control_level["passage"]
+
+
+def test_a_number_far_from_the_file_is_said():
+    surface = RunningSurface(FILED, WAVES)
+    depth = next(u for u in surface.unsure if u.field == "depth")
+    assert otherwise(depth.told(0.9, 0.05)) == ""
+    assert otherwise(depth.told(np.log(4.0), 0.02)).startswith("The depth of the kink at 25.2 m is 3.2 mm")
