@@ -4,6 +4,8 @@ import numpy as np
 
 from turnout.mismatch.joint import Joint
 
+FEWEST = 3  # recordings of which two may disagree with the third
+
 
 def held_out_score(case, fit, observations=None):
     r"""Log predictive density [nats] of each left-out condition, dict condition -> density.
@@ -26,6 +28,26 @@ def held_out_score(case, fit, observations=None):
         if kept:
             found[condition] = _density(joint, fit, theta, out, kept)
     return found
+
+
+def disagreement(case, fit, kind):
+    r"""Standard errors of all parameters of ``fit`` by what its recordings of a ``kind`` say without one another.
+
+    Jackknife (Efron and Stein 1981) over these m recordings, with one Gauss-Newton step for each:
+    :math:`\sqrt{(m - 1) / m \sum (\theta_i - \bar\theta)^2}`. An error that is each recording's own, but no noise,
+    as of a vehicle's file or a coarse step, is in it. Zeros where there are fewer than three.
+    """
+    joint = Joint(case, fit.candidates)
+    theta = np.concatenate([[fit.values[n.name] for n in case.nuisances], fit.psi])
+    parts = [_Part(joint, o, j, r) for o, j, r in zip(joint.observations, fit.jacobian, fit.white)]
+    normal = np.eye(theta.size) + sum(p.gram / fit.scale[p.kind] for p in parts)
+    right = (joint.mean - theta) / joint.sd + sum(p.across / fit.scale[p.kind] for p in parts)
+    out = [p for p in parts if p.kind == kind]
+    if len(out) < FEWEST:
+        return np.zeros(theta.size)
+    scale = fit.scale[kind]
+    moved = np.array([np.linalg.solve(normal - p.gram / scale, right - p.across / scale) for p in out])
+    return joint.sd * np.sqrt((len(out) - 1) * np.var(moved, axis=0))
 
 
 class _Part:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from turnout.mismatch.case import Nuisance
+from turnout.mismatch.held_out import disagreement
 from turnout.mismatch.track.rough_wheels import BEYOND
 
 PLACES = ("place", "start", "end")  # known to a share of their distance from the origin, all else to a factor
@@ -91,10 +92,13 @@ class RunningSurface:
         return tuple(tuple(changed.get(part, part) for part in parts) for parts in self.turnout.surfaces(route))
 
     def told(self, case, fit):
-        """What ``fit`` says of the numbers that its recordings tell more of than the file does, a dict each."""
+        """What ``fit`` says of the numbers that its recordings tell more of than the file does, a dict each; with what
+        the trains disagree by in their errors."""
         index = {n.name: k for k, n in enumerate(case.nuisances)}
+        apart = disagreement(case, fit, "passage") if self.unsure and fit.jacobian else np.zeros(len(index))
         for u in self.unsure:
-            error = float(np.sqrt(fit.covariance[index[u.name], index[u.name]]))
+            k = index[u.name]
+            error = float(np.hypot(np.sqrt(fit.covariance[k, k]), apart[k]))
             if error < TELLS * u.nuisance.sd:
                 yield u.told(fit.values[u.name], error)
 

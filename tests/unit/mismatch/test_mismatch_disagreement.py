@@ -1,0 +1,37 @@
+"""What recordings disagree by is in the errors of what they tell together."""
+
+import numpy as np
+import pytest
+
+from turnout.mismatch.case import Case, Nuisance
+from turnout.mismatch.held_out import disagreement
+from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.observation import Observation
+
+X = np.arange(1.0, 31.0)
+
+
+class Lines(Case):
+    """Recordings of lines through the origin that have one slope in common, or should."""
+
+    def __init__(self, slopes, kinds=None):
+        kinds = kinds or ["line"] * len(slopes)
+        self.observations = tuple(
+            Observation(f"o{k}", f"c{k}", s * X, 0.5, 1.0, kind) for k, (s, kind) in enumerate(zip(slopes, kinds))
+        )
+        self.nuisances = (Nuisance("slope", "-", 0.0, 1e4),)
+
+    def predict(self, values, terms, observations):
+        return [values["slope"] * X for _ in observations]
+
+
+def test_it_is_the_standard_error_of_the_mean_of_what_each_would_say():
+    slopes = np.array([1.7, 2.0, 2.1, 2.6])
+    case = Lines(slopes)
+    expected = np.std(slopes, ddof=1) / np.sqrt(4)  # for a mean the jackknife is exact
+    assert disagreement(case, fit_jointly(case), "line") == pytest.approx([expected], rel=1e-6)
+
+
+def test_recordings_that_agree_add_nothing_and_two_cannot_tell():
+    for case in (Lines([2.0, 2.0, 2.0]), Lines([1.0, 2.0]), Lines([1.0, 2.0, 3.0], ["line", "other", "other"])):
+        assert disagreement(case, fit_jointly(case), "line") == pytest.approx([0.0], abs=1e-9)
