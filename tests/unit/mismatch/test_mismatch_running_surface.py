@@ -105,16 +105,18 @@ def test_a_rough_search_finds_the_nose_from_where_no_straight_step_does(campaign
 
 @pytest.mark.slow
 def test_a_nose_within_its_prior_is_found_as_it_is_and_leaves_what_a_sound_track_leaves(campaign):
-    """Place, depth and length of the true nose lie within three standard errors; with the file's numbers for certain
+    """Place, depth and length of the true nose lie within two standard errors; with the file's numbers for certain
     the same recordings are left with five times as much, and the answer was a dip."""
     case = TrackCase(campaign)
     fit = fit_jointly(case, iterations=15)
     told = {(t["term"], t["name"]): t for t in surface_told(case, fit)}
     for field in ("place", "depth", "length"):
         t = told["running_surface_kink", field]
-        assert abs(t["value"] - getattr(TRUE, field)) < 3.0 * t["se"]
+        assert abs(t["value"] - getattr(TRUE, field)) < 2.0 * t["se"]
     depth = told["running_surface_kink", "depth"]
-    assert depth["filed"] == NOSE.depth and depth["se"] < 0.1 * NOSE.depth
+    assert (
+        depth["filed"] == NOSE.depth and depth["se"] < 0.25 * NOSE.depth
+    )  # a quarter of what the file leaves open, 0.4 mm, is 0.1
     assert ("running_surface_dip", "depth") not in told  # 3.5 m before the free waves: nothing here tells its depth
     certain = fit_jointly(TrackCase(replace(campaign, turnout=replace(FILED, spreads={}))), iterations=15)
     assert certain.level["passage"] > 5.0 * fit.level["passage"]

@@ -16,6 +16,9 @@ LENGTHS = ("length", "wavelength")
 STEP = 0.02  # m, or of a factor's logarithm: over which a passage's derivative is taken
 MOVED = 0.3  # of its own length a part may move in one step of a fit: beyond, its derivative says nothing
 LEAST = 1e-6  # m: a part that is nowhere deeper is not there
+# What the model does wrong at every axle alike, of a logarithm and in metres: long trains had depth 15 and length 19 % too
+# small, a place 4 cm off, where the fit's own errors were a tenth of that.
+MODEL, MODEL_PLACE = 0.1, 0.02
 TELLS = 0.5  # of the prior's standard deviation: a number that is known no better than that is the file's
 
 
@@ -93,12 +96,13 @@ class RunningSurface:
 
     def told(self, case, fit):
         """What ``fit`` says of the numbers that its recordings tell more of than the file does, a dict each; with what
-        the trains disagree by in their errors."""
+        the trains disagree by, and what the model does wrong at every axle alike, in their errors."""
         index = {n.name: k for k, n in enumerate(case.nuisances)}
         apart = disagreement(case, fit, "passage") if self.unsure and fit.jacobian else np.zeros(len(index))
         for u in self.unsure:
             k = index[u.name]
-            error = float(np.hypot(np.sqrt(fit.covariance[k, k]), apart[k]))
+            model = MODEL_PLACE if u.field in PLACES else MODEL
+            error = float(np.sqrt(fit.covariance[k, k] + apart[k] ** 2 + model**2))
             if error < TELLS * u.nuisance.sd:
                 yield u.told(fit.values[u.name], error)
 
