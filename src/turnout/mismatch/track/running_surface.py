@@ -16,8 +16,8 @@ LENGTHS = ("length", "wavelength")
 STEP = 0.02  # m, or of a factor's logarithm: over which a passage's derivative is taken
 MOVED = 0.3  # of its own length a part may move in one step of a fit: beyond, its derivative says nothing
 LEAST = 1e-6  # m: a part that is nowhere deeper is not there
-# What the model does wrong at every axle alike, of a logarithm and in metres: long trains had depth 15 and length 19 % too
-# small, a place 4 cm off, where the fit's own errors were a tenth of that.
+# What the model does wrong at every axle alike, of a logarithm and in metres: long trains had depth 15 and length 19 %
+# too small, a place 4 cm off, where the fit's own errors were a tenth of that.
 MODEL, MODEL_PLACE = 0.1, 0.02
 TELLS = 0.5  # of the prior's standard deviation: a number that is known no better than that is the file's
 
