@@ -79,7 +79,7 @@ def otherwise(told) -> str:
 
     >>> depth = {"term": "running_surface_kink", "place": 26.7, "name": "depth", "unit": "m", "filed": 1e-3}
     >>> otherwise({**depth, "value": 4e-3, "se": 1e-4, "off": 2.8})
-    'The depth of the kink at 26.7 m is 4 mm (3.8 to 4.2 mm), its file has 1 mm.'
+    'The depth of the kink at 26.7 m is 4 mm (3.8 to 4.2 mm), the track file has 1 mm.'
     >>> otherwise({**depth, "value": 1.3e-3, "se": 1e-4, "off": 0.5})
     ''
     """
@@ -89,7 +89,7 @@ def otherwise(told) -> str:
     values = told["value"], told["value"] - half, told["value"] + half, told["filed"]
     now, low, high, filed = (number_in_words(v, told["unit"], 3) for v in values)
     what = f"{told['name']} of the {told['term'].removeprefix('running_surface_')} at {told['place']:.1f} m"
-    return f"The {what} is {now} ({low.removesuffix(' mm')} to {high}), its file has {filed}."
+    return f"The {what} is {now} ({low.removesuffix(' mm')} to {high}), the track file has {filed}."
 
 
 def _or(other) -> str:

@@ -17,9 +17,7 @@ def held_out_score(case, fit, observations=None):
     left-out condition go back to their prior and are integrated out, not fitted. S holds sigma times the noise
     scale that the other conditions gave; correlated samples count by their ``effective`` share.
     """
-    joint = Joint(case, fit.candidates, observations)
-    theta = np.concatenate([[fit.values[n.name] for n in case.nuisances], fit.psi])
-    parts = [_Part(joint, o, j, r) for o, j, r in zip(joint.observations, fit.jacobian, fit.white)]
+    joint, theta, parts = _taken_apart(case, fit, observations)
     conditions = [o.condition for o in joint.observations]
     found = {}
     for condition in dict.fromkeys(conditions):
@@ -37,9 +35,7 @@ def disagreement(case, fit, kind):
     :math:`\sqrt{(m - 1) / m \sum (\theta_i - \bar\theta)^2}`. An error that is each recording's own, but no noise,
     as of a vehicle's file or a coarse step, is in it. Zeros where there are fewer than three.
     """
-    joint = Joint(case, fit.candidates)
-    theta = np.concatenate([[fit.values[n.name] for n in case.nuisances], fit.psi])
-    parts = [_Part(joint, o, j, r) for o, j, r in zip(joint.observations, fit.jacobian, fit.white)]
+    joint, theta, parts = _taken_apart(case, fit)
     normal = np.eye(theta.size) + sum(p.gram / fit.scale[p.kind] for p in parts)
     right = (joint.mean - theta) / joint.sd + sum(p.across / fit.scale[p.kind] for p in parts)
     out = [p for p in parts if p.kind == kind]
@@ -48,6 +44,13 @@ def disagreement(case, fit, kind):
     scale = fit.scale[kind]
     moved = np.array([np.linalg.solve(normal - p.gram / scale, right - p.across / scale) for p in out])
     return joint.sd * np.sqrt((len(out) - 1) * np.var(moved, axis=0))
+
+
+def _taken_apart(case, fit, observations=None):
+    """The joint problem, its parameters in ``fit``, and the sums over each observation."""
+    joint = Joint(case, fit.candidates, observations)
+    theta = np.concatenate([[fit.values[n.name] for n in case.nuisances], fit.psi])
+    return joint, theta, [_Part(joint, o, j, r) for o, j, r in zip(joint.observations, fit.jacobian, fit.white)]
 
 
 class _Part:
@@ -88,7 +91,7 @@ def _density(joint, fit, theta, out, kept):
     return float(-0.5 * (quadratic + log_ratio + n * np.log(2.0 * np.pi)) - log_sigma)
 
 
-def mean_square_out(case, fit, observations, predictions):
+def mean_square_out(observations, predictions):
     """Mean square of ``observations`` minus ``predictions``, whitened."""
     total = sum(o.effective * float(np.sum(o.whitened(o.data - p) ** 2)) for o, p in zip(observations, predictions))
     return total / sum(o.n_effective for o in observations)

@@ -91,12 +91,11 @@ def over(case, fit, settings):
 
 def over_reserved(case, predictions, settings):
     """The same of what ``predictions`` leave of the reserved recordings; 0 where there are none."""
-    total: dict = {}
-    for o, p in zip(case.reserved, predictions):
-        square, n = total.get(o.kind, (0.0, 0.0))
-        total[o.kind] = square + o.effective * float(np.sum(o.whitened(o.data - p) ** 2)), n + o.n_effective
-    control = {kind: case.control_level.get(kind, settings.control_level) for kind in total}
-    return max((square / n / control[kind] for kind, (square, n) in total.items()), default=0.0)
+    found = [0.0]
+    for kind in {o.kind for o in case.reserved}:
+        mine = [(o, p) for o, p in zip(case.reserved, predictions) if o.kind == kind]
+        found.append(mean_square_out(*zip(*mine)) / case.control_level.get(kind, settings.control_level))
+    return max(found)
 
 
 def heard(case, fit, settings):
@@ -149,7 +148,7 @@ def consistent_elsewhere(case, base, best, settings):
     before, after = (fit_of_reserved(case, f)[0] for f in (base, best.fit))
     if after is None or before is None:
         return before is None
-    squares = [mean_square_out(case, f, case.reserved, p) for f, p in ((base, before), (best.fit, after))]
+    squares = [mean_square_out(case.reserved, p) for p in (before, after)]
     lost = 0.5 * sum(o.n_effective for o in case.reserved) * (squares[1] - squares[0])
     fell = falls(case.reserved, before, after, settings.fall) and objected(-lost, best.gain, settings)
     return squares[1] <= settings.withdrawn_ratio * squares[0] and not fell

@@ -13,7 +13,7 @@ from jinja2 import Environment, PackageLoader
 from turnout.chains.accept import _refuse
 from turnout.chains.mismatch_words import headline
 from turnout.errors import SimulationError
-from turnout.report.finding_words import answer, check, facts, parameters
+from turnout.report.finding_words import answer, check, facts, filed, parameters
 from turnout.report.pages.finding import finding_page
 from turnout.report.panels.finding_place import Drawing, marked_place
 
@@ -214,6 +214,16 @@ def test_what_was_accepted_is_shown_over_the_visits():
     ]  # fmt: skip
     text = page(finding("none"), parameters=rows)
     assert "hanging sleeper, gap: 3 visits" in text and "In the track file, estimated anew" in text
+    nose = rows[-1] | {"term": "running_surface_kink", "parameter": "place", "value": 27.041, "value_low": 27.013}
+    assert filed([nose | {"value_high": 27.079}]) == [
+        {
+            "effect": "running surface kink at 24.6 m",
+            "name": "place",
+            "value": "27.04 m",
+            "interval": "27.01 m to 27.08 m",
+        }
+    ]
+    assert filed([nose | {"accepted": False}]) == []
 
 
 def test_why_nothing_can_be_said_stands_on_the_page():
