@@ -35,9 +35,9 @@ def calibrate_to_files(track_name, section, files, turnout_id=None, config="conf
     """
     track = load_track(track_name, seed=seed)
     place, _ = located(track, section)
-    description, force, responses = _channels(section, turnout_id, config)
+    description, force, responses, settings = _channels(section, turnout_id, config)
     recordings = [r for f in files for r in read(Path(f).name, Path(f).parent, description).recordings]
-    settings, measured = ReceptanceSettings(), []
+    measured = []
     for name in responses:
         channel = recordings[0].channels[recordings[0].index(name)]
         at = channel.position
@@ -66,13 +66,13 @@ def identified_modes(recordings, force="hammer", response="acc_1"):
 
 def _channels(section, turnout_id, config):
     if turnout_id is None:
-        return UNDESCRIBED, "hammer", ("acc_1", "acc_2")
+        return UNDESCRIBED, "hammer", ("acc_1", "acc_2"), ReceptanceSettings()
     turnout = load_configuration(config).turnout(turnout_id)
     hammer = turnout.hammer
     if hammer is None:
         raise ConfigError(turnout.layout, "hammer", "nothing about hammer tests", "Add them to the layout")
-    names = (hammer.response[section], hammer.validation[section])
-    return hammer.descriptions[section], hammer.force[section], tuple(n for n in names if n)
+    names = tuple(n for n in (hammer.response[section], hammer.validation[section]) if n)
+    return hammer.descriptions[section], hammer.force[section], names, turnout.settings["receptance"]
 
 
 def _measured(receptance, excited, at):

@@ -84,7 +84,8 @@ def _test(unit, turnout, raw_root, track, found):
     name = f"{unit.section} {unit.campaign}"
     force = turnout.hammer.force[unit.section]
     seated = tuple(_seated(r, place) for r in recordings)
-    found.tests.append(HammerTest(name, place, seated, force, unit.campaign, noted))
+    judged = turnout.settings["receptance"]
+    found.tests.append(HammerTest(name, place, seated, force, unit.campaign, noted, judged))
     found.sections[name] = unit.section
 
 

@@ -15,7 +15,7 @@ from turnout.records import RawChannel, RawDescription
 USED = {
     "hammer": (("receptance", "identify"), ("sections", "hammer")),
     "passage": (("passage",), ("sections", "passages")),
-    "mismatch": (("mismatch", "passage"), ("sections", "hammer", "passages")),
+    "mismatch": (("mismatch", "passage", "receptance"), ("sections", "hammer", "passages")),
 }
 
 

@@ -12,6 +12,7 @@ import small_turnout as small
 from turnout.chains import mismatch, mismatch_gather
 from turnout.chains.accept import with_entry
 from turnout.chains.accepted_terms import Accepted
+from turnout.chains.calibrate import calibrate_to_files
 from turnout.chains.mismatch_context import digest_of_model, track_of
 from turnout.chains.mismatch_gather import MOST_ALIKE, Gathered, _channels_of, _thin_out, gather
 from turnout.chains.mismatch_groups import _neighbours, groups, telling
@@ -26,11 +27,13 @@ from turnout.fleet.scan import scan
 from turnout.mismatch.case import Nuisance
 from turnout.mismatch.track import HammerTest, Passage, TrackCase
 from turnout.mismatch.track.base_model import vehicle_with
+from turnout.mismatch.track.blows import pairs_of
 from turnout.mismatch.track.planned import measured_campaign, small_plan
 from turnout.mismatch.track.rolling import FEWEST, Rolling, observed, rolling_nuisances, rolling_of
 from turnout.readers import HELD, read
 from turnout.readers.writing import write
-from turnout.simulate import load_vehicle
+from turnout.receptance import find_impacts
+from turnout.simulate import Sensor, load_vehicle
 
 
 @pytest.fixture
@@ -321,9 +324,9 @@ def logged(folder):
     return folder
 
 
-def gathered(folder):
+def gathered(folder, kind="passage"):
     turnout = turnout_in(folder)
-    units = [u for u in scan(turnout, folder / "raw").units if u.kind == "passage"]
+    units = [u for u in scan(turnout, folder / "raw").units if u.kind == kind]
     return gather(units, turnout, folder / "raw", track_of(turnout)[0], {})
 
 
@@ -348,3 +351,26 @@ def test_rows_that_may_be_those_of_other_trains_are_not_used_and_that_is_said(lo
     found = gathered(logged)
     assert not found.passages and len([n for n in found.notes if "speed is not known" in n]) == 2
     assert [n for n in found.notes if "2 trains in it, 1 where passages were analysed" in n]
+
+
+@pytest.mark.parametrize(("softest", "used"), [(50.0, True), (50_000.0, False)])
+def test_blows_are_judged_as_the_hammer_stage_judges_them(folder, softest, used):
+    """Its settings are the turnout's: blows too soft for the one are too soft for the other."""
+    file = folder / "config/config.yaml"
+    file.write_text(file.read_text() + f"receptance: {{softest_blow: {softest:g}}}\n")
+    tests = gathered(folder, "hammer").tests
+    turnout = turnout_in(folder)
+    force, response = turnout.hammer.force["A"], turnout.hammer.response["A"]
+    for test in tests:
+        judged = find_impacts(test.recordings, force, response, turnout.settings["receptance"])
+        assert any(i.accepted for i in judged) is used
+        assert bool(pairs_of(test, [Sensor(response, test.place)], 0.03)) is used
+    assert tests
+
+
+def test_a_calibration_judges_blows_by_the_turnouts_settings(folder):
+    file, track = folder / "config/config.yaml", folder / "config/tracks/small.yaml"
+    file.write_text(file.read_text() + "receptance: {softest_blow: 50000}\n")
+    files = sorted((folder / "raw/t1/hammer").rglob("A_*"))
+    with pytest.raises(SimulationError, match="calibration of A: 0 sound impacts"):
+        calibrate_to_files(str(track), "A", files, "t1", folder / "config")

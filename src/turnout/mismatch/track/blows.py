@@ -53,7 +53,7 @@ def pairs_of(test, sensors, tolerance):
     for sensor in sensors:
         if not any(c.name == sensor.name for r in test.recordings for c in r.channels):
             continue
-        impacts = find_impacts(test.recordings, test.force, sensor.name)
+        impacts = find_impacts(test.recordings, test.force, sensor.name, test.judged)
         used = [i for i in impacts if i.accepted]
         if len(used) < FEWEST:
             continue

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.errors import SimulationError
 from turnout.records import Recording
 from turnout.simulate.sensor import Sensor
@@ -13,7 +14,7 @@ LOAD_SD = 0.05  # of all that is sprung, where its load was measured or noted
 @dataclass(frozen=True)
 class HammerTest:
     """Blows at one place [m]: ``force`` is the hammer's channel, all accelerations are responses. ``conditions``
-    such as rail_temperature [°C]; ``condition`` is the fold it belongs to, by default its place and visit."""
+    such as rail_temperature [°C]; ``judged`` says how its blows are found and judged, by default as everywhere."""
 
     name: str
     place: float
@@ -21,6 +22,7 @@ class HammerTest:
     force: str = "hammer"
     visit: str = ""
     conditions: Mapping = field(default_factory=dict)
+    judged: ReceptanceSettings | None = None
 
 
 @dataclass(frozen=True)
