@@ -16,36 +16,40 @@ with unread as (
     left join campaigns c on c.campaign_id = q.turnout_id || '/' || split_part(r.label, '/', -1)
     where q.kind in ('hammer', 'passage')
 ),
-tried as (
+tried as not materialized (
     select
-        turnout_id, section_id, 'hammer' as source, campaign_id as what, measured_at_utc as at_utc,
+        section_id as part, turnout_id, section_id, 'hammer' as source, campaign_id as what, measured_at_utc as at_utc,
         status <> 'rejected' as is_used, reason
     from models_current
     union all
-    select turnout_id, '*', 'passage', passage_id, passed_at_utc, status <> 'rejected', reason from passages_current
+    select turnout_id, turnout_id, '*', 'passage', passage_id, passed_at_utc, status <> 'rejected', reason
+    from passages_current
     union all
-    select turnout_id, section_id, 'hammer', campaign_id, at_utc, false, reason_code from unread where kind = 'hammer'
+    select section_id, turnout_id, section_id, 'hammer', campaign_id, at_utc, false, reason_code
+    from unread where kind = 'hammer'
     union all
-    select turnout_id, '*', 'passage', path, at_utc, false, reason_code from unread where kind = 'passage'
+    select turnout_id, turnout_id, '*', 'passage', path, at_utc, false, reason_code
+    from unread where kind = 'passage'
 ),
-known as (
+known as not materialized (
     select * from tried where coalesce(at_utc <= "asof", "asof" >= newest_measurement(), true)
 ),
 last_used as (
-    select turnout_id, section_id, source, max(at_utc) filter (is_used) as used_at_utc
+    select part, max(at_utc) filter (is_used) as used_at_utc
     from known
-    group by turnout_id, section_id, source
-    having coalesce(max(at_utc) filter (not is_used) > max(at_utc) filter (is_used), max(at_utc) filter (is_used) is null)
+    group by part
+    having coalesce(max(at_utc) filter (not is_used) > used_at_utc, used_at_utc is null)
 ),
 failed as (
     select
-        turnout_id, section_id, source, any_value(used_at_utc) as used_at_utc, count(distinct what) as n,
+        any_value(turnout_id) as turnout_id, any_value(section_id) as section_id, any_value(source) as source,
+        any_value(used_at_utc) as used_at_utc, count(distinct what) as n,
         max(at_utc) as at_utc, coalesce(max_by(what, at_utc), min(what)) as what,
         mode(reason order by reason) as usual_reason, max_by(reason, at_utc) as reason
-    from known join last_used using (turnout_id, section_id, source)
+    from known join last_used using (part)
     where not is_used and coalesce(at_utc > used_at_utc, used_at_utc is null)
-    group by turnout_id, section_id, source
-    having source = 'hammer' or any_value(used_at_utc) is null or count(distinct what) >= 10
+    group by part
+    having any_value(source) = 'hammer' or any_value(used_at_utc) is null or count(distinct what) >= 10
 ),
 blows as (
     select
