@@ -66,16 +66,14 @@ def densities(case, values):
 def models(case, unloaded, found):
     """name -> values of the first passage: recorded, and by each model."""
     k = next(i for i, o in enumerate(case.observations) if o.kind == "passage")
-    return {
+    shown = {
         "recorded": case.observations[k].data,
         "calibrated on blows alone": unloaded[0],
         "all fitted together": found.base.predictions[k],
-        "with the leading effect": _leading(found).predictions[k],
     }
-
-
-def _leading(found):
-    return found.verdict.scores[0].fit if found.verdict.scores else found.base
+    if found.verdict.scores:
+        shown["with the leading effect"] = found.verdict.scores[0].fit.predictions[k]
+    return shown
 
 
 def excess(case, shown):

@@ -139,7 +139,7 @@ def beam_printed():
 def draw(found, path):
     """The reserved blow of three cases: recorded, by the simple model, with what was named."""
     plt = plotting()
-    shown = ("A1", "A3", "B1")
+    shown = ("A1", "A3", "A5", "B1")
     figure, axes = plt.subplots(len(shown), 1, figsize=(8.5, 8.0), layout="constrained")
     for axis, title in zip(axes, shown):
         case, told, d = found[title]

@@ -46,6 +46,9 @@ def make_set(out, truth, seed=None, full=True, folders=(), only=None, limit=None
     if (out / "commit.json").exists():
         raise BlindError(out, "cases", "a set is there already", "Choose another folder, or remove it")
     examines = digest_of_folder(Path(turnout.__file__).parent) if seed == "tool" else None
+    if unknown := sorted(set(only or ()) - set(load_effects(*folders))):
+        there = ", ".join(sorted(load_effects(*folders)))
+        raise BlindError("--only", unknown[0], "no such kind", f"There are {there}")
     about = _begun(truth, seed_for(examines) if examines else seed, full, folders, only, limit)
     seed = about["seed"]
     plans = plan_cases(seed, load_effects(*folders), full, only)[:limit]

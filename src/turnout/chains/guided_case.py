@@ -66,7 +66,9 @@ class GuidedCase:
             return self.case.start_values
         means = {n.name: n.mean for n in cheap.nuisances}
         roughly = fit_jointly(cheap.roughened(), values=means, iterations=CHEAP_STEPS)
-        return {**self.case.start_values, **fit_jointly(cheap, values=roughly.values, iterations=CHEAP_STEPS).values}
+        told = fit_jointly(cheap, values=roughly.values, iterations=CHEAP_STEPS).values
+        self.case.recentre(told)
+        return {**self.case.start_values, **told}
 
     def __getattr__(self, name):
         if "case" not in self.__dict__:  # a copy that is being made

@@ -88,7 +88,7 @@ def best_shown(shown, case, found):
         pool = [s for s in pool if s.sensor == where["sensor"]] or pool
     elif where.get("place") is not None:
         places = {s.name: s.place for s in case.campaign.sensors}
-        nearest = min({s.sensor for s in pool}, key=lambda name: abs(places[name] - where["place"]))
+        nearest = min((s.sensor for s in pool), key=lambda name: (abs(places[name] - where["place"]), name))
         pool = [s for s in pool if s.sensor == nearest]
     changed = found.fit is not found.base
     return max(pool, key=lambda s: _share(s.gain if changed else (s.measured - s.before) ** 2, s.measured))

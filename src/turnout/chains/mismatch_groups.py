@@ -1,7 +1,9 @@
 """Neighbouring sections of one track are one case: what lies further apart does not feel the same effect."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 
 from turnout.chains.mismatch_gather import Gathered
 from turnout.config.turnout import TurnoutConfig
@@ -108,12 +110,13 @@ def formations(passages):
 
 
 def telling(passages, most=MOST_PASSAGES, axles=MOST_AXLES):
-    """At most ``most`` passages and ``axles``: one train of each type, then short trains, extremes of speed first."""
+    """At most ``most`` passages and ``axles``: one train of each type in turn, short ones first, of each type the
+    extremes of speed first."""
     kinds: dict[str, list] = {}
     for p in sorted(passages, key=lambda p: (len(p.vehicle.wheels), p.train, p.speed)):
         kinds.setdefault(p.train, []).append(p)
     queues = [_extremes_first(members) for members in kinds.values()]
-    order = [q[0] for q in queues] + [p for q in queues for p in q[1:]]
+    order = [p for turn in zip_longest(*queues) for p in turn if p is not None]
     chosen: list = []
     for p in order:
         total = sum(len(c.vehicle.wheels) for c in chosen) + len(p.vehicle.wheels)
@@ -129,8 +132,19 @@ def _extremes_first(members):
 
 
 def reserved(passages, tests) -> tuple[str, ...]:
-    """Names that no fit reads: of passages in order of speed every fifth, else of the tests."""
+    """Names that no fit reads: of passages in order of speed every fifth, else of the tests. A train's only passage
+    stays for the fits where another one, the nearest in speed, can be kept back in its place."""
     items = sorted(passages, key=lambda p: p.speed) or sorted(tests, key=lambda t: t.place)
     if len(items) < FEWEST_TO_RESERVE:
         return ()
-    return tuple(item.name for k, item in enumerate(items) if k % RESERVED_EVERY == RESERVED_EVERY // 2)
+    left, chosen = Counter(_train(item) for item in items), []
+    for wanted in range(RESERVED_EVERY // 2, len(items), RESERVED_EVERY):
+        near = sorted((k for k in range(len(items)) if k not in chosen), key=lambda k: abs(k - wanted))
+        chosen.append(next((k for k in near if left[_train(items[k])] > 1), near[0]))
+        left[_train(items[chosen[-1]])] -= 1
+    return tuple(items[k].name for k in sorted(chosen))
+
+
+def _train(item):
+    """Type of a passage's train; all hammer tests are of one kind."""
+    return getattr(item, "train", "")

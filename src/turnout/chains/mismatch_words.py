@@ -4,7 +4,8 @@ import json
 
 from turnout.mismatch.verdict import NO_UPPER_END
 
-# What the simulation lacked, in words; {place}, {channel}, {train}, {wheel} and every parameter with its unit.
+# What the simulation lacked, in words; {place}, {channel}, {train}, {wheel}, every parameter with its
+# unit, and its size without the sign as {<parameter>_size}.
 SENTENCES = {
     "hanging_sleeper": "The sleeper at {place} hangs {gap} above its ballast",
     "lifting_sleepers": "The sleepers about {place} lift off their ballast",
@@ -39,7 +40,10 @@ SENTENCES = {
 # The same where the recordings leave a parameter open by more than half of its value.
 OPEN = {"hanging_sleeper": ("gap", "The sleeper at {place} hangs above its ballast, and no train here closes the gap")}
 # And where it is below 0.
-REVERSED = {"sensor_gain": ("gain", "Sensor {channel} has the wrong polarity: it reads {gain} times what it should")}
+REVERSED = {
+    "sensor_gain": ("gain", "Sensor {channel} has the wrong polarity: it reads {gain} times what it should"),
+    "time_offset": ("delay", "Channel {channel} is early by {delay_size}"),
+}
 OTHERWISE = 2.0  # standard deviations of what the file says of itself
 Z95 = 1.959964
 MILLI = {"m": "mm", "s": "ms"}
@@ -124,6 +128,7 @@ def _sentence(term, finding) -> str:
     places = [fixed[k] for k in ("sleeper", "support", "first", "last", "place") if k in fixed]
     beyond = term["parameters"].get("shift", {"value": 0.0})["value"] if "place" in fixed else 0.0
     words = {name: number_in_words(p["value"], p["unit"]) for name, p in term["parameters"].items()}
+    words |= {f"{name}_size": number_in_words(abs(p["value"]), p["unit"]) for name, p in term["parameters"].items()}
     words |= {
         "place": f"{sum(places) / len(places) + beyond:.1f} m" if places else "an unknown place",
         "channel": fixed.get("channel_name") or finding["channel"] or "?",

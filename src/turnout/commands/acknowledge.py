@@ -26,7 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--suppress-until", metavar="DATE", default="", help="silence it until then, YYYY-MM-DD")
     parser.add_argument("--at", default="", help="when it was said, UTC; now if not given")
     parser.add_argument("--registry", default="results/registry", help="where open alarms are looked up (%(default)s)")
-    parser.add_argument("--configuration", default="config", help="folder of the configuration (%(default)s)")
+    parser.add_argument(
+        "--configuration", "--config", default="config", help="folder of the configuration (%(default)s)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:

@@ -17,7 +17,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     for column, key in list(ROW.items())[2:]:
         unit = f" [{key.unit}]" if key.unit else ""
         parser.add_argument("--" + column.replace("_", "-"), dest=column, metavar="…", help=key.meaning + unit)
-    parser.add_argument("--configuration", default="config", help="folder of the configuration (%(default)s)")
+    parser.add_argument(
+        "--configuration", "--config", default="config", help="folder of the configuration (%(default)s)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:

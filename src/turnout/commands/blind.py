@@ -22,11 +22,13 @@ def add_arguments(parser):
     )  # fmt: skip
     make.add_argument("--fast", action="store_true", help="the fast tier of 40 cases")
     make.add_argument("--effects", action="append", default=[], help="folder with effects of your own")
-    make.add_argument("--only", help="kinds to keep beside the controls, by commas")
+    make.add_argument("--only", help="kinds to keep beside the controls, by commas, as void,dip")
     make.add_argument("--limit", type=int, help="the first so many cases of the shuffled set")
     make.add_argument("--workers", type=int, default=1, help="processes (default 1)")
     diagnose = steps.add_parser("diagnose", help="let the tool diagnose every case, the truth out of its reach")
-    diagnose.add_argument("--command", help="command of the tool; {python}, {case}, {folder}, {out} are filled in")
+    diagnose.add_argument(
+        "--command", dest="tool", help="command of the tool; {python}, {case}, {folder}, {out} are filled in"
+    )
     diagnose.add_argument("--cases", help="only these, by commas")
     diagnose.add_argument("--timeout", type=float, default=1800.0, help="seconds of the clock per case (default 1800)")
     diagnose.add_argument("--cpu", type=float, default=900.0, help="seconds of the processor per case (default 900)")
@@ -56,6 +58,10 @@ def run(args):
 
 
 def _seed(text):
+    from argparse import ArgumentTypeError
+
+    if text != "tool" and not text.isdecimal():
+        raise ArgumentTypeError(f"{text!r} is neither a whole number nor 'tool'")
     return text if text == "tool" else int(text)
 
 
@@ -82,7 +88,7 @@ def _diagnose(args):
 
     only = args.cases.split(",") if args.cases else None
     held = diagnose_set(
-        args.out, _truth(args), args.command or COMMAND, only, args.timeout, args.workers, cpu=args.cpu,
+        args.out, _truth(args), args.tool or COMMAND, only, args.timeout, args.workers, cpu=args.cpu,
         again=args.again, progress=_bar, label=args.ablation,
     )  # fmt: skip
     failed = sum(run["status"] != "answered" for run in held["cases"].values())

@@ -24,7 +24,7 @@ def add_arguments(parser):
     parser.add_argument("--track", default="tommerup", help="file in config/tracks, or its path")
     parser.add_argument("--section", required=True, help="section of the track file")
     parser.add_argument("--turnout", help="id in config/turnouts.tsv, for the channels of the files")
-    parser.add_argument("--config", default="config", help="configuration folder (default config)")
+    parser.add_argument("--configuration", "--config", default="config", help="configuration folder (default config)")
     parser.add_argument("--modes", nargs="+", metavar="BAND=HZ/ZETA", help="resonances to meet instead of files")
 
 
@@ -43,7 +43,7 @@ def run(args):
             print(f"{band}: wanted {frequency:.1f} Hz, {damping:.4f}; reached {reached}")
         values, sd = fit.values, {}
     else:
-        found = calibrate_to_files(args.track, args.section, args.files, args.turnout, args.config)
+        found = calibrate_to_files(args.track, args.section, args.files, args.turnout, args.configuration)
         print(found)
         values, sd = found.values, found.sd
     print(f"\n  # section {args.section}")

@@ -10,7 +10,9 @@ HELP = "check configuration and file names"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Folders of configuration and raw files."""
-    parser.add_argument("--configuration", default="config", help="folder of the configuration (%(default)s)")
+    parser.add_argument(
+        "--configuration", "--config", default="config", help="folder of the configuration (%(default)s)"
+    )
     parser.add_argument("--raw", help="raw root (raw, where it is there)")
     parser.add_argument("--formats", action="store_true", help="list the raw formats")
 

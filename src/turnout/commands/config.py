@@ -7,6 +7,7 @@ turnout config generate --check    say what is out of date, change nothing
 """
 
 import argparse
+import sys
 
 HELP = "show or generate configuration"
 
@@ -22,7 +23,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     generate.add_argument("--defaults", action="store_true", help="do not keep values changed in config.yaml")
     generate.add_argument("--docs", default="docs", help="folder of the documentation (%(default)s)")
     for sub in (show, generate):
-        sub.add_argument("--configuration", default="config", help="folder of the configuration (%(default)s)")
+        sub.add_argument(
+            "--configuration", "--config", default="config", help="folder of the configuration (%(default)s)"
+        )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -36,10 +39,12 @@ def _show(args) -> int:
 
     configuration = load_configuration(args.configuration)
     configuration.turnout(args.turnout)
-    for key, value, source in sources(configuration, args.turnout):
-        if args.only in key:
-            print(f"{key:<44} {value!s:<28} {source}")
-    return 0
+    shown = [found for found in sources(configuration, args.turnout) if args.only in found[0]]
+    for key, value, source in shown:
+        print(f"{key:<44} {value!s:<28} {source}")
+    if not shown:
+        print(f"no key of {args.turnout} contains {args.only!r}; without --only all are shown", file=sys.stderr)
+    return 0 if shown else 1
 
 
 def _generate(args) -> int:

@@ -22,7 +22,7 @@ def add_arguments(parser):
         help="YYYY-MM-DD, YYYY-MM, or 'all' together (effects of temperature need several days): default the newest",
     )
     parser.add_argument("--track", help="file in config/tracks; default: the turnout's own, else its layout's")
-    parser.add_argument("--config", default="config", help="configuration folder (%(default)s)")
+    parser.add_argument("--configuration", "--config", default="config", help="configuration folder (%(default)s)")
     parser.add_argument("--raw", default="raw", help="folder of raw files (%(default)s)")
     parser.add_argument("--work", default="work", help="where fits and results are kept (%(default)s)")
     parser.add_argument("--registry", default="results/registry", help="what --accept looks in, too (%(default)s)")
@@ -59,7 +59,7 @@ def _show(args, results, rows):
     from turnout.report.findings import write_own_page
 
     results.keep(rows)
-    page = write_own_page(rows, args.config, args.turnout, args.pages)
+    page = write_own_page(rows, args.configuration, args.turnout, args.pages)
     print(json.dumps(rows["mismatch_findings"], default=str, indent=1) if args.json else _words(rows))
     print(f"page: {page}")
 
@@ -71,7 +71,7 @@ def _diagnosed(args):
 
     with DiagnoseBar() as bar:
         return diagnose_turnout(
-            args.turnout, args.config, args.raw, args.work, args.visit, args.track, tuple(args.sections),
+            args.turnout, args.configuration, args.raw, args.work, args.visit, args.track, tuple(args.sections),
             None if args.budget is None else 60.0 * args.budget, bar,
         )  # fmt: skip
 
@@ -80,7 +80,7 @@ def _accept(args, results):
     """Write the finding into the track file and say what changed."""
     from turnout.chains.accept import accept
 
-    path, words = accept(results.finding(args.finding), args.config, args.turnout, args.track, args.anyway)
+    path, words = accept(results.finding(args.finding), args.configuration, args.turnout, args.track, args.anyway)
     print(f"{path}: {words}")
     print("From now on the simulation contains it; each visit estimates it anew, see mismatch_parameters.")
     return 0

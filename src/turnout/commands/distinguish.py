@@ -13,7 +13,7 @@ HELP = "which effects a planned campaign can tell apart"
 def add_arguments(parser):
     """Options of the command."""
     parser.add_argument("--track", default="tommerup", help="file in config/tracks (%(default)s)")
-    parser.add_argument("--config", default="config", help="configuration folder (%(default)s)")
+    parser.add_argument("--configuration", "--config", default="config", help="configuration folder (%(default)s)")
     parser.add_argument("--sensors", nargs="+", type=float, required=True, metavar="M", help="places on the rail [m]")
     parser.add_argument("--blows", nargs="*", type=float, default=(), metavar="M", help="places of the hammer [m]")
     parser.add_argument("--temperatures", nargs="+", type=float, default=(15.0,), metavar="C", help="of the rail [°C]")
@@ -34,7 +34,7 @@ def run(args):
         args.trains,
         args.speeds,
         args.families,
-        args.config,
+        args.configuration,
     )
     print(matrix)
     for name in matrix.names:

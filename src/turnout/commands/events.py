@@ -22,7 +22,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--note", default="", help="free text")
     parser.add_argument("--effect", action="store_true", help="what the entered work did, from the registry")
     parser.add_argument("--registry", default="results/registry", help="folder of the registry (%(default)s)")
-    parser.add_argument("--configuration", default="config", help="folder of the configuration (%(default)s)")
+    parser.add_argument(
+        "--configuration", "--config", default="config", help="folder of the configuration (%(default)s)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:

@@ -2,7 +2,9 @@
 
 turnout export out                            every table as one Parquet file
 turnout export out --format csv --only worklist chart_states
-turnout export lake --format delta --only modes charts needs the extra: pip install 'turnout[lakehouse]'
+turnout export lake --format delta --only modes_current charts
+
+Delta Lake needs the extra: pip install -e '.[lakehouse]'
 """
 
 import argparse
@@ -61,7 +63,7 @@ def _delta(con, quoted, path) -> int:
     try:
         from deltalake import write_deltalake
     except ImportError:
-        raise RegistryError("Delta Lake needs a package: pip install 'turnout[lakehouse]'.") from None
+        raise RegistryError("Delta Lake needs a package: pip install -e '.[lakehouse]'.") from None
     rows = con.sql(f"select * from {quoted}").to_arrow_table()
     write_deltalake(str(path), rows, mode="overwrite")
     return rows.num_rows

@@ -13,7 +13,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The recording, its turnout, and where its models lie."""
     parser.add_argument("file", help="passage recording, in any format that is read")
     parser.add_argument("--turnout", required=True, help="id of the turnout, for its sensors and models")
-    parser.add_argument("--configuration", default="config", help="folder of the configuration (%(default)s)")
+    parser.add_argument(
+        "--configuration", "--config", default="config", help="folder of the configuration (%(default)s)"
+    )
     parser.add_argument("--work", default="work", help="folder of the last run (%(default)s)")
     parser.add_argument("--no-fit", action="store_true", help="only find the train, fit no model")
 

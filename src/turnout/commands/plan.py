@@ -16,7 +16,9 @@ STAGES = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Folders of configuration, raw files and results, the turnouts asked about, and the number of shards."""
-    parser.add_argument("--configuration", default="config", help="folder of the configuration (%(default)s)")
+    parser.add_argument(
+        "--configuration", "--config", default="config", help="folder of the configuration (%(default)s)"
+    )
     parser.add_argument("--raw", help="raw root (raw)")
     parser.add_argument("--work", default="work", help="folder of the results of earlier runs (%(default)s)")
     parser.add_argument("--shards", type=int, help="number of shards of those runs, instead of that in config.yaml")

@@ -11,7 +11,9 @@ def add_arguments(parser):
     """Options of the command."""
     parser.add_argument("--registry", default="results/registry", help="folder of the registry (%(default)s)")
     parser.add_argument("--pages", default="results/pages", help="where the pages go (%(default)s)")
-    parser.add_argument("--turnouts", nargs="+", metavar="ID", help="only these turnouts' pages, and the fleet's")
+    parser.add_argument(
+        "--turnouts", "--turnout", nargs="+", metavar="ID", help="only these turnouts' pages, and the fleet's"
+    )
     parser.add_argument("--cores", type=int, default=1, help="processes that draw pages (%(default)s)")
 
 

@@ -38,7 +38,9 @@ def add_arguments(parser):
             "--track", help="file in config/tracks, or its path (default: the turnout's own, else tommerup)"
         )
         sub.add_argument("--turnout", help="id in config/turnouts.tsv")
-        sub.add_argument("--config", default="config", help="configuration folder (default config)")
+        sub.add_argument(
+            "--configuration", "--config", dest="config", default="config", help="its folder (default config)"
+        )
         sub.add_argument("--raw", default="raw", help="folder of raw files (default raw)")
         sub.add_argument("--truth", help="folder for what is true; the pipeline does not read it")
         sub.add_argument("--out", help="file to write instead of a place below --raw")

@@ -15,7 +15,9 @@ HELP = "learn axle loads and clusters from the trains so far"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Which turnouts, and where everything lies."""
     parser.add_argument("--turnout", nargs="*", help="only the loads of these turnouts")
-    parser.add_argument("--configuration", default="config", help="folder of the configuration (%(default)s)")
+    parser.add_argument(
+        "--configuration", "--config", default="config", help="folder of the configuration (%(default)s)"
+    )
     parser.add_argument("--raw", default="raw", help="folder of the recordings (%(default)s)")
     parser.add_argument("--registry", default="results/registry", help="folder of the registry (%(default)s)")
 

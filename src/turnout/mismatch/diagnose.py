@@ -1,6 +1,6 @@
 """The ten steps, from a case to a verdict with everything it rests on."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -57,7 +57,6 @@ class Diagnosis:
     frames: tuple
     verification: Verification
     latent: Latent | None = None
-    preflight: dict = field(default_factory=dict)
     scored: tuple = ()
     where: Whereabouts | None = None
 
@@ -143,10 +142,7 @@ def diagnose(case, settings=None, progress=None, store=None):
     where = whereabouts(case, base, leader, verdicts[0].cause) if verdicts[0].answer == "unknown" else None
     if check.over > UNFORETOLD:
         verdicts[0] = unforetold(verdicts[0], settings)
-    return Diagnosis(
-        tuple(verdicts), base, fit, frames, check, latent_of(case, base), {},
-        scores, where,
-    )  # fmt: skip
+    return Diagnosis(tuple(verdicts), base, fit, frames, check, latent_of(case, base), scores, where)
 
 
 def _with_its_errors(case, fit, settings, store):

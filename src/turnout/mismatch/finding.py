@@ -2,6 +2,8 @@
 
 import json
 
+HALF_BAY = 0.3  # m: nearer than this are the place of a finding and that of a cell of the residual
+FALSE_DISCOVERY = 0.05  # expected share of wrong ones among the frames named
 CHECKS = {
     "hanging_sleeper": "Look under this sleeper while a train passes; tamp it",
     "local_ballast": "Compare the ballast of this sleeper with its neighbours'; tamp or drain",
@@ -70,7 +72,7 @@ def place_in_words(diagnosis):
     """Where what is missing acts, else where the residual is concentrated by the frame attribution."""
     if diagnosis.where is not None:
         return str(diagnosis.where)
-    found = [f for f in diagnosis.frames if f.q < 0.05]
+    found = [f for f in diagnosis.frames if f.q < FALSE_DISCOVERY]
     if not found:
         return "at no place, sensor or train in particular"
     return ", ".join(f"at {f.frame} {f.level} ({f.effect:+.1f} dB, q = {f.q:.3f})" for f in found[:2])
@@ -104,7 +106,7 @@ def finding_row(diagnosis, identity):
         "band_low_hz": None,
         "band_high_hz": None,
         "probability": round(diagnosis.probability, 4),
-        "p_value": next((f.q for f in diagnosis.frames if f.frame == locked), None),
+        "p_value": next((f.q for f in diagnosis.frames if f.frame == locked and _is_there(f.level, where)), None),
         "fit_before_pct": _finite(check.before),
         "fit_after_pct": _finite(check.after),
         "fit_rival_pct": _finite(check.rival),
@@ -153,6 +155,21 @@ def _position(diagnosis, term, where):
         k = diagnosis.fit.part(term).start + names.index("shift")
         place, se = round(float(place + diagnosis.fit.psi[k]), 3), float(f"{diagnosis.fit.psi_se[k]:.3g}")
     return {"position_m": place, "position_se_m": se}
+
+
+def _is_there(level, where):
+    """Whether the level of a frame is where the finding is; one that has no place, sensor or train cannot be elsewhere.
+
+    >>> _is_there("12.0", {"place": 12.3}), _is_there("12.0", {"place": 18.0}), _is_there("A1", {"sensor": "A2"})
+    (True, False, False)
+    """
+    if where.get("place") is not None:
+        try:
+            return abs(float(level) - where["place"]) <= HALF_BAY
+        except ValueError:
+            return False
+    own = (where.get("sensor"), where.get("train"), in_train(where))
+    return str(level) in own or not any(own)
 
 
 def _finite(value):

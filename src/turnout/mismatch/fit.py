@@ -63,11 +63,6 @@ class Fit:
             first += len(candidate.parameters)
         return found
 
-    @property
-    def chi2(self):
-        """Weighted mean square over all observations' effective samples."""
-        return float(sum(self.level.values()) / max(len(self.level), 1))
-
 
 def terms_of(candidates, psi):
     """Terms of several candidates from their stacked parameters."""

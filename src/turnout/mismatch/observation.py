@@ -14,9 +14,10 @@ class Observation:
     ``data``, ``sigma`` (n,) in the same unit: noise and materiality floor; ``effective`` share of the samples
     that are independent, 0 to 1. Folds leave out a ``condition``; ``kind`` shares one noise scale. ``cells`` (n,)
     numbers the time-frequency cell of each sample, -1 for none; ``labels`` frame -> (n_cell,) level of each cell.
-    ``modes`` (n, m) in the unit of the data are errors of this recording's own with unit variance each (roughness
-    of its wheels, tolerance of a model that errs smoothly): they are integrated out, see ``whitened``; in single
-    precision, where they are many, what is whitened is right to 1e-6 of its size.
+    ``rows`` of equal length lie one behind the other, of sensors or of Re and Im: what one misses in a stretch, others
+    may miss as well. ``modes`` (n, m) in the unit of the data are errors of this recording's own with unit variance
+    each (roughness of its wheels, tolerance of a model that errs smoothly): they are integrated out, see ``whitened``;
+    in single precision, where they are many, what is whitened is right to 1e-6 of its size.
     """
 
     name: str
@@ -29,12 +30,15 @@ class Observation:
     cells: np.ndarray | None = None
     labels: Mapping[str, np.ndarray] = field(default_factory=dict)
     modes: np.ndarray | None = None
+    rows: int = 1
 
     def __post_init__(self):
         data = np.asarray(self.data, dtype=float)
         sigma = np.broadcast_to(np.asarray(self.sigma, dtype=float), data.shape)
         if data.ndim != 1 or not np.all(np.isfinite(data)):
             raise ValueError(f"observation {self.name!r}: data must be one row of finite numbers")
+        if data.size % self.rows:
+            raise ValueError(f"observation {self.name!r}: {data.size} samples are no {self.rows} rows of equal length")
         if not np.all(sigma > 0.0) or not 0.0 < self.effective <= 1.0:
             raise ValueError(f"observation {self.name!r}: sigma must be above 0 and effective in 0 to 1")
         object.__setattr__(self, "data", data)

@@ -38,9 +38,9 @@ def fit_of_reserved(case, fit):
 def gain_error(observations, before, after):
     r"""Standard error of ``fit_percent`` of ``after`` less that of ``before``, in points.
 
-    Jackknife over ``BLOCKS`` stretches of each observation (Efron and Stein 1981): with the gain :math:`d_i` of all
-    stretches but one, :math:`\sqrt{(m - 1) / m \sum (d_i - \bar d)^2}`. Both miss the same roughness, so that the
-    gain is known better than either fit.
+    Jackknife over ``BLOCKS`` stretches of each observation, each in all of its rows (Efron and Stein 1981): with the
+    gain :math:`d_i` of all stretches but one, :math:`\sqrt{(m - 1) / m \sum (d_i - \bar d)^2}`. Both miss the same
+    roughness, so that the gain is known better than either fit; so do all sensors under one train.
     """
     sums = np.array([_squares(o, b, a) for o, b, a in zip(observations, before, after)]).transpose(1, 0, 2)
     missed_before, missed_after, total = (np.sum(s) - s.ravel() for s in sums)
@@ -51,20 +51,23 @@ def gain_error(observations, before, after):
 def _squares(o, before, after):
     """(3, BLOCKS) weighted sums of squares of what ``before`` and ``after`` miss, and of the recording."""
     parts = (o.data - before, o.data - after, o.data - np.mean(o.data))
-    return [[o.effective * float(np.sum(b)) for b in np.array_split((p / o.sigma) ** 2, BLOCKS)] for p in parts]
+    return [_stretches(o, (p / o.sigma) ** 2) for p in parts]
+
+
+def _stretches(o, squares):
+    """(BLOCKS,) sums of ``squares`` (n,) over stretches of the observation, each in all of its rows."""
+    together = squares.reshape(o.rows, -1).sum(axis=0)
+    return [o.effective * float(np.sum(b)) for b in np.array_split(together, BLOCKS)]
 
 
 def falls(observations, before, after, points):
     """Whether ``after`` fits worse than ``before`` by more than ``points`` of fit and than two standard errors.
 
-    The difference of weighted squares is taken over ``BLOCKS`` stretches of each observation; these scatter. One
-    standard error is reached by one in six names that say nothing about these observations.
+    The difference of weighted squares is taken over ``BLOCKS`` stretches of each observation, each in all of its rows;
+    these scatter. One standard error is reached by one in six names that say nothing about these observations.
     """
-    parts = [
-        o.effective * float(np.sum(d))
-        for o, b, a in zip(observations, before, after)
-        for d in np.array_split((((o.data - a) ** 2 - (o.data - b) ** 2) / o.sigma**2), BLOCKS)
-    ]
+    lost = (((o.data - a) ** 2 - (o.data - b) ** 2) / o.sigma**2 for o, b, a in zip(observations, before, after))
+    parts = [part for o, d in zip(observations, lost) for part in _stretches(o, d)]
     error = np.std(parts, ddof=1) * np.sqrt(len(parts))
     return sum(parts) > 2.0 * error and fit_percent(observations, after) < fit_percent(observations, before) - points
 

@@ -52,7 +52,7 @@ def describe(name: str | None = None) -> str:
         chosen = {k: v for k, v in described.items() if k.partition("(")[0] == name}
         if not chosen:
             near = difflib.get_close_matches(name, [k.partition("(")[0] for k in described], 1)
-            hint = f" Did you mean {near[0]}?" if near else ""
+            hint = f" Did you mean {near[0]}?" if near else " `turnout registry describe` lists all."
             raise RegistryError(f"{name}: no such table, view or macro.{hint}")
         described = chosen
     blocks = []

@@ -105,9 +105,9 @@ def _two_sensors(recording):
             inside = (frequency >= max(low, 1.0)) & (frequency <= high)
             left, right = axes[row, 2 * column], axes[row, 2 * column + 1]
             left.plot(time, part, lw=0.4)
-            left.set(title=f"{name}, {low:.0f}-{high:.0f} Hz", xlabel="time [s]", ylabel="m/s²")
+            left.set(title=f"{name}, {low:.0f}-{high:.0f} Hz", xlabel="time [s]", ylabel="acceleration [m/s²]")
             right.semilogy(frequency[inside], density[inside], lw=0.8)
-            right.set(xlabel="frequency [Hz]", ylabel="(m/s²)²/Hz")
+            right.set(xlabel="frequency [Hz]", ylabel="power density [(m/s²)²/Hz]")
     return figure
 
 
@@ -132,6 +132,6 @@ def _closed_form():
     kappa = propagation(frequency, track)
     right.plot(frequency, np.abs(kappa[:, 0].real), label="wavenumber [rad/m]")
     right.plot(frequency, -8.686 * kappa[:, 0].imag, label="decay [dB/m]")
-    right.set(xlabel="frequency [Hz]", title="less damped wave", ylim=(0.0, 25.0))
+    right.set(xlabel="frequency [Hz]", ylabel="see key", title="less damped wave", ylim=(0.0, 25.0))
     right.legend()
     return figure

@@ -61,5 +61,5 @@ def _file(name, folder, kind):
     for candidate in folders:
         if (candidate / f"{name}.yaml").is_file():
             return candidate / f"{name}.yaml"
-    there = sorted({p.stem for f in folders if f.is_dir() for p in f.glob("*.yaml")})
+    there = sorted({p.stem for f in folders if f.is_dir() for p in f.glob("*.yaml")} - {"axle_patterns"})
     raise SimulationError(f"no file config/{kind}/{name}.yaml; there are {', '.join(there) or 'none'}.")

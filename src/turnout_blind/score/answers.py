@@ -55,15 +55,24 @@ def _answers(row):
 
 
 def _further(term):
-    """The answer that a further term is, where and how large."""
-    fixed = term.get("fixed", {})
+    """The answer that a further term is, or one of two, where and how large.
+
+    >>> dip = {"term": "surface_dip", "or": "wheel_flat", "fixed": {"place": 21.0},
+    ...        "parameters": {"shift": {"value": 0.4}}}
+    >>> answer = _further(dip)
+    >>> answer.verdict, answer.names, answer.position
+    ('a_or_b', ('surface_dip', 'wheel_flat'), 21.4)
+    """
+    fixed, values = term.get("fixed", {}), _values(term)
+    names = tuple(n for n in (term["term"], term.get("or")) if n)
     places = [fixed[k] for k in ("place", "position", "sleeper", "support") if k in fixed]
     ends = [fixed[k] for k in ("first", "last", "start", "end") if k in fixed]
-    position = float(places[0]) if places else sum(ends) / 2.0 if len(ends) == 2 else None
+    beyond = values.get("shift", (0.0,))[0] if "place" in fixed else 0.0
+    position = float(places[0]) + beyond if places else sum(ends) / 2.0 if len(ends) == 2 else None
     axle = fixed["wheel"] + 1 if "wheel" in fixed else None
     return Answer(
-        "named", (term["term"],), None, position, fixed.get("channel_name"), fixed.get("train"), axle,
-        parameters=_values(term),
+        "named" if len(names) == 1 else "a_or_b", names, None, position, fixed.get("channel_name"), fixed.get("train"),
+        axle, parameters=values,
     )  # fmt: skip
 
 

@@ -15,6 +15,14 @@ from turnout_blind.score.judged import judge
 from turnout_blind.score.pictures import changes, furthest, outcome, pyplot, save, spectrum
 from turnout_blind.strata import CasePlan
 
+METRES = "position depth length gap close play amplitude shift wavelength reach"
+UNITS = dict.fromkeys(METRES.split(), "m") | {
+    "delay": "s", "frequency": "Hz", "mass": "kg", "limit": "m/s²", "coefficient": "1/K", "angle": "rad",
+    "phase": "rad",
+}  # fmt: skip
+FITS = {"before": "no name", "decoy": "a decoy", "rival": "second best name", "after": "the name"}
+ALIKE = 0.05  # half of all lines of two spectra differ by less: a picture of them shows one curve
+
 
 def choose(judged):
     """Ids of three cases: the least plain single named rightly, two effects, and the plainest failure."""
@@ -73,7 +81,19 @@ def _said(row):
 
 
 def _numbers(held):
-    return ", ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in held.items())
+    return ", ".join(f"{k} {_number(v, UNITS.get(k, ''))}" for k, v in held.items())
+
+
+def _number(value, unit):
+    """
+    >>> _number(0.000323, "m"), _number(1.312, ""), _number(7, "")
+    ('0.323 mm', '1.31', '7')
+    """
+    if not isinstance(value, float):
+        return str(value)
+    if unit in ("m", "s") and abs(value) < 0.1:
+        return f"{1e3 * value:.3g} m{unit}"
+    return f"{value:.3g} {unit}".rstrip()
 
 
 def draw(truth, rows, oracle, path, effects):
@@ -84,19 +104,29 @@ def draw(truth, rows, oracle, path, effects):
     figure, axes = plt.subplots(2, 2, figsize=(8.5, 5.6), layout="constrained")
     for axis, (title, before, after, top, window) in zip(axes[0], (_blow(site, world), _train(site, world))):
         k = furthest(before, after)
-        for signals, label in ((before, "without"), (after, "with")):
-            f, density = spectrum(signals, RATE, window)
-            axis.semilogy(f, np.sqrt(density[k]), lw=1, label=f"{label} the effect")
-        axis.set_xlim(0.0, top)
-        inside = (f > 5.0) & (f < top)
-        axis.set_ylim(bottom=0.3 * np.sqrt(density[k][inside].min()))
         axis.set_title(f"{title}, sensor {site.names()[k]}", fontsize=9)
-        axis.set_xlabel("frequency [Hz]")
-    axes[0, 0].set_ylabel("acceleration [m/s²/√Hz]")
-    axes[0, 0].legend()
+        _compared(axis, before[k], after[k], top, window)
+        axis.legend(fontsize=7)
     _map(axes[1, 0], truth, rows, site)
     _bars(axes[1, 1], rows, oracle)
     return save(figure, path)
+
+
+def _compared(axis, before, after, top, window):
+    """Spectra without and with the effect up to ``top``; where these are alike, as with a delay, 30 ms of signals."""
+    (f, was), (_, became) = (spectrum(signal[None], RATE, window) for signal in (before, after))
+    inside = (f > 5.0) & (f < top)
+    if np.median(np.abs(np.log(became[0][inside] / was[0][inside]))) > ALIKE:
+        shown, x, label = np.sqrt([was[0], became[0]]), f, ("frequency [Hz]", "acceleration [m/s²/√Hz]")
+        axis.set(yscale="log", xlim=(0.0, top), ylim=(0.3 * shown[1][inside].min(), None))
+    else:
+        first = max(int(np.argmax(np.abs(after))) - int(0.01 * RATE), 0)
+        part = slice(first, first + int(0.03 * RATE))
+        shown, label = np.array([before[part], after[part]]), ("time [ms]", "acceleration [m/s²]")
+        x = 1e3 * np.arange(shown.shape[1]) / RATE
+    for row, name, style in zip(shown, ("without", "with"), ("-", "--")):
+        axis.plot(x, row, style, lw=1, label=f"{name} the effect")
+    axis.set(xlabel=label[0], ylabel=label[1])
 
 
 def _blow(site, world):
@@ -146,21 +176,27 @@ def _map(axis, truth, rows, site):
     axis.plot(site.blows, np.zeros(len(site.blows)), "v", color="0.7", label="blow")
     for name, x in zip(site.names(), site.sensors):
         axis.annotate(name, (x, 0.0), xytext=(0, -14), textcoords="offset points", ha="center", fontsize=8)
-    for effect in truth["effects"]:
-        x = effect["where"].get("position", truth["sensors"].get(effect["where"].get("sensor")))
-        if x is not None:
-            axis.plot(x, 1.0, "o", color="black")
-            _note(axis, x, 1.0, effect["kind"])
-    for row in rows or ():
-        x = row.get("position_m")
-        x = truth["sensors"].get(row.get("channel")) if x is None else x
-        if x is not None:
-            axis.plot(x, 2.0, "o", mfc="none", color="C3")
-            _note(axis, x, 2.0, str(row.get("term") or row["verdict"]))
+    for k, effect in enumerate(truth["effects"]):
+        where = effect["where"]
+        x = where.get("position", truth["sensors"].get(where.get("sensor")))
+        _mark(axis, x, 1.0 + 0.45 * k, effect["kind"], where.get("train"), where.get("axle"), color="black")
+    for k, a in enumerate(answers_of(rows) or ()):
+        x = truth["sensors"].get(a.sensor) if a.position is None else a.position
+        _mark(axis, x, 2.0 + 0.45 * k, " or ".join(a.names) or a.verdict, a.train, a.axle, color="C3", mfc="none")
     axis.set_yticks([0, 1, 2], ["track", "concealed", "said"])
-    axis.set_ylim(-0.8, 3.2)
+    axis.set_ylim(-1.1, 3.3)
     axis.set_xlabel("place [m]")
-    axis.legend(loc="upper left", ncols=2, fontsize=7)
+    axis.legend(loc="lower right", ncols=2, fontsize=7)
+
+
+def _mark(axis, x, y, words, train, axle, **style):
+    """What has a place there; what has none, with its wheel or train, at the left."""
+    if x is not None:
+        axis.plot(x, y, "o", **style)
+        _note(axis, x, y, words)
+        return
+    wheel = f"axle {axle} of {train}" if axle is not None else train or "no place"
+    axis.annotate(f"{words.replace('_', ' ')}: {wheel}", (0.02, y), xycoords=("axes fraction", "data"), fontsize=8)
 
 
 def _note(axis, x, y, words):
@@ -174,7 +210,7 @@ def _note(axis, x, y, words):
 def _bars(axis, rows, oracle):
     """Held-out fits."""
     row = (rows or [{}])[0]
-    found = {name: row.get(f"fit_{name}_pct") for name in ("before", "decoy", "rival", "after")} | {"oracle": oracle}
+    found = {words: row.get(f"fit_{name}_pct") for name, words in FITS.items()} | {"told the truth": oracle}
     found = {name: value for name, value in found.items() if value is not None}
     axis.barh(list(found), list(found.values()), color="C0")
     axis.set_xlabel("fit on recordings never used [%]")

@@ -49,6 +49,23 @@ def test_few_passages_keep_none_back_and_many_a_fifth_from_the_midst_of_the_spee
     assert reserved(FLEET[:9], ()) == ("ic3 2", "ic3 7")
 
 
+def test_places_go_to_the_types_in_turn():
+    """Not all to the first one, whose passages are as short as the other's."""
+    fleet = [train(f"{kind} {k}", kind, 8, (30.0 if kind == "a" else 40.0) + k) for kind in "ab" for k in range(10)]
+    chosen = telling(fleet, most=8, axles=96)
+    assert [p.name for p in chosen] == ["a 0", "a 1", "a 8", "a 9", "b 0", "b 1", "b 8", "b 9"]
+
+
+def test_the_only_passage_of_a_train_stays_for_the_fits():
+    """Fits that never meet a train know nothing of its wheels; that of the nearest speed is kept back in its place."""
+    fleet = [train(f"a {k}", "a", 8, 30.0 + k) for k in range(7)]
+    assert reserved([*fleet, train("b", "b", 8, 31.5)], ()) == ("a 1", "a 6")  # b would be the third
+    two = [train("a 1", "a", 8, 30.0), train("a 2", "a", 8, 33.0)]
+    others = [train(kind, kind, 8, 31.0 + k) for k, kind in enumerate("bc")]
+    assert reserved([*two, *others], ()) == ("a 2",)
+    assert reserved([train(kind, kind, 8, 30.0 + k) for k, kind in enumerate("abcde")], ()) == ("c",)
+
+
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_train_that_runs_the_other_way_round_is_simulated_so(turned, repository):
     """Its locomotive pushes: axles, their order and loads are those of the reversed train, which is one of its own."""

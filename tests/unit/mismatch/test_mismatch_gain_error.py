@@ -30,6 +30,21 @@ def test_the_stated_error_is_the_scatter_of_the_gain():
     assert np.median(stated) == pytest.approx(np.std(gains), rel=0.2)
 
 
+def test_sensors_that_miss_alike_are_no_further_evidence():
+    """Four sensors under one train miss the same: the gain scatters as that of one, and half of it would be stated were
+    each sensor's stretch a witness of its own."""
+    rng, gains, stated, apart = np.random.default_rng(6), [], [], []
+    for _ in range(400):
+        observations, before, after = drawn(rng)
+        data, before, after = (np.tile(x[0], 4) for x in ([observations[0].data], before, after))
+        together = Observation("a", "a", data, 0.5, rows=4)
+        gains.append(fit_percent([together], [after]) - fit_percent([together], [before]))
+        stated.append(gain_error([together], [before], [after]))
+        apart.append(gain_error([Observation("a", "a", data, 0.5)], [before], [after]))
+    assert np.median(stated) == pytest.approx(np.std(gains), rel=0.2)
+    assert np.median(apart) < 0.7 * np.std(gains)
+
+
 def test_models_that_say_the_same_differ_by_nothing():
     observations, before, _ = drawn(np.random.default_rng(4))
     assert gain_error(observations, before, before) == 0.0

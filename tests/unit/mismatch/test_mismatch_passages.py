@@ -13,7 +13,7 @@ from turnout.mismatch import diagnose
 from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.scoring import judged
 from turnout.mismatch.track import TrackCase, rolling
-from turnout.mismatch.track.alignment import ALIKE, align
+from turnout.mismatch.track.alignment import ALIKE, align, slow
 from turnout.mismatch.track.flats import flats
 from turnout.mismatch.track.planned import measured_campaign, small_plan
 from turnout.mismatch.track.roll import Track1D
@@ -121,21 +121,21 @@ def test_one_sensor_that_disagrees_does_not_cost_the_passage_but_a_wrong_train_d
     passage = next(p for p in case.campaign.passages if p.name == "heavy 2")
     sensors = case.rollings["heavy 2"].sensors
     signals = case.roll(values, (), passage)(passage, passage.vehicle, passage.speed, sensors)
-    reference, speed, _ = align(passage, sensors, signals, case.solver.rate)
+    reference, speed, _ = align(passage, slow(passage.recording, sensors), signals, case.solver.rate)
     rows = [passage.recording.index(s.name) for s in sensors]
 
     def reversed_(*which):
         samples = passage.recording.samples.copy()
         samples[[rows[k] for k in which]] *= -1.0
         turned = replace(passage, recording=replace(passage.recording, samples=samples))
-        return align(turned, sensors, signals, case.solver.rate)
+        return align(turned, slow(turned.recording, sensors), signals, case.solver.rate)
 
     found = reversed_(wrong)
     assert found[2] > ALIKE and found[0] == pytest.approx(reference, abs=2.6e-3)  # two steps of the search
     assert found[1] == pytest.approx(speed, rel=0.003)
     assert reversed_(wrong, wrong + 2)[2] < ALIKE
     light = case.roll(values, (), passage)(passage, case.rollings["light 2"].passage.vehicle, passage.speed, sensors)
-    assert align(passage, sensors, light, case.solver.rate)[2] < ALIKE
+    assert align(passage, slow(passage.recording, sensors), light, case.solver.rate)[2] < ALIKE
 
 
 def power(case, train):

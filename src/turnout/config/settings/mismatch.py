@@ -69,7 +69,6 @@ class MismatchSettings:
     unknown_offset: float = setting(
         -12.0, "nats", "score of 'unknown' relative to the best's shortfall; chosen by hand"
     )
-    false_discovery_rate: float = setting(0.05, "-", "of the frames named, expected share of wrong ones", 0.001, 0.5)
     base_iterations: int = setting(15, why="Gauss-Newton steps of the base fit", minimum=1, maximum=100)
     scouted_places: int = setting(2, why="places of a family fitted to the hammer tests alone", minimum=1, maximum=50)
     promise: float = setting(2.0, "nats", "estimated gain below which a candidate is not refitted", 0.0)

@@ -9,21 +9,27 @@ from turnout.mismatch.track.roll import LEAD
 ALIGNED, ALIKE = 30.0, 0.65  # [Hz], -
 
 
-def align(passage, sensors, simulated, rate):
-    """(reference time [s], speed [m/s], correlation) at which the base simulation lies best on the recording.
+STEP = 1.0 / 800.0  # [s]
+
+
+def slow(recording, sensors):
+    """(n_sensor, n) what the sensors recorded below ``ALIGNED``, every ``STEP``."""
+    grid = np.arange(0.0, recording.duration, STEP)
+    return read_at(limited(recording, sensors, ALIGNED), recording.rate, grid)
+
+
+def align(passage, data, simulated, rate):
+    """(reference time [s], speed [m/s], correlation) at which the base simulation lies best on a recording that is
+    ``slow``.
 
     Searches all lags and speeds within 1.5 % of the noted one; the simulation is stretched in time about the first
     wheel's arrival. The band ends at ``ALIGNED``, below which roughness, dips and flats have no say. Where the sensors
     together look like no such train, the one that disagrees most is not asked, if three or more are there: what is
     wrong with it is for the fit to find.
     """
-    recording = passage.recording
-    step = 1.0 / 800.0
-    grid = np.arange(0.0, recording.duration, step)
-    data = read_at(limited(recording, sensors, ALIGNED), recording.rate, grid)
-    model_time = np.arange(0.0, simulated.shape[-1] / rate, step)
+    n_sensor, model_time = len(data), np.arange(0.0, simulated.shape[-1] / rate, STEP)
     low = band_limited(simulated, rate, high=ALIGNED)
-    size = 1 << int(np.ceil(np.log2(grid.size + model_time.size)))
+    size = 1 << int(np.ceil(np.log2(data.shape[1] + model_time.size)))
     spectrum = np.fft.rfft(data, size)
     weight = 1.0 / np.maximum(np.sqrt(np.sum(data**2, axis=1)), 1e-12)
     all_, but_one = [], []
@@ -33,13 +39,13 @@ def align(passage, sensors, simulated, rate):
         product = np.fft.irfft(spectrum * np.fft.rfft(model, size).conj(), size)
         alike = (weight / norm)[:, None] * product
         total, worst = alike.sum(axis=0), alike.min(axis=0)
-        all_.append(_likest(total / len(sensors), stretch))
-        but_one.append(_likest((total - worst) / max(len(sensors) - 1, 1), stretch))
+        all_.append(_likest(total / n_sensor, stretch))
+        but_one.append(_likest((total - worst) / max(n_sensor - 1, 1), stretch))
     best = max(all_)
-    if best[0] < ALIKE and len(sensors) >= 3:
+    if best[0] < ALIKE and n_sensor >= 3:
         best = max(but_one)
     likeness, k, stretch = best
-    lag = (k if k < size - model_time.size else k - size) * step
+    lag = (k if k < size - model_time.size else k - size) * STEP
     return lag + LEAD, passage.speed * (1.0 + stretch), likeness
 
 

@@ -106,7 +106,7 @@ def observed(pair, h, spread, tolerance):
     condition = f"blows at {pair.test.place:.1f} m {pair.test.visit}".strip()
     return Observation(
         pair.name, condition, data, np.tile(sigma, 2), 0.7, "hammer", dict(pair.conditions), cells, labels,
-        tolerated(pair, h, tolerance),
+        tolerated(pair, h, tolerance), 2,
     )  # fmt: skip
 
 

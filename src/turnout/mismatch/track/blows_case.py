@@ -17,7 +17,9 @@ class Blows(Case):
     def __init__(self, case, observations=None):
         chosen = case.observations if observations is None else observations
         self.whole, self.observations = case, tuple(o for o in chosen if o.name in case.pairs)
-        self.nuisances = tuple(n for n in case.nuisances if n.owner is None and "_wave_" not in n.name)
+        unheard = case.surface.names if case.surface else ()
+        shared = [n for n in case.nuisances if n.owner is None and "_wave_" not in n.name]
+        self.nuisances = tuple(n for n in shared if n.name not in unheard)
         self.predict, self.moved = case.predict, case.moved
 
     def roughened(self):

@@ -30,7 +30,7 @@ def probes(case, values, terms, made):
 
 def support_forces(case, values, terms, made):
     """Histories at the zone's supports on the simulation's clock: rail and sleeper displacement (n_support, n) [m]."""
-    signals = case.marched(values, terms, made, probes(case, values, terms, made))[len(made.sensors) :]
+    signals = case.marched(values, terms, made)[len(made.sensors) :]
     last = 2 * len(case.zone.supports)
     return signals[0:last:2], signals[1:last:2]
 
@@ -60,7 +60,8 @@ def _sag(case, values, terms, made, way):
 
 
 def carried(case, values, terms, made, forces):
-    """Sensors' response to force histories, dict key -> (support, kind, (n,) force on the simulation's clock).
+    """Sensors' response to force histories, dict key -> (support, kind, (n,) force on the simulation's clock), or to a
+    list of such that act together.
 
     Returns key -> (n_sensor * n_time,) on the observation's clock.
     """
@@ -68,26 +69,40 @@ def carried(case, values, terms, made, forces):
     _, g = green(case, values, terms, made)
     sag = _sag(case, values, terms, made, carrier.way)
     g, sag = (np.concatenate([x, x[..., :1] - x[..., 1:]], axis=-1) for x in (g, sag.transpose(0, 2, 1)))
-    support = np.array([j - case.zone.first for j, _, _ in forces.values()])
-    kind = np.array([k for _, k, _ in forces.values()])
-    history = np.array([force for _, _, force in forces.values()])
+    acting = [f if isinstance(f, list) else [f] for f in forces.values()]
+    first = np.cumsum([0, *(len(f) for f in acting[:-1])])
+    each = [f for some in acting for f in some]
+    support = np.array([j - case.zone.first for j, _, _ in each])
+    kind = np.array([k for _, k, _ in each])
+    history = np.array([force for _, _, force in each])
     history = history - history[:, :1]
-    clock = (np.arange(history.shape[1]) + 0.5) / bands.RATE
+    clock = (np.arange(history.shape[1]) + 0.5) / case.solver.rate
     paths = np.empty((support.size, carrier.behind.size, carrier.way.size))
     for w in range(carrier.behind.size):
         when = carrier.times(w, roll.LEAD)
         for k, force in enumerate(history):
             paths[k, w] = np.interp(when, clock, force, 0.0, 0.0) * sag[support[k], :, kind[k]]
-    columns = carrier.pressed(history, g[:, :, support, kind]) + carrier.reactions(paths)
+    columns = carrier.pressed(history, g[:, :, support, kind], first)
+    columns += carrier.reactions(np.add.reduceat(paths, first, axis=0))
     return dict(zip(forces, columns.T))
 
 
 def columns_of(case, values, terms, made, histories):
-    """Derivatives of a passage by the logarithm of each support's own pad and ballast stiffness."""
+    """Derivatives of a passage by the logarithm of each support's own pad and ballast stiffness, and by what all
+    supports have in common: what those beyond the zone add to it is left out."""
     rail, sleeper = histories
     track = track_with(case.track(made.passage.route), case.zone, values)
-    forces = {}
-    for k, j in enumerate(case.zone.supports):
+    zone, forces = case.zone.supports, {}
+    for k, j in enumerate(zone):
         forces[f"pad_{j}"] = j, PAD, -track.pad_stiffness[j] * (rail[k] - sleeper[k])
         forces[f"ballast_{j}"] = j, SLEEPER, -track.ballast_stiffness[j] * sleeper[k]
-    return carried(case, values, terms, made, forces)
+    closing, sinking = (np.gradient(x, axis=1) * case.solver.rate for x in (rail - sleeper, sleeper))
+    inertia = np.gradient(sinking, axis=1) * case.solver.rate
+    for name, kind, moved in (
+        ("pad_damping", PAD, closing), ("ballast_damping", SLEEPER, sinking), ("sleeper_mass", SLEEPER, inertia)
+    ):  # fmt: skip
+        forces[name] = [(j, kind, -getattr(track, name)[j] * moved[k]) for k, j in enumerate(zone)]
+    found = carried(case, values, terms, made, forces)
+    for name in ("pad", "ballast"):
+        found[f"{name}_stiffness"] = sum(found[f"{name}_{j}"] for j in zone)
+    return found

@@ -5,8 +5,8 @@ import numpy as np
 from turnout.errors import SimulationError
 from turnout.mismatch.case import Case
 from turnout.mismatch.track import bands, blows
-from turnout.mismatch.track.base_model import COMMON, RAIL
-from turnout.mismatch.track.columns import FURTHER, columns_of, probes, support_forces
+from turnout.mismatch.track.base_model import RAIL
+from turnout.mismatch.track.columns import FURTHER, columns_of, support_forces
 from turnout.mismatch.track.rough_rail import wave_columns
 from turnout.mismatch.track.running_surface import STEP as SURFACE_STEP
 
@@ -59,7 +59,7 @@ def pair_columns(case, values, terms, pair, heard, predicted, jacobian, index):
 
 
 def _common_columns(case, values, terms, passages, index):
-    shared = [name for name, *_ in COMMON] + [f"wheels_{train}" for train in case.trains]
+    shared = [f"wheels_{train}" for train in case.trains]
     for name, step in (*((name, STEP) for name in shared), *((name, SURFACE_STEP) for name in case.surface.names)):
         for o, predicted, jacobian in passages:
             made = case.rollings[o.name]
@@ -88,8 +88,8 @@ def _own_columns(case, values, terms, made, predicted):
 
 
 def _seat_columns(case, values, terms, made, predicted):
-    further = case.marched(values, terms, made, probes(case, values, terms, made))
-    further = bands.finer(further[len(made.sensors) + 2 * len(case.zone.supports) :])
+    further = case.marched(values, terms, made)[len(made.sensors) + 2 * len(case.zone.supports) :]
+    further = bands.finer(further)
     rows = predicted.reshape(-1, made.time.size)
     for k, sensor in enumerate(made.sensors):
         if not sensor.mounting.startswith("sleeper"):

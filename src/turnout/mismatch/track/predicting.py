@@ -9,10 +9,12 @@ from turnout.errors import SimulationError
 from turnout.mismatch.track import bands, blows, nudged_links, roll
 from turnout.mismatch.track.base_model import inner_values, near_rail, track_with, vehicle_with, with_rail
 from turnout.mismatch.track.blow_model import BlowModel
+from turnout.mismatch.track.columns import probes
 from turnout.mismatch.track.heard import Heard
 from turnout.physics.term import PhysicsTerm
 
 KEPT = 150  # simulated passages remembered
+SPARE = 4  # and so many more than there are passages with all their probes
 
 
 class Predicting:
@@ -21,7 +23,8 @@ class Predicting:
 
     def _forget(self):
         """Nothing simulated is remembered any more."""
-        self._simulated, self._rolls, self._models, self._filed = OrderedDict(), OrderedDict(), OrderedDict(), {}
+        self._simulated, self._whole = OrderedDict(), OrderedDict()
+        self._rolls, self._models, self._filed = OrderedDict(), OrderedDict(), {}
 
     def track(self, route="main", terms=()):
         """The kept part of the base track under a route; what ``terms`` change of the rail is as in its file."""
@@ -118,28 +121,46 @@ class Predicting:
         return (1.0 + values[f"gain_{sensor.name}"]) * bands.read_at(made.limited(row, rate), rate, time)
 
     def clean(self, values, terms, made):
-        """Simulated signals of the sensors before their channels, four times as fine as the march."""
-        return bands.finer(self.marched(values, terms, made)[: len(made.sensors)])
+        """Simulated signals of the sensors before their channels, four times as fine as the march, remembered."""
+        under, key = self._asked(values, terms, made)
+        if key not in self._simulated:
+            self._march(values, terms, made, under, key)
+        return bands.finer(self._simulated[key])
 
-    def marched(self, values, terms, made, probes=()):
-        """Simulated signals of sensors and ``probes`` on the simulation's clock, remembered."""
+    def marched(self, values, terms, made):
+        """Simulated signals of the sensors and of ``probes`` on the simulation's clock, the latest remembered."""
+        under, key = self._asked(values, terms, made)
+        if key not in self._whole:
+            self._march(values, terms, made, under, key)
+        return self._whole[key]
+
+    def _asked(self, values, terms, made):
+        """(terms as a passage meets them, all that its simulation hangs on)."""
         under = tuple(t.under(self.said(made)) for t in terms if t.kind != "channel" or _moves(t))
-        train = made.passage.train or made.passage.name
-        own = values[f"wheels_{train}"], values[f"speed@{made.name}"], values[f"load@{made.name}"]
         path = self.waves.path(values)
         shape, surfaces = path[0].dip.tobytes() if path else b"", self.surface.surfaces(made.passage.route, values)
         seats = tuple(values.get(f"seat_{s.name}", 0.0) for s in made.sensors)
-        key = made.name, inner_values(self.zone, values), own, seats, shape, surfaces, repr(under), len(probes)
-        if key not in self._simulated:
-            vehicle = vehicle_with(made.passage.vehicle, values, train, own[2])
-            roll = self.roll(values, under, made.passage)
-            sensors = [replace(s, place=s.place + more) for s, more in zip(made.sensors, seats)]
-            rolled = tuple((*parts, *path) for parts in surfaces)
-            signals = roll(made.passage, vehicle, made.speed * (1.0 + own[1]), sensors, probes, rolled, made.sensors)
-            self._simulated[key] = signals
-            while len(self._simulated) > KEPT:
-                self._simulated.popitem(last=False)
-        return self._simulated[key]
+        own = self._own(values, made)
+        return under, (made.name, inner_values(self.zone, values), own, seats, shape, surfaces, repr(under))
+
+    def _own(self, values, made):
+        """Unsprung mass, speed and load of a passage."""
+        train = made.passage.train or made.passage.name
+        return values[f"wheels_{train}"], values[f"speed@{made.name}"], values[f"load@{made.name}"]
+
+    def _march(self, values, terms, made, under, key):
+        """Simulate a passage; of its probes, which are many, only what a set of derivatives asks for is remembered."""
+        _, speed, load = self._own(values, made)
+        vehicle = vehicle_with(made.passage.vehicle, values, made.passage.train or made.passage.name, load)
+        roll, path = self.roll(values, under, made.passage), self.waves.path(values)
+        sensors = [replace(s, place=s.place + values.get(f"seat_{s.name}", 0.0)) for s in made.sensors]
+        rolled = tuple((*parts, *path) for parts in self.surface.surfaces(made.passage.route, values))
+        also = probes(self, values, terms, made)
+        signals = roll(made.passage, vehicle, made.speed * (1.0 + speed), sensors, also, rolled, made.sensors)
+        self._simulated[key], self._whole[key] = signals[: len(sensors)].copy(), signals
+        for held, most in ((self._simulated, KEPT), (self._whole, len(self.rollings) + SPARE)):
+            while len(held) > most:
+                held.popitem(last=False)
 
     def said(self, made):
         """Conditions of a passage, as terms ask for them."""
@@ -168,14 +189,14 @@ class Predicting:
         return [np.zeros(p.size) if new is None else new - p for new, p in zip(refined, fit.predictions)]
 
     def _refined(self, fit, made, finer, predicted):
-        kept = self.solver, self._simulated, self._rolls
-        self.solver, self._simulated, self._rolls = finer, OrderedDict(), OrderedDict()
+        kept = self.solver, self._simulated, self._whole, self._rolls
+        self.solver, self._simulated, self._whole, self._rolls = finer, OrderedDict(), OrderedDict(), OrderedDict()
         try:
             return self.passage_of(fit.values, fit.terms, made)
         except SimulationError:
             return predicted
         finally:
-            self.solver, self._simulated, self._rolls = kept
+            self.solver, self._simulated, self._whole, self._rolls = kept
 
 
 def _moves(term):

@@ -34,7 +34,7 @@ class Carrier:
         self.first = self.sign * min(self.sign * s.place for s in made.sensors)
         self.behind = vehicle.wheel_places / self.speed
         span = (waves.end - waves.start + 2.0 * beyond) / self.speed + self.behind[-1] + RING
-        self.rate = made.clock
+        self.rate, self.fine = made.clock, case.solver.rate
         size = 1 << int(np.ceil(np.log2(self.rate * max(span, made.time[-1] - made.time[0] + RING))))
         self.size, self.period, self.start = size, waves.length, waves.start
         grid = np.fft.rfftfreq(size, 1.0 / self.rate)
@@ -120,19 +120,21 @@ class Carrier:
         """(n_x,) when wheel ``w`` is at ``way``, in the simulation's time [s]."""
         return lead + self.sign * (self.way - self.first) / self.speed + self.behind[w]
 
-    def pressed(self, histories, transfer):
-        """(n_sensor * n_time, n_key) response of the free track to forces (n_key, n) on the simulation's clock.
+    def pressed(self, histories, transfer, first):
+        """(n_sensor * n_time, n_key) response of the free track to forces (n_force, n) on the simulation's clock; those
+        from ``first`` (n_key,) of each key on act together.
 
-        ``transfer`` (n_line, n_sensor, n_key) are accelerations per force on ``self.lines``.
+        ``transfer`` (n_line, n_sensor, n_force) are accelerations per force on ``self.lines``.
         """
-        fold = round(bands.RATE / self.rate)
+        fold = round(self.fine / self.rate)
         n = min(histories.shape[1] // fold, self.size)
         slow = histories[:, : n * fold].reshape(-1, n, fold).mean(axis=2)
         spectrum = np.fft.rfft(slow - slow[:, :1], self.size)[:, self.inside]
         spectrum /= np.sinc(self.grid / self.rate)  # what the mean over the block took
         begin = 0.5 / self.rate - roll.LEAD
         spectrum = spectrum * np.exp(-2j * np.pi * self.grid * begin) / self.rate
-        return self._on_clock(_at(self.grid, self.lines, transfer) * spectrum.T[:, None, :])
+        shown = _at(self.grid, self.lines, transfer) * spectrum.T[:, None, :]
+        return self._on_clock(np.add.reduceat(shown, first, axis=-1))
 
     def _on_clock(self, spectrum):
         full = np.zeros((self.size // 2 + 1, *spectrum.shape[1:]), dtype=complex)

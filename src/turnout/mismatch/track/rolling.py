@@ -123,7 +123,9 @@ def observed(rolling, data, noise, tolerance, topped=None):
         said.append(f"{temperature:.0f} °C")
         covariates["temperature"] = float(temperature)
     condition = " ".join(said)
-    return Observation(rolling.name, condition, data.ravel(), sigma.ravel(), 0.35, "passage", covariates, cells, labels)
+    return Observation(
+        rolling.name, condition, data.ravel(), sigma.ravel(), 0.35, "passage", covariates, cells, labels, rows=len(data)
+    )
 
 
 def coupling_modes(rolling, data):

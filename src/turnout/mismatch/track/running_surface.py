@@ -19,7 +19,8 @@ LEAST = 1e-6  # m: a part that is nowhere deeper is not there
 # What the model does wrong at every axle alike, of a logarithm and in metres: long trains had depth 15 and length 19 %
 # too small, a place 4 cm off, where the fit's own errors were a tenth of that.
 MODEL, MODEL_PLACE = 0.1, 0.02
-TELLS = 0.5  # of the prior's standard deviation: a number that is known no better than that is the file's
+TELLS = 0.5  # of the prior's standard deviation: a number that is known no better than that is the file's, unless it
+OTHERWISE = 2.0  # is off by so many of the prior's and of its own
 
 
 @dataclass(frozen=True)
@@ -68,14 +69,16 @@ class Unsure:
 
 
 class RunningSurface:
-    """The routes of ``turnout``; numbers of what lies within ``BEYOND`` of the rail's free ``waves`` may be off.
+    """The ``routes`` of ``turnout`` that trains took; numbers of what lies on one of them within ``BEYOND`` of the
+    rail's free ``waves`` may be off.
 
     ``unsure`` are these numbers, ``names`` of their nuisances.
     """
 
-    def __init__(self, turnout, waves):
+    def __init__(self, turnout, waves, routes):
         x = np.arange(waves.start - BEYOND, waves.end + BEYOND, 0.02)
-        near = [part for part in turnout.spreads if np.max(np.abs(part(x, 0))) > LEAST]
+        met = [part for route in routes for parts in turnout.surfaces(route) for part in parts]
+        near = [part for part in turnout.spreads if part in met and np.max(np.abs(part(x, 0))) > LEAST]
         listed = [(k, part, *of) for k, part in enumerate(near) for of in turnout.spreads[part].items()]
         self.turnout = turnout
         self.unsure = [Unsure(f"surface_{k}_{f}", part, f, s) for k, part, f, s in listed if _may_move(part, f)]
@@ -95,16 +98,17 @@ class RunningSurface:
         return tuple(tuple(changed.get(part, part) for part in parts) for parts in self.turnout.surfaces(route))
 
     def told(self, case, fit):
-        """What ``fit`` says of the numbers that its recordings tell more of than the file does, a dict each; with what
-        the trains disagree by, and what the model does wrong at every axle alike, in their errors."""
+        """What ``fit`` says of the numbers that its recordings tell more of than the file does, or otherwise, a dict
+        each; with what the trains disagree by, and what the model does wrong at every axle alike, in their errors."""
         index = {n.name: k for k, n in enumerate(case.nuisances)}
         apart = disagreement(case, fit, "passage") if self.unsure and fit.jacobian else np.zeros(len(index))
         for u in self.unsure:
             k = index[u.name]
             model = MODEL_PLACE if u.field in PLACES else MODEL
             error = float(np.sqrt(fit.covariance[k, k] + apart[k] ** 2 + model**2))
-            if error < TELLS * u.nuisance.sd:
-                yield u.told(fit.values[u.name], error)
+            by, sd = fit.values[u.name], u.nuisance.sd
+            if error < TELLS * sd or abs(by) > max(OTHERWISE * sd, OTHERWISE * error):
+                yield u.told(by, error)
 
 
 def _may_move(part, field):

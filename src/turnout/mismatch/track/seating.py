@@ -11,7 +11,7 @@ from turnout.errors import SimulationError
 from turnout.mismatch.track import alignment
 from turnout.mismatch.track.running_surface import PLACES
 
-TRIED = 3  # passages, those of the shortest trains: each is simulated some forty times
+TRIED = 3  # passages that fits read, those of the shortest trains: each is simulated twenty times a number, or more
 APART, FAR = 0.15, 2.0  # m between places tried, and how far, in standard deviations of the file's
 FACTORS = (-1.0, -0.5, 0.5, 1.0)  # standard deviations by which another number is moved
 FINER, AROUND = 4, 3  # steps of places in the second round, and how many of them to each side
@@ -22,6 +22,7 @@ HIGHEST = 0.999  # likeness: beyond, it says nothing of the surface
 def seated(case, values):
     """Nuisances of the running surface as a few passages have it, dict name -> value; {} where nothing is unsure."""
     heard = [p for p in case.campaign.passages if case.campaign.sensors_of(p)]
+    heard = [p for p in heard if p.name not in case.campaign.reserved] or heard
     passages = sorted(heard, key=lambda p: len(p.vehicle.wheels))[:TRIED]
     known = {n.name: n for n in case.surface.nuisances()}
     found = dict.fromkeys(known, 0.0)
@@ -66,4 +67,6 @@ def aligned(case, values, passage):
     sensors, surfaces = case.campaign.sensors_of(passage), case.surface.surfaces(passage.route, values)
     roll = case.roll(values, (), passage)
     signals = roll(passage, passage.vehicle, passage.speed, sensors, surfaces=surfaces)
-    return alignment.align(passage, sensors, signals, case.solver.rate)
+    if passage.name not in case.slow:
+        case.slow[passage.name] = alignment.slow(passage.recording, sensors)
+    return alignment.align(passage, case.slow[passage.name], signals, case.solver.rate)

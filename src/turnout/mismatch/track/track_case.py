@@ -45,6 +45,7 @@ class TrackCase(Predicting, Case):
         found, self.start_values, reserved = list(hammer_observations(self)), {}, set(campaign.reserved)
         self.start_values = self._from_blows([o for name, o in found if name not in reserved])
         found += undisturbed(self, list(passage_observations(self)))
+        self.slow.clear()
         self.foreign = foreign(self)
         if not found:
             raise SimulationError("nothing to diagnose: " + "; ".join(self.notes))
@@ -69,22 +70,23 @@ class TrackCase(Predicting, Case):
             return {}
         roughly = fit_jointly(Blows(self).roughened(), iterations=CHEAP_STEPS)
         self.start_values = roughly.values
-        self._recentre(roughly.values)
+        self.recentre(roughly.values)
         found = fit_jointly(Blows(self), values=roughly.values, iterations=CHEAP_STEPS).values
-        self._recentre(found)
+        self.recentre(found)
         return found
 
     def _prepare(self, campaign, settings, solver):
         """What does not depend on recordings."""
         self.settings, self.solver, self.campaign = settings, solver, campaign
         self.nominal, self._railed = zone_of(campaign.turnout, campaign.places()), {}
-        self._recentre({})
+        self.recentre({})
         self.trains = tuple(dict.fromkeys(p.train or p.name for p in campaign.passages))
-        self.pairs, self.rollings, self.strange, self.unlike, self.notes = {}, {}, {}, [], []
+        self.pairs, self.rollings, self.strange, self.slow, self.unlike, self.notes = {}, {}, {}, {}, [], []
         self.waves = self._waves()
-        self.surface = self.waves and RunningSurface(self.nominal.turnout, self.waves)
+        routes = {p.route: None for p in campaign.passages}
+        self.surface = self.waves and RunningSurface(self.nominal.turnout, self.waves, routes)
 
-    def _recentre(self, values):
+    def recentre(self, values):
         """The track gets the rail of ``values``, about which receptances are straight in what it may differ by; nothing
         simulated is remembered any more."""
         self.rail = {name: values.get(name, 0.0) for name, _ in RAIL}

@@ -1,0 +1,57 @@
+"""docs/effects.md: the effects that a diagnosis knows, from the catalogue itself.
+
+``python -m turnout.chains.effects_page docs`` writes it anew; a test compares.
+"""
+
+import sys
+from importlib import import_module
+from pathlib import Path
+
+from turnout.chains.mismatch_words import number_in_words
+from turnout.mismatch.finding import CHECKS
+from turnout.mismatch.track.library import LEAST
+from turnout.physics import TERMS
+
+NEVER_ASKED = ("lifting_sleepers", "rail_bending", "roughness_level")  # can be simulated, and written in a track file
+FIXED_TO = {
+    "place": "a place", "amplitude": "a place, and how far it moves", "frequency": "a frequency band",
+    "condition": "the whole track, under a condition", "sensor": "a sensor", "clock": "a channel's clock",
+    "wheel": "a wheel", "train": "a train", "wavelength": "a stretch of rail",
+}  # fmt: skip
+HEAD = """# What a diagnosis can name
+
+Every effect that `turnout diagnose` asks for, from the catalogue (`turnout.physics`, one file each). "Least": how far
+the first number has to be from what it is in a sound track to get a name; for less nobody would go to the site. What is
+in no row is located and called "unknown". Which of them were found where they were concealed, and how small:
+[blind proof](blind.md).
+
+| effect | name | fixed to | numbers found | least | what to check on site |
+|---|---|---|---|---|---|
+"""
+FOOT = """
+Not asked for, but known to the simulation and to track files: {}.
+"""
+
+
+def page() -> str:
+    """The whole page."""
+    asked = [t for t in TERMS if t.name not in NEVER_ASKED]
+    others = ", ".join(_what(t)[0].lower() + _what(t)[1:] for t in TERMS if t.name in NEVER_ASKED)
+    return HEAD + "".join(_row(t) for t in asked) + FOOT.format(others)
+
+
+def _row(term) -> str:
+    numbers = "; ".join(f"{p.meaning} [{p.unit}]" for p in term.parameters)
+    least = number_in_words(LEAST[term.name], term.parameters[0].unit) if term.name in LEAST else "–"
+    fixed = FIXED_TO[getattr(term, "frame", "place")]
+    cells = _what(term), f"`{term.name}`", fixed, numbers, least, CHECKS.get(term.name, "–")
+    return "| " + " | ".join(cell.replace("|", r"\|") for cell in cells) + " |\n"
+
+
+def _what(term) -> str:
+    """First sentence of the file that the term is in."""
+    return (import_module(term.__module__).__doc__ or "").strip().splitlines()[0].split(": ")[0].removesuffix(".")
+
+
+if __name__ == "__main__":
+    (Path(sys.argv[1]) / "effects.md").write_text(page(), encoding="utf-8")

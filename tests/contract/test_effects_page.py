@@ -1,0 +1,17 @@
+"""docs/effects.md tells what a diagnosis asks for."""
+
+from turnout.chains.effects_page import NEVER_ASKED, page
+from turnout.mismatch.track import TrackCase
+from turnout.mismatch.track.planned import measured_campaign, small_plan
+from turnout.physics import TERMS
+
+
+def test_the_page_is_the_one_that_the_catalogue_gives(repository):
+    written = (repository / "docs" / "effects.md").read_text(encoding="utf-8")
+    assert written == page(), "run: python -m turnout.chains.effects_page docs"
+
+
+def test_what_the_page_calls_never_asked_is_in_no_library():
+    """All that a case of passages and blows asks at once is in the table; what only a residual suggests is so too."""
+    asked = {c.family for c in TrackCase(measured_campaign(small_plan((15.0,)), (), 3)).candidates}
+    assert not asked & set(NEVER_ASKED) and asked <= {t.name for t in TERMS} and len(asked) > 15

@@ -1,0 +1,30 @@
+"""What docs/measuring.md promises of so many campaigns a year is what the charts can see."""
+
+import re
+
+import numpy as np
+import pytest
+
+from turnout.config.settings.trend import TrendSettings
+from turnout.trend.chart import guard_factor
+from turnout.trend.threshold import detectable_shift, threshold_for
+
+
+def seen(spread, campaigns, settings):
+    """Smallest change [%] of a chart without memory, after a baseline of a year."""
+    plain = settings.target_percent >= settings.allowance_switch * spread * settings.guard_large
+    allowance = settings.allowance_large if plain else settings.allowance_small
+    guard = guard_factor(np.array([max(12, campaigns)]), np.array([not plain]), settings)[0]
+    threshold = threshold_for(settings.run_length_loss, allowance)
+    return spread * guard * detectable_shift(threshold, allowance, campaigns, settings.detectable_probability)
+
+
+def test_the_table_is_what_the_charts_can_see(repository):
+    page = (repository / "docs" / "measuring.md").read_text(encoding="utf-8")
+    head, *_ = re.findall(r"\| scatter \|(.*)\|", page)
+    campaigns = [int(cell.split()[0]) for cell in head.split("|")]
+    rows = re.findall(r"^\| ([\d.]+) % \|(.*)\|$", page, re.M)
+    assert len(rows) == 4
+    for spread, cells in rows:
+        expected = [seen(float(spread), n, TrendSettings()) for n in campaigns]
+        assert [float(c) for c in cells.split("|")] == pytest.approx(expected, abs=0.05001)
