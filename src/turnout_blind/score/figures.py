@@ -191,7 +191,7 @@ def confusion(judged):
 
 
 def severity(judged):
-    """{kind: [(rung, visible gain [points], what was said)]} of singles, by rung."""
+    """{kind: [(rung, visibility [points], what was said)]} of singles, by rung."""
     table = {}
     for j in judged:
         if j.stratum in ("single", "outside"):

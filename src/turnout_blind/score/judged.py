@@ -43,7 +43,7 @@ class Judged:
 
 
 def gain_of(visible):
-    """Points of held-out fit that an effect costs which makes up a share ``visible`` of the response [%].
+    """Visibility of an effect that makes up a share ``visible`` of the response [%], in points of fit.
 
     It adds in squares to what controls leave: sqrt(46^2 + v^2) - 46. 3 points are lost at v = 16.9 %.
 

@@ -39,7 +39,7 @@ def outcome(judged):
 
 
 def draw_severity(judged, path):
-    """A cell per kind and rung, from hidden to obvious, with what was said; framed: it costs over 3 points of fit."""
+    """A cell per kind and rung, from hidden to obvious, with what was said; framed: visible by more than 3 points."""
     plt = pyplot()
     mine = [j for j in judged if j.stratum in ("single", "outside", "unidentifiable")]
     kinds = sorted({(("single", "outside", "unidentifiable").index(j.stratum), j.kinds[0]) for j in mine})
@@ -56,7 +56,7 @@ def draw_severity(judged, path):
     axis.set_ylim(-0.6, len(kinds) - 0.4)
     handles = [plt.Rectangle((0, 0), 1, 1, facecolor=c) for c in COLOURS.values()]
     figure.legend(handles, list(COLOURS), ncols=5, loc="outside lower center", frameon=False)
-    axis.set_title("what was said, from hidden to obvious; framed: it costs more than 3 points of fit", fontsize=9)
+    axis.set_title("what was said, from hidden to obvious; framed: visibility above 3 points", fontsize=9)
     return save(figure, path)
 
 

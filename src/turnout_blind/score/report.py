@@ -73,9 +73,9 @@ def report_of(out, more=None):
         figure_table(figures(judged, oracle_of(out))),
         "What was said first, by what was concealed:",
         confusion_table(confusion(judged)),
-        "Along the ladder (points of held-out fit that the effect costs: what was said; * = the right name among it):",
+        "Along the ladder (visibility in points: what was said; * = the right name among it):",
         severity_table(severity(judged)),
-        "Stated probability and share right, by fifths of the cases:",
+        "Stated probability and share right, in up to five groups of the cases, equal ones together:",
         "\n".join(f"- {p:.2f}: {share:.2f} of {n}" for p, share, n in reliability(judged)) or "- none stated",
         "Alarms, wrong names, clear effects without their name or without a word, no answer:",
         failure_table(judged),
@@ -99,7 +99,7 @@ def failure_table(judged):
     """A row per case that went wrong: alarms on controls, wrong names, clear effects missed, no answer; what cannot be
     identified and got any name but a half of "a or b"."""
     lines = [
-        "| case | concealed | costs [points] | said first | wrong names | probability |",
+        "| case | concealed | visibility [points] | said first | wrong names | probability |",
         "|---|---|---|---|---|---|",
     ]
     for j in sorted(judged, key=lambda j: (j.stratum, j.kinds, j.rungs)):

@@ -73,6 +73,25 @@ def test_derivatives_of_passages_are_those_beside_the_term(sound, term):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "cosine"),
+    [("pad_stiffness", 0.98), ("ballast_stiffness", 0.95), ("ballast_damping", 0.7), ("sleeper_mass", 0.4)],
+)
+def test_what_supports_have_in_common_is_pressed_at_those_of_the_zone(sound, name, cosine):
+    """Whitened, against the simulation. Three bays beyond the sensors a support is heard by a hundredth or so; a damper
+    and a mass press by derivatives of the motion at 1.8 kHz, and a wheel feels them as at rest: they say a tenth of
+    what the springs do, and which way. No test of a law but of how fast fits get there."""
+    case, values = sound
+    (seen,) = (o for o in case.observations if o.name == "heavy 2")
+    before = case.predict(values, (), [seen])[0]
+    jacobian = case.nuisance_jacobian(values, (), [seen], [before])[0]
+    column = seen.whitened(jacobian[:, [n.name for n in case.nuisances].index(name)])
+    change = seen.whitened(case.predict({**values, name: values[name] + 0.04}, (), [seen])[0] - before) / 0.04
+    assert column @ change / np.sqrt((column @ column) * (change @ change)) > cosine
+    assert np.linalg.norm(column) == pytest.approx(np.linalg.norm(change), rel=0.05 if "stiffness" in name else 0.4)
+
+
+@pytest.mark.slow
 def test_a_flat_is_found_on_its_wheel_with_the_place_where_it_strikes(plan):
     flat = physics.WheelFlat(2, 0.07, 0.43, 1.1, "heavy")
     case = TrackCase(measured_campaign(plan, (flat,), 7))
