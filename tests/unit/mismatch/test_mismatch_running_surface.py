@@ -17,7 +17,7 @@ from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.track import TrackCase, seating
 from turnout.mismatch.track.planned import measured_campaign, small_plan
 from turnout.mismatch.track.rough_rail import Waves
-from turnout.mismatch.track.running_surface import RunningSurface
+from turnout.mismatch.track.running_surface import MODEL, RunningSurface
 from turnout.simulate.track_file import turnout_track
 from turnout.simulate.wheel_path import Dip, Kink, Sections
 
@@ -81,6 +81,17 @@ def test_a_number_is_told_where_it_is_known_better_than_from_the_file_or_is_not_
     case = SimpleNamespace(nuisances=surface.nuisances())
     fit = SimpleNamespace(values={surface.names[0]: by}, covariance=np.array([[0.03**2]]), jacobian=[])
     assert bool(list(surface.told(case, fit))) is said
+
+
+def test_what_is_told_of_a_number_is_not_drawn_to_the_file():
+    """Recordings that say 0.3 ± 0.2 under a prior of 0.5 have their posterior at 0.26 ± 0.19."""
+    surface = RunningSurface(replace(FILED, spreads={NOSE: {"depth": 0.5}}), WAVES, ("main",))
+    weights = np.array([0.2, 0.5]) ** -2.0
+    values = {surface.names[0]: 0.3 * weights[0] / weights.sum()}
+    fit = SimpleNamespace(values=values, covariance=np.array([[1.0 / weights.sum()]]), jacobian=[])
+    (told,) = surface.told(SimpleNamespace(nuisances=surface.nuisances()), fit)
+    assert told["value"] == pytest.approx(NOSE.depth * np.exp(0.3))
+    assert told["se"] == pytest.approx(told["value"] * np.hypot(0.2, MODEL))
 
 
 def test_the_search_for_the_nose_hears_no_recording_that_is_kept_back(monkeypatch):

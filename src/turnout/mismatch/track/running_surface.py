@@ -19,8 +19,9 @@ LEAST = 1e-6  # m: a part that is nowhere deeper is not there
 # What the model does wrong at every axle alike, of a logarithm and in metres: long trains had depth 15 and length 19 %
 # too small, a place 4 cm off, where the fit's own errors were a tenth of that.
 MODEL, MODEL_PLACE = 0.1, 0.02
-TELLS = 0.5  # of the prior's standard deviation: a number that is known no better than that is the file's, unless it
-OTHERWISE = 2.0  # is off by so many of the prior's and of its own
+TELLS = 0.5  # of the prior's standard deviation: a number that is known no better than that is the file's,
+OTHERWISE = 2.0  # unless it is off by so many of the prior's and of its own
+ALONE = 0.5  # least share of what is known of a number that recordings are taken to have said
 
 
 @dataclass(frozen=True)
@@ -98,15 +99,21 @@ class RunningSurface:
         return tuple(tuple(changed.get(part, part) for part in parts) for parts in self.turnout.surfaces(route))
 
     def told(self, case, fit):
-        """What ``fit`` says of the numbers that its recordings tell more of than the file does, or otherwise, a dict
-        each; with what the trains disagree by, and what the model does wrong at every axle alike, in their errors."""
+        r"""What ``fit`` says of the numbers that its recordings tell more of than the file does, or otherwise, a dict
+        each; with what the trains disagree by, and what the model does wrong at every axle alike, in their errors.
+
+        It is what recordings say without the file, which each visit would be drawn to: with the fit's :math:`m, s^2`
+        under a prior of variance :math:`\tau^2` it is :math:`m / c` of variance :math:`s^2 / c`,
+        :math:`c = 1 - s^2 / \tau^2`, at least ``ALONE``.
+        """
         index = {n.name: k for k, n in enumerate(case.nuisances)}
         apart = disagreement(case, fit, "passage") if self.unsure and fit.jacobian else np.zeros(len(index))
         for u in self.unsure:
             k = index[u.name]
             model = MODEL_PLACE if u.field in PLACES else MODEL
-            error = float(np.sqrt(fit.covariance[k, k] + apart[k] ** 2 + model**2))
-            by, sd = fit.values[u.name], u.nuisance.sd
+            sd, own = u.nuisance.sd, fit.covariance[k, k]
+            free = max(1.0 - own / sd**2, ALONE)
+            by, error = fit.values[u.name] / free, float(np.sqrt(own / free + apart[k] ** 2 + model**2))
             if error < TELLS * sd or abs(by) > max(OTHERWISE * sd, OTHERWISE * error):
                 yield u.told(by, error)
 
