@@ -12,7 +12,16 @@ from turnout.mismatch.latent import Latent
 from turnout.mismatch.locate import attribute, cell_energies
 from turnout.mismatch.refits import scored
 from turnout.mismatch.scoring import heard, judged, latent_of, over, over_reserved
-from turnout.mismatch.together import needed, reconsidered, refused, told_beside, unconfirmed, unforetold
+from turnout.mismatch.together import (
+    needed,
+    other_of,
+    parted,
+    reconsidered,
+    refused,
+    told_beside,
+    unconfirmed,
+    unforetold,
+)
 from turnout.mismatch.verdict import Verdict, opened
 from turnout.mismatch.verify import decoy, fit_of_reserved, fit_percent, gain_error
 from turnout.mismatch.whereabouts import Whereabouts, whereabouts
@@ -116,6 +125,10 @@ def diagnose(case, settings=None, progress=None, store=None):
         if effect and (verdict.answer != "named" or best.gain < _shape_of(verdicts[0].scores[0], best)):
             verdicts[0] = told_beside(verdicts[0], verdict)
             break
+        if effect and verdicts[0].answer == "a_or_b":
+            verdicts[0] = parted(case, base, verdicts[0], verdict, settings)
+            if verdicts[0].answer == "a_or_b":
+                break
         verdicts.append(verdict)
         if verdict.answer == "none" or best is None or best.gain <= settings.threshold:
             break
@@ -128,7 +141,10 @@ def diagnose(case, settings=None, progress=None, store=None):
             break
         if verdict.answer == "named" and not refused(verdicts):  # these are weighed against the base's errors
             case, fit = _with_its_errors(case, fit, settings, store)
-        if verdict.answer == "a_or_b" or (not case.frozen_jacobian and over(case, fit, settings) <= 1.0):
+        torn = verdict.answer == "a_or_b"
+        if torn and (effect or other_of(verdict) is None):
+            break
+        if not torn and not case.frozen_jacobian and over(case, fit, settings) <= 1.0:
             break
     if refused(verdicts):
         verdicts, fit = reconsidered(case, base, fit, verdicts, settings)

@@ -11,7 +11,7 @@ from turnout.errors import SimulationError
 from turnout.mismatch.ends import ended
 from turnout.mismatch.held_out import held_out_score
 from turnout.mismatch.joint import fit_jointly
-from turnout.mismatch.scoring import consistent_elsewhere, explained_of, heard, over, structure_left
+from turnout.mismatch.scoring import consistent_elsewhere, explained_of, heard, judged, over, structure_left
 from turnout.mismatch.verdict import TORN, calibrate, judge, withdraw
 
 RIVALS = 2  # that are fitted anew beside the second effect
@@ -28,6 +28,24 @@ def told_beside(first, second):
     if first.answer != "named" or second.answer != "unknown":
         return first
     return replace(first, reason=f"something else shows beside it: {second.reason}")
+
+
+def other_of(torn):
+    """The Score of the second of two rivals that may both be there, None where one is a form of the other."""
+    if torn.answer != "a_or_b":
+        return None
+    other = next((s for s in torn.scores[1:] if s.family == torn.names[1]), None)
+    return other if other is not None and _vouches(torn.scores[0], other) else None
+
+
+def parted(case, base, torn, second, settings):
+    """The verdict on the first of two rivals where the ``second`` effect, found on top of it, is the other: what each
+    gains alone is as much by chance, and they do not explain the same. ``torn`` itself where it is another effect."""
+    other = other_of(torn)
+    if other is None or second.names[:1] != (other.family,):
+        return torn
+    mine, _ = judged(case, base, tuple(s for s in torn.scores if s is not other), settings)
+    return mine if mine.answer == "named" else torn
 
 
 def reconsidered(case, base, fit, verdicts, settings):

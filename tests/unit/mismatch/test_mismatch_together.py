@@ -76,6 +76,24 @@ def test_a_name_is_graded_by_what_the_last_fit_leaves():
     assert found.probability == min(v.probability for v in found.verdicts)
 
 
+def test_two_effects_that_gain_alike_are_both_there_and_no_choice():
+    """A wave and a ripple of one size gain 80 nats each, within the margin of one another, and explain
+    different things."""
+    found = diagnose(Shapes(("wave", "ripple"), wave=0.06, ripple=0.06))
+    assert [v.answer for v in found.verdicts] == ["named", "named"] and set(found.names) == {"wave", "ripple"}
+    gains = [s.gain for s in found.verdicts[0].scores]
+    assert gains[0] > 50.0 and len(gains) == 1  # the other is no rival of it
+
+
+def test_two_shapes_of_one_effect_stay_a_choice(monkeypatch):
+    """Beside the wave the same wave, 0.01 further along, has nothing left to explain."""
+    monkeypatch.setitem(SHAPES, "twin", np.sin(9.0 * X + 0.01))
+    found = diagnose(Shapes(("wave", "twin"), wave=0.08))
+    assert (
+        found.verdict.answer == "a_or_b" and set(found.verdict.names) == {"wave", "twin"} and len(found.verdicts) == 1
+    )
+
+
 class Trains(Shapes):
     """Two trains with a wave each, seen twenty times over the noise; ``told`` whether candidates say of which train."""
 
