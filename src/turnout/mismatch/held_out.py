@@ -46,6 +46,22 @@ def disagreement(case, fit, kind):
     return joint.sd * np.sqrt((len(out) - 1) * np.var(moved, axis=0))
 
 
+def told_alone(case, fit, kind, name, sd):
+    """What the observations of a ``kind`` say alone of the nuisance ``name``, whose prior is opened to ``sd``: its
+    value one Gauss-Newton step from ``fit``, all other nuisances free under their priors."""
+    joint = Joint(case)
+    theta = np.array([fit.values[n.name] for n in case.nuisances])
+    k, n = [n.name for n in case.nuisances].index(name), theta.size
+    opened = np.ones(n)
+    opened[k] = (joint.sd[k] / sd) ** 2
+    normal, right = np.diag(opened), opened * (joint.mean - theta) / joint.sd
+    for o, jacobian, white in zip(case.observations, fit.jacobian, fit.white):
+        if o.kind == kind:
+            part = _Part(joint, o, jacobian[:, :n], white)
+            normal, right = normal + part.gram / fit.scale[kind], right + part.across / fit.scale[kind]
+    return float(theta[k] + joint.sd[k] * np.linalg.solve(normal, right)[k])
+
+
 def _taken_apart(case, fit, observations=None):
     """The joint problem, its parameters in ``fit``, and the sums over each observation."""
     joint = Joint(case, fit.candidates, observations)

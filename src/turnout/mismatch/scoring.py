@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from turnout.mismatch.held_out import held_out_score, mean_square_out
+from turnout.mismatch.held_out import held_out_score, mean_square_out, told_alone
 from turnout.mismatch.latent import latent_law
 from turnout.mismatch.verdict import Score, judge, objected
 from turnout.mismatch.verify import falls, fit_of_reserved
@@ -50,17 +50,25 @@ def score_of(case, fit, refit, candidate, settings):
 
 def _shown(case, fit, refit, candidate, settings):
     """Whether the observations that must speak for a candidate, if any, fit better with it by a margin, and those that
-    must not speak against it no worse."""
+    must not speak against it do not."""
+    gained = 0.5 * sum(
+        o.effective * float(np.sum(np.square(a)) - np.sum(np.square(b))) / fit.scale[o.kind]
+        for o, a, b in zip(case.observations, fit.white, refit.white)
+        if o.kind == candidate.told_by
+    )
+    told = not candidate.told_by or gained > settings.margin
+    return told and not _opposed(case, fit, refit, candidate)
 
-    def gained(heard):
-        return 0.5 * sum(
-            o.effective * float(np.sum(np.square(a)) - np.sum(np.square(b))) / fit.scale[o.kind]
-            for o, a, b in zip(case.observations, fit.white, refit.white)
-            if heard(o)
-        )
 
-    told = not candidate.told_by or gained(lambda o: o.kind == candidate.told_by) > settings.margin
-    return told and (not candidate.unopposed or gained(lambda o: o.name in candidate.unopposed) > 0.0)
+def _opposed(case, fit, refit, candidate):
+    """Whether observations that must not speak against a candidate put its twin, with a prior as wide as the effect's,
+    nearer to what it is without the effect than to where the effect would have it."""
+    kinds = {o.kind for o in case.observations if o.name in candidate.unopposed}
+    if not kinds or not fit.jacobian:
+        return False
+    size = refit.psi[refit.part(candidate).start] - candidate.neutral[0]
+    mean = next(n.mean for n in case.nuisances if n.name == candidate.twin)
+    return any((told_alone(case, fit, k, candidate.twin, candidate.twin_sd) - mean) / size < 0.5 for k in kinds)
 
 
 def _usual(case, refit, candidate):
