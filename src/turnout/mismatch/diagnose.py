@@ -116,7 +116,7 @@ def diagnose(case, settings=None, progress=None, store=None):
         return Diagnosis(
             (verdict,), base, base, frames, _verified(case, base, base, None, settings), latent_of(case, base)
         )
-    verdicts, fit, scores = [], base, ()
+    verdicts, fit, scores, choice = [], base, (), None
     for effect in range(settings.effects):
         promising = None if refused(verdicts) else {s.family for s in scores if s.gain > settings.threshold}
         scores, fit = scored(case, fit, settings, tell, store, effect, promising)
@@ -125,7 +125,7 @@ def diagnose(case, settings=None, progress=None, store=None):
         if effect and (verdict.answer != "named" or best.gain < _shape_of(verdicts[0].scores[0], best)):
             verdicts[0] = told_beside(verdicts[0], verdict)
             break
-        if effect and verdicts[0].answer == "a_or_b":
+        if choice:
             verdicts[0] = parted(case, base, verdicts[0], verdict, settings)
             if verdicts[0].answer == "a_or_b":
                 break
@@ -141,15 +141,18 @@ def diagnose(case, settings=None, progress=None, store=None):
             break
         if verdict.answer == "named" and not refused(verdicts):  # these are weighed against the base's errors
             case, fit = _with_its_errors(case, fit, settings, store)
-        torn = verdict.answer == "a_or_b"
-        if torn and (effect or other_of(verdict) is None):
-            break
-        if not torn and not case.frozen_jacobian and over(case, fit, settings) <= 1.0:
+        if verdict.answer == "a_or_b":  # both may be there
+            choice = case, [verdict], fit, scores
+            if effect or other_of(verdict) is None:
+                break
+        elif not case.frozen_jacobian and over(case, fit, settings) <= 1.0:
             break
     if refused(verdicts):
         verdicts, fit = reconsidered(case, base, fit, verdicts, settings)
     else:
         verdicts, fit = needed(case, base, fit, verdicts, settings)
+    if choice and [v.answer for v in verdicts] != ["named", "named"]:
+        case, verdicts, fit, scores = choice
     verdicts = [_as_it_ends(v, case, fit, settings) for v in verdicts]
     check = _verified(case, base, fit, _rival(verdicts[0]), settings)
     if len(verdicts) == 1 and check.fell:

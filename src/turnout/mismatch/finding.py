@@ -160,7 +160,7 @@ def _position(diagnosis, term, where):
 def _is_there(level, where):
     """Whether the level of a frame is where the finding is; one that has no place, sensor or train cannot be elsewhere.
 
-    >>> _is_there("12.0", {"place": 12.3}), _is_there("12.0", {"place": 18.0}), _is_there("A1", {"sensor": "A2"})
+    >>> _is_there("12.0", {"place": 12.2}), _is_there("12.0", {"place": 18.0}), _is_there("A1", {"sensor": "A2"})
     (True, False, False)
     """
     if where.get("place") is not None:

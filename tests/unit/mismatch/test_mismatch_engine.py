@@ -45,8 +45,8 @@ def test_a_linear_problem_is_solved_as_by_the_normal_equations():
     x = np.concatenate([case.x[o.name] for o in case.observations])
     y = np.concatenate([o.data for o in case.observations])
     rows = np.column_stack([x, np.ones(x.size)]) / 0.05
-    normal = rows.T @ rows / max(1.0, fit.chi2) + np.eye(2)
-    right = rows.T @ y / 0.05 / max(1.0, fit.chi2) + np.array([1.0, 0.0])
+    normal = rows.T @ rows / max(1.0, *fit.level.values()) + np.eye(2)
+    right = rows.T @ y / 0.05 / max(1.0, *fit.level.values()) + np.array([1.0, 0.0])
     assert [fit.values["slope"], fit.values["level"]] == pytest.approx(list(np.linalg.solve(normal, right)), rel=1e-6)
     assert fit.covariance == pytest.approx(np.linalg.inv(normal), rel=1e-4)
 
