@@ -143,7 +143,7 @@ def diagnose(case, settings=None, progress=None, store=None):
             case, fit = _with_its_errors(case, fit, settings, store)
         if verdict.answer == "a_or_b":  # both may be there
             choice = case, [verdict], fit, scores
-            if effect or other_of(verdict) is None:
+            if other_of(verdict) is None:
                 break
         elif not case.frozen_jacobian and over(case, fit, settings) <= 1.0:
             break

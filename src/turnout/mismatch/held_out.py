@@ -7,7 +7,7 @@ from turnout.mismatch.joint import Joint
 FEWEST = 3  # recordings of which two may disagree with the third
 
 
-def held_out_score(case, fit, observations=None):
+def held_out_score(case, fit):
     r"""Log predictive density [nats] of each left-out condition, dict condition -> density.
 
     .. math:: \ln p(y_c \mid y_{-c}) = \ln N(r_c;\; J_c(\hat\theta_{-c} - \hat\theta),\;
@@ -17,7 +17,7 @@ def held_out_score(case, fit, observations=None):
     left-out condition go back to their prior and are integrated out, not fitted. S holds sigma times the noise
     scale that the other conditions gave; correlated samples count by their ``effective`` share.
     """
-    joint, theta, parts = _taken_apart(case, fit, observations)
+    joint, theta, parts = _taken_apart(case, fit)
     conditions = [o.condition for o in joint.observations]
     found = {}
     for condition in dict.fromkeys(conditions):
@@ -62,9 +62,9 @@ def told_alone(case, fit, kind, name, sd):
     return float(theta[k] + joint.sd[k] * np.linalg.solve(normal, right)[k])
 
 
-def _taken_apart(case, fit, observations=None):
+def _taken_apart(case, fit):
     """The joint problem, its parameters in ``fit``, and the sums over each observation."""
-    joint = Joint(case, fit.candidates, observations)
+    joint = Joint(case, fit.candidates)
     theta = np.concatenate([[fit.values[n.name] for n in case.nuisances], fit.psi])
     return joint, theta, [_Part(joint, o, j, r) for o, j, r in zip(joint.observations, fit.jacobian, fit.white)]
 

@@ -7,9 +7,7 @@ from turnout.mismatch.track.roll import LEAD
 
 # The rail's deflection under the axles: with a dip of 1.5 mm the right train is 0.8 alike, a wrong one at most 0.5
 ALIGNED, ALIKE = 30.0, 0.65  # [Hz], -
-
-
-STEP = 1.0 / 800.0  # [s]
+STEP = 1.0 / 800.0  # between samples of what is compared [s]
 
 
 def slow(recording, sensors):
