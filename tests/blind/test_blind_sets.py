@@ -3,6 +3,7 @@
 import json
 import shutil
 from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,7 +18,9 @@ from turnout_blind.make import make_set
 from turnout_blind.record import hammer_test
 from turnout_blind.reveal import reveal
 from turnout_blind.score.page import BEGIN, END, write_page
+from turnout_blind.score.pictures import pyplot
 from turnout_blind.score.report import report_of
+from turnout_blind.score.stories import _map
 from turnout_blind.seal import BlindError, digest, verify
 from turnout_blind.site import draw_site
 
@@ -349,3 +352,25 @@ def test_a_kept_set_is_small_and_says_all(scored, tmp_path):
         spoilt["stratum"] = "double"
         with pytest.raises(BlindError, match="not what was sealed"):
             verify_kept({**held, "truths": {**held["truths"], case: json.dumps(spoilt)}})
+
+
+def test_a_kind_that_is_not_there_is_refused_before_anything_is_made(tmp_path):
+    with pytest.raises(BlindError, match=r"--only, vod: no such kind\. There are ballast"):
+        make_set(tmp_path / "set", tmp_path / "truth", 1, only={"vod", "pad"})
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_was_said_of_a_wheel_or_a_second_place_is_on_the_map():
+    """What has no place is written with its wheel, and every name of a finding is drawn, not the first alone."""
+    figure, axis = pyplot().subplots()
+    truth = {"effects": [{"kind": "flat", "where": {"train": "railcar", "axle": 2}}], "sensors": {"A1": 2.0}}
+    terms = [
+        {"term": "time_offset", "fixed": {"channel_name": "A1"}},
+        {"term": "surface_dip", "fixed": {"place": 5.0}, "parameters": {"shift": {"value": 0.4}}},
+    ]
+    row = {"verdict": "named", "term": "time_offset", "channel": "A1", "term_json": json.dumps(terms)}
+    _map(axis, truth, [row], SimpleNamespace(sensors=(2.0, 8.0), blows=(2.0,), names=lambda: ("A1", "A2")))
+    words = [text.get_text() for text in axis.texts]
+    assert "flat: axle 2 of railcar" in words and "surface dip" in words and "time offset" in words
+    assert 5.4 in [float(line.get_xdata()[0]) for line in axis.lines]
+    figure.clear()

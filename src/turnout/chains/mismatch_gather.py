@@ -34,7 +34,6 @@ class Gathered:
     sections: dict[str, str] = field(default_factory=dict)
     passages: list[Passage] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
-    quarantine: list[dict] = field(default_factory=list)
 
     def said(self) -> list:
         """All that notes and the passage stage said of the recordings: another word is another diagnosis."""

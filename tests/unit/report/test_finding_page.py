@@ -162,6 +162,13 @@ def test_of_two_effects_each_says_how_sure_it_is_and_what_else_it_may_be():
         _refuse(row, "t1", False)
 
 
+@pytest.mark.parametrize(("delay", "said"), [(9.3e-4, "A2 lags by 0.93 ms"), (-9.3e-4, "A2 is early by 0.93 ms")])
+def test_a_channel_lags_or_is_early(delay, said):
+    number = {"value": delay, "se": 1e-5, "unit": "s"}
+    lag = {"term": "time_offset", "fixed": {"channel_name": "A2"}, "parameters": {"delay": number}}
+    assert said in headline(named() | {"term_json": json.dumps([lag])})
+
+
 def test_axes_carry_their_units():
     text = page(named())
     for label in ("time [s]", "frequency [Hz]", "displacement of the sleeper [m]", "force [N]"):

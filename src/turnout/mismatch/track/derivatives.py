@@ -22,7 +22,8 @@ def own_jacobian(case, values, terms, observation, predicted, names):
 
 
 def nuisance_jacobian(case, values, terms, observations, base):
-    """Exact for receptances, gains, times; what supports have or share by pseudo-forces, wheels and running surface by differences."""
+    """Exact for receptances, gains and times; of passages, what supports have or share by pseudo-forces, wheels and
+    running surface by differences."""
     index = {n.name: k for k, n in enumerate(case.nuisances)}
     found = [np.zeros((o.data.size, len(case.nuisances))) for o in observations]
     heard_by = case.blow_models(values, terms)

@@ -159,7 +159,7 @@ class TrackCase(Predicting, Case):
         return derivatives.own_jacobian(self, values, terms, observation, predicted, names)
 
     def nuisance_jacobian(self, values, terms, observations, base):
-        """Exact for receptances, gains, times; what supports have or share by pseudo-forces, wheels and running surface by differences."""
+        """Exact for receptances, gains and times; the others of passages as ``derivatives`` has them."""
         return derivatives.nuisance_jacobian(self, values, terms, observations, base)
 
     def renewed(self, fit):
