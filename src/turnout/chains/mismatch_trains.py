@@ -65,6 +65,7 @@ def train_of(row: Mapping, said: Mapping, folder: Path) -> TrainFound:
         if not believed:
             raise
         speed, more = float(believed) / KMH, (f"{error}; taken as noted",)
+        vehicle, load_sd, doubts, wrong = _vehicle(name, None, row, said, folder, True)  # as many units as noted
     direction, way = _one_of(("facing", "trailing"), "direction", row, said)
     route, road = _one_of(("main", "diverging"), "track", row, said)
     return TrainFound(name, vehicle, speed, direction, route, (*doubts, *wrong, *more, *way, *road), load_sd)

@@ -47,6 +47,10 @@ class Score:
         open_by = self.candidate.sure * float(self.own[1][0]) if self.candidate.sure else 0.0
         return size - open_by >= self.candidate.least
 
+    def told_elsewhere(self, threshold):
+        """Data that are not those of the fit are evidence enough for it: what the fit leaves is no witness against."""
+        return self.candidate.aside - np.log(self.candidate.scanned) > threshold
+
     @property
     def is_open(self):
         """Its size is only known from below, and beyond it is what ``open_as`` names."""
@@ -212,7 +216,7 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
     if not found:
         return no_name()
     best = found[0]
-    if excess > 1.0 and best.explained < settings.explained:
+    if excess > 1.0 and best.explained < settings.explained and not best.told_elsewhere(settings.threshold):
         return verdict("unknown", reason=f"the best candidate explains {best.explained:.0%} of the excess")
     if left > settings.leftover:
         return verdict("unknown", reason=f"{best.family} leaves {left:.0f} times the level of controls")

@@ -78,6 +78,19 @@ def test_bangs_between_the_axles_do_not_tell_the_speed(repository):
         assert train(row, said, repository).speed == pytest.approx(speed)
 
 
+@pytest.mark.parametrize(("said", "axles"), [({}, 8), ({"units": 3}, 24)])
+def test_bangs_that_are_twice_as_many_as_the_axles_are_no_second_unit(repository, said, axles):
+    """A deep dip is crossed with a bang behind every axle: sixteen, but not where two units have theirs. As many units
+    as the notes say are believed; sixteen axles in place are two units whatever they say."""
+    folder = repository / "config/vehicles"
+    said = {"speed": 25.0, "train_type": "ic3"} | said
+    one, two = (load_vehicle("ic3", 0.0, folder, units).wheel_places for units in (1, 2))
+    bangs = np.sort(np.concatenate([one, one + 1.3])) / 25.0
+    row = {"train_type": "ic3", "n_axles": 16, "speed_kmh": 90.0}
+    assert len(train(row | {"axle_times_s": bangs}, said, repository).vehicle.wheels) == axles
+    assert len(train(row | {"axle_times_s": two / 25.0}, said, repository).vehicle.wheels) == 16
+
+
 @pytest.mark.parametrize("known", [{"axle_load_t": 14.0}, {"load_share": 0.4}, {}])
 def test_a_load_that_nobody_knows_is_as_open_as_from_empty_to_full(repository, known):
     """Uniform between: its standard deviation is half of the way over the root of 3. Known loads are known to 5 %."""
