@@ -158,8 +158,8 @@ def test_one_sensor_that_disagrees_does_not_cost_the_passage_but_a_wrong_train_d
 
 
 def test_blows_many_times_as_strong_as_any_axle_do_not_hide_which_train_it_is(sound):
-    """Three of eight times the largest acceleration, 20 ms long and 160 ms apart: a plain correlation sees nothing else,
-    and of a wrong train they make none."""
+    """Three of eight times the largest acceleration, 20 ms long and 160 ms apart: a plain correlation sees nothing
+    else, and of a wrong train they make none."""
     case, values = sound
     passage = next(p for p in case.campaign.passages if p.name == "heavy 2")
     sensors = case.rollings["heavy 2"].sensors

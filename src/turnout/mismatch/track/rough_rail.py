@@ -4,6 +4,8 @@ All trains roll over the same waves. They enter the simulation as a path; the de
 under the contact force that a wave makes, see ``rolled_waves``.
 """
 
+from functools import cached_property
+
 import numpy as np
 
 from turnout.mismatch.case import Nuisance
@@ -56,8 +58,12 @@ class Waves:
         amplitude = self.amplitudes(values)
         if not amplitude.any():
             return ()
-        x = np.arange(self.start, self.end + STEP, STEP)
-        return (Sampled(self.start, STEP, amplitude @ self.shapes(x)),)
+        return (Sampled(self.start, STEP, amplitude @ self._sampled),)
+
+    @cached_property
+    def _sampled(self):
+        """(n_wave, n) waves every ``STEP``."""
+        return self.shapes(np.arange(self.start, self.end + STEP, STEP))
 
 
 def amplitude_sd(wavelength, length, offset):
