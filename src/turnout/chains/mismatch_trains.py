@@ -65,7 +65,10 @@ def train_of(row: Mapping, said: Mapping, folder: Path) -> TrainFound:
         if not believed:
             raise
         speed, more = float(believed) / KMH, (f"{error}; taken as noted",)
-        vehicle, load_sd, doubts, wrong = _vehicle(name, None, row, said, folder, True)  # as many units as noted
+        if len(axles := vehicle.wheels) == row.get("n_axles"):
+            n = _axles_by_length(name, row, speed, folder)
+            vehicle, load_sd, doubts, wrong = _vehicle(name, n, row, said, folder, True)
+            more += (f"{len(axles)} axles heard over the length of {n}",) if n < len(axles) else ()
     direction, way = _one_of(("facing", "trailing"), "direction", row, said)
     route, road = _one_of(("main", "diverging"), "track", row, said)
     return TrainFound(name, vehicle, speed, direction, route, (*doubts, *wrong, *more, *way, *road), load_sd)
@@ -109,6 +112,15 @@ def _vehicle(name, heard, row, said, folder, believed):
         units = heard // n
     share, load_sd, doubts = _load_share(name, row, said, folder, units)
     return load_vehicle(name, share, folder, units), load_sd, doubts, wrong
+
+
+def _axles_by_length(name, row, speed, folder):
+    """Number of axles of as many units as reach, at ``speed`` [m/s], as far as the axles heard: a dip is crossed with a
+    bang behind every axle, which make the train no longer."""
+    times, n = row["axle_times_s"], len(load_vehicle(name, 0.0, folder).wheels)
+    reach, most = speed * float(np.ptp(times)), len(times) // n
+    lengths = [float(load_vehicle(name, 0.0, folder, units).wheel_places[-1]) for units in range(1, most + 1)]
+    return n * (1 + int(np.argmin(np.abs(np.array(lengths) - reach))))
 
 
 def _load_share(name, row, said, folder, units):

@@ -20,7 +20,8 @@ class Candidate:
     ``from_twin`` makes the first parameter of it, None: its exponential.
     ``parameters`` have name, unit, neutral, bounds and prior as ``turnout.physics.Parameter``.
     One found by a look at the residual has the gain it promises [nats] in ``promise``, starts as it is, from the
-    nuisances ``begin``; ``aside`` is evidence from data that are no observations [nats].
+    nuisances ``begin``; ``aside`` is evidence from data that are no observations [nats], of a ``sounding`` one so much
+    its own that it need not explain what the observations miss.
     ``kin``: laws of one part; where one leads at a place, all with that word are refitted there. ``limit`` is the
     family that it cannot be told from at the lower bound of its first parameter; ``plain`` is (family, k): where its
     first parameter does not matter it is that law, of the size of its k-th; ``open_as`` is the family that shows the
@@ -49,6 +50,7 @@ class Candidate:
     promise: float | None = None
     begin: Mapping[str, float] = field(default_factory=dict)
     aside: float = 0.0
+    sounding: bool = False
     loose: float = 0.0
     exact: bool = False
     told_by: str = ""

@@ -145,23 +145,29 @@ def _tried(case, fit, entry, settings, store, effect, best=0.0):
 
 
 def _from_farther(case, fit, entry, score, settings, store, key):
-    """Score of the entry begun at more than it promised: where the common values of the base fit have taken a part of
-    what the whole track has, a small size costs less than none and a large one more, until these come back. ``score``
-    where the simulation cannot go there."""
+    """Best Score of the entry begun at more than it promised, and with what the base may have bent at its prior: where
+    common values of the base fit have taken a part of what the whole track has, a small size costs less than none and a
+    large one more, until these come back; where the waves of the rail have, they come back on no straight way.
+    ``score`` where none is better or the simulation cannot go there."""
     candidate = entry.candidate
     first, start = candidate.parameters[0], np.array(entry.start, dtype=float)
     start[0] = np.clip(first.neutral + FARTHER * (start[0] - first.neutral), *first.bounds)
     psi, values = np.concatenate([fit.psi, start]), {**fit.values, **entry.values}
+    unbent = values | {n.name: n.mean for n in case.nuisances if n.owner is None and n.bends}
+    found = [score]
+    for how, begin in (("farther", values), ("unbent", unbent)):
 
-    def made():
-        try:
-            both = (*fit.candidates, candidate)
-            return fit_jointly(case, both, psi, values, fit.jacobian, iterations=settings.iterations).light()
-        except SimulationError:
-            return None
+        def made(begin=begin):
+            try:
+                both = (*fit.candidates, candidate)
+                return fit_jointly(case, both, psi, begin, fit.jacobian, iterations=settings.iterations).light()
+            except SimulationError:
+                return None
 
-    refit = kept(store, f"{key}:farther", made, (*fit.candidates, candidate))
-    return score if refit is None else score_of(case, fit, refit, candidate, settings)
+        refit = kept(store, f"{key}:{how}", made, (*fit.candidates, candidate))
+        if refit is not None:
+            found.append(score_of(case, fit, refit, candidate, settings))
+    return max(found, key=lambda s: s.gain)
 
 
 def _polished(case, fit, score, settings, store, effect):

@@ -48,8 +48,10 @@ class Score:
         return size - open_by >= self.candidate.least
 
     def told_elsewhere(self, threshold):
-        """Data that are not those of the fit are evidence enough for it: what the fit leaves is no witness against."""
-        return self.candidate.aside - np.log(self.candidate.scanned) > threshold
+        """Data that are not those of the fit are evidence enough for it, and it makes the fit no worse: what is left
+        there is no witness against."""
+        enough = self.candidate.aside - np.log(self.candidate.scanned) > threshold
+        return self.candidate.sounding and enough and self.explained >= 0.0
 
     @property
     def is_open(self):
@@ -243,4 +245,6 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
     if rivals:
         return verdict("a_or_b", (best.family, rivals[0].family), reason="within the margin of each other")
     grade = "A" if left <= 1.0 else "B"
-    return verdict("named", (best.family,), grade)
+    faint = excess > 1.0 and best.explained < settings.explained
+    reason = f"known by its blows; it explains {best.explained:.0%} of the excess" if faint else ""
+    return verdict("named", (best.family,), grade, reason)

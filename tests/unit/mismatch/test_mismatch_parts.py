@@ -118,12 +118,25 @@ def test_a_name_that_one_condition_speaks_against_is_none(gain, worst, excess, s
     assert judge([found], excess, settings).answer == said
 
 
-@pytest.mark.parametrize("aside, scanned, said", [(30.0, 20, "named"), (13.0, 20, "unknown"), (0.0, 1, "unknown")])
-def test_a_name_with_evidence_of_its_own_need_not_explain_what_the_fit_leaves(aside, scanned, said):
+@pytest.mark.parametrize(
+    "aside, scanned, sounding, explained, said",
+    [
+        (30.0, 20, True, 0.08, "named"),
+        (13.0, 20, True, 0.08, "unknown"),
+        (30.0, 20, False, 0.08, "unknown"),
+        (30.0, 20, True, -0.01, "unknown"),
+    ],
+)
+def test_a_name_with_evidence_of_its_own_need_not_explain_what_the_fit_leaves(
+    aside, scanned, sounding, explained, said
+):
     """Blows that come once a turn are a flat's, though the waveform in the band, which takes the angle to the
-    millimetre, stays as it was: 30 nats less ln 20 are more than a threshold of 12, and 13 less ln 20 are not."""
-    flat = candidate("wheel_flat", {"train": "railcar", "axle": 1}, aside=aside, scanned=scanned)
-    assert answer(score(flat, 50.0, 0.08, 0.01, explained=0.08)).answer == said
+    millimetre, stays as it was: 30 nats less ln 20 are more than a threshold of 12, and 13 less ln 20 are not. A
+    channel's ceiling, or a line above the band, is no such evidence, nor one that makes the fit worse."""
+    where = {"train": "railcar", "axle": 1}
+    flat = candidate("wheel_flat", where, aside=aside, scanned=scanned, sounding=sounding)
+    verdict = answer(score(flat, 50.0, 0.08, 0.01, explained=explained))
+    assert verdict.answer == said and ("8%" in verdict.reason or explained < 0.0)
 
 
 def test_a_fit_that_was_made_is_a_better_start_than_a_column():

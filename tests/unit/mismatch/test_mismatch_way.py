@@ -101,7 +101,8 @@ def test_what_the_fit_without_an_effect_had_not_come_to_is_no_evidence_for_the_e
 def test_a_law_of_the_whole_track_that_gains_too_little_is_begun_again_farther_out(
     monkeypatch, scanned, promised, gain, begun
 ):
-    """At twice its promise or at its bound, 9, and what gains more counts; what has a name or a place is left alone."""
+    """At twice its promise or at its bound, 9, from where the base fit is and with what that may have bent at its prior;
+    what gains most counts. What has a name or a place is left alone."""
     candidate = SimpleNamespace(
         key="a",
         scanned=scanned,
@@ -109,21 +110,25 @@ def test_a_law_of_the_whole_track_that_gains_too_little_is_begun_again_farther_o
         frame="place",
         parameters=(SimpleNamespace(neutral=0.0, bounds=(-9.0, 9.0)),),
     )
-    fit = SimpleNamespace(candidates=(), psi=np.zeros(0), values={}, jacobian=[])
-    starts = []
+    case = Bent(True)
+    shared, wave = Nuisance("pads", "-", 0.2, 0.1), Nuisance("wave", "m", 0.0, 1.0, bends=False)
+    case.nuisances = (shared, wave, Nuisance("time@p", "s", 0.0, 1.0, "p"))
+    fit = SimpleNamespace(candidates=(), psi=np.zeros(0), values={"pads": 0.7, "wave": 0.5, "time@p": 0.1}, jacobian=[])
+    starts, gains = [], iter((15.0, 18.0))
 
-    def fitted(case, candidates, psi, *_, **__):
-        starts.append(float(psi[-1]))
-        return SimpleNamespace(gain=18.0, light=lambda: made, with_candidates=lambda c: made)
+    def fitted(case, candidates, psi, values, *_, **__):
+        starts.append((float(psi[-1]), *values.values()))
+        made = SimpleNamespace(gain=next(gains), with_candidates=lambda c: made)
+        return SimpleNamespace(light=lambda: made)
 
-    made = SimpleNamespace(gain=18.0, with_candidates=lambda c: made)
     first = SimpleNamespace(gain=gain, with_candidates=lambda c: first)
     monkeypatch.setattr(refits, "fit_jointly", fitted)
     monkeypatch.setattr(refits, "_refit", lambda *a: first)
     monkeypatch.setattr(refits, "score_of", lambda case, fit, refit, *a: SimpleNamespace(gain=refit.gain))
     entry = SimpleNamespace(candidate=candidate, start=(promised,), values={}, promised=0.0)
-    score = refits._tried(Bent(True), fit, entry, MismatchSettings(), {}, 0)
-    assert starts == ([] if begun is None else [begun]) and score.gain == (gain if begun is None else 18.0)
+    score = refits._tried(case, fit, entry, MismatchSettings(), {}, 0)
+    assert starts == ([] if begun is None else [(begun, 0.7, 0.5, 0.1), (begun, 0.2, 0.5, 0.1)])
+    assert score.gain == (gain if begun is None else 18.0)
 
 
 def test_a_fit_is_not_made_again_where_nobody_would_be_named():

@@ -22,15 +22,23 @@ def align(passage, data, simulated, rate):
     ``slow``.
 
     Searches all lags and speeds within 1.5 % of the noted one; the simulation is stretched in time about the first
-    wheel's arrival. The band ends at ``ALIGNED``, below which roughness, dips and flats have no say. Where the sensors
+    wheel's arrival. The band ends at ``ALIGNED``, below which roughness and dips have no say. Where the sensors
     together look like no such train, the one that disagrees most is not asked, if three or more are there: what is
-    wrong with it is for the fit to find. No sample counts for more than the largest of the simulation: a flat's blows
-    are many times as strong, and no axle's.
+    wrong with it is for the fit to find. Where that does not help either, no sample counts for more than the largest of
+    the simulation: the blows of a long flat are many times as strong, and no axle's.
     """
-    n_sensor, model_time = len(data), np.arange(0.0, simulated.shape[-1] / rate, STEP)
     low = band_limited(simulated, rate, high=ALIGNED)
-    top = np.max(np.abs(low), axis=1, keepdims=True)
-    data = np.clip(data, -top, top)
+    best = _best(data, low, rate)
+    if best[0] < ALIKE:
+        top = np.max(np.abs(low), axis=1, keepdims=True)
+        best = max(best, _best(np.clip(data, -top, top), low, rate))
+    likeness, lag, stretch = best
+    return lag * STEP + LEAD, passage.speed * (1.0 + stretch), likeness
+
+
+def _best(data, low, rate):
+    """(likeness, lag in steps, stretch) at which the simulation ``low`` lies best on ``data``."""
+    n_sensor, model_time = len(data), np.arange(0.0, low.shape[-1] / rate, STEP)
     size = 1 << int(np.ceil(np.log2(data.shape[1] + model_time.size)))
     spectrum = np.fft.rfft(data, size)
     weight = 1.0 / np.maximum(np.sqrt(np.sum(data**2, axis=1)), 1e-12)
@@ -47,8 +55,7 @@ def align(passage, data, simulated, rate):
     if best[0] < ALIKE and n_sensor >= 3:
         best = max(but_one)
     likeness, k, stretch = best
-    lag = (k if k < size - model_time.size else k - size) * STEP
-    return lag + LEAD, passage.speed * (1.0 + stretch), likeness
+    return likeness, k if k < size - model_time.size else k - size, stretch
 
 
 def _likest(score, stretch):

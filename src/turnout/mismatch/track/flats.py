@@ -36,7 +36,7 @@ def _candidate(case, fit, struck, wheels):
     scanned = wheels * (1.0 + np.ptp(ABOUT) / APART) ** len(phases)
     return Candidate(
         "wheel_flat", physics.WheelFlat.parameters, make, ((length,),), where, "wheel", scanned,
-        promise=float(gain + struck.nats - np.log(scanned)), aside=struck.nats,
+        promise=float(gain + struck.nats - np.log(scanned)), aside=struck.nats, sounding=True,
     )  # fmt: skip
 
 
