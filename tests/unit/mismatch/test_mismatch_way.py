@@ -101,8 +101,8 @@ def test_what_the_fit_without_an_effect_had_not_come_to_is_no_evidence_for_the_e
 def test_a_law_of_the_whole_track_that_gains_too_little_is_begun_again_farther_out(
     monkeypatch, scanned, promised, gain, begun
 ):
-    """At twice its promise or at its bound, 9, from where the base fit is and with what that may have bent at its prior;
-    what gains most counts. What has a name or a place is left alone."""
+    """At twice its promise or at its bound, 9, from where the base fit is and with what that may have bent at its
+    prior; what gains most counts. What has a name or a place is left alone."""
     candidate = SimpleNamespace(
         key="a",
         scanned=scanned,
