@@ -117,10 +117,10 @@ def _vehicle(name, heard, row, said, folder, believed):
 def _axles_by_length(name, row, speed, folder):
     """Number of axles of as many units as reach, at ``speed`` [m/s], as far as the axles heard: a dip is crossed with a
     bang behind every axle, which make the train no longer."""
-    times, n = row["axle_times_s"], len(load_vehicle(name, 0.0, folder).wheels)
-    reach, most = speed * float(np.ptp(times)), len(times) // n
-    lengths = [float(load_vehicle(name, 0.0, folder, units).wheel_places[-1]) for units in range(1, most + 1)]
-    return n * (1 + int(np.argmin(np.abs(np.array(lengths) - reach))))
+    one, two = (load_vehicle(name, 0.0, folder, units) for units in (1, 2))
+    times, n, length = row["axle_times_s"], len(one.wheels), float(one.wheel_places[-1])
+    more = (speed * float(np.ptp(times)) - length) / (float(two.wheel_places[-1]) - length)
+    return n * int(np.clip(1 + round(more), 1, len(times) // n))
 
 
 def _load_share(name, row, said, folder, units):
