@@ -218,8 +218,11 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
     if not found:
         return no_name()
     best = found[0]
-    if excess > 1.0 and best.explained < settings.explained and not best.told_elsewhere(settings.threshold):
-        return verdict("unknown", reason=f"the best candidate explains {best.explained:.0%} of the excess")
+    faint = (
+        f"explains {best.explained:.0%} of the excess" if excess > 1.0 and best.explained < settings.explained else ""
+    )
+    if faint and not best.told_elsewhere(settings.threshold):
+        return verdict("unknown", reason=f"the best candidate {faint}")
     if left > settings.leftover:
         return verdict("unknown", reason=f"{best.family} leaves {left:.0f} times the level of controls")
     weak = best.gain < WEAK * settings.threshold
@@ -245,6 +248,4 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
     if rivals:
         return verdict("a_or_b", (best.family, rivals[0].family), reason="within the margin of each other")
     grade = "A" if left <= 1.0 else "B"
-    faint = excess > 1.0 and best.explained < settings.explained
-    reason = f"known by its blows; it explains {best.explained:.0%} of the excess" if faint else ""
-    return verdict("named", (best.family,), grade, reason)
+    return verdict("named", (best.family,), grade, faint and f"known by its blows; it {faint}")

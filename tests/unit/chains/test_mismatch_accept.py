@@ -220,7 +220,7 @@ def test_accepted_effects_are_simulated_and_estimated_anew_in_a_case(config):
     accepted = accepted_of(own(config).terms)
     alone = dict(case.rail)
     guided = GuidedCase(case, accepted)
-    # receptances are straight about the rail that blows give with the effect standing, not about the one without it
+    # receptances are linearised about the rail that blows give with the effect standing, not about the one without it
     assert case.rail == {name: guided.start_values[name] for name in alone} != alone
     (own_nuisance,) = guided.own
     assert own_nuisance.mean == 0.5 and own_nuisance.sd == pytest.approx(0.25)

@@ -1,5 +1,6 @@
 """Which passage at which sensor a page draws."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -45,7 +46,6 @@ def test_a_recording_never_used_at_the_sensor_found_where_most_is_gained():
 
 
 def test_without_a_name_what_is_missed_most_is_drawn():
-    half = shown("half", "A1")
-    half = Shown(*(getattr(half, f) for f in ("recording", "sensor", "time", "measured")), 0.5 * half.measured,
-                 half.after, half.rival, half.wheel, False)  # fmt: skip
+    whole = shown("half", "A1")
+    half = replace(whole, before=0.5 * whole.measured)
     assert drawn([half, shown("all", "A2")], {}, named=False) == ("all", "A2")

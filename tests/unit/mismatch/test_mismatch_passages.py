@@ -158,8 +158,8 @@ def test_one_sensor_that_disagrees_does_not_cost_the_passage_but_a_wrong_train_d
 
 
 def test_blows_many_times_as_strong_as_any_axle_do_not_hide_which_train_it_is(sound):
-    """Three of eight times the largest acceleration, 20 ms long and 160 ms apart: a plain correlation sees nothing
-    else, and of a wrong train they make none."""
+    """Three of eight times the largest acceleration, 20 ms long and 160 ms apart: what was recorded is hardly like
+    itself with them, and of a wrong train they make none."""
     case, values = sound
     passage = next(p for p in case.campaign.passages if p.name == "heavy 2")
     sensors = case.rollings["heavy 2"].sensors
@@ -170,7 +170,7 @@ def test_blows_many_times_as_strong_as_any_axle_do_not_hide_which_train_it_is(so
     struck = sum(np.exp(-(((time - reference - 0.02 - 0.16 * k) / 0.01) ** 2)) for k in range(3))
     loud = quiet + 8.0 * np.max(np.abs(quiet), axis=1, keepdims=True) * struck
     alike = np.sum(quiet * loud, axis=1) / np.linalg.norm(quiet, axis=1) / np.linalg.norm(loud, axis=1)
-    assert np.max(alike) < 0.7 * ALIKE
+    assert np.max(np.abs(alike)) < 0.7 * ALIKE
     assert align(passage, loud, signals, case.solver.rate)[2] > ALIKE
     light = case.roll(values, (), passage)(passage, case.rollings["light 2"].passage.vehicle, passage.speed, sensors)
     assert align(passage, loud, light, case.solver.rate)[2] < ALIKE
