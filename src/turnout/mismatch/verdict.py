@@ -218,9 +218,8 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
     if not found:
         return no_name()
     best = found[0]
-    faint = (
-        f"explains {best.explained:.0%} of the excess" if excess > 1.0 and best.explained < settings.explained else ""
-    )
+    little = excess > 1.0 and best.explained < settings.explained
+    faint = f"explains {best.explained:.0%} of the excess" if little else ""
     if faint and not best.told_elsewhere(settings.threshold):
         return verdict("unknown", reason=f"the best candidate {faint}")
     if left > settings.leftover:
