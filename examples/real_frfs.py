@@ -206,11 +206,11 @@ def nothing_known(d):
         return (
             f"said to be unknown**: {reason}. The fit of the blow never used is {check.before:.1f} %, best of series A."
         )
-    told = "named, and we cannot check it" if check.after > check.before else "a false name, not withdrawn"
+    told = "a false name, not withdrawn" if check.fell else "named, and we cannot check it"
     return (
         f"{told}.** Nothing was left out that we know of; the fit of the blow never used goes from {check.before:.1f}\n"
-        f"  to {check.after:.1f} %. Resonances above the band there are: the makers print some up to "
-        f"{PRINTED[-1]:.0f} Hz."
+        f"  to {check.after:.1f} % (standard error of the difference {check.error:.1f}). Resonances above the band\n"
+        f"  there are: the makers print some up to {PRINTED[-1]:.0f} Hz."
     )
 
 

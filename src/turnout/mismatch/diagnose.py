@@ -13,6 +13,7 @@ from turnout.mismatch.locate import attribute, cell_energies
 from turnout.mismatch.refits import scored
 from turnout.mismatch.scoring import heard, judged, latent_of, over, over_reserved
 from turnout.mismatch.together import (
+    borne_out,
     needed,
     other_of,
     parted,
@@ -151,6 +152,7 @@ def diagnose(case, settings=None, progress=None, store=None):
         verdicts, fit = reconsidered(case, base, fit, verdicts, settings)
     else:
         verdicts, fit = needed(case, base, fit, verdicts, settings)
+        verdicts, fit = borne_out(case, fit, verdicts, settings)
     if choice and [v.answer for v in verdicts] != ["named", "named"]:
         case, verdicts, fit, scores = choice
     verdicts = [_as_it_ends(v, case, fit, settings) for v in verdicts]

@@ -13,8 +13,10 @@ from turnout.mismatch.held_out import held_out_score
 from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.scoring import consistent_elsewhere, explained_of, heard, judged, over, structure_left
 from turnout.mismatch.verdict import TORN, calibrate, judge, withdraw
+from turnout.mismatch.verify import fit_of_reserved, gain_error
 
 RIVALS = 2  # that are fitted anew beside the second effect
+COSTLY = 3.0  # points of fit on recordings never used; the proof counts what moves more
 
 
 def refused(verdicts):
@@ -76,6 +78,19 @@ def needed(case, base, fit, verdicts, settings):
         return verdicts, fit
     own = replace(second, fit=alone, gain=_gained(alone, base, second.candidate))
     return [replace(verdicts[1], scores=(own, *verdicts[1].scores[1:]))], alone
+
+
+def borne_out(case, fit, verdicts, settings):
+    """(verdicts, fit) without a second name beside which the first foretells recordings never used worse than alone, by
+    more than ``COSTLY`` points and the standard error of that."""
+    if [v.answer for v in verdicts] != ["named", "named"] or not case.reserved:
+        return verdicts, fit
+    first, second = verdicts
+    (before, alone), (after, both) = (fit_of_reserved(case, f) for f in (first.scores[0].fit, fit))
+    if before is None or after is None or alone - both <= max(COSTLY, gain_error(case.reserved, before, after)):
+        return verdicts, fit
+    reason = f"something else shows beside it: {second.names[0]}, which foretells recordings never used worse"
+    return [replace(first, reason=reason)], ended(case, first.scores[0].fit, settings)
 
 
 def _gained(fit, without, candidate):

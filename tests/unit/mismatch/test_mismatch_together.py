@@ -15,7 +15,7 @@ from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.observation import Observation
 from turnout.mismatch.scout import _seen
 from turnout.mismatch.shortlist import Projector, _same_place
-from turnout.mismatch.together import needed
+from turnout.mismatch.together import borne_out, needed
 from turnout.mismatch.verdict import Score, Verdict, judge, opened
 from turnout.physics import Parameter
 
@@ -237,3 +237,19 @@ def test_a_first_name_that_the_second_leaves_nothing_to_is_dropped():
         found, last = needed(case, fit_jointly(case), fit, verdicts, settings)
         assert tuple(v.names[0] for v in found) == left == tuple(c.family for c in last.candidates)
     assert last.psi == pytest.approx([2.5, 2.5], abs=0.15)
+
+
+@pytest.mark.parametrize("reserved, left", [(0.0, ("ramp",)), (0.55, ("ramp", "bowl")), (1.0, ("ramp", "bowl"))])
+def test_a_second_name_that_recordings_never_used_deny_is_dropped(reserved, left):
+    """A bowl of 1.0 shows in all that is fitted. Where none of it is in the recording kept aside, the pair misses that
+    by as much as it gains elsewhere; with a share of 0.55 it gains a little there, and stays."""
+    case, settings = Shapes(("ramp", "bowl"), ramp=2.5, bowl=1.0), MismatchSettings()
+    kept = 2.5 * SHAPES["ramp"] + reserved * SHAPES["bowl"] + 0.1 * np.random.default_rng(6).normal(size=X.size)
+    case.reserved = (Observation("kept", "day 9", kept, np.full(X.size, 0.1)),)
+    alone = fit_jointly(case, case.candidates[:1], [0.1], iterations=20)
+    fit = fit_jointly(case, case.candidates, [0.1, 0.1], iterations=20)
+    scores = [Score(c, 50.0, 0.0, 1.0, f) for c, f in zip(case.candidates, (alone, fit))]
+    verdicts = [Verdict("named", (s.family,), "A", 0.97, {}, (s,)) for s in scores]
+    found, last = borne_out(case, fit, verdicts, settings)
+    assert tuple(v.names[0] for v in found) == left == tuple(c.family for c in last.candidates)
+    assert ("bowl" in found[0].reason) is (len(left) == 1)

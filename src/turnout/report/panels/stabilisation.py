@@ -13,7 +13,7 @@ def stabilisation_panel(row, modes):
     orders = [p["order"] for p in poles]
     chart = Chart(
         Axis(30.0, 1600.0, "frequency [Hz]", "log"),
-        Axis(min(orders) - 1, max(orders) + 1, "model order"),
+        Axis(min(orders) - 1, max(orders) + 3, "model order"),  # room for words
         "Stabilisation: poles over model order",
     )
     for mode in modes:
