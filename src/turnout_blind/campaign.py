@@ -28,6 +28,7 @@ def make_case(folder, case, plan, effects):
     return {
         "case": case,
         "stratum": plan.stratum,
+        "panel": plan.panel,
         "effects": [asdict(d) for d in drawn],
         "visible": seen,
         "decoys": told,
@@ -40,7 +41,7 @@ def make_case(folder, case, plan, effects):
 def stage(plan, effects):
     """(generator of random numbers, site, world with the effects in it, what was concealed) of a plan."""
     rng = np.random.default_rng(list(plan.seed))
-    options = {}
+    options = {"panel": plan.panel}
     for kind, _ in plan.effects:
         options.update(effects[kind].site)
     site = draw_site(rng, **options)

@@ -8,6 +8,7 @@ from turnout_blind.campaign import stage
 from turnout_blind.effect import load_effects
 from turnout_blind.reveal import findings
 from turnout_blind.seal import SET, BlindError, digest, files_of, verify
+from turnout_blind.site import PLAIN
 from turnout_blind.strata import CasePlan, case_id, plan_cases
 
 KEPT = "set.json.gz"
@@ -49,7 +50,8 @@ def verify_kept(held, effects=None):
     sealed, about = json.loads(held["commit"]), json.loads(held["set"])
     effects = effects or load_effects()
     _same(KEPT, "set", digest(held["set"].encode()), sealed["set_sha256"])
-    plans = plan_cases(about["seed"], effects, about["full"], about.get("only") or None)[: about.get("limit")]
+    plans = plan_cases(about["seed"], effects, about["full"], about.get("only") or None, _panel(about))
+    plans = plans[: about.get("limit")]
     planned = {case_id(about["seed"], k): plan for k, plan in enumerate(plans)}
     _same(KEPT, "cases", sorted(sealed["cases"]), sorted(planned))
     truths = {}
@@ -74,7 +76,14 @@ def verify_recordings(held, case, folder):
 def plan_of(held, case):
     """``CasePlan`` of a kept case."""
     truth = json.loads(held["truths"][case])
-    return CasePlan(truth["stratum"], tuple((e["kind"], e["rung"]) for e in truth["effects"]), tuple(truth["seed"]))
+    return CasePlan(
+        truth["stratum"], tuple((e["kind"], e["rung"]) for e in truth["effects"]), tuple(truth["seed"]), _panel(truth)
+    )
+
+
+def _panel(told):
+    """Panel of a set or a case; older ones had none but plain track."""
+    return told.get("panel", PLAIN)
 
 
 def _plain(mapping):

@@ -12,10 +12,13 @@ import turnout
 from turnout_blind.campaign import make_case
 from turnout_blind.effect import load_effects
 from turnout_blind.seal import SET, BlindError, commit, digest, digest_of_folder, seed_for, write_truth
+from turnout_blind.site import PLAIN
 from turnout_blind.strata import case_id, plan_cases
 
 
-def make_set(out, truth, seed=None, full=True, folders=(), only=None, limit=None, workers=1, progress=None):
+def make_set(
+    out, truth, seed=None, full=True, folders=(), only=None, limit=None, panel=PLAIN, workers=1, progress=None
+):
     """Write ``out``/cases, ``out``/commit.json and the truths below ``truth``; returns the SHA-256 of commit.json.
 
     Parameters
@@ -32,6 +35,8 @@ def make_set(out, truth, seed=None, full=True, folders=(), only=None, limit=None
         Folders with effects of your own, one per file.
     only, limit : iterable of str, int
         Kinds to keep beside the controls; the first so many cases of the shuffled set.
+    panel : str
+        Where all cases lie, one of ``turnout_blind.site.PANELS``.
     workers : int
         Processes.
     progress : callable or None
@@ -49,9 +54,9 @@ def make_set(out, truth, seed=None, full=True, folders=(), only=None, limit=None
     if unknown := sorted(set(only or ()) - set(load_effects(*folders))):
         there = ", ".join(sorted(load_effects(*folders)))
         raise BlindError("--only", unknown[0], "no such kind", f"There are {there}")
-    about = _begun(truth, seed_for(examines) if examines else seed, full, folders, only, limit)
+    about = _begun(truth, seed_for(examines) if examines else seed, full, folders, only, limit, panel)
     seed = about["seed"]
-    plans = plan_cases(seed, load_effects(*folders), full, only)[:limit]
+    plans = plan_cases(seed, load_effects(*folders), full, only, panel)[:limit]
     folders = tuple(map(str, folders))
     jobs = [(out / "cases", truth, case_id(seed, k), plan, folders, seed) for k, plan in enumerate(plans)]
     waiting = [job for job in jobs if not _made(job)]
@@ -65,17 +70,21 @@ def make_set(out, truth, seed=None, full=True, folders=(), only=None, limit=None
     return commit(out, truths, examines)
 
 
-def _begun(truth, seed, full, folders, only, limit):
+def _begun(truth, seed, full, folders, only, limit, panel):
     """set.json: what an interrupted set was begun with, or written now."""
     wanted = {"full": full, "effects": sorted(map(str, folders)), "only": sorted(only or ()), "limit": limit}
-    wanted |= {"generator_sha256": digest_of_folder(Path(__file__).parent, "*.py"), "made_on": platform.machine()}
+    wanted |= {
+        "panel": panel,
+        "generator_sha256": digest_of_folder(Path(__file__).parent, "*.py"),
+        "made_on": platform.machine(),
+    }
     path = truth / SET
     if not path.exists():
         seed = secrets.randbits(63) if seed is None else int(seed)
         write_truth(truth, "set", {"seed": seed, **wanted}, seed)
         return json.loads(path.read_bytes())
     held = json.loads(path.read_bytes())
-    other = [k for k, v in wanted.items() if held[k] != v] + (["seed"] if seed not in (None, held["seed"]) else [])
+    other = [k for k, v in wanted.items() if held.get(k) != v] + (["seed"] if seed not in (None, held["seed"]) else [])
     if other:
         raise BlindError(path, other[0], "begun otherwise", "Go on as it was begun, or remove both folders")
     return held

@@ -9,18 +9,20 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
+from numba.extending import overload
 
 STEP = 1.0 / 60000.0
 
 
 class Beam(NamedTuple):
-    """Rail on its grid: constants and damping rates of nodes and of the rotations between them [1/s]."""
+    """Rail on its grid: constants, or arrays where its profile changes (``bending`` and ``mass`` of nodes, ``shear``
+    and ``rotary`` of what lies between), and damping rates of nodes and of the rotations between them [1/s]."""
 
     step: float
-    bending: float
-    shear: float
-    mass: float
-    rotary: float
+    bending: object
+    shear: object
+    mass: object
+    rotary: object
     rate: np.ndarray
     rate_between: np.ndarray
 
@@ -115,6 +117,18 @@ class Blow(NamedTuple):
     velocities: np.ndarray
 
 
+def _of(value, i):
+    """``value`` of the ``i``-th node: a rail of one profile is marched with constants."""
+    return value[i] if isinstance(value, np.ndarray) else value
+
+
+@overload(_of)
+def _compiled_of(value, i):
+    if isinstance(value, numba.types.Array):
+        return lambda value, i: value[i]
+    return lambda value, i: value
+
+
 @numba.njit(cache=True, fastmath=True)
 def _rail_step(beam, dt, v, turn, q, moment, w, f):
     n = v.size
@@ -122,15 +136,15 @@ def _rail_step(beam, dt, v, turn, q, moment, w, f):
     for i in range(1, n - 1):
         d = 0.5 * dt * beam.rate[i]
         push = (q[i] - q[i - 1] + f[i]) / h
-        v[i] = (v[i] * (1.0 - d) + dt / beam.mass * push) / (1.0 + d)
+        v[i] = (v[i] * (1.0 - d) + dt / _of(beam.mass, i) * push) / (1.0 + d)
     for i in range(n - 1):
         d = 0.5 * dt * beam.rate_between[i]
         push = (moment[i + 1] - moment[i]) / h + q[i]
-        turn[i] = (turn[i] * (1.0 - d) + dt / beam.rotary * push) / (1.0 + d)
+        turn[i] = (turn[i] * (1.0 - d) + dt / _of(beam.rotary, i) * push) / (1.0 + d)
     for i in range(n - 1):
-        q[i] += dt * beam.shear * ((v[i + 1] - v[i]) / h - turn[i])
+        q[i] += dt * _of(beam.shear, i) * ((v[i + 1] - v[i]) / h - turn[i])
     for i in range(1, n - 1):
-        moment[i] += dt * beam.bending / h * (turn[i] - turn[i - 1])
+        moment[i] += dt * _of(beam.bending, i) / h * (turn[i] - turn[i - 1])
         w[i] += dt * v[i]
 
 

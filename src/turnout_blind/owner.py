@@ -5,6 +5,9 @@ from pathlib import Path
 from turnout_blind.site import RAIL_DAMPING
 
 SOURCE = "the owner's register"
+RAIL = (("youngs_modulus", 210.0, "GPa"), ("second_moment", 3037.0, "cm⁴"), ("area", 76.7, "cm²"),
+        ("mass", 60.2, "kg/m"), ("shear_modulus", 80.77, "GPa"), ("shear_coefficient", 0.393, "-"),
+        ("density", 7850.0, "kg/m³"), ("damping", RAIL_DAMPING, "N s/m²"))  # fmt: skip
 
 
 def write_configuration(folder, turnout, site):
@@ -59,10 +62,8 @@ def track(site):
     lines += [f"spacing: {_value(0.6, 'm', 0.03)}", "absorbing_end:"]
     lines += [f"  length: {_value(9.0, 'm')}", f"  rate: {_value(400.0, '1/s')}"]
     lines += ["rail:", "  name: 60E1", "  beam: timoshenko"]
-    rail = (("youngs_modulus", 210.0, "GPa"), ("second_moment", 3037.0, "cm⁴"), ("area", 76.7, "cm²"))
-    rail += (("mass", 60.2, "kg/m"), ("shear_modulus", 80.77, "GPa"), ("shear_coefficient", 0.393, "-"))
-    rail += (("density", 7850.0, "kg/m³"), ("damping", RAIL_DAMPING, "N s/m²"))
-    lines += [f"  {name}: {_value(value, unit)}" for name, value, unit in rail]
+    lines += [f"  {name}: {_value(value, unit)}" for name, value, unit in RAIL]
+    lines += _casting(site.crossing) if site.crossing else []
     lines += ["support:", *_support(site.nominal[0]), "sections:"]
     for label, zone, values in zip(("west", "east"), site.zones, site.nominal):
         lines += [f"  - label: {label}", "    panel: CLP"]
@@ -70,7 +71,25 @@ def track(site):
         lines += ["  " + line for line in _support(values)]
     lines += ["locations:"]
     lines += [f"  S{i}: {{place: {_value(x, 'm', 0.02)}}}" for i, x in enumerate(site.sensors, 1)]
-    return "\n".join(lines) + "\nroutes:\n  main: []\n"
+    lines += ["routes:", f"  main: [{_nose(site.crossing) if site.crossing else ''}]"]
+    return "\n".join(lines) + "\n"
+
+
+def _casting(crossing):
+    """The crossing as a stretch of another rail, without the ramps at its ends."""
+    factors = {"second_moment": crossing.bending, "area": crossing.mass, "mass": crossing.mass}
+    factors["damping"] = 1.0
+    start, end = crossing.ends
+    lines = ["stretches:", f"  - from: {_value(start, 'm')}", f"    to: {_value(end, 'm')}", "    rail:"]
+    lines += ["      name: crossing", "      beam: timoshenko"]
+    return lines + [f"      {name}: {_value(value * factors.get(name, 1.0), unit)}" for name, value, unit in RAIL]
+
+
+def _nose(c):
+    """Where wheels pass from wing to nose, by an estimate that says so."""
+    place, share = _value(c.nose, "m", round(0.05 / c.nose, 4)), _value(c.share, "-", 0.2)
+    depth, length = _value(1e3 * c.depth, "mm", 0.4), _value(c.length, "m", 0.2)
+    return f"{{kind: kink, place: {place}, depth: {depth}, length: {length}, share: {share}}}"
 
 
 def _support(v):

@@ -1,10 +1,11 @@
 """One monitored site: what its owner believes (nominal) and what there really is before any effect (truth)."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from turnout_blind import vehicle
+from turnout_blind.crossing import Crossing, bearers, cast_in, draw_crossing
 from turnout_blind.grid import Grid, Rail
 from turnout_blind.instrument import Chain
 from turnout_blind.roughness import rail_roughness, wheel_roughness
@@ -21,6 +22,7 @@ RANGES = {
 }
 SCATTER = {"pad": 0.08, "pad_damping": 0.15, "mass": 0.02, "ballast": 0.10, "ballast_damping": 0.15}
 RAIL_DAMPING = 4000.0  # [N s/m²], loss factor 0.010 at 1040 Hz: Thompson 2009, Railway Noise and Vibration, takes 0.02
+PLAIN, CROSSING = PANELS = ("plain", "crossing")
 COMMON = {"pad": 0.08, "pad_damping": 0.2, "mass": 0.02, "ballast": 0.08, "ballast_damping": 0.2}
 
 
@@ -37,7 +39,8 @@ class Planned:
 @dataclass
 class Site:
     """``nominal`` values of the two ``zones`` [(from, to)] as the owner has them; ``trains`` as in his files,
-    ``true_trains`` as they run; ``chains`` one per sensor; ``temperatures`` of the two campaigns [°C]."""
+    ``true_trains`` as they run; ``chains`` one per sensor; ``temperatures`` of the two campaigns [°C]; ``crossing`` as
+    his drawings have it, None on plain track."""
 
     zones: tuple
     nominal: tuple
@@ -52,15 +55,16 @@ class Site:
     force: Chain
     roughness: dict = field(default_factory=dict)
     tip: float = 1.1e9
+    crossing: Crossing | None = None
 
     def names(self):
         """Names of the sensors."""
         return tuple(f"A{i + 1}" for i in range(len(self.sensors)))
 
 
-def draw_site(rng, same_temperature=None, one_speed=None):
+def draw_site(rng, same_temperature=None, one_speed=None, panel=PLAIN):
     """A site of its own kind; ``same_temperature`` of both campaigns or not (None: one in four), ``one_speed`` for
-    all trains or not (None: one in ten)."""
+    all trains or not (None: one in ten); ``panel`` of ``PANELS``."""
     one_speed = bool(rng.random() < 0.1) if one_speed is None else one_speed
     boundary = float(rng.choice([3.9, 4.5, 5.7, 6.9]))
     zones = ((-45.0, boundary), (boundary, 57.0))
@@ -84,6 +88,18 @@ def draw_site(rng, same_temperature=None, one_speed=None):
     )  # fmt: skip
     site.world.sensor_shift = {c.name: float(0.015 * rng.normal()) for c in chains}
     site.roughness = _roughness(rng, site.true_trains)
+    return with_crossing(rng, site) if panel == CROSSING else site
+
+
+def with_crossing(rng, site):
+    """The site with bearers from its boundary on and a crossing behind that."""
+    (west, east), boundary = site.nominal, site.zones[1][0]
+    factor, true = bearers(rng)
+    site.nominal = west, {**east, "mass": round(factor * east["mass"])}
+    site.world.mass[site.world.place > boundary - 0.3] *= true
+    there, site.crossing = draw_crossing(rng, boundary)
+    cast_in(rng, site.world, there, site.trains)
+    site.chains = tuple(replace(c, full_scale=5.0 * c.full_scale) for c in site.chains)  # a nose strikes hard
     return site
 
 

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from turnout_blind.site import PLAIN
+
 FULL = {"control": 60, "single": 1, "double": 20, "outside": 20, "unidentifiable": 16}
 FAST = {"control": 10, "single": 17, "double": 3, "outside": 5, "unidentifiable": 5}
 # Doubles: two of these that do not mask one another, from the upper half of their ladders.
@@ -15,18 +17,20 @@ MASKING = ({"void", "ballast"}, {"time_offset", "position"}, {"time_offset", "mo
 
 @dataclass(frozen=True)
 class CasePlan:
-    """``stratum`` and ``effects`` ((kind, rung), ...) of one case; ``seed`` of its own generator."""
+    """``stratum`` and ``effects`` ((kind, rung), ...) of one case; ``seed`` of its own generator; ``panel`` it lies
+    in."""
 
     stratum: str
     effects: tuple
     seed: tuple
+    panel: str = PLAIN
 
 
-def plan_cases(seed, effects, full=True, only=None):
+def plan_cases(seed, effects, full=True, only=None, panel=PLAIN):
     """Plans of a whole set in shuffled order.
 
     A full set gives every single effect each rung of its ladder; the fast tier one rung each. ``only``: kinds to
-    keep beside the controls.
+    keep beside the controls. ``panel``: where all of them lie.
 
     >>> from turnout_blind.effect import load_effects
     >>> plans = plan_cases(7, load_effects(), full=False)
@@ -53,7 +57,7 @@ def plan_cases(seed, effects, full=True, only=None):
     if only is not None:
         made = [m for m in made if all(k in only for k, _ in m[1])]
     order = rng.permutation(len(made))
-    return [CasePlan(*made[i], seed=(seed, 23, k)) for k, i in enumerate(order)]
+    return [CasePlan(*made[i], seed=(seed, 23, k), panel=panel) for k, i in enumerate(order)]
 
 
 def _pair(rng, effects):

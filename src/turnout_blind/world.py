@@ -20,8 +20,10 @@ class World:
     """Arrays (n_support,) unless said otherwise; SI units. An effect writes into a ``copy()``.
 
     ``pad`` is the stiffness at ``reference`` temperature; ``softening`` (a function of kelvin above it) multiplies it.
-    ``surface`` is a list of functions of place [m] giving dips of the rail [m]; ``treads`` maps (train, axle from 1)
-    to functions of place and the phase of the passage; ``riders`` holds (place, mass, stiffness, damping, play, stop);
+    ``profile`` is None, or (bending, mass) of every node of the grid as factors on the rail's own, where a crossing is
+    cast into it. ``surface`` is a list of functions of place [m] giving dips of the rail [m]; ``treads`` maps (train,
+    axle from 1) to functions of place and the phase of the passage; ``riders`` holds (place, mass, stiffness, damping,
+    play, stop);
     ``channels`` maps a sensor to functions (signal, rate, kind, rng) -> signal; ``passage_noise`` is a list of
     functions (time, sensor places, k, rng) -> accelerations (n_sensor, n) from another source.
     """
@@ -47,6 +49,7 @@ class World:
     reference: float = 15.0
     softening: object = None
     riders: list = field(default_factory=list)
+    profile: tuple | None = None
     surface: list = field(default_factory=list)
     treads: dict = field(default_factory=dict)
     wheel_mass: dict = field(default_factory=dict)
@@ -81,8 +84,15 @@ class World:
     def beam(self):
         """Arguments of the march for the rail."""
         g, r = self.grid, self.rail
-        loss = r.damping / r.mass
-        return Beam(g.step, r.bending, r.shear, r.mass, r.rotary, g.rates() + loss, g.rates(0.5)[:-1])
+        loss, rates = r.damping / r.mass, (g.rates(), g.rates(0.5)[:-1])
+        if self.profile is None:
+            return Beam(g.step, r.bending, r.shear, r.mass, r.rotary, rates[0] + loss, rates[1])
+        bending, mass = self.profile
+        between = [0.5 * (v[1:] + v[:-1]) for v in self.profile]
+        return Beam(
+            g.step, r.bending * bending, r.shear * between[1], r.mass * mass, r.rotary * between[0],
+            rates[0] + loss / mass, rates[1],
+        )  # fmt: skip
 
     def supports(self, temperature=None, grown=0.0):
         """Arguments of the march for pads, sleepers and ballast at a rail ``temperature`` [°C]; ``grown`` passages

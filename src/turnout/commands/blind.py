@@ -6,7 +6,8 @@
   turnout blind score --out proof                              every figure with its interval
 
 An interrupted make or diagnose goes on where it stopped. --fast makes 40 cases instead of 235. --effects FOLDER adds
-effects of your own, one file each. Print commit.json's hash (make does) and publish it before anybody diagnoses.
+effects of your own, one file each; --panel crossing puts all cases into crossing panels. Print commit.json's hash (make
+does) and publish it before anybody diagnoses.
 """
 
 HELP = "prove the diagnosis on concealed effects: make, diagnose, reveal, score"
@@ -24,6 +25,9 @@ def add_arguments(parser):
     make.add_argument("--effects", action="append", default=[], help="folder with effects of your own")
     make.add_argument("--only", help="kinds to keep beside the controls, by commas, as void,dip")
     make.add_argument("--limit", type=int, help="the first so many cases of the shuffled set")
+    make.add_argument(
+        "--panel", choices=("plain", "crossing"), default="plain", help="where all cases lie (default: plain track)"
+    )
     make.add_argument("--workers", type=int, default=1, help="processes (default 1)")
     diagnose = steps.add_parser("diagnose", help="let the tool diagnose every case, the truth out of its reach")
     diagnose.add_argument(
@@ -73,7 +77,9 @@ def _make(args):
     from turnout_blind.make import make_set
 
     only = args.only.split(",") if args.only else None
-    sha = make_set(args.out, _truth(args), args.seed, not args.fast, args.effects, only, args.limit, args.workers, _bar)
+    sha = make_set(
+        args.out, _truth(args), args.seed, not args.fast, args.effects, only, args.limit, args.panel, args.workers, _bar
+    )
     print(f"sealed: SHA-256 of commit.json is {sha}; the truth lies in {_truth(args)}")
 
 

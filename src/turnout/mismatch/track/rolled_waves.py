@@ -18,6 +18,7 @@ from turnout.mismatch.track.skeleton import matrices_of
 from turnout.simulate.frequency import responses
 
 STRIDE = 2  # nodes; between them a force is shared linearly
+FINE = 0.01  # m
 RING = 0.35  # s that the track rings on
 
 
@@ -81,7 +82,7 @@ class Carrier:
         return self._on_clock(both.reshape(*both.shape[:2], -1) * delay[:, None, None])
 
     def followed(self, paths):
-        """(n_sensor * n_time, n_key) response when every wheel follows the same paths (n_key, n_x) [m] at ``way``."""
+        """(n_sensor * n_time, n_key) response when every wheel follows paths (n_key, n_x) [m] over one period."""
         plus, minus, a = self._harmonics(paths)
         return self._on_clock((plus @ a.T + minus @ a.T.conj()) * self.train()[:, None, None])
 
@@ -113,7 +114,15 @@ class Carrier:
     @property
     def way(self):
         """(n_x,) places of the paths of ``reactions``: one period, so that nothing is seen at its ends."""
-        n = 2 * int(np.ceil(self.period / bands.SHORTEST_WAVE)) + 2
+        return self._places(2 * int(np.ceil(self.period / bands.SHORTEST_WAVE)) + 2)
+
+    @property
+    def course(self):
+        """The same for paths of ``followed`` and ``alone`` whose waves are shorter than those modelled: a kink's would
+        pass for longer ones between places that lie as far apart as those of ``way``."""
+        return self._places(int(self.period / FINE))
+
+    def _places(self, n):
         return self.start + self.period * np.arange(n) / n
 
     def times(self, w, lead):

@@ -11,6 +11,7 @@ from scipy.linalg import eigh
 from turnout.mismatch.absorbed import absorbed
 from turnout.mismatch.track.rolled_waves import Carrier
 from turnout.mismatch.track.rough_rail import amplitude_sd
+from turnout.mismatch.track.unlike_wheels import profile_modes
 
 TURNED = 1.5e-5  # m; each of the first three harmonics of wheels in service, Johansson 2006, Vehicle System Dynamics 44
 WHEEL_LEVEL = -2.0  # dB on the limit curve of rails: disc-braked wheels
@@ -20,13 +21,14 @@ BEYOND = 6.0  # m before and behind the rail's free waves, from where lightly da
 
 
 def wheel_modes(case, values, made, sigma):
-    """(n_sensor * n_time, n_mode) signals of one standard deviation of the waves of all wheels; ``sigma`` (n,).
+    """(n_sensor * n_time, n_mode) signals of one standard deviation of the waves of all wheels, and of how each meets
+    what the file has of the surface; ``sigma`` (n,).
 
     In single precision: a long train over many sensors has a thousand modes of ten thousand samples each.
     """
     waves, scale = case.waves, sigma[:, None].astype(np.float32)
     wheel, carrier = _amplitudes(waves, made.passage.vehicle.radius), Carrier(case, values, made, beyond=BEYOND)
-    both, modes = np.hypot(wheel, waves.sd[::2]), []
+    both, modes = np.hypot(wheel, waves.sd[::2]), [profile_modes(case, values, made, carrier).astype(np.float32)]
     for envelope, sd in zip(_stretches(waves, carrier.node), (wheel, both, both)):
         spectra = carrier.spectra(waves.lengths, envelope)
         for w in range(carrier.behind.size):

@@ -106,7 +106,7 @@ def _paths(case, fit, made, chosen):
     rows = []
     for c, k in chosen:
         parts = c.term(c.starts[k]).paths(None, made.passage.vehicle)
-        rows.append(sum((part(carrier.way, 0) for part in parts), np.zeros(carrier.way.size)))
+        rows.append(sum((part(carrier.course, 0) for part in parts), np.zeros(carrier.course.size)))
     columns = carrier.followed(np.array(rows))
     return {(c.key, k): column for (c, k), column in zip(chosen, columns.T)}
 

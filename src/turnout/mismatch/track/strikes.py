@@ -22,6 +22,8 @@ LOW, HIGH = 250.0, 900.0  # [Hz]
 BIN, ABOUT, AROUND = 0.002, 0.006, 0.12  # s: of the loudness, of a blow, of the noise that it is compared with
 RADII = np.arange(-0.05, 0.031, 0.01)  # a wheel is turned down in service; its file is right to a few per cent
 STEP = 0.06  # m between the phases tried
+FINE = 0.02  # m between the places where wheels are compared
+COMMON = 2.0  # deviations: a median over the wheels that is no noise
 STRENGTHS, DECAYS = (
     (2.0, 4.0, 7.0, 12.0, 20.0),
     (0.3, 0.8, 1.6, 3.0),
@@ -78,10 +80,23 @@ def _normal(off, spread):
 
 
 def heard(made):
-    """(time, loudness) of a ``Rolling``'s sensors."""
+    """(time, loudness) of a ``Rolling``'s sensors, less what every wheel makes where one of them is."""
     recording = made.passage.recording
     rows = [recording.index(s.name) for s in made.sensors]
-    return loudness(recording.samples[rows], recording.rate, made.time[0], made.time[-1])
+    time, loud = loudness(recording.samples[rows], recording.rate, made.time[0], made.time[-1])
+    return time, loud - _common(made, time, loud)
+
+
+def _common(made, time, loud):
+    """(n_sensor, n) the median over the wheels of the loudness when they are at a place, where that is no noise, of the
+    place of any wheel at these times: where all of them bang, at a nose or a joint, the cause is in the rail."""
+    behind = made.passage.vehicle.wheel_places[:, None]
+    way = np.arange(-HEARD, np.ptp([s.place for s in made.sensors]) + HEARD, FINE)  # from the first sensor
+    passed = made.reference + (way + behind) / made.speed
+    each = np.array([np.median([np.interp(t, time, row) for t in passed], axis=0) for row in loud])
+    usual = np.where(each > COMMON, each, 0.0)
+    rolled = (time - made.reference) * made.speed - behind
+    return np.array([np.max(np.interp(rolled, way, row, 0.0, 0.0), axis=0) for row in usual])
 
 
 def of_wheel(mades, loud, wheel):

@@ -1,0 +1,76 @@
+"""Sites at a crossing: what is cast into the rail, what wheels meet, and what the owner's files say of it."""
+
+import numpy as np
+import pytest
+
+from turnout.chains.mismatch_context import track_of
+from turnout.config.load import load_configuration
+from turnout_blind.crossing import Crossing
+from turnout_blind.effect import load_effects
+from turnout_blind.owner import write_configuration
+from turnout_blind.run import roll
+from turnout_blind.site import draw_site
+from turnout_blind.strata import plan_cases
+
+CAST = Crossing(6.0, bending=1.8, mass=2.4, depth=1.2e-3, length=0.8, share=0.4)
+
+
+def test_a_casting_weighs_what_its_stretch_in_the_file_does():
+    """Ramps lie half in, half out: the trapezoid has the area of the rectangle. Far from it the rail is the rail."""
+    x = np.linspace(0.0, 12.0, 120001)
+    start, end = CAST.ends
+    for found, factor in zip(CAST.profile(x), (1.8, 2.4)):
+        assert np.trapezoid(found - 1.0, x) == pytest.approx((factor - 1.0) * (end - start), rel=1e-6)
+        assert found[0] == found[-1] == 1.0 and found.max() == factor
+        assert found[np.searchsorted(x, 6.0)] == factor
+
+
+def test_a_nose_is_as_deep_and_long_as_it_says():
+    """Nothing 0.4 of the length before it and 0.6 behind, its depth in the middle, rounded: no corner."""
+    assert CAST.dip(6.0) == pytest.approx(1.2e-3)
+    assert CAST.dip(6.0 - 0.32 - 0.016) == 0.0 < CAST.dip(6.0 - 0.32 + 0.001)
+    assert CAST.dip(6.0 + 0.48 + 0.016) == 0.0 < CAST.dip(6.0 + 0.48 - 0.001)
+    slope = np.diff(CAST.dip(6.0 + np.array([-1e-5, 0.0, 1e-5])))
+    assert np.abs(slope).max() < 1e-5 * 2e-2 * 1.2e-3 / 0.32  # 2 % of the mean slope
+
+
+@pytest.fixture(scope="module")
+def site():
+    return draw_site(np.random.default_rng([5, 23, 1]), panel="crossing")
+
+
+def test_wheels_meet_the_nose_each_a_little_otherwise_and_come_to_rest(site):
+    """The first wheel's force rises at the nose by far more than elsewhere, and comes back to its weight."""
+    train, nose = site.true_trains["railcar"], site.world.surface[0]
+    _, force, _ = roll(site.world, train, 30.0, [2.0], 1.2, 0.6)
+    load = 0.5 * train.axle_load
+    at = 2.0 + 30.0 * (np.arange(force.shape[1]) * 1e-3 - 0.6)
+    x = np.linspace(0.0, 12.0, 2401)
+    place = float(x[np.argmax(nose(x))])
+    near, far = np.abs(at - place) < 0.6, (np.abs(at - place) > 3.0) & (at > -10.0) & (at < 14.0)
+    assert force[0, near].max() > 1.25 * load > force[0, far].max()
+    assert force[0, far].mean() == pytest.approx(load, rel=0.03)
+    treads = [site.world.treads["railcar", axle][0] for axle in range(1, 9)]
+    more = np.array([np.abs(tread(x, 0.0, 0.43)).max() for tread in treads])
+    assert np.unique(more).size == 8 and more.max() < 0.6 * nose(x).max()
+
+
+def test_the_owner_files_of_a_crossing_load_as_they_were_drawn(site, tmp_path):
+    """The stretch and the nose of the drawings, with their priors; no other wheel, no true number."""
+    write_configuration(tmp_path / "config", "T1", site)
+    (tmp_path / "raw").mkdir()
+    text = (tmp_path / "config" / "tracks" / "site.yaml").read_text()
+    turnout, _ = track_of(load_configuration(tmp_path / "config").turnout("T1"))
+    (stretch,), filed = turnout.track.stretches, site.crossing
+    assert (stretch.start, stretch.end) == pytest.approx(filed.ends, abs=1e-3)
+    assert stretch.rail.mass == pytest.approx(60.2 * filed.mass, rel=1e-4)
+    assert stretch.rail.bending_stiffness == pytest.approx(210e9 * 3037e-8 * filed.bending, rel=1e-4)
+    (kink,) = turnout.surfaces("main")[0]
+    assert (kink.place, kink.depth, kink.length) == pytest.approx((filed.nose, filed.depth, filed.length), rel=1e-4)
+    assert turnout.spreads[kink]["depth"] == 0.4 and f"{site.world.surface[0](filed.nose):g}" not in text
+
+
+def test_a_set_in_panels_has_the_plan_of_one_on_plain_track():
+    plain, cast = (plan_cases(3, load_effects(), full=False, panel=p) for p in ("plain", "crossing"))
+    assert {p.panel for p in plain} == {"plain"} and {p.panel for p in cast} == {"crossing"}
+    assert [(p.stratum, p.effects, p.seed) for p in plain] == [(p.stratum, p.effects, p.seed) for p in cast]
