@@ -225,10 +225,10 @@ def _support_values(p, support, route, routes):
 PATHS = {
     "dip": (Dip, {"place": "m", "depth": "m", "length": "m"}),
     "cosine": (Cosine, {"place": "m", "depth": "m", "length": "m"}),
-    "kink": (Kink, {"place": "m", "depth": "m", "length": "m", "share": "-"}),
+    "kink": (Kink, {"place": "m", "depth": "m", "length": "m", "share": "-", "power": "-"}),
     "corrugation": (Corrugation, {"start": "m", "end": "m", "amplitude": "m", "wavelength": "m"}),
 }
-OPTIONAL = ("share",)
+OPTIONAL = ("share", "power")
 
 
 def _path(p):

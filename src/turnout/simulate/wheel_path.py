@@ -45,10 +45,10 @@ class Cosine:
 
 @dataclass(frozen=True)
 class Kink:
-    r"""Dip of two parabolas, flat at its ends, that meet in a kink: :math:`p = d\,(1 - |x - x_0| / a)^2`.
+    r"""Dip of two curves, flat at its ends, that meet in a kink: :math:`p = d\,(1 - |x - x_0| / a)^n`.
 
     A wheel that leaves the wing of a crossing falls slowly and is thrown up by the nose. ``depth`` d [m] at
-    ``place``; a is ``share`` of ``length`` [m] before the kink and the rest behind it.
+    ``place``; a is ``share`` of ``length`` [m] before the kink and the rest behind it; ``power`` n, 2 of parabolas.
 
     >>> kink = Kink(60.0, depth=2e-3, length=0.5, share=0.5)
     >>> float(kink(60.125)), round(kink.angle, 6)
@@ -59,21 +59,24 @@ class Kink:
     depth: float
     length: float
     share: float = 0.5
+    power: float = 2.0
 
     def __post_init__(self):
         _check_length("kink", self.place, self.length)
+        if not self.power >= 1.0:
+            raise SimulationError(f"kink at {self.place:.3f} m: power {self.power!r} is below 1.")
         if not 0.0 < self.share < 1.0:
             raise SimulationError(f"kink at {self.place:.3f} m: share {self.share!r} is not between 0 and 1.")
 
     @property
     def angle(self):
         """Change of slope at the lowest point [rad]."""
-        return 2.0 * self.depth * (1.0 / (self.share * self.length) + 1.0 / ((1.0 - self.share) * self.length))
+        return self.power * self.depth * (1.0 / (self.share * self.length) + 1.0 / ((1.0 - self.share) * self.length))
 
     def __call__(self, x, wheel=0):
         way = np.asarray(x) - self.place
         before, after = self.share * self.length, (1.0 - self.share) * self.length
-        return self.depth * np.clip(1.0 - np.where(way < 0.0, -way / before, way / after), 0.0, None) ** 2
+        return self.depth * np.clip(1.0 - np.where(way < 0.0, -way / before, way / after), 0.0, None) ** self.power
 
 
 @dataclass(frozen=True)

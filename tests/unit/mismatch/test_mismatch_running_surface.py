@@ -17,7 +17,7 @@ from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.track import TrackCase, seating
 from turnout.mismatch.track.planned import measured_campaign, small_plan
 from turnout.mismatch.track.rough_rail import Waves
-from turnout.mismatch.track.running_surface import MODEL, RunningSurface
+from turnout.mismatch.track.running_surface import MODEL, SHAPE, RunningSurface
 from turnout.simulate.track_file import turnout_track
 from turnout.simulate.wheel_path import Dip, Kink, Sections
 
@@ -39,12 +39,19 @@ def campaign():
 
 def test_numbers_with_a_prior_may_be_off_where_they_can_be_heard():
     surface = RunningSurface(FILED, WAVES, ("main",))
-    assert surface.names == (*(f"surface_0_{f}" for f in SPREADS[NOSE]), "surface_1_depth")
+    assert surface.names == (*(f"surface_0_{f}" for f in (*SPREADS[NOSE], "power")), "surface_1_depth")
     known = {n.name: n for n in surface.nuisances()}
     assert known["surface_0_place"].sd == pytest.approx(0.02 * 25.2) and known["surface_0_place"].unit == "m"
     assert known["surface_0_depth"].sd == 0.5 and known["surface_0_depth"].unit == "-"
     assert known["surface_0_place"].trust * known["surface_0_place"].sd < 0.5 * NOSE.length
     assert 0.55 * np.exp(known["surface_0_share"].bounds[1]) < 1.0
+    assert 2.0 * np.exp(known["surface_0_power"].bounds[0]) == pytest.approx(1.0)  # a V, and nothing that overhangs
+
+
+def test_the_shape_of_a_nose_is_unsure_where_its_depth_is():
+    for spread, more in (({"depth": 0.5}, {"power": SHAPE}), ({"place": 0.02}, {}), ({"depth": 0.5, "power": 0.1}, {})):
+        surface = RunningSurface(replace(FILED, spreads={NOSE: spread}), WAVES, ("main",))
+        assert {u.field: u.spread for u in surface.unsure} == spread | more
 
 
 def test_a_surface_has_the_numbers_that_it_is_given():
@@ -71,13 +78,13 @@ def test_a_measured_profile_may_be_off_by_a_factor_and_a_place_at_the_origin_not
 def test_numbers_of_a_route_that_no_train_took_are_not_asked():
     forked = replace(FILED, routes={"main": ((NOSE,),), "diverging": ((JOINT, FAR),)})
     assert RunningSurface(forked, WAVES, ("diverging",)).names == ("surface_0_depth",)
-    assert len(RunningSurface(forked, WAVES, ("main",)).names) == len(SPREADS[NOSE])
+    assert len(RunningSurface(forked, WAVES, ("main",)).names) == len(SPREADS[NOSE]) + 1
 
 
 @pytest.mark.parametrize(("prior", "by", "said"), [(0.5, 0.2, True), (0.15, 0.7, True), (0.15, 0.2, False)])
 def test_a_number_is_told_where_it_is_known_better_than_from_the_file_or_is_not_the_files(prior, by, said):
     """To 10 % and the fit's own 3: a prior of 15 % knows as much, but 0.7 of a logarithm off is another nose."""
-    surface = RunningSurface(replace(FILED, spreads={NOSE: {"depth": prior}}), WAVES, ("main",))
+    surface = RunningSurface(replace(FILED, spreads={NOSE: {"share": prior}}), WAVES, ("main",))
     case = SimpleNamespace(nuisances=surface.nuisances())
     fit = SimpleNamespace(values={surface.names[0]: by}, covariance=np.array([[0.03**2]]), jacobian=[])
     assert bool(list(surface.told(case, fit))) is said
@@ -85,12 +92,12 @@ def test_a_number_is_told_where_it_is_known_better_than_from_the_file_or_is_not_
 
 def test_what_is_told_of_a_number_is_not_drawn_to_the_file():
     """Recordings that say 0.3 ± 0.2 under a prior of 0.5 have their posterior at 0.26 ± 0.19."""
-    surface = RunningSurface(replace(FILED, spreads={NOSE: {"depth": 0.5}}), WAVES, ("main",))
+    surface = RunningSurface(replace(FILED, spreads={NOSE: {"length": 0.5}}), WAVES, ("main",))
     weights = np.array([0.2, 0.5]) ** -2.0
     values = {surface.names[0]: 0.3 * weights[0] / weights.sum()}
     fit = SimpleNamespace(values=values, covariance=np.array([[1.0 / weights.sum()]]), jacobian=[])
     (told,) = surface.told(SimpleNamespace(nuisances=surface.nuisances()), fit)
-    assert told["value"] == pytest.approx(NOSE.depth * np.exp(0.3))
+    assert told["value"] == pytest.approx(NOSE.length * np.exp(0.3))
     assert told["se"] == pytest.approx(told["value"] * np.hypot(0.2, MODEL))
 
 

@@ -8,12 +8,13 @@ import pytest
 
 from turnout import physics
 from turnout.mismatch.track import skeleton
-from turnout.mismatch.track.base_model import COMMON, OWN
+from turnout.mismatch.track.base_model import COMMON, OWN, castings_of
 from turnout.mismatch.track.blow_model import BlowModel
 from turnout.mismatch.track.heard import Heard
 from turnout.mismatch.track.skeleton import matrices_of
 from turnout.simulate import uniform_track
 from turnout.simulate.matrices import assemble
+from turnout.simulate.track import RailStretch
 
 TERMS = [
     (),
@@ -61,7 +62,8 @@ def heard(model, seat):
     """Of two blows and a sensor that moved, not all of them paired, so that a pair taken for another shows."""
     first, second = ("S", 8.0), ("S", 11.0)
     pairs = (9.1, first), (10.7, first), (10.7, second)
-    return Heard(model, pairs, {first: 8.8, second: seat}, SimpleNamespace(first=18, last=19))
+    zone = SimpleNamespace(first=18, last=19, castings=castings_of(model.track, 9.95, 11.4))
+    return Heard(model, pairs, {first: 8.8, second: seat}, zone)
 
 
 FOLLOWING = [
@@ -111,6 +113,29 @@ def test_the_rails_derivative_is_that_of_a_slightly_stiffer_rail(name):
     ]
     exact = (receptance(1e-3) - receptance(-1e-3)) / 2e-3
     assert np.linalg.norm(found - exact) < 0.015 * np.linalg.norm(exact)
+
+
+@pytest.mark.parametrize("name", ["bending_stiffness", "mass"])
+def test_the_derivative_of_a_casting_is_that_of_a_slightly_other_one(name):
+    """Of every piece of a casting of 3 m, and of what lies half a bay beyond its ends: differences of full solutions,
+    1.5 % as of the rail. A casting beyond the zone has no pieces."""
+    rng, track = np.random.default_rng(4), uniform_track(24.0)
+    track = track.with_(pad_stiffness=track.pad_stiffness * np.exp(0.2 * rng.normal(size=track.support.size)))
+    cast = replace(track.rail, bending_stiffness=1.8 * track.rail.bending_stiffness, mass=2.5 * track.rail.mass)
+    track = track.with_(stretches=(RailStretch(2.0, 4.0, cast), RailStretch(10.2, 13.2, cast)))
+    found = heard(BlowModel(track, ()), 12.3).rail_gradient(PAIR)
+    pieces = castings_of(track, 9.95, 11.4)
+    assert [c.inner for c in pieces] == [False, False, True, True]  # of seven, those that reach into the zone
+    for k, c in enumerate(pieces):
+
+        def receptance(more, c=c):
+            mine = replace(c.piece.rail, **{name: getattr(c.piece.rail, name) * np.exp(more)})
+            other = track.with_(stretches=(*track.stretches, replace(c.piece, rail=mine)))
+            return BlowModel(other, ()).receptance(10.7, 12.3)
+
+        exact = (receptance(1e-3) - receptance(-1e-3)) / 2e-3
+        column = found[:, 2 + 2 * k + ("bending_stiffness", "mass").index(name)]
+        assert np.linalg.norm(column - exact) < 0.015 * np.linalg.norm(exact)
 
 
 def test_the_shear_of_the_file_is_a_share_of_a_rail_that_a_term_softens():

@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import pairwise
 from operator import itemgetter
 
 import numpy as np
 
 from turnout.mismatch.case import Nuisance
-from turnout.simulate.track import PER_SUPPORT
+from turnout.simulate.track import PER_SUPPORT, RailStretch
 
 # Common logarithmic factor on a value of all supports: field, tag of its links, what of the link, prior sd.
 # Priors: spread of published values, Knothe and Grassie 1993, tables 1 to 3.
@@ -43,6 +44,9 @@ OWN = (
 # ln of the profile's stiffness: wear and rolling tolerances; published shear coefficients of 60E1 go from 0.34 to 0.41,
 # and 14 controls of another simulator, right by its own closed forms, asked for 0.12 ± 0.02 less (95 %).
 RAIL = (("rail_bending", 0.015), ("rail_shear", 0.12))
+# The same of a piece of other rail, and of one at its ends: a file's one section stands for a casting that changes.
+CAST = (("cast_bending", 0.10, 0.30), ("cast_mass", 0.10, 0.30))
+RAMP = 0.3  # over which a casting's section grows beyond and before its ends [m]
 RAIL_STEP = 0.05  # of their logarithms; derivatives by pads err by 8 % over 0.12
 WHEELS_SD = 0.06  # ln unsprung mass: reprofiling takes a tenth of it; 42 of another simulator: 0.054
 SEAT_SD = 0.02  # a sensor's place is known to this [m]
@@ -52,14 +56,25 @@ MARGIN = 18.0  # track kept beyond them [m]
 
 
 @dataclass(frozen=True)
+class Casting:
+    """A ``piece`` of the stretch ``of`` other rail, or just beyond, with its rail as in the file; ``inner``: not at an
+    end."""
+
+    of: RailStretch
+    piece: RailStretch
+    inner: bool
+
+
+@dataclass(frozen=True)
 class Zone:
     """Supports ``first`` to ``last`` (inclusive) of the kept track lie among sensors and blows; those of ``asked`` may
-    have an effect."""
+    have an effect; ``castings`` are pieces of other rail there."""
 
     turnout: object
     first: int
     last: int
     asked: range
+    castings: tuple = ()
 
     @property
     def supports(self):
@@ -81,27 +96,65 @@ def zone_of(turnout, places):
     smaller = replace(turnout, track=cut(turnout.track), tracks=tracks)
     support = smaller.track.support
     inside, asked = (np.flatnonzero((support >= low - r) & (support <= high + r)) for r in (REACH, ASKED))
-    return Zone(smaller, int(inside[0]), int(inside[-1]), range(int(asked[0]), int(asked[-1]) + 1))
+    castings = castings_of(smaller.track, low - REACH, high + REACH)
+    return Zone(smaller, int(inside[0]), int(inside[-1]), range(int(asked[0]), int(asked[-1]) + 1), castings)
+
+
+def castings_of(track, low, high):
+    """Pieces of other rail that reach between ``low`` and ``high`` [m], each with the rail of the file: half a bay on
+    both sides of a stretch's ends, where its section grows from the rail's, and pieces of a metre at most between."""
+    found = []
+    for stretch in track.stretches:
+        inside = np.linspace(stretch.start + RAMP, stretch.end - RAMP, 1 + max(1, round(stretch.end - stretch.start)))
+        cuts = [stretch.start - RAMP, stretch.start, *inside, stretch.end, stretch.end + RAMP]
+        for k, (start, end) in enumerate(pairwise(cuts)):
+            if start < end and end > low and start < high:
+                inner = 1 < k < len(cuts) - 3
+                found.append(Casting(stretch, RailStretch(start, end, track.rail_between(0.5 * (start + end))), inner))
+    return tuple(found)
+
+
+def rail_spreads(zone):
+    """{name: standard deviation} of what is not known of the rail: its stiffness, and that and the mass of castings."""
+    cast = [(f"{name}_{k}", sds[not c.inner]) for k, c in enumerate(zone.castings) for name, *sds in CAST]
+    return dict([*RAIL, *cast])
+
+
+def cast_elements(zone, node):
+    """[(n,)] the elements of each casting, between nodes (n_element + 1,) [m]; the last that covers one has it."""
+    middle = 0.5 * (node[:-1] + node[1:])
+    owner = np.full(middle.size, -1)
+    for k, c in enumerate(zone.castings):
+        owner[(middle >= c.piece.start) & (middle < c.piece.end)] = k
+    return [np.flatnonzero(owner == k) for k in range(len(zone.castings))]
 
 
 def with_rail(zone, values):
-    """The zone with its rails' stiffness multiplied by the exponentials of ``values``."""
+    """The zone with its rails' stiffness, and the mass of castings, multiplied by the exponentials of ``values``."""
+    factor = {name: float(np.exp(value)) for name, value in values.items()}
 
-    def changed(rail):
-        return replace(rail, **{field: getattr(rail, field) * factor for field, factor in more})
+    def changed(rail, bending=1.0, mass=1.0):
+        return replace(
+            rail,
+            bending_stiffness=rail.bending_stiffness * factor["rail_bending"] * bending,
+            shear_stiffness=rail.shear_stiffness * factor["rail_shear"],
+            mass=rail.mass * mass,
+        )
 
     def stiffened(track):
-        stretches = tuple(replace(s, rail=changed(s.rail)) for s in track.stretches)
-        return track.with_(rail=changed(track.rail), stretches=stretches)
+        own = [replace(s, rail=changed(s.rail)) for s in track.stretches]
+        for k, c in enumerate(zone.castings):
+            if c.of in track.stretches:
+                own.append(replace(c.piece, rail=changed(c.piece.rail, *(factor[f"{name}_{k}"] for name, *_ in CAST))))
+        return track.with_(rail=changed(track.rail), stretches=tuple(own))
 
-    more = [(f"{name.removeprefix('rail_')}_stiffness", float(np.exp(values[name]))) for name, _ in RAIL]
     tracks = {name: stiffened(track) for name, track in zone.turnout.tracks.items()}
     return replace(zone, turnout=replace(zone.turnout, track=stiffened(zone.turnout.track), tracks=tracks))
 
 
-def near_rail(values):
+def near_rail(values, names):
     """Rail's values on a grid of ``RAIL_STEP``: models are made there, and are straight from there to ``values``."""
-    return {name: RAIL_STEP * round(values[name] / RAIL_STEP) for name, _ in RAIL}
+    return {name: RAIL_STEP * round(values[name] / RAIL_STEP) for name in names}
 
 
 def track_nuisances(zone, trains):
@@ -113,7 +166,7 @@ def track_nuisances(zone, trains):
             sd = float(np.hypot(own.sd, steps[j]))
             meaning, most = f"ln {own.field} of {j}", 6.0 * sd
             found.append(Nuisance(f"{own.tag}_{j}", "-", 0.0, sd, bounds=(-most, most), meaning=meaning))
-    for name, sd in RAIL:
+    for name, sd in rail_spreads(zone).items():
         found.append(Nuisance(name, "-", 0.0, sd, bounds=(-6.0 * sd, 6.0 * sd), meaning=f"ln {name} of the rail"))
     for train in trains:
         found.append(Nuisance(f"wheels_{train}", "-", 0.0, WHEELS_SD, bounds=(-0.5, 0.5), meaning="ln unsprung mass"))

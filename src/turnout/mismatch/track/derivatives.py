@@ -5,7 +5,6 @@ import numpy as np
 from turnout.errors import SimulationError
 from turnout.mismatch.case import Case
 from turnout.mismatch.track import bands, blows
-from turnout.mismatch.track.base_model import RAIL
 from turnout.mismatch.track.columns import FURTHER, columns_of, support_forces
 from turnout.mismatch.track.rough_rail import wave_columns
 from turnout.mismatch.track.running_surface import STEP as SURFACE_STEP
@@ -50,7 +49,7 @@ def pair_columns(case, values, terms, pair, heard, predicted, jacobian, index):
     n, width = block.shape
     jacobian[:n, :width], jacobian[n:, :width] = block.real, block.imag
     rail = blows.split(blows.scaled(pair, heard.rail_gradient(pair), chain))
-    for k, (name, _) in enumerate(RAIL):
+    for k, name in enumerate(case.rail):
         jacobian[:, index[name]] = rail[:, k]
     gain, seat = f"gain_{pair.channel}", f"seat_{pair.channel}"
     if gain in index:

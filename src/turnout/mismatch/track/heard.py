@@ -1,13 +1,15 @@
 """What the pairs of hammer tests under the same conditions share on one model of the track, found once for all."""
 
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_array
 
-from turnout.mismatch.track.base_model import COMMON, OWN
+from turnout.mismatch.track.base_model import COMMON, OWN, cast_elements
 from turnout.mismatch.track.blows import LINES, SHIFTED
 from turnout.mismatch.track.strain_products import by_rail
+from turnout.simulate.rail import element_mass
 
 FIELDS = [o.field for o in OWN]
 OMEGA = 2.0 * np.pi * SHIFTED
@@ -34,8 +36,8 @@ class Heard:
         return self.model.seat_gradient(pair.test.place, self.seats[pair.seat])
 
     def rail_gradient(self, pair):
-        """Derivatives by the logarithms of the rail's bending and shear stiffness, (n_line, 2)."""
-        return self._by_rail[self._of(pair)]
+        """Derivatives by the logarithms of what is not known of the rail (``rail_spreads``), (n_line, n)."""
+        return np.concatenate([self._by_rail[self._of(pair)], self._by_castings[self._of(pair)]], axis=-1)
 
     def gradient(self, pair):
         """Derivatives by the logarithm of each common and own value, (n_line, n) in the order of ``inner_names``."""
@@ -72,6 +74,26 @@ class Heard:
         sheared = 12.0 * ei / (h * (1.0 + p) ** 2)
         weights = np.array([ei / h, sheared, self.model.own_shear * sheared * p])
         return by_rail(self._moved, self._places[1], matrices.node_index, h, weights)
+
+    @cached_property
+    def _by_castings(self):
+        r"""(n_pair, n_line, 2 n_casting) by the logarithms of bending stiffness and mass of each: the same sums over
+        its own elements, and :math:`\omega^2 \sum_e u^T M_e v` with their masses."""
+        matrices, (first, second) = self.model.matrices, self._places[1]
+        h, p, ei, _ = matrices.elements
+        row = matrices.node_index
+        found = [np.zeros((len(self.row), OMEGA.size, 0), dtype=complex)]
+        for e in cast_elements(self.zone, matrices.node):
+            ends = [self._moved[..., row[e + side] + k] for side in (0, 1) for k in (0, 1)]
+            w, turn = ends[::2], ends[1::2]
+            bent, skew = turn[1] - turn[0], (w[1] - w[0]) / h[e] - 0.5 * (turn[0] + turn[1])
+            sheared = 12.0 * ei[e] / (h[e] * (1.0 + p[e]) ** 2)
+            bending = -(bent[first] * bent[second]) @ (ei[e] / h[e]) - (skew[first] * skew[second]) @ sheared
+            u = np.stack(ends, axis=-1)
+            mass = [element_mass(replace(matrices.rails[k], rotary_inertia=0.0), h[k]) for k in e]
+            pressed = np.einsum("pfei,eij->pfej", u, np.reshape(mass, (-1, 4, 4)))
+            found += [bending[..., None], (OMEGA**2 * np.sum(u[first] * pressed[second], axis=(2, 3)))[..., None]]
+        return np.concatenate(found, axis=-1)
 
     @cached_property
     def _by_supports(self):

@@ -63,7 +63,7 @@ class Predicting:
     def blow_model(self, values, terms, pair):
         """The track of a hammer pair as all under its conditions heard it, remembered."""
         under = blows.shown(terms, pair.conditions)
-        near = near_rail(values)
+        near = near_rail(values, self.rail)
         heard, seats = self._touched(values, terms, pair.conditions)
         key = repr(under), tuple(near.values()), inner_values(self.zone, values), heard, tuple(seats.items())
         if key not in self._models:
@@ -100,7 +100,7 @@ class Predicting:
 
     def receptance(self, values, pair, heard):
         """(n_line,) receptance of a pair [m/N], with what the rail differs from that of the model."""
-        off = [values[k] - at for k, at in near_rail(values).items()]
+        off = [values[k] - at for k, at in near_rail(values, self.rail).items()]
         return heard.receptance(pair) + heard.rail_gradient(pair) @ off
 
     def _receptance(self, values, terms, pair, heard):

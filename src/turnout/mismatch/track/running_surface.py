@@ -13,6 +13,7 @@ from turnout.mismatch.track.rough_wheels import BEYOND
 
 PLACES = ("place", "start", "end")  # known to a share of their distance from the origin, all else to a factor
 LENGTHS = ("length", "wavelength")
+SHAPE = 0.25  # ln of the power of a kink whose depth is an estimate: 1.2 to 3.3, from a V to a cusp
 STEP = 0.02  # m, or of a factor's logarithm: over which a passage's derivative is taken
 MOVED = 0.3  # of its own length a part may move in one step of a fit: beyond, its derivative says nothing
 LEAST = 1e-6  # m: a part that is nowhere deeper is not there
@@ -41,8 +42,11 @@ class Unsure:
             sd = self.spread * abs(getattr(self.part, self.field))
             trust = min(3.0, MOVED * _values(self.part, LENGTHS)[0] / sd)
             return Nuisance(self.name, "m", 0.0, sd, meaning=f"{said} less its file's", trust=trust, bends=False)
-        most = 6.0 * self.spread if self.field != "share" else -0.05 - np.log(self.part.share)
-        bounds = (-6.0 * self.spread, most)
+        value, bounds = getattr(self.part, self.field), (-6.0 * self.spread, 6.0 * self.spread)
+        if self.field == "share":
+            bounds = bounds[0], -0.05 - np.log(value)
+        elif self.field == "power":
+            bounds = -np.log(value), bounds[1]
         return Nuisance(self.name, "-", 0.0, self.spread, None, bounds, f"ln {said}", bends=False)
 
     def moved(self, by):
@@ -63,7 +67,7 @@ class Unsure:
             "name": self.field,
             "value": value,
             "se": error if self.field in PLACES else value * error,
-            "unit": "-" if profile or self.field == "share" else "m",
+            "unit": "-" if profile or self.field in ("share", "power") else "m",
             "filed": filed,
             "off": abs(by) / self.nuisance.sd,
         }
@@ -80,7 +84,7 @@ class RunningSurface:
         x = np.arange(waves.start - BEYOND, waves.end + BEYOND, 0.02)
         met = [part for route in routes for parts in turnout.surfaces(route) for part in parts]
         near = [part for part in turnout.spreads if part in met and np.max(np.abs(part(x, 0))) > LEAST]
-        listed = [(k, part, *of) for k, part in enumerate(near) for of in turnout.spreads[part].items()]
+        listed = [(k, part, *of) for k, part in enumerate(near) for of in _spreads(turnout, part).items()]
         self.turnout = turnout
         self.unsure = [Unsure(f"surface_{k}_{f}", part, f, s) for k, part, f, s in listed if _may_move(part, f)]
         self.names = tuple(u.name for u in self.unsure)
@@ -116,6 +120,12 @@ class RunningSurface:
             by, error = fit.values[u.name] / free, float(np.sqrt(own / free + apart[k] ** 2 + model**2))
             if error < TELLS * sd or abs(by) > max(OTHERWISE * sd, OTHERWISE * error):
                 yield u.told(by, error)
+
+
+def _spreads(turnout, part):
+    """How well the numbers of a part are known; the shape of an estimated nose is an estimate as well."""
+    said = turnout.spreads[part]
+    return {**said, "power": SHAPE} if hasattr(part, "power") and "depth" in said and "power" not in said else said
 
 
 def _may_move(part, field):

@@ -10,7 +10,7 @@ from turnout.errors import SimulationError
 from turnout.mismatch.case import Case, Nuisance
 from turnout.mismatch.joint import CHEAP_STEPS, fit_jointly
 from turnout.mismatch.track import derivatives, roll, rolling
-from turnout.mismatch.track.base_model import RAIL, SEAT_SD, track_nuisances, with_rail, zone_of
+from turnout.mismatch.track.base_model import SEAT_SD, rail_spreads, track_nuisances, with_rail, zone_of
 from turnout.mismatch.track.blows_case import Blows
 from turnout.mismatch.track.ceiling import ceilings, within_range
 from turnout.mismatch.track.library import LOOSE, library
@@ -89,7 +89,7 @@ class TrackCase(Predicting, Case):
     def recentre(self, values):
         """The track gets the rail of ``values``, about which receptances are straight in what it may differ by; nothing
         simulated is remembered any more."""
-        self.rail = {name: values.get(name, 0.0) for name, _ in RAIL}
+        self.rail = {name: values.get(name, 0.0) for name in rail_spreads(self.nominal)}
         self.zone = with_rail(self.nominal, self.rail)
         self._forget()
 

@@ -1,0 +1,60 @@
+"""A casting in the rail may be other than the file has it, piece by piece: which pieces, and what they change."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from turnout.mismatch.track.base_model import CAST, RAIL, rail_spreads, track_nuisances, with_rail, zone_of
+from turnout.mismatch.track.planned import small_plan
+from turnout.simulate.track import RailStretch
+
+PLAN = small_plan((15.0,), blows=(24.0,))
+TRACK = PLAN.turnout.track
+HEAVY = replace(TRACK.rail, bending_stiffness=1.7 * TRACK.rail.bending_stiffness, mass=2.2 * TRACK.rail.mass)
+NOSE, FAR = RailStretch(23.0, 26.4, HEAVY), RailStretch(2.0, 4.0, HEAVY)
+
+
+@pytest.fixture(scope="module")
+def zone():
+    """A crossing between the sensors of the main track, which the diverging one does not have, and one far away."""
+    cast = TRACK.with_(stretches=(FAR, NOSE))
+    turnout = replace(PLAN.turnout, track=cast, tracks={"main": cast, "diverging": TRACK.with_(stretches=(FAR,))})
+    return zone_of(turnout, [21.0, 27.3])
+
+
+def test_pieces_cover_the_casting_and_half_a_bay_beyond_its_ends(zone):
+    pieces = [c.piece for c in zone.castings]
+    assert [p.start for p in pieces] == pytest.approx(
+        [22.7, 23.0, 23.3, *(23.3 + 2.8 / 3 * np.arange(1, 3)), 26.1, 26.4]
+    )
+    assert [p.end for p in pieces] == pytest.approx([*(p.start for p in pieces[1:]), 26.7])
+    assert [c.inner for c in zone.castings] == [False, False, True, True, True, False, False]
+    assert [p.rail.mass / TRACK.rail.mass for p in pieces] == pytest.approx([1.0, *[2.2] * 5, 1.0])
+
+
+def test_each_piece_has_its_own_bending_stiffness_and_mass_and_ends_are_less_sure(zone):
+    spreads, known = rail_spreads(zone), {n.name: n.sd for n in track_nuisances(zone, ())}
+    assert list(spreads)[:2] == [name for name, _ in RAIL] and len(spreads) == 2 + 2 * 7
+    assert {name: known[name] for name in spreads} == spreads
+    assert spreads["cast_mass_0"] == dict((n, e) for n, _, e in CAST)["cast_mass"] > spreads["cast_mass_3"]
+
+
+def test_a_piece_changes_its_own_rail_and_no_other(zone):
+    """Half as heavy again and a fifth stiffer in the fourth piece, all rails a tenth stiffer: there, beside it, on the
+    other route, and nothing of what lies far away but what all rails share."""
+    values = dict.fromkeys(rail_spreads(zone), 0.0)
+    values |= {"cast_mass_3": np.log(1.5), "cast_bending_3": np.log(1.2), "rail_bending": np.log(1.1)}
+    changed = with_rail(zone, values).turnout
+    there, beside = (changed.track.rail_between(x) for x in (24.7, 24.0))
+    assert there.mass == pytest.approx(1.5 * HEAVY.mass) and beside.mass == HEAVY.mass
+    assert there.bending_stiffness == pytest.approx(1.1 * 1.2 * HEAVY.bending_stiffness)
+    assert beside.bending_stiffness == pytest.approx(1.1 * HEAVY.bending_stiffness)
+    for x, rail in ((24.7, TRACK.rail), (3.0, HEAVY)):
+        other = changed.tracks["diverging"].rail_between(x)
+        assert (other.mass, other.bending_stiffness) == pytest.approx((rail.mass, 1.1 * rail.bending_stiffness))
+
+
+def test_plain_track_has_nothing_more():
+    plain = zone_of(PLAN.turnout, [21.0, 27.3])
+    assert plain.castings == () and rail_spreads(plain) == dict(RAIL)
