@@ -78,7 +78,6 @@ def track(site):
 def _casting(crossing):
     """The crossing as a stretch of another rail, without the ramps at its ends."""
     factors = {"second_moment": crossing.bending, "area": crossing.mass, "mass": crossing.mass}
-    factors["damping"] = 1.0
     start, end = crossing.ends
     lines = ["stretches:", f"  - from: {_value(start, 'm')}", f"    to: {_value(end, 'm')}", "    rail:"]
     lines += ["      name: crossing", "      beam: timoshenko"]

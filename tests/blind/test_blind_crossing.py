@@ -67,7 +67,10 @@ def test_the_owner_files_of_a_crossing_load_as_they_were_drawn(site, tmp_path):
     assert stretch.rail.bending_stiffness == pytest.approx(210e9 * 3037e-8 * filed.bending, rel=1e-4)
     (kink,) = turnout.surfaces("main")[0]
     assert (kink.place, kink.depth, kink.length) == pytest.approx((filed.nose, filed.depth, filed.length), rel=1e-4)
-    assert turnout.spreads[kink]["depth"] == 0.4 and f"{site.world.surface[0](filed.nose):g}" not in text
+    assert turnout.spreads[kink]["depth"] == 0.4
+    true = site.world.surface[0].__self__
+    assert f"{1e3 * filed.depth:.6g}" in text and f"{filed.nose:.6g}" in text
+    assert f"{1e3 * true.depth:.6g}" not in text and f"{true.nose:.6g}" not in text
 
 
 def test_a_set_in_panels_has_the_plan_of_one_on_plain_track():

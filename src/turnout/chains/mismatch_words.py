@@ -64,6 +64,9 @@ def number_in_words(value, unit, digits=2):
     return shown if unit in ("-", "") else f"{shown} {unit}"
 
 
+NAMES = {"power": "power of the flanks (1 straight, 2 parabolas)", "share": "share before the deepest point"}
+
+
 def headline(finding) -> str:
     """One sentence: what the simulation left out, or what is known instead."""
     terms = json.loads(finding["term_json"] or "[]")
@@ -92,7 +95,8 @@ def otherwise(told) -> str:
     half = Z95 * told["se"]
     values = told["value"], told["value"] - half, told["value"] + half, told["filed"]
     now, low, high, filed = (number_in_words(v, told["unit"], 3) for v in values)
-    what = f"{told['name']} of the {told['term'].removeprefix('running_surface_')} at {told['place']:.1f} m"
+    name, part = NAMES.get(told["name"], told["name"]), told["term"].removeprefix("running_surface_")
+    what = f"{name} of the {part} at {told['place']:.1f} m"
     return f"The {what} is {now} ({low.removesuffix(' mm')} to {high}), the track file has {filed}."
 
 

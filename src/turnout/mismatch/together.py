@@ -86,11 +86,21 @@ def borne_out(case, fit, verdicts, settings):
     if [v.answer for v in verdicts] != ["named", "named"] or not case.reserved:
         return verdicts, fit
     first, second = verdicts
-    (before, alone), (after, both) = (fit_of_reserved(case, f) for f in (first.scores[0].fit, fit))
-    if before is None or after is None or alone - both <= max(COSTLY, gain_error(case.reserved, before, after)):
+    alone = first.scores[0].fit
+    if not _costs(case, alone, fit):
+        return verdicts, fit
+    alone = ended(case, alone, settings)
+    if not _costs(case, alone, fit):
         return verdicts, fit
     reason = f"something else shows beside it: {second.names[0]}, which foretells recordings never used worse"
-    return [replace(first, reason=reason)], ended(case, first.scores[0].fit, settings)
+    return [replace(first, reason=reason)], alone
+
+
+def _costs(case, alone, both):
+    """Whether ``both`` foretell the reserved recordings worse than one ``alone``."""
+    (before, one), (after, two) = (fit_of_reserved(case, fit) for fit in (alone, both))
+    known = before is not None and after is not None
+    return known and one - two > max(COSTLY, gain_error(case.reserved, before, after))
 
 
 def _gained(fit, without, candidate):

@@ -5,7 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from turnout.mismatch.track.base_model import CAST, RAIL, rail_spreads, track_nuisances, with_rail, zone_of
+from turnout.mismatch.track.base_model import (
+    CAST,
+    RAIL,
+    cast_elements,
+    rail_spreads,
+    track_nuisances,
+    with_rail,
+    zone_of,
+)
 from turnout.mismatch.track.planned import small_plan
 from turnout.simulate.track import RailStretch
 
@@ -53,6 +61,31 @@ def test_a_piece_changes_its_own_rail_and_no_other(zone):
     for x, rail in ((24.7, TRACK.rail), (3.0, HEAVY)):
         other = changed.tracks["diverging"].rail_between(x)
         assert (other.mass, other.bending_stiffness) == pytest.approx((rail.mass, 1.1 * rail.bending_stiffness))
+
+
+@pytest.mark.parametrize(
+    "ends",
+    [[(24.0, 24.15)], [(22.0, 24.1), (24.3, 26.0)], [(22.0, 26.0), (23.5, 24.5)], [(22.0, 24.5), (24.0, 26.0)],
+     [(22.0, 24.0), (24.0, 25.0)], [(24.0, 24.6)], [(18.0, 30.0)]],
+)  # fmt: skip
+def test_without_any_change_the_track_is_that_of_the_file(ends):
+    """Element by element: joints of one element, stretches that nearly meet, lie in one another, overlap, abut."""
+    rails = [replace(HEAVY, mass=HEAVY.mass * (1.0 + 0.1 * k)) for k in range(len(ends))]
+    track = TRACK.with_(stretches=tuple(RailStretch(a, b, r) for (a, b), r in zip(ends, rails)))
+    zone = zone_of(replace(PLAN.turnout, track=track, tracks={"main": track}), [21.0, 27.3])
+    same = with_rail(zone, dict.fromkeys(rail_spreads(zone), 0.0)).turnout.track
+    x = np.arange(20.0, 29.0, 0.025) + 0.0125
+    assert zone.castings and [same.rail_between(v) for v in x] == [track.rail_between(v) for v in x]
+    node = np.arange(20.0, 29.0, 0.15)
+    owned = np.concatenate(cast_elements(zone, node))
+    assert owned.size == np.unique(owned).size
+
+
+def test_castings_are_those_of_the_track_that_blows_are_modelled_on():
+    cast = TRACK.with_(stretches=(NOSE,))
+    turnout = replace(PLAN.turnout, track=TRACK, tracks={"diverging": TRACK, "main": cast})
+    assert zone_of(turnout, [21.0, 27.3]).castings
+    assert not zone_of(replace(turnout, track=cast, tracks={"diverging": cast, "main": TRACK}), [21.0, 27.3]).castings
 
 
 def test_plain_track_has_nothing_more():

@@ -45,7 +45,7 @@ def test_numbers_with_a_prior_may_be_off_where_they_can_be_heard():
     assert known["surface_0_depth"].sd == 0.5 and known["surface_0_depth"].unit == "-"
     assert known["surface_0_place"].trust * known["surface_0_place"].sd < 0.5 * NOSE.length
     assert 0.55 * np.exp(known["surface_0_share"].bounds[1]) < 1.0
-    assert 2.0 * np.exp(known["surface_0_power"].bounds[0]) == pytest.approx(1.0)  # a V, and nothing that overhangs
+    assert 1.0 < 2.0 * np.exp(known["surface_0_power"].bounds[0]) < 1.02  # a V, and nothing that overhangs
 
 
 def test_the_shape_of_a_nose_is_unsure_where_its_depth_is():

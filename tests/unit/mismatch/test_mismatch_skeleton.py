@@ -117,8 +117,8 @@ def test_the_rails_derivative_is_that_of_a_slightly_stiffer_rail(name):
 
 @pytest.mark.parametrize("name", ["bending_stiffness", "mass"])
 def test_the_derivative_of_a_casting_is_that_of_a_slightly_other_one(name):
-    """Of every piece of a casting of 3 m, and of what lies half a bay beyond its ends: differences of full solutions,
-    1.5 % as of the rail. A casting beyond the zone has no pieces."""
+    """Of every piece of a casting of 3 m, and of what lies half a bay beyond its ends: differences of full solutions;
+    0.2 % are met. A casting beyond the zone has no pieces; where a term puts another rail a piece changes nothing."""
     rng, track = np.random.default_rng(4), uniform_track(24.0)
     track = track.with_(pad_stiffness=track.pad_stiffness * np.exp(0.2 * rng.normal(size=track.support.size)))
     cast = replace(track.rail, bending_stiffness=1.8 * track.rail.bending_stiffness, mass=2.5 * track.rail.mass)
@@ -135,7 +135,9 @@ def test_the_derivative_of_a_casting_is_that_of_a_slightly_other_one(name):
 
         exact = (receptance(1e-3) - receptance(-1e-3)) / 2e-3
         column = found[:, 2 + 2 * k + ("bending_stiffness", "mass").index(name)]
-        assert np.linalg.norm(column - exact) < 0.015 * np.linalg.norm(exact)
+        assert np.linalg.norm(column - exact) < 0.005 * np.linalg.norm(exact)
+    over = BlowModel(track, (physics.RailBending(9.5, 12.5, 1.3),))
+    assert np.all(heard(over, 12.3).rail_gradient(PAIR)[:, 2:][:, 2:] == 0.0)
 
 
 def test_the_shear_of_the_file_is_a_share_of_a_rail_that_a_term_softens():

@@ -46,6 +46,7 @@ OWN = (
 RAIL = (("rail_bending", 0.015), ("rail_shear", 0.12))
 # The same of a piece of other rail, and of one at its ends: a file's one section stands for a casting that changes.
 CAST = (("cast_bending", 0.10, 0.30), ("cast_mass", 0.10, 0.30))
+SHORT = 0.02  # m: pieces that two ends happen to leave, shorter than any element
 RAMP = 0.3  # over which a casting's section grows beyond and before its ends [m]
 RAIL_STEP = 0.05  # of their logarithms; derivatives by pads err by 8 % over 0.12
 WHEELS_SD = 0.06  # ln unsprung mass: reprofiling takes a tenth of it; 42 of another simulator: 0.054
@@ -96,21 +97,25 @@ def zone_of(turnout, places):
     smaller = replace(turnout, track=cut(turnout.track), tracks=tracks)
     support = smaller.track.support
     inside, asked = (np.flatnonzero((support >= low - r) & (support <= high + r)) for r in (REACH, ASKED))
-    castings = castings_of(smaller.track, low - REACH, high + REACH)
+    castings = castings_of(smaller.track_of("main"), low - REACH, high + REACH)  # blows are modelled on it
     return Zone(smaller, int(inside[0]), int(inside[-1]), range(int(asked[0]), int(asked[-1]) + 1), castings)
 
 
 def castings_of(track, low, high):
-    """Pieces of other rail that reach between ``low`` and ``high`` [m], each with the rail of the file: half a bay on
-    both sides of a stretch's ends, where its section grows from the rail's, and pieces of a metre at most between."""
+    """Pieces of other rail, and of what lies within ``RAMP`` of it, that reach between ``low`` and ``high`` [m]: cut at
+    all ends, at ``RAMP`` from them, where a section grows from the rail's, and every metre or so."""
+    cuts = {x for s in track.stretches for x in (s.start - RAMP, s.start, s.end, s.end + RAMP)}
+    for s in track.stretches:
+        if s.end - s.start > 2.0 * RAMP:
+            cuts |= set(np.linspace(s.start + RAMP, s.end - RAMP, 1 + max(1, round(s.end - s.start))))
     found = []
-    for stretch in track.stretches:
-        inside = np.linspace(stretch.start + RAMP, stretch.end - RAMP, 1 + max(1, round(stretch.end - stretch.start)))
-        cuts = [stretch.start - RAMP, stretch.start, *inside, stretch.end, stretch.end + RAMP]
-        for k, (start, end) in enumerate(pairwise(cuts)):
-            if start < end and end > low and start < high:
-                inner = 1 < k < len(cuts) - 3
-                found.append(Casting(stretch, RailStretch(start, end, track.rail_between(0.5 * (start + end))), inner))
+    for start, end in pairwise(sorted(cuts)):
+        middle = 0.5 * (start + end)
+        near = [s for s in track.stretches if s.start - RAMP < middle < s.end + RAMP]
+        if near and end - start > SHORT and end > low and start < high:
+            of = next((s for s in reversed(near) if s.start <= middle < s.end), near[-1])
+            inner = of.start + RAMP < middle < of.end - RAMP
+            found.append(Casting(of, RailStretch(float(start), float(end), track.rail_between(middle)), inner))
     return tuple(found)
 
 
@@ -121,12 +126,9 @@ def rail_spreads(zone):
 
 
 def cast_elements(zone, node):
-    """[(n,)] the elements of each casting, between nodes (n_element + 1,) [m]; the last that covers one has it."""
+    """[(n,)] the elements of each casting, between nodes (n_element + 1,) [m]."""
     middle = 0.5 * (node[:-1] + node[1:])
-    owner = np.full(middle.size, -1)
-    for k, c in enumerate(zone.castings):
-        owner[(middle >= c.piece.start) & (middle < c.piece.end)] = k
-    return [np.flatnonzero(owner == k) for k in range(len(zone.castings))]
+    return [np.flatnonzero((middle >= c.piece.start) & (middle < c.piece.end)) for c in zone.castings]
 
 
 def with_rail(zone, values):

@@ -84,6 +84,7 @@ class Heard:
         row = matrices.node_index
         found = [np.zeros((len(self.row), OMEGA.size, 0), dtype=complex)]
         for e in cast_elements(self.zone, matrices.node):
+            e = e[[self._is_filed(k) for k in e]] if e.size else e
             ends = [self._moved[..., row[e + side] + k] for side in (0, 1) for k in (0, 1)]
             w, turn = ends[::2], ends[1::2]
             bent, skew = turn[1] - turn[0], (w[1] - w[0]) / h[e] - 0.5 * (turn[0] + turn[1])
@@ -94,6 +95,13 @@ class Heard:
             pressed = np.einsum("pfei,eij->pfej", u, np.reshape(mass, (-1, 4, 4)))
             found += [bending[..., None], (OMEGA**2 * np.sum(u[first] * pressed[second], axis=(2, 3)))[..., None]]
         return np.concatenate(found, axis=-1)
+
+    def _is_filed(self, element):
+        """Whether the rail of an element is the track's own, and none that a term has put there instead."""
+        matrices, track = self.model.matrices, self.model.track
+        own = track.rail_between(0.5 * (matrices.node[element] + matrices.node[element + 1]))
+        there = matrices.rails[element]
+        return (own.bending_stiffness, own.mass) == (there.bending_stiffness, there.mass)
 
     @cached_property
     def _by_supports(self):

@@ -78,6 +78,8 @@ class Predicting:
         """The main track with its rail where ``near_rail`` has it, remembered."""
         key = tuple(near.values())
         if key not in self._railed:
+            if len(self._railed) > 8:
+                self._railed.clear()
             self._railed[key] = with_rail(self.nominal, near).turnout.track_of("main")
         return self._railed[key]
 

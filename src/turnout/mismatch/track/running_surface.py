@@ -46,7 +46,7 @@ class Unsure:
         if self.field == "share":
             bounds = bounds[0], -0.05 - np.log(value)
         elif self.field == "power":
-            bounds = -np.log(value), bounds[1]
+            bounds = 0.01 - np.log(value), bounds[1]
         return Nuisance(self.name, "-", 0.0, self.spread, None, bounds, f"ln {said}", bends=False)
 
     def moved(self, by):

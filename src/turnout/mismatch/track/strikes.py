@@ -89,11 +89,16 @@ def heard(made):
 
 def _common(made, time, loud):
     """(n_sensor, n) the median over the wheels of the loudness when they are at a place, where that is no noise, of the
-    place of any wheel at these times: where all of them bang, at a nose or a joint, the cause is in the rail."""
+    place of any wheel at these times: where all of them bang, at a nose or a joint, the cause is in the rail. Of an
+    even number it is the lower one, so that a flat of one of two wheels stays its own; one wheel tells no place."""
     behind = made.passage.vehicle.wheel_places[:, None]
+    if len(behind) < 2:
+        return np.zeros_like(loud)
     way = np.arange(-HEARD, np.ptp([s.place for s in made.sensors]) + HEARD, FINE)  # from the first sensor
     passed = made.reference + (way + behind) / made.speed
-    each = np.array([np.median([np.interp(t, time, row) for t in passed], axis=0) for row in loud])
+    each = np.array(
+        [np.sort([np.interp(t, time, row) for t in passed], axis=0)[(len(behind) - 1) // 2] for row in loud]
+    )
     usual = np.where(each > COMMON, each, 0.0)
     rolled = (time - made.reference) * made.speed - behind
     return np.array([np.max(np.interp(rolled, way, row, 0.0, 0.0), axis=0) for row in usual])

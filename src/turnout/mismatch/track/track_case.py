@@ -28,7 +28,8 @@ from turnout.mismatch.track.running_surface import RunningSurface
 
 GAIN_SD = 0.02
 WARMTH, SPAN = "pad_temperature", 4.0  # K, chosen: at 1 % per kelvin two per cent of frequency
-FOLLOWED = 0.15  # ln of unsprung mass: what roughness does near P2 then changes by a fifth of its amplitude
+# ln of unsprung mass: what roughness does near P2 then changes by a fifth of its amplitude; and of what the rail has.
+FOLLOWED = 0.15
 
 
 class TrackCase(Predicting, Case):
@@ -163,18 +164,22 @@ class TrackCase(Predicting, Case):
         return derivatives.nuisance_jacobian(self, values, terms, observations, base)
 
     def renewed(self, fit):
-        """With the roughness of wheels as heavy as ``fit`` has them; itself where all are within ``FOLLOWED``."""
+        """With passages on the rail, and with the roughness of wheels as heavy, as ``fit`` has them; itself where all
+        are within ``FOLLOWED``. Blows tell the rail, and had bent it to what the effect now explains."""
         now = heavier(self, fit) if self.rollings else {}
         moved = {train: m for train, m in now.items() if abs(m - self.heavier.get(train, 0.0)) > FOLLOWED}
-        if not moved:
+        bent = bool(self.rollings) and any(abs(fit.values[n] - at) > FOLLOWED for n, at in self.rail.items())
+        if not moved and not bent:
             return self
         found = copy(self)
         found.heavier = {**self.heavier, **moved}
-        values = {**fit.values, **{f"wheels_{train}": m for train, m in moved.items()}}
+        if bent:
+            found.recentre(fit.values)
+        values = {**fit.values, **{f"wheels_{train}": m for train, m in found.heavier.items()}}
 
         def anew(o):
             made = self.rollings.get(o.name)
-            return with_errors(self, values, made, o) if made and self.said(made)["train"] in moved else o
+            return with_errors(found, values, made, o) if made and (bent or self.said(made)["train"] in moved) else o
 
         found.observations, found.reserved = (tuple(map(anew, o)) for o in (self.observations, self.reserved))
         return found
