@@ -15,7 +15,7 @@ from turnout.fleet.atomic import write_if_changed
 from turnout.fleet.scan import scan
 from turnout.passage.analyse import analyse
 from turnout.passage.clusters import Clusters, fit_clusters
-from turnout.passage.load import LoadCalibration, calibrate, quasi_static, train_amplitude
+from turnout.passage.load import LoadCalibration, calibrate, quasi_static, train_amplitude, with_shared
 from turnout.passage.train_data import listed_for, listed_trains
 from turnout.readers import read
 from turnout.records import LongRecording, Recording
@@ -113,6 +113,7 @@ def learn_loads(turnout: TurnoutConfig, trains, settings) -> dict[str, LoadCalib
         found = calibrate(amplitudes, loads, speeds, settings.load_trains_minimum, errors)
         if found is not None:
             made[name] = found
+    made = with_shared(made, trains)
     path = Path(settings.assets) / "loads.json"
     known = read_loads(path)
     if made:

@@ -102,7 +102,8 @@ def fit_channel(samples, rate: float, axle_times, speed: float, model: ModalMode
     found = joint_fit(data, times.times, basis)
     offset = _offset(samples, rate, axle_times)
     noise = float(np.std(filtered(quiet, through)[int(0.02 * rate) :])) if quiet.size > 0.1 * rate else float("nan")
-    noise = max(noise, least * np.sqrt(2.0 * (min(settings.band_high, rate / 2) - settings.band_low) / rate))
+    within = np.sqrt(2.0 * (min(settings.band_high, rate / 2) - settings.band_low) / rate)  # of a white noise's own
+    noise = max(noise, least * within)
     window = np.concatenate([data[int(t) : int(t + settings.score_window * rate)] for t in expected + late])
     status, detail = _judged(scores, null, test, settings)
     return ChannelFit(
@@ -112,7 +113,7 @@ def fit_channel(samples, rate: float, axle_times, speed: float, model: ModalMode
         times.standard_errors / rate,
         times.ambiguous,
         found.amplitudes[:, 0],
-        found.standard_errors(noise)[:, 0] if np.isfinite(noise) else np.full(expected.size, np.nan),
+        found.standard_errors(noise / within)[:, 0] if np.isfinite(noise) else np.full(expected.size, np.nan),
         test,
         scores,
         null,
@@ -133,7 +134,7 @@ def _cut(samples, rate, axle_times, settings):
     start = round(_offset(samples, rate, axle_times) * rate)
     stop = min(int((np.max(axle_times) + settings.score_window + 0.2) * rate), len(samples))
     expected = np.sort(np.asarray(axle_times, dtype=float)) * rate - start
-    room = settings.time_search * rate
+    room = (settings.time_search + settings.delay_search) * rate  # a wheel may be heard that much earlier
     inside = (expected > room + 2) & (expected < stop - start - settings.score_window * rate)
     return samples[start:stop], expected[inside]
 

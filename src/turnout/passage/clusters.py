@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import optimize, stats
@@ -28,10 +28,19 @@ class Cluster:
 
 @dataclass(frozen=True)
 class Clusters:
-    """A fitted set. New passages are assigned to it; it changes only when it is fitted again."""
+    """A fitted set. New passages are assigned to it; it changes only when it is fitted again.
+
+    ``used`` maps a type to the highest number that a cluster of it ever had: those of a traffic that ended among them.
+    """
 
     version: int
     clusters: tuple[Cluster, ...]
+    used: Mapping[str, int] = field(default_factory=dict)
+
+    def highest(self, train_type) -> int:
+        """The highest number used for a type, 0 where it had none."""
+        there = [_number(c.id) for c in self.clusters if c.type == train_type]
+        return max([self.used.get(train_type, 0), *there])
 
     def assign(self, train_type, speed_kmh, axle_load_t, level: float = 1e-4) -> str | None:
         """Id of the cluster that a passage most likely belongs to; None where it lies outside all of its type.
@@ -60,6 +69,7 @@ class Clusters:
         """As plain values, for a JSON file."""
         return {
             "version": self.version,
+            "used": dict(self.used),
             "clusters": [
                 {**vars(c), "mean": c.mean.tolist(), "covariance": c.covariance.tolist()} for c in self.clusters
             ],
@@ -72,7 +82,7 @@ class Clusters:
             Cluster(**{**c, "mean": np.array(c["mean"]), "covariance": np.array(c["covariance"])})
             for c in document["clusters"]
         ]
-        return cls(int(document["version"]), tuple(made))
+        return cls(int(document["version"]), tuple(made), dict(document.get("used", {})))
 
 
 def fit_clusters(passages: Sequence[Mapping], settings, previous: Clusters | None = None) -> Clusters:
@@ -91,7 +101,7 @@ def fit_clusters(passages: Sequence[Mapping], settings, previous: Clusters | Non
     Clusters
         Version one above ``previous``.
     """
-    found = []
+    found, previous = [], previous or Clusters(0, ())
     groups: dict[str, list] = {}
     for p in passages:
         if p["train_type"] and p["train_type"] != "unknown" and p["speed_kmh"]:
@@ -100,9 +110,12 @@ def fit_clusters(passages: Sequence[Mapping], settings, previous: Clusters | Non
         rows = groups[type_]
         loaded = [r for r in rows if r[1] is not None]
         points = np.log([r for r in loaded]) if len(loaded) > 0.5 * len(rows) else np.log([[r[0]] for r in rows])
-        old = [c for c in (previous.clusters if previous else ()) if c.type == type_]
-        found += _named(type_, _mixture(points, settings), len(points), old)
-    return Clusters((previous.version if previous else 0) + 1, tuple(found))
+        old = [c for c in previous.clusters if c.type == type_]
+        fresh = previous.highest(type_) + 1
+        found += _named(type_, _mixture(points, settings), len(points), old, fresh)
+    made = Clusters(previous.version + 1, tuple(found), previous.used)
+    types = sorted({c.type for c in (*previous.clusters, *found)} | set(previous.used))
+    return replace(made, used={t: max(previous.highest(t), made.highest(t)) for t in types})
 
 
 def _mixture(points, settings):
@@ -130,8 +143,9 @@ def _mixture(points, settings):
     return sorted(parts, key=lambda p: (-p[0], tuple(p[1])))
 
 
-def _named(type_, parts, n, old):
-    """Clusters with ids: those of the nearest old ones where they are nearer than two of their deviations."""
+def _named(type_, parts, n, old, fresh):
+    """Clusters with ids: those of the nearest old ones where they are nearer than two of their deviations, else
+    numbers from ``fresh`` on."""
     ids = {}
     if old and len(old[0].mean) == len(parts[0][1]):
         distance = np.array(
@@ -140,12 +154,14 @@ def _named(type_, parts, n, old):
         for i, j in zip(*optimize.linear_sum_assignment(np.minimum(distance, 1e6))):
             if distance[i, j] < 2.0:
                 ids[i] = old[j].id
-    used = [int(c.id.rsplit("/", 1)[1]) for c in old]
-    fresh = max(used, default=0) + 1
     made = []
     for i, (weight, mean, covariance) in enumerate(parts):
         if i not in ids:
             ids[i] = f"{type_}/{fresh}"
             fresh += 1
         made.append(Cluster(ids[i], type_, mean, covariance, float(weight), round(weight * n)))
-    return sorted(made, key=lambda c: int(c.id.rsplit("/", 1)[1]))
+    return sorted(made, key=lambda c: _number(c.id))
+
+
+def _number(id_):
+    return int(id_.rsplit("/", 1)[1])

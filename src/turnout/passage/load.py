@@ -2,7 +2,8 @@ r"""Axle load from the quasi-static part: the rail's moving deflection, calibrat
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from scipy import signal
@@ -19,7 +20,8 @@ class LoadCalibration:
     r"""Amplitude per load of one channel: :math:`\ln(A / P) = \ln k + \gamma \ln(v / v_0)`.
 
     ``log_gain`` and ``exponent`` (near 2: acceleration is v² w'') with their ``covariance`` (2, 2), ``scatter`` of one
-    train about it (relative), ``n`` trains, ``speed`` v_0 [m/s] and the range of speeds ``slowest``, ``fastest``.
+    train about it (relative), ``n`` trains, ``speed`` v_0 [m/s] and the range of speeds ``slowest``, ``fastest``;
+    ``shared`` is the correlation of its errors with those of the other channels, 1 where nobody measured it.
     """
 
     log_gain: float
@@ -30,6 +32,7 @@ class LoadCalibration:
     speed: float
     slowest: float
     fastest: float
+    shared: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -118,12 +121,37 @@ def calibrate(amplitudes, loads, speeds, fewest: int = 5, errors=None) -> LoadCa
     )
 
 
+def with_shared(calibrations, trains) -> dict[str, LoadCalibration]:
+    """The ``calibrations`` by channel, with the correlation of what each train leaves of them in any two channels.
+
+    A wrong speed, frozen ballast and the train's own roughness are the same in all sensors: more of them do not help.
+    ``trains`` are dicts with "load" [t], "speed" [m/s] and "amplitudes", channel -> (mean, standard error) [m/s²].
+    """
+    left = {name: [_left(found, train, name) for train in trains] for name, found in calibrations.items()}
+    together, alone = 0.0, 0.0
+    for one, other in combinations(left.values(), 2):
+        a, b = np.array([pair for pair in zip(one, other) if None not in pair], dtype=float).reshape(-1, 2).T
+        together += float(a @ b)
+        alone += float(np.sqrt((a @ a) * (b @ b)))
+    shared = min(max(together / alone, 0.0), 1.0) if alone > 0.0 else 1.0
+    return {name: replace(found, shared=shared) for name, found in calibrations.items()}
+
+
+def _left(found, train, name):
+    """Residual of one train in one channel, in deviations; None where it did not count."""
+    mean, error = np.abs(train["amplitudes"].get(name, (0.0, 0.0)))
+    if mean == 0.0 or train["load"] <= 0.0 or error > HEARD * mean:
+        return None
+    expected = found.log_gain + found.exponent * np.log(train["speed"] / found.speed)
+    return float((np.log(mean / train["load"]) - expected) / np.hypot(found.scatter, error / mean))
+
+
 def axle_load(recording, passage, calibrations, settings) -> LoadFinding | None:
     """Mean axle load from all calibrated channels; None ("unavailable") where its error would exceed the setting.
 
     A calibration is used between 0.8 times its slowest and 1.25 times its fastest train.
     """
-    logs, errors, shapes = [], [], []
+    logs, errors, shapes, shared = [], [], [], 1.0
     known = {c.name: c for c in recording.channels}
     for name in passage.at_sensor:
         found = calibrations.get(name)
@@ -138,13 +166,15 @@ def axle_load(recording, passage, calibrations, settings) -> LoadFinding | None:
         logs.append(np.log(mean) - where @ [found.log_gain, found.exponent])
         errors.append(np.sqrt(where @ found.covariance @ where + found.scatter**2 + (error / mean) ** 2))
         shapes.append(amplitudes / np.mean(amplitudes))
+        shared = found.shared
     if not logs:
         return None
     weight = np.array(errors) ** -2
     log = float(np.sum(weight * logs) / weight.sum())
-    # the scatter between channels says whether their errors are independent: they share the train and its speed
+    each = weight * np.array(errors) / weight.sum()
+    variance = shared * each.sum() ** 2 + (1.0 - shared) * np.sum(each**2)
     between = float(np.sqrt(np.sum(weight * (np.array(logs) - log) ** 2) / weight.sum())) if len(logs) > 1 else 0.0
-    relative = float(np.hypot(1 / np.sqrt(weight.sum()), between / np.sqrt(len(logs))))
+    relative = float(max(np.sqrt(variance), between / np.sqrt(len(logs))))
     if relative > settings.load_relative_error_maximum:
         return None
     mean = float(np.exp(log))

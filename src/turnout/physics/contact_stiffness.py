@@ -28,4 +28,5 @@ class ContactStiffness(PhysicsTerm):
     def vehicle(self, vehicle):
         """The vehicle with another contact law."""
         self.check()
-        return vehicle.with_(contact=replace(vehicle.contact, stiffness=self.factor * vehicle.contact.stiffness))
+        changed = tuple(replace(law, stiffness=self.factor * law.stiffness) for law in vehicle.each("contact"))
+        return vehicle.with_(contact=changed)

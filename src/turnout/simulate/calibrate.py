@@ -23,6 +23,7 @@ PARAMETERS = {
 BANDS = ((40.0, 100.0), (100.0, 200.0), (200.0, 400.0), (400.0, 600.0), (600.0, 800.0))
 INFORMED = 0.5  # a parameter whose posterior sd is above half its prior sd was not told by the data
 CORRELATED = 0.95
+SMOOTH = 1.0  # octaves over which the model's own error stays what it is
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ class Calibration:
 def calibrate(turnout, section, measured, location=None, parameters=tuple(PARAMETERS), model_sd=0.03, half_length=24.0):
     r"""Maximum a posteriori fit of one section's parameters to receptances, all of its supports alike.
 
-    .. math:: \min_q \sum \frac{|H(q) - \hat H|^2}{\sigma^2 + (\epsilon |\hat H|)^2}
+    .. math:: \min_q \sum_i \frac{|H_i(q) - \hat H_i|^2}{\sigma_i^2 + n_i (\epsilon |\hat H_i|)^2}
               + \sum_p \Bigl(\frac{\ln q_p - \ln q_{p0}}{s_p}\Bigr)^2
 
     Parameters
@@ -94,7 +95,8 @@ def calibrate(turnout, section, measured, location=None, parameters=tuple(PARAME
     parameters : sequence of str
         Keys of ``PARAMETERS``.
     model_sd : float
-        Relative error ε the model itself is granted, so that thousands of lines do not claim certainty.
+        Relative error ε the model itself is granted. It is smooth in frequency: the :math:`n_i` lines within
+        ``SMOOTH`` octaves of a line share one, so that thousands of lines do not claim certainty.
 
     Returns
     -------
@@ -123,7 +125,7 @@ def calibrate(turnout, section, measured, location=None, parameters=tuple(PARAME
     best = least_squares(lambda q: residual(q)[0], centre, jac=lambda q: residual(q)[1], method="trf", x_scale=spread)
     before, after = ([h for h, _ in model(q)] for q in (centre, best.x))
     n = sum(2 * m.value.size for m in measured)
-    reduced = float(np.sum(best.fun[:n] ** 2) / max(1, n - len(parameters)))
+    reduced = _left(measured, after, model_sd) / max(1, n - len(parameters))
     covariance = np.linalg.inv(best.jac.T @ best.jac) * max(1.0, reduced)
     sd = np.sqrt(np.diag(covariance))
     values = dict(zip(parameters, (float(v) for v in np.exp(best.x))))
@@ -144,7 +146,7 @@ def calibrate(turnout, section, measured, location=None, parameters=tuple(PARAME
 
 def _residual(model, measured, model_sd, centre, spread):
     """Function of the logarithms: residuals in their standard errors, the prior's behind them, and the Jacobian."""
-    weights = [1.0 / np.sqrt(m.sd**2 + (model_sd * np.abs(m.value)) ** 2) for m in measured]
+    weights = [1.0 / np.sqrt(m.sd**2 + _lines_alike(m.frequency) * (model_sd * np.abs(m.value)) ** 2) for m in measured]
     newest: dict[bytes, tuple] = {}
 
     def residual(logs):
@@ -163,6 +165,22 @@ def _residual(model, measured, model_sd, centre, spread):
         return newest[key]
 
     return residual
+
+
+def _left(measured, found, model_sd):
+    """Squares of what is left, in standard errors of each line alone."""
+    return float(
+        sum(
+            np.sum(np.abs(h - m.value) ** 2 / (m.sd**2 + (model_sd * np.abs(m.value)) ** 2))
+            for m, h in zip(measured, found)
+        )
+    )
+
+
+def _lines_alike(frequency):
+    """(n,) lines that share the model's error with each line, itself among them."""
+    octaves = np.log2(frequency)
+    return np.sum(np.abs(octaves[:, None] - octaves) <= SMOOTH / 2.0, axis=1)
 
 
 def _tied(parameters, correlation):

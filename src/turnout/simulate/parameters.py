@@ -4,9 +4,9 @@ from pathlib import Path
 
 from turnout.config.parameter_set import ParameterSet, read_parameters
 from turnout.errors import SimulationError
+from turnout.simulate.coupled import coupled
 from turnout.simulate.track_file import turnout_track
 from turnout.simulate.train import train
-from turnout.simulate.vehicle import coupled
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 

@@ -11,9 +11,9 @@ from turnout.simulate.state import PortArrays
 def contact_ports(vehicle, surfaces, start, direction):
     """(place, body row, wheel, surface, law) of each contact: every wheel on every surface of the route."""
     rows, found = vehicle.wheel_rows, []
-    for wheel, behind in enumerate(vehicle.wheel_places):
+    for wheel, (behind, law) in enumerate(zip(vehicle.wheel_places, vehicle.each("contact"))):
         for surface in range(len(surfaces)):
-            found.append((start - direction * behind, int(rows[wheel]), wheel, surface, vehicle.contact))
+            found.append((start - direction * behind, int(rows[wheel]), wheel, surface, law))
     return found
 
 

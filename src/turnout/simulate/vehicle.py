@@ -10,6 +10,7 @@ from turnout.simulate.law import PowerLaw
 
 GRAVITY = 9.81
 HERTZ = PowerLaw(93e9)
+EACH = ("contact", "radius", "pressing")  # what wheels of one train may differ in
 
 
 @dataclass(frozen=True)
@@ -38,9 +39,9 @@ class Body:
 class Vehicle:
     """Half a train (one rail). ``wheels`` are the bodies that touch the rail, front first.
 
-    ``contacts`` are the laws of each wheel's contact with the rail, one per rail surface it can touch
-    (a crossing's wing and nose); ``extra_links`` holds (ends, k, c, m) with ends pairs of a row and a weight.
-    ``radius`` of the wheels [m]; ``pressing`` [N] is a force without mass on each wheel.
+    ``contact`` is the law of a wheel's contact with any rail surface it can touch (a crossing's wing and nose),
+    ``radius`` of the wheels [m] and ``pressing`` [N] a force without mass on each: one for all wheels or a tuple with
+    one for each. ``extra_links`` holds (ends, k, c, m) with ends pairs of a row and a weight.
     ``length`` over buffers and ``overhang`` from the front end to the first wheel [m], for coupling.
 
     Errors: SimulationError where a mass is not above 0, a spring negative or a body rests on nothing.
@@ -51,10 +52,10 @@ class Vehicle:
     suspensions: tuple[Suspension, ...]
     wheels: tuple[int, ...]
     contact: object = HERTZ
-    radius: float = 0.43
+    radius: float | tuple[float, ...] = 0.43
     gravity: float = GRAVITY
     extra_links: tuple = ()
-    pressing: float = 0.0
+    pressing: float | tuple[float, ...] = 0.0
     length: float = 0.0
     overhang: float = 0.0
     conditions: dict = field(default_factory=dict)
@@ -74,6 +75,10 @@ class Vehicle:
         places = self.wheel_places
         if not len(places) or np.any(np.diff(places) <= 0.0):
             raise SimulationError(f"{self.name}: wheels must follow each other, their places are {places!r}.")
+        for what in EACH:
+            value = getattr(self, what)
+            if isinstance(value, tuple) and len(value) != len(places):
+                raise SimulationError(f"{self.name}: {what} of {len(value)} wheels, the train has {len(places)}.")
 
     @cached_property
     def row(self):
@@ -96,6 +101,11 @@ class Vehicle:
         """Distance of each wheel behind the front one [m], (n_wheel,)."""
         return np.array([self.bodies[i].place for i in self.wheels])
 
+    def each(self, what):
+        """``contact``, ``radius`` or ``pressing`` of every wheel, a tuple of n_wheel."""
+        value = getattr(self, what)
+        return value if isinstance(value, tuple) else (value,) * len(self.wheels)
+
     @cached_property
     def matrices(self):
         """Mass, damping, stiffness (n, n) and weight (n,) [N] downwards."""
@@ -105,7 +115,7 @@ class Vehicle:
             mass[row, row], weight[row] = body.mass, self.gravity * body.mass
             if body.inertia is not None:
                 mass[row + 1, row + 1] = body.inertia
-        weight[self.wheel_rows] += self.pressing
+        weight[self.wheel_rows] += self.each("pressing")
         for s in self.suspensions:
             ends = self._ends(s.upper, s.lever, 1.0) + self._ends(s.lower, s.lower_lever, -1.0)
             _add(stiffness, ends, s.stiffness)
@@ -161,6 +171,7 @@ class Vehicle:
             bodies=tuple(replace(b, place=last - b.place) for b in self.bodies),
             suspensions=tuple(replace(s, lever=-s.lever, lower_lever=-s.lower_lever) for s in self.suspensions),
             wheels=self.wheels[::-1], extra_links=links,
+            **{what: self.each(what)[::-1] for what in EACH if isinstance(getattr(self, what), tuple)},
             overhang=self.length - last - self.overhang if self.length else self.overhang,
         )  # fmt: skip
 
@@ -207,38 +218,3 @@ def lone_wheels(mass, places=(0.0,), **more):
     """Wheels of ``mass`` [kg] without suspension at ``places`` [m]; more is passed to ``Vehicle``."""
     bodies = tuple(Body(f"wheel {k}", mass, None, place) for k, place in enumerate(places))
     return Vehicle("wheels", bodies, (), tuple(range(len(bodies))), **more)
-
-
-def coupled(name, vehicles):
-    """One train of ``vehicles`` behind each other; contact and wheel radius are those of the first.
-
-    >>> two = coupled("two cars", [car(length=26.0, overhang=1.9)] * 2)
-    >>> [float(p) for p in two.wheel_places[:5]]
-    [0.0, 2.5, 17.7, 20.2, 26.0]
-    """
-    bodies: list[Body] = []
-    suspensions: list[Suspension] = []
-    wheels: list[int] = []
-    links: list[tuple] = []
-    end = -vehicles[0].overhang
-    for vehicle in vehicles:
-        shift, first = end + vehicle.overhang, len(bodies)
-        row = int(sum(1 if b.inertia is None else 2 for b in bodies))
-        bodies += [replace(b, place=b.place + shift) for b in vehicle.bodies]
-        suspensions += [replace(s, upper=s.upper + first, lower=s.lower + first) for s in vehicle.suspensions]
-        wheels += [w + first for w in vehicle.wheels]
-        links += [(tuple((r + row, f) for r, f in ends), *rest) for ends, *rest in vehicle.extra_links]
-        end += vehicle.length
-    lead = vehicles[0]
-    return Vehicle(
-        name,
-        tuple(bodies),
-        tuple(suspensions),
-        tuple(wheels),
-        contact=lead.contact,
-        radius=lead.radius,
-        extra_links=tuple(links),
-        length=end + lead.overhang,
-        overhang=lead.overhang,
-        conditions=dict(lead.conditions),
-    )

@@ -46,6 +46,28 @@ def test_clusters_are_those_of_the_traffic_and_their_number_is_found(settings):
     assert adjusted_rand_score(truth, labels(clusters, rows)) >= 0.95
 
 
+def test_the_number_of_a_traffic_that_ended_is_never_used_again(settings):
+    """Slow trains end, then their type itself, and another traffic of it begins years later."""
+    rng = np.random.default_rng(8)
+
+    def fitted(groups, previous=None):
+        rows = [
+            {"train_type": t, "speed_kmh": v * np.exp(0.01 * rng.standard_normal()), "axle_load_t": p}
+            for t, v, p, n in groups
+            for _ in range(n)
+        ]
+        found = fit_clusters(rows, settings, previous)
+        return Clusters.of(json.loads(json.dumps(found.document())))
+
+    fast, slow, other = ("IC3", 160.0, 12.0, 200), ("IC3", 80.0, 12.0, 100), ("IC3", 120.0, 18.0, 100)
+    first = fitted([fast, slow])
+    assert [c.id for c in first.clusters] == ["IC3/1", "IC3/2"]
+    third = fitted([fast, other], fitted([fast], first))
+    assert [c.id for c in third.clusters] == ["IC3/1", "IC3/3"]
+    without = fitted([("freight", 90.0, 20.0, 50)], third)
+    assert [c.id for c in fitted([other], without).clusters] == ["IC3/4"]
+
+
 def test_ids_stay_when_a_night_is_added_and_the_clusters_are_fitted_again(settings):
     rng = np.random.default_rng(2)
     rows, _ = night(rng, 600)

@@ -5,9 +5,12 @@ import pytest
 from scipy.linalg import eigh
 
 from turnout.config.parameter_set import read_parameters
+from turnout.errors import SimulationError
 from turnout.simulate import car, load_track, load_vehicle
+from turnout.simulate.coupled import coupled
 from turnout.simulate.parameters import REPOSITORY
-from turnout.simulate.vehicle import GRAVITY, Body, Suspension, Vehicle, coupled
+from turnout.simulate.ports import contact_ports
+from turnout.simulate.vehicle import GRAVITY, Body, Suspension, Vehicle, lone_wheels
 
 AXLES = {
     "ic3": 8,
@@ -98,6 +101,25 @@ def test_coupled_cars_keep_their_places_and_blocks():
     pair = coupled("pair", [car(length=26.0, overhang=1.9), car(length=24.0, overhang=1.5)])
     assert pair.wheel_places[4] == pytest.approx(26.0 - 1.9 + 1.5)
     assert list(pair.blocks) == [0, 10, 20]
+
+
+def test_wheels_of_a_composed_train_keep_their_radius_and_contact():
+    """Four wheels of the locomotive, twenty of its coaches; the other way round the coaches come first."""
+    train, locomotive, coach = (load_vehicle(name) for name in ("intercity", "locomotive", "coach"))
+    assert locomotive.radius != coach.radius and locomotive.contact != coach.contact
+    assert train.each("radius") == (locomotive.radius,) * 4 + (coach.radius,) * 20
+    assert train.turned().each("radius") == (coach.radius,) * 20 + (locomotive.radius,) * 4
+    laws = [law for *_, law in contact_ports(train, ((), ()), 0.0, 1)]
+    assert laws == [locomotive.contact] * 8 + [coach.contact] * 40
+    assert load_vehicle("wagon_four_axles", units=2).radius == load_vehicle("wagon_four_axles").radius
+
+
+def test_what_presses_the_wheels_of_a_vehicle_is_coupled_with_it():
+    light, heavy = (lone_wheels(900.0, (0.0, 2.0), pressing=force, length=5.0) for force in (3e4, 7e4))
+    pair = coupled("pair", [light, heavy])
+    assert pair.static_loads == pytest.approx([*light.static_loads, *heavy.static_loads])
+    with pytest.raises(SimulationError, match="radius of 3 wheels, the train has 4"):
+        pair.with_(radius=(0.4, 0.4, 0.4))
 
 
 @pytest.mark.parametrize(

@@ -84,7 +84,7 @@ def _log_mean(nats):
 
 def _candidate(case, train, wheel, wavelength, parts, nats, scanned):
     passage = next(case.rollings[name].passage for name, *_ in parts)
-    order = max(1, round(2.0 * np.pi * passage.vehicle.radius / wavelength))
+    order = max(1, round(2.0 * np.pi * passage.vehicle.each("radius")[wheel] / wavelength))
     radius = order * wavelength / (2.0 * np.pi)
     middle = np.mean([s.place for s in case.campaign.sensors])  # a wave a little longer then fits there at least
     phases = [(name, np.arctan2(s, c) * radius / order) for name, c, s in parts]

@@ -186,7 +186,8 @@ def _transfers(case, values, made, terms, beyond):
 
 def wheel_and_contact(vehicle, frequency):
     """(m,) receptance of the first wheel under the vehicle, and of its contact [m/N]."""
-    omega, contact = 2.0 * np.pi * frequency, vehicle.contact.tangent(float(np.mean(vehicle.static_loads)))
+    omega = 2.0 * np.pi * frequency
+    contact = vehicle.each("contact")[0].tangent(float(np.mean(vehicle.static_loads)))
     mass, damping, stiffness, _ = vehicle.matrices
     row = int(vehicle.wheel_rows[0])
     unit = np.zeros(vehicle.n)

@@ -27,11 +27,13 @@ def wheel_modes(case, values, made, sigma):
     In single precision: a long train over many sensors has a thousand modes of ten thousand samples each.
     """
     waves, scale = case.waves, sigma[:, None].astype(np.float32)
-    wheel, carrier = _amplitudes(waves, made.passage.vehicle.radius), Carrier(case, values, made, beyond=BEYOND)
-    both, modes = np.hypot(wheel, waves.sd[::2]), [profile_modes(case, values, made, carrier).astype(np.float32)]
-    for envelope, sd in zip(_stretches(waves, carrier.node), (wheel, both, both)):
+    radii, carrier = made.passage.vehicle.each("radius"), Carrier(case, values, made, beyond=BEYOND)
+    treads = {radius: _amplitudes(waves, radius) for radius in radii}
+    modes = [profile_modes(case, values, made, carrier).astype(np.float32)]
+    for envelope, rail in zip(_stretches(waves, carrier.node), (0.0, waves.sd[::2], waves.sd[::2])):
         spectra = carrier.spectra(waves.lengths, envelope)
-        for w in range(carrier.behind.size):
+        for w, radius in enumerate(radii):
+            sd = np.hypot(treads[radius], rail)
             columns = (carrier.shown(spectra, carrier.wheel(w)) * np.repeat(sd, 2)).astype(np.float32)
             modes.append(columns[:, np.sum((columns / scale) ** 2, axis=0) > FAINT * KEPT])
     modes = np.concatenate(modes, axis=1)

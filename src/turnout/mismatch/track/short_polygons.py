@@ -127,7 +127,7 @@ def evidence(z, slots):
 
 
 def _candidate(case, fit, train, wheel, lengths, k, nats, scanned, seen):
-    radius = seen[0].made.passage.vehicle.radius
+    radius = seen[0].made.passage.vehicle.each("radius")[wheel]
     order = round(2.0 * np.pi * radius / lengths[k])
     sizes = np.concatenate([_amplitudes(case, fit, s, wheel, lengths, k) for s in seen])
     amplitude = float(np.clip(np.median(sizes), 1e-6, 9e-4))

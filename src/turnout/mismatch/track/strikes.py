@@ -106,10 +106,9 @@ def _common(made, time, loud):
 
 def of_wheel(mades, loud, wheel):
     """(nats, radius, phases) of the flat on one wheel that explains best what passages of one train sound like."""
-    vehicle = mades[0].passage.vehicle
-    found = []
+    radius, found = mades[0].passage.vehicle.each("radius")[wheel], []
     for share in 1.0 + RADII:
-        turn = 2.0 * np.pi * vehicle.radius * share
+        turn = 2.0 * np.pi * radius * share
         ratios = [_ratios(m, *heard_, wheel, turn) for m, heard_ in zip(mades, loud)]
         total = sum(_mean(r, axis=0) for r in ratios)  # (n_strength * n_decay,)
         found.append((total, share, ratios))
@@ -117,7 +116,7 @@ def of_wheel(mades, loud, wheel):
     nats, best = _mean(all_.ravel(), axis=0), np.unravel_index(int(np.argmax(all_)), all_.shape)
     _, share, ratios = found[best[0]]
     phases = tuple((m.name, float(STEP * np.argmax(r[:, best[1]]))) for m, r in zip(mades, ratios))
-    return float(nats), float(share * vehicle.radius), phases
+    return float(nats), float(share * radius), phases
 
 
 def _mean(ratio, axis):

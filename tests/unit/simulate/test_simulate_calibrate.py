@@ -1,0 +1,55 @@
+"""What a calibration says of its own error: the model's error is one per octave, not one per line."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from turnout.simulate.calibrate import PARAMETERS, Measured, calibrate
+from turnout.simulate.frequency import receptance
+from turnout.simulate.matrices import assemble
+from turnout.simulate.track import uniform_track
+from turnout.simulate.turnout_track import TurnoutTrack
+
+PLACE = 30.0
+
+
+def _track():
+    track = uniform_track(60.0)
+    return track.with_(section=("S",) * track.support.size)
+
+
+def _asked(true, frequency, parameters):
+    """Calibration of the plain track by receptances of a true one, heard at the support and in mid-span."""
+    matrices, track = assemble(true), _track()
+    given = [
+        Measured(frequency, h, 1e-4 * np.abs(h), PLACE, heard)
+        for heard in (PLACE, PLACE + 0.3)
+        for h in [receptance(matrices, frequency, PLACE, heard)]
+    ]
+    return calibrate(TurnoutTrack(track, {"main": ((),)}), "S", given, location=PLACE, parameters=parameters)
+
+
+def test_the_same_curve_in_sixteen_times_the_lines_says_nothing_new():
+    """Lines within an octave share the model's error; 20 %: the curve's ends count a few lines fewer."""
+    parameters = ("pad_stiffness", "ballast_stiffness", "ballast_damping")
+    few, many = (_asked(_track(), np.linspace(60.0, 800.0, n), parameters) for n in (100, 1600))
+    for name in parameters:
+        assert many.sd[name] == pytest.approx(few.sd[name], rel=0.2)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"pad_width": 0.15},
+        {"rail": replace(_track().rail, bending_stiffness=0.95 * _track().rail.bending_stiffness)},
+    ],
+    ids=["pads of a width", "rail 5 % softer"],
+)
+def test_what_the_model_lacks_is_within_the_errors_that_are_said(wrong):
+    """A track that the five parameters cannot describe, 371 lines of two sensors, hardly any noise."""
+    found = _asked(_track().with_(**wrong), np.arange(60.0, 801.0, 2.0), tuple(PARAMETERS))
+    true = {name: getattr(_track(), name)[0] for name in PARAMETERS}
+    for name, value in found.values.items():
+        assert abs(np.log(value / true[name])) < 3.0 * found.sd[name], name
+    assert found.sd["pad_stiffness"] < 0.05  # and they say something
