@@ -16,7 +16,6 @@ from turnout.errors import SimulationError
 from turnout.readers.writing import write
 from turnout.simulate import Hammer, Sensor, load_track, load_vehicle, simulate_hammer, simulate_passage
 from turnout.simulate.hammer import hammer_sensors, located
-from turnout.simulate.turnout_track import stretch_of_track
 
 NOISE = {"acceleration": 0.05, "force": 2.0, "velocity": 1e-6, "displacement": 1e-9}
 
@@ -44,7 +43,7 @@ def write_hammer(request):
             hammer,
             sensors,
             request["blows"],
-            terms_on(track, stretch_of_track(base, place, settings.hammer_half_length), _noted(request), route),
+            terms_on(track, base, _noted(request), route),
             seed=1000 * request["seed"] + test,
             rate=rate,
             substeps=settings.substeps,

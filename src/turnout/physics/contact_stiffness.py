@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 from turnout.physics.term import Parameter, PhysicsTerm
+from turnout.simulate.vehicle import one_or_all
 
 
 @dataclass(frozen=True)
@@ -28,5 +29,5 @@ class ContactStiffness(PhysicsTerm):
     def vehicle(self, vehicle):
         """The vehicle with another contact law."""
         self.check()
-        changed = tuple(replace(law, stiffness=self.factor * law.stiffness) for law in vehicle.each("contact"))
-        return vehicle.with_(contact=changed)
+        laws = [replace(law, stiffness=self.factor * law.stiffness) for law in vehicle.each("contact")]
+        return vehicle.with_(contact=one_or_all(laws))

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.roughness import roughness
 
+OWN = 1  # beside its seed: the base model's roughness is drawn from the seed alone
+
 
 @dataclass(frozen=True)
 class Scaled:
@@ -47,4 +49,4 @@ class RoughnessLevel(PhysicsTerm):
         self.check()
         if self.amplitude == 0.0:
             return ()
-        return (Scaled(roughness(track.start - 5.0, track.end + 5.0, self.seed), self.amplitude),)
+        return (Scaled(roughness(track.start - 5.0, track.end + 5.0, [self.seed, OWN]), self.amplitude),)

@@ -12,7 +12,10 @@ SOURCE = "Grassie and Cox 1984, The dynamic response of railway track with flexi
 
 @dataclass(frozen=True)
 class SleeperMode(PhysicsTerm):
-    r"""A modal mass :math:`\mu m_s` on a spring on each rail seat, resonant at the sleeper's bending frequency."""
+    r"""A share :math:`\mu` of each sleeper's mass on a spring on its rail seat, resonant at its bending frequency.
+
+    The mode of a sleeper whose seats are held (Craig and Bampton): rigid, it has the sleeper's own mass again.
+    """
 
     share: float
     frequency: float = 180.0
@@ -23,7 +26,7 @@ class SleeperMode(PhysicsTerm):
     kind = "matrix"
     frame = "frequency"
     parameters = (
-        Parameter("share", "-", 0.0, (0.0, 1.5), "modal mass over half the sleeper's mass", SOURCE),
+        Parameter("share", "-", 0.0, (0.0, 0.95), "modal mass over half the sleeper's mass", SOURCE),
         Parameter("frequency", "Hz", 180.0, (80.0, 800.0), "resonance with the rail seats held", SOURCE),
     )
 
@@ -43,4 +46,5 @@ class SleeperMode(PhysicsTerm):
             spring = ((("sleeper", j), 1.0), (own, -1.0))
             found.append(Link(spring, mass * omega**2, 2.0 * self.damping * omega * mass, tag="sleeper_mode"))
             found.append(Link(((own, 1.0),), mass=mass, tag="sleeper_mode"))
+            found.append(Link(((("sleeper", j), 1.0),), mass=-mass, tag="sleeper_mode"))
         return found

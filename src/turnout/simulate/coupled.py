@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from turnout.simulate.vehicle import EACH, Body, Suspension, Vehicle
+from turnout.simulate.vehicle import EACH, Body, Suspension, Vehicle, one_or_all
 
 
 def coupled(name, vehicles):
@@ -32,13 +32,9 @@ def coupled(name, vehicles):
         tuple(bodies),
         tuple(suspensions),
         tuple(wheels),
-        **{what: _one_or_all([value for v in vehicles for value in v.each(what)]) for what in EACH},
+        **{what: one_or_all([value for v in vehicles for value in v.each(what)]) for what in EACH},
         extra_links=tuple(links),
         length=end + lead.overhang,
         overhang=lead.overhang,
         conditions=dict(lead.conditions),
     )
-
-
-def _one_or_all(values):
-    return values[0] if all(value == values[0] for value in values) else tuple(values)

@@ -7,11 +7,12 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.records import Recording
+from turnout.simulate.counted import on_stretch
 from turnout.simulate.law import PowerLaw
 from turnout.simulate.prepare import prepare
 from turnout.simulate.run import Drive, run
-from turnout.simulate.sensor import Sensor, measured, seated
-from turnout.simulate.turnout_track import TurnoutTrack, stretch_of_track
+from turnout.simulate.sensor import Sensor, mean_of, measured, seated
+from turnout.simulate.turnout_track import TurnoutTrack, stretch_of_track, within
 from turnout.simulate.vehicle import lone_wheels
 
 # Stiffness of the plastic tip: gives a contact of 1.2 to 1.5 ms on ballasted track, the time the paper's band
@@ -87,7 +88,7 @@ def simulate_hammer(
     n_blows : int
         Blows, each with its own speed and place.
     terms : sequence of PhysicsTerm
-        Effects added to the base model.
+        Effects added to the base model; they count the supports of the whole track.
     seed : int
         Of the blows' scatter and the channels' noise.
     rate, duration, pretrigger : float
@@ -131,12 +132,11 @@ def simulate_hammer(
         velocity = hammer.velocity * np.exp(hammer.velocity_spread * rng.normal())
         hit = place + hammer.place_spread * float(np.clip(rng.normal(), -2.0, 2.0))
         clean = _blow(prepared, hammer, velocity, hit, probes, duration - pretrigger, pulse)
-        clean = clean[:, : substeps * (clean.shape[1] // substeps)].reshape(len(channels), -1, substeps).mean(axis=2)
-        blows.append(Struck(hit, float(velocity), float(clean[0].max())))
-        before = np.zeros((len(channels), round(pretrigger * rate)))
+        blows.append(Struck(hit, float(velocity), float(mean_of(clean[0], substeps).max())))
+        before = np.zeros((len(channels), round(pretrigger * rate) * substeps))
         clean = np.concatenate([before, clean], axis=1)
         samples = [
-            measured(c, row, rate, rng, channel_terms if c.quantity != "force" else ())
+            measured(c, row, rate, rng, channel_terms if c.quantity != "force" else (), substeps)
             for c, row in zip(channels, clean)
         ]
         noted = {"hammer_id": hammer.name, "tip": "plastic", "location": place, **(conditions or {})}
@@ -151,7 +151,8 @@ def simulate_hammer(
 def prepare_hammer(track, location, terms=(), rate=20e3, substeps=1, half_length=30.0, scheme="radau"):
     """Factorisation for hammer tests near ``location``, a place [m] or a name."""
     place, base = located(track, location)
-    return prepare(stretch_of_track(base, place, half_length), 1.0 / (rate * substeps), scheme, terms)
+    stretch, terms = stretch_of_track(base, place, half_length), on_stretch(terms, within(base, place, half_length))
+    return prepare(stretch, 1.0 / (rate * substeps), scheme, terms)
 
 
 def located(track, location):

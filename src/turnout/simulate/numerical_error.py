@@ -1,9 +1,10 @@
 """Our own numerical error: repeat a run with half the time step and half the elements, band by band and sensor."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from turnout.simulate.counted import moved
 from turnout.simulate.passage import simulate_passage
 from turnout.simulate.track import PER_SUPPORT
 from turnout.simulate.turnout_track import TurnoutTrack
@@ -12,7 +13,6 @@ BANDS = ((5.0, 40.0), (40.0, 120.0), (120.0, 300.0), (300.0, 600.0), (600.0, 100
 # Orders of the waveform. Radau's three is measured (2.9 to 3) where its error is above 0.1 %; below that, and where
 # contacts chatter, all schemes come to about two. Timoshenko elements have two.
 STEP_ORDER, MESH_ORDER = {"radau": 3, "gauss": 2, "midpoint": 2}, 2
-COUNTED = ("sleeper", "support", "first", "last")  # fields of terms that count supports from the track's start
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def end_error(case, extra=30.0, bands=BANDS):
     rate = options.get("rate", 20e3)
     bare = _bare(case.sensors)
     count = _count(_base(smooth), extra)
-    moved = options | {"terms": tuple(_moved(term, count) for term in options.get("terms", ()))}
+    moved = options | {"terms": tuple(moved(term, count) for term in options.get("terms", ()))}
     here = simulate_passage(smooth, case.vehicle, case.speed, bare, **options)
     longer = simulate_passage(_lengthened(smooth, extra), case.vehicle, case.speed, bare, **moved)
     return compare(here.samples, longer.samples, rate, bands)[0]
@@ -150,8 +150,3 @@ def _lengthened(track, extra):
 def _count(track, extra):
     """Supports that ``extra`` [m] of track have."""
     return round(extra / float(track.support[1] - track.support[0]))
-
-
-def _moved(term, count):
-    """The term at the same places of a track that has ``count`` supports more in front."""
-    return replace(term, **{f.name: getattr(term, f.name) + count for f in fields(term) if f.name in COUNTED})

@@ -8,7 +8,7 @@ from turnout.errors import SimulationError
 from turnout.records import Recording
 from turnout.simulate.prepare import prepare
 from turnout.simulate.run import Drive, run
-from turnout.simulate.sensor import measured, seated
+from turnout.simulate.sensor import mean_of, measured, seated
 from turnout.simulate.turnout_track import TurnoutTrack
 from turnout.simulate.wheel_path import check_path
 
@@ -132,9 +132,10 @@ def simulate_passage(
     _check_carried(seats, prepared.track, drive)
     outcome = run(prepared, duration, probes, vehicle, drive, forces=truth)
     rng = np.random.default_rng([seed, 1])
-    clean = _mean_of(outcome.signals, substeps)
     channel_terms = [term for term in prepared.terms if term.kind == "channel"]
-    samples = np.array([measured(sensor, row, rate, rng, channel_terms) for sensor, row in zip(sensors, clean)])
+    samples = np.array(
+        [measured(sensor, row, rate, rng, channel_terms, substeps) for sensor, row in zip(sensors, outcome.signals)]
+    )
     noted = {
         "train_type": vehicle.name,
         "speed": float(speed),
@@ -148,7 +149,7 @@ def simulate_passage(
     recording = Recording(samples, rate, channels, "passage", "", 0, started_at, noted)
     if not truth:
         return recording
-    return recording, _truth(outcome, drive, vehicle, clean, rate, substeps)
+    return recording, _truth(outcome, drive, vehicle, rate, substeps)
 
 
 def prepare_passage(track, terms=(), rate=20e3, substeps=1, scheme="radau", route="main"):
@@ -184,20 +185,16 @@ def _check_carried(seats, track, drive):
             )
 
 
-def _mean_of(signals, substeps):
-    n = signals.shape[-1] // substeps
-    return signals[..., : n * substeps].reshape(*signals.shape[:-1], n, substeps).mean(axis=-1)
-
-
-def _truth(outcome, drive, vehicle, clean, rate, substeps):
+def _truth(outcome, drive, vehicle, rate, substeps):
+    clean = mean_of(outcome.signals, substeps)
     time = (np.arange(clean.shape[1]) + 0.5) / rate
     place = drive.start + drive.direction * (drive.speed * time - vehicle.wheel_places[:, None])
     return PassageTruth(
         time,
-        _mean_of(outcome.force, substeps),
-        _mean_of(outcome.surface_force, substeps),
+        mean_of(outcome.force, substeps),
+        mean_of(outcome.surface_force, substeps),
         place,
-        _mean_of(outcome.port_force, substeps),
+        mean_of(outcome.port_force, substeps),
         clean,
         outcome.iterations,
     )

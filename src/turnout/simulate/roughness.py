@@ -32,7 +32,7 @@ def roughness(start, end, seed, offset=0.0, shortest=0.02, longest=3.0, step=0.0
     ----------
     start, end : float
         Places [m]; it fades in and out over ``fade`` metres.
-    seed : int
+    seed : int or sequence of int
         Seed of numpy's default generator: the same seed gives the same rail.
     offset : float
         Level above the limit curve. [dB]

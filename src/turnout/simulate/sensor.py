@@ -63,15 +63,23 @@ def seated(sensor, terms):
     return sensor
 
 
-def measured(sensor, signal, rate, rng, terms=()):
-    r"""The samples (n,) a ``sensor`` makes of the true ``signal`` (n,) at ``rate`` [Hz].
+def mean_of(signals, substeps):
+    """(..., n) means over ``substeps`` time steps of signals (..., n * substeps); what is left over is dropped."""
+    n = signals.shape[-1] // substeps
+    return signals[..., : n * substeps].reshape(*signals.shape[:-1], n, substeps).mean(axis=-1)
 
+
+def measured(sensor, signal, rate, rng, terms=(), substeps=1):
+    r"""The samples (n,) at ``rate`` [Hz] that a ``sensor`` makes of the true ``signal`` (n * substeps,).
+
+    What lies above the sampled band is filtered before samples are taken, or it would fold into the band.
     Mounting: :math:`1 / (1 - (f/f_0)^2 + i f / (Q f_0))`. The anti-alias filter has linear phase and its delay
     is taken off, as in a sigma-delta converter. Terms of kind "channel" act before the gain.
     """
     for term in terms:
-        signal = term.channel(signal, rate, sensor)
-    signal = sensor.gain * _filtered(sensor, np.asarray(signal, dtype=float), rate) + sensor.offset
+        signal = term.channel(signal, rate * substeps, sensor)
+    signal = mean_of(_filtered(sensor, np.asarray(signal, dtype=float), rate, substeps), substeps)
+    signal = sensor.gain * signal + sensor.offset
     if sensor.noise:
         signal = signal + sensor.noise * rng.normal(size=signal.size)
     if sensor.limit is not None:
@@ -81,12 +89,12 @@ def measured(sensor, signal, rate, rng, terms=()):
     return signal
 
 
-def _filtered(sensor, signal, rate):
+def _filtered(sensor, signal, rate, substeps):
     """Mounting, delay and anti-alias filter in one transform, padded so that nothing wraps round."""
     if not (sensor.mount_frequency or sensor.delay or sensor.cutoff):
         return signal
     padded = _fast_length(signal.size + max(4096, signal.size // 8))
-    frequency = np.fft.rfftfreq(padded, 1.0 / rate)
+    frequency = np.fft.rfftfreq(padded, 1.0 / (rate * substeps))
     transfer = np.ones(frequency.size, dtype=complex)
     if sensor.mount_frequency:
         ratio = frequency / sensor.mount_frequency
@@ -94,18 +102,18 @@ def _filtered(sensor, signal, rate):
     if sensor.delay:
         transfer *= np.exp(-2j * np.pi * frequency * sensor.delay)
     if sensor.cutoff:
-        transfer *= _anti_alias(sensor.cutoff, frequency / rate)
+        transfer *= _anti_alias(sensor.cutoff, frequency / rate, substeps)
     return np.fft.irfft(np.fft.rfft(signal, padded) * transfer, padded)[: signal.size]
 
 
-def _anti_alias(cutoff, frequency):
+def _anti_alias(cutoff, frequency, substeps):
     """Amplitude of a windowed-sinc low-pass (Hamming) centred on its own delay; both in shares of the rate."""
-    k = np.arange(-(ALIAS_TAPS // 2), ALIAS_TAPS // 2 + 1)
-    taps = np.sinc(2.0 * cutoff * k) * np.hamming(ALIAS_TAPS)
+    reach = ALIAS_TAPS // 2 * substeps
+    k = np.arange(-reach, reach + 1) / substeps
+    taps = np.sinc(2.0 * cutoff * k) * np.hamming(k.size)
     taps /= taps.sum()
-    half = taps[ALIAS_TAPS // 2 + 1 :]
-    cosine = np.full(frequency.size, taps[ALIAS_TAPS // 2])
-    for m, tap in enumerate(half, start=1):
+    cosine = np.full(frequency.size, taps[reach])
+    for m, tap in zip(k[reach + 1 :], taps[reach + 1 :]):
         cosine += 2.0 * tap * np.cos(2.0 * np.pi * frequency * m)
     return cosine
 

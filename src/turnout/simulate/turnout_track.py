@@ -59,9 +59,14 @@ class TurnoutTrack:
         return replace(self, track=replace(self.track, **changes), tracks=tracks)
 
 
+def within(track, place, half_length):
+    """(n_support,) whether each support lies in the ``stretch_of_track``."""
+    return np.abs(track.support - place) <= half_length
+
+
 def stretch_of_track(track, place, half_length=30.0):
     """The track within ``half_length`` [m] of ``place``, for a hammer test that needs no more."""
-    keep = np.abs(track.support - place) <= half_length
+    keep = within(track, place, half_length)
     if keep.sum() < 3:
         raise SimulationError(f"{track.name}: no three supports within {half_length} m of {place} m.")
     values = {name: getattr(track, name)[keep] for name in PER_SUPPORT}

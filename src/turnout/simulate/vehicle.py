@@ -176,6 +176,11 @@ class Vehicle:
         )  # fmt: skip
 
 
+def one_or_all(values):
+    """What a ``Vehicle`` holds of its wheels' ``values``: the one that all share, or the tuple of them."""
+    return values[0] if all(value == values[0] for value in values) else tuple(values)
+
+
 def _add(matrix, ends, value):
     for a, wa in ends:
         for b, wb in ends:

@@ -10,6 +10,7 @@ from turnout.simulate import car, uniform_track
 from turnout.simulate.frequency import receptance, responses
 from turnout.simulate.matrices import assemble
 from turnout.simulate.sensor import Sensor
+from turnout.simulate.turnout_track import TurnoutTrack
 
 TRACK = uniform_track(24.0)
 A = Sensor("A", 12.0)
@@ -98,10 +99,22 @@ def test_radiation_with_three_layers_is_that_of_a_heavier_ballast_on_a_stronger_
     assert np.allclose(found, receptance(assemble(other), F, 12.0, 12.0), rtol=1e-9)
 
 
-def test_a_sleeper_mode_far_above_the_band_adds_its_mass():
-    """Below its resonance the modal mass moves with the sleeper: error (f/f0)² with f/f0 = 30/800."""
-    expected = receptance(assemble(TRACK.with_(sleeper_mass=180.0)), F[:1], 12.0, 12.0)
-    assert np.isclose(with_term(physics.SleeperMode(0.2, 800.0))[0], expected[0], rtol=(30.0 / 800.0) ** 2)
+def test_a_sleeper_mode_far_above_the_band_is_a_rigid_sleeper():
+    """Below its resonance the modal mass moves with the rest of it: error (f/f0)² with f/f0 = 30/800."""
+    expected = receptance(assemble(TRACK), F[:1], 12.0, 12.0)
+    assert np.isclose(with_term(physics.SleeperMode(0.6, 800.0))[0], expected[0], rtol=(30.0 / 800.0) ** 2)
+
+
+def test_a_sleeper_that_bends_has_the_dynamic_mass_of_its_mode_with_the_seats_held():
+    """m (1 - r + r (1 + 2ijz) / (1 - j² + 2ijz)) at j = f / f0: what is imaginary of it damps as the ballast does."""
+    share, own, loss = 0.3, 200.0, 0.03
+    term = physics.SleeperMode(share, own, loss)
+    for k, f in enumerate(F):
+        j = f / own
+        mass = 1.0 - share + share * (1.0 + 2j * loss * j) / (1.0 - j**2 + 2j * loss * j)
+        damping = TRACK.ballast_damping - 2.0 * np.pi * f * mass.imag * TRACK.sleeper_mass
+        same = TRACK.with_(sleeper_mass=TRACK.sleeper_mass * mass.real, ballast_damping=damping)
+        assert np.isclose(with_term(term)[k], receptance(assemble(same), [f], 12.0, 12.0)[0], rtol=1e-9)
 
 
 def test_shear_turns_an_euler_rail_into_timoshenkos_of_the_same_flexibility():
@@ -246,6 +259,16 @@ def test_roughness_scales_with_its_amplitude():
 def test_a_heavier_wheelset_presses_harder_by_its_weight():
     heavier = physics.UnsprungMass(1.4).vehicle(car())
     assert heavier.static_loads - car().static_loads == pytest.approx(0.4 * 750.0 * 9.81, rel=1e-6)
+
+
+def test_roughness_on_top_of_a_rough_rail_adds_its_power():
+    """Of the same seed, as both have where nothing is said: 1 times the curve twice over is 3 dB, not 6."""
+    rail = TurnoutTrack(TRACK, {"main": ((),)}, roughness_level=0.0)
+    x = np.arange(0.0, 24.0, 0.005)
+    base = rail.rolling(TRACK.start - 5.0, TRACK.end + 5.0, 0)[0](x)
+    more = physics.RoughnessLevel(1.0).paths(TRACK, car())[0](x)
+    assert np.std(more) == pytest.approx(np.std(base), rel=0.3)  # waves up to 3 m in 24 m
+    assert abs(np.corrcoef(base, more)[0, 1]) < 0.5  # some sixteen independent waves carry most of it
 
 
 def test_half_the_contact_constant_has_the_stiffness_of_hertz():

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from turnout.errors import SimulationError
-from turnout.physics import TERMS, LocalBallast, SensorGain, SensorPosition, SurfaceDip
+from turnout.physics import TERMS, LiftingSleepers, LocalBallast, SensorGain, SensorPosition, SurfaceDip
 from turnout.simulate import Hammer, Sensor, prepare_hammer, simulate_hammer, uniform_track
+from turnout.simulate.counted import on_stretch
 
 TRACK, MASS, VELOCITY = uniform_track(30.0), 5.5, 1.2
 HAMMER = Hammer(MASS, VELOCITY, velocity_spread=0.0, place_spread=0.0, force=Sensor("hammer", 15.0, "hammer", "force"))
@@ -35,6 +36,30 @@ def test_the_terms_of_a_prepared_track_count_in_its_channels_too():
     ]
     assert np.allclose(by_gain[1][1], 3.0 * by_gain[0][1], rtol=1e-9, atol=1e-9)
     assert np.array_equal(blow(sensors=quiet, terms=(*terms, SensorGain("A", 3.0))), by_gain[1])
+
+
+def test_a_term_counts_the_supports_of_the_whole_track_however_much_of_it_is_marched():
+    """Soft ballast 3 m from the blow changes what is heard above it, more than an end of the track 27 m from there."""
+    track, place = uniform_track(120.0), 60.0
+    near, far = (LocalBallast(track.nearest_support(x), 0.2) for x in (place + 3.0, 8.0))
+    above = [Sensor("A", place + 3.0, cutoff=None)]
+    said = {"sensors": above, **SHORT}
+    bare, short, whole = (
+        simulate_hammer(track, place, HAMMER, terms=terms, half_length=half, **said)[0].samples[1]
+        for terms, half in (((), 30.0), ((near, far), 30.0), ((near, far), 200.0))
+    )
+    assert np.std(short - bare) > 0.02 * np.std(whole)
+    assert np.std(short - whole) < 0.1 * np.std(short - bare)
+
+
+def test_of_a_run_of_supports_a_stretch_keeps_what_lies_in_it():
+    keep = np.zeros(100, dtype=bool)
+    keep[40:60] = True
+    terms = (LiftingSleepers(30, 45, 1.0), LiftingSleepers(10, 39, 1.0), LocalBallast(59, 0.3),
+             LocalBallast(60, 0.3), SensorGain("A", 2.0))  # fmt: skip
+    kept = on_stretch(terms, keep)
+    assert [type(term) for term in kept] == [LiftingSleepers, LocalBallast, SensorGain]
+    assert (kept[0].first, kept[0].last, kept[1].sleeper) == (0, 5, 19)
 
 
 @pytest.mark.parametrize(("rate", "substeps"), [(10e3, 1), (20e3, 2), (19.2e3, 1)])

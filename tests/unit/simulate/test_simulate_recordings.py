@@ -170,6 +170,19 @@ def test_calibration_says_what_the_data_cannot_tell():
     assert "the data cannot tell" in str(found)
 
 
+@pytest.mark.parametrize("tone", [600.0, 700.0, 800.0])
+def test_what_lies_above_the_sampled_band_does_not_fold_into_it(tone):
+    """1 kHz with twenty steps per sample: half the rate is 500 Hz, 54 dB is what a Hamming window stops."""
+    time = (np.arange(20 * 4096) + 0.5) / 20e3
+    heard = [
+        measured(Sensor("a", 0.0), np.sin(2.0 * np.pi * f * time), 1e3, RNG, substeps=20)[500:-500]
+        for f in (100.0, tone)
+    ]
+    mean_over_a_step = np.sinc(100.0 / 1e3)
+    assert np.ptp(heard[0]) / 2.0 == pytest.approx(mean_over_a_step, rel=5e-3)
+    assert np.ptp(heard[1]) / 2.0 < 10.0 ** (-50.0 / 20.0)
+
+
 def test_the_decay_rate_of_a_winkler_beam_is_that_of_its_exponentials():
     """Far below resonance w ~ e^(-bx)(cos bx + sin bx): the sum over the grid of EN 15461 is known."""
     h = 0.15
