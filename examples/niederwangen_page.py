@@ -200,8 +200,8 @@ def page(measured, found):
         answers=table(head, section_rows(measured, found)),
         terms=table(["section", "left out", "change", "gain", "explained", "numbers"], term_rows(measured, found)),
         dates=table(["section", "left out", "change", "gain by date"], date_rows(measured, found)),
-        warmth=f"Pads are found to soften by {min(soft):.1f} to {max(soft):.1f} % and their loss factor to fall by "
-        f"{min(calm):.1f} to {max(calm):.1f} % per kelvin, section by section.",
+        warmth=f"Pads are found to soften by {min(soft):.1f} to {max(soft):.1f} % and their loss factor to change by "
+        f"{-max(calm):+.1f} to {-min(calm):+.1f} % per kelvin, section by section.",
         spread_v=spread["vertical"], spread_l=spread["lateral"], repeat_v=repeat["vertical"],
         repeat_l=repeat["lateral"],
     )  # fmt: skip

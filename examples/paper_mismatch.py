@@ -119,13 +119,19 @@ def answer_row(name, case, found):
 
 def _unseen(check):
     """Fit on the train that nothing was fitted to, by each model."""
-    said = {"before": check.before, "with the first": check.after, "with the rival": check.rival, "decoy": check.decoy}
+    named = {"with the named effect": check.after, "with the rival": check.rival}
+    said = {"before": check.before, **named, "decoy": check.decoy}
     shown = ", ".join(f"{name} {value:.0f} %" for name, value in said.items() if value is not None)
     return shown if check.n else "no train to spare"
 
 
-def ranking_rows(found):
-    """The leaders, with the first parameter of each."""
+def ranking(found):
+    """The leaders as a table, with the first parameter of each."""
+    rows, head = list(_ranking_rows(found)), ["effect", "nats gained", "first parameter ± half its 95 % interval"]
+    return table(head, rows) if rows else "None: no effect gained evidence."
+
+
+def _ranking_rows(found):
     for score in found.verdict.scores[:4]:
         p = score.candidate.parameters[0]
         k = -len(score.candidate.parameters)
@@ -220,7 +226,6 @@ def main():
         ("campaign", "passages", "answer", "names", "probability", "because", "fit on a train never used"),
         [answer_row("as in the publication", case, found), answer_row("with more trains", more_case, more)],
     )
-    ranks = ("effect", "nats gained", "first parameter ± half its 95 % interval")
     text = PAGE.format(
         slope=SLOPE,
         excess=table(("simulation", "sensor", "5-40 Hz", "40-140 Hz"), excess_rows(excess(case, shown))),
@@ -228,8 +233,8 @@ def main():
         sentence_one=sentence(found),
         sentence_more=sentence(more),
         next_more=(recommendation(more) + "." if recommendation(more) else ""),
-        ranking_one=table(ranks, ranking_rows(found)),
-        ranking_more=table(ranks, ranking_rows(more)),
+        ranking_one=ranking(found),
+        ranking_more=ranking(more),
         concealed=SENTENCES["pad_preload"].lower(),
         outcome=f"One train: {outcome(found)} Five trains: {outcome(more)}",
     )

@@ -90,8 +90,8 @@ def _words(rows):
     """What was found, group by group."""
     lines = []
     for row in rows["mismatch_findings"]:
-        said = f"{row['verdict'].replace('_', ' ')} {row['grade'] or ''}".strip()
-        lines.append(f"{row['sections']}: {said}, probability {row['probability']:.2f}. {row['sentence']}")
+        said = row["verdict"].replace("_", " ") + (f", grade {row['grade']}" if row["grade"] else "")
+        lines.append(f"sections {row['sections']}: {said}, probability {row['probability']:.2f}. {row['sentence']}")
         lines += [f"   {line}" for line in _details(row)]
     for row in rows["quarantine"]:
         lines.append(f"nothing can be said of {row['place']}: {row['found']}")

@@ -129,12 +129,18 @@ def _docs(path: Path) -> str:
     return f"{above}{MARK}\n\n{tables()}"
 
 
+RESETTING = """An empty `section` is the whole turnout. `resets` overrules the kind: `ballast`, `railpad`, `ballast railpad`
+or `none`. Crossing or blade renewed: `rail_change`; bearers: `sleeper_change`; deposit welding: `grinding`; clips
+tightened: `other` with `railpad`.
+"""
+
+
 def tables() -> str:
     """Every column and key as Markdown."""
     blocks = ["## Columns of config/turnouts.tsv\n", _table(_flat(ROW))]
     blocks += ["## Columns of config/events.csv\n", f"`{','.join(EVENT_COLUMNS)}`. `kind` and what it resets:\n"]
     blocks.append("\n".join(f"- `{kind}`: {' and '.join(what) or 'nothing'}" for kind, what in RESETS.items()) + "\n")
-    blocks += ["## Fields of a file pattern\n"]
+    blocks += [RESETTING, "## Fields of a file pattern\n"]
     blocks += [f"- `{kind}`: " + ", ".join(f"`{{{name}}}`" for name in names) for kind, names in FIELDS.items()]
     blocks += ["\n`{section}` in `hammer` is a label of the layout; `*` is anything but a slash.\n"]
     layout = {name: rule for name, rule in layout_keys().items() if name != "settings"}

@@ -294,7 +294,8 @@ def test_one_quantity_in_one_sentence_and_no_impossible_figure(frames):
         why = dict(con.execute("select section_id, why from cannot_see()").fetchall())
     # (1 - 0.019)^2 = 0.962 and (1 - 0.015)^2 = 0.970: one degree of freedom.
     assert why["T00000/S0"] == (
-        "smallest change seen within a year: 1.9 % of frequency (about 3.8 % of stiffness); asked for: 1.5 % (3.0 %)"
+        "a change below 1.9 % of frequency (about 3.8 % of stiffness) may go unseen for a year; "
+        "asked for: 1.5 % (3.0 %)"
     )
     assert "cannot see any change" in why["T00000/S1"] and "149" not in why["T00000/S1"]
 

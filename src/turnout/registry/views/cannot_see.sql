@@ -21,10 +21,10 @@ select
             || ' with a rail temperature so far; a baseline needs a whole year and at least twelve'
         when reason = 'after_event' then n_learned || ' of ' || n_needed || ' campaigns since the event'
         when band = 'amplitude' and coalesce(detectable_pct < 50, false) then
-            printf('smallest change seen within a year: %.1f %% of acceleration; asked for: %.1f %%',
+            printf('a change below %.1f %% of acceleration may go unseen for a year; asked for: %.1f %%',
                 detectable_pct, target_pct)
         when coalesce(detectable_pct < 50, false) then
-            printf('smallest change seen within a year: %.1f %% of frequency (about %.1f %% of stiffness); '
+            printf('a change below %.1f %% of frequency (about %.1f %% of stiffness) may go unseen for a year; '
                 || 'asked for: %.1f %% (%.1f %%)',
                 detectable_pct, 100 * (1 - (1 - detectable_pct / 100) ** 2),
                 target_pct, 100 * (1 - (1 - target_pct / 100) ** 2))
