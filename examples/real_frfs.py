@@ -188,8 +188,8 @@ resonance found outside the band of the fit stands for all that lies beyond, and
 - **B1: found.** Blow 1 is named as struck with a hammer of {gain:.0%} sensitivity (its gain and the tolerance of that
   blow together): its response is that share of what its force calls for, so that the force reads too large for it or
   the responses are cut. The makers say that it was overloaded on purpose; which channel suffered they do not. The
-  double hit (blow 3) is not seen: a ratio of spectra holds for two hits as well. `make real` rejects both, hits 0 and 2 as it
-  counts, from the force itself.
+  double hit (blow 3) is not seen: a ratio of spectra holds for two hits as well. `make real` rejects both, hits 0
+  and 2 as it counts, from the force itself.
 - **B2:** {b2}
 """
 

@@ -129,9 +129,9 @@ def _docs(path: Path) -> str:
     return f"{above}{MARK}\n\n{tables()}"
 
 
-RESETTING = """An empty `section` is the whole turnout. `resets` overrules the kind: `ballast`, `railpad`, `ballast railpad`
-or `none`. Crossing or blade renewed: `rail_change`; bearers: `sleeper_change`; deposit welding: `grinding`; clips
-tightened: `other` with `railpad`.
+RESETTING = """An empty `section` is the whole turnout. `resets` overrules the kind: `ballast`, `railpad`,
+`ballast railpad` or `none`. Crossing or blade renewed: `rail_change`; bearers: `sleeper_change`; deposit welding:
+`grinding`; clips tightened: `other` with `railpad`.
 """
 
 
