@@ -11,6 +11,8 @@ from turnout.errors import ReadError
 PART = 2**18  # samples of a time column that are looked at together
 USUAL = 2**21  # samples that the usual step is taken from
 STAMP = "%Y-%m-%d %H:%M:%S.%f"
+DRIFT = 1e-4  # by which two clocks of one logger, each of its own crystal, may differ
+PER_SECOND = (1.0, 1e3, 1e6)  # a time column without unit may be in s, ms or µs
 
 
 def started_at(moment, time_zone):
@@ -115,9 +117,7 @@ def settled_rate(record, promised, where, source):
     A rate that was printed with few digits (UFF58: 1/51200 s as 1.95312E-05) becomes the whole number of Hz
     that prints the same, where there is just one.
     """
-    rate, tolerance = record.rate, record.rate_tolerance
-    if rate is None and record.time is not None and len(record.time) > 2:
-        rate, tolerance, _ = rate_of_time(record.time)
+    rate, tolerance = _stated_rate(record, where, source)
     if rate is None:
         if promised is None:
             remedy = "Give the rate in the layout, or as hammer_rate_hz or passage_rate_hz in turnouts.tsv"
@@ -126,8 +126,6 @@ def settled_rate(record, promised, where, source):
             )
         _refuse_another(record.unclear, promised, source)
         return float(promised)
-    if not isfinite(rate) or rate <= 0:
-        raise source.error(where, f"the sampling rate is {rate!r} Hz", reason="wrong_rate")
     if promised is not None:
         if abs(rate - promised) > tolerance * promised:
             remedy = "Correct the rate in the layout, or find out why the logger was set differently"
@@ -137,6 +135,23 @@ def settled_rate(record, promised, where, source):
     whole = round(rate)
     unique = rate * tolerance < 0.5
     return float(whole) if unique and abs(rate - whole) <= rate * tolerance else float(rate)
+
+
+def _stated_rate(record, where, source):
+    """(rate [Hz], its tolerance) that a record states, or else its time column; ReadError where these disagree."""
+    rate, tolerance = record.rate, record.rate_tolerance
+    if rate is not None and (not isfinite(rate) or rate <= 0):
+        raise source.error(where, f"the sampling rate is {rate!r} Hz", reason="wrong_rate")
+    if record.time is None or len(record.time) <= 2:
+        return rate, tolerance
+    measured, precision, _ = rate_of_time(record.time)
+    if rate is None:
+        return measured, precision
+    if all(abs(measured * n - rate) > (tolerance + precision + DRIFT) * rate for n in PER_SECOND):
+        found = f"its time column has {measured:.9g} samples a second, its rate says {rate:.9g} Hz"
+        remedy = "Find out which of them is right and export the record again with that one alone"
+        raise source.error(where, found, remedy, reason="wrong_rate")
+    return rate, tolerance
 
 
 def starts_of(moments, time_zone):

@@ -164,6 +164,27 @@ def test_a_wrong_rate(rate, tmp_path, in_si):
     assert str(error) == f"a.npz, record 1 of 1: sampled at {rate:g} Hz instead of 51200 Hz. {remedy}"
 
 
+@pytest.mark.parametrize("promised", [51200.0, None])
+def test_a_rate_that_the_time_column_contradicts(promised, tmp_path, in_si):
+    """Half of the stated rate by the clock: every frequency would be doubled."""
+    name = archive(tmp_path, fs=51200.0, time=np.arange(100) / 25600.0, force=saw(), rail=saw(), units=["N", "m/s²"])
+    error = only_error(name, tmp_path, replace(in_si, rate=promised), 0)
+    assert error.reason == "wrong_rate"
+    found = "its time column has 25600 samples a second, its rate says 51200 Hz"
+    remedy = "Find out which of them is right and export the record again with that one alone"
+    assert str(error) == f"a.npz, record 1 of 1: {found}. {remedy}."
+
+
+@pytest.mark.parametrize("per_second", [1.0, 1e3, 1e6])
+def test_a_time_column_without_unit_that_agrees_with_the_rate_in_ms_or_us_does_not_contradict_it(
+    per_second, tmp_path, in_si
+):
+    """Printed with four digits, of which the last is worth up to a tenth of a step, it agrees as far as these tell."""
+    time = np.array([float(f"{k * per_second / 51200.0:.4g}") for k in range(100)])
+    name = archive(tmp_path, fs=51200.0, time=time, force=saw(), rail=saw(), units=["N", "m/s²"])
+    assert read(name, tmp_path, in_si).recordings[0].rate == 51200.0
+
+
 @pytest.mark.parametrize("rate", [0.0, -51200.0, np.nan, np.inf])
 def test_a_rate_that_is_none(rate, tmp_path, in_si):
     name = archive(tmp_path, fs=rate, force=saw(), rail=saw(), units=["N", "m/s²"])
