@@ -312,6 +312,35 @@ def test_time_that_jumps_has_lost_samples(tmp_path, in_si):
     assert "time jumps from 0.00076171875 s to 0.0009765625 s at 51200 Hz: samples are missing" in str(error)
 
 
+UNEVEN = {
+    "a tenth of it at another rate": np.where(np.arange(299) < 270, 1 / 51200, 1 / 64000),
+    "a rate that rises from 43 to 59 kHz": 1 / np.linspace(43e3, 59e3, 299),
+    "steps that differ by up to 38 %": np.random.default_rng(4).uniform(0.62, 1.38, 299) / 51200,
+}
+
+
+@pytest.mark.parametrize("kind", UNEVEN)
+def test_time_that_is_not_even_is_no_rate_of_whatever_was_promised(kind, tmp_path, in_si):
+    """No step is half a step off, so that no sample is missing; the mean rate is within 2 % of the promised one."""
+    time = np.concatenate([[0.0], np.cumsum(UNEVEN[kind])])
+    name = archive(tmp_path, time=time, force=saw(300), rail=saw(300), units=["N", "m/s²"])
+    error = only_error(name, tmp_path, in_si, 0)
+    assert error.reason == "wrong_rate"
+    assert "is no even rate: sample " in error.found and " steps from where " in error.found
+    assert error.remedy == "Check the logger's clock, or export the record at an even rate"
+
+
+@pytest.mark.parametrize("n", [300, 2**18 + 2, 2**19])
+def test_time_that_is_printed_coarsely_or_drifts_with_the_warmth_of_a_day_is_even(n, tmp_path, in_si):
+    """A last digit of 0.4 steps, cut off; a crystal that changes by 1e-5: 0.7 steps from a line over 2**19 samples."""
+    k = np.arange(n)
+    time = (k + 1e-5 * k**2 / n) / 51200.0
+    digit = 0.4 / 51200.0
+    for printed in (time, np.floor(time / digit) * digit):
+        name = archive(tmp_path, time=printed, force=saw(n), rail=saw(n), units=["N", "m/s²"])
+        assert read(name, tmp_path, in_si).errors == ()
+
+
 def test_channels_of_different_length(tmp_path, in_si):
     name = archive(tmp_path, fs=51200.0, force=saw(100), rail=saw(80), units=["N", "m/s²"])
     error = only_error(name, tmp_path, in_si, 0)
