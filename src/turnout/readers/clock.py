@@ -78,7 +78,7 @@ def _parts(time):
 
 
 def check_time(time, where, source):
-    """ReadError where a time column runs backwards, is not finite, or jumps over missing samples."""
+    """ReadError where a time column runs backwards, is not finite, jumps over missing samples, or is not even."""
     for start, part in _parts(time):
         if not np.isfinite(part).all():
             found = f"the time of sample {start + int(np.argmin(np.isfinite(part)))} is not a number"
@@ -98,6 +98,26 @@ def check_time(time, where, source):
             "Copy the file again from the logger; if the gap is there too, the logger lost samples",
             reason="truncated",
         )
+    _check_even(time, rate, where, source)
+
+
+def _check_even(time, rate, where, source):
+    """ReadError where time leaves a straight line by more than a step and what a crystal may drift.
+
+    Printed digits stay within a step, or it would stand still; each part has a line of its own, for over hours the
+    warmth of the day moves a crystal by many steps.
+    """
+    for start, part in _parts(time):
+        steps = np.arange(part.size)
+        off = np.abs((part - part[0]) * rate - steps)
+        if (odd := off > 1.0 + DRIFT * steps).any():
+            k = int(np.argmax(odd))
+            found = (
+                f"its time column is not even: sample {start + k}, at {part[k]:.9g} s, is {off[k]:.3g} steps from "
+                f"where {rate:.6g} Hz put it"
+            )
+            remedy = "Check the logger's clock, or export the record at an even rate"
+            raise source.error(where, found, remedy, reason="wrong_rate")
 
 
 def _refuse_another(unclear, promised, source):

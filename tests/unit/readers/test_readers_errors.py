@@ -326,15 +326,15 @@ def test_time_that_is_not_even_is_no_rate_of_whatever_was_promised(kind, tmp_pat
     name = archive(tmp_path, time=time, force=saw(300), rail=saw(300), units=["N", "m/s²"])
     error = only_error(name, tmp_path, in_si, 0)
     assert error.reason == "wrong_rate"
-    assert "is no even rate: sample " in error.found and " steps from where " in error.found
+    assert "its time column is not even: sample " in error.found and " steps from where " in error.found
     assert error.remedy == "Check the logger's clock, or export the record at an even rate"
 
 
 @pytest.mark.parametrize("n", [300, 2**18 + 2, 2**19])
 def test_time_that_is_printed_coarsely_or_drifts_with_the_warmth_of_a_day_is_even(n, tmp_path, in_si):
-    """A last digit of 0.4 steps, cut off; a crystal that changes by 1e-5: 0.7 steps from a line over 2**19 samples."""
+    """A last digit of 0.4 steps, cut off; a crystal that changes by 2e-5: 2.6 steps from a line over 2**19 samples."""
     k = np.arange(n)
-    time = (k + 1e-5 * k**2 / n) / 51200.0
+    time = (k + 2e-5 * (k**2 / n - k)) / 51200.0
     digit = 0.4 / 51200.0
     for printed in (time, np.floor(time / digit) * digit):
         name = archive(tmp_path, time=printed, force=saw(n), rail=saw(n), units=["N", "m/s²"])
