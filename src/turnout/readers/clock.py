@@ -1,35 +1,13 @@
-"""When a record began and how fast it was sampled: what the file says against what was promised."""
+"""How fast a record was sampled: what the file and its time column say against what was promised."""
 
-from datetime import UTC
 from math import isfinite
-from zoneinfo import ZoneInfo
 
 import numpy as np
 
-from turnout.errors import ReadError
-
 PART = 2**18  # samples of a time column that are looked at together
 USUAL = 2**21  # samples that the usual step is taken from
-STAMP = "%Y-%m-%d %H:%M:%S.%f"
 DRIFT = 1e-4  # by which two clocks of one logger, each of its own crystal, may differ
 PER_SECOND = (1.0, 1e3, 1e6)  # a time column without unit may be in s, ms or µs
-
-
-def started_at(moment, time_zone):
-    """Naive UTC of a file's start time; a time stamp without a zone is in ``time_zone`` (IANA name).
-
-    >>> from datetime import datetime
-    >>> started_at(datetime(2024, 5, 13, 12, 0), "Europe/Zurich")
-    datetime.datetime(2024, 5, 13, 10, 0)
-    """
-    if moment is None:
-        return None
-    if moment.tzinfo is None:
-        moment = moment.replace(tzinfo=ZoneInfo(time_zone))
-    try:
-        return moment.astimezone(UTC).replace(tzinfo=None)
-    except OverflowError:  # a damaged stamp in the year 1 or 9999
-        return None
 
 
 def rate_of_time(time):
@@ -172,38 +150,3 @@ def _stated_rate(record, where, source):
         remedy = "Find out which of them is right and export the record again with that one alone"
         raise source.error(where, found, remedy, reason="wrong_rate")
     return rate, tolerance
-
-
-def starts_of(moments, time_zone):
-    """[(record, naive UTC)] of [(record, time stamp)] of one file, in its order.
-
-    Of an hour that comes twice in autumn the first is meant, unless a record would then begin before the one in front.
-
-    >>> from datetime import datetime
-    >>> stamps = enumerate([datetime(2024, 10, 27, 2, 55), datetime(2024, 10, 27, 2, 5)])
-    >>> [f"{start:%H:%M}" for _, start in starts_of(stamps, "Europe/Copenhagen")]
-    ['00:55', '01:05']
-    """
-    found, latest = [], None
-    for record, moment in moments:
-        start = started_at(moment, time_zone)
-        if start is not None and latest is not None and start < latest and moment.tzinfo is None:
-            second = started_at(moment.replace(fold=1), time_zone)
-            start = second if second is not None and second >= latest else start
-        found.append((record, start))
-        latest = start if latest is None or (start is not None and start > latest) else latest
-    return found
-
-
-def check_order(starts, source):
-    """{record: ReadError} for each record that began before the one in front of it."""
-    errors: dict[int, ReadError] = {}
-    latest = None
-    for record, start in starts:
-        if latest is not None and start is not None and start < latest:
-            found = f"it began at {start:{STAMP}}, before the record in front of it ({latest:{STAMP}})"
-            remedy = "Check the logger's clock and the time zone in the layout"
-            errors[record] = source.error(f"record {record + 1}", found, remedy, reason="clock_backwards")
-        elif start is not None:
-            latest = start
-    return errors

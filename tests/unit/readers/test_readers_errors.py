@@ -304,6 +304,39 @@ def test_a_record_that_began_before_the_one_in_front_of_it(tmp_path, in_si, hamm
     assert str(error) == f"a.npz, record 3: {began}. Check the logger's clock and the time zone in the layout."
 
 
+@pytest.mark.parametrize(("odd", "neighbour"), [(0, 1), (1, 2)])
+def test_one_stamp_of_the_future_costs_its_record_and_not_those_behind_it(odd, neighbour, tmp_path, in_si, hammer_test):
+    ahead = [
+        replace(r, started_at=r.started_at.replace(year=2099)) if k == odd else r for k, r in enumerate(hammer_test)
+    ]
+    path = write(ahead, tmp_path / "a.npz", "npz")
+    error = only_error(path.name, tmp_path, in_si, 3)
+    assert error.reason == "clock_backwards"
+    began = (
+        f"it began at 2099-05-13 10:0{odd}:01.250000, after a record behind it (2024-05-13 10:0{neighbour}:01.250000)"
+    )
+    assert str(error) == f"a.npz, record {odd + 1}: {began}. Check the logger's clock and the time zone in the layout."
+
+
+@pytest.mark.parametrize(
+    ("minutes", "refused"),
+    [
+        ((0, 3, 2, 5), [2]),  # nobody knows which of two is wrong: the first stays, as ever
+        ((9, 1), [1]),
+        ((5, 6, 7, 0, 1, 2), [3, 4, 5]),
+        ((8, 0, 1, 9, 2, 3), [0, 3]),
+        ((4, 4, 4, 0, 4), [3]),  # equal stamps are in order
+    ],
+)
+def test_the_records_that_stay_are_the_most_that_are_in_order(minutes, refused, tmp_path, in_si, hammer_test):
+    start = hammer_test[0].started_at
+    records = [replace(hammer_test[k % 4], started_at=start.replace(minute=m)) for k, m in enumerate(minutes)]
+    path = write(records, tmp_path / "a.npz", "npz")
+    result = read(path.name, tmp_path, in_si)
+    assert [int(e.where.split()[-1]) - 1 for e in result.errors] == refused
+    assert {e.reason for e in result.errors} == {"clock_backwards"}
+
+
 def test_time_that_jumps_has_lost_samples(tmp_path, in_si):
     time = np.delete(np.arange(110), slice(40, 50)) / 51200.0
     name = archive(tmp_path, time=time, force=saw(), rail=saw(), units=["N", "m/s²"])
