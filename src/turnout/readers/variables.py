@@ -124,7 +124,7 @@ def raw_file(variables: Mapping, source, around: Facts | None = None) -> RawFile
     if numbered:
         first, last = min(numbered), max(numbered)
         parts = [(variables.get(numbered.get(k, "")), f"record {k - first + 1}") for k in range(first, last + 1)]
-    elif inner and not _vectors(variables) and not _matrices(variables):
+    elif inner and not vectors(variables) and not matrices(variables):
         if len(inner) == 1:
             return raw_file(variables[inner[0]], source, facts)
         parts = [(variables[name], f"group {name!r}") for name in sorted(inner, key=natural)]
@@ -163,13 +163,13 @@ def _whole(variables, facts, source, k=0, n=1):
     """The records of variables that hold samples themselves."""
     if damaged := [v for v in variables.values() if isinstance(v, ReadError)]:
         raise damaged[0]
-    matrices = _matrices(variables)
-    if len(matrices) > 1:
-        candidates = ", ".join(repr(name) for name in matrices)
+    blocks_by_name = matrices(variables)
+    if len(blocks_by_name) > 1:
+        candidates = ", ".join(repr(name) for name in blocks_by_name)
         raise source.error(
             "the file", f"several arrays could be the samples: {candidates}", "Export one array or one per record"
         )
-    for name, array in matrices.items():
+    for name, array in blocks_by_name.items():
         blocks = array if array.ndim == 3 else [array]
         if array.ndim == 3 and len(names := texts(facts.get(NAMES))) and array.shape[1] != len(names):
             raise source.error(f"variable {name!r}", f"{array.shape} samples do not match {len(names)} channels")
@@ -177,22 +177,22 @@ def _whole(variables, facts, source, k=0, n=1):
             blocks = array.transpose(2, 1, 0)
         count = (k, n) if array.ndim == 2 else (0, len(blocks))
         return [_record(b, facts, count[0] + i, count[1], f"variable {name!r}", source) for i, b in enumerate(blocks)]
-    vectors = _vectors(variables)
-    if not vectors:
+    channels = vectors(variables)
+    if not channels:
         return []
     noted = facts.get(UNITS)
-    units = [noted.get(v, "") for v in vectors] if isinstance(noted, Mapping) else texts(noted)
-    units = units if len(units) == len(vectors) else [units[0] if len(units) == 1 else ""] * len(vectors)
-    return [_settled(tuple(vectors), list(vectors.values()), units, facts, k, n)]
+    units = [noted.get(v, "") for v in channels] if isinstance(noted, Mapping) else texts(noted)
+    units = units if len(units) == len(channels) else [units[0] if len(units) == 1 else ""] * len(channels)
+    return [_settled(tuple(channels), list(channels.values()), units, facts, k, n)]
 
 
-def _matrices(variables):
+def matrices(variables):
     """Arrays of samples in two or three dimensions."""
     arrays = {name: v for name, v in variables.items() if isinstance(v, ARRAYS) and v.dtype.kind in "fiu"}
     return {name: v for name, v in arrays.items() if v.ndim in (2, 3) and min(v.shape) >= 1 and max(v.shape) > 1}
 
 
-def _vectors(variables):
+def vectors(variables):
     """Vectors that can be channels; those much shorter than the longest are notes, not samples."""
     known = {*RATE, *STEP, *TIME, *NAMES, *UNITS, *START, *COUNT, *CONDITIONS}
     found = {
