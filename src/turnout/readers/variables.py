@@ -17,12 +17,12 @@ What is recognised (names without regard to case, except ``t``):
   4. vectors of equal length, each a channel named like its variable.
 """
 
-import re
 from collections.abc import Mapping
 
 import numpy as np
 
 from turnout.errors import ReadError
+from turnout.readers.numbered import by_number, natural, numbered_names
 from turnout.readers.precision import EXACT, SINGLE, single_precision, step_precision
 from turnout.readers.raw import CONDITIONS, RawFile, RawRecord
 from turnout.readers.stamps import moment
@@ -41,7 +41,6 @@ NAMES = ("channels", "channel_names", "names", "labels")
 UNITS = ("units", "unit", "channel_units")
 START = ("started_at", "start_time", "starttime", "wf_start_time")
 COUNT = ("n_records", "n_record")
-NUMBERED = re.compile(r"^(?:record|rec|segment|impact|hit)[_ ]?(\d+)$", re.IGNORECASE)
 
 
 class Facts:
@@ -119,11 +118,10 @@ def raw_file(variables: Mapping, source, around: Facts | None = None) -> RawFile
     """All records that ``variables`` hold; a value may be a ReadError where it is damaged."""
     facts = Facts(variables, source, around)
     expected = facts.count(COUNT)
-    numbered = {int(m[1]): name for name in variables if (m := NUMBERED.match(name))}
+    numbered = numbered_names(variables)
     inner = [name for name, value in variables.items() if isinstance(value, Mapping)]
     if numbered:
-        first, last = min(numbered), max(numbered)
-        parts = [(variables.get(numbered.get(k, "")), f"record {k - first + 1}") for k in range(first, last + 1)]
+        parts = [(value, f"record {i + 1}") for i, value in enumerate(by_number(numbered, variables, source))]
     elif inner and not vectors(variables) and not matrices(variables):
         if len(inner) == 1:
             return raw_file(variables[inner[0]], source, facts)
@@ -132,11 +130,6 @@ def raw_file(variables: Mapping, source, around: Facts | None = None) -> RawFile
         return RawFile(tuple(_whole(variables, facts, source)), expected)
     records = [_part(value, k, len(parts), where, facts, source) for k, (value, where) in enumerate(parts)]
     return RawFile(tuple(records), expected)
-
-
-def natural(name):
-    """Key that sorts "record_2" before "record_10"."""
-    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name)]
 
 
 def _part(value, k, n, where, facts, source):

@@ -387,3 +387,23 @@ def test_a_record_missing_between_its_neighbours(tmp_path, in_si):
     error = only_error(name, tmp_path, in_si, 2)
     assert error.reason == "truncated"
     assert f"a.npz, record 2: this record is missing between its neighbours. {COPY}" in str(error)
+
+
+@pytest.mark.parametrize("numbers", [("20240513101500", "20240513140000"), ("7", "99999999999999999999", "2000")])
+def test_records_numbered_by_a_clock_or_a_counter_miss_none_between_them(numbers, tmp_path, in_si):
+    records = {f"rec_{n}": np.vstack([saw() + k, saw()[::-1]]) for k, n in enumerate(numbers)}
+    name = archive(tmp_path, fs=51200.0, channels=["force", "rail"], units=["N", "g"], **records)
+    result = read(name, tmp_path, in_si)
+    assert result.errors == ()
+    in_order = sorted(range(len(numbers)), key=lambda k: int(numbers[k]))
+    assert [r.samples[0, 0] for r in result.recordings] == [-3.0 + k for k in in_order]
+
+
+def test_two_names_for_one_number_cost_that_record(tmp_path, in_si):
+    records = {name: np.vstack([saw() + k, saw()[::-1]]) for k, name in enumerate(("hit_1", "impact_1", "hit_2"))}
+    name = archive(tmp_path, fs=51200.0, channels=["force", "rail"], units=["N", "g"], **records)
+    error = only_error(name, tmp_path, in_si, 1)
+    found = "'hit_1' and 'impact_1' are both number 1"
+    assert str(error) == f"a.npz, record 1: {found}. Number the records each by a number of its own."
+    (recording,) = read(name, tmp_path, in_si).recordings
+    assert (recording.record, recording.samples[0, 0]) == (1, -1.0)
