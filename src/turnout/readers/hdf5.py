@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 
 from turnout.errors import ReadError
+from turnout.readers.listed_units import Alphabetical
 from turnout.readers.raw import RawFile
 from turnout.readers.stored import stays, stored
 from turnout.readers.together import check_together
@@ -31,7 +32,10 @@ def read_raw(source) -> RawFile:
 
 def _variables(group, source):
     """Members and attributes of a group in one dictionary; a dataset that cannot be read is its ReadError."""
-    variables = {name: _attribute(value) for name, value in group.attrs.items()}
+    made = group[group.name].id.get_create_plist()  # a File's own id does not know it
+    tracked = made.get_link_creation_order() & h5py.h5p.CRT_ORDER_TRACKED
+    kind = dict if tracked else Alphabetical  # members come in the order of their making only where it was kept
+    variables = kind({name: _attribute(value) for name, value in group.attrs.items()})
     units, clocks = {}, {}
     for name, member in group.items():
         if isinstance(member, h5py.Group):

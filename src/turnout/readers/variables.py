@@ -22,6 +22,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from turnout.errors import ReadError
+from turnout.readers.listed_units import Alphabetical, listed_units
 from turnout.readers.numbered import by_number, natural, numbered_names
 from turnout.readers.precision import EXACT, SINGLE, single_precision, step_precision
 from turnout.readers.raw import CONDITIONS, RawFile, RawRecord
@@ -173,10 +174,21 @@ def _whole(variables, facts, source, k=0, n=1):
     channels = vectors(variables)
     if not channels:
         return []
-    noted = facts.get(UNITS)
-    units = [noted.get(v, "") for v in channels] if isinstance(noted, Mapping) else texts(noted)
-    units = units if len(units) == len(channels) else [units[0] if len(units) == 1 else ""] * len(channels)
+    units = _units_of(channels, facts, not isinstance(variables, Alphabetical), f"record {k + 1}", source)
     return [_settled(tuple(channels), list(channels.values()), units, facts, k, n)]
+
+
+def _units_of(channels, facts, ordered, where, source):
+    """The unit of each variable that is a channel, "" where the file does not say."""
+    noted = facts.get(UNITS)
+    if isinstance(noted, Mapping):
+        return [noted.get(name, "") for name in channels]
+    units = listed_units(list(channels), texts(noted), texts(facts.get(NAMES)), ordered)
+    if units is None:
+        found = f"nothing says which of the units {', '.join(map(repr, texts(noted)))} are whose"
+        remedy = "Write each dataset's unit beside it, or a list 'channels' of their names beside that of the units"
+        raise source.error(where, found, remedy, reason="unit_unknown")
+    return units
 
 
 def matrices(variables):

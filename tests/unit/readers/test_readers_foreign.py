@@ -14,7 +14,7 @@ import soundfile
 
 from turnout.errors import ReadError
 from turnout.readers import read
-from turnout.readers.writing import write
+from turnout.readers.writing import mat73, write
 from turnout.records import Channel, RawChannel, RawDescription, Recording
 
 RATE = 51200.0
@@ -109,6 +109,64 @@ def test_hdf5_with_a_group_per_blow_and_a_time_vector(by_name, tmp_path):
     first, second = read("a.h5", tmp_path, by_name).recordings
     both(first)
     np.testing.assert_allclose(second.signal("force"), 3 * FORCE)
+
+
+def named_by_a_list(folder, **lists):
+    """Groups of datasets, which HDF5 keeps by the alphabet, below lists in the order in which the logger counts."""
+    with h5py.File(folder / "a.h5", "w") as file:
+        file.attrs.update({"rate": RATE, **lists})
+        for blow in (1, 2):
+            group = file.create_group(f"hit_{blow}")
+            group["Sleeper"], group["Force"], group["Acc"] = RAIL[::-1] * blow, FORCE, RAIL
+    return "a.h5"
+
+
+@pytest.fixture
+def by_three_names(by_name):
+    return replace(by_name, channels=(*by_name.channels, RawChannel("sleeper", "Sleeper", "acceleration")))
+
+
+@pytest.mark.parametrize("names", [["Sleeper", "Force", "Acc"], ["SLEEPER", "Spare", "Force", "Acc"]])
+def test_a_list_of_units_goes_by_the_list_of_names_beside_it(names, by_three_names, tmp_path):
+    """By the alphabet "Acc" would be in g and "Sleeper" in m/s², both wrong by 9.8."""
+    units = [{"SLEEPER": "g", "FORCE": "kN", "ACC": "m/s²"}.get(name.upper(), "V") for name in names]
+    result = read(named_by_a_list(tmp_path, channels=names, units=units), tmp_path, by_three_names)
+    assert result.errors == ()
+    for blow, recording in enumerate(result.recordings, start=1):
+        np.testing.assert_allclose(recording.signal("force"), 1000 * FORCE, rtol=1e-14)
+        np.testing.assert_allclose(recording.signal("rail"), RAIL, rtol=1e-14)
+        np.testing.assert_allclose(recording.signal("sleeper"), 9.80665 * blow * RAIL[::-1], rtol=1e-14)
+
+
+@pytest.mark.parametrize("lists", [{}, {"channels": ["a", "b", "c"]}])
+def test_a_list_of_units_in_no_order_is_not_dealt_out_by_the_alphabet(lists, by_three_names, tmp_path):
+    result = read(named_by_a_list(tmp_path, units=["g", "N", "m/s²"], **lists), tmp_path, by_three_names)
+    assert [e.reason for e in result.errors] == ["unit_unknown"] * 2
+    assert result.errors[1].found == "nothing says which of the units 'g', 'N', 'm/s²' are whose"
+    assert result.errors[1].where == "record 2"
+    remedy = "Write each dataset's unit beside it, or a list 'channels' of their names beside that of the units"
+    assert result.errors[1].remedy == remedy
+    accelerations = replace(
+        by_three_names, channels=(*by_three_names.channels[1:], RawChannel("f", "Force", "ignored"))
+    )
+    same = read(named_by_a_list(tmp_path, units=["g"] * 3, **lists), tmp_path, accelerations)
+    np.testing.assert_allclose(same.recordings[0].signal("rail"), 9.80665 * RAIL, rtol=1e-14)
+
+
+def test_a_list_of_units_goes_by_the_order_of_variables_where_the_file_keeps_it(by_name, tmp_path):
+    """Force before Acc: HDF5 that notes the order of its making, MATLAB 5; the alphabet in MATLAB 7.3."""
+    with h5py.File(tmp_path / "a.h5", "w", track_order=True) as file:
+        file["Force"], file["Acc"] = FORCE, RAIL
+        file.attrs.update({"rate": RATE, "units": ["N", "m/s²"]})
+    both(read("a.h5", tmp_path, by_name).recordings[0])
+    with h5py.File(tmp_path / "a.mat", "w", userblock_size=512) as file:
+        for name, numbers in (("Force", FORCE), ("Acc", RAIL), ("fs", RATE)):
+            mat73._double(file, name, numbers)
+        mat73._cell(file, "units", ["N", "m/s²"])
+    with (tmp_path / "a.mat").open("r+b") as file:
+        file.write(mat73.HEADER.ljust(116) + bytes(8) + b"\x00\x02IM")
+    (error,) = _raised("a.mat", tmp_path, by_name)
+    assert error.reason == "unit_unknown" and "which of the units 'N', 'm/s²' are whose" in error.found
 
 
 def test_tdms_of_one_group_with_scaled_integers(by_name, tmp_path):
