@@ -36,7 +36,8 @@ def _variables(group, source):
     tracked = made.get_link_creation_order() & h5py.h5p.CRT_ORDER_TRACKED
     kind = dict if tracked else Alphabetical  # members come in the order of their making only where it was kept
     variables = kind({name: _attribute(value) for name, value in group.attrs.items()})
-    units, clocks = {}, {}
+    units: dict[str, str] = {}
+    clocks: dict[str, dict] = {}
     for name, member in group.items():
         if isinstance(member, h5py.Group):
             variables[name] = _variables(member, source)
