@@ -103,8 +103,11 @@ class Source:
             raise
         except Exception as error:
             said = " ".join(str(error).split())[:200] or type(error).__name__
-            if (fault := _fault_of_the_machine(error)) and not _asks_for_more_than(MOST * self.size, error):
-                raise fault from (None if fault is error else error)
+            fault = None if _asks_for_more_than(MOST * self.size, error) else _fault_of_the_machine(error)
+            if fault is error:
+                raise
+            if fault:
+                raise fault from error
             raise self.error(where, f"{library} cannot read it ({said})", reason=reason) from error
 
 

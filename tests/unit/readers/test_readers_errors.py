@@ -3,6 +3,7 @@
 import os
 from dataclasses import replace
 
+import h5py
 import numpy as np
 import pytest
 
@@ -173,6 +174,20 @@ def test_a_rate_that_the_time_column_contradicts(promised, tmp_path, in_si):
     found = "its time column has 25600 samples a second, its rate says 51200 Hz"
     remedy = "Find out which of them is right and export the record again with that one alone"
     assert str(error) == f"a.npz, record 1 of 1: {found}. {remedy}."
+
+
+def test_a_frequency_of_rcm_dx_that_its_time_stamps_contradict_costs_that_record(tmp_path, in_si, hammer_test):
+    path = write(hammer_test[:2], tmp_path / "a.rcmdx", "rcmdx")
+
+    def change(name, item):
+        if item.attrs.get("CommonTriggerFrequency"):
+            item.attrs["CommonTriggerFrequency"] = np.float32(25600.0)
+
+    with h5py.File(path, "r+") as file:
+        file.visititems(change)
+    result = read(path.name, tmp_path, in_si)
+    assert {e.reason for e in result.errors} == {"wrong_rate"} and len(result.errors) == 2
+    assert "samples a second, its rate says 25600 Hz" in result.errors[0].found
 
 
 @pytest.mark.parametrize("per_second", [1.0, 1e3, 1e6])
