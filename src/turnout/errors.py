@@ -1,5 +1,7 @@
 """What can go wrong, said so that a track engineer knows what to do next."""
 
+import errno
+
 
 class TurnoutError(Exception):
     """Anything this program raises on purpose."""
@@ -73,6 +75,28 @@ class SimulationError(TurnoutError):
 
 class RegistryError(TurnoutError):
     """The registry refuses rows or cannot be used: says table, row, column, value."""
+
+
+# Faults of the machine are nobody's result: those of one file pass or are repaired, the others end the job.
+ONE_FILE = {errno.EIO, errno.ESTALE, errno.EREMOTEIO, errno.ETIMEDOUT, errno.ENOMEM, errno.EACCES}
+EVERY_FILE = {errno.ENOSPC, errno.EDQUOT, errno.EMFILE, errno.ENFILE}
+
+
+def of_the_machine(error: BaseException) -> bool:
+    """Whether ``error`` says nothing of the unit that met it."""
+    return passing(error) or (isinstance(error, OSError) and error.errno in EVERY_FILE)
+
+
+def passing(error: BaseException) -> bool:
+    """Whether the unit that met ``error`` is left for the next run while the others go on.
+
+    A bad sector, a server that does not answer, a file that may not be read or is too large for the memory of this
+    moment.
+
+    >>> passing(OSError(errno.EIO, "Input/output error")), passing(OSError(errno.ENOSPC, "No space left on device"))
+    (True, False)
+    """
+    return isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno in ONE_FILE)
 
 
 # The closed list of reasons for a quarantine row or a rejected impact, and what each one means.

@@ -6,9 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from turnout.config import TurnoutConfig
-from turnout.errors import PartlyComputed, ReadError
+from turnout.errors import PartlyComputed, ReadError, of_the_machine
 from turnout.fleet.batches import UnitResult, encode
-from turnout.fleet.machine import of_the_machine
 from turnout.fleet.scan import unit_id
 from turnout.records import Unit
 from turnout.registry.ids import content_id

@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from turnout.config import Configuration
+from turnout.errors import passing
 from turnout.fleet.batches import UnitResult
 from turnout.fleet.copies import copies, key_without, originals, with_copies_said, without
 from turnout.fleet.guard import guarded
 from turnout.fleet.keys import contents_of, key_of, short
 from turnout.fleet.ledger import Ledger
-from turnout.fleet.machine import passing
 from turnout.fleet.moved import moved, withdrawn
 from turnout.fleet.plan import Planned, read_plan
 from turnout.fleet.pool import in_order

@@ -7,6 +7,9 @@ from turnout.errors import ReadError
 from turnout.readers.units import IGNORED, conversion, to_si
 from turnout.records import Channel, RawChannel
 
+# What loggers write for a unit where nobody told them one; without case.
+MEANINGLESS = ("", "-", "eu", "none", "n/a", "a.u.", "arb", "1", "?", "unknown", "undefined", "unitless")
+
 
 @dataclass(frozen=True)
 class Mapping:
@@ -99,10 +102,13 @@ def _mapping(index, file_unit, raw: RawChannel, where, source):
 def settled_unit(file_unit, layout_unit):
     """The unit of the raw numbers: both must agree where both speak; "V!" in a layout overrules the file.
 
+    Counts of a file become what the layout says that a count is worth: a voltage, or a unit with its factor. Labels
+    that say nothing are overruled by the layout; ValueError for another unit that is not known.
+
     Examples
     --------
-    >>> settled_unit("Newtons", None), settled_unit("", "mV"), settled_unit("g", "V!")
-    ('Newtons', 'mV', 'V')
+    >>> settled_unit("Newtons", None), settled_unit("EU", "mV"), settled_unit("g", "V!"), settled_unit("count", "0.5 N")
+    ('Newtons', 'mV', 'V', '0.5 N')
     """
     if layout_unit is None:
         if not file_unit:
@@ -111,13 +117,18 @@ def settled_unit(file_unit, layout_unit):
     if layout_unit.endswith("!"):
         return layout_unit[:-1]
     stated = conversion(layout_unit)
+    if file_unit.strip().strip("[]").strip().casefold() in MEANINGLESS:
+        return layout_unit
     try:
         written = conversion(file_unit)
     except ValueError:
-        return layout_unit
+        raise ValueError(_both_say(f"{file_unit!r}, which is not known", layout_unit)) from None
+    of_a_count = stated.dimension == "voltage" or layout_unit.lstrip(" [+-.")[:1].isdigit()
     same = stated.dimension == written.dimension and abs(stated.scale - written.scale) <= 1e-9 * abs(stated.scale)
-    if not same and written.dimension != "count":
-        raise ValueError(
-            f"the file says {file_unit!r}, the layout {layout_unit!r} ({layout_unit + '!'!r} would overrule the file)"
-        )
+    if not same and not (written.dimension == "count" and of_a_count):
+        raise ValueError(_both_say(repr(file_unit), layout_unit))
     return layout_unit
+
+
+def _both_say(said, layout_unit):
+    return f"the file says {said}, the layout {layout_unit!r} ({layout_unit + '!'!r} would overrule the file)"

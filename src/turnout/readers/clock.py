@@ -1,33 +1,13 @@
-"""When a record began and how fast it was sampled: what the file says against what was promised."""
+"""How fast a record was sampled: what the file and its time column say against what was promised."""
 
-from datetime import UTC
 from math import isfinite
-from zoneinfo import ZoneInfo
 
 import numpy as np
 
-from turnout.errors import ReadError
-
 PART = 2**18  # samples of a time column that are looked at together
 USUAL = 2**21  # samples that the usual step is taken from
-STAMP = "%Y-%m-%d %H:%M:%S.%f"
-
-
-def started_at(moment, time_zone):
-    """Naive UTC of a file's start time; a time stamp without a zone is in ``time_zone`` (IANA name).
-
-    >>> from datetime import datetime
-    >>> started_at(datetime(2024, 5, 13, 12, 0), "Europe/Zurich")
-    datetime.datetime(2024, 5, 13, 10, 0)
-    """
-    if moment is None:
-        return None
-    if moment.tzinfo is None:
-        moment = moment.replace(tzinfo=ZoneInfo(time_zone))
-    try:
-        return moment.astimezone(UTC).replace(tzinfo=None)
-    except OverflowError:  # a damaged stamp in the year 1 or 9999
-        return None
+DRIFT = 1e-4  # by which two clocks of one logger, each of its own crystal, may differ
+PER_SECOND = (1.0, 1e3, 1e6)  # a time column without unit may be in s, ms or µs
 
 
 def rate_of_time(time):
@@ -76,7 +56,7 @@ def _parts(time):
 
 
 def check_time(time, where, source):
-    """ReadError where a time column runs backwards, is not finite, or jumps over missing samples."""
+    """ReadError where a time column runs backwards, is not finite, jumps over missing samples, or is not even."""
     for start, part in _parts(time):
         if not np.isfinite(part).all():
             found = f"the time of sample {start + int(np.argmin(np.isfinite(part)))} is not a number"
@@ -96,6 +76,26 @@ def check_time(time, where, source):
             "Copy the file again from the logger; if the gap is there too, the logger lost samples",
             reason="truncated",
         )
+    _check_even(time, rate, where, source)
+
+
+def _check_even(time, rate, where, source):
+    """ReadError where time leaves a straight line by more than a step and what a crystal may drift.
+
+    Printed digits stay within a step, or it would stand still; each part has a line of its own, for over hours the
+    warmth of the day moves a crystal by many steps.
+    """
+    for start, part in _parts(time):
+        steps = np.arange(part.size)
+        off = np.abs((part - part[0]) * rate - steps)
+        if (odd := off > 1.0 + DRIFT * steps).any():
+            k = int(np.argmax(odd))
+            found = (
+                f"its time column is not even: sample {start + k}, at {part[k]:.9g} s, is {off[k]:.3g} steps from "
+                f"where {rate:.6g} Hz put it"
+            )
+            remedy = "Check the logger's clock, or export the record at an even rate"
+            raise source.error(where, found, remedy, reason="wrong_rate")
 
 
 def _refuse_another(unclear, promised, source):
@@ -115,9 +115,7 @@ def settled_rate(record, promised, where, source):
     A rate that was printed with few digits (UFF58: 1/51200 s as 1.95312E-05) becomes the whole number of Hz
     that prints the same, where there is just one.
     """
-    rate, tolerance = record.rate, record.rate_tolerance
-    if rate is None and record.time is not None and len(record.time) > 2:
-        rate, tolerance, _ = rate_of_time(record.time)
+    rate, tolerance = _stated_rate(record, where, source)
     if rate is None:
         if promised is None:
             remedy = "Give the rate in the layout, or as hammer_rate_hz or passage_rate_hz in turnouts.tsv"
@@ -126,8 +124,6 @@ def settled_rate(record, promised, where, source):
             )
         _refuse_another(record.unclear, promised, source)
         return float(promised)
-    if not isfinite(rate) or rate <= 0:
-        raise source.error(where, f"the sampling rate is {rate!r} Hz", reason="wrong_rate")
     if promised is not None:
         if abs(rate - promised) > tolerance * promised:
             remedy = "Correct the rate in the layout, or find out why the logger was set differently"
@@ -139,36 +135,18 @@ def settled_rate(record, promised, where, source):
     return float(whole) if unique and abs(rate - whole) <= rate * tolerance else float(rate)
 
 
-def starts_of(moments, time_zone):
-    """[(record, naive UTC)] of [(record, time stamp)] of one file, in its order.
-
-    Of an hour that comes twice in autumn the first is meant, unless a record would then begin before the one in front.
-
-    >>> from datetime import datetime
-    >>> stamps = enumerate([datetime(2024, 10, 27, 2, 55), datetime(2024, 10, 27, 2, 5)])
-    >>> [f"{start:%H:%M}" for _, start in starts_of(stamps, "Europe/Copenhagen")]
-    ['00:55', '01:05']
-    """
-    found, latest = [], None
-    for record, moment in moments:
-        start = started_at(moment, time_zone)
-        if start is not None and latest is not None and start < latest and moment.tzinfo is None:
-            second = started_at(moment.replace(fold=1), time_zone)
-            start = second if second is not None and second >= latest else start
-        found.append((record, start))
-        latest = start if latest is None or (start is not None and start > latest) else latest
-    return found
-
-
-def check_order(starts, source):
-    """{record: ReadError} for each record that began before the one in front of it."""
-    errors: dict[int, ReadError] = {}
-    latest = None
-    for record, start in starts:
-        if latest is not None and start is not None and start < latest:
-            found = f"it began at {start:{STAMP}}, before the record in front of it ({latest:{STAMP}})"
-            remedy = "Check the logger's clock and the time zone in the layout"
-            errors[record] = source.error(f"record {record + 1}", found, remedy, reason="clock_backwards")
-        elif start is not None:
-            latest = start
-    return errors
+def _stated_rate(record, where, source):
+    """(rate [Hz], its tolerance) that a record states, or else its time column; ReadError where these disagree."""
+    rate, tolerance = record.rate, record.rate_tolerance
+    if rate is not None and (not isfinite(rate) or rate <= 0):
+        raise source.error(where, f"the sampling rate is {rate!r} Hz", reason="wrong_rate")
+    if record.time is None or len(record.time) <= 2:
+        return rate, tolerance
+    measured, precision, _ = rate_of_time(record.time)
+    if rate is None:
+        return measured, precision
+    if all(abs(measured * n - rate) > (tolerance + precision + DRIFT) * rate for n in PER_SECOND):
+        found = f"its time column has {measured:.9g} samples a second, its rate says {rate:.9g} Hz"
+        remedy = "Find out which of them is right and export the record again with that one alone"
+        raise source.error(where, found, remedy, reason="wrong_rate")
+    return rate, tolerance

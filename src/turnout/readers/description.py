@@ -7,9 +7,10 @@ import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.channels import mappings
-from turnout.readers.clock import check_order, check_time, settled_rate, starts_of
+from turnout.readers.clock import check_time, settled_rate
 from turnout.readers.long_record import Soundness, Stretches, fault
 from turnout.readers.raw import COPY_AGAIN
+from turnout.readers.started import check_order, starts_of
 from turnout.records import LongRecording, RawDescription, Recording
 
 TOO_SHORT = 2  # samples; one sample has neither rate nor spread

@@ -9,9 +9,11 @@ import h5py
 import numpy as np
 
 from turnout.errors import ReadError
+from turnout.readers.listed_units import Alphabetical
 from turnout.readers.raw import RawFile
 from turnout.readers.stored import stays, stored
-from turnout.readers.variables import RATE, STEP, TIME, raw_file
+from turnout.readers.together import check_together
+from turnout.readers.variables import RATE, STEP, TIME, Facts, matrices, raw_file, vectors
 
 UNIT = ("unit", "units", "Unit", "Units")
 
@@ -30,8 +32,12 @@ def read_raw(source) -> RawFile:
 
 def _variables(group, source):
     """Members and attributes of a group in one dictionary; a dataset that cannot be read is its ReadError."""
-    variables = {name: _attribute(value) for name, value in group.attrs.items()}
-    units = {}
+    made = group[group.name].id.get_create_plist()  # a File's own id does not know it
+    tracked = made.get_link_creation_order() & h5py.h5p.CRT_ORDER_TRACKED
+    kind = dict if tracked else Alphabetical  # members come in the order of their making only where it was kept
+    variables = kind({name: _attribute(value) for name, value in group.attrs.items()})
+    units: dict[str, str] = {}
+    clocks: dict[str, dict] = {}
     for name, member in group.items():
         if isinstance(member, h5py.Group):
             variables[name] = _variables(member, source)
@@ -46,11 +52,27 @@ def _variables(group, source):
         for key, value in member.attrs.items():
             if key in UNIT and isinstance(value := _attribute(value), str):
                 units[name] = value
-            elif key.lower() in (*RATE, *STEP, "channels", "channel_names", "units"):
+            elif key.lower() in (*RATE, *STEP):
+                clocks.setdefault(name, {})[key] = _attribute(value)
+            elif key.lower() in ("channels", "channel_names", "units"):
                 variables.setdefault(key, _attribute(value))
+    _settle(variables, clocks, source)
     if units and not any(key.lower() == "units" for key in variables):
         variables["units"] = units
     return variables
+
+
+def _settle(variables, clocks, source):
+    """The rate or step that samples state each for themselves becomes that of all; those of another are an error."""
+    for name in (*vectors(variables), *matrices(variables)):
+        try:
+            common, own = (Facts(of, source).rate() for of in (variables, clocks.get(name, {})))
+            if common is None:
+                variables |= clocks.get(name, {})
+            elif common and own:
+                check_together((), (1.0 / common, 1.0 / own), (0.0, 0.0), f"dataset {name!r}", source)
+        except ReadError as error:
+            variables[name] = error
 
 
 def _values(dataset):

@@ -12,6 +12,7 @@ from turnout.errors import ReadError
 from turnout.readers.precision import TEXT, step_precision
 from turnout.readers.raw import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, number_or_text
 from turnout.readers.stamps import moment
+from turnout.readers.together import check_together, seconds_behind
 from turnout.readers.variables import Facts
 
 END_OF_HEADER = b"***End_of_Header***"
@@ -72,7 +73,8 @@ def _record(source, start, stop, head, separator, k, n):
     with source.parsed_by("the header", where):
         count = int(fields["Channels"][0])
         samples = [int(s) for s in fields.get("Samples", [])[:count]]
-        step = float(fields["Delta_X"][0].replace(point, ".")) if fields.get("Delta_X") else 0.0
+        steps = [float(s.replace(point, ".")) for s in fields.get("Delta_X", [])[:count] if s] or [0.0]
+        offsets = [float(x.replace(point, ".") or 0.0) for x in _each(fields, "X0", count)]
     if len(names) != count:
         raise source.error(where, f"it names {len(names)} of {count} channels", COPY_AGAIN, reason="truncated")
     with_x = 0 if head.get("X_Columns") == "No" else 1 if head.get("X_Columns", "One") == "One" else count
@@ -83,21 +85,28 @@ def _record(source, start, stop, head, separator, k, n):
             found = f"ends after {len(column)} of {promised} samples"
             raise source.error(place, found, COPY_AGAIN, reason="truncated")
     units = fields.get("Y_Unit_Label", [])
-    date = f"{_at(fields, 'Date') or head.get('Date', '')}".replace("/", "-")
-    clock = (_at(fields, "Time") or head.get("Time", "")).replace(",", ".")
+    stamps = [_moment(*cells) for cells in zip(_each(fields, "Date", count), _each(fields, "Time", count))]
+    starts = [a + b for a, b in zip(seconds_behind(stamps), offsets)]
+    check_together(names, steps, starts, where, source)
+    step = steps[0]
     return RawRecord(
         names=tuple(names),
         samples=columns,
         rate=1.0 / step if step > 0 else None,
         rate_tolerance=max(step_precision(step), TEXT),
         units=tuple(units[:count]) if len(units) >= count else ("",) * count,
-        started_at=moment(f"{date}T{clock[:15]}"),
+        started_at=_moment(*(_each(fields, name, 1)[0] or head.get(name, "") for name in ("Date", "Time"))),
         conditions={name: number_or_text(head[name]) for name in CONDITIONS if name in head},
     )
 
 
-def _at(fields, name):
-    return next(iter(fields.get(name, [])), "")
+def _each(fields, name, count):
+    """The field ``name`` of each channel, "" where there is none."""
+    return [*fields.get(name, []), *[""] * count][:count]
+
+
+def _moment(date, clock):
+    return moment(f"{date.replace('/', '-')}T{clock.replace(',', '.')[:15]}")
 
 
 def _columns(source, body, separator, point, count, with_x, where):

@@ -10,11 +10,13 @@ import h5py
 import numpy as np
 import pymatreader
 
+from turnout.readers.listed_units import Alphabetical
 from turnout.readers.raw import RawFile
 from turnout.readers.stored import stays, stored
 from turnout.readers.variables import TIME, raw_file
 
 LEAST = 128  # bytes of the header of version 5
+NEW = b"MATLAB 7.3"
 
 
 def read_raw(source) -> RawFile:
@@ -23,9 +25,10 @@ def read_raw(source) -> RawFile:
         raise source.error("the header", f"the file ends after {source.size} bytes", reason="truncated")
     with source.parsed_by("pymatreader"), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # objects and tables it cannot read are no samples
-        large = _large(source) if source.stay and source.head.startswith(b"MATLAB 7.3") else {}
+        large = _large(source) if source.stay and source.head.startswith(NEW) else {}
         read = pymatreader.read_mat(source.path, ignore_fields=list(large)) | large
-    return raw_file(_plain({k: v for k, v in read.items() if not k.startswith("__")}), source)
+    kind = Alphabetical if source.head.startswith(NEW) else dict
+    return raw_file(_plain({k: v for k, v in read.items() if not k.startswith("__")}, kind), source)
 
 
 def _large(source):
@@ -38,14 +41,14 @@ def _large(source):
     }
 
 
-def _plain(value):
-    """Dictionaries and arrays throughout; a structure array becomes numbered records."""
+def _plain(value, kind):
+    """Dictionaries of a ``kind`` and arrays throughout; a structure array becomes numbered records."""
     if isinstance(value, dict):
-        members = {name: _plain(v) for name, v in value.items()}
-        return {name: v for name, v in members.items() if v is not None}
+        members = {name: _plain(v, kind) for name, v in value.items()}
+        return kind({name: v for name, v in members.items() if v is not None})
     if isinstance(value, list):
         if value and all(isinstance(v, dict) for v in value):
-            return {f"record_{i:03d}": _plain(v) for i, v in enumerate(value)}
+            return {f"record_{i:03d}": _plain(v, kind) for i, v in enumerate(value)}
         if value and all(isinstance(v, np.ndarray) and v.ndim == 2 for v in value):
             return {f"record_{i:03d}": v for i, v in enumerate(value)}
         return value if all(isinstance(v, str) for v in value) else np.asarray(value, dtype=object)

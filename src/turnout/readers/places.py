@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from turnout.errors import ReadError
+from turnout.errors import ReadError, of_the_machine
 from turnout.readers.raw import Source
 
 HEAD = 4096  # bytes, enough for every signature
@@ -31,6 +31,8 @@ def load(path, root) -> Source:
         again = "Correct the path; if it was there before, start again when it is back, or plan anew without it"
         raise ReadError(name, "the path", "there is no such file", again, reason="vanished") from error
     except OSError as error:
+        if of_the_machine(error) and not isinstance(error, PermissionError):
+            raise
         found = f"the file cannot be opened ({error.strerror})"
         raise ReadError(name, "the path", found, "Correct its permissions or copy it again") from error
     if not size:

@@ -1,7 +1,9 @@
 """What a reader of one format hands over: the numbers as they stand in the file, nothing converted."""
 
 import hashlib
+import math
 import mmap
+import re
 from collections.abc import Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -12,10 +14,12 @@ from pathlib import Path
 import numpy as np
 
 from turnout.content import sha256_of
-from turnout.errors import ReadError, TurnoutError
+from turnout.errors import ReadError, TurnoutError, of_the_machine
 from turnout.records import NOTHING
 
 COPY_AGAIN = "Copy the file again from the logger"
+SYSTEM_ERROR = re.compile(r"errno = (\d{1,9})\b")
+MOST = 1032  # bytes that one of a file can become: deflate's bound
 # What may stand beside the samples in any format, and reaches Recording.conditions.
 CONDITIONS = (
     "rail_temperature",
@@ -89,14 +93,37 @@ class Source:
 
     @contextmanager
     def parsed_by(self, library, where="the file", reason="unreadable"):
-        """Turn whatever ``library`` raises on damaged bytes into a ReadError; for the library's call alone."""
+        """Turn whatever ``library`` raises on damaged bytes into a ReadError; for the library's call alone.
+
+        A fault of the machine is no damage, and goes on as it is.
+        """
         try:
             yield
         except TurnoutError:
             raise
         except Exception as error:
             said = " ".join(str(error).split())[:200] or type(error).__name__
+            fault = None if _asks_for_more_than(MOST * self.size, error) else _fault_of_the_machine(error)
+            if fault is error:
+                raise
+            if fault:
+                raise fault from error
             raise self.error(where, f"{library} cannot read it ({said})", reason=reason) from error
+
+
+def _fault_of_the_machine(error):
+    """``error`` where the machine is at fault, an OSError where HDF5 says so in the text of another; else None."""
+    if of_the_machine(error):
+        return error
+    told = SYSTEM_ERROR.search(str(error))
+    fault = OSError(int(told[1]), str(error)) if told else None
+    return fault if fault and of_the_machine(fault) else None
+
+
+def _asks_for_more_than(n_byte, error):
+    """Whether numpy had no memory for an array of more bytes: that is the length which damaged bytes make up."""
+    shape, dtype = getattr(error, "shape", None), getattr(error, "dtype", None)
+    return shape is not None and dtype is not None and math.prod(shape) * dtype.itemsize > n_byte
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,6 @@ import h5py
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.clock import rate_of_time
 from turnout.readers.raw import CONDITIONS, COPY_AGAIN, RawFile, RawRecord
 from turnout.readers.stored import stays, stored
 from turnout.readers.variables import Facts
@@ -94,11 +93,6 @@ def _record(group, notes, source):
         raise source.error(where, f"its channels name different frequencies: {sorted(rates)} Hz", reason="wrong_rate")
     time = (stamps - stamps[0]) * 1e-9
     rate, tolerance = rates.pop() if rates else None, SINGLE_PRECISION
-    if rate is not None and (np.diff(time) > 0).all():
-        measured, precision, _ = rate_of_time(time)
-        if abs(measured - rate) > (precision + 1e-4) * rate:
-            found = f"its time stamps are {measured:.6g} Hz apart, its frequency says {rate:.6g} Hz"
-            raise source.error(where, found, COPY_AGAIN, reason="wrong_rate")
     names = tuple(name.rpartition(".")[2] for name in channels)
     names = names if len(set(names)) == len(names) else tuple(channels)
     return RawRecord(

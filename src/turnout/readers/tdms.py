@@ -8,14 +8,15 @@ import struct
 from contextlib import nullcontext
 
 import nptdms
-import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.precision import TEXT, step_precision
+from turnout.readers.numbered import natural
+from turnout.readers.precision import step_precision
 from turnout.readers.raw import COPY_AGAIN, RawFile, RawRecord
 from turnout.readers.stamps import moment
 from turnout.readers.stored import Column
-from turnout.readers.variables import COUNT, START, Facts, natural
+from turnout.readers.together import check_together, seconds_behind
+from turnout.readers.variables import COUNT, START, Facts
 
 nptdms.log.log_manager.set_level("ERROR")  # what it warns of on the console is found by cut_off and becomes a reason
 LEAD_IN = 28  # bytes: tag, mask, version, offset of the next segment, offset of the raw data
@@ -83,11 +84,7 @@ def _sound_record(group, k, n, names, damaged, properties, source):
             found = f"ends after {len(channel)}{f' of {promised:g}' if promised else ''} samples"
             place = f"{where}, channel {channel.name!r}"
             raise source.error(place, found, COPY_AGAIN, reason="truncated")
-    steps = [Facts(c.properties, source).number(("wf_increment",)) or 0.0 for c in channels]
-    if not np.allclose(steps, steps[0], rtol=TEXT, atol=0.0):
-        found = f"its channels have different steps: {sorted(set(steps))} s"
-        raise source.error(where, found, "Record all channels of a group at one rate", reason="wrong_rate")
-    step = steps[0]
+    step = _common_step(channels, where, source)
     stated = {"rate": 1.0 / step, "rate_tolerance": step_precision(step)} if step else None
     with source.parsed_by("npTDMS", where):
         samples = [_numbers(c, source.stay) for c in channels]
@@ -101,6 +98,16 @@ def _sound_record(group, k, n, names, damaged, properties, source):
         conditions=facts.conditions(0, 1),
         aliases=tuple((f"{group.name}/{c.name}",) for c in channels),
     )
+
+
+def _common_step(channels, where, source):
+    """Step [s] of all channels, 0 where none says it; a channel begins at its time stamp and ``wf_start_offset``."""
+    facts = [Facts(c.properties, source) for c in channels]
+    steps = [f.number(("wf_increment",)) or 0.0 for f in facts]
+    stamps = seconds_behind([moment(f.one(("wf_start_time",), 0, 1)) for f in facts])
+    starts = [stamp + (f.number(("wf_start_offset",)) or 0.0) for stamp, f in zip(stamps, facts)]
+    check_together([c.name for c in channels], steps, starts, where, source)
+    return steps[0]
 
 
 def _numbers(channel, stay):

@@ -7,10 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from turnout.errors import ReadError
 from turnout.readers.places import load
 from turnout.readers.raw import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, number_or_text
 from turnout.readers.stamps import uff_moment
 from turnout.readers.stored import Column
+from turnout.readers.together import check_together
 from turnout.readers.uff_sets import UffSet, says_si, sets_of
 
 PROMISED = re.compile(r"record \d+ of (\d+)$")
@@ -132,13 +134,12 @@ def _record(group, channels, k, n, si, source):
             return source.error(place, one.damage, COPY_AGAIN, reason="truncated")
     sets = [group[key] for key in channels]
     first = sets[0]
-    steps = {(s.step, s.start) for s in sets}
-    if len({s.step for s in sets}) > 1:
-        found = f"its channels have different steps: {sorted(step for step, _ in steps)} s"
-        return source.error(
-            f"record {k + 1} of {n}", found, "Export channels of one rate to one file", reason="wrong_rate"
-        )
     names, aliases = _distinct(channels)
+    starts, steps = zip(*map(_axis, sets))
+    try:
+        check_together(names, steps, starts, f"record {k + 1} of {n}", source)
+    except ReadError as error:
+        return error
     return RawRecord(
         names=names,
         samples=[s.data for s in sets],
@@ -150,6 +151,13 @@ def _record(group, channels, k, n, si, source):
         time=first.x,
         aliases=aliases,
     )
+
+
+def _axis(one):
+    """(start, mean step) of a set's abscissa [s]."""
+    if one.x is None or len(one.x) < 2:
+        return one.start, one.step
+    return float(one.x[0]), float(one.x[-1] - one.x[0]) / (len(one.x) - 1)
 
 
 def _call(key):

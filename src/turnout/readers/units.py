@@ -11,11 +11,22 @@ IGNORED = "ignored"  # quantity of a channel that is in the file and not wanted
 UNITS = {
     "voltage": {"V": (1.0, 0.0), "mV": (1e-3, 0.0), "µV": (1e-6, 0.0), "kV": (1e3, 0.0)},
     "count": {"count": (1.0, 0.0)},
-    "force": {"N": (1.0, 0.0), "mN": (1e-3, 0.0), "kN": (1e3, 0.0), "lbf": (4.4482216152605, 0.0)},
+    "force": {
+        "N": (1.0, 0.0),
+        "mN": (1e-3, 0.0),
+        "daN": (10.0, 0.0),
+        "kN": (1e3, 0.0),
+        "MN": (1e6, 0.0),
+        "kgf": (STANDARD_GRAVITY, 0.0),
+        "lbf": (4.4482216152605, 0.0),
+    },
     "acceleration": {
         "m/s²": (1.0, 0.0),
         "mm/s²": (1e-3, 0.0),
+        "cm/s²": (1e-2, 0.0),
         "km/s²": (1e3, 0.0),
+        "ft/s²": (0.3048, 0.0),
+        "in/s²": (0.0254, 0.0),
         "g": (STANDARD_GRAVITY, 0.0),
         "mg": (1e-3 * STANDARD_GRAVITY, 0.0),
     },
@@ -29,12 +40,16 @@ SPELLINGS = {
     "V": "Volt Volts volt volts v",
     "mV": "Millivolt Millivolts millivolts",
     "µV": "uV microvolts",
-    "count": "counts Counts COUNT LSB lsb",
+    "count": "counts Counts COUNT cts digit digits ADC LSB lsb",
     "N": "Newton Newtons newton newtons",
     "kN": "Kilonewton kilonewton",
+    "kgf": "kp",
     "lbf": "lb_f lbs",
     "m/s²": "m/s^2 m/s**2 m/s2 m/s/s ms-2 m*s^-2 m·s⁻² MeterPerSecondSquared (m/s²) (m/s^2) (m/s2)",
     "mm/s²": "mm/s^2 mm/s2",
+    "cm/s²": "cm/s^2 cm/s2 Gal gal",
+    "ft/s²": "ft/s^2 ft/s2",
+    "in/s²": "in/s^2 in/s2",
     "g": "gn g_n G gravity",
     "m/s": "MeterPerSecond MetersPerSecond",
     "km/h": "kph KilometerPerHour",
@@ -43,6 +58,7 @@ SPELLINGS = {
     "µm": "um micrometer Micrometer",
     "m/m": "strain -",
     "µm/m": "um/m µstrain ustrain microstrain ue µε",
+    "Pa": "Pascal Pascals pascal",
     "°C": "degC deg_C Celsius celsius DegreeCelsius C",
     "K": "Kelvin kelvin",
     "°F": "degF Fahrenheit",
@@ -58,6 +74,7 @@ SI = {
 }
 _CANONICAL = {name: name for units in UNITS.values() for name in units}
 _CANONICAL |= {other: name for name, others in SPELLINGS.items() for other in others.split()}
+_CANONICAL |= {"deg C": "°C", "Deg C": "°C", "deg F": "°F", "Deg F": "°F"}
 _NUMBER = re.compile(r"^([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.+)$")
 
 

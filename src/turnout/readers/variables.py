@@ -17,12 +17,13 @@ What is recognised (names without regard to case, except ``t``):
   4. vectors of equal length, each a channel named like its variable.
 """
 
-import re
 from collections.abc import Mapping
 
 import numpy as np
 
 from turnout.errors import ReadError
+from turnout.readers.listed_units import Alphabetical, listed_units
+from turnout.readers.numbered import by_number, natural, numbered_names
 from turnout.readers.precision import EXACT, SINGLE, single_precision, step_precision
 from turnout.readers.raw import CONDITIONS, RawFile, RawRecord
 from turnout.readers.stamps import moment
@@ -41,7 +42,6 @@ NAMES = ("channels", "channel_names", "names", "labels")
 UNITS = ("units", "unit", "channel_units")
 START = ("started_at", "start_time", "starttime", "wf_start_time")
 COUNT = ("n_records", "n_record")
-NUMBERED = re.compile(r"^(?:record|rec|segment|impact|hit)[_ ]?(\d+)$", re.IGNORECASE)
 
 
 class Facts:
@@ -119,12 +119,11 @@ def raw_file(variables: Mapping, source, around: Facts | None = None) -> RawFile
     """All records that ``variables`` hold; a value may be a ReadError where it is damaged."""
     facts = Facts(variables, source, around)
     expected = facts.count(COUNT)
-    numbered = {int(m[1]): name for name in variables if (m := NUMBERED.match(name))}
+    numbered = numbered_names(variables)
     inner = [name for name, value in variables.items() if isinstance(value, Mapping)]
     if numbered:
-        first, last = min(numbered), max(numbered)
-        parts = [(variables.get(numbered.get(k, "")), f"record {k - first + 1}") for k in range(first, last + 1)]
-    elif inner and not _vectors(variables) and not _matrices(variables):
+        parts = [(value, f"record {i + 1}") for i, value in enumerate(by_number(numbered, variables, source))]
+    elif inner and not vectors(variables) and not matrices(variables):
         if len(inner) == 1:
             return raw_file(variables[inner[0]], source, facts)
         parts = [(variables[name], f"group {name!r}") for name in sorted(inner, key=natural)]
@@ -132,11 +131,6 @@ def raw_file(variables: Mapping, source, around: Facts | None = None) -> RawFile
         return RawFile(tuple(_whole(variables, facts, source)), expected)
     records = [_part(value, k, len(parts), where, facts, source) for k, (value, where) in enumerate(parts)]
     return RawFile(tuple(records), expected)
-
-
-def natural(name):
-    """Key that sorts "record_2" before "record_10"."""
-    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name)]
 
 
 def _part(value, k, n, where, facts, source):
@@ -163,13 +157,13 @@ def _whole(variables, facts, source, k=0, n=1):
     """The records of variables that hold samples themselves."""
     if damaged := [v for v in variables.values() if isinstance(v, ReadError)]:
         raise damaged[0]
-    matrices = _matrices(variables)
-    if len(matrices) > 1:
-        candidates = ", ".join(repr(name) for name in matrices)
+    blocks_by_name = matrices(variables)
+    if len(blocks_by_name) > 1:
+        candidates = ", ".join(repr(name) for name in blocks_by_name)
         raise source.error(
             "the file", f"several arrays could be the samples: {candidates}", "Export one array or one per record"
         )
-    for name, array in matrices.items():
+    for name, array in blocks_by_name.items():
         blocks = array if array.ndim == 3 else [array]
         if array.ndim == 3 and len(names := texts(facts.get(NAMES))) and array.shape[1] != len(names):
             raise source.error(f"variable {name!r}", f"{array.shape} samples do not match {len(names)} channels")
@@ -177,22 +171,33 @@ def _whole(variables, facts, source, k=0, n=1):
             blocks = array.transpose(2, 1, 0)
         count = (k, n) if array.ndim == 2 else (0, len(blocks))
         return [_record(b, facts, count[0] + i, count[1], f"variable {name!r}", source) for i, b in enumerate(blocks)]
-    vectors = _vectors(variables)
-    if not vectors:
+    channels = vectors(variables)
+    if not channels:
         return []
+    units = _units_of(channels, facts, not isinstance(variables, Alphabetical), f"record {k + 1}", source)
+    return [_settled(tuple(channels), list(channels.values()), units, facts, k, n)]
+
+
+def _units_of(channels, facts, ordered, where, source):
+    """The unit of each variable that is a channel, "" where the file does not say."""
     noted = facts.get(UNITS)
-    units = [noted.get(v, "") for v in vectors] if isinstance(noted, Mapping) else texts(noted)
-    units = units if len(units) == len(vectors) else [units[0] if len(units) == 1 else ""] * len(vectors)
-    return [_settled(tuple(vectors), list(vectors.values()), units, facts, k, n)]
+    if isinstance(noted, Mapping):
+        return [noted.get(name, "") for name in channels]
+    units = listed_units(list(channels), texts(noted), texts(facts.get(NAMES)), ordered)
+    if units is None:
+        found = f"nothing says which of the units {', '.join(map(repr, texts(noted)))} are whose"
+        remedy = "Write each dataset's unit beside it, or a list 'channels' of their names beside that of the units"
+        raise source.error(where, found, remedy, reason="unit_unknown")
+    return units
 
 
-def _matrices(variables):
+def matrices(variables):
     """Arrays of samples in two or three dimensions."""
     arrays = {name: v for name, v in variables.items() if isinstance(v, ARRAYS) and v.dtype.kind in "fiu"}
     return {name: v for name, v in arrays.items() if v.ndim in (2, 3) and min(v.shape) >= 1 and max(v.shape) > 1}
 
 
-def _vectors(variables):
+def vectors(variables):
     """Vectors that can be channels; those much shorter than the longest are notes, not samples."""
     known = {*RATE, *STEP, *TIME, *NAMES, *UNITS, *START, *COUNT, *CONDITIONS}
     found = {

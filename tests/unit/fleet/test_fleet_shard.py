@@ -5,6 +5,7 @@ import json
 import os
 import sys
 
+import numpy as np
 import pytest
 from length_fleet import CALLS, Fleet
 
@@ -18,6 +19,7 @@ from turnout.fleet.postponed import read_postponed
 from turnout.fleet.stage import Stage
 from turnout.fleet.state import State, batch_paths, load_state
 from turnout.fleet.verdict import judge, verdict
+from turnout.readers import read
 
 
 def test_first_run_then_nothing_then_one(fleet):
@@ -108,6 +110,35 @@ def test_a_file_that_is_closed_after_it_was_planned_is_read_once_it_is_open(flee
     assert fleet.run().postponed == 3
     monkeypatch.undo()
     assert fleet.run().processed == 3
+
+
+def n_read(unit, turnout, raw_root, algo=""):
+    """How many samples each file has."""
+    rows: dict[str, list] = {"recordings": [], "quarantine": []}
+    for path, *_ in unit.files:
+        (recording,) = read(path, raw_root, turnout.hammer.descriptions[unit.label.partition("/")[0]]).recordings
+        rows["recordings"].append({"path": path, "n_samples": recording.n_sample, "kind": "hammer"})
+    return rows
+
+
+def test_a_file_that_its_library_could_not_read_for_a_bad_sector_is_read_when_it_can_be(fleet, monkeypatch):
+    for k in range(3):
+        np.savez(fleet.raw / "a.npz", fs=51200.0, units=["N", "g"], data=np.arange(10.0 + 4 * k).reshape(2, -1))
+        (fleet.raw / "a.npz").rename(fleet.raw / f"t{k}/2024-05-13/A_1.txt")
+    load = np.load
+
+    def bad(path, **more):
+        if "t1" in str(path):
+            raise OSError(errno.EIO, "Input/output error")
+        return load(path, **more)
+
+    monkeypatch.setattr("turnout.readers.npz.np.load", bad)
+    summary = fleet.run(stage=Stage("hammer", n_read, "1"))
+    assert (summary.processed, summary.quarantined, summary.postponed) == (2, 0, 1)
+    monkeypatch.undo()
+    summary = fleet.run(stage=Stage("hammer", n_read, "1"))
+    assert (summary.processed, summary.quarantined, summary.postponed) == (1, 0, 0)
+    assert fleet.lengths() == {f"t{k}/hammer/A/2024-05-13": [5 + 2 * k] for k in range(3)}
 
 
 def test_a_sector_that_cannot_be_read_for_the_key_is_its_units_affair_alone(fleet, monkeypatch):

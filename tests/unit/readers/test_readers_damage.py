@@ -1,5 +1,7 @@
 """Cut and damaged files: an error, or the very same numbers; never others in silence."""
 
+import errno
+import zipfile
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from turnout.errors import REASONS, ReadError
+from turnout.errors import REASONS, ReadError, of_the_machine
 from turnout.readers import read
 from turnout.readers.writing import WRITERS, write
 
@@ -162,3 +164,62 @@ def test_uff_says_where_its_set_ends(written, in_si):
     assert len(recordings) == 3
     assert "A7_1.uff, record 4 of 4, channel 'rail', byte " in str(error)
     assert "ends after 176 of 301 samples. Copy the file again from the logger." in str(error)
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        OSError(errno.EIO, "Input/output error"),
+        OSError(errno.ENOSPC, "No space left on device"),
+        MemoryError("Unable to allocate 458. MiB"),
+        KeyError(
+            "Unable to open object (file read failed: time = ..., errno = 5, error message = 'Input/output error'"
+        ),
+    ],
+    ids=repr,
+)
+def test_a_fault_of_the_machine_is_no_damage_of_the_file(fault, written, in_si, monkeypatch):
+    """It passes or is repaired: the unit is left for the next run, and nobody copies a sound file again."""
+    path, whole = written("npz")
+
+    def failing(*_, **__):
+        raise fault
+
+    monkeypatch.setattr("turnout.readers.npz.np.load", failing)
+    with pytest.raises((OSError, MemoryError)) as caught:
+        read(path.name, path.parent, in_si)
+    assert of_the_machine(caught.value)
+    monkeypatch.undo()
+    assert_sound(read(path.name, path.parent, in_si).recordings, whole)
+
+
+def test_a_bad_sector_at_the_begin_of_a_file_is_no_damage_of_it_either(written, in_si, monkeypatch):
+    path, _ = written("npz")
+
+    def failing(*_):
+        raise OSError(errno.EIO, "Input/output error")
+
+    with monkeypatch.context() as patched, pytest.raises(OSError) as caught:
+        patched.setattr("turnout.readers.places.os.fstat", failing)
+        read(path.name, path.parent, in_si)
+    assert of_the_machine(caught.value)
+
+
+def test_an_array_that_no_file_of_this_size_can_hold_is_damage_and_no_want_of_memory(in_si, tmp_path):
+    """The length in its header is that of 80 TB."""
+    header = b"{'descr': '<f8', 'fortran_order': False, 'shape': (2, 5000000000000), }".ljust(117) + b"\n"
+    with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
+        archive.writestr("record_000.npy", b"\x93NUMPY\x01\x00v\x00" + header + bytes(800))
+    (error,) = read("a.npz", tmp_path, in_si).errors
+    assert error.reason == "unreadable" and "numpy cannot read it (Unable to allocate" in error.found
+
+
+@pytest.mark.parametrize("text", ["errno = 22, error message = 'Invalid argument'", "errno = 2 of the wheel", "errno"])
+def test_what_damaged_bytes_make_a_library_say_stays_damage(text, written, in_si, monkeypatch):
+    path, _ = written("hdf5")
+
+    def failing(*_, **__):
+        raise OSError(f"Unable to read (file seek failed: {text})")
+
+    monkeypatch.setattr("turnout.readers.hdf5._values", failing)
+    assert {e.reason for e in outcome(path, in_si)[1]} == {"unreadable"}

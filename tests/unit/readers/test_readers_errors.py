@@ -3,6 +3,7 @@
 import os
 from dataclasses import replace
 
+import h5py
 import numpy as np
 import pytest
 
@@ -164,6 +165,41 @@ def test_a_wrong_rate(rate, tmp_path, in_si):
     assert str(error) == f"a.npz, record 1 of 1: sampled at {rate:g} Hz instead of 51200 Hz. {remedy}"
 
 
+@pytest.mark.parametrize("promised", [51200.0, None])
+def test_a_rate_that_the_time_column_contradicts(promised, tmp_path, in_si):
+    """Half of the stated rate by the clock: every frequency would be doubled."""
+    name = archive(tmp_path, fs=51200.0, time=np.arange(100) / 25600.0, force=saw(), rail=saw(), units=["N", "m/s²"])
+    error = only_error(name, tmp_path, replace(in_si, rate=promised), 0)
+    assert error.reason == "wrong_rate"
+    found = "its time column has 25600 samples a second, its rate says 51200 Hz"
+    remedy = "Find out which of them is right and export the record again with that one alone"
+    assert str(error) == f"a.npz, record 1 of 1: {found}. {remedy}."
+
+
+def test_a_frequency_of_rcm_dx_that_its_time_stamps_contradict_costs_that_record(tmp_path, in_si, hammer_test):
+    path = write(hammer_test[:2], tmp_path / "a.rcmdx", "rcmdx")
+
+    def change(name, item):
+        if item.attrs.get("CommonTriggerFrequency"):
+            item.attrs["CommonTriggerFrequency"] = np.float32(25600.0)
+
+    with h5py.File(path, "r+") as file:
+        file.visititems(change)
+    result = read(path.name, tmp_path, in_si)
+    assert {e.reason for e in result.errors} == {"wrong_rate"} and len(result.errors) == 2
+    assert "samples a second, its rate says 25600 Hz" in result.errors[0].found
+
+
+@pytest.mark.parametrize("per_second", [1.0, 1e3, 1e6])
+def test_a_time_column_without_unit_that_agrees_with_the_rate_in_ms_or_us_does_not_contradict_it(
+    per_second, tmp_path, in_si
+):
+    """Printed with four digits, of which the last is worth up to a tenth of a step, it agrees as far as these tell."""
+    time = np.array([float(f"{k * per_second / 51200.0:.4g}") for k in range(100)])
+    name = archive(tmp_path, fs=51200.0, time=time, force=saw(), rail=saw(), units=["N", "m/s²"])
+    assert read(name, tmp_path, in_si).recordings[0].rate == 51200.0
+
+
 @pytest.mark.parametrize("rate", [0.0, -51200.0, np.nan, np.inf])
 def test_a_rate_that_is_none(rate, tmp_path, in_si):
     name = archive(tmp_path, fs=rate, force=saw(), rail=saw(), units=["N", "m/s²"])
@@ -283,12 +319,74 @@ def test_a_record_that_began_before_the_one_in_front_of_it(tmp_path, in_si, hamm
     assert str(error) == f"a.npz, record 3: {began}. Check the logger's clock and the time zone in the layout."
 
 
+@pytest.mark.parametrize(("odd", "neighbour"), [(0, 1), (1, 2)])
+def test_one_stamp_of_the_future_costs_its_record_and_not_those_behind_it(odd, neighbour, tmp_path, in_si, hammer_test):
+    ahead = [
+        replace(r, started_at=r.started_at.replace(year=2099)) if k == odd else r for k, r in enumerate(hammer_test)
+    ]
+    path = write(ahead, tmp_path / "a.npz", "npz")
+    error = only_error(path.name, tmp_path, in_si, 3)
+    assert error.reason == "clock_backwards"
+    began = (
+        f"it began at 2099-05-13 10:0{odd}:01.250000, after a record behind it (2024-05-13 10:0{neighbour}:01.250000)"
+    )
+    assert str(error) == f"a.npz, record {odd + 1}: {began}. Check the logger's clock and the time zone in the layout."
+
+
+@pytest.mark.parametrize(
+    ("minutes", "refused"),
+    [
+        ((0, 3, 2, 5), [2]),  # nobody knows which of two is wrong: the first stays, as ever
+        ((9, 1), [1]),
+        ((5, 6, 7, 0, 1, 2), [3, 4, 5]),
+        ((8, 0, 1, 9, 2, 3), [0, 3]),
+        ((4, 4, 4, 0, 4), [3]),  # equal stamps are in order
+    ],
+)
+def test_the_records_that_stay_are_the_most_that_are_in_order(minutes, refused, tmp_path, in_si, hammer_test):
+    start = hammer_test[0].started_at
+    records = [replace(hammer_test[k % 4], started_at=start.replace(minute=m)) for k, m in enumerate(minutes)]
+    path = write(records, tmp_path / "a.npz", "npz")
+    result = read(path.name, tmp_path, in_si)
+    assert [int(e.where.split()[-1]) - 1 for e in result.errors] == refused
+    assert {e.reason for e in result.errors} == {"clock_backwards"}
+
+
 def test_time_that_jumps_has_lost_samples(tmp_path, in_si):
     time = np.delete(np.arange(110), slice(40, 50)) / 51200.0
     name = archive(tmp_path, time=time, force=saw(), rail=saw(), units=["N", "m/s²"])
     error = only_error(name, tmp_path, in_si, 0)
     assert error.reason == "truncated"
     assert "time jumps from 0.00076171875 s to 0.0009765625 s at 51200 Hz: samples are missing" in str(error)
+
+
+UNEVEN = {
+    "a tenth of it at another rate": np.where(np.arange(299) < 270, 1 / 51200, 1 / 64000),
+    "a rate that rises from 43 to 59 kHz": 1 / np.linspace(43e3, 59e3, 299),
+    "steps that differ by up to 38 %": np.random.default_rng(4).uniform(0.62, 1.38, 299) / 51200,
+}
+
+
+@pytest.mark.parametrize("kind", UNEVEN)
+def test_time_that_is_not_even_is_no_rate_of_whatever_was_promised(kind, tmp_path, in_si):
+    """No step is half a step off, so that no sample is missing; the mean rate is within 2 % of the promised one."""
+    time = np.concatenate([[0.0], np.cumsum(UNEVEN[kind])])
+    name = archive(tmp_path, time=time, force=saw(300), rail=saw(300), units=["N", "m/s²"])
+    error = only_error(name, tmp_path, in_si, 0)
+    assert error.reason == "wrong_rate"
+    assert "its time column is not even: sample " in error.found and " steps from where " in error.found
+    assert error.remedy == "Check the logger's clock, or export the record at an even rate"
+
+
+@pytest.mark.parametrize("n", [300, 2**18 + 2, 2**19])
+def test_time_that_is_printed_coarsely_or_drifts_with_the_warmth_of_a_day_is_even(n, tmp_path, in_si):
+    """A last digit of 0.4 steps, cut off; a crystal that changes by 2e-5: 2.6 steps from a line over 2**19 samples."""
+    k = np.arange(n)
+    time = (k + 2e-5 * (k**2 / n - k)) / 51200.0
+    digit = 0.4 / 51200.0
+    for printed in (time, np.floor(time / digit) * digit):
+        name = archive(tmp_path, time=printed, force=saw(n), rail=saw(n), units=["N", "m/s²"])
+        assert read(name, tmp_path, in_si).errors == ()
 
 
 def test_channels_of_different_length(tmp_path, in_si):
@@ -304,3 +402,23 @@ def test_a_record_missing_between_its_neighbours(tmp_path, in_si):
     error = only_error(name, tmp_path, in_si, 2)
     assert error.reason == "truncated"
     assert f"a.npz, record 2: this record is missing between its neighbours. {COPY}" in str(error)
+
+
+@pytest.mark.parametrize("numbers", [("20240513101500", "20240513140000"), ("7", "99999999999999999999", "2000")])
+def test_records_numbered_by_a_clock_or_a_counter_miss_none_between_them(numbers, tmp_path, in_si):
+    records = {f"rec_{n}": np.vstack([saw() + k, saw()[::-1]]) for k, n in enumerate(numbers)}
+    name = archive(tmp_path, fs=51200.0, channels=["force", "rail"], units=["N", "g"], **records)
+    result = read(name, tmp_path, in_si)
+    assert result.errors == ()
+    in_order = sorted(range(len(numbers)), key=lambda k: int(numbers[k]))
+    assert [r.samples[0, 0] for r in result.recordings] == [-3.0 + k for k in in_order]
+
+
+def test_two_names_for_one_number_cost_that_record(tmp_path, in_si):
+    records = {name: np.vstack([saw() + k, saw()[::-1]]) for k, name in enumerate(("hit_1", "impact_1", "hit_2"))}
+    name = archive(tmp_path, fs=51200.0, channels=["force", "rail"], units=["N", "g"], **records)
+    error = only_error(name, tmp_path, in_si, 1)
+    found = "'hit_1' and 'impact_1' are both number 1"
+    assert str(error) == f"a.npz, record 1: {found}. Number the records each by a number of its own."
+    (recording,) = read(name, tmp_path, in_si).recordings
+    assert (recording.record, recording.samples[0, 0]) == (1, -1.0)

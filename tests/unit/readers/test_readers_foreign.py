@@ -14,7 +14,8 @@ import soundfile
 
 from turnout.errors import ReadError
 from turnout.readers import read
-from turnout.records import RawChannel, RawDescription
+from turnout.readers.writing import mat73, write
+from turnout.records import Channel, RawChannel, RawDescription, Recording
 
 RATE = 51200.0
 FORCE, RAIL = 900.0 * np.sin(np.arange(300) / 7), 20.0 * np.cos(np.arange(300) / 3) + 0.5
@@ -110,6 +111,64 @@ def test_hdf5_with_a_group_per_blow_and_a_time_vector(by_name, tmp_path):
     np.testing.assert_allclose(second.signal("force"), 3 * FORCE)
 
 
+def named_by_a_list(folder, **lists):
+    """Groups of datasets, which HDF5 keeps by the alphabet, below lists in the order in which the logger counts."""
+    with h5py.File(folder / "a.h5", "w") as file:
+        file.attrs.update({"rate": RATE, **lists})
+        for blow in (1, 2):
+            group = file.create_group(f"hit_{blow}")
+            group["Sleeper"], group["Force"], group["Acc"] = RAIL[::-1] * blow, FORCE, RAIL
+    return "a.h5"
+
+
+@pytest.fixture
+def by_three_names(by_name):
+    return replace(by_name, channels=(*by_name.channels, RawChannel("sleeper", "Sleeper", "acceleration")))
+
+
+@pytest.mark.parametrize("names", [["Sleeper", "Force", "Acc"], ["SLEEPER", "Spare", "Force", "Acc"]])
+def test_a_list_of_units_goes_by_the_list_of_names_beside_it(names, by_three_names, tmp_path):
+    """By the alphabet "Acc" would be in g and "Sleeper" in m/s², both wrong by 9.8."""
+    units = [{"SLEEPER": "g", "FORCE": "kN", "ACC": "m/s²"}.get(name.upper(), "V") for name in names]
+    result = read(named_by_a_list(tmp_path, channels=names, units=units), tmp_path, by_three_names)
+    assert result.errors == ()
+    for blow, recording in enumerate(result.recordings, start=1):
+        np.testing.assert_allclose(recording.signal("force"), 1000 * FORCE, rtol=1e-14)
+        np.testing.assert_allclose(recording.signal("rail"), RAIL, rtol=1e-14)
+        np.testing.assert_allclose(recording.signal("sleeper"), 9.80665 * blow * RAIL[::-1], rtol=1e-14)
+
+
+@pytest.mark.parametrize("lists", [{}, {"channels": ["a", "b", "c"]}])
+def test_a_list_of_units_in_no_order_is_not_dealt_out_by_the_alphabet(lists, by_three_names, tmp_path):
+    result = read(named_by_a_list(tmp_path, units=["g", "N", "m/s²"], **lists), tmp_path, by_three_names)
+    assert [e.reason for e in result.errors] == ["unit_unknown"] * 2
+    assert result.errors[1].found == "nothing says which of the units 'g', 'N', 'm/s²' are whose"
+    assert result.errors[1].where == "record 2"
+    remedy = "Write each dataset's unit beside it, or a list 'channels' of their names beside that of the units"
+    assert result.errors[1].remedy == remedy
+    accelerations = replace(
+        by_three_names, channels=(*by_three_names.channels[1:], RawChannel("f", "Force", "ignored"))
+    )
+    same = read(named_by_a_list(tmp_path, units=["g"] * 3, **lists), tmp_path, accelerations)
+    np.testing.assert_allclose(same.recordings[0].signal("rail"), 9.80665 * RAIL, rtol=1e-14)
+
+
+def test_a_list_of_units_goes_by_the_order_of_variables_where_the_file_keeps_it(by_name, tmp_path):
+    """Force before Acc: HDF5 that notes the order of its making, MATLAB 5; the alphabet in MATLAB 7.3."""
+    with h5py.File(tmp_path / "a.h5", "w", track_order=True) as file:
+        file["Force"], file["Acc"] = FORCE, RAIL
+        file.attrs.update({"rate": RATE, "units": ["N", "m/s²"]})
+    both(read("a.h5", tmp_path, by_name).recordings[0])
+    with h5py.File(tmp_path / "a.mat", "w", userblock_size=512) as file:
+        for name, numbers in (("Force", FORCE), ("Acc", RAIL), ("fs", RATE)):
+            mat73._double(file, name, numbers)
+        mat73._cell(file, "units", ["N", "m/s²"])
+    with (tmp_path / "a.mat").open("r+b") as file:
+        file.write(mat73.HEADER.ljust(116) + bytes(8) + b"\x00\x02IM")
+    (error,) = _raised("a.mat", tmp_path, by_name)
+    assert error.reason == "unit_unknown" and "which of the units 'N', 'm/s²' are whose" in error.found
+
+
 def test_tdms_of_one_group_with_scaled_integers(by_name, tmp_path):
     """LabVIEW stores converter steps and a linear scale: step 0.05 N."""
     steps = np.round(FORCE / 0.05).astype("int16")
@@ -134,6 +193,103 @@ def test_tdms_of_one_group_with_scaled_integers(by_name, tmp_path):
     np.testing.assert_array_equal(recording.signal("rail"), RAIL)
     group = replace(by_name, channels=(replace(by_name.channels[0], source="Untitled/Force"), by_name.channels[1]))
     assert read("a.tdms", tmp_path, group).errors == ()
+
+
+def left_in_hdf5(folder, steps, starts):
+    """Single samples of another rate, which are no channel, come first."""
+    with h5py.File(folder / "a.h5", "w") as file:
+        file["AMBIENT"] = np.arange(3.0)
+        file["AMBIENT"].attrs["rate"] = 1.0
+        for name, samples, unit, step in zip(("Force", "Acc"), (FORCE, RAIL), ("N", "m/s²"), steps):
+            file[name] = samples
+            file[name].attrs.update({"unit": unit, "dt": step} if name == "Acc" else {"unit": unit, "rate": 1 / step})
+    return "a.h5"
+
+
+def left_in_tdms(folder, steps, starts):
+    with nptdms.TdmsWriter(str(folder / "a.tdms")) as writer:
+        for k in range(2):  # half of what the second begins later by stands in its time stamp
+            channels = [
+                nptdms.ChannelObject(
+                    f"blow {k}",
+                    name,
+                    samples,
+                    {
+                        "unit_string": unit,
+                        "wf_increment": step,
+                        "wf_start_offset": k * start / 2,
+                        "wf_start_time": np.datetime64("2024-05-13T10:00:00")
+                        + np.timedelta64(60_000_000 * k + round(k * start / 2 * 1e6), "us"),
+                    },
+                )
+                for name, samples, unit, step, start in zip(
+                    ("Force", "Acc"), (FORCE, RAIL), ("N", "m/s²"), steps if k else (1 / RATE, 1 / RATE), starts
+                )
+            ]
+            writer.write_segment(channels)
+    return "a.tdms"
+
+
+def left_in_lvm(folder, steps, starts):
+    rows = "".join(f"\t{f:.17g}\t{a:.17g}\n" for f, a in zip(FORCE, RAIL))
+    text = "LabVIEW Measurement\t\nSeparator\tTab\nX_Columns\tNo\n***End_of_Header***\t\n\t\n"
+    for k in range(2):
+        clocks = [f"10:0{k}:00.{round(k * start / 2 * 1e7):07d}" for start in starts]
+        columns = [("Channels", 2), ("Samples", 300, 300), ("Date", "2024/05/13", "2024/05/13"), ("Time", *clocks)]
+        columns += [("Y_Unit_Label", "N", "m/s^2"), ("X0", *(k * start / 2 for start in starts))]
+        columns += [("Delta_X", *(steps if k else (1 / RATE, 1 / RATE)))]
+        head = "".join("\t".join(map(str, row)) + "\n" for row in columns)
+        text += f"{head}***End_of_Header***\t\t\nX_Value\tForce\tAcc\tComment\n{rows}\n"
+    (folder / "a.lvm").write_text(text)
+    return "a.lvm"
+
+
+def left_in_uff(folder, steps, starts):
+    channels = (Channel("Force", "force"), Channel("Acc", "acceleration"))
+    whole = [Recording(np.vstack([FORCE, RAIL]), RATE, channels)] * 2
+    data = write(whole, folder / "a.uff", "uff58b").read_bytes()
+    axis = f"{0.0:13.5e}{1 / RATE:13.5e}".encode()
+    parts = data.split(axis)
+    assert len(parts) == 5
+    axes = [axis, axis, *(f"{start:13.5e}{step:13.5e}".encode() for step, start in zip(steps, starts))]
+    (folder / "a.uff").write_bytes(b"".join(x for pair in zip(parts, [*axes, b""]) for x in pair))
+    return "a.uff"
+
+
+LEFT = {"hdf5": left_in_hdf5, "tdms": left_in_tdms, "lvm": left_in_lvm, "uff": left_in_uff}
+
+
+@pytest.mark.parametrize("format", LEFT)
+def test_channels_of_one_record_that_state_different_rates_are_not_put_side_by_side(format, by_name, tmp_path):
+    """Of two records the last, but in HDF5, which has one here."""
+    name = LEFT[format](tmp_path, (1 / RATE, 1 / 20000), (0.0, 0.0))
+    (error,) = _raised(name, tmp_path, by_name)
+    if format != "hdf5":
+        both(read(name, tmp_path, by_name).recordings[0])
+        assert error.where == "record 2 of 2" + " (group 'blow 1')" * (format == "tdms")
+    assert error.reason == "wrong_rate" and ("20000 Hz" in error.found or "5e-05" in error.found)
+
+
+@pytest.mark.parametrize("format", ["tdms", "lvm", "uff"])
+@pytest.mark.parametrize("start", [5e-4, -6e-5])
+def test_channels_of_one_record_that_begin_at_different_moments_are_not_put_side_by_side(
+    format, start, by_name, tmp_path
+):
+    """0.5 ms are 72° at 400 Hz. A part of a sample is no matter: converters that take turns are that far apart."""
+    name = LEFT[format](tmp_path, (1 / RATE, 1 / RATE), (1e-3, 1e-3 + start))
+    result = read(name, tmp_path, by_name)
+    (error,) = result.errors
+    both(result.recordings[0])
+    assert error.reason == "clock_drift" and "record 2 of 2" in error.where
+    late, early = ("Acc", "Force") if start > 0 else ("Force", "Acc")
+    assert error.found == f"channel {late!r} begins {abs(start):.6g} s after channel {early!r}"
+    name = LEFT[format](tmp_path, (1 / RATE, 1 / RATE), (1e-3, 1e-3 + 8e-6))
+    assert read(name, tmp_path, by_name).errors == ()
+
+
+def test_hdf5_channels_of_one_rate_may_say_it_each_in_its_own_way(by_name, tmp_path):
+    result = read(left_in_hdf5(tmp_path, (1 / RATE, 1 / RATE), (0.0, 0.0)), tmp_path, by_name)
+    both(result.recordings[0])
 
 
 @pytest.mark.parametrize(

@@ -33,6 +33,15 @@ G = 9.80665  # m/s², by definition (3rd CGPM, 1901)
         ("strain", "µm/m", None, "", 1e-6),
         ("acceleration", "m/s^2", None, "", 1.0),
         ("acceleration", "[g]", None, "", G),
+        ("force", "daN", None, "", 10.0),
+        ("force", "kp", None, "", G),
+        ("force", "kgf", None, "", G),
+        ("force", "MN", None, "", 1e6),
+        ("acceleration", "cm/s²", None, "", 0.01),
+        ("acceleration", "Gal", None, "", 0.01),
+        ("acceleration", "ft/s²", None, "", 0.3048),  # the international foot, by definition
+        ("acceleration", "in/s^2", None, "", 0.0254),
+        ("temperature", "Deg C", None, "", 1.0),  # as LabVIEW writes it
     ],
 )
 def test_one_raw_unit_is_what_the_data_sheet_says(quantity, unit, sensitivity, sensitivity_unit, one):
@@ -78,11 +87,22 @@ def test_a_lone_factor_of_zero_is_no_unit():
 def test_file_and_layout_must_agree_where_both_speak():
     assert settled_unit("g", "g") == "g"
     assert settled_unit("m/s^2", "m/s²") == "m/s²"
-    assert settled_unit("EU", "V") == "V"  # the file's label means nothing
+    for label in ("EU", "", " - ", "None", "[a.u.]"):  # the file's label means nothing
+        assert settled_unit(label, "V") == "V"
     assert settled_unit("count", "0.305 mV") == "0.305 mV"  # the layout says what a count is worth
     assert settled_unit("g", "V!") == "V"
-    for file_unit, layout_unit in (("mV", "V"), ("g", "m/s²"), ("N", "V")):
+    assert settled_unit("counts", "mV") == "mV"  # a step of the converter is a millivolt
+    assert settled_unit("count", "0.05 N") == "0.05 N"
+    for file_unit, layout_unit in (("mV", "V"), ("g", "m/s²"), ("N", "V"), ("daN", "N"), ("counts", "N")):
         with pytest.raises(ValueError, match=f"the file says '{file_unit}', the layout '{layout_unit}'"):
             settled_unit(file_unit, layout_unit)
     with pytest.raises(ValueError, match="neither the file nor the layout says the unit"):
         settled_unit("", None)
+
+
+def test_a_unit_of_the_file_that_nobody_knows_is_no_licence_for_the_layouts():
+    with pytest.raises(ValueError) as caught:
+        settled_unit("tf", "kN")
+    said = "the file says 'tf', which is not known, the layout 'kN' ('kN!' would overrule the file)"
+    assert str(caught.value) == said
+    assert settled_unit("tf", "kN!") == "kN"
