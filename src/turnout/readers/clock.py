@@ -125,7 +125,8 @@ def settled_rate(record, promised, where, source):
         _refuse_another(record.unclear, promised, source)
         return float(promised)
     if promised is not None:
-        if abs(rate - promised) > tolerance * promised:
+        drift = DRIFT if record.rate is None else 0.0  # the time column's own clock
+        if abs(rate - promised) > (tolerance + drift) * promised:
             remedy = "Correct the rate in the layout, or find out why the logger was set differently"
             found = f"sampled at {rate:.9g} Hz instead of {promised:.9g} Hz"
             raise source.error(where, found, remedy, reason="wrong_rate")

@@ -378,6 +378,17 @@ def test_time_that_is_not_even_is_no_rate_of_whatever_was_promised(kind, tmp_pat
     assert error.remedy == "Check the logger's clock, or export the record at an even rate"
 
 
+@pytest.mark.parametrize(("off", "sound"), [(5e-5, True), (-5e-5, True), (3e-4, False)])
+def test_a_logger_whose_crystal_is_off_by_parts_in_a_million_has_the_promised_rate(off, sound, tmp_path, in_si):
+    """Quartz is good to 50 ppm and more; 300 ppm is another clock."""
+    time = np.arange(4000) * (1.0 + off) / in_si.rate
+    result = read(archive(tmp_path, time=time, force=saw(4000), rail=saw(4000), units=["N", "m/s²"]), tmp_path, in_si)
+    if sound:
+        assert result.recordings[0].rate == in_si.rate
+    else:
+        assert result.errors[0].reason == "wrong_rate"
+
+
 @pytest.mark.parametrize("n", [300, 2**18 + 2, 2**19])
 def test_time_that_is_printed_coarsely_or_drifts_with_the_warmth_of_a_day_is_even(n, tmp_path, in_si):
     """A last digit of 0.4 steps, cut off; a crystal that changes by 2e-5: 2.6 steps from a line over 2**19 samples."""
