@@ -116,7 +116,7 @@ def _newest_of_sections(p, last) -> np.ndarray:
 def _states(charts, settings, status, last, present):
     """The state and the reason of every chart; the first that applies."""
     p = charts.prepared
-    as_of = p.panel.as_of
+    as_of = np.nan_to_num(p.panel.as_of, neginf=0.0)  # no campaign of the fleet can be used: none is old
     stale = stale_after(p, settings)
     old = as_of - last > stale
     whole = status["section_id"].to_numpy() == WHOLE

@@ -176,6 +176,18 @@ def test_one_wrong_clock_does_not_stop_the_night(registry, rows, settings, tmp_p
         assert con.execute("select section_id from worklist").fetchall()[0] == ("T00001/S4",)
 
 
+def test_campaigns_of_a_clock_never_set_alone_are_in_sight_and_no_fault(rows, settings, tmp_path):
+    """Nothing of a turnout, or of the whole fleet, can be used: its charts say so, and the night goes on."""
+    only = rows[(rows["turnout_id"] == "T00001") & (rows["measured_at_utc"] == rows["measured_at_utc"].max())]
+    small_registry(tmp_path, only.assign(measured_at_utc=np.datetime64("1970-01-01T10:00:00", "us")))
+    done = update(tmp_path, settings)
+    assert done.rows == {"chart_status": 9, "baselines": 0, "alarms": 0, "charts": 8} and done.newest is None
+    with open_registry(tmp_path) as con:
+        assert con.execute("select distinct reason from chart_status where section_id <> '*'").fetchall() == [("never",)]
+        assert con.execute("select distinct state from charts").fetchall() == [("wrong_time",)]
+        assert con.execute("select count(*) from worklist").fetchall() == [(0,)]
+
+
 def test_a_year_before_which_no_clock_is_believed_leaves_its_campaigns_in_sight(rows, tmp_path):
     small_registry(tmp_path, rows)
     done = update(tmp_path, TrendSettings(earliest_year=2017))
