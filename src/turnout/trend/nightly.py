@@ -41,7 +41,7 @@ class Updated:
     digests: dict[str, str]
 
 
-def update(registry_dir, settings, digests=None, as_of=None, acknowledgements=None) -> Updated:
+def update(registry_dir, settings, digests=None, as_of=None, acknowledgements=None, day=None) -> Updated:
     """Compute every chart of a registry and put charts, baselines, alarms and states in the place of the old ones.
 
     Parameters
@@ -55,12 +55,16 @@ def update(registry_dir, settings, digests=None, as_of=None, acknowledgements=No
         newest campaign of the fleet whose clock can be believed.
     acknowledgements : list of dict, optional
         All rows of the table of that name; None leaves it alone.
+    day : date, optional
+        The day it is, by default this machine's in UTC: work that is planned for later resets nothing yet, and a
+        campaign of later is not believed.
     """
+    end = np.floor(days([datetime.now(UTC).replace(tzinfo=None) if day is None else day])[0]) + 1.0
     with open_registry(registry_dir) as con:
         events = con.execute("select * from events order by event_at_utc, event_id").df()
-        parts, newest = _parts(con, settings, as_of)
-        now = newest if as_of is not None else max(newest, days([datetime.now(UTC).replace(tzinfo=None)])[0])
-        events = events[days(events["event_at_utc"]) <= now]  # work that is planned resets nothing yet
+        parts, newest = _parts(con, settings, as_of, end)
+        now = newest if as_of is not None else max(newest, end)
+        events = events[days(events["event_at_utc"]) <= now]
         prepared = [prepare(_panel(con, part, newest, events, settings), events, settings) for part in parts]
     years, tables = _tables(prepared, settings)
     rows = {name: table.num_rows for name, table in tables.items()}
@@ -110,19 +114,20 @@ def _tables(prepared, settings):
     return years, {name: arrow_rows(name, frame) for name, frame in joined.items()}
 
 
-def _parts(con, settings, as_of):
-    """Charts in parts of whole turnouts, and the newest time that counts. [d]"""
+def _parts(con, settings, as_of, end):
+    """Charts in parts of whole turnouts, and the newest time that counts; ``end`` of the day it is. [d]"""
     # What trains say is aggregated once; what hammers say is read part by part.
     con.execute("create temp table by_trains as select * from passage_values")
     later = "" if as_of is None else f" where measured_at_utc <= timestamp '{timestamps(days([as_of]))[0]}'"
     con.execute(f"create temp view charted as select * from ({HAMMER} union all select * from by_trains){later}")
-    charts = con.execute(f"select distinct {', '.join(CHART)} from charted").df()
+    charts = con.execute(f"select {', '.join(CHART)}, max(measured_at_utc) as newest from charted group by all").df()
     for name in CHART:
         charts[name] = charts[name].astype(object)
     charts = charts.sort_values(CHART, ignore_index=True)
+    last = days(charts.pop("newest"))
     if as_of is None:
         found = con.execute("select distinct measured_at_utc from charted").df()
-        _, newest = believable(days(found["measured_at_utc"]), settings)
+        _, newest = believable(days(found["measured_at_utc"]), settings, _until(charts, last, end + 1.0))
     else:
         newest = days([as_of])[0]
     if charts.empty:
@@ -131,6 +136,22 @@ def _parts(con, settings, as_of):
     share = dict(zip(rows["turnout_id"], rows["n"].cumsum() // CELLS_PER_PART))
     number = charts["turnout_id"].map(share)
     return [part.reset_index(drop=True) for _, part in charts.groupby(number, sort=True)], newest
+
+
+def _until(charts, last, until):
+    """Time [d] after which no campaign is believed: ``until``, or none where most charts have such a campaign.
+
+    Then it is the clock of this machine that is late, or the fleet is a simulated one. ``last`` are the newest
+    campaigns of the charts. [d]
+    """
+    ahead = last > until
+    if 2 * ahead.sum() > len(ahead):
+        return np.inf
+    if ahead.any():
+        said = "campaigns after %s, which has not come, are shown and not used: %d charts, the first %s. Correct their dates"
+        where = " ".join(charts.loc[ahead, ["section_id", "band"]].iloc[0])
+        logging.getLogger("turnout.trend").warning(said, timestamps([until])[0].item(), ahead.sum(), where)
+    return until
 
 
 def _panel(con, charts, newest, events, settings):

@@ -176,6 +176,30 @@ def test_one_wrong_clock_does_not_stop_the_night(registry, rows, settings, tmp_p
         assert con.execute("select section_id from worklist").fetchall()[0] == ("T00001/S4",)
 
 
+STATES = "select * from chart_status order by turnout_id, section_id, band, source"
+
+
+@pytest.mark.parametrize("ahead", [["2019-03-05"], ["2099-01-05", "2099-01-12"]], ids=["a month mistyped", "2099"])
+def test_a_campaign_of_days_to_come_is_shown_and_not_used(registry, rows, settings, tmp_path, ahead):
+    """Eleven months ahead, and further but not alone: nobody can have measured then, whatever its neighbours say."""
+    own = rows[(rows["section_id"] == "T00000/S3")].tail(len(ahead))
+    wrong = own.assign(measured_at_utc=np.array(ahead, "datetime64[us]"), frequency_hz=[400.0, 390.0][: len(own)])
+    small_registry(tmp_path, pd.concat([rows, wrong], ignore_index=True))
+    done = update(tmp_path, settings, day=rows["measured_at_utc"].max() + pd.Timedelta(days=3))
+    assert done.newest == rows["measured_at_utc"].max()
+    with open_registry(registry[0]) as sound, open_registry(tmp_path) as con:
+        pd.testing.assert_frame_equal(con.execute(STATES).df(), sound.execute(STATES).df())
+        shown = con.execute("select section_id, measured_at_utc::date::varchar from charts where state = 'wrong_time'")
+        assert shown.fetchall() == [("T00000/S3", day) for day in ahead]
+
+
+def test_where_most_charts_are_ahead_it_is_the_clock_of_this_machine_that_is_late(registry, settings, tmp_path, rows):
+    small_registry(tmp_path, rows)
+    update(tmp_path, settings, day=pd.Timestamp("2017-03-01"))
+    with open_registry(registry[0]) as sound, open_registry(tmp_path) as con:
+        assert con.execute(STATES).fetchall() == sound.execute(STATES).fetchall()
+
+
 def test_campaigns_of_a_clock_never_set_alone_are_in_sight_and_no_fault(rows, settings, tmp_path):
     """Nothing of a turnout, or of the whole fleet, can be used: its charts say so, and the night goes on."""
     only = rows[(rows["turnout_id"] == "T00001") & (rows["measured_at_utc"] == rows["measured_at_utc"].max())]
