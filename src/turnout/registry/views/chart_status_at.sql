@@ -11,7 +11,8 @@ with by_epoch as (
     select
         turnout_id, section_id, band, source, epoch, count(*) as n, max(measured_at_utc) as last_at_utc,
         count(*) filter (state in ('baseline', 'learning')) as n_learned,
-        count(*) filter (state = 'no_temperature') as n_cold
+        count(*) filter (state = 'no_temperature') as n_cold,
+        max(measured_at_utc) filter (z is not null) as judged_at_utc
     from charts
     where measured_at_utc <= case when "asof" < newest_charted() then "asof" end and state <> 'wrong_time'
     group by all
@@ -21,7 +22,8 @@ counted as (
         turnout_id, section_id, band, source, max(epoch) as epoch,
         min(epoch) filter (n_learned > 0) as first_epoch,
         sum(n)::integer as n_campaigns, sum(n_learned)::integer as n_baseline, sum(n_cold)::integer as n_cold,
-        max_by(n_learned, epoch)::integer as n_learned, max(last_at_utc) as last_at_utc
+        max_by(n_learned, epoch)::integer as n_learned, max(last_at_utc) as last_at_utc,
+        max(judged_at_utc) as judged_at_utc
     from by_epoch
     group by turnout_id, section_id, band, source
 ),
@@ -60,7 +62,10 @@ known as (
         s.section_id <> '*' and (
             coalesce(len(v.hz) >= 8 and list_max(v.hz) - list_min(v.hz) < 0.001, false)
             or not coalesce(b.sd_pct > 0.1 / b.frequency_hz, b.sd_pct > 0, false)
-        ) as is_stuck
+        ) as is_stuck,
+        s.section_id <> '*'
+            and coalesce("asof" - c.judged_at_utc > to_microseconds((86400e6 * s.stale_after_days)::bigint), true)
+            as is_unheard
     from chart_status s
     left join counted c using (turnout_id, section_id, band, source)
     left join last_eight v using (turnout_id, section_id, band, source)
@@ -81,6 +86,7 @@ judged as (
             when is_old and has_sections then 'too_few_sections'
             when is_old then 'too_long_ago'
             when complete and is_stuck then 'constant'
+            when complete and is_unheard then 'no_temperature'
             when not complete and 2 * n_cold > n_campaigns then 'no_temperature'
             when not complete and is_whole and n_baseline = 0 then 'too_few_sections'
             when not complete then 'baseline'
