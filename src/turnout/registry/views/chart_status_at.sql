@@ -1,8 +1,28 @@
 -- The newest campaign that a chart rests on; newest_measurement() would follow a clock that runs ahead.
 create or replace macro newest_charted() as (select max(last_measured_at_utc) from chart_status);
 
+-- One row per chart: chart_status on a day at or after the newest campaign. A chart that nobody has measured since for
+-- long is not measured, also where the whole fleet is silent; a turnout's median is as old as the newest of its charts.
+create or replace macro chart_status_on("asof") as table
+select * exclude (is_silent) replace (
+    case when is_silent then 'not_measured' else state end as state,
+    case when is_silent then 'too_long_ago' else reason end as reason
+)
+from (
+    select
+        *,
+        coalesce(
+            state in ('ok', 'learning', 'cannot_tell')
+                and "asof" - greatest(last_measured_at_utc, case when section_id = '*' then
+                    max(last_measured_at_utc) over (partition by turnout_id, band, source) end)
+                    > to_microseconds((86400e6 * stale_after_days)::bigint),
+            false
+        ) as is_silent
+    from chart_status
+);
+
 -- One row per chart: its state at a date and why, from what was measured and entered by then.
--- At or after the newest campaign these are the rows of chart_status. Before it everything is counted from `charts` up
+-- At or after the newest campaign these are the rows of chart_status_on. Before it everything is counted from `charts` up
 -- to the date; spread and thresholds are those of the baseline, which later campaigns do not change. Only the memory
 -- is the fleet's of today.
 -- needs: chart_values
@@ -115,5 +135,5 @@ union all by name
 select
     turnout_id, section_id, band, source, state, reason, last_measured_at_utc, n_campaigns, n_baseline, n_learned,
     n_needed, complete, without_temperature, detectable_pct, target_pct
-from chart_status
+from chart_status_on("asof")
 where coalesce("asof" >= newest_charted(), true);
