@@ -78,7 +78,12 @@ def fleet(tmp_path_factory):
     results.append(visit("t13", 90, verdict="none", sections="A7, A9, AS"))
     results.append(visit("t13", 90, verdict="none", sections="OT"))
     bench = Bench(tmp_path_factory.mktemp("findings"))
-    assert bench.register(*results, tables={"events": [EVENT, EVENT | {"event_id": "e2", "turnout_id": "t11", "section_id": None}]}).n_refused == 0
+    assert (
+        bench.register(
+            *results, tables={"events": [EVENT, EVENT | {"event_id": "e2", "turnout_id": "t11", "section_id": None}]}
+        ).n_refused
+        == 0
+    )
     with open_registry(bench.registry) as connection:
         yield connection
 
@@ -136,7 +141,9 @@ def test_a_finding_ends_when_each_of_its_sections_was_looked_at_again(fleet):
     assert fleet.execute(asked, ["t13"]).fetchall() == [
         ("A7, A9, AS", "none"), ("A8", "none"), ("OT", "none"), ("SP", "none"),
     ]  # fmt: skip
-    grown = fleet.execute("select turnout_id, is_open from parameter_growth where turnout_id in ('t12', 't13') order by 1")
+    grown = fleet.execute(
+        "select turnout_id, is_open from parameter_growth where turnout_id in ('t12', 't13') order by 1"
+    )
     assert grown.fetchall() == [("t12", True), ("t13", False)]
 
 

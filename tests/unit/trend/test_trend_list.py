@@ -171,7 +171,9 @@ def test_a_fleet_that_falls_silent_is_not_measured_and_its_alarm_stays(settings)
         states = {d: dict(con.execute(asked.format(d)).fetchall()) for d in (0, 89, 91, 800)}
         assert states[0] == states[89] and states[0]["learning"] == 9
         assert states[91] == states[800] == {"inspect this week": 1, "not measured": 26}
-        why = con.execute("select distinct state, why from cannot_see(newest_measurement() + interval 91 day)").fetchall()
+        why = con.execute(
+            "select distinct state, why from cannot_see(newest_measurement() + interval 91 day)"
+        ).fetchall()
         assert why == [("not measured", f"last measured {newest:%Y-%m-%d}")]
         listed = con.execute("select section_id from worklist(newest_measurement() + interval 91 day)").fetchall()
         assert listed == [("T00001/S4",)]

@@ -207,7 +207,9 @@ def test_campaigns_of_a_clock_never_set_alone_are_in_sight_and_no_fault(rows, se
     done = update(tmp_path, settings)
     assert done.rows == {"chart_status": 9, "baselines": 0, "alarms": 0, "charts": 8} and done.newest is None
     with open_registry(tmp_path) as con:
-        assert con.execute("select distinct reason from chart_status where section_id <> '*'").fetchall() == [("never",)]
+        assert con.execute("select distinct reason from chart_status where section_id <> '*'").fetchall() == [
+            ("never",)
+        ]
         assert con.execute("select distinct state from charts").fetchall() == [("wrong_time",)]
         assert con.execute("select count(*) from worklist").fetchall() == [(0,)]
 
