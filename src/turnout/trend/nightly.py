@@ -21,6 +21,7 @@ from turnout.trend.prepared import prepare
 from turnout.trend.rows import arrow_rows
 from turnout.trend.states import chart_status
 from turnout.trend.tables import alarm_rows, baseline_rows, chart_rows
+from turnout.trend.withdrawn import ACCOUNTED, with_withdrawn
 from turnout.trend.years import digest, split_by_year
 
 CELLS_PER_PART = 1_500_000
@@ -65,8 +66,9 @@ def update(registry_dir, settings, digests=None, as_of=None, acknowledgements=No
         parts, newest = _parts(con, settings, as_of, end)
         now = newest if as_of is not None else max(newest, end)
         events = events[days(events["event_at_utc"]) <= now]
+        before = con.execute(ACCOUNTED if as_of is None else f"from ({ACCOUNTED}) limit 0").df()
         prepared = [prepare(_panel(con, part, newest, events, settings), events, settings) for part in parts]
-    years, tables = _tables(prepared, settings)
+    years, tables = _tables(prepared, settings, lambda alarms: with_withdrawn(alarms, before, newest))
     rows = {name: table.num_rows for name, table in tables.items()}
     rows["charts"] = sum(part.num_rows for found in years.values() for part in found)
     now = {str(year): digest(found, names("charts")) for year, found in years.items()}
@@ -88,8 +90,8 @@ def update(registry_dir, settings, digests=None, as_of=None, acknowledgements=No
     return done
 
 
-def _tables(prepared, settings):
-    """Rows of ``charts`` by year, in parts, and rows of the other derived tables.
+def _tables(prepared, settings, account):
+    """Rows of ``charts`` by year, in parts, and rows of the other derived tables, the alarms as ``account`` makes them.
 
     ``prepared`` is emptied on the way, so that the arrays of a part go when it is done.
     """
@@ -109,6 +111,7 @@ def _tables(prepared, settings):
         for year, part in split_by_year(arrow_rows("charts", chart_rows(done), single=True)).items():
             years.setdefault(year, []).append(part)
     joined = {name: pd.concat(found, ignore_index=True) if found else pd.DataFrame() for name, found in frames.items()}
+    joined["alarms"] = account(joined["alarms"])
     if seen:
         joined["chart_status"] = describe_flagged(joined["chart_status"], flags, settings)
     return years, {name: arrow_rows(name, frame) for name, frame in joined.items()}
@@ -148,7 +151,9 @@ def _until(charts, last, until):
     if 2 * ahead.sum() > len(ahead):
         return np.inf
     if ahead.any():
-        said = "campaigns after %s, which has not come, are shown and not used: %d charts, the first %s. Correct their dates"
+        said = (
+            "campaigns after %s, which has not come, are shown and not used. Correct the dates of %d charts, first %s"
+        )
         where = " ".join(charts.loc[ahead, ["section_id", "band"]].iloc[0])
         logging.getLogger("turnout.trend").warning(said, timestamps([until])[0].item(), ahead.sum(), where)
     return until

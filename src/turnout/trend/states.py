@@ -43,8 +43,8 @@ def chart_status(charts, settings) -> pd.DataFrame:
     """One row per chart: its state today, why, the change it can see, its slope.
 
     States in the order in which they are decided: ``alarm``, which no silence ends; ``not_measured`` (too long
-    ago), ``cannot_tell`` (values that never change; no temperature for as long, or too few), ``learning`` (baseline or level after an
-    event not complete), ``cannot_tell`` (detectable change above the target), ``ok``.
+    ago), ``cannot_tell`` (values that never change; no temperature for as long, or too few), ``learning`` (baseline or
+    level after an event not complete), ``cannot_tell`` (detectable change above the target), ``ok``.
     """
     p = charts.prepared
     n_section = len(p.panel.charts)

@@ -163,7 +163,7 @@ def test_what_is_silenced_comes_back_on_its_day(settings):
 
 
 def test_a_fleet_that_falls_silent_is_not_measured_and_its_alarm_stays(settings):
-    """Weekly charts are stale after 90 days; a chart that is learning after work, and a median, fall silent as others."""
+    """Weekly charts are stale after 90 days; one that is learning after work falls silent as others."""
     rows = fallen()
     newest = rows["measured_at_utc"].max()
     with viewed(rows, settings, work("T00002", newest - pd.Timedelta(weeks=5))) as con:

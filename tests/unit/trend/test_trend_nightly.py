@@ -176,6 +176,53 @@ def test_one_wrong_clock_does_not_stop_the_night(registry, rows, settings, tmp_p
         assert con.execute("select section_id from worklist").fetchall()[0] == ("T00001/S4",)
 
 
+def weekly(rng, turnout, section, phi, drop=0.0):
+    """Three years of one section: AR(1) of 0.6 %, and a fall by ``drop`` in the last 14 weeks."""
+    when = pd.date_range("2016-01-04", periods=157, freq="7D")
+    noise = rng.normal(size=157)
+    for k in range(1, 157):
+        noise[k] = phi * noise[k - 1] + np.sqrt(1.0 - phi**2) * noise[k]
+    rail = 10 + 15 * np.sin(2 * np.pi * np.arange(157) / 52) + rng.normal(0, 4, 157)
+    value = 150 * (1 - 0.0015 * (rail - 10) + 0.006 * noise - drop * (np.arange(157) >= 143))
+    row = {"turnout_id": turnout, "section_id": f"{turnout}/{section}", "band": "ballast", "source": "hammer"}
+    return pd.DataFrame(
+        row | {"measured_at_utc": when, "frequency_hz": value, "frequency_se_hz": 0.3, "rail_temperature_c": rail}
+    )
+
+
+def test_an_alarm_that_is_not_raised_again_is_closed_in_sight(settings, tmp_path, caplog):
+    """Forty turnouts with more memory come to six with none: what was an alarm is none by the memory they share."""
+    rng = np.random.default_rng(5)
+    few = pd.concat([weekly(rng, f"T{k}", s, 0.0, 0.011 * (k == 0)) for k in range(6) for s in "AB"])
+    many = pd.concat([few, *[weekly(rng, f"U{k}", s, 0.5) for k in range(40) for s in "AB"]], ignore_index=True)
+    asked = "select alarm_id, closed_at_utc, closed_by from alarms where alarm_id like 'T0/%' and raised_at_utc > '{}'"
+    asked = asked.format("2018-09-01")
+    listed = "select section_id, state, sentence from worklist where section_id like 'T0/%'"
+    small_registry(tmp_path, few)
+    update(tmp_path, settings)
+    with open_registry(tmp_path) as con:
+        before = con.execute(asked).fetchall()
+    assert before and {row[1:] for row in before} == {(None, None)}
+    small_registry(tmp_path, many, 2)
+    done = update(tmp_path, settings)
+    taken = f"the alarm {before[0][0]} is not raised again"
+    assert taken in caplog.text
+    with open_registry(tmp_path) as con:
+        found, said = con.execute(asked).fetchall(), con.execute(listed).fetchall()
+        then = con.execute("select max(measured_at_utc) from charts").fetchall()[0][0]
+    assert (before[0][0], then, "recomputed") in found and len(found) == len(before)
+    assert any("is not raised again" in sentence for _, state, sentence in said if state == "cannot tell")
+    again = update(tmp_path, settings, done.digests)
+    assert again.generation == done.generation and caplog.text.count(taken) == 1, "the next night changes nothing"
+    later = many[many["section_id"] == "U1/A"].tail(1)
+    later = later.assign(measured_at_utc=later["measured_at_utc"] + pd.Timedelta("7D"))
+    small_registry(tmp_path, pd.concat([many, later]), 9)
+    update(tmp_path, settings)
+    with open_registry(tmp_path) as con:
+        assert con.execute(asked).fetchall() == found
+        assert not [row for row in con.execute(listed).fetchall() if "is not raised again" in row[2]]
+
+
 STATES = "select * from chart_status order by turnout_id, section_id, band, source"
 
 
