@@ -20,5 +20,6 @@ rule report:
     params:
         code=fingerprint("turnout.report.job"),
         turnouts=RUN.job["only"],
+        day=RUN.day,
     script:
         "../scripts/report.py"

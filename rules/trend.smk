@@ -27,5 +27,6 @@ rule trend:
         configuration=RUN.fleet_hash,
         acknowledgements=contents(ACKNOWLEDGED),
         job=RUN.job,
+        day=RUN.day,
     script:
         "../scripts/trend_update.py"

@@ -5,4 +5,5 @@ from pathlib import Path
 from turnout.report.job import report_job
 
 registry, pages = (str(Path(p).parent) for p in (snakemake.input.generation, snakemake.output[0]))
-report_job(registry, pages, snakemake.params.turnouts, snakemake.log[0], snakemake.threads)
+params = snakemake.params
+report_job(registry, pages, params.turnouts, snakemake.log[0], snakemake.threads, params.day)

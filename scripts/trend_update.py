@@ -7,4 +7,5 @@ from turnout.fleet.attempt import attempt
 
 logging.basicConfig(filename=snakemake.log[0], filemode="w", level="INFO", format="%(levelname)s %(message)s")
 with attempt("trend", snakemake.params.again):
-    print(trend_job(snakemake.input.registry, *snakemake.output, snakemake.params.job["configuration"])["rows"])
+    configuration, day = snakemake.params.job["configuration"], snakemake.params.day
+    print(trend_job(snakemake.input.registry, *snakemake.output, configuration, day)["rows"])

@@ -40,6 +40,16 @@ def test_a_second_run_does_nothing(fleet):
     assert "Nothing to be done" in toy.run(fleet, shards=SHARDS).stdout
 
 
+def test_the_list_and_the_pages_are_of_each_day(fleet):
+    """Silences end, planned work begins and charts grow old without a new file: once a day, and nothing else."""
+    whole = {"shards": SHARDS, "target": "results/pages/index.html"}
+    toy.run(fleet, "day=2026-03-01", **whole)
+    assert "Nothing to be done" in toy.run(fleet, "day=2026-03-01", **whole).stdout
+    done = toy.run(fleet, "day=2026-03-02", **whole).stdout
+    assert set(re.findall(r"^(?:localrule|rule) (\w+):", done, re.M)) == {"trend", "report"}
+    assert "Nothing to be done" in toy.run(fleet, "day=2026-03-02", shards=SHARDS).stdout
+
+
 def test_a_touched_file_is_not_computed_again(fleet):
     os.utime(fleet / "raw/T00001/hammer/2024-01-01/A1_1.npz", (1, 1))
     before = toy.data_files(fleet)
@@ -137,6 +147,7 @@ def test_work_files_that_were_cut_are_made_again_and_nothing_is_computed(fleet):
     [
         ("turnout=T00004", "unknown option 'turnout'. Did you mean 'turnouts'?"),
         ("turnouts=T0004", "no turnout 'T0004'. Did you mean 'T00004'?"),
+        ("day=tomorrow", "day: 'tomorrow'. Write YYYY-MM-DD"),
         ("strict=perhaps", "strict: 'perhaps'. Write true or false"),
     ],
 )

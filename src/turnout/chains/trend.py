@@ -11,7 +11,7 @@ from turnout.registry.day import list_day
 from turnout.trend.nightly import update
 
 
-def trend_job(generation, state, worklist, configuration) -> dict:
+def trend_job(generation, state, worklist, configuration, day=None) -> dict:
     """Bring the derived tables of a registry up to date and write the worklist.
 
     Parameters
@@ -25,6 +25,8 @@ def trend_job(generation, state, worklist, configuration) -> dict:
     configuration : path
         Folder of the configuration: settings of the trend, acknowledgements.csv. A row of that file that cannot be
         used is a warning in the log and in ``state``; the others count.
+    day : str, optional
+        YYYY-MM-DD: the list is that of this day, by default of today.
     """
     registry, state = Path(generation).parent, Path(state)
     before = read_json(state, {})
@@ -33,9 +35,9 @@ def trend_job(generation, state, worklist, configuration) -> dict:
     for warning in warnings:
         logging.getLogger("turnout.trend").warning("does not count: %s", warning)
     said = [dict(row) for row in read.acknowledgements]
-    done = update(registry, read.settings["trend"], before.get("digests"), acknowledgements=said)
+    done = update(registry, read.settings["trend"], before.get("digests"), acknowledgements=said, day=day)
     with open_registry(registry) as con:
-        rows = con.execute(f"select * from worklist({list_day()}) order by rank").df()
+        rows = con.execute(f"select * from worklist({list_day(con, day)}) order by rank").df()
     write_text(worklist, rows.to_csv(index=False, lineterminator="\n"))
     newest = done.newest.isoformat() if done.newest else None
     now = {"rows": done.rows, "generation": done.generation, "newest": newest, "digests": done.digests}

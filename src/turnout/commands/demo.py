@@ -25,6 +25,7 @@ def run(args):
 
     from turnout.demo.make import make_fleet
     from turnout.demo.pipeline import run_pipeline
+    from turnout.demo.scenario import campaign_days
     from turnout.demo.told import tell
     from turnout.errors import ConfigError
 
@@ -39,7 +40,8 @@ def run(args):
     if args.only_raw:
         return 0
     print("2. The pipeline: plan, hammer tests, registry, trends, pages", flush=True)
-    code = run_pipeline(cores)
+    last = max(campaign_days(args.campaigns))  # list and pages of that day, not of one years later
+    code = run_pipeline(cores, "--config", f"day={last}")
     if code == 0:
         print("3. What was found\n", flush=True)
         tell("results/registry", "results/pages")

@@ -33,13 +33,14 @@ def run(args: argparse.Namespace) -> int:
 
     with open_registry(args.registry) as con:
         day = [_day(args.asof, con)] if args.asof else []
-        asof = "?::timestamp" if args.asof else list_day()
+        today = list_day(con)
+        asof = "?::timestamp" if args.asof else today
         rows_of = whole_list(asof) if args.all else f"worklist({asof})"
         question = f"select * from {rows_of} order by rank"
         cursor = con.execute(question, day)
         names = [d[0] for d in cursor.description]
         rows = cursor.fetchall()
-        known = con.execute(CHARTS.format(list_day())).fetchall()[0]
+        known = con.execute(CHARTS.format(today)).fetchall()[0]
     if args.csv:
         with opened(args.csv) as stream:
             _write(stream, names, rows)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime
 from pathlib import Path
 
 from turnout.config import Configuration, load_configuration
@@ -23,6 +23,7 @@ OPTIONS = {
     "strict": "true: raise faults of the program instead of noting them",
     "diagnose": "true: diagnose every turnout, whatever its settings say; false: none",
     "accept_vanished": "true: many known files are gone on purpose",
+    "day": "YYYY-MM-DD: the day of list and pages, instead of today",
     "chains": "for each stage module:function, instead of the program's own",
 }
 PLANS = "work/plan"
@@ -34,7 +35,8 @@ LAUNCHED = "work/launched"
 class Launch:
     """``shards`` take part in this run, ``every_shard`` names all; ``job`` is what a stage job is told;
     ``diagnose`` whose mismatches are diagnosed: "every" turnout's, those "enabled" in their settings, "" none;
-    ``learned`` are the files of clusters, calibrations and axle patterns that passages are judged with."""
+    ``learned`` are the files of clusters, calibrations and axle patterns that passages are judged with;
+    ``day`` is that of list and pages, YYYY-MM-DD: what is silenced, planned or not measured changes without a file."""
 
     shards: list[str]
     every_shard: list[str]
@@ -44,6 +46,7 @@ class Launch:
     diagnose: str = ""
     chains: Mapping[str, str] = field(default_factory=dict)
     learned: tuple[str, ...] = ()
+    day: str = ""
 
     def threads(self, cores: int | None) -> int:
         """Processes per job when ``cores`` are shared among the shards."""
@@ -75,11 +78,12 @@ def launch(options: Mapping, scan: bool, formats=None, to_si=None) -> Launch:
             if state.stem in shard_names(shards) and is_cut_state(state):
                 ask_again(state)
         write_text(Path(LAUNCHED), began.isoformat(timespec="seconds"))
+    day = _day(options.get("day"))
     names = shard_names(shards, turnouts)
     chains = dict(options.get("chains") or {})
     whose = _diagnosed(options, configuration)
     learned = _learned(configuration)
-    return Launch(names, shard_names(shards), turnouts, fleet_hash(configuration), job, whose, chains, learned)
+    return Launch(names, shard_names(shards), turnouts, fleet_hash(configuration), job, whose, chains, learned, day)
 
 
 def _learned(configuration: Configuration) -> tuple[str, ...]:
@@ -98,6 +102,16 @@ def launched_at() -> datetime | None:
         return datetime.fromisoformat(Path(LAUNCHED).read_text(encoding="utf-8"))
     except (FileNotFoundError, ValueError):
         return None
+
+
+def _day(said) -> str:
+    """The day asked for, else that on which the run began, of which all of its jobs are."""
+    if not said:
+        return (launched_at() or datetime.now(UTC)).date().isoformat()
+    try:
+        return date.fromisoformat(str(said)).isoformat()
+    except ValueError:
+        raise ConfigError("--config", "day", repr(said), "Write YYYY-MM-DD") from None
 
 
 def _diagnosed(options: Mapping, configuration: Configuration) -> str:

@@ -26,6 +26,22 @@ OFFLINE: dict[str, str | bool | int | float | list[str]] = {
     "autoload_known_extensions": False,
 }
 
+# A logger's clock that runs ahead is not believed: nothing was measured after the last run and the last campaign. A
+# campaign's date is written down by people: after the last run it counts where most turnouts have one, for then it is
+# the clock of this machine that is late.
+LAST_POSSIBLE = """
+    with clock as (select max(ended_at_utc) as at_utc from runs),
+    last as (select turnout_id, max(started_at_utc) as at_utc from campaigns group by turnout_id),
+    judged as (
+        select l.at_utc, coalesce(l.at_utc > c.at_utc + interval 1 day, false) as is_ahead
+        from last l cross join clock c
+    )
+    select greatest(
+        (select at_utc from clock),
+        (select case when 2 * count(*) filter (is_ahead) > count(*) then max(at_utc)
+            else max(at_utc) filter (not is_ahead) end from judged)
+    )::varchar"""
+
 
 def open_registry(path, read_only: bool = True) -> duckdb.DuckDBPyConnection:
     """DuckDB connection to a registry, given its folder or its ``registry.duckdb``. Loads no extension.
@@ -107,9 +123,7 @@ def _create_views(con, root: Path, generation: Generation) -> None:
         con.execute(f'create view "{table}" as {read_live(con, root, table, generation.of(table))}')
     for table in LARGE:
         create_parts(con, root, table, generation.of(table))
-    # a logger's clock that runs ahead is not believed: nothing was measured after the last run and the last campaign
-    known = "greatest((select max(ended_at_utc) from runs), (select max(started_at_utc) from campaigns))"
-    until = con.execute(f"select {known}::varchar").fetchall()[0][0]
+    until = con.execute(LAST_POSSIBLE).fetchall()[0][0]
     counted = newest_that_counts(con, root, generation)
     last = counted and min(counted, until or counted)
     newest = f"timestamp {literal(last)}" if last else "null::timestamp"

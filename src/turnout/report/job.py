@@ -9,8 +9,11 @@ from turnout.report.findings import write_finding_pages
 from turnout.report.write import AT_ONCE, write_pages, write_turnouts
 
 
-def report_job(registry, pages, turnouts=None, log=None, threads=1) -> int:
-    """Write the pages of the registry in folder ``registry`` into ``pages``; returns how many had to be written."""
+def report_job(registry, pages, turnouts=None, log=None, threads=1, day=None) -> int:
+    """Write the pages of the registry in folder ``registry`` into ``pages``; returns how many had to be written.
+
+    They are those of ``day`` (YYYY-MM-DD), by default of today.
+    """
     with open_registry(registry) as connection:
         _check_known(connection, turnouts)
         generation, known = connection.execute(
@@ -18,10 +21,10 @@ def report_job(registry, pages, turnouts=None, log=None, threads=1) -> int:
         ).fetchall()[0]
 
         def elsewhere(content):
-            _in_processes(registry, pages, content, generation, threads)
+            _in_processes(registry, pages, content, generation, threads, day)
 
         many = elsewhere if threads > 1 and known > AT_ONCE else None
-        n = write_pages(connection, pages, generation, turnouts or None, log is None, many)
+        n = write_pages(connection, pages, generation, turnouts or None, log is None, many, day)
         write_finding_pages(connection, pages, generation, turnouts or None)
     if log is not None:
         with open(log, "w") as file:
@@ -29,19 +32,19 @@ def report_job(registry, pages, turnouts=None, log=None, threads=1) -> int:
     return n
 
 
-def _in_processes(registry, pages, content, generation, threads):
+def _in_processes(registry, pages, content, generation, threads, day):
     """Shares of AT_ONCE turnouts to fresh processes, each with a connection of its own: DuckDB's cannot be forked."""
     names = list(content)
     with ProcessPoolExecutor(threads, multiprocessing.get_context("spawn")) as pool:
         shares = [{t: content[t] for t in names[k : k + AT_ONCE]} for k in range(0, len(names), AT_ONCE)]
-        for done in [pool.submit(_write_share, registry, pages, share, generation) for share in shares]:
+        for done in [pool.submit(_write_share, registry, pages, share, generation, day) for share in shares]:
             done.result()
 
 
-def _write_share(registry, pages, content, generation):
+def _write_share(registry, pages, content, generation, day):
     with open_registry(registry) as connection:
         connection.execute("set threads = 1")
-        write_turnouts(connection, pages, content, generation)
+        write_turnouts(connection, pages, content, generation, day=day)
 
 
 def _check_known(connection, turnouts):

@@ -61,10 +61,13 @@ TREND_VIEWS = {"charts", "chart_states", "worklist"}
 
 
 class FleetSource:
-    """Rows as dictionaries: ``turnouts()``, ``reasons()``, ``states()``, ``worklist()`` of the fleet, ``of_some``."""
+    """Rows as dictionaries: ``turnouts()``, ``reasons()``, ``states()``, ``worklist()`` of the fleet, ``of_some``.
 
-    def __init__(self, connection):
-        self.connection, self.day = connection, list_day()
+    States and list are those of ``day`` (YYYY-MM-DD), by default of today.
+    """
+
+    def __init__(self, connection, day=None):
+        self.connection, self.day = connection, list_day(connection, day)
         found = connection.execute("select view_name from duckdb_views() where database_name = current_database()")
         self.there = {row[0] for row in found.fetchall()}
 

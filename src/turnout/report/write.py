@@ -16,7 +16,7 @@ from turnout.report.source import ROWS, FleetSource
 AT_ONCE = 100
 
 
-def write_pages(connection, folder, generation="", turnouts=None, progress=True, elsewhere=None):
+def write_pages(connection, folder, generation="", turnouts=None, progress=True, elsewhere=None, day=None):
     """Write ``folder``/index.html, and ``folder``/turnouts/<id>.html where it does not say what the registry says.
 
     Pages of turnouts that the registry does not know any more are removed.
@@ -33,6 +33,8 @@ def write_pages(connection, folder, generation="", turnouts=None, progress=True,
         Only these turnouts' pages; the fleet's page is always written.
     elsewhere : callable, optional
         Called with (turnout ids, their contents) instead of writing the turnouts' pages here.
+    day : str, optional
+        YYYY-MM-DD: what was known on this day is shown, by default today.
 
     Returns
     -------
@@ -42,22 +44,22 @@ def write_pages(connection, folder, generation="", turnouts=None, progress=True,
     folder = Path(folder)
     (folder / "turnouts").mkdir(parents=True, exist_ok=True)
     environment, shared = page_environment(), shared_by_pages(generation)
-    source = FleetSource(connection)
+    source = FleetSource(connection, day)
     replace_page(folder / "index.html", fleet_page(source, environment.get_template("fleet.html"), shared))
     content = contents(source)
     if turnouts is None:
         _remove_others(folder / "turnouts", content)
     wanted = sorted(content if turnouts is None else set(turnouts) & set(content))
     stale = {t: content[t] for t in wanted if content_of(folder / "turnouts" / f"{t}.html") != content[t]}
-    write = elsewhere or (lambda some: write_turnouts(connection, folder, some, generation, progress))
+    write = elsewhere or (lambda some: write_turnouts(connection, folder, some, generation, progress, day))
     if stale:
         write(stale)
     return 1 + len(stale)
 
 
-def write_turnouts(connection, folder, content, generation="", progress=False):
+def write_turnouts(connection, folder, content, generation="", progress=False, day=None):
     """Write the pages of the turnouts in ``content``, a mapping to the hash that each page carries."""
-    source, shared = FleetSource(connection), shared_by_pages(generation)
+    source, shared = FleetSource(connection, day), shared_by_pages(generation)
     template = page_environment().get_template("turnout.html")
     names = list(content)
     with tqdm(total=len(names), desc="pages", disable=not progress, leave=False) as bar:

@@ -21,6 +21,7 @@ from turnout.trend.prepared import prepare
 from turnout.trend.rows import arrow_rows
 from turnout.trend.states import chart_status
 from turnout.trend.tables import alarm_rows, baseline_rows, chart_rows
+from turnout.trend.withdrawn import ACCOUNTED, with_withdrawn
 from turnout.trend.years import digest, split_by_year
 
 CELLS_PER_PART = 1_500_000
@@ -41,7 +42,7 @@ class Updated:
     digests: dict[str, str]
 
 
-def update(registry_dir, settings, digests=None, as_of=None, acknowledgements=None) -> Updated:
+def update(registry_dir, settings, digests=None, as_of=None, acknowledgements=None, day=None) -> Updated:
     """Compute every chart of a registry and put charts, baselines, alarms and states in the place of the old ones.
 
     Parameters
@@ -55,14 +56,19 @@ def update(registry_dir, settings, digests=None, as_of=None, acknowledgements=No
         newest campaign of the fleet whose clock can be believed.
     acknowledgements : list of dict, optional
         All rows of the table of that name; None leaves it alone.
+    day : date, optional
+        The day it is, by default this machine's in UTC: work that is planned for later resets nothing yet, and a
+        campaign of later is not believed.
     """
+    end = np.floor(days([datetime.now(UTC).replace(tzinfo=None) if day is None else day])[0]) + 1.0
     with open_registry(registry_dir) as con:
         events = con.execute("select * from events order by event_at_utc, event_id").df()
-        parts, newest = _parts(con, settings, as_of)
-        now = newest if as_of is not None else max(newest, days([datetime.now(UTC).replace(tzinfo=None)])[0])
-        events = events[days(events["event_at_utc"]) <= now]  # work that is planned resets nothing yet
+        parts, newest = _parts(con, settings, as_of, end)
+        now = newest if as_of is not None else max(newest, end)
+        events = events[days(events["event_at_utc"]) <= now]
+        before = con.execute(ACCOUNTED if as_of is None else f"from ({ACCOUNTED}) limit 0").df()
         prepared = [prepare(_panel(con, part, newest, events, settings), events, settings) for part in parts]
-    years, tables = _tables(prepared, settings)
+    years, tables = _tables(prepared, settings, lambda alarms: with_withdrawn(alarms, before, newest))
     rows = {name: table.num_rows for name, table in tables.items()}
     rows["charts"] = sum(part.num_rows for found in years.values() for part in found)
     now = {str(year): digest(found, names("charts")) for year, found in years.items()}
@@ -84,8 +90,8 @@ def update(registry_dir, settings, digests=None, as_of=None, acknowledgements=No
     return done
 
 
-def _tables(prepared, settings):
-    """Rows of ``charts`` by year, in parts, and rows of the other derived tables.
+def _tables(prepared, settings, account):
+    """Rows of ``charts`` by year, in parts, and rows of the other derived tables, the alarms as ``account`` makes them.
 
     ``prepared`` is emptied on the way, so that the arrays of a part go when it is done.
     """
@@ -105,24 +111,26 @@ def _tables(prepared, settings):
         for year, part in split_by_year(arrow_rows("charts", chart_rows(done), single=True)).items():
             years.setdefault(year, []).append(part)
     joined = {name: pd.concat(found, ignore_index=True) if found else pd.DataFrame() for name, found in frames.items()}
+    joined["alarms"] = account(joined["alarms"])
     if seen:
         joined["chart_status"] = describe_flagged(joined["chart_status"], flags, settings)
     return years, {name: arrow_rows(name, frame) for name, frame in joined.items()}
 
 
-def _parts(con, settings, as_of):
-    """Charts in parts of whole turnouts, and the newest time that counts. [d]"""
+def _parts(con, settings, as_of, end):
+    """Charts in parts of whole turnouts, and the newest time that counts; ``end`` of the day it is. [d]"""
     # What trains say is aggregated once; what hammers say is read part by part.
     con.execute("create temp table by_trains as select * from passage_values")
     later = "" if as_of is None else f" where measured_at_utc <= timestamp '{timestamps(days([as_of]))[0]}'"
     con.execute(f"create temp view charted as select * from ({HAMMER} union all select * from by_trains){later}")
-    charts = con.execute(f"select distinct {', '.join(CHART)} from charted").df()
+    charts = con.execute(f"select {', '.join(CHART)}, max(measured_at_utc) as newest from charted group by all").df()
     for name in CHART:
         charts[name] = charts[name].astype(object)
     charts = charts.sort_values(CHART, ignore_index=True)
+    last = days(charts.pop("newest"))
     if as_of is None:
         found = con.execute("select distinct measured_at_utc from charted").df()
-        _, newest = believable(days(found["measured_at_utc"]), settings)
+        _, newest = believable(days(found["measured_at_utc"]), settings, _until(charts, last, end + 1.0))
     else:
         newest = days([as_of])[0]
     if charts.empty:
@@ -131,6 +139,24 @@ def _parts(con, settings, as_of):
     share = dict(zip(rows["turnout_id"], rows["n"].cumsum() // CELLS_PER_PART))
     number = charts["turnout_id"].map(share)
     return [part.reset_index(drop=True) for _, part in charts.groupby(number, sort=True)], newest
+
+
+def _until(charts, last, until):
+    """Time [d] after which no campaign is believed: ``until``, or none where most charts have such a campaign.
+
+    Then it is the clock of this machine that is late, or the fleet is a simulated one. ``last`` are the newest
+    campaigns of the charts. [d]
+    """
+    ahead = last > until
+    if 2 * ahead.sum() > len(ahead):
+        return np.inf
+    if ahead.any():
+        said = (
+            "campaigns after %s, which has not come, are shown and not used. Correct the dates of %d charts, first %s"
+        )
+        where = " ".join(charts.loc[ahead, ["section_id", "band"]].iloc[0])
+        logging.getLogger("turnout.trend").warning(said, timestamps([until])[0].item(), ahead.sum(), where)
+    return until
 
 
 def _panel(con, charts, newest, events, settings):

@@ -65,18 +65,18 @@ def timestamps(day) -> np.ndarray:
     return np.where(np.isfinite(day), micro.view("datetime64[us]"), np.datetime64("NaT"))
 
 
-def believable(time, settings) -> tuple[np.ndarray, float]:
+def believable(time, settings, until=np.inf) -> tuple[np.ndarray, float]:
     """Which times of a fleet a clock can have shown, and the newest of them.
 
-    A time is not believed before ``earliest_year``; nor, with everything after it, where one lone last day of
-    measurement lies more than ``clock_gap_days`` after every other in the fleet.
+    A time is not believed before ``earliest_year`` or after ``until`` [d]; nor, with everything after it, where one
+    lone last day of measurement lies more than ``clock_gap_days`` after every other in the fleet.
 
     >>> from turnout.config.settings.trend import TrendSettings
     >>> believable(np.array([-3.0, 15000.0, 15007.0, 26000.0]), TrendSettings())
     (array([False,  True,  True, False]), 15007.0)
     """
     earliest = days([pd.Timestamp(settings.earliest_year, 1, 1)])[0]
-    good = np.isfinite(time) & (time >= earliest)
+    good = np.isfinite(time) & (time >= earliest) & (time <= until)
     dates = np.unique(np.floor(time[good]))
     if dates.size >= 3 and dates[-1] - dates[-2] > settings.clock_gap_days:
         good &= time < dates[-1]

@@ -43,8 +43,8 @@ def chart_status(charts, settings) -> pd.DataFrame:
     """One row per chart: its state today, why, the change it can see, its slope.
 
     States in the order in which they are decided: ``alarm``, which no silence ends; ``not_measured`` (too long
-    ago), ``cannot_tell`` (values that never change; too few temperatures), ``learning`` (baseline or level after an
-    event not complete), ``cannot_tell`` (detectable change above the target), ``ok``.
+    ago), ``cannot_tell`` (values that never change; no temperature for as long, or too few), ``learning`` (baseline or
+    level after an event not complete), ``cannot_tell`` (detectable change above the target), ``ok``.
     """
     p = charts.prepared
     n_section = len(p.panel.charts)
@@ -116,7 +116,7 @@ def _newest_of_sections(p, last) -> np.ndarray:
 def _states(charts, settings, status, last, present):
     """The state and the reason of every chart; the first that applies."""
     p = charts.prepared
-    as_of = p.panel.as_of
+    as_of = np.nan_to_num(p.panel.as_of, neginf=0.0)  # no campaign of the fleet can be used: none is old
     stale = stale_after(p, settings)
     old = as_of - last > stale
     whole = status["section_id"].to_numpy() == WHOLE
@@ -125,6 +125,8 @@ def _states(charts, settings, status, last, present):
     open_now = _last(charts.down_open) | _last(charts.up_open)
     stuck = ~np.isfinite(charts.sigma).any(axis=1) | ~(p.spread > 0.0)
     stuck[: len(p.panel.charts)] |= never_changes(p.panel.frequency)
+    judged = np.max(np.where(np.isfinite(charts.z), p.time, -np.inf), axis=1, initial=-np.inf)
+    unheard = p.baseline.complete & ~whole & (as_of - judged > stale)
     cold = p.baseline.without_temperature > 0.5 * status["n_campaigns"].to_numpy()
     learned = status["n_learned"].to_numpy()
     relearn = p.baseline.complete & (p.pending | ((p.epoch[:, -1] > first_epoch(p)) & (learned < charts.learn)))
@@ -136,6 +138,7 @@ def _states(charts, settings, status, last, present):
         (unjudged, "cannot_tell", "too_few_sections"),
         (old, "not_measured", "too_long_ago"),
         (p.baseline.complete & stuck & ~whole, "cannot_tell", "constant"),
+        (unheard, "cannot_tell", "no_temperature"),
         (~p.baseline.complete & cold, "cannot_tell", "no_temperature"),
         (~p.baseline.complete & whole & (p.baseline.count == 0), "cannot_tell", "too_few_sections"),
         (~p.baseline.complete, "learning", "baseline"),

@@ -30,8 +30,8 @@ def campaigns_of(visits, time, gap, n_visits, works):
 
     A campaign lasts ``gap`` from its first value on and ends at work that resets: ``works`` are sorted ``keys_of``.
     """
-    if not time.size:
-        return np.zeros(0, dtype=np.int64), np.zeros((n_visits, 0))
+    if not time.size:  # one column of none: what comes after needs no case of its own
+        return np.zeros(0, dtype=np.int64), np.full((n_visits, 1), np.nan)
     stamp, row = unique_of(keys_of(visits, time))
     visit, moment = stamp >> 40, (stamp & (2**40 - 1)) / DAY - 2e6
     new_turnout = np.diff(visit, prepend=-1) != 0

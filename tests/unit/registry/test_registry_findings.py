@@ -69,8 +69,21 @@ def fleet(tmp_path_factory):
     results.append(visit("t9", 0, verdict="none", sections="OT"))
     doubtful = [("factor", 0.4, 0.1, "-", 24.6, None)]
     results.append(visit("t10", 0, verdict="a_or_b", term="local_ballast", rival="hanging_sleeper", values=doubtful))
+    results.append(visit("t11", 0, term="sensor_gain", values=[("gain", 0.5, 0.03, "-", None, "A7")]))  # tamped since
+    for turnout in ("t12", "t13"):
+        results.append(visit(turnout, 0, verdict="unknown", sections="A7, A8, A9"))
+        results.append(gap(turnout, 10, 0.8e-3, 0.05e-3, sections="OT, SP"))
+        results.append(visit(turnout, 40, verdict="none", sections="A8"))
+        results.append(visit(turnout, 60, verdict="none", sections="SP"))
+    results.append(visit("t13", 90, verdict="none", sections="A7, A9, AS"))
+    results.append(visit("t13", 90, verdict="none", sections="OT"))
     bench = Bench(tmp_path_factory.mktemp("findings"))
-    assert bench.register(*results, tables={"events": [EVENT]}).n_refused == 0
+    assert (
+        bench.register(
+            *results, tables={"events": [EVENT, EVENT | {"event_id": "e2", "turnout_id": "t11", "section_id": None}]}
+        ).n_refused
+        == 0
+    )
     with open_registry(bench.registry) as connection:
         yield connection
 
@@ -106,16 +119,40 @@ def test_hanging_sleepers_that_grow_are_large_open_and_growing(fleet):
 
 def test_a_wrong_gain_excludes_one_and_is_still_there(fleet):
     rows = fleet.execute(
-        "select turnout_id, channel, gain, gain_low, gain_high from sensors_with_wrong_gain"
+        "select turnout_id, channel, gain, gain_low, gain_high from sensors_with_wrong_gain where turnout_id <> 't11'"
     ).fetchall()
     ((turnout, channel, gain, low, high),) = rows
     assert (turnout, channel, gain) == ("t6", "A8", 1.31)
     assert (low, high) == pytest.approx((1.31 - 1.959964 * 0.02, 1.31 + 1.959964 * 0.02))
 
 
+def test_tamping_mends_no_sensor(fleet):
+    """Ballast work undoes what was found of the ballast; a gain of one half is still one half."""
+    asked = "select channel, gain from sensors_with_wrong_gain where turnout_id = 't11'"
+    assert fleet.execute(asked).fetchall() == [("A7", 0.5)]
+
+
+def test_a_finding_ends_when_each_of_its_sections_was_looked_at_again(fleet):
+    """Sections come and go from visit to visit: A9 of t12 has not been looked at since, in t13 all have."""
+    asked = "select sections, verdict from findings_newest where turnout_id = ? order by all"
+    assert fleet.execute(asked, ["t12"]).fetchall() == [
+        ("A7, A8, A9", "unknown"), ("A8", "none"), ("OT, SP", "named"), ("SP", "none"),
+    ]  # fmt: skip
+    assert fleet.execute(asked, ["t13"]).fetchall() == [
+        ("A7, A9, AS", "none"), ("A8", "none"), ("OT", "none"), ("SP", "none"),
+    ]  # fmt: skip
+    grown = fleet.execute(
+        "select turnout_id, is_open from parameter_growth where turnout_id in ('t12', 't13') order by 1"
+    )
+    assert grown.fetchall() == [("t12", True), ("t13", False)]
+
+
 def test_what_nobody_can_name_is_unknown_or_one_of_two(fleet):
     rows = fleet.execute("select turnout_id, verdict, term, rival_term from mismatches_without_name order by all")
-    assert rows.fetchall() == [("t10", "a_or_b", "local_ballast", "hanging_sleeper"), ("t9", "unknown", None, None)]
+    assert rows.fetchall() == [
+        ("t10", "a_or_b", "local_ballast", "hanging_sleeper"), ("t12", "unknown", None, None),
+        ("t9", "unknown", None, None),
+    ]  # fmt: skip
 
 
 def test_the_newest_visit_of_each_group_counts(fleet):

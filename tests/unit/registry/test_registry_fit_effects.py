@@ -96,3 +96,67 @@ def test_one_type_at_one_speed_has_no_effects_and_still_its_bars(bench):
     bars = bench.frame("from fit_adjusted where section_id = 'north_1/A7' and score = 'fit'")
     assert len(bars) == 3
     np.testing.assert_allclose(bars.adjusted_pct, bars.score_pct, **SAME)
+
+
+def without_channels(registry):
+    """What depends on how many passages there were, of every view that compares scores."""
+    of = {
+        "fit_effects": ("score, factor", "change_pct, change_se_pct, low_pct, high_pct, raw_change_pct"),
+        "fit_adjusted": (
+            "score, factor, class",
+            "score_pct, score_sd_pct, score_se_pct, adjusted_pct, adjusted_se_pct, n_passages",
+        ),
+        "fit_by_cluster_week": (
+            "cluster_id, week_utc",
+            "fit_pct, fit_se_pct, forecast_pct, forecast_se_pct, n_passages",
+        ),
+        "fit_by_speed": (
+            "speed_from_kmh",
+            "fit_pct, fit_sd_pct, fit_se_pct, leave_one_out_se_pct, null_share, n_passages",
+        ),
+        "sections_whose_scores_fell(200)": ("section_id", "change_pct, change_se_pct, z, n_recent, n_before"),
+    }
+    ask = "select {1} from {0} where section_id = 'north_1/A9' order by {2}"
+    return {v: registry.frame(ask.format(v, values, keys)) for v, (keys, values) in of.items()}
+
+
+def test_sensors_that_hear_the_same_train_are_no_trains_of_their_own(bench, tmp_path):
+    """Two more sensors beside each, that say the same: no mean moves, and no error gets smaller."""
+    once, thrice = passage_results(n=200), passage_results(n=200)
+    for result in thrice:
+        fits = result.tables["passage_fits"]
+        result.tables["passage_fits"] = [f | {"channel": f"{f['channel']}{k}"} for f in fits for k in range(3)]
+    more = type(bench)(tmp_path / "more")
+    bench.register(*once)
+    more.register(*thrice)
+    expected, found = without_channels(bench), without_channels(more)
+    for view, frame in expected.items():
+        assert len(frame) and frame.notna().any().all(), view
+        pd.testing.assert_frame_equal(found[view], frame, rtol=1e-9, obj=view)
+    assert more.ask("select sum(n) from fit_by_cluster_week") == [
+        (3 * bench.ask("select sum(n) from fit_by_cluster_week")[0][0],)
+    ]
+
+
+def test_errors_are_those_of_passages_where_sensors_hear_alike(bench):
+    """Three sensors whose scores share four fifths of their scatter: errors from the means of each passage."""
+    rng, results = np.random.default_rng(5), passage_results(n=150)
+    for result in results:
+        fits, common = [f for f in result.tables["passage_fits"] if f["channel"] == "a_A7"], rng.normal(0, 4)
+        result.tables["passage_fits"] = [
+            f | {"channel": f"c{k}", "fit_pct": f["fit_pct"] + common + rng.normal(0, 2)}
+            for f in fits for k in range(int(rng.integers(1, 4)))
+        ]  # fmt: skip
+    bench.register(*results)
+    rows = bench.frame("from passage_scores where axle_load_t is not null")
+    own = rows.groupby("passage_id").agg(
+        {"fit_pct": "mean", "train_type": "first", "speed_kmh": "first", "axle_load_t": "first"}
+    )
+    made, _ = least_squares(own, "fit_pct")
+    found = bench.frame("from fit_effects where score = 'fit' order by factor")
+    np.testing.assert_allclose(found.change_se_pct, [made.bse.load, made.bse.speed], **SAME)
+    np.testing.assert_allclose(found.change_pct, [made.params.load, made.params.speed], **SAME)
+    assert list(found.n) == [len(rows)] * 2
+    bars = bench.frame("from fit_adjusted where score = 'fit' and factor = 'train type'").set_index("class")
+    for name, values in own.fit_pct.groupby(own.train_type):
+        np.testing.assert_allclose(bars.score_se_pct[name], values.sem(), **SAME)

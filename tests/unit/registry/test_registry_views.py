@@ -272,3 +272,16 @@ def test_campaigns_are_believed_where_the_clock_of_the_server_is_late(bench):
     campaign = {"campaign_id": "t1/2098-01-05", "turnout_id": "t1", "started_at_utc": "2098-01-05T10:00:00"}
     bench.register(hammer_result(day="2098-01-05"), tables={"campaigns": [campaign]})
     assert str(bench.ask("select newest_measurement()")[0][0]) == "2098-01-05 10:00:00"
+
+
+def test_a_campaign_that_one_turnout_alone_dates_ahead_does_not_date_the_fleet(bench):
+    """Of three turnouts one has a campaign of 2098: a mistyped year, and no late clock of this server."""
+    days = {"t1": "2026-01-05", "t2": "2098-01-05", "t3": "2026-01-07"}
+    campaigns = [
+        {"campaign_id": f"{turnout}/{day}", "turnout_id": turnout, "started_at_utc": f"{day}T10:00:00"}
+        for turnout, day in days.items()
+    ]
+    results = [hammer_result(turnout=turnout, day=day) for turnout, day in days.items()]
+    bench.register(*results, tables={"campaigns": campaigns})
+    ((newest, ended),) = bench.ask("select newest_measurement(), (select max(ended_at_utc) from runs)")
+    assert newest == ended

@@ -120,6 +120,39 @@ def test_a_bad_line_hides_no_alarm(configuration, tmp_path, capsys, caplog):
     assert "acknowledgements.csv, line 3, column 1: turnout 'nowhere' has no row" in capsys.readouterr().out
 
 
+def test_a_silence_ends_on_its_day_though_no_file_has_come(configuration, tmp_path):
+    """The same registry, asked on the day before and on the day that a silence ends; work that is planned begins."""
+    import numpy as np
+    from benchmarks.trend_fleet import Fleet, drift, modes
+    from benchmarks.trend_registry import small_registry
+
+    from turnout.chains.trend import trend_job
+    from turnout.registry.database import open_registry
+
+    turnout, _ = place_of(configuration)
+    fleet, which = Fleet(turnouts=1, weeks=120, phi=0.1), np.zeros((1, 8), bool)
+    which[0, 4] = True
+    rows = modes(fleet, 3, drift(fleet, which, -6.0, 60)).astype({"turnout_id": object, "section_id": object})
+    rows = rows.assign(turnout_id=turnout, section_id=turnout + rows["section_id"].str[6:])
+    line = f"{turnout},,,suppress,me,2018-04-01,2018-05-02,rails are changed\n"
+    (configuration / "acknowledgements.csv").write_text(HEADER + line, encoding="utf-8")
+    root = tmp_path / "registry"
+    small_registry(root, rows)
+    planned = {"event_id": "e", "turnout_id": turnout, "section_id": None, "kind": "tamping", "resets_ballast": True}
+    planned |= {"resets_railpad": True, "event_at_utc": pd.Timestamp("2018-05-04T10:00")}
+    publish(root, {"events": arrow_rows("events", pd.DataFrame([planned]))})
+    listed = {}
+    for day in ("2018-05-01", "2018-05-02", "2018-05-03", "2018-05-04"):
+        trend_job(root / "_generation.json", tmp_path / "state", tmp_path / "list.csv", configuration, day)
+        found = pd.read_csv(tmp_path / "list.csv", dtype=str).fillna("")
+        listed[day] = found.loc[found["section_id"].str.endswith("S4"), "state"].tolist()
+        with open_registry(root) as con:
+            state = con.execute("select distinct state from chart_status where section_id like '%S4'").fetchall()
+        assert state == [("learning" if day == "2018-05-04" else "alarm",)]
+    assert listed["2018-05-01"] == [] and listed["2018-05-04"] == []
+    assert listed["2018-05-02"] == listed["2018-05-03"] == ["inspect this week"]
+
+
 def test_a_silence_that_is_over_is_not_written(configuration, capsys):
     turnout, _ = place_of(configuration)
     said = ["--by", "me", "--reason", "x", "--configuration", str(configuration)]

@@ -106,6 +106,20 @@ def test_without_any_temperature_the_chart_cannot_tell(settings):
     assert alarm_rows(charts, settings).empty
 
 
+def test_a_thermometer_that_stops_after_the_baseline_leaves_charts_that_cannot_tell(settings):
+    """Fourteen months with temperatures, sixteen without, in which one section falls by a fifth: nothing was judged."""
+    rows = plain(modes(FLEET, 1))
+    cold = rows["measured_at_utc"] >= rows["measured_at_utc"].min() + pd.Timedelta(weeks=60)
+    rows.loc[cold, "rail_temperature_c"] = np.nan
+    rows.loc[cold & (rows["section_id"] == "T00000/S5"), "frequency_hz"] *= 0.8
+    status, _ = status_of(rows, settings)
+    assert set(status["state"]) == {"cannot_tell"}
+    assert set(status.loc[status["section_id"] != "*", "reason"]) == {"no_temperature"}
+    # 70 days after the last temperature it is a gap like others: 90 days make a chart stale
+    soon, _ = status_of(rows, settings, as_of=rows.loc[~cold, "measured_at_utc"].max() + pd.Timedelta(days=70))
+    assert set(soon.loc[soon["section_id"] != "*", "state"]) == {"ok"}
+
+
 @pytest.mark.parametrize("stamp", ["1970-01-01 00:00:10", "2031-05-05"], ids=["never set", "ahead"])
 def test_a_campaign_with_a_wrong_clock_is_shown_and_left_out(settings, stamp):
     rows = plain(modes(FLEET, 1))

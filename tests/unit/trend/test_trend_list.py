@@ -162,6 +162,23 @@ def test_what_is_silenced_comes_back_on_its_day(settings):
         assert con.execute(states.format(3)).fetchall() == [("inspect this week",)]
 
 
+def test_a_fleet_that_falls_silent_is_not_measured_and_its_alarm_stays(settings):
+    """Weekly charts are stale after 90 days; one that is learning after work falls silent as others."""
+    rows = fallen()
+    newest = rows["measured_at_utc"].max()
+    with viewed(rows, settings, work("T00002", newest - pd.Timedelta(weeks=5))) as con:
+        asked = "select state, count(*) from chart_states_on(newest_measurement() + interval {} day) group by all"
+        states = {d: dict(con.execute(asked.format(d)).fetchall()) for d in (0, 89, 91, 800)}
+        assert states[0] == states[89] and states[0]["learning"] == 9
+        assert states[91] == states[800] == {"inspect this week": 1, "not measured": 26}
+        why = con.execute(
+            "select distinct state, why from cannot_see(newest_measurement() + interval 91 day)"
+        ).fetchall()
+        assert why == [("not measured", f"last measured {newest:%Y-%m-%d}")]
+        listed = con.execute("select section_id from worklist(newest_measurement() + interval 91 day)").fetchall()
+        assert listed == [("T00001/S4",)]
+
+
 def test_sections_measured_the_day_after_are_of_the_same_campaign(settings):
     """S4 to S7 a day after S0 to S3: the residuals in SQL have all eight, and the same as in one day."""
     rows = fallen()
@@ -174,7 +191,7 @@ def test_sections_measured_the_day_after_are_of_the_same_campaign(settings):
     pd.testing.assert_frame_equal(*found)
 
 
-def test_the_list_in_words_says_what_it_rests_on_and_what_it_leaves_out(tmp_path, settings, capsys):
+def test_the_list_in_words_says_what_it_rests_on_and_what_it_leaves_out(tmp_path, settings, capsys, monkeypatch):
     from turnout.cli import main
 
     rows = fallen()
@@ -182,6 +199,9 @@ def test_the_list_in_words_says_what_it_rests_on_and_what_it_leaves_out(tmp_path
     silent = (rows["turnout_id"] == "T00002") & (rows["measured_at_utc"] > newest - pd.Timedelta(weeks=20))
     small_registry(tmp_path, rows[~silent])
     update(tmp_path, replace(settings, worklist_rows=1))
+    assert main(["worklist", "--registry", str(tmp_path)]) == 0
+    assert "26 not measured for too long." in capsys.readouterr().out  # of 2018: all but the alarm
+    monkeypatch.setattr("turnout.registry.day.list_day", lambda connection: f"timestamp '{newest}'")
     assert main(["worklist", "--registry", str(tmp_path)]) == 0
     told = capsys.readouterr().out
     assert "INSPECT THIS WEEK: T00001" in told

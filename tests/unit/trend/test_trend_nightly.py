@@ -176,6 +176,91 @@ def test_one_wrong_clock_does_not_stop_the_night(registry, rows, settings, tmp_p
         assert con.execute("select section_id from worklist").fetchall()[0] == ("T00001/S4",)
 
 
+def weekly(rng, turnout, section, phi, drop=0.0):
+    """Three years of one section: AR(1) of 0.6 %, and a fall by ``drop`` in the last 14 weeks."""
+    when = pd.date_range("2016-01-04", periods=157, freq="7D")
+    noise = rng.normal(size=157)
+    for k in range(1, 157):
+        noise[k] = phi * noise[k - 1] + np.sqrt(1.0 - phi**2) * noise[k]
+    rail = 10 + 15 * np.sin(2 * np.pi * np.arange(157) / 52) + rng.normal(0, 4, 157)
+    value = 150 * (1 - 0.0015 * (rail - 10) + 0.006 * noise - drop * (np.arange(157) >= 143))
+    row = {"turnout_id": turnout, "section_id": f"{turnout}/{section}", "band": "ballast", "source": "hammer"}
+    return pd.DataFrame(
+        row | {"measured_at_utc": when, "frequency_hz": value, "frequency_se_hz": 0.3, "rail_temperature_c": rail}
+    )
+
+
+def test_an_alarm_that_is_not_raised_again_is_closed_in_sight(settings, tmp_path, caplog):
+    """Forty turnouts with more memory come to six with none: what was an alarm is none by the memory they share."""
+    rng = np.random.default_rng(5)
+    few = pd.concat([weekly(rng, f"T{k}", s, 0.0, 0.011 * (k == 0)) for k in range(6) for s in "AB"])
+    many = pd.concat([few, *[weekly(rng, f"U{k}", s, 0.5) for k in range(40) for s in "AB"]], ignore_index=True)
+    asked = "select alarm_id, closed_at_utc, closed_by from alarms where alarm_id like 'T0/%' and raised_at_utc > '{}'"
+    asked = asked.format("2018-09-01")
+    listed = "select section_id, state, sentence from worklist where section_id like 'T0/%'"
+    small_registry(tmp_path, few)
+    update(tmp_path, settings)
+    with open_registry(tmp_path) as con:
+        before = con.execute(asked).fetchall()
+    assert before and {row[1:] for row in before} == {(None, None)}
+    small_registry(tmp_path, many, 2)
+    done = update(tmp_path, settings)
+    taken = f"the alarm {before[0][0]} is not raised again"
+    assert taken in caplog.text
+    with open_registry(tmp_path) as con:
+        found, said = con.execute(asked).fetchall(), con.execute(listed).fetchall()
+        then = con.execute("select max(measured_at_utc) from charts").fetchall()[0][0]
+    assert (before[0][0], then, "recomputed") in found and len(found) == len(before)
+    assert any("is not raised again" in sentence for _, state, sentence in said if state == "cannot tell")
+    again = update(tmp_path, settings, done.digests)
+    assert again.generation == done.generation and caplog.text.count(taken) == 1, "the next night changes nothing"
+    later = many[many["section_id"] == "U1/A"].tail(1)
+    later = later.assign(measured_at_utc=later["measured_at_utc"] + pd.Timedelta("7D"))
+    small_registry(tmp_path, pd.concat([many, later]), 9)
+    update(tmp_path, settings)
+    with open_registry(tmp_path) as con:
+        assert con.execute(asked).fetchall() == found
+        assert not [row for row in con.execute(listed).fetchall() if "is not raised again" in row[2]]
+
+
+STATES = "select * from chart_status order by turnout_id, section_id, band, source"
+
+
+@pytest.mark.parametrize("ahead", [["2019-03-05"], ["2099-01-05", "2099-01-12"]], ids=["a month mistyped", "2099"])
+def test_a_campaign_of_days_to_come_is_shown_and_not_used(registry, rows, settings, tmp_path, ahead):
+    """Eleven months ahead, and further but not alone: nobody can have measured then, whatever its neighbours say."""
+    own = rows[(rows["section_id"] == "T00000/S3")].tail(len(ahead))
+    wrong = own.assign(measured_at_utc=np.array(ahead, "datetime64[us]"), frequency_hz=[400.0, 390.0][: len(own)])
+    small_registry(tmp_path, pd.concat([rows, wrong], ignore_index=True))
+    done = update(tmp_path, settings, day=rows["measured_at_utc"].max() + pd.Timedelta(days=3))
+    assert done.newest == rows["measured_at_utc"].max()
+    with open_registry(registry[0]) as sound, open_registry(tmp_path) as con:
+        pd.testing.assert_frame_equal(con.execute(STATES).df(), sound.execute(STATES).df())
+        shown = con.execute("select section_id, measured_at_utc::date::varchar from charts where state = 'wrong_time'")
+        assert shown.fetchall() == [("T00000/S3", day) for day in ahead]
+
+
+def test_where_most_charts_are_ahead_it_is_the_clock_of_this_machine_that_is_late(registry, settings, tmp_path, rows):
+    small_registry(tmp_path, rows)
+    update(tmp_path, settings, day=pd.Timestamp("2017-03-01"))
+    with open_registry(registry[0]) as sound, open_registry(tmp_path) as con:
+        assert con.execute(STATES).fetchall() == sound.execute(STATES).fetchall()
+
+
+def test_campaigns_of_a_clock_never_set_alone_are_in_sight_and_no_fault(rows, settings, tmp_path):
+    """Nothing of a turnout, or of the whole fleet, can be used: its charts say so, and the night goes on."""
+    only = rows[(rows["turnout_id"] == "T00001") & (rows["measured_at_utc"] == rows["measured_at_utc"].max())]
+    small_registry(tmp_path, only.assign(measured_at_utc=np.datetime64("1970-01-01T10:00:00", "us")))
+    done = update(tmp_path, settings)
+    assert done.rows == {"chart_status": 9, "baselines": 0, "alarms": 0, "charts": 8} and done.newest is None
+    with open_registry(tmp_path) as con:
+        assert con.execute("select distinct reason from chart_status where section_id <> '*'").fetchall() == [
+            ("never",)
+        ]
+        assert con.execute("select distinct state from charts").fetchall() == [("wrong_time",)]
+        assert con.execute("select count(*) from worklist").fetchall() == [(0,)]
+
+
 def test_a_year_before_which_no_clock_is_believed_leaves_its_campaigns_in_sight(rows, tmp_path):
     small_registry(tmp_path, rows)
     done = update(tmp_path, TrendSettings(earliest_year=2017))

@@ -86,3 +86,45 @@ def test_trains_show_what_happened_with_their_own_spread(weekly, settings):
     rows = chart_rows(charts)
     assert rows.query("band == 'amplitude'")["expected_hz"].isna().all()
     assert rows.query("band == 'ballast' and section_id != '*'")["expected_hz"].notna().all()
+
+
+def passages(when, speed, peak):
+    """Frames of one sensor of one section under single trains."""
+    ids = [f"p{i:04d}" for i in range(len(when))]
+    common = {"passage_id": ids, "turnout_id": "T1", "passed_at_utc": when, "status": "accepted"}
+    return {
+        "passages": pd.DataFrame(common | {"speed_kmh": speed, "rail_temperature_c": 15.0}),
+        "passage_fits": pd.DataFrame(
+            common | {"section_id": "T1/A7", "channel": "A7", "model_id": "m", "peak_ms2": peak}
+        ),
+    }
+
+
+def amplitudes(*parts):
+    frames = passages(*(np.concatenate(part) for part in zip(*parts)))
+    with connect_views(frames, NEWEST, rounded=False) as con:
+        return con.execute("select * from passage_values order by all").df()
+
+
+@pytest.mark.parametrize("wrong", [["2000-01-01 00:05"], ["2000-01-01 00:05", "2000-01-01 00:15"]])
+def test_passages_of_a_clock_that_was_reset_are_no_first_year(wrong):
+    """Ten trains a week for 60 weeks, their peaks with the speed to the power 1.2; one or two more of the year 2000."""
+    rng = np.random.default_rng(7)
+    weeks, k = np.divmod(np.arange(600), 10)
+    when = np.datetime64("2017-01-02T06:00", "us") + weeks * np.timedelta64(7, "D") + k * np.timedelta64(3, "h")
+    speed = rng.uniform(60.0, 160.0, 600)
+    sound = when, speed, 0.02 * speed**1.2 * np.exp(0.05 * rng.standard_normal(600))
+    reset = np.array(wrong, "datetime64[us]"), np.array([70.0, 150.0])[: len(wrong)], np.full(len(wrong), 9.0)
+    expected, found = amplitudes(sound), amplitudes(sound, reset)
+    assert len(expected) == 60 and expected["frequency_hz"].between(5.0, 8.0).all()
+    pd.testing.assert_frame_equal(found, expected)
+
+
+@pytest.mark.parametrize("speed", [np.full(6, 100.0), np.linspace(99.9, 100.1, 6)], ids=["one speed", "like one"])
+def test_like_speeds_tell_no_exponent_and_peaks_are_taken_as_they_are(speed):
+    """A week of one speed, and one at 60 km/h two years later: a line through points of one abscissa has no slope."""
+    peak, hours = np.array([4.0, 5.0, 6.0, 7.0, 8.0, 9.0]), np.arange(6) * np.timedelta64(1, "h")
+    first, later = np.datetime64("2016-01-05T06:00", "us") + hours, np.datetime64("2018-01-02T06:00", "us") + hours
+    found = amplitudes((first, speed, peak), (later, np.full(6, 60.0), 1.1 * peak))
+    usual = np.exp(np.log(peak).mean())
+    assert found["frequency_hz"].to_list() == pytest.approx([usual, 1.1 * usual], rel=1e-12)

@@ -270,6 +270,23 @@ def test_a_look_back_on_a_turnout_in_alarm_does_not_call_it_unmeasured(frames, s
     assert found == [("cannot_tell", "too_few_sections")] == list(night.itertuples(index=False, name=None))
 
 
+@pytest.mark.parametrize(("days", "reason"), [(15, "no_temperature"), (500, "")])
+def test_a_look_back_knows_that_nothing_was_judged_without_temperatures(settings, days, reason):
+    fleet = Fleet(turnouts=1, weeks=150, phi=0.0, campaign=0.3)
+    rows = modes(fleet, 1).astype({"turnout_id": object, "section_id": object, "band": object, "source": object})
+    newest = rows["measured_at_utc"].max()
+    cold = (rows["measured_at_utc"] > newest - pd.Timedelta(weeks=60)) & (rows["section_id"] != "T00000/S6")
+    rows.loc[cold, "rail_temperature_c"] = np.nan
+    given = {"modes": rows.assign(method="joint"), "events": pd.DataFrame(columns=["event_at_utc"])}
+    now, then = (frames_at(given, settings, day) for day in (newest, newest - pd.Timedelta(days=days)))
+    asked = "select section_id, state, reason from chart_status_at(?) where section_id <> '*' order by all"
+    with connect_views({k: v for k, v in now.items() if k != "events"}, newest, rounded=False) as connection:
+        found = connection.execute(asked, [(newest - pd.Timedelta(days=days)).to_pydatetime()]).fetchall()
+    night = then["chart_status"].query("section_id != '*'")[["section_id", "state", "reason"]]
+    assert found == list(night.astype(object).itertuples(index=False, name=None))
+    assert [r for s, _, r in found if s != "T00000/S6"] == [reason] * 7 and ("T00000/S6", "ok", "") in found
+
+
 @pytest.mark.parametrize("day", ["2017-01-20", "2017-08-21", "2018-11-06"])
 def test_the_list_of_an_earlier_day_is_the_list_of_that_night(con, frames, settings, day):
     then = pd.Timestamp(day)

@@ -1,5 +1,6 @@
 -- One row per chart that cannot answer at a date, and why: too noisy for the target, learning, never warm or cold
--- enough, not measured; and one of band 'all' where no newer recording could be used. detectable_pct is the smallest change of frequency that it shows within a year with 90 %;
+-- enough, not measured; and one of band 'all' where no newer recording could be used, and until the next campaign where an open
+-- alarm was taken back. detectable_pct is the smallest change of frequency that it shows within a year with 90 %;
 -- in stiffness about twice as much (one degree of freedom).
 -- needs: chart_status_at, unusable
 create or replace macro cannot_see("asof" := null) as table
@@ -38,4 +39,13 @@ from chart_status_at(coalesce("asof", newest_measurement())) left join (
 where state not in ('alarm', 'ok') or detectable_pct is null or detectable_pct > target_pct
 union all by name
 select turnout_id, section_id, 'all' as band, source, 'cannot tell' as state, why, used_at_utc as last_measured_at_utc
-from unusable(coalesce("asof", newest_measurement()));
+from unusable(coalesce("asof", newest_measurement()))
+union all by name
+select
+    turnout_id, section_id, 'all' as band, source, 'cannot tell' as state,
+    'the alarm of ' || strftime(raised_at_utc, '%Y-%m-%d') || ' (' || band || ', ' || direction
+        || ') is not raised again: what it rested on was corrected, or the spread or memory of the charts is another' as why,
+    closed_at_utc as last_measured_at_utc
+from alarms
+where closed_by = 'recomputed' and closed_at_utc >= newest_charted()
+    and coalesce("asof", newest_measurement()) >= newest_charted();

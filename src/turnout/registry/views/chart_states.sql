@@ -2,6 +2,7 @@
 -- inspect this week: an open alarm. plan: an acknowledged alarm, or a drift among the discoveries of the fleet
 -- (false-discovery rate 10 %), also where the chart is too noisy to see the target within a year. suppressed: somebody
 -- silenced it, with a reason and an end, a day at which it comes back.
+-- needs: chart_status_at
 create or replace macro chart_states_on("asof") as table
 with open_alarms as (
     select turnout_id, section_id, band, source, max(raised_at_utc) as raised_at_utc
@@ -38,7 +39,7 @@ select
     s.since_at_utc, s.since_earliest_utc, s.since_latest_utc, s.change_pct, s.change_low_pct, s.change_high_pct,
     s.n_after, s.detectable_pct, s.target_pct, s.drift_pct_per_year, s.drift_se_pct_per_year, s.drift_q,
     s.last_measured_at_utc, s.n_campaigns
-from chart_status s
+from chart_status_on("asof") s
 join spoken p using (turnout_id, section_id, band, source);
 
 -- One row per chart: what it says at the newest measurement, in the words of the worklist.

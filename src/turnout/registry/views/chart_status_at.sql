@@ -1,8 +1,28 @@
 -- The newest campaign that a chart rests on; newest_measurement() would follow a clock that runs ahead.
 create or replace macro newest_charted() as (select max(last_measured_at_utc) from chart_status);
 
+-- One row per chart: chart_status on a day at or after the newest campaign. A chart that nobody has measured since for
+-- long is not measured, also where the whole fleet is silent; a turnout's median is as old as the newest of its charts.
+create or replace macro chart_status_on("asof") as table
+select * exclude (is_silent) replace (
+    case when is_silent then 'not_measured' else state end as state,
+    case when is_silent then 'too_long_ago' else reason end as reason
+)
+from (
+    select
+        *,
+        coalesce(
+            state in ('ok', 'learning', 'cannot_tell')
+                and "asof" - greatest(last_measured_at_utc, case when section_id = '*' then
+                    max(last_measured_at_utc) over (partition by turnout_id, band, source) end)
+                    > to_microseconds((86400e6 * stale_after_days)::bigint),
+            false
+        ) as is_silent
+    from chart_status
+);
+
 -- One row per chart: its state at a date and why, from what was measured and entered by then.
--- At or after the newest campaign these are the rows of chart_status. Before it everything is counted from `charts` up
+-- At or after the newest campaign these are the rows of chart_status_on. Before it everything is counted from `charts` up
 -- to the date; spread and thresholds are those of the baseline, which later campaigns do not change. Only the memory
 -- is the fleet's of today.
 -- needs: chart_values
@@ -11,7 +31,8 @@ with by_epoch as (
     select
         turnout_id, section_id, band, source, epoch, count(*) as n, max(measured_at_utc) as last_at_utc,
         count(*) filter (state in ('baseline', 'learning')) as n_learned,
-        count(*) filter (state = 'no_temperature') as n_cold
+        count(*) filter (state = 'no_temperature') as n_cold,
+        max(measured_at_utc) filter (z is not null) as judged_at_utc
     from charts
     where measured_at_utc <= case when "asof" < newest_charted() then "asof" end and state <> 'wrong_time'
     group by all
@@ -21,7 +42,8 @@ counted as (
         turnout_id, section_id, band, source, max(epoch) as epoch,
         min(epoch) filter (n_learned > 0) as first_epoch,
         sum(n)::integer as n_campaigns, sum(n_learned)::integer as n_baseline, sum(n_cold)::integer as n_cold,
-        max_by(n_learned, epoch)::integer as n_learned, max(last_at_utc) as last_at_utc
+        max_by(n_learned, epoch)::integer as n_learned, max(last_at_utc) as last_at_utc,
+        max(judged_at_utc) as judged_at_utc
     from by_epoch
     group by turnout_id, section_id, band, source
 ),
@@ -60,7 +82,10 @@ known as (
         s.section_id <> '*' and (
             coalesce(len(v.hz) >= 8 and list_max(v.hz) - list_min(v.hz) < 0.001, false)
             or not coalesce(b.sd_pct > 0.1 / b.frequency_hz, b.sd_pct > 0, false)
-        ) as is_stuck
+        ) as is_stuck,
+        s.section_id <> '*'
+            and coalesce("asof" - c.judged_at_utc > to_microseconds((86400e6 * s.stale_after_days)::bigint), true)
+            as is_unheard
     from chart_status s
     left join counted c using (turnout_id, section_id, band, source)
     left join last_eight v using (turnout_id, section_id, band, source)
@@ -81,6 +106,7 @@ judged as (
             when is_old and has_sections then 'too_few_sections'
             when is_old then 'too_long_ago'
             when complete and is_stuck then 'constant'
+            when complete and is_unheard then 'no_temperature'
             when not complete and 2 * n_cold > n_campaigns then 'no_temperature'
             when not complete and is_whole and n_baseline = 0 then 'too_few_sections'
             when not complete then 'baseline'
@@ -109,5 +135,5 @@ union all by name
 select
     turnout_id, section_id, band, source, state, reason, last_measured_at_utc, n_campaigns, n_baseline, n_learned,
     n_needed, complete, without_temperature, detectable_pct, target_pct
-from chart_status
+from chart_status_on("asof")
 where coalesce("asof" >= newest_charted(), true);

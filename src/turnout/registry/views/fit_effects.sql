@@ -1,11 +1,11 @@
 -- One row per section, score (fit, forecast) and factor (speed, axle load): its effect on the score in points, the
--- others held fixed, with a 95 % interval that allows every passage its own variance (HC3); and raw_change_pct, what
+-- others held fixed, with a 95 % interval that allows every passage its own variance (HC3) and takes its sensors as one; and raw_change_pct, what
 -- groups show when they are compared as they are. No row where the other factors determine one to 99 %.
 -- needs: fit_residuals
 create or replace view fit_effects as
 with sections as (
     select
-        turnout_id, section_id, score, count(*) as n_scores,
+        turnout_id, section_id, score, sum(n_sensors)::bigint as n_scores,
         count(*) - any_value(n_types) - any_value(has_speed)::integer - any_value(has_load)::integer as freedom,
         unnest(['speed', 'axle load']) as factor, unnest(['10 km/h', 'tonne']) as per,
         unnest([any_value(has_speed), any_value(has_load)]) as known,

@@ -1,15 +1,15 @@
--- One row per passage, sensor and score (fit, forecast): what its train type, speed and axle load each contribute.
+-- One row per passage and score (fit, forecast), mean of its sensors: what its train type, speed and axle load each contribute.
 -- Least squares with a level per train type and slopes in speed and axle load, per section: the ground of fit_effects
 -- and fit_adjusted. Where a fifth of the loads is missing they are left out, and the speed stands for them.
 -- Windows only, no part twice: a condition on turnout_id or section_id reaches the files.
--- needs: passage_scores
+-- needs: section_scores
 create or replace view fit_residuals as
 with measured as (
     select
         turnout_id, section_id, passage_id, coalesce(train_type, 'unknown') as train_type, speed_kmh, axle_load_t,
         unnest(['fit', 'forecast']) as score, unnest([fit_pct, forecast_pct]) as value_pct,
-        unnest([fit_null_pct, forecast_null_pct]) as null_pct
-    from passage_scores
+        unnest([fit_null_pct, forecast_null_pct]) as null_pct, unnest([n_fit, n_forecast]) as n_sensors
+    from section_scores
     where speed_kmh is not null
 ),
 used as (
@@ -50,7 +50,7 @@ solved as (
 )
 select
     turnout_id, section_id, score, passage_id, train_type, speed_kmh, axle_load_t, value_pct, null_pct,
-    n, n_types, has_speed, has_load, per_speed, per_load, i_vv, i_vp, i_pp, v, p,
+    n_sensors, n, n_types, has_speed, has_load, per_speed, per_load, i_vv, i_vp, i_pp, v, p,
     type_pct - per_speed * (speed_kmh - 10 * v - mean_speed) / 10
         - coalesce(per_load * (axle_load_t - p - mean_load), 0) as of_type_pct,
     mean_pct + per_speed * (speed_kmh - mean_speed) / 10 as of_speed_pct,

@@ -1,6 +1,6 @@
 -- One row per turnout, effect, place, sensor and parameter that was named or accepted: its latest value, and its growth.
 -- A straight line through all visits, each weighted by its standard error; NULL with a single visit. Visits before
--- ballast work on their sections do not count for effects of the ballast. is_open: the newest visit still has it.
+-- ballast work on their sections do not count for effects of the ballast. is_open: no newer visit looked at its sections.
 -- needs: findings_newest
 create or replace view parameter_growth as
 with undone as (
@@ -14,8 +14,11 @@ visits as (
         p.turnout_id, p.term, round(p.position_m, 1) as position_m, p.channel, p.parameter, p.unit, p.found_at_utc,
         p.value, p.value_se, p.finding_id, p.value_se ** -2 as weight,
         epoch_us(p.found_at_utc) / 31557600e6 as year
-    from mismatch_parameters p join findings_current f using (finding_id) anti join undone using (finding_id)
-    where p.value_se > 0 and (p.accepted or f.verdict = 'named')
+    from mismatch_parameters p join findings_current f using (finding_id)
+    where p.value_se > 0 and (p.accepted or f.verdict = 'named') and not (
+        p.term in (
+            'hanging_sleeper', 'lifting_sleepers', 'local_ballast', 'ballast_hardening', 'ballast_inertia'
+        ) and p.finding_id in (select finding_id from undone))
 ),
 centred as (
     select *, year - sum(weight * year) over thing / sum(weight) over thing as t from visits

@@ -20,12 +20,27 @@ peaks as (
     where f.status <> 'rejected' and f.peak_ms2 > 0 and p.speed_kmh > 0
     group by f.turnout_id, f.section_id, f.channel, f.passage_id
 ),
+days as (select section_id, channel, passed_at_utc::date as day_utc from peaks group by all),
+begun as (
+    -- a clock that was reset dates a day or two long before all others: the third day is near the first of a real year
+    select section_id, channel, coalesce(min(day_utc) filter (goes_on), min(day_utc))::timestamp as first_at
+    from (
+        select *, lead(day_utc, 2) over (partition by section_id, channel order by day_utc) < day_utc + 400 as goes_on
+        from days
+    )
+    group by section_id, channel
+),
 first_year as (
     select
         section_id, channel, avg(log_speed) as usual_speed, avg(log_peak) as usual_peak,
-        coalesce(regr_slope(log_peak, log_speed), 0) as exponent
-    from (select *, min(passed_at_utc) over (partition by section_id, channel) as first_at from peaks)
-    where passed_at_utc < first_at + interval 365 day
+        -- too few passages, or speeds that differ by less than 3 %, tell no exponent
+        case
+            when regr_count(log_peak, log_speed) >= 10 and stddev_pop(log_speed) > 0.03
+            then regr_slope(log_peak, log_speed)
+            else 0
+        end as exponent
+    from peaks join begun using (section_id, channel)
+    where passed_at_utc >= first_at and passed_at_utc < first_at + interval 365 day
     group by section_id, channel
 ),
 levelled as (

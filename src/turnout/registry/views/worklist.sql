@@ -186,6 +186,7 @@ select
     m.last_work as last_maintenance,
     case
         when h.state = 'learning' then 'nothing: measure again as planned'
+        when h.why like 'the alarm of %' then 'what was corrected or entered since, and the chart of this section'
         when h.band = 'all' then 'what was rejected: turnout query "from rejected where turnout_id = ''' || h.turnout_id || '''"'
         when h.state = 'cannot tell' then 'the measurement: more impacts per campaign, rail temperature, sensor'
         when h.section_id = '*' then 'what all sections share: thermometer, hammer and method first, then drainage'

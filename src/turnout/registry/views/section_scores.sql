@@ -1,0 +1,13 @@
+-- One row per passage and section: the mean scores of its sensors. They hear the same wheels: three sensors are no three
+-- trains, and a standard error of sensors taken as trains is too small.
+-- needs: passage_scores
+create or replace view section_scores as
+select
+    turnout_id, section_id, passage_id, passed_at_utc, count(*) as n,
+    avg(fit_pct) as fit_pct, count(fit_pct) as n_fit, avg(fit_null_pct) as fit_null_pct,
+    avg(forecast_pct) as forecast_pct, count(forecast_pct) as n_forecast, avg(forecast_null_pct) as forecast_null_pct,
+    avg(leave_one_out_pct) as leave_one_out_pct, avg((status = 'null_explains')::integer) as null_share,
+    any_value(train_type) as train_type, any_value(speed_kmh) as speed_kmh, any_value(axle_load_t) as axle_load_t,
+    any_value(cluster_id) as cluster_id
+from passage_scores
+group by turnout_id, section_id, passage_id, passed_at_utc;
