@@ -1,7 +1,7 @@
 """config/acknowledgements.csv: entered by command or by hand, refused with place and remedy."""
 
 import shutil
-from datetime import datetime
+from datetime import UTC, datetime, time
 from types import SimpleNamespace
 
 import pandas as pd
@@ -10,6 +10,7 @@ import pytest
 from turnout.cli import main
 from turnout.config import load_configuration
 from turnout.config.acknowledgements import read_acknowledgements
+from turnout.registry.database import open_registry
 from turnout.registry.derived import publish
 from turnout.registry.register import register
 from turnout.trend.rows import arrow_rows
@@ -63,6 +64,24 @@ def test_an_acknowledgement_of_no_alarm_is_said(configuration, tmp_path, capsys)
         assert ("nothing on the list changes" in capsys.readouterr().out) is not changes
 
 
+def test_a_silence_may_be_planned_and_an_alarm_is_not_seen_before_its_day(configuration, capsys):
+    turnout, label = place_of(configuration)
+    said = ["--by", "me", "--reason", "works", "--configuration", str(configuration), "--at", "2062-03-01"]
+    assert main(["acknowledge", f"{turnout}/{label}", *said]) == 2
+    assert "at 2062-03-01 has not come yet" in capsys.readouterr().err
+    assert main(["acknowledge", f"{turnout}/{label}", "--suppress-until", "2062-03-10", *said]) == 0
+    (row,) = load_configuration(configuration).acknowledgements
+    assert row["at_utc"] == datetime(2062, 3, 1)
+
+
+def test_a_registry_knows_the_day_on_which_it_was_made(tmp_path):
+    before = datetime.now(UTC).date()
+    register([], tmp_path / "registry", read=iter)
+    with open_registry(tmp_path / "registry") as con:
+        ((at,),) = con.execute("select published_at()").fetchall()
+    assert before <= at.date() <= datetime.now(UTC).date() and at.time() == time()
+
+
 def test_no_file_means_that_nobody_has_said_anything(tmp_path):
     assert read_acknowledgements(tmp_path / "acknowledgements.csv") == ([], [])
 
@@ -77,6 +96,7 @@ def test_no_file_means_that_nobody_has_said_anything(tmp_path):
         ("T1,,,suppress,me,2026-01-01T10:00+02:00,,seen", "with a time zone"),
         ("T1,,,suppress,me,2026-01-01,,a,b", "double quotes"),
         (",,,suppress,me,2026-01-01,,a", "column 1: turnout is empty"),
+        ("T1,,,acknowledge,me,2062-03-12,,a", "column 21: at 2062-03-12 has not come yet. Write the day on which"),
         ("T1,,,suppress,me,2026-03-01,2026-02-01,a", "until 2026-02-01 is not after at 2026-03-01"),
         ("T7,,,suppress,me,2026-03-01,,a", "turnout 'T7' has no row"),
         ("T1,Z,,suppress,me,2026-03-01,,a", "column 4: turnout 'T1' has no section 'Z'"),
@@ -103,7 +123,6 @@ def test_a_bad_line_hides_no_alarm(configuration, tmp_path, capsys, caplog):
     from benchmarks.trend_registry import small_registry
 
     from turnout.chains.trend import trend_job
-    from turnout.registry.database import open_registry
 
     turnout, _ = place_of(configuration)
     lines = "{0},,,silence,me,2026-01-01,,x\nnowhere,,,acknowledge,me,2026-01-01,,x\n"

@@ -2,6 +2,7 @@
 -- inspect this week: an open alarm. plan: an acknowledged alarm, or a drift among the discoveries of the fleet
 -- (false-discovery rate 10 %), also where the chart is too noisy to see the target within a year. suppressed: somebody
 -- silenced it, with a reason and an end, a day at which it comes back.
+-- needs: was_said
 create or replace macro chart_states_on("asof") as table
 with open_alarms as (
     select turnout_id, section_id, band, source, max(raised_at_utc) as raised_at_utc
@@ -22,7 +23,7 @@ spoken as (
     left join open_alarms o using (turnout_id, section_id, band, source)
     left join acknowledgements k
         on k.turnout_id = s.turnout_id and coalesce(k.section_id, s.section_id) = s.section_id
-            and coalesce(k.band, s.band) = s.band
+            and coalesce(k.band, s.band) = s.band and was_said(k.at_utc, "asof")
     group by all
 )
 select
