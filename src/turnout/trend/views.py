@@ -11,7 +11,8 @@ from turnout.trend.rows import arrow_rows
 NAMES = (
     "epochs", "resonance_drift",
     "passage_values", "chart_values", "mode_residuals", "cusum", "change_since_event", "maintenance_effect",
-    "chart_status_at", "unusable", "cannot_see", "was_said", "time_to_threshold", "chart_states", "worklist",
+    "chart_status_at", "unusable", "cannot_see", "was_said", "in_service", "time_to_threshold",
+    "chart_states", "worklist",
 )  # fmt: skip
 
 

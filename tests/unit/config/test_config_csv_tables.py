@@ -19,7 +19,7 @@ HEADER = "turnout,section,date,kind,resets,note\n"
 def events(folder, text):
     path = folder / "events.csv"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    found, errors = read_events(path, "config/events.csv", None, {})
+    found, errors, _ = read_events(path, "config/events.csv", None, {})
     return [(e.turnout, e.resets, e.note) for e in found], [str(e) for e in errors]
 
 
