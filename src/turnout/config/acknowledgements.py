@@ -13,7 +13,7 @@ from turnout.errors import ConfigError
 
 COLUMNS = ("turnout", "section", "band", "action", "by", "at", "until", "reason")
 ACTIONS = ("acknowledge", "suppress")
-BANDS = ("ballast", "railpad")
+BANDS = ("ballast", "railpad", "amplitude")
 
 
 def read_acknowledgements(

@@ -5,6 +5,7 @@ import pytest
 from turnout.cli import main
 from turnout.config import load_configuration
 from turnout.config.raw_notes import read_campaigns
+from turnout.config.table import read_table
 from turnout.errors import ConfigErrors
 from turnout.readers.formats import FORMATS
 from turnout.readers.units import to_si
@@ -196,6 +197,24 @@ def test_every_error_of_an_event_is_said_at_its_cell(tmp_path):
         ("line 2, column 6", "turnout 't1' has no section 'B1'"), ("line 2, column 9", "date"),
         ("line 2, column 18", "kind"), ("line 2, column 25", "resets"),
     ]  # fmt: skip
+
+
+def test_a_raw_folder_is_one_however_it_is_spelt(tmp_path):
+    path = tmp_path / "turnouts.tsv"
+    spelt = {
+        "T1": "line_7/T1",
+        "T2": "line_7/T1/",
+        "T3": "./line_7/T1",
+        "T4": "line_7//T1",
+        "T5": "line_7/./T5/",
+        "T6": "",
+    }
+    path.write_text("turnout\tlayout\traw\n" + "".join(f"{t}\tmain\t{raw}\n" for t, raw in spelt.items()))
+    rows, errors = read_table(path, "turnouts.tsv")
+    assert [(row.id, row.raw) for row in rows] == [("T1", "line_7/T1"), ("T5", "line_7/T5"), ("T6", "T6")]
+    assert [str(e).split(". ")[0] for e in errors] == [
+        f"turnouts.tsv, line {n}, column 9: raw folder 'line_7/T1' is also that of turnout 'T1'" for n in (3, 4, 5)
+    ]
 
 
 def test_an_event_of_a_turnout_that_was_taken_out_stops_nothing_and_is_said(tmp_path, capsys):
