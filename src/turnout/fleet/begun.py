@@ -2,8 +2,9 @@
 
 A job that finds notes follows one that was ended in the midst of these units. Which of them ended it, or whether all
 are innocent of what a user, a time limit or a power failure did, nobody knows: it computes them after all others, each
-in a process of its own. Where that dies while the job lives on, the unit is what it died of. A job that is ended as a
-whole condemns no unit, however often.
+in a process of its own. Where that dies while the job lives on, and not in the run that had begun it first (whose jobs
+may all have met the same shortage), the unit is what it died of. A job that is ended as a whole condemns no unit,
+however often.
 """
 
 import hashlib
@@ -18,21 +19,26 @@ PREFIX = "begun-"
 LEFT = "its job ended while it was computed"
 
 
-def begun(state: Path) -> set[str]:
-    """Units that were begun and have not ended; ``state`` is the state file of their shard."""
-    notes = batch_folder(state).glob(f"{PREFIX}*")
-    return {note.read_text(encoding="utf-8") for note in notes} - {""}
+def begun(state: Path) -> dict[str, str]:
+    """Units that were begun and have not ended, and the run that began each; ``state`` is their shard's state file."""
+    found = {}
+    for note in batch_folder(state).glob(f"{PREFIX}*"):
+        run, _, unit = note.read_text(encoding="utf-8").partition("\n")
+        if note == _note(state, unit):  # else it is cut: the unit was not even begun
+            found[unit] = run
+    return found
 
 
 @contextmanager
-def noted(state: Path, unit: str) -> Iterator[None]:
-    """Note a unit until the block has come to its end, by an exception, too.
+def noted(state: Path, unit: str, run: str) -> Iterator[None]:
+    """Note a unit until the block has come to its end, by an exception, too; a note that is there stays as it is.
 
     The note is not flushed to the disk: it tells of a process that died, not of a machine that did.
     """
     note = _note(state, unit)
-    note.parent.mkdir(parents=True, exist_ok=True)
-    note.write_text(unit, encoding="utf-8")
+    if not note.exists():
+        note.parent.mkdir(parents=True, exist_ok=True)
+        note.write_text(f"{run}\n{unit}", encoding="utf-8")
     try:
         yield
     finally:

@@ -5,6 +5,7 @@ import traceback
 from collections import Counter
 from collections.abc import Callable, Collection, Container, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from pathlib import Path
 
 from turnout.config import Configuration
@@ -64,6 +65,7 @@ def run_shard(
     threads: int = 1,
     only: Sequence[str] | None = None,
     strict: bool = False,
+    launched: datetime | None = None,
 ) -> Summary:
     """Bring the results of one shard up to its plan.
 
@@ -81,9 +83,11 @@ def run_shard(
         Turnouts to compute; the others of the shard stay as they are.
     strict : bool
         Raise faults of the program instead of noting them.
+    launched : datetime, optional
+        When the run began that this job belongs to: what is tried again in the same run is tried for the first time.
     """
     with locked(state):
-        run = _Run(Path(state), stage, configuration, Path(raw_root), threads, strict)
+        run = _Run(Path(state), stage, configuration, Path(raw_root), threads, strict, launched)
         planned = named(stage.gather)(plan, configuration) if stage.gather else read_plan(plan)
         return run.bring_up(list(planned), only)
 
@@ -91,10 +95,12 @@ def run_shard(
 class _Run:
     """One call of ``run_shard``."""
 
-    def __init__(self, path: Path, stage: Stage, configuration: Configuration, raw_root: Path, threads, strict):
+    def __init__(
+        self, path: Path, stage: Stage, configuration: Configuration, raw_root: Path, threads, strict, launched
+    ):
         self.path, self.name = path, f"{stage.kind} {path.stem}"
         self.stage, self.raw_root = stage, raw_root
-        self.threads, self.strict = threads, strict
+        self.threads, self.strict, self.launched = threads, strict, launched.isoformat() if launched else ""
         self.ledger = Ledger(path, configuration.settings["fleet"])
         self.state = self.ledger.state
         self.tasks = Tasks(self.state, stage, configuration, raw_root)
@@ -121,7 +127,7 @@ class _Run:
         asked = {name for name in self.suspects if only is None or name.split("/", 1)[0] in only}
         for name in asked - {_name(task) for task in due}:
             forget(self.path, name)
-            self.suspects.discard(name)
+            del self.suspects[name]
 
     def _compute_all(self, tasks: list[Task]) -> Counter[str]:
         """Keep every result; how many there are of each status."""
@@ -154,7 +160,7 @@ class _Run:
             self._keep(found)
         elif self.strict:
             raise RuntimeError(f"{name}: {DIED}")
-        elif name not in self.suspects:
+        elif name not in self.suspects or (self.launched and self.suspects[name] == self.launched):
             self._keep(Postponed(name, DIED))
         else:
             self._keep(found := self._guarded(task, died_of))
@@ -173,7 +179,7 @@ class _Run:
         self.ledger.keep(result, stamp, contents)
 
     def _compute(self, task: Task) -> Computed | Postponed:
-        with noted(self.path, _name(task)):
+        with noted(self.path, _name(task), self.launched):
             return self._guarded(task, self.compute)
 
     def _guarded(self, task: Task, compute: Callable) -> Computed | Postponed:

@@ -1,6 +1,7 @@
 """A unit that kills its process is named and holds nothing else back; a job that is killed condemns nobody."""
 
 import os
+from datetime import datetime
 
 import pytest
 from length_fleet import Fleet
@@ -61,6 +62,19 @@ def test_what_was_computed_beside_it_is_known_the_same_night_and_it_is_said_by_n
     assert jobs == 1 and left == {UNITS[4]: "the process died that computed it"}
     (complaint,) = judge([fleet.state], fleet.configuration).complaints
     assert f"1 units wait for the next run, first {UNITS[4]}: the process died that computed it" in complaint
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_job_that_is_tried_again_in_the_same_run_condemns_no_unit(fleet, threads):
+    """What took the memory of the machine may be there a minute later, too."""
+    fleet.put("t1/2024-05-13/A_1.txt", "kills its process")
+    first, second = datetime(2026, 11, 22, 2), datetime(2026, 11, 23, 2)
+    for _ in range(3):
+        night(fleet, threads=threads, launched=first)
+    assert statuses(fleet) == dict.fromkeys([u for u in UNITS if u != UNITS[1]], "ok")
+    assert read_postponed(fleet.state)[1] == {UNITS[1]: "the process died that computed it"}
+    night(fleet, threads=threads, launched=second)
+    assert statuses(fleet)[UNITS[1]] == "internal_error"
 
 
 @pytest.mark.parametrize("threads", [1, 2])
