@@ -4,10 +4,11 @@ import ast
 
 import pytest
 
-LOWEST = {"content", "errors", "records"}
+LOWEST = {"atomic", "content", "errors", "records"}
 FLOOR = {"config", "readers", "signal", "registry", "fingerprint"}
 PARTS = {"receptance", "identify", "passage", "simulate"}
 ALLOWED = {
+    "atomic": set(),
     "content": set(),
     "errors": set(),
     "records": set(),

@@ -21,6 +21,8 @@ from turnout.registry.ids import content_id
 
 # A campaign may go on into the night after its day, and a clock may show local time.
 OTHER_CAMPAIGN = timedelta(days=2)
+# What the column `test` of the registry holds.
+LARGEST_TEST = 2**31 - 1
 REFILE = "It is used. Move it to its day's campaign if it is another's; a logger's clock that was wrong does no harm"
 
 
@@ -140,12 +142,12 @@ def _identified(impacts, turnout):
 
 
 def _test_number(turnout, unit, path):
-    """Number of the test from the file's name, 0 where the pattern has none or it is no number."""
+    """Number of the test from the file's name; 0 where the pattern has none, or letters or a time in its place."""
     inside = str(PurePosixPath(path).relative_to(turnout.raw))
     labels = tuple(s.label for s in turnout.sections)
     match = compiled(turnout.hammer.files, "hammer", labels).fullmatch(inside)
     number = (match.groupdict().get("test") or "0") if match else "0"
-    return int(number) if number.isdigit() else 0
+    return int(number) if number.isdigit() and int(number) <= LARGEST_TEST else 0
 
 
 def _too_few(n, needed, impacts):

@@ -20,7 +20,7 @@ HELP = "say that an alarm has been seen, or silence it until a date"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Place, person, reason and date of an acknowledgement."""
     parser.add_argument("place", help="turnout, or turnout/section")
-    parser.add_argument("--band", default="", help="ballast or railpad; both if not given")
+    parser.add_argument("--band", default="", help="ballast, railpad or amplitude (under trains); all if not given")
     parser.add_argument("--by", required=True, help="who says so")
     parser.add_argument("--reason", required=True, help="why")
     parser.add_argument("--suppress-until", metavar="DATE", default="", help="silence it until then, YYYY-MM-DD")
@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
         after = load_configuration(args.configuration)
         if acknowledgement(cells) not in after.acknowledgements:
             raise ConfigErrors(after.warnings)
-    print(f"{path}: {action} {args.place} {args.band or 'both resonances'}. It counts from the next run.")
+    print(f"{path}: {action} {args.place} {args.band or 'all its charts'}. It counts from the next run.")
     if action == "acknowledge" and _no_alarm(args.registry, acknowledgement(cells)):
         print(f"Note: no alarm is open there in {args.registry} that was raised by then: nothing on the list changes.")
     return 0

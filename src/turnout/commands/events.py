@@ -51,14 +51,17 @@ def _enter(args) -> int:
 
     from turnout.config import load_configuration
     from turnout.config.append import append_csv, taken_back
-    from turnout.config.events import COLUMNS
+    from turnout.config.events import COLUMNS, wrong_place
+    from turnout.errors import ConfigError, ConfigErrors
 
     path = Path(args.configuration) / "events.csv"
     turnout, _, label = args.place.partition("/")
     given = dict(turnout=turnout, section=label, date=args.date, kind=args.kind, resets=args.resets, note=args.note)
     with taken_back(path):
         append_csv(path, given, COLUMNS)
-        load_configuration(args.configuration)
+        after = load_configuration(args.configuration)
+        if wrong := list(wrong_place(given, after.ids, after.variants)):
+            raise ConfigErrors([ConfigError("events", column, *said) for column, *said in wrong])
     print(f"{path}: {args.kind} at {args.place}, {args.date}. It counts from the next run.")
     return 0
 

@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
-from datetime import datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from turnout.config.csv_table import TableFault, read_csv, unreadable
@@ -13,7 +13,7 @@ from turnout.errors import ConfigError
 
 COLUMNS = ("turnout", "section", "band", "action", "by", "at", "until", "reason")
 ACTIONS = ("acknowledge", "suppress")
-BANDS = ("ballast", "railpad")
+BANDS = ("ballast", "railpad", "amplitude")
 
 
 def read_acknowledgements(
@@ -63,6 +63,8 @@ def faults(cells: Mapping, known, variants) -> Iterator[tuple[str, str, str]]:
     wrong = {column: fault for column in times if (fault := wrong_time(said[column]))}
     for column, (more, remedy) in wrong.items():
         yield column, f"{column} is {said[column]!r}{more}", remedy
+    if said["action"] == "acknowledge" and not wrong and _time(said["at"]) > _now() + timedelta(days=1):
+        yield "at", f"at {said['at']} has not come yet", "Write the day on which the alarm was seen"
     if said["until"] and not wrong and _time(said["until"]) <= _time(said["at"]):
         yield (
             "until",
@@ -88,6 +90,10 @@ def acknowledgement(cells: Mapping) -> dict:
         "reason": said["reason"],
     }
     return {"acknowledgement_id": _id(row)} | row
+
+
+def _now() -> datetime:
+    return datetime.now(UTC).replace(tzinfo=None)
 
 
 def _time(text: str) -> datetime:

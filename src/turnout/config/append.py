@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
+from turnout.atomic import write_atomic
 from turnout.config.csv_table import TableFault, header_of
 from turnout.config.document import Place
 from turnout.errors import ConfigError
@@ -20,10 +21,10 @@ def taken_back(path: Path) -> Iterator[None]:
     try:
         yield
     except BaseException:
-        if before is not None:
-            path.write_bytes(before)
-        elif path.exists():
-            path.unlink()
+        if before is None:
+            path.unlink(missing_ok=True)
+        elif path.read_bytes() != before:
+            _write(path, before)
         raise
 
 
@@ -75,7 +76,11 @@ def _in_order(path: Path, values: Mapping[str, str], header: tuple[str, ...]) ->
 def _append(path: Path, line: str, header: str) -> str:
     before = path.read_bytes() if path.exists() else f"{header}\n".encode()
     end = "\r\n" if b"\r\n" in before else "\n"
-    path.parent.mkdir(parents=True, exist_ok=True)
     gap = b"" if before.endswith(b"\n") else end.encode()
-    path.write_bytes(before + gap + (line + end).encode())
+    _write(path, before + gap + (line + end).encode())
     return line
+
+
+def _write(path: Path, content: bytes) -> None:
+    """In one step: a table that people keep is whole or as it was. Where ``path`` is a link, its file is written."""
+    write_atomic(path.resolve(), lambda stream: stream.write(content))

@@ -36,25 +36,30 @@ class Event:
     note: str = ""
 
 
-def read_events(path: Path, name: str, known, variants) -> tuple[list[Event], list[ConfigError]]:
-    """Events in order of time, and every error of the rows that cannot be used; no file means no events.
+def read_events(path: Path, name: str, known, variants) -> tuple[list[Event], list[ConfigError], list[ConfigError]]:
+    """Events in order of time, every error of the rows that cannot be used, and a warning of each event of a turnout
+    that has no row: it was taken out, and its history keeps its events, or it is misspelt. No file means no events.
 
     ``known`` are the ids of the turnouts, None where turnouts.tsv itself is wrong: then no event is accused.
     """
     if not path.exists():
-        return [], []
+        return [], [], []
     events: list[Event] = []
     try:
         table = read_csv(path, name, COLUMNS, needed=4)
     except TableFault as fault:
-        return [], [fault.error]
-    errors = [fault.error for fault in table.faults]
+        return [], [fault.error], []
+    errors, warnings = [fault.error for fault in table.faults], []
     for line, cells in table.rows:
         found = list(_wrong(cells, known, variants))
         errors += [cells.place(name, line, column).error(*said) for column, *said in found]
-        if not found:
-            events.append(_event(cells))
-    return sorted(events, key=lambda e: (e.at, e.turnout, e.section or "", e.kind)), errors
+        if found:
+            continue
+        events.append(_event(cells))
+        if _of_a_stranger(cells, known):
+            stranger = wrong_place(cells, known, variants)
+            warnings += [cells.place(name, line, column).error(*said) for column, *said in stranger]
+    return sorted(events, key=lambda e: (e.at, e.turnout, e.section or "", e.kind)), errors, warnings
 
 
 def _wrong(cells, known, variants) -> Iterator[tuple[str, str, str]]:
@@ -62,13 +67,19 @@ def _wrong(cells, known, variants) -> Iterator[tuple[str, str, str]]:
     if no_row := unreadable(cells):
         yield no_row
         return
-    yield from wrong_place(cells, known, variants)
+    if not _of_a_stranger(cells, known):
+        yield from wrong_place(cells, known, variants)
     if wrong := wrong_time(cells["date"]):
         yield "date", f"date is {cells['date']!r}{wrong[0]}", wrong[1]
     if cells["kind"] not in RESETS:
         yield "kind", f"kind is {cells['kind']!r}", suggestion(cells["kind"], RESETS)
     if unknown := set(_words(cells)) - {"ballast", "railpad"}:
         yield "resets", f"resets is {cells['resets']!r}", suggestion(min(unknown), ("ballast", "railpad", "none"))
+
+
+def _of_a_stranger(cells, known) -> bool:
+    """Whether a row names a turnout that the fleet has not, or has no more."""
+    return known is not None and cells["turnout"] != "" and cells["turnout"] not in known
 
 
 def wrong_place(cells, known, variants) -> Iterator[tuple[str, str, str]]:

@@ -28,8 +28,8 @@ ABOUT = {"lat_deg": "latitude", "lon_deg": "longitude"}
 class Configuration:
     """The fleet: ``settings`` without any turnout's changes, ``rows`` by id, ``events`` in order of time.
 
-    ``acknowledgements`` are rows of the table of that name; ``warnings`` their rows that do not count. They stop
-    nothing: somebody's slip while silencing an alarm must not hide the alarms of the others.
+    ``acknowledgements`` are rows of the table of that name; ``warnings`` their rows that do not count, and events of
+    turnouts that have no row. They stop nothing: somebody's slip must not hide the alarms of the others.
     """
 
     folder: Path
@@ -90,7 +90,7 @@ def load_configuration(folder: Path | str = "config", formats=None, to_si=None) 
     reading.errors += errors
     variants = reading.variants(rows, settings)
     known = None if errors else {row.id for row in rows}
-    events, errors = read_events(reading.folder / "events.csv", reading.name("events.csv"), known, variants)
+    events, errors, strange = read_events(reading.folder / "events.csv", reading.name("events.csv"), known, variants)
     reading.errors += errors
     if reading.errors:
         raise ConfigErrors(list({str(e): e for e in reading.errors}.values()))
@@ -99,7 +99,7 @@ def load_configuration(folder: Path | str = "config", formats=None, to_si=None) 
     by_id = {row.id: row for row in rows}
     base = build.settings(plain(settings))
     return Configuration(
-        reading.folder, base, Frozen(by_id), tuple(events), Frozen(variants), tuple(spoken), tuple(warnings)
+        reading.folder, base, Frozen(by_id), tuple(events), Frozen(variants), tuple(spoken), (*strange, *warnings)
     )
 
 

@@ -135,6 +135,8 @@ def _row(text, line, header, name) -> tuple[Row, list[ConfigError]]:
     if not errors and leads_out(row.raw):
         said = f"raw is {row.raw!r}, outside the raw root"
         errors.append(row.place("raw").error(said, "Write a folder below the raw root, without '..'"))
+    elif "raw" in row.values:
+        row.values["raw"] = str(PurePosixPath(row.raw))  # "t1/" and "./t1" are the folder "t1"
     return row, errors
 
 

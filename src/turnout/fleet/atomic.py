@@ -1,4 +1,4 @@
-"""Write a file so that a reader sees the old one or the new one, never a part; and tell a part where there is one.
+"""Texts of ``work/``, written in one step, only where they changed; and how to tell a part where there is one.
 
 A full disk, a power failure or a copy that was broken off may leave the beginning of a file all the same.
 """
@@ -6,23 +6,9 @@ A full disk, a power failure or a copy that was broken off may leave the beginni
 import json
 import logging
 import os
-from collections.abc import Callable
 from pathlib import Path
 
-
-def write_atomic(path: os.PathLike, write: Callable) -> None:
-    """Call ``write(stream)`` on a temporary file beside ``path``, flush it to the disk, then put it in place."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        with open(temporary, "wb") as stream:
-            write(stream)
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+from turnout.atomic import write_atomic
 
 
 def write_text(path: os.PathLike, text: str) -> None:

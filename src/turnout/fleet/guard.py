@@ -42,6 +42,18 @@ def guarded(
     return UnitResult(unit_id(unit), unit.turnout, unit.kind, key, algo, status_of(tables), tables)
 
 
+def died_of(unit: Unit, *_, **__) -> dict[str, list[dict]]:
+    """What is known of a unit of which the process that computes it dies."""
+    found = "the process died that computed it, and again where it was computed alone"
+    remedy = (
+        "Look in the machine's log whether its memory ended, and whether its files are whole; "
+        "the unit is tried again when its files or the program change"
+    )
+    return {
+        "quarantine": [quarantine_row(unit, _first_of(unit), "internal_error", "a process of its own", found, remedy)]
+    }
+
+
 def _computed(compute, *args, **more):
     """(tables, faults): faults of single records leave the rows of the others."""
     try:
@@ -88,5 +100,9 @@ def _fault(unit: Unit, error: Exception, path: str | None = None, record: int | 
     trace = " < ".join(f"{Path(f.filename).name}:{f.lineno} {f.name}" for f in reversed(frames[-6:]))
     found = f"{type(error).__name__}: {error}"[:500]
     remedy = "Report it with the log of the run; the unit is tried again when its files or the program change"
-    path = path or (unit.files[0][0] if unit.files else unit.turnout)
-    return quarantine_row(unit, path, "internal_error", trace, found, remedy, record)
+    return quarantine_row(unit, path or _first_of(unit), "internal_error", trace, found, remedy, record)
+
+
+def _first_of(unit: Unit) -> str:
+    """The path that a row names which speaks of no file alone."""
+    return unit.files[0][0] if unit.files else unit.turnout

@@ -34,7 +34,7 @@ def stage_job(plan, mark, log, params, threads: int) -> Summary:
     try:
         summary = run_shard(
             Path(plan), state_of_mark(mark), stage, configuration, Path(job["raw"]),
-            threads=threads, only=job["only"] or None, strict=job["strict"],
+            threads=threads, only=job["only"] or None, strict=job["strict"], launched=launched_at(),
         )  # fmt: skip
     except DamagedBatch as error:
         ask_again(state_of(error.batch))

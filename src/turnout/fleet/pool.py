@@ -1,30 +1,77 @@
-"""The same call for many things, on one processor or several; results come in the order of the things."""
+"""The same call for many things, on one processor or several; a process that dies takes none of the others along."""
 
 import multiprocessing
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from typing import Any
 
 _CALL: Callable | None = None
 
 
-def in_order(call: Callable, things: Sequence, threads: int) -> Iterator:
-    """``call(thing)`` for each of ``things``.
+@dataclass(frozen=True)
+class Died:
+    """``thing`` may be what a process died of: it was computed by that one, or by another beside it."""
 
+    thing: Any
+
+
+def in_order(call: Callable, things: Sequence, threads: int) -> Iterator:
+    """``call(thing)`` for each of ``things``, in their order; in this process where one is enough."""
+    if threads <= 1 or len(things) <= 1:
+        yield from map(call, things)
+    else:
+        yield from in_processes(call, things, threads)
+
+
+def in_processes(call: Callable, things: Sequence, threads: int) -> Iterator:
+    """``call(thing)`` for each of ``things``, in their order, in other processes than this one.
+
+    Where one of these dies, ``Died`` stands for what they had at hand, and new ones go on with the rest, later.
     Processes are forked before the first result is asked for, so ``call`` may hold anything; it must not
     have started threads by then.
     """
-    if threads <= 1 or len(things) <= 1:
-        yield from map(call, things)
-        return
     global _CALL
-    _CALL = call
+    _CALL, left = call, list(things)
     try:
-        with ProcessPoolExecutor(min(threads, len(things)), multiprocessing.get_context("fork")) as pool:
-            yield from pool.map(_call, things)
+        while left:
+            lost: list = []
+            yield from _until_one_dies(left, threads, lost)
+            # things are handed out in their order: the first that are missing were at hand
+            yield from map(Died, lost[:threads])
+            left = lost[threads:]
     finally:
         _CALL = None
 
 
+def _until_one_dies(things: Sequence, threads: int, lost: list) -> Iterator:
+    """What the processes of one pool give; the things that were lost with it go into ``lost``."""
+    with ProcessPoolExecutor(min(threads, len(things)), multiprocessing.get_context("fork")) as pool:
+        futures = deque(_asked(pool, thing) for thing in things)
+        try:
+            for thing in things:
+                try:
+                    found = futures.popleft().result()
+                except BrokenProcessPool:
+                    lost.append(thing)
+                    continue
+                yield found
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _asked(pool: ProcessPoolExecutor, thing) -> Future:
+    """The future of a thing, of a pool that has died meanwhile, too."""
+    try:
+        return pool.submit(_call, thing)
+    except BrokenProcessPool as error:
+        future: Future = Future()
+        future.set_exception(error)
+        return future
+
+
 def _call(thing):
-    assert _CALL is not None, "in_order has set it before the processes were forked"
+    assert _CALL is not None, "in_processes has set it before the processes were forked"
     return _CALL(thing)

@@ -3,20 +3,22 @@
 import logging
 import traceback
 from collections import Counter
-from collections.abc import Collection, Container, Sequence
+from collections.abc import Callable, Collection, Container, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from pathlib import Path
 
 from turnout.config import Configuration
 from turnout.errors import passing
 from turnout.fleet.batches import UnitResult
+from turnout.fleet.begun import begun, forget, noted
 from turnout.fleet.copies import copies, key_without, originals, with_copies_said, without
-from turnout.fleet.guard import guarded
+from turnout.fleet.guard import died_of, guarded
 from turnout.fleet.keys import contents_of, key_of, short
 from turnout.fleet.ledger import Ledger
 from turnout.fleet.moved import moved, withdrawn
 from turnout.fleet.plan import Planned, read_plan
-from turnout.fleet.pool import in_order
+from turnout.fleet.pool import Died, in_order, in_processes
 from turnout.fleet.postponed import Postponed, note_postponed, read_postponed
 from turnout.fleet.progress import Progress
 from turnout.fleet.scan import unit_id
@@ -25,6 +27,9 @@ from turnout.fleet.state import locked
 from turnout.fleet.tasks import Task, Tasks
 
 LOG = logging.getLogger("turnout.fleet")
+DIED = "the process died that computed it"
+# A result, and the stamp and the contents it was computed from.
+Computed = tuple[UnitResult, str, str]
 
 
 @dataclass(frozen=True)
@@ -60,6 +65,7 @@ def run_shard(
     threads: int = 1,
     only: Sequence[str] | None = None,
     strict: bool = False,
+    launched: datetime | None = None,
 ) -> Summary:
     """Bring the results of one shard up to its plan.
 
@@ -77,9 +83,11 @@ def run_shard(
         Turnouts to compute; the others of the shard stay as they are.
     strict : bool
         Raise faults of the program instead of noting them.
+    launched : datetime, optional
+        When the run began that this job belongs to: what is tried again in the same run is tried for the first time.
     """
     with locked(state):
-        run = _Run(Path(state), stage, configuration, Path(raw_root), threads, strict)
+        run = _Run(Path(state), stage, configuration, Path(raw_root), threads, strict, launched)
         planned = named(stage.gather)(plan, configuration) if stage.gather else read_plan(plan)
         return run.bring_up(list(planned), only)
 
@@ -87,57 +95,101 @@ def run_shard(
 class _Run:
     """One call of ``run_shard``."""
 
-    def __init__(self, path: Path, stage: Stage, configuration: Configuration, raw_root: Path, threads, strict):
+    def __init__(
+        self, path: Path, stage: Stage, configuration: Configuration, raw_root: Path, threads, strict, launched
+    ):
         self.path, self.name = path, f"{stage.kind} {path.stem}"
         self.stage, self.raw_root = stage, raw_root
-        self.threads, self.strict = threads, strict
+        self.threads, self.strict, self.launched = threads, strict, launched.isoformat() if launched else ""
         self.ledger = Ledger(path, configuration.settings["fleet"])
         self.state = self.ledger.state
         self.tasks = Tasks(self.state, stage, configuration, raw_root)
         self.postponed: dict[str, str] = {}
+        self.suspects = begun(path)
 
     def bring_up(self, planned: list[Planned], only: Sequence[str] | None) -> Summary:
         """Compute what is missing, write batches and state."""
         wanted = {unit_id(p.unit): p for p in planned if p.unit.kind == self.stage.kind}
         due, stale = self.tasks.due(wanted, only)
+        self._clear_notes(due, only)
         statuses = self._compute_all(due)
         self._set_copies_aside(wanted, only)
         vanished = self._withdraw_vanished(wanted)
-        n_postponed = self._note_postponed(wanted, {unit_id(task.planned.unit) for task in due})
+        n_postponed = self._note_postponed(wanted, {_name(task) for task in due})
         self.ledger.checkpoint()
         done, faults = statuses.total(), statuses["internal_error"]
         return Summary(
             self.name, len(wanted), done, done - statuses["ok"], faults, vanished, stale, n_postponed,
         )  # fmt: skip
 
+    def _clear_notes(self, due: list[Task], only: Sequence[str] | None) -> None:
+        """Forget that units were begun which are asked for no more, or known meanwhile."""
+        asked = {name for name in self.suspects if only is None or name.split("/", 1)[0] in only}
+        for name in asked - {_name(task) for task in due}:
+            forget(self.path, name)
+            del self.suspects[name]
+
     def _compute_all(self, tasks: list[Task]) -> Counter[str]:
         """Keep every result; how many there are of each status."""
         if tasks:
             # before processes are forked: each of them would import it anew
             self.compute = named(self.stage.compute)
-        progress = Progress(self.name, len(tasks))
-        statuses: Counter[str] = Counter()
-        for found in in_order(self._compute, tasks, self.threads):
-            if isinstance(found, Postponed):
-                self.postponed[found.unit] = found.met
-                progress.step(False)
-                continue
-            result, stamp, contents = found
-            statuses[result.status] += 1
-            progress.step(result.status != "ok")
-            self.ledger.keep(result, stamp, contents)
-        progress.close()
-        self.ledger.checkpoint()
-        return statuses
+        self.progress, self.statuses = Progress(self.name, len(tasks)), Counter[str]()
+        alone = [task for task in tasks if _name(task) in self.suspects]
+        each = in_processes if alone else in_order  # a process that has computed may have threads, which no fork takes
+        try:
+            for found in each(self._compute, [t for t in tasks if _name(t) not in self.suspects], self.threads):
+                if isinstance(found, Died):
+                    alone.append(found.thing)
+                else:
+                    self._keep(found)
+            self.ledger.checkpoint()
+            for task in alone:
+                self._compute_alone(task)
+        finally:
+            self.progress.close()
+            self.ledger.checkpoint()
+        return self.statuses
 
-    def _compute(self, task: Task) -> tuple[UnitResult, str, str] | Postponed:
+    def _compute_alone(self, task: Task) -> None:
+        """Compute what a process, or the job before, may have died of; where another one dies of it, that is noted."""
+        name = _name(task)
+        LOG.warning("%s: a process or a job died while it was computed: it is computed by itself", name)
+        (found,) = in_processes(self._compute, [task], 1)
+        if not isinstance(found, Died):
+            self._keep(found)
+        elif self.strict:
+            raise RuntimeError(f"{name}: {DIED}")
+        elif name not in self.suspects or (self.launched and self.suspects[name] == self.launched):
+            self._keep(Postponed(name, DIED))
+        else:
+            self._keep(found := self._guarded(task, died_of))
+            self.ledger.checkpoint()
+            if not isinstance(found, Postponed):
+                forget(self.path, name)
+
+    def _keep(self, found: Computed | Postponed) -> None:
+        if isinstance(found, Postponed):
+            self.postponed[found.unit] = found.met
+            self.progress.step(False)
+            return
+        result, stamp, contents = found
+        self.statuses[result.status] += 1
+        self.progress.step(result.status != "ok")
+        self.ledger.keep(result, stamp, contents)
+
+    def _compute(self, task: Task) -> Computed | Postponed:
+        with noted(self.path, _name(task), self.launched):
+            return self._guarded(task, self.compute)
+
+    def _guarded(self, task: Task, compute: Callable) -> Computed | Postponed:
         planned, unit = task.planned, task.planned.unit
         more = {"context": task.context} if self.stage.context else {}
         try:
             contents = contents_of(planned, self.raw_root)
             key = key_without(key_of(planned, contents), task.copied)
             rest = without(unit, task.copied)
-            compute = self.compute if rest.files else _no_rows
+            compute = compute if rest.files else _no_rows
             result = guarded(compute, rest, task.turnout, self.raw_root, key, self.stage.algo, self.strict, **more)
         except (OSError, MemoryError) as error:
             if self.strict or not passing(error):
@@ -178,6 +230,10 @@ class _Run:
         for name in sorted(left):
             self.ledger.keep(withdrawn(name, units[name]), "")
         return 0 if self.stage.gather else len(gone)
+
+
+def _name(task: Task) -> str:
+    return unit_id(task.planned.unit)
 
 
 def _no_rows(*_, **__) -> dict[str, list[dict]]:

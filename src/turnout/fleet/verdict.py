@@ -11,6 +11,7 @@ from turnout.config.settings.fleet import FleetSettings
 from turnout.errors import TurnoutError
 from turnout.fleet.atomic import read_json, write_text
 from turnout.fleet.batches import read_column
+from turnout.fleet.begun import LEFT, begun
 from turnout.fleet.postponed import ask_again, read_postponed
 from turnout.fleet.state import batch_paths, state_of
 
@@ -69,9 +70,12 @@ def _faults(status: Mapping[str, str]) -> Iterator[str]:
 
 
 def _waiting(states: Iterable[Path]) -> Iterator[str]:
-    if postponed := [met for state in states for met in read_postponed(state)[1].items()]:
-        first = f"{len(postponed)} units wait for the next run, first {': '.join(postponed[0])}"
-        yield f"{first}: look after the disk or the network they lie on"
+    left: dict[str, str] = {}
+    for state in states:
+        left |= dict.fromkeys(sorted(begun(state)), LEFT) | read_postponed(state)[1]
+    if left:
+        first = f"{len(left)} units wait for the next run, first {': '.join(next(iter(left.items())))}"
+        yield f"{first}: look after the disk or the network they lie on, and the memory they take"
 
 
 def _shares(status: Mapping[str, str], lines: Mapping[str, str], limits: FleetSettings) -> Iterator[str]:

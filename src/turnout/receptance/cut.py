@@ -14,7 +14,8 @@ class Cut:
     """One window of a recording around one blow, on its way to becoming an ``Impact``.
 
     ``force`` [N] has its zero line taken off and ``polarity`` (+1, -1) says where the blow points; ``first`` and
-    ``last`` are the first and last sample above the trigger, counted from the start of the window.
+    ``last`` are the first and last sample above the trigger, counted from the start of the window. ``zeros`` were
+    taken off force and acceleration: with them they are what was recorded.
     """
 
     force: np.ndarray
@@ -26,6 +27,7 @@ class Cut:
     force_noise: float
     recording: Recording
     channels: tuple
+    zeros: tuple[float, float] = (0.0, 0.0)
     record: int = 0
     rejections: list = field(default_factory=list)
     notes: list = field(default_factory=list)
@@ -60,7 +62,8 @@ def _cut_one(recording, force, response, settings):
     if f.size == 0 or np.ptp(f) == 0.0:
         whole.rejections.append(_nothing(finite, Rejection("dead_channel", 0.0, None, f"{force} is constant")))
         return [whole]
-    f = f - np.median(f[finite])
+    zero = float(np.median(f[finite]))
+    f = f - zero
     noise = MAD_TO_SD * float(np.median(np.abs(f[finite])))
     blows, level = _find(f, noise, recording.rate, settings)
     if not blows:
@@ -77,7 +80,8 @@ def _cut_one(recording, force, response, settings):
         end = max(end, min(last + 1, f.size))
         part = slice(start, end)
         polarity = 1 if f[first : last + 1].max() >= -f[first : last + 1].min() else -1
-        cut = Cut(f[part], a[part], recording.rate, first - start, last - start, polarity, noise, recording, channels)
+        here = first - start, last - start
+        cut = Cut(f[part], a[part], recording.rate, *here, polarity, noise, recording, channels, (zero, 0.0))
         if not finite[part].all():
             cut.rejections.append(_nothing(finite[part], None, start))
         cuts.append(cut)

@@ -84,7 +84,8 @@ def _measure(cut, settings):
     """Zero lines, contact, further contacts, start of the decay, and what one blow alone can be rejected for."""
     contact = measure_contact(cut, settings.contact_level)
     if contact.zero_acceleration:
-        cut.acceleration = cut.acceleration - _significant_zero(cut, contact)
+        zero = _significant_zero(cut, contact)
+        cut.acceleration, cut.zeros = cut.acceleration - zero, (cut.zeros[0], zero)
     if np.ptp(cut.acceleration) == 0.0:
         cut.rejections.append(Rejection("dead_channel", 0.0, None, f"{cut.channels[1].name} is constant"))
     if cut.polarity < 0:

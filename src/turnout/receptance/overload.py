@@ -69,10 +69,13 @@ def rail_code(x, resolution=None, noise=0.0):
 
 
 def overload(cut, contact):
-    """Rejection for the first sign of an overload on either channel of a blow, or None."""
+    """Rejection for the first sign of an overload on either channel of a blow, or None.
+
+    A range ends where the recorded samples end, not those with the zero line taken off.
+    """
     both = (cut.force, contact.noise_force), (cut.acceleration, contact.noise_acceleration)
-    for (x, noise), channel in zip(both, cut.channels):
-        if (size := range_exceeded(x, channel.limit)) is not None:
+    for (x, noise), zero, channel in zip(both, cut.zeros, cut.channels):
+        if (size := range_exceeded(x + zero, channel.limit)) is not None:
             detail = f"{channel.name} reaches {size:.4g}, its range ends at {channel.limit:.4g}"
             return Rejection("overload", size, channel.limit, detail)
         if (rail := rail_code(x, channel.resolution, noise)) is not None:

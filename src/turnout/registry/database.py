@@ -2,6 +2,7 @@
 
 import csv
 import os
+from datetime import UTC, datetime
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -128,6 +129,7 @@ def _create_views(con, root: Path, generation: Generation) -> None:
     last = counted and min(counted, until or counted)
     newest = f"timestamp {literal(last)}" if last else "null::timestamp"
     con.execute(f"create macro newest_measurement() as {newest}")
+    con.execute(f"create macro published_at() as timestamp '{datetime.now(UTC):%Y-%m-%d}'")
     con.execute(
         f"create view registry_info as select {generation.number}::bigint as generation, "
         f"{literal(str(root))} as folder, {newest} as newest_measurement_at_utc, "

@@ -11,7 +11,8 @@ from turnout.trend.rows import arrow_rows
 NAMES = (
     "epochs", "resonance_drift",
     "passage_values", "chart_values", "mode_residuals", "cusum", "change_since_event", "maintenance_effect",
-    "chart_status_at", "unusable", "cannot_see", "time_to_threshold", "chart_states", "worklist",
+    "chart_status_at", "unusable", "cannot_see", "was_said", "in_service", "time_to_threshold",
+    "chart_states", "worklist",
 )  # fmt: skip
 
 
@@ -19,7 +20,7 @@ def connect_views(frames, newest, rounded=True) -> duckdb.DuckDBPyConnection:
     """DuckDB in memory with the trend's views over ``frames``, a mapping of table to DataFrame.
 
     Tables that are not given are empty; ``modes`` stands for itself and for ``modes_current``. ``newest`` is the
-    time of the newest measurement.
+    time of the newest measurement, on the day after which all this was put together.
     """
     con = duckdb.connect(":memory:", config={"autoinstall_known_extensions": False, "autoload_known_extensions": False})
     for table in tables():
@@ -29,6 +30,7 @@ def connect_views(frames, newest, rounded=True) -> duckdb.DuckDBPyConnection:
             con.register(table, pa.Table.from_pylist([], schema=arrow_schema(table)))
     stamp = timestamps(days([newest]))[0]
     con.execute(f"create macro newest_measurement() as timestamp '{stamp}'")
+    con.execute("create macro published_at() as date_trunc('day', newest_measurement()) + interval 1 day")
     for table in ("models", "modes", "impacts", "passages", "passage_fits"):
         con.execute(f"create view {table}_current as select * from {table}")
     con.execute("create view quarantine_open as select * from quarantine")

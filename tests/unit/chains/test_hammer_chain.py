@@ -1,6 +1,7 @@
 """The whole hammer chain against a truth that it never sees: files on disk in, rows out."""
 
 import json
+from collections import Counter
 from dataclasses import replace
 from datetime import date, datetime
 
@@ -16,6 +17,7 @@ from turnout.published.models import published_model
 from turnout.published.response import paper_response
 from turnout.readers import read
 from turnout.readers.writing import write
+from turnout.registry.intake import Arrival, gather
 
 DAY = date(2024, 5, 13)
 EXTENSIONS = {"uff58b": "uff", "tdms": "tdms", "hdf5": "h5"}
@@ -162,6 +164,20 @@ def test_a_small_hammer_is_believed_where_the_configuration_says_so(tmp_path):
     settings = {**turnout.settings, "receptance": replace(turnout.settings["receptance"], softest_blow=0.0)}
     rows = hammer_unit(unit, replace(turnout, settings=settings), tmp_path, algo="1")
     assert rows["models"][0]["status"] == "accepted"
+
+
+def test_a_test_called_by_the_time_of_its_recording_loses_no_blow_on_the_way_into_the_registry(tmp_path):
+    """Fourteen digits are no number of a test; the largest that a column of 32 bits holds is."""
+    unit, turnout, _ = lay_out(tmp_path, "A7")
+    folder = tmp_path / "tommerup_s1/hammer" / DAY.isoformat()
+    for test, label in ((1, "20240513101500"), (2, "2147483648"), (3, "2147483647")):
+        (folder / f"A7_{test}.h5").rename(folder / f"A7_{label}.h5")
+    (unit,) = scan(turnout, tmp_path).units
+    rows = hammer_unit(unit, turnout, tmp_path, algo="1")
+    arrival = Arrival(0, "tommerup_s1/hammer/A7/2024-05-13", "tommerup_s1", "hammer", "key", "1", rows)
+    gathered, refusals = gather("impacts", [arrival])
+    assert refusals == [] and gathered.num_rows == len(rows["impacts"]) == 30
+    assert Counter(row["test"] for row in rows["impacts"]) == {0: 20, 2**31 - 1: 10}
 
 
 def test_a_reversed_force_is_named(tmp_path):

@@ -1,10 +1,15 @@
 """Tables that people keep: what is not understood in them is said, and no row gets lost in another."""
 
+import resource
+import signal
+from contextlib import contextmanager
+
 import pytest
 
 from turnout.cli import main
 from turnout.config import load_configuration
 from turnout.config.acknowledgements import read_acknowledgements
+from turnout.config.append import append_csv, append_tsv, taken_back
 from turnout.config.events import read_events
 from turnout.config.raw_notes import read_campaigns, read_trains
 
@@ -14,7 +19,7 @@ HEADER = "turnout,section,date,kind,resets,note\n"
 def events(folder, text):
     path = folder / "events.csv"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    found, errors = read_events(path, "config/events.csv", None, {})
+    found, errors, _ = read_events(path, "config/events.csv", None, {})
     return [(e.turnout, e.resets, e.note) for e in found], [str(e) for e in errors]
 
 
@@ -158,3 +163,52 @@ def test_a_row_is_entered_by_the_header_of_its_table(config):
     assert (
         (config / "events.csv").read_bytes().endswith(b'\r\n"machine 09-3X, night",2026-04-02,tamping,,tommerup_s1\r\n')
     )
+
+
+@contextmanager
+def full_disk():
+    """No file may grow beyond 4 kB: to a program that is a disk that is full in the midst of a write."""
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        signal.signal(signal.SIGXFSZ, handler)
+
+
+@pytest.mark.parametrize(("name", "append", "tab"), [("events.csv", append_csv, ","), ("t.tsv", append_tsv, "\t")])
+def test_a_table_is_as_it_was_where_there_is_no_room_for_one_more_row(tmp_path, name, append, tab):
+    path, columns = tmp_path / name, ("turnout", "layout")
+    rows = [tab.join(columns), *(tab.join((f"t{k:04d}", "main")) for k in range(800))]
+    path.write_text("\n".join(rows) + "\n")
+    before = path.read_bytes()
+    assert len(before) > 8192
+    with pytest.raises(OSError, match="too large"), full_disk(), taken_back(path):
+        append(path, {"turnout": "t1", "layout": "main"}, columns)
+    assert path.read_bytes() == before
+    assert [p.name for p in tmp_path.iterdir()] == [name]
+
+
+def test_a_row_that_is_taken_back_leaves_mode_link_and_bytes(tmp_path):
+    path, link = tmp_path / "kept" / "events.csv", tmp_path / "events.csv"
+    path.parent.mkdir()
+    path.write_bytes(b"turnout,section\r\nt1,A7")
+    path.chmod(0o640)
+    link.symlink_to(path)
+    before = path.read_bytes()
+    with pytest.raises(KeyError), taken_back(link):
+        append_csv(link, {"turnout": "t2"}, ("turnout", "section"))
+        assert path.read_bytes() == before + b"\r\nt2,\r\n"
+        raise KeyError
+    assert path.read_bytes() == before and link.is_symlink() and path.stat().st_mode & 0o777 == 0o640
+    assert [p.name for p in path.parent.iterdir()] == ["events.csv"]
+
+
+def test_a_new_table_that_is_taken_back_is_gone(tmp_path):
+    with pytest.raises(KeyError), taken_back(tmp_path / "events.csv"):
+        append_csv(tmp_path / "events.csv", {"turnout": "t2"}, ("turnout", "section"))
+        assert (tmp_path / "events.csv").read_text() == "turnout,section\nt2,\n"
+        raise KeyError
+    assert list(tmp_path.iterdir()) == []

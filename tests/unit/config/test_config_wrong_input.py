@@ -2,8 +2,10 @@
 
 import pytest
 
+from turnout.cli import main
 from turnout.config import load_configuration
 from turnout.config.raw_notes import read_campaigns
+from turnout.config.table import read_table
 from turnout.errors import ConfigErrors
 from turnout.readers.formats import FORMATS
 from turnout.readers.units import to_si
@@ -116,8 +118,8 @@ WRONG = {
         "config/overrides/t1.yaml, line 2, column 7: 'track' is missing",
     ),
     "event of no turnout": (
-        {"events": "turnout,section,date,kind\nt7,,2025-01-01,tamping\n"},
-        "turnout 't7' has no row",
+        {"events": "turnout,section,date,kind\n,,2025-01-01,tamping\n"},
+        "line 2, column 1: turnout '' has no row",
     ),
     "event of no section": (
         {"events": "turnout,section,date,kind\nt1,B1,2025-01-01,tamping\n"},
@@ -195,6 +197,42 @@ def test_every_error_of_an_event_is_said_at_its_cell(tmp_path):
         ("line 2, column 6", "turnout 't1' has no section 'B1'"), ("line 2, column 9", "date"),
         ("line 2, column 18", "kind"), ("line 2, column 25", "resets"),
     ]  # fmt: skip
+
+
+def test_a_raw_folder_is_one_however_it_is_spelt(tmp_path):
+    path = tmp_path / "turnouts.tsv"
+    spelt = {
+        "T1": "line_7/T1",
+        "T2": "line_7/T1/",
+        "T3": "./line_7/T1",
+        "T4": "line_7//T1",
+        "T5": "line_7/./T5/",
+        "T6": "",
+    }
+    path.write_text("turnout\tlayout\traw\n" + "".join(f"{t}\tmain\t{raw}\n" for t, raw in spelt.items()))
+    rows, errors = read_table(path, "turnouts.tsv")
+    assert [(row.id, row.raw) for row in rows] == [("T1", "line_7/T1"), ("T5", "line_7/T5"), ("T6", "T6")]
+    assert [str(e).split(". ")[0] for e in errors] == [
+        f"turnouts.tsv, line {n}, column 9: raw folder 'line_7/T1' is also that of turnout 'T1'" for n in (3, 4, 5)
+    ]
+
+
+def test_an_event_of_a_turnout_that_was_taken_out_stops_nothing_and_is_said(tmp_path, capsys):
+    """Or of one that is misspelt: the fleet goes on, and the row is named. History keeps it."""
+    events = "turnout,section,date,kind\nt2,,2025-01-01,tamping\nt7,A8,2025-02-01,grinding\n"
+    read = configuration(tmp_path, events=events)
+    assert [(e.turnout, e.kind) for e in read.events] == [("t2", "tamping"), ("t7", "grinding")]
+    (warning,) = [str(w) for w in read.warnings]
+    assert "events.csv, line 3, column 1: turnout 't7' has no row in turnouts.tsv. Allowed: t1, t2" in warning
+    folder = ["--configuration", str(read.folder)]
+    assert main(["check", *folder]) == 1
+    assert "events.csv, line 3, column 1: turnout 't7' has no row" in capsys.readouterr().out
+    before = (read.folder / "events.csv").read_bytes()
+    assert main(["events", "t7", "tamping", "2025-03-01", *folder]) == 2
+    assert "turnout 't7' has no row in turnouts.tsv" in capsys.readouterr().err
+    assert (read.folder / "events.csv").read_bytes() == before
+    with pytest.raises(ConfigErrors, match="Did you mean 'tamping'"):  # what else is wrong in such a row is an error
+        configuration(tmp_path / "other", events=events.replace("grinding", "tampin"))
 
 
 def test_a_broken_table_of_turnouts_accuses_no_event(tmp_path):

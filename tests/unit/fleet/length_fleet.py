@@ -1,6 +1,8 @@
 """A fleet of tiny text files, and a chain whose rows are the lengths of them."""
 
 import errno
+import os
+import signal
 
 from turnout.config import load_configuration
 from turnout.errors import ReadError
@@ -39,6 +41,10 @@ def length(unit, turnout, raw_root, algo=""):
             raise OSError(errno.EIO, "Input/output error")
         if text == "too large":
             raise MemoryError
+        if text == "kills its process":
+            os._exit(9)
+        if text == "kills the job":
+            os.killpg(0, signal.SIGKILL)
         rows["recordings"].append({"path": path, "n_samples": len(text), "kind": "hammer"})
     return rows
 

@@ -17,6 +17,10 @@ def findings(impact):
     return [r.reason for r in (*impact.rejections, *impact.notes)]
 
 
+def with_limits(recording, *limits):
+    return replace(recording, channels=tuple(replace(c, limit=x) for c, x in zip(recording.channels, limits)))
+
+
 @pytest.mark.parametrize(
     "contact, delay", [(1e-4, 4e-3), (1e-4, 50e-3), (5e-4, 4e-3), (1.5e-3, 4e-3), (3e-3, 6e-3), (3e-3, 50e-3)]
 )
@@ -115,9 +119,35 @@ def test_a_clipped_response_and_a_known_range_are_overloads(hammer):
     impacts = hammer.impacts([*recordings[1:], hammer.recording(samples, 9)])
     assert [findings(i) for i in impacts] == [[]] * 4 + [["overload"]]
     assert "rail repeats" in impacts[-1].rejections[0].detail
-    channels = (replace(recordings[0].channels[0], limit=3000.0), recordings[0].channels[1])
-    (known,) = hammer.impacts([replace(recordings[0], channels=channels)])
+    (known,) = hammer.impacts([with_limits(recordings[0], 3000.0, None)])
     assert known.rejections[0].reason == "overload" and known.rejections[0].limit == 3000.0
+
+
+@pytest.mark.parametrize("zero", [-60.0, -30.0, 0.0, 30.0, 60.0])
+def test_a_range_is_reached_by_what_was_recorded_not_by_what_the_zero_line_leaves(hammer, zero):
+    """Blows of 4.5 to 6.5 kN in 0.3 ms, 3 samples at the rail of 3 kN: too few to be told by their shape."""
+
+    def recordings(peaks):
+        for k, peak in enumerate(peaks):
+            samples = hammer.samples(hammer.force(peak=peak, contact=3e-4), noise=(0.0, 1e-3))
+            samples[0] = np.clip(samples[0] + zero, -3000.0, 3000.0) + hammer.rng.normal(size=samples.shape[1])
+            yield with_limits(hammer.recording(samples, k), 3000.0, None)
+
+    clipped = hammer.impacts(list(recordings(hammer.rng.uniform(4500.0, 6500.0, 8))))
+    assert [findings(i) for i in clipped] == [["overload"]] * 8
+    # The noise of 1 N is a third of the 3 N by which "reached" is less than the limit itself.
+    assert clipped[3].rejections[0].value == pytest.approx(3000.0, abs=5.0)
+    within = hammer.impacts(list(recordings([2980.0 - zero] * 2)))
+    assert [i.accepted for i in within] == [True, True]
+
+
+@pytest.mark.parametrize("share", [-0.3, 0.3])
+def test_the_range_of_a_response_is_that_of_its_recording(hammer, share):
+    samples = hammer.recordings(1)[0].samples
+    samples = samples + np.array([[0.0], [share * np.abs(samples[1]).max()]])
+    reached = np.abs(samples[1]).max()
+    for limit, found in ((0.99 * reached, ["overload"]), (1.01 * reached, [])):
+        assert [findings(i) for i in hammer.impacts([with_limits(hammer.recording(samples), None, limit)])] == [found]
 
 
 def test_three_equal_samples_by_chance_are_no_rail():

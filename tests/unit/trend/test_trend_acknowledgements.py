@@ -1,7 +1,7 @@
 """config/acknowledgements.csv: entered by command or by hand, refused with place and remedy."""
 
 import shutil
-from datetime import datetime
+from datetime import UTC, datetime, time
 from types import SimpleNamespace
 
 import pandas as pd
@@ -9,10 +9,12 @@ import pytest
 
 from turnout.cli import main
 from turnout.config import load_configuration
-from turnout.config.acknowledgements import read_acknowledgements
+from turnout.config.acknowledgements import acknowledgement, read_acknowledgements
+from turnout.registry.database import open_registry
 from turnout.registry.derived import publish
 from turnout.registry.register import register
 from turnout.trend.rows import arrow_rows
+from turnout.trend.views import connect_views
 
 SECTIONS = {"T1": SimpleNamespace(tree={"sections": {"A": None}})}
 HEADER = "turnout,section,band,action,by,at,until,reason\n"
@@ -63,6 +65,71 @@ def test_an_acknowledgement_of_no_alarm_is_said(configuration, tmp_path, capsys)
         assert ("nothing on the list changes" in capsys.readouterr().out) is not changes
 
 
+def test_a_silence_may_be_planned_and_an_alarm_is_not_seen_before_its_day(configuration, capsys):
+    turnout, label = place_of(configuration)
+    said = ["--by", "me", "--reason", "works", "--configuration", str(configuration), "--at", "2062-03-01"]
+    assert main(["acknowledge", f"{turnout}/{label}", *said]) == 2
+    assert "at 2062-03-01 has not come yet" in capsys.readouterr().err
+    assert main(["acknowledge", f"{turnout}/{label}", "--suppress-until", "2062-03-10", *said]) == 0
+    (row,) = load_configuration(configuration).acknowledgements
+    assert row["at_utc"] == datetime(2062, 3, 1)
+
+
+CHART = {
+    "turnout_id": "T1", "section_id": "T1/A", "source": "passage", "state": "alarm", "reason": "threshold_crossed",
+    "complete": True, "stale_after_days": 90.0, "target_pct": 1.5, "n_campaigns": 100, "run_length_down": 5600.0,
+    "run_length_up": 56000.0, "campaigns_per_year": 52.0, "change_pct": -3.0, "change_low_pct": -4.0,
+    "change_high_pct": -2.0, "worklist_rows": 20, "statistic_ratio": 2.0,
+    "last_measured_at_utc": pd.Timestamp("2026-06-01"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("band", ["amplitude", "ballast", "railpad"])
+def test_each_band_of_a_section_is_silenced_by_itself(configuration, band):
+    turnout, label = place_of(configuration)
+    place = {"turnout_id": turnout, "section_id": f"{turnout}/{label}"}
+    said = ["--by", "me", "--reason", "sensor loose", "--at", "2026-05-30", "--configuration", str(configuration)]
+    command = ["acknowledge", place["section_id"], "--band", band, "--suppress-until", "2099-01-01", *said]
+    assert main(command) == 0
+    bands = ("amplitude", "ballast", "railpad")
+    of_band = [CHART | place | {"band": b} for b in bands]
+    rows = [dict(row) for row in load_configuration(configuration).acknowledgements]
+    alarm = {"direction": "down", "raised_at_utc": pd.Timestamp("2026-05-20"), "threshold": 3.5, **place}
+    point = {"epoch": 0, "residual_pct": -3.0, "cusum_down": 7.0, "state": "alarm_down", **place}
+    frames = {
+        "chart_status": of_band, "acknowledgements": rows,
+        "alarms": [alarm | {"alarm_id": b, "band": b, "source": "passage"} for b in bands],
+        "baselines": [{"epoch": 0, "sd_pct": 0.6, "phi": 0.1, "band": b, "source": "passage", **place} for b in bands],
+        "charts": [
+            point | {"band": b, "source": "passage", "measured_at_utc": CHART["last_measured_at_utc"]} for b in bands
+        ],
+    }  # fmt: skip
+    with connect_views({name: pd.DataFrame(rows) for name, rows in frames.items()}, "2026-06-01") as con:
+        listed = con.execute("select band, state from worklist order by band").fetchall()
+        charted = dict(con.execute("select band, state from chart_states").fetchall())
+    assert listed == [(b, "inspect this week") for b in bands if b != band]
+    assert charted == dict.fromkeys(bands, "inspect this week") | {band: "suppressed"}
+
+
+def test_the_registry_takes_what_is_said_of_passing_trains(tmp_path):
+    cells = dict(
+        turnout="T1", section="A", band="amplitude", action="acknowledge", by="me", at="2026-06-02", reason="x"
+    )
+    register([], tmp_path / "registry", read=iter)
+    said = arrow_rows("acknowledgements", pd.DataFrame([acknowledgement(cells)]))
+    publish(tmp_path / "registry", {"acknowledgements": said})
+    with open_registry(tmp_path / "registry") as con:
+        assert con.execute("select section_id, band from acknowledgements").fetchall() == [("T1/A", "amplitude")]
+
+
+def test_a_registry_knows_the_day_on_which_it_was_made(tmp_path):
+    before = datetime.now(UTC).date()
+    register([], tmp_path / "registry", read=iter)
+    with open_registry(tmp_path / "registry") as con:
+        ((at,),) = con.execute("select published_at()").fetchall()
+    assert before <= at.date() <= datetime.now(UTC).date() and at.time() == time()
+
+
 def test_no_file_means_that_nobody_has_said_anything(tmp_path):
     assert read_acknowledgements(tmp_path / "acknowledgements.csv") == ([], [])
 
@@ -77,6 +144,7 @@ def test_no_file_means_that_nobody_has_said_anything(tmp_path):
         ("T1,,,suppress,me,2026-01-01T10:00+02:00,,seen", "with a time zone"),
         ("T1,,,suppress,me,2026-01-01,,a,b", "double quotes"),
         (",,,suppress,me,2026-01-01,,a", "column 1: turnout is empty"),
+        ("T1,,,acknowledge,me,2062-03-12,,a", "column 21: at 2062-03-12 has not come yet. Write the day on which"),
         ("T1,,,suppress,me,2026-03-01,2026-02-01,a", "until 2026-02-01 is not after at 2026-03-01"),
         ("T7,,,suppress,me,2026-03-01,,a", "turnout 'T7' has no row"),
         ("T1,Z,,suppress,me,2026-03-01,,a", "column 4: turnout 'T1' has no section 'Z'"),
@@ -103,7 +171,6 @@ def test_a_bad_line_hides_no_alarm(configuration, tmp_path, capsys, caplog):
     from benchmarks.trend_registry import small_registry
 
     from turnout.chains.trend import trend_job
-    from turnout.registry.database import open_registry
 
     turnout, _ = place_of(configuration)
     lines = "{0},,,silence,me,2026-01-01,,x\nnowhere,,,acknowledge,me,2026-01-01,,x\n"

@@ -141,6 +141,30 @@ def test_a_drift_is_planned_though_its_chart_is_too_noisy(settings):
     assert not [s for (s,) in noisy if any(t == s[:6] and s[7:] in labels.split(", ") for t, labels in blind)]
 
 
+@pytest.mark.parametrize("named", [("T00000", "T00001"), ("T00000", "T00002"), ()])
+def test_a_turnout_that_was_taken_out_is_off_the_list_and_its_history_stays(settings, named):
+    rows = fallen()
+    turnouts = pd.DataFrame({"turnout_id": list(named), "name": "", "line": ""})
+    kept = set(named or rows["turnout_id"])  # a registry of results alone leaves none out
+    with viewed(rows, settings, turnouts=turnouts) as con:
+        for asof in ("newest_measurement()", "newest_measurement() - interval 1 day"):
+            listed = con.execute(
+                f"select turnout_id, state, false_alarm_words from worklist({asof}, most := 1000)"
+            ).fetchall()
+            assert ("T00001", "inspect this week") in {row[:2] for row in listed} or "T00001" not in kept
+            assert {row[0] for row in listed} <= kept
+            n_charts = con.execute(
+                f"select count(*) from chart_status_at({asof}) where complete and list_contains(?, turnout_id)",
+                [[*kept]],
+            ).fetchall()[0][0]
+            words = [said for _, state, said in listed if state == "inspect this week"]
+            assert all(f"in all {n_charts} charts" in said for said in words)
+        assert {t for (t,) in con.execute("select distinct turnout_id from chart_states").fetchall()} == kept
+        history = con.execute("select count(*) from charts where turnout_id = 'T00001'").fetchall()
+        assert history[0][0] > 800
+        assert con.execute("select count(*) from alarms where turnout_id = 'T00001'").fetchall()[0][0] >= 1
+
+
 def test_what_is_silenced_comes_back_on_its_day(settings):
     rows = fallen()
     newest = rows["measured_at_utc"].max()

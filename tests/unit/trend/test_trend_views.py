@@ -366,6 +366,28 @@ def test_what_is_said_after_the_newest_campaign_counts_now_and_not_on_an_earlier
             assert before == [("inspect this week",)]
 
 
+@pytest.mark.parametrize(("action", "until"), [("acknowledge", None), ("suppress", 10)])
+def test_what_is_said_of_a_day_that_has_not_come_changes_nothing_until_then(frames, action, until):
+    """Dated half a year ahead, by 12/03 taken for 3 December: nobody has seen that, and a planned silence waits."""
+    newest = frames["modes"]["measured_at_utc"].max()
+    at = newest + pd.Timedelta("180D")
+    said = pd.DataFrame(
+        {
+            "acknowledgement_id": ["a"], "turnout_id": ["T00003"], "section_id": ["T00003/S2"], "band": ["railpad"],
+            "action": [action], "by_whom": ["M. Jensen"], "at_utc": [at],
+            "until_utc": [at + pd.Timedelta(days=until) if until else pd.NaT], "reason": ["works"],
+        }
+    )  # fmt: skip
+    where = "where section_id = 'T00003/S2' and band = 'railpad'"
+    with connect_views(frames | {"acknowledgements": said}, newest) as con:
+        for day, counts in ((newest, False), (at - pd.Timedelta("2D"), False), (at + pd.Timedelta("1D"), True)):
+            listed = con.execute(f"select state from worklist(timestamp '{day}') {where}").fetchall()
+            charted = con.execute(f"select state from chart_states_on(timestamp '{day}') {where}").fetchall()
+            then = "plan" if action == "acknowledge" else "suppressed"
+            assert charted == [(then if counts else "inspect this week",)]
+            assert listed == (charted if not counts or action == "acknowledge" else [])
+
+
 @pytest.mark.parametrize(("n", "words"), [(1, "1 campaign with a rail temperature"), (2, "2 campaigns with a rail")])
 def test_a_baseline_counts_campaigns_with_a_rail_temperature_and_says_so(frames, n, words):
     """One campaign of two without a temperature reads as a mistake where "1 campaigns so far" is all that is said."""

@@ -2,7 +2,7 @@
 -- inspect this week: an open alarm. plan: an acknowledged alarm, or a drift among the discoveries of the fleet
 -- (false-discovery rate 10 %), also where the chart is too noisy to see the target within a year. suppressed: somebody
 -- silenced it, with a reason and an end, a day at which it comes back.
--- needs: chart_status_at
+-- needs: chart_status_at, was_said, in_service
 create or replace macro chart_states_on("asof") as table
 with open_alarms as (
     select turnout_id, section_id, band, source, max(raised_at_utc) as raised_at_utc
@@ -23,7 +23,7 @@ spoken as (
     left join open_alarms o using (turnout_id, section_id, band, source)
     left join acknowledgements k
         on k.turnout_id = s.turnout_id and coalesce(k.section_id, s.section_id) = s.section_id
-            and coalesce(k.band, s.band) = s.band
+            and coalesce(k.band, s.band) = s.band and was_said(k.at_utc, "asof")
     group by all
 )
 select
@@ -40,7 +40,8 @@ select
     s.n_after, s.detectable_pct, s.target_pct, s.drift_pct_per_year, s.drift_se_pct_per_year, s.drift_q,
     s.last_measured_at_utc, s.n_campaigns
 from chart_status_on("asof") s
-join spoken p using (turnout_id, section_id, band, source);
+join spoken p using (turnout_id, section_id, band, source)
+where in_service(s.turnout_id);
 
 -- One row per chart: what it says at the newest measurement, in the words of the worklist.
 create or replace view chart_states as select * from chart_states_on(newest_measurement());

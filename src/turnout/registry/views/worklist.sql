@@ -2,7 +2,7 @@
 -- what else there is up to `trend.worklist_rows` rows in all, or `most`; n_in_all counts what there would be without an end.
 -- asof at or after the newest measurement uses everything; an earlier one uses only what was measured by then
 -- (change and date then come from the sums alone, and a slow drift is not among the plans).
--- needs: chart_states, cannot_see, chart_status_at
+-- needs: chart_states, cannot_see, chart_status_at, was_said, in_service
 create or replace macro worklist("asof", most := null) as table
 with then_status as (select * from chart_status_at("asof")),
 recent as (
@@ -37,7 +37,7 @@ spoken as (
             select max_by(k.by_whom || ': ' || k.reason, k.at_utc) from acknowledgements k
             where k.turnout_id = r.turnout_id and coalesce(k.section_id, r.section_id) = r.section_id
                 and coalesce(k.band, r.band) = r.band and k.action = 'acknowledge'
-                and k.at_utc >= r.raised_at_utc and (k.at_utc <= "asof" or "asof" >= newest_charted())
+                and k.at_utc >= r.raised_at_utc and was_said(k.at_utc, "asof")
         ) as acknowledged
     from raised r
 ),
@@ -101,11 +101,11 @@ everything as (
 heard as (
     select e.*
     from everything e
-    where not exists (
+    where in_service(e.turnout_id) and not exists (
         select 1 from acknowledgements k
         where k.turnout_id = e.turnout_id and coalesce(k.section_id, e.section_id) = e.section_id
             and coalesce(k.band, e.band) = e.band and k.action = 'suppress'
-            and (k.at_utc <= "asof" or "asof" >= newest_charted())
+            and was_said(k.at_utc, "asof")
             and coalesce(k.until_utc, timestamp '9999-01-01') > "asof"
     )
 ),
@@ -132,7 +132,7 @@ fleet as (
         count(*) as n_charts, sum(s.campaigns_per_year * (1 / s.run_length_down + 1 / s.run_length_up)) as alarms_per_year
     from chart_status s
     join then_status n using (turnout_id, section_id, band, source)
-    where n.complete
+    where n.complete and in_service(s.turnout_id)
 ),
 maintenance as (
     select

@@ -1,0 +1,126 @@
+"""A unit that kills its process is named and holds nothing else back; a job that is killed condemns nobody."""
+
+import os
+from datetime import datetime
+
+import pytest
+from length_fleet import Fleet
+
+from turnout.fleet.postponed import read_postponed
+from turnout.fleet.state import load_state
+from turnout.fleet.verdict import judge
+
+UNITS = [f"t{i}/hammer/A/2024-05-13" for i in range(6)]
+
+
+@pytest.fixture
+def fleet(tmp_path):
+    return Fleet(tmp_path, 6)
+
+
+def night(fleet, **more):
+    """Exit status of a job in a process group of its own, as the workflow starts it."""
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            os.setsid()
+            fleet.run(**more)
+            code = 0
+        finally:
+            os._exit(code)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+def statuses(fleet):
+    return {unit: known.status for unit, known in load_state(fleet.state).units.items()}
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3])
+def test_a_unit_that_kills_its_process_is_in_quarantine_after_two_nights_and_the_others_are_known(fleet, threads):
+    fleet.put("t1/2024-05-13/A_1.txt", "kills its process")
+    first, second = night(fleet, threads=threads), night(fleet, threads=threads)
+    assert (first == 0, second) == (threads > 1, 0)
+    assert statuses(fleet) == dict.fromkeys(UNITS, "ok") | {UNITS[1]: "internal_error"}
+    (row,) = fleet.rows()[UNITS[1]]["quarantine"]
+    assert (row["reason_code"], row["path"]) == ("internal_error", "t1/2024-05-13/A_1.txt")
+    assert row["found"] == "the process died that computed it, and again where it was computed alone"
+    assert {p.name for p in fleet.state.with_suffix("").glob("b*")} == set(load_state(fleet.state).batches)
+    assert fleet.run(threads=threads).processed == 0
+    fleet.put("t1/2024-05-13/A_1.txt", "mended")
+    assert fleet.run(threads=threads).processed == 1
+    assert statuses(fleet) == dict.fromkeys(UNITS, "ok")
+
+
+@pytest.mark.parametrize("threads", [2, 3])
+def test_what_was_computed_beside_it_is_known_the_same_night_and_it_is_said_by_name(fleet, threads):
+    fleet.put("t4/2024-05-13/A_1.txt", "kills its process")
+    summary = fleet.run(threads=threads)
+    assert (summary.processed, summary.quarantined, summary.postponed) == (5, 0, 1)
+    assert statuses(fleet) == dict.fromkeys([u for u in UNITS if u != UNITS[4]], "ok")
+    jobs, left = read_postponed(fleet.state)
+    assert jobs == 1 and left == {UNITS[4]: "the process died that computed it"}
+    (complaint,) = judge([fleet.state], fleet.configuration).complaints
+    assert f"1 units wait for the next run, first {UNITS[4]}: the process died that computed it" in complaint
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_job_that_is_tried_again_in_the_same_run_condemns_no_unit(fleet, threads):
+    """What took the memory of the machine may be there a minute later, too."""
+    fleet.put("t1/2024-05-13/A_1.txt", "kills its process")
+    first, second = datetime(2026, 11, 22, 2), datetime(2026, 11, 23, 2)
+    for _ in range(3):
+        night(fleet, threads=threads, launched=first)
+    assert statuses(fleet) == dict.fromkeys([u for u in UNITS if u != UNITS[1]], "ok")
+    assert read_postponed(fleet.state)[1] == {UNITS[1]: "the process died that computed it"}
+    night(fleet, threads=threads, launched=second)
+    assert statuses(fleet)[UNITS[1]] == "internal_error"
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_two_units_that_kill_their_processes_cost_no_third_one(fleet, threads):
+    for i in (0, 3):
+        fleet.put(f"t{i}/2024-05-13/A_1.txt", "kills its process")
+    for _ in range(3):
+        night(fleet, threads=threads)
+    assert statuses(fleet) == dict.fromkeys(UNITS, "ok") | {UNITS[i]: "internal_error" for i in (0, 3)}
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_job_killed_as_a_whole_night_after_night_condemns_no_unit(fleet, threads):
+    fleet.put("t2/2024-05-13/A_1.txt", "kills the job")
+    fleet.put("t5/2024-05-13/A_1.txt", "kills the job")
+    for _ in range(4):
+        assert night(fleet, threads=threads) < 0
+    assert statuses(fleet) == dict.fromkeys([UNITS[i] for i in (0, 1, 3, 4)], "ok")
+    (complaint,) = judge([fleet.state], fleet.configuration).complaints
+    assert "wait for the next run, first t2/" in complaint and "its job ended while it was computed" in complaint
+    for i in (2, 5):
+        fleet.put(f"t{i}/2024-05-13/A_1.txt", "spared")
+    assert night(fleet, threads=threads) == 0
+    assert statuses(fleet) == dict.fromkeys(UNITS, "ok")
+    assert judge([fleet.state], fleet.configuration).complaints == ()
+
+
+def test_a_fault_that_ends_the_job_costs_none_of_what_waited_for_a_checkpoint(fleet):
+    fleet.put("t4/2024-05-13/A_1.txt", "full")
+    with pytest.raises(OSError, match="No space left"):
+        fleet.run()
+    assert statuses(fleet) == dict.fromkeys(UNITS[:4], "ok")
+    assert not list(fleet.state.with_suffix("").glob("begun-*"))
+
+
+def test_a_unit_that_was_begun_and_is_asked_for_no_more_is_forgotten(fleet):
+    fleet.put("t2/2024-05-13/A_1.txt", "kills the job")
+    night(fleet)
+    (fleet.raw / "t2/2024-05-13/A_1.txt").unlink()
+    assert fleet.run(only=["t1"]).processed == 1
+    assert list(fleet.state.with_suffix("").glob("begun-*"))
+    assert fleet.run().processed == 4
+    assert not list(fleet.state.with_suffix("").glob("begun-*"))
+
+
+def test_strict_raises_where_a_process_dies(fleet):
+    fleet.put("t1/2024-05-13/A_1.txt", "kills its process")
+    with pytest.raises(RuntimeError, match=f"{UNITS[1]}: the process died that computed it"):
+        fleet.run(threads=2, strict=True)
