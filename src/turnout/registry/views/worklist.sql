@@ -122,7 +122,9 @@ listed as (
         end as sections, band, source, state,
         (case when count(distinct why) = 1 then '' else split_part(min(section_id), '/', -1) || ': ' end)
             || min_by(why, section_id)
-            || (case when count(distinct why) = 1 then '' else '; the others alike' end) as why
+            || (case when count(distinct why) = 1 then '' else
+                '; ' || array_to_string(list(split_part(section_id, '/', -1) order by section_id)[2:], ', ') || ' alike'
+            end) as why
     from heard
     where why is not null
     group by turnout_id, band, source, state, case band when 'all' then why end
