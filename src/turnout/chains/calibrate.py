@@ -1,5 +1,6 @@
 """Calibrate a section of a simulated turnout to hammer tests, or to resonances and dampings."""
 
+import logging
 from pathlib import Path
 
 import numpy as np
@@ -7,16 +8,17 @@ import numpy as np
 from turnout.config.load import load_configuration
 from turnout.config.settings.identify import IdentifySettings
 from turnout.config.settings.receptance import ReceptanceSettings
-from turnout.errors import ConfigError, SimulationError
+from turnout.errors import ConfigError, ReadError, SimulationError
 from turnout.identify import identify
 from turnout.readers import read
 from turnout.receptance import find_impacts, receptance_of
-from turnout.records import RawChannel, RawDescription
+from turnout.records import RawChannel, RawDescription, Recording
 from turnout.simulate import load_track
 from turnout.simulate.calibrate import Measured, calibrate
 from turnout.simulate.calibrate_modes import fit_modes
 from turnout.simulate.hammer import located
 
+LOG = logging.getLogger("turnout.simulate")
 BAND = (60.0, 800.0)
 UNDESCRIBED = RawDescription(
     (
@@ -36,7 +38,11 @@ def calibrate_to_files(track_name, section, files, turnout_id=None, config="conf
     track = load_track(track_name, seed=seed)
     place, _ = located(track, section)
     description, force, responses, settings = _channels(section, turnout_id, config)
-    recordings = [r for f in files for r in read(Path(f).name, Path(f).parent, description).recordings]
+    recordings, refused = _recordings(files, description)
+    if not recordings:
+        raise SimulationError(f"calibration of {section}: no record can be used. {' '.join(refused)}")
+    if refused:
+        LOG.warning("not used: %s", " ".join(refused))
     measured = []
     for name in responses:
         channel = recordings[0].channels[recordings[0].index(name)]
@@ -48,6 +54,21 @@ def calibrate_to_files(track_name, section, files, turnout_id=None, config="conf
             raise SimulationError(f"calibration of {section}: {len(impacts)} sound impacts in channel {name!r}.")
         measured.append(_measured(receptance_of(impacts, settings), place, at))
     return calibrate(track, section, measured)
+
+
+def _recordings(files, description):
+    """The recordings of all files, and what is wrong with those that cannot be used."""
+    recordings: list[Recording] = []
+    refused: list[str] = []
+    for file in map(Path, files):
+        try:
+            result = read(file.name, file.parent, description)
+        except ReadError as error:
+            refused.append(str(error))
+            continue
+        recordings += result.recordings
+        refused += map(str, result.errors)
+    return recordings, refused
 
 
 def calibrate_to_modes(track_name, section, wanted, seed=0, evaluations=14):

@@ -78,9 +78,11 @@ def _effect(registry) -> int:
     for at, turnout, section, band, kinds, verdict, gain, low, high, before, after, held, last in rows:
         where = f"{turnout}, whole turnout" if section == "*" else section
         held = f"half of it lost by {held:%Y-%m-%d}" if held else f"holds until {last:%Y-%m-%d}, the newest campaign"
+        sure = "no interval" if low is None or high is None else f"{low:+.1f} to {high:+.1f}, 95 %"
+        size = "" if gain is None else f", {gain:+.1f} %"
         print(
-            f"{at:%Y-%m-%d} {where} {band}, {kinds}: {verdict}, {gain:+.1f} % ({low:+.1f} to {high:+.1f}, 95 %; "
-            f"{before} and {after} campaigns)" + (f"; {held}" if verdict == "stiffer" else "")
+            f"{at:%Y-%m-%d} {where} {band}, {kinds}: {verdict}{size} ({sure}; {before} and {after} campaigns)"
+            + (f"; {held}" if verdict == "stiffer" else "")
         )
     if not rows:
         print("No event that resets a resonance has campaigns on both sides yet; of others ask change_since_event().")

@@ -8,7 +8,7 @@ from turnout.readers.units import IGNORED, conversion, to_si
 from turnout.records import Channel, RawChannel
 
 # What loggers write for a unit where nobody told them one; without case.
-MEANINGLESS = ("", "-", "eu", "none", "n/a", "a.u.", "arb", "1", "?", "unknown", "undefined", "unitless")
+MEANINGLESS = ("", "-", "eu", "none", "n/a", "a.u.", "arb", "?", "unknown", "undefined", "unitless")
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ def settled_unit(file_unit, layout_unit):
     if layout_unit.endswith("!"):
         return layout_unit[:-1]
     stated = conversion(layout_unit)
-    if file_unit.strip().strip("[]").strip().casefold() in MEANINGLESS:
+    if _says_nothing(file_unit.strip().strip("[]").strip()):
         return layout_unit
     try:
         written = conversion(file_unit)
@@ -128,6 +128,11 @@ def settled_unit(file_unit, layout_unit):
     if not same and not (written.dimension == "count" and of_a_count):
         raise ValueError(_both_say(repr(file_unit), layout_unit))
     return layout_unit
+
+
+def _says_nothing(unit):
+    """Whether a label is none, or a number: a count of something else that stands beside the samples."""
+    return unit.casefold() in MEANINGLESS or unit.replace(".", "", 1).isdigit()
 
 
 def _both_say(said, layout_unit):

@@ -9,6 +9,7 @@ from turnout.readers.variables import COUNT, RATE, START, STEP
 NOTE = re.compile(r"^#?\s*([^\W\d][\w .'’-]*?)\s*([\[(][^\])]*[\])])?\s*[:=,;\t]\s*(.*)$")
 NAME_WITH_UNIT = re.compile(r"^(.*?)\s*[\[(]([^\[\]]*)[\])]$")
 SCALES = {"kHz": 1e3, "khz": 1e3, "MHz": 1e6, "ms": 1e-3, "µs": 1e-6, "\u03bcs": 1e-6, "us": 1e-6}
+TEMPERATURES = {"rail_temperature", "air_temperature"}
 NOTES = {*RATE, *STEP, *START, *COUNT, "n_samples"}
 # A line that says one frequency and nothing else: "Vzorkovani: 10000 Hz", "taktning [kHz];10".
 FREQUENCY = re.compile(r"^#?[^\d\[(]+[\[(]?([kM]?Hz)?[\])]?[\s:=,;]*([\d.,]+)\s*([kM]?Hz)?\W*$", re.IGNORECASE)
@@ -44,9 +45,10 @@ def head_of(data, source):
         plain = _plain(name)
         if plain not in NOTES and (frequency := _frequency(line)) is not None:
             unclear.append((line.strip(), frequency))
-        if match and (line.startswith("#") or plain in NOTES):
-            value = match[3].strip(separator + " ")
-            notes[plain if plain in NOTES else name] = _value(f"{value} {match[2]}" if match[2] else value)
+        value = match[3].strip(separator + " ") if match else ""
+        warmth = plain in TEMPERATURES and _is_number(value.split()[0] if value else "")  # else a column of that name
+        if match and (line.startswith("#") or plain in NOTES or warmth):
+            notes[plain if plain in NOTES or warmth else name] = _value(f"{value} {match[2]}" if match[2] else value)
         elif line.strip():
             before.append(line)
         position = end + 1

@@ -391,3 +391,16 @@ def test_a_calibration_judges_blows_by_the_turnouts_settings(folder):
     files = sorted((folder / "raw/t1/hammer").rglob("A_*"))
     with pytest.raises(SimulationError, match="calibration of A: 0 sound impacts"):
         calibrate_to_files(str(track), "A", files, "t1", folder / "config")
+
+
+def test_files_that_a_calibration_cannot_use_are_said(folder, tmp_path, caplog):
+    """Without the turnout's layout no channel of the file is known."""
+    track = folder / "config/tracks/small.yaml"
+    files = sorted((folder / "raw/t1/hammer").rglob("A_*"))
+    with pytest.raises(SimulationError, match=r"no record can be used\. .*there is no channel 'hammer'"):
+        calibrate_to_files(str(track), "A", files[:1])
+    damaged = tmp_path / files[0].name
+    damaged.write_bytes(files[0].read_bytes()[:-200])
+    with pytest.raises(SimulationError, match="no section 'A'"):  # the blows are read, the small track has no sections
+        calibrate_to_files(str(track), "A", [*files, damaged], "t1", folder / "config")
+    assert damaged.name in caplog.text and "not used" in caplog.text

@@ -13,10 +13,15 @@ from turnout.mismatch.track.polygons import AMPLITUDES, _evidence
 from turnout.mismatch.track.rail_scan import RailScan
 from turnout.mismatch.track.rough_rail import Waves
 from turnout.mismatch.track.strikes import ODD, WIDE, heard, likelihood, of_wheel
+from turnout.simulate.vehicle import lone_wheels
 
 TURN, SPEED, RATE = 2.0 * np.pi * 0.46, 25.0, 5000.0
 WHEELS = np.array([0.0, 1.8, 10.7, 12.5])
 PLACES = (2.4, 4.5, 6.6, 8.7)
+
+
+def wagon(places):
+    return lone_wheels(900.0, tuple(float(place) for place in places), radius=0.46)
 
 
 def passage(phase, wheel, name, radius=0.46, strength=30.0, seed=0):
@@ -33,7 +38,7 @@ def passage(phase, wheel, name, radius=0.46, strength=30.0, seed=0):
         for row, x in zip(samples, PLACES):
             row[inside] += strength * 0.8 ** abs(place - x) * rng.normal(size=inside.sum())
     sensors = tuple(SimpleNamespace(name=f"A{i}", place=x) for i, x in enumerate(PLACES))
-    vehicle = SimpleNamespace(radius=0.46, wheel_places=WHEELS, wheels=range(4))
+    vehicle = wagon(WHEELS)
     recording = SimpleNamespace(samples=samples, rate=RATE, index=lambda n: int(n[1]))
     run = SimpleNamespace(direction="facing", vehicle=vehicle, recording=recording)
     return SimpleNamespace(name=name, sensors=sensors, reference=reference, speed=SPEED, time=time, passage=run)
@@ -66,7 +71,7 @@ def test_noise_and_bangs_at_one_place_blame_no_wheel():
 def with_nose(made, place, loud, seed):
     """The same passage, every wheel banging at ``place`` as loud as ``loud`` says; axles a turn apart in a bogie."""
     rng = np.random.default_rng(seed)
-    made.passage.vehicle.wheel_places = np.array([0.0, TURN, 10.7, 10.7 + TURN])
+    made.passage.vehicle = wagon([0.0, TURN, 10.7, 10.7 + TURN])
     for behind, strength in zip(made.passage.vehicle.wheel_places, loud):
         moment = made.reference + (place - PLACES[0] + behind) / SPEED
         inside = (made.time >= moment) & (made.time < moment + 0.004)
@@ -91,7 +96,7 @@ def test_a_flat_of_one_of_two_wheels_is_no_bang_of_the_rail():
     """A wagon of two axles: the lower of two is not the one that strikes. One wheel tells no place at all."""
     for wheels in ([0.0, 4.9], [0.0]):
         made = passage(1.1, 0, "a", seed=6)
-        made.passage.vehicle.wheel_places = np.array(wheels)
+        made.passage.vehicle = wagon(wheels)
         assert of_wheel([made], [heard(made)], 0)[0] > 15.0  # the louder of two would leave it nothing
 
 

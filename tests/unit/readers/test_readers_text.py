@@ -59,6 +59,22 @@ def test_a_rate_is_read_with_its_unit(head, tmp_path):
     sound(tmp_path, "a.csv", f"{head}\nforce;acc\n" + "".join(f"{a:.4f};{b:.4f}\n" for a, b in X), rate=12800.0)
 
 
+@pytest.mark.parametrize(
+    "head",
+    ["rail_temperature: -2.5", "# rail_temperature: -2.5 °C", "rail_temperature [°C];-2,5", "Rail temperature;-2,5"],
+)
+def test_the_rail_temperature_of_a_head_reaches_the_recording(head, tmp_path):
+    recording = sound(tmp_path, "a.csv", f"rate: 12800\n{head}\nforce;acc\n{ROWS}", rate=12800.0)
+    assert recording.conditions["rail_temperature"] == -2.5
+
+
+def test_a_column_that_is_called_as_a_temperature_is_a_column(tmp_path):
+    (tmp_path / "a.csv").write_text(f"rate: 12800\nrail_temperature;acc\n{ROWS}")
+    warm = RawDescription((RawChannel("force", "rail_temperature", "force", unit="N"), NAMED.channels[1]))
+    (recording,) = read("a.csv", tmp_path, warm).recordings
+    assert "rail_temperature" not in recording.conditions and recording.samples.shape == X.T.shape
+
+
 WORDS = ("Abtastrate", "Abtastfrequenz", "Fréquence d'échantillonnage", "Frecuencia de muestreo",
          "Frequenza di campionamento", "Samplingsfrekvens", "# Taux d’échantillonnage")  # fmt: skip
 ROWS = "".join(f"{a:.4f};{b:.4f}\n" for a, b in X)

@@ -87,7 +87,7 @@ def test_a_lone_factor_of_zero_is_no_unit():
 def test_file_and_layout_must_agree_where_both_speak():
     assert settled_unit("g", "g") == "g"
     assert settled_unit("m/s^2", "m/s²") == "m/s²"
-    for label in ("EU", "", " - ", "None", "[a.u.]"):  # the file's label means nothing
+    for label in ("EU", "", " - ", "None", "[a.u.]", "1.0"):  # the file's label means nothing
         assert settled_unit(label, "V") == "V"
     assert settled_unit("count", "0.305 mV") == "0.305 mV"  # the layout says what a count is worth
     assert settled_unit("g", "V!") == "V"

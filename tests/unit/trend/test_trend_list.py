@@ -137,7 +137,9 @@ def test_a_drift_is_planned_though_its_chart_is_too_noisy(settings):
         most = "worklist(newest_measurement(), most := 1000)"
         listed = con.execute(f"select section_id, state from {most}").fetchall()
         blind = con.execute(f"select turnout_id, sections from {most} where state = 'cannot tell'").fetchall()
-        (why,) = con.execute(f"select max(sentence) from {most} where sections = 'S0, S1, S3, S4, S5, S6, S7'").fetchone()
+        (why,) = con.execute(
+            f"select max(sentence) from {most} where sections = 'S0, S1, S3, S4, S5, S6, S7'"
+        ).fetchone()
         assert "S0: " in why and "; S1, S3, S4, S5, S6, S7 alike" in why
     assert noisy and {(section, "plan") for (section,) in noisy} <= set(listed)
     assert not [s for (s,) in noisy if any(t == s[:6] and s[7:] in labels.split(", ") for t, labels in blind)]
