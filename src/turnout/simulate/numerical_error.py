@@ -108,9 +108,9 @@ def end_error(case, extra=30.0, bands=BANDS):
     rate = options.get("rate", 20e3)
     bare = _bare(case.sensors)
     count = _count(_base(smooth), extra)
-    moved = options | {"terms": tuple(moved(term, count) for term in options.get("terms", ()))}
+    elsewhere = options | {"terms": tuple(moved(term, count) for term in options.get("terms", ()))}
     here = simulate_passage(smooth, case.vehicle, case.speed, bare, **options)
-    longer = simulate_passage(_lengthened(smooth, extra), case.vehicle, case.speed, bare, **moved)
+    longer = simulate_passage(_lengthened(smooth, extra), case.vehicle, case.speed, bare, **elsewhere)
     return compare(here.samples, longer.samples, rate, bands)[0]
 
 
