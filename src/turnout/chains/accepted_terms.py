@@ -9,9 +9,9 @@ from typing import Any
 from turnout import physics
 from turnout.config.parameter_set import Number
 from turnout.errors import SimulationError
+from turnout.simulate.counted import COUNTED
 
-# Fields of terms that number a support of the track; in a file the support's place [m] stands for it.
-SUPPORTS = ("sleeper", "support", "first", "last")
+SUPPORTS = COUNTED  # in a file the support's place [m] stands for its number
 # Effects that belong to a wheelset: it leaves with its train, the track's file is no place for it.
 OF_A_WHEELSET = ("wheel_flat", "out_of_round")
 KINDS: dict[str, Any] = {term.name: term for term in physics.TERMS}
