@@ -35,7 +35,8 @@ def is_usable(rows) -> bool:
 def heading(unit, turnout) -> str:
     """Turnout, section with its place, and campaign."""
     place = turnout.section(unit.section)
-    parts = [PANELS.get(place.panel), f"{place.track} track" if place.track else "", f"{place.position:g} m"]
+    track = "both tracks" if place.track == "both" else f"{place.track} track" if place.track else ""
+    parts = [PANELS.get(place.panel), track, f"{place.position:g} m"]
     return f"{turnout.id}, section {place.label} ({', '.join(p for p in parts if p)}), campaign {unit.campaign}"
 
 
