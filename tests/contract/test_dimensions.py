@@ -13,6 +13,7 @@ from scipy.signal import fftconvolve
 from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.receptance import estimators, find_impacts, receptance_of
 from turnout.receptance.band_edge import band_edges
+from turnout.receptance.dynamic_stiffness import dynamic_stiffness
 from turnout.records import Channel, Recording
 from turnout.signal import coherence, filters, spectra, windows
 from turnout.signal.pulses import force_pulse
@@ -50,6 +51,12 @@ FUNCTIONS = {
     ),
     "coherence": (lambda u: [estimators.coherence(G_FF * u(n=2), G_AA * u(m=2), G_FA * u(m=1, n=1))], [{}]),
     "coherence_limits": (lambda u: coherence.coherence_limits(np.array([0.5, 0.9]), 10), [{}, {}]),
+    "dynamic_stiffness": (
+        lambda u: dynamic_stiffness(
+            FREQUENCY * u(s=-1), G_FA * u(m=1, n=-1), np.array([0.9, 0.7, 0.8]), FREQUENCY > 50.0, 9, 90.0 * u(s=-1)
+        ),
+        [{"m": -1, "n": 1}] * 3,
+    ),
     "band_edges": (
         lambda u: [band_edges([np.hanning(40)[1:] * u(n=1)], 20_000.0 * u(s=-1), resolution=5.0 * u(s=-1))],
         [{"s": -1}],

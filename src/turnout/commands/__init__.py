@@ -12,6 +12,7 @@ COMMANDS: tuple[str, ...] = (
     "demo",
     "diagnose",
     "distinguish",
+    "hammer",
     "nightly",
     "passage",
     "plan",

@@ -1,0 +1,89 @@
+"""Look at a hammer test that was just recorded: is it good enough, and what are the resonances?
+
+  turnout hammer raw/tommerup_s1/hammer/2024-05-13/A7_*.h5 --turnout tommerup_s1
+  turnout hammer /media/stick/log_17.uff --turnout tommerup_s1 --section A7 --campaign 2024-05-13 --figure a7.svg
+
+Says which files and records were read, which blows are accepted and which refused and why, how far the coherence
+reaches, and frequency, damping and dynamic stiffness at the two resonances with their 95 % intervals, or why there is
+none. Blows and records are counted from 1. It computes as the nightly run does, with the same settings, so give all
+files of a section: blows are judged against each other. Files that do not lie in the raw folder need --section and
+--campaign where their names and times do not say them. Nothing is written but the figure that is asked for.
+
+Exit code 1 where a test gives no resonance, 2 where the command cannot be followed.
+"""
+
+import argparse
+
+HELP = "analyse one hammer test and say what is in it"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The files, the turnout, and what their names do not say."""
+    parser.add_argument("file", nargs="+", help="files of the test, in any format that is read")
+    parser.add_argument("--turnout", required=True, help="id of the turnout, for its sections and channels")
+    parser.add_argument("--section", help="label of the section, where the file's name does not say it")
+    parser.add_argument("--campaign", help="day of the campaign, YYYY-MM-DD, where neither name nor file says it")
+    parser.add_argument(
+        "--figure", metavar="OUT.svg", help="draw receptance, coherence, decay and blows into this file"
+    )
+    parser.add_argument(
+        "--configuration", "--config", default="config", help="folder of the configuration (%(default)s)"
+    )
+    parser.add_argument("--raw", help="raw root, for what was noted of the campaign (raw)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print what each section's test holds; exit code 1 where one gives no resonance."""
+    from pathlib import Path
+
+    from turnout.chains.hammer_on_site import asked_for
+    from turnout.config import load_configuration
+    from turnout.errors import ConfigError
+    from turnout.report.hammer_words import hammer_words, is_usable
+
+    if args.raw and not Path(args.raw).is_dir():
+        raise ConfigError(args.raw, "--raw", "no such folder", "Write the folder that holds those of the turnouts")
+    configuration = load_configuration(args.configuration)
+    folders = {name: row.raw for name, row in configuration.rows.items()}
+    turnout, raw = configuration.turnout(args.turnout), Path(args.raw or "raw")
+    tests = asked_for(args.file, turnout, raw, args.section, args.campaign, folders)
+    if args.figure:
+        _check_figure(Path(args.figure), tests)
+    usable = True
+    for k, test in enumerate(tests):
+        if k:
+            print()
+        rows = test.rows()
+        usable = is_usable(rows) and usable
+        print("\n".join(hammer_words(rows, test.unit, test.turnout, test.remarks)))
+        if args.figure:
+            _draw(Path(args.figure), rows, test)
+    return 0 if usable else 1
+
+
+def _check_figure(path, tests):
+    """ConfigError for a figure that could not be made, before anything is computed."""
+    from turnout.errors import ConfigError
+
+    if path.suffix.lower() != ".svg":
+        remedy = "Write a name that ends in .svg; every browser shows and prints it"
+        raise ConfigError(path, "--figure", f"the ending {path.suffix!r} is no drawing that is made here", remedy)
+    if path.is_dir():
+        raise ConfigError(path, "--figure", "it is a folder", "Write the name of a file")
+    if not path.parent.is_dir():
+        raise ConfigError(path, "--figure", f"no folder {path.parent}", "Make it, or write another one")
+    if len(tests) > 1:
+        told = ", ".join(test.unit.label for test in tests)
+        raise ConfigError(path, "--figure", f"one figure for {told}", "Name the files of one section and campaign")
+
+
+def _draw(path, rows, test):
+    from turnout.report.hammer_figure import hammer_figure
+    from turnout.report.write import replace_page
+
+    drawing = hammer_figure(rows, test.unit, test.turnout)
+    if not drawing:
+        print("  figure     none: no blow was read")
+        return
+    replace_page(path, drawing)
+    print(f"  figure     {path}")

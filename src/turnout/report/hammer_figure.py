@@ -1,0 +1,60 @@
+"""One hammer test as a drawing of its own: the panels of the turnout's page in one SVG file."""
+
+import re
+from html import escape
+from importlib.resources import files
+
+from turnout.errors import REASONS
+from turnout.report.hammer_words import heading, resonances, verdict
+from turnout.report.panels.decay import decay_panel
+from turnout.report.panels.impacts import impacts_panel
+from turnout.report.panels.receptance import coherence_panel, receptance_panel
+
+WIDTH, HEAD, GAP = 462, 52, 12
+HEIGHT = re.compile(r' height="(\d+)"')
+
+
+def hammer_figure(rows, unit, turnout) -> str:
+    """SVG: receptance with the bracket of H1 and H2, coherence with its limits, decay with the model's, and the blows.
+
+    ``rows`` by table as ``hammer_unit`` makes them; "" where there is no blow to draw.
+    """
+    drawn = _panels(rows)
+    if not drawn:
+        return ""
+    parts, y = [], HEAD
+    for row in (drawn[:2], drawn[2:]):
+        parts += [f'<g transform="translate({k * (WIDTH + GAP)} {y})">{panel}</g>' for k, panel in enumerate(row)]
+        y += max((int(HEIGHT.findall(panel)[0]) for panel in row), default=0)
+    words = heading(unit, turnout), ": ".join([verdict(rows), *_told(rows)])
+    lines = "".join(
+        f'<text class="{style}" x="8" y="{18 + 20 * k}">{escape(line)}</text>'
+        for k, (style, line) in enumerate(zip(("title", "label"), words))
+    )
+    width = 2 * WIDTH + GAP
+    frame = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {y}" width="{width}" height="{y}">'
+    return (
+        f'{frame}<style>{_style()}</style><rect width="{width}" height="{y}" fill="#fff"/>{lines}{"".join(parts)}</svg>'
+    )
+
+
+def _told(rows) -> list[str]:
+    """The resonances and what the model was refused for."""
+    reasons = [REASONS[model["reason"]] for model in rows.get("models", ()) if model["reason"]]
+    return ["; ".join([*resonances(rows), *reasons])] if rows.get("models") else []
+
+
+def _panels(rows) -> list[str]:
+    modes, panels = rows.get("modes", ()), []
+    if rows.get("receptances"):
+        receptance, model = rows["receptances"][0], rows["models"][0]
+        panels = [receptance_panel(receptance, modes), decay_panel(receptance, model), coherence_panel(receptance)]
+    return [panel for panel in (*panels, impacts_panel(rows.get("impacts", ()))) if panel]
+
+
+def _style() -> str:
+    """Rules of the pages for what is inside a drawing, colours written out: programs that draw know no variables."""
+    css = (files("turnout.report") / "templates" / "page.css").read_text(encoding="utf-8")
+    colours = dict(re.findall(r"(--\w+):([^;}]+)", css))
+    inside = css[css.index("svg text{") : css.index("@media print")]
+    return re.sub(r"var\((--\w+)\)", lambda found: colours[found[1]], inside)

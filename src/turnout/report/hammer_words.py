@@ -1,0 +1,214 @@
+"""One hammer test in words, from the rows that the hammer chain hands to the registry."""
+
+from collections import Counter
+from math import floor
+
+import numpy as np
+
+from turnout.errors import REASONS
+from turnout.receptance.dynamic_stiffness import dynamic_stiffness
+from turnout.report.pages.turnout import BANDS, PANELS
+from turnout.report.words import with_interval
+
+VERDICTS = {
+    "accepted": "both resonances found",
+    "second_order_only": "one of the two resonances found",
+    "rejected": "no resonance found",
+}
+
+
+def verdict(rows) -> str:
+    """What came of a test in a few words.
+
+    >>> verdict({"recordings": [], "quarantine": [{}]})
+    'nothing could be used'
+    """
+    models = rows.get("models")
+    return VERDICTS[models[0]["status"]] if models else "nothing could be used"
+
+
+def is_usable(rows) -> bool:
+    """Whether at least one resonance stands."""
+    return any(model["status"] != "rejected" for model in rows.get("models", ()))
+
+
+def heading(unit, turnout) -> str:
+    """Turnout, section with its place, and campaign."""
+    place = turnout.section(unit.section)
+    track = "both tracks" if place.track == "both" else f"{place.track} track" if place.track else ""
+    parts = [PANELS.get(place.panel), track, f"{place.position:g} m"]
+    return f"{turnout.id}, section {place.label} ({', '.join(p for p in parts if p)}), campaign {unit.campaign}"
+
+
+def hammer_words(rows, unit, turnout, remarks=()) -> list[str]:
+    """Lines of text: what was read, which blows count, what the coherence is, the resonances or why there is none.
+
+    ``rows`` by table as ``hammer_unit`` makes them; ``remarks`` are put below them.
+    """
+    lines = [f"{heading(unit, turnout)}: {verdict(rows)}"]
+    names = _names(rows.get("recordings", ()))
+    lines += [_line("read", _file(row, names[row["recording_id"]])) for row in rows.get("recordings", ())]
+    if rows.get("recordings"):
+        lines.append(_line("channels", _channels(turnout.hammer, unit.section)))
+    lines += _quarantined(rows.get("quarantine", ()))
+    if rows.get("models"):
+        lines += _blows(rows, turnout.settings["receptance"])
+        lines += _gate(rows, turnout.settings)
+        lines += [line for band in _bands(rows) for line in _resonance(band, rows)]
+        lines += _why(rows["models"][0])
+        lines.append(_line("rail", _temperature(rows, unit, turnout)))
+    return lines + [_line("note", remark) for remark in remarks]
+
+
+def resonances(rows) -> list[str]:
+    """A few words for each mode: band, frequency and damping with their 95 % intervals."""
+    return [f"{mode['band']} {_mode(mode)}" for mode in rows.get("modes", ())]
+
+
+def _line(what, words) -> str:
+    return f"  {what:<10} {words}"
+
+
+def _names(recordings) -> dict[str, str]:
+    """Names of files by the ids of their recordings; with their folders where two are called the same."""
+    short = {row["recording_id"]: row["path"].rsplit("/", 1)[-1] for row in recordings}
+    count = Counter(short.values())
+    return {
+        row["recording_id"]: name if count[name := short[row["recording_id"]]] == 1 else row["path"]
+        for row in recordings
+    }
+
+
+def _file(row, name) -> str:
+    one = "1 record" if row["n_records"] == 1 else f"{row['n_records']} records"
+    length = row["n_samples"] / row["sampling_rate_hz"]
+    return f"{name}: {one} of {length:.3g} s at {row['sampling_rate_hz']:g} Hz, {row['file_format']}"
+
+
+def _channels(hammer, section) -> str:
+    known = {channel.name: channel for channel in hammer.descriptions[section].channels}
+    parts = []
+    for what, name in (("force", hammer.force[section]), ("response", hammer.response[section])):
+        channel = known[name]
+        unit = f" [{channel.unit}]" if channel.unit else ""
+        parts.append(f"{what} from {channel.source!r}{unit}{f', {channel.mounting}' if channel.mounting else ''}")
+    return "; ".join(parts)
+
+
+def _quarantined(rows) -> list[str]:
+    """A line for each file or record that is not used; records of a file that lack the same share one.
+
+    What is filed under another time than it notes is used, and said all the same.
+    """
+    alike: dict[tuple, list] = {}
+    for row in rows:
+        alike.setdefault((row["path"], row["reason_code"], row["found"], row["remedy"]), []).append(row["place"])
+    lines = []
+    for (path, reason, found, remedy), places in alike.items():
+        more = f" ({len(places)} such places, the last: {places[-1]})" if len(places) > 1 else ""
+        what = "note" if reason == "wrong_time" else "not used"
+        lines.append(_line(what, f"{path}, {places[0]}: {found}{more}. {remedy}."))
+    return lines
+
+
+def _blows(rows, settings) -> list[str]:
+    """A line for each blow with its verdict; they are counted from 1."""
+    names = _names(rows["recordings"])
+    blows = rows["impacts"]
+    used = sum(blow["status"] == "accepted" for blow in blows)
+    lines = [_line("blows", f"{used} of {len(blows)} accepted, {settings.minimum_impacts} are needed")]
+    width = max(map(len, names.values()))
+    for blow in blows:
+        force, contact = (_number(blow[c], d) for c, d in (("peak_n", 1e3), ("contact_ms", 1.0)))
+        name = f"{names[blow['recording_id']]:<{width}} {blow['record'] + 1:>3}"
+        lines.append(_line("", f"{name}  {force:>6} kN  {contact:>5} ms  {_judged(blow)}"))
+    return lines
+
+
+def _number(value, divisor) -> str:
+    if value is None or not np.isfinite(value):
+        return "–"
+    size = value / divisor
+    return f"{size:.2f}" if abs(size) >= 0.1 else f"{size:.2g}"
+
+
+def _judged(blow) -> str:
+    if blow["status"] == "accepted":
+        return "accepted" + (f", {blow['detail']}" if blow["detail"] else "")
+    return f"refused, {blow['reason']}: {blow['detail']}"
+
+
+def _gate(rows, settings) -> list[str]:
+    """How far the coherence reaches; nothing without a receptance."""
+    if not rows.get("receptances"):
+        return []
+    row, asked = rows["receptances"][0], settings["receptance"]
+    lowest = rows["models"][0]["coherence_minimum"]
+    said = (
+        ""
+        if lowest is None
+        else f"its lower 95 % limit is {floor(1e3 * lowest) / 1e3:.3f} or more around the resonances; "
+    )
+    compared = "that limit" if row["gate"] == "limit" else "the coherence itself"
+    lines = [_line("coherence", f"{said}the gate asks for {asked.gate_level:g} of {compared}")]
+    frequency, passed = np.asarray(row["frequency_hz"]), np.asarray(row["passed"], dtype=bool)
+    shares = []
+    for _, low, high in settings["identify"].bands():
+        inside = (frequency >= low) & (frequency < high)
+        share = 100.0 * np.mean(passed[inside]) if inside.any() else 0.0
+        shares.append(f"{share:.0f} % of {low:g}-{high:g} Hz")
+    return [*lines, _line("gate", f"lets pass {', '.join(shares)}; the hammer reaches to {row['valid_to_hz']:.0f} Hz")]
+
+
+def _bands(rows) -> list[str]:
+    """The two main bands, whether or not they hold a resonance, and others that do."""
+    return [*BANDS, *(mode["band"] for mode in rows.get("modes", ()) if mode["band"] not in BANDS)]
+
+
+def _resonance(band, rows) -> list[str]:
+    mode = next((mode for mode in rows.get("modes", ()) if mode["band"] == band), None)
+    if mode is None:
+        return [_line(band, "none")]
+    return [_line(band, _mode(mode)), *_stiffness(mode, rows)]
+
+
+def _mode(mode) -> str:
+    n = mode["n_impacts"]
+    frequency = with_interval(mode["frequency_hz"], mode["frequency_se_hz"], n)
+    return f"{frequency} Hz, damping {with_interval(mode['damping_ratio'], mode['damping_se'], n, 4)}, n = {n}"
+
+
+def _stiffness(mode, rows) -> list[str]:
+    """Dynamic stiffness at the line next to the resonance; an exponential window would make it another one."""
+    row = rows["receptances"][0]
+    if row["window_decay_per_s"]:
+        return []
+    frequency = np.asarray(row["frequency_hz"], dtype=float)
+    h1 = np.asarray(row["h1_real_m_n"], dtype=float) + 1j * np.asarray(row["h1_imag_m_n"], dtype=float)
+    found = dynamic_stiffness(
+        frequency, h1, row["coherence"], row["passed"], row["n_impacts"], float(mode["frequency_hz"])
+    )
+    if found is None:
+        return []
+    at = frequency[np.argmin(np.abs(frequency - mode["frequency_hz"]))]
+    value, low, high = (f"{v / 1e6:#.4g}" for v in found)
+    return [_line("", f"dynamic stiffness at {at:.0f} Hz {value} MN/m ({low} to {high}, 95 %)")]
+
+
+def _why(model) -> list[str]:
+    """What the model says of itself: why it was refused or holds one resonance alone, and what else was seen."""
+    if not model["reason"]:
+        return [_line("detail", model["detail"])] if model["detail"] else []
+    return [_line("why", f"{REASONS[model['reason']]}: {model['detail']}")]
+
+
+def _temperature(rows, unit, turnout) -> str:
+    noted = turnout.campaigns[unit.campaign].rail_temperature
+    told = next((mode["rail_temperature_c"] for mode in rows.get("modes", ())), None)
+    if noted is not None:
+        return f"{noted:g} °C, noted in campaigns.csv"
+    if told is not None:
+        return f"{told:g} °C, noted in the file"
+    return "temperature not noted in campaigns.csv" + (
+        " nor in the file: no chart judges a campaign without one, note it there" if rows.get("modes") else ""
+    )
