@@ -3,11 +3,11 @@
 import re
 import unicodedata
 
+from turnout.readers.csv_names import NAME_WITH_UNIT, names_among
 from turnout.readers.raw import COPY_AGAIN
 from turnout.readers.variables import COUNT, RATE, START, STEP
 
 NOTE = re.compile(r"^#?\s*([^\W\d][\w .'’-]*?)\s*([\[(][^\])]*[\])])?\s*[:=,;\t]\s*(.*)$")
-NAME_WITH_UNIT = re.compile(r"^(.*?)\s*[\[(]([^\[\]]*)[\])]$")
 SCALES = {"kHz": 1e3, "khz": 1e3, "MHz": 1e6, "ms": 1e-3, "µs": 1e-6, "\u03bcs": 1e-6, "us": 1e-6}
 TEMPERATURES = {"rail_temperature", "air_temperature"}
 NOTES = {*RATE, *STEP, *START, *COUNT, "n_samples"}
@@ -108,13 +108,13 @@ def _names(lines, cells):
     A separator behind the last number, as in "1;2;", makes a column without a name.
     """
     count, open_end = len(cells), not cells[-1]
-    lines = [line + [""] * open_end for line in lines if len(line) >= count - open_end]
+    lines = [(line + [""] * open_end)[:count] for line in lines if any(line) and len(line) >= count - open_end]
     if not lines:
         names = [str(i) for i in range(count)]
         return [*names[:-1], ""] if open_end and count > 1 else names, [""] * count
-    names, units = lines[0][:count], [""] * count
-    if len(lines) > 1:
-        units = [cell.strip("[]() ") for cell in lines[1][:count]]
+    at, below = names_among(lines)
+    names = lines[at]
+    units = [""] * count if below is None else [cell.strip("[]() ") for cell in lines[below]]
     for i, name in enumerate(names):
         if match := NAME_WITH_UNIT.match(name):
             names[i], units[i] = match[1], match[2]

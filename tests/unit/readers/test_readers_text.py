@@ -116,6 +116,36 @@ def test_an_unnamed_column_with_numbers_is_still_a_channel_that_the_layout_does_
     assert error.reason == "channel_unknown"
 
 
+HEADS = {
+    "as many cells above": "Messung;Gleis 3;Weiche 12\nZeit;force;acc\n",
+    "more cells above": "Ort;Bf. Nord;Gleis 3;Weiche 12\nZeit [s];force [N];acc [m/s²]\n",
+    "a row of units": "Messung;Gleis 3;Weiche 12\nPrüfer;M. Jensen;\nZeit;force;acc\ns;N;m/s²\n",
+    "units in brackets of their own": "Messung;Gleis 3;Weiche 12\nZeit;force;acc\n(s);[N];(m/s^2)\n",
+    "a comment below the units": "Messung;Gleis 3;Weiche 12\nZeit;force;acc\ns;N;m/s²\nUhr;Hammer;Schwelle 3\n",
+    "a comment below the names": "Messung;Gleis 3;Weiche 12\nZeit [s];force [N];acc [m/s²]\nUhr;Hammer;Schwelle 3\n",
+    "an empty row between": "Messung;Gleis 3;Weiche 12\n;;\nZeit;force;acc\n;;\ns;N;m/s²\n",
+    "empty units and a comment": "Zeit;force;acc\n;;\nUhr;Hammer;Schwelle 3\n",
+    "the time of day above": "Datum;13.05.2024;\nZeit;08:30:12;\nt_rel [s];force;acc\n",
+    "a unit above": "Einheit;g;N\nMessung;Gleis 3;Weiche 12\nZeit;force;acc\ns;N;m/s²\n",
+    "a length above": "Messung;Gleis 3;\nLage;12 m;\nZeit;force;acc\n",
+    "a unit that says nothing": "Messung;Gleis 3;Weiche 12\nZeit;force;acc\ns;EU;EU\n",
+}
+
+
+@pytest.mark.parametrize("head", HEADS)
+def test_the_names_are_those_above_the_numbers_and_their_units(head, tmp_path):
+    """Whatever stands further up may have as many cells as there are columns."""
+    rows = "".join(f"{k / 20000:.9g};{a:.4f};{b:.4f}\n" for k, (a, b) in enumerate(X))
+    sound(tmp_path, "a.csv", HEADS[head] + rows)
+
+
+def test_a_unit_that_is_not_known_is_still_one_of_a_row_of_units(tmp_path):
+    by_index = replace(NAMED, channels=tuple(replace(c, source=i) for i, c in enumerate(NAMED.channels)))
+    (tmp_path / "a.csv").write_text(f"rate: 20000\nforce;acc\nN;furlong\n{ROWS}")
+    (error,) = read("a.csv", tmp_path, by_index).errors
+    assert error.reason == "unit_unknown" and "furlong" in error.found
+
+
 @pytest.mark.parametrize(("unit", "second"), [("s", 1.0), ("ms", 1e3), ("µs", 1e6), ("\u03bcs", 1e6), ("us", 1e6)])
 def test_a_time_column_in_its_unit_gives_the_rate(unit, second, tmp_path):
     rows = "".join(f"{second * k / 20000:.9g};{a:.4f};{b:.4f}\n" for k, (a, b) in enumerate(X))
