@@ -4,13 +4,16 @@ import re
 import unicodedata
 
 from turnout.readers.csv_names import NAME_WITH_UNIT, names_among
+from turnout.readers.head_words import SAMPLES, START, START_DATE
 from turnout.readers.raw import COPY_AGAIN
-from turnout.readers.variables import COUNT, RATE, START, STEP
+from turnout.readers.variables import COUNT, RATE, STEP
 
 NOTE = re.compile(r"^#?\s*([^\W\d][\w .'’-]*?)\s*([\[(][^\])]*[\])])?\s*[:=,;\t]\s*(.*)$")
 SCALES = {"kHz": 1e3, "khz": 1e3, "MHz": 1e6, "ms": 1e-3, "µs": 1e-6, "\u03bcs": 1e-6, "us": 1e-6}
 TEMPERATURES = {"rail_temperature", "air_temperature"}
-NOTES = {*RATE, *STEP, *START, *COUNT, "n_samples"}
+NOTES = {*RATE, *STEP, *START, *START_DATE, *COUNT, "n_samples"}
+NUMBERS = TEMPERATURES | {*SAMPLES}  # a note only where a number follows, else a column of that name
+GROUPED = re.compile(r"\d{1,3}(?:[ .,'’\u00a0]\d{3})+(?!\d)")
 # A line that says one frequency and nothing else: "Vzorkovani: 10000 Hz", "taktning [kHz];10".
 FREQUENCY = re.compile(r"^#?[^\d\[(]+[\[(]?([kM]?Hz)?[\])]?[\s:=,;]*([\d.,]+)\s*([kM]?Hz)?\W*$", re.IGNORECASE)
 NO_RATE = re.compile(r"filt|pass|paß|cut|grenz|band|coup|cort|tagli|græns|eigen|reson|netz|mains", re.IGNORECASE)
@@ -46,9 +49,11 @@ def head_of(data, source):
         if plain not in NOTES and (frequency := _frequency(line)) is not None:
             unclear.append((line.strip(), frequency))
         value = match[3].strip(separator + " ") if match else ""
-        warmth = plain in TEMPERATURES and _is_number(value.split()[0] if value else "")  # else a column of that name
-        if match and (line.startswith("#") or plain in NOTES or warmth):
-            notes[plain if plain in NOTES or warmth else name] = _value(f"{value} {match[2]}" if match[2] else value)
+        known = plain in NOTES or (plain in NUMBERS and _is_number(value.split()[0] if value else ""))
+        if plain in SAMPLES and (grouped := GROUPED.match(value)):
+            value = re.sub(r"\D", "", grouped[0])
+        if match and (line.startswith("#") or known):
+            notes[plain if known else name] = _value(f"{value} {match[2]}" if match[2] else value)
         elif line.strip():
             before.append(line)
         position = end + 1

@@ -88,6 +88,61 @@ def test_a_rate_in_another_language_is_read_and_held_against_the_layout(word, tm
     assert error.reason == "wrong_rate" and "10000 Hz instead of 20000 Hz" in error.found
 
 
+STARTS = {
+    "Startzeit: 13.05.2024 08:30:12,250": "08:30:12.250000",
+    "Startzeit;13.05.2024;08:30:12,250": "08:30:12.250000",
+    "Startdatum;13.05.2024\nStartzeit;08:30:12,25": "08:30:12.250000",
+    "Startzeit;08:30:12.25;\nStartdatum;2024-05-13;": "08:30:12.250000",
+    "# Messbeginn = 13.5.2024 8:30": "08:30:00",
+    "Début de mesure: 13.05.2024 08:30:12": "08:30:12",
+    "Starttijd: 2024-05-13 08:30:12": "08:30:12",
+    "Začátek měření;13.05.2024 08:30:12": "08:30:12",
+    "Starttidspunkt;13.05.2024 08:30:12": "08:30:12",
+    "started_at: 13.05.2024 08:30:12": "08:30:12",
+}
+
+
+@pytest.mark.parametrize("head", STARTS)
+def test_the_start_in_the_head_is_read_in_the_words_and_dates_of_its_country(head, tmp_path):
+    recording = sound(tmp_path, "a.csv", f"rate: 20000\n{head}\nforce;acc\n{ROWS}")
+    assert recording.started_at.isoformat() == f"2024-05-13T{STARTS[head]}"
+
+
+@pytest.mark.parametrize("stamp", ["04/05/2024 08:30", "31.02.2024 08:30", "13.05.2024", "08:30:12"])
+def test_a_start_that_is_not_clear_is_none(stamp, tmp_path):
+    """Nobody can tell the 4th of May from the 5th of April; a day or a clock alone is no moment."""
+    assert sound(tmp_path, "a.csv", f"rate: 20000\nStartzeit;{stamp}\nforce;acc\n{ROWS}").started_at is None
+
+
+COUNTS = ("Anzahl Messwerte", "# Anzahl Werte", "Number of samples", "Nombre d'échantillons", "Aantal samples",
+          "Počet vzorků", "Antal målepunkter")  # fmt: skip
+
+
+@pytest.mark.parametrize("word", COUNTS)
+def test_a_table_shorter_than_its_head_promises_is_cut(word, tmp_path):
+    text = f"rate: 20000\n{word};{{}}\nforce;acc\n{ROWS}"
+    for whole in ("50", "50 Werte", "49", "0"):
+        sound(tmp_path, "a.csv", text.format(whole))
+    for promised, number in (("60", 60), ("1.200", 1200), ("60 000", 60000)):
+        (tmp_path / "a.csv").write_text(text.format(promised))
+        (error,) = read("a.csv", tmp_path, NAMED).errors
+        assert error.reason == "truncated"
+        assert error.found == f"has 50 of the {number} samples that its head promises"
+
+
+def test_a_count_of_all_rows_does_not_cut_the_records_of_a_file(tmp_path):
+    rows = "".join(f"{1 + k // 20};{a:.4f};{b:.4f}\n" for k, (a, b) in enumerate(X))
+    (tmp_path / "a.csv").write_text(f"rate: 20000\nAnzahl Messwerte: 50\nrecord;force;acc\n{rows}")
+    result = read("a.csv", tmp_path, NAMED)
+    assert result.errors == () and [r.n_sample for r in result.recordings] == [20, 20, 10]
+
+
+def test_a_column_that_is_called_as_a_count_is_a_column(tmp_path):
+    (tmp_path / "a.csv").write_text(f"rate: 12800\nMesswerte;acc\n{ROWS}")
+    called = RawDescription((RawChannel("force", "Messwerte", "force", unit="N"), NAMED.channels[1]))
+    assert read("a.csv", tmp_path, called).recordings[0].samples.shape == X.T.shape
+
+
 @pytest.mark.parametrize("line", ["Vzorkovací kmitočet: 10 kHz", "# taktning [Hz];10000", "Mintavétel 10000 Hz"])
 def test_a_frequency_that_nobody_understood_is_no_licence_for_another_rate(line, tmp_path):
     text = f"{line}\nforce;acc\n{ROWS}"
