@@ -22,6 +22,7 @@ import pyarrow as pa
 from pyarrow import csv
 
 from turnout.readers.clock import PART
+from turnout.readers.csv_cells import MISSING, cells_named
 from turnout.readers.csv_head import head_of
 from turnout.readers.head_words import SAMPLES, START, START_DATE
 from turnout.readers.precision import TEXT
@@ -61,7 +62,8 @@ def _in_utf8(source):
 def _table(source, data, at, separator, names, time):
     """Columns of numbers."""
     options = _options(data, at, separator, len(names))
-    with source.parsed_by("pyarrow", f"the numbers after line {_line(data, at)}"):
+    line = _line(data, at)
+    with source.parsed_by("pyarrow", f"the numbers after line {line}"), cells_named(source, line, names):
         table = csv.read_csv(io.BytesIO(memoryview(data)[at:]), **options)
     return [column.to_numpy(zero_copy_only=False) for column in table.columns]
 
@@ -70,7 +72,8 @@ def _staying(source, data, at, separator, names, time):
     """Columns that read on when they are asked; a time column is read at once."""
     options = _options(data, at, separator, len(names))
     rows = Rows(source.path, at, options)
-    with source.parsed_by("pyarrow", f"the numbers after line {_line(data, at)}"):
+    line = _line(data, at)
+    with source.parsed_by("pyarrow", f"the numbers after line {line}"), cells_named(source, line, names):
         read = rows.scan(time)
     columns = [rows.column(i) for i in range(len(names))]
     return columns if time is None else [*columns[:time], read, *columns[time + 1 :]]
@@ -126,7 +129,7 @@ def _options(data, at, separator, width):
     converting = csv.ConvertOptions(
         column_types={str(i): pa.float64() for i in range(width)},
         decimal_point=point,
-        null_values=["", "NaN", "nan", "NA", "-"],
+        null_values=list(MISSING),
         strings_can_be_null=True,
     )
     reading = csv.ReadOptions(use_threads=False, column_names=[str(i) for i in range(width)], block_size=1 << 24)

@@ -3,6 +3,7 @@
 import re
 import unicodedata
 
+from turnout.readers.csv_cells import MARK, stands_for_a_number
 from turnout.readers.csv_names import NAME_WITH_UNIT, names_among
 from turnout.readers.head_words import SAMPLES, START, START_DATE
 from turnout.readers.raw import COPY_AGAIN
@@ -13,7 +14,7 @@ SCALES = {"kHz": 1e3, "khz": 1e3, "MHz": 1e6, "ms": 1e-3, "µs": 1e-6, "\u03bcs"
 TEMPERATURES = {"rail_temperature", "air_temperature"}
 NOTES = {*RATE, *STEP, *START, *START_DATE, *COUNT, "n_samples"}
 NUMBERS = TEMPERATURES | {*SAMPLES}  # a note only where a number follows, else a column of that name
-GROUPED = re.compile(r"\d{1,3}(?:[ .,'’\u00a0]\d{3})+(?!\d)")
+GROUPED = re.compile(rf"\d{{1,3}}(?:{MARK}\d{{3}})+(?!\d)")
 # A line that says one frequency and nothing else: "Vzorkovani: 10000 Hz", "taktning [kHz];10".
 FREQUENCY = re.compile(r"^#?[^\d\[(]+[\[(]?([kM]?Hz)?[\])]?[\s:=,;]*([\d.,]+)\s*([kM]?Hz)?\W*$", re.IGNORECASE)
 NO_RATE = re.compile(r"filt|pass|paß|cut|grenz|band|coup|cort|tagli|græns|eigen|reson|netz|mains", re.IGNORECASE)
@@ -40,7 +41,7 @@ def head_of(data, source):
         # a comma is the decimal mark where another separator stands
         separator = next((s for s in ("\t", ";") if s in line), ",")
         cells = _cells(line, separator)
-        if line.strip() and all(_is_number(cell) or cell == "" for cell in cells) and any(cells):
+        if any(cells) and all(_is_number(cell) or stands_for_a_number(cell) or cell == "" for cell in cells):
             names, units = _names([_cells(text, separator) for text in before], cells)
             return notes, names, units, position, separator, tuple(unclear)
         match = NOTE.match(line.strip())

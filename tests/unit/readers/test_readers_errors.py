@@ -253,8 +253,9 @@ def test_a_sample_that_is_no_number_costs_that_record(value, tmp_path, in_si, ha
     path = write(hammer_test, tmp_path / "a.npz", "npz")
     error = only_error(path.name, tmp_path, in_si, 3)
     assert error.reason == "not_finite"
-    found = "2 of 301 samples are not finite, the first is sample 17. Export the record again from the logger."
-    assert str(error) == f"a.npz, record 3 of 4, channel 'rail': {found}"
+    found = "2 of 301 samples are missing or not finite, the first is sample 17"
+    remedy = "Export the record again from the logger; if it is so there too, check the channel's cable and range"
+    assert str(error) == f"a.npz, record 3 of 4, channel 'rail': {found}. {remedy}."
 
 
 def test_samples_so_large_that_their_sum_overflows_are_finite(tmp_path, in_si):

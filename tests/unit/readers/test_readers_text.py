@@ -220,15 +220,73 @@ def test_a_time_column_of_another_language_is_held_against_the_promised_rate(tit
         assert error.reason == "wrong_rate" and "10000" in error.found
 
 
-@pytest.mark.parametrize("row", ["08:00:00.5;1,0;2,0", "1.000,5;2,0", "1.0  2.0"])
+@pytest.mark.parametrize("row", ["08:00:00.5;1,0;2,0", "1.0  2.0"])
 def test_a_table_in_which_no_line_is_numbers_alone_is_quoted(row, tmp_path):
-    """A clock, marks for thousands, spaces between: the copy is whole, another one will not help."""
+    """A clock, spaces between: the copy is whole, another one will not help."""
     (tmp_path / "a.csv").write_text("force;acc\n" + f"{row}\n" * 50)
     with pytest.raises(ReadError) as caught:
         read("a.csv", tmp_path, NAMED)
     said = f"no line of numbers; the last line reads '{row}'"
     remedy = "Export numbers between semicolons, tabs or commas, the time in seconds"
     assert str(caught.value) == f"a.csv, the file: {said}. {remedy}."
+
+
+COMMAS = "".join(f"{comma(a)};{comma(b)}\n" for a, b in X)
+
+
+@pytest.mark.parametrize("cell", ["1.234,56", "-1 234,5", "1'234,5", "12\u00a0345,5", "1.234.567"])
+@pytest.mark.parametrize("above", [COMMAS, ""])
+def test_a_mark_for_thousands_is_named_with_its_line_and_column(cell, above, tmp_path):
+    """Also in the first row, which is no line of names; the copy is whole, another one will not help."""
+    (tmp_path / "a.csv").write_text(f"rate: 20000\nforce;acc\n{above}0,5;{cell}\n{COMMAS}", encoding="utf-8")
+    with pytest.raises(ReadError) as caught:
+        read("a.csv", tmp_path, NAMED)
+    line = 3 + 50 * bool(above)
+    assert str(caught.value) == (
+        f"a.csv, line {line}, column 'acc': {cell!r} has marks for thousands, or another decimal mark than other "
+        "numbers. Export all numbers with one decimal mark and without marks for thousands."
+    )
+
+
+@pytest.mark.parametrize("cell", ["#NV", "#N/A", "NaN", "#DIV/0!", ""])
+@pytest.mark.parametrize("where", [0, 30])
+def test_a_missing_value_is_counted_with_its_place_and_costs_its_channel_alone(cell, where, tmp_path):
+    rows = COMMAS.splitlines()
+    rows[where] = rows[where].split(";")[0] + f";{cell}"
+    (tmp_path / "a.csv").write_text("force;acc\n" + "\n".join(rows) + "\n")
+    result = read("a.csv", tmp_path, replace(NAMED, kind="passage", rate=20000.0))
+    (error,) = result.errors
+    assert error.reason == "not_finite" and error.where == "record 1 of 1, channel 'rail'"
+    assert error.found == f"1 of 50 samples are missing or not finite, the first is sample {where}"
+    assert error.remedy.startswith("Export the record again from the logger; if it is so there too, check")
+    np.testing.assert_allclose(result.recordings[0].samples, X.T[:1].round(4), atol=1e-12)
+
+
+def test_a_word_among_the_numbers_is_said_with_its_line_and_column(tmp_path):
+    (tmp_path / "a.csv").write_text(f"rate: 20000\nforce;acc\n{COMMAS}overload;0,5\n")
+    with pytest.raises(ReadError) as caught:
+        read("a.csv", tmp_path, NAMED)
+    assert str(caught.value) == (
+        "a.csv, line 53, column 'force': 'overload' is no number. Export numbers alone; where the logger's own file has "
+        "none there, leave that record out."
+    )
+
+
+SHEETS = {
+    "xlsx": b"PK\x03\x04\x14\x00\x06\x00\x08\x00" + bytes(16) + b"\x13\x00\x00\x00[Content_Types].xml" + bytes(500),
+    "ods": b"PK\x03\x04\x14" + bytes(21) + b"\x08\x00\x00\x00mimetypeapplication/vnd.oasis.opendocument.spreadsheet",
+    "xls": b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(504) + b"\n",
+}
+
+
+@pytest.mark.parametrize("kind", SHEETS)
+@pytest.mark.parametrize(("name", "format"), [("a.csv", "auto"), ("a.csv", "csv"), ("a.xlsx", "auto")])
+def test_a_spreadsheet_is_named_whatever_it_is_called(kind, name, format, tmp_path):
+    (tmp_path / name).write_bytes(SHEETS[kind])
+    with pytest.raises(ReadError) as caught:
+        read(name, tmp_path, replace(NAMED, format=format))
+    said = "it is a spreadsheet's own file. Save it from the spreadsheet as CSV, text with separated columns"
+    assert str(caught.value) == f"{name}, byte 0: {said}." and caught.value.reason == "unreadable"
 
 
 def test_a_time_column_in_another_unit_is_refused(tmp_path):
