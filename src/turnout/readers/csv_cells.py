@@ -5,6 +5,8 @@ from contextlib import contextmanager
 
 import pyarrow as pa
 
+from turnout.readers.raw import COPY_AGAIN
+
 # Empty, or what loggers and spreadsheets write for a value that is not there: these become nan.
 MISSING = (
     "", "NaN", "nan", "NA", "-", "#NV", "#N/A", "#NA", "#VALUE!", "#WERT!", "#DIV/0!", "#NUM!", "#ZAHL!", "#REF!",
@@ -42,5 +44,5 @@ def cells_named(source, line, names):
             remedy = "Export all numbers with one decimal mark and without marks for thousands"
         else:
             found = f"{cell[:60]!r} is no number"
-            remedy = "Export numbers alone; where the logger's own file has none there, leave that record out"
+            remedy = f"{COPY_AGAIN}; if it stands in the logger's own file too, leave that record out"
         raise source.error(where, found, remedy) from error

@@ -267,8 +267,8 @@ def test_a_word_among_the_numbers_is_said_with_its_line_and_column(tmp_path):
     with pytest.raises(ReadError) as caught:
         read("a.csv", tmp_path, NAMED)
     assert str(caught.value) == (
-        "a.csv, line 53, column 'force': 'overload' is no number. Export numbers alone; where the logger's own file has "
-        "none there, leave that record out."
+        "a.csv, line 53, column 'force': 'overload' is no number. Copy the file again from the logger; if it stands in "
+        "the logger's own file too, leave that record out."
     )
 
 
