@@ -218,7 +218,7 @@ def test_fewer_records_than_promised(tmp_path, in_si, hammer_test):
     path = write(hammer_test[:3], tmp_path / "a.npz", "npz")
     error = only_error(path.name, tmp_path, replace(in_si, n_records=10), 3)
     assert error.reason == "truncated"
-    remedy = "Copy the file again from the logger; if it is whole, correct 'records: 10' in the layout (null: any number)"
+    remedy = f"{COPY[:-1]}; if it is whole, correct 'records: 10' in the layout (null: any number)"
     assert str(error) == f"a.npz, record 4 of 10: it holds 3 of the 10 records that the layout promises. {remedy}."
 
 
@@ -243,7 +243,7 @@ def test_fewer_samples_than_promised_cost_that_record(tmp_path, in_si, hammer_te
     error = only_error(path.name, tmp_path, replace(in_si, n_samples=301), 3)
     assert error.reason == "truncated"
     found = "ends after 200 of the 301 samples that the layout promises"
-    remedy = "Copy the file again from the logger; if it is whole, correct 'samples: 301' in the layout (null: any number)"
+    remedy = f"{COPY[:-1]}; if it is whole, correct 'samples: 301' in the layout (null: any number)"
     assert str(error) == f"a.npz, record 2 of 4: {found}. {remedy}."
     kept = read(path.name, tmp_path, replace(in_si, n_samples=301)).recordings
     assert [r.record for r in kept] == [0, 2, 3]
