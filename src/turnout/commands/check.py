@@ -69,6 +69,7 @@ def _faults(configuration, formats, to_si):
 def _left_out(configuration, raw) -> int:
     """Print how many raw files there are and each that is left out or unsound; how many of these."""
     from turnout.config.load import read_notes
+    from turnout.fleet.notes_against_files import contradicted_notes
     from turnout.fleet.scan import scan
 
     n_units = n_files = 0
@@ -77,7 +78,8 @@ def _left_out(configuration, raw) -> int:
         found = scan(turnout, raw)
         n_units += len(found.units)
         n_files += sum(len(u.files) for u in found.units)
-        problems += found.problems + read_notes(turnout, raw)[1]
+        noted, wrong = read_notes(turnout, raw)
+        problems += [*found.problems, *wrong, *contradicted_notes(noted, raw, found.units)]
     print(f"{raw}: {n_files} files in {n_units} units, {len(problems)} left out or unsound.")
     for problem in problems:
         print(f"  {problem}")
