@@ -38,6 +38,8 @@ def run(args: argparse.Namespace) -> int:
     print(f"{args.configuration}: {counts}, {'with faults' if faults else 'sound'}.")
     for fault in faults:
         print(f"  {fault}")
+    for event in _planned(configuration.events):
+        print(f"  {event}")
     raw = Path(args.raw or "raw")
     if not raw.is_dir() and args.raw:
         raise ConfigError(args.raw, "--raw", "no such folder", "Write the folder that holds those of the turnouts")
@@ -64,6 +66,18 @@ def _faults(configuration, formats, to_si):
             yield f"no simulation: {error}"
         except TurnoutError as error:
             yield f"no simulation: {path}: {error}"
+
+
+def _planned(events):
+    """Each event of days to come, which may be a slip of the pen; what is a year ahead is a warning already."""
+    from datetime import timedelta
+
+    from turnout.config.events import AHEAD, now
+
+    for e in events:
+        if timedelta(days=1) < e.at - now() <= AHEAD:
+            where = f"{e.turnout}/{e.section}" if e.section else e.turnout
+            yield f"planned, counts from its day: {e.kind} at {where}, {e.at:%Y-%m-%d} (events.csv)"
 
 
 def _left_out(configuration, raw) -> int:
