@@ -32,13 +32,13 @@ PASSAGE_RATE = Key("number", "samples per second", unit="Hz", minimum=100, nulla
 FILES = {
     "files": Key("text", "pattern of the file names below the turnout's raw folder", required=True),
     "format": Key("text", "reader, one of `turnout check --formats`; auto: by the file itself"),
+    "rate": HAMMER_RATE,
     "records": Key("integer", "records in one file; null: not promised", minimum=1, nullable=True),
     "samples": Key("integer", "samples per record; null: not promised", minimum=1, nullable=True),
     "time_zone": Key("text", "time zone of the file's time stamps, an IANA name"),
 }
 HAMMER = {
     **FILES,
-    "rate": HAMMER_RATE,
     "force": Key("text", "channel of the hammer", required=True),
     "response": Key("text", "channel that the models are identified from", required=True),
     "validation": Key("text", "second channel, only compared with; null: none", nullable=True),
