@@ -51,21 +51,14 @@ def run(args: argparse.Namespace) -> int:
 
 def _faults(configuration, formats, to_si):
     """Each fault that stops no turnout, and what it does stop."""
+    from turnout.chains.placed import faults_of_tracks
     from turnout.config.load import faults_of_unused_layouts
-    from turnout.errors import ConfigError, TurnoutError
-    from turnout.simulate import load_track
 
     for warning in configuration.warnings:
         yield f"does not count: {warning}"
     for error in faults_of_unused_layouts(configuration, formats, to_si):
         yield f"used by no turnout: {error}"
-    for path in sorted((configuration.folder / "tracks").glob("*.yaml")):
-        try:
-            load_track(str(path), folder=path.parent)
-        except ConfigError as error:
-            yield f"no simulation: {error}"
-        except TurnoutError as error:
-            yield f"no simulation: {path}: {error}"
+    yield from faults_of_tracks(configuration)
 
 
 def _planned(events):
