@@ -10,6 +10,7 @@ from turnout.chains.mismatch_trains import TrainUnknownError, train_of
 from turnout.chains.noted import rail_temperature
 from turnout.chains.passage import PassageContext, passage_unit, sensors_of, trains_in
 from turnout.chains.passage_context import known_patterns
+from turnout.chains.placed import misplaced
 from turnout.config.turnout import TurnoutConfig
 from turnout.errors import ReadError
 from turnout.fleet.scan import unit_id
@@ -20,7 +21,6 @@ from turnout.readers import read
 from turnout.records import LongRecording, Recording, Unit
 
 HALF_BAY = 0.3  # m: an accelerometer "mid-span" sits this far from the sleeper struck
-OFF = 0.5  # m: a place in the layout further than this from the one in the track's file is somebody's mistake
 TOPS = 0.002  # share of samples at the range that leaves the band of the diagnosis as it is: tops of blows above it
 MOST_ALIKE = 16  # passages of one train kept of a visit: twice as many as a case has of all
 UNSOUND = ("clipped", "dead_channel", "not_finite", "sensor_lost", "channels_swapped")
@@ -74,7 +74,7 @@ def _test(unit, turnout, raw_root, track, found):
     if not recordings:
         return
     place = float(turnout.section(unit.section).position)
-    if wrong := _misplaced(unit.section, place, track):
+    if wrong := misplaced(unit.section, place, track):
         found.notes.append(wrong)
         return
     campaign = turnout.campaigns[unit.campaign]
@@ -86,19 +86,6 @@ def _test(unit, turnout, raw_root, track, found):
     judged = turnout.settings["receptance"]
     found.tests.append(HammerTest(name, place, seated, force, unit.campaign, noted, judged))
     found.sections[name] = unit.section
-
-
-def _misplaced(label, place, track) -> str:
-    """Why a place of the layout cannot be that of the track, "" where it can."""
-    base = track.track
-    if not base.start < place < base.end:
-        return f"section {label}: {place:.1f} m in the layout, the track goes from {base.start:.0f} to {base.end:.0f} m"
-    known = track.locations.get(label)
-    if known is not None and abs(known[0] - place) > OFF:
-        return (
-            f"section {label}: {place:.1f} m in the layout, {known[0]:.1f} m in the track's file; correct one of them"
-        )
-    return ""
 
 
 def _seated(recording, place):
@@ -215,7 +202,7 @@ def _spoils(row):
 
 def _misplaced_sensors(turnout, track, notes):
     """Sensors whose section lies elsewhere in the layout than on the track."""
-    found = {s.name: wrong for s in sensors_of(turnout) if (wrong := _misplaced(s.section, s.position, track))}
+    found = {s.name: wrong for s in sensors_of(turnout) if (wrong := misplaced(s.section, s.position, track))}
     notes += [wrong for wrong in found.values() if wrong not in notes]
     return set(found)
 

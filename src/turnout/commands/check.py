@@ -38,6 +38,8 @@ def run(args: argparse.Namespace) -> int:
     print(f"{args.configuration}: {counts}, {'with faults' if faults else 'sound'}.")
     for fault in faults:
         print(f"  {fault}")
+    for event in _planned(configuration.events):
+        print(f"  {event}")
     raw = Path(args.raw or "raw")
     if not raw.is_dir() and args.raw:
         raise ConfigError(args.raw, "--raw", "no such folder", "Write the folder that holds those of the turnouts")
@@ -49,26 +51,32 @@ def run(args: argparse.Namespace) -> int:
 
 def _faults(configuration, formats, to_si):
     """Each fault that stops no turnout, and what it does stop."""
+    from turnout.chains.placed import faults_of_tracks
     from turnout.config.load import faults_of_unused_layouts
-    from turnout.errors import ConfigError, TurnoutError
-    from turnout.simulate import load_track
 
     for warning in configuration.warnings:
         yield f"does not count: {warning}"
     for error in faults_of_unused_layouts(configuration, formats, to_si):
         yield f"used by no turnout: {error}"
-    for path in sorted((configuration.folder / "tracks").glob("*.yaml")):
-        try:
-            load_track(str(path), folder=path.parent)
-        except ConfigError as error:
-            yield f"no simulation: {error}"
-        except TurnoutError as error:
-            yield f"no simulation: {path}: {error}"
+    yield from faults_of_tracks(configuration)
+
+
+def _planned(events):
+    """Each event of days to come, which may be a slip of the pen; what is a year ahead is a warning already."""
+    from datetime import timedelta
+
+    from turnout.config.events import AHEAD, now
+
+    for e in events:
+        if timedelta(days=1) < e.at - now() <= AHEAD:
+            where = f"{e.turnout}/{e.section}" if e.section else e.turnout
+            yield f"planned, counts from its day: {e.kind} at {where}, {e.at:%Y-%m-%d} (events.csv)"
 
 
 def _left_out(configuration, raw) -> int:
     """Print how many raw files there are and each that is left out or unsound; how many of these."""
     from turnout.config.load import read_notes
+    from turnout.fleet.notes_against_files import contradicted_notes
     from turnout.fleet.scan import scan
 
     n_units = n_files = 0
@@ -77,7 +85,8 @@ def _left_out(configuration, raw) -> int:
         found = scan(turnout, raw)
         n_units += len(found.units)
         n_files += sum(len(u.files) for u in found.units)
-        problems += found.problems + read_notes(turnout, raw)[1]
+        noted, wrong = read_notes(turnout, raw)
+        problems += [*found.problems, *wrong, *contradicted_notes(noted, raw, found.units)]
     print(f"{raw}: {n_files} files in {n_units} units, {len(problems)} left out or unsound.")
     for problem in problems:
         print(f"  {problem}")

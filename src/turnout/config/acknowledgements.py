@@ -3,11 +3,11 @@
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
 from pathlib import Path
 
 from turnout.config.csv_table import TableFault, read_csv, unreadable
-from turnout.config.events import wrong_place, wrong_time
+from turnout.config.events import now, wrong_place, wrong_time
 from turnout.config.keys import suggestion
 from turnout.errors import ConfigError
 
@@ -63,7 +63,7 @@ def faults(cells: Mapping, known, variants) -> Iterator[tuple[str, str, str]]:
     wrong = {column: fault for column in times if (fault := wrong_time(said[column]))}
     for column, (more, remedy) in wrong.items():
         yield column, f"{column} is {said[column]!r}{more}", remedy
-    if said["action"] == "acknowledge" and not wrong and _time(said["at"]) > _now() + timedelta(days=1):
+    if said["action"] == "acknowledge" and not wrong and _time(said["at"]) > now() + timedelta(days=1):
         yield "at", f"at {said['at']} has not come yet", "Write the day on which the alarm was seen"
     if said["until"] and not wrong and _time(said["until"]) <= _time(said["at"]):
         yield (
@@ -90,10 +90,6 @@ def acknowledgement(cells: Mapping) -> dict:
         "reason": said["reason"],
     }
     return {"acknowledgement_id": _id(row)} | row
-
-
-def _now() -> datetime:
-    return datetime.now(UTC).replace(tzinfo=None)
 
 
 def _time(text: str) -> datetime:

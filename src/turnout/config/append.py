@@ -10,6 +10,7 @@ from pathlib import Path
 from turnout.atomic import write_atomic
 from turnout.config.csv_table import TableFault, header_of
 from turnout.config.document import Place
+from turnout.config.table import no_tabs
 from turnout.errors import ConfigError
 
 
@@ -61,6 +62,8 @@ def append_tsv(path: Path, values: Mapping[str, str], columns: tuple[str, ...]) 
         if not titles:
             raise Place(str(path), 1, 1).error("an empty table", "Write a header: turnout<tab>layout<tab>...")
         header = tuple(title.strip() for title in titles.split("\t"))
+        if wrong := no_tabs(header):
+            raise Place(str(path), 1 + lines.index(titles), 1).error(*wrong)
     return _append(path, "\t".join(_in_order(path, values, header)), "\t".join(columns))
 
 

@@ -2,11 +2,11 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from turnout.config.csv_table import TableFault, read_csv, unreadable
-from turnout.config.keys import suggestion
+from turnout.config.keys import NO_TURNOUT, suggestion
 from turnout.errors import ConfigError
 
 # Which resonance is another one afterwards, where the row does not say.
@@ -21,6 +21,7 @@ RESETS = {
     "method_change": ("ballast", "railpad"),
     "other": (),
 }
+AHEAD = timedelta(days=366)  # that work may be planned; what is dated later is a slip
 COLUMNS = ("turnout", "section", "date", "kind", "resets", "note")
 
 
@@ -38,7 +39,8 @@ class Event:
 
 def read_events(path: Path, name: str, known, variants) -> tuple[list[Event], list[ConfigError], list[ConfigError]]:
     """Events in order of time, every error of the rows that cannot be used, and a warning of each event of a turnout
-    that has no row: it was taken out, and its history keeps its events, or it is misspelt. No file means no events.
+    that has no row (it was taken out, and its history keeps its events, or it is misspelt), and of each that is dated
+    more than a year ahead. No file means no events.
 
     ``known`` are the ids of the turnouts, None where turnouts.tsv itself is wrong: then no event is accused.
     """
@@ -59,6 +61,9 @@ def read_events(path: Path, name: str, known, variants) -> tuple[list[Event], li
         if _of_a_stranger(cells, known):
             stranger = wrong_place(cells, known, variants)
             warnings += [cells.place(name, line, column).error(*said) for column, *said in stranger]
+        if events[-1].at > now() + AHEAD:
+            late = f"date {cells['date']} is more than a year ahead"
+            warnings.append(cells.place(name, line, "date").error(late, "Correct it, or enter it nearer to its day"))
     return sorted(events, key=lambda e: (e.at, e.turnout, e.section or "", e.kind)), errors, warnings
 
 
@@ -86,7 +91,7 @@ def wrong_place(cells, known, variants) -> Iterator[tuple[str, str, str]]:
     """What is wrong with ``turnout`` and ``section`` of a row; ``known`` None (turnouts.tsv is wrong) accuses none."""
     turnout, label = cells["turnout"], cells["section"].removeprefix(f"{cells['turnout']}/")
     if known is not None and turnout not in known:
-        yield "turnout", f"turnout {turnout!r} has no row in turnouts.tsv", suggestion(turnout, known)
+        yield "turnout", f"turnout {turnout!r} has no row in turnouts.tsv", suggestion(turnout, known, NO_TURNOUT)
     elif label and turnout in variants:
         labels = variants[turnout].tree["sections"]
         if label not in labels:
@@ -104,6 +109,11 @@ def wrong_time(text: str) -> tuple[str, str] | None:
     except ValueError:
         return "", "Write YYYY-MM-DD or YYYY-MM-DDTHH:MM in UTC"
     return (", with a time zone", "Write the time in UTC, without a zone") if time.tzinfo else None
+
+
+def now() -> datetime:
+    """The time in UTC, as tables write it."""
+    return datetime.now(UTC).replace(tzinfo=None)
 
 
 def _words(cells) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from difflib import get_close_matches
 from turnout.config.document import Branch, Leaf
 from turnout.errors import ConfigError
 
+NO_TURNOUT = "There are no turnouts yet: add one with 'turnout add ID LAYOUT'"
 KINDS = {
     "text": (str,),
     "number": (int, float),
@@ -65,13 +66,15 @@ class Elsewhere:
     required: bool = False
 
 
-def suggestion(name: str, allowed) -> str:
-    """What to write instead of an unknown ``name``.
+def suggestion(name: str, allowed, none: str = "There is none to choose from") -> str:
+    """What to write instead of an unknown ``name``; ``none`` where nothing is allowed.
 
     >>> suggestion("posiiton", ["position", "panel"])
     "Did you mean 'position'? Allowed: panel, position"
     """
     allowed = sorted(map(str, allowed))
+    if not allowed:
+        return none
     close = get_close_matches(name, allowed, n=1, cutoff=0.6)
     listed = ", ".join(allowed) if len(allowed) <= 24 else f"{len(allowed)} names, as in docs/configuration.md"
     return (f"Did you mean {close[0]!r}? " if close else "") + f"Allowed: {listed}"

@@ -26,10 +26,13 @@ PASSAGE_CHANNEL = {
     **CHANNEL,
     "section": Key("text", "section it watches", required=True, pattern=LABEL),
 }
+# Below these nothing of a track can be seen; a rate that was meant in kHz lies below them.
+HAMMER_RATE = Key("number", "samples per second", unit="Hz", minimum=250, nullable=True)
+PASSAGE_RATE = Key("number", "samples per second", unit="Hz", minimum=100, nullable=True)
 FILES = {
     "files": Key("text", "pattern of the file names below the turnout's raw folder", required=True),
     "format": Key("text", "reader, one of `turnout check --formats`; auto: by the file itself"),
-    "rate": Key("number", "samples per second", unit="Hz", above=0, nullable=True),
+    "rate": HAMMER_RATE,
     "records": Key("integer", "records in one file; null: not promised", minimum=1, nullable=True),
     "samples": Key("integer", "samples per record; null: not promised", minimum=1, nullable=True),
     "time_zone": Key("text", "time zone of the file's time stamps, an IANA name"),
@@ -41,7 +44,11 @@ HAMMER = {
     "validation": Key("text", "second channel, only compared with; null: none", nullable=True),
     "channels": Each(CHANNEL, NAME, "one entry per channel", required=True),
 }
-PASSAGES = {**FILES, "channels": Each(PASSAGE_CHANNEL, NAME, "one entry per channel", required=True)}
+PASSAGES = {
+    **FILES,
+    "rate": PASSAGE_RATE,
+    "channels": Each(PASSAGE_CHANNEL, NAME, "one entry per channel", required=True),
+}
 # What a single section may say otherwise than the rest of the turnout.
 SECTION_HAMMER = {name: rule for name, rule in HAMMER.items() if name != "files"}
 SECTION = {

@@ -10,7 +10,7 @@ from turnout.config.acknowledgements import read_acknowledgements
 from turnout.config.document import Branch, Place, load, merge, plain
 from turnout.config.events import Event, read_events
 from turnout.config.frozen import Frozen
-from turnout.config.keys import check, suggestion
+from turnout.config.keys import NO_TURNOUT, check, suggestion
 from turnout.config.layout_keys import layout_keys
 from turnout.config.meaning import check_meaning
 from turnout.config.pairs import check_ranges
@@ -53,7 +53,7 @@ class Configuration:
         """The merged configuration of one turnout; ConfigError for an id that has no row."""
         if turnout not in self.rows:
             place = Place(str(self.folder / "turnouts.tsv"), 1, 1)
-            raise place.error(f"no turnout {turnout!r}", suggestion(turnout, self.rows))
+            raise place.error(f"no turnout {turnout!r}", suggestion(turnout, self.rows, NO_TURNOUT))
         row, about = self.rows[turnout], {}
         for column in ("name", "line", "km", "lat_deg", "lon_deg", "external_id", "id_scheme"):
             if column in row.values:
@@ -173,8 +173,9 @@ class _Reading:
         return None if self._wrong(tree) else tree
 
     def _unknown(self, name: str, row: Row) -> None:
+        none = f"There are no layouts yet: write layouts/{name}.yaml"
         there = [p.stem for p in (self.folder / "layouts").glob("*.yaml")]
-        self.errors.append(row.place("layout").error(f"no layout {name!r}", suggestion(name, there)))
+        self.errors.append(row.place("layout").error(f"no layout {name!r}", suggestion(name, there, none)))
 
     def _wrong(self, tree: Branch) -> bool:
         found = [*check_meaning(tree, self.to_si), *self._formats(tree), *check_ranges(tree["settings"])]
@@ -198,7 +199,8 @@ class _Reading:
                 found[row.id] = self._variant(row, layout, override)
         for stem, path in overrides.items():
             place = Place(self.name("overrides", path.name), 1, 1)
-            self.errors.append(place.error(f"an override without a turnout {stem!r}", suggestion(stem, found)))
+            remedy = suggestion(stem, [row.id for row in rows], NO_TURNOUT)
+            self.errors.append(place.error(f"an override without a turnout {stem!r}", remedy))
         return found
 
     def _variant(self, row: Row, layout: Branch, override: Path | None) -> Variant:

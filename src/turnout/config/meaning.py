@@ -6,6 +6,7 @@ from zoneinfo import available_timezones
 from turnout.config.document import Branch, merge
 from turnout.config.keys import suggestion
 from turnout.config.pattern import compiled
+from turnout.config.settings_keys import settings_keys
 from turnout.errors import ConfigError
 
 
@@ -18,10 +19,11 @@ def check_meaning(tree: Branch, to_si: Callable | None = None) -> Iterator[Confi
     labels = tuple(tree["sections"])
     if "hammer" in tree:
         yield from _files(tree["hammer"], "hammer", labels)
-        yield from _hammer(tree["hammer"], to_si)
+        softest = _softest_blow(tree)
+        yield from _hammer(tree["hammer"], to_si, softest)
         for section in tree["sections"].values():
             if "hammer" in section:
-                yield from _hammer(merge(tree["hammer"], section["hammer"]), to_si)
+                yield from _hammer(merge(tree["hammer"], section["hammer"]), to_si, softest)
     if "passages" in tree:
         yield from _files(tree["passages"], "passages", labels)
         yield from _channels(tree["passages"], to_si)
@@ -31,7 +33,7 @@ def check_meaning(tree: Branch, to_si: Callable | None = None) -> Iterator[Confi
                 yield leaf.place.error(f"no section {leaf.value!r}", suggestion(leaf.value, labels))
 
 
-def _hammer(tree: Branch, to_si) -> Iterator[ConfigError]:
+def _hammer(tree: Branch, to_si, softest: float) -> Iterator[ConfigError]:
     channels = tree["channels"]
     for role in ("force", "response", "validation"):
         leaf = tree.get(role)
@@ -42,6 +44,10 @@ def _hammer(tree: Branch, to_si) -> Iterator[ConfigError]:
         elif (channels[leaf.value]["quantity"].value == "force") != (role == "force"):
             found = channels[leaf.value]["quantity"].value
             yield leaf.place.error(f"{role} is {leaf.value!r}, which measures {found}", "Name another channel")
+        elif role == "force" and (limit := _value(channels[leaf.value], "limit")) and limit <= softest:
+            found = f"limit is {limit} N for the hammer's force, and receptance.softest_blow is {softest} N"
+            remedy = "Write the limit in N, or a lower softest_blow where the hammer is a small one"
+            yield channels[leaf.value]["limit"].place.error(f"{found}: no blow could count", remedy)
     yield from _channels(tree, to_si)
 
 
@@ -53,11 +59,25 @@ def _channels(tree: Branch, to_si) -> Iterator[ConfigError]:
     for name, channel in tree["channels"].items():
         if to_si:
             yield from _units(name, channel, to_si)
+        limit, step = _value(channel, "limit"), _value(channel, "resolution")
+        if limit and step and step >= limit:
+            found = f"resolution is {step}, and limit is {limit}"
+            yield channel["resolution"].place.error(found, "Write one step of the converter, in the unit of the limit")
         source = channel["source"]
         if source.value in sources:
             found = f"channel {name} reads {source.value!r}, as {sources[source.value]} does"
             yield source.place.error(found, "Give each channel its own source")
         sources[source.value] = name
+
+
+def _value(channel: Branch, key: str):
+    return channel[key].value if key in channel else None
+
+
+def _softest_blow(tree: Branch) -> float:
+    """receptance.softest_blow as written, else its default [N]."""
+    written = tree.get("settings", {}).get("receptance", {}).get("softest_blow")
+    return written.value if written else settings_keys()["receptance"].spec["softest_blow"].default
 
 
 def _units(name: str, channel: Branch, to_si: Callable) -> Iterator[ConfigError]:

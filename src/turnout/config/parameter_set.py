@@ -9,6 +9,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError
 
 from turnout.config.legible import legible
+from turnout.config.yaml_lines import where
 from turnout.errors import ConfigError, SimulationError
 
 # Unit: (SI unit, factor)
@@ -81,11 +82,12 @@ class ParameterSet(Mapping):
     def __init__(self, content, path, place):
         self.content, self.path, self.place = content, str(path), place
 
-    def error(self, key, found, remedy):
-        """A ``ConfigError`` at ``key`` of this mapping, or at the mapping itself where ``key`` is None."""
+    def error(self, key, found, remedy, at=""):
+        """A ``ConfigError`` at ``key`` of this mapping, or at the mapping itself where ``key`` is None; its line is
+        that of the entry ``at`` below there."""
         inside = f"[{key}]" if isinstance(key, int) else f".{key}"
         place = f"{self.place}{inside if key is not None else ''}".lstrip(".")
-        return ConfigError(self.path, place or "the file", found, remedy)
+        return ConfigError(self.path, where(self.path, place, at), found, remedy)
 
     def __getitem__(self, key):
         if key not in self.content:
@@ -158,7 +160,7 @@ class ParameterSet(Mapping):
         """Refuse keys that are not in ``allowed``."""
         for key in self.content:
             if key not in allowed:
-                raise self.error(None, f"unknown key {key!r}", f"Use one of {', '.join(sorted(allowed))}")
+                raise self.error(None, f"unknown key {key!r}", f"Use one of {', '.join(sorted(allowed))}", key)
         return self
 
     def numbers(self):
@@ -221,20 +223,22 @@ def _parse(value, path, place, sources):
 def _parse_number(entry, path, place, sources):
     for key in ("unit", "source"):
         if key not in entry:
-            raise ConfigError(path, place, f"a number without {key}", f"Give its {key}")
+            raise ConfigError(path, where(path, place), f"a number without {key}", f"Give its {key}")
     if unknown := set(entry) - KEYS:
-        raise ConfigError(path, place, f"unknown key {min(unknown)!r}", f"Use {', '.join(sorted(KEYS))}")
+        raise ConfigError(path, where(path, place), f"unknown key {min(unknown)!r}", f"Use {', '.join(sorted(KEYS))}")
     if entry["unit"] not in UNITS:
-        raise ConfigError(path, place, f"unknown unit {entry['unit']!r}", f"Use one of {', '.join(UNITS)}")
+        raise ConfigError(path, where(path, place), f"unknown unit {entry['unit']!r}", f"Use one of {', '.join(UNITS)}")
     source = sources.get(entry["source"], entry["source"])
     prior = entry.get("prior")
     if str(source).startswith("estimate") and prior is None:
-        raise ConfigError(path, place, "an estimate without a prior", "Give its relative standard deviation as prior")
+        raise ConfigError(
+            path, where(path, place), "an estimate without a prior", "Give its relative standard deviation as prior"
+        )
     unit, factor = UNITS[entry["unit"]]
     try:
         found = Number(factor * float(entry["value"]), unit, str(source), None if prior is None else float(prior))
     except (TypeError, ValueError):
-        raise ConfigError(path, place, f"{entry['value']!r} is not a number", "Write a number") from None
+        raise ConfigError(path, where(path, place), f"{entry['value']!r} is not a number", "Write a number") from None
     if not isfinite(found.value):
-        raise ConfigError(path, place, f"{entry['value']!r} is not finite", "Write a number")
+        raise ConfigError(path, where(path, place), f"{entry['value']!r} is not finite", "Write a number")
     return found

@@ -7,6 +7,7 @@ from typing import Any
 
 from turnout.config.document import Place
 from turnout.config.keys import Key, problem, suggestion
+from turnout.config.layout_keys import HAMMER_RATE, PASSAGE_RATE
 from turnout.errors import ConfigError
 
 ID = r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}"
@@ -21,9 +22,9 @@ ROW = {
     "lon_deg": Key("number", "longitude, WGS 84", unit="°", minimum=-180, maximum=180),
     "external_id": Key("text", "the owner's id"),
     "id_scheme": Key("text", "scheme of external_id: railML, RINF, the owner's own"),
-    "hammer_rate_hz": Key("number", "samples per second of its hammer tests", unit="Hz", above=0),
+    "hammer_rate_hz": Key("number", "samples per second of its hammer tests", unit="Hz", minimum=HAMMER_RATE.minimum),
     "hammer_format": Key("text", "reader of its hammer tests"),
-    "passage_rate_hz": Key("number", "samples per second of its passages", unit="Hz", above=0),
+    "passage_rate_hz": Key("number", "samples per second of its passages", unit="Hz", minimum=PASSAGE_RATE.minimum),
     "passage_format": Key("text", "reader of its passages"),
     "pad_type": Key("text", "railpad of all its sections"),
     "sleeper_type": Key("text", "sleeper of all its sections"),
@@ -94,8 +95,8 @@ def read_table(path: Path, name: str) -> tuple[list[Row], list[ConfigError]]:
 
 def _header_errors(header, name, line) -> Iterator[ConfigError]:
     column = 1
-    if len(header) == 1 and len(header[0].split()) > 1:
-        yield Place(name, line, 1).error("blanks between the columns", "Put tabs between the columns")
+    if wrong := no_tabs(header):
+        yield Place(name, line, 1).error(*wrong)
         return
     for i, title in enumerate(header):
         place = Place(name, line, column)
@@ -109,9 +110,23 @@ def _header_errors(header, name, line) -> Iterator[ConfigError]:
             yield Place(name, line, 1).error(f"no column {title!r}", f"Add it: {key.meaning}")
 
 
+def no_tabs(cells) -> tuple[str, str] | None:
+    """(what was found, what to write) where something else than tabs lies between the cells of a line.
+
+    >>> no_tabs(("turnout;layout",)), no_tabs(("turnout", "layout"))
+    (('semicolons between the columns', 'Put tabs between the columns'), None)
+    """
+    for mark, said in ((";", "semicolons"), (",", "commas"), (None, "blanks")):
+        if len(cells) == 1 and len(cells[0].split(mark)) > 1:
+            return f"{said} between the columns", "Put tabs between the columns"
+    return None
+
+
 def _row(text, line, header, name) -> tuple[Row, list[ConfigError]]:
     cells = tuple(text.split("\t"))
     row = Row({}, line, cells, header, name)
+    if wrong := no_tabs(cells):
+        return row, [Place(name, line, 1).error(*wrong)]
     if len(cells) > len(header):
         place = Place(name, line, 1 + sum(len(c) + 1 for c in cells[: len(header)]))
         return row, [place.error(f"{len(cells)} cells under {len(header)} columns", "Remove what is too much")]

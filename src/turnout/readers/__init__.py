@@ -8,6 +8,7 @@ from turnout.errors import TurnoutError
 from turnout.readers.description import describe
 from turnout.readers.formats import FORMATS, detect
 from turnout.readers.places import load
+from turnout.readers.spreadsheet import refuse_spreadsheet
 from turnout.records import LongRecording, RawDescription, ReadResult, Recording
 
 __all__ = ["FORMATS", "read"]
@@ -85,6 +86,7 @@ def _named(source):
 
 
 def _format(source, description):
+    refuse_spreadsheet(source)
     if description.format == "auto":
         return detect(source)
     if description.format not in FORMATS:

@@ -2,9 +2,10 @@
 
 What is recognised: separators comma, semicolon, tab; a decimal comma where the separator is not a comma; head lines
 with or without ``#``: ``rate`` (or ``fs``, ``sample rate [Hz]``, ``Abtastrate`` ...) or ``dt`` [s], ``started_at``,
-``n_records``, ``n_samples``, conditions; a line that says another frequency than the layout's rate, in words that are
-not known, is an error unless they are those of a filter; units in brackets behind the names ("force [N]", "force
-(N)") or in a line of their own; a column of time (``time_column``); a column ``record`` that numbers the records.
+``n_records``, ``n_samples``, starts and counts in other words (``head_words``), conditions; a line that says another
+frequency than the layout's rate, in words that are not known, is an error unless they are those of a filter; units in
+brackets behind the names ("force [N]", "force (N)") or in a line of their own (``csv_names``); a column of time
+(``time_column``); a column ``record`` that numbers the records.
 Without names channels are "0", "1" ...
 
 The text is UTF-8, UTF-16 with its mark, or, where a line of the head is neither, Windows-1252.
@@ -21,13 +22,15 @@ import pyarrow as pa
 from pyarrow import csv
 
 from turnout.readers.clock import PART
+from turnout.readers.csv_cells import MISSING, cells_named
 from turnout.readers.csv_head import head_of
+from turnout.readers.head_words import SAMPLES, START, START_DATE
 from turnout.readers.precision import TEXT
 from turnout.readers.raw import COPY_AGAIN, RawFile, RawRecord
 from turnout.readers.stamps import moment
 from turnout.readers.stored import Column
 from turnout.readers.time_column import seconds_per_number, time_column
-from turnout.readers.variables import COUNT, START, Facts
+from turnout.readers.variables import COUNT, Facts
 
 
 def read_raw(source) -> RawFile:
@@ -59,7 +62,8 @@ def _in_utf8(source):
 def _table(source, data, at, separator, names, time):
     """Columns of numbers."""
     options = _options(data, at, separator, len(names))
-    with source.parsed_by("pyarrow", f"the numbers after line {_line(data, at)}"):
+    line = _line(data, at)
+    with source.parsed_by("pyarrow", f"the numbers after line {line}"), cells_named(source, line, names):
         table = csv.read_csv(io.BytesIO(memoryview(data)[at:]), **options)
     return [column.to_numpy(zero_copy_only=False) for column in table.columns]
 
@@ -68,7 +72,8 @@ def _staying(source, data, at, separator, names, time):
     """Columns that read on when they are asked; a time column is read at once."""
     options = _options(data, at, separator, len(names))
     rows = Rows(source.path, at, options)
-    with source.parsed_by("pyarrow", f"the numbers after line {_line(data, at)}"):
+    line = _line(data, at)
+    with source.parsed_by("pyarrow", f"the numbers after line {line}"), cells_named(source, line, names):
         read = rows.scan(time)
     columns = [rows.column(i) for i in range(len(names))]
     return columns if time is None else [*columns[:time], read, *columns[time + 1 :]]
@@ -124,7 +129,7 @@ def _options(data, at, separator, width):
     converting = csv.ConvertOptions(
         column_types={str(i): pa.float64() for i in range(width)},
         decimal_point=point,
-        null_values=["", "NaN", "nan", "NA", "-"],
+        null_values=list(MISSING),
         strings_can_be_null=True,
     )
     reading = csv.ReadOptions(use_threads=False, column_names=[str(i) for i in range(width)], block_size=1 << 24)
@@ -147,19 +152,21 @@ def _records(columns, names, units, time, facts, source, unclear):
             raise source.error("column 'record'", "it does not number every row", COPY_AGAIN)
         edges = [0, *(np.flatnonzero(np.diff(number)) + 1), n_row]
     n = len(edges) - 1
-    promised = facts.count(("n_samples",))
+    promised, rows = facts.count(("n_samples",)), facts.number(SAMPLES)
+    if promised is None and rows is not None and rows > n_row:
+        promised = int(rows)
     for k, (a, b) in enumerate(pairwise(edges)):
         if promised is not None and b - a != promised:
             found = f"has {b - a} of the {promised} samples that its head promises"
             yield source.error(f"record {k + 1} of {n}", found, COPY_AGAIN, reason="truncated")
             continue
-        start = facts.one((f"started_at_{k}", *START), k, n)
+        date, start = facts.one(START_DATE, k, n), facts.one((f"started_at_{k}", *START), k, n)
         yield RawRecord(
             names=tuple(names[i] for i in kept),
             samples=[columns[i] if isinstance(columns[i], Column) else columns[i][a:b] for i in kept],
             **facts.rated(TEXT),
             units=tuple(units[i] for i in kept),
-            started_at=moment(start),
+            started_at=moment(date if start is None else start) or moment(f"{date} {start}"),
             conditions=facts.conditions(k, n),
             time=None if seconds is None else seconds[a:b],
             unclear=unclear,

@@ -3,14 +3,18 @@
 import re
 import unicodedata
 
+from turnout.readers.csv_cells import MARK, stands_for_a_number
+from turnout.readers.csv_names import NAME_WITH_UNIT, names_among
+from turnout.readers.head_words import SAMPLES, START, START_DATE
 from turnout.readers.raw import COPY_AGAIN
-from turnout.readers.variables import COUNT, RATE, START, STEP
+from turnout.readers.variables import COUNT, RATE, STEP
 
 NOTE = re.compile(r"^#?\s*([^\W\d][\w .'’-]*?)\s*([\[(][^\])]*[\])])?\s*[:=,;\t]\s*(.*)$")
-NAME_WITH_UNIT = re.compile(r"^(.*?)\s*[\[(]([^\[\]]*)[\])]$")
 SCALES = {"kHz": 1e3, "khz": 1e3, "MHz": 1e6, "ms": 1e-3, "µs": 1e-6, "\u03bcs": 1e-6, "us": 1e-6}
 TEMPERATURES = {"rail_temperature", "air_temperature"}
-NOTES = {*RATE, *STEP, *START, *COUNT, "n_samples"}
+NOTES = {*RATE, *STEP, *START, *START_DATE, *COUNT, "n_samples"}
+NUMBERS = TEMPERATURES | {*SAMPLES}  # a note only where a number follows, else a column of that name
+GROUPED = re.compile(rf"\d{{1,3}}(?:{MARK}\d{{3}})+(?!\d)")
 # A line that says one frequency and nothing else: "Vzorkovani: 10000 Hz", "taktning [kHz];10".
 FREQUENCY = re.compile(r"^#?[^\d\[(]+[\[(]?([kM]?Hz)?[\])]?[\s:=,;]*([\d.,]+)\s*([kM]?Hz)?\W*$", re.IGNORECASE)
 NO_RATE = re.compile(r"filt|pass|paß|cut|grenz|band|coup|cort|tagli|græns|eigen|reson|netz|mains", re.IGNORECASE)
@@ -37,7 +41,7 @@ def head_of(data, source):
         # a comma is the decimal mark where another separator stands
         separator = next((s for s in ("\t", ";") if s in line), ",")
         cells = _cells(line, separator)
-        if line.strip() and all(_is_number(cell) or cell == "" for cell in cells) and any(cells):
+        if any(cells) and all(_is_number(cell) or stands_for_a_number(cell) or cell == "" for cell in cells):
             names, units = _names([_cells(text, separator) for text in before], cells)
             return notes, names, units, position, separator, tuple(unclear)
         match = NOTE.match(line.strip())
@@ -46,9 +50,11 @@ def head_of(data, source):
         if plain not in NOTES and (frequency := _frequency(line)) is not None:
             unclear.append((line.strip(), frequency))
         value = match[3].strip(separator + " ") if match else ""
-        warmth = plain in TEMPERATURES and _is_number(value.split()[0] if value else "")  # else a column of that name
-        if match and (line.startswith("#") or plain in NOTES or warmth):
-            notes[plain if plain in NOTES or warmth else name] = _value(f"{value} {match[2]}" if match[2] else value)
+        known = plain in NOTES or (plain in NUMBERS and _is_number(value.split()[0] if value else ""))
+        if plain in SAMPLES and (grouped := GROUPED.match(value)):
+            value = re.sub(r"\D", "", grouped[0])
+        if match and (line.startswith("#") or known):
+            notes[plain if known else name] = _value(f"{value} {match[2]}" if match[2] else value)
         elif line.strip():
             before.append(line)
         position = end + 1
@@ -108,13 +114,13 @@ def _names(lines, cells):
     A separator behind the last number, as in "1;2;", makes a column without a name.
     """
     count, open_end = len(cells), not cells[-1]
-    lines = [line + [""] * open_end for line in lines if len(line) >= count - open_end]
+    lines = [(line + [""] * open_end)[:count] for line in lines if any(line) and len(line) >= count - open_end]
     if not lines:
         names = [str(i) for i in range(count)]
         return [*names[:-1], ""] if open_end and count > 1 else names, [""] * count
-    names, units = lines[0][:count], [""] * count
-    if len(lines) > 1:
-        units = [cell.strip("[]() ") for cell in lines[1][:count]]
+    at, below = names_among(lines)
+    names = lines[at]
+    units = [""] * count if below is None else [cell.strip("[]() ") for cell in lines[below]]
     for i, name in enumerate(names):
         if match := NAME_WITH_UNIT.match(name):
             names[i], units[i] = match[1], match[2]

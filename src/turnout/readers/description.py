@@ -48,16 +48,22 @@ def describe(raw, description: RawDescription, source, longest=None):
 def _count_errors(raw, description, source):
     """What the layout, or the file itself, promises about the number of records, and does not keep."""
     there = len(raw.records)
-    promises = (("the layout", description.n_records), ("its own header", raw.expected))
-    for who, promised in promises:
+    of_layout = _or_layout("records", description.n_records)
+    promises = (("the layout", description.n_records, of_layout), ("its own header", raw.expected, COPY_AGAIN))
+    for who, promised, remedy in promises:
         if promised is not None and there < promised:
             found = f"it holds {there} of the {promised} records that {who} promises"
-            yield source.error(f"record {there + 1} of {promised}", found, COPY_AGAIN, reason="truncated")
+            yield source.error(f"record {there + 1} of {promised}", found, remedy, reason="truncated")
             return
     if description.n_records is not None and there > description.n_records:
         found = f"it holds {there} records, {there - description.n_records} more than the layout promises"
         remedy = "Correct records in the layout, or find out whether two tests share one file"
         yield source.error(f"record {description.n_records + 1}", found, remedy, reason="wrong_length")
+
+
+def _or_layout(key, promised):
+    """The remedy where a file holds less than the layout's ``key`` promises: either may be wrong."""
+    return f"{COPY_AGAIN}; if it is whole, correct '{key}: {promised}' in the layout (null: any number)"
 
 
 def _recording(record, k, n_record, description, source, longest):
@@ -101,8 +107,8 @@ def _sample_count(record, where, promised, source):
         found = f"channel {short!r} ends after {shortest} samples, others after {longest}"
         raise source.error(where, found, COPY_AGAIN, reason="truncated")
     if promised is not None and shortest < promised:
-        found = f"ends after {shortest} of {promised} samples"
-        raise source.error(where, found, COPY_AGAIN, reason="truncated")
+        found = f"ends after {shortest} of the {promised} samples that the layout promises"
+        raise source.error(where, found, _or_layout("samples", promised), reason="truncated")
     if promised is not None and shortest > promised:
         found = f"it has {shortest} samples instead of {promised}"
         remedy = "Correct samples in the layout, or find out why the logger was set differently"

@@ -81,8 +81,9 @@ def fault(n_sample, seen, channel, where, source) -> ReadError | None:
     place = f"{where}, channel {channel.name!r}"
     n_bad, first_bad, value, constant = seen
     if n_bad:
-        found = f"{n_bad} of {n_sample} samples are not finite, the first is sample {first_bad}"
-        return source.error(place, found, "Export the record again from the logger", reason="not_finite")
+        found = f"{n_bad} of {n_sample} samples are missing or not finite, the first is sample {first_bad}"
+        remedy = "Export the record again from the logger; if it is so there too, check the channel's cable and range"
+        return source.error(place, found, remedy, reason="not_finite")
     if constant and channel.quantity != "temperature":
         found = f"all {n_sample} samples are {value:.6g}: the channel is dead"
         return source.error(place, found, "Check sensor, cable and channel map", reason="dead_channel")

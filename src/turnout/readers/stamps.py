@@ -1,16 +1,20 @@
 """Start times as files write them."""
 
 import math
+import re
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
 MATLAB_EPOCH = 719529  # datenum of 1970-01-01
+DOTTED = re.compile(r"(\d{1,2})\.\s?(\d{1,2})\.\s?(\d{4})[\sT,;]+(\d{1,2}):(\d{2}(?::\d{2}(?:[.,]\d{1,9})?)?)")
 MONTHS = {m: i for i, m in enumerate("jan feb mar apr may jun jul aug sep oct nov dec".split(), start=1)}
 
 
 def moment(value):
     """datetime of ISO 8601 text, numpy datetime64 (UTC), seconds since 1970 (UTC) or a MATLAB datenum; else None.
+
+    With dots the day comes first, "13.05.2024 10:00"; with slashes nobody can tell.
 
     Examples
     --------
@@ -25,6 +29,8 @@ def moment(value):
     if isinstance(value, bytes):
         value = value.decode("utf-8", "replace")
     if isinstance(value, str):
+        if match := DOTTED.fullmatch(value.strip()):
+            value = f"{match[3]}-{match[2]:0>2}-{match[1]:0>2}T{match[4]:0>2}:{match[5]}"
         try:
             return datetime.fromisoformat(value.strip())
         except ValueError:

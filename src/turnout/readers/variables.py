@@ -22,6 +22,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from turnout.errors import ReadError
+from turnout.readers.head_words import START
 from turnout.readers.listed_units import Alphabetical, listed_units
 from turnout.readers.numbered import by_number, natural, numbered_names
 from turnout.readers.precision import EXACT, SINGLE, single_precision, step_precision
@@ -40,7 +41,6 @@ STEP = ("dt", "delta_t", "sample_interval", "wf_increment")
 TIME = ("time", "t", "time_s")
 NAMES = ("channels", "channel_names", "names", "labels")
 UNITS = ("units", "unit", "channel_units")
-START = ("started_at", "start_time", "starttime", "wf_start_time")
 COUNT = ("n_records", "n_record")
 
 

@@ -13,10 +13,11 @@ from pathlib import Path
 import numpy as np
 import soundfile
 
+from turnout.readers.head_words import START
 from turnout.readers.raw import COPY_AGAIN, RawFile, RawRecord
 from turnout.readers.stamps import moment
 from turnout.readers.stored import Stored
-from turnout.readers.variables import NAMES, START, UNITS, Facts, texts
+from turnout.readers.variables import NAMES, UNITS, Facts, texts
 
 OPEN_END = 0xFFFFFFFF
 

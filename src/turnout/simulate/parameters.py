@@ -16,16 +16,17 @@ def load_track(name, seed=0, folder=None):
 
     A file with ``extends`` takes what it does not say itself from the file of that name.
     """
-    return turnout_track(_track_parameters(_file(name, folder, "tracks"), folder), seed)
+    return turnout_track(track_parameters(_file(name, folder, "tracks"), folder), seed)
 
 
-def _track_parameters(path, folder, below=()):
+def track_parameters(path, folder, below=()):
+    """Parameters of a track's file, with those of the file that it extends where it says nothing itself."""
     own = read_parameters(path)
     if "extends" not in own:
         return own
     if path in below:
         raise SimulationError(f"{path}: extends itself by way of {', '.join(p.name for p in below)}.")
-    base = _track_parameters(extended(own, path, folder), folder, (*below, path))
+    base = track_parameters(extended(own, path, folder), folder, (*below, path))
     changed = {key: value for key, value in own.content.items() if key != "extends"}
     return ParameterSet({**base.content, **changed}, path, "")
 

@@ -90,7 +90,7 @@ def _surfaces(routes, name):
 
 def _spreads(routes):
     """(part, field -> relative standard deviation) of every part that has a prior; the largest one of a list."""
-    for entry in _entries(routes):
+    for entry in entries_of_routes(routes):
         spread: dict[str, float] = {}
         for place, number in entry.numbers():
             name = place.removeprefix(f"{entry.place}.").split("[")[0]
@@ -100,7 +100,7 @@ def _spreads(routes):
             yield _path(entry), spread
 
 
-def _entries(routes):
+def entries_of_routes(routes):
     """The entry of every part of every route."""
     for name in routes:
         if isinstance(routes[name], list):

@@ -68,6 +68,84 @@ def test_a_track_that_no_turnout_uses_is_checked(folder, capsys, old, new, words
     assert line.startswith("  no simulation: config/tracks/spare.yaml") and words in line
 
 
+def far(folder, kind, old, new):
+    """A place in the file that all turnouts use, and the line in which it stands."""
+    path = folder / kind / "tommerup.yaml"
+    text = path.read_text()
+    assert text.count(old) == 1
+    path.write_text(text.replace(old, new))
+    return 1 + text[: text.index(old)].count("\n")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("A8: {place: {value: 26.4", "A8: {place: {value: 264", "locations.A8.place: 264 m is off the track"),
+        ("A9: {place: {value: 28.2", "A9: {place: {value: -50", "locations.A9.place: -50 m is off the track"),
+        ("cosine, place: {value: 4.5", "cosine, place: {value: 450", "routes.main[0].place: 450 m is off the track"),
+        ("kink, place: {value: 3.9", "kink, place: {value: 390", "routes.diverging[1].place: 390 m is off the track"),
+    ],
+)
+def test_a_place_off_the_track_of_its_own_file_is_said_with_its_line(folder, capsys, old, new, words):
+    line = far(folder, "tracks", old, new)
+    code, said = checked(capsys)
+    start = f"  not on the track: config/tracks/tommerup.yaml, line {line}, {words} from -45 m to 57 m. Correct it"
+    assert code == 1 and [x for x in said.splitlines() if x.startswith(start)], said
+
+
+def test_a_stretch_of_supports_beyond_the_track_is_said_with_its_line(folder, capsys):
+    path = folder / "tracks/tommerup.yaml"
+    text = path.read_text()
+    near = "    from: {value: -46, unit: m, source: guess, prior: 0.1}\n    to: {value: -1.5,"
+    path.write_text(text.replace(near, near.replace("-46", "-96").replace("-1.5", "-61.5")))
+    line = 1 + text[: text.index("  - label: OT")].count("\n")
+    code, said = checked(capsys)
+    assert code == 1 and f"line {line}, sections[0]: from -96 m to -61.5 m lies nothing of the track from -45 m" in said
+
+
+def test_a_place_that_another_track_was_taken_over_with_says_nothing(folder, capsys):
+    """A shorter stretch of a track may leave out what it does not reach."""
+    extent = "extent: {from: {value: -45, unit: m, source: x}, to: {value: 45, unit: m, source: x}}\n"
+    (folder / "tracks/short.yaml").write_text(
+        "extends: tommerup\nname: short\n" + extent.replace("45, unit: m, source: x}}", "30, unit: m, source: x}}")
+    )
+    assert checked(capsys)[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("main, position: 26.4", "main, position: 264",
+         "section A8: 264.0 m in the layout, the track goes from -45 to 57 m. Its track is config/tracks"),
+        ("main, position: 26.4", "main, position: 27.4",
+         "section A8: 27.4 m in the layout, 26.4 m in the track's file; correct one of them. Its track is config"),
+        ("web, section: A9}", "web, section: A9, offset: 24}",
+         "sensor A9 at 52.2 m: wheels are wholly on the track of config/tracks/tommerup.yaml only from -36.0 m to 48"),
+    ],
+)  # fmt: skip
+def test_a_place_of_the_layout_off_the_track_is_said_once_with_its_line(folder, capsys, old, new, words):
+    """All three turnouts follow this layout and its track."""
+    line = far(folder, "layouts", old, new)
+    code, said = checked(capsys)
+    (found,) = [x for x in said.splitlines() if "tommerup.yaml" in x]
+    assert code == 1 and words in found
+    assert found.startswith(f"  not on the track: config/layouts/tommerup.yaml, line {line}, column ")
+
+
+def test_a_place_of_an_override_is_held_against_the_turnouts_own_track(folder, capsys):
+    (folder / "overrides").mkdir(exist_ok=True)
+    (folder / "overrides/tommerup_s2.yaml").write_text("sections:\n  A7: {position: 25.4}\n")
+    code, said = checked(capsys)
+    assert (
+        code == 1 and "config/overrides/tommerup_s2.yaml, line 2, column 18: section A7: 25.4 m in the layout" in said
+    )
+    text = (folder / "tracks/tommerup.yaml").read_text()
+    (folder / "tracks/tommerup_s2.yaml").write_text(
+        text.replace("A7: {place: {value: 24.6", "A7: {place: {value: 25.4")
+    )
+    assert checked(capsys)[0] == 0
+
+
 @pytest.mark.parametrize("content", [b"name: \xff\n", b"name: \x00\n"])
 def test_a_track_file_that_is_no_text_is_said_by_name(tmp_path, content):
     path = tmp_path / "spare.yaml"

@@ -1,12 +1,14 @@
 """Every kind of wrong row or key is said with file, line, column, what stands there and what to write instead."""
 
+from datetime import UTC, datetime, timedelta
+
 import pytest
 
 from turnout.cli import main
 from turnout.config import load_configuration
 from turnout.config.raw_notes import read_campaigns
 from turnout.config.table import read_table
-from turnout.errors import ConfigErrors
+from turnout.errors import ConfigError, ConfigErrors
 from turnout.readers.formats import FORMATS
 from turnout.readers.units import to_si
 
@@ -62,7 +64,31 @@ WRONG = {
     "no id": (row("\tmain"), "line 4, column 1: turnout is empty. Write id"),
     "unknown layout": (row("t3\tmian"), "line 4, column 4: no layout 'mian'. Did you mean 'main'?"),
     "number that is none": (row("t3\tmain\t\t12,4"), "line 4, column 10: km is '12,4'. Write a number from 0 to"),
-    "rate of zero": (row("t3\tmain\t\t\t0"), "line 4, column 11: hammer_rate_hz is 0.0. Write a number above 0 Hz"),
+    "rate of zero": (
+        row("t3\tmain\t\t\t0"),
+        "line 4, column 11: hammer_rate_hz is 0.0. Write a number of at least 250",
+    ),
+    "rate of the table in kHz": (
+        row("t3\tmain\t\t\t51.2"),
+        "hammer_rate_hz is 51.2. Write a number of at least 250 Hz",
+    ),
+    "rate in kHz": (
+        layout("rate: 20000", "rate: 12.8"),
+        "line 9, column 9: rate is 12.8. Write a number of at least 250 Hz",
+    ),
+    "rate of passages in kHz": (
+        layout('  files: "passages/', '  rate: 51.2\n  files: "passages/'),
+        "line 16, column 9: rate is 51.2. Write a number of at least 100 Hz",
+    ),
+    "limit in kN": (
+        layout("source: force, ", "source: force, limit: 22, "),
+        "line 13, column 35: limit is 22 N for the hammer's force, and receptance.softest_blow is 50.0 N: no blow "
+        "could count. Write the limit in N",
+    ),
+    "step as large as the limit": (
+        layout("source: rail, ", "source: rail, limit: 500, resolution: 800, "),
+        "line 14, column 50: resolution is 800, and limit is 500. Write one step of the converter",
+    ),
     "too many cells": (row("t3\tmain\t\t\t\tx"), "line 4, column 12: 6 cells under 5 columns"),
     "raw folder outside": (row("t3\tmain\t../t3"), "line 4, column 9: raw is '../t3', outside the raw root"),
     "raw folder absolute": (row("t3\tmain\t/data/t3"), "column 9: raw is '/data/t3', outside the raw root"),
@@ -72,7 +98,19 @@ WRONG = {
         "line 1, column 20: unknown column 'kilometre'. Allowed:",
     ),
     "column twice": ({"table": TABLE.replace("km", "raw")}, "line 1, column 20: column 'raw' for the second time"),
-    "spaces for tabs": ({"table": "turnout layout\nt1 main\n"}, "Put tabs between the columns"),
+    "spaces for tabs": (
+        {"table": "turnout layout\nt1 main\n"},
+        "line 1, column 1: blanks between the columns. Put tabs",
+    ),
+    "commas for tabs": (
+        {"table": "turnout,layout\nt1,main\n"},
+        "line 1, column 1: commas between the columns. Put tabs",
+    ),
+    "semicolons for tabs": (
+        {"table": "turnout; layout;\nt1;main\n"},
+        "semicolons between the columns. Put tabs between",
+    ),
+    "commas in a row": (row("t3,main,,1.5"), "line 4, column 1: commas between the columns. Put tabs between"),
     "unknown key": (
         layout("    position: 26.4", "    positoin: 26.4"),
         "config/layouts/main.yaml, line 6, column 5: unknown key 'positoin'. Did you mean 'position'?",
@@ -215,6 +253,57 @@ def test_a_raw_folder_is_one_however_it_is_spelt(tmp_path):
     assert [str(e).split(". ")[0] for e in errors] == [
         f"turnouts.tsv, line {n}, column 9: raw folder 'line_7/T1' is also that of turnout 'T1'" for n in (3, 4, 5)
     ]
+
+
+HEADER = "turnout,section,date,kind\n"
+
+
+def test_a_small_hammer_may_clip_below_the_softest_blow_of_a_large_one(tmp_path):
+    small = LAYOUT.replace("source: force, ", "source: force, limit: 22, ")
+    assert configuration(tmp_path, layout=small, settings="receptance: {softest_blow: 0}").ids == ("t1", "t2")
+
+
+def test_an_event_of_another_century_is_said_and_planned_work_is_no_fault(tmp_path, capsys):
+    today = datetime.now(UTC).date()
+    soon, tomorrow = today + timedelta(days=40), today + timedelta(days=1)
+    events = f"{HEADER}t1,,{tomorrow},tamping\nt2,A8,{soon},grinding\n"
+    read = configuration(tmp_path, events=events)
+    assert read.warnings == ()
+    folder = ["--configuration", str(read.folder)]
+    assert main(["check", *folder]) == 0
+    said = capsys.readouterr().out
+    assert f"planned, counts from its day: grinding at t2/A8, {soon} (events.csv)" in said and str(tomorrow) not in said
+    (read.folder / "events.csv").write_text(f"{events}t1,A7,2205-04-02,tamping\n")
+    assert main(["check", *folder]) == 1
+    said = capsys.readouterr().out
+    assert (
+        "does not count: config/events.csv, line 4, column 7: date 2205-04-02 is more than a year ahead. Correct"
+        in said
+    )
+    assert (
+        "planned, counts from its day: grinding at t2/A8" in said
+        and "planned, counts from its day: tamping" not in said
+    )
+
+
+def test_without_any_turnout_it_is_said_how_to_add_one(tmp_path, capsys):
+    read = configuration(tmp_path, table="turnout\tlayout\n", events=f"{HEADER}t1,,2025-01-01,tamping\n")
+    (warning,) = map(str, read.warnings)
+    none = "There are no turnouts yet: add one with 'turnout add ID LAYOUT'."
+    assert warning.endswith(f"turnout 't1' has no row in turnouts.tsv. {none}")
+    with pytest.raises(ConfigError, match=none):
+        read.turnout("t1")
+    with pytest.raises(ConfigErrors, match=r"no layout 'main'\. There are no layouts yet: write layouts/main\.yaml"):
+        (read.folder / "layouts" / "main.yaml").unlink()
+        (read.folder / "turnouts.tsv").write_text(TABLE)
+        load_configuration(read.folder)
+
+
+def test_add_names_a_table_without_tabs(tmp_path, capsys):
+    folder = configuration(tmp_path).folder
+    (folder / "turnouts.tsv").write_text("turnout;layout\n")
+    assert main(["add", "t9", "main", "--configuration", str(folder)]) == 2
+    assert "turnouts.tsv, line 1, column 1: semicolons between the columns. Put tabs between" in capsys.readouterr().err
 
 
 def test_an_event_of_a_turnout_that_was_taken_out_stops_nothing_and_is_said(tmp_path, capsys):

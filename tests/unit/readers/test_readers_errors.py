@@ -218,7 +218,16 @@ def test_fewer_records_than_promised(tmp_path, in_si, hammer_test):
     path = write(hammer_test[:3], tmp_path / "a.npz", "npz")
     error = only_error(path.name, tmp_path, replace(in_si, n_records=10), 3)
     assert error.reason == "truncated"
-    assert str(error) == f"a.npz, record 4 of 10: it holds 3 of the 10 records that the layout promises. {COPY}"
+    remedy = f"{COPY[:-1]}; if it is whole, correct 'records: 10' in the layout (null: any number)"
+    assert str(error) == f"a.npz, record 4 of 10: it holds 3 of the 10 records that the layout promises. {remedy}."
+
+
+def test_fewer_records_than_the_file_itself_promises_are_the_loggers(tmp_path, in_si, hammer_test):
+    path = write(hammer_test[:3], tmp_path / "a.csv", "csv")
+    path.write_text("# n_records: 5\n" + "\n".join(x for x in path.read_text().split("\n") if "n_records" not in x))
+    error = only_error(path.name, tmp_path, in_si, 3)
+    assert error.reason == "truncated"
+    assert str(error) == f"a.csv, record 4 of 5: it holds 3 of the 5 records that its own header promises. {COPY}"
 
 
 def test_more_records_than_promised(tmp_path, in_si, hammer_test):
@@ -233,7 +242,9 @@ def test_fewer_samples_than_promised_cost_that_record(tmp_path, in_si, hammer_te
     path = write(hammer_test, tmp_path / "a.npz", "npz")
     error = only_error(path.name, tmp_path, replace(in_si, n_samples=301), 3)
     assert error.reason == "truncated"
-    assert str(error) == f"a.npz, record 2 of 4: ends after 200 of 301 samples. {COPY}"
+    found = "ends after 200 of the 301 samples that the layout promises"
+    remedy = f"{COPY[:-1]}; if it is whole, correct 'samples: 301' in the layout (null: any number)"
+    assert str(error) == f"a.npz, record 2 of 4: {found}. {remedy}."
     kept = read(path.name, tmp_path, replace(in_si, n_samples=301)).recordings
     assert [r.record for r in kept] == [0, 2, 3]
 
@@ -253,8 +264,9 @@ def test_a_sample_that_is_no_number_costs_that_record(value, tmp_path, in_si, ha
     path = write(hammer_test, tmp_path / "a.npz", "npz")
     error = only_error(path.name, tmp_path, in_si, 3)
     assert error.reason == "not_finite"
-    found = "2 of 301 samples are not finite, the first is sample 17. Export the record again from the logger."
-    assert str(error) == f"a.npz, record 3 of 4, channel 'rail': {found}"
+    found = "2 of 301 samples are missing or not finite, the first is sample 17"
+    remedy = "Export the record again from the logger; if it is so there too, check the channel's cable and range"
+    assert str(error) == f"a.npz, record 3 of 4, channel 'rail': {found}. {remedy}."
 
 
 def test_samples_so_large_that_their_sum_overflows_are_finite(tmp_path, in_si):

@@ -331,7 +331,7 @@ def test_text_with_a_word_among_its_numbers_names_the_place(by_index, tmp_path):
     (tmp_path / "a.csv").write_text("\n".join(text) + "\n")
     (error,) = _raised("a.csv", tmp_path, by_index)
     assert error.reason == "unreadable"
-    assert "pyarrow cannot read it" in str(error) and "overload" in str(error)
+    assert str(error).startswith("a.csv, line 101, column '0': 'overload' is no number")
 
 
 def test_parquet_of_a_data_frame_with_time_stamps(by_name, tmp_path):

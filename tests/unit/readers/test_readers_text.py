@@ -88,6 +88,61 @@ def test_a_rate_in_another_language_is_read_and_held_against_the_layout(word, tm
     assert error.reason == "wrong_rate" and "10000 Hz instead of 20000 Hz" in error.found
 
 
+STARTS = {
+    "Startzeit: 13.05.2024 08:30:12,250": "08:30:12.250000",
+    "Startzeit;13.05.2024;08:30:12,250": "08:30:12.250000",
+    "Startdatum;13.05.2024\nStartzeit;08:30:12,25": "08:30:12.250000",
+    "Startzeit;08:30:12.25;\nStartdatum;2024-05-13;": "08:30:12.250000",
+    "# Messbeginn = 13.5.2024 8:30": "08:30:00",
+    "Début de mesure: 13.05.2024 08:30:12": "08:30:12",
+    "Starttijd: 2024-05-13 08:30:12": "08:30:12",
+    "Začátek měření;13.05.2024 08:30:12": "08:30:12",
+    "Starttidspunkt;13.05.2024 08:30:12": "08:30:12",
+    "started_at: 13.05.2024 08:30:12": "08:30:12",
+}
+
+
+@pytest.mark.parametrize("head", STARTS)
+def test_the_start_in_the_head_is_read_in_the_words_and_dates_of_its_country(head, tmp_path):
+    recording = sound(tmp_path, "a.csv", f"rate: 20000\n{head}\nforce;acc\n{ROWS}")
+    assert recording.started_at.isoformat() == f"2024-05-13T{STARTS[head]}"
+
+
+@pytest.mark.parametrize("stamp", ["04/05/2024 08:30", "31.02.2024 08:30", "13.05.2024", "08:30:12"])
+def test_a_start_that_is_not_clear_is_none(stamp, tmp_path):
+    """Nobody can tell the 4th of May from the 5th of April; a day or a clock alone is no moment."""
+    assert sound(tmp_path, "a.csv", f"rate: 20000\nStartzeit;{stamp}\nforce;acc\n{ROWS}").started_at is None
+
+
+COUNTS = ("Anzahl Messwerte", "# Anzahl Werte", "Number of samples", "Nombre d'échantillons", "Aantal samples",
+          "Počet vzorků", "Antal målepunkter")  # fmt: skip
+
+
+@pytest.mark.parametrize("word", COUNTS)
+def test_a_table_shorter_than_its_head_promises_is_cut(word, tmp_path):
+    text = f"rate: 20000\n{word};{{}}\nforce;acc\n{ROWS}"
+    for whole in ("50", "50 Werte", "49", "0"):
+        sound(tmp_path, "a.csv", text.format(whole))
+    for promised, number in (("60", 60), ("1.200", 1200), ("60 000", 60000)):
+        (tmp_path / "a.csv").write_text(text.format(promised))
+        (error,) = read("a.csv", tmp_path, NAMED).errors
+        assert error.reason == "truncated"
+        assert error.found == f"has 50 of the {number} samples that its head promises"
+
+
+def test_a_count_of_all_rows_does_not_cut_the_records_of_a_file(tmp_path):
+    rows = "".join(f"{1 + k // 20};{a:.4f};{b:.4f}\n" for k, (a, b) in enumerate(X))
+    (tmp_path / "a.csv").write_text(f"rate: 20000\nAnzahl Messwerte: 50\nrecord;force;acc\n{rows}")
+    result = read("a.csv", tmp_path, NAMED)
+    assert result.errors == () and [r.n_sample for r in result.recordings] == [20, 20, 10]
+
+
+def test_a_column_that_is_called_as_a_count_is_a_column(tmp_path):
+    (tmp_path / "a.csv").write_text(f"rate: 12800\nMesswerte;acc\n{ROWS}")
+    called = RawDescription((RawChannel("force", "Messwerte", "force", unit="N"), NAMED.channels[1]))
+    assert read("a.csv", tmp_path, called).recordings[0].samples.shape == X.T.shape
+
+
 @pytest.mark.parametrize("line", ["Vzorkovací kmitočet: 10 kHz", "# taktning [Hz];10000", "Mintavétel 10000 Hz"])
 def test_a_frequency_that_nobody_understood_is_no_licence_for_another_rate(line, tmp_path):
     text = f"{line}\nforce;acc\n{ROWS}"
@@ -116,6 +171,36 @@ def test_an_unnamed_column_with_numbers_is_still_a_channel_that_the_layout_does_
     assert error.reason == "channel_unknown"
 
 
+HEADS = {
+    "as many cells above": "Messung;Gleis 3;Weiche 12\nZeit;force;acc\n",
+    "more cells above": "Ort;Bf. Nord;Gleis 3;Weiche 12\nZeit [s];force [N];acc [m/s²]\n",
+    "a row of units": "Messung;Gleis 3;Weiche 12\nPrüfer;M. Jensen;\nZeit;force;acc\ns;N;m/s²\n",
+    "units in brackets of their own": "Messung;Gleis 3;Weiche 12\nZeit;force;acc\n(s);[N];(m/s^2)\n",
+    "a comment below the units": "Messung;Gleis 3;Weiche 12\nZeit;force;acc\ns;N;m/s²\nUhr;Hammer;Schwelle 3\n",
+    "a comment below the names": "Messung;Gleis 3;Weiche 12\nZeit [s];force [N];acc [m/s²]\nUhr;Hammer;Schwelle 3\n",
+    "an empty row between": "Messung;Gleis 3;Weiche 12\n;;\nZeit;force;acc\n;;\ns;N;m/s²\n",
+    "empty units and a comment": "Zeit;force;acc\n;;\nUhr;Hammer;Schwelle 3\n",
+    "the time of day above": "Datum;13.05.2024;\nZeit;08:30:12;\nt_rel [s];force;acc\n",
+    "a unit above": "Einheit;g;N\nMessung;Gleis 3;Weiche 12\nZeit;force;acc\ns;N;m/s²\n",
+    "a length above": "Messung;Gleis 3;\nLage;12 m;\nZeit;force;acc\n",
+    "a unit that says nothing": "Messung;Gleis 3;Weiche 12\nZeit;force;acc\ns;EU;EU\n",
+}
+
+
+@pytest.mark.parametrize("head", HEADS)
+def test_the_names_are_those_above_the_numbers_and_their_units(head, tmp_path):
+    """Whatever stands further up may have as many cells as there are columns."""
+    rows = "".join(f"{k / 20000:.9g};{a:.4f};{b:.4f}\n" for k, (a, b) in enumerate(X))
+    sound(tmp_path, "a.csv", HEADS[head] + rows)
+
+
+def test_a_unit_that_is_not_known_is_still_one_of_a_row_of_units(tmp_path):
+    by_index = replace(NAMED, channels=tuple(replace(c, source=i) for i, c in enumerate(NAMED.channels)))
+    (tmp_path / "a.csv").write_text(f"rate: 20000\nforce;acc\nN;furlong\n{ROWS}")
+    (error,) = read("a.csv", tmp_path, by_index).errors
+    assert error.reason == "unit_unknown" and "furlong" in error.found
+
+
 @pytest.mark.parametrize(("unit", "second"), [("s", 1.0), ("ms", 1e3), ("µs", 1e6), ("\u03bcs", 1e6), ("us", 1e6)])
 def test_a_time_column_in_its_unit_gives_the_rate(unit, second, tmp_path):
     rows = "".join(f"{second * k / 20000:.9g};{a:.4f};{b:.4f}\n" for k, (a, b) in enumerate(X))
@@ -135,15 +220,73 @@ def test_a_time_column_of_another_language_is_held_against_the_promised_rate(tit
         assert error.reason == "wrong_rate" and "10000" in error.found
 
 
-@pytest.mark.parametrize("row", ["08:00:00.5;1,0;2,0", "1.000,5;2,0", "1.0  2.0"])
+@pytest.mark.parametrize("row", ["08:00:00.5;1,0;2,0", "1.0  2.0"])
 def test_a_table_in_which_no_line_is_numbers_alone_is_quoted(row, tmp_path):
-    """A clock, marks for thousands, spaces between: the copy is whole, another one will not help."""
+    """A clock, spaces between: the copy is whole, another one will not help."""
     (tmp_path / "a.csv").write_text("force;acc\n" + f"{row}\n" * 50)
     with pytest.raises(ReadError) as caught:
         read("a.csv", tmp_path, NAMED)
     said = f"no line of numbers; the last line reads '{row}'"
     remedy = "Export numbers between semicolons, tabs or commas, the time in seconds"
     assert str(caught.value) == f"a.csv, the file: {said}. {remedy}."
+
+
+COMMAS = "".join(f"{comma(a)};{comma(b)}\n" for a, b in X)
+
+
+@pytest.mark.parametrize("cell", ["1.234,56", "-1 234,5", "1'234,5", "12\u00a0345,5", "1.234.567"])
+@pytest.mark.parametrize("above", [COMMAS, ""])
+def test_a_mark_for_thousands_is_named_with_its_line_and_column(cell, above, tmp_path):
+    """Also in the first row, which is no line of names; the copy is whole, another one will not help."""
+    (tmp_path / "a.csv").write_text(f"rate: 20000\nforce;acc\n{above}0,5;{cell}\n{COMMAS}", encoding="utf-8")
+    with pytest.raises(ReadError) as caught:
+        read("a.csv", tmp_path, NAMED)
+    line = 3 + 50 * bool(above)
+    assert str(caught.value) == (
+        f"a.csv, line {line}, column 'acc': {cell!r} has marks for thousands, or another decimal mark than other "
+        "numbers. Export all numbers with one decimal mark and without marks for thousands."
+    )
+
+
+@pytest.mark.parametrize("cell", ["#NV", "#N/A", "NaN", "#DIV/0!", ""])
+@pytest.mark.parametrize("where", [0, 30])
+def test_a_missing_value_is_counted_with_its_place_and_costs_its_channel_alone(cell, where, tmp_path):
+    rows = COMMAS.splitlines()
+    rows[where] = rows[where].split(";")[0] + f";{cell}"
+    (tmp_path / "a.csv").write_text("force;acc\n" + "\n".join(rows) + "\n")
+    result = read("a.csv", tmp_path, replace(NAMED, kind="passage", rate=20000.0))
+    (error,) = result.errors
+    assert error.reason == "not_finite" and error.where == "record 1 of 1, channel 'rail'"
+    assert error.found == f"1 of 50 samples are missing or not finite, the first is sample {where}"
+    assert error.remedy.startswith("Export the record again from the logger; if it is so there too, check")
+    np.testing.assert_allclose(result.recordings[0].samples, X.T[:1].round(4), atol=1e-12)
+
+
+def test_a_word_among_the_numbers_is_said_with_its_line_and_column(tmp_path):
+    (tmp_path / "a.csv").write_text(f"rate: 20000\nforce;acc\n{COMMAS}overload;0,5\n")
+    with pytest.raises(ReadError) as caught:
+        read("a.csv", tmp_path, NAMED)
+    assert str(caught.value) == (
+        "a.csv, line 53, column 'force': 'overload' is no number. Copy the file again from the logger; if it stands in "
+        "the logger's own file too, leave that record out."
+    )
+
+
+SHEETS = {
+    "xlsx": b"PK\x03\x04\x14\x00\x06\x00\x08\x00" + bytes(16) + b"\x13\x00\x00\x00[Content_Types].xml" + bytes(500),
+    "ods": b"PK\x03\x04\x14" + bytes(21) + b"\x08\x00\x00\x00mimetypeapplication/vnd.oasis.opendocument.spreadsheet",
+    "xls": b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(504) + b"\n",
+}
+
+
+@pytest.mark.parametrize("kind", SHEETS)
+@pytest.mark.parametrize(("name", "format"), [("a.csv", "auto"), ("a.csv", "csv"), ("a.xlsx", "auto")])
+def test_a_spreadsheet_is_named_whatever_it_is_called(kind, name, format, tmp_path):
+    (tmp_path / name).write_bytes(SHEETS[kind])
+    with pytest.raises(ReadError) as caught:
+        read(name, tmp_path, replace(NAMED, format=format))
+    said = "it is a spreadsheet's own file. Save it from the spreadsheet as CSV, text with separated columns"
+    assert str(caught.value) == f"{name}, byte 0: {said}." and caught.value.reason == "unreadable"
 
 
 def test_a_time_column_in_another_unit_is_refused(tmp_path):

@@ -78,6 +78,35 @@ def test_a_vehicle_file_is_refused_with_its_place(tmp_path, old, new, said):
     refused(load_vehicle, tmp_path / "v.yaml", VEHICLE.replace(old, new, 1), said)
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "line"),
+    [
+        ("share: {value: 0.55", "shaer: {value: 0.55", "    - &nose"),
+        ("  level:", "  levle:", "  levle:"),
+        ("mass: {value: 60.2", "mass: {value: .nan", "  mass: {value: .nan"),
+        ("unit: cm⁴", "unit: furlong", "  second_moment:"),
+        ("roughness:\n", "rougness:\n", "rougness:"),
+        ("route: diverging}\n  ASM", "route: divering}\n  ASM", "  A9:"),
+        ("layers: 2", "layers: two", "layers: two"),
+    ],
+)
+def test_an_error_of_a_track_file_names_its_line(tmp_path, old, new, line):
+    text = TRACK.replace(old, new, 1)
+    number = 1 + next(k for k, said in enumerate(text.split("\n")) if said.startswith(line))
+    refused(load_track, tmp_path / "t.yaml", text, rf"t\.yaml, line {number}[,:] ")
+
+
+def test_an_error_of_what_another_track_says_names_the_line_of_that_file(tmp_path):
+    (tmp_path / "base.yaml").write_text(TRACK.replace("kind: cosine", "kind: sine"), encoding="utf-8")
+    (tmp_path / "own.yaml").write_text("extends: base\n\nname: own\n", encoding="utf-8")
+    line = 1 + next(k for k, said in enumerate(TRACK.split("\n")) if "kind: cosine" in said)
+    with pytest.raises(ConfigError, match=rf"base\.yaml, line {line}, routes\.main\[0\]\.kind: no path"):
+        load_track(str(tmp_path / "own.yaml"))
+    (tmp_path / "base.yaml").write_text(TRACK.replace("spacing: {value: 0.6", "spacing: {value: 0"), encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"own\.yaml, spacing: 0 m does not"):
+        load_track(str(tmp_path / "own.yaml"))
+
+
 def number(value, unit):
     return {"value": value, "unit": unit, "source": "made up"}
 

@@ -1,0 +1,85 @@
+"""What campaigns.csv and trains.csv say, held against the files beside them."""
+
+from bisect import bisect_left
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from datetime import date, datetime, timedelta
+from pathlib import Path
+
+from turnout.config import TurnoutConfig
+from turnout.config.csv_table import TableFault, read_csv
+from turnout.config.raw_notes import COLUMNS
+from turnout.errors import ReadError
+from turnout.fleet.notes import start_of
+from turnout.records import Unit
+
+SHIFTS = sorted((h for h in range(-14, 15) if h), key=abs)  # hours from UTC to the clocks of the world
+FEWEST = 3  # trains of which one shift makes passages: fewer may be chance
+
+
+def contradicted_notes(turnout: TurnoutConfig, raw_root: Path, units: Iterable[Unit]) -> Iterator[ReadError]:
+    """An error for each row without its files, and for files without their row; ``turnout`` has its notes.
+
+    Without campaigns.csv no row is missed. Rows that cannot be used are said by ``read_notes``.
+    """
+    units = list(units)
+    yield from _campaigns(Path(raw_root) / turnout.raw / "campaigns.csv", f"{turnout.raw}/campaigns.csv", units)
+    if turnout.passages:
+        tolerance = turnout.settings["passage"].train_data_tolerance
+        yield from _trains(turnout.trains, f"{turnout.raw}/trains.csv", units, timedelta(seconds=tolerance))
+
+
+def _campaigns(path: Path, name: str, units) -> Iterator[ReadError]:
+    try:
+        table = read_csv(path, name, COLUMNS, 2)
+    except (OSError, TableFault):
+        return
+    there = Counter(unit.campaign for unit in units if unit.kind == "hammer" for _ in unit.files)
+    noted = set()
+    for line, cells in table.rows:
+        day = _day(cells["campaign"])
+        noted.add(day)
+        if day is not None and day not in there:
+            remedy = "Correct its day, put its files there, or remove the row"
+            where = str(cells.place(name, line, "campaign"))
+            yield ReadError(name, where, f"no hammer file is of campaign {day}", remedy)
+    for day in sorted(there.keys() - noted):
+        files = f"{there[day]} file{'s' * (there[day] > 1)}"
+        found = (
+            f"no row for campaign {day}, of which there are {files}: it counts as measured at noon, without a rail "
+            "temperature"
+        )
+        remedy = f"Add a line '{day},<start in UTC>,<rail temperature in °C>'"
+        yield ReadError(name, "line 1", found, remedy)
+
+
+def _day(text: str) -> str | None:
+    try:
+        return date.fromisoformat(text).isoformat()
+    except ValueError:
+        return None
+
+
+def _trains(rows, name: str, units, tolerance: timedelta) -> Iterator[ReadError]:
+    """An error where no train fits a passage, and most do once whole hours are taken off."""
+    passages = [start for unit in units if unit.kind == "passage" and (start := start_of(unit.label))]
+    trains = sorted(datetime.fromisoformat(row["passed_at_utc"].removesuffix("Z")) for row in rows)
+
+    def fitting(hours: int) -> int:
+        return sum(_near(p + timedelta(hours=hours), trains, tolerance) for p in passages)
+
+    if not passages or not trains or fitting(0):
+        return
+    count, hours = max(((fitting(h), h) for h in SHIFTS), key=lambda found: found[0])
+    if count < max(FEWEST, min(len(passages), len(trains)) / 2):
+        return
+    shift = f"{abs(hours)} h {'after' if hours > 0 else 'before'}"
+    seconds = f"{tolerance.total_seconds():.0f} s"
+    found = f"of {len(passages)} passages none has a train within {seconds}, and {count} have one {shift}"
+    remedy = "Write passed_at_utc in UTC, not in local time"
+    yield ReadError(name, "column passed_at_utc", found, remedy)
+
+
+def _near(moment: datetime, trains: list[datetime], tolerance: timedelta) -> bool:
+    at = bisect_left(trains, moment - tolerance)
+    return at < len(trains) and trains[at] <= moment + tolerance

@@ -1,0 +1,89 @@
+"""`turnout check` holds campaigns.csv and trains.csv against the files beside them."""
+
+from datetime import datetime, timedelta
+
+import pytest
+
+from turnout.cli import main
+
+HEADER = "campaign,started_at_utc,rail_temperature_c\n"
+
+
+@pytest.fixture
+def raw(tmp_path, repository, monkeypatch):
+    """The raw folder of the first of two turnouts, with the files of two campaigns."""
+    import shutil
+
+    shutil.copytree(repository / "config", tmp_path / "config")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "config/turnouts.tsv").write_text("turnout\tlayout\traw\ntommerup_s1\ttommerup\tline_7/s1\n")
+    (tmp_path / "config/events.csv").unlink(missing_ok=True)
+    (tmp_path / "config/acknowledgements.csv").unlink(missing_ok=True)
+    for campaign in ("2024-05-13", "2024-09-02"):
+        folder = tmp_path / "raw/line_7/s1/hammer" / campaign
+        folder.mkdir(parents=True)
+        for name in ("A7_1.uff", "A8_1.uff"):
+            (folder / name).write_bytes(b"x")
+    return tmp_path / "raw/line_7/s1"
+
+
+def checked(capsys):
+    code = main(["check"])
+    return code, [line.strip() for line in capsys.readouterr().out.splitlines() if ".csv, " in line]
+
+
+def test_campaigns_that_agree_with_the_files_say_nothing(raw, capsys):
+    assert checked(capsys) == (0, [])  # nobody noted anything: none is accused
+    (raw / "campaigns.csv").write_text(f"{HEADER}2024-05-13,2024-05-13T09:00,12\n20240902,2024-09-02T09:00,14\n")
+    assert checked(capsys) == (0, [])
+
+
+def test_a_campaign_without_files_and_files_without_a_campaign_are_said(raw, capsys):
+    rows = "2024-05-13,2024-05-13T09:00,12\n\n2024-09-20,2024-09-20T09:00,14\n"
+    (raw / "campaigns.csv").write_text(HEADER + rows)
+    code, said = checked(capsys)
+    assert code == 1 and said == [
+        "line_7/s1/campaigns.csv, line 4, column 1: no hammer file is of campaign 2024-09-20. Correct its day, put its "
+        "files there, or remove the row.",
+        "line_7/s1/campaigns.csv, line 1: no row for campaign 2024-09-02, of which there are 2 files: it counts as "
+        "measured at noon, without a rail temperature. Add a line '"
+        "2024-09-02,<start in UTC>,<rail temperature in °C>'.",
+    ]
+
+
+def test_a_row_that_cannot_be_used_is_said_once(raw, capsys):
+    (raw / "campaigns.csv").write_text(f"{HEADER}2024-05-13,2024-05-13T09:00,12\n2024-09-02,2024-09-02T09:00,warm\n")
+    code, (said,) = checked(capsys)
+    assert code == 1 and "rail_temperature_c is 'warm'" in said
+
+
+def passages(raw, seconds):
+    """A file at each of these seconds after a quarter past ten."""
+    (raw / "passages").mkdir()
+    for moment in (datetime(2024, 5, 13, 10, 15) + timedelta(seconds=s) for s in seconds):
+        (raw / "passages" / f"{moment:%Y%m%dT%H%M%SZ}.h5").write_bytes(b"x")
+
+
+TRAINS = (0, 1340, 2950, 4610, 7333, 11020)
+
+
+@pytest.mark.parametrize("hours", [2, -5])
+def test_trains_listed_in_local_time_are_said(raw, capsys, hours):
+    passages(raw, TRAINS)
+    times = [datetime(2024, 5, 13, 10 + hours, 15, 20) + timedelta(seconds=s) for s in TRAINS[1:]]
+    (raw / "trains.csv").write_text("passed_at_utc\n" + "".join(f"{t:%Y-%m-%dT%H:%M:%S}\n" for t in times))
+    code, (said,) = checked(capsys)
+    late = "after" if hours > 0 else "before"
+    assert code == 1 and said == (
+        f"line_7/s1/trains.csv, column passed_at_utc: of 6 passages none has a train within 90 s, and 5 have one "
+        f"{abs(hours)} h {late}. Write passed_at_utc in UTC, not in local time."
+    )
+
+
+@pytest.mark.parametrize("listed", [TRAINS, TRAINS[:1], (600, 5000), ()])
+def test_trains_of_which_some_were_not_recorded_say_nothing(raw, capsys, listed):
+    """A table of operation lists more trains than were recorded, or fewer."""
+    passages(raw, TRAINS)
+    times = [datetime(2024, 5, 13, 10, 15, 20) + timedelta(seconds=s) for s in listed]
+    (raw / "trains.csv").write_text("passed_at_utc\n" + "".join(f"{t:%Y-%m-%dT%H:%M:%S}\n" for t in times))
+    assert checked(capsys) == (0, [])
