@@ -183,7 +183,7 @@ def _checked(case, fit, score, settings):
         return score
     mine, reference = held_out_score(case, score.fit), held_out_score(case, fit)
     by_condition = {c: mine[c] - reference[c] for c in reference}
-    alone = hangs_on(case, score.fit, score.candidate, by_condition, settings) if score.material else ""
+    alone = hangs_on(case, score.fit, score.candidate, score.gain, by_condition, settings) if score.material else ""
     return replace(score, worst=min(by_condition.values(), default=0.0), by_condition=by_condition, alone=alone)
 
 

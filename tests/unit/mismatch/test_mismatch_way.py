@@ -10,8 +10,8 @@ from turnout.mismatch import ends, refits
 from turnout.mismatch.case import Case, Nuisance
 from turnout.mismatch.joint import FINE, STALL, fit_jointly
 from turnout.mismatch.observation import Observation
+from turnout.mismatch.score import Score
 from turnout.mismatch.track.rolling import BLURRED, Rolling, _topped, observed
-from turnout.mismatch.verdict import Score
 from turnout.records import Channel, Recording
 
 
