@@ -6,6 +6,7 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.alone import hangs_on
+from turnout.mismatch.anew import begun_anew
 from turnout.mismatch.ends import ended, kept
 from turnout.mismatch.held_out import held_out_score
 from turnout.mismatch.joint import FINE, Joint, cost_at, fit_jointly
@@ -60,6 +61,7 @@ def _ranked(case, fit, settings, tell, store, effect, promising):
         close = min(material[0].gain - settings.margin, HELD * material[0].gain) if material else 0.0
         leaders = [s for s in material if s.gain > max(NEARLY * settings.threshold, close)]
         polished = [_polished(case, fit, s, settings, store, effect) for s in leaders]
+        polished = [begun_anew(case, fit, s, settings, store, effect) for s in polished]
         ranked = sorted([*polished, *(s for s in ranked if all(s is not x for x in leaders))], key=lambda s: -s.gain)
     return ranked
 
