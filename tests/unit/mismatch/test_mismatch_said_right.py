@@ -19,6 +19,7 @@ from turnout.mismatch.scoring import explained_of, heard, judged, score_of
 from turnout.mismatch.together import reconsidered
 from turnout.mismatch.track import TrackCase
 from turnout.mismatch.track.blow_model import BlowModel
+from turnout.mismatch.track.ceiling import highest
 from turnout.mismatch.track.library import _sensors
 from turnout.mismatch.track.missing_source import _forces, missing_sources
 from turnout.mismatch.track.planned import measured_campaign, small_plan
@@ -177,7 +178,7 @@ def _library_of(sensor, peak, whole=None):
     campaign = SimpleNamespace(sensors=(sensor,), passages=(SimpleNamespace(recording=recording),))
     made = SimpleNamespace(
         campaign=campaign, pairs={}, rollings={"p": None}, ceilings={},
-        settings=MismatchSettings(), peak=lambda name: peak,
+        settings=MismatchSettings(), peak=lambda name: peak, highest=lambda name: highest(campaign, name),
     )  # fmt: skip
     return _sensors(made)
 

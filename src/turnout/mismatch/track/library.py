@@ -6,7 +6,7 @@ import numpy as np
 
 from turnout import physics
 from turnout.mismatch.candidate import Candidate
-from turnout.mismatch.track.ceiling import LIMIT_SD, highest
+from turnout.mismatch.track.ceiling import LIMIT_SD
 
 LOOSE = 0.15  # share by which sizes err: nine effects of another simulator, opened, had a median of 0.12, rms 0.18
 EXACT = 0.03  # the same of gains and lags, which are what they are: ten, opened, had a median of 0.01
@@ -113,7 +113,7 @@ def _sensors(case):
             yield per(physics.ClockDrift, tuple((sign * d,) for d in DRIFTS for sign in (1.0, -1.0)), whole=True)
             peak = case.peak(name)
             if peak > 0.0:
-                yield from _clipping(per, peak, highest(case.campaign, name))
+                yield from _clipping(per, peak, case.highest(name))
                 least = case.settings.materiality * peak
                 yield per(physics.Hum, ((0.1 * peak, 0.0),), least=least, sized=2)
     for name, ceiling in case.ceilings.items():
