@@ -2,7 +2,7 @@
 
 import json
 
-from turnout.mismatch.verdict import NO_UPPER_END
+from turnout.mismatch.score import NO_UPPER_END
 
 # What the simulation lacked, in words; {place}, {channel}, {train}, {wheel}, every parameter with its
 # unit, and its size without the sign as {<parameter>_size}.

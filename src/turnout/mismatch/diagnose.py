@@ -6,6 +6,7 @@ import numpy as np
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
+from turnout.mismatch.apart import shared
 from turnout.mismatch.ends import kept, to_the_end, with_derivatives
 from turnout.mismatch.joint import CHEAP_STEPS, fit_jointly
 from turnout.mismatch.latent import Latent
@@ -27,10 +28,8 @@ from turnout.mismatch.verdict import Verdict, opened
 from turnout.mismatch.verify import decoy, fit_of_reserved, fit_percent, gain_error
 from turnout.mismatch.whereabouts import Whereabouts, whereabouts
 
-# Share of the first effect's evidence that a law of not quite its shape leaves: sizes are right to a fifth.
+# Share of the first effect's evidence that a law of not quite its shape leaves where that shows: sizes err by a fifth.
 SHAPE = 0.05
-APART = 0.02  # the same to a name for other recordings: what one sensor shows wrong is not what all do, or one train
-FRAMES = {("", "sensor"), ("", "train"), ("sensor", "train"), ("train", "sensor")}  # those apart
 # Level of controls, times: where more is left of recordings never used, nothing agrees. Three opened controls leave
 # 0.37 to 0.54 of it, as in those that were fitted; trains of a kind that was not among those may leave more.
 UNFORETOLD = 2.0
@@ -123,7 +122,7 @@ def diagnose(case, settings=None, progress=None, store=None):
         scores, fit = scored(case, fit, settings, tell, store, effect, promising)
         base = base if effect else fit
         verdict, best = judged(case, fit, scores, settings)
-        if effect and (verdict.answer != "named" or best.gain < _shape_of(verdicts[0].scores[0], best)):
+        if effect and (verdict.answer != "named" or best.gain < _shape_of(case, verdicts[0].scores[0], best)):
             verdicts[0] = told_beside(verdicts[0], verdict)
             break
         if choice:
@@ -186,17 +185,11 @@ def _as_it_ends(verdict, case, fit, settings):
     return opened(replace(verdict, grade=grade, scores=(own, *verdict.scores[1:])), settings)
 
 
-def _shape_of(first, second):
+def _shape_of(case, first, second):
     """Evidence that a law of not quite the shape out there may leave to another name. [nats]"""
-    if first.candidate.exact:
+    if first.candidate.exact or second.gain >= SHAPE * first.gain:
         return 0.0
-    return (APART if (_frame(first), _frame(second)) in FRAMES else SHAPE) * first.gain
-
-
-def _frame(score):
-    """ "sensor", "train", "" for the whole track, or "place"."""
-    where = score.candidate.where
-    return next((k for k in ("sensor", "train") if k in where), "place" if where else "")
+    return SHAPE * first.gain * shared(case, second.fit, first.candidate, second.candidate)
 
 
 def _own_numerics(case, base, settings):

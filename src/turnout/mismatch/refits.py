@@ -6,6 +6,7 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.alone import hangs_on
+from turnout.mismatch.anew import begun_anew
 from turnout.mismatch.ends import ended, kept
 from turnout.mismatch.held_out import held_out_score
 from turnout.mismatch.joint import FINE, Joint, cost_at, fit_jointly
@@ -60,6 +61,7 @@ def _ranked(case, fit, settings, tell, store, effect, promising):
         close = min(material[0].gain - settings.margin, HELD * material[0].gain) if material else 0.0
         leaders = [s for s in material if s.gain > max(NEARLY * settings.threshold, close)]
         polished = [_polished(case, fit, s, settings, store, effect) for s in leaders]
+        polished = [begun_anew(case, fit, s, settings, store, effect) for s in polished]
         ranked = sorted([*polished, *(s for s in ranked if all(s is not x for x in leaders))], key=lambda s: -s.gain)
     return ranked
 
@@ -183,7 +185,7 @@ def _checked(case, fit, score, settings):
         return score
     mine, reference = held_out_score(case, score.fit), held_out_score(case, fit)
     by_condition = {c: mine[c] - reference[c] for c in reference}
-    alone = hangs_on(case, score.fit, score.candidate, by_condition, settings) if score.material else ""
+    alone = hangs_on(case, score.fit, score.candidate, score.gain, by_condition, settings) if score.material else ""
     return replace(score, worst=min(by_condition.values(), default=0.0), by_condition=by_condition, alone=alone)
 
 

@@ -4,7 +4,8 @@ import numpy as np
 
 from turnout.mismatch.held_out import held_out_score, mean_square_out, told_alone
 from turnout.mismatch.latent import latent_law
-from turnout.mismatch.verdict import Score, judge, objected
+from turnout.mismatch.score import Score
+from turnout.mismatch.verdict import judge, leading, objected
 from turnout.mismatch.verify import falls, fit_of_reserved
 
 ODD = 3.0  # times the spread of like parts: one in 370 of sound ones
@@ -128,11 +129,11 @@ def loudest(case, fit):
 
 def judged(case, fit, scored, settings):
     """(Verdict on the ``scored`` candidates on top of ``fit``, the Score that it names or would have, or None)."""
-    best = max((s for s in scored if s.material), key=lambda s: s.gain, default=None)
     excess = heard(case, fit, settings)
     scored = tuple(s for s in scored if s.material)
-    if best is None:
+    if not scored:
         return judge([], excess, settings, disturbed=bool(case.disturbed), foreign=case.foreign), None
+    best = leading(scored, excess, settings)
     consistent, structure = True, 0.0
     if best.gain > settings.threshold:
         consistent = consistent_elsewhere(case, fit, best, settings)

@@ -4,77 +4,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-NO_UPPER_END = 0.5  # of a size; one that errs by more is known from below alone: 95 % reach beyond twice of it
 WEAK = 2.0  # thresholds; below it a name that held-out recordings refuse is no evidence that anything is missing
+EVEN = 3.0  # nats, 20 to 1: by so much a law with a number more falls behind where that number means nothing
 TORN = 0.2  # of the gain; a condition that loses more than this, and half a threshold, speaks against the name
 VERDICTS = ("none", "named", "a_or_b", "unknown", "numerics")
-
-
-@dataclass(frozen=True)
-class Score:
-    """A candidate after its joint refit: ``gain`` in held-out log density over the base model less the log of the
-    places scanned [nats], ``worst`` the least gain of a fold, ``explained`` share of the excess, ``fit``; ``usual``: of
-    a size by which like parts of this very case differ anyway, or not shown by those who would have to; ``alone`` the
-    one condition that it hangs on (``alone.hangs_on``)."""
-
-    candidate: object
-    gain: float
-    worst: float
-    explained: float
-    fit: object
-    by_condition: dict = field(default_factory=dict)
-    usual: bool = False
-    alone: str = ""
-
-    @property
-    def own(self):
-        """(values, standard errors) of its parameters; the first is the size of the effect."""
-        mine = self.fit.part(self.candidate)
-        return self.fit.psi[mine], self.fit.psi_se[mine]
-
-    @property
-    def family(self):
-        """Name of the effect."""
-        return self.candidate.family
-
-    @property
-    def material(self):
-        """It is large enough that somebody would act."""
-        if self.usual:
-            return False
-        known, sized = self.candidate.parameters, self.candidate.sized
-        size = np.linalg.norm(self.own[0][:sized] - self.candidate.neutral[:sized]) if known else np.inf
-        open_by = self.candidate.sure * float(self.own[1][0]) if self.candidate.sure else 0.0
-        return size - open_by >= self.candidate.least
-
-    def told_elsewhere(self, threshold):
-        """Data that are not those of the fit are evidence enough for it, and it makes the fit no worse: what is left
-        there is no witness against."""
-        enough = self.candidate.aside - np.log(self.candidate.scanned) > threshold
-        return self.candidate.sounding and enough and self.explained >= 0.0
-
-    @property
-    def is_open(self):
-        """Its size is only known from below, and beyond it is what ``open_as`` names."""
-        if not self.candidate.open_as:
-            return False
-        sizes, errors = self.own
-        return bool(errors[0] > NO_UPPER_END * abs(sizes[0] - self.candidate.neutral[0]))
-
-    def is_limit_of(self, other):
-        """``other`` is at the bound, within its standard error, where it cannot be told from this at the same place."""
-        if getattr(other.candidate, "limit", "") != self.family or other.candidate.where != self.candidate.where:
-            return False
-        sizes, errors = other.own
-        return float(sizes[0] - errors[0]) <= other.candidate.parameters[0].bounds[0]
-
-    def is_plain_form_of(self, other):
-        """``other`` at the same place says the same with a parameter more: its size is this one's."""
-        family, k = other.candidate.plain or ("", 0)
-        if family != self.family or other.candidate.where != self.candidate.where:
-            return False
-        (mine, error), (others, errors) = self.own, other.own
-        return abs(mine[0] - others[k]) <= 2.0 * np.hypot(error[0], errors[k])
 
 
 @dataclass(frozen=True)
@@ -162,6 +95,13 @@ def objected(worst, gain, settings):
     return worst < -max(0.5 * settings.threshold, TORN * gain)
 
 
+def leading(scores, excess, settings):
+    """The likeliest of ``scores``; where it explains too little, the likeliest that is told by other data, if any."""
+    ranked = sorted(scores, key=lambda s: -s.gain)
+    sure = [s for s in ranked if s.told_elsewhere(settings)]
+    return sure[0] if sure and ranked[0].faint(excess, settings) else ranked[0]
+
+
 def opened(verdict, settings):
     """A name whose size has no upper end, as that or what shows the same beyond it: a gap that no train closes, or no
     ballast at all. Others stay."""
@@ -217,10 +157,10 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
     found = [s for s in ranked if s.gain > settings.threshold and s.material]
     if not found:
         return no_name()
-    best = found[0]
-    little = excess > 1.0 and best.explained < settings.explained
-    faint = f"explains {best.explained:.0%} of the excess" if little else ""
-    if faint and not best.told_elsewhere(settings.threshold):
+    best = leading(found, excess, settings)
+    ranked = [best, *(s for s in ranked if s is not best)]
+    faint = f"explains {best.explained:.0%} of the excess" if best.faint(excess, settings) else ""
+    if faint and not best.told_elsewhere(settings):
         return verdict("unknown", reason=f"the best candidate {faint}")
     if left > settings.leftover:
         return verdict("unknown", reason=f"{best.family} leaves {left:.0f} times the level of controls")
@@ -236,14 +176,11 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
         return verdict("unknown", reason=f"{best.family} hangs on {best.alone} alone, which others do not confirm")
     if torn:
         return verdict("unknown", reason=f"{best.family} makes one condition worse by {-best.worst:.0f} nats")
-    plain = next((s for s in found[1:] if best.gain - s.gain < settings.margin and s.is_plain_form_of(best)), None)
-    best = plain or best  # the law with fewer numbers says as much
-    ranked = [best, *(s for s in ranked if s is not best)]
     same = [s for s in found if s.is_limit_of(best) and s.explained >= settings.explained]
     if same:  # what carries nothing hangs
         return verdict("a_or_b", (best.family, same[0].family), reason=f"{best.family} is at its limit")
     rivals = [s for s in ranked if s is not best and s.material and best.gain - s.gain < settings.margin]
-    rivals = [s for s in rivals if not best.is_plain_form_of(s)]
+    rivals = [s for s in rivals if not (best.is_plain_form_of(s) and best.gain - s.gain > EVEN)]
     if rivals:
         return verdict("a_or_b", (best.family, rivals[0].family), reason="within the margin of each other")
     grade = "A" if left <= 1.0 else "B"

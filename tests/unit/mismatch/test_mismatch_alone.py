@@ -12,7 +12,8 @@ from turnout.mismatch.candidate import Candidate
 from turnout.mismatch.case import Case
 from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.observation import Observation
-from turnout.mismatch.verdict import Score, judge
+from turnout.mismatch.score import Score
+from turnout.mismatch.verdict import judge
 from turnout.physics import Parameter
 
 SIZE = (Parameter("size", "-", 0.0, (-9.0, 9.0), "of a bump", "made up 2026"),)
@@ -63,9 +64,9 @@ def test_plainness_is_the_energy_of_the_change():
 )
 def test_what_one_recording_says_and_its_like_do_not(loud, gains, alone):
     case, fit = fitted(loud)
-    assert hangs_on(case, fit, case.candidates[0], gains, MismatchSettings()) == alone
+    assert hangs_on(case, fit, case.candidates[0], 25.0, gains, MismatchSettings()) == alone
     of_a_train = replace(case.candidates[0], where={"train": "ic3"})
-    assert hangs_on(case, fit, of_a_train, gains, MismatchSettings()) == ""
+    assert hangs_on(case, fit, of_a_train, 25.0, gains, MismatchSettings()) == ""
 
 
 class Struck(Days):
@@ -80,31 +81,35 @@ class Struck(Days):
 
 
 @pytest.mark.parametrize(
-    ("gains", "alone"),
+    ("gains", "gain", "alone"),
     [
         (
             (0.5, -1.0, 7.0, 6.0, 1.0, 0.5, 1.5),
+            16.0,
             "all blows at 4.2 m",
-        ),  # 13 against 2.5; neither campaign is a name alone
-        ((3.5, 4.0, 7.0, 6.0, 1.0, 0.5, 4.0), ""),  # 13 of others, of whom none would do alone
-        ((0.5, -1.0, 5.0, 6.0, 1.0, 0.5, 1.5), "all blows at 4.2 m"),  # 11, half a name, against 2.5
-        ((0.5, -1.0, 5.0, 6.0, 4.0, 1.5, 1.5), ""),  # 11 are no name and the others say half of one
-        ((0.5, -1.0, 2.5, 3.0, 1.0, 0.5, 1.5), ""),  # nor does it hang on 5.5
-        ((0.5, -1.0, 7.0, 6.0, 1.0, 0.5, 12.0), ""),  # the train bears it out
+        ),  # 13 against 2.5; no campaign would do alone
+        ((3.5, 4.0, 7.0, 6.0, 1.0, 0.5, 4.0), 26.0, ""),  # 13 of others, of whom none would do alone
+        ((0.5, -1.0, 5.0, 6.0, 1.0, 0.5, 1.5), 14.0, "all blows at 4.2 m"),  # 11, half a name, against 2.5
+        ((0.5, -1.0, 5.0, 6.0, 4.0, 1.5, 1.5), 17.0, ""),  # 11 are no name and the others say half of one
+        ((0.5, -1.0, 2.5, 3.0, 1.0, 0.5, 1.5), 8.0, ""),  # nor does it hang on 5.5
+        ((0.5, -1.0, 7.0, 6.0, 1.0, 0.5, 12.0), 26.0, ""),  # the train bears it out
+        ((0.5, -1.0, 7.0, 6.0, 1.0, 0.5, 1.5), 30.0, "all blows at 4.2 m"),  # 15.5 are most of 30
+        ((0.5, -1.0, 7.0, 6.0, 1.0, 0.5, 1.5), 32.0, ""),  # and not of 32: the rest is what nuisances pay
+        ((0.5, -4.0, 7.0, 6.0, 1.0, 0.5, 1.5), 32.0, "all blows at 4.2 m"),  # yet others speak against it by 0.5
     ],
 )
-def test_blows_at_one_spot_are_one_witness(gains, alone):
+def test_blows_at_one_spot_are_one_witness(gains, gain, alone):
     conditions = [f"{spot} {year}" for spot in (2.1, 4.2, 9.0) for year in (2025, 2026)]
     by_condition = dict(zip([*conditions, "railcar"], gains))
     case = Struck(2.1, 4.2, 9.0)
-    assert hangs_on(case, None, Days((1.0, 1.0, 1.0)).candidates[0], by_condition, MismatchSettings()) == alone
+    assert hangs_on(case, None, Days((1.0, 1.0, 1.0)).candidates[0], gain, by_condition, MismatchSettings()) == alone
 
 
 def test_of_two_spots_neither_is_the_odd_one():
     case, fit = fitted((1.0, 1.0, 1.0))
     of_two = Struck(2.1, 4.2)
     gains = {"2.1 2025": 0.5, "2.1 2026": -1.0, "4.2 2025": 7.0, "4.2 2026": 6.0, "railcar": 1.0}
-    assert hangs_on(of_two, fit, case.candidates[0], gains, MismatchSettings()) == ""
+    assert hangs_on(of_two, fit, case.candidates[0], 15.0, gains, MismatchSettings()) == ""
 
 
 @pytest.mark.parametrize("gain, answer", [(20.0, "none"), (60.0, "unknown")])

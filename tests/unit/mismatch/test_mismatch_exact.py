@@ -7,6 +7,7 @@ import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch import diagnose
+from turnout.mismatch.apart import shared
 from turnout.mismatch.candidate import Candidate
 from turnout.mismatch.case import Case, Nuisance
 from turnout.mismatch.held_out import told_alone
@@ -26,15 +27,12 @@ SHAPES = {"wave": np.sin(9.0 * X), "ramp": X - 0.5}
 class Shapes(Case):
     """A wave of 200 with a ramp of 0.28 beneath it, noise of 0.1."""
 
-    def __init__(self, exact, where=None):
+    def __init__(self, exact):
         data = 200.0 * SHAPES["wave"] + 0.28 * SHAPES["ramp"] + 0.1 * np.random.default_rng(6).normal(size=X.size)
         self.observations = (Observation("all", "all", data, np.full(X.size, 0.1)),)
         starts = (100.0,), (0.3,)
         self.candidates = tuple(
-            Candidate(
-                n, AMOUNT, lambda p, n=n: (n, p["amount"]), starts, (where or {}).get(n, {"shape": n}), exact=exact
-            )
-            for n in SHAPES
+            Candidate(n, AMOUNT, lambda p, n=n: (n, p["amount"]), starts, {"shape": n}, exact=exact) for n in SHAPES
         )
 
     def predict(self, values, terms, observations):
@@ -47,18 +45,59 @@ def test_a_second_effect_needs_a_share_of_the_first_only_where_its_law_may_be_of
     assert diagnose(Shapes(exact)).names == names
 
 
-WHOLE, SENSOR, TRAIN, PLACE = {}, {"sensor": "A"}, {"train": "railcar"}, {"place": 7.2}
+class Spread(Shapes):
+    """Wave and ramp of four times the energy, for four times the samples, each spread evenly over the ``cells``
+    (recording, sensor) in which it shows."""
+
+    frozen_jacobian = True
+
+    def __init__(self, **cells):
+        super().__init__(False)
+        self.cells, rng = {n: set(c.split()) for n, c in cells.items()}, np.random.default_rng(6)
+        frame = np.repeat([0, 1], X.size)
+        self.observations = tuple(
+            Observation(
+                o,
+                o,
+                y + 0.1 * rng.normal(size=y.size),
+                0.1,
+                cells=frame,
+                labels={"sensor": np.array(["A", "B"])},
+                rows=2,
+            )
+            for o, y in ((o, self.sum_of(o, (("wave", 400.0), ("ramp", 0.56)))) for o in "12")
+        )
+
+    def sum_of(self, o, terms):
+        rows = [
+            sum((a * SHAPES[n] / np.sqrt(len(self.cells[n])) for n, a in terms if o + s in self.cells[n]), 0.0 * X)
+            for s in "AB"
+        ]
+        return np.concatenate(rows)
+
+    def predict(self, values, terms, observations):
+        return [self.sum_of(o.name, terms) for o in observations]
 
 
 @pytest.mark.parametrize(
-    ("first", "second", "names"),
-    [(WHOLE, SENSOR, 2), (WHOLE, TRAIN, 2), (WHOLE, PLACE, 1), (SENSOR, WHOLE, 1), (SENSOR, TRAIN, 2),
-     (SENSOR, PLACE, 1), (TRAIN, SENSOR, 2), (TRAIN, WHOLE, 1), (PLACE, SENSOR, 1), (PLACE, TRAIN, 1),
-     (PLACE, WHOLE, 1)],
-)  # fmt: skip
-def test_what_other_recordings_show_is_less_likely_the_shape_of_the_first(first, second, names):
-    """The ramp is worth a 28th of the wave: beyond a fiftieth, within a twentieth."""
-    assert len(diagnose(Shapes(False, {"wave": first, "ramp": second})).names) == names
+    ("wave", "ramp", "alike", "names"),
+    [
+        ("1A", "1A", 1.0, 1),
+        ("1A", "1B", 0.0, 2),  # another sensor
+        ("1A 1B", "2A 2B", 0.0, 2),  # other recordings
+        ("1A", "1A 1B 2A 2B", 0.5, 2),  # what a mounting leaves is left in its own channel
+        ("1A 1B 2A 2B", "2B", 0.5, 2),  # what the track leaves is left in all
+        ("1A 1B 2A", "1A 1B 2A 2B", 0.866, 1),
+        ("1A 1B 2A 2B", "1A 1B 2A 2B", 1.0, 1),
+    ],
+)
+def test_what_shows_elsewhere_is_not_the_shape_of_the_first(wave, ramp, alike, names):
+    """The ramp is worth a 28th of the wave: within a twentieth of it, beyond 0.71 of a twentieth. Even shares of n and
+    m samples of which k are both's are alike by k over the root of n m."""
+    case = Spread(wave=wave, ramp=ramp)
+    assert len(diagnose(case).names) == names
+    fit = fit_jointly(case, case.candidates, [100.0, 0.3])
+    assert shared(case, fit, *case.candidates) == pytest.approx(alike, abs=1e-3)
 
 
 def test_a_gain_is_sought_beside_a_lag_of_the_same_channel_and_a_mounting_is_not():

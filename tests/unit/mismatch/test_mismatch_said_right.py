@@ -14,16 +14,17 @@ from turnout.mismatch.diagnose import Verification
 from turnout.mismatch.finding import finding_row
 from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.observation import Observation
+from turnout.mismatch.score import Score
 from turnout.mismatch.scoring import explained_of, heard, judged, score_of
 from turnout.mismatch.together import reconsidered
 from turnout.mismatch.track import TrackCase
 from turnout.mismatch.track.blow_model import BlowModel
+from turnout.mismatch.track.ceiling import highest
 from turnout.mismatch.track.library import _sensors
 from turnout.mismatch.track.missing_source import _forces, missing_sources
 from turnout.mismatch.track.planned import measured_campaign, small_plan
 from turnout.mismatch.track.predicting import Predicting
 from turnout.mismatch.track.rolling import Rolling, rolling_of
-from turnout.mismatch.verdict import Score
 from turnout.mismatch.verify import decoy, fit_percent
 from turnout.physics import Parameter
 from turnout.simulate.track import uniform_track
@@ -168,11 +169,16 @@ class Topped(Case):
         return [found for _ in observations]
 
 
-def _library_of(sensor, peak):
-    """The library's candidates of one channel that shows no more than ``peak``."""
+def _library_of(sensor, peak, whole=None):
+    """The library's candidates of one channel that shows no more than ``peak`` in the band, and ``whole`` at all."""
+    recording = SimpleNamespace(
+        channels=(SimpleNamespace(name="B"), sensor), index=["B", "A"].index,
+        samples=np.array([[0.0, 99.0, 1.0], [0.1, -0.3, -1.0]]) * np.array([[1.0], [whole or peak]]),
+    )  # fmt: skip
+    campaign = SimpleNamespace(sensors=(sensor,), passages=(SimpleNamespace(recording=recording),))
     made = SimpleNamespace(
-        campaign=SimpleNamespace(sensors=(sensor,)), pairs={}, rollings={"p": None}, ceilings={},
-        settings=MismatchSettings(), peak=lambda name: peak,
+        campaign=campaign, pairs={}, rollings={"p": None}, ceilings={},
+        settings=MismatchSettings(), peak=lambda name: peak, highest=lambda name: highest(campaign, name),
     )  # fmt: skip
     return _sensors(made)
 
@@ -188,6 +194,14 @@ def test_a_limit_is_found_from_any_start_of_the_library():
     assert np.array_equal(
         candidate.term(candidate.neutral).channel(case.true, 1.0, case.sensor), np.clip(case.true, -12.4, 12.4)
     )
+
+
+@pytest.mark.parametrize("whole, asked", [(6.2, True), (13.0, True), (14.0, False), (586.6, False)])
+def test_a_channel_is_not_cut_off_below_what_it_has_shown(whole, asked):
+    """12.4 in the band are never reached; 0.9 of 13 lie below that, of 14 not."""
+    found = [c for c in _library_of(SimpleNamespace(name="A", place=3.0), 6.2, whole) if c.family == "clipping"]
+    assert bool(found) == asked
+    assert all(0.9 * whole <= start[0] <= 12.4 for c in found for start in c.starts)
 
 
 def test_the_decoy_learns_from_recordings_like_those_it_has_to_predict():

@@ -13,10 +13,11 @@ from turnout.mismatch.case import Case, Nuisance
 from turnout.mismatch.diagnose import _as_it_ends
 from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.observation import Observation
+from turnout.mismatch.score import Score
 from turnout.mismatch.scout import _seen
 from turnout.mismatch.shortlist import Projector, _same_place
 from turnout.mismatch.together import borne_out, needed
-from turnout.mismatch.verdict import Score, Verdict, judge, opened
+from turnout.mismatch.verdict import Verdict, judge, opened
 from turnout.physics import Parameter
 
 AMOUNT = (Parameter("amount", "-", 0.0, (-9.0, 9.0), "share of a shape", "made up 2026"),)
@@ -122,10 +123,10 @@ def test_wheels_of_two_trains_vouch_for_one_another(told, names):
         assert {c.where["train"] for c in found.fit.candidates} == {"a", "b"}
 
 
-def own(candidate, values, errors):
-    """Score of 100 nats with these parameters."""
+def own(candidate, values, errors, nats=100.0):
+    """Score of so many ``nats`` with these parameters."""
     fit = SimpleNamespace(psi=np.array(values), psi_se=np.array(errors), part=lambda _: slice(0, len(values)))
-    return Score(candidate, 100.0, 0.0, 1.0, fit)
+    return Score(candidate, nats, 0.0, 1.0, fit)
 
 
 FACTOR = (Parameter("factor", "-", 1.0, (0.05, 20.0), "share of stiffness", "made up 2026"),)
@@ -135,14 +136,23 @@ GAP = (
 )
 
 
-@pytest.mark.parametrize("seated, said", [(0.33, ("local_ballast",)), (0.75, ("hanging_sleeper", "local_ballast"))])
-def test_a_part_that_never_lands_is_called_by_its_simpler_law(seated, said):
-    """A third of the bed bears, and no train closes the gap: that is ballast of a third. One whose seated share is not
-    what the ballast carries is another thing."""
+@pytest.mark.parametrize(
+    "seated, nats, said",
+    [
+        (0.33, 96.9, ("local_ballast",)),  # 22 to 1 for the law without a gap
+        (0.33, 97.1, ("local_ballast", "hanging_sleeper")),
+        (0.33, 102.0, ("hanging_sleeper", "local_ballast")),
+        (0.75, 96.9, ("local_ballast", "hanging_sleeper")),  # seated on more than the ballast carries: another thing
+        (0.33, 107.0, ("hanging_sleeper",)),
+    ],
+)
+def test_a_gap_and_softer_ballast_that_are_as_likely_are_a_choice(seated, nats, said):
+    """A third of the bed bears, and no train closes the gap: that is ballast of a third; nothing tells more."""
     here = {"sleeper": 7, "place": 4.2}
     ballast = Candidate("local_ballast", FACTOR, lambda p: p, ((0.4,),), here)
     gap = Candidate("hanging_sleeper", GAP, lambda p: p, ((1e-3, 0.0),), here, plain=("local_ballast", 1))
-    verdict = judge([own(gap, [3e-3, seated], [1e-3, 0.03]), own(ballast, [0.35], [0.04])], 2.0, MismatchSettings())
+    scores = [own(gap, [3e-3, seated], [1e-3, 0.03], nats), own(ballast, [0.35], [0.04])]
+    verdict = judge(scores, 2.0, MismatchSettings())
     assert verdict.names == said
     assert verdict.scores[0].family == said[0]  # whose fit and place are shown
 

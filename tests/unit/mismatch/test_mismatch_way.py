@@ -10,8 +10,8 @@ from turnout.mismatch import ends, refits
 from turnout.mismatch.case import Case, Nuisance
 from turnout.mismatch.joint import FINE, STALL, fit_jointly
 from turnout.mismatch.observation import Observation
+from turnout.mismatch.score import Score
 from turnout.mismatch.track.rolling import BLURRED, Rolling, _topped, observed
-from turnout.mismatch.verdict import Score
 from turnout.records import Channel, Recording
 
 
@@ -64,6 +64,7 @@ def test_what_comes_near_a_name_is_fitted_to_its_end_as_leaders_are(monkeypatch,
     )
     monkeypatch.setattr(refits, "_tried", lambda *a: score)
     monkeypatch.setattr(refits, "_polished", lambda *a: asked.append(a) or score)
+    monkeypatch.setattr(refits, "begun_anew", lambda case, fit, s, *a: s)
     monkeypatch.setattr(refits, "_checked", lambda case, fit, s, settings: s)
     monkeypatch.setattr(refits, "_owed", lambda *a: None)
     refits.scored(Bent(True), None, MismatchSettings(), lambda *a: None, {}, 0, None)

@@ -73,3 +73,13 @@ def _limit(sizes):
 def within_range(campaign, found):
     """The campaign without the sensors that have a ceiling: what these show is no response of the track."""
     return replace(campaign, sensors=tuple(s for s in campaign.sensors if s.name not in found))
+
+
+def highest(campaign, name):
+    """Largest value that a channel shows in any passage, reserved or not, at its full rate; 0 where none has it. [m/s²]
+
+    What a channel has shown it can show: it is cut off nowhere below.
+    """
+    recordings = [p.recording for p in campaign.passages]
+    seen = [r.samples[r.index(name)] for r in recordings if name in {c.name for c in r.channels}]
+    return max((float(np.max(np.abs(x))) for x in seen), default=0.0)

@@ -14,7 +14,8 @@ GAPS = (1.3e-4, 3e-4, 7e-4, 1.6e-3)  # below the first a train closes it at once
 SEATED = (0.0, 0.4)  # share of the bed that still bears: nothing, or nearly a half
 MOUNTINGS = tuple(np.geomspace(150.0, 1500.0, 12))  # a width at Q = 5 apart [Hz]
 DELAYS = (1e-4, 2.5e-4, *np.arange(5e-4, 5.6e-3, 5e-4))  # a quarter of a turn at 500 Hz apart [s]
-LIMITS = (0.8, 0.6, 0.4, 0.25)  # of the peak that a channel shows, where it may clip
+LIMITS = (0.05, 0.2, 0.5)  # of the way from what a channel has shown to what it never reaches, where it may clip
+UNLIKE_SIDES = 0.9  # one side of an amplifier, of the other that saturates later
 DRIFTS = (2.5e-4, 5e-4, 1e-3, 2e-3, 4e-3)  # a sensor is passed within some seconds
 RINGING = tuple(np.geomspace(90.0, 500.0, 6))  # a hung mass shows over half an octave [Hz]
 BENDING = tuple(np.geomspace(85.0, 760.0, 20))  # two widths of the resonance apart [Hz]
@@ -112,19 +113,21 @@ def _sensors(case):
             yield per(physics.ClockDrift, tuple((sign * d,) for d in DRIFTS for sign in (1.0, -1.0)), whole=True)
             peak = case.peak(name)
             if peak > 0.0:
-                yield _clipping(per, peak)
+                yield from _clipping(per, peak, case.highest(name))
                 least = case.settings.materiality * peak
                 yield per(physics.Hum, ((0.1 * peak, 0.0),), least=least, sized=2)
     for name, ceiling in case.ceilings.items():
         yield _clipped(name, ceiling)
 
 
-def _clipping(per, peak):
-    """A limit within the channel's own peak [m/s²]: twice that is none."""
-    bounds, prior = (0.01 * peak, 2.0 * peak), (0.6 * peak, 0.4 * peak)
-    limit = replace(physics.Clipping.parameters[0], neutral=2.0 * peak, bounds=bounds, prior=prior)
-    starts = tuple((share * peak,) for share in LIMITS)
-    return replace(per(physics.Clipping, starts, loose=0.0, whole=True), parameters=(limit,))
+def _clipping(per, peak, highest):
+    """A limit within the channel's own peak [m/s²], twice of which is none, and not below what it has ever shown."""
+    least, none = UNLIKE_SIDES * highest, 2.0 * peak
+    if least >= none:
+        return
+    limit = replace(physics.Clipping.parameters[0], neutral=none, bounds=(least, none), prior=(peak, 0.4 * peak))
+    starts = tuple((least + share * (none - least),) for share in LIMITS)
+    yield replace(per(physics.Clipping, starts, loose=0.0, whole=True), parameters=(limit,))
 
 
 def _clipped(name, ceiling):

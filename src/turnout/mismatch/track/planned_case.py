@@ -52,6 +52,10 @@ class PlannedCase(TrackCase):
         self.observations = tuple(self._expected())
         self.candidates, self.families = library(self, families), ()
 
+    def highest(self, channel):
+        """What a channel shows in the band: nothing else is simulated of a campaign to come. [m/s²]"""
+        return self.peak(channel)
+
     def _expected(self):
         values = {n.name: n.mean for n in self.nuisances}
         for pair in list(self.pairs.values()):

@@ -12,7 +12,7 @@ from turnout.mismatch.joint import CHEAP_STEPS, fit_jointly
 from turnout.mismatch.track import derivatives, roll, rolling
 from turnout.mismatch.track.base_model import SEAT_SD, rail_spreads, track_nuisances, with_rail, zone_of
 from turnout.mismatch.track.blows_case import Blows
-from turnout.mismatch.track.ceiling import ceilings, within_range
+from turnout.mismatch.track.ceiling import ceilings, highest, within_range
 from turnout.mismatch.track.library import LOOSE, library
 from turnout.mismatch.track.observing import (
     foreign,
@@ -111,6 +111,10 @@ class TrackCase(Predicting, Case):
             if channel in names:
                 found.append(float(np.max(np.abs(o.data.reshape(len(names), -1)[names.index(channel)]))))
         return max(found)
+
+    def highest(self, channel):
+        """Largest value that a channel has shown at its full rate, in recordings kept back as well. [m/s²]"""
+        return highest(self.campaign, channel)
 
     def _waves(self):
         if not self.campaign.passages:
