@@ -23,7 +23,7 @@ def begun(state: Path) -> dict[str, str]:
     """Units that were begun and have not ended, and the run that began each; ``state`` is their shard's state file."""
     found = {}
     for note in batch_folder(state).glob(f"{PREFIX}*"):
-        run, _, unit = note.read_text(encoding="utf-8").partition("\n")
+        run, unit = _said(note)
         if note == _note(state, unit):  # else it is cut: the unit was not even begun
             found[unit] = run
     return found
@@ -31,12 +31,12 @@ def begun(state: Path) -> dict[str, str]:
 
 @contextmanager
 def noted(state: Path, unit: str, run: str) -> Iterator[None]:
-    """Note a unit until the block has come to its end, by an exception, too; a note that is there stays as it is.
+    """Note a unit until the block has come to its end, by an exception, too; a whole note that is there stays as it is.
 
     The note is not flushed to the disk: it tells of a process that died, not of a machine that did.
     """
     note = _note(state, unit)
-    if not note.exists():
+    if _said(note)[1] != unit:
         note.parent.mkdir(parents=True, exist_ok=True)
         note.write_text(f"{run}\n{unit}", encoding="utf-8")
     try:
@@ -48,6 +48,15 @@ def noted(state: Path, unit: str, run: str) -> Iterator[None]:
 def forget(state: Path, unit: str) -> None:
     """Take the note of a unit away, where there is one."""
     _note(state, unit).unlink(missing_ok=True)
+
+
+def _said(note: Path) -> tuple[str, str]:
+    """(run, unit) of a note, as far as it is there and whole."""
+    try:
+        run, _, unit = note.read_bytes().decode(errors="replace").partition("\n")
+    except FileNotFoundError:  # its unit has ended meanwhile
+        return "", ""
+    return run, unit
 
 
 def _note(state: Path, unit: str) -> Path:

@@ -163,7 +163,7 @@ class _Run:
         elif name not in self.suspects or (self.launched and self.suspects[name] == self.launched):
             self._keep(Postponed(name, DIED))
         else:
-            self._keep(found := self._guarded(task, died_of))
+            self._keep(found := _for_now(self._guarded(task, died_of)))
             self.ledger.checkpoint()
             if not isinstance(found, Postponed):
                 forget(self.path, name)
@@ -230,6 +230,14 @@ class _Run:
         for name in sorted(left):
             self.ledger.keep(withdrawn(name, units[name]), "")
         return 0 if self.stage.gather else len(gone)
+
+
+def _for_now(found: Computed | Postponed) -> Computed | Postponed:
+    """A result that no content is known by: a file that is touched is tried again, for the machine may be another."""
+    if isinstance(found, Postponed):
+        return found
+    result, *stamp = found
+    return replace(result, key=f"{DIED} {result.key}"), *stamp
 
 
 def _name(task: Task) -> str:
