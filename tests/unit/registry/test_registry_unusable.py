@@ -117,3 +117,23 @@ def test_the_cards_of_the_fleets_page_count_the_rows_of_the_list(bench):
         said = fleet_page(FleetSource(con), Template(), {})
     assert [w["label"] for w in said["worklist"]] == ["A1", "A2, A3"]
     assert said["count"]["cannot_tell"] == 2
+
+
+def test_a_turnout_that_was_taken_out_is_on_no_list_and_back_on_it_when_it_is_back(bench):
+    both = [{"turnout_id": t, "layout": "l", "config_hash": "h"} for t in ("t1", "t2")]
+    lists = {
+        name: f"select distinct turnout_id from {name} order by all"
+        for name in ("unusable()", "cannot_see()", "quarantine_open", "quarantine_by_reason")
+    }
+
+    def said():
+        return {name: [row[0] for row in bench.ask(sql)] for name, sql in lists.items()}
+
+    bad = [quarantined_result("t2", section="A2"), quarantined_result("t1", section="A2")]
+    bench.register(rejected_result(), rejected_result(turnout="t2"), *bad, tables={"turnouts": both})
+    assert said() == dict.fromkeys(lists, ["t1", "t2"])
+    bench.register(tables={"turnouts": both[1:]})
+    assert said() == dict.fromkeys(lists, ["t2"])
+    assert bench.ask("select count(*) from models_current where turnout_id = 't1'") == [(1,)]  # history stays
+    bench.register(tables={"turnouts": both})
+    assert said() == dict.fromkeys(lists, ["t1", "t2"])
