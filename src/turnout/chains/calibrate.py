@@ -39,7 +39,7 @@ def track_asked(track, turnout_id=None, config="config"):
 
 
 def calibrate_to_files(track_name, section, files, turnout_id=None, config="config", seed=0):
-    """``Calibration`` of ``section`` of a track, by name or file, to the hammer tests in ``files``, all of that section.
+    """``Calibration`` of ``section`` of a track, by name or file, to the hammer tests in ``files``, all of it.
 
     The receptance is H1 of all accepted impacts; its random error is that of its coherence,
     :math:`\\sigma = |H| \\sqrt{(1-\\gamma^2) / 2n\\gamma^2}` (Bendat and Piersol, eq. 9.90), lines 60-800 Hz.

@@ -168,7 +168,7 @@ def test_a_note_that_was_cut_within_a_letter_is_none(fleet):
     with noted(fleet.state, "t1/hammer/Ø/2024-05-13", "then"):
         (note,) = fleet.state.with_suffix("").glob("begun-*")
         assert begun(fleet.state) == {"t1/hammer/Ø/2024-05-13": "then"}
-        note.write_bytes(note.read_bytes()[: len("then\nt1/hammer/".encode()) + 1])
+        note.write_bytes(note.read_bytes()[: len(b"then\nt1/hammer/") + 1])
         assert begun(fleet.state) == {}
 
 
