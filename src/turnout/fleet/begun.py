@@ -8,6 +8,7 @@ however often.
 """
 
 import hashlib
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,9 +21,12 @@ LEFT = "its job ended while it was computed"
 
 
 def begun(state: Path) -> dict[str, str]:
-    """Units that were begun and have not ended, and the run that began each; ``state`` is their shard's state file."""
+    """Units that were begun and have not ended, and the run that began each first; ``state`` is their shard's file.
+
+    That which was begun last is the last: who ends every job keeps none waiting that was only begun beside it.
+    """
     found = {}
-    for note in batch_folder(state).glob(f"{PREFIX}*"):
+    for note in sorted(batch_folder(state).glob(f"{PREFIX}*"), key=_changed_at):
         run, unit = _said(note)
         if note == _note(state, unit):  # else it is cut: the unit was not even begun
             found[unit] = run
@@ -31,7 +35,7 @@ def begun(state: Path) -> dict[str, str]:
 
 @contextmanager
 def noted(state: Path, unit: str, run: str) -> Iterator[None]:
-    """Note a unit until the block has come to its end, by an exception, too; a whole note that is there stays as it is.
+    """Note a unit until the block has come to its end, by an exception, too; a whole note that is there keeps its run.
 
     The note is not flushed to the disk: it tells of a process that died, not of a machine that did.
     """
@@ -39,6 +43,8 @@ def noted(state: Path, unit: str, run: str) -> Iterator[None]:
     if _said(note)[1] != unit:
         note.parent.mkdir(parents=True, exist_ok=True)
         note.write_text(f"{run}\n{unit}", encoding="utf-8")
+    else:
+        os.utime(note)
     try:
         yield
     finally:
@@ -57,6 +63,13 @@ def _said(note: Path) -> tuple[str, str]:
     except FileNotFoundError:  # its unit has ended meanwhile
         return "", ""
     return run, unit
+
+
+def _changed_at(note: Path) -> int:
+    try:
+        return note.stat().st_mtime_ns
+    except FileNotFoundError:
+        return 0
 
 
 def _note(state: Path, unit: str) -> Path:

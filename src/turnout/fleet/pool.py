@@ -71,8 +71,11 @@ def _until_one_dies(things: Sequence, threads: int, lost: list) -> Iterator:
 def _end_with_parent() -> None:
     """End this process when its parent does: it waits for more to do for ever else, and holds its memory."""
 
-    def watch():
-        multiprocessing.parent_process().join()
+    parent = multiprocessing.parent_process()
+    assert parent is not None, "it is called in the processes of a pool"
+
+    def watch(join=parent.join):
+        join()
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()

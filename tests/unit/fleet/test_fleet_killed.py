@@ -107,6 +107,21 @@ def test_a_job_killed_as_a_whole_night_after_night_condemns_no_unit(fleet, threa
     assert judge([fleet.state], fleet.configuration).complaints == ()
 
 
+def test_one_that_ends_its_job_every_night_keeps_no_other_waiting_that_was_begun_beside_it(fleet):
+    """Where a job may not take more memory all of it is ended, with what its other processes had at hand."""
+    fleet.put("t2/2024-05-13/A_1.txt", "kills the job")
+    child = os.fork()
+    if child == 0:
+        with noted(fleet.state, UNITS[2], "then"), noted(fleet.state, UNITS[3], "then"):
+            with noted(fleet.state, UNITS[5], "then"):
+                os._exit(0)
+    os.waitpid(child, 0)
+    assert set(begun(fleet.state)) == {UNITS[2], UNITS[3], UNITS[5]}
+    for _ in range(2):
+        assert night(fleet) < 0
+    assert statuses(fleet) == dict.fromkeys([u for u in UNITS if u != UNITS[2]], "ok")
+
+
 def test_a_fault_that_ends_the_job_costs_none_of_what_waited_for_a_checkpoint(fleet):
     fleet.put("t4/2024-05-13/A_1.txt", "full")
     with pytest.raises(OSError, match="No space left"):
