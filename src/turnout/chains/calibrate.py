@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from turnout.chains.mismatch_context import track_file
 from turnout.config.load import load_configuration
 from turnout.config.settings.identify import IdentifySettings
 from turnout.config.settings.receptance import ReceptanceSettings
@@ -17,6 +18,7 @@ from turnout.simulate import load_track
 from turnout.simulate.calibrate import Measured, calibrate
 from turnout.simulate.calibrate_modes import fit_modes
 from turnout.simulate.hammer import located
+from turnout.simulate.parameters import track_path
 
 LOG = logging.getLogger("turnout.simulate")
 BAND = (60.0, 800.0)
@@ -29,13 +31,20 @@ UNDESCRIBED = RawDescription(
 )
 
 
+def track_asked(track, turnout_id=None, config="config"):
+    """File of the ``track`` that is named, else of the turnout's own, else of Tommerup's; SimulationError without."""
+    if turnout_id is not None:
+        return track_file(load_configuration(config).turnout(turnout_id), track)
+    return track_path(track or "tommerup")
+
+
 def calibrate_to_files(track_name, section, files, turnout_id=None, config="config", seed=0):
-    """``Calibration`` of ``section`` to the hammer tests in ``files``, all of that section.
+    """``Calibration`` of ``section`` of a track, by name or file, to the hammer tests in ``files``, all of it.
 
     The receptance is H1 of all accepted impacts; its random error is that of its coherence,
     :math:`\\sigma = |H| \\sqrt{(1-\\gamma^2) / 2n\\gamma^2}` (Bendat and Piersol, eq. 9.90), lines 60-800 Hz.
     """
-    track = load_track(track_name, seed=seed)
+    track = load_track(str(track_name), seed=seed)
     place, _ = located(track, section)
     description, force, responses, settings = _channels(section, turnout_id, config)
     recordings, refused = _recordings(files, description)
@@ -73,7 +82,7 @@ def _recordings(files, description):
 
 def calibrate_to_modes(track_name, section, wanted, seed=0, evaluations=14):
     """``ModeFit`` of ``section`` to ``wanted`` {band: (frequency [Hz], damping)} as the program identifies them."""
-    return fit_modes(load_track(track_name, seed=seed), section, wanted, identified_modes, evaluations=evaluations)
+    return fit_modes(load_track(str(track_name), seed=seed), section, wanted, identified_modes, evaluations=evaluations)
 
 
 def identified_modes(recordings, force="hammer", response="acc_1"):

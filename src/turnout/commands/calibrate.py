@@ -1,11 +1,11 @@
 """Fit pads, ballast and damping of a section to its hammer tests, and say what the data cannot tell.
 
-  turnout calibrate --track tommerup --section A7 --turnout tommerup_s1 raw/tommerup_s1/hammer/2024-05-13/A7_*.h5
+  turnout calibrate --turnout tommerup_s1 --section A7 raw/tommerup_s1/hammer/2024-05-13/A7_*.h5
   turnout calibrate --track tommerup --section A7 --modes ballast=99.6/0.292 railpad=616.4/0.066
 
 The first meets the measured receptance line by line (gradients, priors, covariance); the second looks for
 parameters whose simulated test has these resonances [Hz] and damping ratios. Nothing is changed on disk: the values
-are printed as they stand in the track's file.
+are printed as they stand in the track's file. Without --track it is that of the turnout.
 """
 
 HELP = "fit a simulated section to measured receptances"
@@ -21,37 +21,58 @@ UNITS = {
 def add_arguments(parser):
     """Options of the command."""
     parser.add_argument("files", nargs="*", help="hammer tests of the section")
-    parser.add_argument("--track", default="tommerup", help="file in config/tracks, or its path")
+    parser.add_argument(
+        "--track", help="file in config/tracks, or its path (default: the turnout's own, else tommerup)"
+    )
     parser.add_argument("--section", required=True, help="section of the track file")
-    parser.add_argument("--turnout", help="id in config/turnouts.tsv, for the channels of the files")
+    parser.add_argument("--turnout", help="id in config/turnouts.tsv, for the track and the channels of the files")
     parser.add_argument("--configuration", "--config", default="config", help="configuration folder (default config)")
     parser.add_argument("--modes", nargs="+", metavar="BAND=HZ/ZETA", help="resonances to meet instead of files")
 
 
 def run(args):
     """Fit and print."""
-    from turnout.chains.calibrate import calibrate_to_files, calibrate_to_modes
+    from turnout.chains.calibrate import calibrate_to_files, calibrate_to_modes, track_asked
     from turnout.errors import SimulationError
 
     if bool(args.files) == bool(args.modes):
         raise SimulationError("give either hammer tests or --modes.")
+    wanted = _wanted(args.modes or ())
+    track = track_asked(args.track, args.turnout, args.configuration)
+    print(f"track: {track}" + ("" if args.track or args.turnout else " (no turnout and no track was named)"))
     if args.modes:
-        fit = calibrate_to_modes(args.track, args.section, _wanted(args.modes))
+        fit = calibrate_to_modes(track, args.section, wanted)
         for band, (frequency, damping) in fit.wanted.items():
             got = fit.found.get(band)
             reached = f"{got[0]:.1f} Hz, {got[1]:.4f}" if got else "not found"
             print(f"{band}: wanted {frequency:.1f} Hz, {damping:.4f}; reached {reached}")
-        values, sd = fit.values, {}
+        lost = sorted(fit.wanted.keys() - fit.found.keys())
+        missed = f"has no resonance in the band {', '.join(lost)}" if lost else ""
+        print(_block(args.section, fit.values, {}, missed))
+        return 0
+    found = calibrate_to_files(track, args.section, args.files, args.turnout, args.configuration)
+    print(found)
+    missed = "" if found.met else f"does not meet these tests (chi-squared per degree of freedom {found.reduced:.0f})"
+    told = {name: value for name, value in found.values.items() if missed or found.tells(name)}
+    print(_block(args.section, told, found.sd, missed))
+    return 0
+
+
+def _block(section, values, sd, missed) -> str:
+    """The values as lines of the track file; comments that nobody pastes as a result where the fit ``missed``."""
+    if missed:
+        head = f"# do not paste: section {section} with these values {missed}"
+    elif values:
+        head = f"# section {section}: paste into its entry in the track file"
     else:
-        found = calibrate_to_files(args.track, args.section, args.files, args.turnout, args.configuration)
-        print(found)
-        values, sd = found.values, found.sd
-    print(f"\n  # section {args.section}")
+        head = f"# section {section}: nothing to paste, the tests tell none of its values"
+    mark, source = ("# ", "guess: fit that misses its test") if missed else ("", "estimate: fitted")
+    lines = ["", f"  {head}"]
     for name, value in values.items():
         unit, factor = UNITS[name]
-        prior = f", prior: {sd[name]:.2g}" if name in sd else ""
-        print(f'    {name}: {{value: {value / factor:.4g}, unit: {unit}, source: "estimate: fitted"{prior}}}')
-    return 0
+        prior = f", prior: {sd[name]:.2g}" if name in sd and not missed else ""
+        lines.append(f'    {mark}{name}: {{value: {value / factor:.4g}, unit: {unit}, source: "{source}"{prior}}}')
+    return "\n".join(lines)
 
 
 def _wanted(modes):

@@ -2,7 +2,8 @@
 
 A unit is new where it was never computed, changed where one of its files, its settings, what was noted beside it or
 the code of its stage is another than it was computed from. A file that was only touched counts as changed here; the run
-then compares its content and computes nothing.
+then compares its content and computes nothing. Files that the last run knew and that are gone are said, too, and
+whether the next run will stop because of them.
 """
 
 import argparse
@@ -43,7 +44,21 @@ def run(args: argparse.Namespace) -> int:
     for turnout in map(configuration.turnout, args.turnout or configuration.ids):
         _say(turnout, Path(args.raw or "raw"), known, counts)
     print(f"{counts['all']} units, {counts['new']} never computed, {counts['changed']} changed since.")
+    _say_gone(configuration, Path(args.raw or "raw"), Path(args.work) / "plan", shards, args.turnout)
     return 0
+
+
+def _say_gone(configuration, raw, plans, shards, turnouts) -> None:
+    """Print which known files are gone, and the error that the next run will stop with."""
+    from turnout.fleet.plan import gone_files
+
+    gone = gone_files(configuration, raw, plans, shards, turnouts)
+    if error := gone.error(configuration.settings["fleet"], raw):
+        print(f"the next run will stop: {error}")
+    elif len(gone.files) == 1:
+        print(f"{gone}, {gone.files[0]}: what it gave stays in the registry.")
+    elif gone.files:
+        print(f"{gone}, first {gone.files[0]}: what they gave stays in the registry.")
 
 
 def _say(turnout, raw, known, counts) -> None:

@@ -1,6 +1,7 @@
 """Write the pages of a registry: one for the fleet, one for each turnout.
 
-turnout report                       all pages
+turnout report                       all pages, as of today
+turnout report --day 2026-03-01      list and states as of that day, as far as they change without a measurement
 turnout report --turnouts tommerup_s1 tommerup_s2
 """
 
@@ -14,6 +15,7 @@ def add_arguments(parser):
     parser.add_argument(
         "--turnouts", "--turnout", nargs="+", metavar="ID", help="only these turnouts' pages, and the fleet's"
     )
+    parser.add_argument("--day", metavar="DATE", help="list and states of that day, YYYY-MM-DD, instead of today")
     parser.add_argument("--cores", type=int, default=1, help="processes that draw pages (%(default)s)")
 
 
@@ -21,5 +23,30 @@ def run(args):
     """Write the pages and say where they are."""
     from turnout.report.job import report_job
 
-    n = report_job(args.registry, args.pages, args.turnouts, threads=args.cores)
+    day = _day(args.day)
+    n = report_job(args.registry, args.pages, args.turnouts, threads=args.cores, day=day)
     print(f"{n} pages written, the others had not changed: {args.pages}/index.html")
+    if said := f"As of {day}." if day else _of_then(args.registry):
+        print(said)
+
+
+def _day(said):
+    """The day asked for; ConfigError where it is none."""
+    from datetime import date
+
+    from turnout.errors import ConfigError
+
+    try:
+        return date.fromisoformat(said).isoformat() if said else None
+    except ValueError:
+        raise ConfigError("--day", "date", repr(said), "Write YYYY-MM-DD") from None
+
+
+def _of_then(registry):
+    """What to ask for where charts of today's pages have grown old, else nothing."""
+    from turnout.registry.database import open_registry
+    from turnout.registry.day import counts_of, list_day, of_then
+
+    with open_registry(registry) as con:
+        *_, n_unmeasured, newest = counts_of(con, list_day(con))
+    return of_then(newest, "turnout report --day", "pages") if n_unmeasured and newest else ""

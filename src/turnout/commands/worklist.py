@@ -1,6 +1,6 @@
 """Tomorrow's list: what to inspect, what to plan, where nothing can be said.
 
-turnout worklist                      the list of the newest measurement
+turnout worklist                      the list of today
 turnout worklist --asof 2026-03-01    the list as it would have been then
 turnout worklist --all                everything, not only what a person can act on in a day
 turnout worklist --csv list.csv
@@ -11,9 +11,6 @@ import csv
 
 from turnout.commands.query import opened
 
-CHARTS = """
-    select count(*), count(*) filter (state = 'suppressed'), count(*) filter (state = 'not measured'), newest_charted()
-    from chart_states_on({})"""
 FIRST = "select min(measured_at_utc) from charts where state <> 'wrong_time'"
 HELP = "tomorrow's list: what to inspect, what to plan, where nothing can be said"
 
@@ -29,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the list, or write it as comma-separated values."""
     from turnout.registry.database import open_registry
-    from turnout.registry.day import list_day, whole_list
+    from turnout.registry.day import counts_of, list_day, whole_list
 
     with open_registry(args.registry) as con:
         day = [_day(args.asof, con)] if args.asof else []
@@ -40,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
         cursor = con.execute(question, day)
         names = [d[0] for d in cursor.description]
         rows = cursor.fetchall()
-        known = con.execute(CHARTS.format(today)).fetchall()[0]
+        known = counts_of(con, today)
     if args.csv:
         with opened(args.csv) as stream:
             _write(stream, names, rows)
@@ -60,11 +57,15 @@ def as_text(rows, n_charts=0, n_silenced=0, n_unmeasured=0, newest=None) -> str:
         return "\n".join([*text, "No chart has been computed yet: alarms and plans come with the first trend."])
     if newest is None:  # a list of another day: what is silenced or not measured is said of today alone
         return "\n".join(text)
+    from turnout.registry.day import of_then
+
     left = [(n_silenced, "silenced by somebody"), (n_unmeasured, "not measured for too long")]
     parts = [f"{n} {word}" for n, word in left if n]
     text.append(
         f"Of {n_charts} charts, newest campaign {newest:%Y-%m-%d}" + (": " + ", ".join(parts) if parts else "") + "."
     )
+    if n_unmeasured:
+        text.append(of_then(newest, "turnout worklist --asof", "list"))
     return "\n".join(text)
 
 

@@ -8,6 +8,7 @@ however often.
 """
 
 import hashlib
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,10 +21,13 @@ LEFT = "its job ended while it was computed"
 
 
 def begun(state: Path) -> dict[str, str]:
-    """Units that were begun and have not ended, and the run that began each; ``state`` is their shard's state file."""
+    """Units that were begun and have not ended, and the run that began each first; ``state`` is their shard's file.
+
+    That which was begun last is the last: who ends every job keeps none waiting that was only begun beside it.
+    """
     found = {}
-    for note in batch_folder(state).glob(f"{PREFIX}*"):
-        run, _, unit = note.read_text(encoding="utf-8").partition("\n")
+    for note in sorted(batch_folder(state).glob(f"{PREFIX}*"), key=_changed_at):
+        run, unit = _said(note)
         if note == _note(state, unit):  # else it is cut: the unit was not even begun
             found[unit] = run
     return found
@@ -31,14 +35,16 @@ def begun(state: Path) -> dict[str, str]:
 
 @contextmanager
 def noted(state: Path, unit: str, run: str) -> Iterator[None]:
-    """Note a unit until the block has come to its end, by an exception, too; a note that is there stays as it is.
+    """Note a unit until the block has come to its end, by an exception, too; a whole note that is there keeps its run.
 
     The note is not flushed to the disk: it tells of a process that died, not of a machine that did.
     """
     note = _note(state, unit)
-    if not note.exists():
+    if _said(note)[1] != unit:
         note.parent.mkdir(parents=True, exist_ok=True)
         note.write_text(f"{run}\n{unit}", encoding="utf-8")
+    else:
+        os.utime(note)
     try:
         yield
     finally:
@@ -48,6 +54,22 @@ def noted(state: Path, unit: str, run: str) -> Iterator[None]:
 def forget(state: Path, unit: str) -> None:
     """Take the note of a unit away, where there is one."""
     _note(state, unit).unlink(missing_ok=True)
+
+
+def _said(note: Path) -> tuple[str, str]:
+    """(run, unit) of a note, as far as it is there and whole."""
+    try:
+        run, _, unit = note.read_bytes().decode(errors="replace").partition("\n")
+    except FileNotFoundError:  # its unit has ended meanwhile
+        return "", ""
+    return run, unit
+
+
+def _changed_at(note: Path) -> int:
+    try:
+        return note.stat().st_mtime_ns
+    except FileNotFoundError:
+        return 0
 
 
 def _note(state: Path, unit: str) -> Path:

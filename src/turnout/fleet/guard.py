@@ -47,7 +47,7 @@ def died_of(unit: Unit, *_, **__) -> dict[str, list[dict]]:
     found = "the process died that computed it, and again where it was computed alone"
     remedy = (
         "Look in the machine's log whether its memory ended, and whether its files are whole; "
-        "the unit is tried again when its files or the program change"
+        "the unit is tried again when one of its files is touched, or the program changes"
     )
     return {
         "quarantine": [quarantine_row(unit, _first_of(unit), "internal_error", "a process of its own", found, remedy)]

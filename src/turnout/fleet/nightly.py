@@ -7,19 +7,19 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-import duckdb
 from filelock import FileLock, Timeout
 
-from turnout.errors import RegistryError, TurnoutError
+from turnout.errors import TurnoutError
 from turnout.fleet.plan import is_cut_plan, read_plan
 from turnout.fleet.scan import unit_id
 from turnout.fleet.state import load_state, states_below
-from turnout.registry.database import open_registry
+from turnout.fleet.unused import rejected, unused_turnouts
+from turnout.fleet.why import why
 
 JOB_NAMES = "turnouts"
 TOO_LATE = 124
@@ -31,8 +31,9 @@ PUBLISHING = ("all", "register", "verdict", "trend", "report")
 
 @dataclass(frozen=True)
 class Night:
-    """What a run did; ``code`` is 0 only where all went well. ``worst`` are the turnouts of which most was not used,
-    with the number of units."""
+    """What a run did; ``code`` is 0 only where all went well, ``reason`` else says why not. ``vanished`` are units gone
+    since the last run. ``worst`` are the turnouts of which most was not used, with the number of units; ``unused``
+    those of which nothing ever was, ``useless`` whether that is so of the whole fleet."""
 
     code: int
     units: int
@@ -42,17 +43,28 @@ class Night:
     published: bool = True
     rejected: int = 0
     worst: tuple[tuple[str, int], ...] = ()
+    unused: tuple[str, ...] = ()
+    useless: bool = False
+    reason: str = ""
 
     def __str__(self):
-        said = {0: "sound", TOO_LATE: "stopped at the time limit"}.get(self.code, f"failed with exit code {self.code}")
+        well = "every job ran, but nothing could be used" if self.useless else "sound"
+        said = {0: well, TOO_LATE: "stopped at the time limit"}.get(self.code, f"failed with exit code {self.code}")
         return (
             f"{said}: {self.units} units known, {self.processed} processed, "
             f"{self.quarantined} of these with rows in quarantine, "
             + (f"{self.rejected} hammer test{'s' * (self.rejected > 1)} rejected, " if self.rejected else "")
             + f"{self.vanished} vanished"
-            + (f"; worst: {', '.join(f'{t} ({n})' for t, n in self.worst)}, see {LOOK}" if self.worst else "")
+            + (f"; nothing could be used yet of {self._unused()}" if self.unused else "")
+            + (f"; worst: {', '.join(f'{t} ({n})' for t, n in self.worst)}" if self.worst else "")
+            + (f", see {LOOK}" if self.worst or self.unused else "")
             + ("" if self.published else "; the registry was not published")
+            + (f"; why: {self.reason}" if self.reason else "")
         )
+
+    def _unused(self) -> str:
+        more = len(self.unused) - WORST
+        return ", ".join(self.unused[:WORST]) + (f" and {more} more" if more > 0 else "")
 
 
 def nightly(options: Sequence[str], profile: str, limit: float | None = None, work: Path = Path("work")) -> Night:
@@ -69,9 +81,9 @@ def nightly(options: Sequence[str], profile: str, limit: float | None = None, wo
         with lock.acquire(timeout=0), _signals_raise():
             _refuse_beside_another()
             _clear(options, Path(profile).name)
-            before = _batches(work)
+            before, planned, began = _batches(work), _planned(work), time.time_ns()
             code = _run([*options, "--workflow-profile", profile, "--rerun-incomplete"], limit, work)
-            return _night(code, before, work)
+            return _night(code, before, planned, why(began) if code not in (0, TOO_LATE) else "", work)
     except Timeout:
         found = f"{work / '.nightly.lock'} is held: another nightly run is going on"
         raise TurnoutError(f"{found}. Wait for it, or end it.") from None
@@ -175,35 +187,28 @@ def _batches(work: Path) -> set[tuple[Path, str]]:
     return {(path, batch) for path in states_below(work) for batch in load_state(path).batches}
 
 
-def _night(code: int, before: set, work: Path) -> Night:
+def _planned(work: Path) -> set[str]:
+    """Units that the plans name."""
     plans = [plan for plan in sorted((work / "plan").glob("*.json")) if not is_cut_plan(plan)]
-    planned = {unit_id(p.unit) for plan in plans for p in read_plan(plan)}
+    return {unit_id(p.unit) for plan in plans for p in read_plan(plan)}
+
+
+def _night(code: int, before: set, planned_before: set[str], reason: str, work: Path) -> Night:
+    gone = planned_before - _planned(work)
     units = vanished = 0
     processed, quarantined = [], []
     for path in states_below(work):
         for name, known in load_state(path).units.items():
             units += 1
-            vanished += name not in planned
+            vanished += name in gone
             if (path, known.batch) not in before:
                 processed.append(name)
                 quarantined += [name] if known.status not in ("ok", "vanished") else []
     newest = max(map(_changed_at, states_below(work)), default=0)
     published = code == 0 or 0 < newest <= _changed_at(GENERATION)
-    rejected = _rejected(processed)
-    by_turnout = Counter(name.partition("/")[0] for name in {*quarantined, *rejected})
+    tests = rejected(processed, GENERATION.parent)
+    unused, useless = unused_turnouts(GENERATION.parent)
+    by_turnout = Counter(name.partition("/")[0] for name in {*quarantined, *tests})
     worst = sorted(by_turnout.items(), key=lambda item: (-item[1], item[0]))[:WORST]
     counts = len(processed), len(quarantined), vanished
-    return Night(code, units, *counts, published, len(rejected), tuple(worst))
-
-
-def _rejected(processed: Collection[str]) -> list[str]:
-    """Those of the units whose hammer test gave no model, as far as the registry has them."""
-    if not processed or not GENERATION.exists():
-        return []
-    unit = "turnout_id || '/hammer/' || split_part(section_id, '/', -1) || '/' || split_part(campaign_id, '/', -1)"
-    sql = f"select {unit} as unit from models_current where status = 'rejected' and unit in (select unnest(?))"
-    try:
-        with open_registry(GENERATION.parent) as connection:
-            return [row[0] for row in connection.execute(sql, [list(processed)]).fetchall()]
-    except (RegistryError, duckdb.Error):  # the line of a night that failed must come all the same
-        return []
+    return Night(code, units, *counts, published, len(tests), tuple(worst), tuple(unused), useless, reason)

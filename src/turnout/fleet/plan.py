@@ -7,6 +7,7 @@ from pathlib import Path
 
 from turnout.config import Configuration, TurnoutConfig
 from turnout.config.load import read_notes
+from turnout.config.settings.fleet import FleetSettings
 from turnout.errors import ConfigError, ReadError
 from turnout.fleet.atomic import is_cut, write_if_changed
 from turnout.fleet.notes import notes_of
@@ -39,6 +40,44 @@ def write_plans(
     meaning: no time of scan, no absolute path. ConfigError where so many known files are gone that a disk must be
     missing.
     """
+    texts, gone = _looked(configuration, raw_root, folder, shards, turnouts)
+    if not accept_vanished and (error := gone.error(configuration.settings["fleet"], raw_root)):
+        raise error
+    for path, text in texts.items():
+        write_if_changed(path, text)
+    return [path.stem for path in texts]
+
+
+@dataclass(frozen=True)
+class Gone:
+    """Sorted ``files`` that the plans know and no scan finds, of turnouts that are still there; of ``known`` ones."""
+
+    files: list[str]
+    known: int
+
+    def error(self, settings: FleetSettings, raw_root: Path) -> ConfigError | None:
+        """What a run is stopped with where these are so many that a disk must be missing."""
+        if len(self.files) <= max(settings.vanished_files, settings.vanished_share * self.known):
+            return None
+        remedy = (
+            "Nothing was changed. Mount the disk again, or allow reading it; if they are meant to be gone, run once: "
+            "turnout nightly -- --config accept_vanished=true, or snakemake --config accept_vanished=true"
+        )
+        return ConfigError(str(raw_root), "raw root", f"{self}, first {self.files[0]}", remedy)
+
+    def __str__(self):
+        return f"{len(self.files)} known file{'s are' if len(self.files) != 1 else ' is'} gone"
+
+
+def gone_files(
+    configuration: Configuration, raw_root: Path, folder: Path, shards: int, turnouts: Iterable[str] | None = None
+) -> Gone:
+    """What the next run will find gone, by the plans that the last one left in ``folder``; nothing is written."""
+    return _looked(configuration, raw_root, folder, shards, turnouts)[1]
+
+
+def _looked(configuration, raw_root, folder, shards, turnouts) -> tuple[dict[Path, str], Gone]:
+    """New text of each plan, and what is gone of that which the plans there knew."""
     for turnout in turnouts or ():
         configuration.turnout(turnout)
     asked = set(shard_names(shards, turnouts))
@@ -53,16 +92,13 @@ def write_plans(
         texts[path] = _text(name, entries)
         before = path.read_text(encoding="utf-8") if path.exists() and not is_cut_plan(path) else ""
         if before and before != texts[path]:
-            files = _paths(json.loads(before)["turnouts"])
+            # a turnout that was taken out, or given another name, was so on purpose
+            files = _paths(e for e in json.loads(before)["turnouts"] if e["turnout"] in configuration.rows)
             gone += sorted(files - _paths(entries))
             known += len(files)
         elif before:
             known += sum(len(u[5]) for e in entries for u in e["units"])
-    if not accept_vanished:
-        _refuse_if_gone(configuration.settings["fleet"], Path(raw_root), gone, known)
-    for path, text in texts.items():
-        write_if_changed(path, text)
-    return names
+    return texts, Gone(gone, known)
 
 
 def is_cut_plan(path: Path) -> bool:
@@ -113,15 +149,5 @@ def _text(shard: str, entries: list[dict]) -> str:
     return f'{{"shard":"{shard}","turnouts":[\n{lines}{END}'
 
 
-def _paths(entries: list[dict]) -> set[str]:
+def _paths(entries: Iterable[dict]) -> set[str]:
     return {f"{e['raw']}/{f[0]}" for e in entries for u in e["units"] for f in u[5]}
-
-
-def _refuse_if_gone(settings, raw_root: Path, gone: list[str], known: int) -> None:
-    if len(gone) > max(settings.vanished_files, settings.vanished_share * known):
-        found = f"{len(gone)} known files are gone, first {gone[0]}"
-        remedy = (
-            "Nothing was changed. Mount the disk again, or allow reading it; if they are meant to be gone, run once "
-            "with --config accept_vanished=true"
-        )
-        raise ConfigError(str(raw_root), "raw root", found, remedy)

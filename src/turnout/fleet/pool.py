@@ -1,6 +1,11 @@
-"""The same call for many things, on one processor or several; a process that dies takes none of the others along."""
+"""The same call for many things, on one processor or several; a process that dies takes none of the others along.
+
+Only the one that began them all does: they end with it, for nobody would ask for what they find.
+"""
 
 import multiprocessing
+import os
+import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
@@ -48,7 +53,8 @@ def in_processes(call: Callable, things: Sequence, threads: int) -> Iterator:
 
 def _until_one_dies(things: Sequence, threads: int, lost: list) -> Iterator:
     """What the processes of one pool give; the things that were lost with it go into ``lost``."""
-    with ProcessPoolExecutor(min(threads, len(things)), multiprocessing.get_context("fork")) as pool:
+    n = min(threads, len(things))
+    with ProcessPoolExecutor(n, multiprocessing.get_context("fork"), _end_with_parent) as pool:
         futures = deque(_asked(pool, thing) for thing in things)
         try:
             for thing in things:
@@ -60,6 +66,19 @@ def _until_one_dies(things: Sequence, threads: int, lost: list) -> Iterator:
                 yield found
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _end_with_parent() -> None:
+    """End this process when its parent does: it waits for more to do for ever else, and holds its memory."""
+
+    parent = multiprocessing.parent_process()
+    assert parent is not None, "it is called in the processes of a pool"
+
+    def watch(join=parent.join):
+        join()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def _asked(pool: ProcessPoolExecutor, thing) -> Future:

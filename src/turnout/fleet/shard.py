@@ -135,7 +135,8 @@ class _Run:
             # before processes are forked: each of them would import it anew
             self.compute = named(self.stage.compute)
         self.progress, self.statuses = Progress(self.name, len(tasks)), Counter[str]()
-        alone = [task for task in tasks if _name(task) in self.suspects]
+        asked = {_name(task): task for task in tasks}
+        alone = [asked[name] for name in self.suspects if name in asked]
         each = in_processes if alone else in_order  # a process that has computed may have threads, which no fork takes
         try:
             for found in each(self._compute, [t for t in tasks if _name(t) not in self.suspects], self.threads):
@@ -146,6 +147,7 @@ class _Run:
             self.ledger.checkpoint()
             for task in alone:
                 self._compute_alone(task)
+                self.ledger.checkpoint()
         finally:
             self.progress.close()
             self.ledger.checkpoint()
@@ -163,8 +165,8 @@ class _Run:
         elif name not in self.suspects or (self.launched and self.suspects[name] == self.launched):
             self._keep(Postponed(name, DIED))
         else:
-            self._keep(found := self._guarded(task, died_of))
-            self.ledger.checkpoint()
+            self._keep(found := _for_now(self._guarded(task, died_of)))
+            self.ledger.checkpoint()  # before it is forgotten
             if not isinstance(found, Postponed):
                 forget(self.path, name)
 
@@ -230,6 +232,13 @@ class _Run:
         for name in sorted(left):
             self.ledger.keep(withdrawn(name, units[name]), "")
         return 0 if self.stage.gather else len(gone)
+
+
+def _for_now(found: Computed | Postponed) -> Computed | Postponed:
+    """A result that no content is known by: a file that is touched is tried again, for the machine may be another."""
+    if isinstance(found, Postponed):
+        return found
+    return replace(found[0], key=f"{DIED} {found[0].key}"), *found[1:]
 
 
 def _name(task: Task) -> str:

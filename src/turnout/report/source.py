@@ -18,6 +18,14 @@ ROWS = {
         from modes_current where band in ('ballast', 'railpad') and source = 'hammer' and {OF_SOME}
         order by section_id, band, measured_at_utc""",
     "models": f"select * from models_current where {OF_SOME} {NEWEST}",
+    "unused": f"""
+        select turnout_id, section_id, measured_at_utc, reason, detail
+        from (
+            select *, max(measured_at_utc) over (partition by section_id) as newest_utc
+            from models_current where {OF_SOME}
+        )
+        where status = 'rejected' and coalesce(method, 'joint') <> 'paper' and measured_at_utc < newest_utc
+        order by section_id, measured_at_utc desc, model_id""",
     "receptances": f"select * from receptances_current where {OF_SOME} {NEWEST}",
     "impacts": f"""
         select i.turnout_id, i.section_id, i.test, i.record, i.status, i.reason, i.detail, i.peak_n

@@ -62,16 +62,26 @@ class Calibration:
     n: int
     turnout: object
 
+    @property
+    def met(self) -> bool:
+        """Whether the model with these values meets the tests."""
+        return self.reduced <= MET
+
+    def tells(self, name) -> bool:
+        """Whether the tests tell a parameter, by itself or together with another."""
+        return self.informed[name] or any(name in pair for pair in self.tied)
+
     def __str__(self):
-        lines = [f"{self.section}: {self.n} numbers, chi-squared per degree of freedom {self.reduced:.2f}"]
+        bar = f"about 1: met within the errors; above {MET:.0f}: not met"
+        lines = [f"{self.section}: {self.n} numbers, chi-squared per degree of freedom {self.reduced:.2f} ({bar})"]
         for name, value in self.values.items():
-            told = "" if self.informed[name] else "   the data cannot tell: this is the prior"
+            told = "" if self.informed[name] else "   hardly told by these tests: about what the track file says"
             lines.append(f"  {name:<18} {value:12.5g} ± {100 * self.sd[name]:.1f} %{told}")
         lines += [f"  {a} and {b} are told only together" for a, b in self.tied]
         for (low, high), left in self.misfit.items():
             before = self.misfit_before[low, high]
             lines.append(f"  {low:.0f}-{high:.0f} Hz: misfit {100 * before:.1f} % before, {100 * left:.1f} % after")
-        if self.reduced > MET:
+        if not self.met:
             lines.append("  The track's model does not meet this test: neither values nor ± mean anything.")
         return "\n".join(lines)
 

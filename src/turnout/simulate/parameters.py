@@ -16,7 +16,12 @@ def load_track(name, seed=0, folder=None):
 
     A file with ``extends`` takes what it does not say itself from the file of that name.
     """
-    return turnout_track(track_parameters(_file(name, folder, "tracks"), folder), seed)
+    return turnout_track(track_parameters(track_path(name, folder), folder), seed)
+
+
+def track_path(name, folder=None):
+    """File of the track called ``name``, or ``name`` where that is a file's path; SimulationError without one."""
+    return _file(name, folder, "tracks")
 
 
 def track_parameters(path, folder, below=()):

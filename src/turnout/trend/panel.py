@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from turnout.trend.visits import DAY, campaigns_of, keys_of, truth, unique_of
+from turnout.trend.visits import DAY, campaigns_of, keys_of, long_before, truth, unique_of
 
 CHART = ["turnout_id", "band", "source", "section_id"]
 WHOLE = "*"
@@ -111,27 +111,30 @@ def lay_out(charts, chart, time, frequency, error, temperature, newest, settings
     """The panel of rows whose chart is known by number.
 
     ``charts`` has the columns of ``CHART``, sorted by them; ``chart, time, frequency, error, temperature`` are
-    (n_row,) arrays. Rows without a frequency, before ``settings.earliest_year`` or after ``newest`` are left out.
+    (n_row,) arrays. Rows without a frequency, before ``settings.earliest_year``, after ``newest`` or of a lone campaign
+    ``long_before`` all others of its turnout are left out.
     """
     earliest = days([pd.Timestamp(settings.earliest_year, 1, 1)])[0]
     good = (time >= earliest) & (time <= newest)
     sound = np.isfinite(frequency) & (frequency > 0.0)
-    use = good & sound
-    out = ~use
-    left_out = charts[CHART].iloc[chart[out]].reset_index(drop=True)
-    left_out["measured_at_utc"] = timestamps(time[out])
-    left_out["reason"] = np.where(good[out], "no_value", "wrong_time")
     charts = charts.assign(
         group=charts.groupby(CHART[:3], sort=True, observed=True).ngroup().to_numpy(),
         visits=charts.groupby(["turnout_id", "source"], sort=True, observed=True).ngroup().to_numpy(),
     )
+    visits, gap = charts["visits"].to_numpy(), settings.campaign_gap_hours / 24.0
+    n_visits = int(visits.max()) + 1 if len(visits) else 0
+    use = good & sound
+    good[use] = ~long_before(visits[chart[use]], time[use], gap, n_visits)
+    use &= good
+    out = ~use
+    left_out = charts[CHART].iloc[chart[out]].reset_index(drop=True)
+    left_out["measured_at_utc"] = timestamps(time[out])
+    left_out["reason"] = np.where(good[out], "no_value", "wrong_time")
     if not use.all():
         chart, time = chart[use], time[use]
         frequency, error, temperature = frequency[use], error[use], temperature[use]
-    visits = charts["visits"].to_numpy()
-    n_visits = int(visits.max()) + 1 if len(visits) else 0
     works = _works(charts, events)
-    column, starts = campaigns_of(visits[chart], time, settings.campaign_gap_hours / 24.0, n_visits, works)
+    column, starts = campaigns_of(visits[chart], time, gap, n_visits, works)
     order = _later_last(chart, column, starts.shape[1], time)
     cell = (chart[order], column[order])
 

@@ -4,6 +4,9 @@ import numpy as np
 import pandas as pd
 
 DAY = 86400.0
+# A lone campaign so long before all others of its turnout [d]: a mistyped year or a clock that was reset; of one that
+# was meant, an acceptance test, nobody needs to know more than that it begins no year of measurement.
+LONG_BEFORE = 5 * 365.25
 
 
 def truth(flag) -> bool:
@@ -44,6 +47,24 @@ def campaigns_of(visits, time, gap, n_visits, works):
     starts = np.full((n_visits, int(number.max()) + 1), np.nan)
     starts[visit[new], number[new]] = moment[new]
     return number[row], starts
+
+
+def long_before(visits, time, gap, n_visits) -> np.ndarray:
+    """Which rows are of a lone first campaign ``LONG_BEFORE`` the next, where at least two follow.
+
+    A baseline that begins with it would have its year before it has seen a summer.
+
+    >>> long_before(np.zeros(4, int), np.array([0.0, 9000.0, 1.0, 9007.0]), 1.5, 1)
+    array([ True, False,  True, False])
+    """
+    first, second = np.full((2, n_visits), np.inf)
+    last = np.full(n_visits, -np.inf)
+    np.minimum.at(first, visits, time)
+    early = time <= first[visits] + gap
+    np.minimum.at(second, visits[~early], time[~early])
+    np.maximum.at(last, visits, time)
+    lone = (second - first > LONG_BEFORE) & (last > second + gap)
+    return early & lone[visits]
 
 
 def split(new, moment, gap):

@@ -17,7 +17,8 @@ def with_withdrawn(alarms, before, newest) -> pd.DataFrame:
 
     Every alarm is computed anew each night, and a value that was corrected, an event that was entered late or another
     memory of the fleet can take one back. A counterpart is an alarm of the same chart and direction that was open when
-    the old one was raised or later.
+    the old one was raised or later; of an old one that was closed like this before, one that was open in its time: what
+    is raised after that is another alarm.
 
     Parameters
     ----------
@@ -30,10 +31,13 @@ def with_withdrawn(alarms, before, newest) -> pd.DataFrame:
     """
     if before.empty:
         return alarms
-    now = alarms if len(alarms) else pd.DataFrame(columns=[*CHART, "closed_at_utc"])
-    both = before.reset_index().merge(now[[*CHART, "closed_at_utc"]], on=CHART, suffixes=("", "_now"))
-    until = pd.to_datetime(both["closed_at_utc_now"])
-    found = both.loc[(until.isna() | (until >= both["raised_at_utc"])).to_numpy(dtype=bool), "index"]
+    times = ["raised_at_utc", "closed_at_utc"]
+    now = alarms if len(alarms) else pd.DataFrame(columns=[*CHART, *times])
+    both = before.reset_index().merge(now[[*CHART, *times]], on=CHART, suffixes=("", "_now"))
+    until, then = pd.to_datetime(both["closed_at_utc_now"]), pd.to_datetime(both["closed_at_utc"])
+    again = until.isna() | (until >= both["raised_at_utc"])
+    again &= then.isna() | (pd.to_datetime(both["raised_at_utc_now"]) <= then)
+    found = both.loc[again.to_numpy(dtype=bool), "index"]
     gone = before[~before.index.isin(found)]
     fresh = gone["closed_at_utc"].isna()
     for row in gone[fresh].itertuples():

@@ -88,7 +88,7 @@ def test_a_plan_is_made_again_though_its_shard_was_not_asked_for(fleet, share):
 def test_a_run_that_cannot_plan_says_what_it_did_though_a_plan_is_cut(fleet):
     fleet.run()
     cut(fleet.plan, 0.5)
-    assert _night(1, set(), fleet.folder / "work").units == 3
+    assert _night(1, set(), set(), "", fleet.folder / "work").units == 3
 
 
 def test_a_plan_that_is_whole_is_told_from_a_cut_one_at_every_byte(fleet):

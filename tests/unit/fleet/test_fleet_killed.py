@@ -1,12 +1,17 @@
 """A unit that kills its process is named and holds nothing else back; a job that is killed condemns nobody."""
 
 import os
+import signal
+import time
 from datetime import datetime
+from pathlib import Path
 
 import pytest
-from length_fleet import Fleet
+from length_fleet import Fleet, length
 
+from turnout.fleet.begun import begun, noted
 from turnout.fleet.postponed import read_postponed
+from turnout.fleet.stage import Stage
 from turnout.fleet.state import load_state
 from turnout.fleet.verdict import judge
 
@@ -102,6 +107,21 @@ def test_a_job_killed_as_a_whole_night_after_night_condemns_no_unit(fleet, threa
     assert judge([fleet.state], fleet.configuration).complaints == ()
 
 
+def test_one_that_ends_its_job_every_night_keeps_no_other_waiting_that_was_begun_beside_it(fleet):
+    """Where a job may not take more memory all of it is ended, with what its other processes had at hand."""
+    fleet.put("t2/2024-05-13/A_1.txt", "kills the job")
+    child = os.fork()
+    if child == 0:
+        with noted(fleet.state, UNITS[2], "then"), noted(fleet.state, UNITS[3], "then"):
+            with noted(fleet.state, UNITS[5], "then"):
+                os._exit(0)
+    os.waitpid(child, 0)
+    assert set(begun(fleet.state)) == {UNITS[2], UNITS[3], UNITS[5]}
+    for _ in range(2):
+        assert night(fleet) < 0
+    assert statuses(fleet) == dict.fromkeys([u for u in UNITS if u != UNITS[2]], "ok")
+
+
 def test_a_fault_that_ends_the_job_costs_none_of_what_waited_for_a_checkpoint(fleet):
     fleet.put("t4/2024-05-13/A_1.txt", "full")
     with pytest.raises(OSError, match="No space left"):
@@ -124,3 +144,76 @@ def test_strict_raises_where_a_process_dies(fleet):
     fleet.put("t1/2024-05-13/A_1.txt", "kills its process")
     with pytest.raises(RuntimeError, match=f"{UNITS[1]}: the process died that computed it"):
         fleet.run(threads=2, strict=True)
+
+
+def test_what_a_machine_may_have_been_at_fault_for_is_tried_again_when_its_file_is_touched(fleet):
+    """Memory that ended is there again one day, and nobody can change the content of a sound file."""
+    file, short = fleet.raw / "t1/2024-05-13/A_1.txt", fleet.folder / "memory is short"
+
+    def hungry(unit, *more, **options):
+        if unit.turnout == "t1" and short.exists():
+            os._exit(9)
+        return length(unit, *more, **options)
+
+    stage = Stage("hammer", hungry, "1")
+    short.touch()
+    for _ in range(2):
+        night(fleet, threads=2, stage=stage)
+    assert statuses(fleet)[UNITS[1]] == "internal_error"
+    short.unlink()
+    assert fleet.run(stage=stage).processed == 0
+    os.utime(file, ns=(0, file.stat().st_mtime_ns + 1_000_000_000))
+    assert fleet.run(stage=stage).processed == 1
+    assert statuses(fleet) == dict.fromkeys(UNITS, "ok")
+
+
+@pytest.mark.parametrize("cut", ["", "2026-11-22T02:00:00\nt1/ham"])
+def test_a_note_that_a_power_failure_cut_is_written_again(fleet, cut):
+    with noted(fleet.state, UNITS[1], "then"):
+        (note,) = fleet.state.with_suffix("").glob("begun-*")
+        name = note.name
+    note.with_name(name).write_text(cut)
+    fleet.put("t1/2024-05-13/A_1.txt", "kills its process")
+    for _ in range(2):
+        night(fleet)
+    assert statuses(fleet) == dict.fromkeys(UNITS, "ok") | {UNITS[1]: "internal_error"}
+
+
+def test_a_note_that_was_cut_within_a_letter_is_none(fleet):
+    with noted(fleet.state, "t1/hammer/Ø/2024-05-13", "then"):
+        (note,) = fleet.state.with_suffix("").glob("begun-*")
+        assert begun(fleet.state) == {"t1/hammer/Ø/2024-05-13": "then"}
+        note.write_bytes(note.read_bytes()[: len(b"then\nt1/hammer/") + 1])
+        assert begun(fleet.state) == {}
+
+
+def test_where_a_job_is_killed_alone_its_processes_end_with_it(fleet, tmp_path):
+    """They would live for ever, hold their memory, and take away the notes of the job that comes after."""
+
+    def never_done(unit, *_, **__):
+        (tmp_path / f"pid-{os.getpid()}").touch()
+        time.sleep(600)
+
+    child = os.fork()
+    if child == 0:
+        fleet.run(threads=2, stage=Stage("hammer", never_done, "1"))
+        os._exit(0)
+    until = time.monotonic() + 60
+    while len(pids := [int(p.name[4:]) for p in tmp_path.glob("pid-*")]) < 2 and time.monotonic() < until:
+        time.sleep(0.05)
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    try:
+        while any(map(lives, pids)) and time.monotonic() < until:
+            time.sleep(0.05)
+        assert len(pids) == 2 and not any(map(lives, pids))
+    finally:
+        for pid in filter(lives, pids):
+            os.kill(pid, signal.SIGKILL)
+
+
+def lives(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False

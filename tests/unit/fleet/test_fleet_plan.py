@@ -221,6 +221,40 @@ def test_a_lost_disk_is_not_taken_for_tidying_up(fleet):
     assert (fleet / "work/plan/00of01.json").read_text() != text
 
 
+def test_files_of_a_turnout_that_is_taken_out_are_not_lost(fleet):
+    """Its row was taken out on purpose; its raw folder may be there or not."""
+    for k in range(20):
+        add(fleet, f"t2/hammer/2024-05-13/AS_{k}.mat")
+    plans(fleet)
+    (fleet / "config/turnouts.tsv").write_text("turnout\tlayout\nt1\tmain\n")
+    plans(fleet)
+    assert {p.unit.turnout for p in read_plan(fleet / "work/plan/00of01.json")} == {"t1"}
+
+
+def test_plan_announces_that_the_next_run_will_stop_and_what_to_do(fleet, capsys, monkeypatch):
+    from turnout.cli import main
+
+    monkeypatch.chdir(fleet)
+    for k in range(40):
+        add(fleet, f"t2/hammer/2024-05-13/AS_{k}.mat")
+
+    def said():
+        assert main(["plan", "--shards", "2"]) == 0
+        return capsys.readouterr().out
+
+    assert "gone" not in said()  # no run has seen them
+    plans(fleet, shards=2)
+    (fleet / "raw/t2/hammer/2024-05-13/AS_7.mat").unlink()
+    text = said()
+    assert "1 known file is gone, t2/hammer/2024-05-13/AS_7.mat: what it gave stays" in text and "accept" not in text
+    (fleet / "raw/t2").rename(fleet / "raw/away")
+    text = said()
+    assert "the next run will stop: raw, raw root: 41 known files are gone, first t2/hammer/2024-05-13/AS_0" in text
+    assert "turnout nightly -- --config accept_vanished=true" in text
+    plans(fleet, shards=2, accept_vanished=True)
+    assert "gone" not in said()
+
+
 def test_a_few_files_may_go(fleet):
     plans(fleet)
     (fleet / "raw/t1/hammer/2024-05-13/A_1.uff").unlink()

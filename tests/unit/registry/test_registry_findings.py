@@ -170,3 +170,19 @@ def test_a_refused_finding_takes_its_parameters_and_curves_with_it(tmp_path):
     assert bench.register(bad).n_refused == 1
     for table in ("mismatch_findings", "mismatch_parameters", "mismatch_curves"):
         assert bench.ask(f"select count(*) from {table}") == [(0,)]
+
+
+def test_a_turnout_that_was_taken_out_has_nothing_to_look_after(tmp_path):
+    bench = Bench(tmp_path)
+    results = []
+    for t in ("t1", "t2"):
+        results += [gap(t, d, v, s) for d, (v, s) in zip(DAYS, GROWING)]
+        results.append(visit(t, 0, term="sensor_gain", values=[("gain", 1.3, 0.02, "-", None, "SP")], sections="SP"))
+        results.append(visit(t, 0, verdict="unknown", sections="OT"))
+    both = [{"turnout_id": t, "layout": "l", "config_hash": "h"} for t in ("t1", "t2")]
+    lists = ("hanging_sleepers_that_grow()", "sensors_with_wrong_gain", "mismatches_without_name")
+    for there in (both, both[1:]):
+        bench.register(*results, tables={"turnouts": there})
+        for name in lists:
+            found = bench.ask(f"select turnout_id from {name} order by all")
+            assert found == [(row["turnout_id"],) for row in there], name

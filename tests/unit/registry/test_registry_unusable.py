@@ -9,6 +9,7 @@ from turnout.registry.database import open_registry
 from turnout.registry.register import register
 from turnout.report.pages.fleet import fleet_page
 from turnout.report.source import FleetSource
+from turnout.report.write import write_pages
 
 LIST = "select turnout_id, sections, source, state, sentence from worklist(timestamp '2027-01-01') where band = 'all'"
 
@@ -117,3 +118,43 @@ def test_the_cards_of_the_fleets_page_count_the_rows_of_the_list(bench):
         said = fleet_page(FleetSource(con), Template(), {})
     assert [w["label"] for w in said["worklist"]] == ["A1", "A2, A3"]
     assert said["count"]["cannot_tell"] == 2
+
+
+def test_a_turnout_that_was_taken_out_is_on_no_list_and_back_on_it_when_it_is_back(bench):
+    both = [{"turnout_id": t, "layout": "l", "config_hash": "h"} for t in ("t1", "t2")]
+    lists = {
+        name: f"select distinct turnout_id from {name} order by all"
+        for name in ("unusable()", "cannot_see()", "quarantine_open", "quarantine_by_reason")
+    }
+
+    def said():
+        return {name: [row[0] for row in bench.ask(sql)] for name, sql in lists.items()}
+
+    bad = [quarantined_result("t2", section="A2"), quarantined_result("t1", section="A2")]
+    bench.register(rejected_result(), rejected_result(turnout="t2"), *bad, tables={"turnouts": both})
+    assert said() == {name: ["t1", "t2"] for name in lists}
+    bench.register(tables={"turnouts": both[1:]})
+    assert said() == {name: ["t2"] for name in lists}
+    assert bench.ask("select count(*) from models_current where turnout_id = 't1'") == [(1,)]  # history stays
+    bench.register(tables={"turnouts": both})
+    assert said() == {name: ["t1", "t2"] for name in lists}
+
+
+def test_a_test_that_was_not_used_stays_on_the_page_when_newer_ones_were(bench):
+    """The newest test of A1 was used, two before it were not; the rejected one of A2 is its newest, said elsewhere."""
+    sections = [
+        {"section_id": f"t1/{label}", "turnout_id": "t1", "label": label, "panel": "CP", "track": "main"}
+        for label in ("A1", "A2")
+    ]
+    turnout = {"turnout_id": "t1", "layout": "l", "config_hash": "h"}
+    bench.register(
+        hammer_result(day="2026-01-05"), rejected_result(day="2026-02-09"), rejected_result(day="2026-03-09"),
+        hammer_result(day="2026-04-06"), rejected_result(section="A2", day="2026-04-06"),
+        tables={"turnouts": [turnout], "sections": sections},
+    )  # fmt: skip
+    with open_registry(bench.registry) as con:
+        write_pages(con, bench.root / "pages", 1, progress=False)
+    page = (bench.root / "pages/turnouts/t1.html").read_text()
+    first, second = page.split('<h2 id="A2"')
+    said = "Earlier hammer tests that were not used: 2026-03-09 (too few impacts), 2026-02-09 (too few impacts)"
+    assert said in first and "were not used" not in second

@@ -144,3 +144,64 @@ def test_a_calibration_that_does_not_meet_its_test_says_that_its_intervals_mean_
         reduced, 1600, None,
     )  # fmt: skip
     assert ("neither values nor ± mean anything" in str(found)) is warned
+    assert "above 4: not met" in str(found)
+
+
+def calibrated(monkeypatch, capsys, command, reduced=0.9):
+    """What `turnout calibrate` prints, and the file of the track it takes, where the fit ends like this."""
+    taken = []
+
+    def fit(track, section, *_):
+        taken.append(track)
+        band = {(40.0, 100.0): 0.6}
+        values = {"pad_stiffness": 3e8, "ballast_damping": 7.1e4}
+        informed = {"pad_stiffness": True, "ballast_damping": False}
+        return Calibration(
+            section, values, {"pad_stiffness": 0.012, "ballast_damping": 0.8}, np.eye(2), informed, (), band, band,
+            reduced, 1600, None,
+        )  # fmt: skip
+
+    monkeypatch.setattr("turnout.chains.calibrate.calibrate_to_files", fit)
+    assert main(["calibrate", "--section", "M1", "a.h5", *command]) == 0
+    return capsys.readouterr().out, taken
+
+
+@pytest.mark.parametrize("own", ["aarup_n4", "tommerup"], ids=["turnout", "layout"])
+def test_a_calibration_takes_the_track_of_the_turnout_and_says_which(tmp_path, repository, monkeypatch, capsys, own):
+    (tmp_path / "config/tracks").mkdir(parents=True)
+    for name in ("layouts", "turnouts.tsv"):
+        (tmp_path / "config" / name).symlink_to(repository / "config" / name)
+    for name in {own, "tommerup", "other"}:
+        (tmp_path / f"config/tracks/{name}.yaml").write_text(SOFT)
+    asked, folder = ["--turnout", "aarup_n4", "--config", str(tmp_path / "config")], f"{tmp_path}/config/tracks"
+    said, taken = calibrated(monkeypatch, capsys, asked)
+    assert said.startswith(f"track: {folder}/{own}.yaml\n") and [str(p) for p in taken] == [f"{folder}/{own}.yaml"]
+    said, _ = calibrated(monkeypatch, capsys, [*asked, "--track", "other"])
+    assert said.startswith(f"track: {folder}/other.yaml\n")
+    monkeypatch.chdir(tmp_path)
+    said, _ = calibrated(monkeypatch, capsys, [])
+    assert said.startswith(f"track: {folder}/tommerup.yaml (no turnout and no track was named)\n")
+
+
+def test_a_calibration_without_a_track_file_of_the_turnout_says_so(tmp_path, repository, monkeypatch, capsys):
+    (tmp_path / "config").mkdir()
+    for name in ("layouts", "turnouts.tsv"):
+        (tmp_path / "config" / name).symlink_to(repository / "config" / name)
+    monkeypatch.chdir(tmp_path)
+    assert main(["calibrate", "--section", "A7", "a.h5", "--turnout", "aarup_n4"]) == 2
+    assert "aarup_n4: no file config/tracks/aarup_n4.yaml nor tommerup.yaml" in capsys.readouterr().err
+
+
+def test_what_is_to_be_pasted_is_what_the_tests_told(monkeypatch, capsys):
+    said, _ = calibrated(monkeypatch, capsys, [])
+    told, block = said.split("paste")
+    assert "hardly told by these tests: about what the track file says" in told.splitlines()[3]
+    assert '\n    pad_stiffness: {value: 300, unit: MN/m, source: "estimate: fitted", prior: 0.012}\n' in block
+    assert "ballast_damping" not in block
+
+
+def test_nothing_is_to_be_pasted_of_a_fit_that_does_not_meet_its_test(monkeypatch, capsys):
+    said, _ = calibrated(monkeypatch, capsys, [], reduced=241.4)
+    block = said.split("neither values nor ±")[1]
+    assert "do not paste" in block and "does not meet these tests (chi-squared per degree of freedom 241" in block
+    assert not [line for line in block.splitlines()[1:] if line.strip() and not line.lstrip().startswith("#")]

@@ -220,3 +220,31 @@ def test_ballast_as_noisy_as_printed_in_the_paper_cannot_see(settings):
     blind = status[status["section_id"] != "*"].set_index("section_id")
     assert (blind.drop("T00000/CP A8")["state"] == "cannot_tell").all()
     assert (blind.drop("T00000/CP A8")["detectable_pct"] > 1.5).all()
+
+
+def dated(rows, days):
+    """The campaigns of some weeks with other dates, {week: day}, as somebody may have typed them."""
+    week = ((rows["measured_at_utc"] - rows["measured_at_utc"].min()).dt.days + 1) // 7
+    return rows.assign(measured_at_utc=week.map(pd.to_datetime(pd.Series(days))).fillna(rows["measured_at_utc"]))
+
+
+def test_one_campaign_dated_many_years_before_all_others_begins_no_baseline(settings):
+    """2000 for 2016: with it a baseline had its year after twelve weeks, before it had seen a summer."""
+    rows = modes(FLEET, 1)
+    far = dated(rows, {5: "2000-02-08 10:00"})
+    status, charts = status_of(far, settings)
+    without, other = status_of(far[far["measured_at_utc"] > pd.Timestamp("2001-01-01")], settings)
+    pd.testing.assert_frame_equal(status, without)
+    assert charts.prepared.baseline.count.tolist() == other.prepared.baseline.count.tolist()
+    shown = chart_rows(charts)
+    assert shown.loc[shown["measured_at_utc"] < pd.Timestamp("2001-01-01"), "state"].tolist() == ["wrong_time"] * 8
+
+
+@pytest.mark.parametrize(
+    "days", [{5: "2013-02-08"}, {5: "2000-02-08", 6: "2000-03-08"}], ids=["3 years before", "two of 2000"]
+)
+def test_an_acceptance_test_some_years_before_counts_and_so_do_two_old_campaigns(settings, days):
+    rows = dated(modes(FLEET, 1), days)
+    assert (rows["measured_at_utc"] < "2014-01-01").sum() == 8 * len(days)
+    shown = chart_rows(status_of(rows, settings)[1])
+    assert not (shown["state"] == "wrong_time").any()

@@ -1,7 +1,7 @@
 """The list of the morning: nothing that is open goes missing, what is planned or silenced ends on its day."""
 
 from dataclasses import replace
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import pandas as pd
@@ -228,7 +228,23 @@ def test_the_list_in_words_says_what_it_rests_on_and_what_it_leaves_out(tmp_path
     small_registry(tmp_path, rows[~silent])
     update(tmp_path, replace(settings, worklist_rows=1))
     assert main(["worklist", "--registry", str(tmp_path)]) == 0
-    assert "26 not measured for too long." in capsys.readouterr().out  # of 2018: all but the alarm
+    told = capsys.readouterr().out
+    assert "26 not measured for too long." in told  # of 2018: all but the alarm
+    then = f"{newest + pd.Timedelta(days=1):%Y-%m-%d}"
+    assert f"As of {datetime.now(UTC):%Y-%m-%d}; the last data are of {newest:%Y-%m-%d}: " in told
+    assert told.endswith(f"turnout worklist --asof {then} shows the list of then.\n")
+    assert main(["worklist", "--registry", str(tmp_path), "--asof", then]) == 0
+    assert "26 not measured" not in capsys.readouterr().out
+    pages = ["report", "--registry", str(tmp_path), "--pages", str(tmp_path / "pages")]
+    assert main(pages) == 0
+    assert f"turnout report --day {then} shows the pages of then." in capsys.readouterr().out
+    assert "<b>26</b>not measured" in (tmp_path / "pages/index.html").read_text()
+    assert main([*pages, "--day", then]) == 0
+    assert f"As of {then}." in capsys.readouterr().out
+    index = (tmp_path / "pages/index.html").read_text()
+    assert "<b>9</b>not measured" in index and f"as of {then}" in index
+    assert main([*pages, "--day", "yesterday"]) == 2
+    assert "--day, date: 'yesterday'. Write YYYY-MM-DD." in capsys.readouterr().err
     monkeypatch.setattr("turnout.registry.day.list_day", lambda connection: f"timestamp '{newest}'")
     assert main(["worklist", "--registry", str(tmp_path)]) == 0
     told = capsys.readouterr().out

@@ -2,14 +2,14 @@
 -- cluster of the train held fixed. Difference of means per cluster, weighted by n1 n2 / (n1 + n2); worst first.
 -- A cluster counts where both times have at least 5 passages, whose sensors are averaged first; passages of one week
 -- are taken as independent.
--- needs: section_scores
+-- needs: section_scores, in_service
 create or replace macro sections_whose_scores_fell(days := 28, "asof" := null) as table
 with sample as (
     select
         turnout_id, section_id, coalesce(cluster_id, train_type, 'none') as cluster_id, fit_pct,
         passed_at_utc > coalesce("asof", newest_measurement()) - to_days(days) as is_recent
     from section_scores
-    where fit_pct is not null and passed_at_utc <= coalesce("asof", newest_measurement())
+    where in_service(turnout_id) and fit_pct is not null and passed_at_utc <= coalesce("asof", newest_measurement())
         and passed_at_utc > coalesce("asof", newest_measurement()) - to_days(days + 365)
 ),
 per_cluster as (

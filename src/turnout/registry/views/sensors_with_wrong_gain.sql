@@ -1,9 +1,9 @@
 -- One row per sensor whose newest visit says that it reads too much or too little: 1 is right.
--- needs: parameter_growth
+-- needs: parameter_growth, in_service
 create or replace view sensors_with_wrong_gain as
 select
     turnout_id, channel, value as gain, value_se as gain_se, value - 1.959964 * value_se as gain_low,
     value + 1.959964 * value_se as gain_high, n_visits, found_at_utc, finding_id
 from parameter_growth
-where term = 'sensor_gain' and parameter = 'gain' and is_open and abs(value - 1) > 1.959964 * value_se
+where in_service(turnout_id) and term = 'sensor_gain' and parameter = 'gain' and is_open and abs(value - 1) > 1.959964 * value_se
 order by abs(value - 1) desc;

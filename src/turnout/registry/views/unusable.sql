@@ -1,7 +1,7 @@
 -- One row per section under the hammer, and per turnout under trains ('*'), of which nothing could be used since the last
 -- test that gave a model or the last passage that counted, or ever. Of passages it takes ten in a row after a good one:
 -- single ones are rejected every day. Source is empty for a turnout none of whose files belongs to any test or passage.
--- needs: models_current, impacts_current, passages_current, quarantine_open
+-- needs: models_current, impacts_current, passages_current, quarantine_open, in_service
 create or replace macro unusable("asof" := null) as table
 with unread as (
     select
@@ -32,7 +32,8 @@ tried as not materialized (
     from unread where kind = 'passage'
 ),
 known as not materialized (
-    select * from tried where coalesce(at_utc <= "asof", "asof" >= newest_measurement(), true)
+    select * from tried
+    where in_service(turnout_id) and coalesce(at_utc <= "asof", "asof" >= newest_measurement(), true)
 ),
 last_used as (
     select part, max(at_utc) filter (is_used) as used_at_utc

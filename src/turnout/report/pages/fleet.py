@@ -30,6 +30,7 @@ def fleet_page(source, template, shared):
     return template.render(
         n_turnouts=len(turnouts),
         n_sections=sum(t["n_sections"] for t in turnouts),
+        today=source.day.split("'")[1][:10],
         latest=day(max((t["latest"] for t in turnouts if t["latest"]), default=None)),
         count={key: shown.get(state, 0) for state, key in STATES.items()},
         n_quarantined=sum(r["rows"] for r in reasons),

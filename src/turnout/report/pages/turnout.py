@@ -10,6 +10,7 @@ from turnout.report.trains import trains_part
 from turnout.report.words import badge, day, with_interval
 
 BANDS = ("ballast", "railpad")
+SHOWN = 5  # earlier tests that were not used, of one section
 PANELS = {
     "OT": "open track",
     "SP": "switch panel",
@@ -104,7 +105,20 @@ def _section(rows, section, models, states):
         "history": history or f"<p>{'No model yet' if model else 'Not measured yet, or nothing could be read'}.</p>",
         "panels": _panels(rows, section, model, receptance, modes) if model and receptance else "",
         "detail": model["detail"] if model else "",
+        "unused": _unused(_of(rows, "unused", section)),
     }
+
+
+def _unused(tests):
+    """Earlier tests of a section that gave no model, the newest first, for they are no point of its history."""
+    said = [f"{day(t['measured_at_utc'])} ({_reason(t)})" for t in tests[:SHOWN]]
+    more = len(tests) - SHOWN
+    return ", ".join(said) + (f" and {more} before" if more > 0 else "")
+
+
+def _reason(test):
+    words = (test["reason"] or "no reason").replace("_", " ")
+    return f"{words}: {test['detail']}" if test["detail"] else words
 
 
 def _panels(rows, section, model, receptance, modes):

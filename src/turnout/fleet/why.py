@@ -1,0 +1,45 @@
+"""Why a run failed, in a few words: from what Snakemake and its jobs have written."""
+
+import re
+from pathlib import Path
+
+LOGS = Path(".snakemake/log")
+VERDICT = Path("logs/verdict.log")
+FAILED = re.compile(
+    r"^Error in rule (\w+):\n(?:    (?!jobid).*\n)*    jobid: (\d+)\n(?:    (?!log:).*\n)*(?:    log: (\S+))?", re.M
+)
+FINISHED = re.compile(r"^Finished jobid: (\d+) ", re.M)
+STOPPED = re.compile(r"^\w+(?:Errors?|Exception)(?: in (?:file|rule) .*)?:\n(.+)$", re.M)
+LONGEST = 300
+
+
+def why(since: int = 0) -> str:
+    """The verdict's first complaint, else the first rule that failed and its log, else what stopped the run before any
+    job; "" where nothing tells. ``since`` is when the run began [ns since 1970]."""
+    written = sorted((path.stat().st_mtime_ns, path) for path in LOGS.glob("*.snakemake.log"))
+    texts = [path.read_text(encoding="utf-8", errors="replace") for time, path in written if time >= since]
+    failed = [found for text in texts for found in _failed(text)]
+    jobs = [(rule, log) for rule, log in failed if rule != "verdict"]
+    if jobs:
+        rule, log = jobs[0]
+        said = f"rule {rule} failed" + (f", see {log}" if log else "")
+        return said + (f" (and {len(failed) - 1} more)" if len(failed) > 1 else "")
+    if failed:
+        return _complaint()
+    stopped = [found for text in texts if (found := STOPPED.search(text))]
+    return stopped[0][1].strip()[:LONGEST] if stopped else ""
+
+
+def _failed(text: str) -> list[tuple[str, str]]:
+    """(rule, log) of each job that failed and did not come to its end when it was tried again, once."""
+    ended = set(FINISHED.findall(text))
+    return list({job: (rule, log) for rule, job, log in FAILED.findall(text) if job not in ended}.values())
+
+
+def _complaint() -> str:
+    """The first complaint of the verdict, which stands below what it counts."""
+    lines = VERDICT.read_text(encoding="utf-8").splitlines() if VERDICT.exists() else []
+    if len(lines) < 2:
+        return f"rule verdict failed, see {VERDICT}"
+    more = f" (and {len(lines) - 2} more, see {VERDICT})" if len(lines) > 2 else ""
+    return lines[1][:LONGEST] + more

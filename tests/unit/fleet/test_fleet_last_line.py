@@ -1,0 +1,140 @@
+"""The last line of a night: what of it can be used, what is gone since the last one, and why it failed."""
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from turnout.fleet.batches import UnitResult, read_results, write_batch
+from turnout.fleet.nightly import nightly
+from turnout.fleet.why import why
+from turnout.registry.register import register
+
+STATE = """
+from pathlib import Path
+from turnout.fleet.state import Known, State
+known = {{u: Known('', '', '1', s, 'b') for u, s in {known!r}.items()}}
+State(known, ['b']).save(Path('work/hammer/00of01.json'))
+Path('work/plan').mkdir(parents=True, exist_ok=True)
+Path('work/plan/00of01.json').write_text({plan!r})
+{more}
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "profiles/default").mkdir(parents=True)
+    (tmp_path / "profiles/default/config.yaml").write_text("cores: 1\n")
+    return tmp_path
+
+
+def plan(*units):
+    """Text of a plan of hammer tests."""
+    found: dict[str, list] = {}
+    for turnout, kind, label in (u.split("/", 2) for u in units):
+        found.setdefault(turnout, []).append([kind, label, "A", "2026-01-05", "", [["a", 1, 1]]])
+    hashes = {"hammer": "h"}
+    entries = [{"turnout": t, "raw": t, "hashes": hashes, "problems": [], "units": found[t]} for t in sorted(found)]
+    lines = ",\n".join(json.dumps(e) for e in entries)
+    return f'{{"shard":"00of01","turnouts":[\n{lines}\n]}}\n'
+
+
+def night(folder, known, planned, more=""):
+    """The line of a night in which Snakemake leaves these units and this plan."""
+    (folder / "snakemake.py").write_text(STATE.format(known=known, plan=plan(*planned), more=more))
+    return str(nightly([], "profiles/default"))
+
+
+def units(*turnouts):
+    return [f"{t}/hammer/A/2026-01-05" for t in turnouts]
+
+
+def test_what_is_gone_is_said_once(folder):
+    known = dict.fromkeys([*units("t1", "t2"), "t1/mismatch/2026-01-05"], "ok")
+    assert "0 vanished" in night(folder, known, units("t1", "t2"))
+    assert "1 vanished" in night(folder, known, units("t1"))
+    assert "0 vanished" in night(folder, known, units("t1"))
+
+
+def model(turnout, status):
+    row = {
+        "model_id": turnout.encode().hex().zfill(32), "turnout_id": turnout, "section_id": f"{turnout}/A",
+        "campaign_id": f"{turnout}/2026-01-05", "measured_at_utc": "2026-01-05T10:00:00", "method": "joint",
+        "status": status, "code_version": "1", "config_hash": "c",
+    }  # fmt: skip
+    row |= {"reason": "too_few_impacts"} if status == "rejected" else {}
+    return UnitResult(f"{turnout}/hammer/A/2026-01-05", turnout, "hammer", "k", "1", "ok", {"models": [row]})
+
+
+def registry(folder, **status):
+    tables = {"turnouts": [{"turnout_id": t, "layout": "l", "config_hash": "h"} for t in [*status, "never"]]}
+    batch = write_batch(folder / "batches", [model(t, s) for t, s in status.items()])
+    register([batch], folder / "results/registry", read=read_results, tables=tables)
+
+
+def test_turnouts_of_which_nothing_could_be_used_are_named_every_night(folder):
+    registry(folder, t1="accepted", t2="rejected", t3="rejected")
+    known = dict.fromkeys(units("t1", "t2", "t3"), "ok")
+    for said in (night(folder, known, known), night(folder, known, known)):
+        assert said.startswith("sound: ") and "nothing could be used yet of t2, t3" in said
+
+
+def test_a_fleet_of_which_nothing_could_be_used_is_not_called_sound(folder):
+    registry(folder, **dict.fromkeys(("t1", "t2", "t3", "t4", "t5"), "rejected"))
+    known = dict.fromkeys(units("t1", "t2", "t3", "t4", "t5"), "ok")
+    said = night(folder, known, known)
+    assert said.startswith("every job ran, but nothing could be used: 5 units known")
+    assert "nothing could be used yet of t1, t2, t3 and 2 more" in said
+
+
+ERROR = """Error in rule {rule}:
+    message: None
+    jobid: {job}
+    output: work/{rule}
+    log: logs/{rule}.log (check log file(s) for error details)
+"""
+
+
+def test_the_verdicts_sentence_is_why(folder):
+    """A job that was tried again and came to its end is no reason."""
+    text = ERROR.format(rule="hammer", job=2) + "Trying to restart job 2.\nFinished jobid: 2 (Rule: hammer)\n"
+    write("run", text + ERROR.format(rule="verdict", job=4))
+    complaint = "9 of 12 new units of the fleet have rows in quarantine, 75 %, above the limit of 50 %"
+    Path("logs").mkdir()
+    found = "INFO the registry is up to date, but 12 units computed, 9 with rows in quarantine"
+    Path("logs/verdict.log").write_text(f"{found}\n{complaint}\nanother\n")
+    assert why() == f"{complaint} (and 1 more, see logs/verdict.log)"
+
+
+def test_the_first_rule_that_failed_is_why_with_its_log(folder):
+    write("run", ERROR.format(rule="passage", job=2) + ERROR.format(rule="register", job=4))
+    write("then", ERROR.format(rule="verdict", job=1), later=5)
+    assert why() == "rule passage failed, see logs/passage.log (and 2 more)"
+
+
+def test_a_run_that_was_stopped_before_any_job_says_what_it_met(folder):
+    sentence = "raw, raw root: 41 known files are gone, first t2/a.uff. Nothing was changed."
+    write("run", f'ConfigError in file "/srv/t/Snakefile", line 11:\n{sentence}\n  File "/srv/t/Snakefile", line 11\n')
+    assert why() == sentence
+    log = Path(".snakemake/log/run.snakemake.log")
+    assert why(since=log.stat().st_mtime_ns + 1) == ""  # of an earlier run
+
+
+def write(name, text, later=0):
+    log = Path(".snakemake/log") / f"{name}.snakemake.log"
+    log.parent.mkdir(parents=True, exist_ok=True)
+    log.write_text(text)
+    os.utime(log, (log.stat().st_mtime + later, log.stat().st_mtime + later))
+
+
+def test_the_line_of_a_night_that_failed_says_why(folder):
+    error = 'ConfigError in file "Snakefile", line 11:\\nconfig/config.yaml, line 1: unknown key.\\n'
+    more = (
+        "log = Path('.snakemake/log/now.snakemake.log')\nlog.parent.mkdir(parents=True)\n"
+        f"log.write_text('{error}')\nraise SystemExit(1)"
+    )
+    said = night(folder, {}, [], more)
+    assert said.startswith("failed with exit code 1: ") and "\n" not in said
+    assert said.endswith("; why: config/config.yaml, line 1: unknown key.")
