@@ -63,7 +63,7 @@ def long_before(visits, time, gap, n_visits) -> np.ndarray:
     early = time <= first[visits] + gap
     np.minimum.at(second, visits[~early], time[~early])
     np.maximum.at(last, visits, time)
-    lone = (second - first > LONG_BEFORE) & (last > second + gap)
+    lone = (second > first + LONG_BEFORE) & (last > second + gap)
     return early & lone[visits]
 
 

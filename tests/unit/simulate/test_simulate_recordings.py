@@ -167,7 +167,8 @@ def test_calibration_says_what_the_data_cannot_tell():
     h = receptance(made, frequency, -12.0, -12.0)
     found = calibrate(turnout, "OT", [Measured(frequency, h, 0.05 * np.abs(h), -12.0, -12.0)])
     assert found.informed["pad_stiffness"] and not found.informed["ballast_stiffness"]
-    assert "the data cannot tell" in str(found)
+    (line,) = (line for line in str(found).splitlines() if line.split()[0] == "ballast_stiffness")
+    assert "hardly told by these tests" in line
 
 
 @pytest.mark.parametrize("tone", [600.0, 700.0, 800.0])
