@@ -61,7 +61,8 @@ def _ranked(case, fit, settings, tell, store, effect, promising):
         close = min(material[0].gain - settings.margin, HELD * material[0].gain) if material else 0.0
         leaders = [s for s in material if s.gain > max(NEARLY * settings.threshold, close)]
         polished = [_polished(case, fit, s, settings, store, effect) for s in leaders]
-        polished = [begun_anew(case, fit, s, settings, store, effect) for s in polished]
+        if polished and not fit.candidates:  # beside another effect what is left is that one's shape as well
+            polished[0] = begun_anew(case, fit, polished[0], settings, store, effect)
         ranked = sorted([*polished, *(s for s in ranked if all(s is not x for x in leaders))], key=lambda s: -s.gain)
     return ranked
 

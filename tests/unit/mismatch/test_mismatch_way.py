@@ -67,8 +67,25 @@ def test_what_comes_near_a_name_is_fitted_to_its_end_as_leaders_are(monkeypatch,
     monkeypatch.setattr(refits, "begun_anew", lambda case, fit, s, *a: s)
     monkeypatch.setattr(refits, "_checked", lambda case, fit, s, settings: s)
     monkeypatch.setattr(refits, "_owed", lambda *a: None)
-    refits.scored(Bent(True), None, MismatchSettings(), lambda *a: None, {}, 0, None)
+    plain = SimpleNamespace(candidates=())
+    refits.scored(Bent(True), plain, MismatchSettings(), lambda *a: None, {}, 0, None)
     assert len(asked) == ended
+
+
+@pytest.mark.parametrize(("beside", "begun"), [((), ["a"]), (("a name",), [])])
+def test_only_the_first_leader_of_a_first_effect_is_begun_anew(monkeypatch, beside, begun):
+    """Of two leaders; beside a name what is left is that one's shape as well."""
+    scores = {f: SimpleNamespace(gain=g, material=True, family=f, fit=None) for f, g in (("a", 20.0), ("b", 19.0))}
+    entries = [SimpleNamespace(rival=False, candidate=SimpleNamespace(key=f)) for f in "ba"]
+    asked = []
+    monkeypatch.setattr(refits, "shortlist", lambda *a: entries)
+    monkeypatch.setattr(refits, "_tried", lambda case, fit, entry, *a: scores[entry.candidate.key])
+    monkeypatch.setattr(refits, "_same_law_beside", lambda case, fit, ranked, *a: ranked)
+    monkeypatch.setattr(refits, "_polished", lambda case, fit, s, *a: s)
+    monkeypatch.setattr(refits, "begun_anew", lambda case, fit, s, *a: asked.append(s.family) or s)
+    plain = SimpleNamespace(candidates=beside)
+    refits._ranked(Bent(True), plain, MismatchSettings(), lambda *a: None, {}, 0, None)
+    assert asked == begun
 
 
 @pytest.mark.parametrize(("stall", "again"), [(20.0, True), (0.05, False)])
