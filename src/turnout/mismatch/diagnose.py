@@ -15,8 +15,9 @@ from turnout.mismatch.refits import scored
 from turnout.mismatch.scoring import heard, judged, latent_of, over, over_reserved
 from turnout.mismatch.together import (
     borne_out,
+    both_stand,
     needed,
-    other_of,
+    of_one_part,
     parted,
     reconsidered,
     refused,
@@ -122,12 +123,12 @@ def diagnose(case, settings=None, progress=None, store=None):
         scores, fit = scored(case, fit, settings, tell, store, effect, promising)
         base = base if effect else fit
         verdict, best = judged(case, fit, scores, settings)
-        if effect and (verdict.answer != "named" or best.gain < _shape_of(case, verdicts[0].scores[0], best)):
+        if effect and (not of_one_part(verdict) or best.gain < _shape_of(case, verdicts[0].scores[0], best)):
             verdicts[0] = told_beside(verdicts[0], verdict)
             break
         if choice:
             verdicts[0] = parted(case, base, verdicts[0], verdict, settings)
-            if verdicts[0].answer == "a_or_b":
+            if not of_one_part(verdicts[0]):
                 break
         verdicts.append(verdict)
         if verdict.answer == "none" or best is None or best.gain <= settings.threshold:
@@ -139,12 +140,10 @@ def diagnose(case, settings=None, progress=None, store=None):
         fit = found
         if not fit.jacobian:
             break
-        if verdict.answer == "named" and not refused(verdicts):  # these are weighed against the base's errors
+        if of_one_part(verdict) and not refused(verdicts):  # these are weighed against the base's errors
             case, fit = _with_its_errors(case, fit, settings, store)
-        if verdict.answer == "a_or_b":  # both may be there
+        if verdict.answer == "a_or_b" and not of_one_part(verdict):  # both may be there
             choice = case, [verdict], fit, scores
-            if other_of(verdict) is None:
-                break
         elif not case.frozen_jacobian and over(case, fit, settings) <= 1.0:
             break
     if refused(verdicts):
@@ -152,7 +151,7 @@ def diagnose(case, settings=None, progress=None, store=None):
     else:
         verdicts, fit = needed(case, base, fit, verdicts, settings)
         verdicts, fit = borne_out(case, fit, verdicts, settings)
-    if choice and [v.answer for v in verdicts] != ["named", "named"]:
+    if choice and not both_stand(verdicts):
         case, verdicts, fit, scores = choice
     verdicts = [_as_it_ends(v, case, fit, settings) for v in verdicts]
     check = _verified(case, base, fit, _rival(verdicts[0]), settings)

@@ -32,10 +32,18 @@ def told_beside(first, second):
     return replace(first, reason=f"something else shows beside it: {second.reason}")
 
 
-def other_of(torn):
+def of_one_part(verdict):
+    """Whether a verdict says what one effect is: by a name, or by two laws of one part that nothing tells apart."""
+    return verdict.answer == "named" or (verdict.answer == "a_or_b" and _other_of(verdict) is None)
+
+
+def both_stand(verdicts):
+    """Whether there are two verdicts, and each says what one effect is."""
+    return len(verdicts) == 2 and all(of_one_part(v) for v in verdicts)
+
+
+def _other_of(torn):
     """The Score of the second of two rivals that may both be there, None where one is a form of the other."""
-    if torn.answer != "a_or_b":
-        return None
     other = next((s for s in torn.scores[1:] if s.family == torn.names[1]), None)
     return other if other is not None and _vouches(torn.scores[0], other) else None
 
@@ -43,7 +51,7 @@ def other_of(torn):
 def parted(case, base, torn, second, settings):
     """The verdict on the first of two rivals where the ``second`` effect, found on top of it, is the other: what each
     gains alone is as much by chance, and they do not explain the same. ``torn`` itself where it is another effect."""
-    other = other_of(torn)
+    other = _other_of(torn)
     if other is None or second.names[:1] != (other.family,):
         return torn
     mine, _ = judged(case, base, tuple(s for s in torn.scores if s is not other), settings)
@@ -69,7 +77,7 @@ def reconsidered(case, base, fit, verdicts, settings):
 def needed(case, base, fit, verdicts, settings):
     """(verdicts, fit) without a first name that is worth no name beside the second: what it had taken for itself before
     the second was found. Both stay where each is worth one."""
-    if [v.answer for v in verdicts] != ["named", "named"]:
+    if not both_stand(verdicts):
         return verdicts, fit
     alone = _second_alone(case, fit, settings)
     alone = ended(case, alone, settings) if alone is not None else None
@@ -83,7 +91,7 @@ def needed(case, base, fit, verdicts, settings):
 def borne_out(case, fit, verdicts, settings):
     """(verdicts, fit) without a second name beside which the first foretells recordings never used worse than alone, by
     more than ``COSTLY`` points and the standard error of that."""
-    if [v.answer for v in verdicts] != ["named", "named"] or not case.reserved:
+    if not both_stand(verdicts) or not case.reserved:
         return verdicts, fit
     first, second = verdicts
     alone = first.scores[0].fit

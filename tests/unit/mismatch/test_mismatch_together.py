@@ -95,6 +95,20 @@ def test_two_shapes_of_one_effect_stay_a_choice(monkeypatch):
     )
 
 
+@pytest.mark.parametrize("wave, ramp", [(1.2, 0.8), (0.12, 2.5)])
+def test_an_effect_beside_two_forms_of_another_is_found(monkeypatch, wave, ramp):
+    """Nothing tells a wave from the same wave 0.01 further along, two laws of one spring. The ramp is no law of it, and
+    has its name whether it is found after or before that choice."""
+    monkeypatch.setitem(SHAPES, "twin", np.sin(9.0 * X + 0.01))
+    case = Shapes(("wave", "twin"), kin="spring", wave=wave, ramp=ramp)
+    case.candidates += Shapes(("ramp",)).candidates
+    found = diagnose(case)
+    said = {v.answer: set(v.names) for v in found.verdicts}
+    assert said == {"a_or_b": {"wave", "twin"}, "named": {"ramp"}}
+    sizes = dict(zip((c.family for c in found.fit.candidates), found.fit.psi))
+    assert sizes["ramp"] == pytest.approx(ramp, abs=0.06)  # three standard errors or more
+
+
 class Trains(Shapes):
     """Two trains with a wave each, seen twenty times over the noise; ``told`` whether candidates say of which train."""
 
