@@ -1,9 +1,20 @@
 """Write a file so that a reader sees the old one or the new one, never a part."""
 
 import os
+import secrets
 import stat
 from collections.abc import Callable
 from pathlib import Path
+
+
+def beside(path: Path) -> Path:
+    """A hidden name beside ``path`` for what is not finished, that no process uses, on this machine or another.
+
+    >>> name = beside(Path("pages/a.html"))
+    >>> name.parent.name, name.name.startswith(".a.html."), name.suffix, name == beside(Path("pages/a.html"))
+    ('pages', True, '.tmp', False)
+    """
+    return path.with_name(f".{path.name}.{secrets.token_hex(6)}.tmp")
 
 
 def write_atomic(path: os.PathLike, write: Callable) -> None:
@@ -13,7 +24,7 @@ def write_atomic(path: os.PathLike, write: Callable) -> None:
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    temporary = beside(path)
     try:
         with open(temporary, "wb") as stream:
             if path.exists():

@@ -41,12 +41,12 @@ class ReadError(TurnoutError):
 class PartlyComputed(Exception):
     """Faults of the program on some records of a unit: ``tables`` holds the rows of all others.
 
-    ``faults`` are (path, record, exception), one per record that could not be computed.
+    ``faults`` are (path, record from 0, exception), one per record that could not be computed.
     """
 
     def __init__(self, tables, faults):
         path, record, error = faults[0]
-        super().__init__(f"{path}, record {record}: {type(error).__name__}: {error}")
+        super().__init__(f"{path}, record {record + 1}: {type(error).__name__}: {error}")
         self.tables, self.faults = tables, faults
 
 

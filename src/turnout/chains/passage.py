@@ -93,7 +93,7 @@ def passage_unit(
             started_at = recording.started_at or _time_in(unit.label)
             if started_at is None:
                 remedy = "Put the time in its name as YYYYMMDDTHHMMSSZ, or record it in the file"
-                error = ReadError(path, f"record {recording.record}", "has no time", remedy, "wrong_time")
+                error = ReadError(path, f"record {recording.record + 1}", "has no time", remedy, "wrong_time")
                 rows["quarantine"].append(
                     quarantine_row(error, base, "passage", "passage", recording.record, recording_id)
                 )

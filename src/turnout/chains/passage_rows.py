@@ -32,7 +32,7 @@ def finding_rows(passage, base, path, record, recording_id) -> list[dict]:
         whole = finding.reason in ("no_train", "two_trains", "train_cut_off")
         if whole and passage.status != "rejected":
             continue
-        place = f"record {record}" if whole else f"record {record}, {finding.detail.split(':')[0]}"
+        place = f"record {record + 1}" if whole else f"record {record + 1}, {finding.detail.split(':')[0]}"
         remedy = REMEDIES.get(finding.reason, "Look at the recording")
         error = ReadError(path, place, finding.detail or finding.reason, remedy, finding.reason)
         row = quarantine_row(error, base, "passage", "passage", record, recording_id)

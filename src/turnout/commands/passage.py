@@ -60,7 +60,7 @@ def _show(recording, late, turnout, context, settings, no_fit):
 
 def _train(recording, passage) -> list[str]:
     """The train in words."""
-    words = [f"{recording.source}, record {recording.record}: {recording.duration:.1f} s, {passage.status}"]
+    words = [f"{recording.source}, record {recording.record + 1}: {recording.duration:.1f} s, {passage.status}"]
     words += [f"  {f.reason}: {f.detail}" for f in passage.findings]
     if not passage.n_axle:
         return words

@@ -22,7 +22,7 @@ def judge_repeats(cuts):
             first, second = sorted((int(k), int(other)))
             if not repeated(cuts[second]) and (apart := difference(cuts[first], cuts[second])) <= ALIKE:
                 earlier = cuts[first]
-                detail = f"the same samples as record {earlier.record} of {earlier.recording.source or 'the test'}"
+                detail = f"the same samples as record {earlier.record + 1} of {earlier.recording.source or 'the test'}"
                 cuts[second].rejections.append(Rejection("duplicate", apart, ALIKE, detail))
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import duckdb
 
+from turnout.atomic import beside
 from turnout.errors import RegistryError
 from turnout.registry.columns import literal, tables
 from turnout.registry.generation import Generation, load, sync_folder
@@ -70,16 +71,15 @@ def build_database(registry_dir: Path, generation: Generation) -> None:
     The views hold absolute paths: relative ones would break for whoever opens it from another folder.
     """
     root = Path(registry_dir).resolve()
-    beside = root / f".registry.{os.getpid()}.tmp"
-    beside.unlink(missing_ok=True)
+    unfinished = beside(root / "registry")
     con = connect()
     try:
-        con.execute(f"attach {literal(str(beside))} as registry (storage_version '{STORAGE_VERSION}')")
+        con.execute(f"attach {literal(str(unfinished))} as registry (storage_version '{STORAGE_VERSION}')")
         con.execute("use registry")
         _create_views(con, root, generation)
         con.execute("use memory")
         con.execute("detach registry")
-        os.replace(beside, root / DATABASE)
+        os.replace(unfinished, root / DATABASE)
         sync_folder(root)
     except (duckdb.IOException, OSError) as error:
         raise RegistryError(
@@ -88,7 +88,7 @@ def build_database(registry_dir: Path, generation: Generation) -> None:
         ) from error
     finally:
         con.close()
-        for leftover in (beside, Path(f"{beside}.wal")):
+        for leftover in (unfinished, Path(f"{unfinished}.wal")):
             leftover.unlink(missing_ok=True)
 
 

@@ -6,6 +6,7 @@ import os
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
+from turnout.atomic import write_atomic
 from turnout.errors import RegistryError
 from turnout.registry.columns import tables
 
@@ -108,15 +109,7 @@ def commit(registry_dir: Path, generation: Generation) -> None:
 
 def write_durably(path: Path, content: bytes) -> None:
     """Write beside, fsync, replace, fsync the folder: whole or not at all, also after a power cut."""
-    beside = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        with open(beside, "wb") as stream:
-            stream.write(content)
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.replace(beside, path)
-    finally:
-        beside.unlink(missing_ok=True)
+    write_atomic(path, lambda stream: stream.write(content))
     sync_folder(path.parent)
 
 

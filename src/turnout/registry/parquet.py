@@ -5,6 +5,7 @@ from pathlib import Path
 
 import duckdb
 
+from turnout.atomic import beside
 from turnout.content import sha256_of
 from turnout.errors import RegistryError
 from turnout.registry.columns import literal, names, sort_order, tables, time_column
@@ -46,16 +47,16 @@ def write_sorted(
     changed.
     """
     folder = Path(registry_dir) / folder_of(table, year)
-    beside = folder / f".{prefix}.{os.getpid()}.tmp"
+    unfinished = beside(folder / prefix)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        rows = _copy(con, table, select, beside, prefix.startswith("batch"), always_alike)
+        rows = _copy(con, table, select, unfinished, prefix.startswith("batch"), always_alike)
         if rows == 0:
             return None
-        digest = _sync_and_hash(beside)
+        digest = _sync_and_hash(unfinished)
         final = folder / f"{prefix}-{digest[:12]}.parquet"
-        size = beside.stat().st_size
-        os.replace(beside, final)
+        size = unfinished.stat().st_size
+        os.replace(unfinished, final)
         sync_folder(folder)
     except (duckdb.IOException, OSError) as error:
         raise RegistryError(
@@ -63,7 +64,7 @@ def write_sorted(
             "make room or give write permission, then run again."
         ) from error
     finally:
-        beside.unlink(missing_ok=True)
+        unfinished.unlink(missing_ok=True)
         con.execute("drop table if exists to_write")
     path = f"{folder_of(table, year)}/{final.name}"
     return DataFile(path, table, year, rows, size, digest, f"{table}:{schema_hash(table)}", _newest(con, table, final))
@@ -88,15 +89,15 @@ def write_empty(con: duckdb.DuckDBPyConnection, registry_dir: Path, table: str) 
     path = Path(registry_dir) / table / f"_schema-{schema_hash(table)}.parquet"
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
-        beside = path.with_name(f".schema.{os.getpid()}.tmp")
+        unfinished = beside(path)
         typed = ", ".join(f'null::{c.type} as "{c.name}"' for c in tables()[table])
         try:
-            con.execute(f"copy (select {typed} limit 0) to {literal(str(beside))} (format parquet)")
-            os.replace(beside, path)
+            con.execute(f"copy (select {typed} limit 0) to {literal(str(unfinished))} (format parquet)")
+            os.replace(unfinished, path)
         except (duckdb.IOException, OSError) as error:
             raise RegistryError(f"cannot write {path}: {str(error).splitlines()[0]}") from error
         finally:
-            beside.unlink(missing_ok=True)
+            unfinished.unlink(missing_ok=True)
     return f"{table}/{path.name}"
 
 

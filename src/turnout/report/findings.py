@@ -1,6 +1,5 @@
 """Pages of mismatches: from the registry for a fleet, from the rows of a diagnosis for one turnout."""
 
-import os
 from importlib.resources import files
 from pathlib import Path
 
@@ -9,6 +8,7 @@ from jinja2 import Environment, PackageLoader
 from turnout import __version__
 from turnout.config import load_configuration
 from turnout.report.pages.finding import finding_page
+from turnout.report.write import replace_page
 
 NEWEST = """
     select f.* from findings_current f
@@ -52,9 +52,7 @@ def _write(folder, about, rows, generation) -> Path:
     shared = {"css": css, "finding_css": own, "version": __version__, "generation": generation}
     path = Path(folder) / "findings" / f"{about['turnout_id']}.html"
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f"{path.name}.{os.getpid()}.tmp")
-    temporary.write_text(finding_page(about, rows, environment.get_template("finding.html"), shared), encoding="utf-8")
-    os.replace(temporary, path)
+    replace_page(path, finding_page(about, rows, environment.get_template("finding.html"), shared))
     return path
 
 

@@ -8,6 +8,7 @@ from jinja2 import Environment, PackageLoader
 from tqdm import tqdm
 
 from turnout import __version__
+from turnout.atomic import beside
 from turnout.report.changed import MARK, content_of, contents
 from turnout.report.pages.fleet import fleet_page
 from turnout.report.pages.turnout import turnout_page
@@ -94,6 +95,6 @@ def _remove_others(folder, known):
 
 def replace_page(path, text):
     """Put a page in place in one step, so that nobody ever opens half of it."""
-    temporary = path.with_name(f"{path.name}.{os.getpid()}.tmp")
+    temporary = beside(path)
     temporary.write_text(text, encoding="utf-8")
     os.replace(temporary, path)

@@ -113,8 +113,8 @@ def test_a_load_that_nobody_knows_is_as_open_as_from_empty_to_full(repository, k
 
 
 def test_swapped_channels_are_two():
-    assert _channels_of({"place": "record 0, A7 and A8"}) == ["A7", "A8"]
-    assert _channels_of({"place": "record 0, A7: 3 of 40"}) == ["A7"]
+    assert _channels_of({"place": "record 1, A7 and A8"}) == ["A7", "A8"]
+    assert _channels_of({"place": "record 1, A7: 3 of 40"}) == ["A7"]
 
 
 def test_words_where_a_temperature_should_be_cost_the_temperature_alone(folder):

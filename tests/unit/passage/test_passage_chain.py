@@ -137,7 +137,7 @@ def test_a_clipped_channel_is_quarantined_by_name_and_the_others_are_fitted(tmp_
     samples[3] = np.clip(samples[3], -1.0, 1.0)
     unit, turnout = lay_out(tmp_path, replace(recording, samples=samples))
     rows = passage_unit(unit, turnout, tmp_path, context(("A7", "SP")))
-    assert [(q["reason_code"], q["place"]) for q in rows["quarantine"]] == [("clipped", "record 0, A7")]
+    assert [(q["reason_code"], q["place"]) for q in rows["quarantine"]] == [("clipped", "record 1, A7")]
     fits = {f["channel"]: f["status"] for f in rows["passage_fits"]}
     assert fits["A7"] == "rejected" and fits["SP"] == "accepted"
     assert rows["passages"][0]["status"] == "partly"

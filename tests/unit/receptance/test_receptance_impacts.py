@@ -150,7 +150,7 @@ def test_the_same_test_exported_twice_counts_once(hammer, digits):
         again.append(hammer.recording(samples, r.record, "again.csv"))
     alone, both = hammer.impacts(sound), hammer.impacts([*sound, *again])
     assert [reasons(i) for i in both] == [[]] * 5 + [["duplicate"]] * 5
-    assert both[5].rejections[0].detail == "the same samples as record 0 of test.uff"
+    assert both[5].rejections[0].detail == "the same samples as record 1 of test.uff"
     assert [i.peak for i in both[:5]] == [i.peak for i in alone]
     assert receptance_of(both).n == 5
 

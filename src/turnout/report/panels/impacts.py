@@ -24,4 +24,4 @@ def impacts_panel(rows):
 
 def _words(row, peak):
     said = "used" if row["status"] == "accepted" else f"rejected: {row['reason']}. {row['detail'] or ''}"
-    return f"test {row['test']}, record {row['record']}: {peak:.1f} kN, {said}"
+    return f"test {row['test']}, record {row['record'] + 1}: {peak:.1f} kN, {said}"
