@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pandas as pd
 import pytest
-from benchmarks.trend_fleet import Fleet, drift, modes
+from benchmarks.trend_fleet import Fleet, drift, modes, step
 from benchmarks.trend_registry import small_registry
 
 from turnout.registry.database import open_registry
@@ -286,3 +286,23 @@ def test_points_of_a_campaign_of_two_days_are_all_red():
     ]
     svg = history_panel("ballast", modes_, charts, [])
     assert svg.count('class="alarm"') == 2 and svg.count('class="point"') == 1
+
+
+def test_a_loss_after_a_gain_is_called_a_loss(settings):
+    """Frost lifts a section for thirty weeks; a sum sinks slowly, so the alarm is open yet when it falls."""
+    fleet = Fleet(turnouts=1, weeks=106, phi=0.0, campaign=0.3, band="ballast", frequency=150.0)
+    which = (np.arange(8) == 4)[None, :]
+    change = step(fleet, which, 4.0, 66) + step(fleet, which, -7.0, 96)
+    rows = modes(fleet, 3, change)
+    fell = rows["measured_at_utc"].min() + pd.Timedelta(weeks=96)
+    for asof in ("newest_measurement()", "newest_measurement() - interval 1 day"):
+        with viewed(rows, settings) as con:
+            opened = con.execute("select direction from alarms where closed_at_utc is null order by raised_at_utc")
+            assert opened.fetchall() == [("up",), ("down",)]
+            names = "section_id, direction, change_low_pct, change_high_pct, since_at_utc, sentence, look_at"
+            ((place, way, low, high, since, words, look),) = con.execute(
+                f"select {names} from worklist({asof}) where state = 'inspect this week'"
+            ).fetchall()
+        assert (place, way) == ("T00000/S4", "down") and " fell by " in words and look.startswith("voids")
+        assert low < (-7.0 if asof == "newest_measurement()" else -3.0) < high
+        assert abs(since - fell) < pd.Timedelta(weeks=4)
