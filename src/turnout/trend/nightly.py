@@ -64,8 +64,8 @@ def update(registry_dir, settings, digests=None, as_of=None, acknowledgements=No
     with open_registry(registry_dir) as con:
         events = con.execute("select * from events order by event_at_utc, event_id").df()
         parts, newest = _parts(con, settings, as_of, end)
-        now = newest if as_of is not None else max(newest, end)
-        events = events[days(events["event_at_utc"]) <= now]
+        at = days(events["event_at_utc"])
+        events = events[(at <= newest) | ((as_of is None) & (at < end))]
         before = con.execute(ACCOUNTED if as_of is None else f"from ({ACCOUNTED}) limit 0").df()
         prepared = [prepare(_panel(con, part, newest, events, settings), events, settings) for part in parts]
     years, tables = _tables(prepared, settings, lambda alarms: with_withdrawn(alarms, before, newest))

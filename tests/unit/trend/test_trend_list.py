@@ -79,12 +79,13 @@ def test_an_open_alarm_does_not_end_because_nobody_measures(settings):
 
 
 @pytest.mark.parametrize(
-    ("days", "state"), [(400, "inspect this week"), (-40000, "inspect this week"), (0, "learning")]
+    ("days", "state"),
+    [(400, "inspect this week"), (1, "inspect this week"), (-40000, "inspect this week"), (0, "learning")],
 )
 def test_work_that_is_planned_resets_nothing_yet(tmp_path, settings, days, state):
-    """An event of tomorrow, of before the first campaign, and of today: the last has come after the last campaign."""
+    """An event of next year, of tomorrow, of before the first campaign, of today: that came after the last campaign."""
     small_registry(tmp_path, fallen())
-    at = pd.Timestamp.now("UTC").tz_localize(None).floor("s") + pd.Timedelta(days=days)
+    at = pd.Timestamp.now("UTC").tz_localize(None).floor("D") + pd.Timedelta(days=days)
     publish(tmp_path, {"events": arrow_rows("events", work("T00001", at))})
     update(tmp_path, settings)
     with open_registry(tmp_path) as con:
