@@ -307,3 +307,14 @@ def test_a_loss_after_a_gain_is_called_a_loss(settings):
         assert (place, way) == ("T00000/S4", "down") and " fell by " in words and look.startswith("voids")
         assert low < (-7.0 if asof == "newest_measurement()" else -3.0) < high
         assert abs(since - fell) < pd.Timedelta(weeks=4)
+
+
+def test_work_on_a_whole_turnout_that_resets_nothing_is_not_hidden_by_the_siblings(settings):
+    """New sensors of the same type, entered as such, read 2 % more in all sections."""
+    fleet = Fleet(turnouts=1, weeks=120, phi=0.0, campaign=0.3)
+    rows = modes(fleet, 7, step(fleet, np.ones((1, 8), bool), 2.0, 85))
+    at = rows["measured_at_utc"].min() + pd.Timedelta(weeks=84, days=3)
+    with viewed(rows, settings, work("T00000", at).assign(resets_ballast=False, resets_railpad=False)) as con:
+        found = con.execute("select change_pct, change_se_pct, changed from change_since_event('tamping', 200)").df()
+    assert len(found) == 8 and found["changed"].all()
+    assert ((found["change_pct"] - 2.0).abs() < 4 * found["change_se_pct"]).all()
