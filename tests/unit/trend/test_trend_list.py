@@ -170,6 +170,25 @@ def test_a_turnout_that_was_taken_out_is_off_the_list_and_its_history_stays(sett
         assert con.execute("select count(*) from alarms where turnout_id = 'T00001'").fetchall()[0][0] >= 1
 
 
+def test_a_section_that_left_its_layout_is_off_the_list_and_its_history_stays(settings):
+    """Nobody could take it off: neither an acknowledgement nor work is accepted for a section without a layout."""
+    rows = fallen()
+    sections = pd.DataFrame({"section_id": [f"T00001/S{i}" for i in range(8)]})
+    sections = sections.assign(turnout_id="T00001", label="S", left_layout=[None] * 4 + [True] + [False] * 3)
+    with viewed(rows, settings, sections=sections) as con:
+        for asof in ("newest_measurement()", "newest_measurement() - interval 1 day"):
+            listed = f"select count(*) from worklist({asof}, most := 1000) where sections like '%S4%'"
+            assert con.execute(f"{listed} and turnout_id = 'T00001'").fetchall() == [(0,)]
+            assert (
+                con.execute(f"select count(*) from cannot_see({asof}) where section_id = 'T00001/S4'").fetchall()[0][0]
+                == 0
+            )
+        states = con.execute("select count(*) from chart_states where turnout_id = 'T00001'").fetchall()
+        assert states == [(8,)]  # seven sections and their median
+        assert con.execute("select count(*) from charts where section_id = 'T00001/S4'").fetchall()[0][0] > 100
+        assert con.execute("select count(*) from alarms where section_id = 'T00001/S4'").fetchall()[0][0] >= 1
+
+
 def test_what_is_silenced_comes_back_on_its_day(settings):
     rows = fallen()
     newest = rows["measured_at_utc"].max()

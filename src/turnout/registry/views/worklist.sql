@@ -103,7 +103,7 @@ everything as (
 heard as (
     select e.*
     from everything e
-    where in_service(e.turnout_id) and not exists (
+    where in_service(e.turnout_id) and not has_left(e.section_id) and not exists (
         select 1 from acknowledgements k
         where k.turnout_id = e.turnout_id and coalesce(k.section_id, e.section_id) = e.section_id
             and coalesce(k.band, e.band) = e.band and k.action = 'suppress'
@@ -136,7 +136,7 @@ fleet as (
         count(*) as n_charts, sum(s.campaigns_per_year * (1 / s.run_length_down + 1 / s.run_length_up)) as alarms_per_year
     from chart_status s
     join then_status n using (turnout_id, section_id, band, source)
-    where n.complete and in_service(s.turnout_id)
+    where n.complete and in_service(s.turnout_id) and not has_left(s.section_id)
 ),
 maintenance as (
     select
