@@ -39,8 +39,8 @@ class Event:
 
 def read_events(path: Path, name: str, known, variants) -> tuple[list[Event], list[ConfigError], list[ConfigError]]:
     """Events in order of time, every error of the rows that cannot be used, and a warning of each event of a turnout
-    that has no row (it was taken out, and its history keeps its events, or it is misspelt), and of each that is dated
-    more than a year ahead. No file means no events.
+    or section that is not there (it was taken out, and its history keeps its events, or it is misspelt), and of each
+    that is dated more than a year ahead. No file means no events.
 
     ``known`` are the ids of the turnouts, None where turnouts.tsv itself is wrong: then no event is accused.
     """
@@ -53,38 +53,32 @@ def read_events(path: Path, name: str, known, variants) -> tuple[list[Event], li
         return [], [fault.error], []
     errors, warnings = [fault.error for fault in table.faults], []
     for line, cells in table.rows:
-        found = list(_wrong(cells, known, variants))
+        found = list(_wrong(cells))
         errors += [cells.place(name, line, column).error(*said) for column, *said in found]
         if found:
             continue
         events.append(_event(cells))
-        if _of_a_stranger(cells, known):
-            stranger = wrong_place(cells, known, variants)
-            warnings += [cells.place(name, line, column).error(*said) for column, *said in stranger]
+        strange = wrong_place(cells, known, variants)
+        warnings += [cells.place(name, line, column).error(*said) for column, *said in strange]
         if events[-1].at > now() + AHEAD:
             late = f"date {cells['date']} is more than a year ahead"
             warnings.append(cells.place(name, line, "date").error(late, "Correct it, or enter it nearer to its day"))
     return sorted(events, key=lambda e: (e.at, e.turnout, e.section or "", e.kind)), errors, warnings
 
 
-def _wrong(cells, known, variants) -> Iterator[tuple[str, str, str]]:
+def _wrong(cells) -> Iterator[tuple[str, str, str]]:
     """(column, what was found, what to write) of everything in a row that cannot be used."""
     if no_row := unreadable(cells):
         yield no_row
         return
-    if not _of_a_stranger(cells, known):
-        yield from wrong_place(cells, known, variants)
+    if not cells["turnout"]:
+        yield "turnout", "turnout is empty", "Write the id of the turnout"
     if wrong := wrong_time(cells["date"]):
         yield "date", f"date is {cells['date']!r}{wrong[0]}", wrong[1]
     if cells["kind"] not in RESETS:
         yield "kind", f"kind is {cells['kind']!r}", suggestion(cells["kind"], RESETS)
     if unknown := set(_words(cells)) - {"ballast", "railpad"}:
         yield "resets", f"resets is {cells['resets']!r}", suggestion(min(unknown), ("ballast", "railpad", "none"))
-
-
-def _of_a_stranger(cells, known) -> bool:
-    """Whether a row names a turnout that the fleet has not, or has no more."""
-    return known is not None and cells["turnout"] != "" and cells["turnout"] not in known
 
 
 def wrong_place(cells, known, variants) -> Iterator[tuple[str, str, str]]:

@@ -157,11 +157,7 @@ WRONG = {
     ),
     "event of no turnout": (
         {"events": "turnout,section,date,kind\n,,2025-01-01,tamping\n"},
-        "line 2, column 1: turnout '' has no row",
-    ),
-    "event of no section": (
-        {"events": "turnout,section,date,kind\nt1,B1,2025-01-01,tamping\n"},
-        "config/events.csv, line 2, column 4: turnout 't1' has no section 'B1'",
+        "line 2, column 1: turnout is empty. Write the id of the turnout",
     ),
     "event on no day": ({"events": "turnout,section,date,kind\nt1,,1.1.2025,tamping\n"}, "Write YYYY-MM-DD"),
     "event of no kind": ({"events": "turnout,section,date,kind\nt1,,2025-01-01,taming\n"}, "Did you mean 'tamping'?"),
@@ -232,8 +228,7 @@ def test_every_error_of_an_event_is_said_at_its_cell(tmp_path):
         configuration(tmp_path, events='turnout,section,date,kind,resets\n"t1",B1,1.1.2025,taming,ballst\n')
     places = [(e.place, e.found.split(" is ")[0]) for e in caught.value.errors]
     assert places == [
-        ("line 2, column 6", "turnout 't1' has no section 'B1'"), ("line 2, column 9", "date"),
-        ("line 2, column 18", "kind"), ("line 2, column 25", "resets"),
+        ("line 2, column 9", "date"), ("line 2, column 18", "kind"), ("line 2, column 25", "resets"),
     ]  # fmt: skip
 
 
@@ -322,6 +317,16 @@ def test_an_event_of_a_turnout_that_was_taken_out_stops_nothing_and_is_said(tmp_
     assert (read.folder / "events.csv").read_bytes() == before
     with pytest.raises(ConfigErrors, match="Did you mean 'tamping'"):  # what else is wrong in such a row is an error
         configuration(tmp_path / "other", events=events.replace("grinding", "tampin"))
+
+
+def test_an_event_of_a_section_that_left_its_layout_stops_nothing_and_is_said(tmp_path, capsys):
+    read = configuration(tmp_path, events="turnout,section,date,kind\nt1,B1,2025-01-01,tamping\n")
+    assert [(e.turnout, e.section, e.kind) for e in read.events] == [("t1", "B1", "tamping")]
+    (warning,) = map(str, read.warnings)
+    assert warning.startswith("config/events.csv, line 2, column 4: turnout 't1' has no section 'B1'")
+    folder = ["--configuration", str(read.folder)]
+    assert main(["events", "t1/B1", "tamping", "2025-03-01", *folder]) == 2  # a new one is a slip
+    assert "no section 'B1'" in capsys.readouterr().err
 
 
 def test_a_broken_table_of_turnouts_accuses_no_event(tmp_path):
