@@ -13,7 +13,7 @@ rule trend:
         acknowledged=ACKNOWLEDGED,
     output:
         state=update("work/trend.json"),
-        worklist="results/worklist.csv",
+        worklist=update("results/worklist.csv"),
     log:
         "logs/trend.log",
     benchmark:

@@ -41,10 +41,11 @@ def test_every_script_is_thin(path):
     assert len(lines) <= 25 and lines[0].startswith('"""')
 
 
-def test_a_report_that_fails_leaves_the_page_of_the_day_before():
+@pytest.mark.parametrize(("rule", "result"), [("report", "pages/index.html"), ("trend", "worklist.csv")])
+def test_a_job_that_fails_leaves_what_the_day_before_has_made(rule, result):
     """Snakemake removes the output of a job before it begins and where it fails, but for what is to be updated."""
-    text = (toy.REPOSITORY / "rules" / "report.smk").read_text()
-    assert 'update("results/pages/index.html")' in text and 'again=attempts("report")' in text
+    text = (toy.REPOSITORY / "rules" / f"{rule}.smk").read_text()
+    assert f'update("results/{result}")' in text and f'again=attempts("{rule}")' in text
 
 
 def test_profiles_are_read(tmp_path):

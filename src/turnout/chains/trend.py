@@ -21,7 +21,7 @@ def trend_job(generation, state, worklist, configuration, day=None) -> dict:
     state : path
         What the last update wrote, JSON; a new one is put in its place. It may be missing, or cut.
     worklist : path
-        The list as CSV.
+        The list as CSV; ``asof_utc`` tells a list that could not be made anew from that of today.
     configuration : path
         Folder of the configuration: settings of the trend, acknowledgements.csv. A row of that file that cannot be
         used is a warning in the log and in ``state``; the others count.
@@ -33,11 +33,12 @@ def trend_job(generation, state, worklist, configuration, day=None) -> dict:
     read = load_configuration(configuration)
     warnings = [str(warning) for warning in read.warnings]
     for warning in warnings:
-        logging.getLogger("turnout.trend").warning("does not count: %s", warning)
+        logging.getLogger("turnout.trend").warning("%s", warning)
     said = [dict(row) for row in read.acknowledgements]
     done = update(registry, read.settings["trend"], before.get("digests"), acknowledgements=said, day=day)
     with open_registry(registry) as con:
-        rows = con.execute(f"select * from worklist({list_day(con, day)}) order by rank").df()
+        asof = list_day(con, day)
+        rows = con.execute(f"select *, {asof} as asof_utc from worklist({asof}) order by rank").df()
     write_text(worklist, rows.to_csv(index=False, lineterminator="\n"))
     newest = done.newest.isoformat() if done.newest else None
     now = {"rows": done.rows, "generation": done.generation, "newest": newest, "digests": done.digests}

@@ -212,6 +212,7 @@ def test_a_silence_ends_on_its_day_though_no_file_has_come(configuration, tmp_pa
     for day in ("2018-05-01", "2018-05-02", "2018-05-03", "2018-05-04"):
         trend_job(root / "_generation.json", tmp_path / "state", tmp_path / "list.csv", configuration, day)
         found = pd.read_csv(tmp_path / "list.csv", dtype=str).fillna("")
+        assert found["asof_utc"].eq(day).all()
         listed[day] = found.loc[found["section_id"].str.endswith("S4"), "state"].tolist()
         with open_registry(root) as con:
             state = con.execute("select distinct state from chart_status where section_id like '%S4'").fetchall()
