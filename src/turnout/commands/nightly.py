@@ -6,7 +6,8 @@
   turnout nightly -- --config accept_vanished=true
 
 The exit code is 0 only where every job ran and the results may be trusted. The registry is published either way,
-without the shards whose jobs died; a run that reached its limit goes on in the next night and is published then.
+with what was computed until a job died or was ended. Of the limit of time the last sixth is kept for that; the next
+run goes on where this one was ended.
 """
 
 import argparse

@@ -23,6 +23,7 @@ from turnout.fleet.why import why
 
 JOB_NAMES = "turnouts"
 TOO_LATE = 124
+TO_PUBLISH = 1 / 6  # of the limit
 WORST = 3
 LOOK = 'turnout query "from quarantine_open" and "from rejected"'
 GENERATION = Path("results/registry/_generation.json")
@@ -70,9 +71,9 @@ class Night:
 def nightly(options: Sequence[str], profile: str, limit: float | None = None, work: Path = Path("work")) -> Night:
     """Run the workflow once, with ``options`` handed on to Snakemake.
 
-    ``profile`` is a folder of profiles/; ``limit`` [s] ends a run that hangs. Where jobs die, what the others have
-    computed is published without theirs. A signal that ends this process ends Snakemake first. TurnoutError where
-    there is no such profile, or another run is still going on.
+    ``profile`` is a folder of profiles/; ``limit`` [s] ends a run that hangs or has more to do than the night is long.
+    Where jobs die or are ended, what was computed is published without the rest. A signal that ends this process ends
+    Snakemake first. TurnoutError where there is no such profile, or another run is still going on.
     """
     _refuse_no_profile(Path(profile))
     work.mkdir(exist_ok=True)
@@ -128,10 +129,15 @@ def _refuse_beside_another() -> None:
             raise TurnoutError(f"process {process.name} is a Snakemake run in this folder. Wait for it, or end it.")
 
 
-def _clear(options: Sequence[str], profile: str) -> None:
-    """Release Snakemake's lock, drop its backups, and cancel what a killed run left in the queue."""
+def _release() -> None:
+    """Take away what a Snakemake that was killed keeps others out with."""
     shutil.rmtree(Path(".snakemake") / "backups", ignore_errors=True)
     shutil.rmtree(Path(".snakemake") / "locks", ignore_errors=True)
+
+
+def _clear(options: Sequence[str], profile: str) -> None:
+    """Release Snakemake's lock, drop its backups, and cancel what a killed run left in the queue."""
+    _release()
     if profile == "slurm" and shutil.which("scancel"):
         asked = ["squeue", "--me", "-h", "-o", "%i %j %Z"]  # number, name, folder
         queue = subprocess.run(asked, capture_output=True, text=True, check=False)
@@ -142,12 +148,13 @@ def _clear(options: Sequence[str], profile: str) -> None:
 
 
 def _run(options: Sequence[str], limit: float | None, work: Path) -> int:
-    """Exit code of Snakemake; where jobs died so that the registry had to wait for them, it goes out all the same."""
+    """Exit code of Snakemake; where jobs died or were ended before the registry, it goes out all the same."""
     began, launched, generation = time.monotonic(), _changed_at(work / "launched"), _changed_at(GENERATION)
-    code = _snakemake(options, limit)
+    code = _snakemake(options, None if limit is None else (1.0 - TO_PUBLISH) * limit)
     had_jobs, registered = _changed_at(work / "launched") != launched, _changed_at(GENERATION) != generation
-    if code not in (0, TOO_LATE) and had_jobs and not registered:
+    if code != 0 and had_jobs and not registered:
         left = None if limit is None else max(0.0, began + limit - time.monotonic())
+        _release()
         _snakemake([*options, "--allowed-rules", *PUBLISHING], left)
     return code
 

@@ -36,6 +36,22 @@ def test_a_run_that_hangs_is_ended_and_said(tmp_path, monkeypatch):
     assert night.code == TOO_LATE and "stopped at the time limit" in str(night)
 
 
+def test_what_was_computed_until_the_limit_is_published(tmp_path, monkeypatch):
+    """Else a fleet whose first fill takes a week would tell nothing for a week. The killed run has left its lock."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "snakemake.py").write_text(
+        "import sys, time\nfrom pathlib import Path\nlock = Path('.snakemake/locks')\n"
+        "if '--allowed-rules' in sys.argv:\n    assert not lock.exists()\n"
+        "    Path('results/registry').mkdir(parents=True)\n"
+        "    Path('results/registry/_generation.json').write_text('{}')\n"
+        "else:\n    lock.mkdir(parents=True)\n    Path('work/launched').write_text('')\n    time.sleep(60)\n"
+    )
+    began = time.monotonic()
+    (tmp_path / "work").mkdir()
+    code = module._run([], 6.0, tmp_path / "work")
+    assert code == TOO_LATE and module.GENERATION.exists() and time.monotonic() - began < 12.0
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_the_run_and_its_jobs(tmp_path, number):
     """Snakemake and its job leave their process numbers and wait; the job does not listen to SIGTERM."""
