@@ -29,8 +29,8 @@ def cut_passages(blocks: Iterable[np.ndarray], rate: float, settings) -> Iterato
     """Pieces of a continuous record, one per passage, each with ``settings.margin`` seconds on either side.
 
     A passage is what is louder than six times the quiet power, mean over the channels, with no quiet of more than
-    ``settings.gap`` seconds in it. The quiet power is the lower fifth of the last two minutes. No more than
-    ``settings.longest`` seconds and a block are held, whatever the record's length; what is held is float32.
+    ``settings.gap`` seconds in it. The quiet power is the lower fifth of the last two minutes without a passage. No
+    more than ``settings.longest`` seconds and a block are held, whatever the record's length; what is held is float32.
 
     Parameters
     ----------
@@ -78,6 +78,7 @@ class _Cutter:
     seen: int = 0
     rest: np.ndarray = None
     quiet: deque = field(default_factory=lambda: deque(maxlen=int(MEMORY / BIN)))
+    passing: list = field(default_factory=list)
     first: int | None = None
     last: int = 0
 
@@ -99,10 +100,14 @@ class _Cutter:
         self.rest = passed[:, n * per_bin :].copy()
         powers = np.square(passed[:, : n * per_bin]).reshape(passed.shape[0], n, per_bin).mean(axis=2)
         levels = np.log(np.maximum(powers, 1e-30)).mean(axis=0)
-        self.quiet.extend(levels)
-        loud = levels > np.quantile(self.quiet, 0.2) + np.log(LOUD)
+        known = self.quiet if self.quiet else levels
+        loud = levels > np.quantile(known, 0.2) + np.log(LOUD) if n else ()
         for k in range(n):
+            self.passing.append(levels[k])
             yield from self._step(begin + k * per_bin, per_bin, bool(loud[k]))
+            if self.first is None:
+                self.quiet.extend(self.passing)
+                self.passing.clear()
         self._forget()
 
     def end(self):
@@ -124,6 +129,7 @@ class _Cutter:
         elif not loud and place - self.last > self.settings.gap * self.rate:
             yield self._piece(self.first, self.last + margin, True)
             self.first = None
+            self.passing.clear()  # a train as long as the memory would become what is quiet
 
     def _piece(self, start, stop, whole):
         start, parts, place = max(start, self.kept_from), [], self.kept_from

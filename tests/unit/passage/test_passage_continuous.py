@@ -64,6 +64,28 @@ def test_what_is_longer_than_may_be_kept_is_cut_and_says_so(settings):
     assert all(p.samples.shape[1] <= (short.longest + 2.2) * RATE for p in pieces)
 
 
+@pytest.mark.parametrize(("before", "lasts"), [(200.0, 150.0), (30.0, 100.0), (4.0, 40.0)])
+def test_a_train_is_no_less_loud_for_lasting_long(before, lasts, settings):
+    """A freight train of 700 m at 17 km/h; another one shortly after a file began."""
+    rate, rng = 2000.0, np.random.default_rng(6)
+    samples = 0.1 * rng.standard_normal((2, int((before + lasts + 20.0) * rate)))
+    samples[:, int(before * rate) : int((before + lasts) * rate)] *= 30.0
+    (piece,) = cut_passages([samples], rate, settings)
+    stop = (piece.start + piece.samples.shape[1]) / rate
+    assert piece.start / rate == pytest.approx(before - settings.margin, abs=0.1)
+    assert stop == pytest.approx(before + lasts + settings.margin, abs=0.1)
+
+
+def test_noise_that_came_to_stay_becomes_what_is_quiet(settings):
+    """A machine beside the track runs until the record ends: one piece as long as may be kept, no endless row."""
+    rate, rng = 2000.0, np.random.default_rng(7)
+    samples = 0.1 * rng.standard_normal((1, int(600.0 * rate)))
+    samples[:, int(60.0 * rate) :] *= 4.0
+    pieces = list(cut_passages([samples], rate, settings))
+    assert not pieces[0].whole
+    assert sum(p.samples.shape[1] for p in pieces) < (settings.longest + settings.chunk + 10.0) * rate
+
+
 def test_memory_does_not_grow_with_the_record(settings):
     """5 s blocks of 4 channels: 3.2 MB each as float64. Ten times the record, the same peak within a block."""
     peaks = []
