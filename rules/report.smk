@@ -8,7 +8,7 @@ rule report:
         generation="results/registry/_generation.json",
         trend="work/trend.json",
     output:
-        "results/pages/index.html",
+        update("results/pages/index.html"),
     log:
         "logs/report.log",
     benchmark:
@@ -19,6 +19,7 @@ rule report:
         runtime=60,
     params:
         code=fingerprint("turnout.report.job"),
+        again=attempts("report"),
         turnouts=RUN.job["only"],
         day=RUN.day,
     script:

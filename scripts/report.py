@@ -2,8 +2,10 @@
 
 from pathlib import Path
 
+from turnout.fleet.attempt import attempt
 from turnout.report.job import report_job
 
 registry, pages = (str(Path(p).parent) for p in (snakemake.input.generation, snakemake.output[0]))
 params = snakemake.params
-report_job(registry, pages, params.turnouts, snakemake.log[0], snakemake.threads, params.day)
+with attempt("report", params.again):
+    report_job(registry, pages, params.turnouts, snakemake.log[0], snakemake.threads, params.day)

@@ -41,6 +41,12 @@ def test_every_script_is_thin(path):
     assert len(lines) <= 25 and lines[0].startswith('"""')
 
 
+def test_a_report_that_fails_leaves_the_page_of_the_day_before():
+    """Snakemake removes the output of a job before it begins and where it fails, but for what is to be updated."""
+    text = (toy.REPOSITORY / "rules" / "report.smk").read_text()
+    assert 'update("results/pages/index.html")' in text and 'again=attempts("report")' in text
+
+
 def test_profiles_are_read(tmp_path):
     folder = toy.make(tmp_path, n_turnout=1)
     said = toy.run(folder, "--dry-run").stdout

@@ -90,13 +90,14 @@ def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root, algo: str = "") ->
     used = [i for i in impacts if i.accepted]
     counts = len(used), len(impacts) - len(used)
     names = [f"{ids[i.source]}:{i.record}" for i in used]
+    required = turnout.settings["receptance"].gate_level
     if receptance is None:
         return rows | {"models": [model_row(model, base, identity, counts, None)], "modes": []}
     return rows | {
         "models": [model_row(model, base, identity, counts, _lowest(receptance, model))],
         "modes": [mode_row(mode, base, identity, temperature) for mode in model.modes],
         "impact_modes": [impact_mode_row(e, base, identity, names[e["impact"]]) for e in model.per_impact],
-        "receptances": [receptance_row(receptance, model, used[0].decay, base, identity)],
+        "receptances": [receptance_row(receptance, required, model, used[0].decay, base, identity)],
     }
 
 

@@ -98,8 +98,13 @@ def impact_mode_row(entry, base: dict, identity: dict, impact_id: str) -> dict:
     }
 
 
-def receptance_row(receptance: Receptance, model: ModalModel, decay, base: dict, identity: dict) -> dict:
-    """Row of ``receptances``: what a person wants to see, at a resolution that can be drawn."""
+def receptance_row(
+    receptance: Receptance, required: float, model: ModalModel, decay, base: dict, identity: dict
+) -> dict:
+    """Row of ``receptances``: what a person wants to see, at a resolution that can be drawn.
+
+    ``required`` is the level that the gate asks for.
+    """
     lines = shown_lines(receptance.frequency)
     measured, predicted = shown_decay(model, decay)
     return {
@@ -108,6 +113,7 @@ def receptance_row(receptance: Receptance, model: ModalModel, decay, base: dict,
         "measured_at_utc": identity["measured_at_utc"],
         "n_impacts": receptance.n,
         "gate": receptance.gate,
+        "gate_required": required,
         "valid_to_hz": receptance.valid_to,
         "window_decay_per_s": receptance.decay,
         "frequency_hz": receptance.frequency[lines].astype(np.float32),

@@ -71,17 +71,16 @@ def _effect(registry) -> int:
 
     with open_registry(registry) as con:
         rows = con.execute(
-            "select event_at_utc, turnout_id, section_id, band, kinds, verdict, gain_pct, gain_low_pct, gain_high_pct, "
+            "select event_at_utc, section_id, band, kinds, verdict, gain_pct, gain_low_pct, gain_high_pct, "
             "n_before, n_after, held_until_utc, last_measured_at_utc from maintenance_effect "
-            "order by event_at_utc, turnout_id, section_id, band"
+            "order by event_at_utc, section_id, band"
         ).fetchall()
-    for at, turnout, section, band, kinds, verdict, gain, low, high, before, after, held, last in rows:
-        where = f"{turnout}, whole turnout" if section == "*" else section
+    for at, section, band, kinds, verdict, gain, low, high, before, after, held, last in rows:
         held = f"half of it lost by {held:%Y-%m-%d}" if held else f"holds until {last:%Y-%m-%d}, the newest campaign"
         sure = "no interval" if low is None or high is None else f"{low:+.1f} to {high:+.1f}, 95 %"
         size = "" if gain is None else f", {gain:+.1f} %"
         print(
-            f"{at:%Y-%m-%d} {where} {band}, {kinds}: {verdict}{size} ({sure}; {before} and {after} campaigns)"
+            f"{at:%Y-%m-%d} {section} {band}, {kinds}: {verdict}{size} ({sure}; {before} and {after} campaigns)"
             + (f"; {held}" if verdict == "stiffer" else "")
         )
     if not rows:

@@ -1,6 +1,7 @@
 """Run the whole workflow unattended: one run at a time, remains of a killed one cleared, one line at the end.
 
   0 2 * * *   cd /srv/turnouts && mkdir -p logs && .venv/bin/turnout nightly --limit-hours 6 >> logs/nightly.log 2>&1
+  0 14 1 * *  cd /srv/turnouts && .venv/bin/turnout registry vacuum && .venv/bin/turnout registry compact
   turnout nightly --profile profiles/slurm
   turnout nightly -- --config accept_vanished=true
 

@@ -56,6 +56,8 @@ def faults(cells: Mapping, known, variants) -> Iterator[tuple[str, str, str]]:
         yield "action", f"action is {said['action']!r}", suggestion(said["action"], ACTIONS)
     if said["band"] and said["band"] not in BANDS:
         yield "band", f"band is {said['band']!r}", suggestion(said["band"], BANDS)
+    if said["action"] == "suppress" and not said["until"]:
+        yield "until", "until is empty", "Write the day on which it is to speak again"
     for column in ("by", "reason"):
         if not said[column]:
             yield column, f"{column} is empty", "Write who and why: it stays in the record"

@@ -195,12 +195,11 @@ def _planned(work: Path) -> set[str]:
 
 def _night(code: int, before: set, planned_before: set[str], reason: str, work: Path) -> Night:
     gone = planned_before - _planned(work)
-    units = vanished = 0
+    units: set[str] = set()  # another number of shards leaves the states of the earlier one
     processed, quarantined = [], []
     for path in states_below(work):
         for name, known in load_state(path).units.items():
-            units += 1
-            vanished += name in gone
+            units.add(name)
             if (path, known.batch) not in before:
                 processed.append(name)
                 quarantined += [name] if known.status not in ("ok", "vanished") else []
@@ -210,5 +209,5 @@ def _night(code: int, before: set, planned_before: set[str], reason: str, work: 
     unused, useless = unused_turnouts(GENERATION.parent)
     by_turnout = Counter(name.partition("/")[0] for name in {*quarantined, *tests})
     worst = sorted(by_turnout.items(), key=lambda item: (-item[1], item[0]))[:WORST]
-    counts = len(processed), len(quarantined), vanished
-    return Night(code, units, *counts, published, len(tests), tuple(worst), tuple(unused), useless, reason)
+    counts = len(units), len(processed), len(quarantined), len(gone & units)
+    return Night(code, *counts, published, len(tests), tuple(worst), tuple(unused), useless, reason)

@@ -37,14 +37,18 @@ def write_plans(
     """Scan the raw folders and write ``folder``/<shard>.json where the content changed; names of the shards.
 
     ``turnouts`` limits the scan to their shards, and to those whose plan is cut. Nothing in a plan changes without
-    meaning: no time of scan, no absolute path. ConfigError where so many known files are gone that a disk must be
-    missing.
+    meaning: no time of scan, no absolute path. Plans of another number of shards go: nobody would bring them up to
+    date. ConfigError where so many known files are gone that a disk must be missing.
     """
     texts, gone = _looked(configuration, raw_root, folder, shards, turnouts)
     if not accept_vanished and (error := gone.error(configuration.settings["fleet"], raw_root)):
         raise error
     for path, text in texts.items():
         write_if_changed(path, text)
+    names = set(shard_names(shards))
+    for path in Path(folder).glob("*of*.json"):
+        if path.stem not in names:
+            path.unlink(missing_ok=True)
     return [path.stem for path in texts]
 
 

@@ -23,10 +23,14 @@ ONE_FILE = (*WHOLE_TABLES, "runs", "supersedes")
 MADE_HERE = ("quarantine", "results", "runs", "supersedes")
 PENDING = "pending"
 # A section with measurements stays known when the configuration drops it, or never named it: charts, and the events
-# that reset them, are looked up here.
+# that reset them, are looked up here; what the configuration named once has left it.
 SECTIONS = """
-with given as (select * exclude (_unit, _row, _year) from new_sections),
-kept as (from given union all by name (from old_sections anti join given using (section_id))),
+with given as (select * exclude (_unit, _row, _year) replace (false as left_layout) from new_sections),
+left_over as (
+    select * replace (left_layout or (panel is not null and exists (from given)) as left_layout)
+    from old_sections anti join given using (section_id)
+),
+kept as (from given union all by name from left_over),
 measured as (select section_id, turnout_id from new_models union select section_id, turnout_id from new_modes
     union select section_id, turnout_id from new_passage_fits)
 from kept union all by name

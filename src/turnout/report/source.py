@@ -8,6 +8,7 @@ from turnout.report.trains import train_rows
 # One row per section of the newest model, whatever it says.
 NEWEST = "qualify row_number() over (partition by section_id order by measured_at_utc desc, model_id) = 1"
 OF_SOME = "turnout_id in (select unnest($turnouts))"
+ALIKE = 20  # rows of quarantine of one reason that a page shows
 ROWS = {
     "turnouts": f"select * from turnouts where {OF_SOME}",
     "sections": f"select * from sections where {OF_SOME} order by position_m, label",
@@ -34,7 +35,14 @@ ROWS = {
             select section_id, max(campaign_id) as campaign_id from impacts_current where {OF_SOME} group by section_id
         ) newest using (section_id, campaign_id)
         order by i.section_id, i.test, i.record""",
-    "quarantine": f"select * from quarantine_open where {OF_SOME} order by path, record",
+    # of each reason those that are newest by their names: a sensor may be dead for years
+    "quarantine": f"""
+        select *, count(*) over (partition by turnout_id, kind, reason_code) as n_alike
+        from quarantine_open where {OF_SOME}
+        qualify row_number() over (
+            partition by turnout_id, kind, reason_code order by path desc, record desc
+        ) <= {ALIKE}
+        order by path, record""",
     "charts": f"""
         select turnout_id, section_id, band, measured_at_utc, expected_low_hz, expected_high_hz, state
         from charts where source = 'hammer' and {OF_SOME} order by section_id, band, measured_at_utc""",

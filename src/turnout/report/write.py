@@ -96,5 +96,8 @@ def _remove_others(folder, known):
 def replace_page(path, text):
     """Put a page in place in one step, so that nobody ever opens half of it."""
     temporary = beside(path)
-    temporary.write_text(text, encoding="utf-8")
-    os.replace(temporary, path)
+    try:
+        temporary.write_text(text, encoding="utf-8")
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)

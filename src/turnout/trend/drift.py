@@ -7,8 +7,7 @@ from scipy import stats
 def slopes(residual, time, mask, memory):
     r"""Least-squares slope of each chart against time, its standard error widened for the AR(1) memory.
 
-    .. math:: s_b^2 = \frac{\sum r^2}{\nu \sum (t - \bar t)^2} \frac{1 + \phi}{1 - \phi}, \quad
-              \nu = n \frac{1 - \phi}{1 + \phi} - 2
+    .. math:: s_b^2 = \frac{\sum r^2}{\nu \sum (t - \bar t)^2}, \quad \nu = n \frac{1 - \phi}{1 + \phi} - 2
 
     Parameters
     ----------

@@ -32,7 +32,10 @@ COLUMNS = {
 
 @dataclass(frozen=True)
 class Flag:
-    """What is needed to tell the story of one chart: its present epoch, its sums over their limits."""
+    """What is needed to tell the story of one chart: its present epoch, its sums over their limits.
+
+    ``opened`` is the campaign that raised each open alarm, by direction.
+    """
 
     time: np.ndarray
     values: np.ndarray
@@ -40,7 +43,7 @@ class Flag:
     temperature: np.ndarray | None
     known: float
     ratio: dict
-    open: tuple
+    opened: dict
 
 
 def candidates(charts, status, settings) -> dict[int, Flag]:
@@ -52,7 +55,10 @@ def candidates(charts, status, settings) -> dict[int, Flag]:
     for i in np.flatnonzero((status["state"].to_numpy() == "alarm") | drifting):
         column = np.flatnonzero(np.isfinite(charts.residual[i]) & (p.epoch[i] == p.epoch[i, -1]))
         ratio = {d: getattr(charts, d)[i, -1] / getattr(charts, f"threshold_{d}")[i] for d in ("down", "up")}
-        opened = tuple(d for d in ("down", "up") if getattr(charts, f"{d}_open")[i, -1])
+        alarms = {d: getattr(charts, f"{d}_open")[i] for d in ("down", "up")}
+        opened = {d: _raised(alarm) for d, alarm in alarms.items() if alarm[-1]}
+        if len(opened) == 2:  # the later one is news against the level that the earlier one had found
+            column = column[column >= min(opened.values())]
         temperature, known = _heat(charts, i, column)
         found[int(i)] = Flag(
             p.time[i, column],
@@ -64,6 +70,15 @@ def candidates(charts, status, settings) -> dict[int, Flag]:
             opened,
         )
     return found
+
+
+def _raised(alarm) -> int:
+    """Campaign that raised an alarm that is open at the newest.
+
+    >>> _raised(np.array([True, False, True, True]))
+    2
+    """
+    return int(np.max(np.flatnonzero(~alarm), initial=-1)) + 1
 
 
 def _heat(charts, i, column):
@@ -103,8 +118,8 @@ def _story(flag, settings):
     time, values = flag.time, flag.values
     found = find_change(time, values, flag.memory, flag.temperature, flag.known)
     at = int(np.searchsorted(time, found.since)) if np.isfinite(found.since) else 0
-    if flag.open:
-        direction = max(flag.open, key=flag.ratio.get)
+    if flag.opened:
+        direction = max(flag.opened, key=flag.opened.get)
     else:
         direction = "down" if values[-RECENT:].mean() < values.mean() else "up"
     seen = forecast(time[at:], values[at:], flag.memory, settings)

@@ -33,7 +33,7 @@ HAMMER = (
 
 @dataclass(frozen=True)
 class Updated:
-    """Rows by table, years of ``charts`` written, ``generation`` of the registry, ``digests`` of the years."""
+    """Rows by table, years of ``charts`` written, ``generation``, ``digests`` of rows and file by year."""
 
     rows: dict[str, int]
     written: tuple[int, ...]
@@ -50,7 +50,7 @@ def update(registry_dir, settings, digests=None, as_of=None, acknowledgements=No
     registry_dir : path
     settings : TrendSettings
     digests : dict, optional
-        Those of the last update: a year of ``charts`` that is still the same is not written again.
+        Those of the last update: a year of ``charts`` that is still the same, in the same file, is not written again.
     as_of : time, optional
         Look back: newer campaigns and later events are as if they had not been. By default everything up to the
         newest campaign of the fleet whose clock can be believed.
@@ -64,16 +64,16 @@ def update(registry_dir, settings, digests=None, as_of=None, acknowledgements=No
     with open_registry(registry_dir) as con:
         events = con.execute("select * from events order by event_at_utc, event_id").df()
         parts, newest = _parts(con, settings, as_of, end)
-        now = newest if as_of is not None else max(newest, end)
-        events = events[days(events["event_at_utc"]) <= now]
+        at = days(events["event_at_utc"])
+        events = events[(at <= newest) | ((as_of is None) & (at < end))]
         before = con.execute(ACCOUNTED if as_of is None else f"from ({ACCOUNTED}) limit 0").df()
         prepared = [prepare(_panel(con, part, newest, events, settings), events, settings) for part in parts]
     years, tables = _tables(prepared, settings, lambda alarms: with_withdrawn(alarms, before, newest))
     rows = {name: table.num_rows for name, table in tables.items()}
     rows["charts"] = sum(part.num_rows for found in years.values() for part in found)
     now = {str(year): digest(found, names("charts")) for year, found in years.items()}
-    live = {str(f.year) for f in load(Path(registry_dir)).of("charts")}
-    same = {year for year in now if year in live and (digests or {}).get(year) == now[year]}
+    live = _files(load(Path(registry_dir)))  # after a backup was put back they are others than the last update's
+    same = {year for year in now if year in live and (digests or {}).get(year) == f"{now[year]} {live[year]}"}
     changed = [part for year, found in sorted(years.items()) if str(year) not in same for part in found]
     tables["charts"] = (
         pa.concat_tables(changed, promote_options="permissive") if changed else arrow_rows("charts", pd.DataFrame())
@@ -83,11 +83,17 @@ def update(registry_dir, settings, digests=None, as_of=None, acknowledgements=No
         tables["acknowledgements"] = arrow_rows("acknowledgements", pd.DataFrame(acknowledgements))
     years.clear()
     changed.clear()
-    generation = publish(registry_dir, tables, keep={"charts": {int(year) for year in same}}).number
+    published = publish(registry_dir, tables, keep={"charts": {int(year) for year in same}})
     stamp = None if not np.isfinite(newest) else timestamps([newest])[0].item()
-    done = Updated(rows, written, generation, stamp, now)
+    now = {year: f"{said} {_files(published)[year]}" for year, said in now.items()}
+    done = Updated(rows, written, published.number, stamp, now)
     logging.getLogger("turnout.trend").info("%s, years of charts written: %s, newest %s", rows, written, stamp)
     return done
+
+
+def _files(generation) -> dict[str, str]:
+    """File of each year of ``charts``; its name ends with the hash of its content."""
+    return {str(f.year): f.path for f in generation.of("charts")}
 
 
 def _tables(prepared, settings, account):

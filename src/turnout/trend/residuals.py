@@ -66,8 +66,21 @@ def of_sections(p: Prepared, window, settled, serving, settings) -> Residuals:
         use = young & (rest_others >= settings.siblings_minimum)
         median, enough = np.where(use, rest, median), enough | use
     enough &= p.with_siblings[:n, None]
+    enough &= _compared(window[:n], enough, epoch, first_epoch(p)[:n], settings.siblings_share)
     shift, beside = _centred(np.where(enough, e - median, np.nan), window[:n] & enough, epoch)
     return Residuals(p.values, np.where(enough, beside, e), _sigma(p, enough), level, shift, e)
+
+
+def _compared(window, beside, epoch, first, share) -> np.ndarray:
+    """Campaigns of epochs in which the usual difference to the siblings is known, (n_chart, n_campaign).
+
+    After work it is if siblings stood ``beside`` so large a ``share`` of the campaigns that learned the level: who
+    followed one section alone knows its level, and not how it differs from the others.
+    """
+    n_epoch = int(epoch.max(initial=0)) + 1
+    learned, together = (by_epoch(epoch, mask, epoch, n_epoch)[1] for mask in (window, window & beside))
+    later = np.arange(n_epoch) > first[:, None]
+    return spread_out((together > 0) & (together >= share * learned * later), epoch)
 
 
 def of_turnouts(p: Prepared, sections: Residuals, window, settled, alarmed, settings) -> Residuals:

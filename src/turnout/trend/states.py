@@ -19,7 +19,8 @@ def detectable_change(charts, settings) -> tuple[np.ndarray, np.ndarray]:
     """
     campaigns = campaigns_a_year(charts.prepared)
     extra = charts.extra[:, -1] if charts.extra.shape[1] else np.zeros(len(charts.allowance))
-    return change_seen(charts, np.arange(len(extra)), charts.allowance + extra, campaigns, settings), campaigns
+    epoch = charts.prepared.epoch[:, -1] if charts.extra.shape[1] else np.zeros(len(extra), dtype=int)
+    return change_seen(charts, np.arange(len(extra)), epoch, charts.allowance + extra, campaigns, settings), campaigns
 
 
 def campaigns_a_year(p) -> np.ndarray:
@@ -28,15 +29,19 @@ def campaigns_a_year(p) -> np.ndarray:
         return np.clip(np.nan_to_num(np.round(YEAR / p.interval)), 0, 366).astype(int)
 
 
-def change_seen(charts, chart, allowance, campaigns, settings) -> np.ndarray:
-    """Detectable change [%] of the charts numbered ``chart`` with their ``allowance`` and ``campaigns`` a year."""
-    p = charts.prepared
+def spread_in(charts, chart, epoch) -> np.ndarray:
+    """Spread [%] of the charts numbered ``chart`` in an ``epoch``: alone where siblings did not help to learn it."""
+    alone = (charts.learned[chart, epoch] > 0) & ~np.isfinite(charts.shift[chart, epoch])
+    return np.where(alone, charts.prepared.spread_alone[chart], charts.prepared.spread[chart])
+
+
+def change_seen(charts, chart, epoch, allowance, campaigns, settings) -> np.ndarray:
+    """Detectable change [%] of charts in an ``epoch`` with their ``allowance`` and ``campaigns`` a year."""
     harmful = np.minimum(charts.threshold_down, charts.threshold_up)[chart]
     keys = np.column_stack([harmful, np.round(allowance, 2), campaigns])
     unique, where = np.unique(keys, axis=0, return_inverse=True)
     shift = [detectable_shift(float(h), float(k), int(n), settings.detectable_probability) for h, k, n in unique]
-    scale = p.spread * charts.guard * charts.widening
-    return np.array(shift)[where.ravel()] * scale[chart]
+    return np.array(shift)[where.ravel()] * spread_in(charts, chart, epoch) * (charts.guard * charts.widening)[chart]
 
 
 def chart_status(charts, settings) -> pd.DataFrame:

@@ -7,7 +7,7 @@ from scipy import stats
 from turnout.trend.epochs import by_epoch
 from turnout.trend.panel import timestamps
 from turnout.trend.prepared import first_epoch
-from turnout.trend.states import campaigns_a_year, change_seen
+from turnout.trend.states import campaigns_a_year, change_seen, spread_in
 from turnout.trend.threshold import run_lengths
 
 KEYS = ["turnout_id", "section_id", "band", "source"]
@@ -131,7 +131,7 @@ def baseline_rows(charts, settings) -> pd.DataFrame:
         slope_se_pct_per_c=base.slope_se[chart],
         level_pct=charts.level[chart, epoch],
         sibling_shift_pct=charts.shift[chart, epoch],
-        sd_pct=p.spread[chart],
+        sd_pct=spread_in(charts, chart, epoch),
         sd_alone_pct=p.spread_alone[chart],
         phi=charts.memory[chart],
         guard=charts.guard[chart],
@@ -142,7 +142,7 @@ def baseline_rows(charts, settings) -> pd.DataFrame:
         n_learned=learned,
         complete=base.complete[chart],
         with_siblings=p.with_siblings[chart],
-        detectable_pct=change_seen(charts, chart, allowance, campaigns_a_year(p)[chart], settings),
+        detectable_pct=change_seen(charts, chart, epoch, allowance, campaigns_a_year(p)[chart], settings),
     )
 
 

@@ -232,13 +232,13 @@ def test_a_file_that_no_reader_foresaw_costs_itself_alone(tmp_path):
     assert {q["path"][-8:] for q in result.tables["quarantine"]} == {"A7_3.csv"}
 
 
-def test_the_decay_of_an_exponential_window_stands_beside_its_receptance(tmp_path):
+def test_the_decay_of_an_exponential_window_and_the_level_of_the_gate_stand_beside_a_receptance(tmp_path):
     unit, turnout, _ = lay_out(tmp_path, n_test=2)
     for decay in (0.0, 50.0):
-        own = replace(turnout.settings["receptance"], exponential_window=decay)
+        own = replace(turnout.settings["receptance"], exponential_window=decay, gate_level=0.7)
         windowed = replace(turnout, settings={**turnout.settings, "receptance": own})
         (row,) = hammer_unit(unit, windowed, tmp_path, algo="1")["receptances"]
-        assert row["window_decay_per_s"] == decay
+        assert row["window_decay_per_s"] == decay and row["gate_required"] == 0.7
 
 
 def test_a_corrected_temperature_makes_another_model_of_the_same_blows(tmp_path):

@@ -66,6 +66,16 @@ def test_a_silence_without_its_end_does_not_count(tmp_path):
     assert rows == [] and "unknown column 'untill'. Did you mean 'until'?" in str(errors[0])
 
 
+def test_a_silence_needs_the_day_on_which_it_ends(tmp_path):
+    """Left empty by hand, it would hide every alarm of the place for ever."""
+    path = tmp_path / "acknowledgements.csv"
+    seen = "t1,,,acknowledge,me,2026-01-01,,seen"
+    path.write_text(f"turnout,section,band,action,by,at,until,reason\n{seen}\nt1,,,suppress,me,2026-01-01,,x\n")
+    rows, errors = read_acknowledgements(path)
+    assert [row["action"] for row in rows] == ["acknowledge"]
+    assert len(errors) == 1 and "line 3, column 29: until is empty. Write the day on which it is to" in str(errors[0])
+
+
 def test_a_temperature_under_another_title_is_said_and_the_other_cells_are_used(tmp_path):
     path = tmp_path / "campaigns.csv"
     path.write_text("campaign,started_at_utc,rail_temp_c\n2024-05-13,2024-05-13T09:30,18.5\n")

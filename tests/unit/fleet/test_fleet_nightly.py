@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 from filelock import FileLock
@@ -130,6 +131,25 @@ def test_the_three_turnouts_of_which_most_was_not_used_are_named(tmp_path, monke
     said = str(nightly([], "p"))
     assert "9 processed, 7 of these with rows in quarantine, 1 hammer test rejected" in said and "\n" not in said
     assert 'worst: t2 (3), t4 (2), t5 (2), see turnout query "from quarantine_open" and "from rejected"' in said
+
+
+def test_another_number_of_shards_counts_no_unit_twice_and_still_sees_what_vanishes(fleet, tmp_path, monkeypatch):
+    """Three units in one shard, then in two: what the one shard left is no further unit, and no file still there."""
+    monkeypatch.chdir(tmp_path)
+    fleet.run()
+    (tmp_path / "snakemake.py").write_text(
+        f"import sys\nfrom pathlib import Path\nsys.path.append({str(Path(__file__).parent)!r})\n"
+        "from length_fleet import length\nfrom turnout.config import load_configuration\n"
+        "from turnout.fleet.plan import write_plans\nfrom turnout.fleet.shard import run_shard\n"
+        "from turnout.fleet.stage import Stage\n"
+        "read, raw, work = load_configuration('config'), Path('raw'), Path('work')\n"
+        "for shard in write_plans(read, raw, work / 'plan', 2):\n"
+        "    plan, state = (work / kind / f'{shard}.json' for kind in ('plan', 'hammer'))\n"
+        "    run_shard(plan, state, Stage('hammer', length, '1'), read, raw)\n"
+    )
+    assert "3 units known, 3 processed" in str(nightly([], "p"))
+    (tmp_path / "raw/t1/2024-05-13/A_1.txt").unlink()
+    assert "3 units known, 0 processed, 0 of these with rows in quarantine, 1 vanished" in str(nightly([], "p"))
 
 
 def test_it_is_said_in_one_line():

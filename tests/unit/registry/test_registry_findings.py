@@ -1,6 +1,6 @@
 """Findings in the registry: what grows, what reads wrong, what nobody can name, against numpy from the rows."""
 
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import pytest
@@ -186,3 +186,18 @@ def test_a_turnout_that_was_taken_out_has_nothing_to_look_after(tmp_path):
         for name in lists:
             found = bench.ask(f"select turnout_id from {name} order by all")
             assert found == [(row["turnout_id"],) for row in there], name
+
+
+def test_work_that_is_planned_undoes_nothing_yet(tmp_path):
+    """Tamping is entered for next month: the sleeper hangs until then, and the last work is the one before."""
+    then = (datetime.now(UTC) + timedelta(days=30)).replace(tzinfo=None).isoformat()
+    planned = EVENT | {"event_id": "e9", "turnout_id": "t1", "section_id": None, "event_at_utc": then}
+    done = planned | {"event_id": "e8", "kind": "grinding", "event_at_utc": START.isoformat(), "resets_ballast": False}
+    turnouts = [{"turnout_id": "t1", "layout": "l", "config_hash": "h"}]
+    bench = Bench(tmp_path)
+    bench.register(
+        *[gap("t1", d, v, s) for d, (v, s) in zip(DAYS, GROWING)],
+        tables={"events": [done, planned], "turnouts": turnouts},
+    )
+    assert bench.ask("select turnout_id, gap_m from hanging_sleepers_that_grow()") == [("t1", 0.93e-3)]
+    assert bench.ask("select last_event, last_event_utc from fleet_state") == [("grinding", START)]

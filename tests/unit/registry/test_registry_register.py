@@ -162,6 +162,21 @@ def test_small_tables_are_replaced_whole_and_units_keep_their_sections(bench, ha
     assert bench.ask("select section_id, panel from sections order by 1") == [("t1/A1", None), ("t1/A7", "CP")]
 
 
+def test_a_section_that_the_layout_names_no_more_is_known_to_have_left_it(bench, hammer):
+    """What was measured without ever being in a layout has left none; who comes back has not left."""
+    at = {"turnout_id": "t1", "panel": "CP", "track": "main", "position_m": 1.0}
+    both = [at | {"section_id": f"t1/{label}", "label": label} for label in ("A7", "A8")]
+    asked = "select label, panel, left_layout from sections order by 1"
+    bench.register(hammer(section="A1"), tables={"sections": both})
+    assert bench.ask(asked) == [("A1", None, None), ("A7", "CP", False), ("A8", "CP", False)]
+    bench.register(tables={"sections": both[:1]})
+    assert bench.ask(asked) == [("A1", None, None), ("A7", "CP", False), ("A8", "CP", True)]
+    bench.register(hammer(section="A7", day="2026-02-05"), tables={"sections": both[:1]})
+    assert bench.ask(asked) == [("A1", None, None), ("A7", "CP", False), ("A8", "CP", True)]
+    bench.register(tables={"sections": both})
+    assert bench.ask(asked) == [("A1", None, None), ("A7", "CP", False), ("A8", "CP", False)]
+
+
 def test_two_registrations_at_once_give_the_union(tmp_path, hammer):
     (tmp_path / "work").mkdir()
     code = (

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from turnout.report.chart import BOTTOM, LEFT, RIGHT, TOP, Axis, Chart
-from turnout.report.panels.receptance import receptance_panel
+from turnout.report.panels.receptance import coherence_panel, receptance_panel
 from turnout.report.strokes import drawn
 from turnout.report.ticks import linear_ticks, log_ticks, time_ticks
 
@@ -121,3 +121,16 @@ def test_a_curve_behind_an_exponential_window_says_so(decay, said):
         "valid_to_hz": None, "window_decay_per_s": decay,
     }  # fmt: skip
     assert ("exp(-25/s t)" in receptance_panel(row, [])) is said
+
+
+@pytest.mark.parametrize(("required", "drawn_at"), [(0.9, "M62.0 40.6L448.0 40.6"), (None, "")])
+def test_the_limit_of_the_coherence_is_that_of_the_settings(required, drawn_at):
+    """0.9 of an axis to 1.02 in a panel of 190: 150 - 124 * 0.9 / 1.02. Rows of earlier versions do not know it."""
+    n = 40
+    row = dict.fromkeys(("coherence", "coherence_low", "coherence_high"), np.full(n, 0.95)) | {
+        "frequency_hz": np.linspace(20.0, 1600.0, n), "passed": np.ones(n, dtype=bool), "n_impacts": 7,
+        "valid_to_hz": None, "gate": "limit", "gate_required": required,
+    }  # fmt: skip
+    svg = coherence_panel(row)
+    limits = re.findall(r'<path class="limit" d="([^"]*)"><title>required ([\d.]+)', svg)
+    assert limits == ([(drawn_at, "0.9")] if required else [])

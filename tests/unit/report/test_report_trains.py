@@ -32,6 +32,17 @@ def test_bars_are_as_high_as_their_scores_and_say_them():
     assert ">OT<" in svg and ">A7<" not in svg, "a section without scores takes no room"
 
 
+def test_of_more_classes_than_colours_those_with_most_passages_are_drawn_and_the_others_are_said():
+    """Speeds from 20 to 200 km/h in classes of 20: nine of them, and nearly all trains are in the fastest."""
+    rows = [
+        bar("OT", f"{v}-{v + 20} km/h", 10.0, factor="speed", class_from=float(v), n_passages=1 if v < 180 else 500)
+        for v in range(20, 200, 20)
+    ]
+    svg = train_bars("speed", rows[::-1], SECTIONS)
+    assert "180-200 km/h: 10.0 %" in svg and "1 class with fewer passages is not drawn" in svg
+    assert svg.count("others held fixed 9.0") == 8 and "not drawn" not in train_bars("speed", rows[1:], SECTIONS)
+
+
 def test_a_factor_that_nobody_knows_has_no_chart():
     assert train_bars("axle load", [bar("OT", "IC3", 10.0)], SECTIONS) == ""
 

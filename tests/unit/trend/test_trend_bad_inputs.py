@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from benchmarks.trend_fleet import Fleet, drift, modes, step
 
-from turnout.trend import candidates, chart_rows, chart_status, describe_flagged, evaluate
+from turnout.trend import baseline_rows, candidates, chart_rows, chart_status, describe_flagged, evaluate
 from turnout.trend.tables import alarm_rows
 
 FLEET = Fleet(turnouts=1, weeks=130, phi=0.0, campaign=0.3)
@@ -248,3 +248,33 @@ def test_an_acceptance_test_some_years_before_counts_and_so_do_two_old_campaigns
     assert (rows["measured_at_utc"] < "2014-01-01").sum() == 8 * len(days)
     shown = chart_rows(status_of(rows, settings)[1])
     assert not (shown["state"] == "wrong_time").any()
+
+
+def followed_alone(since, bad_first=1.0, fall=0.0):
+    """S2 is tamped before week 60 and visited alone from week ``since`` to 73; from week 90 on it may have fallen."""
+    fleet = Fleet(turnouts=1, weeks=130, phi=0.0, campaign=0.6)
+    one = (np.arange(8) == 2)[None, :]
+    rows = plain(modes(fleet, 1, step(fleet, one, fall, 90)))
+    week = (rows["measured_at_utc"] - rows["measured_at_utc"].min()).dt.days // 7
+    rows.loc[(week == 60) & (rows["section_id"] == "T00000/S2"), "frequency_hz"] *= bad_first
+    alone = (week >= since) & (week < 74) & (rows["section_id"] != "T00000/S2")
+    return rows[~alone], events(["T00000/S2", "2017-02-27", "tamping"])
+
+
+def test_a_section_that_was_followed_alone_after_its_work_is_judged_with_the_others_again(settings):
+    rows, work = followed_alone(60, fall=-6.0)
+    status, charts = status_of(rows, settings, work)
+    changed = section(status)
+    assert tuple(changed[["state", "direction"]]) == ("alarm", "down")
+    assert changed["change_low_pct"] < -6.0 < changed["change_high_pct"]
+    before, after = baseline_rows(charts, settings).query("section_id == 'T00000/S2'")["sd_pct"]
+    # 0.6 % of its own and a median of seven, 0.6 sqrt(1 + 1.57 / 7) = 0.66; alone the campaigns' 0.6 % as well: 0.85
+    assert before < 0.75 < after
+
+
+def test_one_campaign_does_not_say_how_a_section_differs_from_the_others_after_its_work(settings):
+    """Its first value after the work, the only one beside the others, is 3 % too high: a twelfth of its level."""
+    rows, work = followed_alone(61, bad_first=1.03)
+    status, charts = status_of(rows, settings, work)
+    raised = alarm_rows(charts, settings)
+    assert raised[raised["section_id"] == "T00000/S2"].empty and section(status)["state"] in ("ok", "cannot_tell")

@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pandas as pd
 import pytest
-from benchmarks.trend_fleet import Fleet, drift, modes
+from benchmarks.trend_fleet import Fleet, drift, modes, step
 from benchmarks.trend_registry import small_registry
 
 from turnout.registry.database import open_registry
@@ -79,12 +79,13 @@ def test_an_open_alarm_does_not_end_because_nobody_measures(settings):
 
 
 @pytest.mark.parametrize(
-    ("days", "state"), [(400, "inspect this week"), (-40000, "inspect this week"), (0, "learning")]
+    ("days", "state"),
+    [(400, "inspect this week"), (1, "inspect this week"), (-40000, "inspect this week"), (0, "learning")],
 )
 def test_work_that_is_planned_resets_nothing_yet(tmp_path, settings, days, state):
-    """An event of tomorrow, of before the first campaign, and of today: the last has come after the last campaign."""
+    """An event of next year, of tomorrow, of before the first campaign, of today: that came after the last campaign."""
     small_registry(tmp_path, fallen())
-    at = pd.Timestamp.now("UTC").tz_localize(None).floor("s") + pd.Timedelta(days=days)
+    at = pd.Timestamp.now("UTC").tz_localize(None).floor("D") + pd.Timedelta(days=days)
     publish(tmp_path, {"events": arrow_rows("events", work("T00001", at))})
     update(tmp_path, settings)
     with open_registry(tmp_path) as con:
@@ -167,6 +168,25 @@ def test_a_turnout_that_was_taken_out_is_off_the_list_and_its_history_stays(sett
         history = con.execute("select count(*) from charts where turnout_id = 'T00001'").fetchall()
         assert history[0][0] > 800
         assert con.execute("select count(*) from alarms where turnout_id = 'T00001'").fetchall()[0][0] >= 1
+
+
+def test_a_section_that_left_its_layout_is_off_the_list_and_its_history_stays(settings):
+    """Nobody could take it off: neither an acknowledgement nor work is accepted for a section without a layout."""
+    rows = fallen()
+    sections = pd.DataFrame({"section_id": [f"T00001/S{i}" for i in range(8)]})
+    sections = sections.assign(turnout_id="T00001", label="S", left_layout=[None] * 4 + [True] + [False] * 3)
+    with viewed(rows, settings, sections=sections) as con:
+        for asof in ("newest_measurement()", "newest_measurement() - interval 1 day"):
+            listed = f"select count(*) from worklist({asof}, most := 1000) where sections like '%S4%'"
+            assert con.execute(f"{listed} and turnout_id = 'T00001'").fetchall() == [(0,)]
+            assert (
+                con.execute(f"select count(*) from cannot_see({asof}) where section_id = 'T00001/S4'").fetchall()[0][0]
+                == 0
+            )
+        states = con.execute("select count(*) from chart_states where turnout_id = 'T00001'").fetchall()
+        assert states == [(8,)]  # seven sections and their median
+        assert con.execute("select count(*) from charts where section_id = 'T00001/S4'").fetchall()[0][0] > 100
+        assert con.execute("select count(*) from alarms where section_id = 'T00001/S4'").fetchall()[0][0] >= 1
 
 
 def test_what_is_silenced_comes_back_on_its_day(settings):
@@ -286,3 +306,34 @@ def test_points_of_a_campaign_of_two_days_are_all_red():
     ]
     svg = history_panel("ballast", modes_, charts, [])
     assert svg.count('class="alarm"') == 2 and svg.count('class="point"') == 1
+
+
+def test_a_loss_after_a_gain_is_called_a_loss(settings):
+    """Frost lifts a section for thirty weeks; a sum sinks slowly, so the alarm is open yet when it falls."""
+    fleet = Fleet(turnouts=1, weeks=106, phi=0.0, campaign=0.3, band="ballast", frequency=150.0)
+    which = (np.arange(8) == 4)[None, :]
+    change = step(fleet, which, 4.0, 66) + step(fleet, which, -7.0, 96)
+    rows = modes(fleet, 3, change)
+    fell = rows["measured_at_utc"].min() + pd.Timedelta(weeks=96)
+    for asof in ("newest_measurement()", "newest_measurement() - interval 1 day"):
+        with viewed(rows, settings) as con:
+            opened = con.execute("select direction from alarms where closed_at_utc is null order by raised_at_utc")
+            assert opened.fetchall() == [("up",), ("down",)]
+            names = "section_id, direction, change_low_pct, change_high_pct, since_at_utc, sentence, look_at"
+            ((place, way, low, high, since, words, look),) = con.execute(
+                f"select {names} from worklist({asof}) where state = 'inspect this week'"
+            ).fetchall()
+        assert (place, way) == ("T00000/S4", "down") and " fell by " in words and look.startswith("voids")
+        assert low < (-7.0 if asof == "newest_measurement()" else -3.0) < high
+        assert abs(since - fell) < pd.Timedelta(weeks=4)
+
+
+def test_work_on_a_whole_turnout_that_resets_nothing_is_not_hidden_by_the_siblings(settings):
+    """New sensors of the same type, entered as such, read 2 % more in all sections."""
+    fleet = Fleet(turnouts=1, weeks=120, phi=0.0, campaign=0.3)
+    rows = modes(fleet, 7, step(fleet, np.ones((1, 8), bool), 2.0, 85))
+    at = rows["measured_at_utc"].min() + pd.Timedelta(weeks=84, days=3)
+    with viewed(rows, settings, work("T00000", at).assign(resets_ballast=False, resets_railpad=False)) as con:
+        found = con.execute("select change_pct, change_se_pct, changed from change_since_event('tamping', 200)").df()
+    assert len(found) == 8 and found["changed"].all()
+    assert ((found["change_pct"] - 2.0).abs() < 4 * found["change_se_pct"]).all()

@@ -1,5 +1,6 @@
 """From a registry to a registry: derived tables, years kept, the worklist, commands."""
 
+import shutil
 import sys
 
 import numpy as np
@@ -72,6 +73,22 @@ def test_one_more_week_writes_only_its_year(rows, settings, tmp_path):
     with open_registry(tmp_path) as con:
         assert con.execute("select count(*) from charts").fetchall()[0][0] == len(rows) + 360
         assert con.execute("select max(measured_at_utc) from charts").fetchall()[0][0] == last
+
+
+def test_charts_of_a_backup_that_was_put_back_are_written_again(rows, settings, tmp_path):
+    """The folder of the pipeline remembers the last night; the registry is that of a week before it."""
+    last = rows["measured_at_utc"].max()
+    small_registry(tmp_path / "registry", rows[rows["measured_at_utc"] < last])
+    update(tmp_path / "registry", settings)
+    shutil.copytree(tmp_path / "registry", tmp_path / "backup")
+    small_registry(tmp_path / "registry", rows, 5)
+    remembered = update(tmp_path / "registry", settings).digests
+    shutil.rmtree(tmp_path / "registry")
+    shutil.copytree(tmp_path / "backup", tmp_path / "registry")
+    small_registry(tmp_path / "registry", rows, 9)
+    assert update(tmp_path / "registry", settings, remembered).written == (2018,)
+    with open_registry(tmp_path / "registry") as con:
+        assert con.execute("select max(measured_at_utc) from charts").fetchall() == [(last,)]
 
 
 def test_parts_of_the_fleet_share_one_memory(registry, settings, monkeypatch):

@@ -36,7 +36,8 @@ from chart_status_at(coalesce("asof", newest_measurement())) left join (
     select turnout_id, section_id, band, source, max(measured_at_utc) as set_aside_at_utc
     from charts where state = 'wrong_time' and measured_at_utc <= coalesce("asof", newest_measurement()) group by all
 ) a using (turnout_id, section_id, band, source)
-where in_service(turnout_id) and (state not in ('alarm', 'ok') or detectable_pct is null or detectable_pct > target_pct)
+where in_service(turnout_id) and not has_left(section_id)
+    and (state not in ('alarm', 'ok') or detectable_pct is null or detectable_pct > target_pct)
 union all by name
 select turnout_id, section_id, 'all' as band, source, 'cannot tell' as state, why, used_at_utc as last_measured_at_utc
 from unusable(coalesce("asof", newest_measurement()))
@@ -47,5 +48,5 @@ select
         || ') is not raised again: what it rested on was corrected, or the spread or memory of the charts is another' as why,
     closed_at_utc as last_measured_at_utc
 from alarms
-where in_service(turnout_id) and closed_by = 'recomputed' and closed_at_utc >= newest_charted()
-    and coalesce("asof", newest_measurement()) >= newest_charted();
+where in_service(turnout_id) and not has_left(section_id) and closed_by = 'recomputed'
+    and closed_at_utc >= newest_charted() and coalesce("asof", newest_measurement()) >= newest_charted();

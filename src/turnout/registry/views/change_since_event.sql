@@ -2,12 +2,16 @@
 -- Raw frequencies would call every October tamping a success: the summer lies before it, the winter behind.
 -- Windows are half open: [event - days, event) and [event, event + days). change_se_pct holds the scatter of the
 -- campaigns with their memory, and what the error of the temperature slope makes of the difference in temperature.
+-- Of work on a whole turnout the siblings' median is left in, for what all sections share is asked for (but not in
+-- band amplitude).
 create or replace macro change_since_event(kind_of_event, days) as table
 with values_pct as (
     select
         c.turnout_id, c.section_id, c.band, c.source, c.measured_at_utc, c.rail_temperature_c, b.n_learned,
         b.sd_alone_pct * sqrt((1 + b.phi) / (1 - b.phi)) as sd_pct, b.slope_se_pct_per_c,
-        c.residual_pct + b.level_pct as value_pct
+        c.residual_pct + b.level_pct as value_pct,
+        100 * (c.expected_hz / b.frequency_hz - 1) + c.residual_pct
+            - b.slope_pct_per_c * (c.rail_temperature_c - b.rail_temperature_c) as alone_pct
     from charts c
     join baselines b using (turnout_id, section_id, band, source, epoch)
     where c.residual_pct is not null and c.section_id <> '*'
@@ -16,7 +20,8 @@ sides as (
     select
         e.event_id, e.kind, e.event_at_utc, v.turnout_id, v.section_id, v.band, v.source,
         v.measured_at_utc >= e.event_at_utc as is_after,
-        v.value_pct, v.rail_temperature_c, v.sd_pct, v.slope_se_pct_per_c, v.n_learned
+        case when e.section_id is null then coalesce(v.alone_pct, v.value_pct) else v.value_pct end as value_pct,
+        v.rail_temperature_c, v.sd_pct, v.slope_se_pct_per_c, v.n_learned
     from events e
     join values_pct v
         on e.turnout_id = v.turnout_id and coalesce(e.section_id, v.section_id) = v.section_id

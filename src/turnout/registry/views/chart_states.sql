@@ -41,7 +41,7 @@ select
     s.last_measured_at_utc, s.n_campaigns
 from chart_status_on("asof") s
 join spoken p using (turnout_id, section_id, band, source)
-where in_service(s.turnout_id);
+where in_service(s.turnout_id) and not has_left(s.section_id);
 
 -- One row per chart: what it says at the newest measurement, in the words of the worklist.
 create or replace view chart_states as select * from chart_states_on(newest_measurement());

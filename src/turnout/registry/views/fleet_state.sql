@@ -13,7 +13,7 @@ passed as (
 ),
 waiting as (select turnout_id, count(*) as n_quarantine from quarantine_open group by turnout_id),
 work as (select turnout_id, max(event_at_utc) as last_event_utc, arg_max(kind, event_at_utc) as last_event
-    from events group by turnout_id)
+    from events where event_at_utc < published_at() + interval 1 day group by turnout_id)  -- not what is only planned
 select
     t.turnout_id, t.name, t.line, t.km, t.layout,
     (select count(*) from sections s where s.turnout_id = t.turnout_id) as n_sections,

@@ -1,4 +1,5 @@
--- One row per event and chart that it reset: did the work help, by how much, and for how long.
+-- One row per event and section's chart that it reset: did the work help, by how much, and for how long. Several events
+-- between the same two campaigns are one row, dated by the last; a turnout's median begins anew at 0 and has none.
 -- gain_pct: level of the eight campaigns after the event minus that of the eight before. held_until_utc: first
 -- campaign at which the mean of eight has lost half of a gain again; empty = it holds, until last_measured_at_utc.
 create or replace view maintenance_effect as
@@ -14,7 +15,7 @@ with values_pct as (
         ) as place_from_end
     from charts c
     join baselines b using (turnout_id, section_id, band, source, epoch)
-    where c.residual_pct is not null
+    where c.residual_pct is not null and c.section_id <> '*'
     window
         epoch_order as (
             partition by c.turnout_id, c.section_id, c.band, c.source, c.epoch order by c.measured_at_utc
@@ -37,7 +38,8 @@ levels as (
 pairs as (
     select
         l.turnout_id, l.section_id, l.band, l.source, l.epoch, l.epoch_start_utc, l.last_at,
-        b.last_pct as before_pct, l.first_pct as after_pct, b.n_last as n_before, l.n_first as n_after,
+        b.last_at as before_at, b.last_pct as before_pct, l.first_pct as after_pct,
+        b.n_last as n_before, l.n_first as n_after,
         1.96 * l.sd_pct * sqrt(1 / b.n_last + 1 / l.n_first) as half
     from levels l
     join levels b
@@ -57,7 +59,8 @@ select
     (
         select string_agg(distinct e.kind, ', ' order by e.kind) from events e
         where e.turnout_id = p.turnout_id and coalesce(e.section_id, p.section_id) = p.section_id
-            and e.event_at_utc = p.epoch_start_utc
+            and e.event_at_utc > p.before_at and e.event_at_utc <= p.epoch_start_utc
+            and ((e.resets_ballast and p.band <> 'railpad') or (e.resets_railpad and p.band <> 'ballast'))
     ) as kinds,
     n_before, n_after, after_pct - before_pct as gain_pct, after_pct - before_pct - half as gain_low_pct,
     after_pct - before_pct + half as gain_high_pct,

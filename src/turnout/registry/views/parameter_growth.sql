@@ -1,12 +1,13 @@
 -- One row per turnout, effect, place, sensor and parameter that was named or accepted: its latest value, and its growth.
 -- A straight line through all visits, each weighted by its standard error; NULL with a single visit. Visits before
--- ballast work on their sections do not count for effects of the ballast. is_open: no newer visit looked at its sections.
+-- ballast work on their sections, unless it is only planned, do not count for effects of the ballast. is_open: no newer
+-- visit looked at its sections.
 -- needs: findings_newest
 create or replace view parameter_growth as
 with undone as (
     select distinct f.finding_id
     from findings_current f join events e on e.turnout_id = f.turnout_id and e.event_at_utc > f.found_at_utc
-    where e.resets_ballast and (
+    where e.resets_ballast and e.event_at_utc < published_at() + interval 1 day and (
         e.section_id is null or list_contains(string_split(f.sections, ', '), split_part(e.section_id, '/', -1)))
 ),
 visits as (

@@ -33,7 +33,8 @@ tried as not materialized (
 ),
 known as not materialized (
     select * from tried
-    where in_service(turnout_id) and coalesce(at_utc <= "asof", "asof" >= newest_measurement(), true)
+    where in_service(turnout_id) and not has_left(section_id)
+        and coalesce(at_utc <= "asof", "asof" >= newest_measurement(), true)
 ),
 last_used as (
     select part, max(at_utc) filter (is_used) as used_at_utc

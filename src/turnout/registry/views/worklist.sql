@@ -19,11 +19,13 @@ recent as (
         and n.source = a.source and n.state = 'alarm'
     where a.raised_at_utc <= "asof" and coalesce(a.closed_at_utc > "asof", true) and c.measured_at_utc <= "asof"
         and c.residual_pct is not null and c.measured_at_utc > coalesce(a.began_at_utc, a.raised_at_utc - interval 1 day)
+    -- a sum sinks slowly: of a loss after a gain both alarms are open, and the later one is the news
+    qualify a.raised_at_utc = max(a.raised_at_utc) over (partition by a.turnout_id, a.section_id, a.band, a.source)
 ),
 raised as (
     select
-        turnout_id, section_id, band, source, max_by(direction, statistic / threshold) as direction,
-        max(raised_at_utc) as raised_at_utc, min(began_at_utc) as began_at_utc,
+        turnout_id, section_id, band, source, any_value(direction) as direction,
+        any_value(raised_at_utc) as raised_at_utc, any_value(began_at_utc) as began_at_utc,
         max(statistic / threshold) filter (where place = 1) as ratio,
         avg(residual_pct) filter (where place <= 8) as change_pct,
         1.96 * max(sd_pct) / sqrt(count(*) filter (where place <= 8)) as half
@@ -101,7 +103,7 @@ everything as (
 heard as (
     select e.*
     from everything e
-    where in_service(e.turnout_id) and not exists (
+    where in_service(e.turnout_id) and not has_left(e.section_id) and not exists (
         select 1 from acknowledgements k
         where k.turnout_id = e.turnout_id and coalesce(k.section_id, e.section_id) = e.section_id
             and coalesce(k.band, e.band) = e.band and k.action = 'suppress'
@@ -134,7 +136,7 @@ fleet as (
         count(*) as n_charts, sum(s.campaigns_per_year * (1 / s.run_length_down + 1 / s.run_length_up)) as alarms_per_year
     from chart_status s
     join then_status n using (turnout_id, section_id, band, source)
-    where n.complete and in_service(s.turnout_id)
+    where n.complete and in_service(s.turnout_id) and not has_left(s.section_id)
 ),
 maintenance as (
     select

@@ -1,5 +1,7 @@
 """The page of one turnout: where it stands, how its resonances moved, and the evidence behind the latest values."""
 
+from collections import Counter
+
 from turnout.report.panels.decay import decay_panel
 from turnout.report.panels.diagram import diagram
 from turnout.report.panels.history import history_panel
@@ -11,6 +13,7 @@ from turnout.report.words import badge, day, with_interval
 
 BANDS = ("ballast", "railpad")
 SHOWN = 5  # earlier tests that were not used, of one section
+TRACKS = {"main": "main track", "diverging": "diverging track", "both": "both tracks"}
 PANELS = {
     "OT": "open track",
     "SP": "switch panel",
@@ -39,6 +42,7 @@ def turnout_page(rows, turnout, template, shared):
         sections=[_section(rows, s, models, states) for s in rows["sections"]],
         part=trains_part(rows, rows["sections"]),
         quarantine=rows["quarantine"],
+        unshown=_unshown(rows["quarantine"]),
         events=[_event(e) for e in rows["events"]],
         **shared,
     )
@@ -69,7 +73,7 @@ def _latest(modes, band, model):
 
 
 def _summary(section, model, modes):
-    row = {"label": section["label"], "panel": section["panel"], "n": 0, "when": "–", "status": "not measured"}
+    row = {"label": section["label"], "panel": section["panel"] or "–", "n": 0, "when": "–", "status": "not measured"}
     if model:
         row |= {"n": model["n_impacts_used"], "when": day(model["measured_at_utc"])}
         row["status"] = model["status"].replace("_", " ") + (f": {model['reason']}" if model["reason"] else "")
@@ -84,7 +88,8 @@ def _summary(section, model, modes):
 def _section(rows, section, models, states):
     key = section["section_id"]
     model, modes = models.get(key), _of(rows, "modes", section)
-    receptance = next(iter(_of(rows, "receptances", section)), None)
+    own = (r for r in _of(rows, "receptances", section) if model and r["model_id"] == model["model_id"])
+    receptance = next(own, None)  # a test with too few blows has none
     charts, events = _of(rows, "charts", section), [e for e in rows["events"] if e["section_id"] in (None, key)]
     history = "".join(
         history_panel(
@@ -98,15 +103,22 @@ def _section(rows, section, models, states):
     return {
         "label": section["label"],
         "panel": PANELS.get(section["panel"], "panel not configured"),
-        "track": section["track"],
+        "track": TRACKS.get(section["track"], "track not configured"),
         "position": f"{section['position_m']:.1f}" if section["position_m"] is not None else "–",
         "open": states.get(key) in ("inspect this week", "plan"),
         "when": day(model["measured_at_utc"]) if model else "none",
         "history": history or f"<p>{'No model yet' if model else 'Not measured yet, or nothing could be read'}.</p>",
-        "panels": _panels(rows, section, model, receptance, modes) if model and receptance else "",
+        "panels": _panels(rows, section, model, receptance, modes) if receptance else "",
         "detail": model["detail"] if model else "",
         "unused": _unused(_of(rows, "unused", section)),
     }
+
+
+def _unshown(quarantine):
+    """(reason, how many more rows of it there are than are shown), of the reasons that have more."""
+    shown = Counter((q["kind"], q["reason_code"]) for q in quarantine)
+    more = {(q["kind"], q["reason_code"]): q["n_alike"] for q in quarantine}
+    return [(reason, more[kind, reason] - n) for (kind, reason), n in shown.items() if more[kind, reason] > n]
 
 
 def _unused(tests):

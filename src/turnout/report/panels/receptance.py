@@ -47,7 +47,8 @@ def coherence_panel(row):
     _grey_out(chart, frequency, np.asarray(row["passed"], dtype=bool), row)
     chart.band(frequency, row["coherence_low"], row["coherence_high"], "interval", "95 % limits")
     chart.line(frequency, row["coherence"], "curve", "coherence")
-    chart.line(SPAN, [0.8, 0.8], "limit", "required 0.8")
+    if required := row.get("gate_required"):
+        chart.line(SPAN, [required] * 2, "limit", f"required {required:g}")
     return chart.svg()
 
 

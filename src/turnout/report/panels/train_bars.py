@@ -1,5 +1,6 @@
 """The paper's bar charts: mean and spread of a score by train type, speed or axle load, section by section."""
 
+from collections import Counter
 from html import escape
 
 import numpy as np
@@ -29,12 +30,16 @@ def train_bars(factor, rows, sections):
     if not rows:
         return ""
     classes = sorted({(r["class_from"] or 0.0, r["class"]) for r in rows})
-    names = [c for _, c in classes][: len(COLOURS)]
+    most = Counter[str]()
+    for row in rows:
+        most[row["class"]] += row["n_passages"]
+    drawn = {c for c, _ in most.most_common(len(COLOURS))}
+    names = [c for _, c in classes if c in drawn]
     shown = [s for s in sections if any(r["section_id"] == s["section_id"] for r in rows)]
     at = {(r["section_id"], r["class"]): r for r in rows}
     n = sum(r["n_passages"] for r in rows if r["section_id"] == shown[0]["section_id"])
     ends = [e for r in rows for e in (_low(r), _high(r))]
-    title = f"{rows[0]['score']} by {factor}: bar: mean, thin line: ± spread, {KEY}"
+    title = f"{rows[0]['score']} by {factor}: bar: mean, thin line: ± spread, {KEY}{_left(len(classes) - len(names))}"
     chart = Chart(
         Axis(0.5, len(shown) + 0.5, f"section ({n} passages at {shown[0]['label']})", "names", _labels(shown)),
         Axis(min(0.0, max(min(ends), -60.0)) - 2.0, max(ends) * 1.25 + 4.0, f"{rows[0]['score']} [%]"),
@@ -49,6 +54,11 @@ def train_bars(factor, rows, sections):
                 _bar(chart, k - 0.4 + (j + 0.5) * width, width, COLOURS[j], row)
     _key(chart, names)
     return chart.svg()
+
+
+def _left(n):
+    """How many classes have no colour of their own, in words."""
+    return f"; {n} class{'es' * (n > 1)} with fewer passages {'are' if n > 1 else 'is'} not drawn" if n else ""
 
 
 def _labels(sections):

@@ -1,0 +1,121 @@
+"""The page of one turnout from rows by hand: what it shows is of the test that it names, and it has an end."""
+
+import errno
+import re
+from datetime import datetime
+from pathlib import Path
+
+import duckdb
+import numpy as np
+import pytest
+
+from turnout.report.pages.turnout import turnout_page
+from turnout.report.source import ROWS
+from turnout.report.trains import ROWS as OF_TRAINS
+from turnout.report.write import page_environment, replace_page, shared_by_pages
+
+SECTION = {"section_id": "t/A7", "turnout_id": "t", "label": "A7", "panel": "CP", "track": "main", "position_m": 21.4}
+REJECTED = {
+    "section_id": "t/A7", "model_id": "new", "measured_at_utc": datetime(2026, 7, 1, 9), "status": "rejected",
+    "reason": "too_few_impacts", "detail": "2 of 10 impacts accepted, 5 needed", "n_impacts_used": 2, "model_order": 0,
+    "hammer_fit_pct": None, "hammer_fit_null_pct": None,
+}  # fmt: skip
+CURVES = ("h1_real_m_n", "h1_imag_m_n", "h2_abs_m_n", "coherence", "coherence_low", "coherence_high")
+RECEPTANCE = dict.fromkeys(CURVES, np.full(40, 0.5)) | {
+    "section_id": "t/A7", "model_id": "old", "measured_at_utc": datetime(2026, 5, 1, 9), "n_impacts": 30,
+    "frequency_hz": np.linspace(20.0, 1600.0, 40), "passed": np.ones(40, dtype=bool), "gate": "limit",
+    "valid_to_hz": None, "decay_ms2": None, "decay_model_ms2": None, "stabilisation_json": "[]",
+}  # fmt: skip
+
+
+def page(**rows):
+    turnout = {"turnout_id": "t", "name": None, "line": None, "km": None, "layout": "main"}
+    rows = {kind: [] for kind in (*ROWS, *OF_TRAINS)} | {"sections": [SECTION]} | rows
+    return turnout_page(rows, turnout, page_environment().get_template("turnout.html"), shared_by_pages(1))
+
+
+def test_a_rejected_test_is_not_shown_with_the_curves_of_an_earlier_one():
+    text = page(models=[REJECTED], receptances=[RECEPTANCE])
+    assert "Latest hammer test, 2026-07-01: 2 of 10 impacts accepted, 5 needed." in text
+    assert "n = 30 impacts" not in text and "<details" not in text
+
+
+def test_the_curves_of_the_latest_test_are_shown():
+    used = REJECTED | {"model_id": "old", "measured_at_utc": datetime(2026, 5, 1, 9), "status": "accepted"}
+    text = page(models=[used | {"reason": None, "detail": None}], receptances=[RECEPTANCE])
+    assert "Latest hammer test, 2026-05-01: receptance" in text and "n = 30 impacts" in text
+
+
+def test_a_section_that_the_configuration_does_not_know_spoils_no_page():
+    """It was measured, and left the layout before it was registered."""
+    text = page(sections=[SECTION | dict.fromkeys(("panel", "track", "position_m"))])
+    assert "A7: panel not configured, track not configured" in text and "None" not in text
+
+
+def test_a_dead_sensor_of_years_does_not_bury_what_else_is_in_quarantine():
+    with duckdb.connect() as con:
+        con.execute("""
+            create table quarantine_open as
+            select 't' as turnout_id, 'passage' as kind, printf('t/passages/%05d.tdms', i) as path, 0 as record,
+                'dead_channel' as reason_code, 'A7' as place, 'all 0' as found, 'Look at it' as remedy
+            from range(1000) r(i)
+            union all select 't', 'hammer', 't/hammer/A7.uff', null, 'truncated', 'record 3', 'ends early', 'Copy it'
+            union all select 'u', 'hammer', 'u/hammer/A7.uff', null, 'truncated', 'record 3', 'ends early', 'Copy it'
+        """)
+        found = con.execute(ROWS["quarantine"], {"turnouts": ["t"]})
+        rows = [dict(zip([d[0] for d in found.description], row)) for row in found.fetchall()]
+    text = page(quarantine=rows)
+    assert "t/passages/00999.tdms" in text and "t/hammer/A7.uff" in text and text.count("00999.tdms") == 1
+    shown = text.count("<td>dead_channel</td>")
+    assert shown < 50 and f"and {1000 - shown} more of dead_channel" in text and "more of truncated" not in text
+
+
+def test_what_is_folded_is_printed():
+    """A closed fold hides its content by ``content-visibility`` of ``::details-content``, whatever its children say."""
+    printed = shared_by_pages(1)["css"].partition("@media print")[2]
+    assert "details::details-content{display:block;content-visibility:visible}" in printed
+
+
+def luminance(colour):
+    """Relative luminance of a colour #rrggbb, as WCAG 2.2 defines it."""
+    share = (int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5))
+    red, green, blue = (s / 12.92 if s <= 0.04045 else ((s + 0.055) / 1.055) ** 2.4 for s in share)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+
+def contrast(one, other):
+    light, dark = sorted((luminance(one), luminance(other)), reverse=True)
+    return (light + 0.05) / (dark + 0.05)
+
+
+def style(selector):
+    """The rule of the pages' style, with the colours that its variables stand for."""
+    css = shared_by_pages(1)["css"]
+    colours = dict(re.findall(r"(--\w+):(#\w+)", css))
+    return re.sub(r"var\((--\w+)\)", lambda m: colours[m[1]], css.partition(selector + "{")[2].partition("}")[0])
+
+
+@pytest.mark.parametrize("state", ["inspect", "plan", "learning", "ok"])
+def test_the_white_words_of_a_badge_can_be_read(state):
+    """WCAG 2.2, success criterion 1.4.3: at least 4.5 to 1."""
+    assert contrast("#ffffff", re.search("background:(#[0-9a-f]+)", style(f".badge.{state}"))[1]) >= 4.5
+
+
+def test_an_alarm_is_told_from_a_sound_section_by_more_than_red_and_green():
+    """One man in twelve sees them alike, and so does a printer: they differ 3 to 1 in lightness, or in an outline."""
+    alarm, sound = style(".state-inspect"), style(".state-ok")
+    fills = (re.search("fill:(#[0-9a-f]+)", rule)[1] for rule in (alarm, sound))
+    assert contrast(*fills) >= 3.0 or ("stroke" in alarm and "stroke" not in sound)
+
+
+def test_a_full_disk_leaves_the_old_page_and_nothing_beside_it(tmp_path, monkeypatch):
+    (tmp_path / "t.html").write_text("old")
+
+    def full(path, text, **_):
+        path.write_bytes(b"ha")
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", full)
+    with pytest.raises(OSError, match="No space left"):
+        replace_page(tmp_path / "t.html", "new")
+    assert [p.name for p in tmp_path.iterdir()] == ["t.html"] and (tmp_path / "t.html").read_text() == "old"
