@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from turnout.passage.at_sensors import sensor_times
+from turnout.passage.change_of_speed import with_change
 from turnout.passage.count import best_count, count_without_distance
 from turnout.passage.findings import Passage
 from turnout.passage.listen import hearing, listen, narrowed, track_taken
@@ -143,7 +144,8 @@ def _from_scan(heard, settings):
     name = "unknown" if likeness - against < 0.01 else "facing" if sign > 0 else "trailing"
     reference = float(np.mean(heard.positions))
     start = heard.begin - sign * reference * abs(slowness)
-    return Motion(1 / abs(slowness), start, 0.0, sign), name
+    steady = Motion(1 / abs(slowness), start, 0.0, sign)
+    return with_change(heard, steady, settings.acceleration_limit), name
 
 
 def _settled(heard, used, start, offer, found, settings, several) -> Passage:

@@ -48,7 +48,8 @@ def best_count(heard, motion, span, patterns, settings):
 def _near(motion, heard, reach):
     """Motions at speeds within ``reach`` [m/s] of a known one that bring the train's middle past at the same time."""
     middle = 0.5 * (heard.begin + heard.end)
-    low, high = max(motion.speed - reach, 0.75 * motion.speed), min(motion.speed + reach, 1.3 * motion.speed)
+    speed = float(motion.speed_at(middle))
+    low, high = max(speed - reach, 0.75 * speed), min(speed + reach, 1.3 * speed)
     speeds = np.geomspace(low, high, max(int(np.log(high / low) / FINE), 2))
     return [replace(motion, speed=v, start=middle - float(motion.way(middle)) / v, acceleration=0.0) for v in speeds]
 
@@ -68,7 +69,7 @@ def _first_named(heard, motion, offers, error, patterns, settings):
         tried.add(key)
         for placed in _placed(heard, motion, offer):
             times = motion.time(placed.offsets)
-            found = find_type(times, patterns, settings, motion.speed, error, PLACE_SE)
+            found = find_type(times, patterns, settings, float(motion.speed_at(times[0])), error, PLACE_SE)
             if found.type != UNKNOWN and _covers(heard, motion, placed.offsets):
                 return (placed, found), first
             first = first or (placed, found)

@@ -47,18 +47,21 @@ class LoadFinding:
 def quasi_static(samples, rate: float, passage, position: float) -> np.ndarray:
     r"""(n_axle,) amplitude of each axle in the slow acceleration at one sensor, positive for a load. [m/s²]
 
-    Least squares of :math:`\sum_j A_j \kappa(s - d_j)`, κ the curvature of a rail on an elastic foundation with
-    wavenumber 1.1 per metre, both data and κ limited to ``TRUSTED`` wavelengths along the train.
+    Least squares of :math:`\sum_j A_j (v_j/v_0)^2 \kappa(s - d_j)`, κ the curvature of a rail on an elastic foundation
+    with wavenumber 1.1 per metre, both data and κ limited to ``TRUSTED`` wavelengths along the train; v_j is the speed
+    of axle j at the sensor and v_0 that of the motion, which a calibration knows.
     """
     per_bin = max(round(STEP * rate), 1)
     n = len(samples) // per_bin
     slow = np.asarray(samples[: n * per_bin], float).reshape(n, per_bin).mean(axis=1)
     start, stop = passage.offsets[0] - 12.0, passage.offsets[-1] + 12.0
-    row = along_train((slow - np.median(slow))[None], per_bin / rate, [position], passage.motion, start, stop)[0]
+    motion = passage.motion
+    row = along_train((slow - np.median(slow))[None], per_bin / rate, [position], motion, start, stop)[0]
     sections = signal.butter(3, TRUSTED, btype="bandpass", fs=1.0 / GRID, output="sos")
     place = np.arange(len(row)) * GRID + start
     kx = 1.1 * np.abs(place[:, None] - passage.offsets)
     columns = np.exp(-kx) * (np.cos(kx) - np.sin(kx))
+    columns *= (motion.speed_at(motion.passing(passage.offsets, position)) / motion.speed) ** 2
     columns = signal.sosfiltfilt(sections, columns, axis=0)
     return np.linalg.lstsq(columns, signal.sosfiltfilt(sections, row), rcond=None)[0]
 

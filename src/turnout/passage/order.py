@@ -65,7 +65,7 @@ def wrong_places(heard, motion, used):
     keep = np.ones(n, dtype=bool)
     if n < 4:
         return [], keep
-    shifts = _shifts(heard, motion)
+    shifts = half_shifts(heard, motion)
     shifts = shifts - np.median(shifts, axis=0)
     whole = shifts.mean(axis=1)
     limits = np.array([BLOW if s.panel == "CP" else SEEN for s in used])
@@ -85,7 +85,7 @@ def wrong_places(heard, motion, used):
     return findings, keep
 
 
-def _shifts(heard, motion, reach: float = 20.0):
+def half_shifts(heard, motion, reach: float = 20.0) -> np.ndarray:
     """(n_sensor, 2) shift [m] of each sensor against the others, in the first and second half of the train."""
     ways = motion.way(np.array([heard.begin, heard.end]))
     middle = motion.direction * np.mean(heard.positions)

@@ -11,7 +11,8 @@ from turnout.passage.motion import Motion
 def slowness_from_sensors(times, positions, direction: int, place_error: float, limit: float):
     r"""Slowness at the mean time [s/m], its change [s/m per s], and their standard errors.
 
-    .. math:: t_{ij} = \tau_j + d\,x_i\,(q + q' (\tau_j - \bar\tau)) + b_i q
+    .. math:: t_{ij} = \tau_j + \frac{2 d\,x_i}{v_j + \sqrt{v_j^2 + 2 a\,d\,x_i}} + b_i q, \qquad
+        v_j = \frac1q + a (\tau_j - \bar\tau), \quad a = -\frac{q'}{q^2}
 
     Every axle has its own free time, so the train need not be known. The b_i, where along the rail a sensor hears a
     wheel, do not average out over axles: their spread is estimated from the sensors where there are more than two,
@@ -42,15 +43,18 @@ def slowness_from_sensors(times, positions, direction: int, place_error: float, 
     start = np.nansum(level * along[:, None]) / np.sum(np.isfinite(level) * along[:, None] ** 2)
     floor = 0.3 * place_error * abs(start)
     prior = np.zeros((1, n_axle + 2))
-    scale = floor
+    scale, curved = floor, np.zeros(sensor.size)
     for _ in range(10):
         prior[0, -1] = scale / (0.25 * limit * start**2)
         rows = np.vstack([design * weight[:, None], prior])
-        solution = np.linalg.lstsq(rows, np.append(target * weight, 0.0), rcond=None)[0]
-        residual = target - design @ solution
+        solution = np.linalg.lstsq(rows, np.append((target - curved) * weight, 0.0), rcond=None)[0]
+        residual = target - curved - design @ solution
         scale = max(1.4826 * np.median(np.abs(residual)), floor)
         weight = np.sqrt(1.0 / np.maximum(1.0, np.abs(residual) / (2.5 * scale)))
-    q, change = solution[-2:]
+        q, change = solution[-2:]
+        if not q > 0.0:
+            break
+        curved = _by_motion(q, change, along[sensor], late[axle]) - along[sensor] * (q + change * late[axle])
     variance = max(np.sum((weight * residual) ** 2) / max(sensor.size - n_axle - 1, 1), floor**2)
     covariance = np.linalg.pinv(rows.T @ rows) * variance
     place = np.array([np.mean(residual[sensor == i]) for i in np.unique(sensor)])
@@ -63,9 +67,16 @@ def slowness_from_sensors(times, positions, direction: int, place_error: float, 
         change,
         float(np.hypot(np.sqrt(covariance[-2, -2]), spread / np.sqrt(extent))),
         float(np.sqrt(covariance[-1, -1])),
-        float(centre.mean()),
+        float(solution[:-2].mean()),
         residual_by_sensor(times, residual, sensor, axle),
     )
+
+
+def _by_motion(q, change, along, late):
+    """Times from the middle of the sensors to places ``along``, of a slowness ``q`` that changes steadily in speed."""
+    acceleration = -change / q**2
+    speed = np.maximum(1.0 - change / q * late, 0.2) / q
+    return 2.0 * along / (speed + np.sqrt(np.maximum(speed**2 + 2.0 * acceleration * along, 0.0)))
 
 
 def residual_by_sensor(times, residual, sensor, axle):

@@ -1,0 +1,56 @@
+"""Trains that brake or gain speed while sensors over half a hundred metres hear them."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from benchmarks.passage_truth import IC3, PATTERNS, passing, rolling, sensors_for
+
+from turnout.passage.analyse import _sensor_speed, analyse
+
+PLACES = (-12.0, 3.6, 13.8, 24.6, 26.4, 36.0)  # m, those of config/layouts
+# Every third wagon has bogies, the others two axles.
+WAGONS = ((2.0, 3.8, 10.4, 12.2), (2.8, 11.2), (2.8, 11.2))
+FREIGHT = np.concatenate([14.0 * k + np.array(WAGONS[k % 3]) for k in range(22)])
+
+
+def passed(settings, offsets, speed, acceleration, direction):
+    """The passage, and its true speed halfway between the first and the last axle at the origin. [m/s]"""
+    recording = rolling(np.random.default_rng(3), offsets, speed, PLACES, direction, acceleration=acceleration, lead=3)
+    passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
+    first = min(PLACES) if direction > 0 else max(PLACES)
+    at_origin = passing(offsets, (first, 0.0), speed, acceleration, direction, 3.0)[1]
+    return passage, speed + acceleration * (0.5 * (at_origin[0] + at_origin[-1]) - 3.0)
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize(("speed", "acceleration"), [(20.0, -0.8), (12.0, 0.8), (15.0, 0.3)])
+def test_a_train_that_changes_its_speed_is_counted_named_and_finds_no_fault_in_clocks(
+    speed, acceleration, direction, settings
+):
+    passage, middle = passed(settings, IC3, speed, acceleration, direction)
+    assert not {f.reason for f in passage.findings} & {"clock_drift", "channels_swapped", "axles_uncertain"}
+    assert (passage.n_axle, passage.type.type, len(passage.heard)) == (8, "IC3", 6)
+    assert passage.speed.speed == pytest.approx(middle, abs=5.0 * passage.speed.se)
+    assert passage.speed.speed == pytest.approx(middle, rel=3e-3)
+    assert passage.speed.acceleration == pytest.approx(acceleration, abs=0.05)
+
+
+@pytest.mark.parametrize(("speed", "acceleration"), [(18.0, -0.3), (10.0, 0.1)])
+def test_a_freight_train_without_template_too(speed, acceleration, settings):
+    """300 m of wagons: it is two fifths slower, or a third faster, when it has passed."""
+    passage, middle = passed(settings, FREIGHT, speed, acceleration, 1)
+    assert not {f.reason for f in passage.findings} & {"clock_drift", "two_trains", "axles_uncertain"}
+    assert (passage.n_axle, passage.type.type, len(passage.heard)) == (60, "unknown", 6)
+    assert passage.speed.speed == pytest.approx(middle, abs=3.0 * passage.speed.se)
+    assert passage.speed.acceleration == pytest.approx(acceleration, abs=0.01)
+
+
+@pytest.mark.parametrize("acceleration", [0.1, -0.15])
+def test_exact_times_of_a_train_that_changes_its_speed_give_speed_and_acceleration(acceleration, settings):
+    """138 m at 9 m/s at first, up by a fifth or down by two: neither slowness nor way is a straight line."""
+    times = passing(FREIGHT[:28], PLACES, 9.0, acceleration, 1, 3.0)
+    heard = SimpleNamespace(positions=np.array(PLACES))
+    speed, se, found, _, at = _sensor_speed(times, heard, 1, settings.place_error, settings)
+    assert speed == pytest.approx(9.0 + acceleration * (at - 3.0), rel=1e-4) and se < 2e-3 * speed
+    assert found == pytest.approx(acceleration, rel=5e-3)  # the prior holds back a little
