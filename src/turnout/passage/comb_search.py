@@ -8,6 +8,7 @@ from itertools import product
 
 import numpy as np
 
+from turnout.passage.beyond import goes_on
 from turnout.passage.comb import Comb, evidence, explained, profiles_at, teeth_of
 from turnout.passage.comb_row import likeliest_row
 from turnout.passage.motion import Motion
@@ -59,7 +60,10 @@ def choices_of(pattern, row) -> float:
 
 
 def likeliest(heard, motions, patterns) -> dict[str, Fitted]:
-    """Type -> its likeliest row of vehicles, out of ``motions`` in order of their speed, ``FINE`` apart."""
+    """Type -> its likeliest row of vehicles, out of ``motions`` in order of their speed, ``FINE`` apart.
+
+    A row beyond whose ends the train goes on is none.
+    """
     profiles = profiles_at(heard, motions)
     n_sensor, first = len(heard.positions), {}
     for pattern, row, comb in even_rows(patterns):
@@ -77,7 +81,9 @@ def likeliest(heard, motions, patterns) -> dict[str, Fitted]:
     best = {}
     for type_, rows in first.items():
         rows = sorted(rows, key=lambda f: -f.evidence)[:KEPT]
-        best[type_] = max((closely(heard, f) for f in rows), key=lambda f: f.evidence)
+        close = [f for f in (closely(heard, f) for f in rows) if not goes_on(heard, f.motion, *_ends(heard, f))]
+        if close:
+            best[type_] = max(close, key=lambda f: f.evidence)
     return best
 
 
@@ -93,11 +99,17 @@ def closely(heard, fitted: Fitted, passes: int = 3) -> Fitted:
     return fitted
 
 
+def _ends(heard, fitted: Fitted) -> tuple[float, float]:
+    """The row's first axle in its motion's own coordinate, and its length. [m]"""
+    place = fitted.motion.direction * float(np.mean(heard.positions))
+    return float(fitted.motion.way(heard.begin)) - place + fitted.start, float(fitted.comb.offsets[-1])
+
+
 def about_middle(heard, fitted: Fitted) -> Motion:
     """The motion told from the row's middle: ``start`` is when it passes the middle of the sensors, ``speed`` then."""
     motion, place = fitted.motion, fitted.motion.direction * float(np.mean(heard.positions))
-    first = float(motion.way(heard.begin)) - place + fitted.start
-    middle = float(motion.time(first + 0.5 * fitted.comb.offsets[-1] + place))
+    first, length = _ends(heard, fitted)
+    middle = float(motion.time(first + 0.5 * length + place))
     return replace(motion, speed=float(motion.speed_at(middle)), start=middle)
 
 

@@ -73,7 +73,7 @@ def hearing(listening: Listening) -> np.ndarray:
     if not loud.any():
         return np.flatnonzero(loud)
     power = listening.levels.loud
-    return np.flatnonzero(loud & (power >= 0.01 * np.quantile(power[loud], 0.7)))
+    return np.flatnonzero(loud & (power >= 0.01 * np.quantile(power[loud], 0.7, method="higher")))
 
 
 def track_taken(listening: Listening, tracks) -> tuple[str, float]:

@@ -1,0 +1,66 @@
+"""A row of axles that is only a part of the train: what runs before or behind it is heard."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from benchmarks.passage_truth import KNOWN, RATE, recording_of, rolling, sensors_for
+
+from turnout.passage.analyse import analyse
+from turnout.passage.beyond import goes_on
+from turnout.passage.listen import hearing, listen
+from turnout.passage.motion import Motion
+from turnout.passage.patterns import offsets, read_patterns
+
+SPEED, COACHES = 33.0, {"units": [{"any": ["coach"], "count": [2, 12]}]}
+
+
+def with_locomotive(width, seed):
+    """Five coaches whose wheels burst within 0.4 m, behind a locomotive that is heard ``width`` [m] around its own."""
+    patterns = read_patterns({**KNOWN, "trains": {**KNOWN["trains"], "coaches": COACHES}})
+    kinds = {v.name: v for p in patterns for g in p.groups for v in g.vehicles}
+    places = offsets((kinds["loco"], *(kinds["coach"],) * 5))
+    rng = np.random.default_rng(seed)
+    behind = rolling(rng, places[4:] - places[4], SPEED, (2.0,), lead=1.0 + places[4] / SPEED)
+    samples = behind.samples.copy()
+    time = np.arange(samples.shape[1]) / RATE
+    passed = (time[:, None] - 1.0) * SPEED - 2.0 - places[:4]
+    samples[0] += np.sqrt(0.8 * np.sum(np.exp(-0.5 * (passed / width) ** 2), axis=1)) * rng.standard_normal(time.size)
+    return recording_of(samples, (2.0,)), behind, patterns, len(places)
+
+
+def test_coaches_behind_a_locomotive_that_sounds_otherwise_are_not_named_alone(settings):
+    """Named whole, or said not to be known: never as the coaches alone."""
+    whole = 0
+    for width in (1.2, 2.0, 3.0):
+        recording, alone, patterns, n_axle = with_locomotive(width, 5)
+        found = analyse(recording, sensors_for(recording), patterns, settings)
+        assert found.type.type != "coaches"
+        whole += (found.type.type, found.n_axle) == ("intercity", n_axle)
+        found = analyse(alone, sensors_for(alone), patterns, settings)
+        assert (found.type.type, found.n_axle) == ("coaches", n_axle - 4)
+    assert whole >= 2
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize("speed", [12.0, 50.0])
+def test_what_is_heard_beyond_a_row_is_compared_with_the_row(speed, direction):
+    """Amplitude 2 along 60 m and 1.1, 1.3 or 1.45 over 40 m beyond it, quiet level 0.3: shares 0.47, 0.59 and 0.68."""
+    step, motion, place = 0.01, Motion(speed, 4.0, 0.0, direction), 17.0
+    way = motion.way((np.arange(3000) + 0.5) * step) - direction * place
+    for beyond, told in ((1.1, False), (1.3, False), (1.45, True)):
+        for first, last in ((60.0, 100.0), (-40.0, 0.0)):
+            amplitude = np.full((1, way.size), 0.3)
+            amplitude[0, (way > 0) & (way < 60.0)] = 2.0
+            amplitude[0, (way > first) & (way < last)] = beyond
+            levels = SimpleNamespace(amplitude=amplitude, step=step)
+            heard = SimpleNamespace(levels=levels, positions=np.array([place]))
+            assert goes_on(heard, motion, 0.0, 60.0) is told
+
+
+def test_the_neighbouring_track_is_not_heard_beside_one_sensor_of_its_own():
+    """One sensor that hears the train and two of the other track with 8 % of its amplitude: 22 dB below."""
+    rng = np.random.default_rng(3)
+    samples = rolling(rng, positions=(2.0, 9.0, 14.0)).samples * np.array([[1.0], [0.08], [0.08]])
+    samples += 1e-3 * rng.standard_normal(samples.shape)
+    assert hearing(listen(samples, RATE, (2.0, 9.0, 14.0), 0.001)).tolist() == [0]
