@@ -10,7 +10,7 @@ import numpy as np
 from turnout.passage.basis import band_pass, filtered, wheel_basis
 from turnout.passage.direction import DirectionTest, direction_test
 from turnout.passage.nulls import NullBand, null_bases, null_scores
-from turnout.passage.scores import Scores, common_delay, delay_power, forecast, leave_one_out_null, score
+from turnout.passage.scores import Scores, common_delay, delay_power, forecast, score
 from turnout.passage.soundness import converter_step
 from turnout.passage.timing import ImpactTimes, impact_times
 from turnout.passage.wheels import joint_fit
@@ -193,10 +193,3 @@ def _kept_basis(parts, n, model_rate, rate, settings):
 def _bases(order, rate, settings):
     through = band_pass(settings.band_low, settings.band_high, settings.filter_order, rate)
     return null_bases(order, through, rate, settings)
-
-
-def leave_one_out_limit(model: ModalModel, settings) -> float:
-    """Score that one free number reaches on noise, for the model's slowest mode. [%]"""
-    poles = np.linalg.eigvals(model.a)
-    decay_time = -1.0 / (np.log(np.abs(poles).max()) * model.rate)
-    return leave_one_out_null(settings.band_high - settings.band_low, decay_time)

@@ -54,18 +54,6 @@ def fit_percent(measured, predicted) -> float:
     return float(100.0 * (1.0 - np.linalg.norm(measured - predicted) / spread))
 
 
-def leave_one_out_null(bandwidth: float, decay_time: float) -> float:
-    r"""Leave-one-out score that one free number reaches on noise. [%]
-
-    .. math:: 100\,(1 - \sqrt{1 - 1/n}), \qquad n = 2 B \tau
-
-    >>> print(f"{leave_one_out_null(720.0, 0.006):.1f}")
-    6.0
-    """
-    n = max(2.0 * bandwidth * decay_time, 1.0)
-    return 100.0 * (1.0 - np.sqrt(max(0.0, 1.0 - 1.0 / n)))
-
-
 def wheel_windows(expected, n: int, length: int, lead: int) -> tuple[np.ndarray, np.ndarray]:
     """First sample and length of each wheel's own samples: up to the next wheel, at most ``length``. [samples]
 

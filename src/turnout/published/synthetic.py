@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from turnout.identify.poles import continuous_pole, discrete_pole
+from turnout.identify.poles import continuous_pole
 from turnout.identify.pulse_response import haversine_pulse, pulse_response
 from turnout.published.models import PublishedModel, published_model
 
@@ -145,8 +145,3 @@ def _wandering_zero(time, rng):
     phase = 2.0 * np.pi * rng.random((len(time), 1))
     slow = np.exp(-np.clip(time, 0.0, None) / 0.25) + np.sin(2.0 * np.pi * 4.0 * time + phase)
     return slow * np.sign(rng.standard_normal((len(time), 1)))
-
-
-def true_poles(test: HammerTest) -> np.ndarray:
-    """(n_impact, n_mode) discrete poles of the blows of a synthetic test."""
-    return discrete_pole(test.frequency, test.damping, test.rate)

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import duckdb
 import pyarrow as pa
 
-from turnout.registry.columns import create_table, key, names, tables
+from turnout.registry.columns import create_table, key, tables
 from turnout.registry.intake import Arrival, Refusal
 
 UNIQUE = "unique, and another row has it already"
@@ -129,8 +129,3 @@ def _second_of_a_key(con, table) -> list[Refusal]:
     return [
         Refusal(unit, table, row, "+".join(keys), " ".join(map(str, values)), UNIQUE) for unit, row, *values in found
     ]
-
-
-def columns_sql(table: str) -> str:
-    """The columns of a table, quoted, for a SELECT."""
-    return ", ".join(f'"{n}"' for n in names(table))

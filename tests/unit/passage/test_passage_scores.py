@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from turnout.passage.basis import band_pass, filtered, wheel_basis
 from turnout.passage.channel_fit import fit_channel
 from turnout.passage.nulls import NullBand, null_bases, null_scores
-from turnout.passage.scores import fit_percent, forecast, leave_one_out_null, score
+from turnout.passage.scores import fit_percent, forecast, score
 
 THROUGH = band_pass(80, 800, 4, RATE)
 
@@ -31,14 +31,6 @@ def test_the_mean_scores_zero_and_silence_has_no_score():
     assert fit_percent(y, np.full(4, y.mean())) == pytest.approx(0.0)
     assert np.isnan(fit_percent(np.ones(5), np.ones(5)))
     assert np.isnan(fit_percent(np.zeros(0), np.zeros(0)))
-
-
-def test_leave_one_out_null_is_what_one_number_explains_of_white_noise():
-    """n = 2 B tau values, one free number explains 1/n of the energy: 4000 draws, standard error 2.2 %."""
-    n = 20
-    noise = np.random.default_rng(2).standard_normal((4000, n))
-    explained = np.mean(noise[:, 0] ** 2) / np.mean(np.sum(noise**2, axis=1))
-    assert leave_one_out_null(1.0, n / 2) == pytest.approx(100 * (1 - np.sqrt(1 - explained)), rel=0.09)
 
 
 @pytest.mark.parametrize("location", ["OT", "SP", "CLP", "CP A7", "CP A9", "AS main", "AS diverging"])

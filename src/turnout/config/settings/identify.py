@@ -70,7 +70,6 @@ class IdentifySettings:
     confidence: float = setting(0.95, "", "level of the intervals", minimum=0.5, maximum=0.999)
     null_draws: int = setting(60, "", "random pole sets behind the null of the fit", minimum=10, maximum=10000)
     split_frequency: float = setting(200.0, "Hz", "where method paper parts its bands", minimum=1.0)
-    paper_band_low: float = setting(10.0, "Hz", "lower end of the paper's low band", minimum=0.1)
     paper_band_high: float = setting(800.0, "Hz", "upper end of the paper's high band", minimum=1.0)
     paper_filter_order: int = setting(
         4, "", "Butterworth; the paper gives neither filter nor order", minimum=1, maximum=12
