@@ -35,8 +35,11 @@ def residuals_by_pandas(modes, charts, baselines) -> pd.Series:
         base = chart["state"] == "baseline"
         f0 = chart.loc[base, "frequency_hz"].mean()
         percent = 100.0 * (chart["frequency_hz"] / f0 - 1.0)
-        fit = sm.OLS(percent[base], sm.add_constant(chart.loc[base, "rail_temperature_c_mode"])).fit()
-        left = percent - fit.predict(sm.add_constant(chart["rail_temperature_c_mode"]))
+        design = sm.add_constant(chart["rail_temperature_c_mode"] - chart.loc[base, "rail_temperature_c_mode"].mean())
+        scatter = np.sqrt(sm.OLS(percent[base], design[base]).fit().scale)
+        # the slope is 0 ± 0.5 %/°C beforehand: one more observation
+        known = np.vstack([design[base], [0.0, scatter / 0.5]])
+        left = percent - design @ sm.OLS(np.append(percent[base], 0.0), known).fit().params
         centred.append(chart.assign(centred=left))
     cells = pd.concat(centred)
     median = []

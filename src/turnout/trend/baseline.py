@@ -6,6 +6,9 @@ import numpy as np
 
 from turnout.trend.epochs import by_epoch, spread_out
 
+# %/°C, standard deviation of slopes among tracks, about 0: frequencies of pads fall by 0.1 to 0.5 %/°C
+USUAL_SLOPE = 0.5
+
 
 @dataclass(frozen=True)
 class Baseline:
@@ -50,6 +53,9 @@ def fit_baseline(frequency, temperature, time, epoch, settings) -> tuple[Baselin
 
     .. math:: 100 (f_i / f_0 - 1) = l_{e(i)} + b (T_i - T_0) + r_i
 
+    Beforehand b is 0 ± ``USUAL_SLOPE``: a year of temperatures outweighs that a thousand times, and where the
+    thermometer stood still nothing else keeps b from any value.
+
     Returns the baseline and the (n_chart, n_campaign) frequencies in percent of f0 with the temperature taken
     out, nan without frequency or temperature. f0 and T0 are means over the first epoch of the baseline.
     """
@@ -65,11 +71,13 @@ def fit_baseline(frequency, temperature, time, epoch, settings) -> tuple[Baselin
         dt = np.where(inside, temperature - spread_out(level_t, epoch), 0.0)
         dp = np.where(inside, 100.0 * (frequency - spread_out(level_f, epoch)) / f0, 0.0)
         stt, stp = np.sum(dt * dt, axis=1), np.sum(dt * dp, axis=1)
-        slope = np.where(stt > 0.0, stp / np.where(stt > 0.0, stt, 1.0), 0.0)
         n_base = count.sum(axis=1)
         freedom = n_base - (count > 0).sum(axis=1) - (stt > 0.0)
-        rss = np.sum((dp - slope[:, None] * dt) ** 2, axis=1)
-        slope_se = np.where((freedom > 0) & (stt > 0.0), np.sqrt(rss / np.maximum(freedom, 1) / stt), np.nan)
+        rss = np.sum(dp * dp, axis=1) - np.where(stt > 0.0, stp**2 / stt, 0.0)
+        scatter = np.where(freedom > 0, np.maximum(rss, 0.0) / np.maximum(freedom, 1), 0.0)
+        weight = stt + scatter / USUAL_SLOPE**2
+        slope = np.where(weight > 0.0, stp / weight, 0.0)
+        slope_se = np.where((freedom > 0) & (weight > 0.0), np.sqrt(scatter / weight), np.nan)
         corrected = 100.0 * (frequency / f0 - 1.0) - slope[:, None] * (temperature - t0)
     missing = np.sum(np.isfinite(frequency) & ~np.isfinite(temperature), axis=1)
     fitted = Baseline(

@@ -68,7 +68,8 @@ def of_sections(p: Prepared, window, settled, serving, settings) -> Residuals:
     enough &= p.with_siblings[:n, None]
     enough &= _compared(window[:n], enough, epoch, first_epoch(p)[:n], settings.siblings_share)
     shift, beside = _centred(np.where(enough, e - median, np.nan), window[:n] & enough, epoch)
-    return Residuals(p.values, np.where(enough, beside, e), _sigma(p, enough), level, shift, e)
+    sigma = _sigma(p, enough, slope_variance(p, window[:n]))
+    return Residuals(p.values, np.where(enough, beside, e), sigma, level, shift, e)
 
 
 def _compared(window, beside, epoch, first, share) -> np.ndarray:
@@ -95,7 +96,8 @@ def of_turnouts(p: Prepared, sections: Residuals, window, settled, alarmed, sett
     young, young_count = median_of_group(sections.centred, np.isfinite(sections.centred), group)
     whole = np.where(count >= need, median, np.where((young_count >= need) & window[n:], young, np.nan))
     level, residual = _centred(whole, window[n:] & np.isfinite(whole), epoch)
-    sigma = np.repeat(p.spread[n:, None], whole.shape[1], axis=1)
+    common, _ = median_of_group(slope_variance(p, window[:n]), settled[:n] & ~alarmed, group)
+    sigma = np.sqrt(p.spread[n:, None] ** 2 + np.nan_to_num(common))
     return Residuals(whole, residual, np.where(sigma > 0.0, sigma, np.nan), level, np.zeros_like(level), residual)
 
 
@@ -106,12 +108,29 @@ def _centred(values, window, epoch):
     return level, values - spread_out(level, epoch)
 
 
-def _sigma(p, enough):
-    """Spread of each value [%]: the baseline's, with or without siblings, and more where its own error is larger."""
+def slope_variance(p, window):
+    """What the error of the temperature slope adds to each value beyond the temperatures of its baseline. [%²]
+
+    (n_section, n_campaign). Within them the guard allows for it; a summer after a baseline in which the thermometer
+    stood still is judged by a slope that nobody measured.
+    """
+    n, base = len(window), p.baseline
+    _, away = _centred(p.panel.temperature, window & np.isfinite(p.panel.temperature), p.epoch[:n])
+    inside = base.inside[:n]
+    usual = np.sum(np.where(inside, away**2, 0.0), axis=1) / np.maximum(inside.sum(axis=1), 1)
+    beyond = np.maximum(np.nan_to_num(away) ** 2 - usual[:, None], 0.0)
+    return np.nan_to_num(base.slope_se[:n, None]) ** 2 * beyond
+
+
+def _sigma(p, enough, beyond):
+    """Spread of each value [%]: the baseline's, with or without siblings, and more where its own error is larger.
+
+    ``beyond`` (n_section, n_campaign) is the variance of what temperatures make of it that the baseline never saw. [%²]
+    """
     n = len(enough)
     sigma = np.where(enough, p.spread[:n, None], p.spread_alone[:n, None])
     f0, inside = p.baseline.frequency[:n, None], p.baseline.inside[:n]
     error = np.nan_to_num(100.0 * p.panel.error / f0)
     usual = np.sum(np.where(inside, error**2, 0.0), axis=1) / np.maximum(inside.sum(axis=1), 1)
-    sigma = np.sqrt(sigma**2 + np.maximum(error**2 - usual[:, None], 0.0))
+    sigma = np.sqrt(sigma**2 + np.maximum(error**2 - usual[:, None], 0.0) + beyond)
     return np.where(sigma > 100.0 * RESOLUTION / f0, sigma, np.nan)

@@ -6,7 +6,7 @@ import pandas as pd
 from turnout.trend.drift import slopes, span
 from turnout.trend.panel import WHOLE, timestamps
 from turnout.trend.prepared import first_epoch
-from turnout.trend.residuals import RESOLUTION
+from turnout.trend.residuals import RESOLUTION, slope_variance
 from turnout.trend.threshold import detectable_shift, run_lengths
 
 YEAR = 365.25
@@ -57,7 +57,7 @@ def chart_status(charts, settings) -> pd.DataFrame:
     last = np.max(np.where(measured, p.time, -np.inf), axis=1, initial=-np.inf)
     detectable, campaigns = detectable_change(charts, settings)
     present = p.epoch == (p.epoch[:, -1:] if p.epoch.shape[1] else 0)
-    mask = present & np.isfinite(charts.residual)
+    mask = present & np.isfinite(charts.residual) & at_known_temperatures(charts)
     slope, error, p_value = slopes(charts.residual, p.time, mask, charts.memory)
     short = span(p.time, mask) < settings.drift_days
     status = p.charts.drop(columns=["group", "visits"]).copy()
@@ -81,6 +81,15 @@ def chart_status(charts, settings) -> pd.DataFrame:
     status["drift_p"] = np.where(short, np.nan, p_value)
     status["state"], status["reason"] = _states(charts, settings, status, last, present)
     return status
+
+
+def at_known_temperatures(charts) -> np.ndarray:
+    """Campaigns at which the error of the temperature slope is less than the spread, (n_chart, n_campaign): a drift of
+    the others may be that of the seasons."""
+    p, n = charts.prepared, len(charts.prepared.panel.charts)
+    usual = p.spread[:, None] ** 2
+    whole = charts.sigma[n:] ** 2 - usual[n:]
+    return np.vstack([slope_variance(p, charts.learning[:n]), whole]) <= usual
 
 
 def mask_count(charts, present) -> np.ndarray:

@@ -120,6 +120,18 @@ def test_a_thermometer_that_stops_after_the_baseline_leaves_charts_that_cannot_t
     assert set(soon.loc[soon["section_id"] != "*", "state"]) == {"ok"}
 
 
+def test_a_thermometer_that_stood_still_during_the_baseline_raises_no_alarms(settings):
+    """20 turnouts whose thermometer showed 20 °C for a year and works since: nobody knows their slopes."""
+    fleet = Fleet(turnouts=20, weeks=156, phi=0.0)
+    rows = modes(fleet, 3)
+    stuck = (rows["measured_at_utc"] < pd.Timestamp("2017-01-16")).to_numpy()
+    noise = 0.1 * np.random.default_rng(4).standard_normal(len(rows))
+    rows.loc[stuck, "rail_temperature_c"] = 20.0 + noise[stuck]
+    status, charts = status_of(rows, settings)
+    assert len(alarm_rows(charts, settings)) <= 2  # of 180 charts over two years; such a fleet is promised one
+    assert not (status["drift_q"] <= settings.false_discovery).any()
+
+
 @pytest.mark.parametrize("stamp", ["1970-01-01 00:00:10", "2031-05-05"], ids=["never set", "ahead"])
 def test_a_campaign_with_a_wrong_clock_is_shown_and_left_out(settings, stamp):
     rows = plain(modes(FLEET, 1))

@@ -82,12 +82,30 @@ def test_baseline_equals_regression_with_a_level_for_each_epoch(settings):
     assert inside.sum() == base.count[0] == 50 and base.complete[0]  # 52 weekly campaigns less the two without a value
     design = np.column_stack([epoch[0] == 0, epoch[0] == 1, temperature[0] - base.reference[0]])[inside].astype(float)
     f0 = frequency[0, inside & (epoch[0] == 0)].mean()
-    fit = sm.OLS(100 * (frequency[0, inside] / f0 - 1), design).fit()
+    percent = 100 * (frequency[0, inside] / f0 - 1)
+    scale = sm.OLS(percent, design).fit().scale
+    # what is known of the slope beforehand, 0 ± 0.5 %/°C, is one more observation of it
+    known = np.vstack([design, [0.0, 0.0, np.sqrt(scale) / 0.5]])
+    fit = sm.OLS(np.append(percent, 0.0), known).fit()
     assert base.frequency[0] == pytest.approx(f0, rel=1e-12)
     assert base.slope[0] == pytest.approx(fit.params[2], rel=1e-9)
-    assert base.slope_se[0] == pytest.approx(fit.bse[2], rel=1e-9)
+    assert base.slope_se[0] == pytest.approx(np.sqrt(scale * np.linalg.inv(known.T @ known)[2, 2]), rel=1e-9)
     spread, _ = spread_and_memory(corrected, base.inside, epoch, base.freedom, time)
-    assert spread[0] == pytest.approx(np.sqrt(fit.scale), rel=1e-9)
+    assert spread[0] == pytest.approx(np.sqrt(np.sum(fit.resid[:-1] ** 2) / (50 - 3)), rel=1e-9)
+
+
+def test_the_slope_of_a_year_is_that_of_the_data_and_without_temperatures_that_of_other_tracks(settings):
+    """100 charts of one slope, scatter s = 0.6 %: its error is s / sqrt(52 var(T) + (s / 0.5)²) by Gauss."""
+    rng = np.random.default_rng(8)
+    time = np.tile(np.arange(60) * 7.0, (100, 1))
+    season = 12.0 + 15.0 * np.sin(time / 58.1)
+    for reading in (season, 20.0 + 0.1 * rng.standard_normal(time.shape)):
+        error = 0.6 / np.sqrt(52 * np.var(reading[:, :52], axis=1) + (0.6 / 0.5) ** 2)
+        frequency = 450.0 * (1.0 + (-0.3 * (reading - reading.mean()) + 0.6 * rng.standard_normal(time.shape)) / 100.0)
+        base, _ = fit_baseline(frequency, reading, time, np.zeros(time.shape, int), settings)
+        assert base.slope_se == pytest.approx(error, rel=0.35)  # the scatter of 52 values is known to a tenth
+        # within the stated error of the truth, drawn from what is known beforehand: a chi-squared with 100
+        assert np.mean(((base.slope + 0.3) / base.slope_se) ** 2) < 1.6
 
 
 def test_pooled_memory_is_unbiased_where_a_single_chart_is_not():
