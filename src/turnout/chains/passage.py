@@ -179,7 +179,8 @@ def _one_train(recording, started_at, recording_id, path, turnout, context, rows
     identity = {**base, "recording_id": recording_id, "passed_at_utc": passed_at}
     row = passage_row(passage, identity, match, load, recording.conditions)
     if context.clusters is not None and passage.n_axle:
-        row["cluster_id"] = context.clusters.assign(row["train_type"], row["speed_kmh"], row["axle_load_t"])
+        known = (row.get(name) for name in ("train_type", "speed_kmh", "axle_load_t"))
+        row["cluster_id"] = context.clusters.assign(*known)
     fits = _fit_rows(recording, passage, sensors, turnout, context, identity, settings) if passage.n_axle else []
     # of all that it says: train data, models, clusters and loads change it as well as the file does; and of where it
     # lies, so that a copy's row stays when its original's is taken back

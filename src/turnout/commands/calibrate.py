@@ -1,6 +1,6 @@
 """Fit pads, ballast and damping of a section to its hammer tests, and say what the data cannot tell.
 
-  turnout calibrate --turnout tommerup_s1 --section A7 raw/tommerup_s1/hammer/2024-05-13/A7_*.h5
+  turnout calibrate --turnout tommerup_s1 --section A7 raw/tommerup_s1/hammer/2024-01-23/A7_*.uff
   turnout calibrate --track tommerup --section A7 --modes ballast=99.6/0.292 railpad=616.4/0.066
 
 The first meets the measured receptance line by line (gradients, priors, covariance); the second looks for

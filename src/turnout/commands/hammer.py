@@ -1,6 +1,6 @@
 """Look at a hammer test that was just recorded: is it good enough, and what are the resonances?
 
-  turnout hammer raw/tommerup_s1/hammer/2024-05-13/A7_*.h5 --turnout tommerup_s1
+  turnout hammer raw/tommerup_s1/hammer/2024-01-23/A7_*.uff --turnout tommerup_s1
   turnout hammer /media/stick/log_17.uff --turnout tommerup_s1 --section A7 --campaign 2024-05-13 --figure a7.svg
 
 Says which files and records were read, which blows are accepted and which refused and why, how far the coherence

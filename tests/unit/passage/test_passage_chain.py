@@ -12,6 +12,7 @@ from turnout.chains.passage import PassageContext, SectionModel, passage_unit
 from turnout.chains.passage_context import near
 from turnout.config import load_configuration, with_raw
 from turnout.fleet.scan import scan
+from turnout.passage.clusters import Cluster, Clusters
 from turnout.readers.writing import write
 from turnout.records import Channel
 
@@ -105,6 +106,17 @@ def test_the_model_is_the_latest_before_the_passage(tmp_path):
     assert [f["model_id"] for f in rows["passage_fits"]] == ["new"]
     rows = passage_unit(unit, turnout, tmp_path, PassageContext({"A7": (later,)}, PATTERNS))
     assert [f["model_id"] for f in rows["passage_fits"]] == ["later"]
+
+
+def test_a_train_that_nobody_weighed_finds_its_cluster_by_its_speed(tmp_path):
+    recording, _ = on_main()
+    unit, turnout = lay_out(tmp_path, recording)
+    slow, fast = (
+        Cluster(f"IC3/{k}", "IC3", np.log([kmh]), np.array([[1e-3]]), 0.5, 9) for k, kmh in ((1, 80.0), (2, 160.0))
+    )
+    judged = replace(context(), clusters=Clusters(1, (slow, fast)))
+    (passage,) = passage_unit(unit, turnout, tmp_path, judged)["passages"]  # at 44.4 m/s, 160 km/h
+    assert passage["axle_load_source"] == "unavailable" and passage["cluster_id"] == "IC3/2"
 
 
 def test_train_data_stand_beside_the_recording_and_differences_are_said(tmp_path):

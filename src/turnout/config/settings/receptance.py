@@ -14,7 +14,7 @@ class ReceptanceSettings:
     """
 
     trigger: float = setting(
-        10.0, "sd", "a blow must exceed this many standard deviations of the force noise; 4,000 samples reach 4",
+        10.0, "sd", "a blow must exceed this many standard deviations of the force noise, which itself reaches 4",
         minimum=4.0, maximum=1000.0,
     )  # fmt: skip
     weakest_blow: float = setting(
