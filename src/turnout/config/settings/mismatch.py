@@ -31,7 +31,7 @@ class MismatchSettings:
     threshold: float = setting(
         12.0,
         "nats",
-        "evidence that a name needs at least, odds of 160,000 to 1; 8 of 240 sealed controls had more",
+        "evidence that a name needs at least, odds of 160,000 to 1; 8 of 360 sealed controls had more",
         0.0,
     )
     margin: float = setting(6.0, "nats", "runner-up within this of the best: 'a or b'", 0.0)
