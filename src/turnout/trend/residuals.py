@@ -117,8 +117,8 @@ def slope_variance(p, window):
     n, base = len(window), p.baseline
     _, away = _centred(p.panel.temperature, window & np.isfinite(p.panel.temperature), p.epoch[:n])
     inside = base.inside[:n]
-    usual = np.sum(np.where(inside, away**2, 0.0), axis=1) / np.maximum(inside.sum(axis=1), 1)
-    beyond = np.maximum(np.nan_to_num(away) ** 2 - usual[:, None], 0.0)
+    known = np.max(np.where(inside, away, 0.0) ** 2, axis=1, initial=0.0)
+    beyond = np.maximum(np.nan_to_num(away) ** 2 - known[:, None], 0.0)
     return np.nan_to_num(base.slope_se[:n, None]) ** 2 * beyond
 
 
