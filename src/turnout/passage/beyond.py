@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 NEAR, FAR = 5.0, 27.0  # m beyond the last wheel: where the wheels of any vehicle coupled there would be
-AS_LOUD = 0.6  # of the mean amplitude along the row, that tells another vehicle from the sound ahead of the wheels
+# Of the mean amplitude along the row, that tells another vehicle from the sound ahead of the wheels: 68 simulated cases
+# of one sensor leave 0.21 at most where nothing more runs; a locomotive's bogies are at least 0.75 as loud as coaches'.
+AS_LOUD = 0.6
 
 
 def goes_on(heard, motion, first: float, length: float) -> bool:

@@ -6,7 +6,8 @@ import numpy as np
 
 from turnout.trend.epochs import by_epoch, spread_out
 
-# %/°C, standard deviation of slopes among tracks, about 0: frequencies of pads fall by 0.1 to 0.5 %/°C
+# %/°C, standard deviation of slopes among tracks, about 0: resonances fall by 0.15 to 0.4 %/°C (docs/measuring.md), so
+# all lie within one of it; a judgement, of no weight beside a year of temperatures
 USUAL_SLOPE = 0.5
 
 
