@@ -67,7 +67,7 @@ def _train(recording, passage) -> list[str]:
     speed, type_ = passage.speed, passage.type
     words.append(f"  axles      {passage.n_axle}, the clearest cut between them and the rest is {passage.contrast:.1f}")
     words.append(f"  speed      {3.6 * speed.speed:.1f} ± {3.6 * speed.se:.1f} km/h halfway, from {speed.source}")
-    words.append(f"  change     {speed.acceleration:+.2f} ± {speed.acceleration_se:.2f} m/s²")
+    words.append(f"  change     {speed.acceleration:+z.2f} ± {speed.acceleration_se:.2f} m/s²")
     if speed.disagreement is not None and abs(speed.disagreement) > 3:
         words.append(f"  sensors and axle spacing differ by {abs(speed.disagreement):.1f} standard errors")
     words.append(f"  direction  {passage.direction}, track {passage.track}")

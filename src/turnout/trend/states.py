@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 
 from turnout.trend.drift import slopes, span
+from turnout.trend.epochs import by_epoch
 from turnout.trend.panel import WHOLE, timestamps
 from turnout.trend.prepared import first_epoch
 from turnout.trend.residuals import RESOLUTION, slope_variance
@@ -15,7 +16,8 @@ YEAR = 365.25
 def detectable_change(charts, settings) -> tuple[np.ndarray, np.ndarray]:
     """Smallest change [%] that each chart shows within a year with the settings' probability, and its campaigns a year.
 
-    It rests on the spread of the baseline, the guard, the fleet's memory and the allowance of the present epoch.
+    It rests on the spread of the baseline, an unknown temperature slope, the guard, the fleet's memory and the
+    allowance of the present epoch.
     """
     campaigns = campaigns_a_year(charts.prepared)
     extra = charts.extra[:, -1] if charts.extra.shape[1] else np.zeros(len(charts.allowance))
@@ -41,7 +43,17 @@ def change_seen(charts, chart, epoch, allowance, campaigns, settings) -> np.ndar
     keys = np.column_stack([harmful, np.round(allowance, 2), campaigns])
     unique, where = np.unique(keys, axis=0, return_inverse=True)
     shift = [detectable_shift(float(h), float(k), int(n), settings.detectable_probability) for h, k, n in unique]
-    return np.array(shift)[where.ravel()] * spread_in(charts, chart, epoch) * (charts.guard * charts.widening)[chart]
+    spread = np.hypot(spread_in(charts, chart, epoch), of_unknown_temperatures(charts)[chart, epoch])
+    return np.array(shift)[where.ravel()] * spread * (charts.guard * charts.widening)[chart]
+
+
+def of_unknown_temperatures(charts) -> np.ndarray:
+    """What an unknown temperature slope adds to the spread of each epoch [%], (n_chart, n_epoch): the root mean square
+    over its campaigns, counting those at temperatures that the slope says nothing of."""
+    epoch = charts.prepared.epoch
+    added = np.where(at_known_temperatures(charts), 0.0, _of_slopes(charts))
+    mean, _ = by_epoch(added, np.isfinite(charts.residual), epoch, int(epoch.max(initial=0)) + 1)
+    return np.sqrt(np.nan_to_num(mean))
 
 
 def chart_status(charts, settings) -> pd.DataFrame:
@@ -86,10 +98,13 @@ def chart_status(charts, settings) -> pd.DataFrame:
 def at_known_temperatures(charts) -> np.ndarray:
     """Campaigns at which the error of the temperature slope is less than the spread, (n_chart, n_campaign): a drift of
     the others may be that of the seasons."""
+    return _of_slopes(charts) <= charts.prepared.spread[:, None] ** 2
+
+
+def _of_slopes(charts) -> np.ndarray:
+    """What the errors of the temperature slopes add to the variance of each value, (n_chart, n_campaign). [%²]"""
     p, n = charts.prepared, len(charts.prepared.panel.charts)
-    usual = p.spread[:, None] ** 2
-    whole = charts.sigma[n:] ** 2 - usual[n:]
-    return np.vstack([slope_variance(p, charts.learning[:n]), whole]) <= usual
+    return np.vstack([slope_variance(p, charts.learning[:n]), charts.sigma[n:] ** 2 - p.spread[n:, None] ** 2])
 
 
 def mask_count(charts, present) -> np.ndarray:

@@ -13,20 +13,21 @@ BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 def write_page(path, out, more=None, effects=(), cases=None):
     """Put report, pictures and stories of the set ``out`` between the marks of the page at ``path``.
 
-    Pictures go beside the page. Errors: BlindError where the page lacks the marks.
+    Pictures go beside the page and bear its name. Errors: BlindError where the page lacks the marks.
     """
     path = Path(path)
     text = path.read_text(encoding="utf-8")
     if text.count(BEGIN) != 1 or text.count(END) != 1:
         raise BlindError(path, "marks", f"{BEGIN} and {END} are not there once each", "Put them where figures belong")
     judged, _ = judged_set(out, more)
-    draw_severity(judged, path.with_name("blind_severity.svg"))
-    draw_reliability(judged, path.with_name("blind_reliability.svg"))
-    told = tell(out, path.parent, cases, more, oracle_of(out), effects)
+    severity, reliability = f"{path.stem}_severity.svg", f"{path.stem}_reliability.svg"
+    draw_severity(judged, path.with_name(severity))
+    draw_reliability(judged, path.with_name(reliability))
+    told = tell(out, path, cases, more, oracle_of(out), effects)
     measured = "\n\n".join(
         [
-            report_of(out, more).strip(), "![What was said along every ladder](blind_severity.svg)",
-            "![Stated probability and share right](blind_reliability.svg)", told,
+            report_of(out, more).strip(), f"![What was said along every ladder]({severity})",
+            f"![Stated probability and share right]({reliability})", told,
         ]
     )  # fmt: skip
     head, rest = text.split(BEGIN)

@@ -36,8 +36,8 @@ def choose(judged):
     return list(dict.fromkeys(j.case for j in found))
 
 
-def tell(out, folder, cases=None, more=None, oracle=None, effects=()):
-    """Markdown of stories; a picture per case goes to ``folder``. ``cases``: ids, else three are chosen.
+def tell(out, page, cases=None, more=None, oracle=None, effects=()):
+    """Markdown of stories; a picture per case goes beside the ``page``. ``cases``: ids, else three are chosen.
 
     The recordings without the effect are made by the generator from the seed that the truth holds.
     """
@@ -45,12 +45,12 @@ def tell(out, folder, cases=None, more=None, oracle=None, effects=()):
     judged = {case: judge(truths[case], answers_of(rows[case]), more) for case in truths}
     parts = []
     for case in cases or choose(list(judged.values())):
-        name = f"blind_story_{case}.svg"
+        name = f"{Path(page).stem}_story_{case}.svg"
         draw(
             truths[case],
             rows[case],
             (oracle or {}).get(case, (None, None))[1],
-            Path(folder) / name,
+            Path(page).with_name(name),
             load_effects(*effects),
         )
         parts.append(f"### {_title(truths[case])}\n\n{words(truths[case], rows[case])}\n\n![{case}]({name})")

@@ -129,6 +129,9 @@ def test_a_thermometer_that_stood_still_during_the_baseline_raises_no_alarms(set
     rows.loc[stuck, "rail_temperature_c"] = 20.0 + noise[stuck]
     status, charts = status_of(rows, settings)
     assert len(alarm_rows(charts, settings)) <= 2  # of 180 charts over two years; such a fleet is promised one
+    # a slope of 0 ± 0.5 %/°C in seasons of ±15 °C: no change of 1.5 % can be told from the season
+    assert set(status["state"]) == {"cannot_tell"} and set(status["reason"]) == {"too_noisy"}
+    assert status["detectable_pct"].min() > 4.0
     assert not (status["drift_q"] <= settings.false_discovery).any()
 
 
