@@ -5,6 +5,7 @@ import shutil
 import pytest
 from registry_rows import Bench, hammer_result, quarantined_result
 
+from turnout.cli import main
 from turnout.errors import RegistryError
 from turnout.registry.compaction import compact, rebuild
 from turnout.registry.database import rebuild_database
@@ -40,3 +41,11 @@ def test_a_folder_in_which_no_database_can_be_made_is_refused_before_anything_is
     with pytest.raises(RegistryError, match="Rename that folder, or put the registry elsewhere"):
         bench.register(hammer_result())
     assert not list(bench.registry.rglob("*.parquet"))
+
+
+def test_an_export_that_cannot_be_written_is_one_sentence(bench, tmp_path, capsys):
+    bench.register(hammer_result())
+    (tmp_path / "out/modes.parquet").mkdir(parents=True)
+    asked = ["--only", "modes", "--registry", str(bench.registry)]
+    assert main(["export", str(tmp_path / "out"), *asked]) == 2
+    assert f"turnout export: modes cannot be written to {tmp_path / 'out'}: " in capsys.readouterr().err
