@@ -31,7 +31,7 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def main(argv=None) -> int:
-    """Run one command; a fault of the user's input is one message and exit code 2."""
+    """Run one command; a fault of the user's input or of the machine's files is one message and exit code 2."""
     args = build_parser().parse_args(argv)
     try:
         return args.run(args) or 0
@@ -40,6 +40,11 @@ def main(argv=None) -> int:
         return 2
     except BrokenPipeError:
         return 0
+    except OSError as error:
+        where = f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error)
+        remedy = "Put that right, or name another place, then run again"
+        print(f"turnout {args.command}: {where}. {remedy}.", file=sys.stderr)
+        return 2
 
 
 if __name__ == "__main__":

@@ -69,7 +69,7 @@ def _recordings(files, description):
     """The recordings of all files, and what is wrong with those that cannot be used."""
     recordings: list[Recording] = []
     refused: list[str] = []
-    for file in map(Path, files):
+    for file in (Path(f).resolve() for f in files):  # a link may lead anywhere
         try:
             result = read(file.name, file.parent, description)
         except ReadError as error:

@@ -11,9 +11,11 @@ from pathlib import Path
 
 import numpy as np
 from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError
 
 from turnout.chains.passage import PassageContext, SectionModel
 from turnout.config.build import digest
+from turnout.config.legible import legible
 from turnout.config.settings.passage import PassageSettings
 from turnout.content import sha256_of
 from turnout.errors import ConfigError
@@ -83,9 +85,11 @@ def known_patterns(path: str):
     if not Path(path).is_file():
         return ()
     try:
-        return read_patterns(YAML(typ="safe").load(Path(path)))
-    except (KeyError, ValueError, TypeError) as error:
-        raise ConfigError(path, "vehicles and trains", str(error).strip("'\""), "See docs/passages.md") from None
+        with legible(path, "the file"):
+            return read_patterns(YAML(typ="safe").load(Path(path)))
+    except (KeyError, ValueError, TypeError, AttributeError, MarkedYAMLError) as error:
+        said = " ".join(str(error).split()).strip("'\"")
+        raise ConfigError(path, "vehicles and trains", said, "See docs/passages.md") from None
 
 
 def read_clusters(path: Path) -> Clusters | None:

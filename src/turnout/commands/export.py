@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write each table or view and print its number of rows; RegistryError for an unknown name."""
+    """Write each table or view and print its number of rows; RegistryError for one not known, or not written."""
     from pathlib import Path
 
     import duckdb
@@ -42,6 +42,9 @@ def run(args: argparse.Namespace) -> int:
                 path, n = _write(con, name, folder, args.format)
             except duckdb.CatalogException:
                 raise RegistryError(f"no table or view {name!r}. 'turnout query --list' names them.") from None
+            except duckdb.Error as error:
+                said = str(error).splitlines()[0]
+                raise RegistryError(f"{name} cannot be written to {folder}: {said}. Make room or allow it.") from None
             print(f"{path}: {n} rows")
     return 0
 

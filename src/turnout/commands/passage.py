@@ -2,6 +2,8 @@
 
 Nothing is written. The models are those that the last run identified (--work); without them, or with --no-fit, only
 the train is described.
+
+Exit code 1 where no train is found, 2 where the command cannot be followed.
 """
 
 import argparse
@@ -21,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the train of each record and, unless told otherwise, the fit at each sensor."""
+    """Print the train of each record and, unless told otherwise, the fit at each sensor; exit code 1 without any."""
     from pathlib import Path
 
     from turnout.chains.passage import trains_in
@@ -33,20 +35,21 @@ def run(args: argparse.Namespace) -> int:
     turnout = load_configuration(args.configuration).turnout(args.turnout)
     if turnout.passages is None:
         raise ConfigError(turnout.layout, "passages", "nothing about passages", "Add them to the layout")
-    path = Path(args.file)
+    path = Path(args.file).resolve()  # a link may lead anywhere
     settings = turnout.settings["passage"]
     result = read(path.name, path.parent, turnout.passages.description, settings.longest)
     for error in result.errors:
         print(f"Not used: {error}")
     _, context = passage_context(turnout.id, turnout.settings, args.work)
+    found = False
     for whole in (*result.recordings, *result.long):
         for recording, late, name in trains_in(whole, settings):
-            _show(recording, late if name else None, turnout, context, settings, args.no_fit)
-    return 0
+            found |= _show(recording, late if name else None, turnout, context, settings, args.no_fit)
+    return 0 if found else 1
 
 
-def _show(recording, late, turnout, context, settings, no_fit):
-    """Print one train, and how it is fitted."""
+def _show(recording, late, turnout, context, settings, no_fit) -> bool:
+    """Print one train, and how it is fitted; whether there is one."""
     from turnout.chains.passage import sensors_of
     from turnout.passage.analyse import analyse
 
@@ -56,6 +59,7 @@ def _show(recording, late, turnout, context, settings, no_fit):
     print("\n".join(_train(recording, passage)))
     if passage.n_axle and not no_fit:
         print("\n".join(_fits(recording, passage, turnout, context, settings)))
+    return bool(passage.n_axle)
 
 
 def _train(recording, passage) -> list[str]:

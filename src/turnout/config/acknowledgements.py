@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 from collections.abc import Iterator, Mapping
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -24,7 +25,7 @@ def read_acknowledgements(
     No file means that nobody has said anything. Empty ``section`` or ``band`` mean all of the turnout; section "*"
     is its median. ``known`` and ``variants`` are the turnouts and their configuration; None: places are not checked.
     """
-    if not Path(path).exists():
+    if not os.path.lexists(path):
         return [], []
     try:
         table = read_csv(Path(path), name, COLUMNS, needed=6)

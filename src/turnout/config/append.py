@@ -2,6 +2,7 @@
 
 import csv
 import io
+import os
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -18,7 +19,7 @@ from turnout.errors import ConfigError
 def taken_back(path: Path) -> Iterator[None]:
     """What is written to ``path`` inside stays only if nothing is raised there."""
     path = Path(path)
-    before = path.read_bytes() if path.exists() else None
+    before = path.read_bytes() if os.path.lexists(path) else None
     try:
         yield
     except BaseException:

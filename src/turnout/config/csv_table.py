@@ -1,6 +1,7 @@
 """Tables that people keep as CSV (events, acknowledgements, campaigns, trains), read with the place of every cell."""
 
 import csv
+import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -45,7 +46,8 @@ def read_csv(path: Path, name: str, known: tuple[str, ...], needed: int, free: b
     """A CSV whose header has the first ``needed`` of the ``known`` titles, and no others than these.
 
     Where others are ``free`` they are refused only if they look like a known title that is missing. Errors call the
-    file ``name``: TableFault where it is not UTF-8 or a needed title is missing, FileNotFoundError where it is not.
+    file ``name``: TableFault where it cannot be read, is not UTF-8 or a needed title is missing, FileNotFoundError
+    where there is none; a link to nothing is a file that cannot be read.
     A row is one line: a quote that is not closed costs its own row (``unreadable``), not the rows below it.
     """
     lines = [(n, line) for n, line in enumerate(_text(path, name).split("\n"), 1) if line.strip()]
@@ -77,7 +79,7 @@ def unreadable(cells: Mapping) -> tuple[str, str, str] | None:
 
 
 def header_of(path: Path, name: str) -> tuple[str, ...]:
-    """Titles of a CSV; TableFault where it has none or is not UTF-8."""
+    """Titles of a CSV; TableFault where it has none, is not UTF-8 or cannot be read."""
     lines = [(n, line) for n, line in enumerate(_text(path, name).split("\n"), 1) if line.strip()]
     if not lines:
         raise TableFault(Place(name, 1, 1), "an empty table", "Write its header, or remove the file")
@@ -85,7 +87,12 @@ def header_of(path: Path, name: str) -> tuple[str, ...]:
 
 
 def _text(path: Path, name: str) -> str:
-    data = Path(path).read_bytes()
+    try:
+        data = Path(path).read_bytes()
+    except OSError as error:
+        if not os.path.lexists(path):
+            raise
+        raise TableFault(Place(name, 1, 1), str(error.strerror), "Put a file there that may be read") from None
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

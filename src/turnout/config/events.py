@@ -1,5 +1,6 @@
 """config/events.csv: maintenance that starts a new epoch of a resonance."""
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
@@ -44,7 +45,7 @@ def read_events(path: Path, name: str, known, variants) -> tuple[list[Event], li
 
     ``known`` are the ids of the turnouts, None where turnouts.tsv itself is wrong: then no event is accused.
     """
-    if not path.exists():
+    if not os.path.lexists(path):
         return [], [], []
     events: list[Event] = []
     try:

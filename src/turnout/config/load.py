@@ -1,5 +1,6 @@
 """All configuration of a fleet, read and checked once."""
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -140,7 +141,7 @@ class _Reading:
         """Checked YAML file; an absent one is empty, an unsound one adds errors and is empty."""
         name = self.name(path.relative_to(self.folder).as_posix())
         empty = Branch(Place(name, 1, 1))
-        if not path.exists():
+        if not os.path.lexists(path):
             return empty
         try:
             tree = load(path, name)
@@ -157,8 +158,8 @@ class _Reading:
         name = row.values["layout"]
         path = self.folder / "layouts" / f"{name}.yaml"
         if name not in self.layouts:
-            self.layouts[name] = self.layout_of(path, settings) if path.exists() else None
-        if self.layouts[name] is None and not path.exists():
+            self.layouts[name] = self.layout_of(path, settings) if os.path.lexists(path) else None
+        if self.layouts[name] is None and not os.path.lexists(path):
             self._unknown(name, row)
         return self.layouts[name]
 

@@ -204,7 +204,8 @@ def read_parameters(path):
         raise ConfigError(path, place, str(error.problem), "Correct the YAML") from None
     if not isinstance(content, dict):
         raise ConfigError(path, "the file", "is not a mapping", "Write 'key: value' lines")
-    sources = content.pop("sources", {})
+    if not isinstance(sources := content.pop("sources", None) or {}, dict):
+        raise ConfigError(path, where(path, "sources"), "is not a mapping", "Write 'key: source' lines below it")
     return _parse(content, path, "", sources)
 
 
@@ -222,7 +223,7 @@ def _parse(value, path, place, sources):
 
 def _parse_number(entry, path, place, sources):
     for key in ("unit", "source"):
-        if key not in entry:
+        if isinstance(entry.get(key), (list, dict, type(None))):
             raise ConfigError(path, where(path, place), f"a number without {key}", f"Give its {key}")
     if unknown := set(entry) - KEYS:
         raise ConfigError(path, where(path, place), f"unknown key {min(unknown)!r}", f"Use {', '.join(sorted(KEYS))}")
@@ -235,10 +236,15 @@ def _parse_number(entry, path, place, sources):
             path, where(path, place), "an estimate without a prior", "Give its relative standard deviation as prior"
         )
     unit, factor = UNITS[entry["unit"]]
+    spread = None if prior is None else _finite(prior, path, place)
+    return Number(factor * _finite(entry["value"], path, place), unit, str(source), spread)
+
+
+def _finite(said, path, place) -> float:
     try:
-        found = Number(factor * float(entry["value"]), unit, str(source), None if prior is None else float(prior))
+        number = float(said)
     except (TypeError, ValueError):
-        raise ConfigError(path, where(path, place), f"{entry['value']!r} is not a number", "Write a number") from None
-    if not isfinite(found.value):
-        raise ConfigError(path, where(path, place), f"{entry['value']!r} is not finite", "Write a number")
-    return found
+        raise ConfigError(path, where(path, place), f"{said!r} is not a number", "Write a number") from None
+    if not isfinite(number):
+        raise ConfigError(path, where(path, place), f"{said!r} is not finite", "Write a number")
+    return number

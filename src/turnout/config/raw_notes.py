@@ -82,8 +82,6 @@ def _each_row(path, name, known, needed, keep: Callable[[Cells], None], free=Fal
         table = read_csv(path, name, known, needed, free)
     except (FileNotFoundError, NotADirectoryError):
         return []
-    except OSError as error:
-        return [_error(Place(name, 1, 1), str(error.strerror), "Put a file there that may be read")]
     except TableFault as fault:
         return [_error(fault.place, fault.found, fault.remedy)]
     errors = [_error(fault.place, fault.found, fault.remedy) for fault in table.faults]

@@ -1,5 +1,6 @@
 """config/turnouts.tsv: one row per turnout, read with the place of every cell."""
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -8,6 +9,7 @@ from typing import Any
 from turnout.config.document import Place
 from turnout.config.keys import Key, problem, suggestion
 from turnout.config.layout_keys import HAMMER_RATE, PASSAGE_RATE
+from turnout.config.legible import legible
 from turnout.errors import ConfigError
 
 ID = r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}"
@@ -61,12 +63,13 @@ class Row:
 
 def read_table(path: Path, name: str) -> tuple[list[Row], list[ConfigError]]:
     """Sound rows of turnouts.tsv and the errors of the others."""
-    try:
-        lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
-    except FileNotFoundError:
+    if not os.path.lexists(path):
         return [], [ConfigError(name, "line 1", "no such file", "Run 'turnout add ID LAYOUT' to begin one")]
-    except UnicodeDecodeError as error:
-        return [], [ConfigError(name, f"byte {error.start}", "a byte that is not UTF-8", "Save the file as UTF-8")]
+    try:
+        with legible(name, "line 1"):
+            lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
+    except ConfigError as error:
+        return [], [error]
     numbered = [(n, line) for n, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
     if not numbered:
         return [], [ConfigError(name, "line 1", "an empty table", "Write a header: turnout<tab>layout<tab>...")]

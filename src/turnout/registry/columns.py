@@ -3,7 +3,9 @@
 import csv
 from dataclasses import dataclass
 from functools import cache
+from glob import escape
 from importlib.resources import files
+from os import PathLike, fspath
 
 import pyarrow as pa
 
@@ -110,6 +112,15 @@ def literal(text: str) -> str:
     "'o''clock'"
     """
     return "'" + str(text).replace("'", "''") + "'"
+
+
+def file_literal(path: PathLike | str) -> str:
+    """SQL string literal of a file to read: what DuckDB would take for a pattern stands for itself.
+
+    >>> file_literal("line [1]/modes.parquet")
+    "'line [[]1]/modes.parquet'"
+    """
+    return literal(escape(fspath(path)))
 
 
 @cache

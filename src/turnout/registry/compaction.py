@@ -5,7 +5,7 @@ from os import PathLike
 from pathlib import Path
 
 from turnout.errors import RegistryError
-from turnout.registry.columns import WHOLE_TABLES, literal, tables
+from turnout.registry.columns import WHOLE_TABLES, file_literal, tables
 from turnout.registry.database import build_database
 from turnout.registry.generation import (
     DataFile,
@@ -109,6 +109,6 @@ def _cast(root: Path, before: Generation, table: str, files: list[DataFile]) -> 
             f'"{c.name}"::{c.type} as "{c.name}"' if c.name in held else f'null::{c.type} as "{c.name}"'
             for c in tables()[table]
         )
-        paths = ", ".join(literal(str(root / f.path)) for f in files if f.schema == schema)
+        paths = ", ".join(file_literal(root / f.path) for f in files if f.schema == schema)
         parts.append(f"select {columns} from read_parquet([{paths}])")
     return " union all ".join(parts)

@@ -49,7 +49,7 @@ def open_registry(path, read_only: bool = True) -> duckdb.DuckDBPyConnection:
     """DuckDB connection to a registry, given its folder or its ``registry.duckdb``. Loads no extension.
 
     Read-only unless told otherwise: the next registration replaces the file, and what was written into it is gone.
-    RegistryError when there is none, or when it cannot be opened.
+    RegistryError when there is none, when it cannot be opened, or when it was moved and not relocated.
     """
     path = Path(path)
     file = path / DATABASE if path.is_dir() else path
@@ -60,9 +60,14 @@ def open_registry(path, read_only: bool = True) -> duckdb.DuckDBPyConnection:
     try:
         connection = duckdb.connect(str(file), read_only=read_only, config=OFFLINE)
         connection.execute("set enable_progress_bar = false")
-        return connection
+        ((folder,),) = connection.execute("select folder from registry_info").fetchall()
     except duckdb.Error as error:
         raise RegistryError(f"{file}: cannot be opened: {str(error).splitlines()[0]}") from error
+    if not Path(folder).is_dir():
+        connection.close()
+        remedy = f"Where it was moved, run once: turnout registry relocate --registry '{file.parent}'"
+        raise RegistryError(f"{file}: was made in {folder}, which is not there. {remedy}.")
+    return connection
 
 
 def build_database(registry_dir: Path, generation: Generation) -> None:

@@ -13,6 +13,7 @@ from turnout.registry.columns import tables
 FILE = "_generation.json"
 FORMAT = 1
 KEPT_GENERATIONS = 2
+NO_DATABASE = {"?", "\\"}  # DuckDB begins options of a path with the one, and takes the other for a slash
 
 
 @dataclass(frozen=True)
@@ -60,9 +61,15 @@ class Generation:
 def load(registry_dir: Path) -> Generation:
     """The generation file, or generation 0 where there is none yet.
 
-    Raises RegistryError when it is not readable: it is written in one step, so somebody else touched it.
+    Raises RegistryError when it is not readable: it is written in one step, so somebody else touched it; and for a
+    folder in which DuckDB can make no database.
     """
     path = Path(registry_dir) / FILE
+    if forbidden := NO_DATABASE.intersection(path.resolve().as_posix()):
+        raise RegistryError(
+            f"{registry_dir}: DuckDB can make no database where a folder has {min(forbidden)} in its name. "
+            "Nothing was changed. Rename that folder, or put the registry elsewhere."
+        )
     try:
         raw = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import duckdb
 
-from turnout.registry.columns import literal, time_column
+from turnout.registry.columns import file_literal, time_column
 from turnout.registry.generation import Generation
 from turnout.registry.parquet import MEASURED
 from turnout.registry.supersede import last_word
@@ -20,7 +20,7 @@ def newest_that_counts(con: duckdb.DuckDBPyConnection, root: Path, generation: G
     for file in sorted((f for f in generation.files if f.newest), key=lambda f: str(f.newest), reverse=True):
         if newest is not None and str(file.newest) <= newest:
             break
-        source = f"read_parquet({literal(str(root / file.path))})"
+        source = f"read_parquet({file_literal(root / file.path)})"
         counts = f"{MEASURED[file.table]} not in (select old_id from no_longer)"
         found = con.execute(f"select max({time_column(file.table)})::varchar from {source} where {counts}").fetchall()
         newest = max(filter(None, (newest, found[0][0])), default=None)

@@ -8,7 +8,7 @@ import duckdb
 from turnout.atomic import beside
 from turnout.content import sha256_of
 from turnout.errors import RegistryError
-from turnout.registry.columns import literal, names, sort_order, tables, time_column
+from turnout.registry.columns import file_literal, literal, names, sort_order, tables, time_column
 from turnout.registry.generation import DataFile, schema_hash, sync_folder
 
 # Rows that are read or skipped together. Among a year of unmerged batches one section is found three times faster
@@ -106,7 +106,7 @@ def read_list(registry_dir: Path, table: str, paths: list[str], alike: bool = Fa
 
     ``alike`` files all have the present columns: then only the first needs to be opened to know them.
     """
-    listed = ", ".join(literal(str(Path(registry_dir) / p)) for p in paths)
+    listed = ", ".join(file_literal(Path(registry_dir) / p) for p in paths)
     columns = ", ".join(f'"{n}"' for n in names(table))
     by_name = "" if alike else ", union_by_name = true"
     return f"select {columns} from read_parquet([{listed}]{by_name}, hive_partitioning = false)"
@@ -135,5 +135,5 @@ def _newest(con, table, path) -> str | None:
     time = time_column(table)
     if time is None or table not in MEASURED:
         return None
-    found = con.execute(f"select max({time})::varchar from read_parquet({literal(str(path))})").fetchall()
+    found = con.execute(f"select max({time})::varchar from read_parquet({file_literal(path)})").fetchall()
     return found[0][0]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import duckdb
 
-from turnout.registry.columns import literal, names
+from turnout.registry.columns import file_literal, names
 from turnout.registry.generation import DataFile
 from turnout.registry.parquet import read_live
 
@@ -28,7 +28,7 @@ def with_dead(con: duckdb.DuckDBPyConnection, root: Path, files: list[DataFile])
     for table in LARGE:
         paths = {str(root / f.path): f.path for f in files if f.table == table}
         if paths:
-            listed = ", ".join(literal(p) for p in paths)
+            listed = ", ".join(map(file_literal, paths))
             ids = ", ".join(LARGE[table])
             sql = f"select {ids}, filename from read_parquet([{listed}], filename = true, union_by_name = true)"
             rows = con.execute(

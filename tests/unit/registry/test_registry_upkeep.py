@@ -165,6 +165,8 @@ def test_a_moved_registry_is_relocated(five_nights):
     before, moved = five_nights.ask(ALL_MODES), five_nights.root / "elsewhere with 'quotes'"
     shutil.move(five_nights.registry, moved)
     assert "registry.duckdb is not of generation" in check(moved)[0]
+    with pytest.raises(RegistryError, match=r"was made in .*registry, which is not there. Where it was moved, run"):
+        open_registry(moved)
     rebuild_database(moved)
     five_nights.registry = moved
     assert five_nights.ask(ALL_MODES) == before and check(moved) == []

@@ -1,0 +1,101 @@
+"""A name of the configuration that is a folder, or a link to nothing, is said: it is no file that is not there."""
+
+import shutil
+
+import pytest
+
+from turnout.chains.passage_context import known_patterns
+from turnout.cli import main
+from turnout.config.parameter_set import read_parameters
+from turnout.errors import ConfigError
+
+ALL = ("turnouts.tsv", "events.csv", "acknowledgements.csv", "config.yaml", "layouts/tommerup.yaml",
+       "overrides/tommerup_s1.yaml")  # fmt: skip
+KINDS = {"folder": "Is a directory", "link": "No such file or directory"}
+COMMANDS = {
+    "events.csv": ["events", "tommerup_s1", "tamping", "2026-04-02"],
+    "acknowledgements.csv": ["acknowledge", "tommerup_s1", "--by", "M. Jensen", "--reason", "seen"],
+    "turnouts.tsv": ["add", "new", "tommerup"],
+}
+
+
+@pytest.fixture
+def config(tmp_path, repository, monkeypatch):
+    shutil.copytree(repository / "config", tmp_path / "config")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path / "config"
+
+
+def put(path, kind):
+    """A share that is not mounted leaves such links: what lies behind them, maintenance above all, must not be lost."""
+    path.parent.mkdir(exist_ok=True)
+    path.unlink(missing_ok=True)
+    path.mkdir() if kind == "folder" else path.symlink_to(path.parent / "share" / path.name)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", ALL)
+def test_it_is_said_by_name_and_nothing_goes_on_without_it(config, capsys, name, kind):
+    put(config / name, kind)
+    assert main(["check"]) != 0
+    told = "".join(capsys.readouterr())
+    assert f"config/{name}, line 1" in told and KINDS[kind] in told
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_row_is_not_entered_elsewhere_and_one_sentence_says_why(config, capsys, name, kind):
+    put(config / name, kind)
+    assert main(COMMANDS[name]) == 2
+    assert f"config/{name}" in (said := capsys.readouterr().err) and KINDS[kind] in said
+    assert not (config / "share").exists() and (config / name).is_symlink() == (kind == "link")
+
+
+def test_a_table_that_may_not_be_written_is_one_sentence(config, capsys, monkeypatch):
+    def refuse(path, content):
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr("turnout.config.append._write", refuse)  # we may be root
+    assert main(COMMANDS["events.csv"]) == 2
+    said = "turnout events: config/events.csv: Permission denied. Put that right, or name another place"
+    assert capsys.readouterr().err.startswith(said)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("vehicles: [1\n", "vehicles and trains: "),
+        ("vehicles: [1, 2]\ntrains: {}\n", "vehicles and trains: "),
+        ("vehicles: \0\n", "the character '\\x00', which no YAML file may hold"),
+    ],
+)
+def test_axle_patterns_that_are_no_yaml_or_no_patterns_are_said_by_name(tmp_path, content, said):
+    path = tmp_path / "axles.yaml"
+    path.write_text(content)
+    with pytest.raises(ConfigError, match=r"axles\.yaml") as caught:
+        known_patterns(str(path))
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("sources: [paper]\nx: {value: 1, unit: m, source: paper}\n", "line 1, sources: is not a mapping"),
+        ("x: {value: 1, unit: m, source: [a, b]}\n", "line 1, x: a number without source"),
+        ("x: {value: 1, unit: [m], source: a}\n", "line 1, x: a number without unit"),
+        ("x: {value: 1, unit: m, source: estimate, prior: .nan}\n", "line 1, x: nan is not finite"),
+        ("x: {value: 1, unit: m, source: estimate, prior: wide}\n", "line 1, x: 'wide' is not a number"),
+    ],
+)
+def test_sources_and_units_of_another_kind_are_said_with_their_line(tmp_path, content, said):
+    path = tmp_path / "track.yaml"
+    path.write_text(content)
+    with pytest.raises(ConfigError) as caught:
+        read_parameters(path)
+    assert said in str(caught.value)
+
+
+def test_an_emptied_table_of_sources_is_none(tmp_path):
+    path = tmp_path / "track.yaml"
+    path.write_text("sources:\nx: {value: 2, unit: mm, source: drawing}\n")
+    assert read_parameters(path).number("x", "m") == 0.002

@@ -1,0 +1,51 @@
+"""`turnout passage` of a file without a train, and of a link to a file elsewhere."""
+
+from datetime import datetime
+
+import numpy as np
+import pytest
+
+from turnout.cli import main
+from turnout.readers.writing import write
+from turnout.records import Channel, Recording
+
+LAYOUT = """
+sections:
+  A: {panel: CP, track: main, position: 18.0}
+passages:
+  files: "passages/{time}.{ext}"
+  rate: 5000
+  channels:
+    web: {source: web, quantity: acceleration, unit: m/s², mounting: rail web, section: A, limit: 500}
+"""
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    (tmp_path / "config/layouts").mkdir(parents=True)
+    (tmp_path / "config/layouts/small.yaml").write_text(LAYOUT)
+    (tmp_path / "config/turnouts.tsv").write_text("turnout\tlayout\nt1\tsmall\n")
+    (tmp_path / "share").mkdir()
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def told(place, samples, capsys):
+    """(exit code, what was printed) for a recording that lies behind a link."""
+    recording = Recording(samples[None], 5000.0, (Channel("web", "acceleration"),), "passage", datetime(2026, 7, 25, 9))
+    write([recording], place / "share/train.npz", "npz")
+    (place / "here.npz").symlink_to(place / "share/train.npz")
+    code = main(["passage", "here.npz", "--turnout", "t1", "--no-fit"])
+    return code, capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("broken", "said"),
+    [(None, "no_train: nothing stands out of the noise"), (np.nan, "1 of 20000 samples are missing or not finite")],
+)
+def test_a_file_that_tells_of_no_train_is_said_and_is_no_success(place, capsys, broken, said):
+    samples = np.random.default_rng(7).normal(0.0, 0.1, 20000)
+    if broken is not None:
+        samples[7] = broken
+    code, printed = told(place, samples, capsys)
+    assert code == 1 and said in printed
