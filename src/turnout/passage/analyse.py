@@ -12,6 +12,7 @@ from turnout.passage.count import best_count, count_without_distance
 from turnout.passage.findings import Passage
 from turnout.passage.listen import hearing, listen, narrowed, track_taken
 from turnout.passage.motion import Motion
+from turnout.passage.nose import AT_ONCE, at_a_nose, heard_at_once
 from turnout.passage.order import wrong_channels, wrong_places
 from turnout.passage.other_train import second_train
 from turnout.passage.pulses import without_pulses
@@ -95,38 +96,61 @@ def _with_silent(passage, heard, used, lost):
 
 def _of_train(heard, used, track, findings, duration, patterns, settings) -> Passage:
     """The train that the sensors ``used`` hear."""
-    span = np.ptp(heard.positions)
-    if span > 0.05:
-        heard, used, start, direction = _agreeing(heard, used, findings, settings)
-        start = aligned(heard, start)
-        start, offer, found = best_count(heard, start, span, patterns, settings)
+    several, direction, every = bool(np.ptp(heard.positions) > 0.05), "unknown", heard
+    if several:
+        heard, used, direction, counted = _by_several(heard, used, findings, patterns, settings)
     else:
-        direction = "unknown"
-        start, offer, found = count_without_distance(heard, patterns, settings)
+        counted = count_without_distance(heard, patterns, settings)
+    start, offer, found = counted
     if offer is None:
         return Passage("rejected", (*findings, Rejection("no_train", 0.0, None, "sound, but no axles in it")))
-    passage = _settled(heard, used, start, offer, found, settings, span > 0.05)
+    passage = _settled(heard, used, start, offer, found, settings, several)
     passage = replace(passage, direction=direction, track=track, begin=heard.begin, end=heard.end)
-    clear = CLEAR if span > 0.05 else 2.0 * CLEAR
-    if passage.type.type == UNKNOWN and passage.contrast < clear:
-        text = f"{passage.n_axle} axles, but the weakest peak is only {passage.contrast:.2f} times the next one"
-        findings.append(Rejection("axles_uncertain", passage.contrast, clear, text))
+    if passage.type.type == UNKNOWN:
+        findings += _doubts(passage, every, several)
     findings += _cut_off(heard, passage, duration) + second_train(heard, passage, settings)
     return replace(passage, status="partly" if findings else "accepted", findings=tuple(findings))
 
 
-def _agreeing(heard, used, findings, settings):
-    """The sensors that agree on a motion, that motion and its direction; what does not agree goes into ``findings``."""
-    trouble, keep = wrong_channels(heard, used, settings)
+def _by_several(heard, used, findings, patterns, settings):
+    """(heard, used, direction, (motion, count, type)) of sensors along the rail.
+
+    Sensors that agree on no motion go into ``findings``, unless a known train's bangs explain what they hear.
+    """
+    trouble, own, start, direction = _agreeing(heard, used, settings)
+    counted = best_count(own[0], aligned(own[0], start), np.ptp(heard.positions), patterns, settings)
+    accused = bool(trouble) and heard_at_once(heard, start) > -AT_ONCE  # blows at one moment look like wrong clocks
+    if counted[1] is None or counted[2].type == UNKNOWN or accused:
+        banging = at_a_nose(heard, patterns, settings)
+        if banging is not None:
+            return heard, used, "facing" if banging[0].direction > 0 else "trailing", banging
     findings += trouble
+    return *own, direction, counted
+
+
+def _doubts(passage, heard, several) -> list[Rejection]:
+    """What speaks against the number of axles of a train without template."""
+    clear, found = CLEAR if several else 2.0 * CLEAR, []
+    if passage.contrast < clear:
+        text = f"{passage.n_axle} axles, but the weakest peak is only {passage.contrast:.2f} times the next one"
+        found.append(Rejection("axles_uncertain", passage.contrast, clear, text))
+    if several and (at_once := heard_at_once(heard, passage.motion)) > -AT_ONCE:
+        text = f"{passage.n_axle} axles, but sensors hear blows at one moment, as of a crossing's nose or a deep dip"
+        found.append(Rejection("axles_uncertain", at_once, -AT_ONCE, text))
+    return found
+
+
+def _agreeing(heard, used, settings):
+    """(what does not agree, (heard, used) of the sensors that agree on a motion, that motion, its direction)."""
+    found, keep = wrong_channels(heard, used, settings)
     used, heard = [s for s, k in zip(used, keep) if k], heard.only(np.flatnonzero(keep))
     start, direction = _from_scan(heard, settings)
     trouble, keep = wrong_places(heard, start, used)
     if trouble and np.ptp(heard.positions[keep]) > 0.05:
-        findings += trouble
+        found += trouble
         used, heard = [s for s, k in zip(used, keep) if k], heard.only(np.flatnonzero(keep))
         start, direction = _from_scan(heard, settings)
-    return heard, used, start, direction
+    return found, (heard, used), start, direction
 
 
 def _from_scan(heard, settings):

@@ -7,7 +7,7 @@ from scipy import ndimage
 
 from turnout.passage.axles import GRID, along_train
 from turnout.passage.motion import Motion
-from turnout.passage.slowness import scan_slowness
+from turnout.passage.slowness import likeness_at, scan_slowness
 from turnout.records import Rejection
 
 ANOTHER = "another train at about"  # of a finding, in words
@@ -20,8 +20,8 @@ def second_train(heard, passage, settings):
 
     What all sensors have in common along the known train is taken off each of them: the lower median, so that a
     second train, elsewhere along the first one at every sensor, stays. A blow at a fixed place, as at the crossing's
-    nose, stays too, but only at the sensors beside it: half of all must hear the second train, at a tenth of the first
-    one's level. Needs three sensors; with fewer nothing can be said and nothing is.
+    nose, stays too, at the sensors beside it or at all of them at one moment: half of all must hear the second train,
+    at a tenth of the first one's level, and each at its own time. Needs three sensors; with fewer nothing is said.
     """
     if len(heard.positions) < 3:
         return []
@@ -32,7 +32,8 @@ def second_train(heard, passage, settings):
     same = scan.likeness[~other].max(initial=0.0)
     best = int(np.argmax(np.where(other, scan.likeness, -np.inf)))
     strength = float(scan.likeness[best])
-    if strength < LIKE or strength < 1.2 * same:
+    at_once = float(likeness_at([0.0], rest, heard.levels.step, heard.positions)[0])
+    if strength < LIKE or strength < 1.2 * same or strength < at_once:
         return []
     way = 1 if scan.slowness[best] > 0 else -1
     second = Motion(1.0 / abs(scan.slowness[best]), 0.0, 0.0, way)

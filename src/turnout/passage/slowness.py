@@ -50,11 +50,17 @@ def slowness_grid(settings, relative: float = 0.008) -> np.ndarray:
 
 def scan_slowness(values, step: float, positions, settings) -> Scan:
     """Slant stack of levels (n_sensor, n_bin) of sensors at ``positions`` [m], bogies unresolved: no false maxima."""
-    slowness, positions = slowness_grid(settings), np.asarray(positions, dtype=float)
+    slowness = slowness_grid(settings)
+    return Scan(slowness, likeness_at(slowness, values, step, positions))
+
+
+def likeness_at(slowness, values, step: float, positions) -> np.ndarray:
+    """(n,) likeness of all sensors at each slowness [s/m]; at 0 of what they hear at the same moment."""
+    positions = np.asarray(positions, dtype=float)
     # as wide as the grid is coarse at the slow end, where a passage lasts long
     width = np.clip(0.008 * np.ptp(positions) * KMH / 20.0, 0.02, 0.1)
     values, step = coarser(values, step, 0.005)
-    return Scan(slowness, stacked(pair_likeness(values, step, width), step, positions, slowness))
+    return stacked(pair_likeness(values, step, width), step, positions, np.asarray(slowness, dtype=float))
 
 
 def refine_slowness(pairs, step: float, positions, near: float, reach: float = 0.03) -> tuple[float, float]:

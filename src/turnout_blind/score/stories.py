@@ -13,7 +13,7 @@ from turnout_blind.run import strike
 from turnout_blind.score.answers import answers_of
 from turnout_blind.score.judged import judge
 from turnout_blind.score.pictures import changes, furthest, outcome, pyplot, save, spectrum
-from turnout_blind.strata import CasePlan
+from turnout_blind.strata import PLAIN, CasePlan
 
 METRES = "position depth length gap close play amplitude shift wavelength reach"
 UNITS = dict.fromkeys(METRES.split(), "m") | {
@@ -99,7 +99,8 @@ def _number(value, unit):
 def draw(truth, rows, oracle, path, effects):
     """With and without the effect, blow and train; the track with what was there and what was said; the fits."""
     plt = pyplot()
-    plan = CasePlan(truth["stratum"], tuple((e["kind"], e["rung"]) for e in truth["effects"]), tuple(truth["seed"]))
+    concealed = tuple((e["kind"], e["rung"]) for e in truth["effects"])
+    plan = CasePlan(truth["stratum"], concealed, tuple(truth["seed"]), truth.get("panel", PLAIN))
     _, site, world, _ = stage(plan, effects)
     figure, axes = plt.subplots(2, 2, figsize=(8.5, 5.6), layout="constrained")
     for axis, (title, before, after, top, window) in zip(axes[0], (_blow(site, world), _train(site, world))):

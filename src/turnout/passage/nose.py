@@ -1,0 +1,100 @@
+"""A known train at a crossing's nose, or any deep dip: each wheel bangs there, and all sensors hear it at once.
+
+Sensors that hear the bangs louder than the wheels beside them agree on no speed. But what they hear together is one
+place that the whole train passes, and what is left then is each sensor's own wheels, metres before or behind.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from turnout.passage.comb import LEAD, STEP, Comb, profiles_at, teeth_of
+from turnout.passage.comb_search import FINE
+from turnout.passage.envelope import Levels
+from turnout.passage.known_train import known_train
+from turnout.passage.motion import Motion
+from turnout.passage.slowness import pair_likeness, stacked
+from turnout.passage.stack import Listening
+
+KMH = 3.6
+LEAST = 3  # sensors: of two the median is the mean, with the wheels of both in it
+AWAY = 15.0  # m between a sensor and the nose, at most
+BESIDE = 3.0  # m that a nose may lie outside the sensors
+# By how much the true direction must collect more than the other, in standard deviations of one sensor's places: in 37
+# simulated passages of 13 crossings it collects at least 2.2 more; in one the wrong direction had 0.7 more.
+CLEARLY = 2.0
+APART = 0.04  # s that a train takes between two sensors, for what they hear at once to be told from what follows it
+# Of likeness: where nothing bangs, 320 simulated passages of four sensors are at least 0.14 more alike along the train
+# than at the same moment, and a twentieth of them by less than 0.2.
+AT_ONCE = 0.15
+
+
+def at_a_nose(heard, patterns, settings):
+    """(motion, AxleFinding, TypeFinding) of a train of ``patterns`` whose wheels bang at one place; None where none is
+    sure, or its direction is not.
+
+    ``heard``: Listening of at least three sensors. The place comes out with the train: it is in the motion.
+    """
+    if len(heard.positions) < LEAST or not patterns:
+        return None
+    together = _together(heard)
+    slow, fast = settings.speed_minimum / KMH, settings.speed_maximum / KMH
+    speeds = np.geomspace(slow, fast, int(np.log(fast / slow) / FINE))
+    known = known_train(together, [Motion(float(v), heard.begin) for v in speeds], patterns, settings)
+    if known is None:
+        return None
+    motion, offer, found = known
+    collected = _own_wheels(heard, motion, offer.offsets)
+    way, other = sorted((-1, 1), key=lambda sign: -_best(collected, heard.positions, sign)[0])
+    most, nose = _best(collected, heard.positions, way)
+    if most - _best(collected, heard.positions, other)[0] < CLEARLY:
+        return None
+    return replace(motion.moved(-way * nose), direction=way), offer, found
+
+
+def heard_at_once(heard, motion) -> float:
+    """How much more alike sensors are at the same moment than along a train of this ``motion``; above ``-AT_ONCE`` all
+    of them hear the blows of one place. -1 where they are too close together to tell."""
+    pairs = {
+        (i, j): row
+        for (i, j), row in pair_likeness(heard.levels.values, heard.levels.step, 0.02).items()
+        if abs(heard.positions[i] - heard.positions[j]) >= APART * motion.speed
+    }
+    if not pairs:
+        return -1.0
+    slowness = np.array([0.0, motion.direction / motion.speed])
+    at_once, along = stacked(pairs, heard.levels.step, heard.positions, slowness)
+    return float(at_once - along)
+
+
+def _together(heard) -> Listening:
+    """One sensor that hears what most of them hear at the same moment, at place 0."""
+    levels = heard.levels
+    values, amplitude = (np.median(rows, axis=0)[None] for rows in (levels.values, levels.amplitude))
+    one = Levels(values, levels.step, levels.scatter[:1], levels.loud[:1], amplitude)
+    return Listening(one, np.median(heard.slow, axis=0)[None], np.zeros(1), heard.begin, heard.end)
+
+
+def _own_wheels(heard, motion, offsets):
+    """(distances (n,) [m], (n_sensor, n) what each sensor hears of the row of wheels so far from the nose, without the
+    bangs and over its own standard deviation)."""
+    there = replace(heard, positions=np.zeros(len(heard.positions)))
+    profiles, behind = profiles_at(there, [motion]), offsets - offsets[0]
+    start = float(offsets[0] - profiles.origin[0])
+    _, rest = teeth_of(profiles, Comb.of(behind), start)
+    grid = np.arange(rest.shape[1]) * STEP - LEAD
+    distance = np.arange(-AWAY, AWAY + 0.5 * STEP, STEP)
+    at = start + behind + distance[:, None]
+    collected = np.array([np.interp(at, grid, row, left=0.0, right=0.0).sum(axis=1) for row in rest])
+    return distance, collected / np.maximum(np.std(collected, axis=1, keepdims=True), 1e-12)
+
+
+def _best(own, positions, sign) -> tuple[float, float]:
+    """What all sensors collect of their own wheels in one direction, and the place of the nose [m] where it is most."""
+    distance, collected = own
+    noses = np.arange(np.min(positions) - BESIDE, np.max(positions) + BESIDE, 0.5 * STEP)
+    total = sum(np.interp(sign * (x - noses), distance, row) for x, row in zip(positions, collected))
+    best = int(np.argmax(total))
+    return float(total[best]), float(noses[best])
