@@ -12,7 +12,7 @@ from turnout.passage.count import best_count, count_without_distance
 from turnout.passage.findings import Passage
 from turnout.passage.listen import hearing, listen, narrowed, track_taken
 from turnout.passage.motion import Motion
-from turnout.passage.nose import AT_ONCE, at_a_nose, heard_at_once
+from turnout.passage.nose import AT_ONCE, at_a_nose, blows_at_one_place, heard_at_once
 from turnout.passage.order import wrong_channels, wrong_places
 from turnout.passage.other_train import second_train
 from turnout.passage.pulses import without_pulses
@@ -134,9 +134,9 @@ def _doubts(passage, heard, several) -> list[Rejection]:
     if passage.contrast < clear:
         text = f"{passage.n_axle} axles, but the weakest peak is only {passage.contrast:.2f} times the next one"
         found.append(Rejection("axles_uncertain", passage.contrast, clear, text))
-    if several and (at_once := heard_at_once(heard, passage.motion)) > -AT_ONCE:
+    if several and blows_at_one_place(heard, passage.motion):
         text = f"{passage.n_axle} axles, but sensors hear blows at one moment, as of a crossing's nose or a deep dip"
-        found.append(Rejection("axles_uncertain", at_once, -AT_ONCE, text))
+        found.append(Rejection("axles_uncertain", None, None, text))
     return found
 
 
