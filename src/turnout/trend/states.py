@@ -50,10 +50,15 @@ def change_seen(charts, chart, epoch, allowance, campaigns, settings) -> np.ndar
 def of_unknown_temperatures(charts) -> np.ndarray:
     """What an unknown temperature slope adds to the spread of each epoch [%], (n_chart, n_epoch): the root mean square
     over its campaigns, counting those at temperatures that the slope says nothing of."""
-    epoch = charts.prepared.epoch
-    added = np.where(at_known_temperatures(charts), 0.0, _of_slopes(charts))
-    mean, _ = by_epoch(added, np.isfinite(charts.residual), epoch, int(epoch.max(initial=0)) + 1)
-    return np.sqrt(np.nan_to_num(mean))
+    p = charts.prepared
+    variance, n_epoch = _of_slopes(charts), int(p.epoch.max(initial=0)) + 1
+    unknown = variance > p.spread[:, None] ** 2
+    rows = np.flatnonzero(unknown.any(axis=1))  # few charts, or none
+    added = np.where(unknown[rows], variance[rows], 0.0)
+    mean, _ = by_epoch(added, np.isfinite(charts.residual[rows]), p.epoch[rows], n_epoch)
+    spread = np.zeros((len(unknown), n_epoch))
+    spread[rows] = np.sqrt(np.nan_to_num(mean))
+    return spread
 
 
 def chart_status(charts, settings) -> pd.DataFrame:
