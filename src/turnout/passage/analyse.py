@@ -134,9 +134,9 @@ def _doubts(passage, heard, several) -> list[Rejection]:
     if passage.contrast < clear:
         text = f"{passage.n_axle} axles, but the weakest peak is only {passage.contrast:.2f} times the next one"
         found.append(Rejection("axles_uncertain", passage.contrast, clear, text))
-    if several and blows_at_one_place(heard, passage.motion):
+    if several and (blows := blows_at_one_place(heard, passage.motion)):
         text = f"{passage.n_axle} axles, but sensors hear blows at one moment, as of a crossing's nose or a deep dip"
-        found.append(Rejection("axles_uncertain", None, None, text))
+        found.append(Rejection("axles_uncertain", *blows, text))
     return found
 
 

@@ -14,6 +14,7 @@ from turnout.passage.comb_row import likeliest_row
 from turnout.passage.motion import Motion
 from turnout.passage.patterns import Pattern, offsets
 
+KMH = 3.6
 FINE = 0.003  # relative step between speeds
 LOOSE = 0.5  # m over the whole row that a speed may be off in the first search
 OUTSIDE = 75.0  # m that a train is heard before its first axle and after its last one together, at most
@@ -51,6 +52,12 @@ def even_rows(patterns) -> tuple:
             if sum(len(v.axles) for v in row) >= 4:
                 found[pattern.type, tuple((v.length, v.axles) for v in row)] = (pattern, row)
     return tuple((pattern, row, Comb.of(offsets(row))) for pattern, row in found.values())
+
+
+def at_all_speeds(begin: float, settings) -> list[Motion]:
+    """Motions at every speed that trains have, ``FINE`` apart, whose first axle is at 0 when the hearing begins [s]."""
+    slow, fast = settings.speed_minimum / KMH, settings.speed_maximum / KMH
+    return [Motion(float(v), begin) for v in np.geomspace(slow, fast, int(np.log(fast / slow) / FINE))]
 
 
 def choices_of(pattern, row) -> float:

@@ -6,14 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from turnout.passage.comb_search import FINE
+from turnout.passage.comb_search import FINE, KMH, at_all_speeds
 from turnout.passage.known_train import known_train
 from turnout.passage.motion import Motion
 from turnout.passage.place import axle_places
 from turnout.passage.stack import counts, template_counts
 from turnout.passage.train_type import UNKNOWN, find_type, unknown_evidence
 
-KMH = 3.6
 COMBS, PEAKS = 3, 3  # sensors up to which a known train is sought by its comb, and from which on by common peaks
 USUAL_SPEED = 25.0  # m/s, where nothing but the bogies tells it; a factor of 1.8 is one standard deviation
 BEYOND = 25.0  # m, a train is heard before its first axle and after its last one together
@@ -90,11 +89,10 @@ def _placed(heard, motion, offer):
 
 def count_without_distance(heard, patterns, settings):
     """(motion, count, type) from one sensor: a known train at any speed, else the speed that makes the best bogies."""
-    slow, fast = settings.speed_minimum / KMH, settings.speed_maximum / KMH
-    speeds = np.geomspace(slow, fast, int(np.log(fast / slow) / FINE))
-    known = known_train(heard, [Motion(float(v), heard.begin) for v in speeds], patterns, settings)
+    known = known_train(heard, at_all_speeds(heard.begin, settings), patterns, settings)
     if known is not None:
         return known
+    slow, fast = settings.speed_minimum / KMH, settings.speed_maximum / KMH
     offers = []
     for speed in np.geomspace(slow, fast, 32):
         motion = Motion(float(speed), heard.begin)

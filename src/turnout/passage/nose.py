@@ -11,25 +11,26 @@ from dataclasses import replace
 import numpy as np
 
 from turnout.passage.comb import LEAD, STEP, Comb, profiles_at, teeth_of
-from turnout.passage.comb_search import FINE
+from turnout.passage.comb_search import at_all_speeds
 from turnout.passage.envelope import Levels
 from turnout.passage.known_train import known_train
-from turnout.passage.motion import Motion
 from turnout.passage.other_train import without_train
 from turnout.passage.slowness import likeness_at, pair_likeness, stacked
 from turnout.passage.stack import Listening
 
-KMH = 3.6
 LEAST = 3  # sensors: of two the median is the mean, with the wheels of both in it
-AWAY = 15.0  # m between a sensor and the nose, at most
-BESIDE = 3.0  # m that a nose may lie outside the sensors
+# m between a sensor and the nose at most, and that a nose may lie outside the sensors: a crossing panel, whose row of
+# sensors stands about its nose; both are judgements
+AWAY, BESIDE = 15.0, 3.0
 # By how much the true direction must collect more than the other, in standard deviations of one sensor's places: in 37
 # simulated passages of 13 crossings it collects at least 2.2 more; in one the wrong direction had 0.7 more.
 CLEARLY = 2.0
 # Share of what all hear together that the train explains, and how far off its places axles may lie, in tolerances: true
 # ones have 0.74 at least and 1.5 at most; the blows of a flat wheel, taken for another train, 0.57 and 2.6.
 OF_ONE_PLACE, OFF = 2.0 / 3.0, 2.0
-APART = 0.04  # s that a train takes between two sensors, for what they hear at once to be told from what follows it
+# s over which levels are taken, and that a train takes between two sensors for what they hear at once to be told from
+# what follows it: two of them
+SMOOTH, APART = 0.02, 0.04
 # Of likeness: where nothing bangs, 320 simulated passages of four sensors are at least 0.14 more alike along the train
 # than at the same moment, and a twentieth of them by less than 0.2.
 AT_ONCE = 0.15
@@ -44,19 +45,15 @@ def at_a_nose(heard, patterns, settings):
     """
     if len(heard.positions) < LEAST or not patterns:
         return None
-    together = _together(heard)
-    slow, fast = settings.speed_minimum / KMH, settings.speed_maximum / KMH
-    speeds = np.geomspace(slow, fast, int(np.log(fast / slow) / FINE))
-    known = known_train(together, [Motion(float(v), heard.begin) for v in speeds], patterns, settings)
+    known = known_train(_together(heard), at_all_speeds(heard.begin, settings), patterns, settings)
     if known is None:
         return None
     motion, offer, found = known
     if offer.contrast < 1.0 / (1.0 - OF_ONE_PLACE) or found.residual > OFF * settings.type_tolerance:
         return None
     collected = _own_wheels(heard, motion, offer.offsets)
-    way, other = sorted((-1, 1), key=lambda sign: -_best(collected, heard.positions, sign)[0])
-    most, nose = _best(collected, heard.positions, way)
-    if most - _best(collected, heard.positions, other)[0] < CLEARLY:
+    (other, _, _), (most, nose, way) = sorted((*_best(collected, heard.positions, sign), sign) for sign in (-1, 1))
+    if most - other < CLEARLY:
         return None
     return replace(motion.moved(-way * nose), direction=way), offer, found
 
@@ -66,7 +63,7 @@ def heard_at_once(heard, motion) -> float:
     of them hear the blows of one place. -1 where they are too close together to tell."""
     pairs = {
         (i, j): row
-        for (i, j), row in pair_likeness(heard.levels.values, heard.levels.step, 0.02).items()
+        for (i, j), row in pair_likeness(heard.levels.values, heard.levels.step, SMOOTH).items()
         if abs(heard.positions[i] - heard.positions[j]) >= APART * motion.speed
     }
     if not pairs:
@@ -76,13 +73,14 @@ def heard_at_once(heard, motion) -> float:
     return float(at_once - along)
 
 
-def blows_at_one_place(heard, motion) -> bool:
-    """Whether sensors hear at the same moment what does not run along with a train of this ``motion``: where these are
-    as loud as wheels they are counted as axles."""
-    if heard_at_once(heard, motion) > -AT_ONCE:
-        return True
-    rest = without_train(heard, motion)
-    return bool(likeness_at([0.0], rest, heard.levels.step, heard.positions)[0] > LEFT)
+def blows_at_one_place(heard, motion) -> tuple[float, float] | None:
+    """(likeness, limit) where sensors hear at the same moment what does not run along with a train of this ``motion``,
+    None where they do not: blows as loud as wheels are counted as axles."""
+    likeness = heard_at_once(heard, motion)
+    if likeness > -AT_ONCE:
+        return likeness, -AT_ONCE
+    left = float(likeness_at([0.0], without_train(heard, motion), heard.levels.step, heard.positions)[0])
+    return (left, LEFT) if left > LEFT else None
 
 
 def _together(heard) -> Listening:

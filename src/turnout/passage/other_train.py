@@ -7,7 +7,7 @@ from scipy import ndimage
 
 from turnout.passage.axles import GRID, along_train
 from turnout.passage.motion import Motion
-from turnout.passage.slowness import likeness_at, scan_slowness
+from turnout.passage.slowness import likeness_at, slowness_grid
 from turnout.records import Rejection
 
 ANOTHER = "another train at about"  # of a finding, in words
@@ -26,21 +26,22 @@ def second_train(heard, passage, settings):
     if len(heard.positions) < 3:
         return []
     rest = without_train(heard, passage.motion)
-    scan = scan_slowness(rest, heard.levels.step, heard.positions, settings)
+    slowness = slowness_grid(settings)
+    every = likeness_at(np.append(slowness, 0.0), rest, heard.levels.step, heard.positions)
+    likeness, at_once = every[:-1], float(every[-1])
     own = passage.motion.direction / passage.motion.speed
-    other = np.abs(scan.slowness - own) > 0.15 * abs(own)
-    same = scan.likeness[~other].max(initial=0.0)
-    best = int(np.argmax(np.where(other, scan.likeness, -np.inf)))
-    strength = float(scan.likeness[best])
-    at_once = float(likeness_at([0.0], rest, heard.levels.step, heard.positions)[0])
+    other = np.abs(slowness - own) > 0.15 * abs(own)
+    same = likeness[~other].max(initial=0.0)
+    best = int(np.argmax(np.where(other, likeness, -np.inf)))
+    strength = float(likeness[best])
     if strength < LIKE or strength < 1.2 * same or strength < at_once:
         return []
-    way = 1 if scan.slowness[best] > 0 else -1
-    second = Motion(1.0 / abs(scan.slowness[best]), 0.0, 0.0, way)
+    way = 1 if slowness[best] > 0 else -1
+    second = Motion(1.0 / abs(slowness[best]), 0.0, 0.0, way)
     first = _shared_level(heard, np.clip(_smooth(heard), 0.0, None), passage.motion)
     if _shared_level(heard, rest, second) < SHARE * first:
         return []
-    speed = 3.6 / scan.slowness[best]
+    speed = 3.6 / slowness[best]
     way = "facing" if speed > 0 else "trailing"
     return [Rejection("two_trains", strength, LIKE, f"{ANOTHER} {abs(speed):.0f} km/h, {way}")]
 
