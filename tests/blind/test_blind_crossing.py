@@ -9,6 +9,7 @@ from turnout_blind.crossing import Crossing
 from turnout_blind.effect import load_effects
 from turnout_blind.owner import write_configuration
 from turnout_blind.run import roll
+from turnout_blind.score import stories
 from turnout_blind.site import draw_site
 from turnout_blind.strata import plan_cases
 
@@ -77,3 +78,16 @@ def test_a_set_in_panels_has_the_plan_of_one_on_plain_track():
     plain, cast = (plan_cases(3, load_effects(), full=False, panel=p) for p in ("plain", "crossing"))
     assert {p.panel for p in plain} == {"plain"} and {p.panel for p in cast} == {"crossing"}
     assert [(p.stratum, p.effects, p.seed) for p in plain] == [(p.stratum, p.effects, p.seed) for p in cast]
+
+
+def test_the_story_of_a_case_at_a_crossing_is_drawn_there(monkeypatch, tmp_path):
+    class Staged(Exception):
+        """Enough: the plan is known."""
+
+    def staged(plan, effects):
+        raise Staged(plan.panel)
+
+    monkeypatch.setattr(stories, "stage", staged)
+    truth = {"stratum": "control", "effects": [], "seed": [1], "panel": "crossing"}
+    with pytest.raises(Staged, match="crossing"):
+        stories.draw(truth, [], None, tmp_path / "story.svg", {})
