@@ -173,7 +173,7 @@ def test_sixteen_bits_and_their_range():
     shown = digitised(chain, 150.0 * np.sin(2.0 * np.pi * 5.0 * t), 60000.0, 12, np.random.default_rng(0))
     steps = shown / chain.step
     assert shown.size == 5000
-    assert np.allclose(steps, np.round(steps))
+    assert np.allclose(steps, np.round(steps), atol=1e-8)
     assert (steps.min(), steps.max()) == (-32768, 32767)
 
 

@@ -9,7 +9,8 @@ from turnout.physics.term import Parameter, PhysicsTerm
 class RailShear(PhysicsTerm):
     r"""Shear flexibility added to the rail, :math:`1/(\kappa GA)_{new} = 1/(\kappa GA) + s`.
 
-    Zero keeps the base: an Euler-Bernoulli rail has none. ``flexibility`` s is in 1/GN.
+    Zero keeps the base: an Euler-Bernoulli rail has none. ``flexibility`` s is that of the running rail, in 1/GN; a
+    stretch of another section yields in the same proportion, as its area of shear goes with its section.
     """
 
     flexibility: float
@@ -34,10 +35,11 @@ class RailShear(PhysicsTerm):
         self.check()
         if self.flexibility == 0.0:
             return track
-        stretches = tuple(replace(s, rail=self._sheared(s.rail)) for s in track.stretches)
-        return replace(track, rail=self._sheared(track.rail), stretches=stretches)
+        stretches = tuple(replace(s, rail=self._sheared(s.rail, track.rail)) for s in track.stretches)
+        return replace(track, rail=self._sheared(track.rail, track.rail), stretches=stretches)
 
-    def _sheared(self, rail):
-        own = 0.0 if rail.beam == "euler" else 1.0 / rail.shear_stiffness
-        total = max(own + 1e-9 * self.flexibility, 1e-11)
+    def _sheared(self, rail, running):
+        own, usual = (0.0 if r.beam == "euler" else 1.0 / r.shear_stiffness for r in (rail, running))
+        share = own / usual if own and usual else running.mass / rail.mass
+        total = max(own + 1e-9 * self.flexibility * share, 1e-11)
         return replace(rail, shear_stiffness=1.0 / total, beam="timoshenko")

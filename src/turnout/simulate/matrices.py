@@ -116,7 +116,7 @@ def linked(track, links):
 
 def railed(matrices, track):
     """The matrices with the rails of ``track`` in them."""
-    rails = tuple(track.rail_between(0.5 * (a + b)) for a, b in pairwise(matrices.node))
+    rails = tuple(track.rail_over(a, b) for a, b in pairwise(matrices.node.tolist()))
     mass, damping, stiffness = (x.copy() for x in (matrices.mass, matrices.damping, matrices.stiffness))
     _add_rail(track, rails, matrices.node, matrices.node_index, mass, damping, stiffness)
     return replace(matrices, mass=mass, damping=damping, stiffness=stiffness, rails=rails)

@@ -1,13 +1,14 @@
 """A track: one rail on supports, each with its own pad, sleeper and ballast, and what the wheels roll on."""
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.simulate.link import Link
-from turnout.simulate.rail import Rail
+from turnout.simulate.rail import Rail, in_series
 
 NOT_NEGATIVE = (
     "pad_stiffness",
@@ -33,6 +34,7 @@ class RailStretch:
     rail: Rail
 
 
+SAME = 1e-6  # m; ends this near to a node lie on it
 # One number stands for all supports; it becomes an array when the track is made.
 NOTHING: Any = 0.0
 
@@ -135,6 +137,13 @@ class Track:
         """Rail profile at ``x`` [m]; the last stretch that covers it wins."""
         found = [stretch.rail for stretch in self.stretches if stretch.start <= x < stretch.end]
         return found[-1] if found else self.rail
+
+    def rail_over(self, start, end):
+        """Rail profile of an element from ``start`` to ``end`` [m]: that of all profiles which meet in it."""
+        inside = {x for s in self.stretches for x in (s.start, s.end) if start + SAME < x < end - SAME}
+        cuts = [start, *sorted(inside), end]
+        rails = [self.rail_between(0.5 * (a + b)) for a, b in pairwise(cuts)]
+        return in_series(rails, np.diff(cuts) / (end - start)) if inside else rails[0]
 
     def links(self):
         """All springs, dampers and masses of the supports as links."""

@@ -18,8 +18,8 @@ def test_opening_a_prior_gains_the_ratio_of_two_marginal_densities():
     s = (TAU**-2 + NOISE**-2) ** -0.5
     gain, size = gain_when_opened(y * s**2 / NOISE**2, s, TAU, WIDE)
     opened, closed = (stats.norm(0.0, np.hypot(NOISE, sd)).logpdf(y) for sd in (WIDE, TAU))
-    assert np.isclose(gain, opened - closed, rtol=1e-12)
-    assert np.isclose(size, y * WIDE**2 / (WIDE**2 + NOISE**2), rtol=1e-12)
+    assert np.isclose(gain, opened - closed, atol=0.0, rtol=1e-12)
+    assert np.isclose(size, y * WIDE**2 / (WIDE**2 + NOISE**2), atol=0.0, rtol=1e-12)
 
 
 class Springs(Case):
@@ -51,7 +51,7 @@ def test_the_spring_that_took_an_effect_in_gives_it_back_at_its_size():
     gain, candidate, start, values = max(entries, key=lambda e: e[0])
     assert candidate.where["place"] == 1 and gain > 10.0
     # wide prior: least squares but for noise over prior, (0.3 / sqrt(60) / 0.7)² = 0.3 %, and 0.15 of it of the other's
-    assert np.isclose(np.log(start[0]), -0.7, rtol=0.03)
+    assert np.isclose(np.log(start[0]), -0.7, atol=0.0, rtol=0.03)
     assert values["spring_1"] == 0.0 and np.isclose(values["spring_0"], 0.1, atol=0.02)
     other = next(e for e in entries if e[1].where["place"] == 0)
     assert other[0] < 3.0

@@ -247,7 +247,7 @@ def test_a_size_errs_by_the_share_its_law_is_loose_as_well():
     strict = case.candidates[0]
     fit = fit_jointly(case, (strict,), np.array([0.3]))
     loose = fit.with_candidates((replace(strict, loose=0.15),))
-    assert np.allclose(loose.psi_se**2, fit.psi_se**2 + (0.15 * fit.psi) ** 2, rtol=1e-12)
+    assert np.allclose(loose.psi_se**2, fit.psi_se**2 + (0.15 * fit.psi) ** 2, atol=0.0, rtol=1e-12)
 
 
 def test_modes_in_single_precision_whiten_as_in_double():

@@ -196,7 +196,7 @@ def test_two_sources_are_two_charts(settings):
     alone, only = status_of(hammer, settings)
     of_hammer = (charts.prepared.charts["source"] == "hammer").to_numpy()
     assert len(both) == 2 * len(alone)
-    assert np.allclose(charts.residual[of_hammer], only.residual, equal_nan=True)
+    assert np.allclose(charts.residual[of_hammer], only.residual, equal_nan=True, atol=1e-12)
 
 
 def test_a_noisier_campaign_weighs_less(settings):

@@ -251,7 +251,7 @@ def test_a_look_back_equals_what_that_night_said(con, frames, settings, day):
     assert (both["n_learned"] == both["n_learned_night"])[learning].all()
     # Every baseline but the late section's is complete early in 2017: from then on the memory hardly moves.
     told = both[both["detectable_pct"].notna()]
-    assert np.allclose(told["detectable_pct"], told["detectable_pct_night"], rtol=0.08)
+    assert np.allclose(told["detectable_pct"], told["detectable_pct_night"], rtol=0.08, atol=0.0)
     assert len(told) >= 40 or day < "2017"
 
 

@@ -8,7 +8,7 @@ from operator import itemgetter
 import numpy as np
 
 from turnout.mismatch.case import Nuisance
-from turnout.simulate.track import PER_SUPPORT, RailStretch
+from turnout.simulate.track import PER_SUPPORT, SAME, RailStretch
 
 # Common logarithmic factor on a value of all supports: field, tag of its links, what of the link, prior sd.
 # Priors: spread of published values, Knothe and Grassie 1993, tables 1 to 3.
@@ -126,9 +126,13 @@ def rail_spreads(zone):
 
 
 def cast_elements(zone, node):
-    """[(n,)] the elements of each casting, between nodes (n_element + 1,) [m]."""
-    middle = 0.5 * (node[:-1] + node[1:])
-    return [np.flatnonzero((middle >= c.piece.start) & (middle < c.piece.end)) for c in zone.castings]
+    """[((n,) elements, (n,) shares of their length)] that each casting covers, between nodes (n_element + 1,) [m]."""
+    length, found = np.diff(node), []
+    for c in zone.castings:
+        covered = np.minimum(node[1:], c.piece.end) - np.maximum(node[:-1], c.piece.start)
+        inside = np.flatnonzero(covered > SAME)
+        found.append((inside, covered[inside] / length[inside]))
+    return found
 
 
 def with_rail(zone, values):

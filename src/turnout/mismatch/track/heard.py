@@ -78,30 +78,37 @@ class Heard:
     @cached_property
     def _by_castings(self):
         r"""(n_pair, n_line, 2 n_casting) by the logarithms of bending stiffness and mass of each: the same sums over
-        its own elements, and :math:`\omega^2 \sum_e u^T M_e v` with their masses."""
+        the elements it covers, and :math:`\omega^2 \sum_e u^T M_e v` with their masses, each by the casting's part in
+        what the element yields and weighs."""
         matrices, (first, second) = self.model.matrices, self._places[1]
         h, p, ei, _ = matrices.elements
         row = matrices.node_index
         found = [np.zeros((len(self.row), OMEGA.size, 0), dtype=complex)]
-        for e in cast_elements(self.zone, matrices.node):
-            e = e[[self._is_filed(k) for k in e]] if e.size else e
+        for c, (e, share) in zip(self.zone.castings, cast_elements(self.zone, matrices.node)):
+            yields, weighs = self._part_of(c.piece, e, share)
             ends = [self._moved[..., row[e + side] + k] for side in (0, 1) for k in (0, 1)]
             w, turn = ends[::2], ends[1::2]
             bent, skew = turn[1] - turn[0], (w[1] - w[0]) / h[e] - 0.5 * (turn[0] + turn[1])
-            sheared = 12.0 * ei[e] / (h[e] * (1.0 + p[e]) ** 2)
-            bending = -(bent[first] * bent[second]) @ (ei[e] / h[e]) - (skew[first] * skew[second]) @ sheared
+            sheared = yields * 12.0 * ei[e] / (h[e] * (1.0 + p[e]) ** 2)
+            bending = -(bent[first] * bent[second]) @ (yields * ei[e] / h[e]) - (skew[first] * skew[second]) @ sheared
             u = np.stack(ends, axis=-1)
-            mass = [element_mass(replace(matrices.rails[k], rotary_inertia=0.0), h[k]) for k in e]
+            mass = [
+                w_k * element_mass(replace(matrices.rails[k], rotary_inertia=0.0), h[k]) for w_k, k in zip(weighs, e)
+            ]
             pressed = np.einsum("pfei,eij->pfej", u, np.reshape(mass, (-1, 4, 4)))
             found += [bending[..., None], (OMEGA**2 * np.sum(u[first] * pressed[second], axis=(2, 3)))[..., None]]
         return np.concatenate(found, axis=-1)
 
-    def _is_filed(self, element):
-        """Whether the rail of an element is the track's own, and none that a term has put there instead."""
-        matrices, track = self.model.matrices, self.model.track
-        own = track.rail_between(0.5 * (matrices.node[element] + matrices.node[element + 1]))
-        there = matrices.rails[element]
-        return (own.bending_stiffness, own.mass) == (there.bending_stiffness, there.mass)
+    def _part_of(self, piece, elements, shares):
+        """(2, n) parts of a piece in the flexibility and in the mass of the elements of which it covers ``shares``; 0
+        where a term has put another rail instead."""
+        matrices, track, parts = self.model.matrices, self.model.track, np.zeros((2, elements.size))
+        own = track.rail_between(0.5 * (piece.start + piece.end))
+        for k, (e, share) in enumerate(zip(elements, shares)):
+            there, filed = matrices.rails[e], track.rail_over(*matrices.node[e : e + 2].tolist())
+            if (there.bending_stiffness, there.mass) == (filed.bending_stiffness, filed.mass):
+                parts[:, k] = share * there.bending_stiffness / own.bending_stiffness, share * own.mass / there.mass
+        return parts
 
     @cached_property
     def _by_supports(self):
