@@ -31,6 +31,11 @@ def tangent(terms, track):
     return found
 
 
+def linear(track, terms):
+    """Matrices of a track with ``terms`` in it, their ports by ``tangent``."""
+    return matrices_of(track, (*terms, FixedLinks(tangent(terms, track))))
+
+
 def _against(law, d, rate):
     """Half of what the force of a law changes by when the rate turns round [N]."""
     return 0.5 * (float(law.force(d, rate)) - float(law.force(d, -rate)))
@@ -51,8 +56,7 @@ class BlowModel:
 
     def __init__(self, track, terms):
         self.track, self.terms = track, terms
-        self.added = (*terms, FixedLinks(tangent(terms, track)))
-        self.matrices = matrices_of(track, self.added)
+        self.matrices = linear(track, terms)
         self.own_shear = _own_shear(track, terms)
         self.by_place, self.weight = {}, {}
 

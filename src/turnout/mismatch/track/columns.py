@@ -10,8 +10,8 @@ import numpy as np
 
 from turnout.mismatch.track import bands, roll
 from turnout.mismatch.track.base_model import track_with
+from turnout.mismatch.track.blow_model import linear
 from turnout.mismatch.track.rolled_waves import Carrier
-from turnout.mismatch.track.skeleton import matrices_of
 from turnout.simulate.frequency import responses
 from turnout.simulate.run import Probe
 
@@ -39,7 +39,7 @@ def green(case, values, terms, made):
     """(frequency (m,), G (m, n_sensor, n_support, 2)) acceleration per force on rail seat and sleeper [m/s²/N]."""
     under = [t.under(case.said(made)) for t in terms]
     track = track_with(case.track(made.passage.route, under), case.zone, values)
-    matrices = matrices_of(track, [t for t in under if t.kind == "matrix"])
+    matrices = linear(track, under)
     frequency = np.arange(4.0, 1.3 * bands.HIGH, 2.0)
     places = [case.seat(s, values, terms).probe(track).place for s in made.sensors]
     rows = [matrices.index[kind, j] for j in case.zone.supports for kind in ("rail", "sleeper")]
@@ -52,7 +52,7 @@ def _sag(case, values, terms, made, way):
     """(n_support, 2, n_x) static motion of the rail at ``way`` per force on rail seat and sleeper [m/N]."""
     under = [t.under(case.said(made)) for t in terms]
     track = track_with(case.track(made.passage.route, under), case.zone, values)
-    matrices = matrices_of(track, [t for t in under if t.kind == "matrix"])
+    matrices = linear(track, under)
     names = [(kind, j) for j in case.zone.supports for kind in ("rail", "sleeper")]
     h = responses(matrices, [0.0], names, matrices.node_index)[0].real
     inside = [np.interp(way, matrices.node, row) for row in h]

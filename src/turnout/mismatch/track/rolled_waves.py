@@ -4,22 +4,24 @@ A wave p of the rail or of a tread makes the contact force :math:`F = -p / (A_{w
 a free track carries to the sensors. A force of frequency :math:`f_0` that moves at v past nodes with transfer
 :math:`G_{sn}(f)` gives
 
-.. math:: S_s(f) = F \, T \mathrm{sinc}^2((f - f_0) T) \sum_n G_{sn}(f) e^{-2 \pi i (f - f_0) \tau_n}
+.. math:: S_s(f) = T \mathrm{sinc}^2((f - f_0) T) \sum_n F_n G_{sn}(f) e^{-2 \pi i (f - f_0) \tau_n}
 
-with :math:`\tau_n` when it passes the node and T the way between nodes over v.
+with :math:`\tau_n` when it passes the node, T the way between nodes over v and :math:`F_n` the force on the rail that
+is about there: its receptance is averaged over ``MET``, as a wheel rings on for a few bays.
 """
 
 import numpy as np
 
 from turnout.mismatch.track import bands, roll
 from turnout.mismatch.track.base_model import track_with, vehicle_with
+from turnout.mismatch.track.blow_model import linear
 from turnout.mismatch.track.blows import channel_factor
-from turnout.mismatch.track.skeleton import matrices_of
 from turnout.simulate.frequency import responses
 
 STRIDE = 2  # nodes; between them a force is shared linearly
 FINE = 0.01  # m
 RING = 0.35  # s that the track rings on
+MET = 2.4  # m: against simulated waves 0.6 and 1.2 are worse about the wheel's resonance, all of the rail beyond it
 
 
 class Carrier:
@@ -45,7 +47,7 @@ class Carrier:
         self.step = (self.node[1] - self.node[0]) / self.speed
         carry = _at(self.grid, lines, transfer)  # (f, sensor, node)
         self.carry = carry * np.exp(-2j * np.pi * self.grid[:, None, None] * self.passing)
-        self.lines, self.compliance = lines, point + wheel_and_contact(vehicle, lines)
+        self.lines, self.compliance = lines, point + wheel_and_contact(vehicle, lines)[:, None]
         begin = made.time[0] - made.reference - values[f"time@{made.name}"]
         gate = bands.gate(self.grid, bands.LOW, made.high)
         shown = shown_by(values, terms, made, self.grid)
@@ -62,13 +64,13 @@ class Carrier:
     def spectra(self, lengths, envelope):
         """(f, sensor, wave) for cosines exp(i 2 pi x / length), positive and negative frequency."""
         f0 = self.speed / np.asarray(lengths)
-        force = -0.5 / _at(np.clip(f0, self.lines[0], self.lines[-1]), self.lines, self.compliance)
+        force = -0.5 / _at(np.clip(f0, self.lines[0], self.lines[-1]), self.lines, self.compliance).T
         turn = np.exp(2j * np.pi * self.sign * self.first / np.asarray(lengths))
         found = []
         for sign, amount in ((1.0, force * turn), (-1.0, (force * turn).conj())):
-            phase = envelope[:, None] * np.exp(sign * 2j * np.pi * self.passing[:, None] * f0)
+            phase = envelope[:, None] * amount * np.exp(sign * 2j * np.pi * self.passing[:, None] * f0)
             hat = self.step * np.sinc((self.grid[:, None] - sign * f0) * self.step) ** 2
-            found.append((self.carry @ phase) * (hat * amount)[:, None, :])
+            found.append((self.carry @ phase) * hat[:, None, :])
         return found
 
     def signals(self, lengths, envelope, delay):
@@ -168,20 +170,22 @@ def shown_by(values, terms, made, frequency):
 
 
 def _transfers(case, values, made, terms, beyond):
-    """Lines, acceleration of the sensors per force on rail nodes (m, n_sensor, n_node), point receptance, nodes."""
+    """Lines, acceleration of the sensors per force on rail nodes (m, n_sensor, n_node), receptance of the rail about
+    each node (m, n_node), nodes."""
     track = track_with(case.track(made.passage.route, terms), case.zone, values)
-    matrices = matrices_of(track, [t for t in terms if t.kind == "matrix"])
+    matrices = linear(track, terms)
     frequency = np.arange(4.0, 1.3 * bands.HIGH, 2.0)
     beyond += 0.3
     near = np.flatnonzero((matrices.node >= case.waves.start - beyond) & (matrices.node <= case.waves.end + beyond))
     near = near[::STRIDE]
     rows = matrices.node_index[near]
-    seated = [case.seat(s, values, terms) for s in made.sensors]
-    h = responses(matrices, frequency, [s.probe(track).place for s in seated], rows)
-    middle = float(matrices.node[near][near.size // 2])
-    point_rows, weights = matrices.weights(middle)
-    point = responses(matrices, frequency, [middle], point_rows)[:, 0] @ weights
-    return frequency, -((2.0 * np.pi * frequency) ** 2)[:, None, None] * h, point, matrices.node[near]
+    places = [case.seat(s, values, terms).probe(track).place for s in made.sensors]
+    node = matrices.node[near]
+    h = responses(matrices, frequency, [*places, *node.tolist()], rows)
+    heard, met = h[:, : len(places)], np.diagonal(h[:, len(places) :], axis1=1, axis2=2)
+    about = np.abs(node[:, None] - node) < 0.5 * MET
+    point = met @ (about / about.sum(axis=0))
+    return frequency, -((2.0 * np.pi * frequency) ** 2)[:, None, None] * heard, point, node
 
 
 def wheel_and_contact(vehicle, frequency):
