@@ -178,14 +178,19 @@ def _transfers(case, values, made, terms, beyond):
     beyond += 0.3
     near = np.flatnonzero((matrices.node >= case.waves.start - beyond) & (matrices.node <= case.waves.end + beyond))
     near = near[::STRIDE]
-    rows = matrices.node_index[near]
     places = [case.seat(s, values, terms).probe(track).place for s in made.sensors]
+    h, met = carried(matrices, frequency, near, places)
+    return frequency, -((2.0 * np.pi * frequency) ** 2)[:, None, None] * h, met, matrices.node[near]
+
+
+def carried(matrices, frequency, near, places):
+    """(m, n_place, n) receptances between places and nodes ``near``, and (m, n) of the rail about each of these, over
+    ``MET`` [m/N]."""
     node = matrices.node[near]
-    h = responses(matrices, frequency, [*places, *node.tolist()], rows)
-    heard, met = h[:, : len(places)], np.diagonal(h[:, len(places) :], axis1=1, axis2=2)
+    h = responses(matrices, frequency, [*places, *node.tolist()], matrices.node_index[near])
     about = np.abs(node[:, None] - node) < 0.5 * MET
-    point = met @ (about / about.sum(axis=0))
-    return frequency, -((2.0 * np.pi * frequency) ** 2)[:, None, None] * heard, point, node
+    met = np.diagonal(h[:, len(places) :], axis1=1, axis2=2) @ (about / about.sum(axis=0))
+    return h[:, : len(places)], met
 
 
 def wheel_and_contact(vehicle, frequency):

@@ -20,9 +20,8 @@ from turnout import physics
 from turnout.mismatch.candidate import Candidate
 from turnout.mismatch.track import bands, roll
 from turnout.mismatch.track.base_model import track_with
-from turnout.mismatch.track.rolled_waves import wheel_and_contact
+from turnout.mismatch.track.rolled_waves import carried, wheel_and_contact
 from turnout.mismatch.track.skeleton import matrices_of
-from turnout.simulate.frequency import responses
 
 SHORTEST, WIDTH = 0.05, 0.05  # m; of a bin, in the logarithm: what 5 m of rail tell apart at 0.2 m
 LINE = 2  # bins to either side over which a line spreads
@@ -210,11 +209,6 @@ def carried_energy(case, fit, made, length):
     track = track_with(case.track(made.passage.route), case.zone, fit.values)
     matrices, frequency = matrices_of(track), np.array([made.speed / length])
     near = np.flatnonzero((matrices.node >= case.waves.start) & (matrices.node <= case.waves.end))[::STRIDE]
-    rows, node = matrices.node_index[near], matrices.node[near]
-    carried = responses(matrices, frequency, [s.probe(track).place for s in made.sensors], rows)[0]
-    omega = 2.0 * np.pi * frequency
-    middle_rows, weights = matrices.weights(float(node[node.size // 2]))
-    rail = responses(matrices, frequency, [float(node[node.size // 2])], middle_rows)[:, 0] @ weights
-    vehicle = made.passage.vehicle
-    force = 1.0 / np.abs(wheel_and_contact(vehicle, frequency) + rail)[0]
-    return node, (omega**2 * force * np.abs(carried)) ** 2
+    h, met = carried(matrices, frequency, near, [s.probe(track).place for s in made.sensors])
+    force = 1.0 / np.abs(wheel_and_contact(made.passage.vehicle, frequency)[:, None] + met)[0]
+    return matrices.node[near], ((2.0 * np.pi * frequency) ** 2 * force * np.abs(h[0])) ** 2
