@@ -104,7 +104,8 @@ def _analysed(unit, turnout, raw_root) -> dict[str, list[dict]]:
     path = Path(turnout.settings["passage"].axle_patterns)
     if not path.is_file():
         path = Path(turnout.folder) / "vehicles" / path.name
-    return passage_unit(unit, turnout, raw_root, PassageContext(patterns=known_patterns(str(path))))
+    patterns = known_patterns(str(path)) if path.is_file() else ()
+    return passage_unit(unit, turnout, raw_root, PassageContext(patterns=patterns))
 
 
 def _passages(unit, turnout, raw_root, track, tables, found):

@@ -81,8 +81,13 @@ def _section_model(row) -> SectionModel:
 
 @lru_cache(maxsize=4)
 def known_patterns(path: str):
-    """Axle patterns of a YAML file, () where there is none; ConfigError where it cannot be used."""
+    """Axle patterns of a YAML file, () where the usual one is not there; ConfigError where it cannot be used, or where
+    another that the settings name is not there."""
     if not Path(path).is_file():
+        if path != PassageSettings().axle_patterns:
+            raise ConfigError(
+                path, "passage.axle_patterns", "there is no such file", "Name one, or leave the setting out"
+            )
         return ()
     try:
         with legible(path, "the file"):

@@ -10,6 +10,8 @@ effects of your own, one file each; --panel crossing puts all cases into crossin
 does) and publish it before anybody diagnoses.
 """
 
+from turnout.commands.counting import at_least_one
+
 HELP = "prove the diagnosis on concealed effects: make, diagnose, reveal, score"
 
 
@@ -24,11 +26,11 @@ def add_arguments(parser):
     make.add_argument("--fast", action="store_true", help="the fast tier of 40 cases")
     make.add_argument("--effects", action="append", default=[], help="folder with effects of your own")
     make.add_argument("--only", help="kinds to keep beside the controls, by commas, as void,dip")
-    make.add_argument("--limit", type=int, help="the first so many cases of the shuffled set")
+    make.add_argument("--limit", type=at_least_one, help="the first so many cases of the shuffled set")
     make.add_argument(
         "--panel", choices=("plain", "crossing"), default="plain", help="where all cases lie (default: plain track)"
     )
-    make.add_argument("--workers", type=int, default=1, help="processes (default 1)")
+    make.add_argument("--workers", type=at_least_one, default=1, help="processes (default 1)")
     diagnose = steps.add_parser("diagnose", help="let the tool diagnose every case, the truth out of its reach")
     diagnose.add_argument(
         "--command", dest="tool", help="command of the tool; {python}, {case}, {folder}, {out} are filled in"
@@ -40,7 +42,7 @@ def add_arguments(parser):
     diagnose.add_argument(
         "--ablation", metavar="NAME", help="keep beside the tool's findings, as those of a lesser one"
     )
-    diagnose.add_argument("--workers", type=int, default=1, help="cases at a time (default 1)")
+    diagnose.add_argument("--workers", type=at_least_one, default=1, help="cases at a time (default 1)")
     reveal = steps.add_parser("reveal", help="open the envelopes and verify every hash")
     score = steps.add_parser("score", help="print every figure with its interval")
     score.add_argument("--names", help="JSON file {effect: [names of the tool that are right]} to add")

@@ -8,6 +8,8 @@ whether the next run will stop because of them.
 
 import argparse
 
+from turnout.commands.counting import at_least_one
+
 HELP = "say what is new, without computing"
 STAGES = {
     "hammer": ("turnout.chains.hammer", None),
@@ -22,7 +24,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--raw", help="raw root (raw)")
     parser.add_argument("--work", default="work", help="folder of the results of earlier runs (%(default)s)")
-    parser.add_argument("--shards", type=int, help="number of shards of those runs, instead of that in config.yaml")
+    parser.add_argument(
+        "--shards", type=at_least_one, help="number of shards of those runs, instead of that in config.yaml"
+    )
     parser.add_argument("--turnout", action="append", help="only this turnout; may be given again")
 
 

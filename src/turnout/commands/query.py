@@ -12,6 +12,8 @@ import csv
 import sys
 from decimal import Decimal
 
+from turnout.commands.counting import at_least_one
+
 HELP = "ask the registry in SQL"
 
 
@@ -20,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("sql", nargs="?", help="a query; '-' reads it from standard input")
     parser.add_argument("--registry", default="results/registry", help="folder of the registry (%(default)s)")
     parser.add_argument("--csv", metavar="FILE", help="write comma-separated values there, '-' = standard output")
-    parser.add_argument("--rows", type=int, default=60, help="rows shown at most (%(default)s)")
+    parser.add_argument("--rows", type=at_least_one, default=60, help="rows shown at most (%(default)s)")
     parser.add_argument("--list", action="store_true", help="name the tables, views and macros")
 
 

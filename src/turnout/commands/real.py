@@ -5,13 +5,15 @@ a five-hit hammer test (hit 0 overloaded, hit 2 double, by its authors' word), t
 beams with published modes, and vendors' UFF files. Everything lies below real/.
 """
 
+from turnout.commands.counting import at_least_one
+
 HELP = "run everything on recordings made by others"
 
 
 def add_arguments(parser):
     """Options of the command."""
     parser.add_argument("--folder", default="real", help="where everything goes (default real)")
-    parser.add_argument("--cores", type=int, default=2, help="processors to use (default 2)")
+    parser.add_argument("--cores", type=at_least_one, default=2, help="processors to use (default 2)")
 
 
 def run(args):

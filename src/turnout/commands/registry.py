@@ -10,6 +10,8 @@ describe   tables, views and macros with their columns, units and meanings
 
 import argparse
 
+from turnout.commands.counting import at_least_one
+
 HELP = "check, compact, move or describe the registry"
 ACTIONS = ("check", "compact", "vacuum", "relocate", "rebuild", "describe")
 
@@ -20,7 +22,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", nargs="?", help="describe: only this table, view or macro")
     parser.add_argument("--registry", default="results/registry", help="folder of the registry (%(default)s)")
     parser.add_argument("--quick", action="store_true", help="check: do not read the files whole")
-    parser.add_argument("--at-least", type=int, default=2, metavar="N", help="compact: only where N files lie (2)")
+    parser.add_argument(
+        "--at-least", type=at_least_one, default=2, metavar="N", help="compact: only where N files lie (2)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:

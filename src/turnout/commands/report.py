@@ -5,6 +5,8 @@ turnout report --day 2026-03-01      list and states as of that day, as far as t
 turnout report --turnouts tommerup_s1 tommerup_s2
 """
 
+from turnout.commands.counting import at_least_one
+
 HELP = "write the pages of fleet and turnouts"
 
 
@@ -16,7 +18,7 @@ def add_arguments(parser):
         "--turnouts", "--turnout", nargs="+", metavar="ID", help="only these turnouts' pages, and the fleet's"
     )
     parser.add_argument("--day", metavar="DATE", help="list and states of that day, YYYY-MM-DD, instead of today")
-    parser.add_argument("--cores", type=int, default=1, help="processes that draw pages (%(default)s)")
+    parser.add_argument("--cores", type=at_least_one, default=1, help="processes that draw pages (%(default)s)")
 
 
 def run(args):

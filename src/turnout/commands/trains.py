@@ -8,6 +8,7 @@ setting passage.assets names; the next run uses them, and computes the passages 
 """
 
 import argparse
+from pathlib import Path
 
 HELP = "learn axle loads and clusters from the trains so far"
 
@@ -27,8 +28,11 @@ def run(args: argparse.Namespace) -> int:
     from turnout.chains.passage_context import known_patterns
     from turnout.chains.passage_learning import learn_clusters, learn_loads, weighed_trains
     from turnout.config import load_configuration, with_raw
+    from turnout.errors import ConfigError
     from turnout.registry.database import open_registry
 
+    if not Path(args.raw).is_dir():
+        raise ConfigError("--raw", "folder of the recordings", f"there is no folder {args.raw}", "Name the one that is")
     configuration = load_configuration(args.configuration)
     names = args.turnout or list(configuration.rows)
     settings = configuration.settings["passage"]

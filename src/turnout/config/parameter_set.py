@@ -231,12 +231,12 @@ def _parse_number(entry, path, place, sources):
         raise ConfigError(path, where(path, place), f"unknown unit {entry['unit']!r}", f"Use one of {', '.join(UNITS)}")
     source = sources.get(entry["source"], entry["source"])
     prior = entry.get("prior")
-    if str(source).startswith("estimate") and prior is None:
-        raise ConfigError(
-            path, where(path, place), "an estimate without a prior", "Give its relative standard deviation as prior"
-        )
-    unit, factor = UNITS[entry["unit"]]
     spread = None if prior is None else _finite(prior, path, place)
+    if (spread is None and str(source).startswith("estimate")) or (spread is not None and spread <= 0.0):
+        found = "an estimate without a prior" if spread is None else f"a prior of {prior}"
+        remedy = "Give its relative standard deviation, above 0, as prior"
+        raise ConfigError(path, where(path, place), found, remedy)
+    unit, factor = UNITS[entry["unit"]]
     return Number(factor * _finite(entry["value"], path, place), unit, str(source), spread)
 
 

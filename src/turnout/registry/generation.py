@@ -76,10 +76,14 @@ def load(registry_dir: Path) -> Generation:
         return Generation()
     except (json.JSONDecodeError, UnicodeDecodeError) as error:
         raise RegistryError(f"{path}: not a generation file ({error}). Put it back from a backup.") from None
-    if raw.pop("format", None) != FORMAT:
-        raise RegistryError(f"{path}: written by another version of the program. Install that version.")
-    files = [DataFile(**f) for f in raw.pop("files")]
-    return Generation(files=files, retired=[(p, n) for p, n in raw.pop("retired")], **raw)
+    try:
+        if raw.pop("format", None) != FORMAT:
+            raise RegistryError(f"{path}: written by another version of the program. Install that version.")
+        files = [DataFile(**f) for f in raw.pop("files")]
+        return Generation(files=files, retired=[(p, n) for p, n in raw.pop("retired")], **raw)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        said = f"{type(error).__name__}: {error}"
+        raise RegistryError(f"{path}: not a generation file ({said}). Put it back from a backup.") from None
 
 
 def schema_hash(table: str) -> str:

@@ -7,6 +7,7 @@ import pytest
 from turnout.chains.passage_context import known_patterns
 from turnout.cli import main
 from turnout.config.parameter_set import read_parameters
+from turnout.config.settings.passage import PassageSettings
 from turnout.errors import ConfigError
 
 ALL = ("turnouts.tsv", "events.csv", "acknowledgements.csv", "config.yaml", "layouts/tommerup.yaml",
@@ -77,6 +78,26 @@ def test_axle_patterns_that_are_no_yaml_or_no_patterns_are_said_by_name(tmp_path
     assert said in str(caught.value)
 
 
+def test_axle_patterns_that_the_settings_name_and_that_are_not_there_are_said(tmp_path, monkeypatch):
+    """The usual file need not be there: no train has a type then. A path that somebody wrote is a wish."""
+    monkeypatch.chdir(tmp_path)
+    assert known_patterns(PassageSettings().axle_patterns) == ()
+    with pytest.raises(ConfigError, match=r"axels\.yaml, passage.axle_patterns: there is no such file"):
+        known_patterns("config/vehicles/axels.yaml")
+
+
+def test_trains_of_a_folder_that_is_not_there_are_refused(tmp_path, capsys):
+    assert main(["trains", "--raw", str(tmp_path / "rawe")]) == 2
+    assert "there is no folder" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", [["report", "--cores", "0"], ["query", "from modes", "--rows", "-5"]])
+def test_a_count_of_nothing_is_refused(command, capsys):
+    with pytest.raises(SystemExit):
+        main(command)
+    assert "is not a whole number of 1 or more" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("content", "said"),
     [
@@ -85,6 +106,8 @@ def test_axle_patterns_that_are_no_yaml_or_no_patterns_are_said_by_name(tmp_path
         ("x: {value: 1, unit: [m], source: a}\n", "line 1, x: a number without unit"),
         ("x: {value: 1, unit: m, source: estimate, prior: .nan}\n", "line 1, x: nan is not finite"),
         ("x: {value: 1, unit: m, source: estimate, prior: wide}\n", "line 1, x: 'wide' is not a number"),
+        ("x: {value: 1, unit: m, source: drawing, prior: -0.1}\n", "line 1, x: a prior of -0.1"),
+        ("x: {value: 1, unit: m, source: estimate, prior: 0}\n", "line 1, x: a prior of 0. Give its relative"),
     ],
 )
 def test_sources_and_units_of_another_kind_are_said_with_their_line(tmp_path, content, said):

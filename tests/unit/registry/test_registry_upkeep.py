@@ -212,9 +212,10 @@ def test_a_column_that_changed_its_type_is_refused_before_anything_is_written(be
         bench.register(hammer(section="A2"))
 
 
-def test_a_spoilt_generation_file_is_said(bench, hammer):
+@pytest.mark.parametrize("content", ["{", "[]", "3", '{"format": 1}', '{"format": 1, "files": [{"rows": 2}]}'])
+def test_a_spoilt_generation_file_is_said(bench, hammer, content):
     bench.register(hammer())
-    (bench.registry / FILE).write_text("{")
+    (bench.registry / FILE).write_text(content)
     with pytest.raises(RegistryError, match="not a generation file"):
         bench.register(hammer(section="A2"))
 
