@@ -10,6 +10,7 @@ from turnout.mismatch.joint import Joint
 
 NEAR = 0.95  # m: one bay and a half
 ALIKE = 1.5  # m: two bays, of any sleepers; a second of the same kind there is what the first one's shape leaves
+CHEAP = 0.5  # of what a second effect must promise, where the cheap observations alone do: the others come on top
 HOPELESS = 0.1  # of the leader's estimated gain; what promises less is not refitted, but the second is
 
 
@@ -65,13 +66,20 @@ def shortlist(case, fit, settings, promising=()):
             gain, share = projector.score(parts, candidate, k)
             entry = 0.5 * gain - np.log(candidate.scanned), candidate, amplified(candidate, k, share), {}
             scored.setdefault(candidate.family, []).append(entry)
-    least = settings.threshold if fit.candidates else settings.promise  # the residual must promise a second effect
-    found = [entry for entry in _promising(scored, settings) if entry[0] > least]
+    found = [entry for entry in _promising(scored, settings) if entry[0] > _asked(entry, fit, scouted, settings)]
     least = HOPELESS * max((entry[0] for entry in found), default=0.0)
     chosen = [entry for rank, entry in enumerate(found) if rank < 2 or entry[0] > least]
     found = [(e, False) for e in chosen] + [(e, True) for e in _kin(chosen, scored)]
     found = [(_fitted_already(e, scored), rival) for e, rival in found]
     return [Entry(*e[1:], scouted.get(e[1].key, 0.0), rival) for e, rival in found]
+
+
+def _asked(entry, fit, scouted, settings):
+    """Promise from which an entry is refitted: beside an effect the residual must promise another name. [nats]"""
+    if not fit.candidates:
+        return settings.promise
+    by_cheap = entry[0] == scouted.get(entry[1].key)
+    return settings.threshold * (CHEAP if by_cheap else 1.0)
 
 
 def _fitted_already(entry, scored):
@@ -93,12 +101,14 @@ def _kin(chosen, scored):
 
 
 def _same_place(candidate, accepted):
-    """A second law at the place, sensor or train of an accepted effect would only mend its shape, where it can."""
+    """A second law at the place, sensor or train of an accepted effect would only mend its shape, where it can: not
+    one that says what it is, nor what is of all wheels beside what is of one and known by its blows."""
     if candidate.key == accepted.key:
         return True
-    if candidate.exact and accepted.exact:
-        return False
     a, b = candidate.where, accepted.where
+    of_one_wheel = {(c.sounding, "axle" in c.where) for c in (candidate, accepted)}
+    if (candidate.exact and accepted.exact) or of_one_wheel == {(True, True), (False, False)}:
+        return False
     reach = ALIKE if candidate.family == accepted.family else NEAR
     near = "place" in a and "place" in b and abs(a["place"] - b["place"]) < reach
     return near or any(k in a and a[k] == b.get(k) for k in ("sensor", "train"))

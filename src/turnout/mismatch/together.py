@@ -16,6 +16,7 @@ from turnout.mismatch.verdict import TORN, calibrate, judge, withdraw
 from turnout.mismatch.verify import fit_of_reserved, gain_error
 
 RIVALS = 2  # that are fitted anew beside the second effect
+KEPT = 0.5  # of what a rival gains alone; one that gains more on top of the leader explains something else
 COSTLY = 3.0  # points of fit on recordings never used; the proof counts what moves more
 
 
@@ -50,11 +51,14 @@ def _other_of(torn):
 
 def parted(case, base, torn, second, settings):
     """The verdict on the first of two rivals where the ``second`` effect, found on top of it, is the other: what each
-    gains alone is as much by chance, and they do not explain the same. ``torn`` itself where it is another effect."""
+    gains alone is as much by chance, and they do not explain the same; nor do others that keep their gain on top of it.
+    ``torn`` itself where it is another effect."""
     other = _other_of(torn)
     if other is None or second.names[:1] != (other.family,):
         return torn
-    mine, _ = judged(case, base, tuple(s for s in torn.scores if s is not other), settings)
+    on_top = {s.candidate.key: s.gain for s in second.scores}
+    rivals = [s for s in torn.scores if s is not other and on_top.get(s.candidate.key, 0.0) < KEPT * s.gain]
+    mine, _ = judged(case, base, tuple(rivals), settings)
     return mine if mine.answer == "named" else torn
 
 

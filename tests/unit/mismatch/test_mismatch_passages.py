@@ -293,3 +293,7 @@ def test_a_wheel_whose_blows_are_nearly_as_loud_is_sized_as_well(plan, monkeypat
     monkeypatch.setattr("turnout.mismatch.track.flats._sized", lambda case, fit, struck: (0.03, phases, 5.0))
     found = flats(case, SimpleNamespace(candidates=()))
     assert [c.where["axle"] for c in found] == offered
+    heavy, flat = (SimpleNamespace(where={"train": train, **more}) for more in ({}, {"axle": 3}))
+    beside = flats(case, SimpleNamespace(candidates=(heavy,)))
+    assert [c.where["axle"] for c in beside] == offered  # all wheels heavy is no reason against a flat on one
+    assert flats(case, SimpleNamespace(candidates=(flat,))) == ()

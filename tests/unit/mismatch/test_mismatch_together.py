@@ -15,8 +15,8 @@ from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.observation import Observation
 from turnout.mismatch.score import Score
 from turnout.mismatch.scout import _seen
-from turnout.mismatch.shortlist import Projector, _same_place
-from turnout.mismatch.together import borne_out, needed
+from turnout.mismatch.shortlist import Projector, _asked, _same_place
+from turnout.mismatch.together import borne_out, needed, parted
 from turnout.mismatch.verdict import Verdict, judge, opened
 from turnout.physics import Parameter
 
@@ -239,6 +239,47 @@ def test_a_second_of_a_kind_two_bays_on_is_the_shape_of_the_first():
     first = at("local_ballast", 4.2)
     assert _same_place(at("local_ballast", 5.4), first) and not _same_place(at("local_pad", 5.4), first)
     assert not _same_place(at("local_ballast", 6.0), first) and _same_place(at("local_pad", 4.8), first)
+
+
+@pytest.mark.parametrize("known, offered, same", [
+    ({"train": "a"}, {"train": "a", "axle": 2}, False),  # heavy wheels, and a flat that strikes
+    ({"train": "a", "axle": 1}, {"train": "a", "axle": 2}, True),  # two flats
+])  # fmt: skip
+def test_a_wheel_known_by_its_blows_is_no_shape_of_heavy_wheels(known, offered, same):
+    """A flat strikes and all wheels of its train are heavy: two parts. A wheel out of round is told by no blows of its
+    own, and may be what heavy wheels leave."""
+
+    def of(where, sounding):
+        return Candidate("flat" if "axle" in where else "mass", AMOUNT, tuple, ((0.5,),), where, sounding=sounding)
+
+    first, second = of(known, "axle" in known), of(offered, True)
+    assert _same_place(second, first) == _same_place(first, second) == same
+    assert _same_place(of(offered, False), first) and _same_place(first, of(offered, False))
+
+
+@pytest.mark.parametrize("left, answer", [(50.0, "named"), (5.0, "a_or_b")])
+def test_a_rival_that_keeps_its_gain_on_top_of_the_leader_is_none(left, answer):
+    """Wave and ripple are both there. The ramp gains as much as either: beside the wave still 50 nats, so it is a rival
+    of the ripple alone, or nothing, so it is one of the wave's."""
+    case = Shapes(("wave", "ripple", "ramp"), wave=0.06, ripple=0.06)
+    fits = [fit_jointly(case, (c,), [0.06], iterations=20) for c in case.candidates]
+    scores = tuple(Score(c, g, 0.0, 1.0, f) for c, g, f in zip(case.candidates, (60.0, 59.0, 58.0), fits))
+    torn = judge(list(scores), 0.9, MismatchSettings())
+    assert torn.names == ("wave", "ripple")
+    on_top = tuple(Score(c, g, 0.0, 1.0, f) for c, g, f in zip(case.candidates[1:], (59.0, left), fits[1:]))
+    second = Verdict("named", ("ripple",), "A", 0.97, {}, on_top)
+    found = parted(case, fit_jointly(case), torn, second, MismatchSettings())
+    assert found.answer == answer and found.names[0] == "wave"
+
+
+@pytest.mark.parametrize("promised, scouted, asked", [(7.0, 7.0, 6.0), (7.0, 5.0, 12.0)])
+def test_a_second_effect_that_blows_alone_promise_half_of_is_refitted(promised, scouted, asked):
+    """What trains say of it comes on top: a soft rail of 12 nats in blows had 20 in all. What a column promises is of
+    all recordings together, and has to be a name; a first effect is asked from 2 nats on."""
+    settings, candidate = MismatchSettings(), Candidate("soft_rail", AMOUNT, tuple, ((0.5,),))
+    entry, beside = (promised, candidate, np.array([0.5]), {}), SimpleNamespace(candidates=("pad",))
+    assert _asked(entry, beside, {candidate.key: scouted}, settings) == asked
+    assert _asked(entry, SimpleNamespace(candidates=()), {candidate.key: scouted}, settings) == 2.0
 
 
 def test_the_evidence_of_a_row_has_an_entry_for_each_verdict():

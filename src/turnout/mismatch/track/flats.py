@@ -20,7 +20,7 @@ MIDDLING, LENGTHS = 0.05, (0.025, 0.035, 0.045, 0.055, 0.07, 0.09)  # m
 
 def flats(case, fit):
     """Candidates of the wheels that most likely carry a flat."""
-    found, known = strikes(case), {c.where.get("train") for c in fit.candidates}
+    found, known = strikes(case), {c.where.get("train") for c in fit.candidates if "axle" in c.where}
     loud = [s for s in found if s.nats > LEAST + np.log(len(found)) and s.train not in known]
     loud = [s for s in loud if s.nats > loud[0].nats - CLOSE]
     return tuple(_candidate(case, fit, s, len(found)) for s in loud[:NAMED])
