@@ -79,16 +79,19 @@ def _section_model(row) -> SectionModel:
     return SectionModel(row["model_id"], moment, model)
 
 
-@lru_cache(maxsize=4)
 def known_patterns(path: str):
     """Axle patterns of a YAML file, () where the usual one is not there; ConfigError where it cannot be used, or where
     another that the settings name is not there."""
-    if not Path(path).is_file():
-        if path != PassageSettings().axle_patterns:
-            raise ConfigError(
-                path, "passage.axle_patterns", "there is no such file", "Name one, or leave the setting out"
-            )
-        return ()
+    if Path(path).is_file():
+        return _patterns(path, sha256_of(path))
+    if path != PassageSettings().axle_patterns:
+        raise ConfigError(path, "passage.axle_patterns", "there is no such file", "Name one, or leave the setting out")
+    return ()
+
+
+@lru_cache(maxsize=4)
+def _patterns(path: str, content: str):
+    """Of a file of this ``content``: the same name is another file from another folder, or later."""
     try:
         with legible(path, "the file"):
             return read_patterns(YAML(typ="safe").load(Path(path)))

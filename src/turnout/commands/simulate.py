@@ -9,8 +9,6 @@ pipeline finds it; what is true of it goes to a file of the same name below --tr
 each blow fell and how hard, or the wheels' forces.
 """
 
-from turnout.commands.counting import at_least_one
-
 HELP = "simulate a hammer test or a train passage"
 
 
@@ -21,10 +19,8 @@ def add_arguments(parser):
     hammer.add_argument(
         "--section", required=True, help="location of the track file, or, without --turnout, a place in metres"
     )
-    hammer.add_argument(
-        "--tests", type=at_least_one, default=1, help="tests, one file each; --out takes one (default 1)"
-    )
-    hammer.add_argument("--blows", type=at_least_one, default=10, help="blows per test (default 10)")
+    hammer.add_argument("--tests", type=int, default=1, help="tests, one file each; --out takes one (default 1)")
+    hammer.add_argument("--blows", type=int, default=10, help="blows per test (default 10)")
     passage = kinds.add_parser("passage", help="one train over the turnout")
     passage.add_argument("--vehicle", default="ic3", help="file in config/vehicles, or its path (default ic3)")
     passage.add_argument("--speed", type=float, default=160.0, help="km/h (default 160)")
@@ -34,7 +30,7 @@ def add_arguments(parser):
         default=0.5,
         help="share of the payload, 0 (empty) to 1 (full), overloaded up to 1.5 (default 0.5)",
     )
-    passage.add_argument("--units", type=at_least_one, default=1, help="coupled units (default 1)")
+    passage.add_argument("--units", type=int, default=1, help="coupled units (default 1)")
     passage.add_argument("--route", default="main", help="route of the track file (default main)")
     passage.add_argument("--direction", choices=("facing", "trailing"), default="facing")
     for sub in (hammer, passage):
