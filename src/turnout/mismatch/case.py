@@ -106,6 +106,10 @@ class Case:
         """Candidates that only a look at the residual of ``fit`` suggests."""
         return ()
 
+    def distant(self, fit):
+        """(candidate, start) too far from neutral for what a column says: predicted, with the twin at its mean."""
+        return ()
+
     def roughened(self):
         """The same case with broad, independent errors: its optimum has a wide basin."""
         return self

@@ -1,6 +1,6 @@
 """Which candidates are refitted jointly, and from where: scores order the queue, they never speak the verdict."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -54,6 +54,10 @@ def shortlist(case, fit, settings, promising=()):
         if entry[1] in candidates:
             scored.setdefault(entry[1].family, []).append(entry)
     projector, columns = Projector(case, fit), case.screen(fit)
+    for candidate, start in case.distant(fit):
+        if candidate in candidates:
+            entry = _from_afar(case, fit, projector, replace(candidate, starts=(start,), whole=True), candidate)
+            scored.setdefault(candidate.family, []).append(entry)
     for candidate in candidates:
         if candidate.promise is not None:
             entry = candidate.promise, candidate, np.asarray(candidate.starts[0]), dict(candidate.begin)
@@ -72,6 +76,14 @@ def shortlist(case, fit, settings, promising=()):
     found = [(e, False) for e in chosen] + [(e, True) for e in _kin(chosen, scored)]
     found = [(_fitted_already(e, scored), rival) for e, rival in found]
     return [Entry(*e[1:], scouted.get(e[1].key, 0.0), rival) for e, rival in found]
+
+
+def _from_afar(case, fit, projector, at_start, candidate):
+    """Entry of a ``candidate`` as it is ``at_start``, simulated, with its twin back at the mean: neither is small."""
+    back = {n.name: n.mean for n in case.nuisances if n.name == candidate.twin}
+    parts = _predicted(case, replace(fit, values={**fit.values, **back}), at_start, 0)
+    gain, _ = projector.score(parts, at_start, 0)
+    return 0.5 * gain - np.log(candidate.scanned), candidate, np.array(at_start.starts[0]), back
 
 
 def _asked(entry, fit, scouted, settings):

@@ -13,6 +13,7 @@ from turnout.mismatch.track import derivatives, roll, rolling
 from turnout.mismatch.track.base_model import SEAT_SD, rail_spreads, track_nuisances, with_rail, zone_of
 from turnout.mismatch.track.blows_case import Blows
 from turnout.mismatch.track.ceiling import ceilings, highest, within_range
+from turnout.mismatch.track.heavy_wheels import distant_wheels
 from turnout.mismatch.track.library import LOOSE, library
 from turnout.mismatch.track.observing import (
     foreign,
@@ -195,6 +196,10 @@ class TrackCase(Predicting, Case):
         rolled = any(o.name in self.rollings for o in self.observations)
         found = geometry_scan(self, fit, self.families) if rolled else ()
         return tuple(replace(c, loose=LOOSE) for c in found)
+
+    def distant(self, fit):
+        """Wheelsets of other masses, of trains that leave more than sound ones do."""
+        return distant_wheels(self, fit)
 
     def screen(self, fit):
         """Linear columns of the candidates that have one."""
