@@ -9,7 +9,7 @@ from turnout.errors import ConfigError
 @contextmanager
 def legible(path: object, where: str) -> Iterator[None]:
     """Within it a file is read and parsed: ConfigError for ``path`` where it cannot be opened (at ``where``), is not
-    UTF-8 or holds a character that no YAML file may hold."""
+    UTF-8, holds a character that no YAML file may hold, or an anchor within itself."""
     from ruamel.yaml.reader import ReaderError
 
     try:
@@ -22,3 +22,6 @@ def legible(path: object, where: str) -> Iterator[None]:
     except ReaderError as error:
         found = f"the character {chr(error.character)!r}, which no YAML file may hold"
         raise ConfigError(path, f"character {error.position + 1}", found, "Take it away") from None
+    except RecursionError:
+        found = "content without an end, as of an anchor that holds itself"
+        raise ConfigError(path, where, found, "Write the values out there") from None

@@ -195,8 +195,6 @@ def read_parameters(path):
     path = Path(path)
     try:
         with legible(path, "the file"):
-            if not path.exists():
-                raise ConfigError(path, "the file", "does not exist", "Give the path of a parameter file")
             content = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
     except MarkedYAMLError as error:
         mark = error.problem_mark
@@ -206,7 +204,8 @@ def read_parameters(path):
         raise ConfigError(path, "the file", "is not a mapping", "Write 'key: value' lines")
     if not isinstance(sources := content.pop("sources", None) or {}, dict):
         raise ConfigError(path, where(path, "sources"), "is not a mapping", "Write 'key: source' lines below it")
-    return _parse(content, path, "", sources)
+    with legible(path, "the file"):
+        return _parse(content, path, "", sources)
 
 
 def _parse(value, path, place, sources):

@@ -108,6 +108,7 @@ def test_a_count_of_nothing_is_refused(command, capsys):
         ("x: {value: 1, unit: m, source: estimate, prior: wide}\n", "line 1, x: 'wide' is not a number"),
         ("x: {value: 1, unit: m, source: drawing, prior: -0.1}\n", "line 1, x: a prior of -0.1"),
         ("x: {value: 1, unit: m, source: estimate, prior: 0}\n", "line 1, x: a prior of 0. Give its relative"),
+        ("x: &whole\n  y: [*whole]\n", "the file: content without an end, as of an anchor that holds itself"),
     ],
 )
 def test_sources_and_units_of_another_kind_are_said_with_their_line(tmp_path, content, said):
