@@ -42,3 +42,21 @@ def test_a_channel_at_the_range_that_its_file_states_is_no_faulty_one(limit, fou
     sensors = [SimpleNamespace(name=n) for n in ("A1", "A2", "A3")]
     campaign = SimpleNamespace(sensors=sensors, passages=[passage(np.exp(loud)) for loud in LOUD])
     assert list(ceilings(campaign, 12.0)) == found
+
+
+def test_bangs_of_a_flat_that_one_channel_hears_less_are_no_ceiling():
+    """Three passages bang once, alike for A1, which shows five times as much there as where it spends its time."""
+    quiet, others = np.array([66.0, 64.0, 70.0, 68.0, 73.0]), np.array([46.0, 45.0, 49.0, 48.0, 51.0])
+    bangs, heard = np.array([302.0, 312.0, 320.0]), np.array([400.0, 460.0, 480.0])
+    assert saturation(np.log([*quiet, *bangs]), np.log([*others, *heard])) > 12.0 + np.log(3.0)
+
+    def passage(mine, theirs, rolled):
+        samples = np.outer([rolled[0], rolled[1], rolled[1]], np.sin(np.linspace(0.0, 50.0, 1001)))
+        samples[:, 300] = [mine, theirs, theirs]
+        channels = tuple(Channel(n, "acceleration", "m/s²") for n in ("A1", "A2", "A3"))
+        return SimpleNamespace(recording=Recording(samples, 2000.0, channels))
+
+    sensors = [SimpleNamespace(name=n) for n in ("A1", "A2", "A3")]
+    rolling = [passage(a, b, (a, b)) for a, b in zip(quiet, others, strict=True)]
+    banging = [passage(a, b, (66.0, 46.0)) for a, b in zip(bangs, heard, strict=True)]
+    assert ceilings(SimpleNamespace(sensors=sensors, passages=[*rolling, *banging]), 12.0) == {}

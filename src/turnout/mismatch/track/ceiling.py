@@ -34,8 +34,8 @@ def ceilings(campaign, threshold):
     for k, name in enumerate(names):
         others = np.delete(peaks, k, axis=1).mean(axis=1)
         gain = saturation(peaks[:, k], others) - np.log(len(names))
-        if gain > threshold:
-            found[name] = Ceiling(_limit([x[k] for x in sizes]), float(gain))
+        if gain > threshold and (limit := _limit([x[k] for x in sizes])):
+            found[name] = Ceiling(limit, float(gain))
     return found if len(names) - len(found) > 1 else {}
 
 
@@ -65,8 +65,11 @@ def saturation(peaks, others):
 
 
 def _limit(sizes):
-    """Median of what lies near the peak, of the passage that spends most of its time there [m/s²]."""
-    crowded = max(sizes, key=lambda x: np.mean(x > TOP * x.max()))
+    """Median of what lies near the peak, of the passage that spends most of its time there [m/s²]; None where that is
+    none of the loudest: a channel that is cut off dwells at its limit, one that hears a flat or a nose bangs once."""
+    crowded = max(sizes, key=lambda x: (np.mean(x > TOP * x.max()), x.max()))
+    if crowded.max() < TOP * max(x.max() for x in sizes):
+        return None
     return float(np.median(crowded[crowded > TOP * crowded.max()]))
 
 
