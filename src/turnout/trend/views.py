@@ -9,7 +9,7 @@ from turnout.trend.panel import days, timestamps
 from turnout.trend.rows import arrow_rows
 
 NAMES = (
-    "epochs", "resonance_drift",
+    "students_t", "epochs", "resonance_drift",
     "passage_values", "chart_values", "mode_residuals", "cusum", "change_since_event", "maintenance_effect",
     "chart_status_at", "unusable", "cannot_see", "was_said", "in_service", "time_to_threshold",
     "chart_states", "worklist",

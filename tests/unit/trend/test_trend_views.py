@@ -1,12 +1,14 @@
 """The views equal an independent computation: numpy, pandas."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 from benchmarks.trend_fleet import Fleet, drift, modes, step
 from benchmarks.trend_oracle import cusum_by_loop, residuals_by_pandas, slopes_by_statsmodels
+from scipy.stats import t
 
 from turnout.trend import (
     alarm_rows,
@@ -140,6 +142,39 @@ def test_maintenance_effect_says_whether_it_helped(con):
     exchanged = rows[rows["section_id"] == "T00005/S3"].iloc[0]
     # between the same two campaigns; the cleaning at the same time does not concern the pads
     assert exchanged["kinds"] == "pad_exchange, rail_change"
+
+
+@pytest.mark.parametrize("sections", [1, 6])
+def test_intervals_of_work_that_did_nothing_hold_zero_where_the_slope_is_hardly_known(settings, sections):
+    # Fourteen weeks of a winter are the baseline, the work is done in June: the slope's error times 15 to 25 degrees.
+    fleet = Fleet(turnouts=240 // sections, sections=sections, weeks=60)
+    rows = modes(fleet, 5)
+    rows = rows.astype({"turnout_id": object, "section_id": object, "band": object, "source": object})
+    turnouts = sorted(rows["turnout_id"].unique())
+    work = pd.DataFrame({"event_id": turnouts, "turnout_id": turnouts, "section_id": None, "kind": "tamping",
+                         "event_at_utc": pd.Timestamp("2016-06-05"), "resets_ballast": True,
+                         "resets_railpad": True})  # fmt: skip
+    brief = replace(settings, baseline_days=100.0, baseline_campaigns=12)
+    charts = evaluate(rows, work, brief)
+    status = chart_status(charts, brief)
+    frames = {"modes": rows.assign(method="joint"), "events": work, "charts": chart_rows(charts),
+              "baselines": baseline_rows(charts, brief), "alarms": alarm_rows(charts, brief),
+              "chart_status": describe_flagged(status, candidates(charts, status, brief), brief)}  # fmt: skip
+    with connect_views(frames, rows["measured_at_utc"].max(), rounded=False) as con:
+        inside, n, cannot_tell = con.execute(
+            "select avg((gain_low_pct <= 0 and gain_high_pct >= 0)::int), count(*), "
+            "avg((verdict = 'cannot tell')::int) from maintenance_effect"
+        ).fetchone()
+    # 95 % less three binomial errors; sections of a turnout share their campaigns and count as one.
+    assert n == 240 and inside == cannot_tell
+    assert inside > 0.95 - 3 * np.sqrt(0.95 * 0.05 * sections / 240)
+
+
+def test_quantile_in_sql_is_students_t(con):
+    for freedom in (5, 8, 11, 30, 400):
+        assert con.execute("select students_t(?)", [freedom]).fetchone()[0] == pytest.approx(
+            t.ppf(0.975, freedom), abs=0.005
+        )
 
 
 def test_the_true_drift_is_first_and_the_learning_section_is_named(con):

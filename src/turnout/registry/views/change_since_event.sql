@@ -4,10 +4,11 @@
 -- campaigns with their memory, and what the error of the temperature slope makes of the difference in temperature.
 -- Of work on a whole turnout the siblings' median is left in, for what all sections share is asked for (but not in
 -- band amplitude).
+-- needs: students_t
 create or replace macro change_since_event(kind_of_event, days) as table
 with values_pct as (
     select
-        c.turnout_id, c.section_id, c.band, c.source, c.measured_at_utc, c.rail_temperature_c, b.n_learned,
+        c.turnout_id, c.section_id, c.band, c.source, c.measured_at_utc, c.rail_temperature_c, b.n_learned, b.n_baseline,
         b.sd_alone_pct * sqrt((1 + b.phi) / (1 - b.phi)) as sd_pct, b.slope_se_pct_per_c,
         c.residual_pct + b.level_pct as value_pct,
         100 * (c.expected_hz / b.frequency_hz - 1) + c.residual_pct
@@ -21,7 +22,7 @@ sides as (
         e.event_id, e.kind, e.event_at_utc, v.turnout_id, v.section_id, v.band, v.source,
         v.measured_at_utc >= e.event_at_utc as is_after,
         case when e.section_id is null then coalesce(v.alone_pct, v.value_pct) else v.value_pct end as value_pct,
-        v.rail_temperature_c, v.sd_pct, v.slope_se_pct_per_c, v.n_learned
+        v.rail_temperature_c, v.sd_pct, v.slope_se_pct_per_c, v.n_learned, v.n_baseline
     from events e
     join values_pct v
         on e.turnout_id = v.turnout_id and coalesce(e.section_id, v.section_id) = v.section_id
@@ -38,17 +39,19 @@ counted as (
         avg(value_pct) filter (where is_after) as after_pct,
         avg(rail_temperature_c) filter (where is_after) - avg(rail_temperature_c) filter (where not is_after) as dt_c,
         max(sd_pct) as sd_pct, max(slope_se_pct_per_c) as slope_se_pct_per_c,
-        min(n_learned) filter (where is_after) as n_learned
+        min(n_learned) filter (where is_after) as n_learned, min(n_baseline) as n_baseline
     from sides
     group by all
+),
+compared as (
+    select
+        *, after_pct - before_pct as change_pct,
+        sqrt(sd_pct ** 2 * (1 / n_before + 1 / least(n_after, n_learned)) + (slope_se_pct_per_c * dt_c) ** 2)
+            as change_se_pct
+    from counted
+    where n_before > 0 and n_after > 0
 )
 select
     event_id, kind, event_at_utc, turnout_id, section_id, band, source, n_before, n_after, before_pct, after_pct,
-    after_pct - before_pct as change_pct,
-    sqrt(sd_pct ** 2 * (1 / n_before + 1 / least(n_after, n_learned)) + (slope_se_pct_per_c * dt_c) ** 2)
-        as change_se_pct,
-    abs(after_pct - before_pct) > 1.96
-        * sqrt(sd_pct ** 2 * (1 / n_before + 1 / least(n_after, n_learned)) + (slope_se_pct_per_c * dt_c) ** 2)
-        as changed
-from counted
-where n_before > 0 and n_after > 0;
+    change_pct, change_se_pct, abs(change_pct) > students_t(n_baseline - 2) * change_se_pct as changed
+from compared;

@@ -1,7 +1,7 @@
 -- One row per section, score (fit, forecast) and factor (speed, axle load): its effect on the score in points, the
 -- others held fixed, with a 95 % interval that allows every passage its own variance (HC3) and takes its sensors as one; and raw_change_pct, what
 -- groups show when they are compared as they are. No row where the other factors determine one to 99 %.
--- needs: fit_residuals
+-- needs: fit_residuals, students_t
 create or replace view fit_effects as
 with sections as (
     select
@@ -22,7 +22,6 @@ with sections as (
 )
 select
     turnout_id, section_id, score, factor, per, held_fixed, n_scores as n, raw_change_pct, change_pct, change_se_pct,
-    -- quantile of Student's t after Cornish and Fisher, to 0.005 from five degrees of freedom on
-    change_pct - change_se_pct * (1.96 + 2.3724 / freedom + 2.8225 / freedom ** 2 + 2.56 / freedom ** 3) as low_pct,
-    change_pct + change_se_pct * (1.96 + 2.3724 / freedom + 2.8225 / freedom ** 2 + 2.56 / freedom ** 3) as high_pct
+    change_pct - change_se_pct * students_t(freedom) as low_pct,
+    change_pct + change_se_pct * students_t(freedom) as high_pct
 from sections where known;

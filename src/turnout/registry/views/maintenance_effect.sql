@@ -2,26 +2,35 @@
 -- between the same two campaigns are one row, dated by the last; a turnout's median begins anew at 0 and has none.
 -- gain_pct: level of the eight campaigns after the event minus that of the eight before. held_until_utc: first
 -- campaign at which the mean of eight has lost half of a gain again; empty = it holds, until last_measured_at_utc.
+-- The siblings' median is left in, for work on a whole turnout lifts them all (but not in band amplitude). The interval
+-- holds the scatter of the campaigns with their memory, and what the error of the temperature slope makes of the
+-- difference in temperature.
+-- needs: students_t
 create or replace view maintenance_effect as
-with values_pct as (
+with own as (
     select
-        c.turnout_id, c.section_id, c.band, c.source, c.measured_at_utc, c.epoch,
-        b.epoch_start_utc, b.sd_alone_pct * sqrt((1 + b.phi) / (1 - b.phi)) as sd_pct,
-        c.residual_pct + b.level_pct as value_pct,
-        avg(c.residual_pct + b.level_pct) over eight as mean_of_eight,
-        row_number() over epoch_order as place,
-        row_number() over (
-            partition by c.turnout_id, c.section_id, c.band, c.source, c.epoch order by c.measured_at_utc desc
-        ) as place_from_end
+        c.turnout_id, c.section_id, c.band, c.source, c.measured_at_utc, c.epoch, c.rail_temperature_c,
+        b.epoch_start_utc, b.slope_se_pct_per_c, b.n_baseline, b.sd_alone_pct * sqrt((1 + b.phi) / (1 - b.phi)) as sd_pct,
+        coalesce(
+            100 * (c.expected_hz / b.frequency_hz - 1) + c.residual_pct
+                - b.slope_pct_per_c * (c.rail_temperature_c - b.rail_temperature_c),
+            c.residual_pct + b.level_pct
+        ) as value_pct
     from charts c
     join baselines b using (turnout_id, section_id, band, source, epoch)
     where c.residual_pct is not null and c.section_id <> '*'
+),
+values_pct as (
+    select
+        *, avg(value_pct) over eight as mean_of_eight, row_number() over epoch_order as place,
+        row_number() over (
+            partition by turnout_id, section_id, band, source, epoch order by measured_at_utc desc
+        ) as place_from_end
+    from own
     window
-        epoch_order as (
-            partition by c.turnout_id, c.section_id, c.band, c.source, c.epoch order by c.measured_at_utc
-        ),
+        epoch_order as (partition by turnout_id, section_id, band, source, epoch order by measured_at_utc),
         eight as (
-            partition by c.turnout_id, c.section_id, c.band, c.source, c.epoch order by c.measured_at_utc
+            partition by turnout_id, section_id, band, source, epoch order by measured_at_utc
             rows between 7 preceding and current row
         )
 ),
@@ -31,7 +40,10 @@ levels as (
         any_value(epoch_start_utc) as epoch_start_utc, max(sd_pct) as sd_pct, max(measured_at_utc) as last_at,
         avg(value_pct) filter (where place <= 8) as first_pct, count(*) filter (where place <= 8) as n_first,
         avg(value_pct) filter (where place_from_end <= 8) as last_pct,
-        count(*) filter (where place_from_end <= 8) as n_last
+        count(*) filter (where place_from_end <= 8) as n_last,
+        avg(rail_temperature_c) filter (where place <= 8) as first_c,
+        avg(rail_temperature_c) filter (where place_from_end <= 8) as last_c,
+        max(slope_se_pct_per_c) as slope_se_pct_per_c, max(n_baseline) as n_baseline
     from values_pct
     group by all
 ),
@@ -40,7 +52,10 @@ pairs as (
         l.turnout_id, l.section_id, l.band, l.source, l.epoch, l.epoch_start_utc, l.last_at,
         b.last_at as before_at, b.last_pct as before_pct, l.first_pct as after_pct,
         b.n_last as n_before, l.n_first as n_after,
-        1.96 * l.sd_pct * sqrt(1 / b.n_last + 1 / l.n_first) as half
+        students_t(l.n_baseline - 2) * sqrt(
+            l.sd_pct ** 2 * (1 / b.n_last + 1 / l.n_first)
+            + (l.slope_se_pct_per_c * (l.first_c - b.last_c)) ** 2
+        ) as half
     from levels l
     join levels b
         on l.turnout_id = b.turnout_id and l.section_id = b.section_id and l.band = b.band and l.source = b.source
