@@ -1,7 +1,7 @@
 """Say that an alarm has been seen, or silence a chart until a date. The reason stays in the record.
 
   turnout acknowledge tommerup_s1/A7 --band ballast --by "M. Jensen" --reason "tamping ordered for week 14"
-  turnout acknowledge tommerup_s1 --suppress-until 2026-05-01 --by "M. Jensen" --reason "track works"
+  turnout acknowledge tommerup_s1 --suppress-until 2030-05-01 --by "M. Jensen" --reason "track works"
 
 An acknowledged alarm moves from "inspect this week" to "plan"; an alarm raised later is a new one. A suppressed
 chart is off the list until the date. Both are lines of config/acknowledgements.csv and count from the next run.

@@ -45,7 +45,7 @@ def add_arguments(parser):
         sub.add_argument("--truth", help="folder for what is true; the pipeline does not read it")
         sub.add_argument("--out", help="file to write instead of a place below --raw")
         sub.add_argument("--format", help="format of the file (default: by the ending of --out, else hdf5)")
-        sub.add_argument("--at", default="2024-05-13T09:00:00", help="time of the first sample in UTC, without a zone")
+        sub.add_argument("--at", default="2024-05-13T09:00:00", help="UTC of the first sample, no zone (%(default)s)")
         sub.add_argument("--temperature", type=float, help="rail temperature to note [°C]")
         sub.add_argument(
             "--seed",

@@ -150,7 +150,7 @@ def _gate(rows, settings) -> list[str]:
         else f"its lower 95 % limit is {floor(1e3 * lowest) / 1e3:.3f} or more around the resonances; "
     )
     compared = "that limit" if row["gate"] == "limit" else "the coherence itself"
-    lines = [_line("coherence", f"{said}the gate asks for {asked.gate_level:g} of {compared}")]
+    lines = [_line("coherence", f"{said}the gate wants {compared} at {asked.gate_level:g} or more")]
     frequency, passed = np.asarray(row["frequency_hz"]), np.asarray(row["passed"], dtype=bool)
     shares = []
     for _, low, high in settings["identify"].bands():

@@ -8,6 +8,7 @@ from turnout_blind.score.stories import tell
 from turnout_blind.seal import BlindError
 
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
+KEY = '*Red: a wrong name was among those given, also beside a right one. ½: the right name was in an "a or b".*'
 
 
 def write_page(path, out, more=None, effects=(), cases=None):
@@ -26,7 +27,7 @@ def write_page(path, out, more=None, effects=(), cases=None):
     told = tell(out, path, cases, more, oracle_of(out), effects)
     measured = "\n\n".join(
         [
-            report_of(out, more).strip(), f"![What was said along every ladder]({severity})",
+            report_of(out, more).strip(), f"![What was said along every ladder]({severity})", KEY,
             f"![Stated probability and share right]({reliability})", told,
         ]
     )  # fmt: skip

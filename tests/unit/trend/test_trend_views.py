@@ -343,6 +343,7 @@ def test_the_list_of_an_earlier_day_is_the_list_of_that_night(con, frames, setti
 def test_one_quantity_in_one_sentence_and_no_impossible_figure(frames):
     status = frames["chart_status"].assign(state="cannot_tell", reason="too_noisy", detectable_pct=1.9)
     status.loc[status["section_id"] == "T00000/S1", "detectable_pct"] = 149.0
+    status.loc[status["section_id"] == "T00000/S2", "detectable_pct"] = 1.53
     with connect_views(frames | {"chart_status": status}, frames["modes"]["measured_at_utc"].max()) as con:
         why = dict(con.execute("select section_id, why from cannot_see()").fetchall())
     # (1 - 0.019)^2 = 0.962 and (1 - 0.015)^2 = 0.970: one degree of freedom.
@@ -351,6 +352,8 @@ def test_one_quantity_in_one_sentence_and_no_impossible_figure(frames):
         "asked for: 1.5 % (3.0 %)"
     )
     assert "cannot see any change" in why["T00000/S1"] and "149" not in why["T00000/S1"]
+    # 1.53 % is more than the 1.5 % asked for, and reads so; (1 - 0.0153)^2 = 0.9696.
+    assert why["T00000/S2"].startswith("a change below 1.6 % of frequency (about 3.1 % of stiffness)")
 
 
 def test_rows_of_several_sections_name_them(con):

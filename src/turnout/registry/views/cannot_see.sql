@@ -1,3 +1,6 @@
+-- For words, where 1.53 must not be told as the 1.5 that were asked for: rounded up.
+create or replace macro up_to_a_tenth(pct) as (ceil(10 * pct - 1e-6) / 10);
+
 -- One row per chart that cannot answer at a date, and why: too noisy for the target, learning, never warm or cold
 -- enough, not measured; and one of band 'all' where no newer recording could be used, and until the next campaign where an open
 -- alarm was taken back. detectable_pct is the smallest change of frequency that it shows within a year with 90 %;
@@ -23,11 +26,11 @@ select
         when reason = 'after_event' then n_learned || ' of ' || n_needed || ' campaigns since the event'
         when band = 'amplitude' and coalesce(detectable_pct < 50, false) then
             printf('a change below %.1f %% of acceleration may go unseen for a year; asked for: %.1f %%',
-                detectable_pct, target_pct)
+                up_to_a_tenth(detectable_pct), target_pct)
         when coalesce(detectable_pct < 50, false) then
             printf('a change below %.1f %% of frequency (about %.1f %% of stiffness) may go unseen for a year; '
                 || 'asked for: %.1f %% (%.1f %%)',
-                detectable_pct, 100 * (1 - (1 - detectable_pct / 100) ** 2),
+                up_to_a_tenth(detectable_pct), up_to_a_tenth(100 * (1 - (1 - detectable_pct / 100) ** 2)),
                 target_pct, 100 * (1 - (1 - target_pct / 100) ** 2))
         else 'cannot see any change within a year: the values scatter too much'
     end as why,

@@ -9,7 +9,7 @@ from turnout.report.chart import LEFT, TOP, Axis, Chart
 
 WIDTH = 952
 # Light to dark, told apart in print and by colour-blind readers.
-KEY = "○ others held fixed, 95 %, orange: random models"
+KEY = "○ others held fixed, 95 %, magenta: random models"
 COLOURS = ("#c6dbef", "#6baed6", "#2171b5", "#08306b", "#fdd0a2", "#fd8d3c", "#d94801", "#7f2704")
 
 
@@ -22,7 +22,7 @@ def train_bars(factor, rows, sections):
         "train type", "speed" or "axle load".
     rows : list of dict
         Of ``fit_adjusted``: one score of one turnout. Bars are ``score_pct`` with its standard deviation, dots with
-        95 % intervals ``adjusted_pct``, orange lines the null.
+        95 % intervals ``adjusted_pct``, magenta lines, in no class's colour, the null.
     sections : list of dict
         In the order of the track.
     """
@@ -89,7 +89,7 @@ def _bar(chart, x, width, colour, row):
         chart.line([x, x], [_low(row), row["score_pct"] + row["score_sd_pct"]], "edge")
     if row["null_pct"] is not None:
         chart.line(
-            [x - 0.45 * width, x + 0.45 * width], [row["null_pct"]] * 2, "model", "95 % quantile of random models"
+            [x - 0.45 * width, x + 0.45 * width], [row["null_pct"]] * 2, "chance", "95 % quantile of random models"
         )
     half = np.nan if row["adjusted_se_pct"] is None else 1.96 * row["adjusted_se_pct"]
     mean = np.array([row["adjusted_pct"]])
