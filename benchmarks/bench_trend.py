@@ -1,7 +1,7 @@
 """False alarms, delays, ranking, dates and cost of the trend charts on simulated fleets of known truth.
 
 The simulator (trend_fleet.py) knows nothing of the charts. Nothing was tuned on the seeds scored here: the guard
-comes from another simulation (docs/decisions/guard_factor.md), thresholds from Siegmund's formula.
+comes from another simulation and other seeds (docs/decisions/guard_factor.md), thresholds from Siegmund's formula.
 """
 
 import json
@@ -29,6 +29,7 @@ FLEET = 56_000
 def bars():
     """All bars of the trend, in the order of the table they come from."""
     yield from false_alarms()
+    yield from rare_campaigns()
     yield from delays()
     yield from detectable()
     yield from ranking()
@@ -64,6 +65,21 @@ def false_alarms(parts=14, turnouts=500, years=3):
         words = ", ".join(f"{k} {v / weeks:.1f}" for k, v in found.items())
         yield Bar(f"T1 false alarms a week in {FLEET} charts, phi {phi}", total, 10.0, "", "<=",
                   f"n = {parts * turnouts * 8} charts x {years} a", words)  # fmt: skip
+
+
+def rare_campaigns(turnouts=750, years=5):
+    """False alarms of those promised where a campaign comes every other week, or every fourth."""
+    promised = 1.0 / SETTINGS.run_length_loss + 1.0 / SETTINGS.run_length_gain
+    for every in (2, 4):
+        for phi in (0.0, 0.2, 0.4):
+            fleet = Fleet(turnouts=turnouts, weeks=56 + YEAR * years, phi=phi ** (1 / every), every=every)
+            charts = evaluate(modes(fleet, 60 + every), None, SETTINGS)
+            n = fleet.charts
+            judged = np.isfinite(charts.z[:n]) & ~charts.learning[:n] & charts.prepared.baseline.complete[:n, None]
+            alarms = raised(charts.down_open[:n]).sum() + raised(charts.up_open[:n]).sum()
+            share = alarms / (judged.sum() * promised)
+            yield Bar(f"T1 false alarms of those promised, one campaign in {every} weeks, phi {phi}",
+                      share, None, "", "<=", f"n = {n} charts, {alarms} alarms")  # fmt: skip
 
 
 def delays(turnouts=2000):

@@ -91,10 +91,12 @@ def spread_and_memory(residual, inside, epoch, freedom, time) -> tuple[np.ndarra
     r"""Spread s and lag-one autocorrelation of a residual over the baseline, about the mean of each epoch.
 
     .. math:: s^2 = \sum_B r_i^2 / \nu, \qquad
-              \rho = \frac{\sum_B r_i r_{i-1}}{\sum_B r_i^2}, \quad \rho \leftarrow \rho + (1 + 3\rho)/n_B
+              \rho = \frac{\sum_B r_i r_{i-1}}{\sum_B r_i^2}, \quad
+              \rho \leftarrow \frac{n_B \rho + p}{n_B - p - 2}, \quad p = n_B - \nu
 
-    The second is the small-sample correction of Marriott and Pope (Biometrika 41, 1954) for an estimated mean,
-    clipped to 0 ... 0.9. Neighbours further apart than 1.5 usual intervals do not count as a pair.
+    The second takes out the bias of a short series, -(p + (p + 2) rho) / n: for an estimated mean, p = 1, that of
+    Marriott and Pope (Biometrika 41, 1954); a temperature slope, smooth over the year, costs as much as another
+    mean. Clipped to 0 ... 0.9. Neighbours further apart than 1.5 usual intervals do not count as a pair.
 
     Returns
     -------
@@ -117,7 +119,9 @@ def spread_and_memory(residual, inside, epoch, freedom, time) -> tuple[np.ndarra
         pairs = near.sum(axis=1)
         lagged = np.take_along_axis(centred, np.maximum(before, 0), axis=1)
         rho = np.sum(centred * lagged * near, axis=1) / np.where(power > 0.0, power, np.nan)
-        rho = rho + (1.0 + 3.0 * rho) / np.maximum(count.sum(axis=1), 1)
+        n_base = count.sum(axis=1)
+        fitted = n_base - freedom
+        rho = (n_base * rho + fitted) / np.maximum(n_base - fitted - 2, 1)
     return spread, np.where(pairs >= 6, np.clip(rho, 0.0, 0.9), np.nan)
 
 

@@ -55,10 +55,10 @@ def guard_factor(count, small, settings) -> np.ndarray:
 
     >>> from turnout.config.settings.trend import TrendSettings
     >>> guard_factor(np.array([52, 13]), np.array([False, False]), TrendSettings()).round(2)
-    array([1.15, 1.6 ])
+    array([1.12, 1.63])
     """
     excess = np.where(small, settings.guard_small, settings.guard_large) - 1.0
-    return 1.0 + excess * 52.0 / np.maximum(count, 1)
+    return 1.0 + excess * (52.0 / np.maximum(count, 1)) ** np.where(small, 1.0, 1.2)
 
 
 def finish(p: Prepared, memory, settings) -> Charts:

@@ -40,7 +40,7 @@ class TrendSettings:
     allowance_small: float = setting(0.5, "", "CUSUM allowance k elsewhere", minimum=0.1)
     allowance_switch: float = setting(1.2, "", "target in standard deviations from which the large k serves better")
     guard_large: float = setting(
-        1.15, "", "widening of sigma for the estimated baseline of 52 campaigns, k = 1", minimum=1.0
+        1.12, "", "widening of sigma for the estimated baseline of 52 campaigns, k = 1", minimum=1.0
     )
     guard_small: float = setting(1.25, "", "the same for k = 0.5", minimum=1.0)
     learning_large: int = setting(12, "", "campaigns that learn the level after an event, k = 1", minimum=4)
