@@ -5,10 +5,10 @@ from datetime import datetime
 
 import numpy as np
 
-from turnout.chains.accepted_terms import KINDS, described
+from turnout.chains.accepted_terms import described
 from turnout.chains.guided_case import visit_of
 from turnout.chains.mismatch_curves import band_of, band_of_blows, best_shown, curve_rows, passages_shown, reach_of
-from turnout.chains.mismatch_words import Z95, headline, otherwise
+from turnout.chains.mismatch_words import headline, interval, otherwise
 from turnout.mismatch.finding import finding_row
 from turnout.registry.ids import content_id
 
@@ -169,7 +169,7 @@ def _place(fixed):
 
 def _parameter(term, place, channel, name, value, se, unit, accepted):
     known = se is not None and np.isfinite(se)
-    low, high = _interval(term, name, float(value), se) if known else (None, None)
+    low, high = interval(term, name, float(value), se) if known else (None, None)
     return {
         "term": term,
         "position_m": place,
@@ -182,14 +182,3 @@ def _parameter(term, place, channel, name, value, se, unit, accepted):
         "unit": unit,
         "accepted": bool(accepted),
     }
-
-
-def _interval(term, name, value, se):
-    """95 % interval; what cannot be below 0 is not.
-
-    >>> [round(_interval(*what, 0.1, 0.1)[0], 3) for what in (("hanging_sleeper", "seated"), ("kink", "depth"))]
-    [0.0, -0.096]
-    """
-    listed = KINDS[term].parameters if term in KINDS else ()
-    least = 0.0 if any(p.name == name and p.bounds[0] >= 0.0 for p in listed) else -np.inf
-    return float(max(value - Z95 * se, min(least, value))), float(value + Z95 * se)

@@ -2,6 +2,9 @@
 
 import json
 
+import numpy as np
+
+from turnout.chains.accepted_terms import KINDS
 from turnout.mismatch.score import NO_UPPER_END
 
 # What the simulation lacked, in words; {place}, {channel}, {train}, {wheel}, every parameter with its
@@ -62,6 +65,27 @@ def number_in_words(value, unit, digits=2):
         return f"{1e3 * value:.{digits}g} {MILLI[unit]}"
     shown = f"{value:.{digits}g}" if abs(value) < 100 else f"{value:.0f}"
     return shown if unit in ("-", "") else f"{shown} {unit}"
+
+
+def interval(term, name, value, se) -> tuple[float, float]:
+    """95 % interval of a term's parameter; what cannot be below 0 is not.
+
+    >>> [round(interval(*what, 0.1, 0.1)[0], 3) for what in (("hanging_sleeper", "seated"), ("kink", "depth"))]
+    [0.0, -0.096]
+    """
+    listed = KINDS[term].parameters if term in KINDS else ()
+    least = 0.0 if any(p.name == name and p.bounds[0] >= 0.0 for p in listed) else -np.inf
+    return float(max(value - Z95 * se, min(least, value))), float(value + Z95 * se)
+
+
+def parameter_in_words(term, name) -> str:
+    """Name and meaning of a term's parameter, the bare name where the term is not of the library.
+
+    >>> parameter_in_words("hanging_sleeper", "gap"), parameter_in_words("kink", "depth")
+    ('gap: clearance when unloaded', 'depth')
+    """
+    listed = KINDS[term].parameters if term in KINDS else ()
+    return ": ".join([name, *(p.meaning for p in listed if p.name == name)])
 
 
 NAMES = {"power": "power of the flanks (1 straight, 2 parabolas)", "share": "share before the deepest point"}

@@ -2,7 +2,7 @@
 
 import json
 
-from turnout.chains.mismatch_words import Z95, headline, number_in_words
+from turnout.chains.mismatch_words import Z95, headline, interval, number_in_words, parameter_in_words
 
 __all__ = ["answer", "check", "facts", "filed", "headline", "parameters", "rivals"]
 ANSWERS = {
@@ -19,7 +19,7 @@ def parameters(finding) -> list[dict]:
     found = []
     for term in json.loads(finding["term_json"] or "[]"):
         for name, p in term["parameters"].items():
-            low, high = p["value"] - Z95 * p["se"], p["value"] + Z95 * p["se"]
+            low, high = interval(term["term"], name, p["value"], p["se"])
             found.append(_parameter(term["term"], None, name, p["value"], low, high, p["unit"]))
     return found
 
@@ -34,8 +34,12 @@ def _parameter(term, place, name, value, low, high, unit):
     digits = 4 if unit == "m" and abs(value) >= 10.0 else 3  # a place along the turnout, to a centimetre
     effect = term.replace("_", " ") + (f" at {place:.1f} m" if place is not None else "")
     ends = [number_in_words(end, unit, digits) for end in (low, high) if end is not None]
-    interval = " to ".join(ends) if len(ends) == 2 else "–"
-    return {"effect": effect, "name": name, "value": number_in_words(value, unit, digits), "interval": interval}
+    return {
+        "effect": effect,
+        "name": parameter_in_words(term, name),
+        "value": number_in_words(value, unit, digits),
+        "interval": " to ".join(ends) if len(ends) == 2 else "–",
+    }
 
 
 def facts(finding) -> list[tuple[str, str]]:
