@@ -35,14 +35,20 @@ def mounting(samples, rate, frequency, quality):
     return signal.lfilter(b, a, samples)
 
 
-def digitised(chain, samples, rate, down, rng, faults=()):
-    """(n // down,) numbers that the logger keeps of the true ``samples`` at ``rate`` [Hz]; ``faults`` are functions
-    (signal, rate) -> signal, applied to the analogue signal."""
+def amplified(chain, samples, rate, faults=()):
+    """What the amplifier gives of the true ``samples`` at ``rate`` [Hz]: the mounting rings before it, so that what
+    saturates shows no more than its limit. ``faults`` are functions (signal, rate) -> signal."""
     x = np.asarray(samples, dtype=float)
-    for fault in faults:
-        x = fault(x, rate)
     if chain.mount:
         x = mounting(x, rate, chain.mount, chain.quality)
+    for fault in faults:
+        x = fault(x, rate)
+    return x
+
+
+def digitised(chain, samples, rate, down, rng, faults=()):
+    """(n // down,) numbers that the logger keeps of the true ``samples`` at ``rate`` [Hz], through ``faults``."""
+    x = amplified(chain, samples, rate, faults)
     if chain.coupling:
         x = signal.sosfilt(signal.butter(1, chain.coupling, "high", fs=rate, output="sos"), x)
     x = signal.sosfilt(signal.butter(6, 0.4 * rate / down, fs=rate, output="sos"), x)[::down]

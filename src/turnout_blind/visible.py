@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from turnout_blind.instrument import mounting
+from turnout_blind.instrument import amplified
 from turnout_blind.march import STEP
 from turnout_blind.record import PASSAGE_DOWN, RATE, passage_motion, sensor_places
 from turnout_blind.run import strike
@@ -34,10 +34,8 @@ def _shown(site, world, a, kind, seed):
     """The motion as the sensors show it, faults included, noise not."""
     rows = []
     for i, chain in enumerate(site.chains):
-        x = a[i]
-        for fault in world.channels.get(chain.name, ()):
-            x = fault(kind, np.random.default_rng(seed))(x, RATE)
-        rows.append(mounting(x, RATE, chain.mount, chain.quality))
+        faults = [fault(kind, np.random.default_rng(seed)) for fault in world.channels.get(chain.name, ())]
+        rows.append(amplified(chain, a[i], RATE, faults))
     return np.array(rows)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from turnout_blind.effect import LOCKS, load_effects
-from turnout_blind.instrument import Chain, digitised, mounting
+from turnout_blind.instrument import Chain, amplified, digitised, mounting
 from turnout_blind.roughness import level, patch_share, rail_roughness, wheel_roughness
 from turnout_blind.score.names import RIGHT, SAME
 from turnout_blind.site import draw_site
@@ -137,6 +137,19 @@ def test_a_clipped_channel_shows_its_limit_as_the_mean_of_both_sides():
     small = np.linspace(-0.73, 0.73, 9) * limit
     assert shown(small, 6e4) == pytest.approx(small)
     assert 20.0 < limit / drawn.parameters["share"] < 1000.0  # a blow of 10 kN on a rail, within the sensor's range
+
+
+def test_a_saturating_amplifier_shows_no_more_than_its_limit_though_the_mounting_rings():
+    """A click rings at the mounting's 3.5 kHz, far beyond the limit; the larger side has 1.08 of that."""
+    site = draw_site(np.random.default_rng(4))
+    world = site.world.copy()
+    EFFECTS["clipping"].act(world, site, {"sensor": "A2"}, {"limit": 50.0})
+    faults = [fault("hammer", None) for fault in world.channels["A2"]]
+    click = np.zeros(6000)
+    click[1000:1010] = 400.0
+    free, shown = (np.abs(amplified(Chain("A2", 1000.0), click, 60000.0, f)).max() for f in ((), faults))
+    assert free > 3.0 * shown
+    assert shown == pytest.approx(54.0)
 
 
 def test_rail_roughness_has_its_level_in_every_octave():

@@ -39,8 +39,8 @@ def test_a_channel_at_the_range_that_its_file_states_is_no_faulty_one(limit, fou
         channels = tuple(Channel(n, "acceleration", "m/s²", limit=limit if n == "A1" else None) for n in named)
         return SimpleNamespace(recording=Recording(samples, 2000.0, channels))
 
-    sensors = [SimpleNamespace(name=n) for n in ("A1", "A2", "A3")]
-    campaign = SimpleNamespace(sensors=sensors, passages=[passage(np.exp(loud)) for loud in LOUD])
+    sensors = [SimpleNamespace(name=n, place=x) for n, x in (("A1", 1.0), ("A2", 3.0), ("A3", 5.0))]
+    campaign = SimpleNamespace(sensors=sensors, hammer=(), passages=[passage(np.exp(loud)) for loud in LOUD])
     assert list(ceilings(campaign, 12.0)) == found
 
 
@@ -56,7 +56,7 @@ def test_bangs_of_a_flat_that_one_channel_hears_less_are_no_ceiling():
         channels = tuple(Channel(n, "acceleration", "m/s²") for n in ("A1", "A2", "A3"))
         return SimpleNamespace(recording=Recording(samples, 2000.0, channels))
 
-    sensors = [SimpleNamespace(name=n) for n in ("A1", "A2", "A3")]
+    sensors = [SimpleNamespace(name=n, place=x) for n, x in (("A1", 1.0), ("A2", 3.0), ("A3", 5.0))]
     rolling = [passage(a, b, (a, b)) for a, b in zip(quiet, others, strict=True)]
     banging = [passage(a, b, (66.0, 46.0)) for a, b in zip(bangs, heard, strict=True)]
-    assert ceilings(SimpleNamespace(sensors=sensors, passages=[*rolling, *banging]), 12.0) == {}
+    assert ceilings(SimpleNamespace(sensors=sensors, hammer=(), passages=[*rolling, *banging]), 12.0) == {}

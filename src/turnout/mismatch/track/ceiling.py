@@ -1,12 +1,15 @@
-"""Channels that show no more than so much: their peaks stay where those of the other sensors follow the trains."""
+"""Channels that show no more than so much: their peaks stay where trains grow louder, or blows harder."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from turnout.mismatch.track.blow_ceiling import blow_ceiling
+
 FEWEST_PASSAGES, FEWEST_SENSORS = 4, 3
 FLOOR = 0.02  # ln; peaks fall between samples, and mountings ring behind a blow
 TOP = 0.8  # of the peak; above it a clipped channel spends its time
+RINGS = np.pi / 4.0  # what is cut off to a square rings in a recorder's filter, which passes the first of its waves
 LIMIT_SD = 0.1  # of the limit; the two sides of an amplifier seldom saturate alike
 
 
@@ -19,24 +22,35 @@ class Ceiling:
 
 
 def ceilings(campaign, threshold):
-    """Ceiling of every sensor, by name, whose passages show one beyond ``threshold`` [nats].
+    """Ceiling of every sensor, by name, whose passages and blows show one beyond ``threshold`` [nats].
 
-    Reserved passages count as well: whether a channel may be used is no prediction, and holds for them too.
+    Reserved recordings count as well: whether a channel may be used is no prediction, and holds for them too.
     """
+    rolled, found = _rolled(campaign), {}
+    for sensor in campaign.sensors:
+        limit, gain = blow_ceiling(campaign.hammer, sensor.name, sensor.place)
+        seen = rolled.get(sensor.name, Ceiling(limit, 0.0))
+        whole = seen.gain + gain - np.log(len(campaign.sensors))
+        limit = limit if gain > seen.gain else seen.limit
+        if whole > threshold and limit >= RINGS * highest(campaign, sensor.name):
+            found[sensor.name] = Ceiling(limit, float(whole))
+    return found if len(campaign.sensors) - len(found) > 1 else {}
+
+
+def _rolled(campaign):
+    """Ceiling of every sensor, by name, that passages speak for."""
     names = [s.name for s in campaign.sensors]
     recordings = [p.recording for p in campaign.passages]
     recordings = [r for r in recordings if set(names) <= {c.name for c in r.channels} and not _at_its_range(r)]
     if len(recordings) < FEWEST_PASSAGES or len(names) < FEWEST_SENSORS:
         return {}
     sizes = [np.abs(r.samples[[r.index(n) for n in names]]) for r in recordings]
-    peaks = np.log([np.maximum(np.max(x, axis=1), 1e-12) for x in sizes])
-    found = {}
+    peaks, found = np.log([np.maximum(np.max(x, axis=1), 1e-12) for x in sizes]), {}
     for k, name in enumerate(names):
-        others = np.delete(peaks, k, axis=1).mean(axis=1)
-        gain = saturation(peaks[:, k], others) - np.log(len(names))
-        if gain > threshold and (limit := _limit([x[k] for x in sizes])):
-            found[name] = Ceiling(limit, float(gain))
-    return found if len(names) - len(found) > 1 else {}
+        gain = saturation(peaks[:, k], np.delete(peaks, k, axis=1).mean(axis=1))
+        if gain > 0.0 and (limit := _limit([x[k] for x in sizes])):
+            found[name] = Ceiling(limit, gain)
+    return found
 
 
 def _at_its_range(recording):

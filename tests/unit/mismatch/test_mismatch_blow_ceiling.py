@@ -1,0 +1,91 @@
+"""Limits of channels under the hammer: what holds on both sides, what grows, what is known to end there."""
+
+import numpy as np
+import pytest
+from scipy.signal import fftconvolve
+
+from turnout.mismatch.track.blow_ceiling import FLOOR, blow_ceiling, held
+from turnout.mismatch.track.campaign import HammerTest
+from turnout.records import Channel, Recording
+from turnout.signal.pulses import force_pulse
+
+RATE = 20_000.0
+FORCES = np.array([6.0, 6.7, 7.7, 8.4, 9.3, 10.4]) * 1e3
+POLE = -250.0 + 2j * np.pi * 430.0
+
+
+def blows(place, saturated=lambda x: x, share=1.0, limit=None):
+    """A test of six blows at ``place`` on one mode; the channel A shows ``share`` of it, ``saturated``."""
+    t = np.arange(4000) / RATE
+    mode = np.real(np.exp(POLE * t) * (2.0 - 0.7j)) * 2e-3
+    channels = (Channel("force", "force"), Channel("A", "acceleration", limit=limit))
+    rng, made = np.random.default_rng(int(10.0 * place)), []
+    for k, peak in enumerate(FORCES):
+        force = peak * force_pulse("half-sine", t - 0.025, 1.5e-3)
+        shown = saturated(share * fftconvolve(force, mode)[: t.size])
+        noise = rng.normal(size=(2, t.size)) * np.array([[1e-4 * peak], [0.01]])
+        made.append(Recording(np.array([force, shown]) + noise, RATE, channels, source="t.uff", record=k))
+    return HammerTest(f"blows at {place}", place, tuple(made), "force")
+
+
+def uneven(x, limit=30.0):
+    """One side holds at 1.2, the other at 0.8 of ``limit``."""
+    return np.clip(x, -0.8 * limit, 1.2 * limit)
+
+
+def test_peaks_that_hold_gain_the_logarithm_of_the_growth_they_lack():
+    x = np.log(FORCES)
+    limit, gain = held([(x, np.full(6, np.log(50.0)))])
+    assert limit == pytest.approx(50.0)
+    assert gain == pytest.approx(3.0 * np.log(1.0 + np.var(x) / FLOOR**2) - 0.5 * np.log(6.0))
+
+
+@pytest.mark.parametrize("slope", [1.0, 1.4])
+def test_peaks_that_grow_with_the_force_or_faster_gain_nothing(slope):
+    scatter = 0.01 * np.array([1.0, -1.0, 0.5, -0.5, 1.0, -1.0])
+    x = np.log(FORCES)
+    assert held([(x, slope * x - 5.0 + scatter), (x, slope * x - 6.0 - scatter)])[1] < 0.0
+
+
+def test_one_limit_holds_in_all_tests_that_reach_it():
+    """A far test stays below the limit; of two that reach it each alone tells half."""
+    x, top = np.log(FORCES), np.log(50.0)
+    near, far = (x, np.minimum(top, x - 4.9)), (x, 1.3 * x - 9.5)
+    assert far[1].max() < top
+    both, one = held([near, (x + 0.01, near[1]), far])[1], held([near, far])[1]
+    assert both > 1.6 * one > 12.0
+
+
+def test_each_side_of_an_amplifier_holds_for_itself():
+    """Limits of 36 and 24 m/s² are one of 30; a twentieth of that is within the scatter that is allowed for."""
+    limit, gain = blow_ceiling([blows(3.0, uneven), blows(6.0, uneven, share=0.2)], "A", 3.0)
+    assert gain > 12.0
+    assert limit == pytest.approx(30.0, rel=0.05)
+
+
+def test_a_linear_channel_has_no_ceiling():
+    limit, gain = blow_ceiling([blows(3.0), blows(6.0, share=0.2)], "A", 3.0)
+    assert np.isnan(limit)
+    assert gain == 0.0
+
+
+def test_beside_the_blow_one_side_alone_proves_nothing():
+    """There waves of all lengths meet: at 6 m, not struck, a channel has to hold on both sides."""
+
+    def one_side(x):
+        return np.minimum(x, 24.0)
+
+    tests = [blows(3.0, one_side), blows(9.0, one_side)]
+    assert blow_ceiling(tests, "A", 3.0)[1] > 12.0
+    assert blow_ceiling(tests, "A", 6.0)[1] == 0.0
+    assert blow_ceiling([blows(3.0, uneven), blows(9.0, uneven)], "A", 6.0)[1] > 12.0
+
+
+def test_a_range_that_the_file_states_is_no_fault():
+    """No blow below it is left."""
+    assert blow_ceiling([blows(3.0, lambda x: np.clip(x, -24.0, 24.0), limit=24.0)], "A", 3.0)[1] == 0.0
+
+
+def test_a_channel_that_was_not_there_has_none():
+    assert blow_ceiling([blows(3.0, uneven)], "B", 3.0)[1] == 0.0
+    assert blow_ceiling([], "A", 3.0)[1] == 0.0
