@@ -5,6 +5,7 @@ import numpy as np
 from turnout.mismatch.apart import changed
 
 AS_PLAIN, WITNESSES = 0.5, 2  # of the energy that the effect has in the recording that speaks for it; so many others
+HIDDEN = 0.01  # of the energy that an effect has where it shows most: there it does not show, a tenth in amplitude
 TOLD = 0.5  # of the evidence; where conditions left out tell less, the rest is what nuisances pay for the effect
 SPOTS = 3  # at which the hammer fell; of fewer none can be called the odd one
 SPOKEN = (1.0, 0.5)  # of the threshold: what the blows at the odd spot say, and all else together does not
@@ -67,3 +68,13 @@ def plainness(case, fit, candidate):
         energy = o.effective * float(np.sum(change**2))
         found[o.condition] = found.get(o.condition, 0.0) + energy
     return found
+
+
+def told_apart(case, fit, by_condition):
+    """Gain of the conditions in which none of the effects of ``fit`` shows, 0 where it has none. [nats]"""
+    quiet = dict(by_condition) if fit.candidates else {}
+    for candidate in fit.candidates:
+        shown = plainness(case, fit, candidate)
+        most = max(shown.values(), default=np.inf)
+        quiet = {c: gain for c, gain in quiet.items() if shown.get(c, most) < HIDDEN * most}
+    return float(sum(quiet.values()))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.alone import hangs_on
+from turnout.mismatch.alone import hangs_on, told_apart
 from turnout.mismatch.anew import begun_anew
 from turnout.mismatch.ends import ended, kept
 from turnout.mismatch.held_out import held_out_score
@@ -187,7 +187,8 @@ def _checked(case, fit, score, settings):
     mine, reference = held_out_score(case, score.fit), held_out_score(case, fit)
     by_condition = {c: mine[c] - reference[c] for c in reference}
     alone = hangs_on(case, score.fit, score.candidate, score.gain, by_condition, settings) if score.material else ""
-    return replace(score, worst=min(by_condition.values(), default=0.0), by_condition=by_condition, alone=alone)
+    worst, apart = min(by_condition.values(), default=0.0), told_apart(case, fit, by_condition)
+    return replace(score, worst=worst, by_condition=by_condition, alone=alone, apart=apart)
 
 
 def _refit(case, fit, candidate, start, back, far, settings):

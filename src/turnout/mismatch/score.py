@@ -22,6 +22,7 @@ class Score:
     by_condition: dict = field(default_factory=dict)
     usual: bool = False
     alone: str = ""
+    apart: float = 0.0
 
     @property
     def own(self):
@@ -45,8 +46,11 @@ class Score:
         return size - open_by >= self.candidate.least
 
     def told_elsewhere(self, settings):
-        """Data that are not those of the fit are evidence enough for it, and it makes the fit worse by no more than a
-        margin, which its own numbers cost: what is left there is no witness against."""
+        """What is left of the fit is no witness against it: data that are not those of the fit are evidence enough, and
+        it makes the fit worse by no more than a margin, which its own numbers cost; or conditions are in which nothing
+        shows that was named before, whose shape may be what is left elsewhere."""
+        if self.apart > settings.threshold:
+            return True
         told = self.candidate.aside - np.log(self.candidate.scanned)
         return self.candidate.sounding and told > settings.threshold and self.gain > told - settings.margin
 

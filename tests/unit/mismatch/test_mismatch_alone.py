@@ -7,7 +7,7 @@ import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
-from turnout.mismatch.alone import hangs_on, plainness
+from turnout.mismatch.alone import hangs_on, plainness, told_apart
 from turnout.mismatch.candidate import Candidate
 from turnout.mismatch.case import Case
 from turnout.mismatch.joint import fit_jointly
@@ -67,6 +67,31 @@ def test_what_one_recording_says_and_its_like_do_not(loud, gains, alone):
     assert hangs_on(case, fit, case.candidates[0], 25.0, gains, MismatchSettings()) == alone
     of_a_train = replace(case.candidates[0], where={"train": "ic3"})
     assert hangs_on(case, fit, of_a_train, 25.0, gains, MismatchSettings()) == ""
+
+
+@pytest.mark.parametrize(
+    "loud, nats",
+    [
+        ((1.0, 0.13, 0.0), 32.0),  # half of 0.13 squared is 0.8 % of the energy: not seen in b, nor in c
+        ((1.0, 0.15, 0.0), 30.0),  # 1.1 %: b may hold what the first leaves
+        ((1.0, 0.9, 1.0), 0.0),
+        ((1.0, 0.13, -1.0), 0.0),  # it cannot be said without
+    ],
+)
+def test_recordings_without_the_first_effect_tell_of_the_second(loud, nats):
+    case, fit = fitted(loud)
+    gains = {"a": 7.0, "b": 2.0, "c": 30.0}
+    assert told_apart(case, fit, gains) == nats
+    assert told_apart(case, replace(fit, candidates=()), gains) == 0.0  # a first effect has none before it
+
+
+@pytest.mark.parametrize("apart, answer", [(12.5, "named"), (11.5, "unknown")])
+def test_what_others_tell_need_not_explain_what_the_first_left(apart, answer):
+    """A tenth of an excess of twice the level of controls, which may be the shape of the effect named before."""
+    candidate = Candidate("bump", (), lambda p: None, ())
+    said = judge([Score(candidate, 40.0, 0.0, 0.1, None, apart=apart)], 2.0, MismatchSettings())
+    assert said.answer == answer
+    assert "explains 10%" in said.reason
 
 
 class Struck(Days):
