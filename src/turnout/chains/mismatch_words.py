@@ -92,13 +92,19 @@ NAMES = {"power": "power of the flanks (1 straight, 2 parabolas)", "share": "sha
 
 
 def headline(finding) -> str:
+    """The ``title``, and behind a name what else shows or speaks for it."""
+    said, reason = title(finding), json.loads(finding["evidence_json"] or "{}").get("reason")
+    if finding["verdict"] != "named" or not reason or not json.loads(finding["term_json"] or "[]"):
+        return said
+    return f"{said} {reason[:1].upper()}{reason[1:]}."
+
+
+def title(finding) -> str:
     """One sentence: what the simulation left out, or what is known instead."""
     terms = json.loads(finding["term_json"] or "[]")
     if finding["verdict"] in ("named", "a_or_b") and terms:
         rivals = [finding["rival_term"] if finding["verdict"] == "a_or_b" else None, *(None for _ in terms[1:])]
-        said = "; ".join(_sentence(t, finding) + _or(t.get("or", rival)) for t, rival in zip(terms, rivals))
-        more = json.loads(finding["evidence_json"] or "{}").get("reason") if finding["verdict"] == "named" else ""
-        return f"{said}. {more[:1].upper()}{more[1:]}." if more else f"{said}."
+        return "; ".join(_sentence(t, finding) + _or(t.get("or", rival)) for t, rival in zip(terms, rivals)) + "."
     low, high = finding["place_low_m"], finding["place_high_m"]
     if finding["verdict"] == "unknown":
         return f"Something is missing {_somewhere(finding, low, high)}, and no known effect explains it."
@@ -125,7 +131,8 @@ def otherwise(told) -> str:
 
 
 def _or(other) -> str:
-    return f", or it is {other.replace('_', ' ')}: these recordings cannot tell the two apart" if other else ""
+    name = (other or "").replace("_", " ")
+    return f", or what was left out is “{name}”: these recordings cannot tell the two apart" if other else ""
 
 
 def _somewhere(finding, low, high):

@@ -2,9 +2,9 @@
 
 import json
 
-from turnout.chains.mismatch_words import Z95, headline, interval, number_in_words, parameter_in_words
+from turnout.chains.mismatch_words import Z95, headline, interval, number_in_words, parameter_in_words, title
 
-__all__ = ["answer", "check", "facts", "filed", "headline", "parameters", "rivals"]
+__all__ = ["answer", "check", "facts", "filed", "headline", "parameters", "rivals", "title"]
 ANSWERS = {
     "none": "nothing is missing",
     "named": "named",

@@ -141,6 +141,9 @@ def test_what_shows_beside_a_name_stands_in_its_sentence():
     row = named() | {"evidence_json": json.dumps(EVIDENCE | {"reason": reason})}
     said = "hangs 1.1 mm above its ballast. Something else shows beside it: above the level of controls"
     assert said in headline(row) and "above its ballast." in headline(named())
+    heading = page(row).split("<h1>")[1].split("</h1>")[0]
+    assert heading.endswith("above its ballast.")  # the rest stands under "How sure"
+    assert reason in dict(facts(row))["How sure"]
 
 
 PAD = {"term": "local_pad", "fixed": {"sleeper": 8.4}, "probability": 0.97,
@@ -155,7 +158,8 @@ def test_of_two_effects_each_says_how_sure_it_is_and_what_else_it_may_be():
     }  # fmt: skip
     said = headline(row)
     assert "at 8.4 m is 0.3 times as stiff" in said
-    assert said.endswith("above its ballast, or it is local ballast: these recordings cannot tell the two apart.")
+    torn = "above its ballast, or what was left out is “local ballast”: these recordings cannot tell the two apart."
+    assert said.endswith(torn)
     sure = dict(facts(row))["How sure"]
     assert sure.startswith("probability 0.80") and "local pad 0.97, hanging sleeper 0.80" in sure
     with pytest.raises(SimulationError, match="hanging_sleeper may as well be local_ballast"):
@@ -177,7 +181,7 @@ def test_axes_carry_their_units():
 
 def test_one_of_two_says_which_measurement_would_tell():
     row = ROWS["a_or_b"] | {"next_measurement": "Measure passages of a lighter and a heavier train"}
-    assert "or it is local ballast: these recordings cannot tell the two apart" in headline(row)
+    assert "or what was left out is “local ballast”: these recordings cannot tell the two apart" in headline(row)
     assert check(row) == "Measure passages of a lighter and a heavier train."
 
 

@@ -1,6 +1,6 @@
 """The page of a turnout's mismatches: understood in one minute, evidence below."""
 
-from turnout.report.finding_words import answer, check, facts, filed, headline, parameters, rivals
+from turnout.report.finding_words import answer, check, facts, filed, parameters, rivals, title
 from turnout.report.panels.finding_curves import curve_panel, fit_panel, history_of_parameter
 from turnout.report.panels.finding_place import place_panel
 from turnout.report.words import day
@@ -42,7 +42,7 @@ def _finding(finding, rows, number):
         "number": number,
         "id": finding["finding_id"][:12],
         "sections": finding["sections"],
-        "headline": headline(finding),
+        "headline": title(finding),
         "badge": BADGES[finding["verdict"]],
         "answer": answer(finding),
         "quiet": finding["verdict"] == "none",
