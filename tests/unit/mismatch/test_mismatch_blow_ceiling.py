@@ -8,6 +8,7 @@ from turnout.mismatch.track.blow_ceiling import FLOOR, blow_ceiling, held
 from turnout.mismatch.track.campaign import HammerTest
 from turnout.records import Channel, Recording
 from turnout.signal.pulses import force_pulse
+from turnout.simulate.sensor import Sensor
 
 RATE = 20_000.0
 FORCES = np.array([6.0, 6.7, 7.7, 8.4, 9.3, 10.4]) * 1e3
@@ -26,6 +27,10 @@ def blows(place, saturated=lambda x: x, share=1.0, limit=None):
         noise = rng.normal(size=(2, t.size)) * np.array([[1e-4 * peak], [0.01]])
         made.append(Recording(np.array([force, shown]) + noise, RATE, channels, source="t.uff", record=k))
     return HammerTest(f"blows at {place}", place, tuple(made), "force")
+
+
+def at(place, name="A", mounting="rail web"):
+    return Sensor(name, place, mounting)
 
 
 def uneven(x, limit=30.0):
@@ -58,13 +63,13 @@ def test_one_limit_holds_in_all_tests_that_reach_it():
 
 def test_each_side_of_an_amplifier_holds_for_itself():
     """Limits of 36 and 24 m/s² are one of 30; a twentieth of that is within the scatter that is allowed for."""
-    limit, gain = blow_ceiling([blows(3.0, uneven), blows(6.0, uneven, share=0.2)], "A", 3.0)
+    limit, gain = blow_ceiling([blows(3.0, uneven), blows(6.0, uneven, share=0.2)], at(3.0))
     assert gain > 12.0
     assert limit == pytest.approx(30.0, rel=0.05)
 
 
 def test_a_linear_channel_has_no_ceiling():
-    limit, gain = blow_ceiling([blows(3.0), blows(6.0, share=0.2)], "A", 3.0)
+    limit, gain = blow_ceiling([blows(3.0), blows(6.0, share=0.2)], at(3.0))
     assert np.isnan(limit)
     assert gain == 0.0
 
@@ -76,16 +81,27 @@ def test_beside_the_blow_one_side_alone_proves_nothing():
         return np.minimum(x, 24.0)
 
     tests = [blows(3.0, one_side), blows(9.0, one_side)]
-    assert blow_ceiling(tests, "A", 3.0)[1] > 12.0
-    assert blow_ceiling(tests, "A", 6.0)[1] == 0.0
-    assert blow_ceiling([blows(3.0, uneven), blows(9.0, uneven)], "A", 6.0)[1] > 12.0
+    assert blow_ceiling(tests, at(3.0))[1] > 12.0
+    assert blow_ceiling(tests, at(6.0))[1] == 0.0
+    assert blow_ceiling([blows(3.0, uneven), blows(9.0, uneven)], at(6.0))[1] > 12.0
+
+
+def test_a_sensor_on_the_sleeper_is_not_where_the_rail_is_struck():
+    tests = [blows(3.0, lambda x: np.minimum(x, 24.0))]
+    assert blow_ceiling(tests, at(3.0))[1] > 12.0
+    assert blow_ceiling(tests, at(3.0, mounting="sleeper end"))[1] == 0.0
+
+
+@pytest.mark.parametrize("share", [0.0, 1e-4])
+def test_noise_that_no_blow_exceeds_stays_and_is_no_limit(share):
+    assert blow_ceiling([blows(3.0, share=share), blows(9.0, share=share)], at(3.0))[1] == 0.0
 
 
 def test_a_range_that_the_file_states_is_no_fault():
     """No blow below it is left."""
-    assert blow_ceiling([blows(3.0, lambda x: np.clip(x, -24.0, 24.0), limit=24.0)], "A", 3.0)[1] == 0.0
+    assert blow_ceiling([blows(3.0, lambda x: np.clip(x, -24.0, 24.0), limit=24.0)], at(3.0))[1] == 0.0
 
 
 def test_a_channel_that_was_not_there_has_none():
-    assert blow_ceiling([blows(3.0, uneven)], "B", 3.0)[1] == 0.0
-    assert blow_ceiling([], "A", 3.0)[1] == 0.0
+    assert blow_ceiling([blows(3.0, uneven)], at(3.0, "B"))[1] == 0.0
+    assert blow_ceiling([], at(3.0))[1] == 0.0

@@ -12,21 +12,21 @@ SHOWN = 0.9  # of the largest peak: no limit lies below what a channel has shown
 STEP = 0.25 * FLOOR  # between limits that are tried
 
 
-def blow_ceiling(hammer, name, place):
-    """(limit [m/s²], gain [nats]) of the channel ``name`` at ``place`` [m] in the tests ``hammer``; (nan, 0.0) where
-    blows show none.
+def blow_ceiling(hammer, sensor):
+    """(limit [m/s²], gain [nats]) of a sensor's channel in the tests ``hammer``; (nan, 0.0) where blows show none.
 
     Each side of an amplifier for itself; the limit is the mean of those that hold. Where the rail is struck its peaks
     grow with the force: the plainer side speaks. Beside it waves of all lengths meet, which may hold one side while the
     pulse grows shorter, but not both: the lesser side speaks.
     """
-    tests = [(test.place, _peaks(test, name)) for test in hammer]
+    tests = [(test.place, _peaks(test, sensor.name)) for test in hammer]
     tests = [(x, peaks) for x, peaks in tests if peaks is not None]
     if not tests:
         return float("nan"), 0.0
     sides = [held([(force, side[k]) for _, (force, side) in tests]) for k in (0, 1)]
     gains = [gain for _, gain in sides]
-    gain = max(gains) if any(abs(x - place) < STRUCK for x, _ in tests) else min(gains)
+    struck = not sensor.mounting.startswith("sleeper") and any(abs(x - sensor.place) < STRUCK for x, _ in tests)
+    gain = max(gains) if struck else min(gains)
     if gain <= 0.0:
         return float("nan"), 0.0
     return float(np.mean([limit for limit, own in sides if own > 0.0])), gain

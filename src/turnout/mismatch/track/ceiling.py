@@ -28,7 +28,7 @@ def ceilings(campaign, threshold):
     """
     rolled, found = _rolled(campaign), {}
     for sensor in campaign.sensors:
-        limit, gain = blow_ceiling(campaign.hammer, sensor.name, sensor.place)
+        limit, gain = blow_ceiling(campaign.hammer, sensor)
         seen = rolled.get(sensor.name, Ceiling(limit, 0.0))
         whole = seen.gain + gain - np.log(len(campaign.sensors))
         limit = limit if gain > seen.gain else seen.limit
