@@ -1,7 +1,7 @@
 """What an effect is: a file in ``effects/``, or one of your own in a folder given to `turnout blind make --effects`.
 
 The file defines ``EFFECT``, an ``Effect``. Nothing else has to know of it: the plan gives it cases, the seal hides
-them, the scorer counts every name for it as wrong unless ``docs/blind.md`` or ``--names`` says which one is right.
+them, the scorer counts every name for it as wrong unless ``score/names.py`` or ``--names`` says which one is right.
 """
 
 from collections.abc import Callable, Mapping

@@ -46,13 +46,15 @@ class Score:
         return size - open_by >= self.candidate.least
 
     def told_elsewhere(self, settings):
-        """What is left of the fit is no witness against it: data that are not those of the fit are evidence enough, and
-        it makes the fit worse by no more than a margin, which its own numbers cost; or conditions are in which nothing
-        shows that was named before, whose shape may be what is left elsewhere."""
-        if self.apart > settings.threshold:
-            return True
-        told = self.candidate.aside - np.log(self.candidate.scanned)
-        return self.candidate.sounding and told > settings.threshold and self.gain > told - settings.margin
+        """Why what is left of the fit is no witness against it, in words, "" where it is one: data that are not those
+        of the fit are evidence enough, and it makes the fit worse by no more than a margin, which its own numbers cost;
+        or conditions are in which nothing shows that was named before, whose shape may be what is left elsewhere."""
+        places = np.log(self.candidate.scanned)
+        told = self.candidate.aside - places
+        if self.candidate.sounding and told > settings.threshold and self.gain > told - settings.margin:
+            return "known by its blows"
+        apart = self.apart - places > settings.threshold
+        return "seen where the effect named before does not show" if apart else ""
 
     def faint(self, excess, settings):
         """It explains too little of an ``excess`` over controls to be what makes it."""

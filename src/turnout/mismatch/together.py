@@ -88,8 +88,12 @@ def needed(case, base, fit, verdicts, settings):
     first, second = (v.scores[0] for v in verdicts)
     if alone is None or _gained(fit, alone, first.candidate) > settings.threshold:
         return verdicts, fit
-    own = replace(second, fit=alone, gain=_gained(alone, base, second.candidate))
-    return [replace(verdicts[1], scores=(own, *verdicts[1].scores[1:]))], alone
+    explained = explained_of(case, base, alone, settings)
+    own = replace(second, fit=alone, gain=_gained(alone, base, second.candidate), explained=explained, apart=0.0)
+    said = replace(verdicts[1], scores=(own, *verdicts[1].scores[1:]))
+    if own.faint(heard(case, base, settings), settings) and not own.told_elsewhere(settings):
+        return [_unknown(said, f"the best candidate explains {explained:.0%} of the excess", settings)], base
+    return [said], alone
 
 
 def borne_out(case, fit, verdicts, settings):

@@ -184,5 +184,4 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
     if rivals:
         return verdict("a_or_b", (best.family, rivals[0].family), reason="within the margin of each other")
     grade = "A" if left <= 1.0 else "B"
-    known = "by its blows" if best.candidate.sounding else "where nothing shows that was named before"
-    return verdict("named", (best.family,), grade, faint and f"known {known}; it {faint}")
+    return verdict("named", (best.family,), grade, faint and f"{best.told_elsewhere(settings)}; it {faint}")

@@ -2,9 +2,9 @@
 
 import json
 
-from turnout.chains.mismatch_words import Z95, headline, interval, number_in_words, parameter_in_words, title
+from turnout.chains.mismatch_words import Z95, interval, number_in_words, parameter_in_words, title
 
-__all__ = ["answer", "check", "facts", "filed", "headline", "parameters", "rivals", "title"]
+__all__ = ["answer", "check", "facts", "filed", "parameters", "rivals", "title"]
 ANSWERS = {
     "none": "nothing is missing",
     "named": "named",
@@ -117,8 +117,14 @@ def _sure(finding, evidence):
     if evidence.get("reason"):
         words += f"; {evidence['reason']}"
     stated = [evidence, *evidence["beside"]] if evidence.get("beside") else []
-    each = ", ".join(f"{s['term'].replace('_', ' ')} {s['probability']:.2f}" for s in stated if s["term"])
+    each = ", ".join(_by_itself(s, s is not evidence) for s in stated if s["term"])
     return f"{words}; each by itself: {each}" if each else words
+
+
+def _by_itself(said, further):
+    """Name and probability of one of several effects; the reason of a ``further`` one, which stands nowhere else."""
+    why = f" ({said['reason']})" if further and said.get("reason") else ""
+    return f"{said['term'].replace('_', ' ')} {said['probability']:.2f}{why}"
 
 
 def answer(finding) -> str:

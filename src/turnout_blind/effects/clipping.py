@@ -1,4 +1,4 @@
-"""An amplifier that saturates softly, one side before the other; its limit counts in peaks that the channel meets."""
+"""An amplifier that saturates softly, one side before the other; its limit counts in peaks of the rail's motion."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from turnout_blind.run import strike
 
 
 def peak(site, sensor):
-    """Largest acceleration of a sensor [m/s²] in one ordinary blow at each place and in the fastest passage."""
+    """Largest acceleration of the rail at a sensor [m/s²] in an ordinary blow at each place and the fastest passage."""
     i, places = site.names().index(sensor), sensor_places(site, site.world)
     blows = [strike(site.world, places, x, [0.0], [0.95], 0.03, tip=site.tip)[1][i] for x in site.blows]
     fastest = max(range(len(site.passages)), key=lambda k: site.passages[k].speed)

@@ -85,13 +85,17 @@ def test_recordings_without_the_first_effect_tell_of_the_second(loud, nats):
     assert told_apart(case, replace(fit, candidates=()), gains) == 0.0  # a first effect has none before it
 
 
-@pytest.mark.parametrize("apart, answer", [(12.5, "named"), (11.5, "unknown")])
-def test_what_others_tell_need_not_explain_what_the_first_left(apart, answer):
-    """A tenth of an excess of twice the level of controls, which may be the shape of the effect named before."""
-    candidate = Candidate("bump", (), lambda p: None, ())
+@pytest.mark.parametrize(
+    "apart, places, answer", [(12.5, 1, "named"), (11.5, 1, "unknown"), (15.1, 20, "named"), (14.9, 20, "unknown")]
+)
+def test_what_others_tell_need_not_explain_what_the_first_left(apart, places, answer):
+    """A tenth of an excess of twice the level of controls, which may be the shape of the effect named before; of 20
+    places each costs the evidence 3 nats."""
+    candidate = Candidate("bump", (), lambda p: None, (), scanned=places)
     said = judge([Score(candidate, 40.0, 0.0, 0.1, None, apart=apart)], 2.0, MismatchSettings())
     assert said.answer == answer
     assert "explains 10%" in said.reason
+    assert ("does not show" in said.reason) == (answer == "named")
 
 
 class Struck(Days):

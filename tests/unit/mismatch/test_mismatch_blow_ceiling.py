@@ -1,11 +1,14 @@
 """Limits of channels under the hammer: what holds on both sides, what grows, what is known to end there."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.signal import fftconvolve
 
 from turnout.mismatch.track.blow_ceiling import FLOOR, blow_ceiling, held
 from turnout.mismatch.track.campaign import HammerTest
+from turnout.mismatch.track.ceiling import ceilings
 from turnout.records import Channel, Recording
 from turnout.signal.pulses import force_pulse
 from turnout.simulate.sensor import Sensor
@@ -105,3 +108,44 @@ def test_a_range_that_the_file_states_is_no_fault():
 def test_a_channel_that_was_not_there_has_none():
     assert blow_ceiling([blows(3.0, uneven)], at(3.0, "B"))[1] == 0.0
     assert blow_ceiling([], at(3.0))[1] == 0.0
+
+
+def two_tests():
+    return [blows(3.0, uneven), blows(3.1, uneven)]
+
+
+def campaign(names="ABC", hammer=(), peaks=()):
+    """Sensors 3 m apart, the first where blows fall; of each passage the peak that A shows and that of all others."""
+    sensors = [at(3.0 * (k + 1), name) for k, name in enumerate(names)]
+    channels = tuple(Channel(name, "acceleration") for name in names)
+    wave, passages = np.sin(np.linspace(0.0, 50.0, 1001)), []
+    for mine, theirs in peaks:
+        samples = np.outer([mine, *[theirs] * (len(names) - 1)], wave)
+        passages.append(SimpleNamespace(recording=Recording(samples, 2000.0, channels)))
+    return SimpleNamespace(sensors=sensors, hammer=hammer, passages=passages)
+
+
+@pytest.mark.parametrize("names, found", [("ABC", ["A"]), ("AB", ["A"]), ("A", [])])
+def test_blows_alone_tell_a_ceiling_but_not_of_the_only_channel(names, found):
+    known = ceilings(campaign(names, two_tests()), 12.0)
+    assert list(known) == found
+    assert all(c.limit == pytest.approx(30.0, rel=0.05) for c in known.values())
+
+
+@pytest.mark.parametrize("shown, found", [(40.0, ["A"]), (45.0, [])])
+def test_no_limit_lies_far_below_what_trains_have_shown(shown, found):
+    """Of 30 a square wave rings up to 38 m/s² in the recorder's filter, of the louder side by a tenth more."""
+    assert list(ceilings(campaign(hammer=two_tests(), peaks=[(shown, 200.0)]), 12.0)) == found
+
+
+@pytest.mark.parametrize("limit, share", [(30.0, 1.0), (10.0, 0.0)])
+def test_two_that_speak_for_one_limit_speak_together(limit, share):
+    """Trains of 60 to 300 m/s² of which A shows no more than ``limit``, blows of which it shows 30."""
+    peaks = [(min(limit, 0.3 * loud), loud) for loud in (60.0, 90.0, 130.0, 180.0, 240.0, 300.0)]
+    rolled, struck = (
+        ceilings(campaign(hammer=hammer, peaks=rolls), 3.0)["A"] for hammer, rolls in (((), peaks), (two_tests(), ()))
+    )
+    both = ceilings(campaign(hammer=two_tests(), peaks=peaks), 3.0)["A"]
+    plainer, lesser = sorted((rolled, struck), key=lambda c: -c.gain)
+    assert both.limit == plainer.limit
+    assert both.gain == pytest.approx(plainer.gain + share * (lesser.gain + np.log(3.0)))

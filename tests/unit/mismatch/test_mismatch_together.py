@@ -1,5 +1,6 @@
 """Two effects at once: refused one by one, named together; and laws that say the same with fewer numbers."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -302,6 +303,21 @@ def test_a_first_name_that_the_second_leaves_nothing_to_is_dropped():
         found, last = needed(case, fit_jointly(case), fit, verdicts, settings)
         assert tuple(v.names[0] for v in found) == left == tuple(c.family for c in last.candidates)
     assert last.psi == pytest.approx([2.5, 2.5], abs=0.15)
+
+
+@pytest.mark.parametrize("ripple, said", [(0.0, "named"), (3.0, "unknown")])
+def test_a_second_name_that_is_left_alone_has_to_explain_what_is_there(ripple, said):
+    """Beside a bowl that was named first it needed not: the ripple could have been the bowl's shape."""
+    case, settings = Shapes(("ramp", "bowl"), ramp=2.5, ripple=ripple), MismatchSettings()
+    pair = case.candidates[::-1]
+    fit = fit_jointly(case, pair, [0.1, 0.1], iterations=20)
+    verdicts = [
+        Verdict("named", (c.family,), "A", 0.97, {}, (Score(c, 50.0, 0.0, 0.1, fit, apart=40.0),)) for c in pair
+    ]
+    verdicts = [replace(v, posterior={v.names[0]: 0.9, "unknown": 0.1}) for v in verdicts]
+    found, last = needed(case, fit_jointly(case), fit, verdicts, settings)
+    assert [v.answer for v in found] == [said]
+    assert len(last.candidates) == (said == "named")
 
 
 @pytest.mark.parametrize("reserved, left", [(0.0, ("ramp",)), (0.55, ("ramp", "bowl")), (1.0, ("ramp", "bowl"))])

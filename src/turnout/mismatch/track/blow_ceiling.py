@@ -5,8 +5,7 @@ import numpy as np
 from turnout.receptance import find_impacts
 
 FEWEST = 3  # blows of a test, so that its own level and the scatter about it are known
-FLOOR = 0.02  # ln; peaks fall between samples, and blows beside the mark
-AT_RANGE = 0.999  # of the range that a file states: that a channel goes no higher is known
+FLOOR = 0.02  # ln; peaks fall between samples, mountings ring and blows fall beside the mark
 STRUCK = 0.3  # m, half a bay: so near the blow a channel shows what the rail does there
 SHOWN = 0.9  # of the largest peak: no limit lies below what a channel has shown
 STEP = 0.25 * FLOOR  # between limits that are tried
@@ -33,13 +32,10 @@ def blow_ceiling(hammer, sensor):
 
 
 def _peaks(test, name):
-    """(ln peak of the force (n,), ln peaks of the channel (2, n), upward and downward) of a test's sound blows, None
-    where there are too few."""
+    """(ln peak of the force (n,), ln peaks of the channel (2, n), upward and downward) of a test's sound blows, none of
+    which reaches the range that its file states; None where there are too few."""
     heard = [r for r in test.recordings if any(c.name == name for c in r.channels)]
-    limits = [r.channels[r.index(name)].limit for r in heard]
-    least = min((x for x in limits if x is not None), default=np.inf)
-    blows = [i for i in find_impacts(heard, test.force, name, test.judged) if i.accepted] if heard else []
-    blows = [i for i in blows if np.max(np.abs(i.acceleration)) < AT_RANGE * least]
+    blows = [i for i in find_impacts(heard, test.force, name, test.judged) if i.accepted]
     if len(blows) < FEWEST:
         return None
     sides = [[np.max(sign * i.acceleration) for i in blows] for sign in (1.0, -1.0)]
@@ -49,7 +45,7 @@ def _peaks(test, name):
 def held(tests):
     r"""(limit, gain [nats]) of one limit over all ``tests``, pairs (ln forces (n,), ln peaks (n,)).
 
-    .. math:: y = \min(c,\, a_t + x) + e \quad\text{against}\quad y = a_t + b_t x + e,\ b_t \ge 1, \qquad
+    .. math:: y = \min(c,\, a_t + b_t x) + e \quad\text{against}\quad y = a_t + b_t x + e,\ b_t \ge 1, \qquad
               g = \tfrac n2 \ln\frac{s_0^2 + f^2}{s_1^2 + f^2} - \tfrac12 \ln n
 
     with the mean squares s² of the residuals and the least scatter f. The tip of a hammer stiffens under a harder blow,
@@ -66,19 +62,20 @@ def held(tests):
 
 
 def _line(x, y):
-    """(peaks (n,) by a line that grows at least as the force, squares that it leaves)."""
-    mine, theirs = x - x.mean(), y - y.mean()
-    slope = max(1.0, float(mine @ theirs) / max(float(mine @ mine), 1e-12))
-    return y.mean() + slope * mine, float(np.sum((theirs - slope * mine) ** 2))
+    """(slope, squares left) of a line through peaks that grow at least as the force."""
+    x, y = x - x.mean(), y - y.mean()
+    slope = max(1.0, float(x @ y) / max(float(x @ x), 1e-12))
+    return slope, float(np.sum((y - slope * x) ** 2))
 
 
 def _capped(x, y, c):
-    """(squares left, blows that reach it) of the best of: the weaker blows grow, the harder ones hold at ``c``."""
+    """(squares left, blows that reach it) of the best of: the weaker blows grow up to ``c``, the harder ones hold."""
     order = np.argsort(x)
     x, y = x[order], y[order]
     best = float(np.sum((y - c) ** 2)), x.size
     for below in range(1, x.size + 1):
-        line, left = _line(x[:below], y[:below])
-        if line[-1] <= c:
+        slope, left = _line(x[:below], y[:below])
+        ends = y[:below].mean() + slope * (x - x[:below].mean())
+        if ends[below - 1] <= c and np.all(ends[below:] >= c):
             best = min(best, (left + float(np.sum((y[below:] - c) ** 2)), x.size - below))
     return best

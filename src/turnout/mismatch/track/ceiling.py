@@ -4,12 +4,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from turnout.mismatch.track.blow_ceiling import blow_ceiling
+from turnout.mismatch.track.blow_ceiling import FLOOR, blow_ceiling
 
 FEWEST_PASSAGES, FEWEST_SENSORS = 4, 3
-FLOOR = 0.02  # ln; peaks fall between samples, and mountings ring behind a blow
 TOP = 0.8  # of the peak; above it a clipped channel spends its time
 RINGS = np.pi / 4.0  # what is cut off to a square rings in a recorder's filter, which passes the first of its waves
+UNLIKE_SIDES = 0.9  # one side of an amplifier, of the other that saturates later
 LIMIT_SD = 0.1  # of the limit; the two sides of an amplifier seldom saturate alike
 
 
@@ -28,13 +28,21 @@ def ceilings(campaign, threshold):
     """
     rolled, found = _rolled(campaign), {}
     for sensor in campaign.sensors:
-        limit, gain = blow_ceiling(campaign.hammer, sensor)
-        seen = rolled.get(sensor.name, Ceiling(limit, 0.0))
-        whole = seen.gain + gain - np.log(len(campaign.sensors))
-        limit = limit if gain > seen.gain else seen.limit
-        if whole > threshold and limit >= RINGS * highest(campaign, sensor.name):
-            found[sensor.name] = Ceiling(limit, float(whole))
-    return found if len(campaign.sensors) - len(found) > 1 else {}
+        struck = Ceiling(*blow_ceiling(campaign.hammer, sensor))
+        known = _together(rolled.get(sensor.name, struck), struck)
+        known = replace(known, gain=known.gain - float(np.log(len(campaign.sensors))))
+        if known.gain > threshold and known.limit >= UNLIKE_SIDES * RINGS * highest(campaign, sensor.name):
+            found[sensor.name] = known
+    return found if len(found) < len(campaign.sensors) else {}
+
+
+def _together(rolled, struck):
+    """The plainer of two ceilings, with what speaks for both where they are of one limit."""
+    plainer = max(rolled, struck, key=lambda c: c.gain)
+    if rolled is struck or min(rolled.gain, struck.gain) <= 0.0:
+        return plainer
+    one = abs(np.log(rolled.limit / struck.limit)) < 2.0 * LIMIT_SD
+    return replace(plainer, gain=rolled.gain + struck.gain) if one else plainer
 
 
 def _rolled(campaign):

@@ -6,7 +6,7 @@ import numpy as np
 
 from turnout import physics
 from turnout.mismatch.candidate import Candidate
-from turnout.mismatch.track.ceiling import LIMIT_SD
+from turnout.mismatch.track.ceiling import LIMIT_SD, UNLIKE_SIDES
 
 LOOSE = 0.15  # share by which sizes err: nine effects of another simulator, opened, had a median of 0.12, rms 0.18
 EXACT = 0.03  # the same of gains and lags, which are what they are: ten, opened, had a median of 0.01
@@ -15,7 +15,6 @@ SEATED = (0.0, 0.4)  # share of the bed that still bears: nothing, or nearly a h
 MOUNTINGS = tuple(np.geomspace(150.0, 1500.0, 12))  # a width at Q = 5 apart [Hz]
 DELAYS = (1e-4, 2.5e-4, *np.arange(5e-4, 5.6e-3, 5e-4))  # a quarter of a turn at 500 Hz apart [s]
 LIMITS = (0.05, 0.2, 0.5)  # of the way from what a channel has shown to what it never reaches, where it may clip
-UNLIKE_SIDES = 0.9  # one side of an amplifier, of the other that saturates later
 DRIFTS = (2.5e-4, 5e-4, 1e-3, 2e-3, 4e-3)  # a sensor is passed within some seconds
 RINGING = tuple(np.geomspace(90.0, 500.0, 6))  # a hung mass shows over half an octave [Hz]
 BENDING = tuple(np.geomspace(85.0, 760.0, 20))  # two widths of the resonance apart [Hz]
