@@ -30,7 +30,8 @@ class Candidate:
     ``loose`` is the share by which the size of an effect errs since its law is not quite the one out there; an
     ``exact`` one is what it says (a gain, a lag, a place): nothing that it leaves is due to its shape. ``told_by`` is a
     kind of observations that must speak for it, too: to all others it is another law; ``unopposed`` names observations
-    that together must not speak against it.
+    that together must not speak against it. ``leaves_nothing``: one that may bend what a channel shows into much else,
+    and is therefore named only where it leaves no more than sound turnouts do.
     """
 
     family: str
@@ -60,6 +61,7 @@ class Candidate:
     plain: tuple = ()
     open_as: str = ""
     whole: bool = False
+    leaves_nothing: bool = False
     sized: int = 1
     sure: float = 0.0
 

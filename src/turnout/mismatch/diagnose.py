@@ -16,6 +16,7 @@ from turnout.mismatch.scoring import heard, judged, latent_of, over, over_reserv
 from turnout.mismatch.together import (
     borne_out,
     both_stand,
+    finished,
     needed,
     of_one_part,
     parted,
@@ -154,6 +155,7 @@ def diagnose(case, settings=None, progress=None, store=None):
     if choice and not both_stand(verdicts):
         case, verdicts, fit, scores = choice
     verdicts = [_as_it_ends(v, case, fit, settings) for v in verdicts]
+    verdicts, fit = finished(base, fit, verdicts, settings)
     check = _verified(case, base, fit, _rival(verdicts[0]), settings)
     if len(verdicts) == 1 and check.fell:
         verdicts[0] = unconfirmed(verdicts[0], settings)

@@ -174,6 +174,17 @@ def unconfirmed(verdict, settings):
     return _unknown(verdict, reason, settings)
 
 
+def finished(base, fit, verdicts, settings):
+    """(verdicts, fit) as they are, or "unknown" where one of the names would leave nothing
+    (``Candidate.leaves_nothing``) and the last fit, of grade B, leaves more than sound turnouts do."""
+    named = [v for v in verdicts if v.answer == "named" and v.grade == "B"]
+    bent = next((v.names[0] for v in named if v.scores[0].candidate.leaves_nothing), None)
+    if bent is None:
+        return verdicts, fit
+    reason = f"{bent} would leave nothing, and more is left than in sound turnouts"
+    return [_unknown(verdicts[0], reason, settings)], base
+
+
 def unforetold(verdict, settings):
     """Nothing missing, by recordings that were fitted, but those never used are not foretold: unknown. Others stay."""
     if verdict.answer != "none":

@@ -17,7 +17,7 @@ from turnout.mismatch.observation import Observation
 from turnout.mismatch.score import Score
 from turnout.mismatch.scout import _seen
 from turnout.mismatch.shortlist import Projector, _asked, _same_place
-from turnout.mismatch.together import borne_out, needed, parted
+from turnout.mismatch.together import borne_out, finished, needed, parted
 from turnout.mismatch.verdict import Verdict, judge, opened
 from turnout.physics import Parameter
 
@@ -334,3 +334,16 @@ def test_a_second_name_that_recordings_never_used_deny_is_dropped(reserved, left
     found, last = borne_out(case, fit, verdicts, settings)
     assert tuple(v.names[0] for v in found) == left == tuple(c.family for c in last.candidates)
     assert ("bowl" in found[0].reason) is (len(left) == 1)
+
+
+@pytest.mark.parametrize("last, grade, said", [("ramp", "A", 2), ("ramp", "B", 1), ("", "B", 2)])
+def test_what_would_leave_nothing_is_no_name_where_something_is_left(last, grade, said):
+    """A drifting clock bends what its channel shows into much else: first or second, it has to explain all."""
+    pair = [replace(c, leaves_nothing=c.family == last) for c in Shapes(("bowl", "ramp")).candidates]
+    posterior = {"bowl": 0.9, "ramp": 0.05, "unknown": 0.05}
+    verdicts = [
+        Verdict("named", (c.family,), grade, 0.97, dict(posterior), (Score(c, 50.0, 0.0, 1.0, None),)) for c in pair
+    ]
+    found, fit = finished("base", "fit", verdicts, MismatchSettings())
+    assert (len(found), fit) == ((2, "fit") if said == 2 else (1, "base"))
+    assert said == 2 or (found[0].answer == "unknown" and "ramp would leave nothing" in found[0].reason)

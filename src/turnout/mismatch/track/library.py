@@ -109,7 +109,8 @@ def _sensors(case):
         yield per(physics.LowPass, ((1 / 500.0,),), kin="channel")
         yield per(physics.HighPass, ((12.0,),), sure=1.0)
         if case.rollings:
-            yield per(physics.ClockDrift, tuple((sign * d,) for d in DRIFTS for sign in (1.0, -1.0)), whole=True)
+            yield per(physics.ClockDrift, tuple((sign * d,) for d in DRIFTS for sign in (1.0, -1.0)), whole=True,
+                      leaves_nothing=True)  # fmt: skip
             peak = case.peak(name)
             if peak > 0.0:
                 yield from _clipping(per, peak, case.highest(name))
