@@ -347,3 +347,13 @@ def test_what_would_leave_nothing_is_no_name_where_something_is_left(last, grade
     found, fit = finished("base", "fit", verdicts, MismatchSettings())
     assert (len(found), fit) == ((2, "fit") if said == 2 else (1, "base"))
     assert said == 2 or (found[0].answer == "unknown" and "ramp would leave nothing" in found[0].reason)
+
+
+@pytest.mark.parametrize("ripple, answer", [(0.0, "named"), (0.12, "unknown")])
+def test_a_diagnosis_withdraws_what_would_leave_nothing(ripple, answer):
+    """The ramp is there; with a ripple that no candidate has it is of grade B, which a drifting clock may not be."""
+    case = Shapes(("wave", "ramp"), ramp=2.5, ripple=ripple)
+    case.candidates = tuple(replace(c, leaves_nothing=True) for c in case.candidates)
+    found = diagnose(case)
+    assert found.verdict.answer == answer
+    assert bool(found.fit.candidates) == (answer == "named")
