@@ -4,7 +4,7 @@ from snakemake.utils import min_version
 
 from turnout.fleet.launch import launch
 from turnout.readers.formats import FORMATS
-from turnout.readers.units import to_si
+from turnout.units import to_si
 
 min_version("9.14")
 

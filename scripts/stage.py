@@ -1,6 +1,6 @@
 """Rule of any stage: the plan of one shard in, its new units computed, its mark out."""
 
-from turnout.one_thread import one_thread
+from turnout.threads import one_thread
 
 one_thread()
 

@@ -10,7 +10,7 @@ from turnout.chains.accepted_terms import KINDS, OF_A_WHEELSET, SUPPORTS, accept
 from turnout.chains.mismatch_context import track_file
 from turnout.config import load_configuration
 from turnout.errors import SimulationError
-from turnout.fleet.atomic import write_text
+from turnout.files import write_text
 from turnout.simulate import load_track
 
 # Units in which a small number reads better: SI unit -> (unit, its size)

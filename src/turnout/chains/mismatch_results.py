@@ -9,8 +9,8 @@ from turnout.chains.mismatch_context import mismatch_context
 from turnout.chains.mismatch_visits import unit_of, visits
 from turnout.config import load_configuration, with_raw
 from turnout.errors import SimulationError
+from turnout.files import write_text
 from turnout.fingerprint import fingerprint
-from turnout.fleet.atomic import write_text
 from turnout.fleet.batches import decode, encode
 from turnout.fleet.scan import scan
 from turnout.registry.database import open_registry

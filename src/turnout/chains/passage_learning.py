@@ -11,7 +11,7 @@ from turnout.chains.passage import _time_in, sensors_of, trains_in
 from turnout.chains.passage_context import read_clusters, read_loads
 from turnout.config.turnout import TurnoutConfig
 from turnout.errors import ReadError
-from turnout.fleet.atomic import write_if_changed
+from turnout.files import write_if_changed
 from turnout.fleet.scan import scan
 from turnout.passage.analyse import analyse
 from turnout.passage.clusters import Clusters, fit_clusters

@@ -5,7 +5,7 @@ import logging
 from pathlib import Path
 
 from turnout.config import load_configuration
-from turnout.fleet.atomic import read_json, write_text
+from turnout.files import read_json, write_text
 from turnout.registry.database import open_registry
 from turnout.registry.day import list_day
 from turnout.trend.nightly import update

@@ -30,7 +30,7 @@ def run(args: argparse.Namespace) -> int:
     from turnout.config.append import append_tsv, taken_back
     from turnout.config.table import ROW
     from turnout.readers.formats import FORMATS
-    from turnout.readers.units import to_si
+    from turnout.units import to_si
 
     path = Path(args.configuration) / "turnouts.tsv"
     with taken_back(path):

@@ -24,7 +24,7 @@ def run(args: argparse.Namespace) -> int:
     from turnout.config import load_configuration
     from turnout.errors import ConfigError
     from turnout.readers.formats import FORMATS
-    from turnout.readers.units import to_si
+    from turnout.units import to_si
 
     if args.formats:
         print("\n".join(f"{name:<10} {' '.join(f.extensions):<24} {f.meaning}" for name, f in FORMATS.items()))

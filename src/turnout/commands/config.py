@@ -51,7 +51,7 @@ def _generate(args) -> int:
     from pathlib import Path
 
     from turnout.config.generate import generated
-    from turnout.fleet.atomic import write_if_changed
+    from turnout.files import write_if_changed
 
     stale = 0
     for path, text in generated(Path(args.configuration), Path(args.docs), args.defaults).items():

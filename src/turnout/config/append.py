@@ -8,11 +8,11 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from turnout.atomic import write_atomic
 from turnout.config.csv_table import TableFault, header_of
 from turnout.config.document import Place
 from turnout.config.table import no_tabs
 from turnout.errors import ConfigError
+from turnout.files import write_atomic
 
 
 @contextmanager

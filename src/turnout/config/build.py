@@ -4,7 +4,7 @@ import hashlib
 import json
 from dataclasses import asdict
 
-from turnout.config.document import Branch, merge, plain
+from turnout.config.document import Branch, merge_branches, plain
 from turnout.config.frozen import Frozen
 from turnout.config.settings import parts
 from turnout.config.settings_keys import filled
@@ -56,7 +56,7 @@ def hammer(tree: Branch) -> HammerConfig | None:
     descriptions: dict[str, RawDescription] = {}
     roles: dict[str, dict] = {"force": {}, "response": {}, "validation": {}}
     for label, section in tree["sections"].items():
-        own = plain(merge(tree["hammer"], section["hammer"]) if "hammer" in section else tree["hammer"])
+        own = plain(merge_branches(tree["hammer"], section["hammer"]) if "hammer" in section else tree["hammer"])
         position = float(section["position"].value)
         descriptions[label] = description(own, "hammer", {name: position for name in own["channels"]})
         for role, names in roles.items():

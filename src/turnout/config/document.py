@@ -68,14 +68,14 @@ def load(path: Path, name: str | None = None) -> Branch:
     return tree
 
 
-def merge(*branches: Branch) -> Branch:
+def merge_branches(*branches: Branch) -> Branch:
     """Later branches win leaf by leaf; a list is one leaf and is replaced whole."""
     merged = Branch(branches[0].place)
     for branch in branches:
         for name, value in branch.items():
             old = merged.get(name)
             if isinstance(value, Branch):
-                value = merge(old, value) if isinstance(old, Branch) else merge(value)
+                value = merge_branches(old, value) if isinstance(old, Branch) else merge_branches(value)
             merged.put(name, value, branch.key_places[name])
     return merged
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from turnout.config import build
 from turnout.config.acknowledgements import read_acknowledgements
-from turnout.config.document import Branch, Place, load, merge, plain
+from turnout.config.document import Branch, Place, load, merge_branches, plain
 from turnout.config.events import Event, read_events
 from turnout.config.frozen import Frozen
 from turnout.config.keys import NO_TURNOUT, check, suggestion
@@ -170,7 +170,7 @@ class _Reading:
             return None
         base = Branch(settings.place)
         base.put("settings", settings, settings.place)
-        tree = merge(base, tree)
+        tree = merge_branches(base, tree)
         return None if self._wrong(tree) else tree
 
     def _unknown(self, name: str, row: Row) -> None:
@@ -213,7 +213,7 @@ class _Reading:
             self.shared[key] = Variant(tree)
         if override is None:
             return self.shared[key]
-        tree = merge(self.shared[key].tree, self.document(override, layout_keys()))
+        tree = merge_branches(self.shared[key].tree, self.document(override, layout_keys()))
         before = len(self.errors)
         self.errors += check(layout_keys(merged=True), tree)
         if len(self.errors) == before:

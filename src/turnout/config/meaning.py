@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from zoneinfo import available_timezones
 
-from turnout.config.document import Branch, merge
+from turnout.config.document import Branch, merge_branches
 from turnout.config.keys import suggestion
 from turnout.config.pattern import compiled
 from turnout.config.settings_keys import settings_keys
@@ -23,7 +23,7 @@ def check_meaning(tree: Branch, to_si: Callable | None = None) -> Iterator[Confi
         yield from _hammer(tree["hammer"], to_si, softest)
         for section in tree["sections"].values():
             if "hammer" in section:
-                yield from _hammer(merge(tree["hammer"], section["hammer"]), to_si, softest)
+                yield from _hammer(merge_branches(tree["hammer"], section["hammer"]), to_si, softest)
     if "passages" in tree:
         yield from _files(tree["passages"], "passages", labels)
         yield from _channels(tree["passages"], to_si)

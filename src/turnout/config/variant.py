@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from turnout.config import build
-from turnout.config.document import Branch, Leaf, Place, merge, plain
+from turnout.config.document import Branch, Leaf, Place, merge_branches, plain
 from turnout.config.frozen import Frozen
 from turnout.config.table import Row
 
@@ -59,7 +59,7 @@ def with_row(layout: Branch, row: Row) -> Branch:
             for label in layout["sections"]:
                 section = _at(_at(changes, "sections", row.place(column)), label, row.place(column))
                 section.put(key, Leaf(row.values[column], row.place(column)), row.place(column))
-    return merge(layout, changes) if changes else layout
+    return merge_branches(layout, changes) if changes else layout
 
 
 def _at(tree: Branch, name: str, place: Place) -> Branch:

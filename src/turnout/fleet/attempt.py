@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from turnout.fleet.atomic import write_text
+from turnout.files import write_text
 
 FOLDER = Path("work/attempts")
 

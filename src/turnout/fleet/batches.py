@@ -30,7 +30,7 @@ from pathlib import Path
 
 import numpy as np
 
-from turnout.atomic import write_atomic
+from turnout.files import write_atomic
 
 COLUMNS = ("unit", "turnout", "kind", "key", "algo", "status", "rows")
 

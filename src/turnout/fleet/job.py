@@ -8,7 +8,7 @@ from pathlib import Path
 from turnout import __version__
 from turnout.config import load_configuration
 from turnout.errors import TurnoutError
-from turnout.fleet.atomic import write_text
+from turnout.files import write_text
 from turnout.fleet.attempt import attempt
 from turnout.fleet.batches import read_results
 from turnout.fleet.current import DamagedBatch

@@ -8,7 +8,7 @@ from pathlib import Path
 from turnout.config import Configuration, load_configuration
 from turnout.config.keys import suggestion
 from turnout.errors import ConfigError
-from turnout.fleet.atomic import write_text
+from turnout.files import write_text
 from turnout.fleet.plan import write_plans
 from turnout.fleet.postponed import ask_again
 from turnout.fleet.shards import shard_names

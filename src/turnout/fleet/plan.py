@@ -9,7 +9,7 @@ from turnout.config import Configuration, TurnoutConfig
 from turnout.config.load import read_notes
 from turnout.config.settings.fleet import FleetSettings
 from turnout.errors import ConfigError, ReadError
-from turnout.fleet.atomic import is_cut, write_if_changed
+from turnout.files import is_cut, write_if_changed
 from turnout.fleet.notes import notes_of
 from turnout.fleet.scan import scan
 from turnout.fleet.shards import shard_names, shard_of

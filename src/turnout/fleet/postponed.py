@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from turnout.fleet.atomic import read_json, write_text
+from turnout.files import read_json, write_text
 from turnout.fleet.state import batch_folder
 
 

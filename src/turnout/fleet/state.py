@@ -10,7 +10,7 @@ from pathlib import Path
 from filelock import FileLock
 
 from turnout.errors import TurnoutError
-from turnout.fleet.atomic import is_cut, write_text
+from turnout.files import is_cut, write_text
 from turnout.fleet.batches import is_sound, read_column
 
 LOG = logging.getLogger("turnout.fleet")

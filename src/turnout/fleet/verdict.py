@@ -9,7 +9,7 @@ from pathlib import Path
 from turnout.config import Configuration
 from turnout.config.settings.fleet import FleetSettings
 from turnout.errors import TurnoutError
-from turnout.fleet.atomic import read_json, write_text
+from turnout.files import read_json, write_text
 from turnout.fleet.batches import read_column
 from turnout.fleet.begun import LEFT, begun
 from turnout.fleet.postponed import ask_again, read_postponed

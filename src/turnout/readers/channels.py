@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 
 from turnout.errors import ReadError
-from turnout.readers.units import IGNORED, conversion, to_si
 from turnout.records import Channel, RawChannel
+from turnout.units import IGNORED, conversion, to_si
 
 # What loggers write for a unit where nobody told them one; without case.
 MEANINGLESS = ("", "-", "eu", "none", "n/a", "a.u.", "arb", "?", "unknown", "undefined", "unitless")

@@ -4,7 +4,7 @@ import re
 
 from turnout.readers.channels import MEANINGLESS
 from turnout.readers.time_column import SECONDS, WORDS
-from turnout.readers.units import conversion
+from turnout.units import conversion
 
 NAME_WITH_UNIT = re.compile(r"^(.*?)\s*[\[(]([^\[\]]*)[\])]$")
 

@@ -20,16 +20,16 @@ def time_column(names, units):
     for i, name in enumerate(names):
         if name.strip().lower() in WORDS:
             return i
-    return next((i for i, unit in enumerate(units) if unit.strip() and _plain(unit) in SECONDS), None)
+    return next((i for i, unit in enumerate(units) if unit.strip() and _plain_time(unit) in SECONDS), None)
 
 
 def seconds_per_number(unit, source):
     """How many seconds a number in the time column is; ReadError for a unit that is none of time."""
-    if _plain(unit) not in SECONDS:
+    if _plain_time(unit) not in SECONDS:
         remedy = f"Export the time in one of {', '.join(SECONDS)[2:]}"
         raise source.error("the time column", f"its unit {unit!r} is not known", remedy, reason="unit_unknown")
-    return SECONDS[_plain(unit)]
+    return SECONDS[_plain_time(unit)]
 
 
-def _plain(unit):
+def _plain_time(unit):
     return unit.strip().replace("\u03bc", "µ")

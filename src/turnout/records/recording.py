@@ -1,17 +1,101 @@
-"""A recording: channels sampled together over one stretch of time, and what was noted beside them."""
+"""A recording: channels sampled together over one stretch of time, and what was noted beside them.
+
+A recording that is too long to be held: the same nouns, samples in stretches.
+
+What held and long recordings have in common: channels sampled together at one rate.
+
+One measured quantity of a recording.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from types import MappingProxyType
+from typing import Protocol
 
 import numpy as np
 
-from turnout.records.channel import Channel
-from turnout.records.long_recording import LongRecording
-from turnout.records.sampled import Sampled
+
+@dataclass(frozen=True)
+class Channel:
+    """One measured quantity of a recording.
+
+    ``quantity`` is "force" [N], "acceleration" [m/s²], "velocity" [m/s], "displacement" [m], "strain" [-]
+    or "temperature" [°C]; the samples are in that SI unit with the configured sign already applied.
+    ``position`` is the place along the track [m] in the turnout's coordinate, ``mounting`` where the sensor
+    sits ("rail head at sleeper", "rail head mid-span", "rail web", "sleeper", "hammer"). ``limit`` is the
+    range beyond which the instrument clips and ``resolution`` one step of its converter, both in the SI
+    unit, None where unknown.
+    """
+
+    name: str
+    quantity: str
+    position: float | None = None
+    mounting: str = ""
+    serial: str = ""
+    limit: float | None = None
+    resolution: float | None = None
+
+
+class Samples(Protocol):
+    """``n_sample`` samples of ``channels`` at ``rate`` [Hz], which ``read(start, stop)`` gives in SI."""
+
+    @property
+    def rate(self) -> float:
+        """Samples per second [Hz]."""
+
+    @property
+    def n_sample(self) -> int:
+        """Samples per channel."""
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """One per row."""
+
+    @property
+    def read(self):
+        """(start, stop) -> (n_channel, stop - start)."""
+
+
+class Sampled:
+    """Lengths, rows and stretches of ``Samples``."""
+
+    @property
+    def duration(self: Samples) -> float:
+        """Length [s]."""
+        return self.n_sample / self.rate
+
+    def of_quantity(self: Samples, quantity: str) -> tuple[int, ...]:
+        """Rows of all channels that measure ``quantity``."""
+        return tuple(i for i, c in enumerate(self.channels) if c.quantity == quantity)
+
+    def stretches(self: Samples, length: float) -> Iterator[np.ndarray]:
+        """The whole recording in consecutive stretches of ``length`` seconds, (n_channel, n) each."""
+        step = max(round(length * self.rate), 1)
+        for start in range(0, self.n_sample, step):
+            yield self.read(start, min(start + step, self.n_sample))
+
+
+@dataclass(frozen=True)
+class LongRecording(Sampled):
+    """Simultaneously sampled channels of a logger that never stops; its samples stay in their file.
+
+    ``read(start, stop)`` gives (n_channel, stop - start) samples in the SI unit of each channel's quantity, of
+    ``n_sample`` in all; the rest is as in ``Recording``.
+    """
+
+    read: Callable[[int, int], np.ndarray]
+    n_sample: int
+    rate: float
+    channels: tuple[Channel, ...]
+    kind: str = "passage"
+    source: str = ""
+    record: int = 0
+    started_at: datetime | None = None
+    conditions: Mapping = field(default_factory=dict)
+
 
 NOTHING: Mapping = MappingProxyType({})
 

@@ -1,4 +1,7 @@
-"""The unit of work: what is computed once."""
+"""The unit of work: what is computed once.
+
+Why something was not used.
+"""
 
 from __future__ import annotations
 
@@ -21,3 +24,13 @@ class Unit:
     config_hash: str
     section: str | None = None
     campaign: str | None = None
+
+
+@dataclass(frozen=True)
+class Rejection:
+    """Why something was not used: a code of ``turnout.errors.REASONS`` and the number behind it."""
+
+    reason: str
+    value: float | None = None
+    limit: float | None = None
+    detail: str = ""

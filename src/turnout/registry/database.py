@@ -9,8 +9,8 @@ from pathlib import Path
 
 import duckdb
 
-from turnout.atomic import beside
 from turnout.errors import RegistryError
+from turnout.files import beside
 from turnout.registry.columns import literal, tables
 from turnout.registry.generation import Generation, load, sync_folder
 from turnout.registry.ids import content_id

@@ -6,8 +6,8 @@ import os
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from turnout.atomic import write_atomic
 from turnout.errors import RegistryError
+from turnout.files import write_atomic
 from turnout.registry.columns import tables
 
 FILE = "_generation.json"

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import duckdb
 
-from turnout.atomic import beside
 from turnout.content import sha256_of
 from turnout.errors import RegistryError
+from turnout.files import beside
 from turnout.registry.columns import file_literal, literal, names, sort_order, tables, time_column
 from turnout.registry.generation import DataFile, schema_hash, sync_folder
 

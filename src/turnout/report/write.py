@@ -8,7 +8,7 @@ from jinja2 import Environment, PackageLoader
 from tqdm import tqdm
 
 from turnout import __version__
-from turnout.atomic import beside
+from turnout.files import beside
 from turnout.report.changed import MARK, content_of, contents
 from turnout.report.pages.fleet import fleet_page
 from turnout.report.pages.turnout import turnout_page

@@ -11,7 +11,7 @@ from turnout.config import load_configuration
 from turnout.config.generate import generated
 from turnout.config.settings import parts
 from turnout.readers.formats import FORMATS
-from turnout.readers.units import to_si
+from turnout.units import to_si
 
 
 def test_generated_files_are_up_to_date(repository):

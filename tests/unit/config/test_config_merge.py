@@ -5,7 +5,7 @@ import pickle
 import pytest
 
 from turnout.config import load_configuration, with_raw
-from turnout.config.document import load, merge, plain
+from turnout.config.document import load, merge_branches, plain
 from turnout.config.show import sources
 from turnout.errors import ConfigError
 
@@ -119,7 +119,7 @@ def test_a_written_default_is_the_default(folder):
 def test_a_list_is_replaced_whole(tmp_path):
     (tmp_path / "a.yaml").write_text("a: {x: [1, 2, 3], y: 1}")
     (tmp_path / "b.yaml").write_text("a: {x: [9]}")
-    assert plain(merge(load(tmp_path / "a.yaml"), load(tmp_path / "b.yaml"))) == {"a": {"x": (9,), "y": 1}}
+    assert plain(merge_branches(load(tmp_path / "a.yaml"), load(tmp_path / "b.yaml"))) == {"a": {"x": (9,), "y": 1}}
 
 
 def test_it_travels_between_processes(folder):

@@ -10,7 +10,7 @@ from turnout.config.raw_notes import read_campaigns
 from turnout.config.table import read_table
 from turnout.errors import ConfigError, ConfigErrors
 from turnout.readers.formats import FORMATS
-from turnout.readers.units import to_si
+from turnout.units import to_si
 
 LAYOUT = """\
 sections:

@@ -180,7 +180,7 @@ def test_a_full_disk_while_writing_loses_nothing(fleet, monkeypatch):
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("turnout.fleet.atomic.os.fsync", full)
+    monkeypatch.setattr("turnout.files.os.fsync", full)
     with pytest.raises(OSError, match="No space left"):
         fleet.run()
     monkeypatch.undo()

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from turnout.readers.channels import settled_unit
-from turnout.readers.units import conversion, to_si
+from turnout.units import conversion, to_si
 
 G = 9.80665  # m/s², by definition (3rd CGPM, 1901)
 

@@ -63,7 +63,7 @@ def short_polygons(case, fit):
     scanned = n * max(1.0, float(np.ptp(np.log(lengths[tried]))) / TELL_APART)
     if nats < np.log(scanned):
         return ()
-    return (_candidate(case, fit, train, wheel, lengths, k, nats, scanned, seen),)
+    return (_short_candidate(case, fit, train, wheel, lengths, k, nats, scanned, seen),)
 
 
 def _holds(levels):
@@ -126,7 +126,7 @@ def evidence(z, slots):
     return 0.5 * np.log(spread / wide) + 0.5 * z**2 * (1.0 / spread - 1.0 / wide)
 
 
-def _candidate(case, fit, train, wheel, lengths, k, nats, scanned, seen):
+def _short_candidate(case, fit, train, wheel, lengths, k, nats, scanned, seen):
     radius = seen[0].made.passage.vehicle.each("radius")[wheel]
     order = round(2.0 * np.pi * radius / lengths[k])
     sizes = np.concatenate([_amplitudes(case, fit, s, wheel, lengths, k) for s in seen])

@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 
 from turnout.readers.raw import RawRecord
-from turnout.readers.units import IGNORED, SI, to_si
+from turnout.units import IGNORED, SI, to_si
 
 
 def raw_records(recordings, description, dtype):
