@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from turnout.config.parameter_set import UNITS
+from turnout.config.parameters import UNITS
 from turnout.physics import TERMS, PhysicsTerm
 from turnout.physics.term import KINDS
 from turnout.simulate import Sensor, car, simulate_hammer, simulate_passage, uniform_track

@@ -7,7 +7,7 @@ from dataclasses import MISSING, dataclass, fields
 from typing import Any
 
 from turnout import physics
-from turnout.config.parameter_set import Number
+from turnout.config.parameters import Number
 from turnout.errors import SimulationError
 from turnout.simulate.counted import COUNTED
 

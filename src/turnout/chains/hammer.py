@@ -11,7 +11,7 @@ import numpy as np
 from turnout.chains.hammer_rows import impact_mode_row, impact_row, mode_row, model_row, receptance_row
 from turnout.chains.noted import rail_temperature
 from turnout.chains.raw_rows import contradiction, quarantine_row, read_or_quarantine, recording_row
-from turnout.config.pattern import compiled
+from turnout.config.filename_pattern import compiled
 from turnout.config.turnout import TurnoutConfig
 from turnout.errors import ReadError
 from turnout.identify import identify

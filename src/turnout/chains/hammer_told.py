@@ -4,8 +4,8 @@ import os
 from datetime import datetime
 from pathlib import Path
 
-from turnout.config.keys import suggestion
-from turnout.config.pattern import compiled
+from turnout.config.filename_pattern import compiled
+from turnout.config.schema import suggestion
 from turnout.errors import ConfigError, ReadError
 from turnout.readers import read
 

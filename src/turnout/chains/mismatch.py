@@ -15,7 +15,7 @@ from turnout.chains.mismatch_groups import Group, groups
 from turnout.chains.mismatch_rows import finding_tables
 from turnout.chains.mismatch_visits import members_of
 from turnout.chains.raw_rows import quarantine_row
-from turnout.config.build import digest
+from turnout.config.merge import digest
 from turnout.config.turnout import TurnoutConfig
 from turnout.content import sha256_of
 from turnout.errors import ReadError, SimulationError, TurnoutError

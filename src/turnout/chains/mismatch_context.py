@@ -5,7 +5,7 @@ import json
 from pathlib import Path
 
 from turnout.chains.accepted_terms import accepted_of
-from turnout.config.parameter_set import read_parameters
+from turnout.config.parameters import read_parameters
 from turnout.config.turnout import TurnoutConfig
 from turnout.content import sha256_of
 from turnout.errors import SimulationError, TurnoutError

@@ -9,7 +9,7 @@ from re import search
 
 from turnout.chains.mismatch_context import digest_of_model
 from turnout.config import Configuration
-from turnout.config.build import digest
+from turnout.config.merge import digest
 from turnout.fleet.plan import Planned, read_plan
 from turnout.records import Unit
 

@@ -14,8 +14,8 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError
 
 from turnout.chains.passage import PassageContext, SectionModel
-from turnout.config.build import digest
-from turnout.config.legible import legible
+from turnout.config.document import legible
+from turnout.config.merge import digest
 from turnout.config.settings.passage import PassageSettings
 from turnout.content import sha256_of
 from turnout.errors import ConfigError

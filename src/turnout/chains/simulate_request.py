@@ -4,7 +4,7 @@ from datetime import datetime
 from pathlib import Path
 
 from turnout.config.events import wrong_time
-from turnout.config.keys import suggestion
+from turnout.config.schema import suggestion
 from turnout.errors import ConfigError
 from turnout.readers.writing import WRITERS
 

@@ -38,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
 
     from turnout.config import load_configuration
     from turnout.config.acknowledgements import COLUMNS, acknowledgement, faults
-    from turnout.config.append import append_csv, one_line, taken_back
+    from turnout.config.turnouts_table import append_csv, one_line, taken_back
     from turnout.errors import ConfigError, ConfigErrors
 
     turnout, _, label = args.place.partition("/")

@@ -10,7 +10,7 @@ HELP = "add a turnout"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """One option per column of turnouts.tsv."""
-    from turnout.config.table import ROW
+    from turnout.config.turnouts_table import ROW
 
     parser.add_argument("turnout", help=ROW["turnout"].meaning)
     parser.add_argument("layout", help=ROW["layout"].meaning)
@@ -27,8 +27,7 @@ def run(args: argparse.Namespace) -> int:
     from pathlib import Path
 
     from turnout.config import load_configuration
-    from turnout.config.append import append_tsv, taken_back
-    from turnout.config.table import ROW
+    from turnout.config.turnouts_table import ROW, append_tsv, taken_back
     from turnout.readers.formats import FORMATS
     from turnout.units import to_si
 

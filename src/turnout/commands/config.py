@@ -35,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _show(args) -> int:
     from turnout.config import load_configuration
-    from turnout.config.show import sources
+    from turnout.config.load import sources
 
     configuration = load_configuration(args.configuration)
     configuration.turnout(args.turnout)

@@ -50,8 +50,8 @@ def _enter(args) -> int:
     from pathlib import Path
 
     from turnout.config import load_configuration
-    from turnout.config.append import append_csv, taken_back
     from turnout.config.events import COLUMNS, wrong_place
+    from turnout.config.turnouts_table import append_csv, taken_back
     from turnout.errors import ConfigError, ConfigErrors
 
     path = Path(args.configuration) / "events.csv"

@@ -4,9 +4,9 @@
 ``with_raw(turnout, raw_root)`` the same with the campaigns and trains noted in its raw folder.
 """
 
+from turnout.config.campaign_notes import unnoted
 from turnout.config.events import Event
 from turnout.config.load import Configuration, load_configuration, with_raw
-from turnout.config.raw_notes import unnoted
 from turnout.config.turnout import Campaign, HammerConfig, PassageConfig, Section, TurnoutConfig
 
 __all__ = [

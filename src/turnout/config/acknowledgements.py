@@ -9,7 +9,7 @@ from pathlib import Path
 
 from turnout.config.csv_table import TableFault, read_csv, unreadable
 from turnout.config.events import now, wrong_place, wrong_time
-from turnout.config.keys import suggestion
+from turnout.config.schema import suggestion
 from turnout.errors import ConfigError
 
 COLUMNS = ("turnout", "section", "band", "action", "by", "at", "until", "reason")

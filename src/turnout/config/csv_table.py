@@ -8,7 +8,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from turnout.config.document import Place
-from turnout.config.keys import suggestion
+from turnout.config.schema import suggestion
 
 TOO_MANY = "cells beyond the header"
 BROKEN = "a line that is no row"

@@ -1,11 +1,40 @@
-"""A YAML file whose every value knows where it stands, so that an error can say which line to change."""
+"""A YAML file whose every value knows where it stands, so that an error can say which line to change.
 
-from collections.abc import Iterator
+The line of an entry in a YAML file, found again when an error is about to name it.
+
+What keeps a file from being read as text or as YAML at all, as errors that say what to do.
+
+A mapping that cannot be changed and travels between processes.
+"""
+
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from turnout.config.legible import legible
 from turnout.errors import ConfigError
+
+
+@contextmanager
+def legible(path: object, where: str) -> Iterator[None]:
+    """Within it a file is read and parsed: ConfigError for ``path`` where it cannot be opened (at ``where``), is not
+    UTF-8, holds a character that no YAML file may hold, or an anchor within itself."""
+    from ruamel.yaml.reader import ReaderError
+
+    try:
+        yield
+    except OSError as error:
+        found = f"cannot be read: {error.strerror}"
+        raise ConfigError(path, where, found, "Put a file of that name there, or take it away") from None
+    except UnicodeDecodeError as error:
+        raise ConfigError(path, f"byte {error.start}", "a byte that is not UTF-8", "Save the file as UTF-8") from None
+    except ReaderError as error:
+        found = f"the character {chr(error.character)!r}, which no YAML file may hold"
+        raise ConfigError(path, f"character {error.position + 1}", found, "Take it away") from None
+    except RecursionError:
+        found = "content without an end, as of an anchor that holds itself"
+        raise ConfigError(path, where, found, "Write the values out there") from None
 
 
 @dataclass(frozen=True)
@@ -127,3 +156,80 @@ def _scalar(node, path, constructor):
         place = Place(path, node.start_mark.line + 1, node.start_mark.column + 1)
         found = f"{node.value!r} with the tag {node.tag!r}, which is none of a configuration"
         raise place.error(found, "Write a plain value without a tag") from None
+
+
+KEYS = re.compile(r"[^.\[\]]+")
+
+
+def line_of(path, place: str) -> int | None:
+    """Line, from 1, of an entry such as "routes.main[1].share", or of the last one on the way that is there.
+
+    None where the file cannot be read, or its first entry is not in it.
+    """
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+
+    try:
+        node = YAML(typ="safe", pure=True).compose(Path(path).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, YAMLError):
+        return None
+    line = None
+    for key in KEYS.findall(place):
+        if (found := _below(node, key)) is None:
+            break
+        line, node = found
+    return line
+
+
+def where(path, place: str, at: str = "") -> str:
+    """``place`` as errors name it, with the line of ``at``, an entry below it, where it is found.
+
+    >>> where("nowhere.yaml", "rail.mass"), where("nowhere.yaml", "")
+    ('rail.mass', 'the file')
+    """
+    line = line_of(path, f"{place}.{at}")
+    said = [f"line {line}"] if line else []
+    return ", ".join([*said, place] if place else said or ["the file"])
+
+
+def _below(node, key):
+    """(line, node) of the entry ``key`` of a node, also one that it takes over with <<; None where there is none."""
+    kind = getattr(node, "id", "")
+    if kind == "sequence":
+        item = node.value[int(key)] if key.isdigit() and int(key) < len(node.value) else None
+        return item and (item.start_mark.line + 1, item)
+    if kind != "mapping":
+        return None
+    for name, value in node.value:
+        if name.value == key:
+            return name.start_mark.line + 1, value
+    taken = [value for name, value in node.value if name.value == "<<"]
+    return next((found for value in taken if (found := _below(value, key))), None)
+
+
+class Frozen(Mapping):
+    """Read-only view of a dictionary; unlike MappingProxyType it can be pickled.
+
+    >>> Frozen({"a": 1})["a"]
+    1
+    """
+
+    __slots__ = ("_values",)
+
+    def __init__(self, values=()):
+        self._values = dict(values)
+
+    def __getitem__(self, name):
+        return self._values[name]
+
+    def __iter__(self):
+        return iter(self._values)
+
+    def __len__(self):
+        return len(self._values)
+
+    def __repr__(self):
+        return f"{type(self).__name__}({self._values!r})"
+
+    def __reduce__(self):
+        return type(self), (self._values,)

@@ -7,7 +7,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from turnout.config.csv_table import TableFault, read_csv, unreadable
-from turnout.config.keys import NO_TURNOUT, suggestion
+from turnout.config.schema import NO_TURNOUT, suggestion
 from turnout.errors import ConfigError
 
 # Which resonance is another one afterwards, where the row does not say.

@@ -8,12 +8,10 @@ from pathlib import Path
 from turnout.config.document import load, plain
 from turnout.config.events import COLUMNS as EVENT_COLUMNS
 from turnout.config.events import RESETS
-from turnout.config.keys import Each, Elsewhere, Group, Key
-from turnout.config.layout_keys import layout_keys
-from turnout.config.pattern import FIELDS
+from turnout.config.filename_pattern import FIELDS
+from turnout.config.schema import Each, Elsewhere, Group, Key, default_of, layout_keys, settings_keys
 from turnout.config.settings import parts
-from turnout.config.settings_keys import default_of, settings_keys
-from turnout.config.table import ROW
+from turnout.config.turnouts_table import ROW
 
 WIDTH = 112
 HEAD = """\

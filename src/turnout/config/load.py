@@ -1,25 +1,24 @@
-"""All configuration of a fleet, read and checked once."""
+"""All configuration of a fleet, read and checked once.
+
+Where every value of a turnout's configuration comes from.
+"""
 
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from turnout.config import build
+from turnout.config import merge
 from turnout.config.acknowledgements import read_acknowledgements
-from turnout.config.document import Branch, Place, load, merge_branches, plain
+from turnout.config.campaign_notes import Campaigns, read_campaigns, read_trains
+from turnout.config.consistency import check_meaning
+from turnout.config.document import Branch, Frozen, Place, leaves, load, merge_branches, plain
 from turnout.config.events import Event, read_events
-from turnout.config.frozen import Frozen
-from turnout.config.keys import NO_TURNOUT, check, suggestion
-from turnout.config.layout_keys import layout_keys
-from turnout.config.meaning import check_meaning
-from turnout.config.pairs import check_ranges
-from turnout.config.raw_notes import Campaigns, read_campaigns, read_trains
-from turnout.config.settings_keys import settings_keys
-from turnout.config.table import Row, read_table
+from turnout.config.merge import FROM_ROW, OF_SECTIONS, Variant, with_row
+from turnout.config.schema import NO_TURNOUT, check, check_ranges, layout_keys, settings_keys, suggestion
 from turnout.config.turnout import TurnoutConfig
-from turnout.config.variant import FROM_ROW, OF_SECTIONS, Variant, with_row
+from turnout.config.turnouts_table import Row, read_table
 from turnout.errors import ConfigError, ConfigErrors, ReadError
 
 ABOUT = {"lat_deg": "latitude", "lon_deg": "longitude"}
@@ -98,7 +97,7 @@ def load_configuration(folder: Path | str = "config", formats=None, to_si=None) 
     said = "acknowledgements.csv"
     spoken, warnings = read_acknowledgements(reading.folder / said, reading.name(said), known, variants)
     by_id = {row.id: row for row in rows}
-    base = build.settings(plain(settings))
+    base = merge.settings(plain(settings))
     return Configuration(
         reading.folder, base, Frozen(by_id), tuple(events), Frozen(variants), tuple(spoken), (*strange, *warnings)
     )
@@ -219,3 +218,23 @@ class _Reading:
         if len(self.errors) == before:
             self._wrong(tree)
         return Variant(tree)
+
+
+def sources(configuration: Configuration, turnout: str) -> Iterator[tuple[str, object, str]]:
+    """``(key, value, "file, line")`` of every value, settings that no file names included."""
+    row = configuration.rows[turnout]
+    for column, value in row.values.items():
+        yield column, value, _said(row.place(column))
+    tree = configuration.variants[turnout].tree
+    written = dict(leaves(tree))
+    for key, leaf in written.items():
+        if not key.startswith("settings."):
+            yield key, leaf.value, _said(leaf.place)
+    for part, settings in configuration.turnout(turnout).settings.items():
+        for name, value in asdict(settings).items():
+            key = f"settings.{part}.{name}"
+            yield key, value, _said(written[key].place) if key in written else "default"
+
+
+def _said(place) -> str:
+    return f"{place.path}, line {place.line}"

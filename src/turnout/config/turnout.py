@@ -8,7 +8,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from turnout.config.frozen import Frozen
+from turnout.config.document import Frozen
 from turnout.records import RawDescription
 
 

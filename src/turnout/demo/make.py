@@ -12,8 +12,8 @@ from zlib import crc32
 import numpy as np
 from tqdm import tqdm
 
+import turnout.demo.faults as faults
 from turnout.config import load_configuration
-from turnout.demo import faults
 from turnout.demo.hammer import hammer_test
 from turnout.demo.passages import make_passage, make_passages
 from turnout.demo.scenario import FLEET, SECTIONS, campaign_days, gap_under, rail_temperature, stiffness_factors

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from turnout.config.build import digest
+from turnout.config.merge import digest
 from turnout.fleet.batches import UnitResult
 from turnout.fleet.guard import quarantine_row, status_of
 from turnout.fleet.plan import Planned

@@ -4,7 +4,7 @@ import os
 from collections.abc import Container, Sequence
 from pathlib import Path
 
-from turnout.config.build import digest
+from turnout.config.merge import digest
 from turnout.content import sha256_of
 from turnout.fleet.plan import Planned
 from turnout.fleet.state import ELSEWHERE

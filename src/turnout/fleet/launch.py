@@ -6,7 +6,7 @@ from datetime import UTC, date, datetime
 from pathlib import Path
 
 from turnout.config import Configuration, load_configuration
-from turnout.config.keys import suggestion
+from turnout.config.schema import suggestion
 from turnout.errors import ConfigError
 from turnout.files import write_text
 from turnout.fleet.plan import write_plans

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
 
 from turnout.config import TurnoutConfig
-from turnout.config.build import digest
+from turnout.config.merge import digest
 from turnout.records import Unit
 
 AROUND = timedelta(hours=1)  # that the clocks of a logger and of the train data may differ by

@@ -7,8 +7,8 @@ from datetime import date, datetime, timedelta
 from pathlib import Path
 
 from turnout.config import TurnoutConfig
+from turnout.config.campaign_notes import COLUMNS
 from turnout.config.csv_table import TableFault, read_csv
-from turnout.config.raw_notes import COLUMNS
 from turnout.errors import ReadError
 from turnout.fleet.notes import start_of
 from turnout.records import Unit

@@ -7,7 +7,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from turnout.config import TurnoutConfig
-from turnout.config.pattern import compiled
+from turnout.config.filename_pattern import compiled
 from turnout.errors import ReadError
 from turnout.fleet.raw_folder import RawFolder
 from turnout.records import Unit

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from turnout.config.parameter_set import ParameterSet, read_parameters
+from turnout.config.parameters import ParameterSet, read_parameters
 from turnout.errors import SimulationError
 from turnout.simulate.coupled import coupled
 from turnout.simulate.track_file import turnout_track

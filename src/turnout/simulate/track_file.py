@@ -51,7 +51,7 @@ TRACK_KEYS = (
 
 
 def turnout_track(parameters, seed=0):
-    """``TurnoutTrack`` from a parameter set read by ``turnout.config.parameter_set.read_parameters``.
+    """``TurnoutTrack`` from a parameter set read by ``turnout.config.parameters.read_parameters``.
 
     ``sections`` change values of ``support`` between ``from`` and ``to`` [m], later ones over earlier ones;
     ``scatter`` gives relative standard deviations that are drawn, log-normally, with ``seed``.

@@ -3,7 +3,7 @@
 import pytest
 
 from turnout.chains.accepted_terms import Accepted, accepted_of
-from turnout.config.parameter_set import Number, ParameterSet
+from turnout.config.parameters import Number, ParameterSet
 from turnout.errors import ConfigError, SimulationError
 from turnout.simulate import uniform_track
 from turnout.simulate.turnout_track import stretch_of_track

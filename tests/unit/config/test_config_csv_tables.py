@@ -9,9 +9,9 @@ import pytest
 from turnout.cli import main
 from turnout.config import load_configuration
 from turnout.config.acknowledgements import read_acknowledgements
-from turnout.config.append import append_csv, append_tsv, taken_back
+from turnout.config.campaign_notes import read_campaigns, read_trains
 from turnout.config.events import read_events
-from turnout.config.raw_notes import read_campaigns, read_trains
+from turnout.config.turnouts_table import append_csv, append_tsv, taken_back
 
 HEADER = "turnout,section,date,kind,resets,note\n"
 

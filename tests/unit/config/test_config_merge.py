@@ -6,7 +6,7 @@ import pytest
 
 from turnout.config import load_configuration, with_raw
 from turnout.config.document import load, merge_branches, plain
-from turnout.config.show import sources
+from turnout.config.load import sources
 from turnout.errors import ConfigError
 
 LAYOUT = """\

@@ -6,7 +6,7 @@ import pytest
 
 from turnout.chains.passage_context import known_patterns
 from turnout.cli import main
-from turnout.config.parameter_set import read_parameters
+from turnout.config.parameters import read_parameters
 from turnout.config.settings.passage import PassageSettings
 from turnout.errors import ConfigError
 
@@ -56,7 +56,7 @@ def test_a_table_that_may_not_be_written_is_one_sentence(config, capsys, monkeyp
     def refuse(path, content):
         raise PermissionError(13, "Permission denied", str(path))
 
-    monkeypatch.setattr("turnout.config.append._write", refuse)  # we may be root
+    monkeypatch.setattr("turnout.config.turnouts_table._write", refuse)  # we may be root
     assert main(COMMANDS["events.csv"]) == 2
     said = "turnout events: config/events.csv: Permission denied. Put that right, or name another place"
     assert capsys.readouterr().err.startswith(said)

@@ -6,8 +6,8 @@ import pytest
 
 from turnout.cli import main
 from turnout.config import load_configuration
-from turnout.config.raw_notes import read_campaigns
-from turnout.config.table import read_table
+from turnout.config.campaign_notes import read_campaigns
+from turnout.config.turnouts_table import read_table
 from turnout.errors import ConfigError, ConfigErrors
 from turnout.readers.formats import FORMATS
 from turnout.units import to_si

@@ -12,7 +12,7 @@ from turnout.chains.accepted_terms import Accepted
 from turnout.chains.guided_case import GuidedCase
 from turnout.chains.mismatch_rows import surface_told
 from turnout.chains.mismatch_words import otherwise
-from turnout.config.parameter_set import read_parameters
+from turnout.config.parameters import read_parameters
 from turnout.mismatch.joint import fit_jointly
 from turnout.mismatch.track import TrackCase, seating
 from turnout.mismatch.track.planned import measured_campaign, small_plan

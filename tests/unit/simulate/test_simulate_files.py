@@ -175,7 +175,7 @@ def test_whatever_stands_in_a_file_loads_or_is_refused_in_words(tmp_path, monkey
     path, parsed = tmp_path / "file.yaml", [content]
     path.write_text("", encoding="utf-8")
     reader = SimpleNamespace(load=lambda text: deepcopy(parsed[-1]))  # the true one takes twenty times as long
-    monkeypatch.setattr("turnout.config.parameter_set.YAML", lambda typ: reader)
+    monkeypatch.setattr("turnout.config.parameters.YAML", lambda typ: reader)
     load(str(path))
     for way, wrong, other in spoilt(content):
         parsed.append(other)

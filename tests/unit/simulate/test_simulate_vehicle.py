@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from turnout.config.parameter_set import read_parameters
+from turnout.config.parameters import read_parameters
 from turnout.errors import SimulationError
 from turnout.simulate import car, load_track, load_vehicle
 from turnout.simulate.coupled import coupled

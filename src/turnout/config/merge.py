@@ -1,14 +1,18 @@
-"""From the merged tree of names and values to the records of one turnout."""
+"""From the merged tree of names and values to the records of one turnout.
+
+A merged configuration, layout changed by the technical columns of a row, which several turnouts may share.
+"""
 
 import hashlib
 import json
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
+from functools import cached_property
 
-from turnout.config.document import Branch, merge_branches, plain
-from turnout.config.frozen import Frozen
+from turnout.config.document import Branch, Frozen, Leaf, Place, merge_branches, plain
+from turnout.config.schema import filled
 from turnout.config.settings import parts
-from turnout.config.settings_keys import filled
 from turnout.config.turnout import HammerConfig, PassageConfig, Section
+from turnout.config.turnouts_table import Row
 from turnout.records import RawChannel, RawDescription
 
 # What the units of one kind use of a turnout's configuration: parts of the settings and branches of the layout.
@@ -96,3 +100,63 @@ def description(values: dict, kind: str, positions: dict[str, float]) -> RawDesc
 def _real(name: str, value):
     """Physical values as float, whatever way they were written."""
     return float(value) if name in ("rate", "sensitivity", "limit", "resolution") and value is not None else value
+
+
+FROM_ROW = {
+    "hammer_rate_hz": ("hammer", "rate"),
+    "hammer_format": ("hammer", "format"),
+    "passage_rate_hz": ("passages", "rate"),
+    "passage_format": ("passages", "format"),
+}
+OF_SECTIONS = {"pad_type": "pad", "sleeper_type": "sleeper"}
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A merged configuration that several turnouts may share."""
+
+    tree: Branch
+
+    @cached_property
+    def values(self) -> dict:
+        """The merged tree as plain values, without places."""
+        return plain(self.tree)
+
+    @cached_property
+    def hashes(self) -> dict[str, str]:
+        """Configuration hash of the whole (key "") and of what each kind of unit uses."""
+        return hashes(self.values)
+
+    @cached_property
+    def parts(self) -> dict:
+        """What ``TurnoutConfig`` takes from it."""
+        return {
+            "sections": sections(self.values["sections"]),
+            "hammer": hammer(self.tree),
+            "passages": passages(self.tree),
+            "settings": settings(self.values["settings"]),
+            "config_hash": self.hashes[""],
+            "hashes": Frozen({k: v for k, v in self.hashes.items() if k}),
+        }
+
+
+def with_row(layout: Branch, row: Row) -> Branch:
+    """Layout changed by the technical columns of a row."""
+    changes = Branch(layout.place)
+    for column, (group, key) in FROM_ROW.items():
+        if column in row.values and group in layout:
+            _at(changes, group, row.place(column)).put(
+                key, Leaf(row.values[column], row.place(column)), row.place(column)
+            )
+    for column, key in OF_SECTIONS.items():
+        if column in row.values:
+            for label in layout["sections"]:
+                section = _at(_at(changes, "sections", row.place(column)), label, row.place(column))
+                section.put(key, Leaf(row.values[column], row.place(column)), row.place(column))
+    return merge_branches(layout, changes) if changes else layout
+
+
+def _at(tree: Branch, name: str, place: Place) -> Branch:
+    if name not in tree:
+        tree.put(name, Branch(place), place)
+    return tree[name]

@@ -4,9 +4,8 @@ from collections.abc import Callable, Iterator
 from zoneinfo import available_timezones
 
 from turnout.config.document import Branch, merge_branches
-from turnout.config.keys import suggestion
-from turnout.config.pattern import compiled
-from turnout.config.settings_keys import settings_keys
+from turnout.config.filename_pattern import compiled
+from turnout.config.schema import settings_keys, suggestion
 from turnout.errors import ConfigError
 
 

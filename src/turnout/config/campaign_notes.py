@@ -7,9 +7,8 @@ from datetime import datetime
 from pathlib import Path
 
 from turnout.config.csv_table import Cells, TableFault, read_csv, unreadable
-from turnout.config.document import Place
+from turnout.config.document import Frozen, Place
 from turnout.config.events import wrong_time
-from turnout.config.frozen import Frozen
 from turnout.config.turnout import Campaign
 from turnout.errors import ReadError
 

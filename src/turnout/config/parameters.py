@@ -8,8 +8,7 @@ from pathlib import Path
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError
 
-from turnout.config.legible import legible
-from turnout.config.yaml_lines import where
+from turnout.config.document import legible, where
 from turnout.errors import ConfigError, SimulationError
 
 # Unit: (SI unit, factor)

@@ -3,7 +3,7 @@
 import re
 from functools import lru_cache
 
-from turnout.config.keys import suggestion
+from turnout.config.schema import suggestion
 
 FIELDS = {
     "hammer": {"campaign": r"\d{4}-\d{2}-\d{2}", "test": r"[A-Za-z0-9]+", "ext": r"[A-Za-z0-9]+"},

@@ -1,0 +1,376 @@
+"""What a configuration file may say: names, kinds of value, units, limits; and the check against it.
+
+Keys of config/config.yaml, read from the settings dataclasses, and the dataclasses filled from it.
+
+What config/layouts/<name>.yaml and config/overrides/<id>.yaml may say.
+
+Settings that are two ends: the low one lies below the high one, and neighbouring ranges do not overlap.
+"""
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import MISSING, dataclass, fields, is_dataclass
+from difflib import get_close_matches
+from functools import cache
+from types import UnionType
+from typing import Union, get_args, get_origin, get_type_hints
+
+from turnout.config.document import Branch, Leaf
+from turnout.config.settings import parts
+from turnout.errors import ConfigError
+
+NO_TURNOUT = "There are no turnouts yet: add one with 'turnout add ID LAYOUT'"
+KINDS = {
+    "text": (str,),
+    "number": (int, float),
+    "integer": (int,),
+    "flag": (bool,),
+    "name_or_index": (str, int),
+}
+SAID = {"text": "text", "number": "a number", "integer": "a whole number", "flag": "true or false"}
+
+
+@dataclass(frozen=True)
+class Key:
+    """One value: its ``kind`` (``many``: a list of them), unit, limits, and what it means."""
+
+    kind: str
+    meaning: str
+    unit: str = ""
+    required: bool = False
+    minimum: float | None = None
+    maximum: float | None = None
+    above: float | None = None
+    choices: tuple = ()
+    pattern: str = ""
+    many: bool = False
+    nullable: bool = False
+    default: object = None
+
+
+@dataclass(frozen=True)
+class Each:
+    """A mapping whose names are free (matching ``pattern``) and whose values all follow ``spec``."""
+
+    spec: dict
+    pattern: str
+    meaning: str
+    required: bool = False
+
+
+@dataclass(frozen=True)
+class Group:
+    """A mapping with fixed names; in a ``fragment`` none of them is required."""
+
+    spec: dict
+    meaning: str
+    required: bool = False
+    fragment: bool = False
+
+
+@dataclass(frozen=True)
+class Elsewhere:
+    """A name that is understood, but only in the ``file`` that holds for the whole fleet."""
+
+    file: str
+    required: bool = False
+
+
+def suggestion(name: str, allowed, none: str = "There is none to choose from") -> str:
+    """What to write instead of an unknown ``name``; ``none`` where nothing is allowed.
+
+    >>> suggestion("posiiton", ["position", "panel"])
+    "Did you mean 'position'? Allowed: panel, position"
+    """
+    allowed = sorted(map(str, allowed))
+    if not allowed:
+        return none
+    close = get_close_matches(name, allowed, n=1, cutoff=0.6)
+    listed = ", ".join(allowed) if len(allowed) <= 24 else f"{len(allowed)} names, as in docs/configuration.md"
+    return (f"Did you mean {close[0]!r}? " if close else "") + f"Allowed: {listed}"
+
+
+def problem(key: Key, value) -> tuple[str, str] | None:
+    """None where ``value`` fits ``key``, else what was found and what to write instead.
+
+    >>> problem(Key("number", "rate", unit="Hz", above=0), -1)
+    ('-1', 'Write a number above 0 Hz')
+    """
+    if value is None and key.nullable:
+        return None
+    if key.many:
+        if not isinstance(value, tuple):
+            return repr(value), "Write a list, [a, b]"
+        single = Key(**{**key.__dict__, "many": False})
+        return next((p for v in value if (p := problem(single, v))), None)
+    if not isinstance(value, KINDS[key.kind]) or (isinstance(value, bool) and key.kind != "flag"):
+        return repr(value), f"Write {_wanted(key)}"
+    if isinstance(value, float) and not math.isfinite(value):
+        return repr(value), f"Write {_wanted(key)}"
+    if key.choices and value not in key.choices:
+        return repr(value), suggestion(str(value), key.choices)
+    if key.pattern and isinstance(value, str) and not re.fullmatch(key.pattern, value):
+        return repr(value), f"Write {_wanted(key)}"
+    if not isinstance(value, (int, float)):
+        return None
+    low = key.minimum is not None and value < key.minimum
+    if low or (key.maximum is not None and value > key.maximum) or (key.above is not None and value <= key.above):
+        return repr(value), f"Write {_wanted(key)}"
+    return None
+
+
+def check(spec: dict, tree: Branch, whole: bool = True) -> Iterator[ConfigError]:
+    """Every error of ``tree`` against ``spec``; with ``whole`` false, required names may be missing."""
+    misspelt = set()
+    for name, value in tree.items():
+        rule = spec.get(name)
+        if rule is None:
+            misspelt.update(get_close_matches(name, spec, n=1))
+            allowed = [known for known, rule in spec.items() if not isinstance(rule, Elsewhere)]
+            yield tree.key_places[name].error(f"unknown key {name!r}", suggestion(name, allowed))
+        elif isinstance(rule, Elsewhere):
+            whose = f"{name!r} holds for the whole fleet and would be ignored here"
+            yield tree.key_places[name].error(whose, f"It belongs into {rule.file}: move it there")
+        elif isinstance(rule, Key):
+            if isinstance(value, Branch):
+                yield value.place.error(f"names under {name!r}", f"Write {_wanted(rule)}")
+            elif found := problem(rule, value.value):
+                yield value.place.error(f"{name} is {found[0]}", found[1])
+        elif isinstance(value, Leaf):
+            if value.value is not None or whole:
+                yield value.place.error(f"{name} is {value.value!r}", "Write 'name: value' lines below it")
+        elif isinstance(rule, Group):
+            yield from check(rule.spec, value, whole and not rule.fragment)
+        else:
+            yield from _check_each(rule, name, value, whole)
+    if whole:
+        for name, rule in spec.items():
+            if rule.required and name not in tree and name not in misspelt:
+                yield tree.place.error(f"{name!r} is missing", f"Add '{name}:', {rule.meaning}")
+
+
+def _check_each(rule: Each, name: str, tree: Branch, whole: bool) -> Iterator[ConfigError]:
+    for label, value in tree.items():
+        if not re.fullmatch(rule.pattern, label):
+            yield tree.key_places[label].error(f"{label!r} under {name!r}", f"Write a name like {rule.pattern}")
+        elif isinstance(value, Leaf):
+            yield value.place.error(f"{label} is {value.value!r}", "Write 'name: value' lines below it")
+        else:
+            yield from check(rule.spec, value, whole)
+    if whole and not tree:
+        yield tree.place.error(f"{name!r} is empty", f"Add at least one, {rule.meaning}")
+
+
+def _wanted(key: Key) -> str:
+    if key.choices:
+        return "one of " + ", ".join(map(str, key.choices))
+    said = SAID.get(key.kind, "a name, or a number counted from 0")
+    unit = f" {key.unit}" if key.unit not in ("", None, "-", "1") else ""
+    if key.above is not None:
+        said += f" above {key.above:g}{unit}"
+    elif key.minimum is not None and key.maximum is not None:
+        said += f" from {key.minimum:g} to {key.maximum:g}{unit}"
+    elif key.minimum is not None:
+        said += f" of at least {key.minimum:g}{unit}"
+    elif key.maximum is not None:
+        said += f" of at most {key.maximum:g}{unit}"
+    elif unit:
+        said += f" in{unit}"
+    return said + (f" like {key.pattern}" if key.pattern else "")
+
+
+KIND_OF = {int: "integer", float: "number", str: "text", bool: "flag"}
+
+
+@cache
+def settings_keys() -> dict[str, Group]:
+    """One group of keys per part of the program."""
+    return {name: Group(keys_of(cls), _first_line(cls)) for name, cls in parts().items()}
+
+
+def keys_of(cls: type) -> dict[str, Key | Group]:
+    """Key of every field of a settings dataclass, nested ones as groups.
+
+    >>> from turnout.config.settings.fleet import FleetSettings
+    >>> keys_of(FleetSettings)["checkpoint_time"].unit
+    's'
+    """
+    hints = get_type_hints(cls)
+    return {f.name: _key(cls, f, hints[f.name]) for f in fields(cls)}
+
+
+def filled(cls: type, values: dict):
+    """Instance of ``cls`` with ``values`` in place of its defaults."""
+    given = {}
+    for field in fields(cls):
+        if field.name in values:
+            value, default = values[field.name], default_of(field)
+            if is_dataclass(default):
+                value = filled(type(default), value)
+            elif isinstance(default, float) and isinstance(value, int):
+                value = float(value)
+            given[field.name] = value
+    return cls(**given)
+
+
+def default_of(field):
+    """Default of a dataclass field."""
+    return field.default_factory() if field.default is MISSING else field.default
+
+
+def _key(cls, field, hint) -> Key | Group:
+    default, said = default_of(field), field.metadata
+    if is_dataclass(default):
+        return Group(keys_of(type(default)), _first_line(type(default)))
+    nullable = get_origin(hint) in (Union, UnionType) and type(None) in get_args(hint)
+    if nullable:
+        hint = next(a for a in get_args(hint) if a is not type(None))
+    many = get_origin(hint) is tuple or hint is tuple
+    if many:
+        hint = get_args(hint)[0] if get_args(hint) else type(default[0])
+    if hint not in KIND_OF:
+        raise TypeError(f"{cls.__name__}.{field.name}: a setting is int, float, str, bool or a tuple, not {hint}")
+    return Key(
+        KIND_OF[hint],
+        said.get("why", ""),
+        unit=said.get("unit", ""),
+        minimum=said.get("minimum"),
+        maximum=said.get("maximum"),
+        choices=tuple(said.get("choices") or ()),
+        many=many,
+        nullable=nullable,
+        default=default,
+    )
+
+
+def _first_line(cls: type) -> str:
+    return (cls.__doc__ or cls.__name__).strip().splitlines()[0]
+
+
+LABEL = r"[A-Za-z][A-Za-z0-9-]*"
+NAME = r"[A-Za-z][A-Za-z0-9_-]*"
+QUANTITIES = ("force", "acceleration", "velocity", "displacement", "strain", "temperature", "ignored")
+
+CHANNEL = {
+    "source": Key("name_or_index", "name of the channel in the file, or its number counted from 0", required=True),
+    "quantity": Key("text", "what it measures", required=True, choices=QUANTITIES),
+    "unit": Key("text", "unit of the numbers in the file; null: as the file says", nullable=True),
+    "sensitivity": Key(
+        "number", "sensitivity of the sensor; null where the file holds physical units", above=0, nullable=True
+    ),
+    "sensitivity_unit": Key("text", "its unit: mV/N, mV/g, mV/(m/s²), V/count ..."),
+    "sign": Key("integer", "-1 where the sensor is mounted upside down", choices=(1, -1)),
+    "offset": Key("number", "place of the sensor from the section's position", unit="m", minimum=-100, maximum=100),
+    "mounting": Key("text", "where it sits: hammer, rail head at sleeper, rail head mid-span, rail web, sleeper"),
+    "serial": Key("text", "serial number"),
+    "limit": Key("number", "range beyond which it clips, in the SI unit of its quantity", above=0, nullable=True),
+    "resolution": Key("number", "one step of the converter, in the SI unit of its quantity", above=0, nullable=True),
+}
+PASSAGE_CHANNEL = {
+    **CHANNEL,
+    "section": Key("text", "section it watches", required=True, pattern=LABEL),
+}
+# Below these nothing of a track can be seen; a rate that was meant in kHz lies below them.
+HAMMER_RATE = Key("number", "samples per second", unit="Hz", minimum=250, nullable=True)
+PASSAGE_RATE = Key("number", "samples per second", unit="Hz", minimum=100, nullable=True)
+FILES = {
+    "files": Key("text", "pattern of the file names below the turnout's raw folder", required=True),
+    "format": Key("text", "reader, one of `turnout check --formats`; auto: by the file itself"),
+    "rate": HAMMER_RATE,
+    "records": Key("integer", "records in one file; null: not promised", minimum=1, nullable=True),
+    "samples": Key("integer", "samples per record; null: not promised", minimum=1, nullable=True),
+    "time_zone": Key("text", "time zone of the file's time stamps, an IANA name"),
+}
+HAMMER = {
+    **FILES,
+    "force": Key("text", "channel of the hammer", required=True),
+    "response": Key("text", "channel that the models are identified from", required=True),
+    "validation": Key("text", "second channel, only compared with; null: none", nullable=True),
+    "channels": Each(CHANNEL, NAME, "one entry per channel", required=True),
+}
+PASSAGES = {
+    **FILES,
+    "rate": PASSAGE_RATE,
+    "channels": Each(PASSAGE_CHANNEL, NAME, "one entry per channel", required=True),
+}
+# What a single section may say otherwise than the rest of the turnout.
+SECTION_HAMMER = {name: rule for name, rule in HAMMER.items() if name != "files"}
+SECTION = {
+    "panel": Key("text", "open track, switch, closure, crossing panel, after the crossing", required=True,
+                 choices=("OT", "SP", "CLP", "CP", "AS")),
+    "track": Key("text", "track it lies in", required=True, choices=("main", "diverging", "both")),
+    "position": Key("number", "place along the turnout, 0 at the switch toe, towards the crossing", unit="m",
+                    required=True, minimum=-10000, maximum=10000),
+    "pad": Key("text", "railpad"),
+    "sleeper": Key("text", "sleeper"),
+    "hammer": Group(SECTION_HAMMER, "what differs for this section", fragment=True),
+}  # fmt: skip
+
+
+# Settings that are used once for all turnouts: a whole part, or some of its keys.
+FLEET_WIDE: dict[str, tuple[str, ...]] = {"fleet": (), "trend": (), "passage": ("cluster_maximum", "cluster_seed")}
+
+
+def layout_keys(merged: bool = False) -> dict:
+    """Everything a layout or an override may say, settings of its own included; ``merged``: with those of the fleet."""
+    return {
+        "description": Key("text", "what this layout is, for people"),
+        "sections": Each(SECTION, LABEL, "one entry per monitored section", required=True),
+        "hammer": Group(HAMMER, "how the hammer tests lie on the disk"),
+        "passages": Group(PASSAGES, "how the recordings of train passages lie on the disk"),
+        "settings": Group(
+            settings_keys() if merged else _own_settings(), "method settings of config.yaml that differ here"
+        ),
+    }
+
+
+def _own_settings() -> dict:
+    """The settings' keys; those that hold for the whole fleet stand there as belonging elsewhere."""
+    found: dict = dict(settings_keys())
+    for part, names in FLEET_WIDE.items():
+        if names:
+            spec = found[part].spec | {name: Elsewhere("config.yaml") for name in names}
+            found[part] = Group(spec, found[part].meaning)
+        else:
+            found[part] = Elsewhere("config.yaml")
+    return found
+
+
+ENDS = (("_low", "_high"), ("_minimum", "_maximum"))
+BESIDE = (("identify", "ballast_high", "railpad_low"),)  # one range ends before the next begins, or where it does
+
+
+def ends_of_ranges() -> Iterator[tuple[str, str, str]]:
+    """(part, name of the low end, name of the high end) of every range of the settings.
+
+    >>> ("identify", "ballast_low", "ballast_high") in list(ends_of_ranges())
+    True
+    """
+    for part, group in settings_keys().items():
+        for name in group.spec:
+            for low, high in ENDS:
+                if name.endswith(low) and (other := name.removesuffix(low) + high) in group.spec:
+                    yield part, name, other
+
+
+def check_ranges(settings: Branch) -> Iterator[ConfigError]:
+    """An error for every range of ``settings`` whose low end is not below its high end; keys are sound."""
+    for part, low, high in (*ends_of_ranges(), *BESIDE):
+        written = settings.get(part, {})
+        leaves = [written[name] for name in (low, high) if name in written]
+        values = [
+            written[name].value if name in written else settings_keys()[part].spec[name].default for name in (low, high)
+        ]
+        meet = (part, low, high) in BESIDE and values[0] == values[1]
+        if leaves and not (values[0] < values[1] or meet):
+            beside = f" in {leaves[1].place.path}, {leaves[1].place}" if len(leaves) > 1 else ""
+            found = f"{part}.{low} is {values[0]}, and {high} is {values[1]}{beside}"
+            yield leaves[0].place.error(found, f"Write a {low} below {high}")
+    bands = settings.get("identify", {}).get("extra_bands")
+    if bands and not _rising_pairs(bands.value):
+        yield bands.place.error(f"extra_bands is {list(bands.value)}", "Write pairs [low, high, low, high, ...]")
+
+
+def _rising_pairs(edges: tuple[float, ...]) -> bool:
+    return len(edges) % 2 == 0 and all(low < high for low, high in zip(edges[::2], edges[1::2]))
