@@ -115,7 +115,7 @@ def bars():
 
 def _vendors():
     """B11: every set of pyuff's problem files, as pyuff reads it where pyuff gives all of it."""
-    from turnout.readers.uff_sets import sets_of
+    from turnout.readers.uff_datasets import sets_of
 
     folder = Path(__file__).resolve().parents[2] / "shared" / "data" / "uff58_reader_samples"
     files = sorted(folder.glob("*.uff"))

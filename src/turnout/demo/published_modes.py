@@ -11,7 +11,7 @@ from turnout.demo.others import SDYPY_FILE, SDYPY_SHA256
 from turnout.errors import TurnoutError
 from turnout.identify.frf_modes import modes_of_frf
 from turnout.readers.uff import read_frf
-from turnout.readers.uff_sets import sets_of
+from turnout.readers.uff_datasets import sets_of
 
 # (frequency [Hz], damping [%]) of the seven modes in the makers' own showcase; None where they print no damping.
 SDYPY_BEAM = (

@@ -5,10 +5,9 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 from turnout.errors import TurnoutError
-from turnout.readers.description import describe
-from turnout.readers.formats import FORMATS, detect
-from turnout.readers.places import load
-from turnout.readers.spreadsheet import refuse_spreadsheet
+from turnout.readers.formats import FORMATS, detect, refuse_spreadsheet
+from turnout.readers.interpret import describe
+from turnout.readers.source import load
 from turnout.records import LongRecording, RawDescription, ReadResult, Recording
 
 __all__ = ["FORMATS", "read"]

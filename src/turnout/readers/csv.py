@@ -21,16 +21,11 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import csv
 
-from turnout.readers.clock import PART
-from turnout.readers.csv_cells import MISSING, cells_named
-from turnout.readers.csv_head import head_of
-from turnout.readers.head_words import SAMPLES, START, START_DATE
-from turnout.readers.precision import TEXT
-from turnout.readers.raw import COPY_AGAIN, RawFile, RawRecord
-from turnout.readers.stamps import moment
-from turnout.readers.stored import Column
-from turnout.readers.time_column import seconds_per_number, time_column
-from turnout.readers.variables import COUNT, Facts
+from turnout.readers.csv_header import MISSING, cells_named, head_of, seconds_per_number, time_column
+from turnout.readers.lazy import Column
+from turnout.readers.named_arrays import COUNT, SAMPLES, START, START_DATE, Facts
+from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord
+from turnout.readers.timing import PART, TEXT, moment
 
 
 def read_raw(source) -> RawFile:

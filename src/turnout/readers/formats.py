@@ -1,13 +1,15 @@
 """The raw formats: name -> module, extensions and the bytes that give a format away.
 
 A new format is one file with ``read_raw(source) -> RawFile`` and one line here.
+
+Files of a spreadsheet, which people call .csv or put among the recordings.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 
-from turnout.readers.raw import Source
+from turnout.readers.source import Source
 
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
@@ -64,3 +66,15 @@ def detect(source: Source) -> Format:
         f"neither its first bytes ({head[:8]!r}) nor its extension {extension!r} tells a known format",
         f"Set the format in the layout to one of {known}",
     )
+
+
+OLD_EXCEL = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
+FIRST_PARTS = (b"[Content_Types].xml", b"_rels/", b"docProps/", b"xl/", b"mimetypeapplication/vnd.oasis.opendocument")
+
+
+def refuse_spreadsheet(source):
+    """ReadError where the first bytes are those of Excel or of an OpenDocument, whatever the file is called."""
+    zipped = source.head[:4] == b"PK\x03\x04" and source.head[30:].startswith(FIRST_PARTS)
+    if zipped or source.head.startswith(OLD_EXCEL):
+        remedy = "Save it from the spreadsheet as CSV, text with separated columns"
+        raise source.error("byte 0", "it is a spreadsheet's own file", remedy)

@@ -1,4 +1,4 @@
-"""HDF5: groups and datasets as named variables, attributes beside them, read as ``turnout.readers.variables`` says.
+"""HDF5: groups and datasets as named variables, attributes beside them, read as ``turnout.readers.named_arrays`` says.
 
 What ``turnout.readers.writing`` leaves: attributes ``rate``, ``n_records`` and conditions at the root, a group
 ``record_000`` ... per record with ``started_at``, in it one dataset per channel with its ``unit`` and a Fletcher-32
@@ -9,11 +9,10 @@ import h5py
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.listed_units import Alphabetical
-from turnout.readers.raw import RawFile
-from turnout.readers.stored import stays, stored
-from turnout.readers.together import check_together
-from turnout.readers.variables import RATE, STEP, TIME, Facts, matrices, raw_file, vectors
+from turnout.readers.lazy import stays, stored
+from turnout.readers.named_arrays import RATE, STEP, TIME, Alphabetical, Facts, matrices, raw_file, vectors
+from turnout.readers.source import RawFile
+from turnout.readers.timing import check_together
 
 UNIT = ("unit", "units", "Unit", "Units")
 

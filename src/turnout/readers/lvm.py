@@ -9,11 +9,9 @@ import pyarrow as pa
 from pyarrow import csv
 
 from turnout.errors import ReadError
-from turnout.readers.precision import TEXT, step_precision
-from turnout.readers.raw import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, number_or_text
-from turnout.readers.stamps import moment
-from turnout.readers.together import check_together, seconds_behind
-from turnout.readers.variables import Facts
+from turnout.readers.named_arrays import Facts
+from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, number_or_text
+from turnout.readers.timing import TEXT, check_together, moment, seconds_behind, step_precision
 
 END_OF_HEADER = b"***End_of_Header***"
 SEPARATORS = {"Tab": "\t", "Comma": ",", "Semicolon": ";"}

@@ -1,4 +1,4 @@
-"""MATLAB files, version 5 and 7.3: named variables, read as ``turnout.readers.variables`` says.
+"""MATLAB files, version 5 and 7.3: named variables, read as ``turnout.readers.named_arrays`` says.
 
 pymatreader turns structures into dictionaries and gives both versions alike, except that 7.3 arrays come with their
 axes reversed; the channels' count and the longer axis tell which is which.
@@ -10,10 +10,9 @@ import h5py
 import numpy as np
 import pymatreader
 
-from turnout.readers.listed_units import Alphabetical
-from turnout.readers.raw import RawFile
-from turnout.readers.stored import stays, stored
-from turnout.readers.variables import TIME, raw_file
+from turnout.readers.lazy import stays, stored
+from turnout.readers.named_arrays import TIME, Alphabetical, raw_file
+from turnout.readers.source import RawFile
 
 LEAST = 128  # bytes of the header of version 5
 NEW = b"MATLAB 7.3"

@@ -1,10 +1,10 @@
-"""NumPy archives (.npz): named arrays, read as ``turnout.readers.variables`` says. Each member carries a CRC-32."""
+"""NumPy archives (.npz): named arrays, read as ``turnout.readers.named_arrays`` says. Each member carries a CRC-32."""
 
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.raw import RawFile
-from turnout.readers.variables import raw_file
+from turnout.readers.named_arrays import raw_file
+from turnout.readers.source import RawFile
 
 
 def read_raw(source) -> RawFile:

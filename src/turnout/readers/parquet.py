@@ -10,12 +10,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from turnout.readers.head_words import START
-from turnout.readers.precision import TEXT
-from turnout.readers.raw import COPY_AGAIN, RawFile, RawRecord
-from turnout.readers.stamps import moment
-from turnout.readers.stored import Column
-from turnout.readers.variables import COUNT, TIME, Facts
+from turnout.readers.lazy import Column
+from turnout.readers.named_arrays import COUNT, START, TIME, Facts
+from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord
+from turnout.readers.timing import TEXT, moment
 
 
 def read_raw(source) -> RawFile:

@@ -14,9 +14,9 @@ import h5py
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.raw import CONDITIONS, COPY_AGAIN, RawFile, RawRecord
-from turnout.readers.stored import stays, stored
-from turnout.readers.variables import Facts
+from turnout.readers.lazy import stays, stored
+from turnout.readers.named_arrays import Facts
+from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord
 
 FREQUENCY = ("CommonTriggerFrequency", "CommonTriggerFreq", "CommonTriggerFrequence", "TriggerValue")
 NOTED = {*CONDITIONS, "RecordCount"}

@@ -10,14 +10,10 @@ from contextlib import nullcontext
 import nptdms
 
 from turnout.errors import ReadError
-from turnout.readers.head_words import START
-from turnout.readers.numbered import natural
-from turnout.readers.precision import step_precision
-from turnout.readers.raw import COPY_AGAIN, RawFile, RawRecord
-from turnout.readers.stamps import moment
-from turnout.readers.stored import Column
-from turnout.readers.together import check_together, seconds_behind
-from turnout.readers.variables import COUNT, Facts
+from turnout.readers.lazy import Column
+from turnout.readers.named_arrays import COUNT, START, Facts, natural
+from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord
+from turnout.readers.timing import check_together, moment, seconds_behind, step_precision
 
 nptdms.log.log_manager.set_level("ERROR")  # what it warns of on the console is found by cut_off and becomes a reason
 LEAD_IN = 28  # bytes: tag, mask, version, offset of the next segment, offset of the raw data

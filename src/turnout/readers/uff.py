@@ -8,12 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.places import load
-from turnout.readers.raw import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, number_or_text
-from turnout.readers.stamps import uff_moment
-from turnout.readers.stored import Column
-from turnout.readers.together import check_together
-from turnout.readers.uff_sets import UffSet, says_si, sets_of
+from turnout.readers.lazy import Column
+from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, load, number_or_text
+from turnout.readers.timing import check_together, uff_moment
+from turnout.readers.uff_datasets import UffSet, says_si, sets_of
 
 PROMISED = re.compile(r"record \d+ of (\d+)$")
 TIME_RESPONSE, FREQUENCY_RESPONSE, TIME_AXIS = 1, 4, 17

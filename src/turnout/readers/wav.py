@@ -13,11 +13,10 @@ from pathlib import Path
 import numpy as np
 import soundfile
 
-from turnout.readers.head_words import START
-from turnout.readers.raw import COPY_AGAIN, RawFile, RawRecord
-from turnout.readers.stamps import moment
-from turnout.readers.stored import Stored
-from turnout.readers.variables import NAMES, UNITS, Facts, texts
+from turnout.readers.lazy import Stored
+from turnout.readers.named_arrays import NAMES, START, UNITS, Facts, texts
+from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord
+from turnout.readers.timing import moment
 
 OPEN_END = 0xFFFFFFFF
 

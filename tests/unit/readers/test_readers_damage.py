@@ -200,7 +200,7 @@ def test_a_bad_sector_at_the_begin_of_a_file_is_no_damage_of_it_either(written, 
         raise OSError(errno.EIO, "Input/output error")
 
     with monkeypatch.context() as patched, pytest.raises(OSError) as caught:
-        patched.setattr("turnout.readers.places.os.fstat", failing)
+        patched.setattr("turnout.readers.source.os.fstat", failing)
         read(path.name, path.parent, in_si)
     assert of_the_machine(caught.value)
 

@@ -10,7 +10,7 @@ import pyuff
 from turnout.errors import ReadError
 from turnout.readers import read
 from turnout.readers.uff import read_frf
-from turnout.readers.uff_sets import sets_of
+from turnout.readers.uff_datasets import sets_of
 from turnout.readers.writing import write
 from turnout.records import RawChannel, RawDescription
 

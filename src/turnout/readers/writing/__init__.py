@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 
-from turnout.readers.writing.raw_numbers import raw_records
+from turnout.readers.writing.encode import raw_records
 from turnout.records import RawDescription, Recording
 
 WRITERS = {

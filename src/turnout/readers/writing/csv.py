@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from turnout.readers.writing.raw_numbers import iso, noted
+from turnout.readers.writing.encode import iso, noted
 
 
 def write_raw(records, path, decimal_comma=False):

@@ -2,7 +2,7 @@
 
 import h5py
 
-from turnout.readers.writing.raw_numbers import attributes, fixed_text, iso, noted
+from turnout.readers.writing.encode import attributes, fixed_text, iso, noted
 
 
 def write_raw(records, path):

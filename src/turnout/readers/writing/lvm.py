@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from turnout.readers.writing.raw_numbers import noted
+from turnout.readers.writing.encode import noted
 
 END = "***End_of_Header***"
 

@@ -1,6 +1,6 @@
-"""The named variables that npz and MATLAB files share; the layout of ``turnout.readers.variables``."""
+"""The named variables that npz and MATLAB files share; the layout of ``turnout.readers.named_arrays``."""
 
-from turnout.readers.writing.raw_numbers import iso, noted
+from turnout.readers.writing.encode import iso, noted
 
 
 def variables(records):

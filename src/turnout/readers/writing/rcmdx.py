@@ -8,7 +8,7 @@ from datetime import UTC, datetime, timedelta
 import h5py
 import numpy as np
 
-from turnout.readers.writing.raw_numbers import attributes, noted
+from turnout.readers.writing.encode import attributes, noted
 
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 CHANNEL = {

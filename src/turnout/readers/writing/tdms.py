@@ -3,7 +3,7 @@
 import numpy as np
 from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
 
-from turnout.readers.writing.raw_numbers import noted
+from turnout.readers.writing.encode import noted
 
 
 def write_raw(records, path):

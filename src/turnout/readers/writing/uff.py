@@ -5,7 +5,7 @@ ID line 5 says which record of how many a set is of: a file cut between two sets
 
 import numpy as np
 
-from turnout.readers.writing.raw_numbers import noted
+from turnout.readers.writing.encode import noted
 
 DATA_TYPES = {"N": 13, "m/s²": 12, "g": 12, "m/s": 11, "m": 8, "Pa": 15}
 

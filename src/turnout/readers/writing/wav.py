@@ -5,7 +5,7 @@ import json
 import numpy as np
 import soundfile
 
-from turnout.readers.writing.raw_numbers import iso, noted
+from turnout.readers.writing.encode import iso, noted
 
 
 def write_raw(records, path, subtype=None, full_scale=1.0):

@@ -1,4 +1,4 @@
-r"""Records in named variables: how npz, MATLAB and HDF5 files are laid out, ours and those of others.
+"""Records in named variables: how npz, MATLAB and HDF5 files are laid out, ours and those of others.
 
 What is recognised (names without regard to case, except ``t``):
 
@@ -15,20 +15,100 @@ What is recognised (names without regard to case, except ``t``):
   3. one array: (record, channel, sample), or (channel, sample) or (sample, channel), whichever has the channels'
      count along its channel axis, with the longer axis for the samples;
   4. vectors of equal length, each a channel named like its variable.
+
+Records that are told by the numbers in their names: their order, and which of them are missing.
+
+A list of units beside channels that are variables of their own: which unit is whose.
+
+What loggers call the start and the count of samples, in the languages of Europe: lower case, no accents, "_".
 """
 
+import re
 from collections.abc import Mapping
 
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.head_words import START
-from turnout.readers.listed_units import Alphabetical, listed_units
-from turnout.readers.numbered import by_number, natural, numbered_names
-from turnout.readers.precision import EXACT, SINGLE, single_precision, step_precision
-from turnout.readers.raw import CONDITIONS, RawFile, RawRecord
-from turnout.readers.stamps import moment
-from turnout.readers.stored import ARRAYS
+from turnout.readers.lazy import ARRAYS
+from turnout.readers.source import CONDITIONS, RawFile, RawRecord
+from turnout.readers.timing import EXACT, SINGLE, moment, single_precision, step_precision
+
+NUMBERED = re.compile(r"^(?:record|rec|segment|impact|hit)[_ ]?(\d+)$", re.IGNORECASE)
+
+
+def numbered_names(names):
+    """[(number, name)] of the ``names`` that number a record.
+
+    >>> numbered_names(["rate", "hit_02", "Record 10"])
+    [(2, 'hit_02'), (10, 'Record 10')]
+    """
+    return [(int(m[1]), name) for name in names if (m := NUMBERED.match(name))]
+
+
+def by_number(numbered, variables, source):
+    """Values of the records in the order of their numbers, None for one that is missing between its neighbours.
+
+    None is missing where gaps outnumber the records: these are numbered by a clock or a counter.
+    """
+    names: dict[int, list[str]] = {}
+    for number, name in sorted(numbered):
+        names.setdefault(number, []).append(name)
+    first, last = min(names), max(names)
+    whole = last - first + 1 <= 2 * len(names)
+    for i, number in enumerate(range(first, last + 1) if whole else names):
+        same = names.get(number, [])
+        if len(same) > 1:
+            found = f"{' and '.join(map(repr, same))} are both number {number}"
+            yield source.error(f"record {i + 1}", found, "Number the records each by a number of its own")
+        else:
+            yield variables[same[0]] if same else None
+
+
+def natural(name):
+    """Key that sorts "record_2" before "record_10"."""
+    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name)]
+
+
+class Alphabetical(dict):
+    """Variables of a file that keeps them by the alphabet: their order says nothing."""
+
+
+def listed_units(names, units, labels, ordered):
+    """Unit of each of ``names``: by the list of ``labels`` beside the units, else by order; "" where none is said.
+
+    None where the units differ and the names are not ``ordered``: then nothing says which of them is whose.
+
+    >>> listed_units(["rail", "sleeper"], ["g", "m/s²"], ["Sleeper", "rail"], ordered=False)
+    ['m/s²', 'g']
+    >>> listed_units(["rail", "sleeper"], ["g", "m/s²"], [], ordered=True)
+    ['g', 'm/s²']
+    >>> listed_units(["rail", "sleeper"], ["g", "m/s²"], [], ordered=False)
+    """
+    wanted, labels = [name.casefold() for name in names], [label.casefold() for label in labels]
+    if len(labels) == len(set(labels)) == len(units) and set(wanted) <= set(labels):
+        return [units[labels.index(name)] for name in wanted]
+    if len(units) == 1:
+        return units * len(names)
+    if len(units) != len(names):
+        return [""] * len(names)
+    return units if ordered or len(set(units)) == 1 else None
+
+
+START = (
+    "started_at", "start_time", "starttime", "wf_start_time", "startzeit", "startzeitpunkt", "messbeginn", "messstart",
+    "beginn_der_messung", "heure_de_debut", "debut_de_mesure", "debut_de_la_mesure", "starttijd", "begintijd",
+    "begin_meting", "zacatek_mereni", "cas_zacatku", "starttid", "starttidspunkt",
+)  # fmt: skip
+# The day of a start whose time of day stands in a line of its own.
+START_DATE = ("start_date", "startdatum", "date_de_debut", "begindatum", "datum_zacatku", "startdato")
+# Unlike n_samples, which is of each record, these may count the rows of the whole file.
+SAMPLES = (
+    "number_of_samples", "anzahl_messwerte", "anzahl_der_messwerte", "anzahl_werte", "anzahl_abtastwerte",
+    "anzahl_samples", "anzahl_datenpunkte", "nombre_d_echantillons", "nombre_de_points", "aantal_samples",
+    "aantal_meetwaarden", "aantal_meetpunten", "pocet_vzorku", "antal_samples", "antal_malepunkter",
+    "antal_datapunkter",
+)  # fmt: skip
+
 
 RATE = (
     "rate", "fs", "f_s", "rate_hz", "fs_hz", "sample_rate", "samplerate", "samplingrate", "sampling_rate",

@@ -1,4 +1,4 @@
-"""SI samples back to the numbers that a raw file holds: the inverse of ``turnout.readers.channels``."""
+"""SI samples back to the numbers that a raw file holds: the inverse of ``turnout.readers.interpret``."""
 
 from datetime import UTC
 from zoneinfo import ZoneInfo
@@ -6,7 +6,7 @@ from zoneinfo import ZoneInfo
 import h5py
 import numpy as np
 
-from turnout.readers.raw import RawRecord
+from turnout.readers.source import RawRecord
 from turnout.units import IGNORED, SI, to_si
 
 

@@ -1,0 +1,258 @@
+"""The head of a text file: notes by name, names and units of the columns, and where the numbers begin.
+
+Which line above the numbers of a text file holds the names of the columns, and which their units.
+
+Cells of a text file that hold no number: marks for thousands, values that a spreadsheet misses, words.
+
+Which column of a table is the time, and how long one of its numbers lasts.
+"""
+
+import re
+import unicodedata
+from contextlib import contextmanager
+
+import pyarrow as pa
+
+from turnout.readers.interpret import MEANINGLESS
+from turnout.readers.named_arrays import COUNT, RATE, SAMPLES, START, START_DATE, STEP, TIME
+from turnout.readers.source import COPY_AGAIN
+from turnout.units import conversion
+
+WORDS = (*TIME, "zeit", "tid", "temps", "tempo", "tiempo", "tijd")
+SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "µs": 1e-6, "us": 1e-6}
+
+
+def time_column(names, units):
+    """Number of the column that is the time: by its name, else by its unit; None without one.
+
+    No sensor of ours measures in seconds, so that a unit of time tells a column whatever its language.
+
+    Examples
+    --------
+    >>> time_column(["Kraft", "Zeit"], ["N", "s"]), time_column(["idő", "erő"], ["ms", "N"])
+    (1, 0)
+    >>> time_column(["force", "rail"], ["N", ""])
+    """
+    for i, name in enumerate(names):
+        if name.strip().lower() in WORDS:
+            return i
+    return next((i for i, unit in enumerate(units) if unit.strip() and _plain_time(unit) in SECONDS), None)
+
+
+def seconds_per_number(unit, source):
+    """How many seconds a number in the time column is; ReadError for a unit that is none of time."""
+    if _plain_time(unit) not in SECONDS:
+        remedy = f"Export the time in one of {', '.join(SECONDS)[2:]}"
+        raise source.error("the time column", f"its unit {unit!r} is not known", remedy, reason="unit_unknown")
+    return SECONDS[_plain_time(unit)]
+
+
+def _plain_time(unit):
+    return unit.strip().replace("\u03bc", "µ")
+
+
+NAME_WITH_UNIT = re.compile(r"^(.*?)\s*[\[(]([^\[\]]*)[\])]$")
+
+
+def names_among(lines):
+    """(number of the line of names, that of the units or None) of lines of cells, as many as there are columns.
+
+    The names stand above a line of units; without one they are the last line that names a time or has units in
+    brackets, for comments may follow, or else the last line. What stands further up may be anything.
+
+    Examples
+    --------
+    >>> names_among([["Messung", "Gleis 3"], ["Zeit", "Kraft"], ["s", "kN"], ["Uhr", "Hammer"]])
+    (1, 2)
+    >>> names_among([["Messung", "Gleis 3"], ["Rail", "Kraft"]])
+    (1, None)
+    """
+    last = len(lines) - 1
+    for i in range(last, 0, -1):
+        if _are_units(lines[i], 0.5 if i == last else 1.0):
+            return i - 1, i
+    return next((i for i in range(last, -1, -1) if _are_names(lines[i])), last), None
+
+
+def _are_units(cells, share):
+    """Whether at least this share of the cells that are not empty are units."""
+    said = [cell for cell in cells if cell]
+    return sum(map(_is_unit, said)) >= share * len(said)
+
+
+def _is_unit(cell):
+    """A unit that is known, one that says nothing, or whatever stands in brackets; "12 m" is a length."""
+    bare = cell.strip("[]() ")
+    if cell[0] in "[(" or bare.casefold() in MEANINGLESS or bare.replace("\u03bc", "µ") in SECONDS:
+        return True
+    try:
+        return not bare[0].isdigit() and bool(conversion(bare))
+    except ValueError:
+        return False
+
+
+def _are_names(cells):
+    """Whether a time is among the cells, or a unit in brackets behind a name; beside "08:30" it is no column."""
+    if any(cell[:1].isdigit() for cell in cells):
+        return False
+    in_brackets = [match[2] for cell in cells if (match := NAME_WITH_UNIT.match(cell)) and match[1]]
+    return any(cell.lower() in WORDS for cell in cells) or any(unit and _is_unit(unit) for unit in in_brackets)
+
+
+# Empty, or what loggers and spreadsheets write for a value that is not there: these become nan.
+MISSING = (
+    "", "NaN", "nan", "NA", "-", "#NV", "#N/A", "#NA", "#VALUE!", "#WERT!", "#DIV/0!", "#NUM!", "#ZAHL!", "#REF!",
+    "#BEZUG!",
+)  # fmt: skip
+MARK = r"[ .,'’\u00a0\u202f]"  # between groups of three digits
+THOUSANDS = re.compile(rf"[+-]?\d{{1,3}}(?:{MARK}\d{{3}})+(?:[.,]\d+)?")
+REFUSED = re.compile(
+    r"CSV column #(\d+): (?:Row #(\d+): )?CSV conversion error to \w+: invalid value '(.*)'", re.DOTALL
+)
+
+
+def stands_for_a_number(cell):
+    """Whether a cell is a number that cannot be read, or one that is missing; an empty cell is neither.
+
+    >>> stands_for_a_number("-1.234,5"), stands_for_a_number("#NV"), stands_for_a_number("13.05.2024")
+    (True, True, False)
+    """
+    return bool(THOUSANDS.fullmatch(cell)) or (cell.startswith("#") and cell in MISSING)
+
+
+@contextmanager
+def cells_named(source, line, names):
+    """Turn what pyarrow says of a cell in the rows below ``line`` into a ReadError with its line and column."""
+    try:
+        yield
+    except pa.ArrowInvalid as error:
+        if not (match := REFUSED.search(str(error))):
+            raise
+        column, row, cell = int(match[1]), match[2], match[3]
+        where = f"line {line + int(row)}" if row else f"the numbers after line {line}"
+        where += f", column {names[column] or str(column + 1)!r}"
+        if THOUSANDS.fullmatch(cell):
+            found = f"{cell!r} has marks for thousands, or another decimal mark than other numbers"
+            remedy = "Export all numbers with one decimal mark and without marks for thousands"
+        else:
+            found = f"{cell[:60]!r} is no number"
+            remedy = f"{COPY_AGAIN}; if it stands in the logger's own file too, leave that record out"
+        raise source.error(where, found, remedy) from error
+
+
+NOTE = re.compile(r"^#?\s*([^\W\d][\w .'’-]*?)\s*([\[(][^\])]*[\])])?\s*[:=,;\t]\s*(.*)$")
+SCALES = {"kHz": 1e3, "khz": 1e3, "MHz": 1e6, "ms": 1e-3, "µs": 1e-6, "\u03bcs": 1e-6, "us": 1e-6}
+TEMPERATURES = {"rail_temperature", "air_temperature"}
+NOTES = {*RATE, *STEP, *START, *START_DATE, *COUNT, "n_samples"}
+NUMBERS = TEMPERATURES | {*SAMPLES}  # a note only where a number follows, else a column of that name
+GROUPED = re.compile(rf"\d{{1,3}}(?:{MARK}\d{{3}})+(?!\d)")
+# A line that says one frequency and nothing else: "Vzorkovani: 10000 Hz", "taktning [kHz];10".
+FREQUENCY = re.compile(r"^#?[^\d\[(]+[\[(]?([kM]?Hz)?[\])]?[\s:=,;]*([\d.,]+)\s*([kM]?Hz)?\W*$", re.IGNORECASE)
+NO_RATE = re.compile(r"filt|pass|paß|cut|grenz|band|coup|cort|tagli|græns|eigen|reson|netz|mains", re.IGNORECASE)
+
+
+def _line_of(data):
+    """One line as text: UTF-8, or what older loggers of the west write."""
+    try:
+        return data.decode("utf-8-sig").strip("\r\n")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", "replace").strip("\r\n")
+
+
+def head_of(data, source):
+    """(notes, names, units, offset of the first number, separator, lines that name a frequency nobody understood)."""
+    notes: dict[str, float | str] = {}
+    before: list[str] = []
+    unclear: list[tuple[str, float]] = []
+    position = 0
+    while position < len(data):
+        end = data.find(b"\n", position)
+        end = len(data) if end < 0 else end
+        line = _line_of(data[position:end])
+        # a comma is the decimal mark where another separator stands
+        separator = next((s for s in ("\t", ";") if s in line), ",")
+        cells = _cells(line, separator)
+        if any(cells) and all(_is_number(cell) or stands_for_a_number(cell) or cell == "" for cell in cells):
+            names, units = _names([_cells(text, separator) for text in before], cells)
+            return notes, names, units, position, separator, tuple(unclear)
+        match = NOTE.match(line.strip())
+        name = match[1].strip() if match else ""
+        plain = _plain(name)
+        if plain not in NOTES and (frequency := _frequency(line)) is not None:
+            unclear.append((line.strip(), frequency))
+        value = match[3].strip(separator + " ") if match else ""
+        known = plain in NOTES or (plain in NUMBERS and _is_number(value.split()[0] if value else ""))
+        if plain in SAMPLES and (grouped := GROUPED.match(value)):
+            value = re.sub(r"\D", "", grouped[0])
+        if match and (line.startswith("#") or known):
+            notes[plain if known else name] = _value(f"{value} {match[2]}" if match[2] else value)
+        elif line.strip():
+            before.append(line)
+        position = end + 1
+    if len(before) < 2:
+        raise source.error("line 1", "no line of numbers follows", COPY_AGAIN, reason="empty")
+    said = f"no line of numbers; the last line reads {before[-1][:60]!r}"
+    raise source.error("the file", said, "Export numbers between semicolons, tabs or commas, the time in seconds")
+
+
+def _plain(name):
+    """A name without case, accents, spaces and apostrophes.
+
+    >>> _plain("Fréquence d’échantillonnage")
+    'frequence_d_echantillonnage'
+    """
+    letters = unicodedata.normalize("NFKD", name.lower())
+    return re.sub(r"[\s'’]", "_", "".join(c for c in letters if not unicodedata.combining(c)))
+
+
+def _frequency(line):
+    """The one frequency [Hz] that a line says, None where it says none, more, or that of a filter.
+
+    >>> _frequency("# Vzorkovací kmitočet: 10 kHz"), _frequency("Tiefpass: 4000 Hz"), _frequency("0.5-10000 Hz")
+    (10000.0, None, None)
+    """
+    match = FREQUENCY.match(line.strip())
+    if not match or NO_RATE.search(line) or not (match[1] or match[3]):
+        return None
+    value = _value(f"{match[2]} {match[3] or match[1]}")
+    return value if isinstance(value, float) else None
+
+
+def _cells(line, separator):
+    return [cell.strip().strip('"') for cell in line.split(separator)]
+
+
+def _is_number(cell):
+    try:
+        float(cell.replace(",", "."))
+    except ValueError:
+        return False
+    return True
+
+
+def _value(text):
+    """A number where the text begins with one ("51200 Hz", "12,8 kHz"), in Hz or s, else the text."""
+    first, *rest = text.split() or [""]
+    dated = "-" in first[1:].lower().replace("e-", "")
+    if not first or not _is_number(first) or dated:
+        return text
+    return float(first.replace(",", ".")) * SCALES.get(rest[0].strip("[]()") if rest else "", 1.0)
+
+
+def _names(lines, cells):
+    """(names, units) out of the lines between head and the first numbers ``cells``: names, and perhaps units.
+
+    A separator behind the last number, as in "1;2;", makes a column without a name.
+    """
+    count, open_end = len(cells), not cells[-1]
+    lines = [(line + [""] * open_end)[:count] for line in lines if any(line) and len(line) >= count - open_end]
+    if not lines:
+        names = [str(i) for i in range(count)]
+        return [*names[:-1], ""] if open_end and count > 1 else names, [""] * count
+    at, below = names_among(lines)
+    names = lines[at]
+    units = [""] * count if below is None else [cell.strip("[]() ") for cell in lines[below]]
+    for i, name in enumerate(names):
+        if match := NAME_WITH_UNIT.match(name):
+            names[i], units[i] = match[1], match[2]
+    return names, units
