@@ -10,8 +10,8 @@ from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.receptance import find_impacts, receptance_of
 from turnout.records import Recording
 from turnout.signal.coherence import coherence_limits, lower_coherence_limit
-from turnout.signal.pulses import force_pulse
-from turnout.signal.windows import correct_poles
+from turnout.signal.filters import force_pulse
+from turnout.signal.spectra import correct_poles
 
 N_TEST = 400
 

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.signal import fftconvolve
 
 from turnout.records import Channel, Recording
-from turnout.signal.pulses import FAMILIES, force_pulse
+from turnout.signal.filters import FAMILIES, force_pulse
 
 RATE = 20_000.0
 N_SAMPLE = 4_000

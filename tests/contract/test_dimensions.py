@@ -11,12 +11,12 @@ import pytest
 from scipy.signal import fftconvolve
 
 from turnout.config.settings.receptance import ReceptanceSettings
-from turnout.receptance import estimators, find_impacts, receptance_of
-from turnout.receptance.band_edge import band_edges
+from turnout.receptance import find_impacts, frf, receptance_of
+from turnout.receptance.contact import band_edges
 from turnout.receptance.dynamic_stiffness import dynamic_stiffness
 from turnout.records import Channel, Recording
-from turnout.signal import coherence, filters, spectra, windows
-from turnout.signal.pulses import force_pulse
+from turnout.signal import coherence, filters, spectra
+from turnout.signal.filters import force_pulse
 
 METRE, SECOND, NEWTON = 1.7, 0.6, 2.3
 
@@ -43,13 +43,13 @@ FUNCTIONS = {
         lambda u: spectra.spectral_density(ANSWER[0] * u(m=1), 1000.0 * u(s=-1), 50),
         [{"s": -1}, {"m": 2, "s": 1}, {}],
     ),
-    "h1": (lambda u: [estimators.h1(G_FF * u(n=2), G_FA * u(m=1, n=1))], [{"m": 1, "n": -1}]),
-    "h2": (lambda u: [estimators.h2(G_AA * u(m=2), G_FA * u(m=1, n=1))], [{"m": 1, "n": -1}]),
+    "h1": (lambda u: [frf.h1(G_FF * u(n=2), G_FA * u(m=1, n=1))], [{"m": 1, "n": -1}]),
+    "h2": (lambda u: [frf.h2(G_AA * u(m=2), G_FA * u(m=1, n=1))], [{"m": 1, "n": -1}]),
     "hv": (
-        lambda u: [estimators.hv(G_FF * u(n=2), G_AA * u(m=2), G_FA * u(m=1, n=1), 0.8 * u(m=1, n=-1))],
+        lambda u: [frf.hv(G_FF * u(n=2), G_AA * u(m=2), G_FA * u(m=1, n=1), 0.8 * u(m=1, n=-1))],
         [{"m": 1, "n": -1}],
     ),
-    "coherence": (lambda u: [estimators.coherence(G_FF * u(n=2), G_AA * u(m=2), G_FA * u(m=1, n=1))], [{}]),
+    "coherence": (lambda u: [frf.coherence(G_FF * u(n=2), G_AA * u(m=2), G_FA * u(m=1, n=1))], [{}]),
     "coherence_limits": (lambda u: coherence.coherence_limits(np.array([0.5, 0.9]), 10), [{}, {}]),
     "dynamic_stiffness": (
         lambda u: dynamic_stiffness(
@@ -66,8 +66,8 @@ FUNCTIONS = {
         [{"m": 1}],
     ),
     "reduce_rate": (lambda u: [filters.reduce_rate(ANSWER * u(n=1), 4)], [{"n": 1}]),
-    "exponential_window": (lambda u: [windows.exponential_window(50, 3, 4.0 * u(s=-1), 100.0 * u(s=-1))], [{}]),
-    "correct_poles": (lambda u: [windows.correct_poles(POLE * u(s=-1), 7.0 * u(s=-1))], [{"s": -1}]),
+    "exponential_window": (lambda u: [spectra.exponential_window(50, 3, 4.0 * u(s=-1), 100.0 * u(s=-1))], [{}]),
+    "correct_poles": (lambda u: [spectra.correct_poles(POLE * u(s=-1), 7.0 * u(s=-1))], [{"s": -1}]),
     "force_pulse": (lambda u: [force_pulse("half-sine", np.arange(9) * 1e-4 * u(s=1), 7e-4 * u(s=1))], [{}]),
 }
 

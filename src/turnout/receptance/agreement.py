@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.fft import next_fast_len, rfft, rfftfreq
 
-from turnout.receptance.cut import MAD_TO_SD
+from turnout.receptance.segmentation import MAD_TO_SD
 from turnout.records import Rejection
 
 FEWEST_BLOWS = 5

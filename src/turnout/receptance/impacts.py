@@ -5,15 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from turnout.config.settings.receptance import ReceptanceSettings
-from turnout.receptance.against_median import judge_against_median
 from turnout.receptance.agreement import judge_agreement
-from turnout.receptance.band_edge import band_edges
-from turnout.receptance.contact import measure_contact
-from turnout.receptance.cut import cut_blows
-from turnout.receptance.decay import judge_decay, judge_second_contact
-from turnout.receptance.flat_top import judge_tops
-from turnout.receptance.overload import overload
-from turnout.receptance.repeats import judge_repeats, repeated
+from turnout.receptance.contact import band_edges, measure_contact
+from turnout.receptance.free_decay import judge_decay, judge_second_contact
+from turnout.receptance.impact_quality import judge_against_median, judge_repeats, judge_tops, overload, repeated
+from turnout.receptance.segmentation import cut_blows
 from turnout.records import Impact, Recording, Rejection
 
 # Far above any hammer and below what newtons become when they are taken for kilonewtons [N].

@@ -10,7 +10,7 @@ from turnout.mismatch.track.blow_ceiling import FLOOR, blow_ceiling, held
 from turnout.mismatch.track.campaign import HammerTest
 from turnout.mismatch.track.ceiling import ceilings
 from turnout.records import Channel, Recording
-from turnout.signal.pulses import force_pulse
+from turnout.signal.filters import force_pulse
 from turnout.simulate.sensor import Sensor
 
 RATE = 20_000.0

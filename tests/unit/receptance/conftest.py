@@ -9,7 +9,7 @@ from scipy.signal import fftconvolve
 from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.receptance import find_impacts
 from turnout.records import Channel, Recording
-from turnout.signal.pulses import force_pulse
+from turnout.signal.filters import force_pulse
 
 RATE = 20_000.0
 N = 4000

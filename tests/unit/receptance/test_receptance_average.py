@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from turnout.config.settings.receptance import ReceptanceSettings
-from turnout.receptance import bands_passed, estimators, find_impacts, gate_rejections, receptance_of
-from turnout.signal.windows import correct_poles
+from turnout.receptance import bands_passed, find_impacts, frf, gate_rejections, receptance_of
+from turnout.signal.spectra import correct_poles
 
 RATE = 20_000.0
 
@@ -46,8 +46,8 @@ def noisy_spectra(rng, sigma_f, sigma_a, h=0.6 - 1.7j, n=200_000):
 def test_each_estimator_is_unbiased_for_the_noise_it_assumes(sigma_f, sigma_a, unbiased):
     g_ff, g_aa, g_fa, h = noisy_spectra(np.random.default_rng(6), sigma_f, sigma_a)
     ratio = np.inf if sigma_f == 0 else sigma_a / sigma_f
-    estimates = {"h1": estimators.h1(g_ff, g_fa), "h2": estimators.h2(g_aa, g_fa),
-                 "hv": estimators.hv(g_ff, g_aa, g_fa, ratio)}  # fmt: skip
+    estimates = {"h1": frf.h1(g_ff, g_fa), "h2": frf.h2(g_aa, g_fa),
+                 "hv": frf.hv(g_ff, g_aa, g_fa, ratio)}  # fmt: skip
     # 200,000 draws leave 0.4 % of scatter; the wrong estimator is off by 14 % or more.
     assert estimates[unbiased] == pytest.approx([h], rel=0.015)
     wrong = "h2" if unbiased == "h1" else "h1"
@@ -117,7 +117,7 @@ def test_exponential_window_needs_the_pole_corrected_and_nothing_rescaled():
     from scipy.signal import fftconvolve
 
     from turnout.records import Channel, Recording
-    from turnout.signal.pulses import force_pulse
+    from turnout.signal.filters import force_pulse
 
     pole, residue, decay = -0.003 * 2 * np.pi * 150 + 2j * np.pi * 150, 0.7 - 0.4j, 60.0
     t = np.arange(4000) / RATE

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from turnout.receptance.agreement import pairwise_coherence, response_gain
-from turnout.receptance.flat_top import top_share
-from turnout.receptance.overload import rail_code
-from turnout.signal.pulses import FAMILIES, force_pulse
+from turnout.receptance.impact_quality import rail_code, top_share
+from turnout.signal.filters import FAMILIES, force_pulse
 
 RATE = 20_000.0
 

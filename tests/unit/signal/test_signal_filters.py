@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scipy.signal import freqz_sos
 
-from turnout.signal.filters import band_pass, butterworth_sections, reduce_rate
-from turnout.signal.pulses import FAMILIES, force_pulse
-from turnout.signal.windows import correct_poles, exponential_window, force_window
+from turnout.signal.filters import FAMILIES, band_pass, butterworth_sections, force_pulse, reduce_rate
+from turnout.signal.spectra import correct_poles, exponential_window, force_window
 
 RATE = 20_000.0
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from turnout.receptance.double_hit import further_contacts
+from turnout.receptance.contact import further_contacts
 from turnout.records import Rejection
 
 # The end of a record is judged over a period of the slowest mode.

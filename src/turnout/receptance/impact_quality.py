@@ -1,0 +1,274 @@
+"""Channels that left their range: the range itself reached, or one rail code repeated.
+
+Force pulses with a flattened top: what analog clipping and soft saturation leave, however noisy the converter.
+
+The same blow twice: a test that was exported again, in another format or under another name.
+
+A blow held against the others of its test: weak, out of range, noisy.
+"""
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from turnout.receptance.contact import crossing
+from turnout.receptance.segmentation import MAD_TO_SD
+from turnout.records import Rejection
+
+# A parabola one code deep over m equal samples falls by 9 codes within as many samples again, one more by rounding.
+NATURAL_FALL = 12.0
+CHANCE = 1e-3
+
+
+def range_exceeded(x, limit):
+    """Largest absolute sample if it reaches a known range, else None.
+
+    >>> range_exceeded(np.array([0.0, -5.0, 3.0]), 5.0), range_exceeded(np.array([1.0]), None)
+    (5.0, None)
+    """
+    size = float(np.max(np.abs(x)))
+    return size if limit is not None and size >= 0.999 * limit else None
+
+
+def rail_code(x, resolution=None, noise=0.0):
+    r"""Samples that repeat one extreme code as only a clipped signal does: (number of samples, code), or None.
+
+    A smooth top may repeat its highest code as well, on a quiet converter with few bits. Then it is nearly a
+    parabola: m equal samples lie within one step (and the noise) of each other, and over as many samples again on
+    either side it falls by less than ``NATURAL_FALL`` times that. A clipped signal arrives with a slope and falls
+    faster.
+    Noise of several steps seldom repeats a code, m times with the probability
+
+    .. math:: \left(\frac{q}{2\sqrt{\pi}\,\sigma}\right)^{m-1} \quad (q \text{ step},\ \sigma \text{ noise}),
+
+    and where that is below ``CHANCE`` only the step counts. Fewer than three equal samples prove nothing, and
+    three only where chance is ten times smaller still.
+
+    Parameters
+    ----------
+    x : (n_sample,) array of float
+        [any unit]
+    resolution : float, optional
+        One step of the converter; by default the smallest step that occurs.
+    noise : float
+        Standard deviation of the noise. [the same unit]
+
+    Examples
+    --------
+    >>> x = np.round(1000 * np.sin(np.pi * np.arange(61) / 60))
+    >>> rail_code(x), rail_code(np.minimum(x, 900.0))
+    (None, (17, 900.0))
+    """
+    for y, sign in ((x, 1.0), (-x, -1.0)):
+        code = float(y.max())
+        equal = np.flatnonzero(y == code)
+        if equal.size < 3 or code <= 0.0:
+            continue
+        runs = [(first, last) for first, last in _runs(equal) if last - first >= 2]
+        step = (resolution or _smallest_step(y)) if runs else 0.0
+        noisy = noise > step / 4.0
+        for first, last in runs:
+            m = last - first + 1
+            reach = (m + 1) // 2
+            chance = (step / (2.0 * np.sqrt(np.pi) * noise)) ** (m - 1) if noisy else 1.0
+            if first < reach or last + reach >= y.size or (noisy and m == 3 and chance > CHANCE / 10.0):
+                continue
+            depth = step if chance < CHANCE else step + 3.0 * noise
+            if code - max(y[first - reach], y[last + reach]) > NATURAL_FALL * depth:
+                return int(sum(b - a + 1 for a, b in runs)), sign * code
+    return None
+
+
+def overload(cut, contact):
+    """Rejection for the first sign of an overload on either channel of a blow, or None.
+
+    A range ends where the recorded samples end, not those with the zero line taken off.
+    """
+    both = (cut.force, contact.noise_force), (cut.acceleration, contact.noise_acceleration)
+    for (x, noise), zero, channel in zip(both, cut.zeros, cut.channels):
+        if (size := range_exceeded(x + zero, channel.limit)) is not None:
+            detail = f"{channel.name} reaches {size:.4g}, its range ends at {channel.limit:.4g}"
+            return Rejection("overload", size, channel.limit, detail)
+        if (rail := rail_code(x, channel.resolution, noise)) is not None:
+            detail = f"{channel.name} repeats its highest code {rail[1]:.4g} in {rail[0]} samples"
+            return Rejection("overload", float(rail[0]), 2.0, detail)
+    return None
+
+
+def _runs(indices):
+    parts = np.split(indices, np.flatnonzero(np.diff(indices) > 1) + 1)
+    return [(int(p[0]), int(p[-1])) for p in parts if p.size]
+
+
+def _smallest_step(y):
+    steps = np.diff(np.unique(y))
+    steps = steps[steps > 1e-12 * np.ptp(y)]
+    return float(steps.min()) if steps.size else np.inf
+
+
+# A concave pulse is at most as flat as a parabola, sqrt(0.05 / 0.5) = 0.316 of its half width; half-sine 0.303.
+FLATTEST_TOP = 0.335
+# Flat beyond doubt, whatever the test's other blows look like.
+CERTAINLY_FLAT = 0.42
+# Samples above half the peak: too few to say anything, and too few to compare with all pulses there are.
+FEWEST_SAMPLES, ENOUGH_SAMPLES = 3.0, 8.0
+# A blow's top may be flatter than those of its test by this much, more for few samples and for noise of some percent;
+# tanh(1) makes 0.05 to 0.06.
+FLATTER = 0.03
+FEWEST_BLOWS = 5
+NOISIEST = 0.02
+
+
+def top_share(force, contact, polarity=1):
+    r"""Part of the time above half the peak that a pulse spends within 5 % of its peak.
+
+    .. math:: q = w(0.95) / w(0.5)
+
+    Half-sine 0.303, haversine 0.287, Hertzian :math:`\sin^{3/2}` 0.293, parabola 0.316: no pulse that bends most
+    at its top exceeds the parabola, whatever its width, height or skew. Clipped at 90 % of its peak a half-sine has
+    0.49, behind a saturation tanh(1) 0.36. None for pulses of fewer than ``FEWEST_SAMPLES`` at half height.
+
+    Examples
+    --------
+    >>> from turnout.receptance.contact import Contact
+    >>> x = np.sin(np.pi * np.arange(61) / 60)
+    >>> about = Contact(1, 59, 30, 1.0, 40.0, 0.0, 0.0, 0.0, 0.0)
+    >>> print(f"{top_share(x, about):.2f} {top_share(np.minimum(x, 0.9), about):.2f}")
+    0.30 0.49
+    """
+    if contact.half_width < FEWEST_SAMPLES:
+        return None
+    first = max(0, contact.onset - 2)
+    part = polarity * force[first : contact.end + 3]
+    fine = CubicSpline(np.arange(part.size), part)(np.arange(8 * (part.size - 1) + 1) / 8.0)
+    top = int(np.argmax(fine))
+    width = [
+        crossing(fine, top, share * fine[top], 1) - crossing(fine, top, share * fine[top], -1) for share in (0.95, 0.5)
+    ]
+    return width[0] / width[1]
+
+
+def natural_top(contact):
+    """Largest natural ``top_share``: noise shifts the 5 % line, and dw/w = d(level) / (2 * 0.05), three times over."""
+    return FLATTEST_TOP * float(np.sqrt(1.0 + 60.0 * contact.noise_force / abs(contact.peak)))
+
+
+def judge_tops(cuts, deviation):
+    """Reject the blows whose tops are flatter than nature or than the test allows.
+
+    A top flatter than a parabola is rejected unless the test's other blows look the same: then it is the shape of
+    this tip. In a test of ``FEWEST_BLOWS`` or more, one hammer with one tip makes one shape, and a blow that stands
+    out is rejected too: a soft saturation may leave a pointed pulse no flatter than a half-sine is by nature.
+    """
+    known = [(c, share) for c in cuts if (share := _share_if_quiet(c)) is not None]
+    shares = np.array([share for _, share in known])
+    enough = len(known) >= FEWEST_BLOWS
+    middle = float(np.median(shares)) if enough else 0.0
+    spread = deviation * MAD_TO_SD * float(np.median(np.abs(shares - middle))) if enough else np.inf
+    for cut, share in known:
+        c = cut.contact
+        natural = natural_top(c) if c.half_width >= ENOUGH_SAMPLES else np.inf
+        natural = min(max(natural, middle + FLATTER / 2.0), max(natural, CERTAINLY_FLAT))
+        usual = middle + max(spread, FLATTER * (1.0 + 4.0 / c.half_width + 100.0 * c.noise_force / abs(c.peak)))
+        limit = min(natural, usual)
+        if share > limit:
+            words = f"the others' {middle:.2f} allow" if usual < natural else "is natural"
+            detail = f"the top of the force is flat: {share:.2f} of its half width, at most {limit:.2f} {words}"
+            cut.rejections.append(Rejection("overload", float(share), float(limit), detail))
+
+
+def _share_if_quiet(cut):
+    if cut.rejections or cut.contact.noise_force > NOISIEST * abs(cut.contact.peak):
+        return None
+    return top_share(cut.force, cut.contact, cut.polarity)
+
+
+# Of the largest value: what rounding to 16 bits leaves. Two blows of one hammer differ by far more in shape alone.
+ALIKE = 1e-4
+
+
+def judge_repeats(cuts):
+    """Reject every blow whose force and acceleration are those of an earlier one; counted twice it narrows all errors.
+
+    The windows are compared with their peaks upon each other, as far as both go.
+    """
+    peaks = np.array([np.max(np.abs(c.force)) for c in cuts])
+    order = np.argsort(peaks, kind="stable")
+    for place, k in enumerate(order):
+        for other in order[place + 1 :]:
+            if peaks[other] - peaks[k] > 2.0 * ALIKE * peaks[other]:
+                break
+            first, second = sorted((int(k), int(other)))
+            if not repeated(cuts[second]) and (apart := difference(cuts[first], cuts[second])) <= ALIKE:
+                earlier = cuts[first]
+                detail = f"the same samples as record {earlier.record + 1} of {earlier.recording.source or 'the test'}"
+                cuts[second].rejections.append(Rejection("duplicate", apart, ALIKE, detail))
+
+
+def difference(one, other) -> float:
+    """Largest difference of force or acceleration over the largest value of either; inf for different rates."""
+    if one.rate != other.rate:
+        return np.inf
+    tops = [int(np.argmax(np.abs(c.force))) for c in (one, other)]
+    ahead = min(tops)
+    n = ahead + min(one.force.size - tops[0], other.force.size - tops[1])
+    pairs = ((one.force, other.force), (one.acceleration, other.acceleration))
+    found = 0.0
+    for a, b in pairs:
+        a, b = a[tops[0] - ahead :][:n], b[tops[1] - ahead :][:n]
+        top = max(np.max(np.abs(a)), np.max(np.abs(b)))
+        found = max(found, float(np.max(np.abs(a - b)) / top) if top > 0.0 else 0.0)
+    return found
+
+
+def repeated(cut) -> bool:
+    """Whether ``judge_repeats`` found the blow in an earlier one."""
+    return any(r.reason == "duplicate" for r in cut.rejections)
+
+
+NOISE_FLOOR = 0.02
+DEAD = 5.0
+
+
+def judge_against_median(cuts, settings):
+    """Add to each cut the rejections that only the test as a whole can show.
+
+    A number is an outlier if it lies ``deviation`` robust standard deviations *and* a stated factor from the median of
+    the test: the factor alone would fail a test of uneven blows, the deviation alone one of very even blows.
+    """
+    if not cuts:
+        return
+    peak = np.array([abs(c.contact.peak) for c in cuts])
+    largest = np.array([_largest_response(c) for c in cuts])
+    before = np.array([c.contact.noise_acceleration for c in cuts])
+    noise = before / np.where(largest > 0.0, largest, np.inf)
+    for k, cut in enumerate(cuts):
+        if largest[k] <= DEAD * before[k]:
+            _reject(cut, "dead_channel", largest[k], DEAD * before[k], (
+                f"{cut.channels[1].name} answers with {largest[k]:.3g}, no more than its noise"))  # fmt: skip
+        elif noise[k] > settings.noise:
+            _reject(cut, "noisy", noise[k], settings.noise, "rms before the blow is {0:.3f} of the peak acceleration")
+    if len(cuts) < 3:
+        return
+    middle = float(np.median(peak))
+    # Peaks scatter by ratios: a blow of half and one of double the usual force are equally unusual.
+    spread = MAD_TO_SD * float(np.median(np.abs(np.log(peak / middle))))
+    usual = float(np.median(noise))
+    for k, cut in enumerate(cuts):
+        low = middle * min(settings.weak, np.exp(-settings.deviation * spread))
+        high = middle * max(settings.out_of_range, np.exp(settings.deviation * spread))
+        if peak[k] < low:
+            _reject(cut, "weak", peak[k], low, f"{{0:.4g}} N, the test's median is {middle:.4g} N")
+        elif peak[k] > high:
+            _reject(cut, "overload", peak[k], high, f"{{0:.4g}} N, the test's median is {middle:.4g} N")
+        limit = max(NOISE_FLOOR, settings.noise_over_median * usual)
+        if noise[k] > limit and not cut.rejections:
+            _reject(cut, "noisy", noise[k], limit, f"rms before the blow is {{0:.3f}} of the peak acceleration, "
+                    f"{usual:.3f} in the median blow")  # fmt: skip
+
+
+def _largest_response(cut):
+    return float(np.max(np.abs(cut.acceleration[cut.contact.onset :] - cut.contact.zero_acceleration)))
+
+
+def _reject(cut, reason, value, limit, words):
+    cut.rejections.append(Rejection(reason, float(value), float(limit), words.format(float(value))))
