@@ -8,15 +8,15 @@ from datetime import date
 import numpy as np
 
 from benchmarks.bar import Bar
+from benchmarks.published import LOCATIONS, TABLE_1, TABLE_2, TABLE_3, UNMODELLED, hammer_test, published_model
+from benchmarks.published.models import state_matrix
 from turnout.config.settings.identify import IdentifySettings
 from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.demo.hammer import hammer_test as demonstration_test
 from turnout.demo.scenario import SECTIONS
 from turnout.demo.simulated_response import simulated_response
-from turnout.identify import compare_tests, cramer_rao_bound, era, identify, modal_parameters
-from turnout.identify.linearise import drift_columns
-from turnout.published import LOCATIONS, TABLE_1, TABLE_2, TABLE_3, UNMODELLED, hammer_test, published_model
-from turnout.published.models import state_matrix
+from turnout.modal import compare_tests, cramer_rao_bound, era, identify, modal_parameters
+from turnout.modal.least_squares import drift_columns
 from turnout.receptance import find_impacts, receptance_of
 from turnout.records import Channel, Recording
 

@@ -14,9 +14,9 @@ from importlib import import_module
 import numpy as np
 
 from benchmarks.bar import Bar
+from benchmarks.published import LOCATIONS, UNMODELLED, hammer_test
 from turnout.config.settings.identify import IdentifySettings
-from turnout.identify import identify, modal_parameters
-from turnout.published import LOCATIONS, UNMODELLED, hammer_test
+from turnout.modal import identify, modal_parameters
 
 SETTINGS = IdentifySettings()
 TESTS = 3

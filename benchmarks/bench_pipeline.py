@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.bar import Bar, stopwatch
+from benchmarks.published.response import paper_response
 from turnout.chains.hammer import hammer_unit
 from turnout.config import load_configuration, with_raw
 from turnout.demo.hammer import hammer_test
@@ -15,7 +16,6 @@ from turnout.demo.make import EXTENSION
 from turnout.demo.scenario import SECTIONS
 from turnout.fleet.batches import UnitResult, read_results, write_batch
 from turnout.fleet.scan import scan, unit_id
-from turnout.published.response import paper_response
 from turnout.readers import read
 from turnout.readers.writing import write
 from turnout.registry.register import register

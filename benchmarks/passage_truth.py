@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from turnout.identify.poles import continuous_pole
+from benchmarks.published import published_model
+from turnout.modal.poles import continuous_pole
 from turnout.passage.findings import PassageSensor
 from turnout.passage.patterns import read_patterns
-from turnout.published import published_model
 from turnout.records import Channel, ModalModel, Recording
 
 RATE = 20000.0

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.bar import Bar, stopwatch
+from benchmarks.published.response import paper_response
 from turnout.demo.hammer import hammer_test
-from turnout.published.response import paper_response
 from turnout.readers.writing import write
 
 REPOSITORY = Path(__file__).resolve().parents[1]

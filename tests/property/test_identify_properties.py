@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from benchmarks.published import LOCATIONS, hammer_test
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from turnout.config.settings.identify import IdentifySettings
-from turnout.identify import balanced_pair, discrete_pole, era, identify, modal_parameters, summarise
-from turnout.published import LOCATIONS, hammer_test
+from turnout.modal import balanced_pair, discrete_pole, era, identify, modal_parameters, summarise
 
 SETTINGS = IdentifySettings(null_draws=10)
 FREQUENCY, DAMPING = st.floats(30.0, 900.0), st.floats(0.005, 0.5)

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from benchmarks.published import LOCATIONS, TABLE_1, TABLE_2, misprints, published_model
+from benchmarks.published.models import output_row, state_matrix
 
 from turnout.config.settings.identify import IdentifySettings
-from turnout.identify import balanced_pair, era, identify
-from turnout.published import LOCATIONS, TABLE_1, TABLE_2, published_model, slips
-from turnout.published.models import output_row, state_matrix
+from turnout.modal import balanced_pair, era, identify
 
 
 def free_decay(model, n=600):
@@ -50,7 +50,7 @@ def test_identification_of_exact_decays_is_exact_and_reproduces_them(location):
     np.testing.assert_allclose(modelled, decay, atol=1e-5 * np.abs(decay).max())
 
 
-BALANCED = [row for row in TABLE_1 + TABLE_2 if row.key not in slips.BALANCE]
+BALANCED = [row for row in TABLE_1 + TABLE_2 if row.key not in misprints.BALANCE]
 
 
 @pytest.mark.parametrize("row", BALANCED, ids=lambda row: f"{row.location} {row.band}")

@@ -4,11 +4,11 @@ from itertools import product
 
 import numpy as np
 import pytest
+from benchmarks.published import RATE, TABLE_1, TABLE_2, TABLE_3, misprints
+from benchmarks.published.models import output_row, state_matrix
 from scipy.linalg import solve_discrete_lyapunov
 
-from turnout.identify import modal_parameters
-from turnout.published import RATE, TABLE_1, TABLE_2, TABLE_3, slips
-from turnout.published.models import output_row, state_matrix
+from turnout.modal import modal_parameters
 
 PAIRS = {pair.key: pair for pair in TABLE_1 + TABLE_2}
 HALF_DIGIT = 0.5e-4
@@ -46,14 +46,14 @@ def test_frequencies_of_tables_1_and_2_are_those_of_table_3(row):
 
 @pytest.mark.parametrize("row", TABLE_3, ids=name)
 def test_frequency_lies_within_the_rounding_of_its_matrix(row, request):
-    expect_failure(request, slips.FREQUENCY, row)
+    expect_failure(request, misprints.FREQUENCY, row)
     (lowest, highest), _ = modes_of_all_matrices_that_print_as(PAIRS[row.key])
     assert lowest <= row.frequency <= highest
 
 
 @pytest.mark.parametrize("row", TABLE_3, ids=name)
 def test_damping_of_tables_1_and_2_is_that_of_table_3(row, request):
-    expect_failure(request, slips.DAMPING, row)
+    expect_failure(request, misprints.DAMPING, row)
     _, damping = modal_parameters(eigenvalue(state_matrix(PAIRS[row.key])), RATE)
     assert damping == pytest.approx(row.damping, rel=1.2e-2)
 
@@ -66,7 +66,7 @@ def test_the_swapped_digits_of_as_main_are_0341():
 
 @pytest.mark.parametrize("row", TABLE_3, ids=name)
 def test_eigenvalues_of_tables_1_and_2_are_those_of_table_3(row, request):
-    expect_failure(request, slips.EIGENVALUE, row)
+    expect_failure(request, misprints.EIGENVALUE, row)
     z = eigenvalue(state_matrix(PAIRS[row.key]))
     assert (z.real, abs(z.imag)) == pytest.approx((row.real, row.imaginary), abs=1.1e-4)
 
@@ -90,14 +90,14 @@ def propagated(pair):
 
 @pytest.mark.parametrize("row", TABLE_3, ids=name)
 def test_uncertainty_of_the_frequency_follows_from_that_of_the_matrix(row, request):
-    expect_failure(request, slips.FREQUENCY_PLUS_MINUS, row)
+    expect_failure(request, misprints.FREQUENCY_PLUS_MINUS, row)
     assert propagated(PAIRS[row.key]) == pytest.approx(row.frequency_plus_minus, rel=0.2)
 
 
 @pytest.mark.parametrize("row", TABLE_1 + TABLE_2, ids=name)
 def test_printed_pairs_are_balanced(row, request):
     """The observability Gramian of a balanced pair is diagonal; printed with four decimals, to 0.004."""
-    expect_failure(request, slips.BALANCE, row)
+    expect_failure(request, misprints.BALANCE, row)
     a, c = state_matrix(row), output_row(row, repaired=False)
     gramian = solve_discrete_lyapunov(a.T, np.outer(c, c))
     assert abs(gramian[0, 1]) / np.sqrt(gramian[0, 0] * gramian[1, 1]) <= 0.004
@@ -106,19 +106,19 @@ def test_printed_pairs_are_balanced(row, request):
 @pytest.mark.parametrize("row", TABLE_1 + TABLE_2, ids=name)
 def test_uncertainties_of_the_matrix_are_possible(row, request):
     """A pair has a12 = -a21, so both have one uncertainty; all are above zero."""
-    expect_failure(request, slips.PLUS_MINUS_OF_MATRIX, row)
+    expect_failure(request, misprints.PLUS_MINUS_OF_MATRIX, row)
     assert row.plus_minus[1] == row.plus_minus[2]
     assert min(row.plus_minus) > 0.0
 
 
 def test_every_listed_slip_is_a_row_of_a_table():
     listed = (
-        slips.FREQUENCY,
-        slips.DAMPING,
-        slips.EIGENVALUE,
-        slips.FREQUENCY_PLUS_MINUS,
-        slips.BALANCE,
-        slips.PLUS_MINUS_OF_MATRIX,
-        slips.REPAIRED_OUTPUT,
+        misprints.FREQUENCY,
+        misprints.DAMPING,
+        misprints.EIGENVALUE,
+        misprints.FREQUENCY_PLUS_MINUS,
+        misprints.BALANCE,
+        misprints.PLUS_MINUS_OF_MATRIX,
+        misprints.REPAIRED_OUTPUT,
     )
     assert {key for table in listed for key in table} <= set(PAIRS)

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from benchmarks.published import synthetic, tables
 
-from turnout.published import synthetic, tables
 from turnout.receptance import bands_passed, find_impacts, receptance_of
 from turnout.records import Channel, Recording
 

@@ -4,7 +4,7 @@ import pytest
 
 from turnout.config.settings.identify import IdentifySettings
 from turnout.config.settings.receptance import ReceptanceSettings
-from turnout.identify import identify
+from turnout.modal import identify
 from turnout.receptance import find_impacts, receptance_of
 from turnout.simulate import load_track, simulate_hammer
 

@@ -14,7 +14,7 @@ from turnout.chains.raw_rows import contradiction, quarantine_row, read_or_quara
 from turnout.config.filename_pattern import compiled
 from turnout.config.turnout import TurnoutConfig
 from turnout.errors import ReadError
-from turnout.identify import identify
+from turnout.modal import identify
 from turnout.receptance import find_impacts, receptance_of
 from turnout.records import ModalModel, Rejection, Unit
 from turnout.registry.ids import content_id

@@ -9,7 +9,7 @@ import numpy as np
 from turnout.content import sha256_of
 from turnout.demo.others import SDYPY_FILE, SDYPY_SHA256
 from turnout.errors import TurnoutError
-from turnout.identify.frf_modes import modes_of_frf
+from turnout.modal.frf import modes_of_frf
 from turnout.readers.uff import read_frf
 from turnout.readers.uff_datasets import sets_of
 

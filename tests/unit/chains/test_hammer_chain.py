@@ -7,14 +7,14 @@ from datetime import date, datetime
 
 import numpy as np
 import pytest
+from benchmarks.published.models import published_model
+from benchmarks.published.response import paper_response
 
 from turnout.chains.hammer import hammer_unit
 from turnout.config import load_configuration, with_raw
 from turnout.demo.hammer import hammer_test
 from turnout.fleet.guard import guarded
 from turnout.fleet.scan import scan
-from turnout.published.models import published_model
-from turnout.published.response import paper_response
 from turnout.readers import read
 from turnout.readers.writing import write
 from turnout.registry.intake import Arrival, gather

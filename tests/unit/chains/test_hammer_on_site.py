@@ -6,6 +6,8 @@ from datetime import date, datetime
 
 import numpy as np
 import pytest
+from benchmarks.published.models import published_model
+from benchmarks.published.response import ACCELERATION_PER_IMPULSE, LOCATION, paper_response
 
 from turnout.chains.hammer import hammer_unit
 from turnout.cli import main
@@ -13,8 +15,6 @@ from turnout.config import load_configuration, with_raw
 from turnout.demo import faults
 from turnout.demo.hammer import RATE, hammer_test
 from turnout.fleet.scan import scan
-from turnout.published.models import published_model
-from turnout.published.response import ACCELERATION_PER_IMPULSE, LOCATION, paper_response
 from turnout.readers.writing import write
 from turnout.registry.intake import Arrival, gather
 

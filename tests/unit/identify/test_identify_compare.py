@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from benchmarks.published import hammer_test
 from scipy.stats import ttest_ind
 
 from turnout.config.settings.identify import IdentifySettings
-from turnout.identify import compare_tests, identify, welch_test
-from turnout.identify.compare import detectable_shift
-from turnout.published import hammer_test
+from turnout.modal import compare_tests, identify, welch_test
+from turnout.modal.comparison import detectable_shift
 
 SETTINGS = IdentifySettings(null_draws=10)
 

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from benchmarks.published import hammer_test, published_model
 
-from turnout.identify import cramer_rao_bound, discrete_pole, summarise
-from turnout.identify.held_out import held_out_fit, random_mode_fits
-from turnout.identify.linearise import drift_columns, linearise, powers
-from turnout.identify.mixed import between_variance, fit_common, fit_mixed
-from turnout.identify.noise import noise_filter, whiten
-from turnout.published import hammer_test, published_model
+from turnout.modal import cramer_rao_bound, discrete_pole, summarise
+from turnout.modal.held_out import held_out_fit, random_mode_fits
+from turnout.modal.least_squares import drift_columns, linearise, powers
+from turnout.modal.mixed_effects import between_variance, fit_common, fit_mixed
+from turnout.modal.noise import noise_filter, whiten
 
 NO_DRIFT = drift_columns(600, -1)
 

@@ -5,7 +5,7 @@ import gzip
 import numpy as np
 import pytest
 
-from turnout.identify import modes_of_frf
+from turnout.modal import modes_of_frf
 
 # Response 1 of the beam, as its authors publish it from LSCF: Hz and per cent.
 BEAM = ((177.0, 0.86), (477.4, 0.20), (933.1, 0.15), (1535.5, 0.20), (2286.9, 0.28), (3162.4, 0.18), (4181.2, 0.15))

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from benchmarks.published import hammer_test, published_model
 
 from turnout.config.settings.identify import IdentifySettings
 from turnout.config.settings.receptance import ReceptanceSettings
-from turnout.identify import identify
-from turnout.identify.gate import passed_share, residues_of_receptance
-from turnout.identify.poles import continuous_pole
-from turnout.published import hammer_test, published_model
+from turnout.modal import identify
+from turnout.modal.bands import passed_share, residues_of_receptance
+from turnout.modal.poles import continuous_pole
 from turnout.receptance import find_impacts, receptance_of
 from turnout.records import Channel, Receptance, Recording
 

@@ -4,11 +4,11 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from benchmarks.published import hammer_test
 from scipy.linalg import hankel
 
-from turnout.identify import era
-from turnout.identify.hankel import gram_matrices, hankel_operator, hankel_rows
-from turnout.published import hammer_test
+from turnout.modal import era
+from turnout.modal.era import gram_matrices, hankel_operator, hankel_rows
 
 
 def full_svd_era(y, order, rows):

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from benchmarks.published import LOCATIONS, hammer_test
 
 from turnout.config.settings.identify import IdentifySettings
-from turnout.identify import identify
-from turnout.identify.split_bands import band_modes, split
-from turnout.published import LOCATIONS, hammer_test
+from turnout.modal import identify
+from turnout.modal.paper import band_modes, split
 
 SETTINGS = IdentifySettings(null_draws=10, paper_bias_tests=8)
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from turnout.config.settings.identify import IdentifySettings
-from turnout.identify import identify
-from turnout.identify.poles import continuous_pole
+from turnout.modal import identify
+from turnout.modal.poles import continuous_pole
 from turnout.records import Receptance
 
 SETTINGS = IdentifySettings(null_draws=10)

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from benchmarks.published import LOCATIONS, UNMODELLED, Nuisance, hammer_test, published_model
 
 from turnout.config.settings.identify import IdentifySettings
-from turnout.identify import identify
-from turnout.published import LOCATIONS, UNMODELLED, Nuisance, hammer_test, published_model
+from turnout.modal import identify
 
 SETTINGS = IdentifySettings(null_draws=10)
 

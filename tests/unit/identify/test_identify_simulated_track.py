@@ -6,7 +6,7 @@ import pytest
 from turnout.config.settings.identify import IdentifySettings
 from turnout.demo.hammer import N_SAMPLE, RATE, pulse, response_to
 from turnout.demo.simulated_response import simulated_response
-from turnout.identify import identify
+from turnout.modal import identify
 
 SETTINGS = IdentifySettings(null_draws=10)
 START = 100

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from turnout.identify.linearise import drift_columns, linearise, powers
-from turnout.identify.wave_sums import WaveTable, geometric_sums, pair_sums
+from turnout.modal.least_squares import WaveTable, drift_columns, geometric_sums, linearise, pair_sums, powers
 
 # A prime: no pair of tables fits it without a rest.
 N = 599

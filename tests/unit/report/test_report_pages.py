@@ -8,6 +8,7 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from benchmarks.published.response import paper_response
 
 from turnout.chains.hammer import hammer_unit
 from turnout.config import load_configuration, with_raw
@@ -15,7 +16,6 @@ from turnout.demo.hammer import hammer_test
 from turnout.fleet.batches import UnitResult, read_results, write_batch
 from turnout.fleet.scan import scan, unit_id
 from turnout.fleet.tables import configuration_rows
-from turnout.published.response import paper_response
 from turnout.readers.writing import write
 from turnout.registry.database import open_registry
 from turnout.registry.register import register

@@ -7,7 +7,7 @@ from turnout.config.settings.setting import setting
 
 @dataclass(frozen=True)
 class IdentifySettings:
-    """Settings of ``turnout.identify``; the bands name modes, they do not filter."""
+    """Settings of ``turnout.modal``; the bands name modes, they do not filter."""
 
     method: str = setting(
         "joint",

@@ -1,13 +1,74 @@
-"""Modes of measured frequency responses, not told how many there are nor where."""
+"""Modes of measured frequency responses, not told how many there are nor where.
+
+Starting poles for a narrow band of frequency responses: the band as a decay, realised at several orders.
+
+Response of damped modes to a smooth blow, in closed form and with its start between the samples.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import eigh
 from scipy.signal import find_peaks, peak_widths
 
-from turnout.identify.frf_fit import FrfFit, fit_each
-from turnout.identify.frf_poles import zoomed_poles
-from turnout.identify.summary import Summary, summarise
+from turnout.modal.frf_fit import FrfFit, fit_each
+from turnout.modal.summary import Summary, summarise
+
+ORDERS = range(1, 9)
+REAPPEARS = 0.5
+
+
+def zoomed_poles(frequency, frf, centre: float, width: float, damping_maximum: float) -> np.ndarray:
+    r"""Modes near a peak, (n_mode, 2) of ln f and zeta: those that reappear over orders, else the half-power one.
+
+    The lines of the band, transformed back, are a complex decay sampled at the band's width B:
+    :math:`h_k \propto \sum_m R_m \exp((s_m - i 2\pi f_0) k / B)`.
+
+    ``frequency`` (n_line,) [Hz], ``frf`` (n_frf, n_line), ``centre`` and half-power ``width`` of the peak [Hz].
+    """
+    n = len(frequency)
+    rate = n * (frequency[1] - frequency[0])
+    decay = np.fft.ifft(frf, axis=1)[:, 1 : max(8, (2 * n) // 3)]
+    rows = decay.shape[1] // 2
+    gram = _gram(decay, rows)
+    order = min(max(ORDERS), rows - 1)
+    _, u = eigh(gram, subset_by_index=(len(gram) - order, len(gram) - 1))
+    u = u[:, ::-1]
+    found = []
+    for r in ORDERS[:order]:
+        z = np.linalg.eigvals(np.linalg.lstsq(u[:-1, :r], u[1:, :r], rcond=None)[0])
+        s = np.log(np.maximum(np.abs(z), 1e-12)) + 1j * np.mod(np.angle(z), 2.0 * np.pi)
+        s = s * rate + 2j * np.pi * frequency[0]
+        zeta = -s.real / np.abs(s)
+        keep = (zeta > 0.0) & (zeta < damping_maximum) & (np.abs(s.imag / (2 * np.pi) - centre) < 1.5 * width)
+        found += [(r, pole) for pole in s[keep]]
+    starts = _reappearing(found, order)
+    if not starts:
+        starts = [2.0 * np.pi * (-0.5 * width + 1j * centre)]
+    s = np.array(starts)
+    return np.stack([np.log(np.abs(s) / (2.0 * np.pi)), -s.real / np.abs(s)], axis=1)
+
+
+def _gram(decay, rows):
+    columns = decay.shape[1] - rows
+    windows = np.lib.stride_tricks.sliding_window_view(decay, columns, axis=1)
+    return np.einsum("iak,ibk->ab", windows, windows.conj(), optimize=True)
+
+
+def _reappearing(found, n_order):
+    """Medians of groups of poles closer than half their decay rate, if seen at half of the orders."""
+    starts, left = [], list(found)
+    while left:
+        groups = [[p for p in left if abs(p[1] - q[1]) < 0.5 * min(-p[1].real, -q[1].real)] for q in left]
+        largest = max(groups, key=len)
+        orders = {r for r, _ in largest}
+        if len(orders) < REAPPEARS * (n_order - min(orders) + 1) or len(orders) < 3:
+            break
+        poles = np.array([p for _, p in largest])
+        starts.append(complex(np.median(poles.real), np.median(poles.imag)))
+        left = [p for p in left if p not in largest]
+    return starts
+
 
 WIDTHS = 12.0
 FEWEST_LINES = 40
@@ -169,3 +230,56 @@ def _without_doubles(modes, rejected):
         else:
             kept.append(mode)
     return kept
+
+
+def haversine_pulse(time, duration):
+    r"""Force of a soft-tipped hammer over its peak, :math:`\sin^2(\pi t / T)` for 0 <= t <= T, else 0.
+
+    ``time`` [s] of any shape and ``duration`` T [s] that broadcasts with it.
+
+    >>> haversine_pulse(np.array([-1.0, 0.5, 2.0]), 1.0)
+    array([0., 1., 0.])
+    """
+    inside = (time >= 0.0) & (time <= duration)
+    return np.where(inside, np.sin(np.pi * time / duration) ** 2, 0.0)
+
+
+def pulse_response(time, pole, residue, duration):
+    r"""Response of a sum of modes to a haversine force of unit peak.
+
+    .. math:: y(t) = \int_0^{\min(t, T)} \sin^2(\pi\tau/T) \, \mathrm{Re}\sum_m R_m e^{s_m (t - \tau)} d\tau
+
+    Parameters
+    ----------
+    time : (..., n) array of float
+        From the start of contact; 0 before it. [s]
+    pole : (..., n_mode) array of complex
+        Continuous poles, upper half plane. [1/s]
+    residue : (..., n_mode) array of complex
+        Of the impulse response :math:`\mathrm{Re} \sum R e^{st}`. [unit of y per N s]
+    duration : (...) array of float
+        Length of contact T. [s]
+
+    Returns
+    -------
+    (..., n) array of float
+        In the unit of the residues times a second, per newton of peak force.
+
+    Examples
+    --------
+    A slow mode feels only the impulse T/2 of the pulse.
+
+    >>> y = pulse_response(np.array([1e-3]), np.array([-1.0 + 1.0j]), np.array([1.0 + 0j]), 1e-3)
+    >>> print(f"{y[0] / 0.5e-3:.3f}")
+    1.000
+    """
+    time, pole, residue = np.asarray(time, float), np.asarray(pole), np.asarray(residue)
+    duration = np.asarray(duration, float)[..., None]
+    until = np.clip(time, 0.0, duration)[..., None, :]
+    turn = 2j * np.pi / duration[..., None]
+    s = pole[..., None]
+    total = 0.0
+    for weight, a in ((0.5, 0.0), (-0.25, turn), (-0.25, -turn)):
+        total = total + weight * np.expm1((a - s) * until) / (a - s)
+    wave = residue[..., None] * np.exp(s * np.clip(time, 0.0, None)[..., None, :]) * total
+    return np.where(time > 0.0, wave.sum(axis=-2).real, 0.0)

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from turnout.identify.poles import modal_parameters
-from turnout.published.slips import REPAIRED_OUTPUT
-from turnout.published.tables import RATE, TABLE_1, TABLE_2
+from benchmarks.published.misprints import REPAIRED_OUTPUT
+from benchmarks.published.tables import RATE, TABLE_1, TABLE_2
+from turnout.modal.poles import modal_parameters
 
 PAIRS = {pair.key: pair for pair in TABLE_1 + TABLE_2}
 BANDS = {"low": "ballast", "high": "railpad"}

@@ -4,9 +4,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from turnout.identify.poles import continuous_pole
-from turnout.identify.pulse_response import haversine_pulse, pulse_response
-from turnout.published.models import PublishedModel, published_model
+from benchmarks.published.models import PublishedModel, published_model
+from turnout.modal.frf import haversine_pulse, pulse_response
+from turnout.modal.poles import continuous_pole
 
 
 @dataclass(frozen=True)

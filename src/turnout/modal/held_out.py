@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from turnout.identify.linearise import drift_columns, linearise, powers
-from turnout.identify.poles import discrete_pole
+from turnout.modal.least_squares import drift_columns, linearise, powers
+from turnout.modal.poles import discrete_pole
 
 
 def fit_percent(measured, residual) -> np.ndarray:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from turnout.identify.poles import continuous_pole
+from turnout.modal.poles import continuous_pole
 
 LOCAL_TERMS = 3
 SINGLE_CONTRAST = 30.0

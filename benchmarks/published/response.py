@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from turnout.published.models import published_model
+from benchmarks.published.models import published_model
 
 LOCATION = {
     "OT": "OT",

@@ -1,8 +1,8 @@
 """The paper's tables as data, its slips, its models, and hammer tests computed from them."""
 
-from turnout.published.models import PublishedModel, published_model
-from turnout.published.synthetic import UNMODELLED, HammerTest, Nuisance, hammer_test
-from turnout.published.tables import LOCATIONS, RATE, TABLE_1, TABLE_2, TABLE_3, TABLE_4
+from benchmarks.published.models import PublishedModel, published_model
+from benchmarks.published.synthetic import UNMODELLED, HammerTest, Nuisance, hammer_test
+from benchmarks.published.tables import LOCATIONS, RATE, TABLE_1, TABLE_2, TABLE_3, TABLE_4
 
 __all__ = [
     "LOCATIONS",

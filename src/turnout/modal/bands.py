@@ -1,13 +1,63 @@
-"""Name the modes of a test: one for each band, after the coherence gate; the rest listed with the reason."""
+"""Name the modes of a test: one for each band, after the coherence gate; the rest listed with the reason.
+
+Which modes the coherence gate of the receptance lets pass, and their residues from it.
+"""
 
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from turnout.identify.gate import passed_share
-from turnout.identify.mixed import LOWEST_DAMPING
-from turnout.identify.select import Selection
+from turnout.modal.mixed_effects import LOWEST_DAMPING
+from turnout.modal.poles import continuous_pole
+from turnout.modal.selection import Selection
 from turnout.records import Rejection
+
+
+def passed_share(receptance, frequency: float, damping: float) -> tuple[float, float]:
+    """Share of the lines in the half-power band of a mode that pass the gate, and their lowest gate level.
+
+    The band is f (1 ± zeta), at least the three lines nearest to f. (0, nan) if f lies outside the lines.
+    """
+    lines = receptance.frequency
+    if not lines[0] <= frequency <= lines[-1]:
+        return 0.0, float("nan")
+    inside = np.abs(lines - frequency) <= damping * frequency
+    inside[np.argsort(np.abs(lines - frequency), kind="stable")[:3]] = True
+    return float(np.mean(receptance.passed[inside])), float(np.min(receptance.gate_level[inside]))
+
+
+def residues_of_receptance(receptance, frequency, damping) -> np.ndarray | None:
+    r"""Residues R of the accelerance :math:`\sum_m \frac12\left(\frac{R_m}{p - s_m} +
+    \frac{\bar R_m}{p - \bar s_m}\right) + d_0 + d_1 p^2` by least squares over the lines that passed.
+
+    :math:`p = i\omega + a`, with the decay a of the receptance's exponential window.
+
+    Parameters
+    ----------
+    receptance : Receptance
+    frequency, damping : (n_mode,) arrays
+        Known modes, with those that nobody names: what is left out here goes into the residues of the others.
+        [Hz], [-]
+
+    Returns
+    -------
+    (n_mode,) array of complex, or None
+        Of the response :math:`\mathrm{Re} \sum R e^{st}` to a unit impulse [m/s² per N s]; None if fewer than
+        two lines per unknown passed.
+    """
+    use = receptance.passed & np.isfinite(receptance.h1)
+    unknowns = 2 * len(frequency) + 2
+    if np.count_nonzero(use) < 2 * unknowns:
+        return None
+    p = 2j * np.pi * receptance.frequency[use] + receptance.decay
+    accelerance = p**2 * receptance.h1[use]
+    s = continuous_pole(np.asarray(frequency), np.asarray(damping))
+    plus, minus = 0.5 / (p[:, None] - s), 0.5 / (p[:, None] - s.conj())
+    columns = np.hstack([plus + minus, 1j * (plus - minus), np.ones((len(p), 1)), (p[:, None] / abs(p).max()) ** 2])
+    design = np.vstack([columns.real, columns.imag])
+    solution = np.linalg.lstsq(design, np.concatenate([accelerance.real, accelerance.imag]), rcond=None)[0]
+    return solution[: len(s)] + 1j * solution[len(s) : 2 * len(s)]
+
 
 MAIN_BANDS = ("ballast", "railpad")
 EDGE = 0.1  # how far beside its band, of its frequency, a mode may still be meant by it: pads soften so much in summer

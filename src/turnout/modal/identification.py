@@ -1,7 +1,7 @@
 """Modal identification of one section from the free decays of its hammer tests."""
 
-from turnout.identify.joint import identify_joint
-from turnout.identify.paper_method import identify_paper
+from turnout.modal.joint import identify_joint
+from turnout.modal.paper import identify_paper
 from turnout.records import ModalModel
 
 METHODS = {"joint": identify_joint, "paper": identify_paper}

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from turnout.identify.linearise import Linearisation, linearise
+from turnout.modal.least_squares import Linearisation, linearise
 
 LARGEST_STEP = np.array([0.2, 0.15])
 PRINCIPAL = 8

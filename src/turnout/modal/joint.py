@@ -1,0 +1,265 @@
+"""All resonances at once from the unfiltered decays: selection, per-blow modes, their mean, and the model.
+
+What is told beside a model: stabilisation table, noise, drift, blows that were left out.
+
+What it costs that one explanation of the decays had to be chosen: how far the others put the same mode.
+
+Blows that the modes of all others do not describe.
+
+Free decays of a test brought to one length.
+"""
+
+import numpy as np
+
+from turnout.modal.bands import choose_bands, residues_of_receptance
+from turnout.modal.mixed_effects import LOWEST_DAMPING
+from turnout.modal.noise import whiten
+from turnout.modal.selection import Selection, select_modes
+from turnout.modal.state_space import assemble, no_decays, no_model
+from turnout.modal.summary import ImpactEstimates, cramer_rao_bound
+from turnout.records import ModalModel, Rejection
+
+
+def stabilisation_rows(selection: Selection, tolerance: float) -> tuple[dict, ...]:
+    """Poles of all orders from the first sample on; "stable" where they belong to a mode that was kept."""
+    table = selection.table
+    mean = selection.fit.mean if selection.fit is not None else np.empty((0, 2))
+    rows = []
+    for i in np.flatnonzero((table.start == 0) & (table.damping > 0.0)):
+        near = np.abs(table.frequency[i] / np.exp(mean[:, 0]) - 1.0) < tolerance
+        near &= np.abs(table.damping[i] - mean[:, 1]) < tolerance
+        rows.append(
+            {
+                "order": int(table.order[i]),
+                "frequency": float(table.frequency[i]),
+                "damping": float(table.damping[i]),
+                "emac": float(table.emac[i]),
+                "status": "stable" if near.any() else "unstable",
+            }
+        )
+    return tuple(rows)
+
+
+def fit_diagnostics(selection: Selection, index, dropped) -> dict:
+    """Numbers about the fit; ``index`` are the impacts in it, ``dropped`` (impact, Rejection) those that are not."""
+    told = {"impacts": tuple(int(i) for i in index), "dropped_impacts": tuple(dropped)}
+    fit = selection.fit
+    if fit is None:
+        return told
+    absent = np.argwhere(~selection.shows)
+    return told | {
+        "noise": float(np.sqrt(fit.sigma2)),
+        "noise_order": len(selection.whitening) - 1,
+        "drift_degree": selection.background.drift_degree,
+        "hum": selection.background.hum,
+        "modes_in_fit": tuple(float(f) for f in np.exp(fit.mean[:, 0])),
+        "damping_in_fit": tuple(float(zeta) for zeta in fit.mean[:, 1]),
+        "converged": fit.converged,
+        "explanations": 1 + len(selection.others),
+        "impacts_without_mode": tuple((int(index[i]), float(np.exp(fit.mean[m, 0]))) for i, m in absent),
+    }
+
+
+def choice_error(mode, others, farthest: float) -> np.ndarray:
+    r"""Root mean square distance of a mode in all explanations from where the chosen one has it.
+
+    .. math:: \sqrt{\frac{1}{J} \sum_{j=1}^{J} (\theta_j - \theta)^2}, \quad \theta_1 = \theta
+
+    All explanations count alike. Their criteria would give nearly all weight to one: 18,000 samples tell two wrong
+    models apart with certainty, and say nothing about which of them has this mode right.
+
+    Parameters
+    ----------
+    mode : (2,) array of float
+        ln f [Hz] and zeta in the chosen explanation.
+    others : list of (n_mode, 2) arrays of float
+        Modes of the others.
+    farthest : float
+        Distance in ln f beyond which it is another mode: an explanation without this one says nothing about it.
+
+    Returns
+    -------
+    (2,) array of float
+        Of ln f and zeta; 0 without others.
+
+    References
+    ----------
+    Buckland, Burnham and Augustin 1997, Model selection: an integral part of inference, eq. 9, with equal weights.
+
+    Examples
+    --------
+    >>> mode, other = np.array([4.60, 0.20]), np.array([[4.64, 0.17], [6.0, 0.05]])
+    >>> print(choice_error(mode, [other, other, other], 0.15).round(3), choice_error(mode, [], 0.15))
+    [0.035 0.026] [0. 0.]
+    """
+    square, n = np.zeros(2), 1
+    for modes in others:
+        away = np.abs(modes - mode)
+        nearest = int(np.argmin(away @ [1.0, 0.5]))
+        if away[nearest, 0] < farthest:
+            square += away[nearest] ** 2
+            n += 1
+    return np.sqrt(square / n)
+
+
+TIMES_MEDIAN = 9.0
+LARGEST_SHARE = 1.0 / 3.0
+
+
+def odd_blows(residual_power) -> list[tuple[int, Rejection]]:
+    """Blows whose residual is three times (in power nine) that of the median blow: (row, Rejection) each.
+
+    ``residual_power`` is (n_blow,). The power of white noise over some hundred samples is known to ten per cent,
+    so this is no matter of chance. None where more than a third would go: then it is the model that fails.
+
+    >>> [row for row, _ in odd_blows(np.array([1.0, 1.1, 20.0, 0.9]))]
+    [2]
+    """
+    median = float(np.median(residual_power))
+    odd = np.flatnonzero(residual_power > TIMES_MEDIAN * median)
+    if not 0 < len(odd) <= LARGEST_SHARE * len(residual_power):
+        return []
+    words = "power of what the modes of the test leave of this impact, over the median of all"
+    return [(int(i), Rejection("odd_one_out", float(residual_power[i] / median), TIMES_MEDIAN, words)) for i in odd]
+
+
+def common_length(decays, rate: float, settings) -> tuple[np.ndarray, np.ndarray, list[tuple[int, Rejection]]]:
+    """Decays that are long enough, cut to one length, with the ones that are not.
+
+    Parameters
+    ----------
+    decays : sequence of (n,) arrays
+    rate : float
+        [Hz]
+    settings : IdentifySettings
+        ``duration`` is the length aimed at, ``shortest_decay`` the least.
+
+    Returns
+    -------
+    kept : (n_kept, n) array of float
+    index : (n_kept,) array of int
+        Position of each among ``decays``.
+    dropped : list of (index, Rejection)
+    """
+    aim, least = round(settings.duration * rate), round(settings.shortest_decay * rate)
+    kept, dropped = [], []
+    for i, decay in enumerate(decays):
+        decay = np.asarray(decay, dtype=float)
+        if decay.ndim != 1:
+            raise ValueError(f"decay {i} has shape {decay.shape}, need (n,)")
+        if len(decay) < least:
+            dropped.append((i, Rejection("late", len(decay) / rate, settings.shortest_decay, "decay too short [s]")))
+        elif not np.all(np.isfinite(decay[:aim])):
+            bad = int(np.argmin(np.isfinite(decay)))
+            dropped.append((i, Rejection("not_finite", bad, None, "first sample of the decay that is not finite")))
+        elif np.ptp(decay[:aim]) == 0.0:
+            dropped.append((i, Rejection("dead_channel", 0.0, 0.0, "the decay is constant")))
+        else:
+            kept.append((i, decay))
+    if not kept:
+        return np.empty((0, 0)), np.empty(0, dtype=int), dropped
+    n = min(aim, *(len(d) for _, d in kept))
+    return np.array([d[:n] for _, d in kept]), np.array([i for i, _ in kept]), dropped
+
+
+def identify_joint(decays, rate: float, settings, receptance=None, leads=None) -> ModalModel:
+    """Modal model of one section by joint identification; see :func:`turnout.modal.identify`.
+
+    ``leads`` is taken so that both methods can be called alike; it is not used.
+    """
+    records, index, dropped = common_length(decays, rate, settings)
+    if not len(records):
+        return no_decays(rate, "joint", dropped)
+    selection, records, index, dropped = _select_without_odd_blows(records, index, dropped, rate, settings)
+    choice = choose_bands(selection, settings, receptance)
+    estimates, modes = _named(selection, choice, records, index, rate, settings)
+    told = fit_diagnostics(selection, index, dropped)
+    rest = {
+        "rejections": tuple(choice.rejections),
+        "rejected_modes": tuple(choice.rejected_modes),
+        "stabilisation": stabilisation_rows(selection, settings.pole_tolerance),
+    }
+    if choice.status == "rejected":
+        return no_model(rate, "joint", diagnostics=told, **rest)
+    residues, scale = _residues(modes, choice, selection, receptance)
+    return assemble(
+        estimates,
+        modes,
+        residues,
+        (selection.fit.free[:, list(choice.modes.values())], records),
+        rate,
+        settings,
+        method="joint",
+        status=choice.status,
+        diagnostics=told,
+        scale=scale,
+        **rest,
+    )
+
+
+def _select_without_odd_blows(records, index, dropped, rate, settings):
+    """Modes of all blows, or again of all but those that these modes do not describe."""
+    selection = select_modes(records, rate, settings)
+    odd = [] if selection.fit is None else odd_blows(selection.residual_power)
+    if odd:
+        rows = [row for row, _ in odd]
+        dropped = [*dropped, *((int(index[row]), rejection) for row, rejection in odd)]
+        records, index = np.delete(records, rows, axis=0), np.delete(index, rows)
+        selection = select_modes(records, rate, settings)
+    return selection, records, index, dropped
+
+
+def _named(selection, choice, records, index, rate, settings):
+    """(estimates, modes) of the bands chosen; one whose mean over the blows is not damped is taken from ``choice``."""
+    found = []
+    for e in _estimates(selection, choice, records, index, rate, settings) if choice.modes else ():
+        mode = e.mode(settings.confidence)
+        if mode.damping > LOWEST_DAMPING:
+            found.append((e, mode))
+            continue
+        del choice.modes[e.band]
+        detail = f"{e.band} mode at {mode.frequency:.0f} Hz: damping, mean over its blows"
+        choice.rejections.append(Rejection("not_identified", mode.damping, LOWEST_DAMPING, detail))
+    return [e for e, _ in found], tuple(mode for _, mode in found)
+
+
+def _estimates(selection, choice, records, index, rate, settings):
+    fit = selection.fit
+    white = whiten(records, selection.whitening)
+    columns = selection.background.columns(white.shape[1], rate)
+    bound = cramer_rao_bound(fit.theta, white, rate, fit.sigma2, columns)
+    error = np.sqrt(np.einsum("ijj->ij", fit.covariance)).reshape(fit.free.shape)
+    strength = np.linalg.norm(records, axis=1)
+    return [
+        ImpactEstimates(
+            band,
+            index[shows],
+            fit.free[shows, m],
+            error[shows, m],
+            strength[shows],
+            float(selection.energy[m]),
+            bound[m],
+            choice_error(fit.mean[m], selection.others, settings.spread_maximum),
+        )
+        for band, m in choice.modes.items()
+        for shows in (selection.shows[:, m],)
+    ]
+
+
+def _residues(modes, choice, selection, receptance):
+    """From the receptance per unit impulse where there is one, else of the mean decay."""
+    named = [(m.frequency, m.damping) for m in modes]
+    if receptance is not None:
+        for all_modes in (named + _unnamed(choice, selection, receptance), named):
+            residues = residues_of_receptance(receptance, *np.transpose(all_modes))
+            if residues is not None:
+                return residues[: len(named)], "unit impulse [m/s² per N s]"
+    return selection.amplitude.mean(axis=0)[list(choice.modes.values())], "mean decay [m/s²]"
+
+
+def _unnamed(choice, selection, receptance):
+    """(frequency [Hz], damping) of the fit's other modes that lie among the lines that passed."""
+    lines = receptance.frequency[receptance.passed]
+    pairs = [(float(np.exp(f)), float(damping)) for f, damping in selection.fit.mean]
+    rest = [pairs[m] for m in range(len(pairs)) if m not in choice.modes.values()]
+    return [(f, damping) for f, damping in rest if len(lines) and lines[0] < f < lines[-1] and 0.0 < damping < 0.95]

@@ -1,0 +1,179 @@
+"""Mean over blows with its interval, and the spread between blows beyond their own error.
+
+Modes of single blows, and the campaign value with interval that they add up to.
+
+Cramér-Rao bound of frequencies and damping ratios for the decays that were used.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.stats import norm, t
+
+from turnout.modal.least_squares import drift_columns, linearise
+from turnout.modal.mixed_effects import between_variance
+from turnout.records import Mode
+
+
+@dataclass(frozen=True)
+class Summary:
+    """``mean`` ± ``se`` with interval ``low`` to ``high``, between-blow standard deviation ``spread``, ``n`` blows."""
+
+    mean: float
+    se: float
+    low: float
+    high: float
+    spread: float
+    n: int
+
+
+def summarise(value, se, confidence: float = 0.95, choice: float = 0.0) -> Summary:
+    r"""Random-effects mean of estimates that each have a standard error.
+
+    .. math:: m = \frac{\sum w_i x_i}{\sum w_i}, \quad w_i = \frac{1}{s_i^2 + \tau^2}, \quad
+              \mathrm{se}^2 = \frac{\sum w_i (x_i - m)^2}{(n-1) \sum w_i}, \quad m \pm t_{n-1}\,\mathrm{se}
+
+    The standard error comes from the spread of the estimates, not from their stated errors, so it holds if
+    those are wrong by a common factor. With equal errors this is the t interval. A single estimate keeps its own
+    error and a normal interval.
+
+    Parameters
+    ----------
+    value, se : (n,) array of float
+        Estimates and standard errors, same unit; ValueError if there are none.
+    confidence : float
+    choice : float
+        Standard error that all estimates share, such as that of the choice of a model; no blow shows it.
+
+    References
+    ----------
+    Hartung and Knapp 2001; Sidik and Jonkman 2002.
+
+    Examples
+    --------
+    >>> s = summarise(np.array([9.0, 11.0]), np.array([0.1, 0.1]))
+    >>> print(f"{s.mean:.1f} ± {s.se:.1f}, {s.high - s.mean:.2f}")
+    10.0 ± 1.0, 12.71
+    """
+    value, se = np.asarray(value, float), np.asarray(se, float)
+    n = len(value)
+    if n == 0:
+        raise ValueError("no estimates to summarise")
+    if n == 1:
+        error = float(np.hypot(se[0], choice))
+        half = norm.ppf(0.5 + confidence / 2.0) * error
+        return Summary(float(value[0]), error, float(value[0] - half), float(value[0] + half), 0.0, 1)
+    spread2 = float(between_variance(value, np.maximum(se**2, 1e-300)))
+    weight = 1.0 / (np.maximum(se**2, 1e-300) + spread2)
+    mean = float(np.sum(weight * value) / weight.sum())
+    error = float(np.sqrt(np.sum(weight * (value - mean) ** 2) / ((n - 1) * weight.sum())))
+    error = float(np.hypot(error, choice))
+    half = t.ppf(0.5 + confidence / 2.0, n - 1) * error
+    return Summary(mean, error, float(mean - half), float(mean + half), float(np.sqrt(spread2)), n)
+
+
+NEXT_TO_NOTHING = 1e-12
+
+
+@dataclass(frozen=True)
+class ImpactEstimates:
+    """One mode in several blows: ``impact`` (n,) numbers, ``estimate`` and ``error`` (n, 2) of ln f [Hz] and zeta.
+
+    An error of nan is one that nobody knows, and becomes None; all that blows differ by counts as their spread then.
+
+    ``strength`` (n,) is the norm of each decay; ``bound`` (2,) the Cramér-Rao bound, None where unknown;
+    ``choice`` (2,) the error of the choice among explanations, which all blows share.
+    """
+
+    band: str
+    impact: np.ndarray
+    estimate: np.ndarray
+    error: np.ndarray
+    strength: np.ndarray
+    energy: float | None = None
+    bound: np.ndarray | None = None
+    choice: np.ndarray = field(default_factory=lambda: np.zeros(2))
+
+    def rows(self) -> list[dict]:
+        """The table ``per_impact`` of a modal model."""
+        frequency = np.exp(self.estimate[:, 0])
+        return [
+            {
+                "impact": int(self.impact[i]),
+                "band": self.band,
+                "frequency": float(frequency[i]),
+                "damping": float(self.estimate[i, 1]),
+                "frequency_se": _known(frequency[i] * self.error[i, 0]),
+                "damping_se": _known(self.error[i, 1]),
+            }
+            for i in range(len(self.impact))
+        ]
+
+    def mode(self, confidence: float) -> Mode:
+        """Random-effects mean over the blows; the frequency is summarised in its logarithm.
+
+        Weights follow the strength of each blow. Its stated error would not do: a noisy blow's error follows its
+        own estimate, and weighing by it would favour one side.
+        """
+        error = np.median(self.error * self.strength[:, None], axis=0) / self.strength[:, None]
+        error = np.nan_to_num(error, nan=NEXT_TO_NOTHING) if len(error) > 1 else error
+        log_f = summarise(self.estimate[:, 0], error[:, 0], confidence, self.choice[0])
+        zeta = summarise(self.estimate[:, 1], error[:, 1], confidence, self.choice[1])
+        f = float(np.exp(log_f.mean))
+        return Mode(
+            band=self.band,
+            frequency=f,
+            damping=zeta.mean,
+            frequency_se=_known(f * log_f.se),
+            damping_se=_known(zeta.se),
+            frequency_sd=f * log_f.spread,
+            damping_sd=zeta.spread,
+            frequency_low=_known(np.exp(log_f.low)),
+            frequency_high=_known(np.exp(log_f.high)),
+            damping_low=_known(zeta.low),
+            damping_high=_known(zeta.high),
+            frequency_crb=None if self.bound is None else f * float(self.bound[0]),
+            damping_crb=None if self.bound is None else float(self.bound[1]),
+            energy=self.energy,
+            n=log_f.n,
+        )
+
+
+def _known(value) -> float | None:
+    return None if np.isnan(value) else float(value)
+
+
+def cramer_rao_bound(theta, decays, rate, sigma2, columns=None):
+    r"""Smallest standard errors that any unbiased estimator can have: poles shared, amplitudes free in each decay.
+
+    .. math:: \mathrm{cov} \ge \sigma^2 \left(\sum_i J_i^T J_i\right)^{-1}
+
+    Parameters
+    ----------
+    theta : (n_decay, n_mode, 2) array of float
+        True (or estimated) ln f [Hz] and zeta of each decay; the bound is for their common mean if they agree.
+    decays : (n_decay, n) array of float
+        They only set the amplitudes.
+    rate : float
+        [Hz]
+    sigma2 : float or (n_decay,) array
+        Variance of the white noise of each decay.
+    columns : (n_column, n) array of float, optional
+        What has to be estimated too, free in each decay: drift, hum.
+
+    Returns
+    -------
+    (n_mode, 2) array of float
+        Standard errors of ln f (relative) and of zeta.
+
+    References
+    ----------
+    Rao 1945; for damped sinusoids Yao and Pandit 1995.
+    """
+    columns = drift_columns(decays.shape[1], -1) if columns is None else columns
+    at = linearise(theta, decays, rate, columns)
+    weight = 1.0 / np.broadcast_to(sigma2, len(decays))
+    information = np.einsum("i,ijk->jk", weight, at.information)
+    scale = np.sqrt(np.diag(information))
+    covariance = np.linalg.inv(information / np.outer(scale, scale)) / np.outer(scale, scale)
+    return np.sqrt(np.diag(covariance)).reshape(-1, 2)
