@@ -15,20 +15,19 @@ from benchmarks.bar import Bar, stopwatch
 from benchmarks.passage_paper import paper_trends
 from benchmarks.passage_truth import IC3, RATE, paper_model, struck, struck_train
 from turnout.config.settings.passage import PassageSettings
-from turnout.passage.analyse import analyse
-from turnout.passage.basis import band_pass, filtered, wheel_basis
+from turnout.passage.analysis import analyse
+from turnout.passage.axle_load import axle_load, calibrate, quasi_static, train_amplitude
+from turnout.passage.axle_patterns import read_patterns
 from turnout.passage.channel_fit import fit_channel
 from turnout.passage.clusters import fit_clusters
-from turnout.passage.continuous import cut_passages
-from turnout.passage.direction import direction_test
-from turnout.passage.effects import effects
-from turnout.passage.load import axle_load, calibrate, quasi_static, train_amplitude
-from turnout.passage.nulls import null_bases, null_scores
-from turnout.passage.patterns import read_patterns
+from turnout.passage.impact_timing import impact_times
+from turnout.passage.impulse_fit import onsets
+from turnout.passage.model_tests import direction_test, null_bases, null_scores
+from turnout.passage.score_regression import effects
 from turnout.passage.scores import fit_percent, score
-from turnout.passage.timing import impact_times
+from turnout.passage.segmentation import cut_passages
 from turnout.passage.train_type import find_type
-from turnout.passage.wheels import onsets
+from turnout.passage.wheel_basis import band_pass, filtered, wheel_basis
 
 ROOT = Path(__file__).resolve().parents[1]
 SETTINGS = PassageSettings()
@@ -367,7 +366,7 @@ def _logger(rng) -> Iterator[Bar]:
 CHILD = """
 import sys, time
 from pathlib import Path
-from turnout.passage.analyse import analyse
+from turnout.passage.analysis import analyse
 from turnout.chains.passage import trains_in
 from turnout.readers import read
 from turnout.records import RawChannel, RawDescription

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from turnout.passage.findings import PassageSensor
+from turnout.passage.result import PassageSensor
 from turnout.records import Channel, Recording
 from turnout.simulate import Sensor, car, load_track, load_vehicle, prepare_passage, simulate_passage
 from turnout.simulate.coupled import coupled

@@ -9,10 +9,10 @@ import numpy as np
 
 from benchmarks.bar import Bar
 from benchmarks.passage_truth import RATE, paper_model
-from turnout.passage.basis import band_pass, filtered
 from turnout.passage.channel_fit import fit_channel
-from turnout.passage.effects import effects
-from turnout.passage.nulls import random_models
+from turnout.passage.model_tests import random_models
+from turnout.passage.score_regression import effects
+from turnout.passage.wheel_basis import band_pass, filtered
 
 SENSOR, PLACE, LOCATION = 7, 24.6, "CP A7"
 INTERVALS = (0.02, 0.005, 0.002, 0.001)

@@ -9,8 +9,8 @@ import numpy as np
 
 from benchmarks.published import published_model
 from turnout.modal.poles import continuous_pole
-from turnout.passage.findings import PassageSensor
-from turnout.passage.patterns import read_patterns
+from turnout.passage.axle_patterns import read_patterns
+from turnout.passage.result import PassageSensor
 from turnout.records import Channel, ModalModel, Recording
 
 RATE = 20000.0

@@ -5,12 +5,12 @@ import ast
 # Still to be written; nothing may be added here.
 MISSING = {
     "turnout/mismatch/verdict.py Score.family",
-    "turnout/passage/basis.py WheelBasis.n_column",
-    "turnout/passage/basis.py WheelBasis.n_sample",
+    "turnout/passage/wheel_basis.py WheelBasis.n_column",
+    "turnout/passage/wheel_basis.py WheelBasis.n_sample",
     "turnout/passage/envelope.py Levels.n_bin",
-    "turnout/passage/findings.py Passage.n_axle",
-    "turnout/passage/findings.py Passage.times",
-    "turnout/passage/findings.py Passage.heard",
+    "turnout/passage/result.py Passage.n_axle",
+    "turnout/passage/result.py Passage.times",
+    "turnout/passage/result.py Passage.heard",
 }
 
 

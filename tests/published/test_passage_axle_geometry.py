@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from turnout.config.settings.passage import PassageSettings
-from turnout.passage.motion import Motion
-from turnout.passage.patterns import Group, Pattern, Vehicle, offsets
+from turnout.passage.axle_patterns import Group, Pattern, Vehicle, offsets
+from turnout.passage.kinematics import Motion
 from turnout.passage.train_type import find_type
 
 

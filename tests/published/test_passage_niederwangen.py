@@ -11,9 +11,9 @@ import pytest
 from ruamel.yaml import YAML
 
 from turnout.config.settings.passage import PassageSettings
-from turnout.passage.analyse import analyse
-from turnout.passage.findings import PassageSensor
-from turnout.passage.patterns import read_patterns
+from turnout.passage.analysis import analyse
+from turnout.passage.axle_patterns import read_patterns
+from turnout.passage.result import PassageSensor
 from turnout.passage.train_type import find_type
 from turnout.records import Channel, Recording
 

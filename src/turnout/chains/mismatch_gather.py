@@ -15,8 +15,8 @@ from turnout.config.turnout import TurnoutConfig
 from turnout.errors import ReadError
 from turnout.fleet.scan import unit_id
 from turnout.mismatch.track import HammerTest, Passage
-from turnout.passage.other_train import ANOTHER
-from turnout.passage.pulses import without_pulses
+from turnout.passage.channel_checks import without_pulses
+from turnout.passage.second_train import ANOTHER
 from turnout.readers import read
 from turnout.records import LongRecording, Recording, Unit
 

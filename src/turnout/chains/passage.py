@@ -9,13 +9,13 @@ from turnout.chains.passage_rows import finding_rows, fit_row, passage_row
 from turnout.chains.raw_rows import contradiction, quarantine_row, read_or_quarantine, recording_row
 from turnout.config.turnout import PassageConfig, TurnoutConfig
 from turnout.errors import PartlyComputed, ReadError
-from turnout.passage.analyse import analyse
+from turnout.passage.analysis import analyse
+from turnout.passage.axle_load import axle_load
+from turnout.passage.channel_checks import without_pulses
 from turnout.passage.channel_fit import fit_channel
-from turnout.passage.continuous import cut_passages
-from turnout.passage.findings import PassageSensor
-from turnout.passage.load import axle_load
-from turnout.passage.pulses import without_pulses
-from turnout.passage.train_data import listed_for, listed_trains
+from turnout.passage.result import PassageSensor
+from turnout.passage.segmentation import cut_passages
+from turnout.passage.timetable import listed_for, listed_trains
 from turnout.records import ModalModel, Recording, Unit
 from turnout.registry.ids import content_id
 

@@ -21,9 +21,9 @@ from turnout.content import sha256_of
 from turnout.errors import ConfigError
 from turnout.fleet.current import current_results
 from turnout.fleet.notes import LONGEST, start_of
+from turnout.passage.axle_load import LoadCalibration
+from turnout.passage.axle_patterns import read_patterns
 from turnout.passage.clusters import Clusters
-from turnout.passage.load import LoadCalibration
-from turnout.passage.patterns import read_patterns
 from turnout.records import ModalModel, Unit
 
 

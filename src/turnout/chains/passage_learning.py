@@ -13,10 +13,10 @@ from turnout.config.turnout import TurnoutConfig
 from turnout.errors import ReadError
 from turnout.files import write_if_changed
 from turnout.fleet.scan import scan
-from turnout.passage.analyse import analyse
+from turnout.passage.analysis import analyse
+from turnout.passage.axle_load import LoadCalibration, calibrate, quasi_static, train_amplitude, with_shared
 from turnout.passage.clusters import Clusters, fit_clusters
-from turnout.passage.load import LoadCalibration, calibrate, quasi_static, train_amplitude, with_shared
-from turnout.passage.train_data import listed_for, listed_trains
+from turnout.passage.timetable import listed_for, listed_trains
 from turnout.readers import read
 from turnout.records import LongRecording, Recording
 

@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
 def _show(recording, late, turnout, context, settings, no_fit) -> bool:
     """Print one train, and how it is fitted; whether there is one."""
     from turnout.chains.passage import sensors_of
-    from turnout.passage.analyse import analyse
+    from turnout.passage.analysis import analyse
 
     if late is not None:
         print(f"{late:.1f} s after the start of the record:")

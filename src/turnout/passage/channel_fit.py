@@ -7,14 +7,12 @@ from functools import lru_cache
 
 import numpy as np
 
-from turnout.passage.basis import band_pass, filtered, wheel_basis
-from turnout.passage.direction import DirectionTest, direction_test
-from turnout.passage.nulls import NullBand, null_bases, null_scores
+from turnout.passage.channel_checks import converter_step
+from turnout.passage.impact_timing import ImpactTimes, impact_times
+from turnout.passage.impulse_fit import joint_fit, whitener
+from turnout.passage.model_tests import DirectionTest, NullBand, direction_test, null_bases, null_scores
 from turnout.passage.scores import Scores, common_delay, delay_power, forecast, score
-from turnout.passage.soundness import converter_step
-from turnout.passage.timing import ImpactTimes, impact_times
-from turnout.passage.wheels import joint_fit
-from turnout.passage.whiten import whitener
+from turnout.passage.wheel_basis import band_pass, filtered, wheel_basis
 from turnout.records import ModalModel
 
 ACCEPTED, NULL, NOT_AN_IMPULSE, REJECTED = "accepted", "null_explains", "not_an_impulse", "rejected"

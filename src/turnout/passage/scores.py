@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from turnout.passage.basis import WheelBasis
-from turnout.passage.timing import best_times, gather, search_times
-from turnout.passage.wheels import joint_fit, onsets, predict
+from turnout.passage.impact_timing import best_times, gather, search_times
+from turnout.passage.impulse_fit import joint_fit, onsets, predict
+from turnout.passage.wheel_basis import WheelBasis
 
 
 @dataclass(frozen=True)

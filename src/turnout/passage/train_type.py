@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from turnout.passage.patterns import Vehicle, offsets
-from turnout.passage.row_of_vehicles import best_row
+from turnout.passage.axle_patterns import Vehicle, offsets
+from turnout.passage.vehicle_sequence import best_row
 
 UNKNOWN = "unknown"
 # Spacings of a train without template: inside bogies 1.8 to 3.2 m, between them up to 22 m.

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from benchmarks.passage_truth import IC3, PATTERNS, RATE, passing, rolling, sensors_for
 
-from turnout.passage.analyse import analyse
+from turnout.passage.analysis import analyse
 
 PLACES = (0.0, 4.0, 9.0, 15.0, 22.0)
 

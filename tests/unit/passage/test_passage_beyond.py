@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from benchmarks.passage_truth import KNOWN, RATE, recording_of, rolling, sensors_for
 
-from turnout.passage.analyse import analyse
-from turnout.passage.beyond import goes_on
-from turnout.passage.listen import hearing, listen
-from turnout.passage.motion import Motion
-from turnout.passage.patterns import offsets, read_patterns
+from turnout.passage.analysis import analyse
+from turnout.passage.axle_patterns import offsets, read_patterns
+from turnout.passage.comb_search import goes_on
+from turnout.passage.kinematics import Motion
+from turnout.passage.train_detection import hearing, listen
 
 SPEED, COACHES = 33.0, {"units": [{"any": ["coach"], "count": [2, 12]}]}
 

@@ -12,7 +12,7 @@ from turnout.config import load_configuration, with_raw
 from turnout.errors import PartlyComputed
 from turnout.fleet.guard import guarded
 from turnout.fleet.scan import scan
-from turnout.passage.continuous import cut_passages
+from turnout.passage.segmentation import cut_passages
 from turnout.readers.writing import write
 from turnout.records import Channel
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from benchmarks.passage_truth import IC3, PATTERNS, passing, rolling, sensors_for
 
-from turnout.passage.analyse import _sensor_speed, analyse
+from turnout.passage.analysis import _sensor_speed, analyse
 
 PLACES = (-12.0, 3.6, 13.8, 24.6, 26.4, 36.0)  # m, those of config/layouts
 # Every third wagon has bogies, the others two axles.

@@ -7,7 +7,7 @@ import pytest
 from sklearn.metrics import adjusted_rand_score
 
 from turnout.passage.clusters import Clusters, fit_clusters
-from turnout.passage.effects import effects
+from turnout.passage.score_regression import effects
 
 # type, ln-normal speed [km/h], ln-normal load [t], share of the traffic
 TRAFFIC = (

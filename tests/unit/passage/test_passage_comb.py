@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from benchmarks.passage_truth import IC3, PATTERNS, RATE, passing, recording_of, rolling, sensors_for
 
-from turnout.passage.analyse import analyse
-from turnout.passage.comb import STEP, Comb, Profiles, evidence, explained, profiles_at, teeth_of
-from turnout.passage.comb_row import likeliest_row
-from turnout.passage.comb_shape import reshaped
-from turnout.passage.listen import listen
-from turnout.passage.motion import Motion
-from turnout.passage.patterns import Group, Pattern, Vehicle, offsets
+from turnout.passage.analysis import analyse
+from turnout.passage.axle_patterns import Group, Pattern, Vehicle, offsets
+from turnout.passage.comb import STEP, Comb, Profiles, evidence, explained, profiles_at, reshaped, teeth_of
+from turnout.passage.kinematics import Motion
+from turnout.passage.train_detection import listen
+from turnout.passage.vehicle_sequence import likeliest_row
 
 # No symmetry: a tooth with two peaks of different height, off its middle.
 TOOTH = np.zeros(25)

@@ -8,8 +8,8 @@ import pytest
 from benchmarks.passage_truth import IC3, PATTERNS, RATE, rolling, sensors_for
 
 from turnout.chains.passage import trains_in
-from turnout.passage.analyse import analyse
-from turnout.passage.continuous import cut_passages
+from turnout.passage.analysis import analyse
+from turnout.passage.segmentation import cut_passages
 from turnout.readers import read
 from turnout.readers.writing import write
 from turnout.records import Channel, RawChannel, RawDescription, Recording

@@ -15,8 +15,8 @@ from turnout.chains.passage_learning import learn_clusters, learn_loads, weighed
 from turnout.cli import main
 from turnout.config import load_configuration, with_raw
 from turnout.config.settings.passage import PassageSettings
-from turnout.passage.analyse import analyse
-from turnout.passage.load import axle_load, calibrate, train_amplitude, with_shared
+from turnout.passage.analysis import analyse
+from turnout.passage.axle_load import axle_load, calibrate, train_amplitude, with_shared
 from turnout.readers.writing import write
 from turnout.records import Channel
 
@@ -110,7 +110,7 @@ def test_an_error_that_all_sensors_share_is_not_averaged_away(common, own, monke
     """Nine sensors, thirty trains on file, 200 more to be weighed: what is said holds what happens. Thirty
     trains tell the scatter to an eighth, 200 loads to a twentieth."""
     rng, names = np.random.default_rng(34), [f"c{k}" for k in range(9)]
-    monkeypatch.setattr("turnout.passage.load.quasi_static", lambda own_, *_: own_ * np.array([1.001, 0.999] * 6))
+    monkeypatch.setattr("turnout.passage.axle_load.quasi_static", lambda own_, *_: own_ * np.array([1.001, 0.999] * 6))
     settings = PassageSettings(load_relative_error_maximum=1.0)
 
     def train(load, speed):

@@ -5,7 +5,7 @@ import pytest
 from benchmarks.passage_truth import IC3, PATTERNS, RATE, passing, recording_of, rolling, sensors_for
 
 from turnout.config.settings.passage import PassageSettings
-from turnout.passage.analyse import analyse
+from turnout.passage.analysis import analyse
 from turnout.passage.train_type import UNKNOWN
 
 PLACES, NOSE = (0.0, 2.3, 4.1, 7.4), 3.2  # m

@@ -7,9 +7,9 @@ import pytest
 from benchmarks.passage_truth import PATTERNS, struck_train
 from scipy import signal
 
-from turnout.passage.analyse import analyse
-from turnout.passage.findings import PassageSensor
-from turnout.passage.pulses import without_pulses
+from turnout.passage.analysis import analyse
+from turnout.passage.channel_checks import without_pulses
+from turnout.passage.result import PassageSensor
 from turnout.records import Channel
 
 PLACES = {"OT": -12.0, "SP": 3.6, "CLP": 13.8, "A7": 24.6, "A8": 26.4}

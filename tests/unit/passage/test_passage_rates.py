@@ -4,7 +4,7 @@ import benchmarks.passage_truth as truth
 import numpy as np
 import pytest
 
-from turnout.passage.analyse import analyse
+from turnout.passage.analysis import analyse
 
 PLACES = (0.0, 4.0, 9.0, 15.0)
 

@@ -8,10 +8,10 @@ from benchmarks.passage_truth import IC3, RATE, paper_model, struck
 from hypothesis import given
 from hypothesis import strategies as st
 
-from turnout.passage.basis import band_pass, filtered, wheel_basis
 from turnout.passage.channel_fit import fit_channel
-from turnout.passage.nulls import NullBand, null_bases, null_scores
+from turnout.passage.model_tests import NullBand, null_bases, null_scores
 from turnout.passage.scores import fit_percent, forecast, score
+from turnout.passage.wheel_basis import band_pass, filtered, wheel_basis
 
 THROUGH = band_pass(80, 800, 4, RATE)
 

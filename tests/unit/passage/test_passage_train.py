@@ -7,9 +7,9 @@ import pytest
 from benchmarks.passage_truth import IC3, PATTERNS, RATE, rolling, sensors_for, struck_train
 
 from turnout.chains.passage_context import known_patterns
-from turnout.passage.analyse import analyse
-from turnout.passage.motion import Motion
-from turnout.passage.order import wrong_places
+from turnout.passage.analysis import analyse
+from turnout.passage.kinematics import Motion
+from turnout.passage.sensor_consistency import wrong_places
 from turnout.passage.slowness import scan_slowness
 from turnout.passage.speed import slowness_from_sensors
 

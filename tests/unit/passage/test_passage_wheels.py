@@ -5,11 +5,10 @@ import pytest
 from benchmarks.passage_truth import IC3, RATE, paper_model, struck
 from scipy import stats
 
-from turnout.passage.basis import band_pass, filtered, wheel_basis
-from turnout.passage.direction import direction_test
-from turnout.passage.timing import impact_times, search_times
-from turnout.passage.wheels import joint_fit, onsets, predict
-from turnout.passage.whiten import whitener
+from turnout.passage.impact_timing import impact_times, search_times
+from turnout.passage.impulse_fit import joint_fit, onsets, predict, whitener
+from turnout.passage.model_tests import direction_test
+from turnout.passage.wheel_basis import band_pass, filtered, wheel_basis
 from turnout.records import ModalModel
 
 

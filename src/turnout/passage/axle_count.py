@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from turnout.passage.axle_positions import axle_places
 from turnout.passage.comb_search import FINE, KMH, at_all_speeds
-from turnout.passage.known_train import known_train
-from turnout.passage.motion import Motion
-from turnout.passage.place import axle_places
-from turnout.passage.stack import counts, template_counts
+from turnout.passage.kinematics import Motion
+from turnout.passage.sensor_stack import counts, template_counts
+from turnout.passage.template_match import known_train
 from turnout.passage.train_type import UNKNOWN, find_type, unknown_evidence
 
 COMBS, PEAKS = 3, 3  # sensors up to which a known train is sought by its comb, and from which on by common peaks

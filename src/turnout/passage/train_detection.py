@@ -8,7 +8,7 @@ import numpy as np
 from scipy import ndimage
 
 from turnout.passage.envelope import levels
-from turnout.passage.stack import Listening
+from turnout.passage.sensor_stack import Listening
 
 QUIET_BLOCK = 0.05  # s
 

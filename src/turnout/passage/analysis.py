@@ -6,21 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from turnout.passage.at_sensors import sensor_times
-from turnout.passage.change_of_speed import with_change
-from turnout.passage.count import best_count, count_without_distance
-from turnout.passage.findings import Passage
-from turnout.passage.listen import hearing, listen, narrowed, track_taken
-from turnout.passage.motion import Motion
-from turnout.passage.nose import AT_ONCE, at_a_nose, blows_at_one_place, heard_at_once
-from turnout.passage.order import wrong_channels, wrong_places
-from turnout.passage.other_train import second_train
-from turnout.passage.pulses import without_pulses
-from turnout.passage.silence import fell_silent
+from turnout.passage.axle_count import best_count, count_without_distance
+from turnout.passage.axle_positions import sensor_times
+from turnout.passage.channel_checks import channel_states, fell_silent, without_pulses
+from turnout.passage.crossing_nose import AT_ONCE, at_a_nose, blows_at_one_place, heard_at_once
+from turnout.passage.kinematics import Motion
+from turnout.passage.result import Passage
+from turnout.passage.second_train import second_train
+from turnout.passage.sensor_consistency import wrong_channels, wrong_places
+from turnout.passage.sensor_stack import aligned
 from turnout.passage.slowness import pair_likeness, refine_slowness, scan_slowness
-from turnout.passage.soundness import channel_states
-from turnout.passage.speed import combine, motion_of, slowness_from_sensors
-from turnout.passage.stack import aligned
+from turnout.passage.speed import combine, motion_of, slowness_from_sensors, with_change
+from turnout.passage.train_detection import hearing, listen, narrowed, track_taken
 from turnout.passage.train_type import UNKNOWN
 from turnout.records import Recording, Rejection
 

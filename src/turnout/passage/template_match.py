@@ -8,10 +8,9 @@ from dataclasses import replace
 import numpy as np
 from scipy import stats
 
-from turnout.passage.axles import AxleFinding
-from turnout.passage.comb import ALIKE, evidence, explained, profiles_at
+from turnout.passage.axle_features import AxleFinding
+from turnout.passage.comb import ALIKE, evidence, explained, profiles_at, reshaped
 from turnout.passage.comb_search import Fitted, about_middle, likeliest
-from turnout.passage.comb_shape import reshaped
 from turnout.passage.train_type import UNKNOWN, TypeFinding
 
 CLEAR = 10.0  # nat that a comb must be likelier than no train at all

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from turnout.passage.motion import Motion
+from turnout.passage.kinematics import Motion
 from turnout.passage.train_type import TypeFinding
 from turnout.records import Rejection
 

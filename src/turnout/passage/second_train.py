@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy import ndimage
 
-from turnout.passage.axles import GRID, along_train
-from turnout.passage.motion import Motion
+from turnout.passage.axle_features import GRID, along_train
+from turnout.passage.kinematics import Motion
 from turnout.passage.slowness import likeness_at, slowness_grid
 from turnout.records import Rejection
 

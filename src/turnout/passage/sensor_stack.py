@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from turnout.passage.axles import (
+from turnout.passage.axle_features import (
     GRID,
     AxleFinding,
     along_train,
@@ -15,9 +15,9 @@ from turnout.passage.axles import (
     level_feature,
     scaled,
 )
-from turnout.passage.decode import decoded
 from turnout.passage.envelope import Levels
-from turnout.passage.motion import Motion
+from turnout.passage.kinematics import Motion
+from turnout.passage.profile_decoding import decoded
 
 
 @dataclass(frozen=True)

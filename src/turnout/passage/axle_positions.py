@@ -1,12 +1,15 @@
-"""Where each axle is in the train, from the whole shape of the level around it."""
+"""Where each axle is in the train, from the whole shape of the level around it.
+
+When each axle passes each sensor, from that sensor's own record.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from turnout.passage.axles import GRID, along_train
-from turnout.passage.motion import Motion
-from turnout.passage.stack import Listening
+from turnout.passage.axle_features import GRID, along_train
+from turnout.passage.kinematics import Motion
+from turnout.passage.sensor_stack import Listening
 
 REACH = 2.0  # m either side of an axle that is compared
 ROUND = 0.12  # m: a wheel's contact with sleepers and patch rounds the cusp
@@ -71,3 +74,13 @@ def _model(place, level, x, n):
     share = u / total
     by_length = np.sum(share * 2.0 * r / length, axis=1, keepdims=True)
     return np.log(total[:, 0]) - level, np.hstack([share * 2.0 / length * distance / r, share, by_length])
+
+
+def sensor_times(listening: Listening, motion: Motion, offsets) -> np.ndarray:
+    """(n_sensor, n_axle) passing times [s], nan where a sensor puts an axle far from where the others do."""
+    rows = []
+    for i, x in enumerate(listening.positions):
+        places = axle_places(listening.only([i]), motion, offsets)
+        moved = np.abs(places - offsets - np.median(places - offsets))
+        rows.append(np.where(moved < 0.7 * MOST, motion.passing(places, x), np.nan))
+    return np.array(rows)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage, signal
 
-from turnout.passage.motion import Motion
+from turnout.passage.kinematics import Motion
 
 GRID = 0.04  # m
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from turnout.passage.axles import GRID, along_train
+from turnout.passage.axle_features import GRID, along_train
 from turnout.passage.slowness import coarser, pair_likeness, slowness_grid, stacked
 from turnout.records import Rejection
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from turnout.passage.basis import FRACTIONS, WheelBasis
-from turnout.passage.wheels import joint_fit, onsets
+from turnout.passage.impulse_fit import joint_fit, onsets
+from turnout.passage.wheel_basis import FRACTIONS, WheelBasis
 
 
 @dataclass(frozen=True)

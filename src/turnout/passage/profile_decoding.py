@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy import ndimage, signal
 
-from turnout.passage.axles import GRID, AxleFinding
-from turnout.passage.patterns import Pattern
+from turnout.passage.axle_features import GRID, AxleFinding
+from turnout.passage.axle_patterns import Pattern
 
 SLACK = 0.35  # m, how far an axle may lie from where the one before puts it
 LEAST = 0.3  # of a typical peak: what an axle must reach, and what a peak may be without being one

@@ -13,10 +13,10 @@ import numpy as np
 from turnout.passage.comb import LEAD, STEP, Comb, profiles_at, teeth_of
 from turnout.passage.comb_search import at_all_speeds
 from turnout.passage.envelope import Levels
-from turnout.passage.known_train import known_train
-from turnout.passage.other_train import without_train
+from turnout.passage.second_train import without_train
+from turnout.passage.sensor_stack import Listening
 from turnout.passage.slowness import likeness_at, pair_likeness, stacked
-from turnout.passage.stack import Listening
+from turnout.passage.template_match import known_train
 
 LEAST = 3  # sensors: of two the median is the mean, with the wheels of both in it
 # m between a sensor and the nose at most, and that a nose may lie outside the sensors: a crossing panel, whose row of

@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 from scipy import signal
 
-from turnout.passage.axles import GRID, along_train
+from turnout.passage.axle_features import GRID, along_train
 
 STEP = 0.001  # s
 HEARD = 0.3  # largest standard error of a train's amplitude, relative to it: beyond, its logarithm is no number

@@ -1,0 +1,192 @@
+"""What each channel of a passage is worth before anything is sought in it.
+
+Electrical pulses: what all sensors of a turnout show at one moment did not come along the rail.
+
+The fastest wave in a rail takes 0.4 ms from one sensor to the next two metres on, a wheel 100 times as long.
+
+Sensors that stop hearing the train before it is past: they fell off, or their cable broke.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import ndimage
+
+from turnout.records import Recording, Rejection
+
+
+@dataclass(frozen=True)
+class ChannelState:
+    """``usable`` for timing and axles; ``sound`` also for fits. ``until`` [s] is where a lost sensor fell silent."""
+
+    name: str
+    usable: bool
+    sound: bool
+    findings: tuple[Rejection, ...] = ()
+    until: float | None = None
+
+
+def channel_states(recording: Recording) -> tuple[ChannelState, ...]:
+    """State of every acceleration channel, in the order of ``recording.of_quantity("acceleration")``."""
+    rows = recording.of_quantity("acceleration")
+    return tuple(_state(recording.channels[i], recording.samples[i], recording.rate) for i in rows)
+
+
+def _state(channel, samples, rate) -> ChannelState:
+    if not np.all(np.isfinite(samples)):
+        bad = np.flatnonzero(~np.isfinite(samples))
+        found = Rejection("not_finite", float(bad.size), 0.0, f"{channel.name}: first at {bad[0] / rate:.3f} s")
+        return ChannelState(channel.name, False, False, (found,))
+    spread = float(np.ptp(samples))
+    if spread == 0.0:
+        return ChannelState(channel.name, False, False, (Rejection("dead_channel", 0.0, 0.0, channel.name),))
+    share, level = clipped_share(samples, channel.limit)
+    findings = []
+    if share > 0:
+        text = f"{channel.name}: {100 * share:.3f} % of the samples at ±{level:.4g} m/s²"
+        findings.append(Rejection("clipped", share, 0.0, text))
+    silent = silent_from(samples, rate)
+    if silent is not None:
+        text = f"{channel.name}: constant from {silent:.2f} s on"
+        findings.append(Rejection("sensor_lost", silent, None, text))
+    return ChannelState(channel.name, share < 0.2, not findings, tuple(findings), silent)
+
+
+def clipped_share(samples, limit: float | None, run: int = 3) -> tuple[float, float]:
+    """Share of samples at the rail, and the rail. [-], [m/s²]
+
+    At the configured ``limit`` (within 0.1 %), or, where none is given, at an extreme value that is repeated
+    ``run`` times in a row at least twice: noise does not do that, a converter at its end does.
+
+    >>> y = np.sin(np.linspace(0, 20, 400))
+    >>> share, level = clipped_share(np.clip(y, -0.8, 0.8), None)
+    >>> print(f"{share:.2f} at {level:.1f}")
+    0.40 at 0.8
+    >>> clipped_share(y, None)[0]
+    0.0
+    """
+    top = float(np.max(np.abs(samples)))
+    if limit is not None:
+        at = np.abs(samples) >= 0.999 * limit
+        return float(at.mean()), float(limit)
+    at = np.abs(samples) >= top * (1 - 1e-6)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], at.astype(int), [0]])))
+    lengths = edges[1::2] - edges[::2]
+    clipped = np.sum(lengths >= run) >= 2
+    return (float(at.mean()), top) if clipped else (0.0, top)
+
+
+def silent_from(samples, rate: float, block: float = 0.05) -> float | None:
+    """Time from which a channel is constant up to its end [s], None where it lives to the end.
+
+    A sensor that already stood there before the train, within one step of its converter, is quiet and not lost.
+
+    >>> y = np.sin(np.arange(100.0))
+    >>> silent_from(np.r_[y, np.full(900, 0.1)], 1000.0), silent_from(np.r_[np.zeros(60), y, np.zeros(900)], 1000.0)
+    (0.1, None)
+    """
+    changes = np.flatnonzero(np.diff(samples))
+    last = (changes[-1] + 1) / rate if changes.size else 0.0
+    if len(samples) / rate - last <= block:
+        return None
+    start = samples[: max(int(block * rate), 1)]
+    quiet = np.mean(np.abs(start - samples[-1]) < 1.5 * converter_step(samples)) > 0.9
+    return None if changes.size and quiet else float(last)
+
+
+def converter_step(samples) -> float:
+    """Smallest change from one sample to the next: a converter's step, or next to nothing; 0 where nothing changes."""
+    change = np.abs(np.diff(samples))
+    return float(np.min(change, where=change > 0, initial=np.inf)) if change.any() else 0.0
+
+
+TIMES = 8.0  # a pulse is so many times what a thousandth of a channel's samples exceed
+SAME, APART = 2e-4, 2.0  # s within which, and m over which, it is heard everywhere
+AROUND, LONGEST = 3e-3, 1e-2  # s: a filter's ringing on both sides of a pulse, and the longest that is one
+
+
+def without_pulses(recording: Recording, sensors) -> tuple[Recording, tuple[Rejection, ...]]:
+    """The recording with straight lines in place of its electrical pulses, and what was found.
+
+    ``sensors`` are PassageSensors; nothing is cut where those that live are less than 2 m apart. A channel that is
+    dead or not finite is left as it is and has no say.
+    """
+    places = {s.name: s.position for s in sensors}
+    rows = [i for i, c in enumerate(recording.channels) if c.name in places and _lives(recording.samples[i])]
+    if len(rows) < 2 or np.ptp([places[recording.channels[i].name] for i in rows]) < APART:
+        return recording, ()
+    near = 2 * max(round(SAME * recording.rate), 1) + 1
+    shared = np.ones(recording.n_sample, dtype=bool)
+    for i in rows:
+        size = np.abs(recording.samples[i] - np.median(recording.samples[i]))
+        shared &= ndimage.maximum_filter1d(size, near) > TIMES * np.quantile(size, 0.999)
+        if not shared.any():
+            return recording, ()
+    cut, n = _regions(shared, recording.rate)
+    if not n:
+        return recording, ()
+    samples, at, kept = recording.samples.copy(), np.flatnonzero(cut), np.flatnonzero(~cut)
+    for i in rows:
+        samples[i, at] = np.interp(at, kept, samples[i, kept])
+    text = f"all channels: {n} electrical pulse{'s' * (n > 1)} cut out, the first at {at[0] / recording.rate:.3f} s"
+    return replace(recording, samples=samples), (Rejection("interference", float(n), 0.0, text),)
+
+
+def _lives(samples) -> bool:
+    return bool(np.isfinite(samples).all()) and np.ptp(samples) > 0.0
+
+
+def _regions(shared, rate):
+    """((n_sample,) bool to cut, number of pulses): pulses with their ringing, none that lasts too long."""
+    label, _n = ndimage.label(ndimage.maximum_filter1d(shared, 2 * round(AROUND * rate) + 1))
+    runs = ndimage.find_objects(label)
+    short = [run for (run,) in runs if run.stop - run.start <= (LONGEST + 2 * AROUND) * rate]
+    cut = np.zeros(shared.size, dtype=bool)
+    for run in short:
+        cut[run] = True
+    return cut, len(short)
+
+
+FAINT = 0.2  # of a sensor's usual level at an axle, in logarithms: below it the axle is not heard
+REACH = 0.5  # m around the place of an axle
+
+
+def fell_silent(heard, names, at_sensor, speed: float) -> list[Rejection]:
+    """A finding "sensor_lost" for every sensor that hears the first half of the train and not its last two axles.
+
+    Parameters
+    ----------
+    heard : Listening
+        Levels of the sensors ``names``, in that order.
+    names : sequence of str
+    at_sensor : mapping
+        Channel -> (n_axle,) times of the axles there. [s]
+    speed : float
+        [m/s]
+
+    Returns
+    -------
+    list of Rejection
+        With the time of the last sound as their value. [s]
+    """
+    step, found = heard.levels.step, []
+    reach = max(int(REACH / speed / step), 1)
+    loudest = ndimage.maximum_filter1d(heard.levels.values, 2 * reach + 1, axis=1)
+    for name, level, row in zip(names, heard.levels.values, loudest):
+        times = np.asarray(at_sensor.get(name, ()))
+        inside = times[(times > 0) & (times < len(row) * step)]
+        if inside.size < 4:
+            continue
+        at_axles = row[(inside / step).astype(int)]
+        usual = np.median(at_axles[: inside.size // 2])
+        silent = at_axles < FAINT * usual
+        if usual <= 0 or not silent[-2:].all() or silent[: inside.size // 2].mean() > 0.25:
+            continue
+        first_silent = int(np.flatnonzero(~silent)[-1]) + 1
+        stop = int(inside[first_silent] / step)
+        until = (np.flatnonzero(level[:stop] >= FAINT * usual)[-1] + 1) * step
+        text = f"{name}: hears nothing from {until:.2f} s on, {inside.size - first_silent} axles before the last"
+        found.append(Rejection("sensor_lost", float(until), None, text))
+    return found
