@@ -10,14 +10,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from tests.oracles.march_numpy import march_numpy
 
 from benchmarks.bar import Bar, stopwatch
 from turnout.simulate import Sensor, car, load_track, load_vehicle, simulate_passage, uniform_track
-from turnout.simulate.frequency import receptance
+from turnout.simulate.discretization_error import PassageCase, end_error, numerical_error
+from turnout.simulate.frequency_response import receptance
 from turnout.simulate.infinite_track import floquet_receptance, winkler_receptance
-from turnout.simulate.march_numpy import march_numpy
 from turnout.simulate.matrices import assemble
-from turnout.simulate.numerical_error import PassageCase, end_error, numerical_error
 from turnout.simulate.passage import prepare_passage
 from turnout.simulate.prepare import prepare
 from turnout.simulate.rail import Rail

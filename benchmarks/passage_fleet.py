@@ -7,7 +7,7 @@ import numpy as np
 from turnout.passage.result import PassageSensor
 from turnout.records import Channel, Recording
 from turnout.simulate import Sensor, car, load_track, load_vehicle, prepare_passage, simulate_passage
-from turnout.simulate.coupled import coupled
+from turnout.simulate.train import coupled
 
 RATE = 20000.0
 # Places [m] of twelve sensors of the train's track; two of the other one feel it faintly.

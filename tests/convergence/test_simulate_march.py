@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from tests.oracles.march_numpy import march_numpy
 
 from turnout.physics import HangingSleeper, LiftingSleepers, PhysicsTerm
-from turnout.simulate.frequency import responses
-from turnout.simulate.law import GapLaw, LinearLaw, Port
-from turnout.simulate.link import Link
-from turnout.simulate.march_numpy import march_numpy
+from turnout.simulate.force_laws import GapLaw, LinearLaw, Port
+from turnout.simulate.frequency_response import responses
+from turnout.simulate.links import Link
 from turnout.simulate.matrices import assemble
 from turnout.simulate.prepare import prepare
 from turnout.simulate.run import Drive, Probe, run

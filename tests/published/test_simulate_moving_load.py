@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.signal import butter, sosfiltfilt
 
-from turnout.simulate.law import LinearLaw, PowerLaw
+from turnout.simulate.force_laws import LinearLaw, PowerLaw
 from turnout.simulate.prepare import prepare
 from turnout.simulate.rail import Rail
 from turnout.simulate.run import Drive, Probe, run

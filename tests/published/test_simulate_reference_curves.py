@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from turnout.simulate.frequency import receptance
+from turnout.simulate.frequency_response import receptance
 from turnout.simulate.matrices import assemble
 from turnout.simulate.rail import Rail
 from turnout.simulate.track import uniform_track

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
+from turnout.simulate.force_laws import LinearLaw, PowerLaw
 from turnout.simulate.infinite_track import winkler_receptance
-from turnout.simulate.law import LinearLaw, PowerLaw
 from turnout.simulate.prepare import prepare
 from turnout.simulate.rail import Rail
 from turnout.simulate.roughness import roughness

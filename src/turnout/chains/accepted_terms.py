@@ -9,7 +9,7 @@ from typing import Any
 from turnout import physics
 from turnout.config.parameters import Number
 from turnout.errors import SimulationError
-from turnout.simulate.counted import COUNTED
+from turnout.simulate.links import COUNTED
 
 SUPPORTS = COUNTED  # in a file the support's place [m] stands for its number
 # Effects that belong to a wheelset: it leaves with its train, the track's file is no place for it.

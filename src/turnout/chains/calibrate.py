@@ -15,9 +15,9 @@ from turnout.readers import read
 from turnout.receptance import find_impacts, receptance_of
 from turnout.records import RawChannel, RawDescription, Recording
 from turnout.simulate import load_track
-from turnout.simulate.calibrate import Measured, calibrate
-from turnout.simulate.calibrate_modes import fit_modes
+from turnout.simulate.calibration import Measured, calibrate
 from turnout.simulate.hammer import located
+from turnout.simulate.modal_calibration import fit_modes
 from turnout.simulate.parameters import track_path
 
 LOG = logging.getLogger("turnout.simulate")

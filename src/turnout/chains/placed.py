@@ -7,8 +7,8 @@ from turnout.config import Configuration
 from turnout.config.document import Branch
 from turnout.errors import ConfigError, TurnoutError
 from turnout.simulate import load_track
+from turnout.simulate.parameters import off_track
 from turnout.simulate.run import Drive
-from turnout.simulate.track_places import off_track
 
 OFF = 0.5  # m: a place in the layout further than this from the one in the track's file is somebody's mistake
 ENTRY = Drive.entry + Drive.margin  # m: nearer to the track's ends its wheels are not wholly on it

@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 
 from turnout.demo.hammer import N_SAMPLE, RATE
-from turnout.simulate.frequency import receptance
+from turnout.simulate.frequency_response import receptance
 from turnout.simulate.hammer import located
 from turnout.simulate.matrices import assemble
 from turnout.simulate.parameters import load_track

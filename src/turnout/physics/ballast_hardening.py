@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from turnout.physics.term import Parameter, PhysicsTerm
-from turnout.simulate.law import Port, TableLaw
+from turnout.simulate.force_laws import Port, TableLaw
 
 UNIT = 1e-3  # deflection at which the parameter is the share added [m]
 WAY = np.linspace(-3e-3, 3e-3, 121)

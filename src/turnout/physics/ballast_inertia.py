@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from turnout.physics.term import Parameter, PhysicsTerm
-from turnout.simulate.link import Link
+from turnout.simulate.links import Link
 
 SOURCE = "Wolf 1994, Foundation vibration analysis using simple physical models: cones"
 

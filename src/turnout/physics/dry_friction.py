@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from turnout.physics.term import Parameter, PhysicsTerm
-from turnout.simulate.law import FrictionLaw, Port
+from turnout.simulate.force_laws import FrictionLaw, Port
 
 SLIP = 2e-3  # m/s over which the force changes sign
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from turnout.physics.term import Parameter, PhysicsTerm
-from turnout.simulate.law import Port, TableLaw
+from turnout.simulate.force_laws import Port, TableLaw
 
 ONSET = 1e-5  # way over which the ballast's damping comes and goes [m]
 

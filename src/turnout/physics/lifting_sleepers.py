@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from turnout.physics.term import Parameter, PhysicsTerm
-from turnout.simulate.law import LiftLaw, Port
+from turnout.simulate.force_laws import LiftLaw, Port
 
 
 @dataclass(frozen=True)

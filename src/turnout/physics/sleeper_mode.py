@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from turnout.physics.term import Parameter, PhysicsTerm
-from turnout.simulate.link import Link
+from turnout.simulate.links import Link
 
 SOURCE = "Grassie and Cox 1984, The dynamic response of railway track with flexible sleepers"
 

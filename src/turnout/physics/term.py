@@ -43,11 +43,11 @@ class PhysicsTerm:
         raise NotImplementedError(f"{cls.__name__} needs an example for its contract tests")
 
     def links(self, track):
-        """Matrix entries: a list of ``turnout.simulate.link.Link``. Naming a new degree of freedom creates it."""
+        """Matrix entries: a list of ``turnout.simulate.links.Link``. Naming a new degree of freedom creates it."""
         return ()
 
     def ports(self, track):
-        """Scalar forces that matrices cannot hold: a list of ``turnout.simulate.law.Port``."""
+        """Scalar forces that matrices cannot hold: a list of ``turnout.simulate.force_laws.Port``."""
         return ()
 
     @property

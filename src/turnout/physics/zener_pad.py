@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from turnout.physics.term import Parameter, PhysicsTerm
-from turnout.simulate.link import Link
+from turnout.simulate.links import Link
 
 SOURCE = "Knothe and Grassie 1993, Modelling of railway track and vehicle/track interaction at high frequencies"
 

@@ -46,7 +46,7 @@ def _receptances():
     from turnout.config.settings.receptance import ReceptanceSettings
     from turnout.receptance import find_impacts, receptance_of
     from turnout.simulate import load_track, simulate_hammer
-    from turnout.simulate.frequency import receptance
+    from turnout.simulate.frequency_response import receptance
     from turnout.simulate.hammer import located
     from turnout.simulate.matrices import assemble
 
@@ -116,7 +116,7 @@ def _closed_form():
     import matplotlib.pyplot as plt
 
     from turnout.simulate import uniform_track
-    from turnout.simulate.frequency import receptance
+    from turnout.simulate.frequency_response import receptance
     from turnout.simulate.infinite_track import floquet_receptance, propagation
     from turnout.simulate.matrices import assemble
 

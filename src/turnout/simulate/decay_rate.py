@@ -3,7 +3,7 @@
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.simulate.frequency import responses
+from turnout.simulate.frequency_response import responses
 
 # Distances of the blows from the accelerometer in bays after EN 15461:2008+A1, from memory, unverified: the sum is a
 # quadrature over x, so another grid as fine near the accelerometer changes it little.

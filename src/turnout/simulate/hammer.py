@@ -7,8 +7,8 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.records import Recording
-from turnout.simulate.counted import on_stretch
-from turnout.simulate.law import PowerLaw
+from turnout.simulate.force_laws import PowerLaw
+from turnout.simulate.links import on_stretch
 from turnout.simulate.prepare import prepare
 from turnout.simulate.run import Drive, run
 from turnout.simulate.sensor import Sensor, mean_of, measured, seated

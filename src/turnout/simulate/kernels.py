@@ -3,7 +3,7 @@
 import numpy as np
 
 from turnout.simulate.compiled import kernel
-from turnout.simulate.law import FRICTION, GAP, LIFT, LINEAR, POWER
+from turnout.simulate.force_laws import FRICTION, GAP, LIFT, LINEAR, POWER
 
 
 @kernel

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.simulate.additions import links_of
+from turnout.simulate.links import links_of
 from turnout.simulate.rail import element_mass, element_stiffness, local_compliance, shape_functions
 
 ORDER = {"sleeper": 0, "ballast": 1}

@@ -3,8 +3,8 @@
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.simulate.additions import ports_of
-from turnout.simulate.law import TABLE
+from turnout.simulate.force_laws import TABLE
+from turnout.simulate.links import ports_of
 from turnout.simulate.state import PortArrays
 
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.simulate.banded import all_diagonals, factorise, inverse_windows, upper_rows
+from turnout.simulate.integrator import scheme as scheme_called
 from turnout.simulate.matrices import TrackMatrices, assemble
-from turnout.simulate.scheme import scheme as scheme_called
 from turnout.simulate.state import SchemeArrays, TrackArrays
 from turnout.simulate.track import Track
 

@@ -6,11 +6,10 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.simulate.between_nodes import bending, lies_between_nodes, rail_loads, recorded
-from turnout.simulate.bodies import stand_in_of, vehicle_arrays
 from turnout.simulate.march import CONVERGED, LEFT_TRACK, march
 from turnout.simulate.port_system import place_ports
 from turnout.simulate.ports import contact_ports, fixed_ports, port_arrays
-from turnout.simulate.state import PortArrays, RunArrays
+from turnout.simulate.state import PortArrays, RunArrays, stand_in_of, vehicle_arrays
 from turnout.simulate.statics import equilibrium, resting
 from turnout.simulate.wheel_path import spline_pieces
 

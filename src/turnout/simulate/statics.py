@@ -3,8 +3,8 @@
 import numpy as np
 
 from turnout.errors import SimulationError
+from turnout.simulate.force_laws import POWER
 from turnout.simulate.kernels import law_force
-from turnout.simulate.law import POWER
 from turnout.simulate.state import Motion
 
 

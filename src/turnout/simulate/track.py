@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.simulate.link import Link
+from turnout.simulate.links import Link
 from turnout.simulate.rail import Rail, in_series
 
 NOT_NEGATIVE = (

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.simulate.law import PowerLaw
+from turnout.simulate.force_laws import PowerLaw
 
 GRAVITY = 9.81
 HERTZ = PowerLaw(93e9)

@@ -7,7 +7,7 @@ import pytest
 
 from turnout.demo.hammer import RATE, hammer_test
 from turnout.demo.simulated_response import simulated_response
-from turnout.simulate.frequency import receptance
+from turnout.simulate.frequency_response import receptance
 from turnout.simulate.hammer import located
 from turnout.simulate.matrices import assemble
 from turnout.simulate.parameters import load_track

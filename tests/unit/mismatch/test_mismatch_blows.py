@@ -18,7 +18,7 @@ from turnout.mismatch.track.campaign import HammerTest
 from turnout.mismatch.track.observing import hammer_observations
 from turnout.mismatch.track.planned import measured_campaign, small_plan
 from turnout.simulate import uniform_track
-from turnout.simulate.frequency import receptance
+from turnout.simulate.frequency_response import receptance
 from turnout.simulate.hammer import Hammer, simulate_hammer
 from turnout.simulate.matrices import assemble
 from turnout.simulate.sensor import Sensor

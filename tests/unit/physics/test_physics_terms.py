@@ -7,7 +7,7 @@ import pytest
 
 from turnout.errors import SimulationError
 from turnout.physics import HangingSleeper, ZenerPad
-from turnout.simulate.frequency import receptance
+from turnout.simulate.frequency_response import receptance
 from turnout.simulate.matrices import assemble
 from turnout.simulate.prepare import prepare
 from turnout.simulate.run import Drive, run

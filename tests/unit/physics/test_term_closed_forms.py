@@ -8,7 +8,7 @@ import pytest
 
 from turnout import physics
 from turnout.simulate import car, uniform_track
-from turnout.simulate.frequency import receptance, responses
+from turnout.simulate.frequency_response import receptance, responses
 from turnout.simulate.matrices import assemble
 from turnout.simulate.sensor import Sensor
 from turnout.simulate.track import RailStretch

@@ -14,8 +14,8 @@ from turnout.physics import (
     PadPreload,
     PadTemperature,
 )
-from turnout.simulate.additions import links_of, ports_of
-from turnout.simulate.frequency import receptance
+from turnout.simulate.frequency_response import receptance
+from turnout.simulate.links import links_of, ports_of
 from turnout.simulate.matrices import assemble
 from turnout.simulate.prepare import prepare
 from turnout.simulate.run import Drive, run

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from turnout.simulate.decay_rate import GRID, track_decay_rate
-from turnout.simulate.frequency import receptance, receptance_gradient
+from turnout.simulate.force_laws import LinearLaw
+from turnout.simulate.frequency_response import receptance, receptance_gradient
 from turnout.simulate.infinite_track import floquet_receptance
-from turnout.simulate.law import LinearLaw
 from turnout.simulate.matrices import assemble
 from turnout.simulate.prepare import prepare
 from turnout.simulate.rail import Rail

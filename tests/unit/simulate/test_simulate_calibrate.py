@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from turnout.simulate.calibrate import PARAMETERS, Measured, calibrate
-from turnout.simulate.frequency import receptance
+from turnout.simulate.calibration import PARAMETERS, Measured, calibrate
+from turnout.simulate.frequency_response import receptance
 from turnout.simulate.matrices import assemble
 from turnout.simulate.track import uniform_track
 from turnout.simulate.turnout_track import TurnoutTrack

@@ -10,7 +10,7 @@ from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.readers import read
 from turnout.receptance import find_impacts
 from turnout.records import RawChannel, RawDescription
-from turnout.simulate.calibrate import Calibration
+from turnout.simulate.calibration import Calibration
 
 
 def test_a_simulated_hammer_test_is_read_back_and_has_sound_impacts(tmp_path, repository, monkeypatch):

@@ -12,7 +12,7 @@ from turnout.fingerprint import closure
 from turnout.simulate import compiled
 
 HERE = Path(compiled.__file__).parent
-RUN = "from turnout.simulate.spline import uniform_pieces; print(uniform_pieces([0.0, 1.0, 4.0]).sum())"
+RUN = "from turnout.simulate.wheel_path import uniform_pieces; print(uniform_pieces([0.0, 1.0, 4.0]).sum())"
 
 
 def imported_here(module):
@@ -27,7 +27,7 @@ def test_every_kernel_that_another_one_calls_is_behind_the_name_of_the_folder():
     behind = closure(compiled.OUTERMOST)
     for name in with_kernels:
         assert called & imported_here(name) <= behind, f"{name} calls kernels that the folder does not depend on"
-    assert {"turnout.simulate.law", "turnout.simulate.compiled"} <= behind
+    assert {"turnout.simulate.force_laws", "turnout.simulate.compiled"} <= behind
 
 
 def test_no_kernel_goes_round_the_folder():

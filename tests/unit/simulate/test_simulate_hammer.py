@@ -6,7 +6,7 @@ import pytest
 from turnout.errors import SimulationError
 from turnout.physics import TERMS, LiftingSleepers, LocalBallast, SensorGain, SensorPosition, SurfaceDip
 from turnout.simulate import Hammer, Sensor, prepare_hammer, simulate_hammer, uniform_track
-from turnout.simulate.counted import on_stretch
+from turnout.simulate.links import on_stretch
 
 TRACK, MASS, VELOCITY = uniform_track(30.0), 5.5, 1.2
 HAMMER = Hammer(MASS, VELOCITY, velocity_spread=0.0, place_spread=0.0, force=Sensor("hammer", 15.0, "hammer", "force"))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from turnout.simulate.frequency import responses
+from turnout.simulate.frequency_response import responses
 from turnout.simulate.matrices import assemble
 from turnout.simulate.track import uniform_track
 

@@ -8,9 +8,9 @@ import pytest
 
 from turnout.physics import TERMS, LocalBallast
 from turnout.simulate import Sensor, car, prepare_passage, uniform_track
-from turnout.simulate import numerical_error as module
-from turnout.simulate.counted import COUNTED, moved
-from turnout.simulate.numerical_error import PassageCase, end_error, numerical_error
+from turnout.simulate import discretization_error as module
+from turnout.simulate.discretization_error import PassageCase, end_error, numerical_error
+from turnout.simulate.links import COUNTED, moved
 
 TRACK = uniform_track(24.0)
 TRUE = np.random.default_rng(3).normal(size=(1, 4096))

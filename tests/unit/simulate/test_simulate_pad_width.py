@@ -7,7 +7,7 @@ import pytest
 
 from turnout.errors import SimulationError
 from turnout.simulate import uniform_track
-from turnout.simulate.frequency import receptance
+from turnout.simulate.frequency_response import receptance
 from turnout.simulate.matrices import assemble, linked, railed
 
 WIDTH, F = 0.15, np.array([50.0, 200.0, 400.0, 600.0])

@@ -16,12 +16,12 @@ from turnout.simulate import (
     simulate_passage,
     uniform_track,
 )
-from turnout.simulate.calibrate import Measured, calibrate
-from turnout.simulate.calibrate_modes import with_section
+from turnout.simulate.calibration import Measured, calibrate
 from turnout.simulate.decay_rate import track_decay_rate
-from turnout.simulate.frequency import receptance, receptance_gradient
+from turnout.simulate.discretization_error import PassageCase, end_error, numerical_error
+from turnout.simulate.frequency_response import receptance, receptance_gradient
 from turnout.simulate.matrices import assemble
-from turnout.simulate.numerical_error import PassageCase, end_error, numerical_error
+from turnout.simulate.modal_calibration import with_section
 from turnout.simulate.rail import Rail
 from turnout.simulate.roughness import level, roughness
 from turnout.simulate.sensor import measured

@@ -15,8 +15,8 @@ from turnout.simulate import (
     simulate_passage,
     uniform_track,
 )
-from turnout.simulate.law import PowerLaw, TableLaw
-from turnout.simulate.link import Link
+from turnout.simulate.force_laws import PowerLaw, TableLaw
+from turnout.simulate.links import Link
 from turnout.simulate.matrices import assemble
 from turnout.simulate.prepare import prepare
 from turnout.simulate.run import Drive, Probe, run

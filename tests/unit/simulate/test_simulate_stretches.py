@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from turnout.simulate import uniform_track
-from turnout.simulate.frequency import receptance
+from turnout.simulate.frequency_response import receptance
 from turnout.simulate.matrices import assemble
 from turnout.simulate.rail import Rail, element_stiffness, in_series
 from turnout.simulate.track import RailStretch

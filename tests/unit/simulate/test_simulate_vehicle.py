@@ -7,9 +7,9 @@ from scipy.linalg import eigh
 from turnout.config.parameters import read_parameters
 from turnout.errors import SimulationError
 from turnout.simulate import car, load_track, load_vehicle
-from turnout.simulate.coupled import coupled
 from turnout.simulate.parameters import REPOSITORY
 from turnout.simulate.ports import contact_ports
+from turnout.simulate.train import coupled
 from turnout.simulate.vehicle import GRAVITY, Body, Suspension, Vehicle, lone_wheels
 
 AXLES = {

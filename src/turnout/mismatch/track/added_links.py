@@ -5,7 +5,7 @@ from scipy.sparse import lil_array
 
 from turnout.mismatch.track import blows
 from turnout.mismatch.track.blow_model import tangent
-from turnout.simulate.additions import left, links_of
+from turnout.simulate.links import left, links_of
 
 
 class AddedLinks:

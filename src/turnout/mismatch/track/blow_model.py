@@ -7,9 +7,8 @@ import numpy as np
 from turnout.mismatch.track.base_model import OWN
 from turnout.mismatch.track.blows import LINES, SHIFTED
 from turnout.mismatch.track.skeleton import FixedLinks, matrices_of
-from turnout.simulate.additions import links_of, ports_of
-from turnout.simulate.frequency import responses
-from turnout.simulate.link import Link
+from turnout.simulate.frequency_response import responses
+from turnout.simulate.links import Link, links_of, ports_of
 from turnout.simulate.matrices import link_vector
 
 SWING = 1e-6  # motion of a blow for the tangent of a law [m]

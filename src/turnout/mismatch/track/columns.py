@@ -12,7 +12,7 @@ from turnout.mismatch.track import bands, roll
 from turnout.mismatch.track.base_model import track_with
 from turnout.mismatch.track.blow_model import linear
 from turnout.mismatch.track.rolled_waves import Carrier
-from turnout.simulate.frequency import responses
+from turnout.simulate.frequency_response import responses
 from turnout.simulate.run import Probe
 
 FURTHER = 0.01  # way over which a derivative by a sensor's place is taken [m]

@@ -5,11 +5,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from turnout.mismatch.track.campaign import Campaign, HammerTest, Passage
-from turnout.simulate.coupled import coupled
 from turnout.simulate.hammer import Hammer, simulate_hammer
 from turnout.simulate.passage import simulate_passage
 from turnout.simulate.sensor import Sensor
 from turnout.simulate.track import PER_SUPPORT, uniform_track
+from turnout.simulate.train import coupled
 from turnout.simulate.turnout_track import TurnoutTrack
 from turnout.simulate.vehicle import car
 

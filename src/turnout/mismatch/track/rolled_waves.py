@@ -16,7 +16,7 @@ from turnout.mismatch.track import bands, roll
 from turnout.mismatch.track.base_model import track_with, vehicle_with
 from turnout.mismatch.track.blow_model import linear
 from turnout.mismatch.track.blows import channel_factor
-from turnout.simulate.frequency import responses
+from turnout.simulate.frequency_response import responses
 
 STRIDE = 2  # nodes; between them a force is shared linearly
 FINE = 0.01  # m

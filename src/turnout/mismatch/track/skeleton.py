@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from turnout.physics.term import PhysicsTerm
-from turnout.simulate.additions import links_of
+from turnout.simulate.links import links_of
 from turnout.simulate.matrices import TrackMatrices, assemble, link_vector, linked, railed
 
 KEPT = 24

@@ -6,10 +6,10 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from turnout.errors import SimulationError
-from turnout.simulate.calibrate_modes import with_section
-from turnout.simulate.frequency import receptance_gradient
+from turnout.simulate.frequency_response import receptance_gradient
 from turnout.simulate.hammer import located
 from turnout.simulate.matrices import assemble
+from turnout.simulate.modal_calibration import with_section
 from turnout.simulate.turnout_track import stretch_of_track
 
 # Parameter -> (links' tag, what of them, relative sd of the prior, an estimate).

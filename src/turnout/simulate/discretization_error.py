@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from turnout.simulate.counted import moved
+from turnout.simulate.links import moved
 from turnout.simulate.passage import simulate_passage
 from turnout.simulate.track import PER_SUPPORT
 from turnout.simulate.turnout_track import TurnoutTrack
