@@ -20,11 +20,11 @@ from turnout.chains.mismatch_groups import groups
 from turnout.config.load import load_configuration, with_raw
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.fleet.scan import scan
-from turnout.mismatch.diagnose import diagnose
-from turnout.mismatch.finding import acts
-from turnout.mismatch.joint import fit_jointly
-from turnout.mismatch.shortlist import shortlist
-from turnout.mismatch.track.track_case import TrackCase
+from turnout.mismatch.engine.candidate_search import shortlist
+from turnout.mismatch.engine.diagnose import diagnose
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.turnout.case import TrackCase
+from turnout.stages.mismatch_rows import acts
 
 LESSER = {
     "in_sample": "names by the fit to what was fitted, not by conditions left out",

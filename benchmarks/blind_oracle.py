@@ -22,9 +22,9 @@ from tqdm import tqdm
 import turnout
 from benchmarks.blind_bridge import campaigns_of
 from turnout.errors import TurnoutError
-from turnout.mismatch.joint import cost_at, fit_jointly
-from turnout.mismatch.track.track_case import TrackCase
-from turnout.mismatch.verify import fit_percent, predict_reserved
+from turnout.mismatch.engine.map_fit import cost_at, fit_jointly
+from turnout.mismatch.engine.reserved_data import fit_percent, predict_reserved
+from turnout.mismatch.turnout.case import TrackCase
 from turnout_blind.score.judged import BAY, CLEAR, gain_of
 from turnout_blind.score.names import SAME, right_names
 from turnout_blind.score.report import provenance

@@ -14,8 +14,8 @@ from examples.decay_model import BANDS
 from examples.recorded import DOCS, folder_of
 
 from turnout.mismatch import diagnose
-from turnout.mismatch.held_out import held_out_score
-from turnout.mismatch.joint import fit_jointly
+from turnout.mismatch.engine.cross_validation import held_out_score
+from turnout.mismatch.engine.map_fit import fit_jointly
 
 FLOOR = 0.1  # least spread of a logarithm that anybody should believe
 LEFT_OUT = ("2015-09", "2013-07")  # each in its turn; before 2013-01 there is only what the model is calibrated on

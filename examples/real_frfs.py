@@ -16,7 +16,7 @@ from scipy import stats
 from turnout.config.load import load_configuration
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch import diagnose
-from turnout.mismatch.verify import predict_reserved
+from turnout.mismatch.engine.reserved_data import predict_reserved
 from turnout.readers import read
 
 SETTINGS = MismatchSettings(base_iterations=40, iterations=40)  # sharp resonances: the way is long

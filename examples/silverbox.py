@@ -8,12 +8,12 @@ FOLDER holds SNLS80mV.csv. Every number in the page comes from the run; its pros
 import sys
 
 import numpy as np
+from examples.oscillator_case import LAWS, OscillatorCase
 from examples.recorded import DOCS, folder_of, plotting, save, table
 
 from turnout.mismatch import diagnose
-from turnout.mismatch.latent import latent_law
-from turnout.mismatch.lumped import LAWS, OscillatorCase
-from turnout.mismatch.verify import fit_percent, predict_reserved
+from turnout.mismatch.engine.latent_force import latent_law
+from turnout.mismatch.engine.reserved_data import fit_percent, predict_reserved
 
 RATE = 1e7 / 2**14  # [Hz]
 ARROW, START, LENGTH = 40000, 40650, 8692  # samples of the arrow; the first multisine and the length of each

@@ -1,8 +1,8 @@
 """docs/effects.md tells what a diagnosis asks for."""
 
 from turnout.chains.effects_page import NEVER_ASKED, page
-from turnout.mismatch.track import TrackCase
-from turnout.mismatch.track.planned import measured_campaign, small_plan
+from turnout.mismatch.turnout import TrackCase
+from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.physics import TERMS
 
 

@@ -7,10 +7,10 @@ ten realisations of a multisine.
 
 import numpy as np
 import pytest
+from examples.oscillator_case import LAWS, OscillatorCase
 
 from turnout.mismatch import diagnose
-from turnout.mismatch.lumped import LAWS, OscillatorCase
-from turnout.mismatch.verify import fit_percent, predict_reserved
+from turnout.mismatch.engine.reserved_data import fit_percent, predict_reserved
 
 RATE = 1e7 / 2**14
 START, LENGTH = 40650, 8692

@@ -4,10 +4,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from turnout.errors import SimulationError
-from turnout.mismatch.distinguish import cheapest_addition, distinguishability
-from turnout.mismatch.track.library import library
-from turnout.mismatch.track.planned import Plan, Train
-from turnout.mismatch.track.planned_case import PlannedCase
+from turnout.mismatch.engine.distinguishability import cheapest_addition, distinguishability
+from turnout.mismatch.turnout.candidates.catalogue import library
+from turnout.mismatch.turnout.planned_case import Plan, PlannedCase, Train
 from turnout.simulate import Sensor, load_track, load_vehicle
 
 # Effort of one more of each, in hours of two people on site.

@@ -8,9 +8,9 @@ from importlib import import_module
 from pathlib import Path
 
 from turnout.chains.mismatch_words import number_in_words
-from turnout.mismatch.finding import CHECKS
-from turnout.mismatch.track.library import LEAST
+from turnout.mismatch.turnout.candidates.catalogue import LEAST
 from turnout.physics import TERMS
+from turnout.stages.mismatch_rows import CHECKS
 
 NEVER_ASKED = ("lifting_sleepers", "rail_bending", "roughness_level")  # can be simulated, and written in a track file
 FIXED_TO = {

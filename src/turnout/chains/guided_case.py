@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from turnout.errors import SimulationError, TurnoutError
-from turnout.mismatch.case import Nuisance
-from turnout.mismatch.joint import CHEAP_STEPS, fit_jointly
+from turnout.mismatch.engine.case import Nuisance
+from turnout.mismatch.engine.map_fit import CHEAP_STEPS, fit_jointly
 
 WIDE = 0.5  # prior sd of an accepted value on its next visit, as a share of its way from neutral: it may well grow
 NO_LIMIT = 100.0  # times a value, beyond which its neutral one stands for "no limit at all"

@@ -20,8 +20,8 @@ from turnout.config.turnout import TurnoutConfig
 from turnout.content import sha256_of
 from turnout.errors import ReadError, SimulationError, TurnoutError
 from turnout.fleet.scan import scan
-from turnout.mismatch.diagnose import diagnose
-from turnout.mismatch.track import TrackCase
+from turnout.mismatch.engine.diagnose import diagnose
+from turnout.mismatch.turnout import TrackCase
 from turnout.records import Unit
 
 FITS = "work/mismatch-fits"

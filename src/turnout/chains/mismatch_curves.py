@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import welch
 
-from turnout.mismatch.verify import fit_of_reserved
+from turnout.mismatch.engine.reserved_data import fit_of_reserved
 
 WINDOW = 0.8  # s of waveform shown
 SEGMENT = 0.5  # s of a piece of Welch's estimate: 2 Hz lines

@@ -14,7 +14,7 @@ from turnout.chains.placed import misplaced
 from turnout.config.turnout import TurnoutConfig
 from turnout.errors import ReadError
 from turnout.fleet.scan import unit_id
-from turnout.mismatch.track import HammerTest, Passage
+from turnout.mismatch.turnout import HammerTest, Passage
 from turnout.passage.channel_checks import without_pulses
 from turnout.passage.second_train import ANOTHER
 from turnout.readers import read

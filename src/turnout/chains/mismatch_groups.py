@@ -7,7 +7,7 @@ from itertools import zip_longest
 
 from turnout.chains.mismatch_gather import Gathered
 from turnout.config.turnout import TurnoutConfig
-from turnout.mismatch.track import Campaign
+from turnout.mismatch.turnout import Campaign
 from turnout.simulate import Sensor, TurnoutTrack
 
 GAP = 6.0  # m: sections further apart than this do not hear the same sleeper

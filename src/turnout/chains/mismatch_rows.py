@@ -9,8 +9,8 @@ from turnout.chains.accepted_terms import described
 from turnout.chains.guided_case import visit_of
 from turnout.chains.mismatch_curves import band_of, band_of_blows, best_shown, curve_rows, passages_shown, reach_of
 from turnout.chains.mismatch_words import headline, interval, otherwise
-from turnout.mismatch.finding import finding_row
 from turnout.registry.ids import content_id
+from turnout.stages.mismatch_rows import finding_row
 
 NOTES_KEPT = 12
 

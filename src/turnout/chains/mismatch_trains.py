@@ -8,7 +8,7 @@ import numpy as np
 
 from turnout.chains.noted import number
 from turnout.errors import ConfigError, SimulationError
-from turnout.mismatch.track.campaign import LOAD_SD
+from turnout.mismatch.turnout.campaign import LOAD_SD
 from turnout.simulate import load_vehicle
 
 PATTERN = 0.4  # m rms between axles heard and those of the vehicle's file: half of a short bogie is 0.9

@@ -5,7 +5,7 @@ import json
 import numpy as np
 
 from turnout.chains.accepted_terms import KINDS
-from turnout.mismatch.score import NO_UPPER_END
+from turnout.mismatch.engine.score import NO_UPPER_END
 
 # What the simulation lacked, in words; {place}, {channel}, {train}, {wheel}, every parameter with its
 # unit, and its size without the sign as {<parameter>_size}.

@@ -17,8 +17,8 @@ from turnout.chains.guided_case import GuidedCase
 from turnout.chains.mismatch_context import digest_of_model
 from turnout.chains.mismatch_groups import Group
 from turnout.errors import SimulationError, TurnoutError
-from turnout.mismatch.track import TrackCase
-from turnout.mismatch.track.planned import measured_campaign, small_plan
+from turnout.mismatch.turnout import TrackCase
+from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.simulate import load_track, simulate_hammer
 
 GAP = {"value": 1.12e-3, "se": 0.05e-3, "unit": "m"}

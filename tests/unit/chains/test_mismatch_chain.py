@@ -16,7 +16,7 @@ from turnout.chains.mismatch_results import Results, diagnose_turnout
 from turnout.cli import main
 from turnout.config import load_configuration
 from turnout.errors import SimulationError
-from turnout.mismatch.track import TrackCase
+from turnout.mismatch.turnout import TrackCase
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import pytest
 from turnout.chains.mismatch_gather import _spoils
 from turnout.chains.mismatch_groups import formations, reserved, telling
 from turnout.chains.mismatch_trains import train_of
-from turnout.mismatch.track.campaign import Passage
+from turnout.mismatch.turnout.campaign import Passage
 from turnout.simulate import load_vehicle
 
 

@@ -24,12 +24,12 @@ from turnout.config import load_configuration, with_raw
 from turnout.errors import SimulationError
 from turnout.fleet.batches import encode
 from turnout.fleet.scan import scan
-from turnout.mismatch.case import Nuisance
-from turnout.mismatch.track import HammerTest, Passage, TrackCase
-from turnout.mismatch.track.base_model import vehicle_with
-from turnout.mismatch.track.blows import pairs_of
-from turnout.mismatch.track.planned import measured_campaign, small_plan
-from turnout.mismatch.track.rolling import FEWEST, Rolling, observed, rolling_nuisances, rolling_of
+from turnout.mismatch.engine.case import Nuisance
+from turnout.mismatch.turnout import HammerTest, Passage, TrackCase
+from turnout.mismatch.turnout.passage_observation import FEWEST, Rolling, observed, rolling_nuisances, rolling_of
+from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
+from turnout.mismatch.turnout.receptance_observation import pairs_of
+from turnout.mismatch.turnout.track_parameters import vehicle_with
 from turnout.readers import HELD, read
 from turnout.readers.writing import write
 from turnout.receptance import find_impacts
@@ -243,7 +243,7 @@ def test_a_train_outside_its_recording_is_noted_and_the_blows_are_used(monkeypat
     def nowhere(*_):
         raise SimulationError("the train lies outside the recording")
 
-    monkeypatch.setattr("turnout.mismatch.track.rolling.rolling_of", nowhere)
+    monkeypatch.setattr("turnout.mismatch.turnout.passage_observation.rolling_of", nowhere)
     case = TrackCase(measured_campaign(small_plan((15.0,), (40.0,), blows=(24.0,)), (), 5), families=())
     assert not case.rollings and case.observations
     assert any("outside the recording" in note for note in case.notes)

@@ -3,11 +3,10 @@
 import numpy as np
 from scipy import stats
 
-from turnout.mismatch.absorbed import absorbed, gain_when_opened
-from turnout.mismatch.candidate import Candidate
-from turnout.mismatch.case import Case, Nuisance
-from turnout.mismatch.joint import fit_jointly
-from turnout.mismatch.observation import Observation
+from turnout.mismatch.engine.candidate import Candidate
+from turnout.mismatch.engine.candidate_search import absorbed, gain_when_opened
+from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.physics.term import Parameter
 
 TAU, NOISE, WIDE = 0.1, 0.06, 0.7

@@ -7,13 +7,12 @@ import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
-from turnout.mismatch.alone import hangs_on, plainness, told_apart
-from turnout.mismatch.candidate import Candidate
-from turnout.mismatch.case import Case
-from turnout.mismatch.joint import fit_jointly
-from turnout.mismatch.observation import Observation
-from turnout.mismatch.score import Score
-from turnout.mismatch.verdict import judge
+from turnout.mismatch.engine.candidate import Candidate
+from turnout.mismatch.engine.case import Case, Observation
+from turnout.mismatch.engine.cross_validation import hangs_on, plainness, told_apart
+from turnout.mismatch.engine.decision import judge
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.score import Score
 from turnout.physics import Parameter
 
 SIZE = (Parameter("size", "-", 0.0, (-9.0, 9.0), "of a bump", "made up 2026"),)

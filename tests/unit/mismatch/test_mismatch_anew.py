@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
-from turnout.mismatch.anew import begun_anew
-from turnout.mismatch.candidate import Candidate
-from turnout.mismatch.case import Case, Nuisance
-from turnout.mismatch.joint import fit_jointly
-from turnout.mismatch.observation import Observation
-from turnout.mismatch.scoring import score_of
+from turnout.mismatch.engine.candidate import Candidate
+from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.evidence import score_of
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.refit import begun_anew
 from turnout.physics import Parameter
 
 X = np.linspace(0.0, 1.0, 400)

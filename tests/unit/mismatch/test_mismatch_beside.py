@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
-from turnout.mismatch.candidate import Candidate
-from turnout.mismatch.case import Case
-from turnout.mismatch.joint import fit_jointly
-from turnout.mismatch.observation import Observation
-from turnout.mismatch.refits import beside
-from turnout.mismatch.scoring import score_of
+from turnout.mismatch.engine.candidate import Candidate
+from turnout.mismatch.engine.case import Case, Observation
+from turnout.mismatch.engine.evidence import score_of
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.refit import beside
 from turnout.physics import Parameter
 
 AMOUNT = (Parameter("amount", "-", 0.0, (-3.0, 3.0), "share of a shape", "made up 2026"),)

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import fftconvolve
 
-from turnout.mismatch.track.blow_ceiling import FLOOR, blow_ceiling, held
-from turnout.mismatch.track.campaign import HammerTest
-from turnout.mismatch.track.ceiling import ceilings
+from turnout.mismatch.turnout.campaign import HammerTest
+from turnout.mismatch.turnout.saturation import FLOOR, blow_ceiling, ceilings, held
 from turnout.records import Channel, Recording
 from turnout.signal.filters import force_pulse
 from turnout.simulate.sensor import Sensor

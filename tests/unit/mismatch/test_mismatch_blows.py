@@ -11,18 +11,18 @@ from turnout import physics
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
 from turnout.mismatch import diagnose
-from turnout.mismatch.finding import finding_row
-from turnout.mismatch.track import Campaign, TrackCase, blows, derivatives
-from turnout.mismatch.track.blow_model import BlowModel
-from turnout.mismatch.track.campaign import HammerTest
-from turnout.mismatch.track.observing import hammer_observations
-from turnout.mismatch.track.planned import measured_campaign, small_plan
+from turnout.mismatch.turnout import Campaign, TrackCase, receptance_observation, sensitivity
+from turnout.mismatch.turnout.campaign import HammerTest
+from turnout.mismatch.turnout.observations import hammer_observations
+from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
+from turnout.mismatch.turnout.receptance_model import BlowModel
 from turnout.simulate import uniform_track
 from turnout.simulate.frequency_response import receptance
 from turnout.simulate.hammer import Hammer, simulate_hammer
 from turnout.simulate.matrices import assemble
 from turnout.simulate.sensor import Sensor
 from turnout.simulate.turnout_track import TurnoutTrack
+from turnout.stages.mismatch_rows import finding_row
 
 IDENTITY = {"finding_id": "f", "turnout_id": "t", "section_id": None, "found_at_utc": None, "result_id": "r"}
 
@@ -139,7 +139,9 @@ def test_a_receptance_follows_the_rail_however_far_it_goes(plan):
     track = case.nominal.turnout.track
     softer = replace(track.rail, shear_stiffness=track.rail.shear_stiffness * np.exp(-0.41))
     model = BlowModel(track.with_(rail=softer), ())
-    exact = blows.split(blows.scaled(pair, model.receptance(pair.test.place, model.place_of(pair.sensor))))
+    exact = receptance_observation.split(
+        receptance_observation.scaled(pair, model.receptance(pair.test.place, model.place_of(pair.sensor)))
+    )
     assert np.linalg.norm(found - exact) < 1e-3 * np.linalg.norm(exact)
 
 
@@ -176,7 +178,7 @@ def test_a_derivative_goes_to_the_side_where_the_simulation_can():
         return np.array([values["load"] ** 2])
 
     case = SimpleNamespace(passage_of=simulated)
-    found = derivatives._difference(case, {"load": 3.0}, (), None, np.array([9.0]), "load", 0.1)
+    found = sensitivity._difference(case, {"load": 3.0}, (), None, np.array([9.0]), "load", 0.1)
     assert found == pytest.approx([5.9])
 
 
@@ -189,10 +191,10 @@ def test_a_track_that_still_rings_when_the_record_ends_shows_the_receptance_of_i
     recordings = simulate_hammer(track, 30.0, Hammer(place_spread=0.0), (sensor,), 4, seed=5, duration=0.15)
     assert recordings[0].duration == pytest.approx(0.15)
     test = HammerTest("blows", 30.0, recordings, "hammer", "", {})
-    ((pair, seen),) = blows.pairs_of(test, (sensor,), 0.03)
+    ((pair, seen),) = receptance_observation.pairs_of(test, (sensor,), 0.03)
     n = pair.lines.size
     measured = (seen.data[:n] + 1j * seen.data[n:]) * pair.size
-    model = receptance(assemble(track), blows.SHIFTED[pair.lines], 30.0, 30.0)
+    model = receptance(assemble(track), receptance_observation.SHIFTED[pair.lines], 30.0, 30.0)
     low = pair.frequency < 300.0
     assert low.sum() > 20 and pair.frequency[0] < 40.0
     # 0.1 s after the blow exp(-(21 + 20) 0.1 s) = 1.7 % are left, and an amplifier of 0.4 Hz turns 36 Hz by 1.1 %

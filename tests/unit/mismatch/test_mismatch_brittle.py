@@ -7,14 +7,13 @@ import pytest
 
 from turnout.errors import SimulationError
 from turnout.mismatch import diagnose
-from turnout.mismatch.candidate import Candidate
-from turnout.mismatch.case import Case, Nuisance
-from turnout.mismatch.joint import fit_jointly
-from turnout.mismatch.observation import Observation
-from turnout.mismatch.track import Campaign, TrackCase
-from turnout.mismatch.track.campaign import Passage
-from turnout.mismatch.track.planned import measured_campaign, small_plan
-from turnout.mismatch.track.short_polygons import louder, short_polygons
+from turnout.mismatch.engine.candidate import Candidate
+from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.turnout import Campaign, TrackCase
+from turnout.mismatch.turnout.campaign import Passage
+from turnout.mismatch.turnout.candidates.out_of_roundness import louder, short_polygons
+from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.physics import Parameter
 
 AMOUNT = (Parameter("amount", "-", 0.0, (-9.0, 9.0), "share of a wave", "made up 2026"),)

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from turnout.mismatch.track.base_model import (
+from turnout.mismatch.turnout.planned_case import small_plan
+from turnout.mismatch.turnout.track_parameters import (
     CAST,
     RAIL,
     cast_elements,
@@ -14,7 +15,6 @@ from turnout.mismatch.track.base_model import (
     with_rail,
     zone_of,
 )
-from turnout.mismatch.track.planned import small_plan
 from turnout.simulate.track import RailStretch
 
 PLAN = small_plan((15.0,), blows=(24.0,))

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from turnout.mismatch.track.ceiling import FLOOR, ceilings, saturation
+from turnout.mismatch.turnout.saturation import FLOOR, ceilings, saturation
 from turnout.records import Channel, Recording
 
 LOUD = np.log([40.0, 55.0, 70.0, 100.0, 140.0, 200.0])

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from turnout.mismatch.case import Case, Nuisance
-from turnout.mismatch.held_out import disagreement
-from turnout.mismatch.joint import fit_jointly
-from turnout.mismatch.observation import Observation
+from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.cross_validation import disagreement
+from turnout.mismatch.engine.map_fit import fit_jointly
 
 X = np.arange(1.0, 31.0)
 

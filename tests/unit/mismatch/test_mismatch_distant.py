@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
-from turnout.mismatch.candidate import Candidate
-from turnout.mismatch.case import Case, Nuisance
-from turnout.mismatch.joint import fit_jointly
-from turnout.mismatch.observation import Observation
-from turnout.mismatch.shortlist import shortlist
-from turnout.mismatch.track.heavy_wheels import MASSES, distant_wheels, left_by
+from turnout.mismatch.engine.candidate import Candidate
+from turnout.mismatch.engine.candidate_search import shortlist
+from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.turnout.candidates.catalogue import MASSES, distant_wheels, left_by
 from turnout.physics import Parameter
 
 FACTOR = (Parameter("factor", "-", 1.0, (0.4, 2.5), "times the pitch", "made up 2026", (1.0, 0.3)),)

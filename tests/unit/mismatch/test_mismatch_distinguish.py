@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from turnout.cli import main
-from turnout.mismatch.distinguish import distinguishability
-from turnout.mismatch.track.planned import small_plan
-from turnout.mismatch.track.planned_case import PlannedCase
+from turnout.mismatch.engine.distinguishability import distinguishability
+from turnout.mismatch.turnout.planned_case import PlannedCase, small_plan
 
 FAMILIES = ("pad_temperature", "zener_pad", "local_ballast", "local_pad", "mount_resonance")
 

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from turnout import physics
-from turnout.mismatch.case import Case, Nuisance
-from turnout.mismatch.joint import CHEAP_STEPS, Joint, fit_jointly
-from turnout.mismatch.observation import Observation
-from turnout.mismatch.steps import Steps
-from turnout.mismatch.track import TrackCase
-from turnout.mismatch.track.blows_case import Blows
-from turnout.mismatch.track.planned import measured_campaign, small_plan
+from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.levenberg_marquardt import Steps
+from turnout.mismatch.engine.map_fit import CHEAP_STEPS, Joint, fit_jointly
+from turnout.mismatch.turnout import TrackCase
+from turnout.mismatch.turnout.hammer_case import Blows
+from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.simulate import uniform_track
 from turnout.simulate.turnout_track import TurnoutTrack
 

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
-from turnout.mismatch.candidate import Candidate
-from turnout.mismatch.case import Case, Nuisance
-from turnout.mismatch.diagnose import diagnose
-from turnout.mismatch.held_out import held_out_score
-from turnout.mismatch.joint import fit_jointly
-from turnout.mismatch.locate import attribute
-from turnout.mismatch.observation import Observation
+from turnout.mismatch.engine.candidate import Candidate
+from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.cross_validation import held_out_score
+from turnout.mismatch.engine.diagnose import diagnose
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.residual_attribution import attribute
 from turnout.physics import Parameter
 
 

@@ -7,16 +7,14 @@ import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch import diagnose
-from turnout.mismatch.apart import shared
-from turnout.mismatch.candidate import Candidate
-from turnout.mismatch.case import Case, Nuisance
-from turnout.mismatch.held_out import told_alone
-from turnout.mismatch.joint import fit_jointly
-from turnout.mismatch.observation import Observation
-from turnout.mismatch.scoring import score_of
-from turnout.mismatch.shortlist import _same_place
-from turnout.mismatch.track import TrackCase
-from turnout.mismatch.track.planned import measured_campaign, small_plan
+from turnout.mismatch.engine.candidate import Candidate
+from turnout.mismatch.engine.candidate_search import _same_place
+from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.cross_validation import shared, told_alone
+from turnout.mismatch.engine.evidence import score_of
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.turnout import TrackCase
+from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.physics import Parameter
 
 AMOUNT = (Parameter("amount", "-", 0.0, (-400.0, 400.0), "share of a shape", "made up 2026"),)

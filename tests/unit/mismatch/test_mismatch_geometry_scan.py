@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from turnout import physics
-from turnout.mismatch.case import Case
-from turnout.mismatch.joint import fit_jointly
-from turnout.mismatch.observation import Observation
-from turnout.mismatch.track.polygons import AMPLITUDES, _evidence
-from turnout.mismatch.track.rail_scan import RailScan
-from turnout.mismatch.track.rough_rail import Waves
-from turnout.mismatch.track.strikes import ODD, WIDE, heard, likelihood, of_wheel
+from turnout.mismatch.engine.case import Case, Observation
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.turnout.candidates.out_of_roundness import AMPLITUDES, _evidence
+from turnout.mismatch.turnout.candidates.rail_defects import RailScan
+from turnout.mismatch.turnout.candidates.wheel_flats import ODD, WIDE, heard, likelihood, of_wheel
+from turnout.mismatch.turnout.rail_roughness import Waves
 from turnout.simulate.vehicle import lone_wheels
 
 TURN, SPEED, RATE = 2.0 * np.pi * 0.46, 25.0, 5000.0

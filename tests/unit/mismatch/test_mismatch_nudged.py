@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from turnout import physics
-from turnout.mismatch.track import TrackCase, blows
-from turnout.mismatch.track.added_links import AddedLinks
-from turnout.mismatch.track.nudged_links import nudged
-from turnout.mismatch.track.planned import measured_campaign, small_plan
-from turnout.mismatch.track.screening import CHANNELS, _pair_channels
+from turnout.mismatch.turnout import TrackCase, receptance_observation
+from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
+from turnout.mismatch.turnout.receptance_model import AddedLinks, nudged
+from turnout.mismatch.turnout.screening import CHANNELS, _pair_channels
 from turnout.simulate import uniform_track
 from turnout.simulate.turnout_track import TurnoutTrack
 
@@ -78,7 +77,7 @@ def test_links_that_are_others_are_no_small_step(somewhere):
     assert nudged(model, (physics.LocalBallast(J + 1, 0.5),)) is None
     assert nudged(model, (physics.LocalPad(J, 0.5),)) is None
     ends, impedance = nudged(model, (physics.LocalBallast(J, 0.5),))
-    assert ends.shape[0] == 0 and impedance.shape == (0, blows.LINES.size)
+    assert ends.shape[0] == 0 and impedance.shape == (0, receptance_observation.LINES.size)
 
 
 def test_an_added_link_changes_a_receptance_as_a_track_that_has_it(somewhere):

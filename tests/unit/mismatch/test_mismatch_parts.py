@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
-from turnout.mismatch.candidate import Candidate
-from turnout.mismatch.case import Nuisance
-from turnout.mismatch.score import Score
-from turnout.mismatch.scoring import ODD, _usual
-from turnout.mismatch.shortlist import _fitted_already, _kin
-from turnout.mismatch.verdict import judge
+from turnout.mismatch.engine.candidate import Candidate
+from turnout.mismatch.engine.candidate_search import _fitted_already, _kin
+from turnout.mismatch.engine.case import Nuisance
+from turnout.mismatch.engine.decision import judge
+from turnout.mismatch.engine.evidence import ODD, _usual
+from turnout.mismatch.engine.score import Score
 from turnout.physics import Parameter
 
 FACTOR = (Parameter("factor", "-", 1.0, (0.05, 20.0), "share of stiffness", "made up 2026"),)

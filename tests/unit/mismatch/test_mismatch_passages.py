@@ -11,15 +11,14 @@ from turnout import physics
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
 from turnout.mismatch import diagnose
-from turnout.mismatch.joint import fit_jointly
-from turnout.mismatch.scoring import judged
-from turnout.mismatch.track import TrackCase, rolling
-from turnout.mismatch.track.alignment import ALIKE, align, slow
-from turnout.mismatch.track.flats import flats
-from turnout.mismatch.track.planned import measured_campaign, small_plan
-from turnout.mismatch.track.roll import Track1D
-from turnout.mismatch.track.strikes import Strikes
-from turnout.mismatch.whereabouts import whereabouts
+from turnout.mismatch.engine.evidence import judged
+from turnout.mismatch.engine.localization import whereabouts
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.turnout import TrackCase, passage_observation
+from turnout.mismatch.turnout.candidates.wheel_flats import Strikes, flats
+from turnout.mismatch.turnout.passage_alignment import ALIKE, align, slow
+from turnout.mismatch.turnout.passage_model import Track1D
+from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 
 
 @pytest.fixture(scope="module")
@@ -268,14 +267,14 @@ def test_a_train_that_looks_like_no_such_train_is_said_and_located(plan):
 
 def test_a_train_that_could_not_be_looked_at_is_no_train_of_another_file(sound, monkeypatch):
     """Recordings that end too early, or have too few samples, are no word on the wheels that came: no alarm."""
-    plain = rolling.rolling_of
+    plain = passage_observation.rolling_of
 
     def cut_short(passage, *more):
         if passage.train == "heavy":
             raise SimulationError("the train lies outside the recording")
         return plain(passage, *more)
 
-    monkeypatch.setattr(rolling, "rolling_of", cut_short)
+    monkeypatch.setattr(passage_observation, "rolling_of", cut_short)
     case = TrackCase(sound[0].campaign, families=())
     assert len([n for n in case.notes if "outside the recording" in n]) == 2
     assert case.rollings and case.foreign == ()
@@ -289,8 +288,10 @@ def test_a_wheel_whose_blows_are_nearly_as_loud_is_sized_as_well(plan, monkeypat
     train, phases = case.said(made)["train"], ((made.name, 0.5),)
     nats = {2: 20.0, 0: 20.0 - behind, 5: 20.0 - behind}
     heard = [Strikes(n, train, wheel, radius, phases) for wheel, n in nats.items()]
-    monkeypatch.setattr("turnout.mismatch.track.flats.strikes", lambda case: heard)
-    monkeypatch.setattr("turnout.mismatch.track.flats._sized", lambda case, fit, struck: (0.03, phases, 5.0))
+    monkeypatch.setattr("turnout.mismatch.turnout.candidates.wheel_flats.strikes", lambda case: heard)
+    monkeypatch.setattr(
+        "turnout.mismatch.turnout.candidates.wheel_flats._sized", lambda case, fit, struck: (0.03, phases, 5.0)
+    )
     found = flats(case, SimpleNamespace(candidates=()))
     assert [c.where["axle"] for c in found] == offered
     heavy, flat = (SimpleNamespace(where={"train": train, **more}) for more in ({}, {"axle": 3}))

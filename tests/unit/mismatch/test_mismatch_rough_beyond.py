@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from turnout import physics
-from turnout.mismatch.track import TrackCase
-from turnout.mismatch.track.base_model import ASKED
-from turnout.mismatch.track.observing import with_errors
-from turnout.mismatch.track.planned import measured_campaign, small_plan
+from turnout.mismatch.turnout import TrackCase
+from turnout.mismatch.turnout.observations import with_errors
+from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
+from turnout.mismatch.turnout.track_parameters import ASKED
 from turnout.simulate.roughness import level
 
 

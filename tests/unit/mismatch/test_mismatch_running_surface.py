@@ -13,11 +13,11 @@ from turnout.chains.guided_case import GuidedCase
 from turnout.chains.mismatch_rows import surface_told
 from turnout.chains.mismatch_words import otherwise
 from turnout.config.parameters import read_parameters
-from turnout.mismatch.joint import fit_jointly
-from turnout.mismatch.track import TrackCase, seating
-from turnout.mismatch.track.planned import measured_campaign, small_plan
-from turnout.mismatch.track.rough_rail import Waves
-from turnout.mismatch.track.running_surface import MODEL, SHAPE, RunningSurface
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.turnout import TrackCase, passage_alignment
+from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
+from turnout.mismatch.turnout.rail_roughness import Waves
+from turnout.mismatch.turnout.running_surface import MODEL, SHAPE, RunningSurface
 from turnout.simulate.track_file import turnout_track
 from turnout.simulate.wheel_path import Dip, Kink, Sections
 
@@ -103,11 +103,11 @@ def test_what_is_told_of_a_number_is_not_drawn_to_the_file():
 
 def test_the_search_for_the_nose_hears_no_recording_that_is_kept_back(monkeypatch):
     heard = []
-    monkeypatch.setattr(seating, "_likeness", lambda case, values, passage: heard.append(passage.name) or 0.5)
+    monkeypatch.setattr(passage_alignment, "_likeness", lambda case, values, passage: heard.append(passage.name) or 0.5)
     passages = [SimpleNamespace(name=name, vehicle=SimpleNamespace(wheels=range(4))) for name in "abc"]
     campaign = SimpleNamespace(passages=passages, reserved=("a",), sensors_of=lambda p: ("A1",))
     surface = RunningSurface(FILED, WAVES, ("main",))
-    seating.seated(SimpleNamespace(campaign=campaign, surface=surface), {})
+    passage_alignment.seated(SimpleNamespace(campaign=campaign, surface=surface), {})
     assert set(heard) == {"b", "c"}
 
 

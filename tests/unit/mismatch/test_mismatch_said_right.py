@@ -8,26 +8,25 @@ import pytest
 
 from turnout import physics
 from turnout.config.settings.mismatch import MismatchSettings
-from turnout.mismatch.candidate import Candidate
-from turnout.mismatch.case import Case, Nuisance
-from turnout.mismatch.diagnose import Verification
-from turnout.mismatch.finding import finding_row
-from turnout.mismatch.joint import fit_jointly
-from turnout.mismatch.observation import Observation
-from turnout.mismatch.score import Score
-from turnout.mismatch.scoring import explained_of, heard, judged, score_of
-from turnout.mismatch.together import reconsidered
-from turnout.mismatch.track import TrackCase
-from turnout.mismatch.track.blow_model import BlowModel
-from turnout.mismatch.track.ceiling import highest
-from turnout.mismatch.track.library import _sensors
-from turnout.mismatch.track.missing_source import _forces, missing_sources
-from turnout.mismatch.track.planned import measured_campaign, small_plan
-from turnout.mismatch.track.predicting import Predicting
-from turnout.mismatch.track.rolling import Rolling, rolling_of
-from turnout.mismatch.verify import decoy, fit_percent
+from turnout.mismatch.engine.candidate import Candidate
+from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.diagnose import Verification
+from turnout.mismatch.engine.evidence import explained_of, heard, judged, score_of
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.reserved_data import decoy, fit_percent
+from turnout.mismatch.engine.score import Score
+from turnout.mismatch.engine.two_effects import reconsidered
+from turnout.mismatch.turnout import TrackCase
+from turnout.mismatch.turnout.candidates.catalogue import _sensors
+from turnout.mismatch.turnout.passage_observation import Rolling, rolling_of
+from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
+from turnout.mismatch.turnout.prediction import Predicting
+from turnout.mismatch.turnout.receptance_model import BlowModel
+from turnout.mismatch.turnout.residual_spaces import _forces, missing_sources
+from turnout.mismatch.turnout.saturation import highest
 from turnout.physics import Parameter
 from turnout.simulate.track import uniform_track
+from turnout.stages.mismatch_rows import finding_row
 
 
 class Alike(Case):

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from turnout import physics
-from turnout.mismatch.track import TrackCase
-from turnout.mismatch.track.planned import measured_campaign, small_plan
-from turnout.mismatch.track.short_polygons import LOUD, ONE, SPREAD, evidence, short_polygons
+from turnout.mismatch.turnout import TrackCase
+from turnout.mismatch.turnout.candidates.out_of_roundness import LOUD, ONE, SPREAD, evidence, short_polygons
+from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 
 
 def found_in(*terms, seed=7, changed=lambda campaign: campaign):

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from turnout import physics
-from turnout.mismatch.track import TrackCase
-from turnout.mismatch.track.planned import measured_campaign, small_plan
-from turnout.mismatch.track.short_waves import LOUD, SPREAD, Loud, _holds, evidence, short_waves
+from turnout.mismatch.turnout import TrackCase
+from turnout.mismatch.turnout.candidates.short_corrugation import LOUD, SPREAD, Loud, _holds, evidence, short_waves
+from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.simulate.wheel_path import Corrugation
 
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from turnout import physics
-from turnout.mismatch.track import skeleton
-from turnout.mismatch.track.base_model import COMMON, OWN, castings_of
-from turnout.mismatch.track.blow_model import BlowModel
-from turnout.mismatch.track.heard import Heard
-from turnout.mismatch.track.skeleton import matrices_of
+from turnout.mismatch.turnout import matrix_cache
+from turnout.mismatch.turnout.matrix_cache import matrices_of
+from turnout.mismatch.turnout.receptance_model import BlowModel
+from turnout.mismatch.turnout.receptance_sensitivity import Heard
+from turnout.mismatch.turnout.track_parameters import COMMON, OWN, castings_of
 from turnout.simulate import uniform_track
 from turnout.simulate.matrices import assemble
 from turnout.simulate.track import RailStretch
@@ -49,7 +49,7 @@ def test_a_skeleton_does_not_know_which_track_came_first():
     one, other = (track.with_(pad_stiffness=track.pad_stiffness * np.exp(0.3 * rng.normal(size=n))) for _ in range(2))
     found = []
     for first in (one, other):
-        skeleton._known.clear()
+        matrix_cache._known.clear()
         matrices_of(first)
         found.append(matrices_of(one).stiffness)
     assert np.array_equal(*found)

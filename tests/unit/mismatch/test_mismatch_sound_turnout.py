@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from turnout.mismatch.joint import fit_jointly
-from turnout.mismatch.track import Campaign, TrackCase
-from turnout.mismatch.track.campaign import HammerTest, Passage
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.turnout import Campaign, TrackCase
+from turnout.mismatch.turnout.campaign import HammerTest, Passage
 from turnout.simulate import Sensor, load_track, load_vehicle, simulate_hammer, simulate_passage
 from turnout.simulate.hammer import Hammer
 

@@ -9,16 +9,15 @@ import pytest
 from turnout.chains.mismatch_rows import _evidence
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch import diagnose
-from turnout.mismatch.candidate import Candidate
-from turnout.mismatch.case import Case, Nuisance
-from turnout.mismatch.diagnose import _as_it_ends
-from turnout.mismatch.joint import fit_jointly
-from turnout.mismatch.observation import Observation
-from turnout.mismatch.score import Score
-from turnout.mismatch.scout import _seen
-from turnout.mismatch.shortlist import Projector, _asked, _same_place
-from turnout.mismatch.together import borne_out, finished, needed, parted
-from turnout.mismatch.verdict import Verdict, judge, opened
+from turnout.mismatch.engine.candidate import Candidate
+from turnout.mismatch.engine.candidate_search import Projector, _asked, _same_place
+from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.decision import Verdict, judge, opened
+from turnout.mismatch.engine.diagnose import _as_it_ends
+from turnout.mismatch.engine.hammer_prescreen import _seen
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.score import Score
+from turnout.mismatch.engine.two_effects import borne_out, finished, needed, parted
 from turnout.physics import Parameter
 
 AMOUNT = (Parameter("amount", "-", 0.0, (-9.0, 9.0), "share of a shape", "made up 2026"),)

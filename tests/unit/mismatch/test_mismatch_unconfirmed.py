@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
-from turnout.mismatch.case import Case, Nuisance
-from turnout.mismatch.diagnose import Verification, diagnose
-from turnout.mismatch.finding import sentence
-from turnout.mismatch.observation import Observation
-from turnout.mismatch.scoring import over_reserved
-from turnout.mismatch.together import unconfirmed, unforetold
-from turnout.mismatch.verdict import Verdict
+from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.decision import Verdict
+from turnout.mismatch.engine.diagnose import Verification, diagnose
+from turnout.mismatch.engine.evidence import over_reserved
+from turnout.mismatch.engine.two_effects import unconfirmed, unforetold
+from turnout.stages.mismatch_rows import sentence
 
 POSTERIOR = {"pad_preload": 0.8, "none": 0.15, "unknown": 0.05}
 

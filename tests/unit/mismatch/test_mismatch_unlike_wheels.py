@@ -6,12 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from turnout.mismatch.joint import fit_jointly
-from turnout.mismatch.track import TrackCase
-from turnout.mismatch.track.planned import measured_campaign, small_plan
-from turnout.mismatch.track.rolled_waves import Carrier
-from turnout.mismatch.track.rough_wheels import BEYOND
-from turnout.mismatch.track.unlike_wheels import DEPTH, LENGTH, PLACE, _otherwise, _parts, profile_modes
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.turnout import TrackCase
+from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
+from turnout.mismatch.turnout.wave_response import Carrier
+from turnout.mismatch.turnout.wheel_roughness import BEYOND, DEPTH, LENGTH, PLACE, _otherwise, _parts, profile_modes
 from turnout.physics.term import PhysicsTerm
 from turnout.simulate.wheel_path import Corrugation, Kink, Sections
 

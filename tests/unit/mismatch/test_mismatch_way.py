@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
-from turnout.mismatch import ends, refits
-from turnout.mismatch.case import Case, Nuisance
-from turnout.mismatch.joint import FINE, STALL, fit_jointly
-from turnout.mismatch.observation import Observation
-from turnout.mismatch.score import Score
-from turnout.mismatch.track.rolling import BLURRED, Rolling, _topped, observed
+from turnout.mismatch.engine import refit
+from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.map_fit import FINE, STALL, fit_jointly
+from turnout.mismatch.engine.score import Score
+from turnout.mismatch.turnout.passage_observation import BLURRED, Rolling, _topped, observed
 from turnout.records import Channel, Recording
 
 
@@ -49,9 +48,9 @@ def test_a_dear_fit_on_which_the_verdict_rests_goes_on_for_less(monkeypatch):
     assert early.cost > late.cost + 1.0
     assert fit_jointly(Bent(False), iterations=25, stall=20.0).cost == pytest.approx(late.cost, abs=0.2)  # cheap: none
     asked = []
-    monkeypatch.setattr(ends, "fit_jointly", lambda *a, stall=STALL, **k: asked.append(stall) or late)
-    ends.ended(Bent(True), early, MismatchSettings())
-    ends.to_the_end(Bent(True), early, MismatchSettings())
+    monkeypatch.setattr(refit, "fit_jointly", lambda *a, stall=STALL, **k: asked.append(stall) or late)
+    refit.ended(Bent(True), early, MismatchSettings())
+    refit.to_the_end(Bent(True), early, MismatchSettings())
     assert set(asked[:-1]) == {FINE} and asked[-1] == STALL > FINE
 
 
@@ -60,15 +59,15 @@ def test_what_comes_near_a_name_is_fitted_to_its_end_as_leaders_are(monkeypatch,
     """A name needs 12 nats; from half of them on the fit goes on to its end."""
     score, asked = SimpleNamespace(gain=gain, material=True, family="a"), []
     monkeypatch.setattr(
-        refits, "shortlist", lambda *a: [SimpleNamespace(rival=False, candidate=SimpleNamespace(key="a"))]
+        refit, "shortlist", lambda *a: [SimpleNamespace(rival=False, candidate=SimpleNamespace(key="a"))]
     )
-    monkeypatch.setattr(refits, "_tried", lambda *a: score)
-    monkeypatch.setattr(refits, "_polished", lambda *a: asked.append(a) or score)
-    monkeypatch.setattr(refits, "begun_anew", lambda case, fit, s, *a: s)
-    monkeypatch.setattr(refits, "_checked", lambda case, fit, s, settings: s)
-    monkeypatch.setattr(refits, "_owed", lambda *a: None)
+    monkeypatch.setattr(refit, "_tried", lambda *a: score)
+    monkeypatch.setattr(refit, "_polished", lambda *a: asked.append(a) or score)
+    monkeypatch.setattr(refit, "begun_anew", lambda case, fit, s, *a: s)
+    monkeypatch.setattr(refit, "_checked", lambda case, fit, s, settings: s)
+    monkeypatch.setattr(refit, "_owed", lambda *a: None)
     plain = SimpleNamespace(candidates=())
-    refits.scored(Bent(True), plain, MismatchSettings(), lambda *a: None, {}, 0, None)
+    refit.scored(Bent(True), plain, MismatchSettings(), lambda *a: None, {}, 0, None)
     assert len(asked) == ended
 
 
@@ -78,13 +77,13 @@ def test_only_the_first_leader_of_a_first_effect_is_begun_anew(monkeypatch, besi
     scores = {f: SimpleNamespace(gain=g, material=True, family=f, fit=None) for f, g in (("a", 20.0), ("b", 19.0))}
     entries = [SimpleNamespace(rival=False, candidate=SimpleNamespace(key=f)) for f in "ba"]
     asked = []
-    monkeypatch.setattr(refits, "shortlist", lambda *a: entries)
-    monkeypatch.setattr(refits, "_tried", lambda case, fit, entry, *a: scores[entry.candidate.key])
-    monkeypatch.setattr(refits, "_same_law_beside", lambda case, fit, ranked, *a: ranked)
-    monkeypatch.setattr(refits, "_polished", lambda case, fit, s, *a: s)
-    monkeypatch.setattr(refits, "begun_anew", lambda case, fit, s, *a: asked.append(s.family) or s)
+    monkeypatch.setattr(refit, "shortlist", lambda *a: entries)
+    monkeypatch.setattr(refit, "_tried", lambda case, fit, entry, *a: scores[entry.candidate.key])
+    monkeypatch.setattr(refit, "_same_law_beside", lambda case, fit, ranked, *a: ranked)
+    monkeypatch.setattr(refit, "_polished", lambda case, fit, s, *a: s)
+    monkeypatch.setattr(refit, "begun_anew", lambda case, fit, s, *a: asked.append(s.family) or s)
     plain = SimpleNamespace(candidates=beside)
-    refits._ranked(Bent(True), plain, MismatchSettings(), lambda *a: None, {}, 0, None)
+    refit._ranked(Bent(True), plain, MismatchSettings(), lambda *a: None, {}, 0, None)
     assert asked == begun
 
 
@@ -103,10 +102,10 @@ def test_what_the_fit_without_an_effect_had_not_come_to_is_no_evidence_for_the_e
         debt = late.evidence - fit.evidence
         return [Score(SimpleNamespace(key=k), debt + g, 0.0, 1.0, late) for k, g in (("a", 20.0), ("b", 3.0))]
 
-    monkeypatch.setattr(refits, "_ranked", ranked)
-    monkeypatch.setattr(refits, "beside", lambda case, fit, found, settings: found)
-    monkeypatch.setattr(refits, "_checked", lambda case, fit, s, settings: s)
-    found, fit = refits.scored(Bent(True), early, MismatchSettings(), lambda *a: None, {}, 0, None)
+    monkeypatch.setattr(refit, "_ranked", ranked)
+    monkeypatch.setattr(refit, "beside", lambda case, fit, found, settings: found)
+    monkeypatch.setattr(refit, "_checked", lambda case, fit, s, settings: s)
+    found, fit = refit.scored(Bent(True), early, MismatchSettings(), lambda *a: None, {}, 0, None)
     assert [s.gain for s in found] == pytest.approx([20.0, 3.0], abs=0.5)
     assert len(asked) == 1 + again and fit.evidence == pytest.approx(asked[-1])
     assert fit.evidence == pytest.approx(late.evidence, abs=0.5 if again else MismatchSettings().threshold)
@@ -140,11 +139,11 @@ def test_a_law_of_the_whole_track_that_gains_too_little_is_begun_again_farther_o
         return SimpleNamespace(light=lambda: made)
 
     first = SimpleNamespace(gain=gain, with_candidates=lambda c: first)
-    monkeypatch.setattr(refits, "fit_jointly", fitted)
-    monkeypatch.setattr(refits, "_refit", lambda *a: first)
-    monkeypatch.setattr(refits, "score_of", lambda case, fit, refit, *a: SimpleNamespace(gain=refit.gain))
+    monkeypatch.setattr(refit, "fit_jointly", fitted)
+    monkeypatch.setattr(refit, "_refit", lambda *a: first)
+    monkeypatch.setattr(refit, "score_of", lambda case, fit, refit, *a: SimpleNamespace(gain=refit.gain))
     entry = SimpleNamespace(candidate=candidate, start=(promised,), values={}, promised=0.0)
-    score = refits._tried(case, fit, entry, MismatchSettings(), {}, 0)
+    score = refit._tried(case, fit, entry, MismatchSettings(), {}, 0)
     assert starts == ([] if begun is None else [(begun, 0.7, 0.5, 0.1), (begun, 0.2, 0.5, 0.1)])
     assert score.gain == (gain if begun is None else 18.0)
 
@@ -152,7 +151,7 @@ def test_a_law_of_the_whole_track_that_gains_too_little_is_begun_again_farther_o
 def test_a_fit_is_not_made_again_where_nobody_would_be_named():
     late = fit_jointly(Bent(True), iterations=25, stall=FINE)
     silent = [Score(SimpleNamespace(key="a"), 11.0, 0.0, 1.0, late)]
-    assert refits._owed(Bent(True), late, silent, MismatchSettings(), {}, 0) is None
+    assert refit._owed(Bent(True), late, silent, MismatchSettings(), {}, 0) is None
 
 
 def test_where_a_channel_was_at_its_range_the_passage_says_no_more_than_its_size():

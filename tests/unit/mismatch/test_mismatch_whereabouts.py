@@ -7,14 +7,12 @@ import pytest
 from scipy.stats import f
 
 from turnout.config.settings.mismatch import MismatchSettings
-from turnout.mismatch.case import Case
-from turnout.mismatch.joint import fit_jointly
-from turnout.mismatch.observation import Observation
-from turnout.mismatch.spaces import AMPLITUDES, NOISE, Space, evidence, weigh
-from turnout.mismatch.track import quiet
-from turnout.mismatch.verdict import calibrate, judge
-from turnout.mismatch.verify import falls
-from turnout.mismatch.whereabouts import Whereabouts, whereabouts
+from turnout.mismatch.engine.case import Case, Observation
+from turnout.mismatch.engine.decision import calibrate, judge
+from turnout.mismatch.engine.localization import AMPLITUDES, NOISE, Space, Whereabouts, evidence, weigh, whereabouts
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.reserved_data import falls
+from turnout.mismatch.turnout import disturbances
 
 N, K = 60, 6
 
@@ -94,7 +92,7 @@ def test_the_refused_candidate_is_heard_where_it_explains_more():
 
 
 def levels_of(rng, n_sensor=4, n=2500, rate=5000.0, scale=1.0):
-    return quiet.band_level(scale * rng.normal(size=(n_sensor, n)), rate)
+    return disturbances.band_level(scale * rng.normal(size=(n_sensor, n)), rate)
 
 
 def test_degrees_of_freedom_of_a_quiet_segment():
@@ -108,7 +106,7 @@ def test_degrees_of_freedom_of_a_quiet_segment():
 
 def test_quiet_segments_of_noise_have_uniform_chances():
     rng = np.random.default_rng(5)
-    chances = np.array([quiet.louder_than(levels_of(rng), [levels_of(rng)])[1] for _ in range(600)])
+    chances = np.array([disturbances.louder_than(levels_of(rng), [levels_of(rng)])[1] for _ in range(600)])
     for q in (0.1, 0.5):
         assert abs(np.mean(chances < q) - q) < 4.0 * np.sqrt(q * (1.0 - q) / chances.size)
 
@@ -116,13 +114,13 @@ def test_quiet_segments_of_noise_have_uniform_chances():
 def test_another_train_shakes_all_sensors_and_a_noisy_channel_is_alone():
     rng = np.random.default_rng(6)
     others = [levels_of(rng) for _ in range(5)]
-    louder, p = quiet.louder_than(levels_of(rng, scale=2.0), others)  # twice the amplitude: 6 dB
+    louder, p = disturbances.louder_than(levels_of(rng, scale=2.0), others)  # twice the amplitude: 6 dB
     assert louder == pytest.approx(6.0, abs=1.0)
-    assert p < quiet.DISTURBED
+    assert p < disturbances.DISTURBED
     power, freedom = levels_of(rng)
-    louder, p = quiet.louder_than((power * np.array([100.0, 1.0, 1.0, 1.0]), freedom), others)
-    assert louder < quiet.LOUDER
-    assert p > quiet.DISTURBED
+    louder, p = disturbances.louder_than((power * np.array([100.0, 1.0, 1.0, 1.0]), freedom), others)
+    assert louder < disturbances.LOUDER
+    assert p > disturbances.DISTURBED
 
 
 def test_a_fall_of_the_held_out_fit_counts_beyond_two_standard_errors():
@@ -163,7 +161,7 @@ def test_recordings_that_were_not_fitted_say_where_only_if_they_are_the_reason()
     the sensors in another one, and whoever came in a third."""
     rng, settings = np.random.default_rng(8), MismatchSettings()
     case = Places(0.5 * rng.normal(size=(3, 40)) + 4.0 * np.outer([0.2, 0.5, 1.0], rng.normal(size=40)))
-    case.disturbed, case.foreign = (quiet.Disturbance("p7", "before", 16.0, 1e-9),), ("freight",)
+    case.disturbed, case.foreign = (disturbances.Disturbance("p7", "before", 16.0, 1e-9),), ("freight",)
     fit = fit_jointly(case)
     for disturbed, foreign in ((True, ()), (False, ("freight",))):
         verdict = judge([], 5.0, settings, disturbed=disturbed, foreign=foreign)
@@ -181,10 +179,10 @@ def test_passages_with_different_sensors_are_compared_by_those_they_share():
         "b": ({"S1": 1.0, "S2": 2.0}, 50.0),
         "c": ({"S1": 1.0}, 50.0),
     }
-    louder, p = quiet.louder_than(*quiet._comparable(levels, "a"))
+    louder, p = disturbances.louder_than(*disturbances._comparable(levels, "a"))
     assert louder == pytest.approx(10.0 * np.log10(4.0))  # S3, which no other passage has, says nothing
     assert p == pytest.approx(f.sf(4.0, 50.0, 50.0) ** 2)  # both sensors
-    assert quiet.louder_than(*quiet._comparable(levels, "c")) == (0.0, 1.0)
+    assert disturbances.louder_than(*disturbances._comparable(levels, "c")) == (0.0, 1.0)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,198 @@
+"""A lumped oscillator with a law in its feedback: the smallest system that the engine diagnoses."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from turnout.mismatch.engine.candidate import Candidate
+from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.physics.term import Parameter
+
+# Law of displacement y and velocity v, each with y and v over their scales, so that a parameter of 1 is as strong
+# as the linear spring.
+(CUBIC, QUINTIC, QUADRATIC, ABSOLUTE, SOFTENING, PLAY, FRICTION, DRAG, CUBIC_DAMPING, STATE_DAMPING, NONE) = range(11)
+LAWS = {
+    "cubic_spring": (CUBIC, "spring force grows with the cube of the displacement", (-3.0, 3.0)),
+    "quintic_spring": (QUINTIC, "spring force grows with the fifth power of the displacement", (-3.0, 3.0)),
+    "quadratic_spring": (QUADRATIC, "spring is stiffer on one side", (-3.0, 3.0)),
+    "absolute_quadratic_spring": (ABSOLUTE, "spring force grows with the square of the displacement", (-3.0, 3.0)),
+    "saturating_spring": (SOFTENING, "a further spring saturates", (-3.0, 3.0)),
+    "play": (PLAY, "spring is lost within a play of a tenth of the motion", (-3.0, 3.0)),
+    "dry_friction": (FRICTION, "dry friction opposes the motion", (0.0, 1.0)),
+    "quadratic_drag": (DRAG, "drag grows with the square of the velocity", (0.0, 3.0)),
+    "cubic_damping": (CUBIC_DAMPING, "damping force grows with the cube of the velocity", (-1.0, 3.0)),
+    "state_damping": (STATE_DAMPING, "damping grows with the square of the displacement", (-1.0, 3.0)),
+}
+SOURCE = "Kerschen et al. 2006, Past, present and future of nonlinear system identification in structural dynamics"
+
+
+@dataclass(frozen=True)
+class LawTerm:
+    """Feedback force of one kind; ``amount`` is its share of the linear spring at the scale of the motion."""
+
+    name: str
+    kind: int
+    amount: float
+
+    def sentence(self):
+        """What was left out, in words."""
+        return f"{LAWS[self.name][1]} (amount {self.amount:.3g})"
+
+
+def law_candidates(without=()):
+    """All laws but those ``without``."""
+    found = []
+    for name, (kind, meaning, bounds) in LAWS.items():
+        if name not in without:
+            parameter = Parameter("amount", "-", 0.0, bounds, meaning, SOURCE)
+            starts = ((0.05,), (0.5 if bounds[0] < 0.0 else 0.2,))
+            found.append(
+                Candidate(name, (parameter,), lambda psi, n=name, k=kind: LawTerm(n, k, psi["amount"]), starts,
+                          frame="amplitude", kin="oscillator")
+            )  # fmt: skip
+    return tuple(found)
+
+
+@njit(cache=True)
+def _law(kind, y, v):
+    if kind == CUBIC:
+        return y * y * y
+    if kind == QUINTIC:
+        return y**5
+    if kind == QUADRATIC:
+        return y * y
+    if kind == ABSOLUTE:
+        return abs(y) * y
+    if kind == SOFTENING:
+        return np.tanh(3.0 * y)
+    if kind == PLAY:
+        return -min(max(y, -0.1), 0.1)
+    if kind == FRICTION:
+        return 0.1 * np.tanh(v / 0.02)
+    if kind == DRAG:
+        return 0.1 * abs(v) * v
+    if kind == CUBIC_DAMPING:
+        return 0.1 * v * v * v
+    if kind == STATE_DAMPING:
+        return 0.1 * y * y * v
+    return 0.0
+
+
+@njit(cache=True)
+def _march(force, dt, omega, zeta, gain, kinds, amounts, scale):
+    """Displacement by the classical Runge-Kutta scheme; ``force`` holds three values a step (start, middle, end)."""
+    out = np.zeros(force.shape[0] + 1)
+    y, v = 0.0, 0.0
+    for n in range(force.shape[0]):
+        ky, kv = np.zeros(4), np.zeros(4)
+        for stage in range(4):
+            way = 0.0 if stage == 0 else 0.5 if stage < 3 else 1.0
+            ys = y + (way * dt * ky[stage - 1] if stage else 0.0)
+            vs = v + (way * dt * kv[stage - 1] if stage else 0.0)
+            f = force[n, 0 if stage == 0 else 1 if stage < 3 else 2]
+            acceleration = gain * f - 2.0 * zeta * omega * vs - omega * omega * ys
+            for k in range(kinds.size):
+                acceleration -= omega * omega * scale * amounts[k] * _law(kinds[k], ys / scale, vs / (omega * scale))
+            ky[stage], kv[stage] = vs, acceleration
+        y += dt / 6.0 * (ky[0] + 2.0 * ky[1] + 2.0 * ky[2] + ky[3])
+        v += dt / 6.0 * (kv[0] + 2.0 * kv[1] + 2.0 * kv[2] + kv[3])
+        if not abs(y) < 100.0 * scale:
+            y, v = 0.0, 0.0
+        out[n + 1] = y
+    return out
+
+
+class OscillatorCase(Case):
+    r"""One degree of freedom driven by a known input, its displacement recorded with an unknown offset.
+
+    .. math:: \ddot y + 2\zeta\omega\dot y + \omega^2 y + \sum_l \omega^2 a_l Y \varphi_l(y/Y, \dot y/(\omega Y)) = g u
+
+    Parameters
+    ----------
+    records : sequence of (name, condition, input, output)
+        One row each, rising in time, from rest; the first ``skipped`` samples are marched but not judged.
+    reserved : sequence of the same
+        Read by nothing but the verification.
+    rate : float
+        Samples per second [Hz].
+    frequency, damping, gain : (mean, sd)
+        Priors of the linear system; gain is of input to ω² y.
+    tolerance : float
+        Materiality floor as a share of each record's rms.
+    offset : float
+        Prior standard deviation of the sensor's offset; 0 leaves this nuisance out.
+    """
+
+    def __init__(self, records, reserved, rate, frequency, damping, gain, tolerance=0.01, offset=0.02, skipped=400,
+                 without=(), effective=0.2):  # fmt: skip
+        self.rate, self.skipped, self.effective = rate, skipped, effective
+        self.scale = 3.0 * float(np.sqrt(np.mean(np.concatenate([y for *_, y in records]) ** 2)))
+        self.inputs = {name: (_thirds(u), y) for name, _, u, y in (*records, *reserved)}
+        self.observations = tuple(self._observation(*r, tolerance) for r in records)
+        self.reserved = tuple(self._observation(*r, tolerance) for r in reserved)
+        parts = [("frequency", "Hz", frequency, (0.0, np.inf)), ("damping", "-", damping, (0.0, 1.0))]
+        parts += [("gain", "-", gain, (-np.inf, np.inf))]
+        parts += [("offset", "V", (0.0, offset), (-np.inf, np.inf))] if offset else []
+        self.nuisances = tuple(Nuisance(n, u, *prior, bounds=b) for n, u, prior, b in parts)
+        self.candidates = law_candidates(without)
+
+    def _observation(self, name, condition, u, y, tolerance):
+        judged = y[self.skipped :]
+        sigma = tolerance * float(np.sqrt(np.mean(judged**2)))
+        return Observation(name, condition, judged, sigma, self.effective, covariates={"rms": float(np.std(judged))})
+
+    def predict(self, values, terms, observations):
+        """Displacement of every record."""
+        omega = 2.0 * np.pi * values["frequency"]
+        kinds = np.array([t.kind for t in terms], dtype=np.int64)
+        amounts = np.array([t.amount for t in terms], dtype=float)
+        gain = values["gain"] * omega**2
+        found = []
+        for o in observations:
+            force, _ = self.inputs[o.name]
+            y = _march(force, 1.0 / self.rate, omega, values["damping"], gain, kinds, amounts, self.scale)
+            found.append(y[self.skipped : self.skipped + o.data.size] + values.get("offset", 0.0))
+        return found
+
+    def latent(self, fit):
+        """Missing feedback from the recorded motion: what the model's equation lacks, over ω²."""
+        omega, damping = 2.0 * np.pi * fit.values["frequency"], fit.values["damping"]
+        parts = []
+        for o in self.observations:
+            force, y = self.inputs[o.name]
+            y = y - fit.values.get("offset", 0.0)
+            v, a = _derivatives(y, self.rate)
+            missing = fit.values["gain"] * force[:, 0] - a[:-1] / omega**2 - 2.0 * damping * v[:-1] / omega - y[:-1]
+            for term in fit.terms:
+                u, w = y[:-1] / self.scale, v[:-1] / (omega * self.scale)
+                missing = missing - term.amount * self.scale * np.array([_law(term.kind, p, q) for p, q in zip(u, w)])
+            inner = slice(self.skipped, -50)
+            parts.append((missing[inner], y[:-1][inner], v[:-1][inner], np.arange(missing.size)[inner] / self.rate))
+        force, y, v, t = (np.concatenate(p) for p in zip(*parts))
+        return {"force": _band_limited(force, self.rate, 3.2 * fit.values["frequency"]), "unit": "V",
+                "displacement": y, "velocity": v, "time": t}  # fmt: skip
+
+
+def _thirds(u):
+    """Input at start, middle and end of each step, band-limited between samples, (n - 1, 3)."""
+    n = u.size
+    spectrum = np.fft.rfft(np.concatenate([u, u[::-1]]))
+    middle = np.fft.irfft(spectrum * np.exp(1j * np.pi * np.arange(spectrum.size) / (2 * n)), 2 * n)[: n - 1]
+    return np.column_stack([u[:-1], middle, u[1:]])
+
+
+def _derivatives(y, rate):
+    """Velocity and acceleration of a record by Fourier transform of it and its mirror image."""
+    n = y.size
+    both = np.concatenate([y, y[::-1]])
+    omega = 2j * np.pi * np.fft.rfftfreq(2 * n, 1.0 / rate)
+    spectrum = np.fft.rfft(both)
+    return np.fft.irfft(omega * spectrum, 2 * n)[:n], np.fft.irfft(omega**2 * spectrum, 2 * n)[:n]
+
+
+def _band_limited(x, rate, cutoff):
+    """Below ``cutoff``: differentiated noise above carries no force."""
+    spectrum = np.fft.rfft(x)
+    frequency = np.fft.rfftfreq(x.size, 1.0 / rate)
+    return np.fft.irfft(spectrum / (1.0 + (frequency / cutoff) ** 8), x.size)

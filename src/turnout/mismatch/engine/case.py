@@ -1,0 +1,224 @@
+"""A case: conditions, inputs and outputs, a simulator, terms, nuisances. The engine knows nothing else.
+
+One recording as the engine sees it: data, errors, conditions, and the cells its mismatch may be locked to.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from turnout.mismatch.engine.candidate import Candidate
+
+
+@dataclass(frozen=True)
+class Observation:
+    """One recording under one condition, as a vector the simulator can predict.
+
+    ``data``, ``sigma`` (n,) in the same unit: noise and materiality floor; ``effective`` share of the samples
+    that are independent, 0 to 1. Folds leave out a ``condition``; ``kind`` shares one noise scale. ``cells`` (n,)
+    numbers the time-frequency cell of each sample, -1 for none; ``labels`` frame -> (n_cell,) level of each cell.
+    ``rows`` of equal length lie one behind the other, of sensors or of Re and Im: what one misses in a stretch, others
+    may miss as well. ``modes`` (n, m) in the unit of the data are errors of this recording's own with unit variance
+    each (roughness of its wheels, tolerance of a model that errs smoothly): they are integrated out, see ``whitened``;
+    in single precision, where they are many, what is whitened is right to 1e-6 of its size.
+    """
+
+    name: str
+    condition: str
+    data: np.ndarray
+    sigma: np.ndarray
+    effective: float = 1.0
+    kind: str = "response"
+    covariates: Mapping[str, float] = field(default_factory=dict)
+    cells: np.ndarray | None = None
+    labels: Mapping[str, np.ndarray] = field(default_factory=dict)
+    modes: np.ndarray | None = None
+    rows: int = 1
+
+    def __post_init__(self):
+        data = np.asarray(self.data, dtype=float)
+        sigma = np.broadcast_to(np.asarray(self.sigma, dtype=float), data.shape)
+        if data.ndim != 1 or not np.all(np.isfinite(data)):
+            raise ValueError(f"observation {self.name!r}: data must be one row of finite numbers")
+        if data.size % self.rows:
+            raise ValueError(f"observation {self.name!r}: {data.size} samples are no {self.rows} rows of equal length")
+        if not np.all(sigma > 0.0) or not 0.0 < self.effective <= 1.0:
+            raise ValueError(f"observation {self.name!r}: sigma must be above 0 and effective in 0 to 1")
+        object.__setattr__(self, "data", data)
+        object.__setattr__(self, "sigma", sigma)
+
+    @cached_property
+    def _subspace(self):
+        """Orthonormal directions (n, m) of the modes over sigma, and how much each is shrunk (m,)."""
+        if self.modes is None or not self.modes.shape[1]:
+            return None
+        scaled = self.modes / self.sigma[:, None]
+        power, turn = np.linalg.eigh(scaled.T @ scaled)
+        keep = power > 1e-4
+        power = power[keep]
+        along = (scaled @ turn[:, keep] / np.sqrt(power)).astype(self.modes.dtype)
+        return along, 1.0 - 1.0 / np.sqrt(1.0 + power)
+
+    def whitened(self, values):
+        r"""``values`` (n,) or (n, k) over the standard deviation of all that is random: :math:`C^{-1/2} x`,
+        :math:`C = \mathrm{diag}(\sigma^2) + M M^T` with M the ``modes``.
+
+        >>> o = Observation("a", "a", np.zeros(3), 2.0, modes=np.array([[2.0], [2.0], [2.0]]))
+        >>> [round(float(v), 3) for v in o.whitened(np.array([2.0, 2.0, 2.0]))]  # along the mode: over sqrt(1 + 3)
+        [0.5, 0.5, 0.5]
+        >>> [round(float(v), 3) for v in o.whitened(np.array([2.0, -2.0, 0.0]))]  # across it: over sigma alone
+        [1.0, -1.0, 0.0]
+        """
+        if isinstance(values, Whitened):
+            return np.asarray(values)
+        scaled = values / (self.sigma if values.ndim == 1 else self.sigma[:, None])
+        if self._subspace is None:
+            return scaled
+        along, shrunk = self._subspace
+        inner = along.T @ scaled.astype(along.dtype)
+        inner *= (shrunk if values.ndim == 1 else shrunk[:, None]).astype(along.dtype)
+        return scaled - along @ inner
+
+    @property
+    def n_effective(self):
+        """Number of independent samples."""
+        return self.effective * self.data.size
+
+
+class Whitened(np.ndarray):
+    """Values of an observation that are whitened already."""
+
+    def __new__(cls, values):
+        return np.asarray(values, dtype=float).view(cls)
+
+
+@dataclass(frozen=True)
+class Nuisance:
+    """A number of the base model that is not exactly known, free under a normal prior.
+
+    ``mean`` and ``sd`` of the prior in ``unit``; ``owner`` is the observation it belongs to, None where shared;
+    ``trust`` the largest step in prior standard deviations; it ``bends`` where the base model may have bent it to hide
+    an effect, as it may what the track is made of.
+    """
+
+    name: str
+    unit: str
+    mean: float
+    sd: float
+    owner: str | None = None
+    bounds: tuple[float, float] = (-np.inf, np.inf)
+    meaning: str = ""
+    trust: float = 3.0
+    bends: bool = True
+
+
+class Case:
+    """Base of all cases: give it observations, nuisances, candidates and override ``predict``.
+
+    ``reserved`` are observations that no fit reads: they may withdraw a name, and verify it. ``frozen_jacobian`` tells
+    the engine that a prediction is dear: the nuisances' derivatives are then kept and updated by Broyden's formula, but
+    for observations that are ``cheap``. ``start_values`` are values of nuisances where fits start, else their means;
+    ``control_level`` the weighted mean square by kind that cases without an effect reach, else that of the settings;
+    ``cell_level`` the same for one channel of one recording, by kind;
+    ``disturbed`` recordings not used, since something else than the known inputs shows in them (``track.quiet``);
+    ``foreign`` trains, most recordings of which do not look as their description has it; ``measured`` the first and the
+    last place where anything was [m].
+    """
+
+    observations: tuple[Observation, ...] = ()
+    reserved: tuple[Observation, ...] = ()
+    nuisances: tuple[Nuisance, ...] = ()
+    candidates: tuple[Candidate, ...] = ()
+    frozen_jacobian = False
+    start_values: Mapping[str, float] = {}
+    control_level: Mapping[str, float] = {}
+    cell_level: Mapping[str, float] = {}
+    disturbed: tuple = ()
+    foreign: tuple = ()
+    measured = (-np.inf, np.inf)
+
+    def cheap(self, observation):
+        """Derivatives of this observation cost next to nothing."""
+        return False
+
+    def predict(self, values, terms, observations):
+        """List of (n,) predictions, one per observation; ``values`` are nuisances, ``terms`` the effects."""
+        raise NotImplementedError
+
+    def moved(self, values, terms, new, observations, predictions):
+        """Predictions with ``new`` terms, a small step from ``terms`` with known ``predictions``: for derivatives."""
+        return self.predict(values, new, observations)
+
+    def nuisance_jacobian(self, values, terms, observations, base):
+        """List of (n, n_nuisance) derivatives; by forward differences unless a case knows better.
+
+        Nuisances owned by different observations are moved together: one prediction serves them all.
+        """
+        groups, seen = {}, {}
+        for k, nuisance in enumerate(self.nuisances):
+            if nuisance.owner is None:
+                groups[nuisance.name] = [k]
+            else:
+                rank = seen[nuisance.owner] = seen.get(nuisance.owner, -1) + 1
+                groups.setdefault(("own", rank), []).append(k)
+        found = [np.zeros((o.data.size, len(self.nuisances))) for o in observations]
+        for members in groups.values():
+            moved = dict(values)
+            for k in members:
+                moved[self.nuisances[k].name] += 0.1 * self.nuisances[k].sd
+            predicted = self.predict(moved, terms, observations)
+            for k in members:
+                nuisance = self.nuisances[k]
+                for o, new, old, jacobian in zip(observations, predicted, base, found):
+                    if nuisance.owner in (None, o.name):
+                        jacobian[:, k] = (new - old) / (0.1 * nuisance.sd)
+        return found
+
+    def own_jacobian(self, values, terms, observation, predicted, names):
+        """(n, n_name) derivatives of an observation by nuisances of its own."""
+        full = self.nuisance_jacobian(values, terms, [observation], [predicted])[0]
+        order = [n.name for n in self.nuisances]
+        return full[:, [order.index(name) for name in names]]
+
+    def screen(self, fit):
+        """Columns for candidates at their starts, (key, start) -> list of (n,) per observation; those that are missing
+        are predicted."""
+        return {}
+
+    def further(self, fit):
+        """Candidates that only a look at the residual of ``fit`` suggests."""
+        return ()
+
+    def distant(self, fit):
+        """(candidate, start) too far from neutral for what a column says: predicted, with the twin at its mean."""
+        return ()
+
+    def roughened(self):
+        """The same case with broad, independent errors: its optimum has a wide basin."""
+        return self
+
+    def struck(self):
+        """Condition -> where the hammer fell [m], for those that are hammer tests."""
+        return {}
+
+    def renewed(self, fit):
+        """The same case with errors of its observations as the model of ``fit`` makes them; itself where they stay."""
+        return self
+
+    def cheap_part(self):
+        """A case of the cheap observations alone, with the same shared nuisances; None where there is none."""
+        return None
+
+    def spaces(self, fit):
+        """Subspaces of the observations that a cause could be locked to, ``spaces.Space``; none by default."""
+        return ()
+
+    def latent(self, fit):
+        """Covariates of the latent force: name -> (n,), with "force"; None where the case has no such view."""
+        return None
+
+    def numerical_error(self, fit):
+        """Own numerical error of each observation's prediction, list of (n,), or None where it is exact."""
+        return None

@@ -1,0 +1,113 @@
+"""Which effects a planned campaign can tell apart: expected log evidence lost when one is explained by another."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnout.errors import SimulationError
+from turnout.mismatch.engine.map_fit import Joint, fit_jointly
+
+SMALL = 0.02  # share of an effect at which it is linear; a law with a threshold is taken whole
+ENOUGH = 5.0  # nats: odds of 150 to 1
+
+
+@dataclass(frozen=True)
+class Distinguishability:
+    """``names`` (n,) effects; ``lost`` (n, n) nats lost when the row's effect is explained by the column's best
+    amplitude; ``seen`` (n,) nats lost when it is explained by nuisances alone."""
+
+    names: tuple[str, ...]
+    lost: np.ndarray
+    seen: np.ndarray
+
+    def confused(self, name, enough=ENOUGH):
+        """Effects that ``name`` cannot be told from, "none" among them where it cannot be seen at all."""
+        row = self.names.index(name)
+        found = [] if self.seen[row] >= enough else ["none"]
+        return found + [n for k, n in enumerate(self.names) if k != row and self.lost[row, k] < enough]
+
+    def __str__(self):
+        width = max(len(n) for n in self.names)
+        head = " " * width + "      none " + " ".join(f"{n[:9]:>9}" for n in self.names)
+        lines = [head]
+        for name, seen, row in zip(self.names, self.seen, self.lost):
+            lines.append(f"{name:<{width}} {seen:>9.0f} " + " ".join(f"{min(v, 1e7):>9.0f}" for v in row))
+        return "\n".join(lines)
+
+
+def distinguishability(case, strengths=None):
+    r"""Matrix for the ``case``: no data are needed, only what a recording would look like.
+
+    .. math:: L_{AB} = \tfrac12 \min_a (c_A - a c_B)^T P (c_A - a c_B)
+
+    with c the change that an effect makes and P the nuisances projected out under their priors.
+
+    Parameters
+    ----------
+    case : Case
+        Its data may be its own predictions.
+    strengths : dict or None
+        Key of a candidate -> its parameters; by default each candidate's first start. One candidate of each family
+        is taken, the first.
+    """
+    fit = fit_jointly(case, iterations=0)
+    joint = Joint(case)
+    unit = dict.fromkeys(fit.scale, 1.0)
+    rows, _ = joint.stacked(fit.jacobian, fit.white, unit)
+    scaled = rows * joint.sd
+    normal = np.linalg.inv(scaled.T @ scaled + np.eye(scaled.shape[1]))
+    names, columns = [], []
+    for candidate in _one_of_each(case.candidates, strengths or {}):
+        start = np.asarray((strengths or {}).get(candidate.key, candidate.starts[0]), dtype=float)
+        share = 1.0 if getattr(candidate.term(start), "kind", "port") == "port" else SMALL
+        weak = candidate.neutral + share * (start - candidate.neutral)
+        try:
+            new = case.predict(fit.values, (candidate.term(weak),), case.observations)
+        except SimulationError:
+            continue
+        change = [o.whitened(a - b) for o, a, b in zip(case.observations, new, fit.predictions)]
+        _, column = joint.stacked(fit.jacobian, change, unit)
+        names.append(candidate.family)
+        columns.append(column / share)
+    c = np.array(columns)
+    across = c @ scaled
+    gram = c @ c.T - across @ normal @ across.T
+    size = np.maximum(np.diag(gram), 0.0)
+    explained = np.where(size > 1e-9, gram**2 / np.maximum(size, 1e-9), 0.0)
+    lost = 0.5 * np.maximum(size[:, None] - explained, 0.0)
+    np.fill_diagonal(lost, 0.0)
+    return Distinguishability(tuple(names), lost, 0.5 * size)
+
+
+def _one_of_each(candidates, strengths):
+    """The strengthened candidates, and the middle place of every other family."""
+    found = {}
+    for candidate in candidates:
+        found.setdefault(candidate.family, []).append(candidate)
+    for members in found.values():
+        chosen = [m for m in members if m.key in strengths]
+        yield chosen[0] if chosen else members[len(members) // 2]
+
+
+def cheapest_addition(base, additions, enough=ENOUGH):
+    """(name, pairs told apart, nats won) of the addition that resolves most pairs, cheapest first among equals.
+
+    ``base`` is a Distinguishability, ``additions`` name -> (cost, Distinguishability of the plan with it).
+    """
+    ranked = []
+    for name, (cost, wider) in additions.items():
+        common = [n for n in base.names if n in wider.names]
+        won = resolved = 0.0
+        for a in common:
+            for b in common:
+                if a == b:
+                    continue
+                before = base.lost[base.names.index(a), base.names.index(b)]
+                after = wider.lost[wider.names.index(a), wider.names.index(b)]
+                resolved += before < enough <= after
+                won += max(0.0, min(after, 50.0) - min(before, 50.0))
+            before, after = base.seen[base.names.index(a)], wider.seen[wider.names.index(a)]
+            resolved += before < enough <= after
+        ranked.append((-resolved, cost, name, won))
+    resolved, _, name, won = min(ranked)
+    return name, int(-resolved), float(won)

@@ -1,6 +1,0 @@
-"""The case of a turnout: hammer tests and passages against the simulation of track and train."""
-
-from turnout.mismatch.track.campaign import Campaign, HammerTest, Passage
-from turnout.mismatch.track.track_case import TrackCase
-
-__all__ = ["Campaign", "HammerTest", "Passage", "TrackCase"]

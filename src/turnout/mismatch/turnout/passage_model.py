@@ -1,0 +1,57 @@
+"""Passages simulated for a fit: coarse in time and mesh, many trains on one factorised track."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnout.mismatch.turnout.matrix_cache import matrices_of
+from turnout.mismatch.turnout.passage_band import RATE
+from turnout.simulate.prepare import prepare
+from turnout.simulate.run import Drive, run
+
+ELEMENTS = 2  # per bay: 0.2 to 0.5 % of the waveform below 112 Hz from four, which 1.8 kHz misses by 0.4 to 1 %
+DECAY = 8.0  # of a force's effect along the rail within a step, as exponent: 3e-6 of the waveform, 6 % faster than 12
+LEAD = 0.25  # s of rolling before the first wheel reaches the first sensor
+EDGE = 0.08  # s kept before the first and behind the last wheel
+
+
+@dataclass(frozen=True)
+class Track1D:
+    """Settings of the simulation used for fitting; ``elements`` per bay, None as in the track's file."""
+
+    rate: float = RATE
+    scheme: str = "radau"
+    elements: int | None = ELEMENTS
+
+
+class Roll:
+    """Simulated passages on one track with one set of terms; the factorisation is shared among them."""
+
+    def __init__(self, turnout, track, terms, settings):
+        self.turnout, self.terms, self.settings = turnout, tuple(terms), settings
+        if settings.elements and not track.pad_width:  # a wide pad needs the nodes beside its support
+            track = track.with_(elements_per_bay=settings.elements)
+        self.track = track
+        matrices = matrices_of(track, self.terms)
+        self.prepared = prepare(track, 1.0 / settings.rate, settings.scheme, self.terms, DECAY, matrices)
+
+    def __call__(self, passage, vehicle, speed, sensors, probes=(), surfaces=None, described=None):
+        """(n_sensor + n_probe, n) signals of the march over ``surfaces``, by default the file's; time 0: first wheel
+        ``LEAD`` before the first sensor where it is ``described`` to be."""
+        for term in self.terms:
+            vehicle = term.vehicle(vehicle)
+        sign = 1 if passage.direction == "facing" else -1
+        places = sign * np.array([s.place for s in described or sensors])
+        start = sign * (places.min() - speed * LEAD)
+        way = np.ptp(places) + float(vehicle.wheel_places[-1]) + speed * (LEAD + 2.0 * EDGE)
+        seats = [seat(s, self.terms).probe(self.track) for s in sensors]
+        drive = Drive(start, speed, sign, surfaces or self.turnout.surfaces(passage.route), path_step=0.01)
+        outcome = run(self.prepared, way / speed, [*seats, *probes], vehicle, drive, forces=False, tolerance=1e-3)
+        return outcome.signals
+
+
+def seat(sensor, terms):
+    """The sensor where the terms say it sits."""
+    for term in terms:
+        sensor = term.sensor(sensor)
+    return sensor

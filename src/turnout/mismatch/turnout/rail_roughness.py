@@ -1,0 +1,81 @@
+"""The rail's own roughness as a nuisance: waves whose amplitudes are free under the spectrum of ISO 3095.
+
+All trains roll over the same waves. They enter the simulation as a path; the derivatives are those of a free track
+under the contact force that a wave makes, see ``rolled_waves``.
+"""
+
+from functools import cached_property
+
+import numpy as np
+
+from turnout.mismatch.engine.case import Nuisance
+from turnout.mismatch.turnout import passage_band
+from turnout.mismatch.turnout.wave_response import Carrier
+from turnout.simulate.roughness import level
+from turnout.simulate.wheel_path import Sampled
+
+REACH = 3.0  # rolling before the first and behind the last sensor that still shakes them [m]
+LONGEST, SHORTEST = 3.0, passage_band.SHORTEST_WAVE  # [m]
+STEP = 0.02  # m
+
+
+class Waves:
+    """Cosines and sines over the reach of the sensors; ``names`` of their amplitudes."""
+
+    def __init__(self, places, offset):
+        self.start, self.end = min(places) - REACH, max(places) + REACH
+        self.length = 1.1 * (self.end - self.start)
+        orders = np.arange(int(np.ceil(self.length / LONGEST)), int(self.length / SHORTEST) + 1)
+        self.lengths = self.length / orders
+        self.wavelength = np.repeat(self.lengths, 2)
+        self.quarter = np.tile([0.0, 0.5 * np.pi], orders.size)
+        self.names = tuple(
+            f"{'cos' if q == 0.0 else 'sin'}_wave_{o}" for o, q in zip(np.repeat(orders, 2), self.quarter)
+        )
+        # the limit curve is an upper limit for sound rails: more hides dips of half a millimetre
+        self.sd = amplitude_sd(self.wavelength, self.length, offset)
+
+    def nuisances(self):
+        """One amplitude per wave [m]."""
+        return [Nuisance(n, "m", 0.0, float(sd), bends=False) for n, sd in zip(self.names, self.sd)]
+
+    def fade(self, x):
+        """(n,) 0 to 1: the waves come and go at both ends."""
+        edge = np.clip(np.minimum(x - self.start, self.end - x) / 0.8, 0.0, 1.0)
+        return edge * edge * (3.0 - 2.0 * edge)
+
+    def shapes(self, x):
+        """(n_wave, n) waves at x, faded at both ends."""
+        x = np.asarray(x, dtype=float)
+        return self.fade(x) * np.cos(2.0 * np.pi * x / self.wavelength[:, None] - self.quarter[:, None])
+
+    def amplitudes(self, values):
+        """(n_wave,) of ``values``."""
+        return np.array([values[n] for n in self.names])
+
+    def path(self, values):
+        """The waves as a part of a wheel's path; () where all are 0."""
+        amplitude = self.amplitudes(values)
+        if not amplitude.any():
+            return ()
+        return (Sampled(self.start, STEP, amplitude @ self._sampled),)
+
+    @cached_property
+    def _sampled(self):
+        """(n_wave, n) waves every ``STEP``."""
+        return self.shapes(np.arange(self.start, self.end + STEP, STEP))
+
+
+def amplitude_sd(wavelength, length, offset):
+    """Standard deviation [m] of cosine and sine of waves that are harmonics of ``length`` [m].
+
+    The variance of a third octave is spread over the waves in it, half for each quarter.
+    """
+    width = (2.0 ** (1 / 6) - 2.0 ** (-1 / 6)) / wavelength
+    return 1e-6 * 10.0 ** (level(wavelength, offset) / 20.0) * np.sqrt(1.0 / (length * width))
+
+
+def wave_columns(case, values, terms, made):
+    """(n_sensor * n_time, n_wave) derivative of a passage by the waves' amplitudes."""
+    carrier = Carrier(case, values, made, terms)
+    return carrier.signals(case.waves.lengths, case.waves.fade(carrier.node), carrier.train())

@@ -1,0 +1,243 @@
+"""Receptances of a track as blows find it: its matrices with terms in them, solved once per place.
+
+What links added to a track change in its receptances, exactly and without solving it again.
+
+Receptances with parameters of terms moved a little: exact to first order, and nothing is solved again.
+"""
+
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csr_array, lil_array
+
+from turnout.mismatch.turnout import receptance_observation
+from turnout.mismatch.turnout.matrix_cache import FixedLinks, matrices_of
+from turnout.mismatch.turnout.receptance_observation import LINES, SHIFTED
+from turnout.mismatch.turnout.track_parameters import OWN
+from turnout.physics.term import PhysicsTerm
+from turnout.simulate.frequency_response import responses
+from turnout.simulate.links import Link, left, links_of, ports_of
+from turnout.simulate.matrices import link_vector
+
+SWING = 1e-6  # motion of a blow for the tangent of a law [m]
+# Rate of a joint under a blow: from that of a free one to that of one which is held, over so much force against it.
+# Blows of 5 kN on a simulated track with friction of 0.3 to 8 kN are met best at 20, 13, 8, 3 and 1.5 mm/s.
+FREE, HELD, HOLDING = 0.021, 1.5e-3, 2e3  # [m/s, m/s, N]
+SHARE = 1e-3  # of a support's value, by which what follows it is found
+
+
+def tangent(terms, track):
+    """Links of the terms' ports as a blow finds them: their secant over a micrometre and the rate that they leave."""
+    found = []
+    for port in ports_of(terms, track):
+        law, d = port.law, -port.gap
+        k = (float(law.force(d + SWING, 0.0)) - float(law.force(d - SWING, 0.0))) / (2.0 * SWING)
+        rate = HELD + (FREE - HELD) * np.exp(-abs(_against(law, d, FREE)) / HOLDING)
+        c = _against(law, d, rate) / rate
+        found.append(Link(port.ends, k, c, tag="tangent"))
+    return found
+
+
+def linear(track, terms):
+    """Matrices of a track with ``terms`` in it, their ports by ``tangent``."""
+    return matrices_of(track, (*terms, FixedLinks(tangent(terms, track))))
+
+
+def _against(law, d, rate):
+    """Half of what the force of a law changes by when the rate turns round [N]."""
+    return 0.5 * (float(law.force(d, rate)) - float(law.force(d, -rate)))
+
+
+def _own_shear(track, terms):
+    """Share of the rail's flexibility in shear that is the file's, the rest being that of ``terms``."""
+    if track.rail.beam == "euler":
+        return 0.0
+    changed = track
+    for term in terms:
+        changed = term.rail(changed)
+    return changed.rail.shear_stiffness / track.rail.shear_stiffness
+
+
+class BlowModel:
+    """Receptances of one track with terms at given conditions on ``LINES``."""
+
+    def __init__(self, track, terms):
+        self.track, self.terms = track, terms
+        self.matrices = linear(track, terms)
+        self.own_shear = _own_shear(track, terms)
+        self.by_place, self.weight = {}, {}
+
+    def solve(self, places):
+        """Remember the displacements under unit forces at these places: together they need one factorisation."""
+        new = [p for p in dict.fromkeys(places) if p not in self.by_place]
+        if new:
+            found = responses(self.matrices, SHIFTED, new)
+            self.by_place |= {p: found[:, k] for k, p in enumerate(new)}
+
+    def displacement(self, place):
+        """(n_line, n) of all degrees of freedom under a unit force at a place."""
+        self.solve([place])
+        return self.by_place[place]
+
+    def moved(self, excited, measured):
+        """(n_line,) displacement at one place under a unit force at another, nodes' motion alone. [m/N]"""
+        if measured not in self.weight:
+            self.weight[measured] = self.matrices.weights(measured)
+        rows, weights = self.weight[measured]
+        return self.displacement(excited)[:, rows] @ weights
+
+    def place_of(self, sensor):
+        """Place of a sensor on the model."""
+        return sensor.probe(self.track).place
+
+    def receptance(self, excited, measured):
+        """(n_line,) complex [m/N]."""
+        h = self.moved(excited, measured)
+        return h if isinstance(measured, tuple) else h + self.matrices.compliance(float(excited), float(measured))
+
+    def seat_gradient(self, excited, measured, way=0.01):
+        """Derivative by the sensor's place on the rail, (n_line,) [1/N]; 0 on a sleeper."""
+        if isinstance(measured, tuple):
+            return np.zeros(LINES.size, dtype=complex)
+        return (self.receptance(excited, measured + way) - self.receptance(excited, measured - way)) / (2.0 * way)
+
+    @cached_property
+    def rows(self):
+        """Rows of the rail and of the sleeper at every support, each (n_support,)."""
+        index, supports = self.matrices.index, range(self.track.support.size)
+        return tuple(np.array([index[kind, j] for j in supports]) for kind in ("rail", "sleeper"))
+
+    @cached_property
+    def following(self):
+        """Links of the terms that follow a value of their support: [(field, support, rows, weights, (k, c, m) per
+        logarithm of the value)]. Soft ballast has a share of it, a pad's branch goes with the pad, a gap has none."""
+        if not self.terms:
+            return []
+        found, known = [], self.links(self.terms)
+        for field in dict.fromkeys(o.field for o in OWN):
+            moved = self.links(self.terms, self.track.with_(**{field: getattr(self.track, field) * (1.0 + SHARE)}))
+            for a, b in zip(known, moved):
+                change = tuple((getattr(b, w) - getattr(a, w)) / SHARE for w in ("stiffness", "damping", "mass"))
+                if any(change):
+                    found.append((field, a.ends[0][0][1], *link_vector(a, self.matrices.index), change))
+        return found
+
+    def links(self, terms, track=None):
+        """Links of ``terms`` on this track or another, tangents of their ports behind."""
+        track = track or self.track
+        return [*links_of(terms, track), *tangent(terms, track)]
+
+
+class AddedLinks:
+    """Changes of receptances about a fit by each of ``chosen`` [(candidate, start)]; what these add is asked once for
+    all pairs under the same conditions."""
+
+    def __init__(self, case, fit, chosen):
+        self.case, self.fit, self.chosen, self.known = case, fit, chosen, {}
+
+    def changes(self, pair):
+        r"""(key, start) -> (n,) change of a pair's observation.
+
+        One link w with impedance z changes a receptance by :math:`-z\,u_w v_w / (1 + z\,g_w)`, u and v the motion of
+        its ends under the blow and under a force at the sensor, g under a pair of forces at its own ends; several links
+        of one candidate are taken as if each were alone.
+        """
+        case, fit, chosen = self.case, self.fit, self.chosen
+        if not chosen:
+            return {}
+        heard = case.blow_model(fit.values, fit.terms, pair)
+        said = tuple(sorted(pair.conditions.items()))
+        if said not in self.known:
+            self.known[said] = _answers(heard.model, pair.conditions, chosen)
+        ends, index, answer, owner = self.known[said]
+        u, v = (x.T for x in heard.motion(ends, pair))
+        change = np.zeros((receptance_observation.LINES.size, len(chosen)), dtype=complex)
+        np.add.at(change.T, owner, -(answer * (u * v)[:, index]).T)
+        columns = receptance_observation.split(
+            receptance_observation.scaled(pair, change, case.chain(fit.values, fit.terms, pair))
+        )
+        return {(c.key, k): column for (c, k), column in zip(chosen, columns.T)}
+
+
+def _answers(model, conditions, chosen):
+    """(ends (n_end, n), which end each link has, z / (1 + z g) of each (n_line, n_link), candidate of each link)."""
+    omega, known, index, impedance, owner = 2.0 * np.pi * receptance_observation.SHIFTED, {}, [], [], []
+    track = left(model.track, links_of(model.terms, model.track))
+    for i, (c, k) in enumerate(chosen):
+        for ends, z in _impedances(track, c, c.term(c.starts[k]).under(conditions), omega):
+            index.append(known.setdefault(ends, len(known)))
+            impedance.append(z)
+            owner.append(i)
+    weights = lil_array((len(known), model.matrices.n))
+    own = np.empty((omega.size, len(known)), dtype=complex)
+    for ends, k in known.items():
+        pushed = sum(weight * model.displacement(name) for name, weight in ends)
+        own[:, k] = sum(weight * pushed[:, model.matrices.index[name]] for name, weight in ends)
+        for name, weight in ends:
+            weights[k, model.matrices.index[name]] += weight
+    index, z = np.array(index, dtype=int), np.array(impedance).reshape(-1, omega.size).T
+    return weights.tocsr(), index, z / (1.0 + z * own[:, index]), np.array(owner, dtype=int)
+
+
+def _impedances(track, candidate, term, omega):
+    """(ends, impedance (n_line,)) of every link that a term adds."""
+    if candidate.family == "attached_resonator":
+        return [
+            (((("rail", candidate.where["sleeper"]), 1.0),), term.dynamic_stiffness(receptance_observation.SHIFTED))
+        ]
+    links = [*term.links(track), *tangent((term,), track)]
+    return [(tuple(m.ends), m.stiffness + 1j * omega * m.damping - omega**2 * m.mass) for m in links]
+
+
+WHAT = ("stiffness", "damping", "mass")
+
+
+def moved(case, values, terms, new, observations, predictions):
+    """Predictions of a track case with ``new`` terms, a small step from ``terms``: passages are simulated, receptances
+    follow the links where these differ by their values alone."""
+    found, heard_by, known = [], case.blow_models(values, terms), {}
+    anew = any(a != b and b.kind == "channel" for a, b in zip(terms, new))
+    for o, old in zip(observations, predictions):
+        if o.name in case.pairs and not anew:
+            pair = case.pairs[o.name]
+            heard, said = heard_by(pair), tuple(sorted(pair.conditions.items()))
+            if said not in known:
+                known[said] = nudged(heard.model, receptance_observation.shown(new, pair.conditions))
+            if known[said] is not None:
+                change = changed(heard, pair, *known[said])
+                found.append(
+                    old
+                    + receptance_observation.split(
+                        receptance_observation.scaled(pair, change, case.chain(values, terms, pair))
+                    )
+                )
+                continue
+        found += case.predict(values, new, [o])
+    return found
+
+
+def nudged(model, terms):
+    """Ends (n_link, n) and impedances (n_link, n_line) by which the links of ``terms`` differ from the model's own;
+    None where they differ by more than values: another rail, a link that was not there."""
+    pairs = list(zip(model.terms, terms))
+    if any(type(a) is not type(b) or (a != b and type(b).rail is not PhysicsTerm.rail) for a, b in pairs):
+        return None
+    old, new = model.links(model.terms), model.links(terms)
+    if [k.ends for k in old] != [k.ends for k in new] or any(k.loss_factor for k in (*old, *new)):
+        return None
+    differs = [(a, b) for a, b in zip(old, new) if a != b]
+    values = np.array([[getattr(b, w) - getattr(a, w) for w in WHAT] for a, b in differs]).reshape(-1, 3)
+    omega = 2.0 * np.pi * receptance_observation.SHIFTED
+    impedance = values @ np.array([np.ones(omega.size), 1j * omega, -(omega**2)])
+    vectors = [link_vector(a, model.matrices.index) for a, _ in differs]
+    first = np.cumsum([0, *(rows.size for rows, _ in vectors)])
+    rows = np.concatenate([np.zeros(0, dtype=int), *(rows for rows, _ in vectors)])
+    weights = np.concatenate([np.zeros(0), *(weights for _, weights in vectors)])
+    return csr_array((weights, rows, first), shape=(len(differs), model.matrices.n)), impedance
+
+
+def changed(heard, pair, ends, impedance):
+    r"""(n_line,) complex change of a pair's receptance [m/N] by links whose impedance changes by z:
+    :math:`-\sum z\,u_w v_w`, u and v the motion of their ends under unit forces at blow and sensor."""
+    u, v = heard.motion(ends, pair)
+    return -np.sum(impedance * u * v, axis=0)

@@ -1,0 +1,195 @@
+"""What the pairs of hammer tests under the same conditions share on one model of the track, found once for all.
+
+Compiled sums over the rail's elements of products of strains under two unit forces.
+"""
+
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from turnout.mismatch.turnout.receptance_observation import LINES, SHIFTED
+from turnout.mismatch.turnout.track_parameters import COMMON, OWN, cast_elements
+from turnout.simulate.compiled import kernel
+from turnout.simulate.rail import element_mass
+
+
+@kernel
+def by_rail(moved, pairs, row, length, weights):
+    """(n_pair, n_line, 2) derivatives of receptances by the logarithms of the rail's bending and shear stiffness.
+
+    ``moved`` (n_place, n_line, n) are displacements under unit forces, ``pairs`` (2, n_pair) the places of blow and
+    sensor, ``row`` (n_node,) that of a node's deflection, ``length`` (n_element,), ``weights`` (3, n_element) what
+    bending, shearing and shearing by the shear stiffness alone of each element weigh.
+    """
+    n_place, n_line, n_element = moved.shape[0], moved.shape[1], length.size
+    found = np.zeros((pairs.shape[1], n_line, 2), dtype=np.complex128)
+    bent, skew = np.zeros((2, n_place, n_element)), np.zeros((2, n_place, n_element))
+    for line in range(n_line):
+        for k in range(n_place):
+            u = moved[k, line]
+            for e in range(n_element):
+                first, second = row[e], row[e + 1]
+                b = u[second + 1] - u[first + 1]
+                s = (u[second] - u[first]) / length[e] - 0.5 * (u[first + 1] + u[second + 1])
+                bent[0, k, e], bent[1, k, e], skew[0, k, e], skew[1, k, e] = b.real, b.imag, s.real, s.imag
+        for k in range(pairs.shape[1]):
+            p, q = pairs[0, k], pairs[1, k]
+            b_p, c_p, s_p, t_p = bent[0, p], bent[1, p], skew[0, p], skew[1, p]
+            b_q, c_q, s_q, t_q = bent[0, q], bent[1, q], skew[0, q], skew[1, q]
+            real, imag, shear_real, shear_imag = 0.0, 0.0, 0.0, 0.0
+            for e in range(n_element):
+                x, y = s_p[e] * s_q[e] - t_p[e] * t_q[e], s_p[e] * t_q[e] + t_p[e] * s_q[e]
+                bend, shear, alone = weights[0, e], weights[1, e], weights[2, e]
+                real += bend * (b_p[e] * b_q[e] - c_p[e] * c_q[e]) + shear * x
+                imag += bend * (b_p[e] * c_q[e] + c_p[e] * b_q[e]) + shear * y
+                shear_real += alone * x
+                shear_imag += alone * y
+            found[k, line, 0], found[k, line, 1] = -complex(real, imag), -complex(shear_real, shear_imag)
+    return found
+
+
+FIELDS = [o.field for o in OWN]
+OMEGA = 2.0 * np.pi * SHIFTED
+FACTOR = {"stiffness": -1.0 + 0j * OMEGA, "damping": -1j * OMEGA, "mass": OMEGA**2 + 0j}
+
+
+class Heard:
+    """A ``model`` (``BlowModel``), the ``pairs`` (place struck, ``Pair.seat``) that were heard, ``seats`` from the
+    latter to the place of the sensor, and the ``zone`` whose supports have values of their own."""
+
+    def __init__(self, model, pairs, seats, zone):
+        self.model, self.seats, self.zone = model, seats, zone
+        self.row = {pair: k for k, pair in enumerate(dict.fromkeys(pairs))}
+
+    def _of(self, pair):
+        return self.row[pair.test.place, pair.seat]
+
+    def receptance(self, pair):
+        """(n_line,) complex [m/N]."""
+        return self.model.receptance(pair.test.place, self.seats[pair.seat])
+
+    def seat_gradient(self, pair):
+        """Derivative by the sensor's place on the rail, (n_line,) [1/N]; 0 on a sleeper."""
+        return self.model.seat_gradient(pair.test.place, self.seats[pair.seat])
+
+    def rail_gradient(self, pair):
+        """Derivatives by the logarithms of what is not known of the rail (``rail_spreads``), (n_line, n)."""
+        return np.concatenate([self._by_rail[self._of(pair)], self._by_castings[self._of(pair)]], axis=-1)
+
+    def gradient(self, pair):
+        """Derivatives by the logarithm of each common and own value, (n_line, n) in the order of ``inner_names``."""
+        return self._by_supports[self._of(pair)]
+
+    def motion(self, ends, pair):
+        """((n_link, n_line), the same) motion of links' ``ends`` (n_link, n) under unit forces at blow and sensor."""
+        return tuple(ends @ self._moved[place].T for place in self._places[1][:, self._of(pair)])
+
+    @cached_property
+    def _places(self):
+        """Index of every place that was struck or where a sensor sat, and (2, n_pair) those of each pair."""
+        ends = [(place, self.seats[seat]) for place, seat in self.row]
+        index = {place: k for k, place in enumerate(dict.fromkeys(p for pair in ends for p in pair))}
+        return index, np.array([[index[p] for p in pair] for pair in ends]).T
+
+    @cached_property
+    def _moved(self):
+        """(n_place, n_line, n) of all degrees of freedom under unit forces at the places."""
+        return np.array([self.model.displacement(place) for place in self._places[0]])
+
+    @cached_property
+    def _by_rail(self):
+        r"""(n_pair, n_line, 2) of
+
+        .. math:: -\sum_e \frac{EI}{h} s_u s_v + \frac{12 EI}{h (1+P)^2} a_u a_v, \quad
+                  -\sum_e \frac{12 EI P}{h (1+P)^2} a_u a_v
+
+        with :math:`s = \theta_2 - \theta_1`, :math:`a = (w_2 - w_1)/h - (\theta_1 + \theta_2)/2` of each element and P
+        its share of shear: the element's two modes (Przemieniecki 1968, ch. 11). Its mass hardly hangs on them.
+        """
+        matrices = self.model.matrices
+        h, p, ei, _ = matrices.elements
+        sheared = 12.0 * ei / (h * (1.0 + p) ** 2)
+        weights = np.array([ei / h, sheared, self.model.own_shear * sheared * p])
+        return by_rail(self._moved, self._places[1], matrices.node_index, h, weights)
+
+    @cached_property
+    def _by_castings(self):
+        r"""(n_pair, n_line, 2 n_casting) by the logarithms of bending stiffness and mass of each: the same sums over
+        the elements it covers, and :math:`\omega^2 \sum_e u^T M_e v` with their masses, each by the casting's part in
+        what the element yields and weighs."""
+        matrices, (first, second) = self.model.matrices, self._places[1]
+        h, p, ei, _ = matrices.elements
+        row = matrices.node_index
+        found = [np.zeros((len(self.row), OMEGA.size, 0), dtype=complex)]
+        for c, (e, share) in zip(self.zone.castings, cast_elements(self.zone, matrices.node)):
+            yields, weighs = self._part_of(c.piece, e, share)
+            ends = [self._moved[..., row[e + side] + k] for side in (0, 1) for k in (0, 1)]
+            w, turn = ends[::2], ends[1::2]
+            bent, skew = turn[1] - turn[0], (w[1] - w[0]) / h[e] - 0.5 * (turn[0] + turn[1])
+            sheared = yields * 12.0 * ei[e] / (h[e] * (1.0 + p[e]) ** 2)
+            bending = -(bent[first] * bent[second]) @ (yields * ei[e] / h[e]) - (skew[first] * skew[second]) @ sheared
+            u = np.stack(ends, axis=-1)
+            mass = [
+                w_k * element_mass(replace(matrices.rails[k], rotary_inertia=0.0), h[k]) for w_k, k in zip(weighs, e)
+            ]
+            pressed = np.einsum("pfei,eij->pfej", u, np.reshape(mass, (-1, 4, 4)))
+            found += [bending[..., None], (OMEGA**2 * np.sum(u[first] * pressed[second], axis=(2, 3)))[..., None]]
+        return np.concatenate(found, axis=-1)
+
+    def _part_of(self, piece, elements, shares):
+        """(2, n) parts of a piece in the flexibility and in the mass of the elements of which it covers ``shares``; 0
+        where a term has put another rail instead."""
+        matrices, track, parts = self.model.matrices, self.model.track, np.zeros((2, elements.size))
+        own = track.rail_between(0.5 * (piece.start + piece.end))
+        for k, (e, share) in enumerate(zip(elements, shares)):
+            there, filed = matrices.rails[e], track.rail_over(*matrices.node[e : e + 2].tolist())
+            if (there.bending_stiffness, there.mass) == (filed.bending_stiffness, filed.mass):
+                parts[:, k] = share * there.bending_stiffness / own.bending_stiffness, share * own.mass / there.mass
+        return parts
+
+    @cached_property
+    def _by_supports(self):
+        """(n_pair, n_line, n) of all values."""
+        zone, track = self.zone, self.model.track
+        inside, n = slice(zone.first, zone.last + 1), zone.last + 1 - zone.first
+        first, second = self._places[1]
+        pad, sleeper = (u[first] * u[second] for u in self._at_supports(self._moved))
+        product = {"pad": pad, "ballast": sleeper, "sleeper": sleeper}
+        found = np.empty((len(self.row), LINES.size, len(COMMON) + n * len(OWN)), dtype=complex)
+        for k, o in enumerate(OWN):
+            value, factor = getattr(track, o.field), FACTOR[o.what]
+            found[..., _COMMON_OF[o.field]] = (product[o.link] @ value) * factor
+            start, by = len(COMMON) + k * n, factor[:, None] * value[inside]
+            np.multiply(product[o.link][..., inside], by, out=found[..., start : start + n])
+        if self.model.following:
+            found += self._followed(found.shape, n)
+        return found
+
+    def _at_supports(self, u):
+        """Stretch of every pad and motion of every sleeper, each (..., n_support)."""
+        rail, sleeper = self.model.rows
+        return u[..., rail] - u[..., sleeper], u[..., sleeper]
+
+    def _followed(self, shape, n):
+        """What links of terms add that follow a value of their support."""
+        fields, supports, rows, weights, changes = zip(*self.model.following)
+        first = np.cumsum([0, *(r.size for r in rows)])
+        ends = csr_array((np.concatenate(weights), np.concatenate(rows), first), (len(rows), self.model.matrices.n))
+        impedance = np.array(changes) @ np.array([FACTOR["stiffness"], FACTOR["damping"], FACTOR["mass"]])
+        moved = (ends @ self._moved.reshape(-1, ends.shape[1]).T).reshape(len(fields), -1, LINES.size)
+        first, second = self._places[1]
+        each = moved[:, first] * moved[:, second] * impedance[:, None]
+        common = [(e, _COMMON_OF[field]) for e, field in enumerate(fields)]
+        own = [
+            (e, len(COMMON) + FIELDS.index(field) * n + support - self.zone.first)
+            for e, (field, support) in enumerate(zip(fields, supports))
+            if self.zone.first <= support <= self.zone.last
+        ]
+        entry, column = np.array([*common, *own]).T
+        sums = csr_array((np.ones(entry.size), (entry, column)), (len(fields), shape[-1]))
+        return (sums.T @ each.reshape(len(fields), -1)).T.reshape(shape)
+
+
+_COMMON_OF = {name: k for k, (name, *_) in enumerate(COMMON)}

@@ -1,0 +1,223 @@
+"""The base model of a turnout: which of its numbers are free, how free, and the track that they give."""
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import pairwise
+from operator import itemgetter
+
+import numpy as np
+
+from turnout.mismatch.engine.case import Nuisance
+from turnout.simulate.track import PER_SUPPORT, SAME, RailStretch
+
+# Common logarithmic factor on a value of all supports: field, tag of its links, what of the link, prior sd.
+# Priors: spread of published values, Knothe and Grassie 1993, tables 1 to 3.
+COMMON = (
+    ("pad_stiffness", "pad", "stiffness", 0.25),
+    ("pad_damping", "pad", "damping", 0.5),
+    ("ballast_stiffness", "ballast", "stiffness", 0.25),
+    ("ballast_damping", "ballast", "damping", 0.5),
+    ("sleeper_mass", "sleeper", "mass", 0.06),
+)
+
+
+@dataclass(frozen=True)
+class Own:
+    """A value that every support of the zone has of its own: ``field`` of the track, short ``tag``, the ``link`` it
+    belongs to, ``what`` of it, and the standard deviation ``sd`` of its logarithm from support to support."""
+
+    field: str
+    tag: str
+    link: str
+    what: str
+    sd: float
+
+
+# Scatter from support to support: Oscarsson 2002; dampers were never measured one by one, sleepers are cast alike.
+OWN = (
+    Own("pad_stiffness", "pad", "pad", "stiffness", 0.10),
+    Own("ballast_stiffness", "ballast", "ballast", "stiffness", 0.10),
+    Own("pad_damping", "pad_damper", "pad", "damping", 0.15),
+    Own("ballast_damping", "ballast_damper", "ballast", "damping", 0.15),
+    Own("sleeper_mass", "sleeper", "sleeper", "mass", 0.03),
+)
+# ln of the profile's stiffness: wear and rolling tolerances; published shear coefficients of 60E1 go from 0.34 to 0.41,
+# and 14 controls of another simulator, right by its own closed forms, asked for 0.12 ± 0.02 less (95 %).
+RAIL = (("rail_bending", 0.015), ("rail_shear", 0.12))
+# The same of a piece of other rail, and of one at its ends: a file's one section stands for a casting that changes.
+CAST = (("cast_bending", 0.10, 0.30), ("cast_mass", 0.10, 0.30))
+SHORT = 0.02  # m: pieces that two ends happen to leave, shorter than any element
+RAMP = 0.3  # over which a casting's section grows beyond and before its ends [m]
+RAIL_STEP = 0.05  # of their logarithms; derivatives by pads err by 8 % over 0.12
+WHEELS_SD = 0.06  # ln unsprung mass: reprofiling takes a tenth of it; 42 of another simulator: 0.054
+SEAT_SD = 0.02  # a sensor's place is known to this [m]
+REACH = 1.9  # supports this far beyond sensors and blows have values of their own [m]
+ASKED = 0.7  # and this far laws of their own: the outermost ones are given what all beyond them differ by [m]
+MARGIN = 18.0  # track kept beyond them [m]
+
+
+@dataclass(frozen=True)
+class Casting:
+    """A ``piece`` of the stretch ``of`` other rail, or just beyond, with its rail as in the file; ``inner``: not at an
+    end."""
+
+    of: RailStretch
+    piece: RailStretch
+    inner: bool
+
+
+@dataclass(frozen=True)
+class Zone:
+    """Supports ``first`` to ``last`` (inclusive) of the kept track lie among sensors and blows; those of ``asked`` may
+    have an effect; ``castings`` are pieces of other rail there."""
+
+    turnout: object
+    first: int
+    last: int
+    asked: range
+    castings: tuple = ()
+
+    @property
+    def supports(self):
+        """Indices of the supports of the zone."""
+        return range(self.first, self.last + 1)
+
+
+def zone_of(turnout, places):
+    """The part of a turnout that matters, with absorbing ends kept as they are."""
+    low, high = min(places), max(places)
+
+    def cut(track):
+        keep = (track.support >= low - MARGIN) & (track.support <= high + MARGIN)
+        values = {name: getattr(track, name)[keep] for name in PER_SUPPORT}
+        section = tuple(s for s, k in zip(track.section, keep) if k)
+        return replace(track, support=track.support[keep], section=section, **values)
+
+    tracks = {name: cut(track) for name, track in turnout.tracks.items()}
+    smaller = replace(turnout, track=cut(turnout.track), tracks=tracks)
+    support = smaller.track.support
+    inside, asked = (np.flatnonzero((support >= low - r) & (support <= high + r)) for r in (REACH, ASKED))
+    castings = castings_of(smaller.track_of("main"), low - REACH, high + REACH)  # blows are modelled on it
+    return Zone(smaller, int(inside[0]), int(inside[-1]), range(int(asked[0]), int(asked[-1]) + 1), castings)
+
+
+def castings_of(track, low, high):
+    """Pieces of other rail, and of what lies within ``RAMP`` of it, that reach between ``low`` and ``high`` [m]: cut at
+    all ends, at ``RAMP`` from them, where a section grows from the rail's, and every metre or so."""
+    cuts = {x for s in track.stretches for x in (s.start - RAMP, s.start, s.end, s.end + RAMP)}
+    for s in track.stretches:
+        if s.end - s.start > 2.0 * RAMP:
+            cuts |= set(np.linspace(s.start + RAMP, s.end - RAMP, 1 + max(1, round(s.end - s.start))))
+    found = []
+    for start, end in pairwise(sorted(cuts)):
+        middle = 0.5 * (start + end)
+        near = [s for s in track.stretches if s.start - RAMP < middle < s.end + RAMP]
+        if near and end - start > SHORT and end > low and start < high:
+            of = next((s for s in reversed(near) if s.start <= middle < s.end), near[-1])
+            inner = of.start + RAMP < middle < of.end - RAMP
+            found.append(Casting(of, RailStretch(float(start), float(end), track.rail_between(middle)), inner))
+    return tuple(found)
+
+
+def rail_spreads(zone):
+    """{name: standard deviation} of what is not known of the rail: its stiffness, and that and the mass of castings."""
+    cast = [(f"{name}_{k}", sds[not c.inner]) for k, c in enumerate(zone.castings) for name, *sds in CAST]
+    return dict([*RAIL, *cast])
+
+
+def cast_elements(zone, node):
+    """[((n,) elements, (n,) shares of their length)] that each casting covers, between nodes (n_element + 1,) [m]."""
+    length, found = np.diff(node), []
+    for c in zone.castings:
+        covered = np.minimum(node[1:], c.piece.end) - np.maximum(node[:-1], c.piece.start)
+        inside = np.flatnonzero(covered > SAME)
+        found.append((inside, covered[inside] / length[inside]))
+    return found
+
+
+def with_rail(zone, values):
+    """The zone with its rails' stiffness, and the mass of castings, multiplied by the exponentials of ``values``."""
+    factor = {name: float(np.exp(value)) for name, value in values.items()}
+
+    def changed(rail, bending=1.0, mass=1.0):
+        return replace(
+            rail,
+            bending_stiffness=rail.bending_stiffness * factor["rail_bending"] * bending,
+            shear_stiffness=rail.shear_stiffness * factor["rail_shear"],
+            mass=rail.mass * mass,
+        )
+
+    def stiffened(track):
+        own = [replace(s, rail=changed(s.rail)) for s in track.stretches]
+        for k, c in enumerate(zone.castings):
+            if c.of in track.stretches:
+                own.append(replace(c.piece, rail=changed(c.piece.rail, *(factor[f"{name}_{k}"] for name, *_ in CAST))))
+        return track.with_(rail=changed(track.rail), stretches=tuple(own))
+
+    tracks = {name: stiffened(track) for name, track in zone.turnout.tracks.items()}
+    return replace(zone, turnout=replace(zone.turnout, track=stiffened(zone.turnout.track), tracks=tracks))
+
+
+def near_rail(values, names):
+    """Rail's values on a grid of ``RAIL_STEP``: models are made there, and are straight from there to ``values``."""
+    return {name: RAIL_STEP * round(values[name] / RAIL_STEP) for name in names}
+
+
+def track_nuisances(zone, trains):
+    """Nuisances of track and vehicles, all as logarithms of a factor on the file's value."""
+    found = [Nuisance(name, "-", 0.0, sd, bounds=(-2.0, 2.0), meaning=f"ln {name}") for name, _, _, sd in COMMON]
+    for own in OWN:
+        steps = steps_of(getattr(zone.turnout.track, own.field))
+        for j in zone.supports:
+            sd = float(np.hypot(own.sd, steps[j]))
+            meaning, most = f"ln {own.field} of {j}", 6.0 * sd
+            found.append(Nuisance(f"{own.tag}_{j}", "-", 0.0, sd, bounds=(-most, most), meaning=meaning))
+    for name, sd in rail_spreads(zone).items():
+        found.append(Nuisance(name, "-", 0.0, sd, bounds=(-6.0 * sd, 6.0 * sd), meaning=f"ln {name} of the rail"))
+    for train in trains:
+        found.append(Nuisance(f"wheels_{train}", "-", 0.0, WHEELS_SD, bounds=(-0.5, 0.5), meaning="ln unsprung mass"))
+    return found
+
+
+def steps_of(values):
+    """(n,) largest step of the logarithm to a neighbour: where sections meet, a support may belong to either, since a
+    track file has their border to a bay.
+
+    >>> [round(float(s), 3) for s in steps_of(np.array([2.0, 2.0, 1.0, 1.0]))]
+    [0.0, 0.693, 0.693, 0.0]
+    """
+    step = np.abs(np.diff(np.log(values)))
+    return np.maximum(np.append(step, 0.0), np.append(0.0, step))
+
+
+def track_with(track, zone, values):
+    """The track with the factors of ``values`` on its supports."""
+    changes = {name: getattr(track, name) * np.exp(values[name]) for name, *_ in COMMON}
+    for own in OWN:
+        for j in zone.supports:
+            changes[own.field][j] *= np.exp(values[f"{own.tag}_{j}"])
+    return track.with_(**changes)
+
+
+def inner_names(zone):
+    """Names of all that ``track_with`` reads, first among the nuisances of a case."""
+    return _names_of(zone.supports)
+
+
+@lru_cache(maxsize=8)
+def _names_of(supports):
+    return [n for n, *_ in COMMON] + [f"{own.tag}_{j}" for own in OWN for j in supports]
+
+
+def inner_values(zone, values):
+    """All that ``track_with`` reads, as one row: a key for what was computed with it."""
+    return np.array(itemgetter(*inner_names(zone))(values)).tobytes()
+
+
+def vehicle_with(vehicle, values, train, load):
+    """The vehicle with its wheels' mass and its load changed; ``load`` is relative, on all that is sprung."""
+    factor, wheels = float(np.exp(values.get(f"wheels_{train}", 0.0))), set(vehicle.wheels)
+    bodies = tuple(
+        replace(b, mass=b.mass * (factor if i in wheels else 1.0 + load)) for i, b in enumerate(vehicle.bodies)
+    )
+    return vehicle.with_(bodies=bodies)
