@@ -16,12 +16,12 @@ from examples.oscillator_case import OscillatorCase
 
 from benchmarks.bar import Bar, stopwatch
 from turnout import physics
-from turnout.chains.mismatch_groups import reserved, telling
 from turnout.mismatch import diagnose
 from turnout.mismatch.engine.distinguishability import distinguishability
 from turnout.mismatch.engine.reserved_data import fit_percent, predict_reserved
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.planned_case import PlannedCase, measured_campaign, small_plan, turnout_plan
+from turnout.stages.mismatch_groups import reserved, telling
 
 EFFECTS = {
     "hanging_sleeper": (physics.HangingSleeper(39, 5e-4), {"place": 23.4}),

@@ -367,7 +367,7 @@ CHILD = """
 import sys, time
 from pathlib import Path
 from turnout.passage.analysis import analyse
-from turnout.chains.passage import trains_in
+from turnout.stages.passage import trains_in
 from turnout.readers import read
 from turnout.records import RawChannel, RawDescription
 from benchmarks.bench_passage import SETTINGS, passage_truth

@@ -9,7 +9,6 @@ import numpy as np
 
 from benchmarks.bar import Bar, stopwatch
 from benchmarks.published.response import paper_response
-from turnout.chains.hammer import hammer_unit
 from turnout.config import load_configuration, with_raw
 from turnout.demo.hammer import hammer_test
 from turnout.demo.make import EXTENSION
@@ -19,6 +18,7 @@ from turnout.fleet.scan import scan, unit_id
 from turnout.readers import read
 from turnout.readers.writing import write
 from turnout.registry.register import register
+from turnout.stages.hammer import hammer_unit
 
 DAY = date(2024, 5, 13)
 FORMATS = ("uff58b", "hdf5", "tdms", "mat", "csv")

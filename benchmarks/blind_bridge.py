@@ -14,9 +14,6 @@ from pathlib import Path
 
 import numpy as np
 
-from turnout.chains.mismatch_context import track_of
-from turnout.chains.mismatch_gather import gather
-from turnout.chains.mismatch_groups import groups
 from turnout.config.load import load_configuration, with_raw
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.fleet.scan import scan
@@ -24,6 +21,8 @@ from turnout.mismatch.engine.candidate_search import shortlist
 from turnout.mismatch.engine.diagnose import diagnose
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.turnout.case import TrackCase
+from turnout.stages.mismatch_groups import groups
+from turnout.stages.mismatch_inputs import gather, track_of
 from turnout.stages.mismatch_rows import acts
 
 LESSER = {

@@ -17,7 +17,7 @@ rule hammer:
         mem_mb=1000,
         runtime=120,
     params:
-        **stage_params("hammer", "turnout.chains.hammer:hammer_unit"),
+        **stage_params("hammer", "turnout.stages.hammer:hammer_unit"),
         kind="hammer",
     script:
         "../scripts/stage.py"

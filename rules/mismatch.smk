@@ -30,10 +30,10 @@ rule mismatch:
         mem_mb=4000,
         runtime=1440,
     params:
-        **stage_params("mismatch", "turnout.chains.mismatch:mismatch_unit"),
+        **stage_params("mismatch", "turnout.stages.mismatch:mismatch_unit"),
         kind="mismatch",
         models=contents(MODELS),
-        context="turnout.chains.mismatch_context:mismatch_context",
-        gather=f"turnout.chains.mismatch_visits:{RUN.diagnose or 'enabled'}_visit",
+        context="turnout.stages.mismatch_inputs:mismatch_context",
+        gather=f"turnout.stages.mismatch_groups:{RUN.diagnose or 'enabled'}_visit",
     script:
         "../scripts/stage.py"

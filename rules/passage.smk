@@ -19,9 +19,9 @@ rule passage:
         mem_mb=2000,
         runtime=240,
     params:
-        **stage_params("passage", "turnout.chains.passage:passage_unit"),
+        **stage_params("passage", "turnout.stages.passage:passage_unit"),
         kind="passage",
         learned=contents(RUN.learned),
-        context="turnout.chains.passage_context:passage_context",
+        context="turnout.stages.passage_context:passage_context",
     script:
         "../scripts/stage.py"

@@ -1,6 +1,6 @@
 """Simulated recordings on request: `snakemake simulated/tommerup/passages/ic3_160_main_facing_1.h5`."""
 
-SIMULATED_CODE = fingerprint("turnout.chains.simulate")
+SIMULATED_CODE = fingerprint("turnout.stages.simulate")
 
 
 wildcard_constraints:

@@ -2,7 +2,7 @@
 
 import logging
 
-from turnout.chains.trend import trend_job
+from turnout.stages.trend import trend_job
 from turnout.fleet.attempt import attempt
 
 logging.basicConfig(filename=snakemake.log[0], filemode="w", level="INFO", format="%(levelname)s %(message)s")

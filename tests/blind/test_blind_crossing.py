@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from turnout.chains.mismatch_context import track_of
 from turnout.config.load import load_configuration
+from turnout.stages.mismatch_inputs import track_of
 from turnout_blind.crossing import Crossing
 from turnout_blind.effect import load_effects
 from turnout_blind.owner import write_configuration

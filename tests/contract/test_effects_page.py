@@ -1,14 +1,14 @@
 """docs/effects.md tells what a diagnosis asks for."""
 
-from turnout.chains.effects_page import NEVER_ASKED, page
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.physics import TERMS
+from turnout.stages.effects_page import NEVER_ASKED, page
 
 
 def test_the_page_is_the_one_that_the_catalogue_gives(repository):
     written = (repository / "docs" / "effects.md").read_text(encoding="utf-8")
-    assert written == page(), "run: python -m turnout.chains.effects_page docs"
+    assert written == page(), "run: python -m turnout.stages.effects_page docs"
 
 
 def test_what_the_page_calls_never_asked_is_in_no_library():

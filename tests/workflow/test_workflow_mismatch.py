@@ -13,7 +13,7 @@ import small_turnout as small
 
 LIGHT = '''"""The program's own chain with two families, so that a turnout takes a second; one turnout has a fault."""
 from functools import partial
-from turnout.chains import mismatch
+from turnout.stages import mismatch
 from turnout.mismatch.turnout import TrackCase
 mismatch.TrackCase = partial(TrackCase, families=("local_ballast", "local_pad"))
 def unit(unit, turnout, raw_root, context=None, algo=""):

@@ -32,8 +32,8 @@ def add_arguments(parser):
 
 def run(args):
     """Fit and print."""
-    from turnout.chains.calibrate import calibrate_to_files, calibrate_to_modes, track_asked
     from turnout.errors import SimulationError
+    from turnout.stages.calibrate import calibrate_to_files, calibrate_to_modes, track_asked
 
     if bool(args.files) == bool(args.modes):
         raise SimulationError("give either hammer tests or --modes.")

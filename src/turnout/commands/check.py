@@ -51,8 +51,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _faults(configuration, formats, to_si):
     """Each fault that stops no turnout, and what it does stop."""
-    from turnout.chains.placed import faults_of_tracks
     from turnout.config.load import faults_of_unused_layouts
+    from turnout.stages.layout_checks import faults_of_tracks
 
     for warning in configuration.warnings:
         yield f"does not count: {warning}"

@@ -36,12 +36,12 @@ def add_arguments(parser):
 
 def run(args):
     """Diagnose and print, or accept what was found."""
-    from turnout.chains.mismatch_results import Results
+    from turnout.stages.mismatch_results import Results
 
     results = Results(args.work, args.turnout, args.registry)
     if args.accept:
         return _accept(args, results)
-    from turnout.chains.guided_case import BudgetSpentError
+    from turnout.stages.accepted_effects_case import BudgetSpentError
 
     try:
         _show(args, results, _diagnosed(args))
@@ -66,8 +66,8 @@ def _show(args, results, rows):
 
 def _diagnosed(args):
     """Rows by table of the visit asked for."""
-    from turnout.chains.mismatch_results import diagnose_turnout
     from turnout.commands.diagnose_bar import DiagnoseBar
+    from turnout.stages.mismatch_results import diagnose_turnout
 
     with DiagnoseBar() as bar:
         return diagnose_turnout(
@@ -78,7 +78,7 @@ def _diagnosed(args):
 
 def _accept(args, results):
     """Write the finding into the track file and say what changed."""
-    from turnout.chains.accept import accept
+    from turnout.stages.accept_finding import accept
 
     path, words = accept(results.finding(args.finding), args.configuration, args.turnout, args.track, args.anyway)
     print(f"{path}: {words}")

@@ -25,7 +25,7 @@ def add_arguments(parser):
 
 def run(args):
     """Print the matrix, what is confused, and the addition that would resolve most."""
-    from turnout.chains.distinguish import planned_matrix
+    from turnout.stages.distinguish import planned_matrix
 
     matrix, advice = planned_matrix(
         args.track,

@@ -36,10 +36,10 @@ def run(args: argparse.Namespace) -> int:
     """Print what each section's test holds; exit code 1 where one gives no resonance."""
     from pathlib import Path
 
-    from turnout.chains.hammer_on_site import asked_for
     from turnout.config import load_configuration
     from turnout.errors import ConfigError
     from turnout.report.hammer_words import hammer_words, is_usable
+    from turnout.stages.hammer_adhoc import asked_for
 
     if args.raw and not Path(args.raw).is_dir():
         raise ConfigError(args.raw, "--raw", "no such folder", "Write the folder that holds those of the turnouts")

@@ -26,11 +26,11 @@ def run(args: argparse.Namespace) -> int:
     """Print the train of each record and, unless told otherwise, the fit at each sensor; exit code 1 without any."""
     from pathlib import Path
 
-    from turnout.chains.passage import trains_in
-    from turnout.chains.passage_context import passage_context
     from turnout.config import load_configuration
     from turnout.errors import ConfigError
     from turnout.readers import read
+    from turnout.stages.passage import trains_in
+    from turnout.stages.passage_context import passage_context
 
     turnout = load_configuration(args.configuration).turnout(args.turnout)
     if turnout.passages is None:
@@ -50,8 +50,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _show(recording, late, turnout, context, settings, no_fit) -> bool:
     """Print one train, and how it is fitted; whether there is one."""
-    from turnout.chains.passage import sensors_of
     from turnout.passage.analysis import analyse
+    from turnout.stages.passage import sensors_of
 
     if late is not None:
         print(f"{late:.1f} s after the start of the record:")
@@ -88,8 +88,8 @@ def _fits(recording, passage, turnout, context, settings) -> list[str]:
     """A line per sensor: each score beside its null."""
     from datetime import datetime
 
-    from turnout.chains.passage import model_at, sensors_of
     from turnout.passage.channel_fit import fit_channel
+    from turnout.stages.passage import model_at, sensors_of
 
     words = ["  sensor      fit / null   forecast / null  left out / null   along b  peak m/s²  status"]
     for sensor in sensors_of(turnout):

@@ -12,8 +12,8 @@ from turnout.commands.counting import at_least_one
 
 HELP = "say what is new, without computing"
 STAGES = {
-    "hammer": ("turnout.chains.hammer", None),
-    "passage": ("turnout.chains.passage", "turnout.chains.passage_context:passage_context"),
+    "hammer": ("turnout.stages.hammer", None),
+    "passage": ("turnout.stages.passage", "turnout.stages.passage_context:passage_context"),
 }
 
 

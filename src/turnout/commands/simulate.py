@@ -65,7 +65,7 @@ def run(args):
         for path in draw_all(args.out):
             print(path)
         return 0
-    from turnout.chains.simulate import write_hammer, write_passage
+    from turnout.stages.simulate import write_hammer, write_passage
 
     write = write_hammer if args.kind == "hammer" else write_passage
     for path, note in write(vars(args)):

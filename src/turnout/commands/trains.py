@@ -25,11 +25,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print each calibration and each cluster."""
-    from turnout.chains.passage_context import known_patterns
-    from turnout.chains.passage_learning import learn_clusters, learn_loads, weighed_trains
     from turnout.config import load_configuration, with_raw
     from turnout.errors import ConfigError
     from turnout.registry.database import open_registry
+    from turnout.stages.passage_context import known_patterns
+    from turnout.stages.passage_training import learn_clusters, learn_loads, weighed_trains
 
     if not Path(args.raw).is_dir():
         raise ConfigError("--raw", "folder of the recordings", f"there is no folder {args.raw}", "Name the one that is")

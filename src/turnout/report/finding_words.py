@@ -2,7 +2,7 @@
 
 import json
 
-from turnout.chains.mismatch_words import Z95, interval, number_in_words, parameter_in_words, title
+from turnout.stages.mismatch_text import Z95, interval, number_in_words, parameter_in_words, title
 
 __all__ = ["answer", "check", "facts", "filed", "parameters", "rivals", "title"]
 ANSWERS = {

@@ -16,7 +16,7 @@ class TurnoutTrack:
     ``roughness_level`` [dB above the limit curve of ISO 3095], None for a smooth rail. ``locations`` are named
     (place [m], route); ``numbers`` the parameters with unit, source and prior as read. ``tracks`` holds the track
     of a route that has rails of its own, as behind a crossing. ``terms`` are the entries of effects that recordings
-    showed to be missing from the base track, as read; ``turnout.chains.accepted_terms`` makes terms of them.
+    showed to be missing from the base track, as read; ``turnout.stages.accepted_effects`` makes terms of them.
     ``spreads`` has for parts of routes the relative standard deviation of each number with a prior, by its field.
     """
 

@@ -2,11 +2,11 @@
 
 import pytest
 
-from turnout.chains.accepted_terms import Accepted, accepted_of
 from turnout.config.parameters import Number, ParameterSet
 from turnout.errors import ConfigError, SimulationError
 from turnout.simulate import uniform_track
 from turnout.simulate.turnout_track import stretch_of_track
+from turnout.stages.accepted_effects import Accepted, accepted_of
 
 TRACK = uniform_track(60.0)
 LIFTS = Accepted("lifting_sleepers", {"first": 12.0, "last": 55.8}, {"share": (1.0, None)})

@@ -10,7 +10,6 @@ import pytest
 from benchmarks.published.models import published_model
 from benchmarks.published.response import paper_response
 
-from turnout.chains.hammer import hammer_unit
 from turnout.config import load_configuration, with_raw
 from turnout.demo.hammer import hammer_test
 from turnout.fleet.guard import guarded
@@ -18,6 +17,7 @@ from turnout.fleet.scan import scan
 from turnout.readers import read
 from turnout.readers.writing import write
 from turnout.registry.intake import Arrival, gather
+from turnout.stages.hammer import hammer_unit
 
 DAY = date(2024, 5, 13)
 EXTENSIONS = {"uff58b": "uff", "tdms": "tdms", "hdf5": "h5"}

@@ -9,7 +9,6 @@ import pytest
 from benchmarks.published.models import published_model
 from benchmarks.published.response import ACCELERATION_PER_IMPULSE, LOCATION, paper_response
 
-from turnout.chains.hammer import hammer_unit
 from turnout.cli import main
 from turnout.config import load_configuration, with_raw
 from turnout.demo import faults
@@ -17,6 +16,7 @@ from turnout.demo.hammer import RATE, hammer_test
 from turnout.fleet.scan import scan
 from turnout.readers.writing import write
 from turnout.registry.intake import Arrival, gather
+from turnout.stages.hammer import hammer_unit
 
 DAY = date(2024, 5, 13)
 NOTES = "campaign,started_at_utc,rail_temperature_c\n2024-05-13,2024-05-13T09:00:00,11.5\n"

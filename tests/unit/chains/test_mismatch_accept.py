@@ -10,16 +10,16 @@ import pytest
 import small_turnout as small
 
 from turnout import physics
-from turnout.chains import mismatch
-from turnout.chains.accept import accept
-from turnout.chains.accepted_terms import OF_A_WHEELSET, Accepted, accepted_of, described, terms_on
-from turnout.chains.guided_case import GuidedCase
-from turnout.chains.mismatch_context import digest_of_model
-from turnout.chains.mismatch_groups import Group
 from turnout.errors import SimulationError, TurnoutError
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.simulate import load_track, simulate_hammer
+from turnout.stages import mismatch
+from turnout.stages.accept_finding import accept
+from turnout.stages.accepted_effects import OF_A_WHEELSET, Accepted, accepted_of, described, terms_on
+from turnout.stages.accepted_effects_case import GuidedCase
+from turnout.stages.mismatch_groups import Group
+from turnout.stages.mismatch_inputs import digest_of_model
 
 GAP = {"value": 1.12e-3, "se": 0.05e-3, "unit": "m"}
 HANGS = {"term": "hanging_sleeper", "fixed": {"sleeper": 18.0}, "parameters": {"gap": GAP}}

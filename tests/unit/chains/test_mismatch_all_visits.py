@@ -2,8 +2,8 @@
 
 import pytest
 
-from turnout.chains.mismatch_results import ALL, _visit
 from turnout.errors import SimulationError
+from turnout.stages.mismatch_results import ALL, _visit
 
 FOUND = {"2024-02-06": ["cold blows"], "2024-07-16": ["warm blows", "trains"]}
 

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 import small_turnout as small
 
-from turnout.chains import mismatch, mismatch_groups
-from turnout.chains.accept import accept
-from turnout.chains.guided_case import BudgetSpentError
-from turnout.chains.mismatch_context import track_of
-from turnout.chains.mismatch_results import Results, diagnose_turnout
 from turnout.cli import main
 from turnout.config import load_configuration
 from turnout.errors import SimulationError
 from turnout.mismatch.turnout import TrackCase
+from turnout.stages import mismatch, mismatch_groups
+from turnout.stages.accept_finding import accept
+from turnout.stages.accepted_effects_case import BudgetSpentError
+from turnout.stages.mismatch_inputs import track_of
+from turnout.stages.mismatch_results import Results, diagnose_turnout
 
 
 @pytest.fixture
@@ -101,8 +101,8 @@ def test_what_was_accepted_is_not_found_again_in_passages_either(soft):
 
 def test_the_simulated_file_holds_the_accepted_effect(soft):
     """The file that `turnout simulate` writes is the recording of the track with the term, and not the one without."""
-    from turnout.chains.simulate import COMMON, write_hammer
     from turnout.readers import read
+    from turnout.stages.simulate import COMMON, write_hammer
 
     turnout = load_configuration("config").turnout("t1")
     Results("work", "t1").keep(diagnose_turnout("t1"))

@@ -4,11 +4,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from turnout.chains.mismatch_gather import _spoils
-from turnout.chains.mismatch_groups import formations, reserved, telling
-from turnout.chains.mismatch_trains import train_of
 from turnout.mismatch.turnout.campaign import Passage
 from turnout.simulate import load_vehicle
+from turnout.stages.mismatch_groups import formations, reserved, telling
+from turnout.stages.mismatch_inputs import _spoils
+from turnout.stages.mismatch_trains import train_of
 
 
 def train(name, kind, axles, speed):

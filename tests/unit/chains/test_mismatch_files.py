@@ -9,17 +9,6 @@ import numpy as np
 import pytest
 import small_turnout as small
 
-from turnout.chains import mismatch, mismatch_gather
-from turnout.chains.accept import with_entry
-from turnout.chains.accepted_terms import Accepted
-from turnout.chains.calibrate import calibrate_to_files
-from turnout.chains.mismatch_context import digest_of_model, track_of
-from turnout.chains.mismatch_gather import MOST_ALIKE, Gathered, _channels_of, _thin_out, gather
-from turnout.chains.mismatch_groups import _neighbours, groups, telling
-from turnout.chains.mismatch_results import Results, diagnose_turnout
-from turnout.chains.mismatch_trains import train_of
-from turnout.chains.mismatch_visits import unit_of
-from turnout.chains.noted import number, rail_temperature
 from turnout.config import load_configuration, with_raw
 from turnout.errors import SimulationError
 from turnout.fleet.batches import encode
@@ -34,6 +23,23 @@ from turnout.readers import HELD, read
 from turnout.readers.writing import write
 from turnout.receptance import find_impacts
 from turnout.simulate import Sensor, load_vehicle
+from turnout.stages import mismatch, mismatch_inputs
+from turnout.stages.accept_finding import with_entry
+from turnout.stages.accepted_effects import Accepted
+from turnout.stages.calibrate import calibrate_to_files
+from turnout.stages.common import number, rail_temperature
+from turnout.stages.mismatch_groups import _neighbours, groups, telling, unit_of
+from turnout.stages.mismatch_inputs import (
+    MOST_ALIKE,
+    Gathered,
+    _channels_of,
+    _thin_out,
+    digest_of_model,
+    gather,
+    track_of,
+)
+from turnout.stages.mismatch_results import Results, diagnose_turnout
+from turnout.stages.mismatch_trains import train_of
 
 
 @pytest.fixture
@@ -155,14 +161,14 @@ def test_another_content_of_the_same_size_is_another_finding(folder):
 @pytest.mark.parametrize(("detail", "used"), [("", 1), ("A: clipped; another train at about 80 km/h, facing", 0)])
 def test_of_two_trains_at_once_neither_is_simulated(folder, monkeypatch, detail, used):
     """Also where another finding comes first."""
-    plain = mismatch_gather.passage_unit
+    plain = mismatch_inputs.passage_unit
 
     def found(*arguments, **more):
         tables = plain(*arguments, **more)
         tables["passages"][0] |= {"detail": detail, "reason": "clipped" if detail else None}
         return tables
 
-    monkeypatch.setattr(mismatch_gather, "passage_unit", found)
+    monkeypatch.setattr(mismatch_inputs, "passage_unit", found)
     small.roll(folder, speeds=(100.0,))
     assert diagnose_turnout("t1")["mismatch_findings"][0]["n_passages"] == used
 
@@ -272,7 +278,7 @@ def _tones_at(rate):
 
 
 def test_a_note_of_this_group_is_not_cut_off_by_those_of_others():
-    from turnout.chains.mismatch_rows import _of_visit
+    from turnout.stages.mismatch_rows import _of_visit
 
     notes = [f"passage {k}: load not known" for k in range(20)] + ["section C: elsewhere"]
     campaign = SimpleNamespace(passages=[SimpleNamespace(name="17")])
@@ -280,7 +286,7 @@ def test_a_note_of_this_group_is_not_cut_off_by_those_of_others():
 
 
 def test_notes_that_are_cut_off_are_counted():
-    from turnout.chains.mismatch_rows import NOTES_KEPT, _kept
+    from turnout.stages.mismatch_rows import NOTES_KEPT, _kept
 
     notes = [f"note {k}" for k in range(NOTES_KEPT + 3)]
     assert _kept(notes) == [*notes[:NOTES_KEPT], "and 3 more"]
@@ -350,7 +356,7 @@ def gathered(folder, kind="passage"):
 @pytest.mark.parametrize("held", [HELD, 0])
 def test_a_logger_that_never_stops_gives_its_trains(logged, monkeypatch, held):
     """Both are used, each as its own; also of a file so large that it is not read as a whole."""
-    monkeypatch.setattr(mismatch_gather, "read", partial(read, held=held))
+    monkeypatch.setattr(mismatch_inputs, "read", partial(read, held=held))
     found = gathered(logged)
     assert [round(3.6 * p.speed, -1) for p in found.passages] == [80.0, 110.0], found.notes
     assert len({p.name for p in found.passages}) == 2 and not [n for n in found.notes if "trains in it" in n]
@@ -358,13 +364,13 @@ def test_a_logger_that_never_stops_gives_its_trains(logged, monkeypatch, held):
 
 def test_rows_that_may_be_those_of_other_trains_are_not_used_and_that_is_said(logged, monkeypatch):
     """The passage stage lost the first of two: its only row would give either train the other's speed and load."""
-    plain = mismatch_gather.passage_unit
+    plain = mismatch_inputs.passage_unit
 
     def lost(*arguments, **more):
         tables = plain(*arguments, **more)
         return {**tables, "passages": tables["passages"][1:]}
 
-    monkeypatch.setattr(mismatch_gather, "passage_unit", lost)
+    monkeypatch.setattr(mismatch_inputs, "passage_unit", lost)
     found = gathered(logged)
     assert not found.passages and len([n for n in found.notes if "speed is not known" in n]) == 2
     assert [n for n in found.notes if "2 trains in it, 1 where passages were analysed" in n]

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from turnout.chains.mismatch_curves import Shown, best_shown
+from turnout.stages.mismatch_curves import Shown, best_shown
 
 PLACES = {"A1": 2.0, "A2": 4.0, "A3": 6.0}
 

@@ -4,11 +4,11 @@ import shutil
 
 import pytest
 
-from turnout.chains.passage_context import known_patterns
 from turnout.cli import main
 from turnout.config.parameters import read_parameters
 from turnout.config.settings.passage import PassageSettings
 from turnout.errors import ConfigError
+from turnout.stages.passage_context import known_patterns
 
 ALL = ("turnouts.tsv", "events.csv", "acknowledgements.csv", "config.yaml", "layouts/tommerup.yaml",
        "overrides/tommerup_s1.yaml")  # fmt: skip

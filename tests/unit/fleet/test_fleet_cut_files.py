@@ -5,7 +5,6 @@ import json
 import pytest
 from length_fleet import CALLS
 
-from turnout.chains.trend import trend_job
 from turnout.fleet.attempt import attempt, attempts
 from turnout.fleet.launch import launch
 from turnout.fleet.nightly import _night
@@ -13,6 +12,7 @@ from turnout.fleet.plan import read_plan, write_plans
 from turnout.fleet.postponed import read_postponed
 from turnout.fleet.state import batch_paths
 from turnout.fleet.verdict import verdict
+from turnout.stages.trend import trend_job
 
 PARTS = [0.0, 0.3, 0.7, 0.95]
 

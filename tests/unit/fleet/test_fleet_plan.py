@@ -132,7 +132,7 @@ def test_plan_says_what_is_new_and_what_changed(fleet, capsys, monkeypatch):
     plans(fleet, shards=3)
     folders = ["--configuration", "config", "--raw", "raw", "--work", "elsewhere", "--shards", "3"]
     monkeypatch.chdir(fleet)
-    algo = fingerprint("turnout.chains.hammer")
+    algo = fingerprint("turnout.stages.hammer")
     for plan in (fleet / "work/plan").glob("*.json"):
         units = {unit_id(p.unit): Known(stamp_of(p), "", algo, "ok", "b") for p in read_plan(plan)}
         (fleet / "elsewhere/hammer").mkdir(parents=True, exist_ok=True)

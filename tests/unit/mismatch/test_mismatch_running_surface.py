@@ -8,10 +8,6 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from turnout.chains.accepted_terms import Accepted
-from turnout.chains.guided_case import GuidedCase
-from turnout.chains.mismatch_rows import surface_told
-from turnout.chains.mismatch_words import otherwise
 from turnout.config.parameters import read_parameters
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.turnout import TrackCase, passage_alignment
@@ -20,6 +16,10 @@ from turnout.mismatch.turnout.rail_roughness import Waves
 from turnout.mismatch.turnout.running_surface import MODEL, SHAPE, RunningSurface
 from turnout.simulate.track_file import turnout_track
 from turnout.simulate.wheel_path import Dip, Kink, Sections
+from turnout.stages.accepted_effects import Accepted
+from turnout.stages.accepted_effects_case import GuidedCase
+from turnout.stages.mismatch_rows import surface_told
+from turnout.stages.mismatch_text import otherwise
 
 TOMMERUP = Path(__file__).parents[3] / "config" / "tracks" / "tommerup.yaml"
 PLAN = small_plan((15.0,), blows=(24.0,))

@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from turnout.chains.mismatch_rows import _evidence
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch import diagnose
 from turnout.mismatch.engine.candidate import Candidate
@@ -19,6 +18,7 @@ from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.two_effects import borne_out, finished, needed, parted
 from turnout.physics import Parameter
+from turnout.stages.mismatch_rows import _evidence
 
 AMOUNT = (Parameter("amount", "-", 0.0, (-9.0, 9.0), "share of a shape", "made up 2026"),)
 X = np.linspace(0.0, 1.0, 300)

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from benchmarks.passage_truth import PATTERNS, paper_model, struck_train
 
-from turnout.chains.passage import PassageContext, SectionModel, passage_unit
 from turnout.config import load_configuration, with_raw
 from turnout.errors import PartlyComputed
 from turnout.fleet.guard import guarded
@@ -15,6 +14,7 @@ from turnout.fleet.scan import scan
 from turnout.passage.segmentation import cut_passages
 from turnout.readers.writing import write
 from turnout.records import Channel
+from turnout.stages.passage import PassageContext, SectionModel, passage_unit
 
 PLACES = {"OT": -12.0, "SP": 3.6, "CLP": 13.8, "A7": 24.6, "A8": 26.4, "A9": 28.2, "ASM": 36.0, "ASD": 36.0}
 LOCATIONS = dict(zip(PLACES, ("OT", "SP", "CLP", "CP A7", "CP A8", "CP A9", "AS main", "AS diverging")))
@@ -142,7 +142,7 @@ def test_a_fault_of_the_program_costs_one_record(tmp_path, monkeypatch):
         if recording.record == 1:
             raise ZeroDivisionError("in the toy")
 
-    monkeypatch.setattr("turnout.chains.passage.axle_load", failing)
+    monkeypatch.setattr("turnout.stages.passage.axle_load", failing)
     with pytest.raises(PartlyComputed) as caught:
         rows_of(tmp_path, *later)
     assert calls == [0, 1, 2]

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from benchmarks.passage_truth import IC3, PATTERNS, RATE, rolling, sensors_for
 
-from turnout.chains.passage import trains_in
 from turnout.passage.analysis import analyse
 from turnout.passage.segmentation import cut_passages
 from turnout.readers import read
 from turnout.readers.writing import write
 from turnout.records import Channel, RawChannel, RawDescription, Recording
+from turnout.stages.passage import trains_in
 
 
 def record(starts, speeds, length, seed=1):

@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 from benchmarks.passage_truth import IC3, PATTERNS, RATE, passing, rolling, sensors_for
 
-from turnout.chains.passage_context import read_clusters, read_loads
-from turnout.chains.passage_learning import learn_clusters, learn_loads, weighed_trains
 from turnout.cli import main
 from turnout.config import load_configuration, with_raw
 from turnout.config.settings.passage import PassageSettings
@@ -19,6 +17,8 @@ from turnout.passage.analysis import analyse
 from turnout.passage.axle_load import axle_load, calibrate, train_amplitude, with_shared
 from turnout.readers.writing import write
 from turnout.records import Channel
+from turnout.stages.passage_context import read_clusters, read_loads
+from turnout.stages.passage_training import learn_clusters, learn_loads, weighed_trains
 
 PLACES = {"OT": -12.0, "SP": 3.6, "CLP": 13.8, "A7": 24.6, "ASM": 36.0}
 GAIN = {"OT": 1.0, "SP": 1.4, "CLP": 0.8, "A7": 1.2, "ASM": 0.9}

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from benchmarks.passage_truth import IC3, PATTERNS, RATE, rolling, sensors_for, struck_train
 
-from turnout.chains.passage_context import known_patterns
 from turnout.passage.analysis import analyse
 from turnout.passage.kinematics import Motion
 from turnout.passage.sensor_consistency import wrong_places
 from turnout.passage.slowness import scan_slowness
 from turnout.passage.speed import slowness_from_sensors
+from turnout.stages.passage_context import known_patterns
 
 COACHES = np.concatenate(
     [[0.0, 3.0, 9.5, 12.5]] + [18.98 - 3.24 + 2.45 + 26.4 * k + np.array([0, 2.5, 19, 21.5]) for k in range(3)]

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from jinja2 import Environment, PackageLoader
 
-from turnout.chains.accept import _refuse
-from turnout.chains.mismatch_words import headline
 from turnout.errors import SimulationError
 from turnout.report.finding_words import answer, check, facts, filed, parameters
 from turnout.report.pages.finding import finding_page
 from turnout.report.panels.finding_place import Drawing, marked_place
+from turnout.stages.accept_finding import _refuse
+from turnout.stages.mismatch_text import headline
 
 SECTIONS = [
     {"label": "OT", "panel": "OT", "track": "both", "position_m": -12.0},
@@ -250,8 +250,8 @@ def test_numbers_read_as_engineers_write_them():
 
 
 def test_every_effect_of_the_catalogue_has_its_sentence():
-    from turnout.chains.mismatch_words import SENTENCES
     from turnout.physics import TERMS
+    from turnout.stages.mismatch_text import SENTENCES
 
     assert {t.name for t in TERMS} - set(SENTENCES) <= {"roughness_level"}
     for term in TERMS:

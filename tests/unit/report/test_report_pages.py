@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from benchmarks.published.response import paper_response
 
-from turnout.chains.hammer import hammer_unit
 from turnout.config import load_configuration, with_raw
 from turnout.demo.hammer import hammer_test
 from turnout.fleet.batches import UnitResult, read_results, write_batch
@@ -23,6 +22,7 @@ from turnout.report.job import report_job
 from turnout.report.pages.turnout import line_of
 from turnout.report.panels.diagram import diagram
 from turnout.report.write import write_pages
+from turnout.stages.hammer import hammer_unit
 
 DAYS = (date(2024, 5, 13), date(2024, 6, 17))
 

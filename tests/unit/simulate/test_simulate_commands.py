@@ -161,7 +161,7 @@ def calibrated(monkeypatch, capsys, command, reduced=0.9):
             reduced, 1600, None,
         )  # fmt: skip
 
-    monkeypatch.setattr("turnout.chains.calibrate.calibrate_to_files", fit)
+    monkeypatch.setattr("turnout.stages.calibrate.calibrate_to_files", fit)
     assert main(["calibrate", "--section", "M1", "a.h5", *command]) == 0
     return capsys.readouterr().out, taken
 

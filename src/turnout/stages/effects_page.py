@@ -1,16 +1,16 @@
 """docs/effects.md: the effects that a diagnosis knows, from the catalogue itself.
 
-``python -m turnout.chains.effects_page docs`` writes it anew; a test compares.
+``python -m turnout.stages.effects_page docs`` writes it anew; a test compares.
 """
 
 import sys
 from importlib import import_module
 from pathlib import Path
 
-from turnout.chains.mismatch_words import number_in_words
 from turnout.mismatch.turnout.candidates.catalogue import LEAST
 from turnout.physics import TERMS
 from turnout.stages.mismatch_rows import CHECKS
+from turnout.stages.mismatch_text import number_in_words
 
 NEVER_ASKED = ("lifting_sleepers", "rail_bending", "roughness_level")  # can be simulated, and written in a track file
 FIXED_TO = {

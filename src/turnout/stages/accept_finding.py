@@ -6,12 +6,12 @@ from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
 
-from turnout.chains.accepted_terms import KINDS, OF_A_WHEELSET, SUPPORTS, accepted_of
-from turnout.chains.mismatch_context import track_file
 from turnout.config import load_configuration
 from turnout.errors import SimulationError
 from turnout.files import write_text
 from turnout.simulate import load_track
+from turnout.stages.accepted_effects import KINDS, OF_A_WHEELSET, SUPPORTS, accepted_of
+from turnout.stages.mismatch_inputs import track_file
 
 # Units in which a small number reads better: SI unit -> (unit, its size)
 SMALLER = {"m": ("mm", 1e-3), "s": ("ms", 1e-3)}

@@ -13,7 +13,6 @@ import numpy as np
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError
 
-from turnout.chains.passage import PassageContext, SectionModel
 from turnout.config.document import legible
 from turnout.config.merge import digest
 from turnout.config.settings.passage import PassageSettings
@@ -25,6 +24,7 @@ from turnout.passage.axle_load import LoadCalibration
 from turnout.passage.axle_patterns import read_patterns
 from turnout.passage.clusters import Clusters
 from turnout.records import ModalModel, Unit
+from turnout.stages.passage import PassageContext, SectionModel
 
 
 def passage_context(

@@ -8,9 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from turnout.chains.hammer_rows import impact_mode_row, impact_row, mode_row, model_row, receptance_row
-from turnout.chains.noted import rail_temperature
-from turnout.chains.raw_rows import contradiction, quarantine_row, read_or_quarantine, recording_row
 from turnout.config.filename_pattern import compiled
 from turnout.config.turnout import TurnoutConfig
 from turnout.errors import ReadError
@@ -18,6 +15,8 @@ from turnout.modal import identify
 from turnout.receptance import find_impacts, receptance_of
 from turnout.records import ModalModel, Rejection, Unit
 from turnout.registry.ids import content_id
+from turnout.stages.common import contradiction, quarantine_row, rail_temperature, read_or_quarantine, recording_row
+from turnout.stages.hammer_rows import impact_mode_row, impact_row, mode_row, model_row, receptance_row
 
 # A campaign may go on into the night after its day, and a clock may show local time.
 OTHER_CAMPAIGN = timedelta(days=2)

@@ -7,8 +7,6 @@ from dataclasses import asdict
 from datetime import timedelta
 from pathlib import Path
 
-from turnout.chains.passage import _time_in, sensors_of, trains_in
-from turnout.chains.passage_context import read_clusters, read_loads
 from turnout.config.turnout import TurnoutConfig
 from turnout.errors import ReadError
 from turnout.files import write_if_changed
@@ -19,6 +17,8 @@ from turnout.passage.clusters import Clusters, fit_clusters
 from turnout.passage.timetable import listed_for, listed_trains
 from turnout.readers import read
 from turnout.records import LongRecording, Recording
+from turnout.stages.passage import _time_in, sensors_of, trains_in
+from turnout.stages.passage_context import read_clusters, read_loads
 
 MOST_PASSAGES = 20_000  # for the clusters: more change no boundary, and mixtures take time
 RECENT = """

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 
-from turnout.chains.passage_rows import finding_rows, fit_row, passage_row
-from turnout.chains.raw_rows import contradiction, quarantine_row, read_or_quarantine, recording_row
 from turnout.config.turnout import PassageConfig, TurnoutConfig
 from turnout.errors import PartlyComputed, ReadError
 from turnout.passage.analysis import analyse
@@ -18,6 +16,8 @@ from turnout.passage.segmentation import cut_passages
 from turnout.passage.timetable import listed_for, listed_trains
 from turnout.records import ModalModel, Recording, Unit
 from turnout.registry.ids import content_id
+from turnout.stages.common import contradiction, quarantine_row, read_or_quarantine, recording_row
+from turnout.stages.passage_rows import finding_rows, fit_row, passage_row
 
 # Names in local time differ by less.
 OTHER_TIME = timedelta(days=1)

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from turnout.chains.noted import number
 from turnout.errors import ConfigError, SimulationError
 from turnout.mismatch.turnout.campaign import LOAD_SD
 from turnout.simulate import load_vehicle
+from turnout.stages.common import number
 
 PATTERN = 0.4  # m rms between axles heard and those of the vehicle's file: half of a short bogie is 0.9
 LEAST_REACH = 0.03  # share by which the vehicle's axle distances may correct the speed found

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 
-from turnout.chains.mismatch_context import track_file
 from turnout.config.load import load_configuration
 from turnout.config.settings.identify import IdentifySettings
 from turnout.config.settings.receptance import ReceptanceSettings
@@ -19,6 +18,7 @@ from turnout.simulate.calibration import Measured, calibrate
 from turnout.simulate.hammer import located
 from turnout.simulate.modal_calibration import fit_modes
 from turnout.simulate.parameters import track_path
+from turnout.stages.mismatch_inputs import track_file
 
 LOG = logging.getLogger("turnout.simulate")
 BAND = (60.0, 800.0)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from turnout.chains.noted import number, temperature
-from turnout.chains.raw_rows import quarantine_row
 from turnout.errors import ReadError
 from turnout.passage.train_type import UNKNOWN
+from turnout.stages.common import number, quarantine_row, temperature
 
 KMH = 3.6
 NEWTON_PER_TONNE = 9806.65

@@ -7,14 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from turnout.chains.checkpoint import Checkpoint, Replay
-from turnout.chains.guided_case import BudgetSpentError, GuidedCase, Watch
-from turnout.chains.mismatch_context import digest_of_model, track_of
-from turnout.chains.mismatch_gather import gather
-from turnout.chains.mismatch_groups import Group, groups
-from turnout.chains.mismatch_rows import finding_tables
-from turnout.chains.mismatch_visits import members_of
-from turnout.chains.raw_rows import quarantine_row
 from turnout.config.merge import digest
 from turnout.config.turnout import TurnoutConfig
 from turnout.content import sha256_of
@@ -23,6 +15,12 @@ from turnout.fleet.scan import scan
 from turnout.mismatch.engine.diagnose import diagnose
 from turnout.mismatch.turnout import TrackCase
 from turnout.records import Unit
+from turnout.stages.accepted_effects_case import BudgetSpentError, GuidedCase, Watch
+from turnout.stages.checkpoint import Checkpoint, Replay
+from turnout.stages.common import quarantine_row
+from turnout.stages.mismatch_groups import Group, groups, members_of
+from turnout.stages.mismatch_inputs import digest_of_model, gather, track_of
+from turnout.stages.mismatch_rows import finding_tables
 
 FITS = "work/mismatch-fits"
 TABLES = ("mismatch_findings", "mismatch_parameters", "mismatch_curves", "quarantine")

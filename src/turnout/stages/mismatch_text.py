@@ -4,8 +4,8 @@ import json
 
 import numpy as np
 
-from turnout.chains.accepted_terms import KINDS
 from turnout.mismatch.engine.score import NO_UPPER_END
+from turnout.stages.accepted_effects import KINDS
 
 # What the simulation lacked, in words; {place}, {channel}, {train}, {wheel}, every parameter with its
 # unit, and its size without the sign as {<parameter>_size}.

@@ -3,10 +3,6 @@
 import time
 from pathlib import Path
 
-from turnout.chains.guided_case import Watch
-from turnout.chains.mismatch import Options, diagnose_visit
-from turnout.chains.mismatch_context import mismatch_context
-from turnout.chains.mismatch_visits import unit_of, visits
 from turnout.config import load_configuration, with_raw
 from turnout.errors import SimulationError
 from turnout.files import write_text
@@ -14,6 +10,10 @@ from turnout.fingerprint import fingerprint
 from turnout.fleet.batches import decode, encode
 from turnout.fleet.scan import scan
 from turnout.registry.database import open_registry
+from turnout.stages.accepted_effects_case import Watch
+from turnout.stages.mismatch import Options, diagnose_visit
+from turnout.stages.mismatch_groups import unit_of, visits
+from turnout.stages.mismatch_inputs import mismatch_context
 
 ALL = "all"  # every visit in one case: what depends on temperature or time needs more than one
 
@@ -43,7 +43,7 @@ def diagnose_turnout(
     _, told = mismatch_context(turnout_id, work=work)
     watch = Watch(None if budget is None else time.monotonic() + budget, bar.simulations if bar else None)
     options = Options(track, tuple(sections), str(Path(work) / "mismatch-fits"), watch, bar.group if bar else None)
-    return diagnose_visit(unit, turnout, raw_root, told, fingerprint("turnout.chains.mismatch"), options)
+    return diagnose_visit(unit, turnout, raw_root, told, fingerprint("turnout.stages.mismatch"), options)
 
 
 def _visit(turnout_id, found, wanted, raw_root):
