@@ -2,7 +2,7 @@
 
 from snakemake.utils import min_version
 
-from turnout.fleet.launch import launch
+from turnout.workflow.launch import launch
 from turnout.readers.formats import FORMATS
 from turnout.units import to_si
 

@@ -13,12 +13,12 @@ from turnout.config import load_configuration, with_raw
 from turnout.demo.hammer import hammer_test
 from turnout.demo.make import EXTENSION
 from turnout.demo.scenario import SECTIONS
-from turnout.fleet.batches import UnitResult, read_results, write_batch
-from turnout.fleet.scan import scan, unit_id
 from turnout.readers import read
 from turnout.readers.writing import write
 from turnout.registry.register import register
 from turnout.stages.hammer import hammer_unit
+from turnout.workflow.batches import UnitResult, read_results, write_batch
+from turnout.workflow.scan import scan, unit_id
 
 DAY = date(2024, 5, 13)
 FORMATS = ("uff58b", "hdf5", "tdms", "mat", "csv")

@@ -9,12 +9,12 @@ import duckdb
 from benchmarks import bench_pipeline
 from benchmarks.bar import Bar, stopwatch
 from turnout.config import load_configuration, with_raw
-from turnout.fleet.batches import read_results, write_batch
-from turnout.fleet.scan import scan
-from turnout.fleet.tables import configuration_rows
 from turnout.registry.database import open_registry
 from turnout.registry.register import register
 from turnout.report.write import write_pages
+from turnout.workflow.batches import read_results, write_batch
+from turnout.workflow.configuration_rows import configuration_rows
+from turnout.workflow.scan import scan
 
 N_TURNOUT, N_CAMPAIGN, N_WRITTEN = 3_500, 12, 200
 ONCE = ("receptances_current", "results_current")

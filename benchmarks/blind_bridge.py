@@ -16,7 +16,6 @@ import numpy as np
 
 from turnout.config.load import load_configuration, with_raw
 from turnout.config.settings.mismatch import MismatchSettings
-from turnout.fleet.scan import scan
 from turnout.mismatch.engine.candidate_search import shortlist
 from turnout.mismatch.engine.diagnose import diagnose
 from turnout.mismatch.engine.map_fit import fit_jointly
@@ -24,6 +23,7 @@ from turnout.mismatch.turnout.case import TrackCase
 from turnout.stages.mismatch_groups import groups
 from turnout.stages.mismatch_inputs import gather, track_of
 from turnout.stages.mismatch_rows import acts
+from turnout.workflow.scan import scan
 
 LESSER = {
     "in_sample": "names by the fit to what was fitted, not by conditions left out",

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from turnout.fleet.batches import UnitResult, write_batch
 from turnout.registry.ids import content_id
+from turnout.workflow.batches import UnitResult, write_batch
 
 SHARDS = 64
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from turnout.content import sha256_of
 from turnout.fingerprint import fingerprint
-from turnout.fleet.attempt import attempts
-from turnout.fleet.postponed import read_postponed
+from turnout.workflow.retries import attempts
+from turnout.workflow.retries import read_postponed
 
 # Stages whose results go into the registry, in order, and the files that a whole run makes.
 STAGES, TARGETS = [], []

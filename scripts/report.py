@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from turnout.fleet.attempt import attempt
+from turnout.workflow.retries import attempt
 from turnout.report.job import report_job
 
 registry, pages = (str(Path(p).parent) for p in (snakemake.input.generation, snakemake.output[0]))

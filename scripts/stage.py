@@ -4,6 +4,6 @@ from turnout.threads import one_thread
 
 one_thread()
 
-from turnout.fleet.job import stage_job  # noqa: E402
+from turnout.workflow.jobs import stage_job  # noqa: E402
 
 stage_job(snakemake.input.plan, snakemake.output.done, snakemake.log[0], snakemake.params, snakemake.threads)

@@ -3,7 +3,7 @@
 import logging
 
 from turnout.stages.trend import trend_job
-from turnout.fleet.attempt import attempt
+from turnout.workflow.retries import attempt
 
 logging.basicConfig(filename=snakemake.log[0], filemode="w", level="INFO", format="%(levelname)s %(message)s")
 with attempt("trend", snakemake.params.again):

@@ -81,5 +81,5 @@ def read_json(path: os.PathLike, otherwise):
     except FileNotFoundError:
         return otherwise
     except ValueError as error:
-        logging.getLogger("turnout.fleet").warning("%s is cut or no JSON (%s): it is made again", path, error)
+        logging.getLogger("turnout.workflow").warning("%s is cut or no JSON (%s): it is made again", path, error)
         return otherwise

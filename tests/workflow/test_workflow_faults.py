@@ -7,7 +7,7 @@ import sys
 import pytest
 import toy_fleet as toy
 
-from turnout.fleet.shards import shard_of
+from turnout.workflow.plan import shard_of
 
 SHARDS = 3
 CHAIN = '''"""The toy chain, on a machine that has a bad sector or ends a process while a file says so."""

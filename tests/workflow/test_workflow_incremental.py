@@ -7,8 +7,8 @@ import time
 import pytest
 import toy_fleet as toy
 
-from turnout.fleet.shards import shard_of
 from turnout.registry.database import open_registry
+from turnout.workflow.plan import shard_of
 
 SHARDS = 3
 

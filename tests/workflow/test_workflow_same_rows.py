@@ -9,14 +9,14 @@ import pytest
 import toy_fleet as toy
 
 from turnout.config import load_configuration
-from turnout.fleet.batches import read_results
-from turnout.fleet.plan import write_plans
-from turnout.fleet.shard import run_shard
-from turnout.fleet.stage import Stage
-from turnout.fleet.state import batch_paths
-from turnout.fleet.tables import configuration_rows, fleet_hash
 from turnout.registry.database import open_registry
 from turnout.registry.register import register
+from turnout.workflow.batches import read_results
+from turnout.workflow.configuration_rows import configuration_rows, fleet_hash
+from turnout.workflow.plan import write_plans
+from turnout.workflow.shard import run_shard
+from turnout.workflow.state import batch_paths
+from turnout.workflow.tasks import Stage
 
 ALGO = "toy_fleet:unit"
 

@@ -76,8 +76,8 @@ def _planned(events):
 def _left_out(configuration, raw) -> int:
     """Print how many raw files there are and each that is left out or unsound; how many of these."""
     from turnout.config.load import read_notes
-    from turnout.fleet.notes_against_files import contradicted_notes
-    from turnout.fleet.scan import scan
+    from turnout.workflow.notes_check import contradicted_notes
+    from turnout.workflow.scan import scan
 
     n_units = n_files = 0
     problems = []

@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the workflow once, print its one line, and return its exit code."""
-    from turnout.fleet.nightly import nightly
+    from turnout.workflow.nightly import nightly
 
     limit = None if args.limit_hours is None else 3600.0 * args.limit_hours
     try:

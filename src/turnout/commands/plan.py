@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _say_gone(configuration, raw, plans, shards, turnouts) -> None:
     """Print which known files are gone, and the error that the next run will stop with."""
-    from turnout.fleet.plan import gone_files
+    from turnout.workflow.plan import gone_files
 
     gone = gone_files(configuration, raw, plans, shards, turnouts)
     if error := gone.error(configuration.settings["fleet"], raw):
@@ -68,9 +68,9 @@ def _say_gone(configuration, raw, plans, shards, turnouts) -> None:
 def _say(turnout, raw, known, counts) -> None:
     """Print what is new of one turnout and what was left out, and count."""
     from turnout.config.load import read_notes
-    from turnout.fleet.notes import notes_of
-    from turnout.fleet.plan import Planned
-    from turnout.fleet.scan import scan, unit_id
+    from turnout.workflow.notes import notes_of
+    from turnout.workflow.plan import Planned
+    from turnout.workflow.scan import scan, unit_id
 
     found = scan(turnout, raw)
     noted, wrong = read_notes(turnout, raw)
@@ -96,11 +96,10 @@ class _Known:
     def judged(self, planned, settings) -> str:
         """ "new", "changed", or "" where its result stands."""
         from turnout.fingerprint import fingerprint
-        from turnout.fleet.keys import stamp_of
-        from turnout.fleet.scan import unit_id
-        from turnout.fleet.shards import shard_of
-        from turnout.fleet.stage import with_token
-        from turnout.fleet.state import load_state
+        from turnout.workflow.plan import shard_of
+        from turnout.workflow.scan import unit_id
+        from turnout.workflow.state import load_state
+        from turnout.workflow.tasks import stamp_of, with_token
 
         unit = planned.unit
         module, _ = STAGES[unit.kind]
@@ -117,7 +116,7 @@ class _Known:
 
     def _token(self, unit, settings):
         """What a stage takes from another one for this turnout: the passages the models of the hammer tests."""
-        from turnout.fleet.stage import named
+        from turnout.workflow.tasks import named
 
         context = STAGES[unit.kind][1]
         if context and (unit.kind, unit.turnout) not in self.tokens:

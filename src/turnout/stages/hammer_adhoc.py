@@ -14,11 +14,11 @@ from turnout.config.filename_pattern import compiled
 from turnout.config.load import read_notes
 from turnout.config.schema import suggestion
 from turnout.errors import ConfigError, ReadError
-from turnout.fleet.guard import guarded
-from turnout.fleet.scan import scan
 from turnout.readers import read
 from turnout.records import NOTHING, Unit
 from turnout.stages.hammer import hammer_unit
+from turnout.workflow.guard import guarded
+from turnout.workflow.scan import scan
 
 
 def check_asked(turnout, section, campaign):

@@ -11,7 +11,6 @@ from turnout.config.merge import digest
 from turnout.config.turnout import TurnoutConfig
 from turnout.content import sha256_of
 from turnout.errors import ReadError, SimulationError, TurnoutError
-from turnout.fleet.scan import scan
 from turnout.mismatch.engine.diagnose import diagnose
 from turnout.mismatch.turnout import TrackCase
 from turnout.records import Unit
@@ -21,6 +20,7 @@ from turnout.stages.common import quarantine_row
 from turnout.stages.mismatch_groups import Group, groups, members_of
 from turnout.stages.mismatch_inputs import digest_of_model, gather, track_of
 from turnout.stages.mismatch_rows import finding_tables
+from turnout.workflow.scan import scan
 
 FITS = "work/mismatch-fits"
 TABLES = ("mismatch_findings", "mismatch_parameters", "mismatch_curves", "quarantine")

@@ -15,11 +15,11 @@ from re import search
 from turnout.config import Configuration
 from turnout.config.merge import digest
 from turnout.config.turnout import TurnoutConfig
-from turnout.fleet.plan import Planned, read_plan
 from turnout.mismatch.turnout import Campaign
 from turnout.records import Unit
 from turnout.simulate import Sensor, TurnoutTrack
 from turnout.stages.mismatch_inputs import Gathered, digest_of_model
+from turnout.workflow.plan import Planned, read_plan
 
 GAP = 6.0  # m: sections further apart than this do not hear the same sleeper
 MOST_PASSAGES = 8  # of one case: each is simulated hundreds of times, and more of the same kind tell little more

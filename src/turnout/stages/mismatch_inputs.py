@@ -14,8 +14,6 @@ from turnout.config.parameters import read_parameters
 from turnout.config.turnout import TurnoutConfig
 from turnout.content import sha256_of
 from turnout.errors import ReadError, SimulationError, TurnoutError
-from turnout.fleet.current import current_results
-from turnout.fleet.scan import unit_id
 from turnout.mismatch.turnout import HammerTest, Passage
 from turnout.passage.channel_checks import without_pulses
 from turnout.passage.second_train import ANOTHER
@@ -30,6 +28,8 @@ from turnout.stages.layout_checks import misplaced
 from turnout.stages.mismatch_trains import TrainUnknownError, train_of
 from turnout.stages.passage import PassageContext, passage_unit, sensors_of, trains_in
 from turnout.stages.passage_context import known_patterns
+from turnout.workflow.current_results import current_results
+from turnout.workflow.scan import unit_id
 
 HALF_BAY = 0.3  # m: an accelerometer "mid-span" sits this far from the sleeper struck
 TOPS = 0.002  # share of samples at the range that leaves the band of the diagnosis as it is: tops of blows above it

@@ -7,13 +7,13 @@ from turnout.config import load_configuration, with_raw
 from turnout.errors import SimulationError
 from turnout.files import write_text
 from turnout.fingerprint import fingerprint
-from turnout.fleet.batches import decode, encode
-from turnout.fleet.scan import scan
 from turnout.registry.database import open_registry
 from turnout.stages.accepted_effects_case import Watch
 from turnout.stages.mismatch import Options, diagnose_visit
 from turnout.stages.mismatch_groups import unit_of, visits
 from turnout.stages.mismatch_inputs import mismatch_context
+from turnout.workflow.batches import decode, encode
+from turnout.workflow.scan import scan
 
 ALL = "all"  # every visit in one case: what depends on temperature or time needs more than one
 

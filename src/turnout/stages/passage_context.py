@@ -18,13 +18,13 @@ from turnout.config.merge import digest
 from turnout.config.settings.passage import PassageSettings
 from turnout.content import sha256_of
 from turnout.errors import ConfigError
-from turnout.fleet.current import current_results
-from turnout.fleet.notes import LONGEST, start_of
 from turnout.passage.axle_load import LoadCalibration
 from turnout.passage.axle_patterns import read_patterns
 from turnout.passage.clusters import Clusters
 from turnout.records import ModalModel, Unit
 from turnout.stages.passage import PassageContext, SectionModel
+from turnout.workflow.current_results import current_results
+from turnout.workflow.notes import LONGEST, start_of
 
 
 def passage_context(

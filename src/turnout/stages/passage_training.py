@@ -10,7 +10,6 @@ from pathlib import Path
 from turnout.config.turnout import TurnoutConfig
 from turnout.errors import ReadError
 from turnout.files import write_if_changed
-from turnout.fleet.scan import scan
 from turnout.passage.analysis import analyse
 from turnout.passage.axle_load import LoadCalibration, calibrate, quasi_static, train_amplitude, with_shared
 from turnout.passage.clusters import Clusters, fit_clusters
@@ -19,6 +18,7 @@ from turnout.readers import read
 from turnout.records import LongRecording, Recording
 from turnout.stages.passage import _time_in, sensors_of, trains_in
 from turnout.stages.passage_context import read_clusters, read_loads
+from turnout.workflow.scan import scan
 
 MOST_PASSAGES = 20_000  # for the clusters: more change no boundary, and mixtures take time
 RECENT = """

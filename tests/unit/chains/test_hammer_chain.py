@@ -12,12 +12,12 @@ from benchmarks.published.response import paper_response
 
 from turnout.config import load_configuration, with_raw
 from turnout.demo.hammer import hammer_test
-from turnout.fleet.guard import guarded
-from turnout.fleet.scan import scan
 from turnout.readers import read
 from turnout.readers.writing import write
 from turnout.registry.intake import Arrival, gather
 from turnout.stages.hammer import hammer_unit
+from turnout.workflow.guard import guarded
+from turnout.workflow.scan import scan
 
 DAY = date(2024, 5, 13)
 EXTENSIONS = {"uff58b": "uff", "tdms": "tdms", "hdf5": "h5"}

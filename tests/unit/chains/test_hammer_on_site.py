@@ -13,10 +13,10 @@ from turnout.cli import main
 from turnout.config import load_configuration, with_raw
 from turnout.demo import faults
 from turnout.demo.hammer import RATE, hammer_test
-from turnout.fleet.scan import scan
 from turnout.readers.writing import write
 from turnout.registry.intake import Arrival, gather
 from turnout.stages.hammer import hammer_unit
+from turnout.workflow.scan import scan
 
 DAY = date(2024, 5, 13)
 NOTES = "campaign,started_at_utc,rail_temperature_c\n2024-05-13,2024-05-13T09:00:00,11.5\n"

@@ -11,8 +11,6 @@ import small_turnout as small
 
 from turnout.config import load_configuration, with_raw
 from turnout.errors import SimulationError
-from turnout.fleet.batches import encode
-from turnout.fleet.scan import scan
 from turnout.mismatch.engine.case import Nuisance
 from turnout.mismatch.turnout import HammerTest, Passage, TrackCase
 from turnout.mismatch.turnout.passage_observation import FEWEST, Rolling, observed, rolling_nuisances, rolling_of
@@ -40,6 +38,8 @@ from turnout.stages.mismatch_inputs import (
 )
 from turnout.stages.mismatch_results import Results, diagnose_turnout
 from turnout.stages.mismatch_trains import train_of
+from turnout.workflow.batches import encode
+from turnout.workflow.scan import scan
 
 
 @pytest.fixture

@@ -6,11 +6,11 @@ import signal
 
 from turnout.config import load_configuration
 from turnout.errors import ReadError
-from turnout.fleet.batches import read_results
-from turnout.fleet.plan import write_plans
-from turnout.fleet.shard import run_shard
-from turnout.fleet.stage import Stage
-from turnout.fleet.state import batch_paths
+from turnout.workflow.batches import read_results
+from turnout.workflow.plan import write_plans
+from turnout.workflow.shard import run_shard
+from turnout.workflow.state import batch_paths
+from turnout.workflow.tasks import Stage
 
 LAYOUT = """\
 sections: {A: {panel: CP, track: main, position: 1}}

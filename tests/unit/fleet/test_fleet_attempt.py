@@ -2,7 +2,7 @@
 
 import pytest
 
-from turnout.fleet.attempt import attempt, attempts
+from turnout.workflow.retries import attempt, attempts
 
 
 def test_a_job_that_failed_is_asked_for_until_it_comes_to_its_end(tmp_path, monkeypatch):

@@ -2,7 +2,7 @@
 
 import pyarrow.parquet as pq
 
-from turnout.fleet.batches import UnitResult, read_results, write_batch
+from turnout.workflow.batches import UnitResult, read_results, write_batch
 
 
 def results(n):

@@ -6,7 +6,7 @@ import shutil
 import pytest
 from length_fleet import CALLS, Fleet
 
-from turnout.fleet.state import batch_paths
+from turnout.workflow.state import batch_paths
 
 
 def test_a_copy_is_said_and_counts_once_its_original_is_gone(fleet):
@@ -90,7 +90,7 @@ def test_a_shared_file_counts_once_though_the_job_was_killed_before_it_knew(flee
     def killed(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("turnout.fleet.shard.copies", killed)
+    monkeypatch.setattr("turnout.workflow.shard.copies", killed)
     with pytest.raises(KeyboardInterrupt):
         fleet.run()
     monkeypatch.undo()

@@ -5,14 +5,13 @@ import json
 import pytest
 from length_fleet import CALLS
 
-from turnout.fleet.attempt import attempt, attempts
-from turnout.fleet.launch import launch
-from turnout.fleet.nightly import _night
-from turnout.fleet.plan import read_plan, write_plans
-from turnout.fleet.postponed import read_postponed
-from turnout.fleet.state import batch_paths
-from turnout.fleet.verdict import verdict
 from turnout.stages.trend import trend_job
+from turnout.workflow.launch import launch
+from turnout.workflow.nightly import _night
+from turnout.workflow.plan import read_plan, write_plans
+from turnout.workflow.quality_gate import verdict
+from turnout.workflow.retries import attempt, attempts, read_postponed
+from turnout.workflow.state import batch_paths
 
 PARTS = [0.0, 0.3, 0.7, 0.95]
 

@@ -9,11 +9,10 @@ from pathlib import Path
 import pytest
 from length_fleet import Fleet, length
 
-from turnout.fleet.begun import begun, noted
-from turnout.fleet.postponed import read_postponed
-from turnout.fleet.stage import Stage
-from turnout.fleet.state import load_state
-from turnout.fleet.verdict import judge
+from turnout.workflow.quality_gate import judge
+from turnout.workflow.retries import begun, noted, read_postponed
+from turnout.workflow.state import load_state
+from turnout.workflow.tasks import Stage
 
 UNITS = [f"t{i}/hammer/A/2024-05-13" for i in range(6)]
 

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from turnout.fleet.batches import UnitResult, read_results, write_batch
-from turnout.fleet.nightly import nightly
-from turnout.fleet.why import why
 from turnout.registry.register import register
+from turnout.workflow.batches import UnitResult, read_results, write_batch
+from turnout.workflow.nightly import nightly
+from turnout.workflow.run_report import why
 
 STATE = """
 from pathlib import Path
-from turnout.fleet.state import Known, State
+from turnout.workflow.state import Known, State
 known = {{u: Known('', '', '1', s, 'b') for u, s in {known!r}.items()}}
 State(known, ['b']).save(Path('work/hammer/00of01.json'))
 Path('work/plan').mkdir(parents=True, exist_ok=True)

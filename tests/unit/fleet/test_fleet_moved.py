@@ -5,14 +5,13 @@ from dataclasses import replace
 import pytest
 from length_fleet import CALLS, Fleet, length
 
-from turnout.fleet.batches import read_results
-from turnout.fleet.moved import withdraw_moved
-from turnout.fleet.plan import Planned, read_plan, write_plans
-from turnout.fleet.postponed import read_postponed
-from turnout.fleet.shard import run_shard
-from turnout.fleet.shards import shard_of
-from turnout.fleet.stage import Stage
-from turnout.fleet.state import batch_paths
+from turnout.workflow.batches import read_results
+from turnout.workflow.duplicate_files import withdraw_moved
+from turnout.workflow.plan import Planned, read_plan, shard_of, write_plans
+from turnout.workflow.retries import read_postponed
+from turnout.workflow.shard import run_shard
+from turnout.workflow.state import batch_paths
+from turnout.workflow.tasks import Stage
 
 SHARDS = ["00of02", "01of02"]
 
@@ -45,7 +44,7 @@ def test_a_measurement_that_was_moved_counts_once_though_the_job_was_killed_befo
     def killed(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("turnout.fleet.shard._Run._withdraw_vanished", killed)
+    monkeypatch.setattr("turnout.workflow.shard._Run._withdraw_vanished", killed)
     with pytest.raises(KeyboardInterrupt):
         fleet.run()
     monkeypatch.undo()
@@ -127,7 +126,7 @@ def test_what_was_moved_is_withdrawn_though_the_job_was_killed_before_it_was_wri
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        patch.setattr("turnout.fleet.moved.withdrawn", killed)
+        patch.setattr("turnout.workflow.duplicate_files.withdrawn", killed)
         fleet.night(SHARDS)
     assert fleet.lengths()["t0/hammer/A/2024-05-13"] == [9]
     assert fleet.look_through() == 1

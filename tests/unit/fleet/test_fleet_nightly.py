@@ -11,8 +11,8 @@ import pytest
 from filelock import FileLock
 
 from turnout.errors import TurnoutError
-from turnout.fleet import nightly as module
-from turnout.fleet.nightly import TOO_LATE, Night, nightly
+from turnout.workflow import nightly as module
+from turnout.workflow.nightly import TOO_LATE, Night, nightly
 
 
 @pytest.fixture(autouse=True)
@@ -124,8 +124,8 @@ def test_a_profile_that_is_not_there_is_said_before_anything_begins(tmp_path, mo
 
 def test_the_three_turnouts_of_which_most_was_not_used_are_named(tmp_path, monkeypatch):
     """Quarantine from the states, rejected tests from the registry; the units of one turnout come from both."""
-    from turnout.fleet.batches import UnitResult, read_results, write_batch
     from turnout.registry.register import register
+    from turnout.workflow.batches import UnitResult, read_results, write_batch
 
     monkeypatch.chdir(tmp_path)
     rejected = {
@@ -140,7 +140,7 @@ def test_the_three_turnouts_of_which_most_was_not_used_are_named(tmp_path, monke
     known = {f"{t}/hammer/B/{k}": "quarantined" for t, n in bad.items() for k in range(n)}
     known |= {"t4/hammer/A/2026-01-05": "ok", "t3/hammer/A/1": "ok"}
     (tmp_path / "snakemake.py").write_text(
-        "from pathlib import Path\nfrom turnout.fleet.state import Known, State\n"
+        "from pathlib import Path\nfrom turnout.workflow.state import Known, State\n"
         f"known = {{u: Known('', '', '1', s, 'b') for u, s in {known!r}.items()}}\n"
         "State(known, ['b']).save(Path('work/hammer/00of01.json'))\n"
     )
@@ -156,8 +156,8 @@ def test_another_number_of_shards_counts_no_unit_twice_and_still_sees_what_vanis
     (tmp_path / "snakemake.py").write_text(
         f"import sys\nfrom pathlib import Path\nsys.path.append({str(Path(__file__).parent)!r})\n"
         "from length_fleet import length\nfrom turnout.config import load_configuration\n"
-        "from turnout.fleet.plan import write_plans\nfrom turnout.fleet.shard import run_shard\n"
-        "from turnout.fleet.stage import Stage\n"
+        "from turnout.workflow.plan import write_plans\nfrom turnout.workflow.shard import run_shard\n"
+        "from turnout.workflow.tasks import Stage\n"
         "read, raw, work = load_configuration('config'), Path('raw'), Path('work')\n"
         "for shard in write_plans(read, raw, work / 'plan', 2):\n"
         "    plan, state = (work / kind / f'{shard}.json' for kind in ('plan', 'hammer'))\n"
@@ -178,7 +178,7 @@ def test_it_is_said_in_one_line():
 def test_what_a_job_that_did_not_come_to_its_end_has_kept_is_counted(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "snakemake.py").write_text(
-        "from pathlib import Path\nfrom turnout.fleet.state import Known, State\n"
+        "from pathlib import Path\nfrom turnout.workflow.state import Known, State\n"
         "known = {'t1/hammer/A/1': Known('', '', '1', 'ok', 'b')}\n"
         "State(known, ['b']).save(Path('work/hammer/00of01.json'))\nraise SystemExit(1)\n"
     )
@@ -191,7 +191,7 @@ def test_where_jobs_die_what_the_others_computed_is_published(tmp_path, monkeypa
     monkeypatch.chdir(tmp_path)
     (tmp_path / "snakemake.py").write_text(
         "import sys\nfrom pathlib import Path\n"
-        "from turnout.fleet.state import State\n"
+        "from turnout.workflow.state import State\n"
         "Path('said').open('a').write(' '.join(sys.argv[1:]) + '\\n')\n"
         "if '--allowed-rules' in sys.argv and Path('publish').exists():\n"
         "    Path('results/registry').mkdir(parents=True)\n"

@@ -6,8 +6,8 @@ import os
 import pytest
 
 from turnout.config import load_configuration
-from turnout.fleet.plan import read_plan, read_problems, write_plans
-from turnout.fleet.raw_folder import RawFolder
+from turnout.workflow.plan import read_plan, read_problems, write_plans
+from turnout.workflow.scan import RawFolder
 
 LAYOUT = """\
 sections: {A: {panel: CP, track: main, position: 1}}
@@ -97,7 +97,7 @@ def test_a_file_that_may_not_be_read_is_new_once_it_may(fleet, monkeypatch):
     """Its permission changes neither its size nor its time: the plan has to."""
     path = fleet / f"raw/t1/{DAY}/A_1.uff"
     path.chmod(0o600)
-    monkeypatch.setattr("turnout.fleet.raw_folder.os.access", lambda path, mode: "t1" not in path)  # we may be root
+    monkeypatch.setattr("turnout.workflow.scan.os.access", lambda path, mode: "t1" not in path)  # we may be root
     turnouts, problems = planned(fleet)
     assert turnouts == ["t2"] and problems == [(f"t1/{DAY}/A_1.uff", "file", "may not be read")]
     path.chmod(0o644)

@@ -6,11 +6,10 @@ import pytest
 
 from turnout.config import load_configuration
 from turnout.errors import ConfigError
-from turnout.fleet.launch import launch
-from turnout.fleet.plan import read_plan, read_problems, write_plans
-from turnout.fleet.scan import scan, unit_id
-from turnout.fleet.shards import shard_names, shard_of
-from turnout.fleet.tables import configuration_rows, fleet_hash
+from turnout.workflow.configuration_rows import configuration_rows, fleet_hash
+from turnout.workflow.launch import launch
+from turnout.workflow.plan import read_plan, read_problems, shard_names, shard_of, write_plans
+from turnout.workflow.scan import scan, unit_id
 
 LAYOUT = """\
 sections:
@@ -126,8 +125,8 @@ def test_an_impossible_date_is_a_named_problem(fleet, name, found):
 def test_plan_says_what_is_new_and_what_changed(fleet, capsys, monkeypatch):
     from turnout.cli import main
     from turnout.fingerprint import fingerprint
-    from turnout.fleet.keys import stamp_of
-    from turnout.fleet.state import Known, State
+    from turnout.workflow.state import Known, State
+    from turnout.workflow.tasks import stamp_of
 
     plans(fleet, shards=3)
     folders = ["--configuration", "config", "--raw", "raw", "--work", "elsewhere", "--shards", "3"]

@@ -10,16 +10,16 @@ import pytest
 from length_fleet import CALLS, Fleet
 
 from turnout.errors import TurnoutError
-from turnout.fleet import keys
-from turnout.fleet.batches import read_batch, read_column, read_results
-from turnout.fleet.current import DamagedBatch, current_results
-from turnout.fleet.job import stage_job
-from turnout.fleet.plan import write_plans
-from turnout.fleet.postponed import read_postponed
-from turnout.fleet.stage import Stage
-from turnout.fleet.state import State, batch_paths, load_state
-from turnout.fleet.verdict import judge, verdict
 from turnout.readers import read
+from turnout.workflow import tasks
+from turnout.workflow.batches import read_batch, read_column, read_results
+from turnout.workflow.current_results import DamagedBatch, current_results
+from turnout.workflow.jobs import stage_job
+from turnout.workflow.plan import write_plans
+from turnout.workflow.quality_gate import judge, verdict
+from turnout.workflow.retries import read_postponed
+from turnout.workflow.state import State, batch_paths, load_state
+from turnout.workflow.tasks import Stage
 
 
 def test_first_run_then_nothing_then_one(fleet):
@@ -106,7 +106,7 @@ def test_a_file_that_is_closed_after_it_was_planned_is_read_once_it_is_open(flee
     def closed(path):
         raise PermissionError(errno.EACCES, "Permission denied")
 
-    monkeypatch.setattr(keys, "sha256_of", closed)
+    monkeypatch.setattr(tasks, "sha256_of", closed)
     assert fleet.run().postponed == 3
     monkeypatch.undo()
     assert fleet.run().processed == 3
@@ -144,14 +144,14 @@ def test_a_file_that_its_library_could_not_read_for_a_bad_sector_is_read_when_it
 def test_a_sector_that_cannot_be_read_for_the_key_is_its_units_affair_alone(fleet, monkeypatch):
     fleet.run()
     os.utime(fleet.raw / "t0/2024-05-13/A_1.txt", (1, 1))
-    sound = keys.sha256_of
+    sound = tasks.sha256_of
 
     def bad(path):
         if "t0" in str(path):
             raise OSError(errno.EIO, "Input/output error")
         return sound(path)
 
-    monkeypatch.setattr(keys, "sha256_of", bad)
+    monkeypatch.setattr(tasks, "sha256_of", bad)
     fleet.put("t1/2024-05-13/A_2.txt", "new")
     summary = fleet.run()
     assert (summary.processed, summary.postponed) == (1, 1) and len(fleet.lengths()) == 3
@@ -313,7 +313,7 @@ def test_a_stage_that_builds_on_a_damaged_batch_asks_for_it_again(fleet, monkeyp
     (batch,) = batch_paths([fleet.state])
     batch.unlink()
     monkeypatch.chdir(fleet.folder)
-    monkeypatch.setattr("turnout.fleet.job._log_to", lambda log: None)
+    monkeypatch.setattr("turnout.workflow.jobs._log_to", lambda log: None)
     module = type(sys)("upon_hammer")
     module.models = lambda turnout, settings: ("", list(current_results("work", "hammer", turnout)))
     monkeypatch.setitem(sys.modules, "upon_hammer", module)

@@ -7,7 +7,7 @@ import pytest
 from length_fleet import Fleet
 
 from turnout.errors import TurnoutError
-from turnout.fleet.verdict import judge, verdict
+from turnout.workflow.quality_gate import judge, verdict
 
 
 def test_the_verdict_judges_what_is_new_over_the_fleet_and_each_line(tmp_path):

@@ -9,12 +9,12 @@ import pytest
 from benchmarks.passage_truth import IC3, PATTERNS, paper_model, rolling, struck_train
 
 from turnout.config import load_configuration, with_raw
-from turnout.fleet.scan import scan
 from turnout.passage.clusters import Cluster, Clusters
 from turnout.readers.writing import write
 from turnout.records import Channel
 from turnout.stages.passage import PassageContext, SectionModel, passage_unit
 from turnout.stages.passage_context import near
+from turnout.workflow.scan import scan
 
 PLACES = {"OT": -12.0, "SP": 3.6, "CLP": 13.8, "A7": 24.6, "A8": 26.4, "A9": 28.2, "ASM": 36.0, "ASD": 36.0}
 LOCATIONS = dict(zip(PLACES, ("OT", "SP", "CLP", "CP A7", "CP A8", "CP A9", "AS main", "AS diverging")))

@@ -9,12 +9,12 @@ from benchmarks.passage_truth import PATTERNS, paper_model, struck_train
 
 from turnout.config import load_configuration, with_raw
 from turnout.errors import PartlyComputed
-from turnout.fleet.guard import guarded
-from turnout.fleet.scan import scan
 from turnout.passage.segmentation import cut_passages
 from turnout.readers.writing import write
 from turnout.records import Channel
 from turnout.stages.passage import PassageContext, SectionModel, passage_unit
+from turnout.workflow.guard import guarded
+from turnout.workflow.scan import scan
 
 PLACES = {"OT": -12.0, "SP": 3.6, "CLP": 13.8, "A7": 24.6, "A8": 26.4, "A9": 28.2, "ASM": 36.0, "ASD": 36.0}
 LOCATIONS = dict(zip(PLACES, ("OT", "SP", "CLP", "CP A7", "CP A8", "CP A9", "AS main", "AS diverging")))

@@ -8,13 +8,13 @@ import pytest
 from benchmarks.passage_truth import IC3, PATTERNS, paper_model, rolling
 
 from turnout.config import load_configuration, with_raw
-from turnout.fleet.batches import UnitResult, read_results, write_batch
-from turnout.fleet.scan import scan
 from turnout.readers.writing import write
 from turnout.records import Channel
 from turnout.registry.database import open_registry
 from turnout.registry.register import register
 from turnout.stages.passage import PassageContext, SectionModel, passage_unit
+from turnout.workflow.batches import UnitResult, read_results, write_batch
+from turnout.workflow.scan import scan
 
 PLACES = {"OT": -12.0, "SP": 3.6, "CLP": 13.8, "A7": 24.6, "A8": 26.4, "A9": 28.2, "ASM": 36.0, "ASD": 36.0}
 SILENT = ("A9", "ASD")  # on the other track

@@ -4,8 +4,8 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
-from turnout.fleet.batches import UnitResult
 from turnout.registry.ids import content_id
+from turnout.workflow.batches import UnitResult
 
 START = datetime(2023, 1, 9, 10)
 TURNOUTS, SECTIONS, CAMPAIGNS = ("north_1", "south_2"), ("OT", "A7", "A9"), 75

@@ -3,10 +3,10 @@
 import hashlib
 from pathlib import Path
 
-from turnout.fleet.batches import UnitResult, read_results, write_batch
 from turnout.registry.database import open_registry
 from turnout.registry.ids import content_id
 from turnout.registry.register import register
+from turnout.workflow.batches import UnitResult, read_results, write_batch
 
 
 def hammer_result(turnout="t1", section="A1", day="2026-01-05", frequency=150.0, algo="1", key="k1", file="a", **more):

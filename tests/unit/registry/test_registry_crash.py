@@ -13,15 +13,15 @@ from filelock import FileLock
 from registry_rows import Bench, hammer_result
 
 from turnout.errors import RegistryError
-from turnout.fleet.batches import read_results
 from turnout.registry import registration
 from turnout.registry.database import is_behind, rebuild_database
 from turnout.registry.generation import load
 from turnout.registry.inspection import check, vacuum
 from turnout.registry.register import register
+from turnout.workflow.batches import read_results
 
 REGISTER = (
-    "import sys; from turnout.registry.register import register; from turnout.fleet.batches import read_results;"
+    "import sys; from turnout.registry.register import register; from turnout.workflow.batches import read_results;"
     "print('ready', flush=True); register(sys.argv[2:], sys.argv[1], read=read_results)"
 )
 

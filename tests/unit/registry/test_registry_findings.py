@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from registry_rows import Bench
 
-from turnout.fleet.batches import UnitResult
 from turnout.registry.database import open_registry
+from turnout.workflow.batches import UnitResult
 
 START = datetime(2025, 1, 10, 9, 0)
 YEAR = 365.25 * 86400.0

@@ -4,12 +4,12 @@ import pytest
 from registry_rows import hammer_result, quarantined_result
 
 from turnout.cli import main
-from turnout.fleet.batches import UnitResult
 from turnout.registry.database import open_registry
 from turnout.registry.register import register
 from turnout.report.pages.fleet import fleet_page
 from turnout.report.source import FleetSource
 from turnout.report.write import write_pages
+from turnout.workflow.batches import UnitResult
 
 LIST = "select turnout_id, sections, source, state, sentence from worklist(timestamp '2027-01-01') where band = 'all'"
 

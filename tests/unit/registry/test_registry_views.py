@@ -6,7 +6,7 @@ import pytest
 import statsmodels.api as sm
 from registry_rows import hammer_result
 
-from turnout.fleet.batches import UnitResult
+from turnout.workflow.batches import UnitResult
 
 YEAR = 31557600.0
 CHART = ["turnout_id", "section_id", "band", "source"]

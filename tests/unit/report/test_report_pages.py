@@ -12,9 +12,6 @@ from benchmarks.published.response import paper_response
 
 from turnout.config import load_configuration, with_raw
 from turnout.demo.hammer import hammer_test
-from turnout.fleet.batches import UnitResult, read_results, write_batch
-from turnout.fleet.scan import scan, unit_id
-from turnout.fleet.tables import configuration_rows
 from turnout.readers.writing import write
 from turnout.registry.database import open_registry
 from turnout.registry.register import register
@@ -23,6 +20,9 @@ from turnout.report.pages.turnout import line_of
 from turnout.report.panels.diagram import diagram
 from turnout.report.write import write_pages
 from turnout.stages.hammer import hammer_unit
+from turnout.workflow.batches import UnitResult, read_results, write_batch
+from turnout.workflow.configuration_rows import configuration_rows
+from turnout.workflow.scan import scan, unit_id
 
 DAYS = (date(2024, 5, 13), date(2024, 6, 17))
 

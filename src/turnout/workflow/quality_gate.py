@@ -10,10 +10,9 @@ from turnout.config import Configuration
 from turnout.config.settings.fleet import FleetSettings
 from turnout.errors import TurnoutError
 from turnout.files import read_json, write_text
-from turnout.fleet.batches import read_column
-from turnout.fleet.begun import LEFT, begun
-from turnout.fleet.postponed import ask_again, read_postponed
-from turnout.fleet.state import batch_paths, state_of
+from turnout.workflow.batches import read_column
+from turnout.workflow.retries import LEFT, ask_again, begun, read_postponed
+from turnout.workflow.state import batch_paths, state_of
 
 SAID_BEFORE = "said before; it ends when they are mended, or when enough newer units are sound by themselves"
 IN_QUARANTINE, FAULTS = ("partly", "quarantined"), ("internal_error",)

@@ -9,11 +9,10 @@ from turnout.config import Configuration, load_configuration
 from turnout.config.schema import suggestion
 from turnout.errors import ConfigError
 from turnout.files import write_text
-from turnout.fleet.plan import write_plans
-from turnout.fleet.postponed import ask_again
-from turnout.fleet.shards import shard_names
-from turnout.fleet.state import is_cut_state, states_below
-from turnout.fleet.tables import fleet_hash
+from turnout.workflow.configuration_rows import fleet_hash
+from turnout.workflow.plan import shard_names, write_plans
+from turnout.workflow.retries import ask_again
+from turnout.workflow.state import is_cut_state, states_below
 
 OPTIONS = {
     "configuration": "folder with config.yaml, turnouts.tsv, layouts/",

@@ -5,15 +5,25 @@ are innocent of what a user, a time limit or a power failure did, nobody knows: 
 in a process of its own. Where that dies while the job lives on, and not in the run that had begun it first (whose jobs
 may all have met the same shortage), the unit is what it died of. A job that is ended as a whole condemns no unit,
 however often.
+
+Units that met a fault of the machine have no result; the file that notes them asks for the shard's next job.
+
+A job that was begun and did not come to its end is asked for again.
+
+Snakemake gives the old output of a failed job the time of now and notes its parameters as if it had been made: nothing
+would run it again. The number of this file is one of those parameters; it is another one until the job has ended.
 """
 
 import hashlib
+import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
-from turnout.fleet.state import batch_folder
+from turnout.files import read_json, write_text
+from turnout.workflow.state import batch_folder
 
 PREFIX = "begun-"
 # What the verdict says of a unit that such a job left.
@@ -74,3 +84,62 @@ def _changed_at(note: Path) -> int:
 
 def _note(state: Path, unit: str) -> Path:
     return batch_folder(state) / f"{PREFIX}{hashlib.sha256(unit.encode()).hexdigest()[:16]}"
+
+
+@dataclass(frozen=True)
+class Postponed:
+    """A unit, and the fault that it ``met``."""
+
+    unit: str
+    met: str
+
+
+def read_postponed(state: Path) -> tuple[int, dict[str, str]]:
+    """(how often the next job of a shard was asked for, {unit: what it met}); ``state`` is its state file.
+
+    The number is a parameter of that job: one more makes it run again, though no plan has changed.
+    """
+    content = read_json(_path(state), {"jobs": 0, "units": {}})
+    return content["jobs"], content["units"]
+
+
+def note_postponed(state: Path, units: Mapping[str, str]) -> None:
+    """Note the ``units`` that the job of a shard leaves; without any, and none before, there is no file."""
+    jobs, before = read_postponed(state)
+    if units or before:
+        _write(state, jobs + bool(units), units)
+
+
+def ask_again(state: Path) -> None:
+    """Let the job of a shard run again, though no unit of it was left: one of its batches is damaged."""
+    jobs, units = read_postponed(state)
+    _write(state, jobs + 1, units)
+
+
+def _write(state: Path, jobs: int, units: Mapping[str, str]) -> None:
+    write_text(_path(state), json.dumps({"jobs": jobs, "units": dict(units)}, indent=1) + "\n")
+
+
+def _path(state: Path) -> Path:
+    return batch_folder(state) / "postponed.json"
+
+
+FOLDER = Path("work/attempts")
+
+
+def attempts(job: str) -> int:
+    """How often ``job`` was begun without coming to its end; a number it never was where the file is cut."""
+    try:
+        return int((FOLDER / job).read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return 0
+    except ValueError:
+        return -1
+
+
+@contextmanager
+def attempt(job: str, before: int) -> Iterator[None]:
+    """One more attempt until the block has come to its end without an exception; ``before`` it was begun so often."""
+    write_text(FOLDER / job, str(before + 1))
+    yield
+    write_text(FOLDER / job, str(before))

@@ -7,12 +7,12 @@ from pathlib import Path
 
 from turnout.config import TurnoutConfig
 from turnout.errors import PartlyComputed, ReadError, of_the_machine
-from turnout.fleet.batches import UnitResult, encode
-from turnout.fleet.scan import unit_id
 from turnout.records import Unit
 from turnout.registry.ids import content_id
+from turnout.workflow.batches import UnitResult, encode
+from turnout.workflow.scan import unit_id
 
-LOG = logging.getLogger("turnout.fleet")
+LOG = logging.getLogger("turnout.workflow")
 
 
 def guarded(

@@ -15,11 +15,10 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from turnout.errors import TurnoutError
-from turnout.fleet.plan import is_cut_plan, read_plan
-from turnout.fleet.scan import unit_id
-from turnout.fleet.state import load_state, states_below
-from turnout.fleet.unused import rejected, unused_turnouts
-from turnout.fleet.why import why
+from turnout.workflow.plan import is_cut_plan, read_plan
+from turnout.workflow.run_report import rejected, unused_turnouts, why
+from turnout.workflow.scan import unit_id
+from turnout.workflow.state import load_state, states_below
 
 JOB_NAMES = "turnouts"
 TOO_LATE = 124

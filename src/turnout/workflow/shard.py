@@ -1,6 +1,11 @@
-"""One stage of one shard: compute the units whose key changed, keep the results of all others."""
+"""One stage of one shard: compute the units whose key changed, keep the results of all others.
+
+How far a shard is: a bar for a person, lines for a log.
+"""
 
 import logging
+import sys
+import time
 import traceback
 from collections import Counter
 from collections.abc import Callable, Collection, Container, Sequence
@@ -10,23 +15,52 @@ from pathlib import Path
 
 from turnout.config import Configuration
 from turnout.errors import passing
-from turnout.fleet.batches import UnitResult
-from turnout.fleet.begun import begun, forget, noted
-from turnout.fleet.copies import copies, key_without, originals, with_copies_said, without
-from turnout.fleet.guard import died_of, guarded
-from turnout.fleet.keys import contents_of, key_of, short
-from turnout.fleet.ledger import Ledger
-from turnout.fleet.moved import moved, withdrawn
-from turnout.fleet.plan import Planned, read_plan
-from turnout.fleet.pool import Died, in_order, in_processes
-from turnout.fleet.postponed import Postponed, note_postponed, read_postponed
-from turnout.fleet.progress import Progress
-from turnout.fleet.scan import unit_id
-from turnout.fleet.stage import Stage, named
-from turnout.fleet.state import locked
-from turnout.fleet.tasks import Task, Tasks
+from turnout.workflow.batches import UnitResult
+from turnout.workflow.duplicate_files import copies, key_without, moved, originals, with_copies_said, withdrawn, without
+from turnout.workflow.guard import died_of, guarded
+from turnout.workflow.ledger import Ledger
+from turnout.workflow.plan import Planned, read_plan
+from turnout.workflow.pool import Died, in_order, in_processes
+from turnout.workflow.retries import Postponed, begun, forget, note_postponed, noted, read_postponed
+from turnout.workflow.scan import unit_id
+from turnout.workflow.state import locked
+from turnout.workflow.tasks import Stage, Task, Tasks, contents_of, key_of, named, short
 
-LOG = logging.getLogger("turnout.fleet")
+# Seconds between two lines in a log.
+PAUSE = 30.0
+
+
+class Progress:
+    """Counts units; on a terminal a bar, elsewhere a line now and then."""
+
+    def __init__(self, name: str, total: int, stream=None):
+        self.name, self.total, self.done, self.quarantined = name, total, 0, 0
+        self.stream = stream or sys.stderr
+        self.next_line = time.monotonic() + PAUSE
+        self.bar = None
+        if total and self.stream.isatty():
+            from tqdm import tqdm
+
+            self.bar = tqdm(total=total, desc=name, unit="unit", file=self.stream)
+
+    def step(self, quarantined: bool) -> None:
+        """One more unit is done."""
+        self.done += 1
+        self.quarantined += quarantined
+        if self.bar:
+            self.bar.update()
+            self.bar.set_postfix(quarantined=self.quarantined)
+        elif time.monotonic() >= self.next_line:
+            self.next_line = time.monotonic() + PAUSE
+            print(f"{self.name}: {self.done} of {self.total} units", file=self.stream, flush=True)
+
+    def close(self) -> None:
+        """End the bar; a log needs nothing."""
+        if self.bar:
+            self.bar.close()
+
+
+LOG = logging.getLogger("turnout.workflow")
 DIED = "the process died that computed it"
 # A result, and the stamp and the contents it was computed from.
 Computed = tuple[UnitResult, str, str]

@@ -11,9 +11,9 @@ from filelock import FileLock
 
 from turnout.errors import TurnoutError
 from turnout.files import is_cut, write_text
-from turnout.fleet.batches import is_sound, read_column
+from turnout.workflow.batches import is_sound, read_column
 
-LOG = logging.getLogger("turnout.fleet")
+LOG = logging.getLogger("turnout.workflow")
 
 # Of a unit: its rows count; all its files are gone and it has no rows.
 WITH_ROWS, VANISHED = ("ok", "partly"), "vanished"

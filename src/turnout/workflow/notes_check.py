@@ -10,8 +10,8 @@ from turnout.config import TurnoutConfig
 from turnout.config.campaign_notes import COLUMNS
 from turnout.config.csv_table import TableFault, read_csv
 from turnout.errors import ReadError
-from turnout.fleet.notes import start_of
 from turnout.records import Unit
+from turnout.workflow.notes import start_of
 
 SHIFTS = sorted((h for h in range(-14, 15) if h), key=abs)  # hours from UTC to the clocks of the world
 FEWEST = 3  # trains of which one shift makes passages: fewer may be chance

@@ -5,8 +5,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from turnout.config import Configuration, Event, TurnoutConfig, with_raw
-from turnout.fleet.plan import read_plan, read_problems
 from turnout.registry.ids import content_id
+from turnout.workflow.plan import read_plan, read_problems
 
 
 def configuration_rows(configuration: Configuration, raw_root: Path, plans: Iterable[Path]) -> dict[str, list[dict]]:

@@ -1,17 +1,99 @@
-"""What a shard has to compute: units that are new, and those of which anything changed that they are computed from."""
+"""What a shard has to compute: units that are new, and those of which anything changed that they are computed from.
 
-from collections.abc import Mapping, Sequence
+From what a unit is computed: quickly by names, sizes and times of its files, surely by their content.
+
+A stage: what is computed of each unit, by which code, with what from other stages.
+"""
+
+import os
+import sys
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from importlib import import_module
 from pathlib import Path
 
 from turnout.config import Configuration, TurnoutConfig, with_raw
+from turnout.config.merge import digest
+from turnout.content import sha256_of
 from turnout.errors import ConfigError
-from turnout.fleet.copies import Original, originals_of
-from turnout.fleet.keys import contents_of, key_of, short, stamp_of
-from turnout.fleet.plan import Planned
-from turnout.fleet.scan import unit_id
-from turnout.fleet.stage import Stage, Token, named, with_token
-from turnout.fleet.state import State
+from turnout.records import Unit
+from turnout.workflow.duplicate_files import Original, originals_of
+from turnout.workflow.plan import Planned
+from turnout.workflow.scan import unit_id
+from turnout.workflow.state import ELSEWHERE, State
+
+
+def stamp_of(planned: Planned) -> str:
+    """Digest of configuration, note, and name, size and time of each file; no file is opened."""
+    unit = planned.unit
+    return digest([unit.config_hash, planned.note, unit.files])
+
+
+def contents_of(planned: Planned, raw_root: Path) -> list[str | None]:
+    """sha256 of each file of a unit, None for one that is gone; OSError where one cannot be read."""
+    return [_content(os.path.join(raw_root, path)) for path, *_ in planned.unit.files]
+
+
+def key_of(planned: Planned, contents: Sequence[str | None]) -> str:
+    """Digest of configuration, note, and name and content of each file."""
+    unit = planned.unit
+    files = [[path, content] for (path, *_), content in zip(unit.files, contents, strict=True)]
+    return digest([unit.config_hash, planned.note, files])
+
+
+def short(contents: Sequence[str | None], elsewhere: Container[int] = ()) -> str:
+    """The contents as a state keeps them: enough to tell the files of a fleet; "" where one was gone.
+
+    The files whose numbers are in ``elsewhere`` count elsewhere.
+
+    >>> short(["e3b0c44298fc1c149afbf4c8996fb924", "0123456789abcdef0123456789abcdef"], {1})
+    'e3b0c44298fc1c14 -0123456789abcdef'
+    """
+    marks = [ELSEWHERE if k in elsewhere else "" for k in range(len(contents))]
+    return " ".join(mark + c[:16] for mark, c in zip(marks, contents) if c) if all(contents) else ""
+
+
+def _content(path: str) -> str | None:
+    try:
+        return sha256_of(path)
+    except (FileNotFoundError, IsADirectoryError):
+        return None
+
+
+Token = str | Callable[[Unit], str]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """What a stage computes: units of ``kind`` by ``compute(unit, turnout, raw_root, algo=...)``.
+
+    ``algo`` is the version of its code, part of every key. ``context(turnout_id, settings)``, where given, returns
+    (token, value): the token, or what it says of a unit where it is a function, enters the key; the value is passed on
+    as ``context=``. ``settings`` are those of the turnout, by part. ``gather(plan, configuration)``,
+    where given, makes units of the stage's own from a plan file, else they are the plan's. All three may be named,
+    "package.module:function", and are then imported when there is something to compute.
+    """
+
+    kind: str
+    compute: Callable | str
+    algo: str
+    context: Callable[[str, Mapping], tuple[Token, object]] | str | None = None
+    gather: Callable[[Path, Configuration], Iterable[Planned]] | str | None = None
+
+
+def named(function: Callable | str) -> Callable:
+    """The function that "package.module:name" names; a module of one's own lies in the folder of the run."""
+    if callable(function):
+        return function
+    module, _, name = function.partition(":")
+    if module.partition(".")[0] != "turnout" and os.getcwd() not in sys.path:
+        sys.path.append(os.getcwd())
+    return getattr(import_module(module), name)
+
+
+def with_token(planned: Planned, token: Token) -> Planned:
+    """The unit as planned, its note with what the stage's context says of it."""
+    return replace(planned, note=planned.note + (token if isinstance(token, str) else token(planned.unit)))
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from functools import lru_cache
 from pathlib import Path
 
 from turnout.errors import TurnoutError
-from turnout.fleet.batches import UnitResult, read_results
-from turnout.fleet.state import batch_folder, load_state
+from turnout.workflow.batches import UnitResult, read_results
+from turnout.workflow.state import batch_folder, load_state
 
 
 class DamagedBatch(TurnoutError):

@@ -5,10 +5,10 @@ import time
 from pathlib import Path
 
 from turnout.config.settings.fleet import FleetSettings
-from turnout.fleet.batches import UnitResult, is_sound, write_batch
-from turnout.fleet.state import Known, batch_folder, load_state, remove_orphans
+from turnout.workflow.batches import UnitResult, is_sound, write_batch
+from turnout.workflow.state import Known, batch_folder, load_state, remove_orphans
 
-LOG = logging.getLogger("turnout.fleet")
+LOG = logging.getLogger("turnout.workflow")
 
 
 class Ledger:

@@ -9,17 +9,16 @@ from turnout import __version__
 from turnout.config import load_configuration
 from turnout.errors import TurnoutError
 from turnout.files import write_text
-from turnout.fleet.attempt import attempt
-from turnout.fleet.batches import read_results
-from turnout.fleet.current import DamagedBatch
-from turnout.fleet.launch import launched_at
-from turnout.fleet.moved import withdraw_moved
-from turnout.fleet.postponed import ask_again
-from turnout.fleet.shard import Summary, run_shard
-from turnout.fleet.stage import Stage
-from turnout.fleet.state import batch_paths, state_of, state_of_mark
-from turnout.fleet.tables import configuration_rows
-from turnout.fleet.verdict import Verdict, verdict
+from turnout.workflow.batches import read_results
+from turnout.workflow.configuration_rows import configuration_rows
+from turnout.workflow.current_results import DamagedBatch
+from turnout.workflow.duplicate_files import withdraw_moved
+from turnout.workflow.launch import launched_at
+from turnout.workflow.quality_gate import Verdict, verdict
+from turnout.workflow.retries import ask_again, attempt
+from turnout.workflow.shard import Summary, run_shard
+from turnout.workflow.state import batch_paths, state_of, state_of_mark
+from turnout.workflow.tasks import Stage
 
 
 def stage_job(plan, mark, log, params, threads: int) -> Summary:
@@ -74,7 +73,7 @@ def register_job(register, generation, log, params) -> None:
         )  # fmt: skip
     os.utime(generation)
     for batch, fault in done.faults.items():
-        logging.getLogger("turnout.fleet").warning("%s: %s", batch, fault)
+        logging.getLogger("turnout.workflow").warning("%s: %s", batch, fault)
     _say(f"register: {done.n_units} units, {sum(done.rows.values())} rows, {done.n_refused} refused")
 
 
@@ -91,5 +90,5 @@ def _log_to(log) -> None:
 
 
 def _say(what) -> None:
-    logging.getLogger("turnout.fleet").info("%s", what)
+    logging.getLogger("turnout.workflow").info("%s", what)
     print(what, file=sys.stderr, flush=True)
