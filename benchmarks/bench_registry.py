@@ -17,7 +17,7 @@ from benchmarks.registry_questions import CUSUM, NETWORK, PASSAGES
 from benchmarks.registry_race import race
 from benchmarks.registry_results import hammer_batches, passage_batches
 from turnout.registry.database import open_registry
-from turnout.registry.listing import views
+from turnout.registry.documentation import views
 from turnout.registry.register import register
 from turnout.workflow.batches import read_results
 

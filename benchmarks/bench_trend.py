@@ -200,8 +200,9 @@ def ar_noise(rng, n, length, phi, sigma):
 
 def season_only(turnouts=300):
     """T7: work in October that changes nothing; how often is it called a change?"""
+    from tests.oracles.trend_views import connect_views
+
     from turnout.trend import baseline_rows, chart_rows
-    from turnout.trend.views import connect_views
 
     for resets in (True, False):
         fleet = Fleet(turnouts=turnouts, weeks=3 * YEAR, phi=0.2)
@@ -224,9 +225,10 @@ def season_only(turnouts=300):
 
 def oracle():
     """T8: sums by a plain loop, residuals by pandas, slopes by statsmodels; never by the code that made the charts."""
+    from tests.oracles.trend_views import connect_views
+
     from benchmarks.trend_oracle import cusum_by_loop, residuals_by_pandas, slopes_by_statsmodels
     from turnout.trend import alarm_rows, baseline_rows, chart_rows
-    from turnout.trend.views import connect_views
 
     fleet = Fleet(turnouts=20, weeks=3 * YEAR, phi=0.3, missing=0.05)
     rows = modes(fleet, 81).astype({k: object for k in ("turnout_id", "section_id", "band", "source")})

@@ -12,7 +12,8 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from turnout.trend.campaigns import (
+from turnout.trend.drift import discoveries
+from turnout.trend.sparse_campaigns import (
     Block,
     deviance,
     find_splits,
@@ -21,7 +22,6 @@ from turnout.trend.campaigns import (
     steps,
     verdicts,
 )
-from turnout.trend.drift import discoveries
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 DIRECTIONS = ("vertical", "lateral")

@@ -5,13 +5,12 @@ Nine finished years lie compacted, the tenth as one batch a week: the everyday s
 
 from pathlib import Path
 
-from turnout.registry.columns import names, tables
 from turnout.registry.database import build_database
 from turnout.registry.generation import Generation, commit, schema_of
 from turnout.registry.parquet import read_live, write_sorted
-from turnout.registry.settled import with_dead
+from turnout.registry.schema import names, tables
 from turnout.registry.staging import connect
-from turnout.registry.supersede import last_word
+from turnout.registry.supersede import last_word, with_dead
 
 WEEKS, WEEKS_A_YEAR, FIRST = 520, 52, "2016-01-04 10:00:00"
 # Two uniform numbers from a hash, one normal number from them: the same rows on every machine.

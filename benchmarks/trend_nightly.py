@@ -12,7 +12,7 @@ def main(registry, state) -> None:
 
     from turnout.config.settings.trend import TrendSettings
     from turnout.registry.database import open_registry
-    from turnout.trend.nightly import update
+    from turnout.trend.update import update
 
     known = json.loads(Path(state).read_text()) if Path(state).exists() else None
     done = update(registry, TrendSettings(), known)

@@ -22,7 +22,7 @@ rule trend:
         mem_mb=4000,
         runtime=60,
     params:
-        code=fingerprint("turnout.trend.nightly"),
+        code=fingerprint("turnout.trend.update"),
         again=attempts("trend"),
         configuration=RUN.fleet_hash,
         acknowledgements=contents(ACKNOWLEDGED),

@@ -6,14 +6,12 @@ import pytest
 
 from turnout.errors import REASONS
 from turnout.registry import documentation
-from turnout.registry.columns import ARROW, FILLED_BY_REGISTER, key, sort_order, tables, time_column
-from turnout.registry.database import open_registry
-from turnout.registry.listing import views
+from turnout.registry.database import open_registry, view_files
+from turnout.registry.documentation import views
 from turnout.registry.register import register
-from turnout.registry.settled import LARGE
+from turnout.registry.schema import ARROW, FILLED_BY_REGISTER, key, sort_order, tables, time_column
 from turnout.registry.staging import CHILDREN
-from turnout.registry.supersede import KINDS
-from turnout.registry.view_files import view_files
+from turnout.registry.supersede import KINDS, LARGE
 
 UNIT_SUFFIX = {
     "_hz": "Hz", "_pct": "%", "_c": "°C", "_t": "t", "_kmh": "km/h", "_ms2": "m/s²", "_at_utc": "UTC", "_utc": "UTC",

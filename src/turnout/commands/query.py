@@ -32,7 +32,7 @@ def run(args: argparse.Namespace) -> int:
 
     from turnout.errors import RegistryError
     from turnout.registry.database import open_registry
-    from turnout.registry.listing import listing
+    from turnout.registry.documentation import listing
 
     if args.list or not args.sql:
         print(listing())

@@ -35,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _check(args) -> int:
-    from turnout.registry.inspection import check
+    from turnout.registry.integrity import check
 
     problems = check(_existing(args), hashes=not args.quick)
     print("\n".join(problems) or "The registry holds what its list says.")
@@ -63,7 +63,7 @@ def _say(done, verb) -> int:
 
 
 def _vacuum(args) -> int:
-    from turnout.registry.inspection import vacuum
+    from turnout.registry.integrity import vacuum
 
     gone = vacuum(_existing(args))
     print("\n".join(gone) or "Nothing to delete.")
@@ -80,7 +80,7 @@ def _relocate(args) -> int:
 
 
 def _describe(args) -> int:
-    from turnout.registry.listing import describe
+    from turnout.registry.documentation import describe
 
     print(describe(args.name))
     return 0

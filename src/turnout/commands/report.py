@@ -46,8 +46,8 @@ def _day(said):
 
 def _of_then(registry):
     """What to ask for where charts of today's pages have grown old, else nothing."""
+    from turnout.registry.as_of import counts_of, list_day, of_then
     from turnout.registry.database import open_registry
-    from turnout.registry.day import counts_of, list_day, of_then
 
     with open_registry(registry) as con:
         *_, n_unmeasured, newest = counts_of(con, list_day(con))

@@ -25,8 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the list, or write it as comma-separated values."""
+    from turnout.registry.as_of import counts_of, list_day, whole_list
     from turnout.registry.database import open_registry
-    from turnout.registry.day import counts_of, list_day, whole_list
 
     with open_registry(args.registry) as con:
         day = [_day(args.asof, con)] if args.asof else []
@@ -57,7 +57,7 @@ def as_text(rows, n_charts=0, n_silenced=0, n_unmeasured=0, newest=None) -> str:
         return "\n".join([*text, "No chart has been computed yet: alarms and plans come with the first trend."])
     if newest is None:  # a list of another day: what is silenced or not measured is said of today alone
         return "\n".join(text)
-    from turnout.registry.day import of_then
+    from turnout.registry.as_of import of_then
 
     left = [(n_silenced, "silenced by somebody"), (n_unmeasured, "not measured for too long")]
     parts = [f"{n} {word}" for n, word in left if n]

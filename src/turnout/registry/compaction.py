@@ -5,7 +5,6 @@ from os import PathLike
 from pathlib import Path
 
 from turnout.errors import RegistryError
-from turnout.registry.columns import WHOLE_TABLES, file_literal, tables
 from turnout.registry.database import build_database
 from turnout.registry.generation import (
     DataFile,
@@ -18,9 +17,9 @@ from turnout.registry.generation import (
 )
 from turnout.registry.lock import locked
 from turnout.registry.parquet import folder_of, read_list, read_live, write_sorted
-from turnout.registry.settled import LARGE, halves, with_dead
+from turnout.registry.schema import WHOLE_TABLES, file_literal, tables
 from turnout.registry.staging import connect
-from turnout.registry.supersede import last_word
+from turnout.registry.supersede import LARGE, halves, last_word, with_dead
 
 
 def compact(registry_dir: PathLike, at_least: int = 2, patience: float = 600.0) -> dict[str, tuple[int, int]]:

@@ -1,24 +1,93 @@
-"""``registry.duckdb``: views over the live files, macros and comments, and no data of its own."""
+"""``registry.duckdb``: views over the live files, macros and comments, and no data of its own.
+
+The views and macros of the registry: one SQL file per question, created in the order of their needs.
+
+When the newest measurement that counts was made: a date that was corrected no longer does.
+"""
 
 import csv
 import os
+import re
 from datetime import UTC, datetime
 from functools import cache
+from graphlib import CycleError, TopologicalSorter
 from importlib.resources import files
 from pathlib import Path
 
 import duckdb
 
-from turnout.errors import RegistryError
+from turnout.errors import REASONS, RegistryError
 from turnout.files import beside
-from turnout.registry.columns import literal, tables
 from turnout.registry.generation import Generation, load, sync_folder
 from turnout.registry.ids import content_id
-from turnout.registry.newest import newest_that_counts
-from turnout.registry.parquet import read_live
-from turnout.registry.settled import LARGE, create_parts
+from turnout.registry.parquet import MEASURED, read_live
+from turnout.registry.schema import file_literal, literal, tables, time_column
 from turnout.registry.staging import connect
-from turnout.registry.view_files import reasons_sql, view_files
+from turnout.registry.supersede import LARGE, create_parts, last_word
+
+_NEEDS = re.compile(r"^--\s*needs:\s*(.+)$", re.MULTILINE)
+
+
+@cache
+def view_files() -> dict[str, str]:
+    """SQL text of every file in ``views``, each after those it needs; ties by name.
+
+    >>> order = list(view_files())
+    >>> order.index("superseded") < order.index("modes_current")
+    True
+    """
+    folder = files("turnout.registry") / "views"
+    texts = {p.name[:-4]: p.read_text(encoding="utf-8") for p in folder.iterdir() if p.name.endswith(".sql")}
+    return in_order(texts)
+
+
+def in_order(texts: dict[str, str]) -> dict[str, str]:
+    """The files sorted so that each follows what its line ``-- needs: a, b`` names.
+
+    >>> list(in_order({"a": "-- needs: c", "b": "", "c": ""}))
+    ['b', 'c', 'a']
+    """
+    sorter: TopologicalSorter = TopologicalSorter()
+    for name in sorted(texts):
+        needs = [n.strip() for line in _NEEDS.findall(texts[name]) for n in line.split(",") if n.strip()]
+        if missing := [n for n in needs if n not in texts]:
+            raise RegistryError(f"views/{name}.sql needs {', '.join(missing)}, and there is no such file.")
+        sorter.add(name, *needs)
+    try:
+        sorter.prepare()
+    except CycleError as error:
+        raise RegistryError(f"views need each other in a circle: {' -> '.join(error.args[1])}") from None
+    order: list[str] = []
+    while sorter.is_active():
+        ready = sorted(sorter.get_ready())
+        order += ready
+        sorter.done(*ready)
+    return {name: texts[name] for name in order}
+
+
+def reasons_sql() -> str:
+    """View ``reasons``: every reason code with its meaning."""
+    values = ", ".join(f"({literal(code)}, {literal(meaning)})" for code, meaning in REASONS.items())
+    return f"create or replace view reasons as select * from (values {values}) as r(reason_code, meaning)"
+
+
+def newest_that_counts(con: duckdb.DuckDBPyConnection, root: Path, generation: Generation) -> str | None:
+    """ISO time of the newest measurement that nothing took back, None without any.
+
+    Files are opened from the one that reaches furthest on, until no other can hold a later time.
+    """
+    con.execute(f"create or replace temp table no_longer as {last_word('supersedes')}")
+    newest = None
+    for file in sorted((f for f in generation.files if f.newest), key=lambda f: str(f.newest), reverse=True):
+        if newest is not None and str(file.newest) <= newest:
+            break
+        source = f"read_parquet({file_literal(root / file.path)})"
+        counts = f"{MEASURED[file.table]} not in (select old_id from no_longer)"
+        found = con.execute(f"select max({time_column(file.table)})::varchar from {source} where {counts}").fetchall()
+        newest = max(filter(None, (newest, found[0][0])), default=None)
+    con.execute("drop table no_longer")
+    return newest
+
 
 DATABASE = "registry.duckdb"
 # Every DuckDB since 1.2 opens it; a file in the newest format could not be read by tools that embed an older one.

@@ -9,7 +9,6 @@ import pandas as pd
 import pyarrow as pa
 
 from turnout.errors import RegistryError
-from turnout.registry.columns import WHOLE_TABLES, key, tables, time_column
 from turnout.registry.database import build_database, is_behind
 from turnout.registry.generation import (
     DataFile,
@@ -22,6 +21,7 @@ from turnout.registry.generation import (
 )
 from turnout.registry.lock import locked
 from turnout.registry.parquet import write_sorted
+from turnout.registry.schema import WHOLE_TABLES, key, tables, time_column
 from turnout.registry.staging import connect
 
 BY_YEAR = ("charts",)

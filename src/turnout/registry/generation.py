@@ -8,7 +8,7 @@ from pathlib import Path
 
 from turnout.errors import RegistryError
 from turnout.files import write_atomic
-from turnout.registry.columns import tables
+from turnout.registry.schema import tables
 
 FILE = "_generation.json"
 FORMAT = 1

@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
-from turnout.registry.columns import FILLED_BY_REGISTER, Column, names, tables
 from turnout.registry.ids import content_id
+from turnout.registry.schema import FILLED_BY_REGISTER, Column, names, tables
 
 UNDATED = 0
 _DATE = re.compile(r"(?<!\d)(\d{4})(?:-\d\d-\d\d|\d{4}T?)")
@@ -126,7 +126,7 @@ def _by_column(rows: list[dict], wanted: list[str]) -> list[Sequence]:
 def typed(column: Column, values: Sequence) -> tuple[pa.Array, list[int]]:
     """Arrow array of ``values``, None where one does not fit, and the places of those.
 
-    >>> from turnout.registry.columns import column
+    >>> from turnout.registry.schema import column
     >>> typed(column("modes", "n_impacts"), [30, None, "many"])[1]
     [2]
     """

@@ -8,8 +8,8 @@ import duckdb
 from turnout.content import sha256_of
 from turnout.errors import RegistryError
 from turnout.files import beside
-from turnout.registry.columns import file_literal, literal, names, sort_order, tables, time_column
 from turnout.registry.generation import DataFile, schema_hash, sync_folder
+from turnout.registry.schema import file_literal, literal, names, sort_order, tables, time_column
 
 # Rows that are read or skipped together. Among a year of unmerged batches one section is found three times faster
 # with small groups; large files are larger by a tenth with them, and hardly faster.

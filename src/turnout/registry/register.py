@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from os import PathLike, fspath
 from pathlib import Path
 
-from turnout.registry.arrivals import chunks, fresh, merged, of_tables, present
+from turnout.registry.batch_stream import chunks, fresh, merged, of_tables, present
 from turnout.registry.generation import check_schemas, load
 from turnout.registry.lock import locked
 from turnout.registry.registration import Registered, Registration

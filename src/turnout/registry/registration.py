@@ -8,16 +8,22 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from turnout.registry.columns import WHOLE_TABLES, key, literal, tables
 from turnout.registry.database import build_database, is_behind
 from turnout.registry.generation import FILE, Generation, commit, delete_files, due_for_deletion, schema_of
 from turnout.registry.ids import content_id
 from turnout.registry.intake import Arrival, Refusal, gather
 from turnout.registry.parquet import read_live, write_sorted
-from turnout.registry.refusals import identified, quarantine_of
-from turnout.registry.settled import with_dead
-from turnout.registry.staging import admit, connect, create_staging, note_arrivals, refuse_orphans
-from turnout.registry.supersede import last_word, leave_out_known, note_dead, supersede
+from turnout.registry.schema import WHOLE_TABLES, key, literal, tables
+from turnout.registry.staging import (
+    admit,
+    connect,
+    create_staging,
+    identified,
+    note_arrivals,
+    quarantine_of,
+    refuse_orphans,
+)
+from turnout.registry.supersede import last_word, leave_out_known, note_dead, supersede, with_dead
 
 ONE_FILE = (*WHOLE_TABLES, "runs", "supersedes")
 MADE_HERE = ("quarantine", "results", "runs", "supersedes")

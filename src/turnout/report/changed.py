@@ -3,7 +3,7 @@
 import re
 
 from turnout.fingerprint import fingerprint
-from turnout.registry.day import whole_list
+from turnout.registry.as_of import whole_list
 
 # What a page is made of. A result's id stands for its models, modes, impacts, receptances and passages: it is a
 # hash of the raw files, the configuration and the code that they were computed from.

@@ -2,7 +2,7 @@
 
 from collections import defaultdict
 
-from turnout.registry.day import list_day, whole_list
+from turnout.registry.as_of import list_day, whole_list
 from turnout.report.trains import train_rows
 
 # One row per section of the newest model, whatever it says.

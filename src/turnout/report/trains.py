@@ -2,7 +2,7 @@
 
 from collections import defaultdict
 
-from turnout.registry.columns import literal
+from turnout.registry.schema import literal
 from turnout.report.panels.train_bars import train_bars
 
 # Conditions on a constant list reach the files below the views' windows; a subquery would not.

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from turnout.config import load_configuration
 from turnout.files import read_json, write_text
+from turnout.registry.as_of import list_day
 from turnout.registry.database import open_registry
-from turnout.registry.day import list_day
-from turnout.trend.nightly import update
+from turnout.trend.update import update
 
 
 def trend_job(generation, state, worklist, configuration, day=None) -> dict:

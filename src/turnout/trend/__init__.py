@@ -1,10 +1,10 @@
 """Trends of the resonances: charts with their false-alarm rate, states, drift, dates, tomorrow's worklist."""
 
-from turnout.trend.chart import Charts, finish
+from turnout.trend.alarms import candidates, describe_flagged
+from turnout.trend.cusum import Charts, finish
 from turnout.trend.evaluation import evaluate, evaluate_panels
-from turnout.trend.flagged import candidates, describe_flagged
 from turnout.trend.panel import Panel, panel_of
-from turnout.trend.prepared import prepare
+from turnout.trend.residuals import prepare
 from turnout.trend.states import chart_status
 from turnout.trend.tables import alarm_rows, baseline_rows, chart_rows
 

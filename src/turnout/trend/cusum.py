@@ -1,6 +1,15 @@
-"""The cumulative sum with resets, for all charts at once."""
+"""The chart: temperature out, siblings out, standardised, summed; all sections of a fleet at once.
+
+The cumulative sum with resets, for all charts at once.
+"""
+
+from dataclasses import dataclass
 
 import numpy as np
+
+from turnout.trend.epochs import by_epoch, spread_out
+from turnout.trend.residuals import Prepared, first_epoch, learning, of_sections, of_turnouts, stacked
+from turnout.trend.threshold import run_lengths, threshold_for
 
 
 def cusum(z, allowance, threshold, active, fresh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -55,3 +64,133 @@ def cusum(z, allowance, threshold, active, fresh) -> tuple[np.ndarray, np.ndarra
         alarm = (alarm & ~resting & ~fresh[i]) | (total > threshold)
         statistic[i], opened[i], began[i] = total, alarm, since
     return np.ascontiguousarray(statistic.T), np.ascontiguousarray(opened.T), np.ascontiguousarray(began.T)
+
+
+SIBLING_ROUNDS = 3
+
+
+@dataclass
+class Charts:
+    """Charts of a panel, finished: see ``chart_rows``, ``baseline_rows``, ``alarm_rows`` for the tables.
+
+    (n_chart, n_campaign) arrays: ``residual`` and ``sigma`` [%], ``z``, ``down``, ``up`` (CUSUM), ``down_open``,
+    ``up_open`` (alarm open), ``down_began``, ``up_began`` (last campaign before the change), ``learning``,
+    ``fitted`` (expected value, % of f0); ``serving`` (siblings of others), of the sections alone. (n_chart,):
+    ``allowance, learn, guard, memory, spread, threshold_down, threshold_up``; ``level`` and ``learned`` are
+    (n_chart, n_epoch).
+    """
+
+    prepared: Prepared
+    allowance: np.ndarray
+    learn: np.ndarray
+    guard: np.ndarray
+    memory: np.ndarray
+    widening: np.ndarray
+    level: np.ndarray
+    shift: np.ndarray
+    learned: np.ndarray
+    residual: np.ndarray
+    sigma: np.ndarray
+    z: np.ndarray
+    fitted: np.ndarray
+    learning: np.ndarray
+    serving: np.ndarray
+    extra: np.ndarray
+    threshold_down: np.ndarray
+    threshold_up: np.ndarray
+    down: np.ndarray
+    up: np.ndarray
+    down_open: np.ndarray
+    up_open: np.ndarray
+    down_began: np.ndarray
+    up_began: np.ndarray
+
+
+def guard_factor(count, small, settings) -> np.ndarray:
+    """Widening of sigma for an estimated baseline of ``count`` campaigns; see docs/decisions/guard_factor.md.
+
+    >>> from turnout.config.settings.trend import TrendSettings
+    >>> guard_factor(np.array([52, 13]), np.array([False, False]), TrendSettings()).round(2)
+    array([1.12, 1.63])
+    """
+    excess = np.where(small, settings.guard_small, settings.guard_large) - 1.0
+    return 1.0 + excess * (52.0 / np.maximum(count, 1)) ** np.where(small, 1.0, 1.2)
+
+
+def finish(p: Prepared, memory, settings) -> Charts:
+    """Residuals, CUSUM and alarms of prepared charts; ``memory`` is the pooled autocorrelation of each chart."""
+    n = len(p.panel.charts)
+    widening = np.sqrt((1.0 + memory) / (1.0 - memory))
+    with np.errstate(invalid="ignore"):
+        visible = settings.target_percent >= settings.allowance_switch * p.spread * widening * settings.guard_large
+    allowance = np.where(visible, settings.allowance_large, settings.allowance_small)
+    guard = guard_factor(p.baseline.count, ~visible, settings)
+    learn = np.where(visible, settings.learning_large, settings.learning_small)
+    window, settled = learning(p, learn, n, settings.siblings_minimum + 1)
+    summing = _Summing(p, allowance, window, guard * widening, settings)
+    sections, first, serving = _siblings_without_alarm(p, window, settled, summing, settings)
+    alarmed = first["down_open"] | first["up_open"]
+    turnouts = of_turnouts(p, sections, window, settled, alarmed, settings)
+    second = summing(slice(n, None), turnouts)
+    sums = {name: np.concatenate([first[name], second[name]]) for name in first}
+    both = {k: np.vstack([getattr(sections, k), getattr(turnouts, k)]) for k in ("values", "residual", "sigma")}
+    level, shift = (stacked(getattr(sections, k), getattr(turnouts, k)) for k in ("level", "shift"))
+    learned = by_epoch(both["values"], window & np.isfinite(both["values"]), p.epoch, level.shape[1])[1]
+    return Charts(
+        p, allowance, learn, guard, memory, widening, level, shift, learned, both["residual"], both["sigma"],
+        fitted=both["values"] - both["residual"], learning=window, serving=serving, **sums,
+    )  # fmt: skip
+
+
+def _siblings_without_alarm(p, window, settled, summing, settings):
+    """Residuals and sums of the sections, and which of their campaigns are siblings: none that is in alarm.
+
+    Sections that have fallen far may raise an alarm in a sound one first; without them it is quiet, and a sibling
+    again.
+    """
+    n = len(p.panel.charts)
+    serving = settled[:n]
+    for _ in range(SIBLING_ROUNDS):
+        sections = sums = None  # both rounds' arrays together would be the peak of memory
+        sections = of_sections(p, window, settled, serving, settings)
+        sums = summing(slice(0, n), sections)
+        before, serving = serving, settled[:n] & ~(sums["down_open"] | sums["up_open"])
+        if np.array_equal(before, serving):
+            break
+    return sections, sums, before
+
+
+def _thresholds(length, allowance):
+    """(n_chart,) thresholds that give each chart its run ``length`` with its ``allowance``."""
+    pairs, where = np.unique(np.column_stack([length, allowance]), axis=0, return_inverse=True)
+    return np.array([threshold_for(float(n), float(k)) for n, k in pairs] or [0.0])[where.ravel()]
+
+
+class _Summing:
+    """Standardise residuals and sum them, for the sections first and then for the turnouts."""
+
+    def __init__(self, p, allowance, window, factor, settings):
+        self.p, self.allowance, self.window, self.factor, self.settings = p, allowance, window, factor, settings
+
+    def __call__(self, part, found):
+        p, settings, window = self.p, self.settings, self.window[part]
+        epoch = p.epoch[part]
+        usable = window & np.isfinite(found.values)
+        _, learned = by_epoch(found.values, usable, epoch, int(epoch.max(initial=0)) + 1)
+        later = epoch > first_epoch(p)[part, None]
+        extra = np.where(later, 1.0 / np.sqrt(np.maximum(spread_out(learned, epoch), 1)), 0.0)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            z = found.residual / (found.sigma * self.factor[part, None])
+        active = np.isfinite(z) & ~window & p.baseline.complete[part, None]
+        fresh = np.diff(epoch, axis=1, prepend=0) > 0
+        sums = {"z": z, "extra": extra}
+        k = self.allowance[part]
+        bands = p.charts["band"].to_numpy()[part]
+        for name, sign in (("down", 1.0), ("up", -1.0)):
+            h = _thresholds(run_lengths(bands, name, settings), k)
+            limit = settings.single_share * h[:, None] + k[:, None] + extra
+            sums[f"threshold_{name}"] = h
+            sums[name], sums[f"{name}_open"], sums[f"{name}_began"] = cusum(
+                np.maximum(sign * z, -limit), k[:, None] + extra, h, active, fresh
+            )
+        return sums

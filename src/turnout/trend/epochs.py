@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from turnout.trend.panel import days
-from turnout.trend.visits import truth
+from turnout.trend.panel import days, truth
 
 
 def epochs_of(charts, time, events) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -3,9 +3,9 @@
 import numpy as np
 
 from turnout.trend.baseline import pooled_memory
-from turnout.trend.chart import finish
+from turnout.trend.cusum import finish
 from turnout.trend.panel import WHOLE, panel_of
-from turnout.trend.prepared import prepare
+from turnout.trend.residuals import prepare
 
 
 def memory_classes(prepared) -> list[np.ndarray]:

@@ -6,8 +6,7 @@ import pandas as pd
 from turnout.trend.drift import slopes, span
 from turnout.trend.epochs import by_epoch
 from turnout.trend.panel import WHOLE, timestamps
-from turnout.trend.prepared import first_epoch
-from turnout.trend.residuals import RESOLUTION, slope_variance
+from turnout.trend.residuals import RESOLUTION, first_epoch, slope_variance
 from turnout.trend.threshold import detectable_shift, run_lengths
 
 YEAR = 365.25

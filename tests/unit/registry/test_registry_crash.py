@@ -16,7 +16,7 @@ from turnout.errors import RegistryError
 from turnout.registry import registration
 from turnout.registry.database import is_behind, rebuild_database
 from turnout.registry.generation import load
-from turnout.registry.inspection import check, vacuum
+from turnout.registry.integrity import check, vacuum
 from turnout.registry.register import register
 from turnout.workflow.batches import read_results
 

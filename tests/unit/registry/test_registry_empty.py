@@ -8,7 +8,7 @@ import pytest
 from turnout.cli import main
 from turnout.errors import REASONS
 from turnout.registry.database import open_registry, view_columns
-from turnout.registry.listing import views
+from turnout.registry.documentation import views
 from turnout.registry.register import register
 
 # DuckDB writes its storage version behind the magic bytes of the main header; 64 was written by all of 0.9.2 to 1.2.

@@ -9,11 +9,11 @@ import pytest
 from registry_rows import hammer_result
 
 from turnout.errors import RegistryError
-from turnout.registry.arrivals import chunks
-from turnout.registry.columns import arrow_schema, create_table, tables
+from turnout.registry.batch_stream import chunks
 from turnout.registry.database import open_registry
 from turnout.registry.derived import publish
 from turnout.registry.register import register
+from turnout.registry.schema import arrow_schema, create_table, tables
 from turnout.registry.staging import connect
 from turnout.workflow.batches import UnitResult
 

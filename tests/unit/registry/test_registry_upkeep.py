@@ -11,10 +11,9 @@ from registry_rows import Bench, hammer_result
 from turnout.errors import RegistryError
 from turnout.registry import compaction, database
 from turnout.registry.compaction import compact, rebuild
-from turnout.registry.database import open_registry, rebuild_database
+from turnout.registry.database import in_order, open_registry, rebuild_database
 from turnout.registry.generation import FILE, load
-from turnout.registry.inspection import check, vacuum
-from turnout.registry.view_files import in_order
+from turnout.registry.integrity import check, vacuum
 
 ALL_MODES = "select * from modes order by model_id, band"
 

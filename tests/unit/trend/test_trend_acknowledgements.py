@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import pandas as pd
 import pytest
+from tests.oracles.trend_views import connect_views
 
 from turnout.cli import main
 from turnout.config import load_configuration
@@ -13,8 +14,7 @@ from turnout.config.acknowledgements import acknowledgement, read_acknowledgemen
 from turnout.registry.database import open_registry
 from turnout.registry.derived import publish
 from turnout.registry.register import register
-from turnout.trend.rows import arrow_rows
-from turnout.trend.views import connect_views
+from turnout.trend.tables import arrow_rows
 
 SECTIONS = {"T1": SimpleNamespace(tree={"sections": {"A": None}})}
 HEADER = "turnout,section,band,action,by,at,until,reason\n"

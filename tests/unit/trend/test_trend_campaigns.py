@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import statsmodels.api as sm
 
-from turnout.trend.campaigns import (
+from turnout.trend.sparse_campaigns import (
     Block,
     design,
     deviance,

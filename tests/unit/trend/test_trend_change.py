@@ -5,7 +5,7 @@ import pytest
 import statsmodels.api as sm
 from scipy.integrate import trapezoid
 
-from turnout.trend.change import find_change, fits
+from turnout.trend.change_point import find_change, fits
 from turnout.trend.forecast import YEAR
 
 

@@ -8,16 +8,15 @@ import pandas as pd
 import pytest
 from benchmarks.trend_fleet import Fleet, drift, modes, step
 from benchmarks.trend_registry import small_registry
+from tests.oracles.trend_views import connect_views
 
 from turnout.registry.database import open_registry
 from turnout.registry.derived import publish
 from turnout.report.panels.history import history_panel
 from turnout.trend import candidates, chart_rows, chart_status, describe_flagged, evaluate, panel_of
 from turnout.trend.forecast import forecast
-from turnout.trend.nightly import update
-from turnout.trend.rows import arrow_rows
-from turnout.trend.tables import alarm_rows, baseline_rows
-from turnout.trend.views import connect_views
+from turnout.trend.tables import alarm_rows, arrow_rows, baseline_rows
+from turnout.trend.update import update
 
 ONE = (1, 4)
 
@@ -265,7 +264,7 @@ def test_the_list_in_words_says_what_it_rests_on_and_what_it_leaves_out(tmp_path
     assert "<b>9</b>not measured" in index and f"as of {then}" in index
     assert main([*pages, "--day", "yesterday"]) == 2
     assert "--day, date: 'yesterday'. Write YYYY-MM-DD." in capsys.readouterr().err
-    monkeypatch.setattr("turnout.registry.day.list_day", lambda connection: f"timestamp '{newest}'")
+    monkeypatch.setattr("turnout.registry.as_of.list_day", lambda connection: f"timestamp '{newest}'")
     assert main(["worklist", "--registry", str(tmp_path)]) == 0
     told = capsys.readouterr().out
     assert "INSPECT THIS WEEK: T00001" in told

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from turnout.config.settings.trend import TrendSettings
-from turnout.trend.chart import guard_factor
+from turnout.trend.cusum import guard_factor
 from turnout.trend.threshold import detectable_shift, threshold_for
 
 

@@ -13,7 +13,7 @@ from benchmarks.trend_registry import small_registry
 from turnout.config.settings.trend import TrendSettings
 from turnout.registry.database import build_database, open_registry
 from turnout.registry.generation import Generation, commit, load
-from turnout.trend.nightly import update
+from turnout.trend.update import update
 
 FLEET = Fleet(turnouts=3, weeks=120, phi=0.1)
 
@@ -93,7 +93,7 @@ def test_charts_of_a_backup_that_was_put_back_are_written_again(rows, settings, 
 
 def test_parts_of_the_fleet_share_one_memory(registry, settings, monkeypatch):
     root, done = registry
-    monkeypatch.setattr("turnout.trend.nightly.CELLS_PER_PART", 960)
+    monkeypatch.setattr("turnout.trend.update.CELLS_PER_PART", 960)
     assert update(root, settings).digests == done.digests
 
 
@@ -298,7 +298,7 @@ def test_a_look_back_equals_the_night_of_that_day(rows, settings, tmp_path):
 
 
 def test_parts_with_few_and_with_many_sections_make_one_table(settings, tmp_path, monkeypatch):
-    monkeypatch.setattr("turnout.trend.nightly.CELLS_PER_PART", 300)
+    monkeypatch.setattr("turnout.trend.update.CELLS_PER_PART", 300)
     small = modes(Fleet(turnouts=1, sections=4, weeks=70, prefix="A"), 5)
     large = modes(Fleet(turnouts=1, sections=140, weeks=2, prefix="B"), 6)
     texts = {k: object for k in ("turnout_id", "section_id", "band", "source")}

@@ -3,9 +3,9 @@
 import numpy as np
 import pandas as pd
 import pytest
+from tests.oracles.trend_views import connect_views
 
 from turnout.trend import chart_rows, chart_status, evaluate
-from turnout.trend.views import connect_views
 
 NEWEST = "2018-12-31"
 

@@ -9,6 +9,7 @@ import pytest
 from benchmarks.trend_fleet import Fleet, drift, modes, step
 from benchmarks.trend_oracle import cusum_by_loop, residuals_by_pandas, slopes_by_statsmodels
 from scipy.stats import t
+from tests.oracles.trend_views import connect_views
 
 from turnout.trend import (
     alarm_rows,
@@ -19,7 +20,6 @@ from turnout.trend import (
     describe_flagged,
     evaluate,
 )
-from turnout.trend.views import connect_views
 
 FLEET = Fleet(turnouts=6, weeks=150, phi=0.2)
 SOUND = "T00004/S1"
@@ -249,7 +249,7 @@ def test_every_view_answers_an_empty_registry():
 
 def test_no_view_uses_what_an_older_duckdb_cannot_open():
     # DuckDB 2 stores if(...) in the database file as a function call, which DuckDB 1.5 does not have.
-    from turnout.registry.view_files import view_files
+    from turnout.registry.database import view_files
 
     assert not [name for name, sql in view_files().items() if re.search(r'(?<![\w"])if\s*\(', sql)]
 

@@ -3,8 +3,8 @@
 import pandas as pd
 import pytest
 
+from turnout.trend.alarms import CHART, with_withdrawn
 from turnout.trend.panel import days
-from turnout.trend.withdrawn import CHART, with_withdrawn
 
 NEWEST = days(["2026-09-07"])[0]
 

@@ -3,10 +3,10 @@
 import duckdb
 import pyarrow as pa
 
-from turnout.registry.columns import arrow_schema, tables
-from turnout.registry.view_files import view_files
+from turnout.registry.database import view_files
+from turnout.registry.schema import arrow_schema, tables
 from turnout.trend.panel import days, timestamps
-from turnout.trend.rows import arrow_rows
+from turnout.trend.tables import arrow_rows
 
 NAMES = (
     "students_t", "epochs", "resonance_drift",

@@ -8,10 +8,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from turnout.content import sha256_of
-from turnout.registry.columns import tables
 from turnout.registry.database import DATABASE, is_behind
 from turnout.registry.generation import DataFile, Generation, load
 from turnout.registry.lock import locked
+from turnout.registry.schema import tables
 
 _SCHEMA = re.compile(r"_schema-[0-9a-f]{12}\.parquet")
 
