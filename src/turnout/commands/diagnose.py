@@ -56,7 +56,7 @@ def _show(args, results, rows):
     """Keep, draw and print the rows."""
     import json
 
-    from turnout.report.findings import write_own_page
+    from turnout.report.finding_pages import write_own_page
 
     results.keep(rows)
     page = write_own_page(rows, args.configuration, args.turnout, args.pages)

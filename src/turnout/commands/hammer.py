@@ -38,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
 
     from turnout.config import load_configuration
     from turnout.errors import ConfigError
-    from turnout.report.hammer_words import hammer_words, is_usable
+    from turnout.report.hammer_text import hammer_words, is_usable
     from turnout.stages.hammer_adhoc import asked_for
 
     if args.raw and not Path(args.raw).is_dir():

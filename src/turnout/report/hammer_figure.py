@@ -5,10 +5,8 @@ from html import escape
 from importlib.resources import files
 
 from turnout.errors import REASONS
-from turnout.report.hammer_words import heading, resonances, verdict
-from turnout.report.panels.decay import decay_panel
-from turnout.report.panels.impacts import impacts_panel
-from turnout.report.panels.receptance import coherence_panel, receptance_panel
+from turnout.report.hammer_text import heading, resonances, verdict
+from turnout.report.panels.hammer import coherence_panel, decay_panel, impacts_panel, receptance_panel
 
 WIDTH, HEAD, GAP = 462, 52, 12
 HEIGHT = re.compile(r' height="(\d+)"')

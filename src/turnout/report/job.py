@@ -5,7 +5,7 @@ from concurrent.futures import ProcessPoolExecutor
 
 from turnout.errors import RegistryError
 from turnout.registry.database import open_registry
-from turnout.report.findings import write_finding_pages
+from turnout.report.finding_pages import write_finding_pages
 from turnout.report.write import AT_ONCE, write_pages, write_turnouts
 
 

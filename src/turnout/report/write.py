@@ -9,10 +9,10 @@ from tqdm import tqdm
 
 from turnout import __version__
 from turnout.files import beside
-from turnout.report.changed import MARK, content_of, contents
 from turnout.report.pages.fleet import fleet_page
 from turnout.report.pages.turnout import turnout_page
 from turnout.report.source import ROWS, FleetSource
+from turnout.report.stale_pages import MARK, content_of, contents
 
 AT_ONCE = 100
 

@@ -10,7 +10,7 @@ from turnout import physics
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.diagnose import Verification
 from turnout.mismatch.engine.residual_attribution import Frame, attribute
-from turnout.report.finding_words import facts
+from turnout.report.finding_text import facts
 from turnout.stages.mismatch_rows import finding_row
 
 OF_A_ROW = {"place_low_m": 2.4, "place_high_m": 8.7, "wheel_within_m": None, "evidence_json": None,

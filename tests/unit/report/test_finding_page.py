@@ -11,9 +11,9 @@ import pytest
 from jinja2 import Environment, PackageLoader
 
 from turnout.errors import SimulationError
-from turnout.report.finding_words import answer, check, facts, filed, parameters
+from turnout.report.finding_text import answer, check, facts, filed, parameters
 from turnout.report.pages.finding import finding_page
-from turnout.report.panels.finding_place import Drawing, marked_place
+from turnout.report.panels.finding import Drawing, marked_place
 from turnout.stages.accept_finding import _refuse
 from turnout.stages.mismatch_text import headline
 

@@ -6,10 +6,8 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from turnout.report.chart import BOTTOM, LEFT, RIGHT, TOP, Axis, Chart
-from turnout.report.panels.receptance import coherence_panel, receptance_panel
-from turnout.report.strokes import drawn
-from turnout.report.ticks import linear_ticks, log_ticks, time_ticks
+from turnout.report.panels.hammer import coherence_panel, receptance_panel
+from turnout.report.svg import BOTTOM, LEFT, RIGHT, TOP, Axis, Chart, drawn, linear_ticks, log_ticks, time_ticks
 
 
 def chart(scale="linear"):

@@ -1,9 +1,8 @@
 """The page of a turnout's mismatches: understood in one minute, evidence below."""
 
-from turnout.report.finding_words import answer, check, facts, filed, parameters, rivals, title
-from turnout.report.panels.finding_curves import curve_panel, fit_panel, history_of_parameter
-from turnout.report.panels.finding_place import place_panel
-from turnout.report.words import day
+from turnout.report.finding_text import answer, check, facts, filed, parameters, rivals, title
+from turnout.report.formatting import day
+from turnout.report.panels.finding import curve_panel, fit_panel, history_of_parameter, place_panel
 
 GRAVITY = ("named", "a_or_b", "unknown", "numerics", "none")
 BADGES = {"named": "inspect", "a_or_b": "plan", "unknown": "plan", "numerics": "learning", "none": "ok"}

@@ -3,7 +3,7 @@
 from collections import Counter
 
 from turnout.errors import REASONS
-from turnout.report.words import badge, day
+from turnout.report.formatting import badge, day
 
 STATES = {
     "inspect this week": "inspect",

@@ -2,14 +2,17 @@
 
 from collections import Counter
 
-from turnout.report.panels.decay import decay_panel
+from turnout.report.formatting import badge, day, with_interval
 from turnout.report.panels.diagram import diagram
+from turnout.report.panels.hammer import (
+    coherence_panel,
+    decay_panel,
+    impacts_panel,
+    receptance_panel,
+    stabilisation_panel,
+)
 from turnout.report.panels.history import history_panel
-from turnout.report.panels.impacts import impacts_panel
-from turnout.report.panels.receptance import coherence_panel, receptance_panel
-from turnout.report.panels.stabilisation import stabilisation_panel
 from turnout.report.trains import trains_part
-from turnout.report.words import badge, day, with_interval
 
 BANDS = ("ballast", "railpad")
 SHOWN = 5  # earlier tests that were not used, of one section

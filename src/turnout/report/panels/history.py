@@ -4,8 +4,8 @@ from datetime import datetime
 
 import numpy as np
 
-from turnout.report.chart import Axis, Chart
-from turnout.report.words import student_quantile
+from turnout.report.formatting import student_quantile
+from turnout.report.svg import Axis, Chart
 
 EPOCH = datetime(1970, 1, 1)
 

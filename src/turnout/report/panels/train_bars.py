@@ -5,7 +5,7 @@ from html import escape
 
 import numpy as np
 
-from turnout.report.chart import LEFT, TOP, Axis, Chart
+from turnout.report.svg import LEFT, TOP, Axis, Chart
 
 WIDTH = 952
 # Light to dark, told apart in print and by colour-blind readers.

@@ -7,8 +7,8 @@ import numpy as np
 
 from turnout.errors import REASONS
 from turnout.receptance.dynamic_stiffness import dynamic_stiffness
+from turnout.report.formatting import with_interval
 from turnout.report.pages.turnout import BANDS, PANELS
-from turnout.report.words import with_interval
 
 VERDICTS = {
     "accepted": "both resonances found",

@@ -1,0 +1,254 @@
+"""Measured against simulated, before and after: waveform, spectrum, receptance, missing force.
+
+The turnout as a drawing with what was diagnosed: each group's answer, and the place that a finding points at.
+"""
+
+from html import escape
+
+import numpy as np
+
+from turnout.report.svg import Axis, Chart
+
+TITLES = {
+    "waveform": "Waveform",
+    "spectrum": "Power spectral density",
+    "receptance": "Receptance",
+    "latent": "The missing force",
+}
+WIDE = 944
+
+
+def curve_panel(row, changed="what was left out"):
+    """One row of ``mismatch_curves``; ``changed``: what is in the simulation after, "" where there is no after."""
+    if row["curve"] == "latent":
+        return _latent(row)
+    x = np.asarray(row["x"], dtype=float)
+    names = ["measured", "before"] + (["after"] if changed else [])
+    values = {name: np.asarray(row[name], dtype=float) for name in names}
+    log = row["curve"] != "waveform"
+    chart = Chart(_across(row, x, log), _up(row, values, log), _title(row),
+                  width=WIDE if row["curve"] == "waveform" else 462, height=250)  # fmt: skip
+    words = {"measured": "measured", "before": "simulated before", "after": f"simulated with {changed}"}
+    for name in names:
+        chart.line(x, values[name], f"curve-{name}", words[name])
+    _key(chart, names, words)
+    return chart.svg()
+
+
+def _title(row):
+    label = row["label"] if row["curve"] == "waveform" else row["label"].partition(",")[0]
+    return f"{TITLES[row['curve']]}: {label}"
+
+
+def _across(row, x, log):
+    return Axis(float(x.min()), float(x.max()), _named(row), "log" if log else "linear")
+
+
+def _up(row, values, log):
+    """Axis that holds what was measured and, as far as it is near, what was simulated."""
+    every = np.concatenate([v[np.isfinite(v)] for v in values.values()])
+    label = {"waveform": "acceleration", "spectrum": "PSD", "receptance": "receptance"}[row["curve"]]
+    if log:
+        every = every[every > 0.0]
+        top = float(values["measured"].max())
+        low = max(float(every.min()), 1e-5 * top)
+        return Axis(low / 1.3, float(every.max()) * 3.0, f"{label} [{row['y_unit']}]", "log")
+    reach = float(np.max(np.abs(every))) * 1.25
+    return Axis(-reach, reach, f"{label} [{row['y_unit']}]")
+
+
+def _key(chart, names, words):
+    """Which line is which, in a row at the head of the panel."""
+    x = 0.01
+    for name in names:
+        chart.text(x, 0.06, words[name], f"key-{name}")
+        x += (6.2 * len(words[name]) + 16) / (chart.width - 76)
+
+
+def _named(row):
+    """Quantity and unit of the horizontal axis."""
+    return f"{row['x_label']} [{row['x_unit']}]" if row["x_unit"] else row["x_label"]
+
+
+def _latent(row):
+    """Mean missing force with its 95 % limits over the covariate that explains most."""
+    x, mean = np.asarray(row["x"], dtype=float), np.asarray(row["measured"], dtype=float)
+    low, high = np.asarray(row["before"], dtype=float), np.asarray(row["after"], dtype=float)
+    pad = 0.1 * float(np.ptp(np.concatenate([low, high]))) or 1.0
+    chart = Chart(
+        Axis(float(x.min()), float(x.max()), _named(row)),
+        Axis(float(low.min()) - pad, float(high.max()) + pad, f"force [{row['y_unit']}]"),
+        row["label"][:1].upper() + row["label"][1:],
+        height=250,
+    )
+    chart.band(x, low, high, "interval", "95 % limits")
+    chart.points(x, mean, "point", 2.5, low, high)
+    return chart.svg()
+
+
+def fit_panel(finding):
+    """Bars of the fit on recordings never used: before, with the term, best rival, decoy; "" without any."""
+    entries = [
+        ("before", finding["fit_before_pct"], "bar-before"),
+        ("with it", finding["fit_after_pct"], "bar-after"),
+        ("best rival", finding["fit_rival_pct"], "bar-rival"),
+        ("decoy", finding["fit_decoy_pct"], "bar-rival"),
+    ]
+    entries = [e for e in entries if e[1] is not None]
+    if not entries or not finding["n_held_out"]:
+        return ""
+    low = min(0.0, *(max(e[1], -100.0) for e in entries))
+    chart = Chart(
+        Axis(0.4, len(entries) + 0.6, "", "names", tuple(e[0] for e in entries)),
+        Axis(low, 100.0, "fit [%]"),
+        f"Fit on recordings never used, n = {finding['n_held_out']}{_gain(finding)}",
+        height=250,
+    )
+    for k, (_, value, style) in enumerate(entries, start=1):
+        top, zero = float(chart.py(max(value, low))), float(chart.py(0.0))
+        x = float(chart.px(k))
+        chart.parts.append(
+            f'<rect class="{style}" x="{x - 26:.1f}" y="{min(top, zero):.1f}" width="52" '
+            f'height="{abs(zero - top):.1f}"/><text class="place" x="{x:.1f}" y="{min(top, zero) - 5:.1f}" '
+            f'text-anchor="middle">{value:.0f} %</text>'
+        )
+    return chart.svg()
+
+
+def _gain(finding):
+    """What the term gains with its standard error, in words; "" where that is not known."""
+    before, after, error = (finding.get(k) for k in ("fit_before_pct", "fit_after_pct", "fit_gain_se_pct"))
+    return "" if None in (before, after, error) else f": {after - before:+.1f} ± {error:.1f} points"
+
+
+def history_of_parameter(rows):
+    """A parameter over the visits with its 95 % intervals; rows of ``mismatch_parameters``, oldest first."""
+    if len(rows) < 2:
+        return ""
+    seconds = [r["found_at_utc"].timestamp() for r in rows]
+    values = [r["value"] for r in rows]
+    low = [r["value"] if r["value_low"] is None else r["value_low"] for r in rows]
+    high = [r["value"] if r["value_high"] is None else r["value_high"] for r in rows]
+    span, pad = max(seconds) - min(seconds), 0.1 * (max(high) - min(low)) or 1.0
+    name = f"{rows[0]['term'].replace('_', ' ')}, {rows[0]['parameter']}"
+    chart = Chart(
+        Axis(min(seconds) - 0.05 * span - 86400, max(seconds) + 0.05 * span + 86400, "", "time"),
+        Axis(min([*low, 0.0]) - pad, max(high) + pad, f"{rows[0]['parameter']} [{rows[0]['unit']}]"),
+        f"{name}: {len(rows)} visits",
+    )
+    chart.points(np.array(seconds), np.array(values), "point", 3.0, np.array(low), np.array(high))
+    return chart.svg()
+
+
+STYLES = {
+    "named": "found-named",
+    "a_or_b": "found-aorb",
+    "unknown": "found-unknown",
+    "numerics": "found-numerics",
+    "none": "found-none",
+}
+WIDTH, HEIGHT = 920, 210
+MAIN, SPREAD = 92.0, 58.0
+
+
+class Drawing:
+    """Places [m] along the turnout to pixels; the diverging track leaves the main one at the switch toe."""
+
+    toe = 0.0  # places count from it
+
+    def __init__(self, sections):
+        self.branches = any(s["track"] == "diverging" for s in sections)
+        shown = [s["position_m"] or 0.0 for s in sections] + [self.toe] * self.branches
+        self.low, self.high = min(shown) - 4.0, max(shown) + 4.0
+        self.parts: list[str] = []
+
+    def px(self, metres):
+        """Horizontal pixel of a place."""
+        return 20 + (WIDTH - 40) * (metres - self.low) / (self.high - self.low)
+
+    def py(self, metres, diverging):
+        """Vertical pixel of a place on the main or the diverging track."""
+        share = max(0.0, (metres - self.toe) / (self.high - self.toe)) if diverging else 0.0
+        return MAIN + SPREAD * share**1.6
+
+    def rails(self):
+        """The main track, and the diverging one where it is measured."""
+        steps = [self.toe + (self.high - self.toe) * k / 24 for k in range(25)]
+        curve = " ".join(f"L{self.px(m):.1f} {self.py(m, True):.1f}" for m in steps)
+        self.parts.append(f'<path class="rail" d="M{self.px(self.low):.1f} {MAIN}H{self.px(self.high):.1f}"/>')
+        if self.branches:
+            self.parts.append(f'<path class="rail" d="M{self.px(self.toe):.1f} {MAIN} {curve}"/>')
+
+    def stretch(self, finding):
+        """What a group covers, in the colour of its answer."""
+        diverging = finding["route"] == "diverging"
+        low, high = finding["place_low_m"] - 1.3, finding["place_high_m"] + 1.3
+        steps = [low + (high - low) * k / 12 for k in range(13)]
+        path = "L".join(f"{self.px(m):.1f} {self.py(m, diverging):.1f}" for m in steps)
+        words = escape(f"{finding['sections']}: {finding['verdict'].replace('_', ' ')}")
+        style = STYLES[finding["verdict"]]
+        self.parts.append(f'<path class="stretch {style}" d="M{path}"><title>{words}</title></path>')
+
+    def sensor(self, section, row, unnamed=False):
+        """A measured section with its label, or ``unnamed``; crowded labels take turns."""
+        diverging = section["track"] == "diverging"
+        x, y = self.px(section["position_m"] or 0.0), self.py(section["position_m"] or 0.0, diverging)
+        side = 24 + 13 * (row % 2) if diverging else -16 - 13 * (row % 2)
+        label = escape(section["label"])
+        self.parts.append(f'<circle class="seat" cx="{x:.1f}" cy="{y:.1f}" r="4.5"><title>{label}</title></circle>')
+        if not unnamed:
+            text = f'<text class="tick" x="{x:.1f}" y="{y + side:.1f}" text-anchor="middle">{label}</text>'
+            self.parts.append(text)
+
+    def mark(self, place, diverging, words):
+        """An arrow to a place, with words at its tail."""
+        x, y = self.px(place), self.py(place, diverging)
+        anchor = "end" if x > WIDTH - 260 else "start"
+        beside = x - 10 if anchor == "end" else x + 10
+        self.parts.append(
+            f'<path class="arrow" d="M{x:.1f} {y - 62:.1f}V{y - 12:.1f}"/>'
+            f'<path class="arrowhead" d="M{x - 6:.1f} {y - 18:.1f}L{x:.1f} {y - 6:.1f}L{x + 6:.1f} {y - 18:.1f}Z"/>'
+            f'<text class="mark" x="{beside:.1f}" y="{y - 56:.1f}" text-anchor="{anchor}">{escape(words)}</text>'
+        )
+
+    def svg(self):
+        """The whole drawing."""
+        legend = f'<text class="label" x="24" y="{HEIGHT - 6}">facing direction →, metres from the switch toe</text>'
+        return (
+            f'<svg class="diagram" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" role="img" '
+            f'aria-label="The turnout and what was found">{"".join(self.parts)}{legend}</svg>'
+        )
+
+
+def place_panel(sections, findings, marked=None):
+    """Drawing of ``sections`` (rows) with the answers of ``findings``; ``marked`` is the one that gets the arrow."""
+    drawing = Drawing(sections)
+    drawing.rails()
+    for finding in findings:
+        drawing.stretch(finding)
+    place, words = marked_place(marked, sections) if marked is not None else (None, "")
+    ordered = sorted(sections, key=lambda s: (s["track"] == "diverging", s["position_m"] or 0.0))
+    for row, section in enumerate(ordered):
+        hidden = place is not None and marked is not None and _under(section, place, marked["route"])
+        drawing.sensor(section, row, hidden)
+        words += f" ({section['label']})" if hidden and section["label"] not in words else ""
+    if place is not None and marked is not None:
+        drawing.mark(place, marked["route"] == "diverging", words)
+    return drawing.svg()
+
+
+def _under(section, place, route):
+    """Whether the arrow would lie on the section's label."""
+    same = (section["track"] == "diverging") == (route == "diverging")
+    return same and abs((section["position_m"] or 0.0) - place) < 0.5
+
+
+def marked_place(finding, sections):
+    """(place [m] or None, words) that the arrow points at: the effect's place, or its sensor's."""
+    if finding["position_m"] is not None:
+        return finding["position_m"], f"{finding['position_m']:.1f} m"
+    if finding["channel"]:
+        seats = {s["label"]: s["position_m"] for s in sections}
+        middle = 0.5 * (finding["place_low_m"] + finding["place_high_m"])
+        return seats.get(finding["channel"], middle), f"sensor {finding['channel']}"
+    return None, ""

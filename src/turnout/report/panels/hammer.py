@@ -1,0 +1,159 @@
+"""Receptance of one section with its H1-H2 bracket, and the coherence that says where to trust it.
+
+The free decay of one impact and the model's decay laid over it.
+
+Poles over model order: the ones that stay where they are as the order grows are the track's.
+
+The impacts of a campaign by peak force: which were used, which were not and why.
+"""
+
+import json
+
+import numpy as np
+
+from turnout.report.svg import Axis, Chart
+
+SPAN = (30.0, 1600.0)
+
+
+def receptance_panel(row, modes):
+    """Magnitude of the receptance over frequency; lines that fail the gate are grey.
+
+    ``row`` is one row of ``receptances``, ``modes`` the rows of ``modes`` of the same model.
+    """
+    frequency = np.asarray(row["frequency_hz"], dtype=float)
+    inside = (frequency >= SPAN[0]) & (frequency <= SPAN[1])
+    h1 = np.hypot(row["h1_real_m_n"], row["h1_imag_m_n"])
+    h2 = np.asarray(row["h2_abs_m_n"], dtype=float)
+    shown = np.concatenate([h1[inside], h2[inside]])
+    shown = shown[np.isfinite(shown) & (shown > 0)]
+    if not shown.size:
+        return ""
+    chart = Chart(
+        Axis(*SPAN, "frequency [Hz]", "log"),
+        Axis(np.quantile(shown, 0.005) / 1.5, shown.max() * 1.6, "receptance [m/N]", "log"),
+        f"Receptance, H1 with H1-H2 bracket, n = {row['n_impacts']} impacts{_window(row)}",
+    )
+    passed = np.asarray(row["passed"], dtype=bool)
+    _grey_out(chart, frequency, passed, row)
+    chart.band(frequency, h1, h2, "bracket", "between H1 and H2")
+    chart.line(frequency, h1, "curve failed", "H1, fails the gate")
+    chart.line(frequency, np.where(passed, h1, np.nan), "curve", "H1")
+    for mode in modes:
+        chart.vertical(mode["frequency_hz"], "mode", f"{mode['band']} {mode['frequency_hz']:.0f} Hz")
+    return chart.svg()
+
+
+def coherence_panel(row):
+    """Coherence with its 95 % limits and the gate it is held against."""
+    frequency = np.asarray(row["frequency_hz"], dtype=float)
+    chart = Chart(
+        Axis(*SPAN, "frequency [Hz]", "log"),
+        Axis(0.0, 1.02, "coherence"),
+        f"Coherence, 95 % limits, n = {row['n_impacts']}; gate: {row['gate']}",
+        height=190,
+    )
+    _grey_out(chart, frequency, np.asarray(row["passed"], dtype=bool), row)
+    chart.band(frequency, row["coherence_low"], row["coherence_high"], "interval", "95 % limits")
+    chart.line(frequency, row["coherence"], "curve", "coherence")
+    if required := row.get("gate_required"):
+        chart.line(SPAN, [required] * 2, "limit", f"required {required:g}")
+    return chart.svg()
+
+
+def _window(row):
+    """What an exponential window did to the curve; nothing to say without one."""
+    decay = row.get("window_decay_per_s")
+    return f"; a window exp(-{decay:g}/s t) adds to its damping, not to the model's" if decay else ""
+
+
+def _grey_out(chart, frequency, passed, row):
+    """Shade the lines that the gate refused, and what lies beyond the hammer."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], (~passed).astype(int), [0]])))
+    for first, last in zip(edges[::2], edges[1::2] - 1):
+        half = 0.5 * (frequency[1] - frequency[0])
+        chart.span(frequency[first] - half, frequency[last] + half, "gated", "refused by the gate")
+    if row["valid_to_hz"]:
+        chart.vertical(row["valid_to_hz"], "edge", "hammer's band edge", row=1)
+
+
+# Points of a drawn decay: ten a period at 1 kHz.
+DRAWN = 300
+
+
+def decay_panel(row, model):
+    """``row`` of ``receptances`` and ``model`` of ``models``; 30 ms are shown."""
+    if row["decay_ms2"] is None or row["decay_model_ms2"] is None:
+        return ""
+    measured = np.asarray(row["decay_ms2"], dtype=float)
+    predicted = np.asarray(row["decay_model_ms2"], dtype=float)
+    n = min(len(measured), len(predicted), int(0.03 * row["decay_rate_hz"]))
+    step = max(1, n // DRAWN)
+    measured, predicted, n = measured[:n:step], predicted[:n:step], len(measured[:n:step])
+    time = 1e3 * step * np.arange(n) / row["decay_rate_hz"]
+    largest = 1.1 * float(np.max(np.abs(measured[:n])))
+    fit, null = model["hammer_fit_pct"], model["hammer_fit_null_pct"]
+    score = f"fit left out {fit:.0f} % (null {null:.0f} %)" if _known(fit) and _known(null) else ""
+    chart = Chart(
+        Axis(0.0, float(time[-1]), "time after contact [ms]"),
+        Axis(-largest, largest, "acceleration [m/s²]"),
+        f"Free decay, one impact; {score}" if score else "Free decay, one impact",
+    )
+    chart.line(time, measured[:n], "measured", "measured")
+    chart.line(time, predicted[:n], "model", "model")
+    chart.text(0.98, 0.08, "measured", "key measured", "end")
+    chart.text(0.98, 0.16, f"model of order {model['model_order']}", "key model", "end")
+    return chart.svg()
+
+
+def _known(value):
+    return value is not None and np.isfinite(value)
+
+
+def stabilisation_panel(row, modes):
+    """``stabilisation_json`` of one row of ``receptances``; ``modes`` are marked."""
+    poles = json.loads(row["stabilisation_json"] or "[]")
+    if not poles:
+        return ""
+    orders = [p["order"] for p in poles]
+    chart = Chart(
+        Axis(30.0, 1600.0, "frequency [Hz]", "log"),
+        Axis(min(orders) - 1, max(orders) + 3, "model order"),  # room for words
+        "Stabilisation: poles over model order",
+    )
+    for mode in modes:
+        chart.vertical(mode["frequency_hz"], "mode", mode["band"])
+    for status, style, radius in (("unstable", "pole-unstable", 2.0), ("stable", "pole-stable", 3.0)):
+        chosen = [p for p in poles if (p["status"] == "stable") == (status == "stable")]
+        chart.points(
+            [p["frequency"] for p in chosen],
+            [p["order"] for p in chosen],
+            style,
+            radius,
+            labels=[f"order {p['order']}: {p['frequency']:.1f} Hz, damping {p['damping']:.3f}" for p in chosen],
+        )
+    return chart.svg()
+
+
+def impacts_panel(rows):
+    """``rows`` of ``impacts`` of one section and campaign, in order of test and record."""
+    if not rows:
+        return ""
+    peaks = [abs(r["peak_n"] or 0.0) / 1e3 for r in rows]
+    used = sum(r["status"] == "accepted" for r in rows)
+    chart = Chart(
+        Axis(0.0, len(rows) + 1.0, "impact"),
+        Axis(0.0, 1.15 * max([*peaks, 1e-3]), "peak force [kN]"),
+        f"Impacts: {used} used, {len(rows) - used} rejected",
+        height=190,
+    )
+    for style in ("used", "rejected"):
+        some = [i for i, row in enumerate(rows) if (row["status"] == "accepted") == (style == "used")]
+        labels = [_words(rows[i], peaks[i]) for i in some]
+        chart.points([i + 1 for i in some], [peaks[i] for i in some], style, 3.5, labels=labels)
+    return chart.svg()
+
+
+def _words(row, peak):
+    said = "used" if row["status"] == "accepted" else f"rejected: {row['reason']}. {row['detail'] or ''}"
+    return f"test {row['test']}, record {row['record'] + 1}: {peak:.1f} kN, {said}"
