@@ -13,8 +13,8 @@ from benchmarks.published.models import state_matrix
 from turnout.config.settings.identify import IdentifySettings
 from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.demo.hammer import hammer_test as demonstration_test
+from turnout.demo.hammer import simulated_response
 from turnout.demo.scenario import SECTIONS
-from turnout.demo.simulated_response import simulated_response
 from turnout.modal import compare_tests, cramer_rao_bound, era, identify, modal_parameters
 from turnout.modal.least_squares import drift_columns
 from turnout.receptance import find_impacts, receptance_of

@@ -25,10 +25,9 @@ def run(args):
     """Make the fleet, run the pipeline, say what was found."""
     import os
 
-    from turnout.demo.make import make_fleet
-    from turnout.demo.pipeline import run_pipeline
+    from turnout.demo.make import make_fleet, run_pipeline
     from turnout.demo.scenario import campaign_days
-    from turnout.demo.told import tell
+    from turnout.demo.summary import tell
     from turnout.errors import ConfigError
 
     for option, least in (("campaigns", 1), ("passages", 0)):

@@ -1,12 +1,21 @@
-"""One hammer test of the demonstration fleet: ten blows, the section's response, the instruments, the mishaps."""
+"""One hammer test of the demonstration fleet: ten blows, the section's response, the instruments, the mishaps.
+
+Impulse response of a section from the simulated track, with its stiffness changed by given factors.
+"""
 
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, time, timedelta
+from functools import lru_cache
 
 import numpy as np
 
-from turnout.demo import faults
+from turnout.demo import scenario
 from turnout.records import Channel, Recording
+from turnout.simulate.frequency_response import receptance
+from turnout.simulate.hammer import located
+from turnout.simulate.matrices import assemble
+from turnout.simulate.parameters import load_track
+from turnout.simulate.turnout_track import stretch_of_track
 
 RATE = 20_000.0
 N_SAMPLE = 3_000
@@ -69,7 +78,7 @@ def hammer_test(impulse_response, temperature, day, test, rng, n_blow=10):
             samples, RATE, (FORCE, RAIL), "hammer", record=record, conditions=conditions,
             started_at=started + timedelta(seconds=20 * record),
         )  # fmt: skip
-        recordings.append(_convert(faults.overload(recording) if fault == "overload" else recording))
+        recordings.append(_convert(scenario.overload(recording) if fault == "overload" else recording))
         truth.append(Blow(test, record, peak, str(fault)))
     return recordings, truth
 
@@ -84,3 +93,54 @@ def _convert(recording):
     limits = np.array([[c.limit] for c in recording.channels])
     step = limits / 2**15
     return replace(recording, samples=np.clip(np.round(recording.samples / step) * step, -limits, limits))
+
+
+SPREAD = 0.006
+HALF_LENGTH = 18.0
+# The hammer's pulse has nothing above; a smooth end keeps the impulse response short.
+PASS, STOP = 2_500.0, 4_000.0
+
+
+def simulated_response(section, ballast, railpad, hangs=False):
+    """Function of a random generator giving (N_SAMPLE,) acceleration per unit impulse [m/s² per N s].
+
+    The rail head is struck and measured at the section's place on the track of config/tracks/tommerup.yaml,
+    whose ballast and pads are ``ballast`` and ``railpad`` times as stiff as there. From blow to blow the track
+    answers 0.6 % faster or slower: hammer and sensor never stand in quite the same place. ``hangs``: the sleeper
+    under the sensor hangs above its ballast, which an unloaded track never touches.
+    """
+    frequency, accelerance = _accelerance(section, round(ballast, 6), round(railpad, 6), hangs)
+
+    def response(rng):
+        stretched = np.interp(frequency * (1.0 + SPREAD * rng.standard_normal()), frequency, accelerance)
+        return np.fft.irfft(stretched, N_SAMPLE) * RATE
+
+    return response
+
+
+@lru_cache(maxsize=8)
+def _accelerance(section, ballast, railpad, hangs):
+    """Frequencies [Hz] and accelerance [m/s²/N] up to the Nyquist frequency."""
+    place, track = located(_turnout(), section)
+    stretch = stretch_of_track(track, place, HALF_LENGTH)
+    under = stretch.nearest_support(place)
+    place = float(stretch.support[under])
+    touched = np.ones(stretch.support.size)
+    touched[under] = 0.0 if hangs else 1.0
+    changed = stretch.with_(
+        ballast_stiffness=ballast * touched * stretch.ballast_stiffness,
+        ballast_damping=touched * stretch.ballast_damping,
+        pad_stiffness=railpad * stretch.pad_stiffness,
+    )
+    frequency = np.fft.rfftfreq(N_SAMPLE, 1.0 / RATE)
+    inside = (frequency > 0) & (frequency < STOP)
+    h = receptance(assemble(changed), frequency[inside], place, place)
+    taper = 0.5 * (1.0 + np.cos(np.pi * np.clip((frequency[inside] - PASS) / (STOP - PASS), 0.0, 1.0)))
+    accelerance = np.zeros(frequency.size, complex)
+    accelerance[inside] = -((2 * np.pi * frequency[inside]) ** 2) * h * taper
+    return frequency, accelerance
+
+
+@lru_cache(maxsize=1)
+def _turnout():
+    return load_track("tommerup")

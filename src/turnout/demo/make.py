@@ -1,8 +1,13 @@
-"""Write the raw files of the demonstration fleet, and its truth where the pipeline does not read."""
+"""Write the raw files of the demonstration fleet, and its truth where the pipeline does not read.
+
+Run the workflow as a user would.
+"""
 
 import csv
 import json
 import os
+import subprocess
+import sys
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
 from datetime import datetime, time
@@ -12,12 +17,11 @@ from zlib import crc32
 import numpy as np
 from tqdm import tqdm
 
-import turnout.demo.faults as faults
+import turnout.demo.scenario as faults
 from turnout.config import load_configuration
-from turnout.demo.hammer import hammer_test
+from turnout.demo.hammer import hammer_test, simulated_response
 from turnout.demo.passages import make_passage, make_passages
 from turnout.demo.scenario import FLEET, SECTIONS, campaign_days, gap_under, rail_temperature, stiffness_factors
-from turnout.demo.simulated_response import simulated_response
 from turnout.readers.writing import write
 
 EXTENSION = {"uff58b": "uff", "tdms": "tdms", "hdf5": "h5", "mat": "mat", "csv": "csv"}
@@ -141,3 +145,9 @@ def _write_truth(truth, scenario, days, temperatures, seed):
         "file_faults": [[*k, v] for k, v in FILE_FAULTS.items() if k[0] == scenario.turnout],
     }
     (truth / f"{scenario.turnout}.json").write_text(json.dumps(content, indent=1))
+
+
+def run_pipeline(cores, *options) -> int:
+    """Snakemake on ``cores`` processors with further ``options``; its exit code."""
+    command = [sys.executable, "-m", "snakemake", "--cores", str(cores), *options]
+    return subprocess.run(command).returncode

@@ -78,10 +78,10 @@ def test_every_mishap_of_a_blow_is_named_and_no_sound_blow_is_lost(tmp_path):
 
 
 def test_one_dead_channel_costs_one_file_and_says_what_to_do(tmp_path):
-    from turnout.demo import faults
+    from turnout.demo import scenario
 
     def change(test, recordings):
-        return [faults.dead_channel(r) for r in recordings] if test == 2 else recordings
+        return [scenario.dead_channel(r) for r in recordings] if test == 2 else recordings
 
     unit, turnout, _ = lay_out(tmp_path, "CLP", change=change)
     rows = hammer_unit(unit, turnout, tmp_path, algo="1")
@@ -181,9 +181,9 @@ def test_a_test_called_by_the_time_of_its_recording_loses_no_blow_on_the_way_int
 
 
 def test_a_reversed_force_is_named(tmp_path):
-    from turnout.demo import faults
+    from turnout.demo import scenario
 
-    unit, turnout, _ = lay_out(tmp_path, "SP", change=lambda _, rs: [faults.swapped_sign(r) for r in rs])
+    unit, turnout, _ = lay_out(tmp_path, "SP", change=lambda _, rs: [scenario.swapped_sign(r) for r in rs])
     rows = hammer_unit(unit, turnout, tmp_path, algo="1")
     assert rows["models"][0]["status"] == "rejected" and rows["models"][0]["reason"] == "too_few_impacts"
     assert {i["reason"] for i in rows["impacts"]} == {"sign_reversed"}

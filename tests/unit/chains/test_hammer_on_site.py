@@ -11,7 +11,7 @@ from benchmarks.published.response import ACCELERATION_PER_IMPULSE, LOCATION, pa
 
 from turnout.cli import main
 from turnout.config import load_configuration, with_raw
-from turnout.demo import faults
+from turnout.demo import scenario
 from turnout.demo.hammer import RATE, hammer_test
 from turnout.readers.writing import write
 from turnout.registry.intake import Arrival, gather
@@ -104,7 +104,7 @@ def test_the_dynamic_stiffness_is_that_of_the_closed_form_within_its_interval(tm
 
 def test_what_is_said_is_what_the_registry_will_hold(tmp_path, capsys):
     def two_faults(recordings):
-        clipped, twice = faults.overload(recordings[1]), _struck_twice(recordings[7])
+        clipped, twice = scenario.overload(recordings[1]), _struck_twice(recordings[7])
         return [recordings[0], clipped, *recordings[2:7], twice, *recordings[8:]]
 
     files = [*filed(tmp_path, "A9", (1,)), *filed(tmp_path, "A9", (2,), change=two_faults)]
@@ -141,7 +141,7 @@ def _struck_twice(recording):
 
 
 def test_nothing_is_shown_as_sound_that_the_chain_refuses(tmp_path, capsys):
-    files = filed(tmp_path, "SP", (1,), change=lambda rs: [faults.swapped_sign(r) for r in rs])
+    files = filed(tmp_path, "SP", (1,), change=lambda rs: [scenario.swapped_sign(r) for r in rs])
     code, text, _ = say(capsys, tmp_path, *files)
     assert code == 1 and "no resonance" in text and "0 of 10 accepted" in text
     assert text.count("refused, sign_reversed") == 10 and not resonances(text) and "MN/m" not in text
@@ -240,7 +240,7 @@ def test_what_cannot_be_known_is_asked_for(tmp_path, capsys):
 
 
 def test_damage_is_named_before_a_day_is_asked_for(tmp_path, capsys):
-    path = record(tmp_path / "stick" / "A7_1.h5", change=lambda rs: [faults.dead_channel(r) for r in rs])
+    path = record(tmp_path / "stick" / "A7_1.h5", change=lambda rs: [scenario.dead_channel(r) for r in rs])
     code, _, error = say(capsys, tmp_path, path)
     assert code == 2 and "record 1 of 10" in error and "the channel is dead" in error
     code, text, _ = say(capsys, tmp_path, path, more=["--campaign", "2024-05-13"])
@@ -307,7 +307,7 @@ def test_the_figure_holds_what_was_found_and_nothing_else_is_written(tmp_path, c
 
 
 def test_the_figure_of_a_refused_test_shows_its_blows_and_no_resonance(tmp_path, capsys):
-    files = filed(tmp_path, "SP", change=lambda rs: [faults.swapped_sign(r) for r in rs])
+    files = filed(tmp_path, "SP", change=lambda rs: [scenario.swapped_sign(r) for r in rs])
     code, _, _ = say(capsys, tmp_path, *files, more=["--figure", str(tmp_path / "sp.svg")])
     drawing = (tmp_path / "sp.svg").read_text()
     assert code == 1 and "no resonance" in drawing and "too few accepted impacts" in drawing

@@ -5,8 +5,7 @@ import datetime
 import numpy as np
 import pytest
 
-from turnout.demo.hammer import RATE, hammer_test
-from turnout.demo.simulated_response import simulated_response
+from turnout.demo.hammer import RATE, hammer_test, simulated_response
 from turnout.simulate.frequency_response import receptance
 from turnout.simulate.hammer import located
 from turnout.simulate.matrices import assemble

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from turnout.config.settings.identify import IdentifySettings
-from turnout.demo.hammer import N_SAMPLE, RATE, pulse, response_to
-from turnout.demo.simulated_response import simulated_response
+from turnout.demo.hammer import N_SAMPLE, RATE, pulse, response_to, simulated_response
 from turnout.modal import identify
 
 SETTINGS = IdentifySettings(null_draws=10)
