@@ -159,7 +159,16 @@ def quarantined(folder):
 def killed(folder, seconds):
     """Start the unattended run, kill it and all its jobs; True where it had not ended before."""
     profile = str(toy.REPOSITORY / "profiles/default")
-    command = [sys.executable, "-m", "turnout.cli", "nightly", "--profile", profile, "--", *toy.command(shards=4)[3:]]
+    command = [
+        sys.executable,
+        "-m",
+        "turnout.cli.main",
+        "nightly",
+        "--profile",
+        profile,
+        "--",
+        *toy.command(shards=4)[3:],
+    ]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     run = subprocess.Popen(command, cwd=folder, env=toy.environment(), start_new_session=True, **quiet)
     time.sleep(seconds)

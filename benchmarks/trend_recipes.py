@@ -7,7 +7,7 @@ that in which ``turnout demo`` was run.
 import sys
 from pathlib import Path
 
-from turnout.commands.query import shown
+from turnout.cli.query import shown
 from turnout.registry.database import open_registry
 
 MARKS = "<!-- examples: generated, do not edit -->", "<!-- end of examples -->"

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from turnout.workflow.retries import attempt
 from turnout.report.job import report_job
+from turnout.workflow.retries import attempt
 
 registry, pages = (str(Path(p).parent) for p in (snakemake.input.generation, snakemake.output[0]))
 params = snakemake.params

@@ -15,7 +15,7 @@ from turnout_blind.seal import BlindError, digest, digest_of_folder, read_commit
 
 # Run in a copy of the case, which holds config/ and raw/. {python}, {case}, {folder} (the copy), {work} (a folder of
 # the case's own) and {out} (a JSON file of rows) are filled in; without {out} the rows are the JSON that it prints.
-COMMAND = "{python} -m turnout.cli diagnose --turnout {case} --visit all --work {work} --json"
+COMMAND = "{python} -m turnout.cli.main diagnose --turnout {case} --visit all --work {work} --json"
 WALL, CPU = 1800.0, 900.0  # budget of a case: seconds of the clock and of the processor
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from turnout.cli import build_parser
+from turnout.cli.main import build_parser
 from turnout.registry.database import open_registry
 from turnout.registry.register import register
 

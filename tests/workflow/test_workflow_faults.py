@@ -77,7 +77,7 @@ def test_a_job_that_dies_holds_back_nothing_but_what_it_has_not_computed(fleet):
     (fleet / "killer").touch()
     options = toy.command(chain="faulty:unit", shards=SHARDS)[3:]
     profile = str(toy.REPOSITORY / "profiles/default")
-    night = [sys.executable, "-m", "turnout.cli", "nightly", "--profile", profile, "--", *options]
+    night = [sys.executable, "-m", "turnout.cli.main", "nightly", "--profile", profile, "--", *options]
     done = subprocess.run(night, cwd=fleet, env=toy.environment(), text=True, capture_output=True, check=False)
     assert done.returncode != 0 and "not published" not in done.stdout
     assert sum("2024-02-01" in repr(row) for row in toy.rows(fleet)["recordings"]) == 3

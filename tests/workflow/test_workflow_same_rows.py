@@ -112,7 +112,7 @@ def killed_after(folder, seconds):
 def nightly_command():
     options = toy.command(shards=2)[3:]
     profile = str(toy.REPOSITORY / "profiles/default")
-    return [sys.executable, "-m", "turnout.cli", "nightly", "--profile", profile, "--", *options]
+    return [sys.executable, "-m", "turnout.cli.main", "nightly", "--profile", profile, "--", *options]
 
 
 def nightly(folder):

@@ -9,7 +9,7 @@ import pytest
 from benchmarks.published.models import published_model
 from benchmarks.published.response import ACCELERATION_PER_IMPULSE, LOCATION, paper_response
 
-from turnout.cli import main
+from turnout.cli.main import main
 from turnout.config import load_configuration, with_raw
 from turnout.demo import scenario
 from turnout.demo.hammer import RATE, hammer_test

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import small_turnout as small
 
-from turnout.cli import main
+from turnout.cli.main import main
 from turnout.config import load_configuration
 from turnout.errors import SimulationError
 from turnout.mismatch.turnout import TrackCase

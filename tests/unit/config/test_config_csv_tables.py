@@ -6,7 +6,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from turnout.cli import main
+from turnout.cli.main import main
 from turnout.config import load_configuration
 from turnout.config.acknowledgements import read_acknowledgements
 from turnout.config.campaign_notes import read_campaigns, read_trains

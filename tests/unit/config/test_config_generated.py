@@ -6,7 +6,7 @@ import jsonschema
 import pytest
 from ruamel.yaml import YAML
 
-from turnout.cli import main
+from turnout.cli.main import main
 from turnout.config import load_configuration
 from turnout.config.generate import generated
 from turnout.config.settings import parts

@@ -4,7 +4,7 @@ import shutil
 
 import pytest
 
-from turnout.cli import main
+from turnout.cli.main import main
 from turnout.config.parameters import read_parameters
 from turnout.config.settings.passage import PassageSettings
 from turnout.errors import ConfigError

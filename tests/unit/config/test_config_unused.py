@@ -4,7 +4,7 @@ import shutil
 
 import pytest
 
-from turnout.cli import main
+from turnout.cli.main import main
 from turnout.errors import ConfigError
 from turnout.simulate import load_track
 

@@ -4,7 +4,7 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from turnout.cli import main
+from turnout.cli.main import main
 from turnout.config import load_configuration
 from turnout.config.campaign_notes import read_campaigns
 from turnout.config.turnouts_table import read_table
@@ -403,7 +403,7 @@ def test_a_folder_in_place_of_an_override_is_an_error(tmp_path):
     ],
 )
 def test_a_wrong_option_is_said(repository, monkeypatch, capsys, command, words):
-    from turnout.cli import main
+    from turnout.cli.main import main
 
     monkeypatch.chdir(repository)
     assert main(command) == 2 and words in capsys.readouterr().err

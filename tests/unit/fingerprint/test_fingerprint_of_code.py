@@ -108,5 +108,5 @@ def test_the_hammer_chain_stands_on_its_parts():
     found = fp.closure("turnout.stages.hammer")
     assert {"turnout.receptance", "turnout.modal", "turnout.readers.uff", "turnout.signal.spectra"} <= found
     assert not {
-        m for m in found if m.startswith(("turnout.report", "turnout.trend", "turnout.workflow", "turnout.cli"))
+        m for m in found if m.startswith(("turnout.report", "turnout.trend", "turnout.workflow", "turnout.cli.main"))
     }

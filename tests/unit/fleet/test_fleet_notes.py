@@ -4,7 +4,7 @@ from datetime import datetime, timedelta
 
 import pytest
 
-from turnout.cli import main
+from turnout.cli.main import main
 
 HEADER = "campaign,started_at_utc,rail_temperature_c\n"
 

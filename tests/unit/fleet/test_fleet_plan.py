@@ -123,7 +123,7 @@ def test_an_impossible_date_is_a_named_problem(fleet, name, found):
 
 
 def test_plan_says_what_is_new_and_what_changed(fleet, capsys, monkeypatch):
-    from turnout.cli import main
+    from turnout.cli.main import main
     from turnout.fingerprint import fingerprint
     from turnout.workflow.state import Known, State
     from turnout.workflow.tasks import stamp_of
@@ -231,7 +231,7 @@ def test_files_of_a_turnout_that_is_taken_out_are_not_lost(fleet):
 
 
 def test_plan_announces_that_the_next_run_will_stop_and_what_to_do(fleet, capsys, monkeypatch):
-    from turnout.cli import main
+    from turnout.cli.main import main
 
     monkeypatch.chdir(fleet)
     for k in range(40):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from turnout.cli import main
+from turnout.cli.main import main
 from turnout.mismatch.engine.distinguishability import distinguishability
 from turnout.mismatch.turnout.planned_case import PlannedCase, small_plan
 

@@ -5,7 +5,7 @@ from datetime import datetime
 import numpy as np
 import pytest
 
-from turnout.cli import main
+from turnout.cli.main import main
 from turnout.readers.writing import write
 from turnout.records import Channel, Recording
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from benchmarks.passage_truth import IC3, PATTERNS, RATE, passing, rolling, sensors_for
 
-from turnout.cli import main
+from turnout.cli.main import main
 from turnout.config import load_configuration, with_raw
 from turnout.config.settings.passage import PassageSettings
 from turnout.passage.analysis import analyse

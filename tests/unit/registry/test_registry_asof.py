@@ -2,7 +2,7 @@
 
 import pytest
 
-from turnout.cli import main
+from turnout.cli.main import main
 from turnout.registry.register import register
 
 

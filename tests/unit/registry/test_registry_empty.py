@@ -5,7 +5,7 @@ import csv
 import duckdb
 import pytest
 
-from turnout.cli import main
+from turnout.cli.main import main
 from turnout.errors import REASONS
 from turnout.registry.database import open_registry, view_columns
 from turnout.registry.documentation import views

@@ -5,7 +5,7 @@ import shutil
 import pytest
 from registry_rows import Bench, hammer_result, quarantined_result
 
-from turnout.cli import main
+from turnout.cli.main import main
 from turnout.errors import RegistryError
 from turnout.registry.compaction import compact, rebuild
 from turnout.registry.database import rebuild_database

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from turnout.commands.query import shown
+from turnout.cli.query import shown
 from turnout.registry.database import open_registry
 
 EXAMPLE = re.compile(r"```sql\n(.*?)```\n(?:<!-- output -->|```text\n(.*?)```)", re.DOTALL)

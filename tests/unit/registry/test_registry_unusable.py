@@ -3,7 +3,7 @@
 import pytest
 from registry_rows import hammer_result, quarantined_result
 
-from turnout.cli import main
+from turnout.cli.main import main
 from turnout.registry.database import open_registry
 from turnout.registry.register import register
 from turnout.report.pages.fleet import fleet_page

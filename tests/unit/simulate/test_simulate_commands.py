@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from turnout.cli import main
+from turnout.cli.main import main
 from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.readers import read
 from turnout.receptance import find_impacts

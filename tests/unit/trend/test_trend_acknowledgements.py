@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from tests.oracles.trend_views import connect_views
 
-from turnout.cli import main
+from turnout.cli.main import main
 from turnout.config import load_configuration
 from turnout.config.acknowledgements import acknowledgement, read_acknowledgements
 from turnout.registry.database import open_registry

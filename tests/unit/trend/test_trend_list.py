@@ -239,7 +239,7 @@ def test_sections_measured_the_day_after_are_of_the_same_campaign(settings):
 
 
 def test_the_list_in_words_says_what_it_rests_on_and_what_it_leaves_out(tmp_path, settings, capsys, monkeypatch):
-    from turnout.cli import main
+    from turnout.cli.main import main
 
     rows = fallen()
     newest = rows["measured_at_utc"].max()
@@ -275,7 +275,7 @@ def test_the_list_in_words_says_what_it_rests_on_and_what_it_leaves_out(tmp_path
 
 
 def test_without_a_trend_nobody_is_told_that_there_is_nothing_to_do(tmp_path, capsys):
-    from turnout.cli import main
+    from turnout.cli.main import main
 
     small_registry(tmp_path, fallen(weeks=3))
     assert main(["worklist", "--registry", str(tmp_path)]) == 0

@@ -106,7 +106,7 @@ def test_an_empty_registry_is_no_fault(tmp_path, settings):
 
 
 def test_the_list_on_the_terminal_says_where_what_and_how_sure(registry, capsys, tmp_path):
-    from turnout.cli import main
+    from turnout.cli.main import main
 
     root, _ = registry
     assert main(["worklist", "--registry", str(root)]) == 0
@@ -120,7 +120,7 @@ def test_the_list_on_the_terminal_says_where_what_and_how_sure(registry, capsys,
 
 
 def test_a_list_of_a_day_before_the_first_measurement_says_so(registry, rows, capsys, tmp_path):
-    from turnout.cli import main
+    from turnout.cli.main import main
 
     root, _ = registry
     first = rows["measured_at_utc"].min()
@@ -136,7 +136,7 @@ def test_a_list_of_a_day_before_the_first_measurement_says_so(registry, rows, ca
 
 
 def test_tables_go_out_as_files_that_others_read(registry, tmp_path, capsys):
-    from turnout.cli import main
+    from turnout.cli.main import main
 
     root, _ = registry
     assert main(["export", str(tmp_path / "out"), "--only", "charts", "worklist", "--registry", str(root)]) == 0
@@ -152,7 +152,7 @@ def test_tables_go_out_as_files_that_others_read(registry, tmp_path, capsys):
 
 def test_a_lake_holds_what_the_registry_says_in_versions(registry, tmp_path):
     deltalake = pytest.importorskip("deltalake", reason="the extra 'lakehouse' is not installed")
-    from turnout.cli import main
+    from turnout.cli.main import main
 
     names = ["alarms", "charts", "worklist", "modes_current"]
     command = ["export", str(tmp_path), "--format", "delta", "--only", *names, "--registry", str(registry[0])]
@@ -169,7 +169,7 @@ def test_a_lake_holds_what_the_registry_says_in_versions(registry, tmp_path):
 
 
 def test_a_lake_without_its_package_says_what_to_install(registry, tmp_path, capsys, monkeypatch):
-    from turnout.cli import main
+    from turnout.cli.main import main
 
     monkeypatch.setitem(sys.modules, "deltalake", None)
     code = main(["export", str(tmp_path), "--format", "delta", "--only", "alarms", "--registry", str(registry[0])])

@@ -5,12 +5,12 @@ import sys
 from importlib import import_module
 
 from turnout import __version__
-from turnout.commands import COMMANDS
+from turnout.cli import COMMANDS
 from turnout.errors import TurnoutError
 
 
 def build_parser() -> argparse.ArgumentParser:
-    """Parser with one subcommand per module of ``turnout.commands``."""
+    """Parser with one subcommand per module of ``turnout.cli``."""
     parser = argparse.ArgumentParser(
         prog="turnout",
         description="Watch railway switches and crossings from hammer tests and train passages.",
@@ -18,7 +18,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=__version__)
     subparsers = parser.add_subparsers(dest="command", metavar="command", required=True)
     for name in COMMANDS:
-        module = import_module(f"turnout.commands.{name}")
+        module = import_module(f"turnout.cli.{name}")
         sub = subparsers.add_parser(
             name.replace("_", "-"),
             help=module.HELP,

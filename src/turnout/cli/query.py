@@ -12,7 +12,7 @@ import csv
 import sys
 from decimal import Decimal
 
-from turnout.commands.counting import at_least_one
+from turnout.cli.blind import at_least_one
 
 HELP = "ask the registry in SQL"
 

@@ -8,7 +8,7 @@ whether the next run will stop because of them.
 
 import argparse
 
-from turnout.commands.counting import at_least_one
+from turnout.cli.blind import at_least_one
 
 HELP = "say what is new, without computing"
 STAGES = {

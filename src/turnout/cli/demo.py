@@ -7,7 +7,7 @@ The same seed gives the same samples. The configuration that comes with the prog
 turnouts.
 """
 
-from turnout.commands.counting import at_least_one
+from turnout.cli.blind import at_least_one
 
 HELP = "make a demonstration fleet and run everything on it"
 

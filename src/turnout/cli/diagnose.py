@@ -8,7 +8,12 @@ The newest visit is diagnosed, neighbouring sections together, and a page is wri
 whose budget is spent, goes on where it stopped; the groups that are done have their findings by then. --accept writes
 the term that was named into the turnout's track file, from then on the simulation contains it; nothing is diagnosed
 again for that.
+
+How far a diagnosis is: a bar on a terminal, a line now and then elsewhere.
 """
+
+import sys
+import time
 
 HELP = "say what the simulation of a turnout leaves out"
 
@@ -66,7 +71,6 @@ def _show(args, results, rows):
 
 def _diagnosed(args):
     """Rows by table of the visit asked for."""
-    from turnout.commands.diagnose_bar import DiagnoseBar
     from turnout.stages.mismatch_results import diagnose_turnout
 
     with DiagnoseBar() as bar:
@@ -107,3 +111,67 @@ def _details(row):
     if row["next_measurement"]:
         yield row["next_measurement"] + "."
     yield f"from {row['n_hammer_tests']} hammer tests, {row['n_passages']} passages, {row['n_sensors']} sensors"
+
+
+PAUSE = 20.0  # s between two lines in a log
+USUAL = "neighbouring sections together; a group takes a minute to ten, more with many axles"
+
+
+class DiagnoseBar:
+    """Counts joint fits of a group; the number of simulations so far shows that a long fit is alive."""
+
+    def __init__(self, stream=None):
+        self.stream = stream or sys.stderr
+        self.bar = None
+        self.said, self.next_line, self.what = "", time.monotonic() + PAUSE, ""
+        self.began = None
+
+    def __enter__(self):
+        if self.stream.isatty():
+            from tqdm import tqdm
+
+            self.bar = tqdm(total=None, unit="fit", file=self.stream)
+        return self
+
+    def __exit__(self, *_):
+        if self.bar is not None:
+            self.bar.close()
+        return False
+
+    def group(self, group, number, count):
+        """Called when a group begins; returns the callable for its joint fits."""
+        self._plan(number, count)
+        self.said = f"{'+'.join(group.labels)} ({number + 1} of {count})"
+        self.what = "base fit"
+        if self.bar is not None:
+            self.bar.reset()
+        self.simulations(0)
+
+        def fits(done, total, what):
+            self.what = f"{done} of {total} joint fits, {what}"
+            if self.bar is not None:
+                self.bar.total = total
+                self.bar.update(done - self.bar.n)
+
+        return fits
+
+    def _plan(self, number, count):
+        """How much there is to do, then how far it is: whoever has little time must know before."""
+        if self.began is None:
+            self.began = time.monotonic()
+            text = f"{count} {'group' if count == 1 else 'groups'}: {USUAL}"
+        else:
+            text = f"{number} of {count} groups done, {(time.monotonic() - self.began) / 60.0:.1f} minutes so far"
+        if self.bar is not None:
+            self.bar.write(text, file=self.stream)
+        else:
+            print(text, file=self.stream, flush=True)
+
+    def simulations(self, count):
+        """Called at every prediction."""
+        text = f"{self.said}: {self.what[:60]}, {count} simulations"
+        if self.bar is not None:
+            self.bar.set_description(text, refresh=count % 10 == 0)
+        elif time.monotonic() >= self.next_line:
+            self.next_line = time.monotonic() + PAUSE
+            print(text, file=self.stream, flush=True)

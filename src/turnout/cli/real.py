@@ -5,7 +5,7 @@ a five-hit hammer test (hit 0 overloaded, hit 2 double, by its authors' word), t
 beams with published modes, and vendors' UFF files. Everything lies below real/.
 """
 
-from turnout.commands.counting import at_least_one
+from turnout.cli.blind import at_least_one
 
 HELP = "run everything on recordings made by others"
 

@@ -10,7 +10,7 @@ describe   tables, views and macros with their columns, units and meanings
 
 import argparse
 
-from turnout.commands.counting import at_least_one
+from turnout.cli.blind import at_least_one
 
 HELP = "check, compact, move or describe the registry"
 ACTIONS = ("check", "compact", "vacuum", "relocate", "rebuild", "describe")

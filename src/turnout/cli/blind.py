@@ -1,4 +1,6 @@
-"""Prove the diagnosis on recordings in which an effect is concealed; everything again on your own machine.
+"""Whole numbers on the command line that count something.
+
+Prove the diagnosis on recordings in which an effect is concealed; everything again on your own machine.
 
   turnout blind make --out proof --truth proof-truth           campaigns, and truths under seal
   turnout blind diagnose --out proof --truth proof-truth       the tool reads the campaigns and cannot read the truth
@@ -10,7 +12,23 @@ effects of your own, one file each; --panel crossing puts all cases into crossin
 does) and publish it before anybody diagnoses.
 """
 
-from turnout.commands.counting import at_least_one
+import argparse
+
+
+def at_least_one(text: str) -> int:
+    """The number of ``text``, 1 or more; argparse.ArgumentTypeError otherwise.
+
+    >>> at_least_one("4")
+    4
+    """
+    try:
+        number = int(text)
+    except ValueError:
+        number = 0
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of 1 or more")
+    return number
+
 
 HELP = "prove the diagnosis on concealed effects: make, diagnose, reveal, score"
 

@@ -9,7 +9,7 @@ turnout worklist --csv list.csv
 import argparse
 import csv
 
-from turnout.commands.query import opened
+from turnout.cli.query import opened
 
 FIRST = "select min(measured_at_utc) from charts where state <> 'wrong_time'"
 HELP = "tomorrow's list: what to inspect, what to plan, where nothing can be said"

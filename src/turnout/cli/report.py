@@ -5,7 +5,7 @@ turnout report --day 2026-03-01      list and states as of that day, as far as t
 turnout report --turnouts tommerup_s1 tommerup_s2
 """
 
-from turnout.commands.counting import at_least_one
+from turnout.cli.blind import at_least_one
 
 HELP = "write the pages of fleet and turnouts"
 
