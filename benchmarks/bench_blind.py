@@ -8,7 +8,7 @@ from pathlib import Path
 from benchmarks.bar import Bar, stopwatch
 from turnout_blind.campaign import make_case
 from turnout_blind.effect import load_effects
-from turnout_blind.score.figures import Share, figures
+from turnout_blind.score.metrics import Share, figures
 from turnout_blind.score.report import judged_set, oracle_of
 from turnout_blind.strata import case_id, plan_cases
 

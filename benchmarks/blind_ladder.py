@@ -13,7 +13,7 @@ import numpy as np
 
 from turnout_blind.effect import load_effects
 from turnout_blind.site import draw_site
-from turnout_blind.visible import visible
+from turnout_blind.visibility import visible
 
 HIDDEN = {"hammer_pct": 6.0, "passage_pct": 46.0}
 

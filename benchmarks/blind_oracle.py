@@ -25,7 +25,7 @@ from turnout.errors import TurnoutError
 from turnout.mismatch.engine.map_fit import cost_at, fit_jointly
 from turnout.mismatch.engine.reserved_data import fit_percent, predict_reserved
 from turnout.mismatch.turnout.case import TrackCase
-from turnout_blind.score.judged import BAY, CLEAR, gain_of
+from turnout_blind.score.matching import BAY, CLEAR, gain_of
 from turnout_blind.score.names import SAME, right_names
 from turnout_blind.score.report import provenance
 from turnout_blind.seal import digest_of_folder

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from turnout.readers.writing import write
-from turnout_blind.owner import write_configuration
+from turnout_blind.nominal_files import write_configuration
 from turnout_blind.record import BETWEEN, CAMPAIGNS, FIRST_PASSAGE, N_BLOWS, hammer_test, passage
 from turnout_blind.site import draw_site
-from turnout_blind.visible import visible
+from turnout_blind.visibility import visible
 
 STAMP = 1_700_000_000  # of every file [s]
 

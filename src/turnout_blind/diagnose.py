@@ -10,7 +10,7 @@ from pathlib import Path
 
 import turnout
 from turnout_blind.isolation import Hidden
-from turnout_blind.running import limited, run
+from turnout_blind.limited_process import limited, run
 from turnout_blind.seal import BlindError, digest, digest_of_folder, read_commit
 
 # Run in a copy of the case, which holds config/ and raw/. {python}, {case}, {folder} (the copy), {work} (a folder of

@@ -4,7 +4,7 @@ import numpy as np
 
 from turnout_blind.grid import lost_compliance, read
 from turnout_blind.march import STEP, march
-from turnout_blind.marched import Blow, Roll
+from turnout_blind.march_inputs import Blow, Roll
 from turnout_blind.vehicle import cars_of, no_train, wheels_of
 
 PATH_STEP = 5e-3

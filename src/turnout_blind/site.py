@@ -9,8 +9,8 @@ from turnout_blind.crossing import Crossing, bearers, cast_in, draw_crossing
 from turnout_blind.grid import Grid, Rail
 from turnout_blind.instrument import Chain
 from turnout_blind.roughness import rail_roughness, wheel_roughness
+from turnout_blind.true_site import SPACING, World
 from turnout_blind.vehicle import Car, Train
-from turnout_blind.world import SPACING, World
 
 SENSOR_SETS = ((2.4, 4.5, 6.6, 8.7), (2.4, 4.2, 6.3, 9.0), (1.8, 3.9, 6.0, 8.1), (2.1, 4.2, 6.6, 9.0))
 RANGES = {

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from turnout_blind.marched import Cars, Wheels
+from turnout_blind.march_inputs import Cars, Wheels
 
 GRAVITY = 9.81
 

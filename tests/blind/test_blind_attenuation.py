@@ -9,7 +9,7 @@ from turnout_blind.march import STEP
 from turnout_blind.record import HAMMER_LENGTH, PRETRIGGER, sensor_places
 from turnout_blind.run import strike
 from turnout_blind.site import RAIL_DAMPING, draw_site
-from turnout_blind.world import uniform_world
+from turnout_blind.true_site import uniform_world
 
 
 def fading(x, omega, k, c, rail):

@@ -7,9 +7,9 @@ from turnout.config.load import load_configuration
 from turnout.stages.mismatch_inputs import track_of
 from turnout_blind.crossing import Crossing
 from turnout_blind.effect import load_effects
-from turnout_blind.owner import write_configuration
+from turnout_blind.nominal_files import write_configuration
 from turnout_blind.run import roll
-from turnout_blind.score import stories
+from turnout_blind.score import case_reports
 from turnout_blind.site import draw_site
 from turnout_blind.strata import plan_cases
 
@@ -87,7 +87,7 @@ def test_the_story_of_a_case_at_a_crossing_is_drawn_there(monkeypatch, tmp_path)
     def staged(plan, effects):
         raise Staged(plan.panel)
 
-    monkeypatch.setattr(stories, "stage", staged)
+    monkeypatch.setattr(case_reports, "stage", staged)
     truth = {"stratum": "control", "effects": [], "seed": [1], "panel": "crossing"}
     with pytest.raises(Staged, match="crossing"):
-        stories.draw(truth, [], None, tmp_path / "story.svg", {})
+        case_reports.draw(truth, [], None, tmp_path / "story.svg", {})

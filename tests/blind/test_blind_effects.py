@@ -12,7 +12,7 @@ from turnout_blind.roughness import level, patch_share, rail_roughness, wheel_ro
 from turnout_blind.score.names import RIGHT, SAME
 from turnout_blind.site import draw_site
 from turnout_blind.strata import case_id, plan_cases
-from turnout_blind.visible import _difference
+from turnout_blind.visibility import _difference
 
 EFFECTS = load_effects()
 MAY = {"turnout", "turnout.errors", "turnout.records", "turnout.readers", "turnout.readers.writing"}

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from benchmarks.blind_bridge import rows
 
+from turnout_blind.archive import kept, plan_of, verify_kept, verify_recordings
 from turnout_blind.campaign import make_case
 from turnout_blind.effect import load_effects
-from turnout_blind.keep import kept, plan_of, verify_kept, verify_recordings
 from turnout_blind.score.answers import answers_of
-from turnout_blind.score.figures import Share, figures
-from turnout_blind.score.judged import judge
+from turnout_blind.score.matching import judge
+from turnout_blind.score.metrics import Share, figures
 
 ZIP64 = 45  # version of the format that reading needs
 SMALL = 120e3  # bytes of the kept set

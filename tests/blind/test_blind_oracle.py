@@ -11,7 +11,7 @@ from benchmarks.blind_oracle import _candidates, _told, clear_singles
 from turnout.mismatch import Candidate
 from turnout.physics import Parameter
 from turnout_blind.score.answers import answers_of
-from turnout_blind.score.judged import judge
+from turnout_blind.score.matching import judge
 
 FACTOR = Parameter("factor", "-", 1.0, (0.05, 5.0), "of stiffness", "a test")
 

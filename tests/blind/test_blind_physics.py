@@ -8,8 +8,8 @@ import pytest
 from turnout_blind.grid import Rail, lost_compliance, read
 from turnout_blind.march import STEP, _ballast, hertz
 from turnout_blind.run import roll, strike
+from turnout_blind.true_site import SPACING, uniform_world
 from turnout_blind.vehicle import GRAVITY, Car, Train
-from turnout_blind.world import SPACING, uniform_world
 
 CAR = Car(32e3, 1.8e6, 3000.0, 3000.0, 1500.0, 1.2e6, 60e3, 0.5e6, 80e3, 2.5, 8.0, 12.0)
 

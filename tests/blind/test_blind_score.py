@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from turnout_blind.score.answers import answers_of
-from turnout_blind.score.figures import confusion, figures, reliability
 from turnout_blind.score.intervals import clopper_pearson
-from turnout_blind.score.judged import gain_of, judge
+from turnout_blind.score.matching import gain_of, judge
+from turnout_blind.score.metrics import confusion, figures, reliability
 from turnout_blind.score.names import LOCKS, RIGHT, SAME, right_names
 from turnout_blind.score.report import failure_table, oracle_of, oracle_words
 from turnout_blind.seal import BlindError

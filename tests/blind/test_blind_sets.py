@@ -10,17 +10,17 @@ import pytest
 
 from turnout.config.load import load_configuration, with_raw
 from turnout.readers import read
+from turnout_blind.archive import keep, kept, verify_kept, verify_recordings
 from turnout_blind.diagnose import diagnose_set
 from turnout_blind.effect import load_effects
 from turnout_blind.isolation import Hidden, method
-from turnout_blind.keep import keep, kept, verify_kept, verify_recordings
 from turnout_blind.make import make_set
 from turnout_blind.record import hammer_test
 from turnout_blind.reveal import reveal
+from turnout_blind.score.case_reports import _map
 from turnout_blind.score.page import BEGIN, END, write_page
-from turnout_blind.score.pictures import pyplot
+from turnout_blind.score.plots import pyplot
 from turnout_blind.score.report import report_of
-from turnout_blind.score.stories import _map
 from turnout_blind.seal import BlindError, digest, verify
 from turnout_blind.site import draw_site
 

@@ -9,7 +9,7 @@ from turnout_blind.effect import load_effects
 from turnout_blind.record import passage_motion
 from turnout_blind.site import draw_site
 from turnout_blind.vehicle import Train
-from turnout_blind.visible import HAMMER_BAND, PASSAGE_BAND, PASSAGE_DOWN, _blow, _difference, _shown
+from turnout_blind.visibility import HAMMER_BAND, PASSAGE_BAND, PASSAGE_DOWN, _blow, _difference, _shown
 
 EFFECTS = load_effects()
 HIDDEN = 5.0  # % of the response, below the 6 % that two owners' models differ by

@@ -146,7 +146,7 @@ def _score(args):
 
 
 def _keep(args):
-    from turnout_blind.keep import keep
+    from turnout_blind.archive import keep
 
     path = keep(args.out, args.folder, _truth(args))
     print(f"{path}: {path.stat().st_size / 1e3:.0f} kB")

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from turnout_blind.score.pictures import draw_reliability, draw_severity
+from turnout_blind.score.case_reports import tell
+from turnout_blind.score.plots import draw_reliability, draw_severity
 from turnout_blind.score.report import judged_set, oracle_of, report_of
-from turnout_blind.score.stories import tell
 from turnout_blind.seal import BlindError
 
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"

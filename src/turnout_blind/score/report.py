@@ -5,8 +5,8 @@ from pathlib import Path
 
 from turnout_blind.reveal import revealed
 from turnout_blind.score.answers import answers_of
-from turnout_blind.score.figures import Share, as_it_should, confusion, figures, reliability, severity
-from turnout_blind.score.judged import judge
+from turnout_blind.score.matching import judge
+from turnout_blind.score.metrics import Share, as_it_should, confusion, figures, reliability, severity
 from turnout_blind.seal import BlindError, read_commit
 
 KEY = (

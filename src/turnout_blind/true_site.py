@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from turnout_blind.grid import Grid, Rail, spread
-from turnout_blind.marched import Beam, Riders, Supports
+from turnout_blind.march_inputs import Beam, Riders, Supports
 
 SPACING = 0.6
 PER_SUPPORT = ("place", "pad", "pad_damping", "mass", "ballast", "ballast_damping")

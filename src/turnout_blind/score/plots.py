@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from turnout_blind.score.figures import reliability
 from turnout_blind.score.intervals import clopper_pearson
+from turnout_blind.score.metrics import reliability
 
 COLOURS = {"right": "#2a7f3f", "among two": "#8fce9a", "none": "#e8e8e8", "unknown": "#9ab6d8", "wrong": "#c0392b"}
 LETTERS = {"right": "✓", "among two": "½", "none": "–", "unknown": "?", "wrong": "✗"}

@@ -11,8 +11,8 @@ from turnout_blind.record import RATE, passage_motion, sensor_places
 from turnout_blind.reveal import revealed
 from turnout_blind.run import strike
 from turnout_blind.score.answers import answers_of
-from turnout_blind.score.judged import judge
-from turnout_blind.score.pictures import changes, furthest, outcome, pyplot, save, spectrum
+from turnout_blind.score.matching import judge
+from turnout_blind.score.plots import changes, furthest, outcome, pyplot, save, spectrum
 from turnout_blind.strata import PLAIN, CasePlan
 
 METRES = "position depth length gap close play amplitude shift wavelength reach"

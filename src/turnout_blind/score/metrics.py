@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from turnout_blind.score.intervals import clopper_pearson
-from turnout_blind.score.judged import CLEAR
+from turnout_blind.score.matching import CLEAR
 
 POINT = 1.0  # of held-out fit
 FEWEST = 5  # cases of a group of probabilities that is held against its bar

@@ -1,0 +1,321 @@
+"""Record the results of a state of the program, or compare two recordings. See README.md.
+
+python tests/golden/golden.py record /work/golden/after [--tier quick|full] [--src /work/main/src] [--only fleet]
+python tests/golden/golden.py compare /work/golden/base /work/golden/after
+"""
+
+import argparse
+import difflib
+import hashlib
+import os
+import re
+import resource
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import duckdb
+
+HERE = Path(__file__).resolve().parent
+INPUTS = Path(os.environ.get("TURNOUT_GOLDEN_INPUTS", "/work/golden/inputs"))
+DAY = "2026-08-01"
+MAIN = "import sys; from turnout.cli import main; sys.exit(main())"
+COMMANDS = (
+    "add", "calibrate", "check", "config", "demo", "diagnose", "distinguish", "hammer", "nightly", "passage", "plan",
+    "query", "export", "events", "acknowledge", "blind", "worklist", "real", "registry", "report", "simulate", "trains",
+    "config show", "config generate", "blind make", "blind diagnose", "blind reveal", "blind score", "blind keep",
+    "simulate hammer", "simulate passage", "simulate figures",
+)  # fmt: skip
+# Asked in this order in the folder of the fleet after its nightly run; FILE is the n-th raw file of a pattern.
+ASKED = """
+check
+check --raw raw
+check --formats
+config show tommerup_s2
+config show aarup_n4 --only receptance
+config generate --check
+config show nowhere
+plan
+plan --turnout aarup_n4 --work nowhere
+worklist
+worklist --all --csv -
+worklist --asof 2025-11-01
+query --list
+query "select * from worklist"
+query "select section_id, band, measured_at_utc, frequency_hz, frequency_se_hz, n_impacts from section_trend('aarup_n4/ASM', 'ballast') order by all"
+query "select reason, count(*) as n from impacts_current group by all order by all" --csv -
+query "from quarantine_open order by all" --csv -
+query "from passages_current order by all" --csv -
+query "select nothing from nowhere"
+hammer {raw/tommerup_s2/hammer/*/A8_*:0} {raw/tommerup_s2/hammer/*/A8_*:1} {raw/tommerup_s2/hammer/*/A8_*:2} --turnout tommerup_s2 --figure a8.svg
+hammer {raw/tommerup_s1/hammer/*/SP_*:1} --turnout tommerup_s1
+hammer {raw/aarup_n4/hammer/*/A9_*:2} --turnout aarup_n4
+passage {raw/tommerup_s1/passages/*:0} --turnout tommerup_s1
+passage {raw/tommerup_s1/passages/*:1} --turnout tommerup_s1
+passage {raw/tommerup_s2/passages/*:0} --turnout tommerup_s2
+passage {raw/tommerup_s2/passages/*:1} --turnout tommerup_s2
+passage {raw/aarup_n4/passages/*:0} --turnout aarup_n4
+passage {raw/aarup_n4/passages/*:1} --turnout aarup_n4
+passage {raw/aarup_n4/passages/*:1} --turnout aarup_n4 --no-fit
+trains
+events
+events --effect
+registry check
+registry describe
+registry describe worklist
+registry vacuum
+export exported --format csv
+export exported --only impacts_current modes_current
+report --pages asked_pages --day 2025-11-01
+report --turnouts nowhere
+simulate hammer --section A7 --blows 3 --seed 3 --out simulated/hammer.h5 --truth simulated
+simulate hammer --turnout tommerup_s1 --section CLP --blows 2 --raw simulated --truth simulated
+simulate passage --vehicle locomotive --speed 120 --turnout tommerup_s1 --raw simulated --truth simulated
+calibrate --track tommerup --section A7 --modes ballast=99.6/0.292 railpad=616.4/0.066
+calibrate --turnout tommerup_s2 --section A8 {raw/tommerup_s2/hammer/*/A8_*:0}
+distinguish --track tommerup --sensors 23.4 26.4 --blows 24.6 --families local_ballast local_pad
+diagnose --turnout nowhere
+add aarup_n5 tommerup --name "Aarup, switch N5" --km 21.9
+events tommerup_s1/A7 tamping 2026-04-02 --note "machine 09-3X"
+acknowledge aarup_n4/ASM --band ballast --by "M. Jensen" --reason "tamping ordered" --at 2026-08-01T06:00
+acknowledge aarup_n4 --suppress-until 2030-05-01 --by "M. Jensen" --reason "track works" --at 2026-08-01T06:00
+registry compact
+registry rebuild
+registry check
+plan
+"""
+
+
+class Recording:
+    """Where the results of one run of the program go, and how the program is started."""
+
+    def __init__(self, out, src, only):
+        self.out, self.src, self.only = Path(out).resolve(), Path(src).resolve(), only
+        self.files, self.repository = self.out / "files", self.src.parent
+        where = f"{HERE / 'pinned'}{os.pathsep}{self.src}"
+        self.environment = os.environ | {
+            "PYTHONPATH": where, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "COLUMNS": "100", "TZ": "UTC",
+            "PYTHONHASHSEED": "0", "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+        }  # fmt: skip
+        self.files.mkdir(parents=True, exist_ok=True)
+        found = self.run(["-c", "import turnout; print(turnout.__file__)"], self.files)[1].strip()
+        if not Path(found).is_relative_to(self.src):
+            sys.exit(f"the program is taken from {found}, not from {self.src}")
+
+    def run(self, words, folder):
+        """(exit code, standard output, standard error) of Python with ``words``."""
+        done = subprocess.run(
+            [sys.executable, *map(str, words)], cwd=folder, env=self.environment, text=True, capture_output=True,
+            stdin=subprocess.DEVNULL, check=False,
+        )  # fmt: skip
+        return done.returncode, done.stdout, done.stderr
+
+    def command(self, words, folder, name):
+        """Keep what ``turnout`` says to ``words``."""
+        code, out, err = self.run(["-c", MAIN, *words], folder)
+        self.keep(name, f"$ turnout {shlex.join(words)}\n{out}--- stderr\n{err}--- exit code {code}\n")
+        return out
+
+    def keep(self, name, content):
+        """Write a text, without the places of this run, or bytes."""
+        path = self.files / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if isinstance(content, str):
+            for place, word in ((self.out, "<out>"), (self.src, "<src>"), (self.repository, "<repository>")):
+                content = content.replace(str(place), word)
+            content = content.encode()
+        path.write_bytes(content)
+
+    def keep_files(self, folder, pattern, name):
+        """Keep the files of a folder, pages and texts without places and hashes of content."""
+        for path in sorted(p for p in folder.glob(pattern) if p.is_file()):
+            content = path.read_bytes()
+            if path.suffix in (".html", ".csv", ".json", ".svg", ".yaml", ".tsv", ".md"):
+                content = re.sub(r'<meta name="turnout-content" content="\w+">', "", content.decode())
+            self.keep(f"{name}/{path.relative_to(folder)}", content)
+
+    def place(self, name):
+        """A working copy of the inputs ``name``."""
+        folder = self.out / "run" / name
+        shutil.rmtree(folder, ignore_errors=True)
+        shutil.rmtree(self.files / name, ignore_errors=True)
+        return Path(shutil.copytree(INPUTS / name, folder))
+
+    def workflow(self, folder, name, *more, nightly=False, settings=()):
+        """Run the whole workflow on one core, keep registry, trends, list and pages."""
+        snakefile = self.repository / "Snakefile"
+        options = ["--snakefile", snakefile, "--cores", 1, *more, "--config", f"day={DAY}", "shards=1", *settings]
+        profile = ["nightly", "--profile", self.repository / "profiles/default", "--"]
+        start = ["-c", MAIN, *profile] if nightly else ["-m", "snakemake"]
+        code, out, err = self.run([*start, *options], folder)
+        (folder / "workflow.log").write_text(out + err)
+        said = re.findall(r"^(?:\w+ \S+: \d+ known|register: |sound: |failed |every job ).*", out, re.M)
+        self.keep(f"{name}/workflow.txt", "\n".join([*said, f"exit code {code}"]))
+        results = folder / "results"
+        self.keep_files(results / "registry", "**/*.parquet", f"{name}/parquet")
+        self.keep_files(results, "*.csv", f"{name}/results")
+        self.keep_files(results / "pages", "**/*", f"{name}/pages")
+        self.rows(results / "registry/registry.duckdb", f"{name}/rows")
+
+    def rows(self, database, name):
+        """All rows of every table and view of the registry, sorted."""
+        if not database.exists():
+            return
+        with duckdb.connect(str(database), read_only=True) as con:
+            con.execute("set threads = 1")
+            con.execute("set timezone = 'UTC'")
+            for (table,) in con.execute("select table_name from information_schema.tables order by all").fetchall():
+                columns = [c for c, *_ in con.execute(f'describe "{table}"').fetchall()]
+                rows = con.execute(f'select * from "{table}"').fetchall()
+                lines = sorted("\t".join(map(repr, row)) for row in rows)
+                self.keep(f"{name}/{table}.tsv", "\n".join(["\t".join(columns), *lines, ""]))
+
+
+def fleet(rec):
+    """Three turnouts of the demonstration fleet, few sections, through all stages; then the commands."""
+    folder = rec.place("fleet")
+    rec.workflow(folder, "fleet", nightly=True)
+    for k, line in enumerate(filter(None, ASKED.splitlines())):
+        words = [_file(folder, word) for word in shlex.split(line)]
+        rec.command(words, folder, f"fleet/asked/{k + 1:02d} {re.sub(r'[^a-z0-9]+', '_', line.lower())[:40]}.txt")
+    rec.keep_files(folder, "a8.svg", "fleet/asked")
+    for made in ("exported", "asked_pages", "simulated", "config"):
+        rec.keep_files(folder / made, "**/*", f"fleet/{made}")
+    rec.rows(folder / "results/registry/registry.duckdb", "fleet/rows_compacted")
+
+
+def _file(folder, word):
+    """``{pattern:n}`` is the n-th file."""
+    if not word.startswith("{"):
+        return word
+    pattern, _, n = word[1:-1].rpartition(":")
+    return str(sorted(folder.glob(pattern))[int(n)].relative_to(folder))
+
+
+def toy(rec):
+    """Thirty-six tiny files, ten of them damaged in ten ways."""
+    folder = rec.place("toy")
+    rec.workflow(folder, "toy")
+    rec.command(["worklist"], folder, "toy/worklist.txt")
+
+
+def helps(rec):
+    """What every command says of itself, and the page of effects."""
+    shutil.rmtree(rec.files / "help", ignore_errors=True)
+    for words in ("", *COMMANDS):
+        rec.command([*words.split(), "--help"], rec.out, f"help/{words.replace(' ', '_') or 'turnout'}.txt")
+    for path in sorted((rec.src / "turnout").glob("**/effects_page.py")):
+        module = ".".join(path.relative_to(rec.src).with_suffix("").parts)
+        (rec.out / "run/docs").mkdir(parents=True, exist_ok=True)
+        rec.run(["-m", module, rec.out / "run/docs"], rec.out)
+        rec.keep_files(rec.out / "run/docs", "*.md", "help")
+
+
+def small(rec):
+    """A small turnout, whose soft pad is diagnosed by the workflow."""
+    folder = rec.place("small")
+    rec.workflow(folder, "small", settings=["diagnose=true"])
+
+
+def demo(rec):
+    """One campaign of all sections of the demonstration fleet."""
+    rec.workflow(rec.place("demo"), "demo")
+
+
+def blind(case):
+    """A case of the kept blind set, diagnosed."""
+
+    def diagnosed(rec):
+        folder, name = rec.place(f"blind/{case}"), f"blind/{case}"
+        rec.command(
+            ["diagnose", "--turnout", case, "--visit", "all", "--work", "work", "--json"], folder, f"{name}/answers.txt"
+        )
+        rec.keep_files(folder / "results/pages", "**/*", f"{name}/pages")
+
+    return diagnosed
+
+
+def items(tier):
+    """name -> function, in order."""
+    if tier == "quick":
+        return {"help": helps, "toy": toy, "small": small, "fleet": fleet}
+    return {"demo": demo} | {f"blind/{p.name}": blind(p.name) for p in sorted((INPUTS / "blind").iterdir())}
+
+
+def record(args):
+    """Record a tier and write its list of hashes."""
+    rec = Recording(args.out, args.src, args.only)
+    chosen = {name: job for name, job in items(args.tier).items() if not args.only or name in args.only}
+    for name, job in chosen.items():
+        before = _cpu()
+        job(rec)
+        print(f"{name}: {_cpu() - before:.0f} CPU s", flush=True)
+    lines = [
+        f"{path.relative_to(rec.files)}  {hashlib.sha256(path.read_bytes()).hexdigest()}"
+        for name in items(args.tier) for path in (rec.files / name).glob("**/*") if path.is_file()
+    ]  # fmt: skip
+    (rec.out / f"{args.tier}.sha256").write_text("\n".join(sorted(lines)) + "\n")
+    print(f"{rec.out}/{args.tier}.sha256: {len(lines)} files, {_cpu():.0f} CPU s in all")
+    if not args.keep_run:
+        shutil.rmtree(rec.out / "run", ignore_errors=True)
+
+
+def _cpu():
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def compare(args):
+    """Say what differs between two recordings, tier by tier; exit code 1 where something does."""
+    worst = 0
+    for tier in ("quick", "full"):
+        lists = [Path(side) / f"{tier}.sha256" for side in (args.a, args.b)]
+        if not all(path.exists() for path in lists):
+            print(f"{tier}: not recorded in both")
+            continue
+        a, b = (dict(line.rsplit("  ", 1) for line in path.read_text().splitlines()) for path in lists)
+        differing = [name for name in sorted(a.keys() | b.keys()) if a.get(name) != b.get(name)]
+        print(f"{tier}: {len(a.keys() | b.keys())} files, {len(differing)} differ")
+        for name in differing:
+            print(f"  {name}" + ("" if name in a and name in b else f": only in {args.a if name in a else args.b}"))
+            if name in a and name in b:
+                _show(Path(args.a) / "files" / name, Path(args.b) / "files" / name, args.lines)
+        worst |= bool(differing)
+    return worst
+
+
+def _show(a, b, n):
+    """The first lines that differ of two texts."""
+    try:
+        texts = [path.read_text().splitlines() for path in (a, b)]
+    except UnicodeDecodeError:
+        print("    (not text)")
+        return
+    changed = [line for line in difflib.unified_diff(*texts, n=0, lineterm="") if line[:3] not in ("---", "+++")]
+    for line in changed[:n]:
+        print(f"    {line[:300]}")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    steps = parser.add_subparsers(dest="step", required=True)
+    one = steps.add_parser("record")
+    one.add_argument("out")
+    one.add_argument("--tier", choices=("quick", "full"), default="quick")
+    one.add_argument(
+        "--src", default=HERE.parents[1] / "src", help="folder with the package; its Snakefile lies beside"
+    )
+    one.add_argument("--only", nargs="+", help="only these items, as fleet toy small help")
+    one.add_argument("--keep-run", action="store_true", help="leave the working folders")
+    two = steps.add_parser("compare")
+    two.add_argument("a")
+    two.add_argument("b")
+    two.add_argument("--lines", type=int, default=6, help="differing lines shown per file (6)")
+    args = parser.parse_args()
+    sys.exit(record(args) if args.step == "record" else compare(args))
+
+
+if __name__ == "__main__":
+    main()
