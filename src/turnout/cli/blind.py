@@ -1,6 +1,4 @@
-"""Whole numbers on the command line that count something.
-
-Prove the diagnosis on recordings in which an effect is concealed; everything again on your own machine.
+"""Prove the diagnosis on recordings in which an effect is concealed; everything again on your own machine.
 
   turnout blind make --out proof --truth proof-truth           campaigns, and truths under seal
   turnout blind diagnose --out proof --truth proof-truth       the tool reads the campaigns and cannot read the truth

@@ -8,8 +8,6 @@ The newest visit is diagnosed, neighbouring sections together, and a page is wri
 whose budget is spent, goes on where it stopped; the groups that are done have their findings by then. --accept writes
 the term that was named into the turnout's track file, from then on the simulation contains it; nothing is diagnosed
 again for that.
-
-How far a diagnosis is: a bar on a terminal, a line now and then elsewhere.
 """
 
 import sys

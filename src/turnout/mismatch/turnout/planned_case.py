@@ -41,7 +41,7 @@ class Planned:
 
 
 class PlannedCase(TrackCase):
-    """``TrackCase`` of a ``Plan`` of ``turnout.mismatch.turnout.planned_case``; nothing is measured, nothing is fitted."""
+    """``TrackCase`` of a ``Plan``: nothing is measured, nothing is fitted."""
 
     def __init__(self, plan, settings=None, families=None, solver=None):
         self.plan = plan
