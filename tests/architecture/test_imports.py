@@ -11,6 +11,7 @@ ALLOWED = {
     "content": set(),
     "errors": set(),
     "files": {"errors"},
+    "former_names": set(),
     "records": {"errors"},
     "threads": set(),
     "units": {"errors", "records"},
