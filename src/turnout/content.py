@@ -1,15 +1,15 @@
-"""Content of a file as a number that no other content has."""
+"""Hash of the content of a file."""
 
 import hashlib
 import os
 
 
 def sha256_of(path: os.PathLike | str) -> str:
-    """sha256 of a file's bytes, 64 hexadecimal digits; OSError where it is gone or may not be read.
+    """sha256 of a file's bytes, 64 hexadecimal digits; OSError if it is absent or not readable.
 
     Examples
     --------
-    FIPS 180-4: the sha256 of nothing.
+    FIPS 180-4: the sha256 of empty content.
 
     >>> sha256_of(os.devnull)[:16]
     'e3b0c44298fc1c14'

@@ -1,25 +1,25 @@
-"""What can go wrong, said so that a track engineer knows what to do next."""
+"""Exceptions of the program. Each message tells a track engineer what to do next."""
 
 import errno
 
 
 class TurnoutError(Exception):
-    """Anything this program raises on purpose."""
+    """Base class of all exceptions that the program raises on purpose."""
 
 
 class ReadError(TurnoutError):
-    """A recording is not what its format or its configuration promises.
+    """A recording does not agree with its format or its configuration.
 
     Parameters
     ----------
     path : str
         The file, relative to the raw root where there is one.
     where : str
-        The place in it: record, channel, byte or line.
-    found : str
-        What stands there.
+        The record, channel, byte or line in the file.
+    problem : str
+        What is wrong there.
     remedy : str
-        What to do, a sentence without its full stop.
+        What to do: a sentence without its full stop.
     reason : str
         One of ``REASONS``: the code of the quarantine row.
 
@@ -39,9 +39,9 @@ class ReadError(TurnoutError):
 
 
 class PartlyComputed(Exception):
-    """Faults of the program on some records of a unit: ``tables`` holds the rows of all others.
+    """The program failed on some records of a unit; ``tables`` holds the rows of all other records.
 
-    ``faults`` are (path, record from 0, exception), one per record that could not be computed.
+    ``faults`` holds (path, record from 0, exception) of each record that could not be computed.
     """
 
     def __init__(self, tables, faults):
@@ -51,9 +51,9 @@ class PartlyComputed(Exception):
 
 
 class ConfigError(TurnoutError):
-    """A configuration file says something that cannot be used.
+    """A configuration file contains something that cannot be used.
 
-    ``place`` is "line 12, column 5" or the key; ``remedy`` says what to write instead.
+    ``place`` is "line 12, column 5" or the key; ``remedy`` is what to write instead.
     """
 
     def __init__(self, path, place, found, remedy):
@@ -62,7 +62,7 @@ class ConfigError(TurnoutError):
 
 
 class ConfigErrors(TurnoutError):
-    """Every configuration error found in one pass; ``errors`` is the list."""
+    """All configuration errors of one pass; ``errors`` is their list."""
 
     def __init__(self, errors):
         super().__init__("\n".join(str(e) for e in errors))
@@ -70,28 +70,29 @@ class ConfigErrors(TurnoutError):
 
 
 class SimulationError(TurnoutError):
-    """A simulation cannot go on: says time, place and value."""
+    """A simulation cannot continue; the message names time, position and value."""
 
 
 class RegistryError(TurnoutError):
-    """The registry refuses rows or cannot be used: says table, row, column, value."""
+    """The registry rejects rows or cannot be used; the message names table, row, column and value."""
 
 
-# Faults of the machine are nobody's result: those of one file pass or are repaired, the others end the job.
+# errno codes of the machine, not of the data. Transient ones concern one file: the next run tries it again.
+# The others concern every file and end the job.
 ONE_FILE = {errno.EIO, errno.ESTALE, errno.EREMOTEIO, errno.ETIMEDOUT, errno.ENOMEM, errno.EACCES}
 EVERY_FILE = {errno.ENOSPC, errno.EDQUOT, errno.EMFILE, errno.ENFILE}
 
 
 def of_the_machine(error: BaseException) -> bool:
-    """Whether ``error`` says nothing of the unit that met it."""
+    """Whether ``error`` is a fault of the machine or the network, not of the data of the unit."""
     return passing(error) or (isinstance(error, OSError) and error.errno in EVERY_FILE)
 
 
 def passing(error: BaseException) -> bool:
-    """Whether the unit that met ``error`` is left for the next run while the others go on.
+    """Whether ``error`` is a transient fault: its unit is left for the next run while the other units continue.
 
-    A bad sector, a server that does not answer, a file that may not be read or is too large for the memory of this
-    moment.
+    Examples are a bad sector, a server that does not answer, a file without read permission, and too little free
+    memory.
 
     >>> passing(OSError(errno.EIO, "Input/output error")), passing(OSError(errno.ENOSPC, "No space left on device"))
     (True, False)
@@ -99,7 +100,7 @@ def passing(error: BaseException) -> bool:
     return isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno in ONE_FILE)
 
 
-# The closed list of reasons for a quarantine row or a rejected impact, and what each one means.
+# All reasons of a quarantine row or of a rejected impact, with their meaning.
 REASONS = {
     "unreadable": "the file is not of its format",
     "empty": "the file has no bytes or no records",

@@ -1,8 +1,7 @@
-"""Write a file so that a reader sees the old one or the new one, never a part.
+"""Atomic writing of files: a reader sees the old file or the new one, never an incomplete one.
 
-Texts of ``work/``, written in one step, only where they changed; and how to tell a part where there is one.
-
-A full disk, a power failure or a copy that was broken off may leave the beginning of a file all the same.
+A full disk, a power failure or an interrupted copy may still truncate a file. ``is_truncated`` and ``read_json``
+detect that.
 """
 
 import json
@@ -15,7 +14,7 @@ from pathlib import Path
 
 
 def beside(path: Path) -> Path:
-    """A hidden name beside ``path`` for what is not finished, that no process uses, on this machine or another.
+    """Hidden name in the folder of ``path`` for an unfinished file; no other process or machine uses it.
 
     >>> name = beside(Path("pages/a.html"))
     >>> name.parent.name, name.name.startswith(".a.html."), name.suffix, name == beside(Path("pages/a.html"))
@@ -25,9 +24,9 @@ def beside(path: Path) -> Path:
 
 
 def write_atomic(path: os.PathLike, write: Callable) -> None:
-    """Call ``write(stream)`` on a temporary file beside ``path``, flush it to the disk, then put it in place.
+    """Call ``write(stream)`` on a temporary file in the same folder, flush it to the disk, then rename it to ``path``.
 
-    A file that is there keeps its permissions, and its content where ``write`` or the disk fails (OSError).
+    An existing file keeps its permissions. If ``write`` or the disk fails (OSError), it keeps its content as well.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -50,7 +49,7 @@ def write_text(path: os.PathLike, text: str) -> None:
 
 
 def write_if_changed(path: os.PathLike, text: str) -> bool:
-    """Write ``text`` unless the file already says so; the file's time then tells when its content changed.
+    """Write ``text`` unless it is already the content; so the file's time is that of its last change.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -65,7 +64,7 @@ def write_if_changed(path: os.PathLike, text: str) -> bool:
 
 
 def is_cut(path: os.PathLike, end: str) -> bool:
-    """Whether a file is there and lacks its last line ``end``; only the end of it is read."""
+    """Whether an existing file lacks its last line ``end``; only the end of the file is read."""
     try:
         with open(path, "rb") as stream:
             stream.seek(max(0, stream.seek(0, os.SEEK_END) - len(end.encode())))
@@ -75,7 +74,7 @@ def is_cut(path: os.PathLike, end: str) -> bool:
 
 
 def read_json(path: os.PathLike, otherwise):
-    """What a JSON file of ``work/`` says; ``otherwise`` where there is none, and where it is cut, with a warning."""
+    """Content of a JSON file of ``work/``; ``default`` if it is absent, or (with a warning) if it is truncated."""
     try:
         return json.loads(Path(path).read_text(encoding="utf-8"))
     except FileNotFoundError:

@@ -1,4 +1,4 @@
-"""A hash of the code a result was computed with, blind to comments, docstrings and layout."""
+"""Hash of the code that computed a result; comments, docstrings and formatting do not change it."""
 
 import ast
 import hashlib
@@ -10,12 +10,12 @@ ROOT = Path(__file__).parent
 
 
 def fingerprint(*modules: str) -> str:
-    """16 hex characters over the syntax trees of ``modules`` and of all they import from this package.
+    """16 hexadecimal characters over the syntax trees of ``modules`` and of all that they import from this package.
 
-    Imports inside functions count, a package counts where it is itself imported from, and
-    ``import_module(f"turnout.readers.{name}")`` counts as every module of ``turnout.readers``. Data files of the
-    package (CSV, SQL) that lie beside an imported module count by their bytes, a folder without modules (templates,
-    SQL) with the modules that name it in a string. ValueError for a module that does not exist.
+    Imports inside functions count. A package counts if it is itself imported from, and
+    ``import_module(f"turnout.readers.{name}")`` counts as every module of ``turnout.readers``. Data files (CSV, SQL) in
+    the folder of an imported module count by their bytes. A folder without modules (templates, SQL) counts for the
+    modules that name it in a string. ValueError for a module that does not exist.
 
     >>> fingerprint("turnout.errors") == fingerprint("turnout.errors")
     True
@@ -42,7 +42,7 @@ def closure(*modules: str) -> frozenset[str]:
 
 
 def forget() -> None:
-    """Read the source files again: they changed while this process ran."""
+    """Forget the cached hashes: source files changed while this process was running."""
     _file.cache_clear()
     _tree.cache_clear()
     _beside.cache_clear()
@@ -60,7 +60,7 @@ def _file(name: str) -> Path | None:
 
 @cache
 def _tree(name: str) -> tuple[str, tuple[str, ...]]:
-    """Hash of one module without its words, and the names it may import."""
+    """Hash of one module without its docstrings, and the names of the modules that it may import."""
     path = _file(name)
     if path is None:
         raise ValueError(f"no module {name} in the package {PACKAGE}")
@@ -77,7 +77,7 @@ def _tree(name: str) -> tuple[str, tuple[str, ...]]:
 
 
 def _data(folder: Path, nodes: list[ast.AST]) -> list[Path]:
-    """Tables beside a module, and all that lies in the folders of data that it names."""
+    """Tables in the folder of a module, and all files of the data folders that it names."""
     tables, folders = _beside(folder)
     if not folders:
         return list(tables)
@@ -87,7 +87,7 @@ def _data(folder: Path, nodes: list[ast.AST]) -> list[Path]:
 
 @cache
 def _beside(folder: Path) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
-    """Tables in a folder, and its folders in which there is no module."""
+    """Tables in a folder, and its subfolders without modules."""
     found = sorted(folder.iterdir())
     inner = (p for p in found if p.is_dir() and p.name != "__pycache__" and not any(p.glob("*.py")))
     return tuple(p for p in found if p.suffix in (".csv", ".sql")), tuple(inner)
@@ -115,7 +115,7 @@ def _imports(nodes: list[ast.AST], name: str, is_package: bool) -> list[str]:
 
 
 def _family(node: ast.JoinedStr) -> list[str]:
-    """All modules that a name like f"turnout.readers.{format}" may stand for."""
+    """All modules that match a name like f"turnout.readers.{format}"."""
     start = node.values[0].value if node.values and isinstance(node.values[0], ast.Constant) else ""
     if not (isinstance(start, str) and start.startswith(PACKAGE + ".") and start.endswith(".")):
         return []

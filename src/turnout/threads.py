@@ -1,4 +1,4 @@
-"""One BLAS thread per process: the processes share the cores among themselves."""
+"""One BLAS thread per process, because the processes share the cores."""
 
 import os
 
@@ -6,6 +6,9 @@ VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUME
 
 
 def one_thread() -> None:
-    """To be called before numpy is imported. Snakemake sets these to the threads of a job, each of whose
-    processes would then start as many: four times the CPU time for small matrices."""
+    """Limit BLAS to one thread; call this before numpy is imported.
+
+    Snakemake sets these variables to the number of threads of a job, and each process of the job would start as many.
+    That costs four times the CPU time for small matrices.
+    """
     os.environ.update(dict.fromkeys(VARIABLES, "1"))

@@ -1,11 +1,11 @@
-"""Units that stand in raw files and in layouts, and what turns them into SI."""
+"""Units of raw files and layouts, and their conversion to SI."""
 
 import math
 import re
 from dataclasses import dataclass
 
 STANDARD_GRAVITY = 9.80665
-IGNORED = "ignored"  # quantity of a channel that is in the file and not wanted
+IGNORED = "ignored"  # quantity of a channel that is in the file and is not read
 
 # dimension -> {spelling: (scale, offset)} with SI = scale * number + offset
 UNITS = {
@@ -88,9 +88,9 @@ class Conversion:
 
 
 def conversion(unit: str) -> Conversion:
-    """What one number in ``unit`` is in SI; a leading factor says what one step or full scale is worth.
+    """Conversion of numbers in ``unit`` to SI; a leading factor is the value of one step or of full scale.
 
-    ValueError for a unit that the table does not hold. "µ" may be either of its two code points.
+    ValueError for a unit that is not in the table. "µ" may be either of its two code points.
 
     Examples
     --------
@@ -124,12 +124,12 @@ def to_si(quantity: str, unit: str, sensitivity: float | None = None, sensitivit
     quantity : str
         A key of ``SI``.
     unit : str
-        Unit of the raw numbers, electrical or already physical; with an optional factor ("0.305 mV" where one
-        step of the converter is 0.305 mV, "10 V" where 1.0 is a full scale of 10 V).
+        Unit of the raw numbers, electrical or physical, with an optional factor: "0.305 mV" where one
+        step of the converter is 0.305 mV, "10 V" where 1.0 is a full scale of 10 V.
     sensitivity : float or None
-        Needed for electrical units, not used where the numbers are physical already.
+        Required for electrical units; not used for physical ones.
     sensitivity_unit : str
-        As above.
+        Unit of the sensitivity, such as "mV/N".
 
     Raises
     ------
@@ -164,7 +164,7 @@ def to_si(quantity: str, unit: str, sensitivity: float | None = None, sensitivit
 
 
 def _fraction(unit):
-    """Both sides of a sensitivity's unit: "mV/(m/s²)" -> voltage, acceleration; "m/s²/V" -> acceleration, voltage."""
+    """Numerator and denominator of a unit: "mV/(m/s²)" -> voltage, acceleration; "m/s²/V" -> acceleration, voltage."""
     text = unit.strip()
     for top, _, bottom in (text.partition("/"), text.rpartition("/")):
         try:

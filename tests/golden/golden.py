@@ -28,64 +28,8 @@ COMMANDS = (
     "config show", "config generate", "blind make", "blind diagnose", "blind reveal", "blind score", "blind keep",
     "simulate hammer", "simulate passage", "simulate figures",
 )  # fmt: skip
-# Asked in this order in the folder of the fleet after its nightly run; FILE is the n-th raw file of a pattern.
-ASKED = """
-check
-check --raw raw
-check --formats
-config show tommerup_s2
-config show aarup_n4 --only receptance
-config generate --check
-config show nowhere
-plan
-plan --turnout aarup_n4 --work nowhere
-worklist
-worklist --all --csv -
-worklist --asof 2025-11-01
-query --list
-query "select * from worklist"
-query "select section_id, band, measured_at_utc, frequency_hz, frequency_se_hz, n_impacts from section_trend('aarup_n4/ASM', 'ballast') order by all"
-query "select reason, count(*) as n from impacts_current group by all order by all" --csv -
-query "from quarantine_open order by all" --csv -
-query "from passages_current order by all" --csv -
-query "select nothing from nowhere"
-hammer {raw/tommerup_s2/hammer/*/A8_*:0} {raw/tommerup_s2/hammer/*/A8_*:1} {raw/tommerup_s2/hammer/*/A8_*:2} --turnout tommerup_s2 --figure a8.svg
-hammer {raw/tommerup_s1/hammer/*/SP_*:1} --turnout tommerup_s1
-hammer {raw/aarup_n4/hammer/*/A9_*:2} --turnout aarup_n4
-passage {raw/tommerup_s1/passages/*:0} --turnout tommerup_s1
-passage {raw/tommerup_s1/passages/*:1} --turnout tommerup_s1
-passage {raw/tommerup_s2/passages/*:0} --turnout tommerup_s2
-passage {raw/tommerup_s2/passages/*:1} --turnout tommerup_s2
-passage {raw/aarup_n4/passages/*:0} --turnout aarup_n4
-passage {raw/aarup_n4/passages/*:1} --turnout aarup_n4
-passage {raw/aarup_n4/passages/*:1} --turnout aarup_n4 --no-fit
-trains
-events
-events --effect
-registry check
-registry describe
-registry describe worklist
-registry vacuum
-export exported --format csv
-export exported --only impacts_current modes_current
-report --pages asked_pages --day 2025-11-01
-report --turnouts nowhere
-simulate hammer --section A7 --blows 3 --seed 3 --out simulated/hammer.h5 --truth simulated
-simulate hammer --turnout tommerup_s1 --section CLP --blows 2 --raw simulated --truth simulated
-simulate passage --vehicle locomotive --speed 120 --turnout tommerup_s1 --raw simulated --truth simulated
-calibrate --track tommerup --section A7 --modes ballast=99.6/0.292 railpad=616.4/0.066
-calibrate --turnout tommerup_s2 --section A8 {raw/tommerup_s2/hammer/*/A8_*:0}
-distinguish --track tommerup --sensors 23.4 26.4 --blows 24.6 --families local_ballast local_pad
-diagnose --turnout nowhere
-add aarup_n5 tommerup --name "Aarup, switch N5" --km 21.9
-events tommerup_s1/A7 tamping 2026-04-02 --note "machine 09-3X"
-acknowledge aarup_n4/ASM --band ballast --by "M. Jensen" --reason "tamping ordered" --at 2026-08-01T06:00
-acknowledge aarup_n4 --suppress-until 2030-05-01 --by "M. Jensen" --reason "track works" --at 2026-08-01T06:00
-registry compact
-registry rebuild
-registry check
-plan
-"""
+# Asked in this order in the folder of the fleet after its nightly run; {PATTERN:N} is the N-th file of a pattern.
+ASKED = (HERE / "asked.txt").read_text(encoding="utf-8")
 
 
 class Recording:
@@ -96,8 +40,9 @@ class Recording:
         self.files, self.repository = self.out / "files", self.src.parent
         where = f"{HERE / 'pinned'}{os.pathsep}{self.src}"
         self.environment = os.environ | {
-            "PYTHONPATH": where, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "COLUMNS": "100", "TZ": "UTC",
-            "PYTHONHASHSEED": "0", "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+            "PYTHONPATH": where, "TURNOUT_GOLDEN": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1",
+            "COLUMNS": "100", "TZ": "UTC", "PYTHONHASHSEED": "0",
+            "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
         }  # fmt: skip
         self.files.mkdir(parents=True, exist_ok=True)
         found = self.run(["-c", "import turnout; print(turnout.__file__)"], self.files)[1].strip()
@@ -114,7 +59,10 @@ class Recording:
 
     def command(self, words, folder, name):
         """Keep what ``turnout`` says to ``words``."""
+        before = _cpu()
         code, out, err = self.run(["-c", MAIN, *words], folder)
+        with open(self.out / "cpu.txt", "a") as file:
+            file.write(f"{_cpu() - before:6.1f} s {name}\n")
         self.keep(name, f"$ turnout {shlex.join(words)}\n{out}--- stderr\n{err}--- exit code {code}\n")
         return out
 
@@ -223,7 +171,10 @@ def small(rec):
 
 def demo(rec):
     """One campaign of all sections of the demonstration fleet."""
-    rec.workflow(rec.place("demo"), "demo")
+    folder = rec.place("demo")
+    rec.workflow(folder, "demo")
+    words = "calibrate --track tommerup --section A7 --modes ballast=99.6/0.292 railpad=616.4/0.066"
+    rec.command(words.split(), folder, "demo/calibrate.txt")
 
 
 def blind(case):

@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Append the line to acknowledgements.csv; ConfigError where turnout, section or date do not stand."""
+    """Append the line to acknowledgements.csv; ConfigError for an invalid turnout, section or date."""
     from datetime import UTC, datetime
     from pathlib import Path
 
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _no_alarm(registry, row):
-    """Whether there is a registry, and no open alarm in it of which the row of ``acknowledgements`` speaks."""
+    """Whether there is a registry without an open alarm that the row of ``acknowledgements`` refers to."""
     from pathlib import Path
 
     from turnout.registry.database import DATABASE, open_registry

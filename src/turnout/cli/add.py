@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Append the row, check the whole configuration, and take the row back where it is unsound."""
+    """Append the row and check the whole configuration; an invalid row is removed again."""
     from pathlib import Path
 
     from turnout.config import load_configuration

@@ -75,7 +75,7 @@ def add_arguments(parser):
 
 
 def run(args):
-    """Take the step."""
+    """Run the step."""
     return {"make": _make, "diagnose": _diagnose, "reveal": _reveal, "score": _score, "keep": _keep}[args.step](args)
 
 

@@ -59,7 +59,7 @@ def run(args):
 
 
 def _block(section, values, sd, missed) -> str:
-    """The values as lines of the track file; comments that nobody pastes as a result where the fit ``missed``."""
+    """The values as lines of the track file, or as comments if the fit ``missed`` the tests."""
     if missed:
         head = f"# do not paste: section {section} with these values {missed}"
     elif values:

@@ -18,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print what is sound and each problem; exit code 1 where there is one, though no turnout meets it yet."""
+    """Print the counts and each problem; exit code 1 if there is one, even if no turnout is affected yet."""
     from pathlib import Path
 
     from turnout.config import load_configuration
@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _faults(configuration, formats, to_si):
-    """Each fault that stops no turnout, and what it does stop."""
+    """Each fault that stops no turnout, with its consequence."""
     from turnout.config.load import faults_of_unused_layouts
     from turnout.stages.layout_checks import faults_of_tracks
 
@@ -62,7 +62,7 @@ def _faults(configuration, formats, to_si):
 
 
 def _planned(events):
-    """Each event of days to come, which may be a slip of the pen; what is a year ahead is a warning already."""
+    """Each event of the next year, which may be a typing error; later ones are warnings already."""
     from datetime import timedelta
 
     from turnout.config.events import AHEAD, now
@@ -74,7 +74,7 @@ def _planned(events):
 
 
 def _left_out(configuration, raw) -> int:
-    """Print how many raw files there are and each that is left out or unsound; how many of these."""
+    """Print the number of raw files and each problem with them; returns the number of problems."""
     from turnout.config.load import read_notes
     from turnout.workflow.notes_check import contradicted_notes
     from turnout.workflow.scan import scan

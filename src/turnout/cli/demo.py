@@ -22,7 +22,7 @@ def add_arguments(parser):
 
 
 def run(args):
-    """Make the fleet, run the pipeline, say what was found."""
+    """Make the fleet, run the pipeline, print the results."""
     import os
 
     from turnout.demo.make import make_fleet, run_pipeline

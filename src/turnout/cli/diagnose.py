@@ -38,7 +38,7 @@ def add_arguments(parser):
 
 
 def run(args):
-    """Diagnose and print, or accept what was found."""
+    """Diagnose and print, or accept a finding."""
     from turnout.stages.mismatch_results import Results
 
     results = Results(args.work, args.turnout, args.registry)
@@ -49,14 +49,14 @@ def run(args):
     try:
         _show(args, results, _diagnosed(args))
     except BudgetSpentError as spent:
-        if spent.done:  # an older result of all groups is worth more than none of any
+        if spent.done:  # with no finished group the older result of all groups stays
             _show(args, results, spent.rows)
         raise
     return 0
 
 
 def _show(args, results, rows):
-    """Keep, draw and print the rows."""
+    """Save, draw and print the rows."""
     import json
 
     from turnout.report.finding_pages import write_own_page
@@ -68,7 +68,7 @@ def _show(args, results, rows):
 
 
 def _diagnosed(args):
-    """Rows by table of the visit asked for."""
+    """Rows by table of the requested visit."""
     from turnout.stages.mismatch_results import diagnose_turnout
 
     with DiagnoseBar() as bar:
@@ -79,7 +79,7 @@ def _diagnosed(args):
 
 
 def _accept(args, results):
-    """Write the finding into the track file and say what changed."""
+    """Write the finding into the track file and print the change."""
     from turnout.stages.accept_finding import accept
 
     path, words = accept(results.finding(args.finding), args.configuration, args.turnout, args.track, args.anyway)
@@ -89,7 +89,7 @@ def _accept(args, results):
 
 
 def _words(rows):
-    """What was found, group by group."""
+    """Findings, quarantine and notes in words."""
     lines = []
     for row in rows["mismatch_findings"]:
         said = row["verdict"].replace("_", " ") + (f", grade {row['grade']}" if row["grade"] else "")
@@ -116,7 +116,7 @@ USUAL = "neighbouring sections together; a group takes a minute to ten, more wit
 
 
 class DiagnoseBar:
-    """Counts joint fits of a group; the number of simulations so far shows that a long fit is alive."""
+    """Progress of a diagnosis: joint fits of a group, and simulations so far, which move during a long fit."""
 
     def __init__(self, stream=None):
         self.stream = stream or sys.stderr
@@ -137,7 +137,7 @@ class DiagnoseBar:
         return False
 
     def group(self, group, number, count):
-        """Called when a group begins; returns the callable for its joint fits."""
+        """Begin a group; returns the callable that reports its joint fits."""
         self._plan(number, count)
         self.said = f"{'+'.join(group.labels)} ({number + 1} of {count})"
         self.what = "base fit"
@@ -154,7 +154,7 @@ class DiagnoseBar:
         return fits
 
     def _plan(self, number, count):
-        """How much there is to do, then how far it is: whoever has little time must know before."""
+        """Print the number of groups at the start, and the finished ones later."""
         if self.began is None:
             self.began = time.monotonic()
             text = f"{count} {'group' if count == 1 else 'groups'}: {USUAL}"

@@ -24,7 +24,7 @@ def add_arguments(parser):
 
 
 def run(args):
-    """Print the matrix, what is confused, and the addition that would resolve most."""
+    """Print the matrix, the confused effects, and the addition that would resolve most."""
     from turnout.stages.distinguish import planned_matrix
 
     matrix, advice = planned_matrix(

@@ -14,7 +14,7 @@ HELP = "list maintenance, or enter it"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """What to enter, or what to list."""
+    """The event to enter, or the options of the list."""
     parser.add_argument("place", nargs="?", help="turnout, or turnout/section")
     parser.add_argument("kind", nargs="?", help="tamping, pad_exchange, sensor_change ...")
     parser.add_argument("date", nargs="?", help="YYYY-MM-DD or YYYY-MM-DDTHH:MM, UTC")
@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """List events, enter one, or tell the effect of maintenance; ConfigError for half an event."""
+    """List events, enter one, or print the effect of maintenance; ConfigError for an incomplete event."""
     from turnout.config import load_configuration
     from turnout.errors import ConfigError
 
@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _enter(args) -> int:
-    """Append the line and read the configuration again; a line that is refused is taken back."""
+    """Append the line and read the configuration again; an invalid line is removed."""
     from pathlib import Path
 
     from turnout.config import load_configuration

@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write each table or view and print its number of rows; RegistryError for one not known, or not written."""
+    """Write each table or view and print its number of rows; RegistryError if it is unknown or cannot be written."""
     from pathlib import Path
 
     import duckdb
@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _write(con, name, folder, form):
-    """Where one table or view went, and its rows; a Delta table is replaced by a new version, others by a new file."""
+    """(path, number of rows) of one written table or view; an existing one is replaced."""
     quoted = '"' + name.replace('"', '""') + '"'
     if form == "delta":
         return folder / name, _delta(con, quoted, folder / name)

@@ -18,7 +18,7 @@ HELP = "analyse one hammer test and say what is in it"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The files, the turnout, and what their names do not say."""
+    """The files, the turnout, and options for what the file names do not give."""
     parser.add_argument("file", nargs="+", help="files of the test, in any format that is read")
     parser.add_argument("--turnout", required=True, help="id of the turnout, for its sections and channels")
     parser.add_argument("--section", help="label of the section, where the file's name does not say it")
@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print what each section's test holds; exit code 1 where one gives no resonance."""
+    """Print the results of each section's test; exit code 1 if one gives no resonance."""
     from pathlib import Path
 
     from turnout.config import load_configuration
@@ -62,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _check_figure(path, tests):
-    """ConfigError for a figure that could not be made, before anything is computed."""
+    """ConfigError for a figure that cannot be written, before anything is computed."""
     from turnout.errors import ConfigError
 
     if path.suffix.lower() != ".svg":

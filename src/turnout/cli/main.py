@@ -31,7 +31,7 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def main(argv=None) -> int:
-    """Run one command; a fault of the user's input or of the machine's files is one message and exit code 2."""
+    """Run one command; an error of the input or of a file is one message and exit code 2."""
     args = build_parser().parse_args(argv)
     try:
         return args.run(args) or 0

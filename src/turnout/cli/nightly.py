@@ -17,7 +17,7 @@ INTERRUPTED = 130
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Profile, limit of time [h] and options of Snakemake."""
+    """Profile, time limit [h] and options of Snakemake."""
     parser.add_argument("--profile", default="profiles/default", help="folder of the profile (%(default)s)")
     parser.add_argument("--limit-hours", type=float, default=None, help="end a run that takes longer")
     parser.add_argument("options", nargs="*", help="handed on to Snakemake, after --")

@@ -12,7 +12,7 @@ HELP = "analyse one passage file and say what is in it"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The recording, its turnout, and where its models lie."""
+    """The recording, its turnout, and the folder of its models."""
     parser.add_argument("file", help="passage recording, in any format that is read")
     parser.add_argument("--turnout", required=True, help="id of the turnout, for its sensors and models")
     parser.add_argument(
@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the train of each record and, unless told otherwise, the fit at each sensor; exit code 1 without any."""
+    """Print the train of each record and, unless --no-fit, the fit at each sensor; exit code 1 without a train."""
     from pathlib import Path
 
     from turnout.config import load_configuration
@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _show(recording, late, turnout, context, settings, no_fit) -> bool:
-    """Print one train, and how it is fitted; whether there is one."""
+    """Print one train and its fits; returns whether there is a train."""
     from turnout.passage.analysis import analyse
     from turnout.stages.passage import sensors_of
 
@@ -85,7 +85,7 @@ def _train(recording, passage) -> list[str]:
 
 
 def _fits(recording, passage, turnout, context, settings) -> list[str]:
-    """A line per sensor: each score beside its null."""
+    """A line per sensor: each score with that of its null models."""
     from datetime import datetime
 
     from turnout.passage.channel_fit import fit_channel
@@ -115,7 +115,7 @@ def _fits(recording, passage, turnout, context, settings) -> list[str]:
 
 
 def fit_rate(settings) -> str:
-    """What the scores rest on."""
+    """The settings behind the scores, in words."""
     return (
         f"band {settings.band_low:g}-{settings.band_high:g} Hz, two numbers per wheel, "
         f"null: {settings.null_models} random models, 95 % quantile"

@@ -18,7 +18,7 @@ STAGES = {
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Folders of configuration, raw files and results, the turnouts asked about, and the number of shards."""
+    """Folders of configuration, raw files and results, the turnouts, and the number of shards."""
     parser.add_argument(
         "--configuration", "--config", default="config", help="folder of the configuration (%(default)s)"
     )
@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _say_gone(configuration, raw, plans, shards, turnouts) -> None:
-    """Print which known files are gone, and the error that the next run will stop with."""
+    """Print which files of the last run are missing, and the error of the next run, if any."""
     from turnout.workflow.plan import gone_files
 
     gone = gone_files(configuration, raw, plans, shards, turnouts)
@@ -66,7 +66,7 @@ def _say_gone(configuration, raw, plans, shards, turnouts) -> None:
 
 
 def _say(turnout, raw, known, counts) -> None:
-    """Print what is new of one turnout and what was left out, and count."""
+    """Print and count the new and changed units of one turnout, and print the files left out."""
     from turnout.config.load import read_notes
     from turnout.workflow.notes import notes_of
     from turnout.workflow.plan import Planned
@@ -85,7 +85,7 @@ def _say(turnout, raw, known, counts) -> None:
 
 
 class _Known:
-    """What earlier runs computed, read when a shard is first asked for."""
+    """Results of earlier runs, read when a shard is first needed."""
 
     def __init__(self, work, shards) -> None:
         self.work, self.shards = work, shards
@@ -94,7 +94,7 @@ class _Known:
         self.algo: dict[str, str] = {}
 
     def judged(self, planned, settings) -> str:
-        """ "new", "changed", or "" where its result stands."""
+        """ "new", "changed", or "" if its result is current."""
         from turnout.fingerprint import fingerprint
         from turnout.workflow.plan import shard_of
         from turnout.workflow.scan import unit_id
@@ -115,7 +115,7 @@ class _Known:
         return "" if (before.stamp, before.algo) == (stamp_of(planned), self.algo[unit.kind]) else "changed"
 
     def _token(self, unit, settings):
-        """What a stage takes from another one for this turnout: the passages the models of the hammer tests."""
+        """Token of what a stage takes from another one, such as the models that passages are fitted with."""
         from turnout.workflow.tasks import named
 
         context = STAGES[unit.kind][1]

@@ -18,7 +18,7 @@ HELP = "ask the registry in SQL"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The query, where the registry lies and how to show the answer."""
+    """The query, the folder of the registry and the output."""
     parser.add_argument("sql", nargs="?", help="a query; '-' reads it from standard input")
     parser.add_argument("--registry", default="results/registry", help="folder of the registry (%(default)s)")
     parser.add_argument("--csv", metavar="FILE", help="write comma-separated values there, '-' = standard output")
@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print or write the rows of a query; RegistryError with the words of DuckDB where it fails."""
+    """Print or write the rows of a query; RegistryError with the message of DuckDB if it fails."""
     import duckdb
 
     from turnout.errors import RegistryError
@@ -60,7 +60,7 @@ def _write_csv(result, path):
 
 
 def opened(path):
-    """The file at ``path`` to write to, standard output for "-"; RegistryError where it cannot be written."""
+    """The file at ``path`` open for writing, standard output for "-"; RegistryError if it cannot be written."""
     from turnout.errors import RegistryError
 
     if path == "-":
@@ -83,7 +83,7 @@ class _Standard:
 
 
 def shown(result, limit: int = 60) -> str:
-    """Aligned columns, numbers to the right, NULL as an empty place, and how many rows there are."""
+    """Text table of a result: numbers right aligned, NULL empty, and the number of rows."""
     rows = result.limit(limit + 1).fetchall()
     more, rows = len(rows) > limit, rows[:limit]
     text = [[_cell(value) for value in row] for row in rows]

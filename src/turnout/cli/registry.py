@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do the action; exit code 1 where the check finds a problem."""
+    """Run the action; exit code 1 if the check finds a problem."""
     return {"check": _check, "compact": _compact, "vacuum": _vacuum, "relocate": _relocate}.get(
         args.action, _describe if args.action == "describe" else _rebuild
     )(args)

@@ -22,7 +22,7 @@ def add_arguments(parser):
 
 
 def run(args):
-    """Write the pages and say where they are."""
+    """Write the pages and print their folder."""
     from turnout.report.job import report_job
 
     day = _day(args.day)
@@ -33,7 +33,7 @@ def run(args):
 
 
 def _day(said):
-    """The day asked for; ConfigError where it is none."""
+    """The requested day, None without one; ConfigError if it is invalid."""
     from datetime import date
 
     from turnout.errors import ConfigError
@@ -45,7 +45,7 @@ def _day(said):
 
 
 def _of_then(registry):
-    """What to ask for where charts of today's pages have grown old, else nothing."""
+    """A hint to an earlier day if charts of today's pages are too old, else ""."""
     from turnout.registry.as_of import counts_of, list_day, of_then
     from turnout.registry.database import open_registry
 

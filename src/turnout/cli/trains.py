@@ -14,7 +14,7 @@ HELP = "learn axle loads and clusters from the trains so far"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Which turnouts, and where everything lies."""
+    """The turnouts, and the folders of configuration, recordings and registry."""
     parser.add_argument("--turnout", nargs="*", help="only the loads of these turnouts")
     parser.add_argument(
         "--configuration", "--config", default="config", help="folder of the configuration (%(default)s)"

@@ -16,7 +16,7 @@ HELP = "tomorrow's list: what to inspect, what to plan, where nothing can be sai
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Where the registry lies, the date asked about and where to write."""
+    """Folder of the registry, date of the list and output file."""
     parser.add_argument("--registry", default="results/registry", help="folder of the registry (%(default)s)")
     parser.add_argument("--asof", metavar="DATE", help="as it was then: YYYY-MM-DD, UTC")
     parser.add_argument("--all", action="store_true", help="every row; open alarms are never left out anyway")
@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def as_text(rows, n_charts=0, n_silenced=0, n_unmeasured=0, newest=None) -> str:
-    """The list for a terminal: one paragraph per row, what it leaves out, and on what it rests."""
+    """The list for a terminal: one paragraph per row, then the number of rows left out and of charts."""
     text = [_paragraph(row) for row in rows]
     if not rows and n_charts:
         text = ["Nothing to do: no chart in alarm, none that drifts, none that cannot tell."]
@@ -55,7 +55,7 @@ def as_text(rows, n_charts=0, n_silenced=0, n_unmeasured=0, newest=None) -> str:
         text.append(f"... and {rows[0]['n_in_all'] - len(rows)} more: turnout worklist --all")
     if not n_charts:
         return "\n".join([*text, "No chart has been computed yet: alarms and plans come with the first trend."])
-    if newest is None:  # a list of another day: what is silenced or not measured is said of today alone
+    if newest is None:  # a list of another day: silenced and unmeasured charts are counted for today only
         return "\n".join(text)
     from turnout.registry.as_of import of_then
 
@@ -88,7 +88,7 @@ def _write(stream, names, rows):
 
 
 def _day(text, con):
-    """The time that ``--asof`` means; ConfigError where it is none, or nothing had been measured by then."""
+    """The time of ``--asof``; ConfigError if it is invalid or before the first measurement."""
     from datetime import datetime
 
     from turnout.config.events import wrong_time

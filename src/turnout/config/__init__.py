@@ -1,7 +1,7 @@
-"""Configuration: what the user says about the fleet, checked, merged and hashed.
+"""Configuration of the fleet: read, checked, merged and hashed.
 
-``load_configuration("config")`` gives a ``Configuration``; its ``turnout(id)`` a frozen ``TurnoutConfig``;
-``with_raw(turnout, raw_root)`` the same with the campaigns and trains noted in its raw folder.
+``load_configuration("config")`` returns a ``Configuration``. Its ``turnout(id)`` returns a frozen ``TurnoutConfig``.
+``with_raw(turnout, raw_root)`` adds the campaigns and trains that are listed in the raw folder.
 """
 
 from turnout.config.campaign_notes import unnoted

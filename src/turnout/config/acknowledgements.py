@@ -1,4 +1,4 @@
-"""config/acknowledgements.csv: who has seen an alarm, or silences it until a date, and why."""
+"""Reader of config/acknowledgements.csv: who has seen an alarm, or suppresses it until a date, and why."""
 
 import hashlib
 import json
@@ -20,10 +20,11 @@ BANDS = ("ballast", "railpad", "amplitude")
 def read_acknowledgements(
     path: Path, name: str = "acknowledgements.csv", known=None, variants: Mapping | None = None
 ) -> tuple[list[dict], list[ConfigError]]:
-    """Sound rows as rows of the table ``acknowledgements``, and every error of the others.
+    """Valid rows as rows of the table ``acknowledgements``, and every error of the other rows.
 
-    No file means that nobody has said anything. Empty ``section`` or ``band`` mean all of the turnout; section "*"
-    is its median. ``known`` and ``variants`` are the turnouts and their configuration; None: places are not checked.
+    Without the file there are no rows. Empty ``section`` or ``band`` mean all of the turnout; section "*"
+    is its median. ``turnout_ids`` and ``variants`` are the turnouts and their configuration; None: neither turnout nor
+    section is checked.
     """
     if not os.path.lexists(path):
         return [], []
@@ -31,7 +32,7 @@ def read_acknowledgements(
         table = read_csv(Path(path), name, COLUMNS, needed=6)
     except TableFault as fault:
         return [], [fault.error]
-    if table.faults:  # a title that is not understood may be the end of a silence: no row counts
+    if table.faults:  # an unknown title may be a misspelt "until": no row counts
         return [], [fault.error for fault in table.faults]
     rows: list[dict] = []
     errors: list[ConfigError] = []
@@ -44,7 +45,7 @@ def read_acknowledgements(
 
 
 def faults(cells: Mapping, known, variants) -> Iterator[tuple[str, str, str]]:
-    """(column, what was found, what to write) of everything in a row that cannot be used."""
+    """(column, problem, remedy) of every error in a row."""
     said = {column: cells.get(column, "") for column in COLUMNS}
     if no_row := unreadable(cells):
         yield no_row
@@ -77,7 +78,7 @@ def faults(cells: Mapping, known, variants) -> Iterator[tuple[str, str, str]]:
 
 
 def acknowledgement(cells: Mapping) -> dict:
-    """The row of the table ``acknowledgements`` of a sound row of the file."""
+    """The row of the table ``acknowledgements`` for a valid row of the file."""
     said = {column: cells.get(column, "") for column in COLUMNS}
     section = said["section"]
     if section and section != "*" and "/" not in section:

@@ -1,4 +1,4 @@
-"""What was noted beside the raw files of a turnout: campaigns.csv and trains.csv."""
+"""Readers of campaigns.csv and trains.csv in the raw folder of a turnout."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -18,9 +18,9 @@ TRAIN_RANGES = {"speed_kmh": (1, 400), "axle_load_t": (0.1, 60), "n_axles": (1, 
 
 
 def read_campaigns(path: Path, name: str) -> tuple[dict[str, Campaign], list[ReadError]]:
-    """Campaigns by date, and an error for each row that cannot be used; without the file there are none.
+    """Campaigns by date, and an error for each row that cannot be used. Without the file there are none.
 
-    A row whose temperature is empty is sound: the temperature is None.
+    The temperature of a campaign is None if its cell is empty.
     """
     campaigns: dict[str, Campaign] = {}
 
@@ -35,7 +35,7 @@ def read_campaigns(path: Path, name: str) -> tuple[dict[str, Campaign], list[Rea
 
 
 class Campaigns(Frozen):
-    """Campaigns by date; one that campaigns.csv does not know is ``unnoted``.
+    """Campaigns by date; for a date that is not in campaigns.csv an unlisted campaign.
 
     >>> Campaigns()["2024-05-13"].started_at.isoformat(), Campaigns()["2024-05-13"].noted
     ('2024-05-13T12:00:00', False)
@@ -46,14 +46,14 @@ class Campaigns(Frozen):
 
 
 def unnoted(date: str) -> Campaign:
-    """A campaign that campaigns.csv does not know: noon of its day, nothing else."""
+    """A campaign that is not in campaigns.csv: it starts at noon of its day and has no other data."""
     return Campaign(date, datetime.fromisoformat(date + "T12:00"), noted=False)
 
 
 def read_trains(path: Path, name: str) -> tuple[tuple[dict[str, str], ...], list[ReadError]]:
-    """Rows of trains.csv as text, in the file's order, and an error for each that cannot be used.
+    """Rows of trains.csv as text, in the order of the file, and an error for each row that cannot be used.
 
-    Further columns are kept; without the file there are no rows.
+    Additional columns are read too. Without the file there are no rows.
     """
     trains: list[Cells] = []
 
@@ -72,11 +72,11 @@ def read_trains(path: Path, name: str) -> tuple[tuple[dict[str, str], ...], list
 
 
 class _Wrong(Exception):
-    """Column, what was found, what to write."""
+    """A cell that cannot be used: (column, problem, remedy)."""
 
 
 def _each_row(path, name, known, needed, keep: Callable[[Cells], None], free=False) -> list[ReadError]:
-    """``keep`` every row; an error for each that cannot be used, and for what is wrong with the header."""
+    """Call ``add_row`` with every row; return the errors of the header and of the rows that cannot be used."""
     try:
         table = read_csv(path, name, known, needed, free)
     except (FileNotFoundError, NotADirectoryError):

@@ -1,4 +1,4 @@
-"""Errors that no single key shows: names that point nowhere, units that do not fit, patterns that cannot match."""
+"""Consistency checks over several keys of a layout: references to names, units, file patterns, limits."""
 
 from collections.abc import Callable, Iterator
 from zoneinfo import available_timezones
@@ -10,10 +10,10 @@ from turnout.errors import ConfigError
 
 
 def check_meaning(tree: Branch, to_si: Callable | None = None) -> Iterator[ConfigError]:
-    """Every such error of a merged layout whose keys are sound.
+    """Every consistency error of a merged layout whose single keys are valid.
 
     ``to_si(quantity, unit, sensitivity, sensitivity_unit)`` raises ValueError for units that cannot be
-    converted; without it units are not checked.
+    converted. Without it units are not checked.
     """
     labels = tuple(tree["sections"])
     if "hammer" in tree:
@@ -74,7 +74,7 @@ def _value(channel: Branch, key: str):
 
 
 def _softest_blow(tree: Branch) -> float:
-    """receptance.softest_blow as written, else its default [N]."""
+    """The setting receptance.softest_blow, else its default [N]."""
     written = tree.get("settings", {}).get("receptance", {}).get("softest_blow")
     return written.value if written else settings_keys()["receptance"].spec["softest_blow"].default
 

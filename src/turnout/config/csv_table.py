@@ -1,4 +1,4 @@
-"""Tables that people keep as CSV (events, acknowledgements, campaigns, trains), read with the place of every cell."""
+"""Reader of CSV tables that people edit (events, campaigns, trains ...); it knows line and column of every cell."""
 
 import csv
 import os
@@ -15,7 +15,7 @@ BROKEN = "a line that is no row"
 
 
 class TableFault(Exception):
-    """What is wrong with a table as a whole: where, what was found, what to write; ``error`` is its ConfigError."""
+    """Error of a whole table: place, problem and remedy; ``error`` is the same as ConfigError."""
 
     def __init__(self, place: Place, found: str, remedy: str):
         super().__init__(found)
@@ -24,31 +24,31 @@ class TableFault(Exception):
 
 
 class Cells(dict):
-    """One row of a CSV: text by column. ``text`` is its line, ``titles`` are those of the header."""
+    """One row of a CSV: text by column. ``text`` is its line, ``titles`` are the titles of the header."""
 
     text = ""
     titles: tuple[str, ...] = ()
 
     def place(self, name: str, line: int, column: str) -> Place:
-        """Where the cell of ``column`` starts; the start of the line where it has no such cell."""
+        """Where the cell of ``column`` starts; the start of the line if it has no such cell."""
         return Place(name, line, dict(zip((*self.titles, TOO_MANY), _starts(self.text))).get(column, 1))
 
 
 @dataclass(frozen=True)
 class CsvTable:
-    """``rows`` are (line, cells); ``faults`` are those of the header that leave the rows readable."""
+    """``rows`` are (line, cells); ``faults`` are errors of the header despite which the rows can be read."""
 
     rows: tuple[tuple[int, Cells], ...]
     faults: tuple[TableFault, ...]
 
 
 def read_csv(path: Path, name: str, known: tuple[str, ...], needed: int, free: bool = False) -> CsvTable:
-    """A CSV whose header has the first ``needed`` of the ``known`` titles, and no others than these.
+    """Read a CSV. Its header must have the first ``n_required`` of ``columns``, and no titles outside ``columns``.
 
-    Where others are ``free`` they are refused only if they look like a known title that is missing. Errors call the
-    file ``name``: TableFault where it cannot be read, is not UTF-8 or a needed title is missing, FileNotFoundError
-    where there is none; a link to nothing is a file that cannot be read.
-    A row is one line: a quote that is not closed costs its own row (``unreadable``), not the rows below it.
+    With ``allow_others`` an unknown title is an error only if it resembles a title that is missing. Errors call the
+    file ``name``. TableError is raised if it cannot be read, is not UTF-8 or lacks a required title, FileNotFoundError
+    if it does not exist; a broken link is a file that cannot be read.
+    A row is one line: an unclosed quote is an error of its own row (``row_problem``), not of the rows below it.
     """
     lines = [(n, line) for n, line in enumerate(_text(path, name).split("\n"), 1) if line.strip()]
     first, header = lines[0] if lines else (1, "")
@@ -66,7 +66,7 @@ def read_csv(path: Path, name: str, known: tuple[str, ...], needed: int, free: b
 
 
 def unreadable(cells: Mapping) -> tuple[str, str, str] | None:
-    """(column, what was found, what to write) where a line is no row of its table.
+    """(column, problem, remedy) if a line is no valid row of its table, else None.
 
     >>> unreadable(_cells('tamping,"machine 09-3X', ("kind", "note")))[1]
     'a double quote that is not closed in its line'
@@ -79,7 +79,7 @@ def unreadable(cells: Mapping) -> tuple[str, str, str] | None:
 
 
 def header_of(path: Path, name: str) -> tuple[str, ...]:
-    """Titles of a CSV; TableFault where it has none, is not UTF-8 or cannot be read."""
+    """Titles of a CSV; TableError if it has none, is not UTF-8 or cannot be read."""
     lines = [(n, line) for n, line in enumerate(_text(path, name).split("\n"), 1) if line.strip()]
     if not lines:
         raise TableFault(Place(name, 1, 1), "an empty table", "Write its header, or remove the file")
@@ -103,7 +103,7 @@ def _text(path: Path, name: str) -> str:
 
 
 def _titles(header: str) -> tuple[str, ...]:
-    """Stripped titles; a spreadsheet's empty columns on the right are none."""
+    """Stripped titles; empty columns on the right, as spreadsheets write them, are ignored."""
     try:
         titles = [title.strip() for title in next(csv.reader([header], strict=True), [])]
     except csv.Error:
@@ -114,7 +114,7 @@ def _titles(header: str) -> tuple[str, ...]:
 
 
 def _title_fault(title, titles, k, known, free) -> tuple[str, str] | None:
-    """(what was found, what to write) of the ``k``-th title where it cannot be used."""
+    """(problem, remedy) of the ``k``-th title if it cannot be used, else None."""
     if title in titles[:k]:
         return f"column {title!r} for the second time", "Keep one of them"
     if title in known:
@@ -143,7 +143,7 @@ def _cells(line: str, titles: tuple[str, ...]) -> Cells:
 
 
 def _starts(line: str) -> Iterator[int]:
-    """Columns, from 1, at which the cells of a line of CSV begin.
+    """Columns, counted from 1, at which the cells of a line of CSV begin.
 
     >>> list(_starts('a,"b,c",d'))
     [1, 3, 9]

@@ -1,10 +1,6 @@
-"""A YAML file whose every value knows where it stands, so that an error can say which line to change.
+"""YAML files as trees in which every value knows its line and column, so that an error can name them.
 
-The line of an entry in a YAML file, found again when an error is about to name it.
-
-What keeps a file from being read as text or as YAML at all, as errors that say what to do.
-
-A mapping that cannot be changed and travels between processes.
+Files that cannot be read as text or YAML raise ``ConfigError``. ``Frozen`` is a read-only mapping that can be pickled.
 """
 
 import re
@@ -18,8 +14,11 @@ from turnout.errors import ConfigError
 
 @contextmanager
 def legible(path: object, where: str) -> Iterator[None]:
-    """Within it a file is read and parsed: ConfigError for ``path`` where it cannot be opened (at ``where``), is not
-    UTF-8, holds a character that no YAML file may hold, or an anchor within itself."""
+    """Context in which a file is read and parsed; errors become a ConfigError for ``path``.
+
+    Covered are files that cannot be opened (error at ``where``) or are not UTF-8, characters that YAML does not allow,
+    and an anchor inside its own content.
+    """
     from ruamel.yaml.reader import ReaderError
 
     try:
@@ -39,7 +38,7 @@ def legible(path: object, where: str) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Place:
-    """File, line and column, counted from 1; line 0 stands for a value built into the program."""
+    """File, line and column, counted from 1. Line 0 is a value that is built into the program."""
 
     path: str
     line: int = 0
@@ -62,7 +61,7 @@ class Leaf:
 
 
 class Branch(dict):
-    """A mapping from names to ``Leaf`` or ``Branch``; ``place`` is where it starts, ``key_places`` its names."""
+    """A mapping from names to ``Leaf`` or ``Branch``; ``place`` is its start, ``key_places`` those of its names."""
 
     def __init__(self, place: Place):
         super().__init__()
@@ -76,7 +75,7 @@ class Branch(dict):
 
 
 def load(path: Path, name: str | None = None) -> Branch:
-    """The mapping in the YAML file ``path``; errors call the file ``name``; ConfigError where it is no YAML."""
+    """The mapping in the YAML file ``path``, called ``name`` in errors; ConfigError if it is no YAML."""
     from ruamel.yaml import YAML
     from ruamel.yaml.error import MarkedYAMLError
 
@@ -98,7 +97,7 @@ def load(path: Path, name: str | None = None) -> Branch:
 
 
 def merge_branches(*branches: Branch) -> Branch:
-    """Later branches win leaf by leaf; a list is one leaf and is replaced whole."""
+    """Merge branches leaf by leaf; later branches win. A list is one leaf and is replaced as a whole."""
     merged = Branch(branches[0].place)
     for branch in branches:
         for name, value in branch.items():
@@ -110,7 +109,7 @@ def merge_branches(*branches: Branch) -> Branch:
 
 
 def plain(tree):
-    """The values alone: dict, tuple, text, numbers."""
+    """The values without their places: dict, tuple, text, numbers."""
     return {k: plain(v) for k, v in tree.items()} if isinstance(tree, Branch) else tree.value
 
 
@@ -162,9 +161,9 @@ KEYS = re.compile(r"[^.\[\]]+")
 
 
 def line_of(path, place: str) -> int | None:
-    """Line, from 1, of an entry such as "routes.main[1].share", or of the last one on the way that is there.
+    """Line, from 1, of an entry such as "routes.main[1].share", or of its last ancestor that exists.
 
-    None where the file cannot be read, or its first entry is not in it.
+    None if the file cannot be read, or does not contain the first entry of the path.
     """
     from ruamel.yaml import YAML
     from ruamel.yaml.error import YAMLError
@@ -182,7 +181,7 @@ def line_of(path, place: str) -> int | None:
 
 
 def where(path, place: str, at: str = "") -> str:
-    """``place`` as errors name it, with the line of ``at``, an entry below it, where it is found.
+    """``place`` as errors name it, with the line of ``entry`` below it if that exists.
 
     >>> where("nowhere.yaml", "rail.mass"), where("nowhere.yaml", "")
     ('rail.mass', 'the file')
@@ -193,7 +192,7 @@ def where(path, place: str, at: str = "") -> str:
 
 
 def _below(node, key):
-    """(line, node) of the entry ``key`` of a node, also one that it takes over with <<; None where there is none."""
+    """(line, node) of the entry ``key`` of a node, merge keys (<<) included; None if there is none."""
     kind = getattr(node, "id", "")
     if kind == "sequence":
         item = node.value[int(key)] if key.isdigit() and int(key) < len(node.value) else None

@@ -1,4 +1,4 @@
-"""config/events.csv: maintenance that starts a new epoch of a resonance."""
+"""Reader of config/events.csv: maintenance that starts a new epoch of a resonance."""
 
 import os
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ from turnout.config.csv_table import TableFault, read_csv, unreadable
 from turnout.config.schema import NO_TURNOUT, suggestion
 from turnout.errors import ConfigError
 
-# Which resonance is another one afterwards, where the row does not say.
+# Resonances that start a new epoch after each kind of work, where the row does not name them.
 RESETS = {
     "tamping": ("ballast",),
     "pad_exchange": ("railpad",),
@@ -22,7 +22,7 @@ RESETS = {
     "method_change": ("ballast", "railpad"),
     "other": (),
 }
-AHEAD = timedelta(days=366)  # that work may be planned; what is dated later is a slip
+AHEAD = timedelta(days=366)  # how far ahead work may be planned; a later date is taken for a mistake
 COLUMNS = ("turnout", "section", "date", "kind", "resets", "note")
 
 
@@ -39,11 +39,11 @@ class Event:
 
 
 def read_events(path: Path, name: str, known, variants) -> tuple[list[Event], list[ConfigError], list[ConfigError]]:
-    """Events in order of time, every error of the rows that cannot be used, and a warning of each event of a turnout
-    or section that is not there (it was taken out, and its history keeps its events, or it is misspelt), and of each
-    that is dated more than a year ahead. No file means no events.
+    """(events in order of time, errors of rows that cannot be used, warnings). Without the file there are no events.
 
-    ``known`` are the ids of the turnouts, None where turnouts.tsv itself is wrong: then no event is accused.
+    Warnings concern events of an unknown turnout or section and events dated more than a year ahead. An unknown
+    turnout may be misspelt, or it was removed and its history keeps its events.
+    ``turnout_ids`` is None if turnouts.tsv itself has errors: then turnouts are not checked.
     """
     if not os.path.lexists(path):
         return [], [], []
@@ -68,7 +68,7 @@ def read_events(path: Path, name: str, known, variants) -> tuple[list[Event], li
 
 
 def _wrong(cells) -> Iterator[tuple[str, str, str]]:
-    """(column, what was found, what to write) of everything in a row that cannot be used."""
+    """(column, problem, remedy) of every error in a row."""
     if no_row := unreadable(cells):
         yield no_row
         return
@@ -83,7 +83,7 @@ def _wrong(cells) -> Iterator[tuple[str, str, str]]:
 
 
 def wrong_place(cells, known, variants) -> Iterator[tuple[str, str, str]]:
-    """What is wrong with ``turnout`` and ``section`` of a row; ``known`` None (turnouts.tsv is wrong) accuses none."""
+    """Errors in ``turnout`` and ``section`` of a row; none if ``turnout_ids`` is None (turnouts.tsv has errors)."""
     turnout, label = cells["turnout"], cells["section"].removeprefix(f"{cells['turnout']}/")
     if known is not None and turnout not in known:
         yield "turnout", f"turnout {turnout!r} has no row in turnouts.tsv", suggestion(turnout, known, NO_TURNOUT)
@@ -94,7 +94,7 @@ def wrong_place(cells, known, variants) -> Iterator[tuple[str, str, str]]:
 
 
 def wrong_time(text: str) -> tuple[str, str] | None:
-    """What is wrong with a time in UTC, and what to write; None where nothing is.
+    """(problem, remedy) of a time in UTC; None if it is valid.
 
     >>> wrong_time("2026-04-02") is None, wrong_time("2.4.2026")
     (True, ('', 'Write YYYY-MM-DD or YYYY-MM-DDTHH:MM in UTC'))
@@ -107,7 +107,7 @@ def wrong_time(text: str) -> tuple[str, str] | None:
 
 
 def now() -> datetime:
-    """The time in UTC, as tables write it."""
+    """The present time in UTC, naive as in the tables."""
     return datetime.now(UTC).replace(tzinfo=None)
 
 
@@ -116,7 +116,7 @@ def _words(cells) -> tuple[str, ...]:
 
 
 def _event(cells) -> Event:
-    """The event of a sound row."""
+    """The event of a valid row."""
     turnout, kind = cells["turnout"], cells["kind"]
     label = cells["section"].removeprefix(f"{turnout}/") or None
     resets = _words(cells) if cells.get("resets") else RESETS[kind]

@@ -1,4 +1,4 @@
-"""File-name patterns: ``hammer/{campaign}/{section}_{test}.{ext}`` finds the files of a turnout and names them."""
+"""File-name patterns such as ``hammer/{campaign}/{section}_{test}.{ext}``, which find and name raw files."""
 
 import re
 from functools import lru_cache
@@ -14,9 +14,9 @@ NEEDED = {"hammer": ("campaign", "section"), "passages": ("time",)}
 
 @lru_cache(maxsize=256)
 def compiled(pattern: str, kind: str, sections: tuple[str, ...] = ()) -> re.Pattern:
-    """Regular expression with one named group per field; ``*`` stands for anything but a slash.
+    """Regular expression of a pattern: one named group per field; ``*`` is anything but a slash.
 
-    Raises ValueError with what to write instead.
+    ``branch`` is "hammer" or "passages". Raises ValueError with the remedy.
 
     >>> match = compiled("hammer/{campaign}/{section}_{test}.{ext}", "hammer", ("A7", "AS"))
     >>> match.fullmatch("hammer/2024-05-13/A7_2.uff").groupdict()

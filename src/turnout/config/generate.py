@@ -1,4 +1,4 @@
-"""Files made from the settings and the keys of a layout: config.yaml, JSON schemas, the table in the docs."""
+"""Files generated from the keys of settings and layouts: config.yaml, JSON schemas, docs/configuration.md."""
 
 import json
 import textwrap
@@ -24,7 +24,7 @@ JSON_TYPE = {"text": "string", "number": "number", "integer": "integer", "flag":
 
 
 def generated(folder: Path, docs: Path, defaults: bool = False) -> dict[Path, str]:
-    """Text of every generated file; values changed in config.yaml are kept unless ``defaults`` is set."""
+    """Text of every generated file; changed values in config.yaml stay unless ``defaults`` is set."""
     path = Path(folder) / "config.yaml"
     present = plain(load(path)) if path.exists() and not defaults else {}
     layout, override = layout_keys(), layout_keys()
@@ -38,7 +38,7 @@ def generated(folder: Path, docs: Path, defaults: bool = False) -> dict[Path, st
 
 
 def config_yaml(present: dict) -> str:
-    r"""config.yaml with each key's reason, unit and limits above it.
+    r"""Text of config.yaml, with unit, limits and reason in a comment above each key.
 
     >>> "\n  # 1 to 4096: one job" in config_yaml({}), "\n  shards: 64\n" in config_yaml({"fleet": {"shards": 64}})
     (True, True)
@@ -57,7 +57,7 @@ def config_yaml(present: dict) -> str:
 
 
 def said(key: Key) -> str:
-    """Unit, limits and reason of a key in words.
+    """Unit, limits and reason of a key as text.
 
     >>> said(Key("number", "the paper's gate", minimum=0.0, maximum=1.0))
     "0 to 1: the paper's gate"
@@ -79,7 +79,7 @@ def said(key: Key) -> str:
 
 
 def schema(keys: dict, title: str, whole: bool) -> str:
-    """JSON schema for editors; the program itself checks with the same keys and says more."""
+    """JSON schema for editors. The program itself checks with the same keys and gives more detailed errors."""
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title}
     return json.dumps(head | _object(keys, whole), indent=1, ensure_ascii=False) + "\n"
 
@@ -122,7 +122,7 @@ MARK = "<!-- below: made by `turnout config generate` -->"
 
 
 def _docs(path: Path) -> str:
-    """What stands above the mark is kept."""
+    """docs/configuration.md: the text above the mark stays, the tables below it are generated."""
     above = path.read_text(encoding="utf-8").partition(MARK)[0] if path.exists() else "# Configuration\n\n"
     return f"{above}{MARK}\n\n{tables()}"
 
@@ -134,7 +134,7 @@ RESETTING = """An empty `section` is the whole turnout. `resets` overrules the k
 
 
 def tables() -> str:
-    """Every column and key as Markdown."""
+    """Tables of all columns and keys in Markdown."""
     blocks = ["## Columns of config/turnouts.tsv\n", _table(_flat(ROW))]
     blocks += ["## Columns of config/events.csv\n", f"`{','.join(EVENT_COLUMNS)}`. `kind` and what it resets:\n"]
     blocks.append("\n".join(f"- `{kind}`: {' and '.join(what) or 'nothing'}" for kind, what in RESETS.items()) + "\n")
@@ -169,7 +169,7 @@ def _table(keys: list[tuple[str, Key]], with_default: bool = False) -> str:
 
 
 def _yaml(value) -> str:
-    """A value as it is written in YAML."""
+    """A value in YAML notation."""
     if isinstance(value, tuple):
         return "[" + ", ".join(_yaml(v) for v in value) + "]"
     if isinstance(value, str):

@@ -1,7 +1,4 @@
-"""All configuration of a fleet, read and checked once.
-
-Where every value of a turnout's configuration comes from.
-"""
+"""Reading and checking of the whole configuration of a fleet, and the source of every value in it."""
 
 import os
 from collections.abc import Iterator, Mapping
@@ -26,10 +23,10 @@ ABOUT = {"lat_deg": "latitude", "lon_deg": "longitude"}
 
 @dataclass(frozen=True)
 class Configuration:
-    """The fleet: ``settings`` without any turnout's changes, ``rows`` by id, ``events`` in order of time.
+    """Configuration of the fleet: common ``settings``, ``rows`` of turnouts by id, ``events`` in order of time.
 
-    ``acknowledgements`` are rows of the table of that name; ``warnings`` their rows that do not count, and events of
-    turnouts that have no row. They stop nothing: somebody's slip must not hide the alarms of the others.
+    ``acknowledgements`` are rows of the table of that name. ``warnings`` are its invalid rows and events of unknown
+    turnouts. They are no errors: one wrong row must not hide the alarms of other turnouts.
     """
 
     folder: Path
@@ -42,15 +39,15 @@ class Configuration:
 
     @property
     def ids(self) -> tuple[str, ...]:
-        """All turnouts, in the order of turnouts.tsv."""
+        """Ids of all turnouts, in the order of turnouts.tsv."""
         return tuple(self.rows)
 
     def hash_of(self, turnout: str, kind: str = "") -> str:
-        """Configuration hash of one turnout: the whole, or what units of ``kind`` use."""
+        """Hash of the configuration of one turnout: of all of it, or of what units of ``unit_kind`` use."""
         return self.variants[turnout].hashes[kind]
 
     def turnout(self, turnout: str) -> TurnoutConfig:
-        """The merged configuration of one turnout; ConfigError for an id that has no row."""
+        """The merged configuration of one turnout; ConfigError for an unknown id."""
         if turnout not in self.rows:
             place = Place(str(self.folder / "turnouts.tsv"), 1, 1)
             raise place.error(f"no turnout {turnout!r}", suggestion(turnout, self.rows, NO_TURNOUT))
@@ -63,12 +60,12 @@ class Configuration:
 
 
 def with_raw(turnout: TurnoutConfig, raw_root: Path) -> TurnoutConfig:
-    """The same turnout with the campaigns and trains noted in its raw folder; unsound rows are left out."""
+    """The turnout with the campaigns and trains that are listed in its raw folder; invalid rows are left out."""
     return read_notes(turnout, raw_root)[0]
 
 
 def read_notes(turnout: TurnoutConfig, raw_root: Path) -> tuple[TurnoutConfig, list[ReadError]]:
-    """The same turnout with the notes of its raw folder, and an error for each row that cannot be used."""
+    """The turnout with the campaigns and trains of its raw folder, and an error for each invalid row."""
     folder = Path(raw_root) / turnout.raw
     campaigns, wrong = read_campaigns(folder / "campaigns.csv", f"{turnout.raw}/campaigns.csv")
     trains, bad = read_trains(folder / "trains.csv", f"{turnout.raw}/trains.csv")
@@ -78,9 +75,9 @@ def read_notes(turnout: TurnoutConfig, raw_root: Path) -> tuple[TurnoutConfig, l
 def load_configuration(folder: Path | str = "config", formats=None, to_si=None) -> Configuration:
     """Read and check config.yaml, turnouts.tsv, layouts/, overrides/, events.csv and acknowledgements.csv.
 
-    Raises ConfigErrors with every error found: file, line, column, what stands there, what to write instead.
-    ``formats`` are the names of the readers, ``to_si`` their conversion of units; without them neither the
-    formats nor the units of channels are checked.
+    Raises ConfigErrors with all errors: file, line, column, problem, remedy.
+    ``formats`` are the names of the readers, ``to_si`` converts units. Without them formats and units of channels
+    are not checked.
     """
     reading = _Reading(Path(folder), formats, to_si)
     reading.misnamed()
@@ -104,7 +101,7 @@ def load_configuration(folder: Path | str = "config", formats=None, to_si=None) 
 
 
 def faults_of_unused_layouts(configuration: Configuration, formats=None, to_si=None) -> list[ConfigError]:
-    """What is wrong with the layouts that no turnout follows; nothing depends on them until one does."""
+    """Errors of the layouts that no turnout uses."""
     reading = _Reading(configuration.folder, formats, to_si)
     settings = reading.document(reading.folder / "config.yaml", settings_keys())
     used = {row.values["layout"] for row in configuration.rows.values()}
@@ -115,7 +112,7 @@ def faults_of_unused_layouts(configuration: Configuration, formats=None, to_si=N
 
 
 class _Reading:
-    """One pass over the configuration, collecting errors."""
+    """Reads the files of the configuration and collects all errors."""
 
     def __init__(self, folder: Path, formats, to_si):
         self.folder, self.formats, self.to_si = folder, formats, to_si
@@ -124,11 +121,11 @@ class _Reading:
         self.shared: dict[tuple, Variant] = {}
 
     def name(self, *parts: str) -> str:
-        """How errors call a file: its path with the name of the configuration folder in front."""
+        """Name of a file in errors: its path below the configuration folder, with the name of that folder in front."""
         return "/".join((self.folder.name, *parts))
 
     def misnamed(self) -> None:
-        """An error for every file that would be read if it ended in .yaml, and is not."""
+        """Add an error for every YAML file that is not read because its name does not end in .yaml."""
         for parts in ((), ("layouts",), ("overrides",)):
             for path in sorted(self.folder.joinpath(*parts).glob("*")):
                 if path.suffix.lower() in (".yml", ".yaml") and path.suffix != ".yaml":
@@ -137,7 +134,7 @@ class _Reading:
                     self.errors.append(place.error(f"it ends in {path.suffix} and would not be read", remedy))
 
     def document(self, path: Path, spec: dict, whole: bool = False) -> Branch:
-        """Checked YAML file; an absent one is empty, an unsound one adds errors and is empty."""
+        """Tree of a checked YAML file; empty if the file is absent or, after adding its errors, invalid."""
         name = self.name(path.relative_to(self.folder).as_posix())
         empty = Branch(Place(name, 1, 1))
         if not os.path.lexists(path):
@@ -153,7 +150,7 @@ class _Reading:
         return tree
 
     def layout(self, row: Row, settings: Branch) -> Branch | None:
-        """Layout of a row over the settings of config.yaml; None where it cannot be used."""
+        """Layout of a row, merged onto the settings of config.yaml; None if it cannot be used."""
         name = row.values["layout"]
         path = self.folder / "layouts" / f"{name}.yaml"
         if name not in self.layouts:
@@ -163,7 +160,7 @@ class _Reading:
         return self.layouts[name]
 
     def layout_of(self, path: Path, settings: Branch) -> Branch | None:
-        """The layout in a file over the settings of config.yaml; None where it cannot be used."""
+        """Layout of a file, merged onto the settings of config.yaml; None if it cannot be used."""
         tree = self.document(path, layout_keys(), whole=True)
         if not tree:
             return None
@@ -189,7 +186,7 @@ class _Reading:
                 yield leaf.place.error(f"format is {leaf.value!r}", suggestion(leaf.value, allowed))
 
     def variants(self, rows: list[Row], settings: Branch) -> dict[str, Variant]:
-        """Merged configuration of every row; rows that differ in nothing technical share one."""
+        """Merged configuration of every row; rows with the same technical columns share one."""
         overrides = {p.stem: p for p in sorted((self.folder / "overrides").glob("*.yaml"))}
         found = {}
         for row in rows:
@@ -221,7 +218,7 @@ class _Reading:
 
 
 def sources(configuration: Configuration, turnout: str) -> Iterator[tuple[str, object, str]]:
-    """``(key, value, "file, line")`` of every value, settings that no file names included."""
+    """``(key, value, "file, line")`` of every value, defaults included."""
     row = configuration.rows[turnout]
     for column, value in row.values.items():
         yield column, value, _said(row.place(column))

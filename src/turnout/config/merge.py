@@ -1,6 +1,6 @@
-"""From the merged tree of names and values to the records of one turnout.
+"""Merged configuration of one turnout, as a tree and as records, with its hashes.
 
-A merged configuration, layout changed by the technical columns of a row, which several turnouts may share.
+A ``Variant`` is a layout changed by the technical columns of a row; several turnouts may share it.
 """
 
 import hashlib
@@ -15,7 +15,7 @@ from turnout.config.turnout import HammerConfig, PassageConfig, Section
 from turnout.config.turnouts_table import Row
 from turnout.records import RawChannel, RawDescription
 
-# What the units of one kind use of a turnout's configuration: parts of the settings and branches of the layout.
+# What each kind of unit uses of a turnout's configuration: sections of the settings, branches of the layout.
 USED = {
     "hammer": (("receptance", "identify"), ("sections", "hammer")),
     "passage": (("passage",), ("sections", "passages")),
@@ -29,9 +29,9 @@ def digest(value) -> str:
 
 
 def hashes(values: dict) -> dict[str, str]:
-    """``config_hash`` under "" and the hash of what each kind of unit uses; defaults count like written values."""
+    """``config_hash`` under "", and the hash of what each kind of unit uses. Defaults count like written values."""
     branches = {k: v for k, v in values.items() if k not in ("description", "settings")}
-    # how the run is cut up changes no result
+    # the division of a run into shards changes no result
     filled_in = {name: asdict(s) for name, s in settings(values["settings"]).items() if name != "fleet"}
     found = {"": digest([filled_in, branches])}
     for kind, (used, names) in USED.items():
@@ -40,7 +40,7 @@ def hashes(values: dict) -> dict[str, str]:
 
 
 def settings(values: dict) -> Frozen:
-    """Settings of every part."""
+    """Settings of every section."""
     return Frozen({name: filled(cls, values.get(name, {})) for name, cls in parts().items()})
 
 
@@ -54,7 +54,7 @@ def sections(values: dict) -> tuple[Section, ...]:
 
 
 def hammer(tree: Branch) -> HammerConfig | None:
-    """Hammer tests, section by section: what ``hammer`` says, changed by what the section's ``hammer`` says."""
+    """Configuration of the hammer tests: the branch ``hammer``, changed per section by the section's ``hammer``."""
     if "hammer" not in tree:
         return None
     descriptions: dict[str, RawDescription] = {}
@@ -70,7 +70,7 @@ def hammer(tree: Branch) -> HammerConfig | None:
 
 
 def passages(tree: Branch) -> PassageConfig | None:
-    """Passage recordings with the section of every channel."""
+    """Configuration of the passage recordings, with the section of every channel."""
     if "passages" not in tree:
         return None
     own = plain(tree["passages"])
@@ -80,7 +80,7 @@ def passages(tree: Branch) -> PassageConfig | None:
 
 
 def description(values: dict, kind: str, positions: dict[str, float]) -> RawDescription:
-    """What the files of one kind must hold; a sensor sits at ``positions`` plus its offset."""
+    """Description of the raw files of one kind; the position of a sensor is that in ``positions`` plus its offset."""
     channels = []
     for name, channel in values["channels"].items():
         given = {k: _real(k, v) for k, v in channel.items() if k not in ("offset", "section") and v is not None}
@@ -98,7 +98,7 @@ def description(values: dict, kind: str, positions: dict[str, float]) -> RawDesc
 
 
 def _real(name: str, value):
-    """Physical values as float, whatever way they were written."""
+    """Physical values as float, even if written as integers."""
     return float(value) if name in ("rate", "sensitivity", "limit", "resolution") and value is not None else value
 
 
@@ -119,17 +119,17 @@ class Variant:
 
     @cached_property
     def values(self) -> dict:
-        """The merged tree as plain values, without places."""
+        """The merged tree as plain values, without their places in files."""
         return plain(self.tree)
 
     @cached_property
     def hashes(self) -> dict[str, str]:
-        """Configuration hash of the whole (key "") and of what each kind of unit uses."""
+        """Hash of the whole configuration (key "") and of what each kind of unit uses."""
         return hashes(self.values)
 
     @cached_property
     def parts(self) -> dict:
-        """What ``TurnoutConfig`` takes from it."""
+        """Fields of ``TurnoutConfig`` that come from this configuration."""
         return {
             "sections": sections(self.values["sections"]),
             "hammer": hammer(self.tree),
@@ -141,7 +141,7 @@ class Variant:
 
 
 def with_row(layout: Branch, row: Row) -> Branch:
-    """Layout changed by the technical columns of a row."""
+    """The layout, changed by the technical columns of a row."""
     changes = Branch(layout.place)
     for column, (group, key) in FROM_ROW.items():
         if column in row.values and group in layout:

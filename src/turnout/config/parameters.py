@@ -1,4 +1,4 @@
-"""Parameter sets of the simulation: YAML files in which every number carries its unit and its source."""
+"""Parameter files of the simulation: YAML files in which every number has a unit and a source."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -59,7 +59,7 @@ KEYS = {"value", "unit", "source", "prior", "note"}
 
 @dataclass(frozen=True)
 class Number:
-    """A number in its SI unit with its source; ``prior`` is its relative standard deviation, None if measured."""
+    """A number in its SI unit with its source. ``prior`` is its relative standard deviation, None if measured."""
 
     value: float
     unit: str
@@ -71,7 +71,7 @@ class Number:
 
 
 class ParameterSet(Mapping):
-    """A mapping of a parameter file that knows its place, so that errors can name it.
+    """A mapping of a parameter file that knows its place in the file, so that errors can name it.
 
     >>> node = ParameterSet({"mass": Number(1500.0, "kg", "data sheet")}, "car.yaml", "bogie")
     >>> node.number("mass", "kg"), node.number("length", "m", default=2.5)
@@ -82,8 +82,10 @@ class ParameterSet(Mapping):
         self.content, self.path, self.place = content, str(path), place
 
     def error(self, key, found, remedy, at=""):
-        """A ``ConfigError`` at ``key`` of this mapping, or at the mapping itself where ``key`` is None; its line is
-        that of the entry ``at`` below there."""
+        """A ``ConfigError`` at ``key`` of this mapping, or at the mapping itself if ``key`` is None.
+
+        Its line is that of ``entry`` below that place.
+        """
         inside = f"[{key}]" if isinstance(key, int) else f".{key}"
         place = f"{self.place}{inside if key is not None else ''}".lstrip(".")
         return ConfigError(self.path, where(self.path, place, at), found, remedy)
@@ -103,11 +105,11 @@ class ParameterSet(Mapping):
         return len(self.content)
 
     def get(self, key, default=None):
-        """Value of ``key``, or ``default`` where it is not given."""
+        """Value of ``key``, or ``default`` if it is absent."""
         return self.content.get(key, default)
 
     def number(self, key, unit, default=None):
-        """Value of ``key`` in the SI unit ``unit``; ``default`` where it is not given and a default exists."""
+        """Value of ``key`` in the SI unit ``unit``; ``default`` if it is absent and a default exists."""
         if key not in self.content and default is not None:
             return default
         found = self[key]
@@ -118,7 +120,7 @@ class ParameterSet(Mapping):
         return found.value
 
     def count(self, key, default, least=1):
-        """Whole number at ``key``, at least ``least``; ``default`` where it is not given."""
+        """Whole number at ``key``, at least ``minimum``; ``default`` if it is absent."""
         found = self.get(key, default)
         if not isinstance(found, int) or isinstance(found, bool) or found < least:
             remedy = f"Write a whole number of at least {least}, without unit and source"
@@ -133,11 +135,11 @@ class ParameterSet(Mapping):
         return found
 
     def maybe(self, key):
-        """The mapping at ``key``, an empty one where it is not given."""
+        """The mapping at ``key``, an empty one if it is absent."""
         return ParameterSet({}, self.path, self.place) if self.get(key) is None else self.part(key)
 
     def listed(self, key):
-        """The list at ``key`` as a set whose keys are 0, 1, 2 ...; an empty one where it is not given."""
+        """The list at ``key`` as a ParameterSet with the keys 0, 1, 2 ...; an empty one if it is absent."""
         found = [] if self.get(key) is None else self[key]
         if not isinstance(found, list):
             raise self.error(key, f"{_said(found)} instead of a list", "Write each entry with a dash before it")
@@ -149,27 +151,27 @@ class ParameterSet(Mapping):
         return [listed.part(k) for k in listed]
 
     def make(self, kind, *values, **named):
-        """``kind(*values, **named)``; what it refuses is a ``ConfigError`` that names this place."""
+        """``factory(*values, **named)``; its SimulationError becomes a ``ConfigError`` that names this place."""
         try:
             return kind(*values, **named)
         except SimulationError as error:
             raise self.error(None, str(error).rstrip("."), "Correct the value") from None
 
     def only(self, *allowed):
-        """Refuse keys that are not in ``allowed``."""
+        """Raise ConfigError for a key that is not in ``allowed``; return the mapping itself."""
         for key in self.content:
             if key not in allowed:
                 raise self.error(None, f"unknown key {key!r}", f"Use one of {', '.join(sorted(allowed))}", key)
         return self
 
     def numbers(self):
-        """(place, Number) of every number below here."""
+        """(place, Number) of every number in this mapping and below."""
         for key, value in self.content.items():
             yield from _numbers(value, f"{self.place}.{key}" if self.place else str(key))
 
 
 def _said(found):
-    """What stands in a file, in an error's words."""
+    """An entry as errors describe it."""
     if isinstance(found, Number):
         return f"{found.value:g} {found.unit}"
     return "a mapping" if isinstance(found, ParameterSet) else repr(found)
@@ -188,8 +190,8 @@ def _numbers(value, place):
 def read_parameters(path):
     """The parameter set in a YAML file.
 
-    A number is ``{value: 120, unit: MN/m, source: ...}``; ``source`` is text or a key of the file's ``sources``
-    table; where the source begins with "estimate" a ``prior`` is required: its relative standard deviation.
+    A number is ``{value: 120, unit: MN/m, source: ...}``. ``source`` is text or a key of the file's ``sources``
+    table. A source that begins with "estimate" requires a ``prior``: the relative standard deviation of the value.
     """
     path = Path(path)
     try:

@@ -1,10 +1,7 @@
-"""What a configuration file may say: names, kinds of value, units, limits; and the check against it.
+"""Schema of the configuration files: names, types, units and limits of all keys, and the check of a file against it.
 
-Keys of config/config.yaml, read from the settings dataclasses, and the dataclasses filled from it.
-
-What config/layouts/<name>.yaml and config/overrides/<id>.yaml may say.
-
-Settings that are two ends: the low one lies below the high one, and neighbouring ranges do not overlap.
+The keys of config/config.yaml come from the settings dataclasses. The keys of layouts and overrides are listed here.
+Ranges of settings are checked as well: the low end must be below the high end, and adjacent bands must not overlap.
 """
 
 import math
@@ -33,7 +30,7 @@ SAID = {"text": "text", "number": "a number", "integer": "a whole number", "flag
 
 @dataclass(frozen=True)
 class Key:
-    """One value: its ``kind`` (``many``: a list of them), unit, limits, and what it means."""
+    """One value: its ``value_type`` (``many``: a list of these), unit, limits and meaning."""
 
     kind: str
     meaning: str
@@ -51,7 +48,7 @@ class Key:
 
 @dataclass(frozen=True)
 class Each:
-    """A mapping whose names are free (matching ``pattern``) and whose values all follow ``spec``."""
+    """A mapping with free names that match ``pattern`` and with values that all follow ``spec``."""
 
     spec: dict
     pattern: str
@@ -61,7 +58,7 @@ class Each:
 
 @dataclass(frozen=True)
 class Group:
-    """A mapping with fixed names; in a ``fragment`` none of them is required."""
+    """A mapping with fixed names; in a ``fragment`` no name is required."""
 
     spec: dict
     meaning: str
@@ -71,14 +68,14 @@ class Group:
 
 @dataclass(frozen=True)
 class Elsewhere:
-    """A name that is understood, but only in the ``file`` that holds for the whole fleet."""
+    """A name that is allowed only in ``file``, because it holds for the whole fleet."""
 
     file: str
     required: bool = False
 
 
 def suggestion(name: str, allowed, none: str = "There is none to choose from") -> str:
-    """What to write instead of an unknown ``name``; ``none`` where nothing is allowed.
+    """Remedy for an unknown ``name``; ``none`` if nothing is allowed.
 
     >>> suggestion("posiiton", ["position", "panel"])
     "Did you mean 'position'? Allowed: panel, position"
@@ -92,7 +89,7 @@ def suggestion(name: str, allowed, none: str = "There is none to choose from") -
 
 
 def problem(key: Key, value) -> tuple[str, str] | None:
-    """None where ``value`` fits ``key``, else what was found and what to write instead.
+    """None if ``value`` fits ``key``, else (problem, remedy).
 
     >>> problem(Key("number", "rate", unit="Hz", above=0), -1)
     ('-1', 'Write a number above 0 Hz')
@@ -121,7 +118,7 @@ def problem(key: Key, value) -> tuple[str, str] | None:
 
 
 def check(spec: dict, tree: Branch, whole: bool = True) -> Iterator[ConfigError]:
-    """Every error of ``tree`` against ``spec``; with ``whole`` false, required names may be missing."""
+    """Every error of ``tree`` against ``spec``; without ``whole`` required names may be missing."""
     misspelt = set()
     for name, value in tree.items():
         rule = spec.get(name)
@@ -185,12 +182,12 @@ KIND_OF = {int: "integer", float: "number", str: "text", bool: "flag"}
 
 @cache
 def settings_keys() -> dict[str, Group]:
-    """One group of keys per part of the program."""
+    """One group of keys per section of the settings."""
     return {name: Group(keys_of(cls), _first_line(cls)) for name, cls in parts().items()}
 
 
 def keys_of(cls: type) -> dict[str, Key | Group]:
-    """Key of every field of a settings dataclass, nested ones as groups.
+    """Key of every field of a settings dataclass; nested dataclasses become groups.
 
     >>> from turnout.config.settings.fleet import FleetSettings
     >>> keys_of(FleetSettings)["checkpoint_time"].unit
@@ -271,7 +268,7 @@ PASSAGE_CHANNEL = {
     **CHANNEL,
     "section": Key("text", "section it watches", required=True, pattern=LABEL),
 }
-# Below these nothing of a track can be seen; a rate that was meant in kHz lies below them.
+# Minimum rates: below them a recording shows no mode of the track. They also catch a rate written in kHz.
 HAMMER_RATE = Key("number", "samples per second", unit="Hz", minimum=250, nullable=True)
 PASSAGE_RATE = Key("number", "samples per second", unit="Hz", minimum=100, nullable=True)
 FILES = {
@@ -294,7 +291,7 @@ PASSAGES = {
     "rate": PASSAGE_RATE,
     "channels": Each(PASSAGE_CHANNEL, NAME, "one entry per channel", required=True),
 }
-# What a single section may say otherwise than the rest of the turnout.
+# Keys that a single section may set differently from the turnout.
 SECTION_HAMMER = {name: rule for name, rule in HAMMER.items() if name != "files"}
 SECTION = {
     "panel": Key("text", "open track, switch, closure, crossing panel, after the crossing", required=True,
@@ -308,12 +305,12 @@ SECTION = {
 }  # fmt: skip
 
 
-# Settings that are used once for all turnouts: a whole part, or some of its keys.
+# Settings that hold for the whole fleet: a whole section (empty tuple), or some of its keys.
 FLEET_WIDE: dict[str, tuple[str, ...]] = {"fleet": (), "trend": (), "passage": ("cluster_maximum", "cluster_seed")}
 
 
 def layout_keys(merged: bool = False) -> dict:
-    """Everything a layout or an override may say, settings of its own included; ``merged``: with those of the fleet."""
+    """Keys of a layout or an override, its own settings included; ``merged``: with the settings of the fleet."""
     return {
         "description": Key("text", "what this layout is, for people"),
         "sections": Each(SECTION, LABEL, "one entry per monitored section", required=True),
@@ -326,7 +323,7 @@ def layout_keys(merged: bool = False) -> dict:
 
 
 def _own_settings() -> dict:
-    """The settings' keys; those that hold for the whole fleet stand there as belonging elsewhere."""
+    """The keys of the settings; those that hold for the whole fleet are marked as such."""
     found: dict = dict(settings_keys())
     for part, names in FLEET_WIDE.items():
         if names:
@@ -342,7 +339,7 @@ BESIDE = (("identify", "ballast_high", "railpad_low"),)  # one range ends before
 
 
 def ends_of_ranges() -> Iterator[tuple[str, str, str]]:
-    """(part, name of the low end, name of the high end) of every range of the settings.
+    """(section, name of the low end, name of the high end) of every range of the settings.
 
     >>> ("identify", "ballast_low", "ballast_high") in list(ends_of_ranges())
     True
@@ -355,7 +352,7 @@ def ends_of_ranges() -> Iterator[tuple[str, str, str]]:
 
 
 def check_ranges(settings: Branch) -> Iterator[ConfigError]:
-    """An error for every range of ``settings`` whose low end is not below its high end; keys are sound."""
+    """An error for every range of ``settings`` whose low end is not below its high end. Single keys must be valid."""
     for part, low, high in (*ends_of_ranges(), *BESIDE):
         written = settings.get(part, {})
         leaves = [written[name] for name in (low, high) if name in written]

@@ -1,4 +1,4 @@
-"""Everything the program knows about one turnout before it opens a recording."""
+"""Configuration of one turnout: sections, hammer tests, passages, campaigns and settings."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from turnout.records import RawDescription
 
 @dataclass(frozen=True)
 class Section:
-    """One monitored place: ``label`` as in the layout, ``position`` along the turnout [m]."""
+    """One monitored section: ``label`` as in the layout, ``position`` along the turnout [m]."""
 
     label: str
     panel: str
@@ -26,9 +26,9 @@ class Section:
 
 @dataclass(frozen=True)
 class HammerConfig:
-    """Hammer tests: pattern of the ``files`` and, per section label, the channels and what a file must hold.
+    """Hammer tests: pattern of the ``files`` and, per section label, the description of a file.
 
-    ``force``, ``response`` and ``validation`` (None: there is none) name channels of the description.
+    ``force``, ``response`` and ``validation`` (None: there is none) are names of channels of the description.
     """
 
     files: str
@@ -40,7 +40,7 @@ class HammerConfig:
 
 @dataclass(frozen=True)
 class PassageConfig:
-    """Passage recordings: pattern of the ``files``, their ``description``, and the section each channel watches."""
+    """Passage recordings: pattern of the ``files``, their ``description``, and the section of each channel."""
 
     files: str
     description: RawDescription
@@ -49,7 +49,7 @@ class PassageConfig:
 
 @dataclass(frozen=True)
 class Campaign:
-    """One row of campaigns.csv: ``rail_temperature`` [°C] is None where it was not noted."""
+    """One campaign; ``rail_temperature`` [°C] may be None. ``listed`` is whether campaigns.csv has a row for it."""
 
     date: str
     started_at: datetime
@@ -64,11 +64,10 @@ class Campaign:
 class TurnoutConfig:
     """Merged configuration of one turnout: defaults < layout < row of turnouts.tsv < override.
 
-    ``settings`` maps a part ("receptance", "identify" ...) to its settings. ``config_hash`` changes when
-    anything does that can change a result; ``hashes`` the same for what one kind of unit uses ("hammer",
-    "passage"). ``campaigns`` (by date) and ``trains`` (rows of trains.csv as text) come from the raw folder
-    and are empty until ``turnout.config.with_raw`` has filled them in. ``folder`` is where the configuration lies,
-    with tracks and vehicles in it.
+    ``settings`` maps a section ("receptance", "identify" ...) to its settings. ``config_hash`` changes with
+    everything that can change a result; ``hashes`` holds the same for what one kind of unit uses ("hammer",
+    "passage"). ``campaigns`` (by date) and ``trains`` (rows of trains.csv as text) come from the raw folder:
+    ``turnout.config.with_raw`` adds them. ``folder`` is the folder of the configuration, with tracks and vehicles.
     """
 
     id: str
@@ -92,7 +91,7 @@ class TurnoutConfig:
     folder: Path = Path("config")
 
     def section(self, label: str) -> Section:
-        """The section called ``label``; KeyError lists the labels there are."""
+        """The section called ``label``; KeyError lists the existing labels."""
         for section in self.sections:
             if section.label == label:
                 return section

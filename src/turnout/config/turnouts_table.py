@@ -1,7 +1,4 @@
-"""config/turnouts.tsv: one row per turnout, read with the place of every cell.
-
-Add a row to a table of the configuration, in the order of the table's own header, or leave it as it was.
-"""
+"""Reader of config/turnouts.tsv (one row per turnout), and functions that add a row to a table of the configuration."""
 
 import csv
 import io
@@ -42,7 +39,7 @@ ROW = {
 
 @dataclass(frozen=True)
 class Row:
-    """``values`` of the cells that are not empty, numbers as float; ``line`` counted from 1."""
+    """``values`` of the cells that are not empty, numbers as float; ``line`` is counted from 1."""
 
     values: dict[str, Any]
     line: int
@@ -57,7 +54,7 @@ class Row:
 
     @property
     def raw(self) -> str:
-        """Its folder below the raw root; its id where the column is empty."""
+        """Its folder below the raw root; its id if the column is empty."""
         return self.values.get("raw", self.id)
 
     def place(self, column: str) -> Place:
@@ -69,7 +66,7 @@ class Row:
 
 
 def read_table(path: Path, name: str) -> tuple[list[Row], list[ConfigError]]:
-    """Sound rows of turnouts.tsv and the errors of the others."""
+    """Valid rows of turnouts.tsv, and the errors of the other rows."""
     if not os.path.lexists(path):
         return [], [ConfigError(name, "line 1", "no such file", "Run 'turnout add ID LAYOUT' to begin one")]
     try:
@@ -121,7 +118,7 @@ def _header_errors(header, name, line) -> Iterator[ConfigError]:
 
 
 def no_tabs(cells) -> tuple[str, str] | None:
-    """(what was found, what to write) where something else than tabs lies between the cells of a line.
+    """(problem, remedy) if the cells of a line are separated by something other than tabs, else None.
 
     >>> no_tabs(("turnout;layout",)), no_tabs(("turnout", "layout"))
     (('semicolons between the columns', 'Put tabs between the columns'), None)
@@ -166,7 +163,7 @@ def _row(text, line, header, name) -> tuple[Row, list[ConfigError]]:
 
 
 def leads_out(path: str) -> bool:
-    """Whether a relative path leaves the folder it starts from.
+    """Whether a relative path leads out of its folder.
 
     >>> leads_out("line_7/T00042"), leads_out("../other"), leads_out("/data")
     (False, True, True)
@@ -176,7 +173,7 @@ def leads_out(path: str) -> bool:
 
 @contextmanager
 def taken_back(path: Path) -> Iterator[None]:
-    """What is written to ``path`` inside stays only if nothing is raised there."""
+    """Context that restores the content of ``path`` if an exception is raised inside it."""
     path = Path(path)
     before = path.read_bytes() if os.path.lexists(path) else None
     try:
@@ -190,7 +187,7 @@ def taken_back(path: Path) -> Iterator[None]:
 
 
 def one_line(text: object) -> str:
-    """Text as a cell holds it: None is empty, line breaks and tabs are blanks.
+    """Text of a cell: None becomes empty, line breaks and tabs become blanks.
 
     >>> one_line("machine 09-3X\\n at night ")
     'machine 09-3X at night'
@@ -199,7 +196,7 @@ def one_line(text: object) -> str:
 
 
 def append_csv(path: Path, values: Mapping[str, str], columns: tuple[str, ...]) -> str:
-    """Add one row to a CSV; a new table gets ``columns``. Returns the line; ConfigError where a value has no column."""
+    """Add one row to a CSV and return its line; a new table gets ``columns``. ConfigError if a value has no column."""
     try:
         header = header_of(path, str(path)) if path.exists() else columns
     except TableFault as fault:
@@ -210,7 +207,7 @@ def append_csv(path: Path, values: Mapping[str, str], columns: tuple[str, ...]) 
 
 
 def append_tsv(path: Path, values: Mapping[str, str], columns: tuple[str, ...]) -> str:
-    """The same for a table with tabs between its columns, where a line that begins with # is a comment."""
+    """As ``append_csv``, for a table with tabs between its columns and # before comments."""
     header = columns
     if path.exists():
         try:
@@ -245,5 +242,5 @@ def _append(path: Path, line: str, header: str) -> str:
 
 
 def _write(path: Path, content: bytes) -> None:
-    """In one step: a table that people keep is whole or as it was. Where ``path`` is a link, its file is written."""
+    """Write the whole table atomically. If ``path`` is a link, the file that it points to is written."""
     write_atomic(path.resolve(), lambda stream: stream.write(content))

@@ -1,4 +1,4 @@
 """The demonstration fleet: three turnouts over three years, with seasons, maintenance, faults and one true drift.
 
-Everything it knows goes into ``truth/``, where the pipeline does not read; raw files into ``raw/``.
+Raw files go to ``raw/``, the truth to ``truth/``, which the pipeline does not read.
 """

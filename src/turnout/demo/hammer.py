@@ -1,6 +1,6 @@
-"""One hammer test of the demonstration fleet: ten blows, the section's response, the instruments, the mishaps.
+"""Simulate a hammer test of the demonstration fleet: ten impacts, the section's response, instruments and faults.
 
-Impulse response of a section from the simulated track, with its stiffness changed by given factors.
+The impulse response of a section is that of the simulated track, with its stiffness changed by given factors.
 """
 
 from dataclasses import dataclass, replace
@@ -17,18 +17,18 @@ from turnout.simulate.matrices import assemble
 from turnout.simulate.parameters import load_track
 from turnout.simulate.turnout_track import stretch_of_track
 
-RATE = 20_000.0
-N_SAMPLE = 3_000
-TRIGGER = 100
-FORCE_LIMIT, ACCELERATION_LIMIT = 22_000.0, 2_000.0
-DOUBLE_HIT_SHARE, OVERLOAD_SHARE = 0.02, 0.01
+RATE = 20_000.0  # Hz
+N_SAMPLE = 3_000  # of a record
+TRIGGER = 100  # sample of the impact
+FORCE_LIMIT, ACCELERATION_LIMIT = 22_000.0, 2_000.0  # N and m/s²: ranges of the channels
+DOUBLE_HIT_SHARE, OVERLOAD_SHARE = 0.02, 0.01  # of the impacts
 FORCE = Channel("force", "force", mounting="hammer", limit=FORCE_LIMIT)
 RAIL = Channel("rail", "acceleration", mounting="rail head at sleeper", limit=ACCELERATION_LIMIT)
 
 
 @dataclass(frozen=True)
 class Blow:
-    """Truth of one blow: what befell it, "" for nothing."""
+    """Truth of one impact: ``peak`` force [N], and its ``fault``, "" for none."""
 
     test: int
     record: int
@@ -45,20 +45,21 @@ def pulse(peak, contact, start):
 def response_to(force, impulse_response):
     """Acceleration [m/s²], (N_SAMPLE,), of a ``force`` [N] by a response of ``N_SAMPLE`` samples [m/s² per N s].
 
-    Around the circle of one record: a response with a highest frequency also answers a little before the blow, and
-    holds that at its end. Without it the mass-like jump at the blow is halved, and all receptance below it is wrong.
+    The convolution is circular over one record: a band-limited response begins a little before the impact, and that
+    part is at the end of the record. Without it the mass-like jump at the impact is halved, and the receptance at all
+    lower frequencies is wrong.
     """
     return np.fft.irfft(np.fft.rfft(force) * np.fft.rfft(impulse_response, N_SAMPLE), N_SAMPLE) / RATE
 
 
 def hammer_test(impulse_response, temperature, day, test, rng, n_blow=10):
-    """Recordings of one test and the truth of each blow.
+    """Recordings of one test and the truth of each impact.
 
     Parameters
     ----------
     impulse_response : callable
-        ``impulse_response(rng)`` gives (n,) acceleration per unit impulse [m/s² per N s] at ``RATE``; called
-        once per blow, since no blow meets quite the same track.
+        ``impulse_response(rng)`` gives (n,) acceleration per unit impulse [m/s² per N s] at ``RATE``. It is called
+        once per impact, since no two impacts meet quite the same track.
     temperature : float or None
         Rail temperature written into the recording. [°C]
     """
@@ -89,25 +90,25 @@ def _noise(peak, acceleration, rng):
 
 
 def _convert(recording):
-    """A 16-bit converter: quantised, and cut at the range."""
+    """The recording after a 16-bit converter: quantised, and clipped at the range."""
     limits = np.array([[c.limit] for c in recording.channels])
     step = limits / 2**15
     return replace(recording, samples=np.clip(np.round(recording.samples / step) * step, -limits, limits))
 
 
-SPREAD = 0.006
-HALF_LENGTH = 18.0
-# The hammer's pulse has nothing above; a smooth end keeps the impulse response short.
+SPREAD = 0.006  # relative sd of the track's frequencies between impacts: hammer and sensor move a little
+HALF_LENGTH = 18.0  # m of track on each side of the impact
+# Hz: taper of the accelerance. The hammer's pulse has no power above; a smooth end keeps the impulse response short.
 PASS, STOP = 2_500.0, 4_000.0
 
 
 def simulated_response(section, ballast, railpad, hangs=False):
     """Function of a random generator giving (N_SAMPLE,) acceleration per unit impulse [m/s² per N s].
 
-    The rail head is struck and measured at the section's place on the track of config/tracks/tommerup.yaml,
-    whose ballast and pads are ``ballast`` and ``railpad`` times as stiff as there. From blow to blow the track
-    answers 0.6 % faster or slower: hammer and sensor never stand in quite the same place. ``hangs``: the sleeper
-    under the sensor hangs above its ballast, which an unloaded track never touches.
+    Impact and response are on the rail head at the section's position, on the track of config/tracks/tommerup.yaml.
+    Its ballast and pads are ``ballast`` and ``railpad`` times as stiff as there. From impact to impact the frequencies
+    scatter by 0.6 %: hammer and sensor are never in quite the same position. ``hangs``: the sleeper under the sensor
+    hangs above its ballast, without contact on the unloaded track.
     """
     frequency, accelerance = _accelerance(section, round(ballast, 6), round(railpad, 6), hangs)
 

@@ -1,7 +1,4 @@
-"""Write the raw files of the demonstration fleet, and its truth where the pipeline does not read.
-
-Run the workflow as a user would.
-"""
+"""Write the raw files and the truth of the demonstration fleet, and run the workflow as a user would."""
 
 import csv
 import json
@@ -26,7 +23,7 @@ from turnout.readers.writing import write
 
 EXTENSION = {"uff58b": "uff", "tdms": "tdms", "hdf5": "h5", "mat": "mat", "csv": "csv"}
 MISSING_TEMPERATURE = ("tommerup_s1", 7)
-# (turnout, campaign, section, test) -> what befalls the file.
+# (turnout, campaign, section, test) -> fault of the file, a function of ``scenario``.
 FILE_FAULTS = {
     ("tommerup_s1", 3, "SP", 2): "cut_off",
     ("tommerup_s2", 6, "OT", 1): "dead_channel",
@@ -41,7 +38,7 @@ def make_fleet(raw, truth, seed=1, n_campaign=24, n_passage=12, turnouts=None, w
     Parameters
     ----------
     raw, truth : path
-        Folders, made where they do not exist.
+        Folders, made if they do not exist.
     seed : int
         The same seed gives the same samples.
     n_campaign : int
@@ -86,7 +83,7 @@ def make_fleet(raw, truth, seed=1, n_campaign=24, n_passage=12, turnouts=None, w
 
 
 def _make_tests(job):
-    """Three test files of one section and campaign; returns their number."""
+    """Write three test files of one section and campaign; returns their number."""
     raw, truth, scenario, seed, number, section, day, temperature = job
     rng = np.random.default_rng([seed, crc32(f"{scenario.turnout}/{section}".encode()), number])
     ballast, railpad = stiffness_factors(scenario, section, day, temperature)
@@ -148,6 +145,6 @@ def _write_truth(truth, scenario, days, temperatures, seed):
 
 
 def run_pipeline(cores, *options) -> int:
-    """Snakemake on ``cores`` processors with further ``options``; its exit code."""
+    """Run Snakemake on ``cores`` processors with further ``options``; returns its exit code."""
     command = [sys.executable, "-m", "snakemake", "--cores", str(cores), *options]
     return subprocess.run(command).returncode

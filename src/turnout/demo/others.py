@@ -1,4 +1,4 @@
-"""Recordings that others made and published under the MIT licence, fetched by package name and checked by sha256."""
+"""Fetch recordings published by others under the MIT licence, by package name, and check their sha256."""
 
 import subprocess
 import sys
@@ -16,7 +16,7 @@ SDYPY_SHA256 = "2830c43170834e4b7ea46f87309d65be873cc3df430e44a11b4c7bca6fe2fb9d
 
 @dataclass(frozen=True)
 class Source:
-    """A source distribution: ``members`` maps files inside it to where they go below the raw folder."""
+    """A source distribution; ``members`` are (file inside it, target below the raw folder)."""
 
     package: str
     version: str
@@ -54,9 +54,9 @@ CAMPAIGNS = "campaign,started_at_utc,rail_temperature_c,hammer_id,tip,operator\n
 
 
 def fetch_all(raw, say=print):
-    """Put every file of ``SOURCES`` below ``raw``; what is there already stays.
+    """Put every file of ``SOURCES`` below ``raw``; existing files stay.
 
-    TurnoutError says which package could not be fetched, or whose bytes are not the ones expected.
+    TurnoutError if a package cannot be fetched, or if its bytes are not the expected ones.
     """
     raw = Path(raw)
     for source in SOURCES:

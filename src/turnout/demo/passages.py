@@ -1,4 +1,4 @@
-"""Train passages of the demonstration fleet: several trains, speeds and loads over the simulated turnout."""
+"""Simulate the train passages of the demonstration fleet: several trains, speeds and loads."""
 
 import csv
 from dataclasses import replace
@@ -24,13 +24,13 @@ TRAFFIC = (
     ("locomotive", "locomotive", 60.0, 120.0, 0.10),
 )
 DIVERGING_SHARE, DIVERGING_SPEED = 0.2, 60.0
-# A sensor on the other track hears what comes through the bearers.
+# Share of the vibration that reaches a sensor on the other track through the bearers.
 NEIGHBOUR_GAIN = 0.02
 NOISE, LIMIT = 0.3, 5_000.0
 
 
 def make_passages(raw, scenario, turnout, seed, n_passage, last_day):
-    """Jobs for ``make_passage``, one per train of the weeks before ``last_day``, and trains.csv of the turnout."""
+    """Jobs for ``make_passage``, one per train of the weeks before ``last_day``; writes trains.csv of the turnout."""
     rng = np.random.default_rng([seed, 77, crc32(scenario.turnout.encode())])
     places = {s.label: (s.position, s.track) for s in turnout.sections}
     jobs, listed = [], []
@@ -48,7 +48,7 @@ def make_passages(raw, scenario, turnout, seed, n_passage, last_day):
             "track": route, "direction": direction, "rail_temperature_c": temperature,
         }  # fmt: skip
         jobs.append((str(raw), scenario, places, vehicle, truth, [seed, k]))
-        # the train data know most trains, and their speed to some km/h
+        # the train data have most trains, and their speed to some km/h
         if rng.uniform() < 0.7:
             said = {"passed_at_utc": (moment + timedelta(seconds=int(rng.integers(-20, 20)))).isoformat()}
             listed.append(said | {"train_type": name, "speed_kmh": f"{speed * rng.normal(1.0, 0.02):.0f}"})
@@ -62,7 +62,7 @@ def make_passages(raw, scenario, turnout, seed, n_passage, last_day):
 
 
 def make_passage(job):
-    """Simulate one passage and write its file; returns what is true of it."""
+    """Simulate one passage and write its file; returns its truth."""
     raw, scenario, places, vehicle, truth, seed = job
     moment = datetime.fromisoformat(truth["started_at_utc"])
     track = _track_of(scenario, moment.date(), round(truth["rail_temperature_c"]))
@@ -93,7 +93,7 @@ def _sensor(label, place, side, route):
 
 
 def _terms_of(scenario, turnout, route, day):
-    """The hanging sleepers of that day on the route taken."""
+    """Terms of the hanging sleepers of that day on ``route``."""
     track, found = turnout.track_of(route), []
     for section in sorted({g.section for g in scenario.gaps}):
         gap = gap_under(scenario, section, day)
@@ -110,7 +110,7 @@ def _vehicle(name, load):
 
 @lru_cache(maxsize=4)
 def _track_of(scenario, day, temperature):
-    """The turnout with every section's stiffness of that day, on both routes."""
+    """The turnout with the stiffness of every section on that day, on both routes."""
     turnout = load_track("tommerup")
 
     def changed(track):

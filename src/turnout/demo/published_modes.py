@@ -1,4 +1,4 @@
-"""What the makers of the recordings of others say about them, and what is found here, side by side."""
+"""Compare the published modes of recordings by others with the modes identified here."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -13,11 +13,11 @@ from turnout.modal.frf import modes_of_frf
 from turnout.readers.uff import read_frf
 from turnout.readers.uff_datasets import sets_of
 
-# (frequency [Hz], damping [%]) of the seven modes in the makers' own showcase; None where they print no damping.
+# (frequency [Hz], damping [%]) of the seven modes in the makers' own showcase.
 SDYPY_BEAM = (
     (177.0, 0.86), (477.4, 0.20), (933.1, 0.15), (1535.5, 0.20), (2286.9, 0.28), (3162.4, 0.18), (4181.2, 0.15),
 )  # fmt: skip
-# peaks of the three curves in the file; nobody published a table of its modes
+# peaks of the three curves in the file; no table of its modes was published
 UFF_BEAM = tuple((f, None) for f in (52.6, 144.6, 283.1, 468.3, 698.5, 973.0, 1293.0))
 FUNCTIONS = {0: "general functions", 1: "time responses", 2: "auto-spectra", 4: "frequency responses", 6: "coherences"}
 HITS = {0: "overloaded on purpose", 1: "good", 2: "double impact", 3: "good", 4: "good"}
@@ -25,8 +25,10 @@ HITS = {0: "overloaded on purpose", 1: "good", 2: "double impact", 3: "good", 4:
 
 @dataclass(frozen=True)
 class Beam:
-    """``frequency`` (n_line,) [Hz], ``responses`` (n_frf, n_line) complex; ``rows`` of (published frequency [Hz],
-    published damping [%], found mode), None where one is lacking."""
+    """A beam: ``frequency`` (n_line,) [Hz], ``responses`` (n_frf, n_line) complex.
+
+    ``rows`` are (published frequency [Hz], published damping [%], identified mode), None where one is missing.
+    """
 
     name: str
     origin: str
@@ -37,10 +39,10 @@ class Beam:
 
 
 def beam_modes(raw):
-    """The beams of the two files of frequency responses below ``raw``, with their modes, published and found."""
+    """The beams of the two files of frequency responses below ``raw``, with published and identified modes."""
     path = Path(raw) / SDYPY_FILE
     if sha256_of(path) != SDYPY_SHA256:
-        # it is a pickle, and a pickle of unknown origin can do anything
+        # it is a pickle, and a pickle of unknown origin can run any code
         raise TurnoutError(f"{path} is not the published file. Delete it and run again")
     frequency, responses = np.load(path, allow_pickle=True)
     frequency, responses = np.asarray(frequency, float), np.asarray(responses, complex).reshape(-1, len(frequency))
@@ -55,7 +57,7 @@ def _beam(name, origin, frequency, responses, published, highest):
 
 
 def _rows(frequency, responses, published, highest):
-    """Every published mode with the found mode next to it, then what was found and not published."""
+    """Every published mode with the nearest identified mode, then the identified modes that are not published."""
     found = list(modes_of_frf(frequency, responses, highest=highest).modes)
     rows = []
     for f, damping in published:
@@ -69,7 +71,7 @@ def _rows(frequency, responses, published, highest):
 
 
 def uff_contents(path):
-    """In words, what a vendor's UFF file holds: sets by kind, samples, damage."""
+    """Content of a vendor's UFF file in words: sets by type, lengths, damage."""
     sets = [s for s in sets_of(Path(path).read_bytes()) if s.kind in ("58", "58b")]
     damaged = [s.damage for s in sets if s.damage]
     names = [

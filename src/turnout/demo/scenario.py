@@ -1,6 +1,6 @@
-"""What happens to the demonstration fleet: campaigns, weather, maintenance, and the drift that is to be found.
+"""Scenario of the demonstration fleet: campaigns, weather, maintenance, one true drift, and instrument faults.
 
-The faults of real life, put into sound recordings: each one a function of a recording and its channel range.
+Each fault is a function that puts it into a recording or a file.
 """
 
 from dataclasses import dataclass, replace
@@ -15,10 +15,10 @@ FIRST_CAMPAIGN = date(2023, 9, 12)
 
 @dataclass(frozen=True)
 class Change:
-    """Stiffness of one section from a day on: a step, then a drift, as factors of the healthy value.
+    """Stiffness of one section from a day on: a step, then a drift, as factors of the reference value.
 
     ``component`` is "ballast" or "railpad"; ``step`` the factor at ``since``; ``per_year`` the relative
-    change of stiffness per year after it. ``event`` is the maintenance that did it, "" where nobody knows.
+    change of stiffness per year after it. ``event`` is the maintenance that caused it, "" if unknown.
     """
 
     section: str
@@ -39,7 +39,7 @@ class Change:
 
 @dataclass(frozen=True)
 class Gap:
-    """A sleeper that comes to hang above its ballast: ``gap`` [m] on the day it shows, ``per_year`` [m] more after."""
+    """A sleeper that hangs above its ballast: ``gap`` [m] from the day ``since``, growing by ``per_year`` [m]."""
 
     section: str
     since: date
@@ -59,7 +59,7 @@ class Gap:
 
 @dataclass(frozen=True)
 class TurnoutScenario:
-    """One turnout of the fleet: how its files look and what happens to it."""
+    """One turnout of the fleet: its file format and its changes over time."""
 
     turnout: str
     format: str
@@ -91,7 +91,7 @@ FLEET = (
 
 
 def campaign_days(n_campaign, weeks_between=6.5):
-    """Days of the campaigns: every few weeks, never exactly, the same for the same number.
+    """Days of the campaigns: every few weeks with random shifts, the same for the same number.
 
     >>> campaign_days(3, weeks_between=6)[0].isoformat()
     '2023-09-12'
@@ -102,18 +102,18 @@ def campaign_days(n_campaign, weeks_between=6.5):
 
 
 def rail_temperature(day, rng):
-    """Rail temperature [°C] at the hour of the test: a Danish year and its weather."""
+    """Rail temperature [°C] at the time of the test: season in Denmark and random weather."""
     season = np.sin(2 * np.pi * (day.timetuple().tm_yday - 110) / 365.25)
     return float(11.0 + 11.0 * season + rng.normal(0.0, 4.0))
 
 
 def gap_under(scenario, section, day):
-    """Gap [m] under the sleeper of a section's sensor, 0 where it lies on its ballast."""
+    """Gap [m] under the sleeper of a section's sensor, 0 if it lies on its ballast."""
     return max((g.on(day) for g in scenario.gaps if g.section == section), default=0.0)
 
 
 def stiffness_factors(scenario, section, day, temperature):
-    """(ballast, railpad) stiffness relative to the healthy section at 15 °C.
+    """(ballast, railpad) stiffness relative to the reference section at 15 °C.
 
     The pad softens by 0.3 % per kelvin (static stiffness of EPDM pads falls by up to half between -20 and
     60 °C, Othman et al. 2022); frozen ballast stiffens by up to 6 % below 0 °C.
@@ -129,7 +129,7 @@ def stiffness_factors(scenario, section, day, temperature):
 
 
 def dead_channel(recording):
-    """The accelerometer's cable is off: zeros and half a bit of noise."""
+    """The accelerometer's cable is off: zeros."""
     samples = recording.samples.copy()
     samples[1] = 0.0
     return replace(recording, samples=samples)
@@ -143,7 +143,7 @@ def swapped_sign(recording):
 
 
 def overload(recording, share=0.6):
-    """Range set too low: everything above ``share`` of the peak acceleration is the rail code."""
+    """Range set too low: the acceleration is clipped at ``share`` of its peak."""
     samples = recording.samples.copy()
     limit = share * np.max(np.abs(samples[1]))
     samples[1] = np.clip(samples[1], -limit, limit)
@@ -158,7 +158,7 @@ def not_a_number(recording):
 
 
 def cut_off(path, share=0.55):
-    """A copy that broke off: only the first part of the file's bytes."""
+    """An interrupted copy: only the first ``share`` of the file's bytes."""
     size = path.stat().st_size
     with open(path, "r+b") as file:
         file.truncate(int(share * size))

@@ -1,4 +1,4 @@
-"""What a run found, in a few lines, and what to ask next."""
+"""Print the results of a run in a few lines, and queries to try next."""
 
 import os
 import sys
@@ -32,7 +32,7 @@ WORK = "select coalesce(section_id, turnout_id), band, state, sentence from work
 
 
 def tell(registry, pages, say=print):
-    """Print counts, quarantine, tomorrow's list, where the pages lie, and three questions to try."""
+    """Print counts, quarantine, tomorrow's list, the folder of the pages, and three queries to try."""
     with open_registry(registry) as connection:
         counts = dict(zip((d[0] for d in connection.execute(COUNTS).description), connection.fetchall()[0]))
         say(
@@ -53,7 +53,7 @@ def tell(registry, pages, say=print):
 
 
 def _command():
-    """How the reader calls this program: by name where it is on the path, else by its place."""
+    """Command of this program: its name if it is on the path, else its file."""
     beside = Path(sys.executable).parent / "turnout"
     on_path = str(beside.parent) in os.environ.get("PATH", "").split(os.pathsep)
     return "turnout" if on_path else os.path.relpath(beside)

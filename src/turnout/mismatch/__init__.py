@@ -1,4 +1,4 @@
-"""Where simulation and recording differ: locate, name, model, verify. The engine knows no track."""
+"""Diagnosis of what a simulation lacks: localize a residual, name its cause, model it and verify the model."""
 
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case, Nuisance, Observation

@@ -1,4 +1,4 @@
-"""Modal identification of free decays: realisation, maximum likelihood, selection, summary over impacts."""
+"""Modal identification of free decays: realisation, maximum likelihood, mode selection, mean over the impacts."""
 
 from turnout.modal.comparison import Shift, compare_tests, welch_test
 from turnout.modal.era import Realisation, era

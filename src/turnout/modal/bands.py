@@ -1,6 +1,6 @@
-"""Name the modes of a test: one for each band, after the coherence gate; the rest listed with the reason.
+"""Assign the modes of a test to the frequency bands, one mode per band, after the coherence gate.
 
-Which modes the coherence gate of the receptance lets pass, and their residues from it.
+Every other mode is listed with the reason. The residues of the modes come from the receptance.
 """
 
 from dataclasses import dataclass, field
@@ -36,8 +36,8 @@ def residues_of_receptance(receptance, frequency, damping) -> np.ndarray | None:
     ----------
     receptance : Receptance
     frequency, damping : (n_mode,) arrays
-        Known modes, with those that nobody names: what is left out here goes into the residues of the others.
-        [Hz], [-]
+        All modes of the fit, also those without a band: a mode that is missing here distorts the residues of
+        the others. [Hz], [-]
 
     Returns
     -------
@@ -60,12 +60,15 @@ def residues_of_receptance(receptance, frequency, damping) -> np.ndarray | None:
 
 
 MAIN_BANDS = ("ballast", "railpad")
-EDGE = 0.1  # how far beside its band, of its frequency, a mode may still be meant by it: pads soften so much in summer
+EDGE = 0.1  # relative distance from the edge of its band up to which a mode still belongs to it: warm pads soften
 
 
 @dataclass
 class BandChoice:
-    """``modes`` maps a band to the index of its mode in the fit; ``rejected_modes`` and ``rejections`` say the rest."""
+    """``modes`` maps a band to the index of its mode in the fit.
+
+    ``rejected_modes`` lists all other modes, ``rejections`` the reasons why a band has none.
+    """
 
     modes: dict[str, int] = field(default_factory=dict)
     rejected_modes: list = field(default_factory=list)
@@ -73,13 +76,13 @@ class BandChoice:
 
     @property
     def status(self) -> str:
-        """ "accepted" with both main resonances, "second_order_only" with one of them, else "rejected"."""
+        """ "accepted" with both main resonances, "second_order_only" with one, "rejected" with none."""
         found = [band for band in MAIN_BANDS if band in self.modes]
         return ("rejected", "second_order_only", "accepted")[len(found)]
 
 
 def choose_bands(selection: Selection, settings, receptance=None) -> BandChoice:
-    """The mode of each band most significant for its width, unless the coherence gate of ``receptance`` stops it."""
+    """The mode of each band that is most significant for its bandwidth, if it passes the gate of ``receptance``."""
     choice = BandChoice(rejected_modes=list(selection.rejected))
     if selection.fit is not None:
         _strongest(choice, selection, settings)
@@ -94,8 +97,8 @@ def choose_bands(selection: Selection, settings, receptance=None) -> BandChoice:
 
 def _strongest(choice, selection, settings):
     frequency, damping = np.exp(selection.fit.mean[:, 0]), selection.fit.mean[:, 1]
-    # per bandwidth: a broad pole below a stronger mode takes up much of what that leaves. Not by energy: two close,
-    # heavily damped poles trade large opposite amplitudes between them
+    # Divided by the bandwidth: a broad pole below a stronger mode takes up much of the residual of that mode.
+    # Not by energy: two close, heavily damped poles have large opposite amplitudes.
     significance = np.median(selection.chi_squared, axis=0) / np.maximum(damping, LOWEST_DAMPING)
     for band, low, high in settings.bands():
         inside = np.flatnonzero((frequency >= low) & (frequency < high)).tolist()
@@ -111,9 +114,9 @@ def _strongest(choice, selection, settings):
 
 
 def _across_edges(choice, frequency, damping, significance, unfit, settings):
-    """Give an empty main band a mode that lies just beside it, where the band next door has another one for itself.
+    """Give an empty main band a mode just outside its edge, if the neighbouring band has another mode for itself.
 
-    A soft pad's resonance may fall below the edge by a hertz, and would hide that of the ballast there.
+    The resonance of a soft pad may lie a hertz below the edge. It would then hide the ballast resonance.
     """
     edges = {band: (low, high) for band, low, high in settings.bands()}
     for band, beside in zip(MAIN_BANDS, MAIN_BANDS[::-1]):

@@ -1,4 +1,4 @@
-"""Have the modes of a section moved between two tests, and what shift could have been seen at all?"""
+"""Compare the modes of a section between two tests: the shift, its significance and the smallest detectable shift."""
 
 from dataclasses import dataclass
 
@@ -13,10 +13,10 @@ from turnout.records import ModalModel
 class Shift:
     """Change of one parameter of one mode from a first test to a second.
 
-    ``first``, ``second`` means, ``difference`` with ``se`` and interval ``low`` to ``high``, all in the unit of
-    the parameter (Hz, or 1 for damping); ``probability`` of as large a difference without any change, ``n``
-    impacts of both tests, ``detectable`` the smallest shift that would be found with ``power``, and ``found``
-    whether ``probability`` is below ``level``.
+    ``first`` and ``second`` are the means of the two tests. ``difference`` has the standard error ``se`` and the
+    interval ``low`` to ``high``. All are in the unit of the parameter (Hz, or 1 for damping). ``probability`` is that
+    of a difference as large without any change, and ``n`` are the impacts of both tests. ``detectable`` is the
+    smallest shift that a test detects with ``power``. ``detected`` says whether ``probability`` is below ``level``.
     """
 
     band: str
@@ -49,7 +49,7 @@ class Shift:
 
 
 def welch_test(first, second, level: float = 0.01, power: float = 0.8):
-    r"""Welch's t test of two samples, with the smallest shift it would find.
+    r"""Welch's t test of two samples, with the smallest shift that it would detect.
 
     .. math:: t = \frac{m_2 - m_1}{\sqrt{s_1^2/n_1 + s_2^2/n_2}}, \quad
               \nu = \frac{(s_1^2/n_1 + s_2^2/n_2)^2}{(s_1^2/n_1)^2/(n_1-1) + (s_2^2/n_2)^2/(n_2-1)}
@@ -59,7 +59,7 @@ def welch_test(first, second, level: float = 0.01, power: float = 0.8):
     first, second : (n,) arrays of float
         At least two values each, else ValueError.
     level, power : float
-        Two-sided probability of a false alarm, and of finding a shift of ``detectable``.
+        Two-sided probability of a false alarm, and probability of detecting a shift of ``detectable``.
 
     Returns
     -------
@@ -90,7 +90,7 @@ def welch_test(first, second, level: float = 0.01, power: float = 0.8):
 
 
 def detectable_shift(freedom: float, level: float = 0.01, power: float = 0.8) -> float:
-    """Shift over its standard error that a two-sided t test finds with ``power``.
+    """Shift over its standard error that a two-sided t test detects with ``power``.
 
     With many impacts it is the sum of two normal quantiles.
 
@@ -106,8 +106,8 @@ def compare_tests(
 ) -> Shift | None:
     """Shift of ``parameter`` ("frequency" [Hz] or "damping") of the mode in ``band`` between two tests.
 
-    Compares the estimates of single impacts, never fits: a fit hardly changes where the parameter does. None if
-    a test has fewer than two impacts that show the mode.
+    The estimates of single impacts are compared, not the fit percentages: these hardly change with the parameter.
+    None if a test has fewer than two impacts that show the mode.
     """
     samples = [
         np.array([row[parameter] for row in model.per_impact if row["band"] == band]) for model in (first, second)

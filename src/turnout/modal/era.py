@@ -1,8 +1,7 @@
-"""Eigensystem realisation of free decays: exact, through FFT products and Lanczos, or a Gram matrix for several.
+"""Eigensystem realisation of free decays: state matrices and poles from Hankel matrices.
 
-Hankel matrices of free decays that are never formed: products by FFT, Gram matrices by running sums.
-
-Signal subspace of several decays: from it the state matrices of all orders at once.
+The Hankel matrices are never formed. One decay uses products by FFT and Lanczos iterations, several decays use a Gram
+matrix from running sums. The signal subspace of several decays gives the state matrices of all orders at once.
 """
 
 from dataclasses import dataclass
@@ -16,10 +15,9 @@ from turnout.modal.poles import modal_parameters
 
 
 def hankel_rows(n_sample: int, decay_time: float | None = None) -> int:
-    """Rows of the Hankel matrix of a decay: a third of the record, or square if that is under a decay time.
+    """Rows of the Hankel matrix of a decay: a third of the record, or half if a third is below one decay time.
 
-    The short side decides what can be seen; ``decay_time`` is that of the slowest mode in samples, None if
-    unknown.
+    The shorter side limits the resolution. ``decay_time`` is that of the slowest mode [samples], None if unknown.
 
     >>> hankel_rows(600), hankel_rows(600, decay_time=250.0)
     (200, 300)
@@ -32,7 +30,7 @@ def hankel_operator(y, rows: int, shift: int = 0) -> LinearOperator:
     r"""Hankel matrix :math:`H_{ij} = y_{i+j+\text{shift}}` as an operator of O(n log n) time and O(n) memory.
 
     ``y`` is (n,); the operator is (rows, n - rows - shift) at shift 1 and one column more at shift 0 so that
-    both have ``n - rows`` columns. ValueError if fewer than one column is left.
+    both have ``n - rows`` columns. ValueError if no column remains.
 
     >>> h = hankel_operator(np.array([1.0, 2.0, 4.0, 8.0]), rows=2)
     >>> h @ np.array([1.0, 0.0])
@@ -73,7 +71,7 @@ def gram_matrices(decays, rows: int, starts=(0,)) -> list[np.ndarray]:
         Rows of every Hankel matrix; the result has one more, so that it also holds the shifted products:
         ``G[:-1, :-1]`` is H0 H0^T and ``G[1:, :-1]`` is H1 H0^T.
     starts : sequence of int
-        Leading samples left out, one matrix for each.
+        Numbers of leading samples that are skipped, one matrix for each.
 
     Returns
     -------
@@ -104,7 +102,7 @@ def gram_matrices(decays, rows: int, starts=(0,)) -> list[np.ndarray]:
     return grams
 
 
-DENSE_BELOW = 64
+DENSE_BELOW = 64  # rows or columns: smaller Hankel matrices are decomposed as dense ones, which is faster
 
 
 @dataclass(frozen=True)
@@ -139,8 +137,8 @@ def era(decay, order: int, rows: int | None = None, rate: float = 1.0) -> Realis
 
     .. math:: H_0 = U S V^T, \quad A = S^{-1/2} U^T H_1 V S^{-1/2}, \quad c = U_0 S^{1/2}, \quad x_0 = S^{1/2} V_0^T
 
-    One decay: the leading singular triplets come from Lanczos iterations on FFT products and agree with a full
-    SVD to rounding. Several: all decays side by side, through the Gram matrix of their rows; the poles are
+    One decay: the leading singular triplets come from Lanczos iterations on FFT products. They agree with a full SVD
+    to rounding. Several decays: they are set side by side and use the Gram matrix of their rows. The poles are
     common, every decay has its own initial state.
 
     Parameters
@@ -148,7 +146,7 @@ def era(decay, order: int, rows: int | None = None, rate: float = 1.0) -> Realis
     decay : (n,) or (n_decay, n) array of float
         Free decay from its first sample, unfiltered.
     order : int
-        States kept, two per mode.
+        Number of states, two per mode.
     rows : int, optional
         Rows of the Hankel matrix; a third of the record by default. See :func:`hankel_rows`.
     rate : float
@@ -216,14 +214,14 @@ def _largest_singular_triplets(h, order):
     if n < DENSE_BELOW or order >= n - 1:
         u, s, vt = np.linalg.svd(h @ np.eye(h.shape[1]), full_matrices=False)
     else:
-        # PROPACK-free route: eigenpairs of H H^T lose half of the digits, the augmented matrix keeps them.
+        # PROPACK works on H itself: eigenpairs of H H^T would lose half of the digits.
         u, s, vt = svds(h, k=order, v0=None, solver="propack", rng=np.random.default_rng(1))
     leading = np.argsort(-s, kind="stable")[:order]
     return u[:, leading], s[leading], vt[leading].T
 
 
 def _start(h: LinearOperator):
-    """A start vector with a share in every singular vector that a decay can have: its own first column."""
+    """Start vector of the iteration: the first column of H, which has a share in every singular vector."""
     return h @ np.eye(1, h.shape[1]).ravel() + 1e-3 * np.random.default_rng(1).standard_normal(h.shape[0])
 
 
@@ -239,15 +237,15 @@ def _era_side_by_side(decays, order, rows, rate):
     return Realisation(a, (root * v0).T, u[0] * root, s, rate)
 
 
-MOST_ROWS = 300
+MOST_ROWS = 300  # rows of the Hankel matrices of several decays; limits the time of a decomposition
 
 
 @dataclass(frozen=True)
 class Subspace:
     """Leading left singular vectors ``u`` (n_row, order) of the Hankel matrices side by side.
 
-    ``index`` (n_row,) are the samples that the rows begin at; ``step`` (order, order) is the state matrix of the
-    largest order, of which those of lower orders are leading blocks but for the correction by ``last``.
+    ``index`` (n_row,) are the samples at which the rows begin. ``transition`` (order, order) is the state matrix of the
+    largest order. Those of lower orders are its leading blocks, corrected by ``last_row`` where this is not None.
     """
 
     u: np.ndarray
@@ -267,9 +265,9 @@ class Subspace:
 def subspaces(decays, rows: int, order: int, starts=(0,)) -> list[Subspace]:
     r"""One subspace for each start sample.
 
-    Up to ``MOST_ROWS`` rows the state matrix is the least squares solution of :math:`U_\uparrow A = U_\downarrow`.
-    A longer record keeps its length but only every q-th row, and :math:`A = S^{-1} U^T H_1 V S^{-1}` still steps by
-    one sample: nothing is decimated and nothing folds.
+    Up to ``MAX_ROWS`` rows the state matrix is the least squares solution of :math:`U_\uparrow A = U_\downarrow`.
+    A longer record uses only every q-th row over its full length. :math:`A = S^{-1} U^T H_1 V S^{-1}` still advances by
+    one sample, so there is no decimation and no aliasing.
     """
     stride = -(-rows // MOST_ROWS)
     if stride == 1:

@@ -1,8 +1,7 @@
-"""Modes of measured frequency responses, not told how many there are nor where.
+"""Find the modes of measured frequency responses without knowing their number or frequencies.
 
-Starting poles for a narrow band of frequency responses: the band as a decay, realised at several orders.
-
-Response of damped modes to a smooth blow, in closed form and with its start between the samples.
+The band around each peak is turned into a decay. Realisations of several orders give the starting poles of the fit.
+Also here: the response of damped modes to a smooth impact, in closed form and with its start between samples.
 """
 
 from dataclasses import dataclass
@@ -14,12 +13,12 @@ from scipy.signal import find_peaks, peak_widths
 from turnout.modal.frf_fit import FrfFit, fit_each
 from turnout.modal.summary import Summary, summarise
 
-ORDERS = range(1, 9)
-REAPPEARS = 0.5
+ORDERS = range(1, 9)  # model orders at which the band around a peak is realised
+REAPPEARS = 0.5  # share of the orders at which a pole must occur
 
 
 def zoomed_poles(frequency, frf, centre: float, width: float, damping_maximum: float) -> np.ndarray:
-    r"""Modes near a peak, (n_mode, 2) of ln f and zeta: those that reappear over orders, else the half-power one.
+    r"""Modes near a peak, (n_mode, 2) of ln f and zeta: poles that recur over the orders, else the half-power one.
 
     The lines of the band, transformed back, are a complex decay sampled at the band's width B:
     :math:`h_k \propto \sum_m R_m \exp((s_m - i 2\pi f_0) k / B)`.
@@ -56,7 +55,7 @@ def _gram(decay, rows):
 
 
 def _reappearing(found, n_order):
-    """Medians of groups of poles closer than half their decay rate, if seen at half of the orders."""
+    """Medians of groups of poles closer than half their decay rate, if they occur at half of the orders."""
     starts, left = [], list(found)
     while left:
         groups = [[p for p in left if abs(p[1] - q[1]) < 0.5 * min(-p[1].real, -q[1].real)] for q in left]
@@ -70,8 +69,8 @@ def _reappearing(found, n_order):
     return starts
 
 
-WIDTHS = 12.0
-FEWEST_LINES = 40
+WIDTHS = 12.0  # half-power widths in the band that is fitted around a peak
+FEWEST_LINES = 40  # frequency lines of that band
 MOST_LINES = 600
 
 
@@ -79,8 +78,8 @@ MOST_LINES = 600
 class FrfMode:
     """A mode of several responses: ``frequency`` [Hz] and ``damping`` over the responses, ``contrast`` [dB].
 
-    ``residue`` (n_frf,) complex is that of :math:`R / (i\\omega - s)`, in the unit of the response times 1/s;
-    the contrast is the height of the resonance over what the fit leaves.
+    ``residue`` (n_frf,) complex is that of :math:`R / (i\\omega - s)`, in the unit of the response times 1/s.
+    The contrast is the height of the resonance over the residual of the fit.
     """
 
     frequency: Summary
@@ -108,9 +107,9 @@ def modes_of_frf(
 ) -> FrfModes:
     r"""Resonances of one or several responses with common poles.
 
-    Peaks of the summed power say where to look. There the band is turned into a decay, realisations of several
-    orders propose poles, and those that reappear are fitted by least squares with a local polynomial for all other
-    modes. Each response is fitted alone, for a moved sensor or hammer shifts the poles by its mass; the mean and its
+    The bands are those around the peaks of the summed power. Each band is turned into a decay, and realisations of
+    several orders propose poles. Those that recur are fitted by least squares, with a local polynomial for all other
+    modes. Each response is fitted alone: a moved sensor or hammer shifts the poles by its mass. The mean and its
     errors come from the spread between responses.
 
     Parameters
@@ -120,17 +119,17 @@ def modes_of_frf(
     frf : (n_line,) or (n_frf, n_line) array of complex
         Receptance, mobility or accelerance: the poles are the same.
     lowest, highest : float
-        Where to look. [Hz]
+        Frequency range of the peaks. [Hz]
     prominence : float
-        Of a peak in the summed power. [dB]
+        Smallest prominence of a peak in the summed power. [dB]
     contrast : float
-        Least height of a mode over the residual of its fit. [dB]
+        Smallest height of a mode over the residual of its fit. [dB]
     damping_maximum : float
 
     Returns
     -------
     FrfModes
-        Fewer modes rather than wrong ones: a peak that is no resonance is among ``rejected``, with the reason.
+        A peak that is no resonance is among ``rejected``, with the reason. Doubtful peaks are rejected too.
 
     Raises
     ------
@@ -139,7 +138,7 @@ def modes_of_frf(
 
     Examples
     --------
-    One mode at 100 Hz, 1 % damping, seen on a grid of 0.5 Hz.
+    One mode at 100 Hz, 1 % damping, on a grid of 0.5 Hz.
 
     >>> f = np.arange(1.0, 1001.0) * 0.5
     >>> h = 1.0 / (100.0**2 - f**2 + 2j * 0.01 * 100.0 * f)
@@ -179,7 +178,7 @@ def _check(frequency, frf):
 
 
 def _sort(fits: list[FrfFit], near, least_contrast, damping_maximum, modes, rejected):
-    """Every mode of a band to those accepted or to those rejected with the reason."""
+    """Append every mode of a band to ``modes``, or to ``rejected`` with the reason."""
     theta = np.array([fit.theta for fit in fits])
     error = np.array([fit.error for fit in fits])
     height = np.median([fit.contrast for fit in fits], axis=0)
@@ -210,7 +209,7 @@ def _exponential(s: Summary) -> Summary:
 
 
 def _without_doubles(modes, rejected):
-    """One mode per resonance: of two that agree within their half widths, the one with more contrast."""
+    """One mode per resonance: of two closer than half their half-power width, the one with more contrast."""
     kept: list[FrfMode] = []
     for mode in modes:
         f, zeta = mode.frequency.mean, mode.damping.mean
@@ -267,7 +266,7 @@ def pulse_response(time, pole, residue, duration):
 
     Examples
     --------
-    A slow mode feels only the impulse T/2 of the pulse.
+    A slow mode responds to the impulse T/2 of the pulse only.
 
     >>> y = pulse_response(np.array([1e-3]), np.array([-1.0 + 1.0j]), np.array([1.0 + 0j]), 1e-3)
     >>> print(f"{y[0] / 0.5e-3:.3f}")

@@ -1,4 +1,4 @@
-"""Least-squares fit of modes to frequency responses in a narrow band, residues projected out."""
+"""Fit modes to frequency responses in a narrow band by least squares, with the residues eliminated."""
 
 from dataclasses import dataclass
 
@@ -6,16 +6,16 @@ import numpy as np
 
 from turnout.modal.poles import continuous_pole
 
-LOCAL_TERMS = 3
-SINGLE_CONTRAST = 30.0
+LOCAL_TERMS = 3  # coefficients of the polynomial in frequency that stands for modes outside the band
+SINGLE_CONTRAST = 30.0  # dB over the residual from which on one mode is enough for a peak
 
 
 @dataclass(frozen=True)
 class FrfFit:
     """Fit of a band: ``theta`` (n_mode, 2) ln f [Hz] and zeta; ``information`` (n_frf, p, p), ``score`` (n_frf, p).
 
-    ``residue`` (n_mode, n_frf) complex and ``residual`` (n_frf, n_line) complex; everything is over the noise of
-    each response, ``noise`` (n_frf,) its standard deviation per real part.
+    ``residue`` (n_mode, n_frf) and ``residual`` (n_frf, n_line) are complex. ``noise`` (n_frf,) is the standard
+    deviation of each response per real part; ``information`` and ``score`` are relative to it.
     """
 
     theta: np.ndarray
@@ -41,14 +41,14 @@ class FrfFit:
 
     @property
     def cost(self) -> float:
-        """Sum of squared residuals over the variance of the noise, what the fit makes small. [-]"""
+        """Sum of squared residuals over the variance of the noise, which the fit minimises. [-]"""
         return float(np.sum(np.abs(self.residual) ** 2 / self.noise[:, None] ** 2))
 
 
 def linearise_frf(theta, frequency, frf, noise) -> FrfFit:
     r"""Local model :math:`\sum_m R_m / (i\omega - s_m) + p_0 + p_1 \omega + p_2 \omega^2` around given modes.
 
-    The polynomial stands for all modes outside of the band and for the conjugate poles.
+    The polynomial stands for all modes outside the band and for the conjugate poles.
 
     ``theta`` (n_mode, 2), ``frequency`` (n_line,) [Hz], ``frf`` (n_frf, n_line), ``noise`` (n_frf,).
     """
@@ -105,11 +105,11 @@ def fit_frf(theta, frequency, frf, iterations: int = 25) -> FrfFit:
 
 
 def fit_each(start, frequency, frf, near) -> list[FrfFit]:
-    """Each response fitted alone from the modes of their common fit, with as few modes as it takes.
+    """Fit each response alone, from the modes of the common fit and with as few modes as possible.
 
-    Poles that differ between responses look like close poles to a common fit: the mode nearest to the peak
-    (``near``: its frequency and half-power width [Hz]) is tried alone first, and kept alone where it stands
-    ``SINGLE_CONTRAST`` over the residual.
+    Poles that differ between responses look like close poles to a common fit. So the mode nearest to the peak
+    (``peak_and_width``: its frequency and half-power width [Hz]) is tried alone first. It stays the only one if it
+    stands ``MIN_SINGLE_CONTRAST`` over the residual.
     """
     nearest = int(np.argmin(np.abs(np.exp(start[:, 0]) - near[0])))
     alone = [_fit_alone(start[[nearest]], frequency, response) for response in frf]

@@ -1,4 +1,4 @@
-"""Fit of each blow by the modes of the others, beside what random modes would score."""
+"""Fit of each held-out impact by the modes of the other impacts, and the fit of random modes to compare with."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ def fit_percent(measured, residual) -> np.ndarray:
 
     References
     ----------
-    Barkhordari et al., eq. 22, with its brackets set right.
+    Barkhordari et al., eq. 22, with its brackets corrected.
 
     Examples
     --------
@@ -26,9 +26,9 @@ def fit_percent(measured, residual) -> np.ndarray:
 
 
 def held_out_fit(theta, decays, rate) -> np.ndarray:
-    """Fit of each decay with the mean modes of all the others, amplitudes refitted. [%]
+    """Fit of each decay with the mean modes of all other decays, amplitudes refitted. [%]
 
-    ``theta`` (n_decay, n_mode, 2) holds ln f [Hz] and zeta of each decay. A single decay has no others: nan.
+    ``theta`` (n_decay, n_mode, 2) holds ln f [Hz] and zeta of each decay. A single decay gives nan.
     """
     n = len(decays)
     if n < 2:
@@ -42,7 +42,7 @@ def random_mode_fits(decays, rate, bands, draws: int, seed: int = 20171001) -> n
     """Median fit over the decays for ``draws`` random mode sets, one mode in each band; (draws,). [%]
 
     Frequencies are uniform in the logarithm within ``bands`` ((low, high) [Hz] each), damping ratios uniform
-    from 0.02 to 0.3; amplitudes are fitted like those of the real modes, so this is what free amplitudes buy.
+    from 0.02 to 0.3. Amplitudes are fitted like those of the real modes: this is the fit that free amplitudes give.
     """
     rng = np.random.default_rng(seed)
     low, high = np.log(np.array(bands, dtype=float)).T

@@ -21,16 +21,16 @@ def identify(decays, rate: float, settings, receptance=None, method: str | None 
         Sampling rate. [Hz]
     settings : IdentifySettings
     receptance : Receptance, optional
-        Its coherence gate drops modes that it does not let pass; its H1 gives b and c for a unit impulse.
+        Its coherence gate rejects modes. Its H1 gives b and c for a unit impulse.
     method : "joint" or "paper", optional
         ``settings.method`` by default.
     options
-        Of the method: ``leads`` (the samples before each decay) for "paper".
+        Options of the method: ``leads`` (the samples before each decay) for "paper".
 
     Returns
     -------
     ModalModel
-        ``status`` "rejected" with reasons where no mode is found: fewer modes rather than wrong ones.
+        ``status`` "rejected" with reasons where no mode is identified. Doubtful modes are rejected.
 
     Raises
     ------

@@ -1,12 +1,7 @@
-"""All resonances at once from the unfiltered decays: selection, per-blow modes, their mean, and the model.
+"""Identify all resonances of a test together from its unfiltered decays, and build the modal model.
 
-What is told beside a model: stabilisation table, noise, drift, blows that were left out.
-
-What it costs that one explanation of the decays had to be chosen: how far the others put the same mode.
-
-Blows that the modes of all others do not describe.
-
-Free decays of a test brought to one length.
+The steps: cut the decays to one length, select the modes, drop outlier impacts, assign modes to bands, average over
+the impacts. The model also holds the error of the choice between explanations, the stabilisation table and the noise.
 """
 
 import numpy as np
@@ -21,7 +16,7 @@ from turnout.records import ModalModel, Rejection
 
 
 def stabilisation_rows(selection: Selection, tolerance: float) -> tuple[dict, ...]:
-    """Poles of all orders from the first sample on; "stable" where they belong to a mode that was kept."""
+    """Poles of all orders from the first sample on; "stable" where they belong to a mode of the fit."""
     table = selection.table
     mean = selection.fit.mean if selection.fit is not None else np.empty((0, 2))
     rows = []
@@ -41,7 +36,7 @@ def stabilisation_rows(selection: Selection, tolerance: float) -> tuple[dict, ..
 
 
 def fit_diagnostics(selection: Selection, index, dropped) -> dict:
-    """Numbers about the fit; ``index`` are the impacts in it, ``dropped`` (impact, Rejection) those that are not."""
+    """Diagnostics of the fit; ``index`` are the impacts in it, ``dropped`` (impact, Rejection) those that are not."""
     told = {"impacts": tuple(int(i) for i in index), "dropped_impacts": tuple(dropped)}
     fit = selection.fit
     if fit is None:
@@ -61,26 +56,26 @@ def fit_diagnostics(selection: Selection, index, dropped) -> dict:
 
 
 def choice_error(mode, others, farthest: float) -> np.ndarray:
-    r"""Root mean square distance of a mode in all explanations from where the chosen one has it.
+    r"""Root mean square distance of a mode in all explanations from its value in the chosen one.
 
     .. math:: \sqrt{\frac{1}{J} \sum_{j=1}^{J} (\theta_j - \theta)^2}, \quad \theta_1 = \theta
 
-    All explanations count alike. Their criteria would give nearly all weight to one: 18,000 samples tell two wrong
-    models apart with certainty, and say nothing about which of them has this mode right.
+    All explanations have the same weight. Weights from their criteria would be nearly 1 for one of them: 18,000 samples
+    distinguish two wrong models with certainty, but do not show which of them has this mode right.
 
     Parameters
     ----------
     mode : (2,) array of float
         ln f [Hz] and zeta in the chosen explanation.
-    others : list of (n_mode, 2) arrays of float
-        Modes of the others.
-    farthest : float
-        Distance in ln f beyond which it is another mode: an explanation without this one says nothing about it.
+    rival_modes : list of (n_mode, 2) arrays of float
+        Modes of the other explanations.
+    max_distance : float
+        Distance in ln f beyond which it is another mode. An explanation without this mode does not count.
 
     Returns
     -------
     (2,) array of float
-        Of ln f and zeta; 0 without others.
+        Of ln f and zeta; 0 without other explanations.
 
     References
     ----------
@@ -102,15 +97,15 @@ def choice_error(mode, others, farthest: float) -> np.ndarray:
     return np.sqrt(square / n)
 
 
-TIMES_MEDIAN = 9.0
-LARGEST_SHARE = 1.0 / 3.0
+TIMES_MEDIAN = 9.0  # residual power of an impact over that of the median impact
+LARGEST_SHARE = 1.0 / 3.0  # share of the impacts that may be outliers; beyond it the model is wrong, not they
 
 
 def odd_blows(residual_power) -> list[tuple[int, Rejection]]:
-    """Blows whose residual is three times (in power nine) that of the median blow: (row, Rejection) each.
+    """Impacts whose residual is three times (in power nine) that of the median impact: (row, Rejection) each.
 
-    ``residual_power`` is (n_blow,). The power of white noise over some hundred samples is known to ten per cent,
-    so this is no matter of chance. None where more than a third would go: then it is the model that fails.
+    ``residual_power`` is (n_impact,). The power of white noise over some hundred samples is known to ten per cent, so
+    such a ratio is not due to chance. Empty where more than a third would be dropped: then the model is wrong.
 
     >>> [row for row, _ in odd_blows(np.array([1.0, 1.1, 20.0, 0.9]))]
     [2]
@@ -124,7 +119,7 @@ def odd_blows(residual_power) -> list[tuple[int, Rejection]]:
 
 
 def common_length(decays, rate: float, settings) -> tuple[np.ndarray, np.ndarray, list[tuple[int, Rejection]]]:
-    """Decays that are long enough, cut to one length, with the ones that are not.
+    """Cut the usable decays to one length, and list those that cannot be used.
 
     Parameters
     ----------
@@ -132,13 +127,13 @@ def common_length(decays, rate: float, settings) -> tuple[np.ndarray, np.ndarray
     rate : float
         [Hz]
     settings : IdentifySettings
-        ``duration`` is the length aimed at, ``shortest_decay`` the least.
+        ``duration`` is the target length [s], ``shortest_decay`` the shortest that is accepted [s].
 
     Returns
     -------
-    kept : (n_kept, n) array of float
-    index : (n_kept,) array of int
-        Position of each among ``decays``.
+    usable : (n_usable, n) array of float
+    index : (n_usable,) array of int
+        Index of each in ``decays``.
     dropped : list of (index, Rejection)
     """
     aim, least = round(settings.duration * rate), round(settings.shortest_decay * rate)
@@ -165,7 +160,7 @@ def common_length(decays, rate: float, settings) -> tuple[np.ndarray, np.ndarray
 def identify_joint(decays, rate: float, settings, receptance=None, leads=None) -> ModalModel:
     """Modal model of one section by joint identification; see :func:`turnout.modal.identify`.
 
-    ``leads`` is taken so that both methods can be called alike; it is not used.
+    ``leads`` is not used. It exists because both methods have the same parameters.
     """
     records, index, dropped = common_length(decays, rate, settings)
     if not len(records):
@@ -198,7 +193,7 @@ def identify_joint(decays, rate: float, settings, receptance=None, leads=None) -
 
 
 def _select_without_odd_blows(records, index, dropped, rate, settings):
-    """Modes of all blows, or again of all but those that these modes do not describe."""
+    """Select the modes from all impacts, and once more without the outliers if there are any."""
     selection = select_modes(records, rate, settings)
     odd = [] if selection.fit is None else odd_blows(selection.residual_power)
     if odd:
@@ -210,7 +205,7 @@ def _select_without_odd_blows(records, index, dropped, rate, settings):
 
 
 def _named(selection, choice, records, index, rate, settings):
-    """(estimates, modes) of the bands chosen; one whose mean over the blows is not damped is taken from ``choice``."""
+    """(estimates, modes) of the chosen bands; a mode with a mean damping of zero or less is removed from ``choice``."""
     found = []
     for e in _estimates(selection, choice, records, index, rate, settings) if choice.modes else ():
         mode = e.mode(settings.confidence)
@@ -247,7 +242,7 @@ def _estimates(selection, choice, records, index, rate, settings):
 
 
 def _residues(modes, choice, selection, receptance):
-    """From the receptance per unit impulse where there is one, else of the mean decay."""
+    """Residues per unit impulse from the receptance if there is one, else those of the mean decay."""
     named = [(m.frequency, m.damping) for m in modes]
     if receptance is not None:
         for all_modes in (named + _unnamed(choice, selection, receptance), named):
@@ -258,7 +253,7 @@ def _residues(modes, choice, selection, receptance):
 
 
 def _unnamed(choice, selection, receptance):
-    """(frequency [Hz], damping) of the fit's other modes that lie among the lines that passed."""
+    """(frequency [Hz], damping) of the fit's modes without a band that lie among the lines that passed the gate."""
     lines = receptance.frequency[receptance.passed]
     pairs = [(float(np.exp(f)), float(damping)) for f, damping in selection.fit.mean]
     rest = [pairs[m] for m in range(len(pairs)) if m not in choice.modes.values()]

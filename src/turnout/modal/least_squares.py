@@ -1,6 +1,6 @@
-"""Least-squares fit of damped modes to decays, with the amplitudes projected out, and its linearisation.
+"""Linearise the least-squares fit of damped modes to decays, with the amplitudes eliminated.
 
-Sums over the samples of damped waves z^k and their products, from short tables and without the waves themselves.
+The sums over samples of damped waves z^k and of their products come from short tables. The waves are never formed.
 """
 
 from dataclasses import dataclass
@@ -9,9 +9,9 @@ import numpy as np
 from numpy.polynomial import legendre
 from scipy.special import factorial
 
-# At this distance times n the differences still keep 14 digits and 14 terms of the series all 16.
+# Limit of |1 - q| n below which the series is summed. At it the differences still have 14 digits, the series all 16.
 NEAR_ONE = 0.5
-SERIES_TERMS = 14
+SERIES_TERMS = 14  # terms of the exponential series
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class WaveTable:
     r"""Waves :math:`z^k = c_i f_j` with k = width i + j, as two short tables.
 
     ``fine`` (..., n_wave, width) and ``coarse`` (..., n_wave, n_block) hold :math:`z^j` and :math:`z^{\text{width} i}`;
-    ``n`` samples are meant, the rest of the last block is not.
+    Only the first ``n`` samples count; the last block may be longer.
     """
 
     z: np.ndarray
@@ -36,14 +36,14 @@ class WaveTable:
         return cls(z, fine[..., :width], coarse, n)
 
     def last(self) -> np.ndarray:
-        """(..., n_wave) the power z^n, just behind the last sample."""
+        """(..., n_wave) the power z^n, one sample after the last one."""
         block, rest = divmod(self.n, self.fine.shape[-1])
         if block < self.coarse.shape[-1]:
             return self.coarse[..., block] * self.fine[..., rest]
         return self.coarse[..., -1] * self.fine[..., -1] * self.z
 
     def blocks(self, series) -> np.ndarray:
-        """(..., width, n_series * n_block) of (..., n_series, n) real ``series``, as :meth:`products` wants them."""
+        """(..., width, n_series * n_block) of (..., n_series, n) real ``series``, as :meth:`products` needs them."""
         width, n_block = self.fine.shape[-1], self.coarse.shape[-1]
         padded = np.zeros((*series.shape[:-1], n_block * width))
         padded[..., : self.n] = series
@@ -78,11 +78,11 @@ class WaveTable:
 
 
 def geometric_sums(q, q_to_n, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    r"""Sums :math:`\sum_{k<n} k^p q^k` for p = 0, 1, 2, each from the one before by telescoping.
+    r"""Sums :math:`\sum_{k<n} k^p q^k` for p = 0, 1, 2, each from the previous one by telescoping.
 
     .. math:: (1 - q) S_0 = 1 - q^n, \quad (1 - q) S_1 = q S_0 - n q^n, \quad (1 - q) S_2 = q (2 S_1 + S_0) - n^2 q^n
 
-    Where q is so near to 1 that these differences lose digits, the exponential series of :math:`q^k` is summed.
+    Where q is so close to 1 that these differences lose digits, the exponential series of :math:`q^k` is summed.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def geometric_sums(q, q_to_n, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarra
 
 
 def _sums_near_one(log, n):
-    """The same for (n_q,) logarithms of q, by the series of the exponential."""
+    """The same sums for (n_q,) logarithms of q, by the exponential series."""
     k = np.arange(n) / n
     term = (log[:, None] * n) ** np.arange(SERIES_TERMS) / factorial(np.arange(SERIES_TERMS))
     return tuple(float(n) ** p * (term @ [np.sum(k ** (p + j)) for j in range(SERIES_TERMS)]) for p in range(3))
@@ -133,18 +133,18 @@ def _first_powers(z, n):
     return np.cumprod(table, axis=-1)
 
 
-RIDGE = 1e-13
+RIDGE = 1e-13  # relative addition to the diagonal of the Gram matrix, so that it stays invertible
 
 
 @dataclass(frozen=True)
 class Linearisation:
     r"""Fit of :math:`y_k = \mathrm{Re} \sum_m \alpha_m z_m^k + \text{drift}` around given modes, per decay.
 
-    ``information`` (n_decay, p, p) is J^T J and ``score`` (n_decay, p) is J^T r for the p = 2 n_mode parameters
-    (ln f, zeta of each mode in turn), amplitudes and drift eliminated; ``rss`` (n_decay,) the squared residual,
-    ``amplitude`` (n_decay, n_mode) complex, ``residual`` (n_decay, n); ``gram`` (n_decay, k, k) and
-    ``coefficient`` (n_decay, k) belong to the columns of the model: cosines, sines, drift. Where all decays share
-    their modes there is one ``gram`` (1, k, k).
+    ``information`` (n_decay, p, p) is J^T J and ``score`` (n_decay, p) is J^T r, with amplitudes and drift
+    eliminated. The p = 2 n_mode parameters are ln f and zeta of each mode in turn. ``rss`` (n_decay,) is the sum of
+    squared residuals, ``amplitude`` (n_decay, n_mode) is complex, ``residual`` is (n_decay, n). ``gram``
+    (n_decay, k, k) and ``coefficient`` (n_decay, k) belong to the columns of the model: cosines, sines, drift. If all
+    decays share their modes there is one ``gram`` (1, k, k).
     """
 
     information: np.ndarray
@@ -185,8 +185,8 @@ def linearise(theta, decays, rate, drift) -> Linearisation:
 
     .. math:: J = (I - B B^+) \, \mathrm{d}B \, a, \qquad r = (I - B B^+) y
 
-    Neither B nor its derivative is formed: they enter by sums over samples, which are geometric series among the
-    waves and products of short tables with the data.
+    Neither B nor its derivative is formed. They enter through sums over samples: geometric series for the waves, and
+    products of short tables with the data.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ def linearise(theta, decays, rate, drift) -> Linearisation:
     Golub and Pereyra 1973; Kaufman 1975.
     """
     n_decay, n = decays.shape
-    # One group of decays for each set of modes: all in one, or each alone.
+    # One group of decays for each set of modes: all decays in one group, or each in its own.
     group = decays.reshape(len(theta), -1, n)
     pole, slope = _poles(theta, rate)
     waves = WaveTable.of(np.exp(pole), n)
@@ -217,7 +217,7 @@ def linearise(theta, decays, rate, drift) -> Linearisation:
     if len(drift):
         residual -= coefficient[..., 2 * n_mode :] @ drift
     ramped = np.swapaxes(waves.products(waves.blocks(residual * np.arange(n))), -1, -2)
-    # (group, decay, mode, parameter): what a step in a parameter does is Re(tilt k z^k)
+    # (group, decay, mode, parameter): the derivative by a parameter is Re(tilt k z^k)
     tilt = slope[:, None] * amplitude[..., None]
     score = np.real(tilt * ramped[..., None])
     information = _information(tilt, gram, plus, minus, of_drift)
@@ -267,7 +267,7 @@ def _gram(waves, plus, minus, drift):
 
 
 def _information(tilt, gram, plus, minus, of_drift):
-    """J^T J (group, decay, p, p) of Re(tilt k z^k), less what the columns of the model take up."""
+    """J^T J (group, decay, p, p) of Re(tilt k z^k), minus its projection on the columns of the model."""
     n_group, n_decay, m, _ = tilt.shape
     flat = tilt.reshape(n_group, n_decay, 2 * m)
     twice = np.repeat(np.arange(m), 2)

@@ -1,4 +1,4 @@
-"""Modes of each blow and their mean, estimated together: maximum likelihood with a spread between blows."""
+"""Estimate the modes of each impact and their mean together: maximum likelihood with a spread between impacts."""
 
 from dataclasses import dataclass
 
@@ -6,20 +6,20 @@ import numpy as np
 
 from turnout.modal.least_squares import Linearisation, linearise
 
-LARGEST_STEP = np.array([0.2, 0.15])
-PRINCIPAL = 8
-RIDGE = 1e-10  # keeps two modes that are nearly one invertible; what tells modes apart is 1e-6 and more
-LOWEST_DAMPING, HIGHEST_DAMPING = 1e-5, 0.95
+LARGEST_STEP = np.array([0.2, 0.15])  # of ln f and of zeta in one iteration
+PRINCIPAL = 8  # combinations of the decays that hold the signal
+RIDGE = 1e-10  # keeps matrices of two nearly equal modes invertible; distinct modes differ by 1e-6 and more
+LOWEST_DAMPING, HIGHEST_DAMPING = 1e-5, 0.95  # damping ratios during the fit
 
 
 @dataclass(frozen=True)
 class MixedFit:
-    """Common modes, modes of each blow, and what they are worth.
+    """Common modes, modes of each impact, and their covariance.
 
-    ``mean`` (n_mode, 2) of ln f and zeta; ``theta`` (n_decay, n_mode, 2) the modes of each blow drawn towards
-    the mean as far as their noise asks; ``free`` the same undrawn, linearised there, with ``covariance``
-    (n_decay, p, p) from the noise alone; ``spread`` (p,) the variance between blows; ``sigma2`` that of the
-    noise; ``converged`` False if the iteration was stopped.
+    ``mean`` (n_mode, 2) of ln f and zeta. ``theta`` (n_decay, n_mode, 2) are the modes of each impact, shrunken towards
+    the mean according to their noise. ``unshrunken`` are these modes without shrinkage, linearised at ``theta``, with
+    ``covariance`` (n_decay, p, p) from the noise alone. ``spread`` (p,) is the variance between impacts, ``sigma2``
+    that of the noise. ``converged`` is False if the iteration was stopped.
     """
 
     mean: np.ndarray
@@ -33,7 +33,7 @@ class MixedFit:
 
     @property
     def inside(self) -> np.ndarray:
-        """(n_mode, 2) mean of the drawn modes: unlike ``mean`` always underdamped, a safe start."""
+        """(n_mode, 2) mean of the shrunken modes: a safe start, as it is always underdamped, unlike ``mean``."""
         return self.theta.mean(axis=0)
 
     @property
@@ -43,12 +43,12 @@ class MixedFit:
 
 
 def degrees_of_freedom(decays, n_mode: int, n_drift: int) -> int:
-    """Samples less amplitudes, drift and (shared) poles; at least one."""
+    """Number of samples minus amplitudes, drift and (shared) poles; at least one."""
     return max(1, decays.size - len(decays) * (2 * n_mode + n_drift) - 2 * n_mode)
 
 
 def between_variance(value, variance):
-    r"""Variance between estimates beyond their own, by the moments of their weighted spread; per last axis.
+    r"""Variance between estimates in excess of their own variance, by the method of moments; per last axis.
 
     .. math:: \tau^2 = \max\left(0, \frac{Q - (n-1)}{\sum w - \sum w^2 / \sum w}\right), \quad w = 1/s^2
 
@@ -72,10 +72,11 @@ def between_variance(value, variance):
 
 
 def fit_common(start, decays, rate, drift, iterations=12, tolerance=1e-3):
-    """Shared modes by Gauss-Newton with halved steps; returns (n_mode, 2) of ln f and zeta, and whether it settled.
+    """Shared modes by Gauss-Newton with reduced steps: (n_mode, 2) of ln f and zeta, and whether it converged.
 
-    All sums over decays are the same for any rotation of the decays, so those are turned into their principal ones,
-    of which ``PRINCIPAL`` hold the signal; ``start`` (n_mode, 2), ``decays`` (n_decay, n), ``drift`` (n_drift, n).
+    All sums over decays are invariant to a rotation of the decays. So the decays are replaced by their principal
+    combinations, of which ``MAX_PRINCIPAL`` hold the signal. ``start`` is (n_mode, 2), ``decays`` (n_decay, n) and
+    ``drift`` (n_drift, n).
     """
     n_mode = len(start)
     mean = np.array(start, dtype=float)
@@ -109,7 +110,7 @@ def fit_common(start, decays, rate, drift, iterations=12, tolerance=1e-3):
 
 
 def _principal(decays):
-    """The decays' principal combinations (at most ``PRINCIPAL``, n), and the power of the others."""
+    """The decays' principal combinations (at most ``MAX_PRINCIPAL``, n), and the power of the others."""
     if len(decays) <= PRINCIPAL:
         return decays, 0.0
     power, turn = np.linalg.eigh(decays @ decays.T)
@@ -117,14 +118,14 @@ def _principal(decays):
 
 
 def fit_mixed(start, decays, rate, drift, theta=None, iterations=12, tolerance=0.01) -> MixedFit:
-    r"""Modes of every blow, drawn towards their common mean by the spread that the data show.
+    r"""Modes of every impact, shrunken towards their common mean according to the spread in the data.
 
     .. math:: z_i = \theta_i + (J^T J)^{-1} J^T r, \quad
               \mu = \left(\sum W_i\right)^{-1} \sum W_i z_i, \quad
               \theta_i \leftarrow \mu + T W_i (z_i - \mu), \quad W_i = (\sigma^2 (J^T J)^{-1} + T)^{-1}
 
-    With no spread (T = 0) this is maximum likelihood with shared poles, with a large one every blow is fitted
-    alone; in between, linearising at the drawn modes keeps the bias of a single noisy blow out of the mean.
+    With no spread (T = 0) this is maximum likelihood with shared poles. With a large spread every impact is fitted
+    alone. In between, linearising at the shrunken modes keeps the bias of a single noisy impact out of the mean.
 
     Parameters
     ----------
@@ -141,7 +142,7 @@ def fit_mixed(start, decays, rate, drift, theta=None, iterations=12, tolerance=0
     ----------
     Lindstrom and Bates 1990, Nonlinear mixed effects models for repeated measures data.
     """
-    if theta is None:  # not from shared modes fitted first: to those the spread between blows looks like a twin
+    if theta is None:  # do not fit shared modes first: the spread between impacts would look like a second mode
         theta = np.repeat(np.asarray(start, dtype=float)[None], len(decays), axis=0)
     n_decay, n_mode = theta.shape[:2]
     dof = degrees_of_freedom(decays, n_mode, len(drift))
@@ -168,7 +169,7 @@ def fit_mixed(start, decays, rate, drift, theta=None, iterations=12, tolerance=0
 
 
 def _inside(theta, before):
-    """The new modes, moved no further than a safe step and kept underdamped."""
+    """The new modes, with the step limited and the damping between its limits."""
     theta = before + np.clip(theta - before, -LARGEST_STEP, LARGEST_STEP)
     theta[..., 1] = np.clip(theta[..., 1], LOWEST_DAMPING, HIGHEST_DAMPING)
     return theta

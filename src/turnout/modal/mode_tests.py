@@ -1,6 +1,6 @@
-"""Tests that a mode must pass: it reappears, it is significant, it is one mode and a property of the place.
+"""Test the modes of a fit: a mode must recur over orders, be significant, be single and agree between impacts.
 
-Is a mode, or a drift, in the data? Chi-squared tests of amplitudes, per blow and over all blows.
+The significance of a mode or a drift comes from chi-squared tests of amplitudes, per impact and over all impacts.
 """
 
 from dataclasses import replace
@@ -13,7 +13,7 @@ from turnout.modal.mixed_effects import MixedFit, degrees_of_freedom, fit_mixed
 
 
 def mode_chi_squared(at: Linearisation, sigma2: float) -> np.ndarray:
-    r"""Squared amplitude of each mode in each blow over its own covariance: chi-squared(2) if it is not there.
+    r"""Squared amplitude of each mode in each impact over its covariance: chi-squared(2) if the mode is absent.
 
     .. math:: \chi^2 = a^T \left(\sigma^2 [(B^T B)^{-1}]_{mm}\right)^{-1} a
 
@@ -28,7 +28,7 @@ def mode_chi_squared(at: Linearisation, sigma2: float) -> np.ndarray:
 
 
 def columns_chi_squared(at: Linearisation, sigma2: float, columns) -> float:
-    """Chi-squared(n_decay times columns) that these columns of the model (a drift, a hum) are not needed."""
+    """Statistic of columns of the model (a drift, a hum): chi-squared(n_decay times columns) if they are absent."""
     columns = np.asarray(columns)
     block = np.linalg.inv(at.gram)[:, columns[:, None], columns]
     value = at.coefficient[:, columns]
@@ -36,7 +36,7 @@ def columns_chi_squared(at: Linearisation, sigma2: float, columns) -> float:
 
 
 def common_probability(statistic: np.ndarray) -> np.ndarray:
-    """Probability of the sum over blows of chi-squared(2) values, if the mode is not there; (n_mode,).
+    """Probability of the sum over impacts of chi-squared(2) values if the mode is absent; (n_mode,).
 
     >>> print(common_probability(np.array([[0.0], [0.0]])))
     [1.]
@@ -45,13 +45,13 @@ def common_probability(statistic: np.ndarray) -> np.ndarray:
 
 
 def share_of_blows(statistic: np.ndarray, probability: float = 0.01) -> np.ndarray:
-    """Share of blows in which the mode shows by itself at ``probability``; (n_mode,)."""
+    """Share of impacts in which the mode alone is significant at ``probability``; (n_mode,)."""
     return (statistic > chi2.isf(probability, 2)).mean(axis=0)
 
 
-HOPELESS = 0.01
-LISTED_PRESENCE = 0.2
-# Within a tenth of the errors of single blows a fit says as much about its modes as to the last digit.
+HOPELESS = 0.01  # probability of being absent above which all modes are dropped at once, not one by one
+LISTED_PRESENCE = 0.2  # share of orders and starts from which on a rejected pole is listed
+# During the search a fit within a tenth of the errors of single impacts is accurate enough to choose modes.
 SEARCH = {"iterations": 24, "tolerance": 0.1}
 
 
@@ -69,7 +69,7 @@ def rejection(candidate, reason, value, limit) -> dict:
 
 
 def reappearing(found, rate, settings):
-    """Candidates that are there in enough orders and starts, and above the lowest frequency a record can show."""
+    """Candidates that occur at enough orders and starts, and above the lowest frequency that a record can resolve."""
     lowest = 0.5 / settings.duration
     listed = 1.5 * max(high for _, _, high in settings.bands())
     kept, rejected = [], []
@@ -93,7 +93,7 @@ def start_of(kept) -> np.ndarray:
 
 
 def screen(kept, decays, rate, columns, settings, rejected):
-    """Drop what is not significant where the realisation put it: first all that is hopeless, then one by one."""
+    """Drop candidates that are not significant at the poles of the realisation: the clear ones first, then singly."""
     limit = settings.false_mode_probability
     while kept:
         at = linearise(start_of(kept)[None], decays, rate, columns)
@@ -119,10 +119,10 @@ def fit_and_prune(
     heaviest: float | None = None,
     needed: set | None = None,
 ):
-    """Maximum likelihood with all modes, dropping the worst that fails a test until none does: (fit, kept).
+    """Maximum likelihood with all modes; drops the worst mode that fails a test until none does: (fit, candidates).
 
-    ``needed`` collects the candidates (by identity) that are no needless twins, and those in it are not asked again.
-    The fits are good enough to choose by (``SEARCH``), not for the last digit.
+    ``indispensable`` collects the candidates (by identity) that are not redundant; they are not tested again.
+    The fits have the accuracy of ``SEARCH_OPTIONS``, enough to choose modes.
     """
     if not kept:
         return None, kept
@@ -148,9 +148,9 @@ def fit_and_prune(
 
 
 def _needless_twin(fit, kept, decays, rate, columns, settings, needed):
-    """A mode that overlaps a stronger one and without which the decays fit as well: (index, fit without, p).
+    """A mode that overlaps a stronger one and is not needed for the fit: (index, fit without it, probability).
 
-    Poles that differ between blows look like two poles to a realisation of all blows, never to a fit of each.
+    Poles that differ between impacts look like two poles to a realisation of all impacts, but not to a fit of each.
     """
     statistic = mode_chi_squared(fit.at, fit.sigma2).sum(axis=0)
     for weak in np.argsort(statistic):
@@ -160,7 +160,7 @@ def _needless_twin(fit, kept, decays, rate, columns, settings, needed):
         overlaps = (gap < fit.mean[:, 1] + fit.mean[weak, 1]) & (statistic > statistic[weak])
         if not overlaps.any():
             continue
-        # from common modes on: what is left must be free to move to where it does the work of both
+        # start from common modes: the remaining mode must be free to move between the two
         without = fit_mixed(np.delete(fit.inside, weak, axis=0), decays, rate, columns, **SEARCH)
         probability = float(chi2.sf((without.rss - fit.rss) / fit.sigma2, 4 * len(decays)))
         if probability > settings.false_mode_probability:
@@ -172,7 +172,7 @@ def _needless_twin(fit, kept, decays, rate, columns, settings, needed):
 def mode_failures(fit: MixedFit, settings, heaviest=None) -> list[tuple[int, tuple[str, float, float]]]:
     """Every mode that fails a test, as (index, (reason, value, limit)), the weakest first.
 
-    With ``heaviest`` only what a pole needs to stay in a fit is asked: it shows, and is damped less than that.
+    With ``max_damping`` only the tests for a pole to stay in a fit apply: it is present and damped less than this.
     """
     n_mode = len(fit.mean)
     statistic = mode_chi_squared(fit.at, fit.sigma2)

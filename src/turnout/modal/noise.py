@@ -1,6 +1,6 @@
-"""Coloured noise: an autoregressive model of what the modes leave, and decays whitened by it.
+"""Model what decays contain besides modes: coloured noise, a slow zero drift, and hum of mains or traction current.
 
-What the decays hold besides modes: a slow drift of the zero and hum of the mains or the traction current.
+The noise is an autoregressive model of the residual; decays are whitened with it.
 """
 
 from dataclasses import dataclass
@@ -48,7 +48,7 @@ def noise_filter(residual, order_maximum: int) -> np.ndarray:
 
 
 def whiten(decays, whitening) -> np.ndarray:
-    """Decays through the whitening filter, without the samples it needs to fill; poles stay as they are.
+    """Decays through the whitening filter, without its first samples; the poles stay the same.
 
     A sum of exponentials through a finite filter is the same sum with other amplitudes.
 
@@ -59,10 +59,10 @@ def whiten(decays, whitening) -> np.ndarray:
     return lfilter(whitening, 1.0, decays, axis=-1)[:, order:] if order else decays
 
 
-PROBABILITY = 1e-3
-CHANCE = 1e-2
-NEAR_HARMONIC = 0.06
-HARMONICS = 5
+PROBABILITY = 1e-3  # significance level of a drift or a hum
+CHANCE = 1e-2  # significance level of equal phases in all impacts
+NEAR_HARMONIC = 0.06  # relative distance from a harmonic
+HARMONICS = 5  # harmonics of each source
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class Background:
 
 
 def highest_drift(n: int, rate: float, settings) -> int:
-    """Highest degree of a drift that stays below the ballast band, at most ``settings.drift_maximum``.
+    """Highest degree of a drift below the ballast band, at most ``settings.drift_maximum``.
 
     A polynomial of degree d over a record of length T holds frequencies up to (d + 1) / (2 T).
     """
@@ -88,9 +88,9 @@ def highest_drift(n: int, rate: float, settings) -> int:
 
 
 def hum_frequencies(table, n: int, rate: float, settings) -> tuple[float, ...]:
-    """Harmonics of ``settings.hum_sources`` at which an undamped pole reappears over orders and starts. [Hz]
+    """Harmonics of ``settings.hum_sources`` at which an undamped pole recurs over orders and starts. [Hz]
 
-    Undamped: it decays, or grows, by less than half over the ``n`` samples. ``table`` is a Stabilisation.
+    Undamped: it decays or grows by less than a factor of two over the ``n`` samples. ``table`` is a Stabilisation.
     """
     found: list[float] = []
     for source in settings.hum_sources:
@@ -106,10 +106,10 @@ def hum_frequencies(table, n: int, rate: float, settings) -> tuple[float, ...]:
 
 
 def of_the_blow(frequency: float, theta, decays, rate: float) -> bool:
-    """Whether what sounds at ``frequency`` [Hz] beside the modes ``theta`` (n_mode, 2) begins with every blow alike.
+    """Whether the oscillation at ``frequency`` [Hz] beside the modes ``theta`` (n_mode, 2) starts with every impact.
 
-    Hum does not know when the hammer falls: its phases lie anywhere, those of a lightly damped mode agree (Rayleigh's
-    test at ``CHANCE``; three blows or fewer cannot tell).
+    The phases of hum are random, those of a lightly damped mode agree between impacts. This is Rayleigh's test at
+    ``PHASE_SIGNIFICANCE``; three impacts or fewer are not enough for it.
 
     References
     ----------
@@ -127,9 +127,9 @@ def of_the_blow(frequency: float, theta, decays, rate: float) -> bool:
 
 
 def needed_background(theta, decays, rate, most: Background) -> Background:
-    """The part of ``most`` that is significant beside the modes ``theta`` (n_decay, n_mode, 2).
+    """The part of ``largest`` that is significant beside the modes ``theta`` (n_decay, n_mode, 2).
 
-    Hum by hum, then from no drift upwards: the lowest degree above which nothing is significant.
+    First each hum is tested. The drift gets the lowest degree above which no term is significant.
     """
     n_decay, n = decays.shape
     n_mode = theta.shape[1]

@@ -1,8 +1,6 @@
-"""Method "paper": 200 Hz split, 2 + 2 states, validation fit; kept to compare with, its bias beside it.
+"""Identify modes by the paper's procedure (method "paper"): two filtered bands, a second-order realisation of each.
 
-What the paper's procedure does to a known model: its bias, by simulation at the model just identified.
-
-The paper's procedure: two filtered bands, a second-order realisation of each.
+It exists for comparison. Its bias is simulated at the identified model and reported with the result.
 """
 
 import numpy as np
@@ -19,13 +17,13 @@ from turnout.modal.state_space import assemble, no_decays, no_model
 from turnout.modal.summary import ImpactEstimates
 from turnout.records import ModalModel, Rejection
 
-TOP = 0.45  # of the sampling rate: no filter has its edge beyond
+TOP = 0.45  # highest edge of a filter as a share of the sampling rate
 
 
 def split(records, rate: float, settings) -> tuple[np.ndarray, ...]:
     """Records below and above the split frequency, (n, n_sample) each; filtered over their whole length.
 
-    At a low rate the upper band ends earlier, and without room for it there is only the lower one.
+    At a low sampling rate the upper band ends earlier; if nothing remains of it there is only the lower one.
 
     Butterworth low-pass at ``split_frequency`` and band-pass from there to ``paper_band_high``, forwards and
     backwards if ``paper_zero_phase``. The paper names neither filter nor order nor phase.
@@ -44,7 +42,7 @@ def split(records, rate: float, settings) -> tuple[np.ndarray, ...]:
 
 
 def second_order_mode(decay, rate: float) -> tuple[float, float]:
-    """Frequency [Hz] and damping of the one mode that a square, order-2 realisation finds; nan if it is real.
+    """Frequency [Hz] and damping of the mode of a square, order-2 realisation; nan if its poles are real.
 
     References
     ----------
@@ -55,9 +53,9 @@ def second_order_mode(decay, rate: float) -> tuple[float, float]:
 
 
 def band_modes(records, starts, n: int, rate: float, settings) -> np.ndarray:
-    """(n_band, n_record, 2) frequencies [Hz] and damping ratios of ballast and railpad band, nan where not found.
+    """(n_band, n_record, 2) frequencies [Hz] and damping ratios of ballast and railpad band, nan without a mode.
 
-    ``records`` hold the contact too; ``starts`` say where each decay begins and ``n`` how long it is.
+    ``records`` include the contact. ``starts`` are the first samples of the decays, ``n`` is their length.
     """
     found = np.full((2, len(records), 2), np.nan)
     for i, (record, start) in enumerate(zip(records, starts, strict=True)):
@@ -66,18 +64,18 @@ def band_modes(records, starts, n: int, rate: float, settings) -> np.ndarray:
     return found
 
 
-CONTACT = 1.5e-3
-LEAD = 0.01
-AFTER_CONTACT = 2e-4
+CONTACT = 1.5e-3  # s, mean contact time of the simulated impacts, that of a soft tip
+LEAD = 0.01  # s before contact
+AFTER_CONTACT = 2e-4  # s from the end of contact to the start of the decay
 
 
 def simulated_bias(
     frequency, damping, amplitude, noise: float, n: int, rate: float, settings, bands=("ballast", "railpad")
 ) -> dict:
-    """Bias of the split into two bands on decays of known modes.
+    """Bias of the procedure on decays of known modes.
 
-    Blows of a soft tip (1.5 ms, 8 % spread, start between samples) on a model with these modes, white noise added,
-    through the same filters and realisations.
+    Impacts of a soft tip (1.5 ms, 8 % spread, start between samples) on a model with these modes are simulated, and
+    white noise is added. They pass the same filters and realisations.
 
     Parameters
     ----------
@@ -92,7 +90,7 @@ def simulated_bias(
     rate : float
         [Hz]
     settings : IdentifySettings
-        ``paper_bias_tests`` blows are simulated.
+        ``paper_bias_tests`` impacts are simulated.
     bands : tuple of str
         Which of the two bands the first modes belong to.
 
@@ -100,7 +98,7 @@ def simulated_bias(
     -------
     dict
         For each of ``bands``: ``frequency_percent`` and ``damping_percent``, the mean error over the true value [%],
-        ``found``, the share of blows in which it is found, and ``n``, the blows.
+        ``found``, the share of impacts in which a mode is found, and ``n``, the number of impacts.
     """
     rng = np.random.default_rng(20171001)
     draws = settings.paper_bias_tests
@@ -109,7 +107,7 @@ def simulated_bias(
     lead = round(LEAD * rate)
     time = (np.arange(lead + round((2.0 * CONTACT + AFTER_CONTACT) * rate) + n) - lead) / rate
     time = time - rng.random(draws)[:, None] / rate
-    # The residue that leads to the given amplitude when the decay starts.
+    # The residue that gives this amplitude at the start of the decay.
     turn = 2.0 * np.pi / CONTACT
     spectrum = -np.expm1(-s * CONTACT) / s * 0.5 * turn**2 / (s**2 + turn**2)
     residue = amplitude * np.exp(-s * (CONTACT + AFTER_CONTACT)) / spectrum
@@ -135,7 +133,7 @@ def simulated_bias(
 
 
 def in_words(bias: dict) -> str:
-    """The bias as it is printed beside every result of the paper's procedure.
+    """The bias as a sentence, printed with every result of the paper's procedure.
 
     >>> in_words({"ballast": {"frequency_percent": -10.9, "damping_percent": -10.0, "found": 1.0, "n": 12}})
     'simulated bias of method paper at this model (12 blows): ballast f -10.9 %, zeta -10.0 %, found 100 %'
@@ -149,10 +147,10 @@ def in_words(bias: dict) -> str:
 
 
 def identify_paper(decays, rate: float, settings, receptance=None, leads=None) -> ModalModel:
-    """The paper's procedure with its holes filled as the settings say; see :func:`turnout.modal.identify`.
+    """The paper's procedure; the settings supply what the paper leaves open. See :func:`turnout.modal.identify`.
 
-    ``leads`` are the samples before each decay (pre-trigger and contact), one (n_lead,) array each: the filters
-    run over them too. Without them the filters start at the decay, which adds an error of its own.
+    ``leads`` are the samples before each decay (pre-trigger and contact), one (n_lead,) array each. The filters run
+    over them too. Without them the filters start at the decay, which adds an error.
 
     The result's ``diagnostics`` hold ``simulated_bias`` per band and ``bias_words``, the same to print.
     """
@@ -194,7 +192,7 @@ def _edges(band, settings):
 
 
 def _estimates(found, records, index, settings, receptance):
-    """Second-order estimates of each band over the blows, without errors, for the procedure states none."""
+    """Second-order estimates of each band over the impacts, without errors: the procedure gives none."""
     strength = np.linalg.norm(records, axis=1)
     estimates, rejections = [], []
     for band, values in zip(("ballast", "railpad"), found, strict=True):
@@ -224,7 +222,7 @@ def _amplitude(modes, records, rate):
 
 
 def _bias(selection, modes, amplitude, n, rate, settings):
-    """Simulated at the modes of the joint fit where it has these bands, else at the procedure's own."""
+    """Bias at the modes of the joint fit if it has modes in these bands, else at those of the procedure."""
     truth = {m.band: (m.frequency, m.damping, amplitude[i]) for i, m in enumerate(modes)}
     noise = np.sqrt(selection.fit.sigma2) if selection.fit is not None else 0.0
     if selection.fit is not None:
@@ -243,7 +241,7 @@ def _bias(selection, modes, amplitude, n, rate, settings):
 
 
 def _in_common(estimates, records, index):
-    """Modes and decays of the blows in which every band gave a mode, for the validation fit."""
+    """Modes and decays of the impacts in which every band has a mode, for the validation fit."""
     common = set(index)
     for e in estimates:
         common &= set(e.impact)

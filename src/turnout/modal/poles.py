@@ -1,4 +1,4 @@
-"""Poles of a sampled system and the frequency and damping they stand for."""
+"""Convert between the poles of a sampled system and frequencies and damping ratios."""
 
 import numpy as np
 

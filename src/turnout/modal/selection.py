@@ -1,6 +1,7 @@
-"""Choose the modes that the decays of a test really hold, knowing neither their number nor their frequencies.
+"""Select the modes of a test from its decays without knowing their number or frequencies.
 
-One explanation of the decays of a test (modes, background and noise), and how good it is for its size.
+An explanation of the decays consists of modes, background and noise. Several explanations are compared by the Akaike
+information criterion.
 """
 
 from dataclasses import dataclass, field, replace
@@ -23,16 +24,16 @@ from turnout.modal.noise import (
 )
 from turnout.modal.stabilization import DAMPING, Stabilisation, candidates, likely_poles, stabilisation
 
-NOISE_PASSES = 3
-# Two optima of as many modes differ by more: each residual sum is known to a hundredth.
+NOISE_PASSES = 3  # fits with a new whitening filter
+# Relative difference of residual sums up to which two fits are the same. Two distinct optima differ by more.
 SAME = 1e-4
 
 
 @dataclass
 class Explanation:
-    """``fit`` of the modes ``kept``, beside ``background``, of the decays whitened by ``whitening``.
+    """``fit`` of the modes ``candidates`` and the ``background`` to the decays whitened by ``whitening``.
 
-    ``rejected`` lists the candidates that failed a test; ``fit`` is None if all did.
+    ``rejected`` lists the candidates that failed a test; ``fit`` is None if all failed.
     """
 
     fit: MixedFit | None
@@ -43,7 +44,7 @@ class Explanation:
 
     @property
     def doubtful(self) -> bool:
-        """Noise that is not white or a drift may be what is left of modes that were overlooked."""
+        """Whether there is coloured noise or a drift: it may be the remainder of overlooked modes."""
         return len(self.whitening) > 1 or self.background.drift_degree >= 0
 
 
@@ -57,15 +58,15 @@ def explain(start, decays, rate, background, settings, most=None, heaviest=None,
     rate : float
         [Hz]
     background : Background
-        Of the first fit.
+        Background of the first fit.
     settings : IdentifySettings
-    most : Background, optional
-        What is needed of it, beside the modes of the first fit, replaces ``background``.
-    heaviest : float, optional
+    largest_background : Background, optional
+        The part of it that is significant beside the modes of the first fit replaces ``background``.
+    max_damping : float, optional
         Damping up to which a pole may stay in the fit although it is no mode.
-    known : list of MixedFit, optional
-        First fits of explanations with this ``background``; this one is added. One that is there already is not
-        followed again: ``fit`` is then None.
+    known_fits : list of MixedFit, optional
+        First fits of explanations with this ``background``; this one is added. If it is there already it is not
+        continued: ``fit`` is then None.
     """
     told = Explanation(None, [], background)
     columns = background.columns(decays.shape[1], rate)
@@ -83,12 +84,12 @@ def explain(start, decays, rate, background, settings, most=None, heaviest=None,
 
 
 def _same(fit, other):
-    """Whether two fits of the same decays have settled in the same modes."""
+    """Whether two fits of the same decays have converged to the same modes."""
     return len(fit.mean) == len(other.mean) and abs(fit.rss / other.rss - 1.0) < SAME
 
 
 def _settle_noise(told, decays, rate, settings, heaviest):
-    """Fit the decays whitened by the noise that the last fit left, until its order settles."""
+    """Fit the decays whitened by the residual noise of the last fit, until the order of the noise is constant."""
     columns = told.background.columns(decays.shape[1], rate)
     needed: set = set()
     for _ in range(NOISE_PASSES):
@@ -104,7 +105,7 @@ def _settle_noise(told, decays, rate, settings, heaviest):
 
 
 def polished(told: Explanation, decays, rate) -> Explanation:
-    """The same explanation with its fit iterated until it settles."""
+    """The same explanation with its fit iterated to convergence."""
     if told.fit is None:
         return told
     white = whiten(decays, told.whitening)
@@ -113,17 +114,17 @@ def polished(told: Explanation, decays, rate) -> Explanation:
 
 
 def criterion(told: Explanation, decays) -> float:
-    r"""Akaike information criterion of an explanation: of two, the smaller is the likelier.
+    r"""Akaike information criterion of an explanation: the smaller one is the likelier.
 
     .. math:: N \ln\frac{\sum r^2}{N} + 2 k
 
-    with :math:`N` samples in all. :math:`k` counts modes and noise of the test, amplitudes and background of every
-    decay, and its own modes as far as they are not drawn to the mean. A mode has passed a stricter test of its own,
-    so the criterion need not guard against one too many.
+    with :math:`N` samples in all. :math:`k` counts the modes and noise of the test, and the amplitudes and background
+    of every decay. The modes of single decays count as far as they are not shrunken to the mean. Each mode has passed a
+    stricter test, so the criterion need not prevent a mode too many.
 
     References
     ----------
-    Akaike 1974; number of parameters of a drawn fit after Hodges and Sargent 2001.
+    Akaike 1974; number of parameters of a shrunken fit after Hodges and Sargent 2001.
     """
     fit, order = told.fit, len(told.whitening) - 1
     if fit is None:
@@ -133,25 +134,25 @@ def criterion(told: Explanation, decays) -> float:
     background = told.background.drift_degree + 1 + 2 * len(told.background.hum)
     each = n_decay * (2 * n_mode + background) + float(np.sum(fit.spread / (fit.spread + own)))
     total = n_decay * (decays.shape[1] - order)
-    # Per sample, as whitening costs a few of them.
+    # Per sample, as whitening removes a few of them.
     return decays.size * np.log(fit.rss / total) + 2.0 * (2 * n_mode + order + each)
 
 
-STARTS = (0.0, 5e-4, 1e-3)
-BUILD_DRIFT = 2
-MOST_STARTS = 2
+STARTS = (0.0, 5e-4, 1e-3)  # s, times at which the realisations start
+BUILD_DRIFT = 2  # degree of the drift of the first fit
+MOST_STARTS = 2  # lists of likely poles that are tried
 
 
 @dataclass
 class Selection:
-    """Modes found in a test, the fit that holds them and all others that were looked at.
+    """Modes of a test, their fit, and all rejected candidates.
 
-    ``fit`` is None if nothing was found. Per mode of it: ``presence`` over orders and starts, ``energy`` share,
-    ``chi_squared`` and ``amplitude`` (n_decay, n_mode); ``residual_power`` (n_decay,) is what they leave.
-    ``unfit`` maps modes that stay in the fit but cannot be named to (reason, value, limit).
-    ``others`` are the modes (n_mode, 2) of the explanations that were not chosen.
-    ``rejected`` lists mappings of frequency, damping, reason, value and limit; ``whitening`` and ``background``
-    describe what else was modelled.
+    ``fit`` is None if there are no modes. Per mode of it: ``presence`` over orders and starts, ``energy`` share,
+    ``chi_squared`` and ``amplitude`` (n_decay, n_mode). ``residual_power`` (n_decay,) is the power of the residual.
+    ``failed_tests`` maps modes that stay in the fit but belong to no band to (reason, value, limit).
+    ``rival_modes`` are the modes (n_mode, 2) of the explanations that were not chosen.
+    ``rejected`` lists mappings of frequency, damping, reason, value and limit. ``whitening`` and ``background``
+    describe the rest of the model.
     """
 
     table: Stabilisation
@@ -169,15 +170,15 @@ class Selection:
 
     @property
     def shows(self) -> np.ndarray:
-        """(n_decay, n_mode) bool: the mode shows in this blow by itself, at 1 %."""
+        """(n_decay, n_mode) bool: the mode is significant in this impact alone, at 1 %."""
         return self.chi_squared > chi2.isf(0.01, 2)
 
 
 def select_modes(decays, rate, settings) -> Selection:
-    """Over-ordered realisations, candidate poles, maximum likelihood, and tests that each mode must pass.
+    """Select modes: over-ordered realisations, candidate poles, maximum likelihood, and tests of each mode.
 
-    The first explanation starts from poles that reappear over orders. If it leaves coloured noise or needs a
-    drift, further ones start from :func:`~turnout.modal.stabilization.likely_poles`; the likeliest counts.
+    The first explanation starts from poles that recur over the orders. If it leaves coloured noise or needs a drift,
+    further ones start from :func:`~turnout.modal.stabilization.likely_poles`. The likeliest one is chosen.
 
     Parameters
     ----------
@@ -217,13 +218,13 @@ def select_modes(decays, rate, settings) -> Selection:
 
 
 def _others(told, table, decays, rate, settings):
-    """Explanations by the likeliest poles until one leaves no doubt: without a drift, then with that of ``told``."""
+    """Explanations from the likeliest poles until one is not doubtful: without a drift, then with the one found."""
     hum, drift = told.background.hum, told.background.drift_degree
     for background, most in ((Background(-1, hum), MOST_STARTS), (Background(drift, hum), 1))[: 1 + (drift >= 0)]:
         columns = background.columns(decays.shape[1], rate)
         known: list = []
         for start in likely_poles(table, decays, rate, columns, settings, most):
-            # a pole that may stand for many weak modes stays in the fit, though it is not known well enough for a name
+            # a pole that stands for many weak modes stays in the fit, even if it is too uncertain to be a mode
             other = explain(start, decays, rate, background, settings, heaviest=DAMPING[1], known=known)
             if other.fit is not None:
                 yield other

@@ -1,6 +1,6 @@
-"""Poles of a test over model orders and start samples, and those that reappear.
+"""Compute the poles of a test over model orders and start samples, and find those that recur.
 
-Poles of the realisation whose maximum likelihood fit to what all decays share is likeliest for its size.
+A second list of candidates comes from the order whose maximum likelihood fit to the mean decay is the likeliest.
 """
 
 from dataclasses import dataclass
@@ -13,15 +13,15 @@ from turnout.modal.mixed_effects import fit_common
 from turnout.modal.mode_tests import mode_chi_squared
 from turnout.modal.poles import continuous_pole, modal_parameters
 
-GROWTH = 1.002  # a hum may look as if it grew by this much per sample
+GROWTH = 1.002  # factor per sample by which an oscillation may grow: a hum may seem to grow this much
 
 
 @dataclass(frozen=True)
 class Stabilisation:
     """One row per pole: (n_pole,) ``start`` [samples], ``order``, ``frequency`` [Hz], ``damping`` and two indicators.
 
-    ``energy`` is the share of the mode in the energy of all decays from the start sample on, ``emac`` its extended
-    modal amplitude coherence, 0 to 1: whether the mode does after one decay time what its pole says.
+    ``energy`` is the share of the mode in the energy of all decays from the start sample on. ``emac`` is its extended
+    modal amplitude coherence, 0 to 1: how well the mode after one decay time agrees with its pole.
     """
 
     start: np.ndarray
@@ -35,7 +35,7 @@ class Stabilisation:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A pole that reappears: medians of ``frequency`` [Hz], ``damping``, ``energy``, ``emac``; ``presence`` 0 to 1."""
+    """A pole that recurs: medians of ``frequency`` [Hz], ``damping``, ``energy``, ``emac``; ``presence`` 0 to 1."""
 
     frequency: float
     damping: float
@@ -57,7 +57,7 @@ def stabilisation(decays, rate, rows, order_maximum, starts=(0,)) -> Stabilisati
         [Hz]
     rows, order_maximum : int
     starts : sequence of int
-        Leading samples left out.
+        Numbers of leading samples that are skipped.
     """
     total = float(np.sum(decays**2))
     columns = []
@@ -89,7 +89,7 @@ def amplitude_coherence(shape, z, index) -> np.ndarray:
         Observability of each mode along the rows of the Hankel matrix.
     z : (n_mode,) array of complex
     index : (n_row,) array of int
-        Samples that the rows begin at.
+        Samples at which the rows begin.
 
     References
     ----------
@@ -120,10 +120,10 @@ def _energy(amplitude, z, n):
 
 
 def candidates(table: Stabilisation, tolerance: float, damping_maximum: float) -> list[Candidate]:
-    """Groups of poles that reappear over orders and starts, most energetic first.
+    """Groups of poles that recur over orders and starts, most energetic first.
 
-    Two poles are one mode if they lie closer than ``tolerance`` times their magnitude. ``presence`` counts the
-    cells of orders and starts, from the lowest order on at which the group appears.
+    Two poles are one mode if they are closer than ``tolerance`` times their magnitude. ``presence`` is the share of the
+    pairs of order and start that have the pole, from the lowest order on at which the group occurs.
     """
     plausible = (table.damping > 0.0) & (table.damping < damping_maximum)
     pole = np.full(len(table.frequency), np.nan, dtype=complex)
@@ -153,7 +153,7 @@ def candidates(table: Stabilisation, tolerance: float, damping_maximum: float) -
 
 
 def _fullest_neighbourhood(pole, free, tolerance, table):
-    """Free poles near the one that has most of them about it; ties go to the most energetic."""
+    """Ungrouped poles near the one with the most neighbours; in a tie that of the most energetic."""
     index = np.flatnonzero(free)
     distance = np.abs(pole[index, None] - pole[None, index])
     near = distance < tolerance * np.minimum(np.abs(pole[index, None]), np.abs(pole[None, index]))
@@ -164,16 +164,16 @@ def _fullest_neighbourhood(pole, free, tolerance, table):
     return mask
 
 
-LOWEST_ORDER = 8
-DAMPING = (2e-3, 0.9)
+LOWEST_ORDER = 8  # lowest model order whose poles are fitted
+DAMPING = (2e-3, 0.9)  # damping ratios of usable poles
 
 
 def likely_poles(table: Stabilisation, decays, rate: float, columns, settings, most=1) -> list[list[Candidate]]:
-    """Lists of candidates that need not reappear: poles of one order together, the likeliest first, ``most`` lists.
+    """Up to ``max_lists`` lists of candidates: each has the poles of one order, the likeliest list first.
 
-    The leading right singular vector of the decays is their weighted mean: as long as one decay, with the noise
-    of one, and the signal of all. From the poles of each order it is fitted by maximum likelihood, and modes are
-    dropped, the weakest first, as long as the criterion falls.
+    These poles need not recur. The leading right singular vector of the decays is their weighted mean: as long as one
+    decay, with the noise of one and the signal of all. It is fitted by maximum likelihood from the poles of each order.
+    Modes are dropped, the weakest first, as long as the criterion falls.
 
     Parameters
     ----------
@@ -182,7 +182,7 @@ def likely_poles(table: Stabilisation, decays, rate: float, columns, settings, m
     rate : float
         [Hz]
     columns : (n_column, n) array of float
-        Background.
+        Columns of the background.
     settings : IdentifySettings
     """
     _, size, shape = np.linalg.svd(decays, full_matrices=False)
@@ -195,7 +195,7 @@ def likely_poles(table: Stabilisation, decays, rate: float, columns, settings, m
         start = np.stack([np.log(table.frequency[here]), table.damping[here]], axis=1)
         found.append(_thinned(start, shared, rate, columns))
     found.sort(key=lambda item: item[0])
-    # two orders that end in the same optimum agree to more digits than two optima ever do
+    # orders with the same optimum agree to more digits than two different optima
     lists = {round(value, 2): poles for value, poles in found if len(poles)}
     return [_as_candidates(poles, shared, rate, columns, len(table.order)) for poles in list(lists.values())[:most]]
 
@@ -210,7 +210,7 @@ def _as_candidates(poles, shared, rate, columns, n_pole):
 
 
 def _thinned(theta, shared, rate, columns):
-    """(criterion, modes) where dropping the least significant mode no longer helps."""
+    """(criterion, modes) at which dropping the least significant mode no longer reduces the criterion."""
     n = shared.size
     best, poles = np.inf, theta[:0]
     while len(theta):

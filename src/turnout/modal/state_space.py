@@ -1,6 +1,6 @@
-"""Put modes, their residues and what is told about them together into a modal model.
+"""Assemble modes, residues and diagnostics into a modal model with a state space.
 
-State-space pairs in the balanced form in which the paper prints its models.
+The state-space pairs have the balanced form in which the paper prints its models.
 """
 
 import numpy as np
@@ -42,7 +42,7 @@ def balanced_pair(pole: complex, residue: complex) -> tuple[np.ndarray, np.ndarr
     a = np.array([[pole.real, -pole.imag], [pole.imag, pole.real]])
     c = np.sqrt(2.0) * np.array([root.real, -root.imag])
     gramian = solve_discrete_lyapunov(a.T, np.outer(c, c))
-    # diag(1, -1) survives hyperbolic rotations only: turn until the observability Gramian is diagonal.
+    # Only hyperbolic rotations preserve diag(1, -1): rotate until the observability Gramian is diagonal.
     turn = -0.5 * np.arctanh(2.0 * gramian[0, 1] / (gramian[0, 0] + gramian[1, 1]))
     rotation = np.array([[np.cosh(turn), np.sinh(turn)], [np.sinh(turn), np.cosh(turn)]])
     a = np.linalg.solve(rotation, a @ rotation)
@@ -78,13 +78,13 @@ def assemble(
     modes : tuple of Mode
         Their campaign values, in the order of the state vector.
     residues : (n_mode,) array of complex
-        Of the response that ``b`` stands for, which ``scale`` names.
-    scored : (theta, records)
-        Modes (n_impact, n_mode, 2) and decays (n_impact, n) that the held-out fit is over.
+        Residues of the response that ``scale`` names; ``b`` follows from them.
+    validation_set : (theta, records)
+        Modes (n_impact, n_mode, 2) and decays (n_impact, n) of the held-out fit.
     rate : float
         [Hz]
     settings : IdentifySettings
-    rest
+    model_fields
         ``rejections``, ``rejected_modes``, ``stabilisation`` of the model.
     """
     a, b, c = block_model([discrete_pole(m.frequency, m.damping, rate) for m in modes], residues)
@@ -123,6 +123,6 @@ def no_model(rate, method, rejections, diagnostics, **extras) -> ModalModel:
 
 
 def no_decays(rate, method, dropped) -> ModalModel:
-    """A rejected model, for there is no decay that can be used; ``dropped`` are (impact, Rejection)."""
+    """A rejected model without a usable decay; ``dropped`` are (impact, Rejection)."""
     found = Rejection("not_identified", 0, 1, "no decay is long enough" if dropped else "no decays")
     return no_model(rate, method, (found, *(r for _, r in dropped)), {"dropped_impacts": tuple(dropped)})

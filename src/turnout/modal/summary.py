@@ -1,9 +1,4 @@
-"""Mean over blows with its interval, and the spread between blows beyond their own error.
-
-Modes of single blows, and the campaign value with interval that they add up to.
-
-Cramér-Rao bound of frequencies and damping ratios for the decays that were used.
-"""
+"""Summarise a mode over the impacts: mean with interval, spread between impacts, Cramér-Rao bound."""
 
 from dataclasses import dataclass, field
 
@@ -17,7 +12,7 @@ from turnout.records import Mode
 
 @dataclass(frozen=True)
 class Summary:
-    """``mean`` ± ``se`` with interval ``low`` to ``high``, between-blow standard deviation ``spread``, ``n`` blows."""
+    """``mean`` ± ``se``, interval ``low`` to ``high``, standard deviation ``spread`` between ``n`` impacts."""
 
     mean: float
     se: float
@@ -33,8 +28,8 @@ def summarise(value, se, confidence: float = 0.95, choice: float = 0.0) -> Summa
     .. math:: m = \frac{\sum w_i x_i}{\sum w_i}, \quad w_i = \frac{1}{s_i^2 + \tau^2}, \quad
               \mathrm{se}^2 = \frac{\sum w_i (x_i - m)^2}{(n-1) \sum w_i}, \quad m \pm t_{n-1}\,\mathrm{se}
 
-    The standard error comes from the spread of the estimates, not from their stated errors, so it holds if
-    those are wrong by a common factor. With equal errors this is the t interval. A single estimate keeps its own
+    The standard error comes from the spread of the estimates, not from their stated errors. So it is right even if
+    those are wrong by a common factor. With equal errors this is the t interval. A single estimate has its stated
     error and a normal interval.
 
     Parameters
@@ -42,8 +37,8 @@ def summarise(value, se, confidence: float = 0.95, choice: float = 0.0) -> Summa
     value, se : (n,) array of float
         Estimates and standard errors, same unit; ValueError if there are none.
     confidence : float
-    choice : float
-        Standard error that all estimates share, such as that of the choice of a model; no blow shows it.
+    shared_se : float
+        Standard error that all estimates share, such as that of the choice of a model. The spread does not show it.
 
     References
     ----------
@@ -72,17 +67,16 @@ def summarise(value, se, confidence: float = 0.95, choice: float = 0.0) -> Summa
     return Summary(mean, error, float(mean - half), float(mean + half), float(np.sqrt(spread2)), n)
 
 
-NEXT_TO_NOTHING = 1e-12
+NEXT_TO_NOTHING = 1e-12  # stands for an unknown standard error: the spread between impacts then is all the error
 
 
 @dataclass(frozen=True)
 class ImpactEstimates:
-    """One mode in several blows: ``impact`` (n,) numbers, ``estimate`` and ``error`` (n, 2) of ln f [Hz] and zeta.
+    """One mode in several impacts: ``impact`` (n,) numbers, ``estimate`` and ``error`` (n, 2) of ln f [Hz] and zeta.
 
-    An error of nan is one that nobody knows, and becomes None; all that blows differ by counts as their spread then.
-
-    ``strength`` (n,) is the norm of each decay; ``bound`` (2,) the Cramér-Rao bound, None where unknown;
-    ``choice`` (2,) the error of the choice among explanations, which all blows share.
+    An error of nan is unknown and becomes None; the whole difference between impacts then counts as spread.
+    ``strength`` (n,) is the norm of each decay, ``bound`` (2,) the Cramér-Rao bound, None where unknown.
+    ``shared_se`` (2,) is the error of the choice between explanations, common to all impacts.
     """
 
     band: str
@@ -110,10 +104,10 @@ class ImpactEstimates:
         ]
 
     def mode(self, confidence: float) -> Mode:
-        """Random-effects mean over the blows; the frequency is summarised in its logarithm.
+        """Random-effects mean over the impacts; for the frequency that of its logarithm.
 
-        Weights follow the strength of each blow. Its stated error would not do: a noisy blow's error follows its
-        own estimate, and weighing by it would favour one side.
+        The weights follow the strength of each impact, not its stated error. The error of a noisy impact depends on
+        its estimate, so weighting by it would bias the mean.
         """
         error = np.median(self.error * self.strength[:, None], axis=0) / self.strength[:, None]
         error = np.nan_to_num(error, nan=NEXT_TO_NOTHING) if len(error) > 1 else error
@@ -151,15 +145,15 @@ def cramer_rao_bound(theta, decays, rate, sigma2, columns=None):
     Parameters
     ----------
     theta : (n_decay, n_mode, 2) array of float
-        True (or estimated) ln f [Hz] and zeta of each decay; the bound is for their common mean if they agree.
+        True (or estimated) ln f [Hz] and zeta of each decay. The bound is for their common mean if they agree.
     decays : (n_decay, n) array of float
-        They only set the amplitudes.
+        They set the amplitudes only.
     rate : float
         [Hz]
     sigma2 : float or (n_decay,) array
         Variance of the white noise of each decay.
     columns : (n_column, n) array of float, optional
-        What has to be estimated too, free in each decay: drift, hum.
+        Drift and hum that are estimated too, free in each decay.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""One recording in, one passage out: axles, speed, direction, track, type, and everything that is wrong with it."""
+"""Analyse one recording of a passage: axles, speed, direction, track, train type, and whatever is wrong with it."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from turnout.passage.train_detection import hearing, listen, narrowed, track_tak
 from turnout.passage.train_type import UNKNOWN
 from turnout.records import Recording, Rejection
 
-SHORT_SPAN, PLACE_ALONE = 10.0, 0.3  # m: sensors closer together than this, and how far off each may hear a wheel
-SHORTEST = 0.1  # s: two blocks over which a level is taken
-CLEAR = 1.5  # least ratio between accepted and refused peaks of an unknown train
+SHORT_SPAN, PLACE_ALONE = 10.0, 0.3  # m: span of a short row of sensors; position error of each in it
+SHORTEST = 0.1  # s, least duration of a recording: two blocks of the quiet level
+CLEAR = 1.5  # least ratio of accepted to rejected peaks of an unknown train
 
 
 def analyse(recording: Recording, sensors, patterns, settings) -> Passage:
@@ -32,9 +32,9 @@ def analyse(recording: Recording, sensors, patterns, settings) -> Passage:
     Parameters
     ----------
     recording : Recording
-        Channels of accelerations; others are left alone.
+        Channels of acceleration; other channels are ignored.
     sensors : sequence of PassageSensor
-        What the channels are; channels without a sensor are left alone.
+        What the channels are; channels without a sensor are ignored.
     patterns : sequence of Pattern
         Axle patterns of known trains, may be empty.
     settings : PassageSettings
@@ -42,7 +42,7 @@ def analyse(recording: Recording, sensors, patterns, settings) -> Passage:
     Returns
     -------
     Passage
-        "rejected" where no axle was found, "partly" where something is wrong and part of it is sound.
+        "rejected" where no axle was found, "partly" where only a part of the passage can be used.
     """
     recording, pulses = without_pulses(recording, sensors)
     states = {s.name: s for s in channel_states(recording)}
@@ -71,7 +71,10 @@ def analyse(recording: Recording, sensors, patterns, settings) -> Passage:
 
 
 def _with_silent(passage, heard, used, lost):
-    """The passage with the sensors that fell silent: they say nothing about the train, but can be fitted up to then."""
+    """Passage completed with the sensors that were lost: they say nothing about the train.
+
+    Their data up to that moment can still be fitted.
+    """
     side = [i for i, s in enumerate(used) if s.track in ("both", passage.track)]
     times = {used[i].name: passage.motion.passing(passage.offsets, used[i].position) for i in side}
     wrong = {f.detail.split(":")[0] for f in passage.findings}
@@ -92,7 +95,7 @@ def _with_silent(passage, heard, used, lost):
 
 
 def _of_train(heard, used, track, findings, duration, patterns, settings) -> Passage:
-    """The train that the sensors ``used`` hear."""
+    """Passage of the train that ``sensors`` record."""
     several, direction, every = bool(np.ptp(heard.positions) > 0.05), "unknown", heard
     if several:
         heard, used, direction, counted = _by_several(heard, used, findings, patterns, settings)
@@ -110,13 +113,14 @@ def _of_train(heard, used, track, findings, duration, patterns, settings) -> Pas
 
 
 def _by_several(heard, used, findings, patterns, settings):
-    """(heard, used, direction, (motion, count, type)) of sensors along the rail.
+    """(envelopes, sensors, direction, (motion, axle finding, type)) from several sensors along the rail.
 
-    Sensors that agree on no motion go into ``findings``, unless a known train's bangs explain what they hear.
+    Sensors that agree on no motion go into ``findings``. They do not if a known train's impacts at a nose explain the
+    data.
     """
     trouble, own, start, direction = _agreeing(heard, used, settings)
     counted = best_count(own[0], aligned(own[0], start), np.ptp(heard.positions), patterns, settings)
-    accused = bool(trouble) and heard_at_once(heard, start) > -AT_ONCE  # blows at one moment look like wrong clocks
+    accused = bool(trouble) and heard_at_once(heard, start) > -AT_ONCE  # impacts at one moment look like wrong clocks
     if counted[1] is None or counted[2].type == UNKNOWN or accused:
         banging = at_a_nose(heard, patterns, settings)
         if banging is not None:
@@ -126,7 +130,7 @@ def _by_several(heard, used, findings, patterns, settings):
 
 
 def _doubts(passage, heard, several) -> list[Rejection]:
-    """What speaks against the number of axles of a train without template."""
+    """Reasons to doubt the number of axles of a train without template."""
     clear, found = CLEAR if several else 2.0 * CLEAR, []
     if passage.contrast < clear:
         text = f"{passage.n_axle} axles, but the weakest peak is only {passage.contrast:.2f} times the next one"
@@ -138,7 +142,7 @@ def _doubts(passage, heard, several) -> list[Rejection]:
 
 
 def _agreeing(heard, used, settings):
-    """(what does not agree, (heard, used) of the sensors that agree on a motion, that motion, its direction)."""
+    """(findings on inconsistent sensors, (envelopes, sensors) of the consistent ones, their motion, its direction)."""
     found, keep = wrong_channels(heard, used, settings)
     used, heard = [s for s, k in zip(used, keep) if k], heard.only(np.flatnonzero(keep))
     start, direction = _from_scan(heard, settings)
@@ -151,10 +155,10 @@ def _agreeing(heard, used, settings):
 
 
 def _from_scan(heard, settings):
-    """First motion and the direction's name from the slant stack."""
+    """First motion, and the name of its direction, from the slant stack."""
     scan = scan_slowness(heard.levels.values, heard.levels.step, heard.positions, settings)
     values, step, positions = heard.levels.values, heard.levels.step, heard.positions
-    # a wheel is heard over about a third of a metre
+    # a wheel is audible over about a third of a metre
     near = [n for n, _ in scan.peaks(3)]
     pairs = pair_likeness(values, step, float(np.clip(0.3 * abs(near[0]), 0.004, 0.03)))
     found = [refine_slowness(pairs, step, positions, n) for n in near]
@@ -170,9 +174,9 @@ def _from_scan(heard, settings):
 
 
 def _settled(heard, used, start, offer, found, settings, several) -> Passage:
-    """Motion from sensors and template together, axle offsets on its scale, times at the sensors."""
+    """Passage with motion from sensors and template together: axle offsets on its scale, times at the sensors."""
     motion, offsets = start, offer.offsets
-    # a few metres of sensors, and nothing else that tells: where each of them hears a wheel decides
+    # a short row of sensors and no template: the position error of each sensor decides
     alone = several and found.type == UNKNOWN and np.ptp(heard.positions) < SHORT_SPAN
     place_error = PLACE_ALONE if alone else settings.place_error
     for _ in range(2):
@@ -184,7 +188,7 @@ def _settled(heard, used, start, offer, found, settings, several) -> Passage:
         if found.type != UNKNOWN:
             from_type = (found.middle, found.middle_se, found.acceleration, found.acceleration_se, middle)
         if from_sensors is None and from_type is None:
-            # an unknown train on one sensor: its bogies give the speed to a sixth
+            # an unknown train at one sensor: its bogies give the speed to one sixth
             from_type = (motion.speed, 0.16 * motion.speed, 0.0, 0.3, middle)
         speed = combine(from_sensors, from_type, middle)
         settled = abs(speed.at(centre[0]) / motion.speed - 1) < 2e-3
@@ -199,7 +203,7 @@ def _settled(heard, used, start, offer, found, settings, several) -> Passage:
 
 
 def _sensor_speed(times, heard, direction, place_error, settings):
-    """(v, se, a, a_se, time) from delays between sensors; None where too few axles are heard at two sensors."""
+    """(v, se, a, a_se, time) from delays between sensors; None where fewer than two axles have times at two sensors."""
     good = np.isfinite(times)
     axles = good.sum(axis=0) >= 2
     if axles.sum() < 2:
@@ -213,9 +217,9 @@ def _sensor_speed(times, heard, direction, place_error, settings):
 
 
 def _cut_off(heard, passage, duration):
-    """Findings where the train is already or still there at an end of the recording."""
+    """Findings where the train is present at the start or at the end of the recording."""
     found = []
-    # another bogie of an unknown train may come as far behind as its bogies are apart
+    # an unknown train may have a further bogie, as far away as its bogies are from each other
     gap = 3.0 if passage.type.type != UNKNOWN else 1.05 * max(np.diff(passage.offsets).max(initial=3.0), 3.0)
     reach = gap / passage.motion.speed
     first = min(t[0] for t in passage.at_sensor.values())

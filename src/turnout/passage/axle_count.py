@@ -1,4 +1,7 @@
-"""How many axles: the count whose places fit a train that is known, else the one with the clearest cut."""
+"""Count the axles of a train.
+
+The count whose positions fit a known train is taken, else the one with the largest contrast.
+"""
 
 from __future__ import annotations
 
@@ -13,18 +16,18 @@ from turnout.passage.sensor_stack import counts, template_counts
 from turnout.passage.template_match import known_train
 from turnout.passage.train_type import UNKNOWN, find_type, unknown_evidence
 
-COMBS, PEAKS = 3, 3  # sensors up to which a known train is sought by its comb, and from which on by common peaks
-USUAL_SPEED = 25.0  # m/s, where nothing but the bogies tells it; a factor of 1.8 is one standard deviation
-BEYOND = 25.0  # m, a train is heard before its first axle and after its last one together
-SHORT = 0.3  # m, that two sensors close to each other may hear a wheel off its place
-PLACE_SE = 0.05  # m, of an axle placed by the level around it; measured against the simulation
+COMBS, PEAKS = 3, 3  # most sensors of a search by comb, least sensors of one by peaks
+USUAL_SPEED = 25.0  # m/s, prior where only the bogies show the speed; sd is a factor of 1.8
+BEYOND = 25.0  # m, audible before the first and behind the last axle together
+SHORT = 0.3  # m, position error of a wheel at each of two sensors close together
+PLACE_SE = 0.05  # m, error of a fitted axle position; from simulated passages
 
 
 def best_count(heard, motion, span, patterns, settings):
-    """(motion, count, type): the count whose axles fit a template, else the one with the clearest cut.
+    """(motion, axle finding, type): the count whose axles fit a template, else the one with the largest contrast.
 
-    With few sensors a template is sought by its comb, else first among the cuts between peaks, then among the rows of
-    vehicles that collect most of the profile.
+    With few sensors a template is matched by its comb. With more sensors the cuts between peaks are tried first. Then
+    the rows of vehicles that collect most of the profile are tried.
     """
     error = motion.speed * np.sqrt(2.0) * max(2 * settings.place_error, _reach(span)) / max(span, 0.1)
     error = min(error, 0.25 * motion.speed)
@@ -32,10 +35,10 @@ def best_count(heard, motion, span, patterns, settings):
         known = known_train(heard, _near(motion, heard, 3.0 * error), patterns, settings)
         if known is not None:
             return known
-        # a cut between the peaks of one or two may fit a template by chance
+        # a cut between the peaks of one or two sensors may fit a template by chance
         patterns = patterns if len(heard.positions) >= PEAKS else ()
     offers = [o for o in counts(heard, motion, settings)[:8] if len(o.offsets) >= 2]
-    # a guess, which is said to be one, still leaves direction, track and speed
+    # a guess, reported as such, still leaves direction, track and speed
     offers = [o for o in offers if o.contrast >= 1.15] or offers[:1]
     best, first = _first_named(heard, motion, offers, error, patterns, settings)
     if best is None and patterns:
@@ -45,7 +48,7 @@ def best_count(heard, motion, span, patterns, settings):
 
 
 def _near(motion, heard, reach):
-    """Motions at speeds within ``reach`` [m/s] of a known one that bring the train's middle past at the same time."""
+    """Motions at speeds within ``reach`` [m/s] of a given one, with the train's middle at the same time."""
     middle = 0.5 * (heard.begin + heard.end)
     speed = float(motion.speed_at(middle))
     low, high = max(speed - reach, 0.75 * speed), min(speed + reach, 1.3 * speed)
@@ -54,12 +57,12 @@ def _near(motion, heard, reach):
 
 
 def _reach(span):
-    """How far off a sensor may hear a wheel [m]: many metres of sensors average it out."""
+    """Position error of a wheel at one sensor [m]: a long row of sensors averages it out."""
     return SHORT if span < 10.0 else 0.1
 
 
 def _first_named(heard, motion, offers, error, patterns, settings):
-    """First (count, type) that fits a template, and the first that was looked at; None where there is none."""
+    """First (axle finding, type) that fits a template, and the first one tried; None where there is none."""
     first, tried = None, set()
     for offer in offers:
         key = tuple(np.round(offer.offsets, 1))
@@ -76,19 +79,25 @@ def _first_named(heard, motion, offers, error, patterns, settings):
 
 
 def _covers(heard, motion, offsets) -> bool:
-    """Whether axles reach along all that is heard; a few of a longer train's would fit a shorter one by chance."""
+    """Whether the axles reach along the whole audible length.
+
+    A few axles of a longer train would fit a shorter one by chance.
+    """
     heard_length = motion.way(heard.end) - motion.way(heard.begin) - np.ptp(heard.positions)
     return bool(offsets[-1] - offsets[0] + BEYOND >= 0.9 * heard_length)
 
 
 def _placed(heard, motion, offer):
-    """The offer with its axles placed by the whole level around them, and as its peaks have it."""
+    """The axles with positions fitted to the level around them, and then as given by the peaks."""
     yield replace(offer, offsets=axle_places(heard, motion, offer.offsets))
     yield offer
 
 
 def count_without_distance(heard, patterns, settings):
-    """(motion, count, type) from one sensor: a known train at any speed, else the speed that makes the best bogies."""
+    """(motion, axle finding, type) from one sensor.
+
+    A known train is sought at any speed. Else the speed is taken that makes the most plausible bogies.
+    """
     known = known_train(heard, at_all_speeds(heard.begin, settings), patterns, settings)
     if known is not None:
         return known

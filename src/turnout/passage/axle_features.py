@@ -1,4 +1,4 @@
-"""Axles in the train's own coordinate: all sensors laid on top of each other along the train."""
+"""Find axles in the coordinate along the train, where the records of all sensors lie upon each other."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from scipy import ndimage, signal
 
 from turnout.passage.kinematics import Motion
 
-GRID = 0.04  # m
+GRID = 0.04  # m, step of the grid along the train
 
 
 @dataclass(frozen=True)
 class AxleFinding:
     """``offsets`` (n_axle,) [m] behind the stack's origin, ``height`` (n_axle,) of the peaks.
 
-    ``contrast`` is the weakest accepted peak over the strongest refused one: near 1 the count is a guess.
+    ``contrast`` is the weakest accepted peak over the strongest rejected one: near 1 the count is a guess.
     """
 
     offsets: np.ndarray
@@ -26,7 +26,7 @@ class AxleFinding:
 
 
 def along_train(values, step: float, positions, motion: Motion, start: float, stop: float) -> np.ndarray:
-    """(n_sensor, n) values at every ``GRID`` metres along the train between ``start`` and ``stop`` [m]."""
+    """(n_sensor, n) values at every ``GRID_STEP`` metres along the train between ``start`` and ``stop`` [m]."""
     offsets = np.arange(start, stop, GRID)
     bins = np.arange(values.shape[1])
     rows = [
@@ -37,11 +37,11 @@ def along_train(values, step: float, positions, motion: Motion, start: float, st
 
 
 def axle_candidates(profile, start: float, spacing: float, noise: float, feature: str = "", n: int = 4):
-    """Up to ``n`` counts of the peaks of ``profile`` (n,), the one with the clearest cut first.
+    """Up to ``n`` counts of the peaks of ``profile`` (n,), the one with the largest contrast first.
 
-    Peaks are at least ``spacing`` metres apart; what counts is the lesser of prominence and twice the height, and it
-    must exceed ``noise``. The cut lies where the ratio between neighbouring ranks is large, and never so high that
-    it would drop peaks of more than 60 % of the typical one.
+    Peaks are at least ``spacing`` metres from each other. The lesser of prominence and twice the height must exceed
+    ``noise``. The cut lies where the ratio between neighbouring ranks is large. It never rejects peaks of more than 60
+    % of the typical height.
     """
     peaks, found = signal.find_peaks(profile, distance=max(int(spacing / GRID), 1), prominence=0.2 * noise)
     height = np.minimum(found["prominences"], 2.0 * profile[peaks])
@@ -70,16 +70,16 @@ def _refined(profile, peaks):
 
 
 def level_feature(stack) -> np.ndarray:
-    """Levels along the train with everything longer than a bogie taken off: a peak per wheel, any load."""
+    """Levels along the train without everything longer than a bogie: one peak per wheel, at any load."""
     return _smooth(stack, 0.2) - _smooth(stack, 0.9)
 
 
 def deflection_feature(stack, wavenumber: float = 1.1) -> np.ndarray:
-    r"""Low-frequency acceleration along the train, sharpened to a peak per wheel; its sign is found here.
+    r"""Low-frequency acceleration along the train, sharpened to one peak per wheel; its sign is found here.
 
-    A wheel leaves v² w'' of the rail on its foundation, :math:`w'' \propto e^{-k|x|} (\sin k|x| - \cos kx)`,
+    A wheel causes v² w'' of the rail on its foundation, :math:`w'' \propto e^{-k|x|} (\sin k|x| - \cos kx)`,
     k near 1 per metre for standard rails on ballast. The regularised inverse of that kernel is applied, then a
-    Gaussian of 0.25 m. Wheels press one way: the sign is that of the larger skewness.
+    Gaussian of 0.25 m. Wheels press in one direction: the sign is that of the larger skewness.
     """
     x = np.arange(-4.0, 4.0 + GRID / 2, GRID)
     kx = wavenumber * np.abs(x)
@@ -99,10 +99,10 @@ def _smooth(profile, width):
 
 
 def scaled(profile, inside) -> tuple[np.ndarray, float]:
-    """Profile over its own large values within the train, and its noise on that scale.
+    """Profile divided by its own large values within the train, and its noise on that scale.
 
-    The noise is the standard deviation that the quietest 30 % of the values would have if they were normal: between
-    the wheels, where most of a train is.
+    The noise is the standard deviation that the quietest 30 % of the values would have if they were normal. They lie
+    between the wheels, which is most of a train.
     """
     top = np.quantile(profile[inside], 0.98) if inside.any() else 0.0
     if top <= 0:

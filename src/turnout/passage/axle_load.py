@@ -1,4 +1,4 @@
-r"""Axle load from the quasi-static part: the rail's moving deflection, calibrated on trains of known weight."""
+"""Estimate axle loads from the quasi-static deflection of the rail, calibrated on trains of known weight."""
 
 from __future__ import annotations
 
@@ -10,18 +10,19 @@ from scipy import signal
 
 from turnout.passage.axle_features import GRID, along_train
 
-STEP = 0.001  # s
-HEARD = 0.3  # largest standard error of a train's amplitude, relative to it: beyond, its logarithm is no number
-TRUSTED = (0.12, 0.9)  # cycles per metre that are compared: longer ones drown in drift, shorter ones in vibration
+STEP = 0.001  # s, bins of the slow acceleration
+HEARD = 0.3  # relative standard error of an amplitude; above it the logarithm has no normal error
+TRUSTED = (0.12, 0.9)  # cycles per metre: below is drift, above is vibration
 
 
 @dataclass(frozen=True)
 class LoadCalibration:
     r"""Amplitude per load of one channel: :math:`\ln(A / P) = \ln k + \gamma \ln(v / v_0)`.
 
-    ``log_gain`` and ``exponent`` (near 2: acceleration is v² w'') with their ``covariance`` (2, 2), ``scatter`` of one
-    train about it (relative), ``n`` trains, ``speed`` v_0 [m/s] and the range of speeds ``slowest``, ``fastest``;
-    ``shared`` is the correlation of its errors with those of the other channels, 1 where nobody measured it.
+    ``log_gain`` and ``exponent`` (near 2: acceleration is v² w'') have the ``covariance`` (2, 2). ``scatter`` is the
+    relative scatter of one train about it, ``n`` the number of trains. ``speed`` is v_0 [m/s]; ``slowest`` and
+    ``fastest`` limit the speeds [m/s]. ``shared`` is the correlation of its errors with those of the other channels,
+    1 where it is not measured.
     """
 
     log_gain: float
@@ -37,7 +38,7 @@ class LoadCalibration:
 
 @dataclass(frozen=True)
 class LoadFinding:
-    """Mean axle load with standard error [t], and ``per_axle`` (n_axle,) [t] relative to it, rougher."""
+    """Mean axle load with standard error [t], and ``per_axle`` (n_axle,) [t], which is less accurate."""
 
     mean: float
     se: float
@@ -48,8 +49,8 @@ def quasi_static(samples, rate: float, passage, position: float) -> np.ndarray:
     r"""(n_axle,) amplitude of each axle in the slow acceleration at one sensor, positive for a load. [m/s²]
 
     Least squares of :math:`\sum_j A_j (v_j/v_0)^2 \kappa(s - d_j)`, κ the curvature of a rail on an elastic foundation
-    with wavenumber 1.1 per metre, both data and κ limited to ``TRUSTED`` wavelengths along the train; v_j is the speed
-    of axle j at the sensor and v_0 that of the motion, which a calibration knows.
+    with wavenumber 1.1 per metre. Data and κ are both limited to ``WAVENUMBER_BAND`` along the train. v_j is the speed
+    of axle j at the sensor; v_0 is the speed of the motion, which is that of the calibration.
     """
     per_bin = max(round(STEP * rate), 1)
     n = len(samples) // per_bin
@@ -69,7 +70,7 @@ def quasi_static(samples, rate: float, passage, position: float) -> np.ndarray:
 def train_amplitude(per_axle) -> tuple[float, float]:
     """Mean of ``quasi_static`` (n_axle,) and its standard error, both signed like a load; inf from a single axle.
 
-    A slow train leaves less than the noise: v² w''. Its axles then differ by more than loads do, and say so.
+    A slow train causes less than the noise, by v² w''. Its axles then differ by more than loads do; the error shows it.
 
     >>> mean, se = train_amplitude([1.0, 1.2, 0.8, 1.0])
     >>> print(f"{mean:.2f} ± {se:.2f}")
@@ -82,7 +83,7 @@ def train_amplitude(per_axle) -> tuple[float, float]:
 
 
 def calibrate(amplitudes, loads, speeds, fewest: int = 5, errors=None) -> LoadCalibration | None:
-    """Calibration of one channel from trains of known mean axle load; None from fewer than ``fewest`` trains.
+    """Calibration of one channel from trains of known mean axle load; None from fewer than ``min_trains``.
 
     Parameters
     ----------
@@ -92,9 +93,9 @@ def calibrate(amplitudes, loads, speeds, fewest: int = 5, errors=None) -> LoadCa
         [t]
     speeds : (n_train,) array of float
         [m/s]
-    fewest : int
+    min_trains : int
     errors : (n_train,) array of float or None
-        Standard errors of the amplitudes; trains with more than ``HEARD`` of their amplitude do not count. [m/s²]
+        Standard errors of the amplitudes; trains above ``MAX_AMPLITUDE_ERROR`` do not count. [m/s²]
     """
     amplitudes, loads, speeds = (np.asarray(x, dtype=float) for x in (amplitudes, loads, speeds))
     amplitudes = np.abs(amplitudes)
@@ -105,7 +106,7 @@ def calibrate(amplitudes, loads, speeds, fewest: int = 5, errors=None) -> LoadCa
     reference = float(np.exp(np.mean(np.log(speeds[good]))))
     relative = np.log(speeds[good] / reference)
     target = np.log(amplitudes[good] / loads[good])
-    # acceleration goes with v²; trains of one speed cannot say otherwise
+    # acceleration goes with v²; trains of one speed cannot show anything else
     prior = np.array([[0.0, 0.0], [0.0, 1 / 0.3**2]])
     scatter, own = 0.05, (errors[good] / amplitudes[good]) ** 2
     design = np.column_stack([np.ones(good.sum()), relative])
@@ -114,7 +115,7 @@ def calibrate(amplitudes, loads, speeds, fewest: int = 5, errors=None) -> LoadCa
         normal = (design * weight[:, None]).T @ design + prior
         solution = np.linalg.solve(normal, design.T @ (weight * target) + prior @ [0.0, 2.0])
         residual = target - design @ solution
-        # what the trains' own errors leave over, weighted as the fit is
+        # variance beyond the trains' own errors, weighted as the fit is
         excess = np.sum(weight * (residual**2 * good.sum() / max(good.sum() - 2, 1) - own)) / weight.sum()
         scatter = float(np.sqrt(max(excess, 1e-6)))
     low, high = speeds[good].min(), speeds[good].max()
@@ -125,9 +126,9 @@ def calibrate(amplitudes, loads, speeds, fewest: int = 5, errors=None) -> LoadCa
 
 
 def with_shared(calibrations, trains) -> dict[str, LoadCalibration]:
-    """The ``calibrations`` by channel, with the correlation of what each train leaves of them in any two channels.
+    """The ``calibrations`` by channel, with the correlation of the trains' residuals in any two channels.
 
-    A wrong speed, frozen ballast and the train's own roughness are the same in all sensors: more of them do not help.
+    A wrong speed, frozen ballast and the train's own roughness are the same in all sensors: more sensors do not help.
     ``trains`` are dicts with "load" [t], "speed" [m/s] and "amplitudes", channel -> (mean, standard error) [m/s²].
     """
     left = {name: [_left(found, train, name) for train in trains] for name, found in calibrations.items()}
@@ -141,7 +142,7 @@ def with_shared(calibrations, trains) -> dict[str, LoadCalibration]:
 
 
 def _left(found, train, name):
-    """Residual of one train in one channel, in deviations; None where it did not count."""
+    """Residual of one train in one channel, in standard deviations; None where the train did not count."""
     mean, error = np.abs(train["amplitudes"].get(name, (0.0, 0.0)))
     if mean == 0.0 or train["load"] <= 0.0 or error > HEARD * mean:
         return None

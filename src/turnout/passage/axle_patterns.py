@@ -1,4 +1,4 @@
-"""Trains as rows of vehicles, each with its axles: what an axle pattern is compared with."""
+"""Describe trains as rows of vehicles with their axles: the templates that an axle pattern is compared with."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Vehicle:
-    """``length`` over couplers and the place of each axle from the front coupler. [m]"""
+    """``length`` over couplers and the position of each axle behind the front coupler. [m]"""
 
     name: str
     length: float
@@ -29,7 +29,7 @@ class Vehicle:
         return self.length - self.axles[-1]
 
     def reversed(self) -> Vehicle:
-        """Running the other way round; itself where it is symmetric to a millimetre."""
+        """The vehicle in the other direction; itself where it is symmetric to a millimetre."""
         turned = tuple(round(self.length - x, 4) for x in reversed(self.axles))
         if np.allclose(turned, self.axles, atol=1e-3):
             return self
@@ -62,26 +62,26 @@ class Group:
 
 @dataclass(frozen=True)
 class Pattern:
-    """One way a ``type`` of train may be made up: groups one after the other, front first."""
+    """One composition of a ``type`` of train: groups one after the other, front first."""
 
     type: str
     groups: tuple[Group, ...]
 
     def reversed(self) -> Pattern:
-        """The same train running the other way."""
+        """The same train in the other direction."""
         groups = tuple(
             Group(tuple(v.reversed() for v in g.vehicles), g.minimum, g.maximum) for g in reversed(self.groups)
         )
         return Pattern(self.type, groups)
 
     def only_row(self):
-        """(0.0, vehicles, 0.0) where there is nothing to choose, else None."""
+        """(0.0, vehicles, 0.0) where the pattern has one composition only, else None."""
         if any(len(g.vehicles) > 1 or g.minimum != g.maximum for g in self.groups):
             return None
         return 0.0, tuple(v for g in self.groups for v in g.vehicles * g.minimum), 0.0
 
     def following(self, g: int, count: int):
-        """(group, how many of it are then used) of the next vehicle, behind ``count`` vehicles of group ``g``."""
+        """(group, vehicles used of it) of each possible next vehicle behind ``count`` vehicles of group ``g``."""
         if count < self.groups[g].maximum:
             yield g, count + 1
         if count >= self.groups[g].minimum:
@@ -91,17 +91,17 @@ class Pattern:
                     return
 
     def may_end(self, g: int, count: int) -> bool:
-        """Whether the train may end behind ``count`` vehicles of group ``g``."""
+        """Whether the train can end behind ``count`` vehicles of group ``g``."""
         return count >= self.groups[g].minimum and all(group.minimum == 0 for group in self.groups[g + 1 :])
 
     def lengths(self) -> tuple[float, float]:
-        """Least and largest length over couplers. [m]"""
+        """Smallest and largest length over couplers. [m]"""
         lengths = [[v.length for v in g.vehicles] for g in self.groups]
         low = sum(min(x) * g.minimum for x, g in zip(lengths, self.groups))
         return low, sum(max(x) * g.maximum for x, g in zip(lengths, self.groups))
 
     def axle_counts(self) -> tuple[int, int]:
-        """Least and largest number of axles."""
+        """Smallest and largest number of axles."""
         return self._axle_counts
 
     @cached_property
@@ -111,7 +111,7 @@ class Pattern:
 
     @cached_property
     def log_choices(self) -> list[float]:
-        """Logarithm of the number of vehicles that each group leaves to choice."""
+        """Logarithm of the number of vehicles that each group offers."""
         return [float(np.log(len(g.vehicles))) for g in self.groups]
 
     @cached_property
@@ -134,12 +134,11 @@ def offsets(vehicles) -> np.ndarray:
 
 
 def read_patterns(document: Mapping) -> tuple[Pattern, ...]:
-    """Patterns of all train types of a document with ``vehicles`` and ``trains``; both directions of running.
+    """Patterns of all train types of a document with ``vehicles`` and ``trains``, in both directions.
 
-    A train is ``units``: a list whose items name a vehicle, or say ``any: [names]`` with ``count: [least, most]``;
-    a name ending in ``'`` is the vehicle turned round. ``coupled`` is the largest number of whole units in a train,
-    ``type`` what it is called where that is not its own name.
-    KeyError names a vehicle that is not described.
+    A train is ``units``: a list whose items name a vehicle, or give ``any: [names]`` with ``count: [least, most]``.
+    A name ending in ``'`` is the reversed vehicle. ``coupled`` is the largest number of whole units in a train.
+    ``type`` is the train type where that is not the train's own name. KeyError names a vehicle that is not described.
     """
     vehicles = {name: Vehicle.of(name, values) for name, values in document["vehicles"].items()}
     patterns: list[Pattern] = []

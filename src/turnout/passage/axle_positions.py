@@ -1,6 +1,6 @@
-"""Where each axle is in the train, from the whole shape of the level around it.
+"""Fit the position of each axle in the train to the level around it.
 
-When each axle passes each sensor, from that sensor's own record.
+From one sensor's own record the same fit gives the times at which the axles pass that sensor.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from turnout.passage.axle_features import GRID, along_train
 from turnout.passage.kinematics import Motion
 from turnout.passage.sensor_stack import Listening
 
-REACH = 2.0  # m either side of an axle that is compared
-ROUND = 0.12  # m: a wheel's contact with sleepers and patch rounds the cusp
-MOST = 0.6  # m that an axle may move
-APART = 3.5  # m from which on two axles are placed one by one
-EVERY = 2  # points of the grid that are compared
+REACH = 2.0  # m compared on either side of an axle
+ROUND = 0.12  # m: contact patch and sleepers round the cusp at a wheel
+MOST = 0.6  # m that an axle may move in the fit
+APART = 3.5  # m: axles further from each other are fitted one by one
+EVERY = 2  # every second point of the grid is compared
 
 
 def axle_places(listening: Listening, motion: Motion, offsets) -> np.ndarray:
@@ -23,9 +23,9 @@ def axle_places(listening: Listening, motion: Motion, offsets) -> np.ndarray:
 
     .. math:: L(s) = \ln\Bigl(1 + \sum_j e^{\alpha_j - 2 r_j/\ell}\Bigr), \qquad r_j = \sqrt{(s - d_j)^2 + \rho^2}
 
-    Power dies away from a wheel at the same rate either way; powers of wheels add. Peaks of a sharpened profile are
-    pushed apart within a bogie and follow a few speckles each; here 4 m of record speak for every axle. An axle that
-    would move more than 0.6 m stays where it was.
+    Power decays from a wheel at the same rate in both directions; powers of wheels add. Peaks of a sharpened profile
+    are biased outwards within a bogie, and each depends on little data. Here 4 m of record determine each axle. An
+    axle that would move more than 0.6 m stays where it was.
     """
     offsets = np.asarray(offsets, dtype=float)
     start, stop = offsets[0] - REACH, offsets[-1] + REACH
@@ -43,7 +43,7 @@ def axle_places(listening: Listening, motion: Motion, offsets) -> np.ndarray:
 
 
 def _fitted(place, level, x, n, passes=15):
-    """(n,) places by Levenberg and Marquardt from ``x``: places, heights, logarithm of the decay length."""
+    """(n,) positions by Levenberg and Marquardt from ``x``: positions, heights, logarithm of the decay length."""
     misfit, jacobian = _model(place, level, x, n)
     square, damping = misfit @ misfit, 1e-2
     for _ in range(passes):
@@ -66,7 +66,7 @@ def _fitted(place, level, x, n, passes=15):
 
 
 def _model(place, level, x, n):
-    """Misfit (n_place,) and its derivatives (n_place, 2 n + 1)."""
+    """Misfit (n_grid,) and its derivatives (n_grid, 2 n + 1)."""
     distance = place[:, None] - x[:n]
     r, length = np.hypot(distance, ROUND), np.exp(x[-1])
     u = np.exp(np.minimum(x[n:-1] - 2.0 * r / length, 50.0))
@@ -77,7 +77,7 @@ def _model(place, level, x, n):
 
 
 def sensor_times(listening: Listening, motion: Motion, offsets) -> np.ndarray:
-    """(n_sensor, n_axle) passing times [s], nan where a sensor puts an axle far from where the others do."""
+    """(n_sensor, n_axle) passing times [s]; nan where a sensor's axle position deviates much from the common one."""
     rows = []
     for i, x in enumerate(listening.positions):
         places = axle_places(listening.only([i]), motion, offsets)

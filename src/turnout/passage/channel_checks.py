@@ -1,10 +1,8 @@
-"""What each channel of a passage is worth before anything is sought in it.
+"""Check each channel of a passage before axles are sought in it.
 
-Electrical pulses: what all sensors of a turnout show at one moment did not come along the rail.
-
-The fastest wave in a rail takes 0.4 ms from one sensor to the next two metres on, a wheel 100 times as long.
-
-Sensors that stop hearing the train before it is past: they fell off, or their cable broke.
+Electrical pulses are removed: they appear at all sensors at one moment. The fastest wave in a rail takes 0.4 ms over
+the two metres between neighbouring sensors, and a wheel takes 100 times as long. Sensors that are lost during the
+passage are reported: they fell off, or their cable broke.
 """
 
 from __future__ import annotations
@@ -19,7 +17,10 @@ from turnout.records import Recording, Rejection
 
 @dataclass(frozen=True)
 class ChannelState:
-    """``usable`` for timing and axles; ``sound`` also for fits. ``until`` [s] is where a lost sensor fell silent."""
+    """``usable`` for timing and axles; ``fit_for_model`` also for fits of a model.
+
+    ``lost_at`` [s] is the time at which a lost sensor became constant.
+    """
 
     name: str
     usable: bool
@@ -55,10 +56,10 @@ def _state(channel, samples, rate) -> ChannelState:
 
 
 def clipped_share(samples, limit: float | None, run: int = 3) -> tuple[float, float]:
-    """Share of samples at the rail, and the rail. [-], [m/s²]
+    """Share of samples at the limit of the channel, and that limit. [-], [m/s²]
 
-    At the configured ``limit`` (within 0.1 %), or, where none is given, at an extreme value that is repeated
-    ``run`` times in a row at least twice: noise does not do that, a converter at its end does.
+    The limit is the configured one (within 0.1 %). Without one it is an extreme value that is repeated ``run`` times
+    in a row, at least twice: noise does not do that, a saturated converter does.
 
     >>> y = np.sin(np.linspace(0, 20, 400))
     >>> share, level = clipped_share(np.clip(y, -0.8, 0.8), None)
@@ -79,9 +80,9 @@ def clipped_share(samples, limit: float | None, run: int = 3) -> tuple[float, fl
 
 
 def silent_from(samples, rate: float, block: float = 0.05) -> float | None:
-    """Time from which a channel is constant up to its end [s], None where it lives to the end.
+    """Time from which a channel is constant up to its end [s], None where it changes to the end.
 
-    A sensor that already stood there before the train, within one step of its converter, is quiet and not lost.
+    A sensor that had this value before the train as well, within one step of its converter, is quiet and not lost.
 
     >>> y = np.sin(np.arange(100.0))
     >>> silent_from(np.r_[y, np.full(900, 0.1)], 1000.0), silent_from(np.r_[np.zeros(60), y, np.zeros(900)], 1000.0)
@@ -97,21 +98,21 @@ def silent_from(samples, rate: float, block: float = 0.05) -> float | None:
 
 
 def converter_step(samples) -> float:
-    """Smallest change from one sample to the next: a converter's step, or next to nothing; 0 where nothing changes."""
+    """Smallest change from one sample to the next: a converter's step, or nearly 0; 0 where nothing changes."""
     change = np.abs(np.diff(samples))
     return float(np.min(change, where=change > 0, initial=np.inf)) if change.any() else 0.0
 
 
-TIMES = 8.0  # a pulse is so many times what a thousandth of a channel's samples exceed
-SAME, APART = 2e-4, 2.0  # s within which, and m over which, it is heard everywhere
-AROUND, LONGEST = 3e-3, 1e-2  # s: a filter's ringing on both sides of a pulse, and the longest that is one
+TIMES = 8.0  # least height of a pulse, in units of the 99.9 % quantile of the channel
+SAME, APART = 2e-4, 2.0  # s: largest delay between sensors; m: least span of the sensors
+AROUND, LONGEST = 3e-3, 1e-2  # s: filter ringing on both sides of a pulse; longest pulse
 
 
 def without_pulses(recording: Recording, sensors) -> tuple[Recording, tuple[Rejection, ...]]:
-    """The recording with straight lines in place of its electrical pulses, and what was found.
+    """The recording with straight lines in place of its electrical pulses, and the findings.
 
-    ``sensors`` are PassageSensors; nothing is cut where those that live are less than 2 m apart. A channel that is
-    dead or not finite is left as it is and has no say.
+    ``sensors`` are PassageSensors. Nothing is cut where the live ones are less than 2 m from each other. A channel
+    that is constant or not finite stays as it is and is not asked.
     """
     places = {s.name: s.position for s in sensors}
     rows = [i for i, c in enumerate(recording.channels) if c.name in places and _lives(recording.samples[i])]
@@ -139,7 +140,7 @@ def _lives(samples) -> bool:
 
 
 def _regions(shared, rate):
-    """((n_sample,) bool to cut, number of pulses): pulses with their ringing, none that lasts too long."""
+    """((n_sample,) bool to cut, number of pulses): pulses with their ringing; longer events are not pulses."""
     label, _n = ndimage.label(ndimage.maximum_filter1d(shared, 2 * round(AROUND * rate) + 1))
     runs = ndimage.find_objects(label)
     short = [run for (run,) in runs if run.stop - run.start <= (LONGEST + 2 * AROUND) * rate]
@@ -149,16 +150,16 @@ def _regions(shared, rate):
     return cut, len(short)
 
 
-FAINT = 0.2  # of a sensor's usual level at an axle, in logarithms: below it the axle is not heard
-REACH = 0.5  # m around the place of an axle
+FAINT = 0.2  # of a sensor's typical log level at axles: below it an axle is not audible
+REACH = 0.5  # m around an axle in which its level is taken
 
 
 def fell_silent(heard, names, at_sensor, speed: float) -> list[Rejection]:
-    """A finding "sensor_lost" for every sensor that hears the first half of the train and not its last two axles.
+    """A finding "sensor_lost" for every sensor that records the first half of the train and not its last two axles.
 
     Parameters
     ----------
-    heard : Listening
+    envelopes : SensorEnvelopes
         Levels of the sensors ``names``, in that order.
     names : sequence of str
     at_sensor : mapping
@@ -169,7 +170,7 @@ def fell_silent(heard, names, at_sensor, speed: float) -> list[Rejection]:
     Returns
     -------
     list of Rejection
-        With the time of the last sound as their value. [s]
+        With the time of the last audible sample as their value. [s]
     """
     step, found = heard.levels.step, []
     reach = max(int(REACH / speed / step), 1)

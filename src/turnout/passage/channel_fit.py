@@ -1,4 +1,4 @@
-"""The identified model of a section against one sensor's record of a passage, with everything that judges it."""
+"""Fit the identified model of a section to one sensor's record of a passage, and test the fit."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from turnout.passage.wheel_basis import band_pass, filtered, wheel_basis
 from turnout.records import ModalModel
 
 ACCEPTED, NULL, NOT_AN_IMPULSE, REJECTED = "accepted", "null_explains", "not_an_impulse", "rejected"
-LEAD = 0.25  # s kept before the first wheel: the band-pass settles in it
+LEAD = 0.25  # s before the first wheel, in which the band-pass settles
 
 
 @dataclass(frozen=True)
@@ -25,8 +25,8 @@ class ChannelFit:
 
     ``times`` (n_wheel,) [s] of the impacts with ``times_se`` and ``ambiguous`` flags; ``amplitudes`` (n_wheel,)
     along b with ``amplitudes_se`` [m/s² per unit of b c]; ``test`` the chi-squared test per wheel; ``scores`` of the
-    model, ``null`` band of random models, ``others`` the forecast skill of other sections' models by name; ``ceiling``
-    the fit that noise alone would leave [%]; ``peak`` [m/s²] of the band-passed acceleration;
+    model, ``null`` band of random models, ``other_skills`` the forecast skill of other sections' models by name;
+    ``max_fit`` the fit that noise alone would leave [%]; ``peak`` [m/s²] of the band-passed acceleration;
     ``parameters_per_second``.
     """
 
@@ -47,7 +47,7 @@ class ChannelFit:
 
     @property
     def skill(self) -> float:
-        """How far the forecast reaches from its null (0) to what the noise allows (1)."""
+        """Forecast skill on a scale from its null (0) to the limit set by the noise (1)."""
         if self.null is None or self.scores is None:
             return float("nan")
         return (self.scores.forecast - self.null.forecast) / (self.ceiling - self.null.forecast)
@@ -69,24 +69,24 @@ def fit_channel(samples, rate: float, axle_times, speed: float, model: ModalMode
     model : ModalModel
         Of the sensor's section.
     settings : PassageSettings
-    others : mapping or None
-        Name -> ModalModel of other sections, whose forecast skill is told beside.
-    nulls : bool
-        Also score random models. Without them "null_explains" cannot be said.
+    other_models : mapping or None
+        Name -> ModalModel of other sections, whose forecast skill is given for comparison.
+    with_null : bool
+        Also score random models. Without them "null_explains" cannot result.
 
     Returns
     -------
     ChannelFit
     """
     samples = np.asarray(samples, dtype=float)
-    samples = samples - np.median(samples)  # the filters start from zero: an offset would ring in them as a blow
+    samples = samples - np.median(samples)  # the filters start from zero: an offset would act as an impact
     part, expected = _cut(samples, rate, axle_times, settings)
     if expected.size < 2:
         return ChannelFit(REJECTED, "fewer than two wheels with a whole window in the recording")
     through = band_pass(settings.band_low, settings.band_high, settings.filter_order, rate)
     data = filtered(part, through)
     quiet = _quiet(samples, rate, axle_times, speed)
-    least = converter_step(samples) / np.sqrt(12.0)  # a record that is quiet within one step has this noise at least
+    least = converter_step(samples) / np.sqrt(12.0)  # a record constant within one step has at least this noise
     if not least > 0.0:
         return ChannelFit(REJECTED, "it never changes")
     basis = _basis(model, rate, settings)
@@ -100,7 +100,7 @@ def fit_channel(samples, rate: float, axle_times, speed: float, model: ModalMode
     found = joint_fit(data, times.times, basis)
     offset = _offset(samples, rate, axle_times)
     noise = float(np.std(filtered(quiet, through)[int(0.02 * rate) :])) if quiet.size > 0.1 * rate else float("nan")
-    within = np.sqrt(2.0 * (min(settings.band_high, rate / 2) - settings.band_low) / rate)  # of a white noise's own
+    within = np.sqrt(2.0 * (min(settings.band_high, rate / 2) - settings.band_low) / rate)  # of white noise in the band
     noise = max(noise, least * within)
     window = np.concatenate([data[int(t) : int(t + settings.score_window * rate)] for t in expected + late])
     status, detail = _judged(scores, null, test, settings)
@@ -123,22 +123,22 @@ def fit_channel(samples, rate: float, axle_times, speed: float, model: ModalMode
 
 
 def _offset(samples, rate, axle_times) -> float:
-    """Start of the part that is looked at. [s]"""
+    """Start of the excerpt that is analysed. [s]"""
     return max(int((np.min(axle_times) - LEAD) * rate), 0) / rate
 
 
 def _cut(samples, rate, axle_times, settings):
-    """The part of the record with the train in it, and the axle times in its samples."""
+    """The excerpt of the record with the train in it, and the axle times in its samples."""
     start = round(_offset(samples, rate, axle_times) * rate)
     stop = min(int((np.max(axle_times) + settings.score_window + 0.2) * rate), len(samples))
     expected = np.sort(np.asarray(axle_times, dtype=float)) * rate - start
-    room = (settings.time_search + settings.delay_search) * rate  # a wheel may be heard that much earlier
+    room = (settings.time_search + settings.delay_search) * rate  # a wheel may appear that much earlier
     inside = (expected > room + 2) & (expected < stop - start - settings.score_window * rate)
     return samples[start:stop], expected[inside]
 
 
 def _quiet(samples, rate, axle_times, speed):
-    """Record far from any wheel (15 m, half a second at least): before the train or after it, the longer part."""
+    """Record at least 15 m and 0.5 s from any wheel: before or after the train, whichever is longer."""
     away = max(15.0 / speed, 0.5) * rate
     before = samples[: max(int(np.min(axle_times) * rate - away), 0)]
     after = samples[int(np.max(axle_times) * rate + away) :]
@@ -158,10 +158,10 @@ def _impacts(part, expected, quiet, speed, model, rate, settings, least) -> tupl
 
 
 def _judged(scores, null, test, settings) -> tuple[str, str]:
-    """Status and why: first whether the null explains the scores, then whether the load was an impulse.
+    """Status and reason: first whether the null explains the scores, then whether the load was an impulse.
 
-    The chi-squared test alone cannot say that: at 40 dB it fails for a model 5 % off in one resonance, whose fit is
-    97 %. What a load that is no impulse leaves is jumps that point anywhere.
+    The chi-squared test alone cannot show that. At 40 dB it fails for a model 5 % off in one resonance, whose fit is
+    97 %. A load that is no impulse leaves jumps in all directions.
     """
     if null is not None and not (scores.fit > null.fit and scores.forecast > null.forecast):
         return (
@@ -174,7 +174,7 @@ def _judged(scores, null, test, settings) -> tuple[str, str]:
 
 
 def _basis(model, rate, settings):
-    """``wheel_basis`` behind the band-pass; the same few models come with every passage and are kept."""
+    """``wheel_basis`` behind the band-pass. It is cached: the same few models are used for every passage."""
     parts = tuple(np.ascontiguousarray(x, dtype=float).tobytes() for x in (model.a, model.b, model.c))
     return _kept_basis(parts, len(np.atleast_1d(model.b)), model.rate, rate, settings)
 

@@ -1,4 +1,4 @@
-"""Clusters of like passages: found from the data, numbered so that a cluster keeps its name."""
+"""Group similar passages into clusters, found from the data and numbered so that a cluster keeps its id."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy import optimize, stats
 
-FLOOR = np.array([0.01, 0.02])  # least standard deviations: ln(speed), ln(load)
+FLOOR = np.array([0.01, 0.02])  # least standard deviations of ln(speed) and ln(load)
 
 
 @dataclass(frozen=True)
@@ -28,9 +28,9 @@ class Cluster:
 
 @dataclass(frozen=True)
 class Clusters:
-    """A fitted set. New passages are assigned to it; it changes only when it is fitted again.
+    """A fitted set of clusters. New passages are assigned to it; it changes only when it is fitted again.
 
-    ``used`` maps a type to the highest number that a cluster of it ever had: those of a traffic that ended among them.
+    ``used`` maps a type to the highest number that a cluster of it ever had, also of traffic that has ended.
     """
 
     version: int
@@ -43,9 +43,9 @@ class Clusters:
         return max([self.used.get(train_type, 0), *there])
 
     def assign(self, train_type, speed_kmh, axle_load_t, level: float = 1e-4) -> str | None:
-        """Id of the cluster that a passage most likely belongs to; None where it lies outside all of its type.
+        """Id of the cluster that a passage most likely belongs to; None where it lies outside all clusters of its type.
 
-        Outside: further from every cluster than a share ``level`` of its members would be.
+        Outside: only a share below ``level`` of a cluster's members would be so far from it.
         """
         if train_type is None or speed_kmh is None:
             return None
@@ -94,7 +94,7 @@ def fit_clusters(passages: Sequence[Mapping], settings, previous: Clusters | Non
         With train_type, speed_kmh, axle_load_t (may be None).
     settings : PassageSettings
     previous : Clusters or None
-        A cluster nearest to one of these keeps its id; new ones get numbers that were never used.
+        A cluster nearest to one of these keeps its id; new clusters get new numbers.
 
     Returns
     -------
@@ -144,8 +144,10 @@ def _mixture(points, settings):
 
 
 def _named(type_, parts, n, old, fresh):
-    """Clusters with ids: those of the nearest old ones where they are nearer than two of their deviations, else
-    numbers from ``fresh`` on."""
+    """Clusters with ids: that of the nearest previous cluster where it is nearer than two of its standard deviations.
+
+    The others get numbers from ``next_number`` on.
+    """
     ids = {}
     if old and len(old[0].mean) == len(parts[0][1]):
         distance = np.array(

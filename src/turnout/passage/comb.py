@@ -1,11 +1,10 @@
-r"""How much of what sensors hear one row of axles explains, if every axle sounds alike: a comb with a free tooth.
+r"""Explain the sensor envelopes by one row of axles that all sound alike: a comb with a free tooth.
 
 .. math:: y_i(s) = \sum_j k_i(s - d_j) + e
 
-The tooth k_i, what sensor i hears of one wheel within ``HALF`` metres, is estimated from the recording itself, for
-every row of axles anew: a blow at a crossing's nose, a weld, the sleepers' places are in it. Nothing is cut into peaks.
-
-Whether the vehicles of a row stand as the template has them: their axles moved alike in every vehicle of a kind.
+The tooth k_i is what sensor i records of one wheel within ``TOOTH_HALF_WIDTH`` metres. It is estimated from the
+recording, for every row of axles again. So it contains impacts at a crossing's nose, welds and sleeper positions.
+Nothing is cut into peaks. A fit of the vehicles' shape moves their axles alike in every vehicle of one type.
 """
 
 from __future__ import annotations
@@ -15,13 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg, ndimage
 
-STEP = 0.2  # m
-HALF = 2.4  # m either side of a wheel: shorter than a bogie and the gap behind it, or a tooth could be a bogie
-TAPS = 25  # 2 HALF / STEP + 1
-WIDE = 2.5  # m, standard deviation of what is taken off as slow
-STIFF = 0.03  # ridge on the tooth, of its own power
-LEAD, TAIL = 12.0, 24.0  # m kept before and after what is heard
-ALIKE = 0.5  # m, over which what a comb leaves over hangs together
+STEP = 0.2  # m, step of the grid along the train
+HALF = 2.4  # m either side of a wheel: less than bogie and gap, else a tooth could be a bogie
+TAPS = 25  # 2 TOOTH_HALF_WIDTH / COMB_STEP + 1
+WIDE = 2.5  # m, standard deviation of the slow part that is subtracted
+STIFF = 0.03  # ridge on the tooth, relative to its own power
+LEAD, TAIL = 12.0, 24.0  # m kept before and after the audible length
+ALIKE = 0.5  # m, correlation length of the residual of a comb
 
 
 @dataclass(frozen=True)
@@ -48,11 +47,11 @@ class Comb:
 
 @dataclass(frozen=True)
 class Profiles:
-    """What each sensor hears along the train in each of some ``motions`` (n_motion,), on a grid of ``STEP`` metres.
+    """Record of each sensor along the train for some ``motions`` (n_motion,), on a grid of ``COMB_STEP`` metres.
 
-    ``values`` (n_sensor, n_motion, n) start ``LEAD`` metres before what is heard begins; ``spectra`` are their
-    transforms, ``power`` (n_motion,) the sum of their squares, ``length`` (n_motion,) the metres that are heard,
-    ``origin`` (n_motion,) [m] where in the motion's own coordinate the hearing begins.
+    ``values`` (n_sensor, n_motion, n) start ``LEAD_LENGTH`` metres before the audible part. ``spectra`` are their
+    transforms, ``power`` (n_motion,) the sum of their squares, ``length`` (n_motion,) the audible metres.
+    ``origin`` (n_motion,) [m] is the start of the audible part in the motion's own coordinate.
     """
 
     motions: tuple
@@ -74,7 +73,7 @@ def profiles_at(listening, motions) -> Profiles:
     step, amplitude, positions = listening.levels.step, listening.levels.amplitude, listening.positions
     ends = np.array([[m.way(t) for t in (listening.begin, listening.end)] for m in motions])
     middle = np.array([m.direction * np.mean(positions) for m in motions])
-    origin, length = ends[:, 0] - middle, np.maximum(ends[:, 1] - ends[:, 0], 0.0)  # 0: it would have turned back
+    origin, length = ends[:, 0] - middle, np.maximum(ends[:, 1] - ends[:, 0], 0.0)  # 0: the train would have reversed
     n = int((length.max() + LEAD + TAIL) / STEP) + 1
     values = np.zeros((len(positions), len(motions), n))
     edges = np.arange(amplitude.shape[1] + 1) * step
@@ -85,7 +84,7 @@ def profiles_at(listening, motions) -> Profiles:
             borders = motion.passing(origin[k] - LEAD + (np.arange(m + 1) - 0.5) * STEP, x)
             mean = np.diff(np.interp(borders, edges, total)) / np.maximum(np.diff(borders), 1e-9)
             values[i, k, :m] = mean - ndimage.gaussian_filter1d(mean, WIDE / STEP)
-    # every sensor counts alike, however loud it is
+    # every sensor has the same weight, at any level
     values /= np.maximum(np.sqrt(np.mean(values**2, axis=2, keepdims=True)), 1e-12)
     size = 2 ** int(np.ceil(np.log2(n + TAPS + 8)))
     power = np.maximum(np.sum(values**2, axis=(0, 2)), 1e-12)
@@ -95,7 +94,7 @@ def profiles_at(listening, motions) -> Profiles:
 def explained(profiles: Profiles, comb: Comb, rows, every: int = 1):
     """(n_row, n_start) share of the profiles' power that the comb explains in the motions ``rows``, and the starts [m].
 
-    The start is where the first axle lies, in metres behind the beginning of what is heard.
+    A start is the position of the first axle, in metres behind the beginning of the audible part.
     """
     size, half = 2 * (profiles.spectra.shape[2] - 1), TAPS // 2
     teeth = np.fft.rfft(comb.teeth, size).conj()
@@ -112,14 +111,17 @@ def explained(profiles: Profiles, comb: Comb, rows, every: int = 1):
 
 
 def evidence(share, length, n_sensor: int):
-    r"""Logarithm of how much likelier the profile is with the comb than without: :math:`-\frac n2 \ln(1 - R^2)` less
-    what the free numbers of the teeth gain by chance (Schwarz). ``share`` is R², ``length`` [m] what is heard."""
+    r"""Log Bayes factor of the comb against no comb: :math:`-\frac n2 \ln(1 - R^2)` less the Schwarz penalty.
+
+    The penalty is what the free numbers of the teeth gain by chance. ``share`` is R², ``length`` [m] the audible
+    length.
+    """
     n = np.maximum(length / ALIKE, 2.0) * n_sensor
     return -0.5 * n * np.log(np.maximum(1.0 - share, 1e-6)) - 0.5 * TAPS * n_sensor * np.log(n)
 
 
 def teeth_of(profiles: Profiles, comb: Comb, start: float):
-    """(n_sensor, TAPS) tooth of each sensor, (n_sensor, n) what the comb leaves over; ``profiles`` of one motion."""
+    """(n_sensor, N_TAPS) tooth of each sensor, (n_sensor, n) residual of the comb; ``profiles`` of one motion."""
     size, half = 2 * (profiles.spectra.shape[2] - 1), TAPS // 2
     at = round((start + LEAD) / STEP)
     teeth, rest = [], []
@@ -134,30 +136,30 @@ def teeth_of(profiles: Profiles, comb: Comb, start: float):
     return np.array(teeth), np.array(rest)
 
 
-STRIDES = (0.24, 0.12, 0.06, 0.03)  # m
-BOGIE = 3.6  # m, axles closer than this are also moved against each other
-WORTH = 1e-4  # share of the power that a move must explain
-STARTS = np.arange(-2, 3) * STEP  # m by which the whole row may move
+STRIDES = (0.24, 0.12, 0.06, 0.03)  # m, by which axles are moved, coarse to fine
+BOGIE = 3.6  # m: axles of one bogie are also moved against each other
+WORTH = 1e-4  # least gain of the explained share by a move
+STARTS = np.arange(-2, 3) * STEP  # m by which the whole row may be shifted
 
 
 def reshaped(profiles: Profiles, vehicles, places, start: float, reach: float = 0.6):
-    """(places, share before, share after): ``places`` changed until the comb explains most, alike in all vehicles.
+    """(positions, share before, share after): ``positions`` moved until the comb explains most, alike in all vehicles.
 
-    A train without template that looks like a known one differs from it in every vehicle: wheelbases, pivots. That
-    shows here when the axles, each by itself, hide it: the tooth, estimated with them, blurs until they seem in place.
+    A train without template that resembles a known one differs in wheelbases or pivots of every vehicle. Axles that
+    move one by one do not show that: the estimated tooth becomes wider until they seem to be right.
 
     Parameters
     ----------
     profiles : Profiles
         Of one motion.
     vehicles : sequence of Vehicle
-        The row, its axles at ``places``.
-    places : (n_axle,) array of float
+        The row, its axles at ``positions``.
+    positions : (n_axle,) array of float
         Metres behind the first axle.
     start : float
-        Of the first axle, from where the hearing begins. [m]
+        Of the first axle, behind the beginning of the audible part. [m]
     reach : float
-        By how much an axle may move at most. [m]
+        Largest move of an axle. [m]
     """
     kinds = [(v.name, i) for v in vehicles for i in range(len(v.axles))]
     names = list(dict.fromkeys(kinds))
@@ -180,7 +182,7 @@ def reshaped(profiles: Profiles, vehicles, places, start: float, reach: float = 
 
 
 def _moves(vehicles, names):
-    """Each axle of a kind by itself, neighbours in a bogie against each other, and both bogies of a vehicle wider."""
+    """Moves of each axle of a vehicle type: alone, against its neighbour in a bogie, and bogies against each other."""
     index, moves = {name: k for k, name in enumerate(names)}, list(np.eye(len(names)))
     for v in {v.name: v for v in vehicles}.values():
         own = np.array([index[v.name, i] for i in range(len(v.axles))])
@@ -198,7 +200,7 @@ def _moves(vehicles, names):
 
 
 def _share(profiles, places, start):
-    """Share of the power that a comb at ``places`` explains, at the best of a few starts near ``start``."""
+    """Share of the power that a comb at ``positions`` explains, at the best of a few starts near ``start``."""
     first = places[0]
     if not np.all(np.diff(places) > 0.5):
         return -np.inf
@@ -209,7 +211,7 @@ def _share(profiles, places, start):
     for values in profiles.values[:, 0]:
         padded = np.pad(values, (TAPS, TAPS + comb.teeth.size))
         for k, shift in enumerate(STARTS):
-            # whole steps: the tooth takes up the rest
+            # whole steps: the tooth takes up the remainder
             at = round((start + first + shift + LEAD) / STEP) + TAPS
             found = comb.teeth[teeth] @ padded[at + teeth[:, None] + lags]
             total[k] += found @ comb.inverse @ found

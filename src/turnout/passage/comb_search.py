@@ -1,6 +1,6 @@
-"""Which known train, at which speed: combs of all rows of vehicles laid along what is heard, the likeliest first.
+"""Search the known train and its speed: combs of all rows of vehicles are fitted, and the likeliest row is taken.
 
-Whether as much is heard before or behind a row of axles as along it: then the train is longer than the row.
+A row is rejected where the sensors record as much before or behind it as along it: the train is longer than the row.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ from turnout.passage.comb import Comb, evidence, explained, profiles_at, teeth_o
 from turnout.passage.kinematics import Motion
 from turnout.passage.vehicle_sequence import likeliest_row
 
-NEAR, FAR = 5.0, 27.0  # m beyond the last wheel: where the wheels of any vehicle coupled there would be
-# Of the mean amplitude along the row, that tells another vehicle from the sound ahead of the wheels: 68 simulated cases
-# of one sensor leave 0.21 at most where nothing more runs; a locomotive's bogies are at least 0.75 as loud as coaches'.
+NEAR, FAR = 5.0, 27.0  # m beyond the last wheel, where wheels of a further vehicle would be
+# Share of the mean amplitude along the row above which a further vehicle runs there. In 68 simulated cases of one
+# sensor it is at most 0.21 without one; the bogies of a locomotive have at least 0.75 of the amplitude of coaches.
 AS_LOUD = 0.6
 
 
 def goes_on(heard, motion, first: float, length: float) -> bool:
-    """Whether the sensors hear more than ``AS_LOUD`` times the row's own amplitude beyond either of its ends.
+    """Whether the sensors record more than ``MIN_BEYOND_AMPLITUDE`` times the row's own amplitude beyond either end.
 
-    A row that is a part of the train fits that part as well as the train's own row does, and better where the rest
-    sounds otherwise: coaches without the locomotive before them.
+    A row that is a part of the train fits that part as well as the train's own row does. It fits better where the
+    remaining vehicles sound different: coaches without their locomotive.
 
     Parameters
     ----------
-    heard : Listening
+    envelopes : SensorEnvelopes
     motion : Motion
     first : float
         The row's first axle, in the motion's own coordinate. [m]
@@ -53,18 +53,21 @@ def _amplitudes(heard, i, motion, stretches):
 
 
 KMH = 3.6
-FINE = 0.003  # relative step between speeds
-LOOSE = 0.5  # m over the whole row that a speed may be off in the first search
-OUTSIDE = 75.0  # m that a train is heard before its first axle and after its last one together, at most
-BEND = 0.15  # m between accelerations, that the middle of a train lies off its ends; and m/s² at most
-CLOSE = 2.0  # m by which a train may be longer than what is heard
-KEPT = 3  # rows of a type that are looked at closely
+FINE = 0.003  # relative step between the speeds that are tried
+LOOSE = 0.5  # m, error of the first search over the length of the row
+OUTSIDE = 75.0  # m, most that is audible before the first and behind the last axle together
+BEND = 0.15  # m, step of the middle against the ends between accelerations; also its limit in m/s²
+CLOSE = 2.0  # m by which a row may exceed the audible length
+KEPT = 3  # rows of a type that are refined
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """A row of vehicles on what is heard: ``share`` explained, ``evidence`` [nat], ``start`` [m] of the first axle
-    behind the beginning of what is heard, ``motion``, and ``vehicles`` of the ``pattern``."""
+    """A row of vehicles fitted to the sensor envelopes.
+
+    ``share`` is explained, ``evidence`` [nat] its log Bayes factor. ``start`` [m] is the first axle behind the
+    beginning of the audible part. ``motion`` belongs to it, and ``vehicles`` of the ``pattern``.
+    """
 
     pattern: Pattern
     vehicles: tuple
@@ -78,7 +81,7 @@ class Fitted:
 
 @lru_cache(maxsize=4)
 def even_rows(patterns) -> tuple:
-    """(pattern, vehicles, comb) of every row whose groups are each of one kind of vehicle."""
+    """(pattern, vehicles, comb) of every row in which each group has vehicles of one type only."""
     found = {}
     for pattern in patterns:
         groups = []
@@ -93,21 +96,21 @@ def even_rows(patterns) -> tuple:
 
 
 def at_all_speeds(begin: float, settings) -> list[Motion]:
-    """Motions at every speed that trains have, ``FINE`` apart, whose first axle is at 0 when the hearing begins [s]."""
+    """Motions at all speeds of trains, ``SPEED_STEP`` apart, with the first axle at 0 at the time ``begin`` [s]."""
     slow, fast = settings.speed_minimum / KMH, settings.speed_maximum / KMH
     return [Motion(float(v), begin) for v in np.geomspace(slow, fast, int(np.log(fast / slow) / FINE))]
 
 
 def choices_of(pattern, row) -> float:
-    """Logarithm of the number of rows of the same vehicles' count that the pattern leaves to choice, at most."""
+    """Logarithm of the largest number of rows with as many vehicles that the pattern allows."""
     kinds = max(len(g.vehicles) for g in pattern.groups)
     return float(np.log(kinds) * len(row)) if len({v.name for v in row}) > 2 else float(np.log(kinds))
 
 
 def likeliest(heard, motions, patterns) -> dict[str, Fitted]:
-    """Type -> its likeliest row of vehicles, out of ``motions`` in order of their speed, ``FINE`` apart.
+    """Type -> its likeliest row of vehicles, out of ``motions`` in order of their speed, ``SPEED_STEP`` apart.
 
-    A row beyond whose ends the train goes on is none.
+    A row is left out where the train continues beyond its ends.
     """
     profiles = profiles_at(heard, motions)
     n_sensor, first = len(heard.positions), {}
@@ -133,7 +136,7 @@ def likeliest(heard, motions, patterns) -> dict[str, Fitted]:
 
 
 def closely(heard, fitted: Fitted, passes: int = 3) -> Fitted:
-    """The row with its speed, and where the pattern leaves a choice its vehicles, improved in turn."""
+    """The row with refined speed and, where the pattern allows a choice, refined vehicles, in turn."""
     fitted = sharper(heard, fitted, 0.006)
     for _ in range(passes):
         better = _other_vehicles(heard, fitted)
@@ -151,7 +154,7 @@ def _ends(heard, fitted: Fitted) -> tuple[float, float]:
 
 
 def about_middle(heard, fitted: Fitted) -> Motion:
-    """The motion told from the row's middle: ``start`` is when it passes the middle of the sensors, ``speed`` then."""
+    """The motion relative to the row's middle: ``start`` when it passes the middle of the sensors, ``speed`` then."""
     motion, place = fitted.motion, fitted.motion.direction * float(np.mean(heard.positions))
     first, length = _ends(heard, fitted)
     middle = float(motion.time(first + 0.5 * length + place))
@@ -159,7 +162,7 @@ def about_middle(heard, fitted: Fitted) -> Motion:
 
 
 def sharper(heard, fitted: Fitted, reach: float) -> Fitted:
-    """The same row at the best of the speeds within ``reach`` (relative), and of accelerations around its own."""
+    """The same row at the best speed within ``reach`` (relative) and the best acceleration near its own."""
     middle = about_middle(heard, fitted)
     bend = 16.0 * BEND / (fitted.comb.offsets[-1] / middle.speed) ** 2
     bends = middle.acceleration + min(bend, BEND) * np.arange(-2, 3)
@@ -176,7 +179,7 @@ def sharper(heard, fitted: Fitted, reach: float) -> Fitted:
 
 
 def _other_vehicles(heard, fitted):
-    """The row that goes best with the tooth of this one; itself where there is nothing to choose."""
+    """The row that fits best with the tooth of this one; unchanged where the pattern allows no choice."""
     if fitted.pattern.only_row() is not None:
         return fitted
     profiles = profiles_at(heard, [fitted.motion])

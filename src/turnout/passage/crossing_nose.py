@@ -1,7 +1,7 @@
-"""A known train at a crossing's nose, or any deep dip: each wheel bangs there, and all sensors hear it at once.
+"""Detect a known train at a crossing's nose or a deep dip, where each wheel makes an impact that all sensors record.
 
-Sensors that hear the bangs louder than the wheels beside them agree on no speed. But what they hear together is one
-place that the whole train passes, and what is left then is each sensor's own wheels, metres before or behind.
+Sensors that record these impacts louder than the wheels beside them agree on no speed. But what they share is one
+position that the whole train passes. The residual is each sensor's own wheels, metres before or behind it.
 """
 
 from __future__ import annotations
@@ -18,30 +18,30 @@ from turnout.passage.sensor_stack import Listening
 from turnout.passage.slowness import likeness_at, pair_likeness, stacked
 from turnout.passage.template_match import known_train
 
-LEAST = 3  # sensors: of two the median is the mean, with the wheels of both in it
-# m between a sensor and the nose at most, and that a nose may lie outside the sensors: a crossing panel, whose row of
-# sensors stands about its nose; both are judgements
+LEAST = 3  # sensors: the median of two is the mean, which contains the wheels of both
+# m: largest distance between a sensor and the nose, and of the nose outside the row of sensors. The sensors of a
+# crossing panel stand around its nose; both numbers are judgements.
 AWAY, BESIDE = 15.0, 3.0
-# By how much the true direction must collect more than the other, in standard deviations of one sensor's places: in 37
-# simulated passages of 13 crossings it collects at least 2.2 more; in one the wrong direction had 0.7 more.
+# By how much the true direction must exceed the other, in standard deviations of one sensor's response. In 37 simulated
+# passages of 13 crossings it exceeds by at least 2.2; in one the wrong direction exceeded by 0.7.
 CLEARLY = 2.0
-# Share of what all hear together that the train explains, and how far off its places axles may lie, in tolerances: true
-# ones have 0.74 at least and 1.5 at most; the blows of a flat wheel, taken for another train, 0.57 and 2.6.
+# Least share of the common envelope that the train explains, and largest residual of axle positions, in tolerances.
+# True trains have at least 0.74 and at most 1.5; impacts of a flat wheel, taken for another train, have 0.57 and 2.6.
 OF_ONE_PLACE, OFF = 2.0 / 3.0, 2.0
-# s over which levels are taken, and that a train takes between two sensors for what they hear at once to be told from
-# what follows it: two of them
+# s: smoothing of the levels, and least travel time between two sensors (twice that) to separate simultaneous from
+# moving sources
 SMOOTH, APART = 0.02, 0.04
-# Of likeness: where nothing bangs, 320 simulated passages of four sensors are at least 0.14 more alike along the train
-# than at the same moment, and a twentieth of them by less than 0.2.
+# Least excess of the correlation along the train over the simultaneous one. Without impacts, 320 simulated passages of
+# four sensors have at least 0.14, and one in twenty less than 0.2.
 AT_ONCE = 0.15
-LEFT = 0.5  # likeness at the same moment of what the train leaves over; 0.52 in one of a hundred of those 320 passages
+LEFT = 0.5  # simultaneous correlation of the residual; 1 % of those 320 passages have 0.52
 
 
 def at_a_nose(heard, patterns, settings):
-    """(motion, AxleFinding, TypeFinding) of a train of ``patterns`` whose wheels bang at one place; None where none is
-    sure, or its direction is not.
+    """(motion, AxleFinding, TypeFinding) of a train of ``patterns`` whose wheels make impacts at one position.
 
-    ``heard``: Listening of at least three sensors. The place comes out with the train: it is in the motion.
+    None where no train or no direction is certain. ``envelopes``: SensorEnvelopes of at least three sensors. The
+    position of the impacts is a result as well: it is the origin of the motion.
     """
     if len(heard.positions) < LEAST or not patterns:
         return None
@@ -59,8 +59,11 @@ def at_a_nose(heard, patterns, settings):
 
 
 def heard_at_once(heard, motion) -> float:
-    """How much more alike sensors are at the same moment than along a train of this ``motion``; above ``-AT_ONCE`` all
-    of them hear the blows of one place. -1 where they are too close together to tell."""
+    """Excess of the sensors' correlation at the same moment over that along a train of this ``motion``.
+
+    Above ``-MIN_MOTION_GAIN`` all sensors record the impacts at one position. -1 where they are too close to each
+    other.
+    """
     pairs = {
         (i, j): row
         for (i, j), row in pair_likeness(heard.levels.values, heard.levels.step, SMOOTH).items()
@@ -74,8 +77,10 @@ def heard_at_once(heard, motion) -> float:
 
 
 def blows_at_one_place(heard, motion) -> tuple[float, float] | None:
-    """(likeness, limit) where sensors hear at the same moment what does not run along with a train of this ``motion``,
-    None where they do not: blows as loud as wheels are counted as axles."""
+    """(correlation, limit) where sensors record simultaneous impacts beside a train of this ``motion``, else None.
+
+    Impacts as loud as wheels are counted as axles.
+    """
     likeness = heard_at_once(heard, motion)
     if likeness > -AT_ONCE:
         return likeness, -AT_ONCE
@@ -84,7 +89,7 @@ def blows_at_one_place(heard, motion) -> tuple[float, float] | None:
 
 
 def _together(heard) -> Listening:
-    """One sensor that hears what most of them hear at the same moment, at place 0."""
+    """One sensor at position 0 that records what most of them record at the same moment."""
     levels = heard.levels
     values, amplitude = (np.median(rows, axis=0)[None] for rows in (levels.values, levels.amplitude))
     one = Levels(values, levels.step, levels.scatter[:1], levels.loud[:1], amplitude)
@@ -92,8 +97,10 @@ def _together(heard) -> Listening:
 
 
 def _own_wheels(heard, motion, offsets):
-    """(distances (n,) [m], (n_sensor, n) what each sensor hears of the row of wheels so far from the nose, without the
-    bangs and over its own standard deviation)."""
+    """(distances (n,) [m], (n_sensor, n) response of each sensor to the row of wheels at that distance from the nose).
+
+    The impacts are subtracted. The unit is the response's own standard deviation.
+    """
     there = replace(heard, positions=np.zeros(len(heard.positions)))
     profiles, behind = profiles_at(there, [motion]), offsets - offsets[0]
     start = float(offsets[0] - profiles.origin[0])
@@ -106,7 +113,7 @@ def _own_wheels(heard, motion, offsets):
 
 
 def _best(own, positions, sign) -> tuple[float, float]:
-    """What all sensors collect of their own wheels in one direction, and the place of the nose [m] where it is most."""
+    """Largest sum of all sensors' response to their own wheels in one direction, and its nose position [m]."""
     distance, collected = own
     noses = np.arange(np.min(positions) - BESIDE, np.max(positions) + BESIDE, 0.5 * STEP)
     total = sum(np.interp(sign * (x - noses), distance, row) for x, row in zip(positions, collected))

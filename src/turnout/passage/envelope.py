@@ -1,4 +1,4 @@
-"""Level of each channel in a few bands on a coarse time grid: what axles are sought in."""
+"""Compute the level of each channel in a few bands on a coarse time grid, in which axles are sought."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import fft
 
-# Between ballast and railpad resonance the rail's vibration dies away fastest along the track, above it slowest;
-# three bands, each in its own logarithm, so that no resonance drowns the place of the wheel.
+# Hz. Between ballast and railpad resonance the rail's vibration decays fastest along the track, above them slowest.
+# Three bands, each with its own logarithm, so that no resonance masks the position of the wheel.
 BANDS = ((30.0, 120.0), (120.0, 400.0), (400.0, 900.0))
 
 
@@ -16,10 +16,10 @@ BANDS = ((30.0, 120.0), (120.0, 400.0), (400.0, 900.0))
 class Levels:
     """``values`` (n_channel, n_bin): mean over the bands of ln(power above the quiet level), 0 where quiet.
 
-    ``step`` [s] between bins; bin k covers [k, k + 1) steps from the start of the recording. ``scatter``
-    (n_channel,) standard deviation of the values where it is quiet, ``loud`` (n_channel,) power that the loudest
-    tenth of 50 ms blocks exceed, mean over the bands in logarithms. [(m/s²)²] ``amplitude`` (n_channel, n_bin): mean
-    over the bands of the root of the power, each band over its own root mean square.
+    ``step`` [s] between bins; bin k covers [k, k + 1) steps from the start of the recording. ``scatter`` (n_channel,)
+    is the standard deviation of the quiet values. ``loud_power`` (n_channel,) is the power that a tenth of the 50 ms
+    blocks exceed, mean over the bands in logarithms. [(m/s²)²] ``amplitude`` (n_channel, n_bin) is the mean over the
+    bands of the root of the power, each band over its own root mean square.
     """
 
     values: np.ndarray
@@ -36,8 +36,8 @@ class Levels:
 def band_powers(samples, rate: float, step: float, bands=BANDS) -> np.ndarray:
     """(n_channel, n_band, n_bin) mean square of the band-passed samples in each bin. [(m/s²)²]
 
-    One transform per channel; each band has cosine edges a fifth wide and comes back at four samples per bin, or
-    more where the band needs it: no delay, and a third of the cost of filters.
+    One transform per channel. Each band has cosine edges of relative width 0.2. It is transformed back at four samples
+    per bin, or more where the band needs it. There is no delay, and the cost is a third of that of filters.
     """
     samples = np.atleast_2d(samples)
     per_bin = max(round(step * rate), 1)
@@ -64,9 +64,9 @@ def _edges(frequency, low, high, width=0.2):
 
 
 def levels(samples, rate: float, step: float, bands=BANDS) -> Levels:
-    """Levels of all channels; the quiet level of a band is the median of the quieter fifth of 50 ms blocks.
+    """Levels of all channels; the quiet level of a band is the median of the quietest fifth of 50 ms blocks.
 
-    A bin is the whole number of samples next to ``step``; the ``step`` of the result is how long that really is.
+    A bin is the whole number of samples next to ``step``; the ``step`` of the result is its exact length.
     """
     step = max(round(step * rate), 1) / rate
     powers = band_powers(samples, rate, step, bands)
@@ -85,9 +85,9 @@ def levels(samples, rate: float, step: float, bands=BANDS) -> Levels:
 
 
 def quiet_level(powers, block: int) -> np.ndarray:
-    """(..., ) level of the quietest fifth of blocks of bins; never zero."""
+    """(...,) level of the quietest fifth of blocks of bins; never zero."""
     n = max(powers.shape[-1] // block, 1)
     blocks = powers[..., : n * block].reshape(*powers.shape[:-1], n, -1).mean(axis=-1)
     level = np.quantile(blocks, 0.1, axis=-1)
-    # 27 dB below the loud parts is quiet: what a rail carries from wheels far away says nothing about axles
+    # 27 dB below the loud parts is quiet: vibration from distant wheels says nothing about axles
     return np.maximum(level, 2e-3 * np.quantile(blocks, 0.98, axis=-1) + np.finfo(float).tiny)

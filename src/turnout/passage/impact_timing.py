@@ -1,4 +1,4 @@
-r"""When each wheel struck, between two samples, and whether the interval is certain."""
+"""Estimate when each wheel's impact occurred, between two samples, and whether that interval is certain."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from turnout.passage.wheel_basis import FRACTIONS, WheelBasis
 
 @dataclass(frozen=True)
 class ImpactTimes:
-    """Times of the wheels with what is known about them.
+    """Times of the wheels' impacts with their errors.
 
-    ``times`` (n_wheel,) [samples], ``standard_errors`` (n_wheel,) [samples] over all intervals, ``odds``
-    (n_wheel,) of the best interval between samples against all others together, ``ambiguous`` (n_wheel,) bool:
-    odds below those asked for, the time may lie in another interval.
+    ``times`` (n_wheel,) [samples], ``standard_errors`` (n_wheel,) [samples] over all intervals, ``odds`` (n_wheel,) of
+    the best interval between samples against all others together, ``ambiguous`` (n_wheel,) bool: the odds are below the
+    required ones, and the time may lie in another interval.
     """
 
     times: np.ndarray
@@ -33,14 +33,14 @@ def gather(data, first, length: int) -> np.ndarray:
 
 
 def explained(own, basis: WheelBasis, allowed, seen=None) -> np.ndarray:
-    r"""(n_wheel, n_lag, n_fraction) drop of the residual's sum of squares by one wheel at n - phi.
+    r"""(n_wheel, n_lag, n_fraction) reduction of the residual's sum of squares by one wheel at n - phi.
 
     .. math:: P_n(\varphi) = (b_n^T\theta(\varphi))^2 / \theta^T G \theta
 
-    ``own`` (n_wheel, n_lag - 1 + n_sample) is the data around each wheel, b_n their inner products with the columns.
-    Wheels press one way: the sign of all amplitudes is the one that explains more, and times that need the other one
-    are -inf, like those that ``allowed`` (n_wheel, n_lag, n_fraction) forbids. Without that rule half a period of a
-    slow mode is as good as none.
+    ``windows`` (n_wheel, n_lag - 1 + n_sample) is the data around each wheel, b_n their inner products with the
+    columns. Wheels press in one direction: all amplitudes have the sign that explains more. Times that need the other
+    sign are -inf, like those that ``allowed`` (n_wheel, n_lag, n_fraction) excludes. Without that rule a time half a
+    period of a slow mode away fits equally well.
     """
     n_lag = allowed.shape[1]
     inner = basis.correlated(own, n_lag)
@@ -52,14 +52,14 @@ def explained(own, basis: WheelBasis, allowed, seen=None) -> np.ndarray:
     up, down = signed.max(axis=(1, 2), initial=0.0), signed.min(axis=(1, 2), initial=0.0)
     sign = 1.0 if np.sum(up**2) >= np.sum(down**2) else -1.0
     signed *= sign
-    # a wheel without any time of that sign keeps its place, with nothing explained
+    # a wheel without any time of that sign keeps its time and explains nothing
     signed[signed <= 0.0] = -np.inf
     power = np.where(np.isfinite(signed), signed, 0.0) ** 2
     return np.where(allowed & (np.isfinite(signed) | (power.max(axis=(1, 2), keepdims=True) == 0)), power, -np.inf)
 
 
 def best_times(own, first, expected, basis: WheelBasis, half: float, seen=None) -> np.ndarray:
-    """(n_wheel,) times within ``half`` of ``expected`` that explain most of the rows ``own`` from ``first`` on."""
+    """(n_wheel,) times within ``search_range`` of ``expected`` that explain most of ``windows`` from ``first`` on."""
     n_lag = own.shape[1] - basis.n_sample + 1
     power = explained(own, basis, _allowed(first, expected, half, n_lag), seen)
     lag, fraction = np.unravel_index(power.reshape(len(first), -1).argmax(axis=1), power.shape[1:])
@@ -71,10 +71,10 @@ def _allowed(first, expected, half, n_lag):
 
 
 def search_times(data, expected, basis: WheelBasis, half: float, length: int = 300, sweeps: int = 3) -> np.ndarray:
-    """(n_wheel,) impact times within ``half`` of ``expected`` that explain most. [samples]
+    """(n_wheel,) impact times within ``search_range`` of ``expected`` that explain most. [samples]
 
-    One amplitude along b per wheel; the neighbours are taken off with the joint fit of the sweep before, unless
-    no response reaches the next wheel. Only the first ``length`` samples of a response are compared.
+    One amplitude along b per wheel. The neighbours' responses are subtracted as the joint fit of the previous sweep has
+    them, unless no response reaches the next wheel. Only the first ``length`` samples of a response are compared.
     """
     power, first = _power(data, expected, basis, half, length, sweeps)
     lag, fraction = np.unravel_index(power.reshape(len(first), -1).argmax(axis=1), power.shape[1:])
@@ -91,15 +91,15 @@ def impact_times(data, expected, basis: WheelBasis, half: float, noise: float, s
     data : (n_sample,) array of float
         Behind the filter of ``basis``; its noise must be white. [m/s²]
     expected : (n_wheel,) array of float
-        Prior mean: speed and axle spacing say where the wheel should be. [samples]
-    half : float
+        Prior mean, from speed and axle spacing. [samples]
+    search_range : float
         Range searched on either side. [samples]
     noise : float
         Standard deviation of the noise. [m/s²]
     spread : float
         Standard deviation of the prior. [samples]
     odds : float
-        A time is ambiguous unless its interval beats all others together by these odds.
+        A time is ambiguous unless its interval has at least these odds against all others together.
 
     Returns
     -------
@@ -143,7 +143,7 @@ def _power(data, expected, basis, half, length, sweeps):
 
 
 def _without_neighbours(data, times, basis, first, span):
-    """Data around each wheel, all other wheels' responses taken off."""
+    """Data around each wheel, without the responses of all other wheels."""
     order = np.argsort(times, kind="stable")
     fit = joint_fit(data, times[order], basis)
     amplitude = np.empty(len(times))
@@ -157,14 +157,14 @@ def _without_neighbours(data, times, basis, first, span):
 
 
 def _neighbours(power, lag, fraction):
-    """Best fraction kept off the ends of its interval, and the power there and on both sides."""
+    """Best fraction, not at an end of its interval, and the power there and on both sides."""
     wheel = np.arange(len(lag))
     inner = np.clip(fraction, 1, len(FRACTIONS) - 2)
     return inner, [power[wheel, lag, inner + step] for step in (-1, 0, 1)]
 
 
 def _polished(power, lag, fraction, first):
-    """Parabola through the best fraction and its neighbours in the same interval: n - phi."""
+    """Times n - phi from a parabola through the best fraction and its neighbours in the same interval."""
     inner, (low, mid, high) = _neighbours(power, lag, fraction)
     with np.errstate(divide="ignore", invalid="ignore"):
         shift = np.nan_to_num(0.5 * (low - high) / (low - 2 * mid + high))

@@ -1,6 +1,6 @@
-"""Joint least squares over all wheels of a passage at one sensor.
+"""Fit the impacts of all wheels of a passage at one sensor by joint least squares.
 
-A filter that makes a sensor's noise white, so that sums of squares may be tested.
+A whitening filter for a sensor's noise is estimated here too, so that sums of squares can be tested.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from turnout.passage.wheel_basis import WheelBasis
 
 @dataclass(frozen=True)
 class WheelFit:
-    """One set of numbers per wheel, all wheels estimated together.
+    """Amplitudes of every wheel, all wheels estimated together.
 
     ``times`` (n_wheel,) impact times in samples, ``amplitudes`` (n_wheel, n_number): one amplitude along b, or
     the free jump's column weights. ``covariance`` (n_wheel n_number, same) without the noise variance,
@@ -40,12 +40,12 @@ def onsets(times) -> tuple[np.ndarray, np.ndarray]:
 
 
 def joint_fit(data, times, basis: WheelBasis, free: bool = False) -> WheelFit:
-    r"""Least squares over all wheels with every overlap kept.
+    r"""Least squares over all wheels, including their overlaps.
 
     .. math:: \min \| y - \sum_j g_j\, h(k - t_j) \|^2, \qquad h = F * c A^k b
 
-    with F the filter that the data passed, or the free jump w_j in place of g_j b (``free``). The normal equations
-    are banded: wheels further apart than the response share nothing.
+    with F the filter of the data, or the free jump w_j in place of g_j b (``free``). The normal equations are banded:
+    wheels further from each other than the response do not interact.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def joint_fit(data, times, basis: WheelBasis, free: bool = False) -> WheelFit:
     times : (n_wheel,) array of float
         Impact times, increasing. [samples]
     basis : WheelBasis
-        Responses; a wheel whose response runs past the end is fitted on what is there.
+        Responses; a wheel whose response runs past the end is fitted on the available samples.
     free : bool
         Estimate the free jump (as many numbers as the model has states) instead of one amplitude along b.
 
@@ -64,7 +64,7 @@ def joint_fit(data, times, basis: WheelBasis, free: bool = False) -> WheelFit:
 
     References
     ----------
-    Barkhordari et al., eq. 17 (initial state), here repaired to one joint problem for all wheels.
+    Barkhordari et al., eq. 17 (initial state), here corrected to one joint problem for all wheels.
 
     Examples
     --------
@@ -130,7 +130,7 @@ def _normal_equations(data, first, weights, basis):
 
 
 def _solve_banded(blocks, right, reach):
-    """Solution and inverse of the banded normal matrix; a hair of ridge where two wheels coincide."""
+    """Solution and inverse of the banded normal matrix, with a tiny ridge for wheels that coincide."""
     p = next(iter(blocks.values())).shape[0]
     width = (reach + 1) * p
     bands = np.zeros((width, right.size))
@@ -147,7 +147,7 @@ def _solve_banded(blocks, right, reach):
 
 
 def whitener(quiet, order: int = 16) -> tuple[np.ndarray, float]:
-    """Taps (order + 1,) of the prediction-error filter of ``quiet`` (n,), and the standard deviation it leaves.
+    """Taps (order + 1,) of the prediction-error filter of ``quiet`` (n,), and the standard deviation of its residual.
 
     Yule-Walker on the biased autocovariance: always stable, exact for autoregressive noise as n grows. ValueError
     for fewer than ten samples per tap.
@@ -166,7 +166,7 @@ def whitener(quiet, order: int = 16) -> tuple[np.ndarray, float]:
     covariance = np.fft.irfft(power)[: order + 1] / quiet.size
     if covariance[0] == 0.0:
         return np.eye(1, order + 1)[0], 0.0
-    # a millionth of white noise: a converter's zeros must not make the matrix singular
+    # 1e-6 of white noise: constant samples of a converter must not make the matrix singular
     covariance[0] *= 1.0 + 1e-6
     coefficients = linalg.solve_toeplitz(covariance[:-1], covariance[1:])
     variance = covariance[0] - coefficients @ covariance[1:]

@@ -1,4 +1,4 @@
-r"""Motion of a train past the sensors: constant acceleration, either direction."""
+"""Describe the motion of a train past the sensors: constant acceleration, in either direction."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Motion:
-    r"""Where the first axle is: :math:`u(t) = v (t - t_0) + \tfrac12 a (t - t_0)^2` from the turnout's origin.
+    r"""Position of the first axle: :math:`u(t) = v (t - t_0) + \tfrac12 a (t - t_0)^2` from the turnout's origin.
 
     ``speed`` [m/s] above 0 and ``acceleration`` [m/s²] at ``start`` [s], when the first axle passes the origin;
     ``direction`` is +1 where the train runs towards larger positions (facing: from the switch to the crossing),
-    -1 against them. An axle ``d`` metres behind the first passes the place ``x`` when u = d + direction * x.
+    -1 against them. An axle ``d`` metres behind the first passes the position ``x`` when u = d + direction * x.
     """
 
     speed: float
@@ -22,30 +22,30 @@ class Motion:
     direction: int = 1
 
     def time(self, way) -> np.ndarray:
-        """When the first axle has covered ``way`` [m] from the origin; negative before it. [s]
+        """Time at which the first axle is ``distance`` [m] past the origin; negative ``distance`` before it. [s]
 
         >>> float(Motion(10.0, 1.0, 2.0).time(24.0))
         3.0
         """
         way = np.asarray(way, dtype=float)
         square = np.maximum(self.speed**2 + 2.0 * self.acceleration * way, 1e-6)
-        # the rationalised root: no cancellation as the acceleration goes to 0
+        # rationalised root: no cancellation as the acceleration goes to 0
         return self.start + 2.0 * way / (self.speed + np.sqrt(square))
 
     def way(self, time) -> np.ndarray:
-        """Inverse of ``time``. [m]"""
+        """Distance that the first axle has travelled from the origin at ``time``: the inverse of ``time()``. [m]"""
         past = np.asarray(time, dtype=float) - self.start
         return self.speed * past + 0.5 * self.acceleration * past**2
 
     def passing(self, offsets, position: float) -> np.ndarray:
-        """When axles ``offsets`` [m] behind the first pass ``position`` [m]. [s]"""
+        """Times at which axles ``offsets`` [m] behind the first pass ``position`` [m]. [s]"""
         return self.time(np.asarray(offsets, dtype=float) + self.direction * position)
 
     def speed_at(self, time) -> np.ndarray:
-        """[m/s]"""
+        """Speed at ``time`` [s]. [m/s]"""
         return self.speed + self.acceleration * (np.asarray(time) - self.start)
 
     def moved(self, way: float) -> Motion:
-        """The same motion told from an axle ``way`` metres behind the first."""
+        """The same motion relative to an axle ``distance`` metres behind the first."""
         start = float(self.time(way))
         return replace(self, speed=float(self.speed_at(start)), start=start)

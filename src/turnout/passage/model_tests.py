@@ -1,6 +1,7 @@
-"""Whether each wheel's jump points along b: if not, the load was no impulse at the sensor and no score means much.
+"""Test whether a model can be the cause of the data at one sensor.
 
-Null bands: what models that have nothing to do with the section score on the same data.
+If the wheels' jumps do not point along b, the load was no impulse at the sensor and the scores mean little. Null bands
+show what models unrelated to the section score on the same data.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ class DirectionTest:
     """Chi-squared per wheel: ``statistic`` (n_wheel,), ``freedom``, ``p_value`` (n_wheel,), ``failed_share``.
 
     ``jumps`` (n_wheel, n_column) are the free jumps as column weights, ``covariance`` (n_wheel, n_column, n_column)
-    theirs. ``along_share`` is the part of all jumps' power that is along b: 1 for impulses, whatever the noise, while
-    the test finds the smallest error of a model once the noise is low.
+    theirs. ``along_share`` is the share of all jumps' power that is along b. It is 1 for impulses at any noise, while
+    the test detects even the smallest error of a model at low noise.
     """
 
     statistic: np.ndarray
@@ -39,9 +40,9 @@ def direction_test(data, times, basis: WheelBasis, noise: float, level: float = 
 
     .. math:: \chi^2_j = \min_g (\hat w_j - g b)^T \Sigma_j^{-1} (\hat w_j - g b)
 
-    is chi-squared with one degree of freedom less than there are states. ``data`` must have white residuals of
-    standard deviation ``noise``: raw or whitened, not band-passed. A time estimated from the same data takes up
-    part of one more degree, which makes the test a little lenient. ``times`` in samples.
+    is chi-squared; its degrees of freedom are the number of states less one. ``data`` must have white residuals of
+    standard deviation ``noise``: raw or whitened, not band-passed. A time estimated from the same data uses
+    a part of one more degree, which makes the test slightly lenient. ``times`` in samples.
     """
     if not noise > 0:
         raise ValueError(f"the noise must be above 0, got {noise}")
@@ -79,8 +80,10 @@ class NullBand:
 
 
 def random_models(n: int, order: int, low: float, high: float, rate: float, seed: int) -> tuple[ModalModel, ...]:
-    """Models of ``order`` whose pole pairs are anywhere in the band: frequency log-uniform between ``low`` and
-    ``high`` [Hz], damping log-uniform between 0.02 and 0.35, the range of the paper's tables widened a little.
+    """Models of ``order`` with random pole pairs in the band.
+
+    The frequency is log-uniform between ``low`` and ``high`` [Hz]. The damping ratio is log-uniform between 0.02 and
+    0.35, slightly wider than in the paper's tables.
 
     >>> [m.order for m in random_models(2, 4, 80.0, 800.0, 20000.0, seed=1)]
     [4, 4]
@@ -101,7 +104,7 @@ def random_models(n: int, order: int, low: float, high: float, rate: float, seed
 
 
 def null_bases(order: int, through, rate: float, settings) -> list:
-    """Bases of the random models behind the same filter: the same for every passage, so made once."""
+    """Bases of the random models behind the same filter. They are the same for every passage."""
     models = random_models(settings.null_models, order, settings.band_low, settings.band_high, rate, settings.null_seed)
     return [wheel_basis(model, through, rate, longest=0.1) for model in models]
 

@@ -1,4 +1,4 @@
-"""Rows of vehicles laid along the train's profile: axles that no cut between peaks finds, where a template asks."""
+"""Fit rows of vehicles to the train's profile: this finds axles that no cut between peaks finds, with a template."""
 
 from __future__ import annotations
 
@@ -8,25 +8,25 @@ from scipy import ndimage, signal
 from turnout.passage.axle_features import GRID, AxleFinding
 from turnout.passage.axle_patterns import Pattern
 
-SLACK = 0.35  # m, how far an axle may lie from where the one before puts it
-LEAST = 0.3  # of a typical peak: what an axle must reach, and what a peak may be without being one
-SCALES = 1.0 + 0.012 * np.arange(-4, 5)
-STARTS = 8
+SLACK = 0.35  # m, largest deviation of an axle from its position behind the previous one
+LEAST = 0.3  # of a typical peak: least height of an axle, and largest height of a peak that is no axle
+SCALES = 1.0 + 0.012 * np.arange(-4, 5)  # factors on the lengths, for an error of the speed
+STARTS = 8  # first peaks that are tried as the first axle
 
 
 def decoded(profile, start: float, pattern: Pattern, around: float, feature: str) -> AxleFinding | None:
-    """The row of vehicles of ``pattern`` that collects most of ``profile`` (n,), as an axle count; None if none does.
+    """Axle count of the row of vehicles of ``pattern`` that collects most of ``profile`` (n,); None if there is none.
 
-    Starts from each of the first peaks, at each of a few scales, and goes from axle to axle: the next one is the
-    highest place within 0.35 m of where the vehicle has it, measured from the one before, so that a speed a per cent
-    off does not add up. Where the pattern leaves a choice the vehicle is taken that collects more, less the peaks that
-    it leaves over within its length; the row ends where the peaks beyond it cost least. ``around`` [m] is the length
-    that is heard.
+    The search starts from each of the first peaks, at each of a few scales, and goes from axle to axle. The next axle
+    is the highest point within 0.35 m of its position in the vehicle, measured from the previous axle. So an error of
+    the speed does not accumulate. Where the pattern allows a choice, the vehicle that collects more is taken, less the
+    peaks that it leaves over within its length. The row ends where the peaks beyond it cost least. ``audible_length``
+    [m] is the length of the audible part.
     """
     low, high = pattern.lengths()
     if not low - 8.0 < around * 1.06 or not high + 12.0 > around * 0.9:
         return None
-    # a wheel is a peak of 1; noise beside it must not be collected
+    # a wheel is a peak of height 1; noise beside it must not be collected
     top = ndimage.maximum_filter1d(profile, 2 * int(SLACK / GRID) + 1)
     peaks, _ = signal.find_peaks(profile, height=LEAST, distance=int(0.6 / GRID))
     if peaks.size < 4:
@@ -36,7 +36,7 @@ def decoded(profile, start: float, pattern: Pattern, around: float, feature: str
     for group in pattern.groups:
         for count in range(group.maximum):
             if not walk.alive.any():
-                break  # every row has ended: nothing is added to any of them any more
+                break  # every row has ended: no vehicle can be added
             walk.couple(group.vehicles, forced=count < group.minimum)
     value, places = walk.best()
     if places is None or len(places) < 4:
@@ -48,7 +48,7 @@ def decoded(profile, start: float, pattern: Pattern, around: float, feature: str
 
 
 class _Walk:
-    """Hypotheses (start, scale) that grow vehicle by vehicle, all at once."""
+    """Search over hypotheses (start, scale), to all of which vehicles are added at once."""
 
     def __init__(self, profile, top, peaks, first, scale):
         self.profile, self.top, self.scale = profile, top, scale
@@ -59,7 +59,7 @@ class _Walk:
         self.ended: tuple[float, np.ndarray | None] = (-np.inf, None)
 
     def couple(self, vehicles, forced):
-        """Add one of ``vehicles`` to every hypothesis; where it is not forced, ending before it is an option."""
+        """Add one of ``vehicles`` to every hypothesis; where none is required, the row may also end before it."""
         if not forced:
             self._consider()
         tried = [self._trial(v) for v in vehicles]
@@ -75,7 +75,7 @@ class _Walk:
         collected = np.array([t[3] for t in tried])[best, pick]
         good = gain[best, pick] > (-0.35 if forced else -0.1)
         if not forced:
-            # a hypothesis that finds no further vehicle has ended; it stays what it was
+            # a hypothesis that finds no further vehicle has ended and does not change any more
             self.alive &= good
         self.score = np.where(self.alive, self.score + collected, self.score)
         self.rear = np.array([v.rear for v in vehicles])[best]
@@ -83,12 +83,12 @@ class _Walk:
         self.places = np.hstack([self.places, added])
 
     def best(self):
-        """(value, places) of the best end so far and now."""
+        """(value, positions) of the best end so far and now."""
         self._consider()
         return self.ended
 
     def _trial(self, vehicle):
-        """Net gain per axle (n,), places (n, n_axle) [m], vehicle, what it collects (n,), behind each hypothesis."""
+        """Net gain per axle (n,), positions (n, n_axle) [m], vehicle, collected height (n,), for each hypothesis."""
         if self.places.shape[1]:
             last = np.nanmax(np.where(np.isfinite(self.places), self.places, -np.inf), axis=1)
             last = np.where(np.isfinite(last), last, self.first)
@@ -108,7 +108,7 @@ class _Walk:
         return (gain - over) / len(gaps), found, vehicle, gain
 
     def _nearest(self, place):
-        """Highest place within the slack, the nearer of equals."""
+        """Highest position within the slack, the nearer of equals."""
         reach = int(SLACK / GRID)
         centre = np.clip(np.round(place / GRID).astype(int), reach, self.profile.size - reach - 1)
         window = self.profile[centre[:, None] + np.arange(-reach, reach + 1)]
@@ -120,7 +120,7 @@ class _Walk:
         return np.minimum(self.profile[index], 1.0)
 
     def _consider(self):
-        """Keep the best hypothesis if the row ended here: what it collects less the peaks that it leaves over."""
+        """Keep the best hypothesis if the row ended here: what it collects, less the peaks that it leaves over."""
         if not self.places.shape[1]:
             return
         over = np.clip(np.minimum(self.peak_height, 1.0) - LEAST, 0.0, None)

@@ -1,4 +1,4 @@
-"""What is found out about one passage."""
+"""Hold the results of one passage: sensors, speed, and the passage itself."""
 
 from __future__ import annotations
 
@@ -13,8 +13,11 @@ from turnout.records import Rejection
 
 @dataclass(frozen=True)
 class PassageSensor:
-    """A channel of a passage: ``name``, the ``section`` it watches, its ``position`` [m], and which trains it feels:
-    ``track`` is "main", "diverging" or "both". ``panel`` is that of the section, "" where it is not known."""
+    """A channel of a passage: ``name``, the ``section`` that it monitors and its ``position`` [m].
+
+    ``track`` is "main", "diverging" or "both": the trains that it measures. ``panel`` is that of the section, "" where
+    it is not known.
+    """
 
     name: str
     section: str
@@ -27,8 +30,8 @@ class PassageSensor:
 class SpeedFinding:
     """``speed`` [m/s] with ``se`` at ``time`` [s], halfway through the passage; ``acceleration`` [m/s²] with its error.
 
-    ``source`` says what it rests on: "sensors", "axle spacing", "both" or "bogie" (a guess from an unknown train's
-    bogies). ``disagreement`` is the difference of sensors and axle spacing in standard errors, None without both.
+    ``source`` is "sensors", "axle spacing", "both" or "bogie" (a guess from an unknown train's bogies).
+    ``disagreement`` is the difference of sensors and axle spacing in standard errors, None without both.
     """
 
     speed: float
@@ -49,8 +52,8 @@ class Passage:
     """One train found in a recording.
 
     ``offsets`` (n_axle,) [m] behind the first axle, ``times`` (n_axle,) [s] when they pass the turnout's origin.
-    ``at_sensor`` maps a channel to (n_axle,) [s]; only channels that heard the train. ``heard`` names them.
-    ``status`` "accepted", "partly" or "rejected" with ``findings``; ``contrast`` of the axle count.
+    ``at_sensor`` maps a channel to (n_axle,) [s], for channels that recorded the train; ``audible_sensors`` names them.
+    ``status`` is "accepted", "partly" or "rejected" with ``findings``; ``contrast`` of the axle count.
     """
 
     status: str

@@ -1,4 +1,4 @@
-r"""What train type, speed and axle load each do to a score, the others held fixed."""
+"""Estimate the effect of train type, speed and axle load on a score, each with the others held fixed."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ NEEDED = ("train_type", "speed_kmh", "axle_load_t")
 class Effect:
     """``change`` of the score [points] per ``per`` of ``factor``, with standard error and 95 % interval.
 
-    ``adjusted``: the other factors held fixed; otherwise what groups show when compared as they are. ``n`` passages.
+    ``adjusted``: the other factors are held fixed; otherwise the groups are compared as they are. ``n`` passages.
     """
 
     factor: str
@@ -33,8 +33,8 @@ def effects(rows: Sequence[Mapping], score: str = "fit_pct") -> tuple[Effect, ..
 
     .. math:: y = \mu_{type} + \beta_v (v - \bar v) + \beta_P (P - \bar P) + e
 
-    Least squares with standard errors that allow a variance of its own for every passage (HC3). A factor that the
-    others determine, as where every type has its own load, has no adjusted effect and none is given.
+    Least squares with standard errors that allow a different variance for every passage (HC3). A factor that the others
+    determine has no adjusted effect; for example, where every type has its own load.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def effects(rows: Sequence[Mapping], score: str = "fit_pct") -> tuple[Effect, ..
 
 
 def _types(y, is_type, types, beside, adjusted):
-    """Each further type against the most frequent one."""
+    """Effects of each further type against the most frequent one."""
     reference = int(np.argmax(is_type.sum(axis=0)))
     others = [k for k in range(len(types)) if k != reference]
     design = np.column_stack([np.ones(len(y)), is_type[:, others], beside])
@@ -74,7 +74,7 @@ def _types(y, is_type, types, beside, adjusted):
 
 
 def _effect(y, design, columns, factor, names, adjusted):
-    """Effects of some columns of a design; those that the other columns determine to 99 % are left out."""
+    """Effects of some columns of a design; columns that the others determine to 99 % are left out."""
     found = []
     n, p = design.shape
     if n <= p + 2:
@@ -94,7 +94,7 @@ def _effect(y, design, columns, factor, names, adjusted):
 
 
 def _determined(design, column) -> bool:
-    """Do the other columns explain this one to 99 % of its variance?"""
+    """Whether the other columns explain this one to 99 % of its variance."""
     others = np.delete(design, column, axis=1)
     x = design[:, column]
     rest = x - others @ np.linalg.lstsq(others, x, rcond=None)[0]

@@ -1,4 +1,7 @@
-r"""How much of a passage a model explains, and how much it foretells: the same measures for models and nulls."""
+"""Score how much of a passage a model explains and how much it predicts.
+
+The measures are the same for models and nulls.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,7 @@ class Scores:
     """Fit, forecast skill and leave-one-wheel-out score of one model at one sensor. [%]
 
     ``per_wheel`` (n_wheel, 3) holds the same three for each wheel, nan where a wheel has too little data of its
-    own. ``n_value`` samples were scored in the fit, ``n_parameter`` numbers estimated for it.
+    own. ``n_value`` samples were scored in the fit, and ``n_parameter`` numbers were estimated for it.
     """
 
     fit: float
@@ -29,7 +32,7 @@ class Scores:
 
 
 def fit_percent(measured, predicted) -> float:
-    r"""Amplitude fit of a prediction; 100 is perfect, 0 as good as the mean, without a lower end.
+    r"""Amplitude fit of a prediction; 100 is perfect, 0 as good as the mean, without a lower limit.
 
     .. math:: 100\,(1 - \|y - \hat y\| / \|y - \bar y\|)
 
@@ -57,7 +60,7 @@ def fit_percent(measured, predicted) -> float:
 def wheel_windows(expected, n: int, length: int, lead: int) -> tuple[np.ndarray, np.ndarray]:
     """First sample and length of each wheel's own samples: up to the next wheel, at most ``length``. [samples]
 
-    They start ``lead`` samples before the expected time, so that no model gains by a later onset.
+    They start ``lead`` samples before the expected time, so that no model profits from a later onset.
     """
     first = np.floor(np.asarray(expected, dtype=float)).astype(int) - lead
     following = np.append(first[1:], n)
@@ -67,9 +70,9 @@ def wheel_windows(expected, n: int, length: int, lead: int) -> tuple[np.ndarray,
 def score(data, expected, basis: WheelBasis, settings) -> Scores:
     """Scores of the model behind ``basis``; ``data`` (n_sample,) has passed its filter.
 
-    ``expected`` (n_wheel,) are the detected axles [samples], increasing. Every model, true or random, first finds
-    the one delay of all wheels that suits it, then each impact within ``settings.time_search``; in the forecast it
-    uses only what it has seen.
+    ``expected`` (n_wheel,) are the detected axles [samples], increasing. Every model, true or random, first gets the
+    one delay of all wheels that fits best. Then each impact is sought within ``settings.time_search``. The forecast
+    uses only data before the predicted samples.
     """
     rate, n = basis.rate, len(data)
     half, expected = settings.time_search * rate, np.asarray(expected, dtype=float)
@@ -94,9 +97,9 @@ def score(data, expected, basis: WheelBasis, settings) -> Scores:
 
 @dataclass(frozen=True)
 class DelayPower:
-    """``power`` (n_wheel, n_delay): what each wheel's free jump explains at delays from -``reach`` by ``stride``.
+    """``power`` (n_wheel, n_delay): power that each wheel's free jump explains at delays from -``reach`` by ``stride``.
 
-    Already the best within reach of the wheel's own search. [samples]
+    It is the largest value within the search range of the wheel. [samples]
     """
 
     power: np.ndarray
@@ -105,10 +108,10 @@ class DelayPower:
 
 
 def delay_power(data, expected, basis: WheelBasis, settings) -> DelayPower:
-    """How much each wheel explains at every delay against the detected axles.
+    """Power that each wheel explains at every delay against the detected axles.
 
-    An envelope has its peak behind an impact and a sensor hears a wheel before it is there, alike for all wheels.
-    Free jumps are compared, a few times per period of the band's upper edge: they do not depend on the phase.
+    An envelope has its peak after an impact, and a sensor records a wheel before it arrives, alike for all wheels. Free
+    jumps are compared, a few times per period of the band's upper edge: they do not depend on the phase.
     """
     stride = max(int(basis.rate / (12.0 * settings.band_high)), 1)
     reach = round(settings.delay_search * basis.rate / stride) * stride
@@ -123,22 +126,22 @@ def delay_power(data, expected, basis: WheelBasis, settings) -> DelayPower:
 def common_delay(heard: DelayPower, without_own: bool = False) -> np.ndarray:
     """(n_wheel,) delay of all wheels against the detected axles that explains most, the same for all. [samples]
 
-    ``without_own``: for every wheel what the others say, so that its own future does not enter.
+    ``leave_own_out``: for every wheel the delay from the other wheels, so that its own future does not enter.
     """
     each = heard.power
     total = np.broadcast_to(each.sum(axis=0), each.shape) - (each if without_own and len(each) > 1 else 0.0)
-    # the middle of the range over which every wheel keeps its best time within reach of its own search
+    # middle of the range in which every wheel has its best time within its search range
     best = [np.median(np.flatnonzero(row >= row.max() * (1 - 1e-9))) for row in (total if without_own else total[:1])]
     return np.broadcast_to(np.array(best), len(each)) * heard.stride - heard.reach
 
 
 def forecast(data, expected, basis: WheelBasis, settings, heard: DelayPower | None = None):
-    """Forecast skill [%], pooled and (n_wheel,) per wheel: jumps from the first milliseconds, judged on the next.
+    """Forecast skill [%], pooled and (n_wheel,) per wheel: jumps from the first milliseconds predict the next ones.
 
-    Causal: the filter is, and nothing behind ``forecast_train`` after a wheel's expected impact enters its time and
-    amplitude; what earlier wheels still ring is taken from their own forecasts, and how far the sensor hears wheels
-    from where they were detected from the other wheels. A wheel whose successor comes too soon is not judged.
-    ``heard`` is ``delay_power`` of the same arguments, where it is known.
+    The forecast is causal, as is the filter: nothing after ``forecast_train`` behind a wheel's expected impact enters
+    its time and amplitude. The decay of earlier wheels is taken from their own forecasts. The delay between a sensor's
+    record and the detected axles is taken from the other wheels. A wheel whose successor comes too soon is not scored.
+    ``delays`` is ``delay_power`` of the same arguments, if it is known.
     """
     rate, n = basis.rate, len(data)
     train, test = round(settings.forecast_train * rate), round(settings.forecast_test * rate)
@@ -161,7 +164,7 @@ def forecast(data, expected, basis: WheelBasis, settings, heard: DelayPower | No
 
 
 def _from_training(data, expected, end, basis, half):
-    """Sum (n,) of the responses foretold from what is seen of each wheel before its ``end``."""
+    """Sum (n,) of the predicted responses, from the data of each wheel before its ``end``."""
     reach = int(np.ceil(half)) + 1
     first = np.round(expected).astype(int) - reach
     n_lag, span = 2 * reach + 1, int(end[0] - first[0])
@@ -186,7 +189,7 @@ def _from_training(data, expected, end, basis, half):
 
 
 def leave_one_out(data, times, basis: WheelBasis, own):
-    """Score [%] with the jump's direction from the other wheels and one amplitude for the wheel left out."""
+    """Score [%] with the jump's direction from the other wheels and one amplitude for the held-out wheel."""
     if len(times) < 3:
         return float("nan"), np.full(len(times), np.nan)
     free = joint_fit(data, times, basis, free=True)

@@ -1,4 +1,4 @@
-"""A second train at the same time: what moves past the sensors at another speed or the other way."""
+"""Detect a second train at the same time: a coherent source that passes the sensors at another speed or direction."""
 
 from __future__ import annotations
 
@@ -10,18 +10,19 @@ from turnout.passage.kinematics import Motion
 from turnout.passage.slowness import likeness_at, slowness_grid
 from turnout.records import Rejection
 
-ANOTHER = "another train at about"  # of a finding, in words
-LIKE = 0.25  # least correlation of what is left, among the sensors
-SHARE = 0.1  # of the first train's level that half of the sensors must hear of the second, laid along its own motion
+ANOTHER = "another train at about"  # beginning of a finding's text
+LIKE = 0.25  # least correlation of the residual between sensors
+SHARE = 0.1  # least level of the second train along its own motion, in half of the sensors, over the first's
 
 
 def second_train(heard, passage, settings):
-    """Finding "two_trains" where what the known motion leaves over moves coherently in another way.
+    """Finding "two_trains" where the residual of the known motion moves coherently in another way.
 
-    What all sensors have in common along the known train is taken off each of them: the lower median, so that a
-    second train, elsewhere along the first one at every sensor, stays. A blow at a fixed place, as at the crossing's
-    nose, stays too, at the sensors beside it or at all of them at one moment: half of all must hear the second train,
-    at a tenth of the first one's level, and each at its own time. Needs three sensors; with fewer nothing is said.
+    The common level of all sensors along the known train is subtracted from each: the lower median. A second train
+    stays in the residual, since at every sensor it is elsewhere along the first. An impact at a fixed position, as at
+    the crossing's nose, stays too, at the sensors beside it or at all at one moment. So half of the sensors must
+    record the second train at a tenth of the first one's level, each at its own time. Needs three sensors, else there
+    is no finding.
     """
     if len(heard.positions) < 3:
         return []
@@ -47,7 +48,7 @@ def second_train(heard, passage, settings):
 
 
 def _smooth(heard):
-    """Levels over 20 ms."""
+    """Levels, smoothed over 20 ms."""
     return ndimage.uniform_filter1d(heard.levels.values, max(round(0.02 / heard.levels.step), 1), axis=1)
 
 
@@ -60,7 +61,7 @@ def _shared_level(heard, values, motion) -> float:
 
 
 def without_train(heard, motion) -> np.ndarray:
-    """(n_sensor, n_bin) levels above what the sensors share along the train, smoothed over 20 ms, never below 0."""
+    """(n_sensor, n_bin) levels above the sensors' common level along the train, smoothed over 20 ms, at least 0."""
     step, positions = heard.levels.step, heard.positions
     values = _smooth(heard)
     ways = [motion.way(t) - motion.direction * x for t in (heard.begin, heard.end) for x in positions]

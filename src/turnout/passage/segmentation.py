@@ -1,4 +1,4 @@
-"""Passages cut out of a continuous record, block by block, in bounded memory."""
+"""Cut passages out of a continuous record, block by block, in bounded memory."""
 
 from __future__ import annotations
 
@@ -9,16 +9,18 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy import signal
 
-BAND = (120.0, 400.0)  # Hz, where wheels are loud on any rail
-BIN = 0.05  # s
-LOUD = 6.0  # times the quiet power
-MEMORY = 120.0  # s over which the quiet power is remembered
+BAND = (120.0, 400.0)  # Hz, in which wheels are loud on any rail
+BIN = 0.05  # s, length of a bin of the level
+LOUD = 6.0  # least ratio of a passage's power to the quiet power
+MEMORY = 120.0  # s of quiet time from which the quiet power is taken
 
 
 @dataclass(frozen=True)
 class Piece:
-    """``samples`` (n_channel, n) from sample ``start`` of the record on; ``whole`` is False where a passage was longer
-    than may be kept, and was cut."""
+    """``samples`` (n_channel, n) from sample ``start`` of the record on.
+
+    ``is_whole`` is False where a passage was longer than allowed and was cut.
+    """
 
     start: int
     samples: np.ndarray
@@ -28,9 +30,9 @@ class Piece:
 def cut_passages(blocks: Iterable[np.ndarray], rate: float, settings) -> Iterator[Piece]:
     """Pieces of a continuous record, one per passage, each with ``settings.margin`` seconds on either side.
 
-    A passage is what is louder than six times the quiet power, mean over the channels, with no quiet of more than
-    ``settings.gap`` seconds in it. The quiet power is the lower fifth of the last two minutes without a passage. No
-    more than ``settings.longest`` seconds and a block are held, whatever the record's length; what is held is float32.
+    A passage exceeds six times the quiet power, mean over the channels, without a gap of more than ``settings.gap``
+    seconds. The quiet power is the 20 % quantile of the last two minutes without a passage. At any length of the
+    record, no more than ``settings.longest`` seconds and a block are in memory, as float32.
 
     Parameters
     ----------
@@ -46,7 +48,7 @@ def cut_passages(blocks: Iterable[np.ndarray], rate: float, settings) -> Iterato
 
 
 def equal_blocks(blocks, length: int) -> Iterator[np.ndarray]:
-    """The same samples in blocks of ``length``, the last one shorter: what is found must not depend on the blocks.
+    """The same samples in blocks of ``length``, the last one shorter: results must not depend on the blocks.
 
     >>> [b.tolist() for b in equal_blocks([np.array([[1, 2]]), np.array([[3, 4, 5]])], 3)]
     [[[1, 2, 3]], [[4, 5]]]
@@ -67,7 +69,7 @@ def equal_blocks(blocks, length: int) -> Iterator[np.ndarray]:
 
 @dataclass
 class _Cutter:
-    """What is remembered between blocks."""
+    """Cut passages from successive blocks; holds the state between them."""
 
     rate: float
     settings: object
@@ -83,10 +85,10 @@ class _Cutter:
     last: int = 0
 
     def feed(self, block):
-        """Pieces that end in this block."""
+        """Excerpts that end in this block."""
         if self.sections is None:
             self.sections = signal.butter(2, BAND, btype="bandpass", fs=self.rate, output="sos")
-            # as if the channels had always stood where they start: a zero offset is no blow
+            # as if the channels had always had their first value: an offset is no impact
             rest = np.median(block, axis=1)[None, :, None]
             self.memory = signal.sosfilt_zi(self.sections)[:, None, :] * rest
             self.rest = np.zeros((block.shape[0], 0))
@@ -111,7 +113,7 @@ class _Cutter:
         self._forget()
 
     def end(self):
-        """The piece that the record's end cuts off, if there is one."""
+        """The excerpt that the end of the record cuts off, if there is one."""
         if self.first is not None:
             yield self._piece(self.first, self.seen, True)
 
@@ -129,7 +131,7 @@ class _Cutter:
         elif not loud and place - self.last > self.settings.gap * self.rate:
             yield self._piece(self.first, self.last + margin, True)
             self.first = None
-            self.passing.clear()  # a train as long as the memory would become what is quiet
+            self.passing.clear()  # a train as long as the memory would be taken as quiet
 
     def _piece(self, start, stop, whole):
         start, parts, place = max(start, self.kept_from), [], self.kept_from
@@ -140,7 +142,7 @@ class _Cutter:
         return Piece(start, np.concatenate(parts, axis=1), whole)
 
     def _forget(self):
-        """Drop blocks that no coming piece can need."""
+        """Remove blocks that no later excerpt can need."""
         margin = int((self.settings.margin + BIN) * self.rate)
         needed = self.first if self.first is not None else self.seen - margin - self.rest.shape[1]
         while self.kept and self.kept_from + self.kept[0].shape[1] <= needed:

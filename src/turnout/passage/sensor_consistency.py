@@ -1,4 +1,4 @@
-"""Sensors that do not hear the train where they are said to be: swapped channels, drifting or offset clocks."""
+"""Find sensors whose records disagree with their positions: swapped channels, drifting or offset clocks."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from turnout.passage.axle_features import GRID, along_train
 from turnout.passage.slowness import coarser, pair_likeness, slowness_grid, stacked
 from turnout.records import Rejection
 
-SEEN = 0.7  # m: a sensor hears a wheel within this of its own place
-BLOW = 2.5  # m: in the crossing panel it may hear the blow at the nose louder than the wheel above it
-POOR, GOOD = 0.85, 0.95  # of the likeness that free shifts reach: below nothing fits, above everything does
-WIDTH = 0.02  # s
+SEEN = 0.7  # m, largest shift between a wheel's position in a record and the sensor
+BLOW = 2.5  # m, the same in the crossing panel, where the impact at the nose may be louder than the wheel
+POOR, GOOD = 0.85, 0.95  # of the correlation with free shifts: below is inconsistent, above is consistent
+WIDTH = 0.02  # s, smoothing of the levels
 
 
 def wrong_channels(heard, used, settings):
-    """Findings and (n_sensor,) bool of the sensors to keep: which channels make all others disagree.
+    """Findings and (n_sensor,) bool of the sensors to keep: channels that make all others disagree.
 
-    Asked only where no speed brings the sensors' levels together nearly as well as shifts of their own would. Then
-    every exchange of two channels is tried, and every sensor is left out once: what helps decisively is named. Fewer
-    than four sensors cannot say which one is wrong.
+    They are sought only where no speed correlates the sensors' levels nearly as well as free shifts do. Then every
+    exchange of two channels is tried, and every sensor is left out once. The one that helps decisively is reported.
+    Fewer than four sensors cannot show which one is wrong.
     """
     n = len(used)
     keep = np.ones(n, dtype=bool)
@@ -56,10 +56,10 @@ def wrong_channels(heard, used, settings):
 def wrong_places(heard, motion, used):
     """Findings and (n_sensor,) bool of the sensors to keep: small offsets, once the motion is known.
 
-    Each sensor's level along the train is compared with the median of the others, in the first and in the second
-    half: a shift that changes is a drifting clock, a constant one a clock or a position in the configuration that is
-    off. In the crossing panel a constant shift of less than ``BLOW`` is no finding: it may be the distance to the
-    nose. Fewer than four sensors cannot say which one is wrong.
+    Each sensor's level along the train is compared with the median of the others, in the first and in the second half.
+    A shift that changes is a drifting clock; a constant one is an error of the clock or of the configured position. In
+    the crossing panel a constant shift below ``MAX_NOSE_SHIFT`` is no finding: it may be the distance to the nose.
+    Fewer than four sensors cannot show which one is wrong.
     """
     n = len(used)
     keep = np.ones(n, dtype=bool)
@@ -99,7 +99,7 @@ def half_shifts(heard, motion, reach: float = 20.0) -> np.ndarray:
         size = 2 ** int(np.ceil(np.log2(2 * rows.shape[1])))
         spectra = np.fft.rfft(rows, size, axis=1)
         for i in range(len(rows)):
-            # the median of the others: a second wrong sensor must not pull it
+            # the median of the others: a second wrong sensor must not affect it
             others = np.median(np.delete(rows, i, axis=0), axis=0)
             likeness = np.fft.irfft(spectra[i] * np.fft.rfft(others, size).conj(), size)
             out[i, k] = lags[np.argmax(likeness[lags])] * GRID

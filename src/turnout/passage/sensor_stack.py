@@ -1,4 +1,4 @@
-"""Features along the train from all sensors: levels, deflection, and both together."""
+"""Compute features along the train from all sensors: levels, deflection, and both combined."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from turnout.passage.profile_decoding import decoded
 
 @dataclass(frozen=True)
 class Listening:
-    """What a recording offers to the search for axles, on one time grid.
+    """Envelopes of all sensors on one time grid, in which axles are sought.
 
-    ``levels`` (n_sensor, n_bin) with their ``step`` [s]; ``slow`` (n_sensor, n_bin) mean acceleration per bin,
-    without offset [m/s²]; ``positions`` (n_sensor,) [m]; ``begin``, ``end`` [s] where the train is heard.
+    ``levels`` (n_sensor, n_bin) with their ``step`` [s]; ``slow`` (n_sensor, n_bin) mean acceleration per bin, without
+    offset [m/s²]; ``positions`` (n_sensor,) [m]; ``begin``, ``end`` [s] where the train is audible.
     """
 
     levels: Levels
@@ -35,7 +35,7 @@ class Listening:
     end: float
 
     def only(self, rows) -> Listening:
-        """Some of the sensors."""
+        """The envelopes of some of the sensors."""
         rows = np.asarray(rows, dtype=int)
         levels = self.levels
         part = Levels(levels.values[rows], levels.step, levels.scatter[rows], levels.loud[rows], levels.amplitude[rows])
@@ -63,7 +63,7 @@ def profiles(listening: Listening, motion: Motion) -> tuple[dict, float]:
 
 
 def aligned(listening: Listening, motion: Motion, reach: float = 2.0, passes: int = 3) -> Motion:
-    """The motion with its speed corrected until all sensors' own features lie on each other.
+    """The motion with its speed corrected until all sensors' features coincide along the train.
 
     Each sensor's shift against the mean of the others [m], up to ``reach``, is regressed on its position.
     """
@@ -73,7 +73,7 @@ def aligned(listening: Listening, motion: Motion, reach: float = 2.0, passes: in
         return motion
     for _ in range(passes):
         shifts = _own_shifts(listening, motion, reach)
-        # the slope is v/v' - 1: a train faster than believed arrives early at sensors further on
+        # the slope is v/v' - 1: a train faster than assumed arrives early at later sensors
         slope = np.sum(along * shifts) / np.sum(along**2)
         slope = float(np.clip(slope, -0.2, 0.2))
         middle = float(motion.time(motion.direction * listening.positions.mean()))
@@ -100,19 +100,19 @@ def _own_shifts(listening, motion, reach):
         spectra = np.fft.rfft(rows, size, axis=1)
         others = spectra.sum(axis=0) - spectra
         found = np.fft.irfft(spectra * others.conj(), size, axis=1)[:, lags]
-        # at low speed the deflection is lost in noise, on a quiet rail the level says little: the better one counts
+        # at low speed the deflection is below noise, on a quiet rail the level is: the better one counts
         if found.max(axis=1).mean() > likeness.max(axis=1).mean():
             likeness = found
-    # a broad preference for no shift keeps a train of equal bogies from slipping by one
+    # a wide prior at no shift keeps a train of equal bogies from a shift by one bogie
     likeness = likeness * np.exp(-0.5 * (lags * GRID / max(reach, 1.0)) ** 2)
     best = likeness.argmax(axis=1)
     n = len(positions)
-    # the others' mean moves as well: with n sensors a common slope is seen n / (n - 1) times too large
+    # the others' mean moves too: with n sensors a common slope appears n / (n - 1) times too large
     return lags[best] * GRID * (n - 1) / n
 
 
 def _stretch(listening, motion):
-    """Along the train, from before the first to after the last axle. [m]"""
+    """Range along the train, from before the first to behind the last axle. [m]"""
     ways = [motion.way(t) - motion.direction * x for t in (listening.begin, listening.end) for x in listening.positions]
     return min(ways) - 12.0, max(ways) + 12.0
 
@@ -129,7 +129,7 @@ def template_counts(listening: Listening, motion: Motion, patterns, n: int = 3) 
 
 
 def counts(listening: Listening, motion: Motion, settings) -> list[AxleFinding]:
-    """Axle counts that the features offer, the clearest first."""
+    """Candidate axle counts of all features, the one with the largest contrast first."""
     found, start = profiles(listening, motion)
     offers = []
     for feature, (profile, noise) in found.items():

@@ -1,4 +1,4 @@
-"""Speed and direction from the levels of two or more sensors, before any axle is known."""
+"""Estimate speed and direction from the levels of two or more sensors, before any axle is known."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import fft, ndimage
 
-KMH = 3.6
+KMH = 3.6  # km/h per m/s
 
 
 @dataclass(frozen=True)
 class Scan:
-    """Likeness of all sensors after shifting them by distance times slowness, over signed slowness. [s/m]
+    """Correlation of all sensors after shifts by distance times slowness, over signed slowness. [s/m]
 
-    ``likeness`` (n,) is the mean correlation coefficient over pairs of sensors, weighted by distance up to 3 m.
+    ``correlation`` (n,) is the mean correlation coefficient over pairs of sensors, weighted by distance up to 3 m.
     """
 
     slowness: np.ndarray
     likeness: np.ndarray
 
     def peaks(self, n: int = 3, apart: float = 0.04) -> list[tuple[float, float]]:
-        """The ``n`` best (slowness, likeness), at least ``apart`` (relative) from each other."""
+        """The ``n`` best (slowness, correlation), at least ``min_distance`` (relative) from each other."""
         found, left = [], self.likeness.copy()
         for _ in range(n):
             k = int(np.argmax(left))
@@ -42,29 +42,32 @@ class Scan:
 
 
 def slowness_grid(settings, relative: float = 0.008) -> np.ndarray:
-    """Signed slownesses between the slowest and fastest train, ``relative`` apart. [s/m]"""
+    """Signed slownesses between the slowest and the fastest train, with relative steps ``relative``. [s/m]"""
     slow, fast = KMH / settings.speed_minimum, KMH / settings.speed_maximum
     one = np.geomspace(fast, slow, int(np.log(slow / fast) / relative) + 2)
     return np.concatenate([-one[::-1], one])
 
 
 def scan_slowness(values, step: float, positions, settings) -> Scan:
-    """Slant stack of levels (n_sensor, n_bin) of sensors at ``positions`` [m], bogies unresolved: no false maxima."""
+    """Slant stack of levels (n_sensor, n_bin) of sensors at ``positions`` [m].
+
+    Bogies are not resolved, so that there are no false maxima.
+    """
     slowness = slowness_grid(settings)
     return Scan(slowness, likeness_at(slowness, values, step, positions))
 
 
 def likeness_at(slowness, values, step: float, positions) -> np.ndarray:
-    """(n,) likeness of all sensors at each slowness [s/m]; at 0 of what they hear at the same moment."""
+    """(n,) correlation of all sensors at each slowness [s/m]; at 0 that of simultaneous records."""
     positions = np.asarray(positions, dtype=float)
-    # as wide as the grid is coarse at the slow end, where a passage lasts long
+    # as wide as the grid at the slow end, where a passage is long
     width = np.clip(0.008 * np.ptp(positions) * KMH / 20.0, 0.02, 0.1)
     values, step = coarser(values, step, 0.005)
     return stacked(pair_likeness(values, step, width), step, positions, np.asarray(slowness, dtype=float))
 
 
 def refine_slowness(pairs, step: float, positions, near: float, reach: float = 0.03) -> tuple[float, float]:
-    """Best slowness within ``reach`` (relative) of ``near`` and its likeness, from ``pair_likeness`` of fine levels."""
+    """Best slowness within ``reach`` (relative) of ``near`` and its correlation, from fine ``pair_correlations``."""
     positions = np.asarray(positions, dtype=float)
     span = max(np.ptp(positions), 0.1)
     n = int(np.clip(2 * reach * abs(near) * span / (0.5 * step), 21, 601)) | 1
@@ -73,7 +76,7 @@ def refine_slowness(pairs, step: float, positions, near: float, reach: float = 0
 
 
 def coarser(values, step: float, wanted: float):
-    """(levels, step) averaged over as many bins as fit into ``wanted`` [s]."""
+    """(levels, step) averaged over as many bins as fit into ``max_step`` [s]."""
     values, k = np.atleast_2d(values), max(int(wanted / step + 1e-9), 1)
     n = values.shape[1] // k
     return values[:, : n * k].reshape(len(values), n, k).mean(axis=2), k * step

@@ -1,6 +1,6 @@
-"""Speed and its change from axle times at several sensors, and from known axle distances.
+"""Estimate speed and acceleration from axle times at several sensors and from known axle distances.
 
-A train that brakes or gains speed: by how much, from where the sensors hear its first and its second half.
+For a train that brakes or accelerates, the records of its first and its second half give the acceleration.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ def slowness_from_sensors(times, positions, direction: int, place_error: float, 
     .. math:: t_{ij} = \tau_j + \frac{2 d\,x_i}{v_j + \sqrt{v_j^2 + 2 a\,d\,x_i}} + b_i q, \qquad
         v_j = \frac1q + a (\tau_j - \bar\tau), \quad a = -\frac{q'}{q^2}
 
-    Every axle has its own free time, so the train need not be known. The b_i, where along the rail a sensor hears a
-    wheel, do not average out over axles: their spread is estimated from the sensors where there are more than two,
-    and is never taken below ``place_error`` [m].
+    Every axle has its own free time, so the train need not be known. The b_i are the offsets along the rail between a
+    sensor and a wheel in its record. They do not average out over axles. Their spread is estimated from the sensors
+    where there are more than two, and is at least ``position_error`` [m].
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def slowness_from_sensors(times, positions, direction: int, place_error: float, 
     positions : (n_sensor,) array of float
         [m]
     limit : float
-        Accelerations are a quarter as large, one standard deviation: two sensors alone would give any. [m/s²]
+        Four standard deviations of the prior of the acceleration: two sensors alone leave it open. [m/s²]
     """
     times, along = np.asarray(times, float), direction * np.asarray(positions, float)
     along = along - along.mean()
@@ -79,7 +79,7 @@ def slowness_from_sensors(times, positions, direction: int, place_error: float, 
 
 
 def _by_motion(q, change, along, late):
-    """Times from the middle of the sensors to places ``along``, of a slowness ``q`` that changes steadily in speed."""
+    """Travel times from the middle of the sensors to positions ``travel``, at a slowness ``q`` with a steady change."""
     acceleration = -change / q**2
     speed = np.maximum(1.0 - change / q * late, 0.2) / q
     return 2.0 * along / (speed + np.sqrt(np.maximum(speed**2 + 2.0 * acceleration * along, 0.0)))
@@ -95,7 +95,7 @@ def residual_by_sensor(times, residual, sensor, axle):
 def combine(from_sensors, from_type, at: float) -> SpeedFinding:
     """Speed at the time ``at`` [s] from both sources, weighted by their variances.
 
-    Each source is (speed, se, acceleration, acceleration se, time its speed belongs to) or None.
+    Each source is (speed, se, acceleration, acceleration se, time of its speed) or None.
     """
     carried = []
     for source in (from_sensors, from_type):
@@ -110,7 +110,7 @@ def combine(from_sensors, from_type, at: float) -> SpeedFinding:
         return SpeedFinding(v, se, a, a_se, "sensors" if sensors else "axle spacing", None, at)
     difference = (sensors[0] - spacing[0]) / np.hypot(sensors[1], spacing[1])
     if abs(difference) > 3.0:
-        # distances in a train are known better than where along the rail a sensor hears it
+        # distances in a train are known better than the offset between sensor and wheel
         return SpeedFinding(*spacing, "axle spacing", float(difference), at)
     v, se = weighted(sensors[:2], spacing[:2])
     a, a_se = weighted(sensors[2:], spacing[2:])
@@ -129,24 +129,24 @@ def weighted(first, second) -> tuple[float, float]:
 
 
 def motion_of(finding: SpeedFinding, start: float, direction: int) -> Motion:
-    """Motion with the found speed, first axle at the origin at ``start`` [s]."""
+    """Motion with the speed of ``finding``, first axle at the origin at ``start`` [s]."""
     return Motion(finding.at(start), start, finding.acceleration, direction)
 
 
-STEADY = 0.15  # m: halves of a steady train lie no further apart from sensor to sensor, in the mean
-PASSES, SETTLED = 6, 2e-3
+STEADY = 0.15  # m, largest mean difference between the halves of a steady train
+PASSES, SETTLED = 6, 2e-3  # largest number of passes; slope at which they have converged
 
 
 def with_change(heard, motion: Motion, limit: float) -> Motion:
-    r"""The motion with the change of speed that brings all sensors together in both halves of the train.
+    r"""The motion with the acceleration that aligns all sensors in both halves of the train.
 
-    Where the train runs at v and is taken to run at v', a sensor x metres on hears it :math:`x (v'/v - 1)` metres too
-    far back: the slope over the sensors gives the speed of each half. Kept where it more than halves what lies apart;
-    what a single clock does is none of the train's. Wagons all alike may hide a change of speed by a fifth and more.
+    If the train runs at v and is assumed to run at v', a sensor x metres on records it :math:`x (v'/v - 1)` metres too
+    far back. The slope over the sensors gives the speed of each half. The acceleration is accepted where it more than
+    halves the spread; a single wrong clock cannot do that. Equal wagons may hide a change of speed of a fifth or more.
 
     Parameters
     ----------
-    heard : Listening
+    envelopes : SensorEnvelopes
         Of three sensors or more, else the motion stays as it is.
     motion : Motion
         At a steady speed.
@@ -171,19 +171,19 @@ def with_change(heard, motion: Motion, limit: float) -> Motion:
 
 
 def _apart(shifts) -> float:
-    """Mean over the sensors of how far the halves lie apart, against the usual sensor. [m]"""
+    """Mean over the sensors of the difference between the halves, against the median sensor. [m]"""
     change = shifts[:, 1] - shifts[:, 0]
     return float(np.mean(np.abs(change - np.median(change))))
 
 
 def _slope(along, shift) -> float:
-    """Median slope over all pairs of sensors (Theil and Sen), those at one place aside."""
+    """Median slope over all pairs of sensors (Theil and Sen), except pairs at one position."""
     pairs = [(i, j) for i, j in combinations(range(len(along)), 2) if abs(along[j] - along[i]) > 0.5]
     return float(np.median([(shift[j] - shift[i]) / (along[j] - along[i]) for i, j in pairs])) if pairs else 0.0
 
 
 def _bent(motion, heard, slopes) -> Motion:
-    """The motion with speeds in the middles of both halves that are by ``slopes`` too high."""
+    """The motion with the speeds in the middles of both halves corrected by ``slopes``, by which they are too high."""
     begin, end = motion.way(heard.begin), motion.way(heard.end)
     times = motion.time(begin + np.array([0.25, 0.75]) * (end - begin))
     speeds = motion.speed_at(times) / (1.0 + slopes)

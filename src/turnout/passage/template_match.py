@@ -1,5 +1,7 @@
-"""A known train heard by one or two sensors: its comb explains more than any other's, and no other shape explains
-much more."""
+"""Match a known train to the envelopes of one or two sensors.
+
+Its comb must explain more than any other's, and no other shape of its vehicles may explain much more.
+"""
 
 from __future__ import annotations
 
@@ -13,34 +15,34 @@ from turnout.passage.comb import ALIKE, evidence, explained, profiles_at, reshap
 from turnout.passage.comb_search import Fitted, about_middle, likeliest
 from turnout.passage.train_type import UNKNOWN, TypeFinding
 
-CLEAR = 10.0  # nat that a comb must be likelier than no train at all
-# Share of its evidence that a comb may gain by another shape of its vehicles, less what their free numbers gain by
-# chance. Simulated trains with a template gain 0.08 at most, strangers that look like one 0.22 at least.
+CLEAR = 10.0  # nat, least log Bayes factor of a comb against no train
+# Largest gain by another shape of the vehicles, as a share of the evidence, less what free numbers gain by chance.
+# Simulated trains with a template gain 0.08 at most, similar trains without one at least 0.22.
 RESHAPED = 0.14
-SPEEDS = np.linspace(-0.012, 0.012, 49)
-BEND = 0.2  # m between accelerations, that the middle of a train lies off its ends
-STEADY, STEADY_SHARE = 0.02, 0.8  # m/s², and how many trains keep their speed over a turnout
+SPEEDS = np.linspace(-0.012, 0.012, 49)  # relative speeds around the best one
+BEND = 0.2  # m, step of the train's middle against its ends between accelerations
+STEADY, STEADY_SHARE = 0.02, 0.8  # m/s², sd of a steady train; share of trains that pass a turnout at a steady speed
 
 
 def known_train(heard, motions, patterns, settings):
-    """(motion, AxleFinding, TypeFinding) of the train of ``patterns`` that is heard, None where none is sure.
+    """(motion, AxleFinding, TypeFinding) of the train of ``patterns`` in the envelopes, None where none is certain.
 
     Parameters
     ----------
-    heard : Listening
+    envelopes : SensorEnvelopes
         Of one sensor or more.
     motions : sequence of Motion
-        Tried, in order of their speed.
+        Candidates, in order of their speed.
     patterns : sequence of Pattern
-        Known trains; their rows are tried with every group of one kind of vehicle, then vehicle by vehicle.
+        Known trains; their rows are tried with one vehicle type per group, then vehicle by vehicle.
     settings : PassageSettings
-        The probability from which on a type is named, the prior of trains without template, the limit of acceleration.
+        Least probability of a type, prior of trains without template, limit of the acceleration.
     """
     types = likeliest(heard, motions, tuple(patterns)) if patterns else {}
     if not types:
         return None
     best = max(types.values(), key=lambda f: f.evidence)
-    # a train without template explains nothing more than noise does, here; its shape is asked for below
+    # here a train without template explains no more than noise; its shape is tested below
     log = {name: f.evidence + np.log((1 - settings.unknown_prior) / len(types)) for name, f in types.items()}
     log[UNKNOWN] = CLEAR + np.log(settings.unknown_prior)
     top = max(log.values())
@@ -59,7 +61,7 @@ def known_train(heard, motions, patterns, settings):
     offsets = fitted.comb.offsets
     half = 0.5 * offsets[-1] / speed
     residual = float(np.std(shape - best.comb.offsets))
-    # axles that fit better elsewhere may all be off: as much as that moves a straight line through them
+    # the axles' residuals may be systematic: they move a straight line through the axles by that much
     speed_se = float(np.hypot(speed_se, speed * residual / np.sqrt(np.sum((offsets - offsets.mean()) ** 2))))
     found = TypeFinding(
         best.pattern.type,
@@ -83,8 +85,8 @@ def known_train(heard, motions, patterns, settings):
 def speed_of(heard, fitted: Fitted, settings):
     """(speed halfway [m/s], its standard error, acceleration [m/s²], its standard error, the likeliest fit).
 
-    Means over what the comb's evidence leaves possible of both. Most trains pass a turnout at a steady speed: 0.8 of
-    the prior is 0 ± 0.02 m/s², the rest 0 ± a quarter of the limit.
+    Posterior means of both, from the comb's evidence. Most trains pass a turnout at a steady speed: 0.8 of the prior of
+    the acceleration is 0 ± 0.02 m/s², the remainder 0 ± a quarter of the limit.
     """
     lasted = fitted.comb.offsets[-1] / fitted.motion.speed
     step = 16.0 * BEND / lasted**2
@@ -95,7 +97,7 @@ def speed_of(heard, fitted: Fitted, settings):
     motions = [replace(middle, speed=v, acceleration=a) for a in bends for v in speeds]
     profiles = profiles_at(heard, motions)
     share, starts = explained(profiles, fitted.comb, np.arange(len(motions)))
-    # sensors hear the same wheels: what the comb does not explain of them is no second witness of the speed
+    # sensors record the same wheels: their residuals are not independent, so they count as one
     log = evidence(share.max(axis=1), profiles.length, 1).reshape(13, -1)
     edges = np.append(bends - 0.5 * (bends[1] - bends[0]), bends[-1] + 0.5 * (bends[1] - bends[0]))
     steady = np.diff(stats.norm.cdf(edges / STEADY))
@@ -105,10 +107,10 @@ def speed_of(heard, fitted: Fitted, settings):
     weight /= weight.sum()
     by_speed, by_bend = weight.sum(axis=0), weight.sum(axis=1)
     speed, acceleration = float(by_speed @ speeds), float(by_bend @ bends)
-    # between two points of the grid nothing is known: a twelfth of their distance squared
+    # the grid is no finer: add a twelfth of its step squared
     speed_se = np.sqrt(by_speed @ (speeds - speed) ** 2 + (speeds[1] - speeds[0]) ** 2 / 12)
     acceleration_se = np.sqrt(by_bend @ (bends - acceleration) ** 2 + min(STEADY, bends[1] - bends[0]) ** 2)
-    k = int(np.argmax(log))  # of all motions in a row
+    k = int(np.argmax(log))  # index over all motions
     start = float(starts[int(np.argmax(share[k]))])
     best = replace(fitted, motion=motions[k], start=start, share=float(share[k].max()))
     return speed, float(speed_se), acceleration, float(acceleration_se), best

@@ -1,4 +1,4 @@
-"""What a timetable or the train data say about a passage, beside what the recording says."""
+"""Find the train of a passage in the timetable or train data."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from datetime import datetime
 
 @dataclass(frozen=True)
 class Listed:
-    """One row of trains.csv; None where it says nothing. ``speed`` [km/h], ``axle_load`` [t]."""
+    """One row of trains.csv; None for an empty field. ``speed`` [km/h], ``axle_load`` [t]."""
 
     passed_at: datetime
     train_type: str | None = None
@@ -20,7 +20,7 @@ class Listed:
 
 
 def listed_trains(rows: Sequence[Mapping[str, str]]) -> tuple[tuple[Listed, ...], tuple[str, ...]]:
-    """Sound rows in order of time, and a sentence for each row that cannot be used.
+    """Valid rows in order of time, and a sentence for each row that cannot be used.
 
     Columns: passed_at_utc (needed), train_type, speed_kmh, axle_load_t, track, n_axles.
 
@@ -66,9 +66,9 @@ def _number(text, column, low, high):
 
 
 def listed_for(moment: datetime, n_axles: int, trains: Sequence[Listed], tolerance: float) -> Listed | None:
-    """The train that the data list nearest to ``moment``, within ``tolerance`` [s].
+    """The listed train nearest in time to ``moment``, within ``tolerance`` [s].
 
-    None where the nearest has another number of axles, or where a second one is nearly as near and as likely.
+    None where it has another number of axles, or where a second one fits nearly as well.
     """
     near = [(abs((t.passed_at - moment).total_seconds()), t) for t in trains]
     near = sorted((x for x in near if x[0] <= tolerance), key=lambda x: x[0])

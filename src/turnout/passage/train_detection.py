@@ -1,4 +1,4 @@
-"""From samples to what axles are sought in, and which sensors hear the train."""
+"""Compute the envelopes in which axles are sought, and find the sensors and the track on which the train is audible."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from scipy import ndimage
 from turnout.passage.envelope import levels
 from turnout.passage.sensor_stack import Listening
 
-QUIET_BLOCK = 0.05  # s
+QUIET_BLOCK = 0.05  # s over which a level is averaged
 
 
 def listen(samples, rate: float, positions, step: float) -> Listening | None:
-    """``Listening`` of the channels (n_sensor, n_sample), None where nothing is louder than the quiet parts."""
+    """``SensorEnvelopes`` of the channels (n_sensor, n_sample), None where nothing is louder than the quiet parts."""
     found = levels(samples, rate, step)
     step, n = found.step, found.n_bin
     per_bin = round(step * rate)
@@ -30,8 +30,8 @@ def listen(samples, rate: float, positions, step: float) -> Listening | None:
 def heard_bins(level, step: float, times: float = 8.0) -> np.ndarray:
     """(n_bin,) bool: the level (n_bin,) over 50 ms is above a seventh of its range.
 
-    All False where that range is less than ``times`` the scatter of neighbouring blocks, or less than half a neper:
-    then nothing but noise was recorded.
+    All False where that range is below ``min_ratio`` times the scatter of neighbouring blocks, or below half a neper:
+    then only noise was recorded.
     """
     width = max(round(QUIET_BLOCK / step), 1)
     smooth = ndimage.uniform_filter1d(level, width)
@@ -45,7 +45,7 @@ def heard_bins(level, step: float, times: float = 8.0) -> np.ndarray:
 
 
 def narrowed(listening: Listening, rows) -> Listening:
-    """Only the sensors ``rows``, with the begin and end of what they hear."""
+    """Only the sensors ``rows``, with the begin and end of the train in their envelopes."""
     part = listening.only(rows)
     bins = np.flatnonzero(heard_bins(part.levels.values.mean(axis=0), part.levels.step))
     if bins.size == 0:
@@ -54,7 +54,7 @@ def narrowed(listening: Listening, rows) -> Listening:
 
 
 def loudness(listening: Listening) -> np.ndarray:
-    """(n_sensor,) level over 50 ms that a tenth of the passage exceeds; 0 where a sensor hears nothing but noise."""
+    """(n_sensor,) level over 50 ms that a tenth of the passage exceeds; 0 where a sensor records only noise."""
     step = listening.levels.step
     width = max(round(QUIET_BLOCK / step), 1)
     part = slice(int(listening.begin / step), max(int(listening.end / step), 1))
@@ -65,9 +65,10 @@ def loudness(listening: Listening) -> np.ndarray:
 
 
 def hearing(listening: Listening) -> np.ndarray:
-    """Rows of the sensors that hear the train: not only noise, and not much fainter than most.
+    """Rows of the sensors that record the train: more than noise, and not much fainter than most.
 
-    A tenth of the amplitude of the best third is the neighbouring track's train, not a less sensitive sensor.
+    A sensor with a tenth of the amplitude of the best third belongs to the neighbouring track; it is not a less
+    sensitive sensor.
     """
     loud = loudness(listening) > 0.1
     if not loud.any():
@@ -77,11 +78,11 @@ def hearing(listening: Listening) -> np.ndarray:
 
 
 def track_taken(listening: Listening, tracks) -> tuple[str, float]:
-    """("main" | "diverging" | "unknown", difference): which of the sensors of one track only are the louder.
+    """("main" | "diverging" | "unknown", difference): the track whose own sensors are the louder ones.
 
-    ``difference`` is in nepers of power; twice the amplitude, 1.4 nepers, is asked for. With sensors of one track
-    only, that track is taken if they are not much fainter than the sensors that feel both; if they hear nothing, the
-    other one is.
+    ``difference`` is in nepers of power; at least twice the amplitude, 1.4 nepers, is required. With sensors of one
+    track only, that track is taken if they are not much fainter than the sensors of both tracks. If they record
+    nothing, the other track is taken.
     """
     tracks, heard = np.asarray(tracks), loudness(listening) > 0.1
     power = np.where(heard, np.log(np.maximum(listening.levels.loud, 1e-300)), -np.inf)
@@ -101,5 +102,5 @@ def track_taken(listening: Listening, tracks) -> tuple[str, float]:
 
 
 def _difference(first, second) -> float:
-    """Of two logarithms, either of which may be that of silence."""
+    """Difference of two logarithms, either of which may be that of silence."""
     return 0.0 if first == second else float(np.clip(first - second, -20.0, 20.0))

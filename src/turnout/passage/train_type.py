@@ -1,4 +1,4 @@
-r"""Train type by axle pattern: posterior probability over templates and "unknown"."""
+"""Identify the train type by its axle pattern: posterior probability over templates and "unknown"."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from turnout.passage.axle_patterns import Vehicle, offsets
 from turnout.passage.vehicle_sequence import best_row
 
 UNKNOWN = "unknown"
-# Spacings of a train without template: inside bogies 1.8 to 3.2 m, between them up to 22 m.
+# m, axle spacings of a train without template: inside bogies 1.8 to 3.2 m, between them up to 22 m.
 BOGIE, BOGIE_SPREAD, LONG_FROM, LONGEST = 2.4, 0.4, 3.4, 22.0
 
 
@@ -19,11 +19,11 @@ BOGIE, BOGIE_SPREAD, LONG_FROM, LONGEST = 2.4, 0.4, 3.4, 22.0
 class TypeFinding:
     """``type`` is a name or "unknown", ``probability`` its posterior; ``probabilities`` those of every candidate.
 
-    ``vehicles`` and ``offsets`` (n_axle,) [m] belong to the best template even where it was not accepted, then
-    ``residual`` [m], the rms deviation of the axle spacings, says why. ``speed`` [m/s] at the first axle,
-    ``speed_se``, ``acceleration`` [m/s²] and ``acceleration_se`` follow from the template's distances, ``middle`` and
-    ``middle_se`` are the speed halfway between the first and the last axle: an acceleration that is not sure moves it
-    least.
+    ``vehicles`` and ``offsets`` (n_axle,) [m] belong to the best template, also where it was not accepted. Then
+    ``residual`` [m], the rms deviation of the axle spacings, is the reason. ``speed`` [m/s] at the first axle,
+    ``speed_se``, ``acceleration`` [m/s²] and ``acceleration_se`` follow from the template's distances. ``middle_speed``
+    and ``middle_speed_se`` are for the middle between the first and the last axle, where an uncertain acceleration
+    matters least.
     """
 
     type: str
@@ -57,8 +57,8 @@ def axle_times_to_motion(times, places, sigma: float, limit: float):
     .. math:: d = u_0 + v t + \tfrac12 a t^2
 
     Most trains pass a turnout at a steady speed: the acceleration is 0 ± 0.02 m/s² with prior probability 0.8, else
-    0 ± ``limit`` / 4. Both fits are weighted by what the times say; the covariance holds the doubt between them.
-    ``sigma`` [m] is the error of one axle's place. Returns ((v, a), covariance (2, 2)).
+    0 ± ``limit`` / 4. Both fits are weighted by their evidence; the covariance includes the difference between them.
+    ``sigma`` [m] is the error of one axle's position. Returns ((v, a), covariance (2, 2)).
     """
     t = np.asarray(times, dtype=float) - times[0]
     design = np.column_stack([np.ones_like(t), t, 0.5 * t**2]) / sigma
@@ -79,9 +79,9 @@ def axle_times_to_motion(times, places, sigma: float, limit: float):
 
 
 def find_type(times, patterns, settings, speed=None, speed_se=None, place_se: float = 0.03) -> TypeFinding:
-    """Which template the axle ``times`` (n_axle,) [s] fit, at any speed, or at ``speed`` ± ``speed_se`` [m/s].
+    """Template that the axle ``times`` (n_axle,) [s] fit, at any speed, or at ``speed`` ± ``speed_se`` [m/s].
 
-    ``place_se`` [m] is the error of one axle's place along the rail. A type is named if its posterior probability
+    ``position_se`` [m] is the error of one axle's position along the rail. A type is named if its posterior probability
     reaches ``settings.type_probability`` and its deviations pass a chi-squared test at 0.001; else "unknown".
     """
     times = np.asarray(times, dtype=float)
@@ -130,21 +130,21 @@ def _decide(times, found, n_type, settings, speed, sigma):
 def unknown_evidence(spacing) -> float:
     """Log density of axle spacings [m] of a train that has no template.
 
-    Short spacings (in a bogie) and long ones follow each other as a chain: a long one nearly always comes after a
-    short one. That is what tells bogies from axles where the speed is not known.
+    Short spacings (in a bogie) and long ones form a Markov chain: a short one is nearly always followed by a long one.
+    This distinguishes bogies from axles where the speed is not known.
     """
     short = np.asarray(spacing) < LONG_FROM
     density = np.where(short, 0.95 * stats.norm.pdf(spacing, BOGIE, BOGIE_SPREAD) + 0.01, 1 / (LONGEST - LONG_FROM))
     density = np.where(np.asarray(spacing) > 1.5 * LONGEST, 1e-4, density)
     follows = np.where(short[:-1], np.where(short[1:], 0.05, 0.95), np.where(short[1:], 0.85, 0.15))
-    # three short ones in a row are four axles at bogie distance: no vehicle has them
+    # three short ones in a row are four axles at bogie distance, which no vehicle has
     runs = np.sum(short[:-2] & short[1:-1] & short[2:])
     first = np.log(0.9 if short[0] else 0.1) + runs * np.log(0.01)
     return float(np.sum(np.log(density)) + np.sum(np.log(follows)) + first)
 
 
 def _fit_pattern(times, pattern, settings, speed, speed_se, sigma):
-    """Best row of one pattern: coarse over speed and acceleration, then twice sharp."""
+    """Best row of one pattern: a coarse search over speed and acceleration, then a fine one."""
     low, high = pattern.axle_counts()
     if not low <= len(times) <= high:
         return None
@@ -166,7 +166,10 @@ def _fit_pattern(times, pattern, settings, speed, speed_se, sigma):
 
 
 def _plausible(times, pattern, row, settings, speed, speed_se):
-    """Cheap refusal: length of a fixed row, or first wheelbase of a free one, out of reach of the known speed."""
+    """Whether the known speed allows the pattern, by a cheap test.
+
+    It compares the length of a fixed row, or the first wheelbase of a free one.
+    """
     lasted = times[-1] - times[0]
     slack = 4 * speed_se * lasted + 0.5 * settings.acceleration_limit * lasted**2 + 1.0
     if row is not None:
@@ -177,7 +180,7 @@ def _plausible(times, pattern, row, settings, speed, speed_se):
 
 
 def _candidate(times, type_, row, settings, speed, speed_se, sigma):
-    """Motion, deviations and evidence of one row of vehicles."""
+    """Motion, residual and evidence of one row of vehicles."""
     _, vehicles, choices = row
     places = offsets(vehicles)
     limit = settings.acceleration_limit
@@ -193,16 +196,16 @@ def _candidate(times, type_, row, settings, speed, speed_se, sigma):
         freedom += 1
     evidence = -0.5 * square - len(residual) * np.log(sigma * np.sqrt(2 * np.pi)) - choices
     rms = float(np.sqrt(np.mean(residual**2)))
-    # the error of the motion follows the scatter that is seen, as far as a few axles can tell it
+    # the error of the motion follows the observed scatter, as far as a few axles determine it
     covariance = covariance * min(1.0, max((rms / sigma) ** 2 * len(times) / freedom, 0.1))
-    # neighbours err alike, a heavy vehicle's axles most of all: so many fewer of them count
+    # errors of neighbours are correlated, most in a heavy vehicle: fewer of them are independent
     covariance = covariance * _alike(v * past + 0.5 * a * past**2 - places)
     p_value = float(stats.chi2.sf(square, freedom))
     return _Candidate(type_, evidence, p_value, vehicles, places, rms, ((v, a), covariance))
 
 
 def _alike(residual) -> float:
-    r"""How much larger a variance is for residuals (n,) that follow each other: :math:`(1 + \rho) / (1 - \rho)`.
+    r"""Factor on a variance for residuals (n,) with autocorrelation: :math:`(1 + \rho) / (1 - \rho)`.
 
     >>> _alike(np.array([1.0, -1.0] * 4)), round(_alike(np.array([1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0])), 1)
     (1.0, 4.3)
@@ -215,7 +218,7 @@ def _alike(residual) -> float:
 
 
 def _starts(times, pattern, settings, speed, speed_se):
-    """Speeds and accelerations to start from: fine enough for the coarse tolerance over the whole train."""
+    """Start values of speed and acceleration, fine enough for the coarse tolerance over the whole train."""
     spacing = np.diff(times)
     if speed is not None:
         n = int(np.ceil(2.0 * (speed_se or 0.0) / (0.02 * speed)))
@@ -228,5 +231,5 @@ def _starts(times, pattern, settings, speed, speed_se):
         step = 0.03 * v / max(times[-1] - times[0], 1e-3)
         n = int(np.floor(min(settings.acceleration_limit, 1.0) / step))
         for k in range(-min(n, 40), min(n, 40) + 1):
-            # the mean speed stays v: a train that gains speed starts slower
+            # the mean speed stays v: a train that accelerates starts slower
             yield v - 0.5 * k * step * (times[-1] - times[0]), k * step

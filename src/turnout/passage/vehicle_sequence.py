@@ -1,6 +1,7 @@
-"""The row of vehicles that explains most, once it is known how one wheel sounds: dynamic programming over vehicles.
+"""Find rows of vehicles by dynamic programming.
 
-The row of vehicles of a pattern that comes closest to a row of axles, by dynamic programming.
+One function finds the row that explains most of the profiles, once the tooth of one wheel is known. The other finds the
+row of a pattern that is closest to given axle spacings.
 """
 
 from __future__ import annotations
@@ -10,17 +11,17 @@ import numpy as np
 from turnout.passage.axle_patterns import Pattern
 from turnout.passage.comb import LEAD, STEP, TAPS, Profiles
 
-SLACK = 1  # steps that a vehicle may stand off: lengths on the grid, a speed a little off
+SLACK = 1  # grid steps that a vehicle may deviate: rounding of lengths, error of the speed
 
 
 def likeliest_row(profiles: Profiles, teeth, pattern: Pattern, first: float, reach: float = 30.0):
-    r"""(row of vehicles, start [m]) of ``pattern`` that leaves least over; None where there is none.
+    r"""(row of vehicles, start [m]) of ``pattern`` with the smallest residual; None where there is none.
 
     .. math:: \|y - \sum_j k(s - d_j)\|^2 = \|y\|^2 - \sum_j \Bigl(2 m(d_j) - \sum_l a(d_j - d_l)\Bigr)
 
     with m the correlation of profile and tooth and a that of the tooth with itself: terms of a vehicle, and of a
-    vehicle and the one before it. The first axle is sought within ``reach`` metres of ``first``, both as told from
-    where the hearing begins. ``teeth`` (n_sensor, TAPS), ``profiles`` of one motion.
+    vehicle and the one before it. The first axle is sought within ``reach`` metres of ``first``, both behind the
+    beginning of the audible part. ``teeth`` (n_sensor, N_TAPS), ``profiles`` of one motion.
     """
     values = profiles.values[:, 0]
     match = sum(np.correlate(np.pad(v, TAPS // 2), k, "valid") for v, k in zip(values, teeth))
@@ -52,24 +53,24 @@ def likeliest_row(profiles: Profiles, teeth, pattern: Pattern, first: float, rea
 
 
 class _Couplings:
-    """What overlapping teeth take off: -a(distance) twice, between axles."""
+    """What overlapping teeth subtract: -a(distance) twice, between axles."""
 
     def __init__(self, self_match):
         self.places = (np.arange(self_match.size) - TAPS + 1) * STEP
         self.values = self_match
 
     def at(self, distance):
-        """a at ``distance`` [m]."""
+        """Autocorrelation a of the tooth at ``distance`` [m]."""
         return np.interp(distance, self.places, self.values, left=0.0, right=0.0)
 
     def between(self, v, w):
-        """Of all axles of ``v`` with those of ``w`` behind it."""
+        """Sum over all axles of ``v`` with those of ``w`` behind it."""
         apart = v.length + np.asarray(w.axles)[None] - np.asarray(v.axles)[:, None]
         return 2.0 * float(np.sum(self.at(apart)))
 
 
 def _gain(match, v, couplings):
-    """(n,) what vehicle ``v`` explains with its front coupler at each place of the grid."""
+    """(n,) gain of vehicle ``v`` with its front coupler at each point of the grid."""
     place = np.arange(match.size)
     total = np.zeros(match.size)
     for axle in v.axles:
@@ -79,7 +80,7 @@ def _gain(match, v, couplings):
 
 
 def _extend(layers, node, following, v, w, score, gain, couplings):
-    """Put ``w`` behind every row that ends with ``v``; of rows that end alike the better one stays."""
+    """Couple ``w`` behind every row that ends with ``v``; of rows with the same end the better one stays."""
     n, length = score.size, round(v.length / STEP)
     reached, step = np.full(n, -np.inf), np.zeros(n, dtype=int)
     for shift in range(length - SLACK, length + SLACK + 1):
@@ -99,7 +100,7 @@ def _extend(layers, node, following, v, w, score, gain, couplings):
 
 
 def _traced(layers, end):
-    """(row, start [m]) from the end of the best row back to its beginning."""
+    """(row, start [m]) of the best row, traced from its end to its beginning."""
     row, (node, name, place) = [], end
     while True:
         _, (sources, source, step), v = layers[node][name]
@@ -117,15 +118,15 @@ def best_row(spacing, pattern: Pattern, tolerance: float):
     """(cost [nat], row of vehicles, its choices): axle spacings closest to ``spacing`` (n_axle - 1,) [m].
 
     Cost is half the squared deviation in units of ``tolerance`` [m], summed over the spacings, plus the logarithm of
-    the number of vehicles that stood to choice; ``choices`` is the sum of these. None where the pattern cannot have
-    this number of axles, or where no row comes near.
+    the number of vehicles to choose from; ``choices`` is the sum of these logarithms. None where the pattern cannot
+    have this number of axles, or where no row is near.
     """
     n_axle = len(spacing) + 1
     low, high = pattern.axle_counts()
     if not low <= n_axle <= high:
         return None
-    limit = 20.0 + 4.0 * n_axle  # beyond it the chi-squared test fails whatever follows
-    # plain floats: a train has hundreds of thousands of pairs, most of them given up at the first spacing
+    limit = 20.0 + 4.0 * n_axle  # above it the chi-squared test fails anyway
+    # plain floats for speed: there are several 1e5 pairs, most of them rejected at the first spacing
     seen, weight, within = np.asarray(spacing).tolist(), 0.5 / tolerance**2, pattern.spacings
     chance = pattern.log_choices
     # state: axles used, group, vehicles used of the group, last vehicle -> (cost, row, choices)

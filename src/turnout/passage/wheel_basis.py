@@ -1,4 +1,4 @@
-r"""What one wheel leaves at a sensor: the model's free decay from an impact between two samples, filtered."""
+"""Compute the filtered response of a sensor to one wheel: a model's free decay from an impact between two samples."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from scipy import fft, signal
 
 from turnout.records import ModalModel
 
-# Impacts are sought at the middles of this many parts of the interval between two samples.
+# Impacts are sought at the middles of 16 equal parts of the interval between two samples.
 FRACTIONS = (np.arange(16) + 0.5) / 16
 
 
@@ -68,7 +68,7 @@ class WheelBasis:
         return stacked[..., keep]
 
     def turned(self, weights, phi) -> np.ndarray:
-        """(n, n_column) column weights after the impacts move ``phi`` (n,) samples earlier."""
+        """(n, n_column) column weights if the impacts are ``phi`` (n,) samples earlier."""
         oscillates = self.poles.imag > 0
         place = np.concatenate([[0], np.cumsum(1 + oscillates)[:-1]])
         weights = np.asarray(weights, dtype=float)
@@ -93,7 +93,7 @@ class WheelBasis:
         return theta / np.sqrt(np.einsum("qp,pr,qr->q", theta, self.gram, theta))[:, None]
 
     def correlated(self, rows, n_lag: int) -> np.ndarray:
-        """(n_row, n_lag, n_column) inner products of the columns with each row (n_row, n) from every lag on."""
+        """(n_row, n_lag, n_column) inner products of the columns with each row (n_row, n), shifted by every lag."""
         size = fft.next_fast_len(rows.shape[1], real=True)
         if size not in self._spectra:
             self._spectra[size] = fft.rfft(self.columns, size).conj()
@@ -105,7 +105,7 @@ class WheelBasis:
         return {}
 
     def unit_weights_of(self, seen) -> np.ndarray:
-        """(n, n_fraction, n_column) the same where only the first ``seen`` (n,) samples of a response count."""
+        """(n, n_fraction, n_column) ``unit_weights`` for the first ``n_observed`` (n,) samples of a response."""
         key = tuple(int(k) for k in seen)
         if key not in self._seen:
             products = self.columns[:, None, :] * self.columns[None, :, :]
@@ -127,7 +127,7 @@ class WheelBasis:
 
     @cached_property
     def whitening(self) -> np.ndarray:
-        """(n_column, n_column) upper triangular: its product with column weights has the norm of the response."""
+        """(n_column, n_column) upper triangular; its product with column weights has the norm of the response."""
         gram = self.gram + 1e-12 * np.trace(self.gram) * np.eye(self.n_column)
         return np.linalg.cholesky(gram).T
 
@@ -138,7 +138,7 @@ class WheelBasis:
         return self.columns[:, lag:] @ self.columns[:, : self.n_sample - lag].T
 
     def cut(self, n: int) -> WheelBasis:
-        """The same columns, only their first ``n`` samples."""
+        """The same basis with the first ``n`` samples of its columns."""
         if n >= self.n_sample:
             return self
         if n not in self._cuts:
@@ -161,7 +161,7 @@ def band_pass(low: float, high: float, order: int, rate: float) -> np.ndarray:
 
 
 def filtered(samples, through) -> np.ndarray:
-    """Samples (..., n) behind ``through``: second-order sections (n, 6), taps (n,) or None for nothing."""
+    """Samples (..., n) behind ``filter_``: second-order sections (n, 6), taps (n,) or None for no filter."""
     if through is None:
         return np.asarray(samples, dtype=float)
     if np.ndim(through) == 2:
@@ -170,7 +170,7 @@ def filtered(samples, through) -> np.ndarray:
 
 
 def settling(poles, through, tolerance: float, longest: int) -> int:
-    """Samples after which the slowest of the poles, model or filter, has fallen to ``tolerance``."""
+    """Samples after which the slowest pole of model and filter has decayed to ``tolerance``."""
     inner = signal.sos2zpk(through)[1] if np.ndim(through) == 2 else np.zeros(0)
     radii = np.concatenate([np.abs(poles), np.abs(inner), [0.0]])
     slowest = min(radii.max(), 1 - 1e-6)
@@ -178,9 +178,9 @@ def settling(poles, through, tolerance: float, longest: int) -> int:
 
 
 def wheel_basis(model: ModalModel, through, rate: float, tolerance=1e-4, longest=0.25) -> WheelBasis:
-    """Basis of ``model`` at the sampling ``rate`` of the passage [Hz], behind the filter ``through`` (``filtered``).
+    """Basis of ``model`` at the sampling ``rate`` of the passage [Hz], behind ``filter_`` (``apply_filter``).
 
-    A model identified at another rate is carried over by A^(ratio): its poles in 1/s stay the same. ``tolerance``
+    A model identified at another rate is converted by A^(ratio): its poles in 1/s stay the same. ``tolerance``
     is the remaining amplitude at which columns end, ``longest`` [s] their limit. ValueError for an unstable model.
     """
     poles, vectors = np.linalg.eig(np.asarray(model.a, dtype=float))

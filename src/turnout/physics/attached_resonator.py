@@ -36,7 +36,7 @@ class AttachedResonator(PhysicsTerm):
         return cls(20, 20.0, 250.0)
 
     def links(self, track):
-        """A further degree of freedom at the support."""
+        """Links of an additional degree of freedom at the support."""
         self.check()
         if self.mass == 0.0:
             return []
@@ -48,7 +48,7 @@ class AttachedResonator(PhysicsTerm):
         ]
 
     def dynamic_stiffness(self, frequency):
-        """(n,) complex stiffness that it adds at the rail [N/m]."""
+        """(n,) complex stiffness added at the rail [N/m]."""
         omega = 2.0 * np.pi * np.asarray(frequency)
         r = omega / (2.0 * np.pi * self.frequency)
         inner = 2j * self.damping * r

@@ -7,13 +7,16 @@ import numpy as np
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.force_laws import Port, TableLaw
 
-UNIT = 1e-3  # deflection at which the parameter is the share added [m]
+UNIT = 1e-3  # m, deflection at which the parameter is the added share of stiffness
 WAY = np.linspace(-3e-3, 3e-3, 121)
 
 
 @dataclass(frozen=True)
 class BallastHardening(PhysicsTerm):
-    r"""Cubic spring under some sleepers, :math:`F = h k_b y (y / 1\,\mathrm{mm})^2`; a hammer's µm do not see it."""
+    r"""Cubic spring under some sleepers, :math:`F = h k_b y (y / 1\,\mathrm{mm})^2`.
+
+    A hammer test with its micrometres does not show it.
+    """
 
     first: int
     last: int

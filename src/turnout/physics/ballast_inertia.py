@@ -12,8 +12,8 @@ SOURCE = "Wolf 1994, Foundation vibration analysis using simple physical models:
 class BallastInertia(PhysicsTerm):
     r"""A cone of ground under every sleeper: :math:`\Delta K(\omega) = i\omega c - \omega^2 m`.
 
-    With 3 layers it is under the ballast's mass, beside the subgrade. A negative c takes nine tenths of the damper
-    there at most: less than none would give energy.
+    With 3 layers it is under the ballast mass, parallel to the subgrade. A negative c removes at most nine tenths of
+    the damper there: a negative damper would add energy.
     """
 
     mass: float

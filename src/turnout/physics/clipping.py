@@ -9,7 +9,7 @@ from turnout.physics.term import Parameter, PhysicsTerm
 
 @dataclass(frozen=True)
 class Clipping(PhysicsTerm):
-    r"""The channel shows :math:`\mathrm{clip}(y, -L, L)` and says nothing of it."""
+    r"""The channel shows :math:`\mathrm{clip}(y, -L, L)` without a warning."""
 
     channel_name: str
     limit: float
@@ -25,7 +25,7 @@ class Clipping(PhysicsTerm):
 
     @classmethod
     def example(cls):
-        """At a few m/s²."""
+        """Clips at 2 m/s²."""
         return cls("A", 2.0)
 
     def channel(self, signal, rate, sensor):

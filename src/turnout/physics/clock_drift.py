@@ -9,9 +9,11 @@ from turnout.physics.term import Parameter, PhysicsTerm
 
 @dataclass(frozen=True)
 class ClockDrift(PhysicsTerm):
-    r"""The channel shows :math:`y(t(1+\epsilon))`: its lag grows through the record. A hammer test is too short.
+    r"""The channel shows :math:`y(t(1+\epsilon))`: its lag grows during the record.
 
-    ``start`` is the time of the signal's first sample since the record's start [s].
+    A hammer test is too short to show it.
+
+    ``start`` is the time from the start of the record to the first sample of the signal [s].
     """
 
     channel_name: str
@@ -29,15 +31,15 @@ class ClockDrift(PhysicsTerm):
 
     @classmethod
     def example(cls):
-        """One in a thousand."""
+        """A drift of one in a thousand."""
         return cls("A", 1e-3)
 
     def under(self, conditions):
-        """With the time at which this recording's signal starts."""
+        """The term with the start time of the signal of this recording."""
         return replace(self, start=float(conditions.get("start", 0.0)))
 
     def channel(self, signal, rate, sensor):
-        """The signal read at the wrong times, cubic between samples."""
+        """The signal at the wrong times, by cubic interpolation."""
         self.check()
         if sensor.name != self.channel_name or self.drift == 0.0:
             return signal

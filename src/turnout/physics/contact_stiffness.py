@@ -23,7 +23,7 @@ class ContactStiffness(PhysicsTerm):
 
     @classmethod
     def example(cls):
-        """Half as stiff."""
+        """Half the stiffness."""
         return cls(0.5)
 
     def vehicle(self, vehicle):

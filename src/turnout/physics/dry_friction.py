@@ -7,7 +7,7 @@ import numpy as np
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.force_laws import FrictionLaw, Port
 
-SLIP = 2e-3  # m/s over which the force changes sign
+SLIP = 2e-3  # m/s, slip rate over which the force changes sign
 
 
 @dataclass(frozen=True)

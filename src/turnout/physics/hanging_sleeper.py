@@ -5,19 +5,20 @@ from dataclasses import dataclass
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.force_laws import Port, TableLaw
 
-ONSET = 1e-5  # way over which the ballast's damping comes and goes [m]
+ONSET = 1e-5  # m, deflection over which the ballast damping increases or decreases
 
 
 @dataclass(frozen=True)
 class HangingSleeper(PhysicsTerm):
-    r"""Withhold the ballast reaction while one sleeper moves within its gap.
+    r"""Remove the ballast reaction while one sleeper moves within its gap.
 
     .. math:: F = (1 - s) \left( k_b \, \mathrm{clip}(y, -g, g) + c_b \dot y \, [|y| < g] \right)
 
-    The base simulation has :math:`-k_b y - c_b \dot y` under every sleeper; this gives it back within the gap, but for
-    the share s of the sleeper that is ``seated``: voids grow from partial ones.
-    y is the sleeper's position below where it hangs unloaded, with 3 layers above the ballast's mass. A hammer's blow
-    moves it by micrometres both ways: there it is a free sleeper. A lift by more than the gap is left to the base.
+    The base simulation has :math:`-k_b y - c_b \dot y` under every sleeper. This force cancels it within the gap,
+    except for the share s of the sleeper that is ``seated``: a void grows from a partial one.
+    y is the displacement of the sleeper from its unloaded position, with 3 layers relative to the ballast mass. A
+    hammer impact moves it by micrometres up and down, so in a hammer test the sleeper is free. A lift by more than the
+    gap is as in the base simulation.
     """
 
     sleeper: int
@@ -57,7 +58,7 @@ class HangingSleeper(PhysicsTerm):
         return 1.0 - self.seated
 
     def ports(self, track):
-        """One port at the sleeper; none where the gap is closed."""
+        """One port at the sleeper; none without a gap."""
         self.check()
         if self.gap == 0.0:
             return ()
@@ -73,7 +74,7 @@ class HangingSleeper(PhysicsTerm):
             self.gap + onset,
         )
         withheld = tuple(-k * min(max(y, -self.gap), self.gap) for y in way)
-        if onset == self.gap - onset:  # the two middle places are one
+        if onset == self.gap - onset:  # the two middle points are equal
             way, withheld = (*way[:2], 0.0, *way[4:]), (*withheld[:2], 0.0, *withheld[4:])
         viscous = (0.0, -0.5 * c, *(-c,) * (len(way) - 4), -0.5 * c, 0.0)
         law = TableLaw(way, withheld, viscous)

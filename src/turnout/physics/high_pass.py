@@ -24,11 +24,11 @@ class HighPass(TransferTerm):
 
     @classmethod
     def example(cls):
-        """At 15 Hz."""
+        """A corner at 15 Hz."""
         return cls("A", 15.0)
 
     def transfer(self, frequency):
-        """High-pass; 1 at its neutral value, at 0 Hz too."""
+        """High-pass; 1 at its neutral value, also at 0 Hz."""
         f = np.asarray(frequency)
         if self.corner == 0.0:
             return np.ones(f.shape, dtype=complex)

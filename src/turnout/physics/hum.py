@@ -9,9 +9,9 @@ from turnout.physics.term import Parameter, PhysicsTerm
 
 @dataclass(frozen=True)
 class Hum(PhysicsTerm):
-    r"""A line at the mains' frequency, :math:`a \sin 2\pi f t + b \cos 2\pi f t`, before, with and after the train.
+    r"""A line at the mains frequency, :math:`a \sin 2\pi f t + b \cos 2\pi f t`, also before and after the train.
 
-    ``start`` is the time of the signal's first sample since the record's start [s].
+    ``start`` is the time from the start of the record to the first sample of the signal [s].
     """
 
     channel_name: str
@@ -32,19 +32,19 @@ class Hum(PhysicsTerm):
 
     @classmethod
     def example(cls):
-        """Of 1 m/s² at 50 Hz."""
+        """1 m/s² at 50 Hz."""
         return cls("A", 0.8, 0.6)
 
     def sentence(self):
-        """What was left out, in words."""
+        """Sentence that states what was left out."""
         return self.left_out.format(**vars(self), amplitude=float(np.hypot(self.sine, self.cosine)))
 
     def under(self, conditions):
-        """With the time at which this recording's signal starts."""
+        """The term with the start time of the signal of this recording."""
         return replace(self, start=float(conditions.get("start", 0.0)))
 
     def channel(self, signal, rate, sensor):
-        """The signal with the line on it."""
+        """The signal with the line added."""
         self.check()
         if sensor.name != self.channel_name:
             return signal

@@ -8,14 +8,14 @@ from turnout.simulate.force_laws import LiftLaw, Port
 
 @dataclass(frozen=True)
 class LiftingSleepers(PhysicsTerm):
-    r"""Take the pull of the ballast away where a sleeper lifts by more than its dead load W presses it down.
+    r"""Remove the tension of the ballast where a sleeper lifts off against its dead load W.
 
     .. math:: R = \max(0,\, W + k_b y + c_b \dot y) - W, \qquad \text{base: } R = k_b y + c_b \dot y
 
-    y is the sleeper's position below where it rests unloaded, with 3 layers above the ballast's mass. The whole sum
-    says whether there is contact: by y alone the damper would hold what leaves. W is what presses the sleeper, its own
-    weight and that of a bay of rail: 1.8 kN, which 90 MN/m carry on 20 µm. ``share`` of the pull is taken away, 1: all
-    of it. Every sleeper is a port in one system: choose those near the sensors.
+    y is the displacement of the sleeper from its unloaded position, with 3 layers relative to the ballast mass. The sum
+    decides on contact: with y alone the damper would hold a sleeper that lifts. W is the weight of the sleeper and of a
+    bay of rail: 1.8 kN, 20 µm on 90 MN/m. ``share`` is the part of the tension that is removed, 1: all of it. Every
+    sleeper is a port in one system, so choose those near the sensors.
     """
 
     first: int
@@ -39,12 +39,12 @@ class LiftingSleepers(PhysicsTerm):
 
     @classmethod
     def example(cls):
-        """Eleven sleepers whose rail, bent upwards, carries most of their weight."""
+        """Eleven sleepers; the rail is bent upwards and carries most of their weight."""
         return cls(15, 25, 1.0, dead_load=400.0)
 
     @property
     def withheld(self):
-        """Share of the ballast that is missing above where it lifts off."""
+        """Share of the ballast that is missing after lift-off."""
         return self.share
 
     def ports(self, track):

@@ -9,7 +9,7 @@ from turnout.physics.term import Parameter, PhysicsTerm
 class LocalBallast(PhysicsTerm):
     r"""Ballast stiffness of one sleeper is :math:`r` times that of the base; linear, unlike a gap.
 
-    The damping ratio stays, so the damper :math:`c = 2 \zeta \sqrt{k m}` goes with :math:`\sqrt{r}`.
+    The damping ratio is constant, so the damper :math:`c = 2 \zeta \sqrt{k m}` scales with :math:`\sqrt{r}`.
     """
 
     sleeper: int
@@ -32,7 +32,7 @@ class LocalBallast(PhysicsTerm):
         return cls(20, 0.3)
 
     def links(self, track):
-        """What is added to the ballast's spring and damper."""
+        """Links added to the spring and damper of the ballast."""
         self.check()
         found = [link for link in track.support_links(self.sleeper) if link.tag == "ballast"]
         more = self.factor - 1.0

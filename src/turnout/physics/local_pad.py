@@ -9,7 +9,7 @@ from turnout.physics.term import Parameter, PhysicsTerm
 class LocalPad(PhysicsTerm):
     r"""Pad stiffness of one support is :math:`r` times that of the base.
 
-    The damping ratio stays, so the damper :math:`c = 2 \zeta \sqrt{k m}` goes with :math:`\sqrt{r}`.
+    The damping ratio is constant, so the damper :math:`c = 2 \zeta \sqrt{k m}` scales with :math:`\sqrt{r}`.
     """
 
     sleeper: int
@@ -32,7 +32,7 @@ class LocalPad(PhysicsTerm):
         return cls(20, 3.0)
 
     def links(self, track):
-        """What is added to the pad's spring and damper."""
+        """Links added to the spring and damper of the pad."""
         self.check()
         found = [link for link in track.support_links(self.sleeper) if link.tag == "pad"]
         more = self.factor - 1.0

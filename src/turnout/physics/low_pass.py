@@ -24,11 +24,11 @@ class LowPass(TransferTerm):
 
     @classmethod
     def example(cls):
-        """At 600 Hz."""
+        """A corner at 600 Hz."""
         return cls("A", 1 / 600.0)
 
     def sentence(self):
-        """What was left out, in words."""
+        """Sentence that states what was left out."""
         return self.left_out.format(**vars(self), corner=1.0 / self.period if self.period else np.inf)
 
     def transfer(self, frequency):

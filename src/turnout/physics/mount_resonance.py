@@ -31,11 +31,11 @@ class MountResonance(TransferTerm):
         return cls("A", 1 / 500.0, 8.0)
 
     def sentence(self):
-        """What was left out, in words."""
+        """Sentence that states what was left out."""
         frequency = 1.0 / self.period if self.period else np.inf
         return self.left_out.format(**vars(self), frequency=frequency)
 
     def transfer(self, frequency):
-        """Acceleration shown over acceleration of the rail."""
+        """Recorded acceleration over acceleration of the rail."""
         ratio = np.asarray(frequency) * self.period
         return 1.0 / (1.0 - ratio**2 + 1j * ratio / self.quality)

@@ -12,9 +12,8 @@ SOURCE = "Nielsen and Johansson 2000, Out-of-round railway wheels - a literature
 class OutOfRound(PhysicsTerm):
     r"""One wheel has n waves around it, :math:`p = a \cos(n (x - x_0)/R) + b \sin(n (x - x_0)/R)`.
 
-    ``train`` names the trains that carry it ("" all), ``phases`` the way :math:`x_0` [m] by recording: the angle at
-    which a wheel comes differs from passage to passage. In a recording that is not among them nothing
-    is said.
+    ``train`` names the trains that have it ("" all). ``phases`` are the rolling distances :math:`x_0` [m] by recording:
+    the angle of a wheel differs between passages. In a recording that is not among them the term has no effect.
     """
 
     wheel: int
@@ -42,20 +41,20 @@ class OutOfRound(PhysicsTerm):
         return cls(0, 2e-4, 1e-4)
 
     def sentence(self):
-        """What was left out, in words."""
+        """Sentence that states what was left out."""
         amplitude = (self.cosine**2 + self.sine**2) ** 0.5
         who = self.train or "every train"
         return self.left_out.format(number=self.wheel + 1, who=who, order=self.order, amplitude=amplitude)
 
     def under(self, conditions):
-        """With the angle of a recording; round in another train, and where the angle is not known."""
+        """The term with the phase of a recording; no effect in another train or if the phase is unknown."""
         known, name = dict(self.phases), conditions.get("name")
         if (self.train and conditions.get("train", self.train) != self.train) or (known and name not in known):
             return replace(self, cosine=0.0, sine=0.0)
         return replace(self, phases=((name, known[name]),)) if known else self
 
     def paths(self, track, vehicle):
-        """Two waves a quarter apart."""
+        """Two waves a quarter wave apart."""
         self.check()
         if self.cosine == 0.0 and self.sine == 0.0:
             return ()

@@ -4,15 +4,15 @@ from dataclasses import dataclass, replace
 
 from turnout.physics.term import Parameter, PhysicsTerm
 
-SEAT_SHARE = 0.45  # of a wheel load on the support below it, 60 kg/m rail on 0.6 m
+SEAT_SHARE = 0.45  # share of a wheel load on the support below it, 60 kg/m rail on 0.6 m spacing
 
 
 @dataclass(frozen=True)
 class PadPreload(PhysicsTerm):
-    r"""All pads as they are under a train: :math:`k_p = k_{p0} + b F`, F the mean seat load; a hammer finds F = 0.
+    r"""All pads under a train: :math:`k_p = k_{p0} + b F`, F the mean seat load; F = 0 in a hammer test.
 
-    The tangent at the train's mean load stands for the law: supports between bogies are made as stiff as those
-    under them.
+    The stiffness is the tangent at the mean load of the train: supports between bogies are as stiff as those under
+    bogies.
     """
 
     slope: float
@@ -33,13 +33,13 @@ class PadPreload(PhysicsTerm):
         return cls(4e3)
 
     def under(self, conditions):
-        """At the load of a recording: no axle loads, as in a hammer test, is no load."""
+        """The term at the load of a recording; without axle loads, as in a hammer test, the load is zero."""
         loads = conditions.get("axle_loads", ())
         mean = sum(loads) / len(loads) / 2.0 if len(loads) else 0.0
         return replace(self, load=SEAT_SHARE * mean)
 
     def links(self, track):
-        """What is added to every pad."""
+        """Links added to every pad."""
         self.check()
         more = self.slope * self.load
         if more == 0.0:

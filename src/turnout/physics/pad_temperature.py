@@ -4,12 +4,12 @@ from dataclasses import dataclass, replace
 
 from turnout.physics.term import Parameter, PhysicsTerm
 
-REFERENCE = 15.0  # °C, at which the base model's pads hold
+REFERENCE = 15.0  # °C, temperature of the pads of the base model
 
 
 @dataclass(frozen=True)
 class PadTemperature(PhysicsTerm):
-    r"""All pads: :math:`k_p(T) = k_{p0} [1 - \alpha (T - 15\,°C)]`. At one temperature nothing tells it from k_p."""
+    r"""All pads: :math:`k_p(T) = k_{p0} [1 - \alpha (T - 15\,°C)]`. One temperature cannot separate it from k_p."""
 
     coefficient: float
     temperature: float = 30.0
@@ -30,11 +30,11 @@ class PadTemperature(PhysicsTerm):
         return cls(0.01)
 
     def under(self, conditions):
-        """At the rail temperature of a recording; unknown temperature counts as the reference."""
+        """The term at the rail temperature of a recording; an unknown one is the reference temperature."""
         return replace(self, temperature=float(conditions.get("rail_temperature", REFERENCE)))
 
     def links(self, track):
-        """What is added to every pad."""
+        """Links added to every pad."""
         self.check()
         more = max(-self.coefficient * (self.temperature - REFERENCE), -0.95)
         if more == 0.0:

@@ -8,7 +8,7 @@ from turnout.simulate.track import RailStretch
 
 @dataclass(frozen=True)
 class RailBending(PhysicsTerm):
-    r"""Between two places the rail has :math:`r\,EI`, and :math:`\sqrt r` times its mass, as profiles scale."""
+    r"""Between two positions the rail has :math:`r\,EI`, and :math:`\sqrt r` times its mass, as profiles scale."""
 
     start: float
     end: float
@@ -29,7 +29,7 @@ class RailBending(PhysicsTerm):
         return cls(10.0, 14.0, 2.0)
 
     def rail(self, track):
-        """The track with one stretch more."""
+        """The track with one more stretch."""
         self.check()
         if self.factor == 1.0:
             return track

@@ -11,7 +11,7 @@ SOURCE = "Grassie 2009, Rail corrugation: characteristics, causes and treatments
 
 @dataclass(frozen=True)
 class Waves:
-    """Two waves a quarter apart between two places, faded over one wavelength; see ``RailCorrugation``."""
+    """Two waves a quarter wave apart between two positions, faded over one wavelength; see ``RailCorrugation``."""
 
     start: float
     end: float
@@ -28,7 +28,7 @@ class Waves:
 
 @dataclass(frozen=True)
 class RailCorrugation(PhysicsTerm):
-    r"""Every wheel meets a wave :math:`a \sin 2\pi x/\lambda + b \cos 2\pi x/\lambda`: a line at v/λ."""
+    r"""Every wheel rolls over a wave :math:`a \sin 2\pi x/\lambda + b \cos 2\pi x/\lambda`: a line at v/λ."""
 
     start: float
     end: float
@@ -52,7 +52,7 @@ class RailCorrugation(PhysicsTerm):
         return cls(8.0, 16.0, 5e-5)
 
     def sentence(self):
-        """What was left out, in words."""
+        """Sentence that states what was left out."""
         return self.left_out.format(**vars(self), amplitude=float(np.hypot(self.sine, self.cosine)))
 
     def paths(self, track, vehicle):

@@ -9,8 +9,8 @@ from turnout.physics.term import Parameter, PhysicsTerm
 class RailShear(PhysicsTerm):
     r"""Shear flexibility added to the rail, :math:`1/(\kappa GA)_{new} = 1/(\kappa GA) + s`.
 
-    Zero keeps the base: an Euler-Bernoulli rail has none. ``flexibility`` s is that of the running rail, in 1/GN; a
-    stretch of another section yields in the same proportion, as its area of shear goes with its section.
+    Zero is the base model; an Euler-Bernoulli rail has no shear. ``flexibility`` s is that of the running rail,
+    in 1/GN. A stretch of another profile changes in the same proportion, as its shear area scales with its area.
     """
 
     flexibility: float
@@ -22,16 +22,16 @@ class RailShear(PhysicsTerm):
     parameters = (
         Parameter("flexibility", "-", 0.0, (-3.0, 20.0), "shear flexibility added, in 1/GN",
                   "Timoshenko 1921, On the correction for shear of the differential equation; 60E1 has 4.1 per GN",
-                  (2.0, 4.0)),  # 4.1 where the file has none, half as much again where it is right about the rest
+                  (2.0, 4.0)),  # 4.1 if the file has no shear, half of this again if it has the right one
     )  # fmt: skip
 
     @classmethod
     def example(cls):
-        """Half as much again as 60E1 has."""
+        """Half of the shear flexibility of 60E1 is added."""
         return cls(2.0)
 
     def rail(self, track):
-        """The track with sheared rails."""
+        """The track with the added shear flexibility in its rails."""
         self.check()
         if self.flexibility == 0.0:
             return track

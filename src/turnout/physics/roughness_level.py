@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.roughness import roughness
 
-OWN = 1  # beside its seed: the base model's roughness is drawn from the seed alone
+OWN = 1  # second element of its seed; the roughness of the base model uses the seed alone
 
 
 @dataclass(frozen=True)
@@ -22,9 +22,9 @@ class Scaled:
 
 @dataclass(frozen=True)
 class RoughnessLevel(PhysicsTerm):
-    r"""More roughness of the shape of ISO 3095, its amplitude :math:`a` times the limit curve's.
+    r"""Additional roughness with the spectrum of ISO 3095, its amplitude :math:`a` times that of the limit curve.
 
-    A random effect, not a defect: it widens the null, and only its level is ever named.
+    A random effect, not a defect: it widens the null distribution, and only its level is reported.
     """
 
     amplitude: float
@@ -41,7 +41,7 @@ class RoughnessLevel(PhysicsTerm):
 
     @classmethod
     def example(cls):
-        """As rough as the limit."""
+        """The amplitude of the limit curve."""
         return cls(1.0)
 
     def paths(self, track, vehicle):

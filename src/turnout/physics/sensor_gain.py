@@ -10,9 +10,9 @@ from turnout.physics.transfer import TransferTerm
 
 @dataclass(frozen=True)
 class SensorGain(TransferTerm):
-    r"""One channel shows :math:`g` times what it should, at every frequency, in passages and hammer tests alike.
+    r"""One channel shows :math:`g` times the true signal at every frequency, in passages and in hammer tests.
 
-    Below 0 its polarity is wrong.
+    A negative g is a wrong polarity.
     """
 
     channel_name: str

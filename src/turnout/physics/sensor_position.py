@@ -7,7 +7,7 @@ from turnout.physics.term import Parameter, PhysicsTerm
 
 @dataclass(frozen=True)
 class SensorPosition(PhysicsTerm):
-    r"""The sensor sits :math:`\Delta x` further along; wheels reach it :math:`\Delta x / v` later."""
+    r"""The sensor is :math:`\Delta x` further along the track; wheels reach it :math:`\Delta x / v` later."""
 
     channel_name: str
     shift: float
@@ -23,10 +23,10 @@ class SensorPosition(PhysicsTerm):
 
     @classmethod
     def example(cls):
-        """Sensor A sits 0.3 m further on."""
+        """Sensor A is 0.3 m further along."""
         return cls("A", 0.3)
 
     def sensor(self, sensor):
-        """The sensor where it is."""
+        """The sensor at its true position."""
         self.check()
         return replace(sensor, place=sensor.place + self.shift) if sensor.name == self.channel_name else sensor

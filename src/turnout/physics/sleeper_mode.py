@@ -14,7 +14,7 @@ SOURCE = "Grassie and Cox 1984, The dynamic response of railway track with flexi
 class SleeperMode(PhysicsTerm):
     r"""A share :math:`\mu` of each sleeper's mass on a spring on its rail seat, resonant at its bending frequency.
 
-    The mode of a sleeper whose seats are held (Craig and Bampton): rigid, it has the sleeper's own mass again.
+    The mode of a sleeper with fixed rail seats (Craig and Bampton). The total mass is still that of the sleeper.
     """
 
     share: float
@@ -32,11 +32,11 @@ class SleeperMode(PhysicsTerm):
 
     @classmethod
     def example(cls):
-        """A quarter of the mass at 180 Hz."""
+        """A quarter of the mass at 200 Hz."""
         return cls(0.25, 200.0)
 
     def links(self, track):
-        """A further degree of freedom for every sleeper."""
+        """Links of an additional degree of freedom for every sleeper."""
         self.check()
         if self.share == 0.0 or track.layers == 1:
             return []

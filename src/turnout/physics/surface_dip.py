@@ -12,7 +12,7 @@ SOURCE = "Jenkins et al. 1974, The effect of track and vehicle parameters on whe
 class SurfaceDip(PhysicsTerm):
     r"""Every wheel falls by :math:`d` over a length L, :math:`p = d[(1-s)\cos^2(\pi x/L) + s\,(1 - 2|x|/L)^2]`.
 
-    ``sharpness`` s goes from a smooth cosine (0) to a kink (1), so that the shape is not forced on the data.
+    ``sharpness`` s goes from a smooth cosine (0) to a kink (1), so that the data determine the shape.
     """
 
     place: float
@@ -39,11 +39,11 @@ class SurfaceDip(PhysicsTerm):
 
     @property
     def where(self):
-        """Deepest place [m]."""
+        """Position of the lowest point [m]."""
         return self.place + self.shift
 
     def sentence(self):
-        """What was left out, in words."""
+        """Sentence that states what was left out."""
         return self.left_out.format(**{**vars(self), "place": self.where})
 
     def paths(self, track, vehicle):

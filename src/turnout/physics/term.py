@@ -11,8 +11,11 @@ KINDS = ("matrix", "port", "path", "channel", "vehicle")
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of a term. ``neutral`` is where the term vanishes; ``bounds`` where it makes sense, both in
-    ``unit``; ``meaning`` in words; ``source`` whence its range. ``prior`` (mean, standard deviation) or None."""
+    """One parameter of a term.
+
+    At ``neutral`` the term vanishes; ``bounds`` limit the plausible range; both are in ``unit``. ``meaning`` is a short
+    description, ``source`` the source of the range. ``prior`` is (mean, standard deviation) or None.
+    """
 
     name: str
     unit: str
@@ -24,22 +27,22 @@ class Parameter:
 
 
 class PhysicsTerm:
-    """Base of all terms. A term is a frozen dataclass with fields for its places and its parameters.
+    """Base class of all terms. A term is a frozen dataclass with fields for its positions and its parameters.
 
-    Class attributes: ``name``; ``left_out``, a sentence with the term's fields in braces that says what the base
-    model lacked; ``kind`` in ``KINDS``; ``parameters``, a tuple of ``Parameter`` whose names are fields. Override
-    one of the methods below; each returns what is *added* to the base simulation.
+    Class attributes: ``name``; ``left_out``, a sentence with the term's fields in braces that states what the base
+    model lacked; ``effect_type``, one of ``EFFECT_TYPES``; ``parameters``, a tuple of ``Parameter`` whose names are
+    fields. Override one of the methods below; each returns what is *added* to the base simulation.
     """
 
     name = ""
     left_out = ""
     kind = ""
     parameters: tuple[Parameter, ...] = ()
-    scales = False  # whether its links are a multiple of the track's own springs, on which other terms then build
+    scales = False  # whether its links are a multiple of the track's springs; other terms then act on the result
 
     @classmethod
     def example(cls):
-        """A term with ordinary values on a track of at least 40 supports and sensors "A", "B": what tests run."""
+        """A term with ordinary values for the tests: on a track of at least 40 supports with sensors "A" and "B"."""
         raise NotImplementedError(f"{cls.__name__} needs an example for its contract tests")
 
     def links(self, track):
@@ -47,25 +50,27 @@ class PhysicsTerm:
         return ()
 
     def ports(self, track):
-        """Scalar forces that matrices cannot hold: a list of ``turnout.simulate.force_laws.Port``."""
+        """Scalar forces that matrices cannot describe: a list of ``turnout.simulate.force_laws.Port``."""
         return ()
 
     @property
     def withheld(self):
-        """Share of a sleeper's ballast that its ports take away."""
+        """Share of the ballast of a sleeper that the ports of this term remove."""
         return 0.0
 
     def paths(self, track, vehicle):
-        """Parts of a wheel's path: callables (x, wheel) -> dip [m]. An attribute ``wheel`` restricts a part to
-        one wheel, ``per_wheel = True`` has it evaluated for each wheel."""
+        """Parts of a wheel's path: callables (x, wheel) -> dip [m].
+
+        An attribute ``wheel`` restricts a part to one wheel; ``per_wheel = True`` has it evaluated for each wheel.
+        """
         return ()
 
     def rail(self, track):
-        """The track with other rails; its supports are the links' business."""
+        """The track with changed rails; its supports are changed by links."""
         return track
 
     def sensor(self, sensor):
-        """The sensor as it really sits, where its description is wrong."""
+        """The sensor at its true position, if its description is wrong."""
         return sensor
 
     def under(self, conditions):
@@ -73,15 +78,15 @@ class PhysicsTerm:
         return self
 
     def channel(self, signal, rate, sensor):
-        """What the channel of ``sensor`` makes of the true ``signal`` (n,) at ``rate`` [Hz]."""
+        """Signal that the channel of ``sensor`` records of the true ``signal`` (n,) at ``rate`` [Hz]."""
         return signal
 
     def vehicle(self, vehicle):
-        """The vehicle with the effect in it."""
+        """The vehicle with the effect."""
         return vehicle
 
     def force(self, state):
-        """Extra force [N] on each sleeper, down positive, (n_sleeper,), of ports that act on sleepers alone.
+        """Additional force [N] on each sleeper, down positive, (n_sleeper,), of ports that act on sleepers only.
 
         ``state`` has ``track``, ``sleeper_position`` (n_sleeper,) [m] and ``sleeper_velocity`` [m/s].
         """
@@ -95,16 +100,16 @@ class PhysicsTerm:
         return force
 
     def neutral(self):
-        """The same term with every parameter at its neutral value: it must change nothing."""
-        # Every term is a dataclass; only its class says so.
+        """The same term with every parameter at its neutral value: it must have no effect."""
+        # Every term is a dataclass; mypy does not know this of the base class.
         return replace(self, **{p.name: p.neutral for p in self.parameters})  # type: ignore[type-var]
 
     def sentence(self):
-        """What was left out, in words, with this term's numbers."""
+        """Sentence that states what was left out, with the numbers of this term."""
         return self.left_out.format(**vars(self))
 
     def check(self):
-        """Refuse parameters outside their bounds."""
+        """Raise SimulationError if a parameter is outside its bounds."""
         for p in self.parameters:
             value = getattr(self, p.name)
             low, high = p.bounds

@@ -12,7 +12,7 @@ from turnout.physics.transfer import TransferTerm
 class TimeOffset(TransferTerm):
     r"""One channel lags by the same time at every speed, :math:`T = e^{-2\pi i f \Delta t}`.
 
-    A sensor in the wrong place lags by a time that goes as one over the speed.
+    The lag of a sensor at a wrong position is inversely proportional to the speed.
     """
 
     channel_name: str

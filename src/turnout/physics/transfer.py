@@ -18,7 +18,7 @@ class TransferTerm(PhysicsTerm):
         raise NotImplementedError
 
     def channel(self, signal, rate, sensor):
-        """The signal with the transfer applied, padded so that nothing wraps round."""
+        """The signal with the transfer function applied, padded so that it does not wrap around."""
         self.check()
         if sensor.name != self.channel_name:
             return signal

@@ -7,7 +7,7 @@ from turnout.physics.term import Parameter, PhysicsTerm
 
 @dataclass(frozen=True)
 class UnsprungMass(PhysicsTerm):
-    r"""All wheelsets have :math:`r` times their mass; the P2 resonance goes as its inverse root."""
+    r"""All wheelsets have :math:`r` times their mass; the P2 frequency scales with :math:`1/\sqrt r`."""
 
     factor: float
     train: str = ""
@@ -24,20 +24,20 @@ class UnsprungMass(PhysicsTerm):
 
     @classmethod
     def example(cls):
-        """30 % more."""
+        """30 % more mass."""
         return cls(1.3)
 
     def sentence(self):
-        """What was left out, in words."""
+        """Sentence that states what was left out."""
         return self.left_out.format(factor=self.factor, who=self.train or "all trains")
 
     def under(self, conditions):
-        """Nothing in another train."""
+        """The same term; no effect in another train."""
         other = self.train and conditions.get("train", self.train) != self.train
         return replace(self, factor=1.0) if other else self
 
     def vehicle(self, vehicle):
-        """The vehicle with its wheels' masses changed."""
+        """The vehicle with changed wheel masses."""
         self.check()
         wheels = set(vehicle.wheels)
         bodies = tuple(

@@ -10,10 +10,10 @@ SOURCE = "Newton and Clark 1979, An investigation into the dynamic effects on th
 
 @dataclass(frozen=True)
 class WheelFlat(PhysicsTerm):
-    r"""One wheel drops by :math:`l^2/16R` once a turn; the phase differs from passage to passage.
+    r"""One wheel drops by :math:`l^2/16R` once per revolution; the phase differs between passages.
 
-    ``train`` names the trains that carry it ("" all), ``phases`` the rolling way to the first flat by recording; in a
-    recording that is not among them the angle is not known, and nothing is said.
+    ``train`` names the trains that have it ("" all). ``phases`` are the rolling distances to the first flat by
+    recording. In a recording that is not among them the phase is unknown, and the term has no effect.
     """
 
     wheel: int
@@ -37,18 +37,18 @@ class WheelFlat(PhysicsTerm):
         return cls(0, 0.05)
 
     def sentence(self):
-        """What was left out, in words."""
+        """Sentence that states what was left out."""
         return self.left_out.format(length=self.length, number=self.wheel + 1, who=self.train or "every train")
 
     def under(self, conditions):
-        """With the phase of a recording; no flat in another train, nor where the phase is not known."""
+        """The term with the phase of a recording; no flat in another train or if the phase is unknown."""
         known, name = dict(self.phases), conditions.get("name")
         if (self.train and conditions.get("train", self.train) != self.train) or (known and name not in known):
             return replace(self, length=0.0)
         return replace(self, phase=known.get(name, self.phase))
 
     def paths(self, track, vehicle):
-        """The path of that wheel alone."""
+        """The path part of that wheel."""
         self.check()
         if self.length == 0.0:
             return ()

@@ -12,11 +12,11 @@ SOURCE = "Knothe and Grassie 1993, Modelling of railway track and vehicle/track 
 
 @dataclass(frozen=True)
 class ZenerPad(PhysicsTerm):
-    r"""A Maxwell branch beside every pad, its spring a share of the pad's own.
+    r"""A Maxwell branch parallel to every pad; its spring is a share of the pad stiffness.
 
     .. math:: \tilde k(\omega) = k_p + i \omega c_p + r k_p \frac{i \omega \tau}{1 + i \omega \tau}
 
-    One further degree of freedom per pad: the joint of damper :math:`r k_p \tau` and spring :math:`r k_p`.
+    One additional degree of freedom per pad: the joint of damper :math:`r k_p \tau` and spring :math:`r k_p`.
     """
 
     ratio: float
@@ -32,7 +32,7 @@ class ZenerPad(PhysicsTerm):
 
     @classmethod
     def example(cls):
-        """A branch as stiff as the pad."""
+        """A branch with the stiffness of the pad."""
         return cls(1.0)
 
     def links(self, track):

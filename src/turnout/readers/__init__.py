@@ -1,4 +1,4 @@
-"""Raw files of ten kinds -> ``Recording`` in SI units, or a reason why not."""
+"""Readers of raw files: ``read`` converts a file of any supported format to recordings in SI units."""
 
 import logging
 from contextlib import contextmanager
@@ -14,35 +14,35 @@ __all__ = ["FORMATS", "read"]
 
 LOG = logging.getLogger("turnout.readers")
 
-HELD = 32 * 2**20  # bytes: a file up to this size is read whole, whatever its length in time
+HELD = 32 * 2**20  # bytes: a file up to this size is read into memory as a whole, whatever its duration
 
 
 def read(path, root, description: RawDescription, longest: float | None = None, held: int = HELD) -> ReadResult:
-    """Recordings of one raw file, in SI units, in the order and with the signs that the configuration promises.
+    """Recordings of one raw file, in SI units, with the order and signs of channels that the configuration states.
 
     Parameters
     ----------
     path : path-like
         Relative to ``root``, or absolute inside it.
     root : path-like
-        The raw root: nothing outside it is opened, symbolic links included.
+        The raw root. No file outside it is opened, not even through a symbolic link.
     description : RawDescription
         Format (or "auto"), channel map with units and sensitivities, rate, counts, time zone.
-    longest : float or None
-        Records of more seconds than this stay in a file of more than ``held`` bytes and come as ``LongRecording``;
-        None: every record is read.
-    held : int
+    max_duration : float or None
+        Longer records of a large file stay in the file and become a ``LongRecording``; None: all are read. [s]
+    max_whole_file_size : int
+        A file up to this size is read into memory as a whole. [bytes]
 
     Returns
     -------
     ReadResult
-        Sound records, one ReadError for each damaged one, sha256 of the file's bytes. A long record has been read
-        through once, to know which of its channels are sound.
+        Intact records, one ReadError for each damaged one, sha256 of the file's bytes. A long record has been read
+        once, to check its channels.
 
     Raises
     ------
     ReadError
-        Where the file as a whole cannot be used: says file, place, what stands there, what to do.
+        If the file as a whole cannot be used. The message names file, place, problem and remedy.
 
     Examples
     --------
@@ -73,7 +73,7 @@ def read(path, root, description: RawDescription, longest: float | None = None, 
 
 @contextmanager
 def _named(source):
-    """Whatever a reader did not foresee costs this file alone, and names it; the traceback is in the log."""
+    """Turn any unexpected exception of a reader into a ReadError of this file; the traceback goes to the log."""
     try:
         yield
     except (TurnoutError, MemoryError, OSError):

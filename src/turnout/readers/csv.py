@@ -1,16 +1,19 @@
-"""Text with separated columns: a head of ``name: value`` lines, a line of names, then numbers.
+"""Reader of text files with separated columns: a head of ``name: value`` lines, a line of names, then numbers.
 
-What is recognised: separators comma, semicolon, tab; a decimal comma where the separator is not a comma; head lines
-with or without ``#``: ``rate`` (or ``fs``, ``sample rate [Hz]``, ``Abtastrate`` ...) or ``dt`` [s], ``started_at``,
-``n_records``, ``n_samples``, starts and counts in other words (``head_words``), conditions; a line that says another
-frequency than the layout's rate, in words that are not known, is an error unless they are those of a filter; units in
-brackets behind the names ("force [N]", "force (N)") or in a line of their own (``csv_names``); a column of time
-(``time_column``); a column ``record`` that numbers the records.
-Without names channels are "0", "1" ...
+What is recognised:
 
-The text is UTF-8, UTF-16 with its mark, or, where a line of the head is neither, Windows-1252.
+* separators: comma, semicolon or tab; a decimal comma where the separator is not a comma;
+* head lines with or without ``#``: ``rate`` (or ``fs``, ``sample rate [Hz]``, ``Abtastrate`` ...) or ``dt`` [s],
+  ``started_at``, ``n_records``, ``n_samples``, conditions, and the words of other languages listed in
+  ``named_arrays``;
+* units in brackets after the names ("force [N]", "force (N)") or in a line of their own;
+* a column of time, and a column ``record`` that numbers the records.
 
-The last line must end with a line break: without it nobody can tell a cut number from a whole one.
+Without names channels are called "0", "1" ... A head line with unknown words and another frequency than the layout's
+rate is an error, unless its words are those of a filter.
+
+The text is UTF-8, or UTF-16 with a byte order mark. Head lines that are neither are read as Windows-1252.
+The last line must end with a line break: without it a truncated number looks like a complete one.
 """
 
 import codecs
@@ -49,13 +52,13 @@ def read_raw(source) -> RawFile:
 
 
 def _in_utf8(source):
-    """The text of a file that a spreadsheet saved as "Unicode", in UTF-8."""
+    """A file that a spreadsheet saved as "Unicode" (UTF-16), converted to UTF-8."""
     with source.parsed_by("Python", "the text in UTF-16"):
         return source.data.decode("utf-16").encode()
 
 
 def _table(source, data, at, separator, names, time):
-    """Columns of numbers."""
+    """All columns as arrays."""
     options = _options(data, at, separator, len(names))
     line = _line(data, at)
     with source.parsed_by("pyarrow", f"the numbers after line {line}"), cells_named(source, line, names):
@@ -64,7 +67,7 @@ def _table(source, data, at, separator, names, time):
 
 
 def _staying(source, data, at, separator, names, time):
-    """Columns that read on when they are asked; a time column is read at once."""
+    """Columns that read their numbers when sliced; a time column is read at once."""
     options = _options(data, at, separator, len(names))
     rows = Rows(source.path, at, options)
     line = _line(data, at)
@@ -79,14 +82,14 @@ def _line(data, at):
 
 
 class Rows:
-    """Rows of a text file, read one after the other; asked for what has gone by, the reading starts again."""
+    """Reads the rows of a text file in order; a request for earlier rows starts again at the beginning."""
 
     def __init__(self, path, at, options):
         self.path, self.at, self.options = path, at, options
         self.n_row, self.begin, self.held, self.reader = 0, 0, [], None
 
     def scan(self, time):
-        """Count the rows; (n_row,) of the column ``time`` on the way, None without one."""
+        """Count the rows; return column number ``time``, (n_row,), or None if ``time`` is None."""
         found = []
         for batch in self._opened():
             self.n_row += batch.num_rows
@@ -117,7 +120,7 @@ class Rows:
 
 
 def _options(data, at, separator, width):
-    """How pyarrow reads the numbers from byte ``at`` on."""
+    """Options of pyarrow for the numbers from byte ``offset`` on."""
     dot = data.find(b".", at)
     commas = separator != "," and data.find(b",", at, dot if dot >= 0 else len(data)) >= 0
     point = "," if commas else "."
@@ -133,7 +136,7 @@ def _options(data, at, separator, width):
 
 
 def _records(columns, names, units, time, facts, source, unclear):
-    """The records: all rows, or one per number in the column ``record``."""
+    """The records: one of all rows, or one per number in the column ``record``."""
     lower = [name.strip().lower() for name in names]
     number = columns[lower.index("record")] if "record" in lower else None
     kept = [i for i, name in enumerate(lower) if name != "record" and i != time]

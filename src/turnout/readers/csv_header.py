@@ -1,10 +1,6 @@
-"""The head of a text file: notes by name, names and units of the columns, and where the numbers begin.
+"""Head of a text file: its ``name: value`` lines, names and units of the columns, and where the numbers begin.
 
-Which line above the numbers of a text file holds the names of the columns, and which their units.
-
-Cells of a text file that hold no number: marks for thousands, values that a spreadsheet misses, words.
-
-Which column of a table is the time, and how long one of its numbers lasts.
+It also finds the time column and its unit, and explains cells that are no numbers.
 """
 
 import re
@@ -23,9 +19,9 @@ SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "µs": 1e-6, "us": 1e-6}
 
 
 def time_column(names, units):
-    """Number of the column that is the time: by its name, else by its unit; None without one.
+    """Number of the time column: by its name, else by its unit; None without one.
 
-    No sensor of ours measures in seconds, so that a unit of time tells a column whatever its language.
+    No sensor measures in seconds, so a unit of time identifies the column in any language.
 
     Examples
     --------
@@ -40,7 +36,7 @@ def time_column(names, units):
 
 
 def seconds_per_number(unit, source):
-    """How many seconds a number in the time column is; ReadError for a unit that is none of time."""
+    """Seconds per number in the time column; ReadError for an unknown unit of time."""
     if _plain_time(unit) not in SECONDS:
         remedy = f"Export the time in one of {', '.join(SECONDS)[2:]}"
         raise source.error("the time column", f"its unit {unit!r} is not known", remedy, reason="unit_unknown")
@@ -55,10 +51,10 @@ NAME_WITH_UNIT = re.compile(r"^(.*?)\s*[\[(]([^\[\]]*)[\])]$")
 
 
 def names_among(lines):
-    """(number of the line of names, that of the units or None) of lines of cells, as many as there are columns.
+    """(number of the line of names, number of the line of units or None) of lines with one cell per column.
 
-    The names stand above a line of units; without one they are the last line that names a time or has units in
-    brackets, for comments may follow, or else the last line. What stands further up may be anything.
+    The names are in the line above the units. Without a line of units they are in the last line that names a time or
+    has units in brackets, because comments may follow. Else they are in the last line.
 
     Examples
     --------
@@ -75,13 +71,13 @@ def names_among(lines):
 
 
 def _are_units(cells, share):
-    """Whether at least this share of the cells that are not empty are units."""
+    """Whether at least this share of the filled cells are units."""
     said = [cell for cell in cells if cell]
     return sum(map(_is_unit, said)) >= share * len(said)
 
 
 def _is_unit(cell):
-    """A unit that is known, one that says nothing, or whatever stands in brackets; "12 m" is a length."""
+    """Whether a cell is a known unit, a meaningless one, or anything in brackets; "12 m" is a length."""
     bare = cell.strip("[]() ")
     if cell[0] in "[(" or bare.casefold() in MEANINGLESS or bare.replace("\u03bc", "µ") in SECONDS:
         return True
@@ -92,14 +88,14 @@ def _is_unit(cell):
 
 
 def _are_names(cells):
-    """Whether a time is among the cells, or a unit in brackets behind a name; beside "08:30" it is no column."""
+    """Whether a cell names the time or has a unit in brackets; not if any cell starts with a digit, as in "08:30"."""
     if any(cell[:1].isdigit() for cell in cells):
         return False
     in_brackets = [match[2] for cell in cells if (match := NAME_WITH_UNIT.match(cell)) and match[1]]
     return any(cell.lower() in WORDS for cell in cells) or any(unit and _is_unit(unit) for unit in in_brackets)
 
 
-# Empty, or what loggers and spreadsheets write for a value that is not there: these become nan.
+# What loggers and spreadsheets write for a missing value; these become nan.
 MISSING = (
     "", "NaN", "nan", "NA", "-", "#NV", "#N/A", "#NA", "#VALUE!", "#WERT!", "#DIV/0!", "#NUM!", "#ZAHL!", "#REF!",
     "#BEZUG!",
@@ -112,7 +108,7 @@ REFUSED = re.compile(
 
 
 def stands_for_a_number(cell):
-    """Whether a cell is a number that cannot be read, or one that is missing; an empty cell is neither.
+    """Whether a cell is a number with thousands marks or the mark of a missing one; an empty cell is neither.
 
     >>> stands_for_a_number("-1.234,5"), stands_for_a_number("#NV"), stands_for_a_number("13.05.2024")
     (True, True, False)
@@ -122,7 +118,7 @@ def stands_for_a_number(cell):
 
 @contextmanager
 def cells_named(source, line, names):
-    """Turn what pyarrow says of a cell in the rows below ``line`` into a ReadError with its line and column."""
+    """Turn pyarrow's error about a cell in the rows below ``line`` into a ReadError with its line and column."""
     try:
         yield
     except pa.ArrowInvalid as error:
@@ -144,15 +140,15 @@ NOTE = re.compile(r"^#?\s*([^\W\d][\w .'’-]*?)\s*([\[(][^\])]*[\])])?\s*[:=,;\
 SCALES = {"kHz": 1e3, "khz": 1e3, "MHz": 1e6, "ms": 1e-3, "µs": 1e-6, "\u03bcs": 1e-6, "us": 1e-6}
 TEMPERATURES = {"rail_temperature", "air_temperature"}
 NOTES = {*RATE, *STEP, *START, *START_DATE, *COUNT, "n_samples"}
-NUMBERS = TEMPERATURES | {*SAMPLES}  # a note only where a number follows, else a column of that name
+NUMBERS = TEMPERATURES | {*SAMPLES}  # a head line only if a number follows, else the name of a column
 GROUPED = re.compile(rf"\d{{1,3}}(?:{MARK}\d{{3}})+(?!\d)")
-# A line that says one frequency and nothing else: "Vzorkovani: 10000 Hz", "taktning [kHz];10".
+# A line with one frequency and nothing else: "Vzorkovani: 10000 Hz", "taktning [kHz];10".
 FREQUENCY = re.compile(r"^#?[^\d\[(]+[\[(]?([kM]?Hz)?[\])]?[\s:=,;]*([\d.,]+)\s*([kM]?Hz)?\W*$", re.IGNORECASE)
 NO_RATE = re.compile(r"filt|pass|paß|cut|grenz|band|coup|cort|tagli|græns|eigen|reson|netz|mains", re.IGNORECASE)
 
 
 def _line_of(data):
-    """One line as text: UTF-8, or what older loggers of the west write."""
+    """One line as text: UTF-8, else Windows-1252 of older western loggers."""
     try:
         return data.decode("utf-8-sig").strip("\r\n")
     except UnicodeDecodeError:
@@ -160,7 +156,7 @@ def _line_of(data):
 
 
 def head_of(data, source):
-    """(notes, names, units, offset of the first number, separator, lines that name a frequency nobody understood)."""
+    """(notes, names, units, offset of the first number, separator, lines with a frequency in unknown words)."""
     notes: dict[str, float | str] = {}
     before: list[str] = []
     unclear: list[tuple[str, float]] = []
@@ -206,7 +202,7 @@ def _plain(name):
 
 
 def _frequency(line):
-    """The one frequency [Hz] that a line says, None where it says none, more, or that of a filter.
+    """The only frequency [Hz] in a line; None if it has none, several, or that of a filter.
 
     >>> _frequency("# Vzorkovací kmitočet: 10 kHz"), _frequency("Tiefpass: 4000 Hz"), _frequency("0.5-10000 Hz")
     (10000.0, None, None)
@@ -231,7 +227,7 @@ def _is_number(cell):
 
 
 def _value(text):
-    """A number where the text begins with one ("51200 Hz", "12,8 kHz"), in Hz or s, else the text."""
+    """A number in Hz or s if the text begins with one ("51200 Hz", "12,8 kHz"), else the text."""
     first, *rest = text.split() or [""]
     dated = "-" in first[1:].lower().replace("e-", "")
     if not first or not _is_number(first) or dated:
@@ -240,9 +236,9 @@ def _value(text):
 
 
 def _names(lines, cells):
-    """(names, units) out of the lines between head and the first numbers ``cells``: names, and perhaps units.
+    """(names, units) from the lines between the head and the first line of numbers, ``cells``.
 
-    A separator behind the last number, as in "1;2;", makes a column without a name.
+    A separator after the last number, as in "1;2;", makes a column without a name.
     """
     count, open_end = len(cells), not cells[-1]
     lines = [(line + [""] * open_end)[:count] for line in lines if any(line) and len(line) >= count - open_end]

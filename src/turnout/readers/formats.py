@@ -1,8 +1,6 @@
-"""The raw formats: name -> module, extensions and the bytes that give a format away.
+"""Registry of the raw formats: module, file extensions and first bytes of each; detection of the format of a file.
 
-A new format is one file with ``read_raw(source) -> RawFile`` and one line here.
-
-Files of a spreadsheet, which people call .csv or put among the recordings.
+A new format is one file with ``read_raw(source) -> RawFile`` and one line here. Spreadsheets are rejected.
 """
 
 from collections.abc import Callable
@@ -16,7 +14,7 @@ HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 @dataclass(frozen=True)
 class Format:
-    """``extensions`` with dot, lower case; ``signature(head)`` is True where the first bytes are proof."""
+    """``extensions`` are in lower case with a dot; ``signature(head)`` is True if the first bytes prove the format."""
 
     module: str
     extensions: tuple[str, ...]
@@ -24,7 +22,7 @@ class Format:
     meaning: str = ""
 
     def read_raw(self, source: Source):
-        """The file's records as they stand (the module is imported only now: h5py alone costs 0.1 s)."""
+        """The file's records, not converted. The module is imported only now: h5py alone costs 0.1 s."""
         return import_module(f"turnout.readers.{self.module}").read_raw(source)
 
 
@@ -51,7 +49,7 @@ FORMATS = {
 
 
 def detect(source: Source) -> Format:
-    """The format of a file: by its first bytes where they tell, otherwise by its extension; ReadError if neither."""
+    """The format of a file, by its first bytes or else by its extension; ReadError if neither is known."""
     head = source.head
     extension = source.path.suffix.lower()
     for entry in FORMATS.values():
@@ -73,7 +71,7 @@ FIRST_PARTS = (b"[Content_Types].xml", b"_rels/", b"docProps/", b"xl/", b"mimety
 
 
 def refuse_spreadsheet(source):
-    """ReadError where the first bytes are those of Excel or of an OpenDocument, whatever the file is called."""
+    """ReadError if the first bytes are those of Excel or OpenDocument, whatever the name of the file."""
     zipped = source.head[:4] == b"PK\x03\x04" and source.head[30:].startswith(FIRST_PARTS)
     if zipped or source.head.startswith(OLD_EXCEL):
         remedy = "Save it from the spreadsheet as CSV, text with separated columns"

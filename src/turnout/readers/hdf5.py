@@ -1,8 +1,8 @@
-"""HDF5: groups and datasets as named variables, attributes beside them, read as ``turnout.readers.named_arrays`` says.
+"""Reader of HDF5: groups, datasets and attributes as the named variables of ``turnout.readers.named_arrays``.
 
-What ``turnout.readers.writing`` leaves: attributes ``rate``, ``n_records`` and conditions at the root, a group
-``record_000`` ... per record with ``started_at``, in it one dataset per channel with its ``unit`` and a Fletcher-32
-checksum, so that a damaged record costs that record only.
+``turnout.readers.writing`` writes the attributes ``rate``, ``n_records`` and conditions at the root, and a group
+``record_000`` ... with ``started_at`` per record. It holds one dataset per channel with its ``unit`` and a Fletcher-32
+checksum, so that damage is limited to one record.
 """
 
 import h5py
@@ -21,7 +21,7 @@ def read_raw(source) -> RawFile:
     """Records of an HDF5 file."""
     if source.stay:
         with source.parsed_by("HDF5"):
-            # not closed here: a dataset keeps its file open as long as it is there
+            # not closed here: a dataset keeps its file open as long as it exists
             variables = _variables(h5py.File(source.path, "r"), source)
     else:
         with source.parsed_by("HDF5"), h5py.File(source.path, "r") as file:
@@ -30,10 +30,10 @@ def read_raw(source) -> RawFile:
 
 
 def _variables(group, source):
-    """Members and attributes of a group in one dictionary; a dataset that cannot be read is its ReadError."""
-    made = group[group.name].id.get_create_plist()  # a File's own id does not know it
+    """Members and attributes of a group in one dictionary; a ReadError for a dataset that cannot be read."""
+    made = group[group.name].id.get_create_plist()  # the id of a File does not have it
     tracked = made.get_link_creation_order() & h5py.h5p.CRT_ORDER_TRACKED
-    kind = dict if tracked else Alphabetical  # members come in the order of their making only where it was kept
+    kind = dict if tracked else Alphabetical  # members are in the order of creation only if it was tracked
     variables = kind({name: _attribute(value) for name, value in group.attrs.items()})
     units: dict[str, str] = {}
     clocks: dict[str, dict] = {}
@@ -62,7 +62,7 @@ def _variables(group, source):
 
 
 def _settle(variables, clocks, source):
-    """The rate or step that samples state each for themselves becomes that of all; those of another are an error."""
+    """Use the rate or step that datasets state individually as the common one; a different one is an error."""
     for name in (*vectors(variables), *matrices(variables)):
         try:
             common, own = (Facts(of, source).rate() for of in (variables, clocks.get(name, {})))

@@ -1,6 +1,6 @@
-"""The stage that all formats share: raw records and what the layout promises -> recordings in SI units.
+"""Conversion of raw records to recordings in SI units, for all formats.
 
-Which channel of a file is which of the layout, and what turns its numbers into SI.
+It assigns the channels of a file to those of the layout, converts units and checks what the layout states.
 """
 
 from dataclasses import dataclass, replace
@@ -16,13 +16,13 @@ from turnout.readers.timing import check_order, check_time, settled_rate, starts
 from turnout.records import Channel, LongRecording, RawChannel, RawDescription, Recording
 from turnout.units import IGNORED, conversion, to_si
 
-# What loggers write for a unit where nobody told them one; without case.
+# Labels that loggers write for a unit that was not configured; in lower case.
 MEANINGLESS = ("", "-", "eu", "none", "n/a", "a.u.", "arb", "?", "unknown", "undefined", "unitless")
 
 
 @dataclass(frozen=True)
 class Mapping:
-    """Row ``index`` of the file becomes ``channel`` by SI = ``scale`` * number + ``offset``, sign included."""
+    """Row ``index`` of the file becomes ``channel``: SI = ``scale`` * number + ``offset``, sign included."""
 
     index: int
     channel: Channel
@@ -31,10 +31,10 @@ class Mapping:
 
 
 def mappings(record, channels, where, source):
-    """One Mapping per wanted channel, in the layout's order; ReadError where file and layout disagree.
+    """One ChannelMapping per channel that is read, in the layout's order; ReadError if file and layout disagree.
 
-    ``RawChannel.limit`` and ``resolution`` are in SI already. Channels with the quantity "ignored" are in the file
-    but not wanted; nobody misses one that is not there.
+    ``RawChannel.limit`` and ``resolution`` are in SI already. Channels with the quantity "ignored" are not read and
+    may be absent.
     """
     channels = [c for c in channels if c.quantity != IGNORED or _is_there(record, c.source, where, source)]
     indices = [index_of(record, channel.source, where, source) for channel in channels]
@@ -57,7 +57,7 @@ def mappings(record, channels, where, source):
 
 
 def index_of(record, wanted, where, source):
-    """Row of the channel that a layout calls ``wanted``: a number, a name, or another name the format gives it."""
+    """Row of the channel that the layout calls ``wanted``: a number, a name, or an alias of the format."""
     if isinstance(wanted, int):
         if 0 <= wanted < len(record.names):
             return wanted
@@ -109,10 +109,10 @@ def _mapping(index, file_unit, raw: RawChannel, where, source):
 
 
 def settled_unit(file_unit, layout_unit):
-    """The unit of the raw numbers: both must agree where both speak; "V!" in a layout overrules the file.
+    """Unit of the raw numbers. File and layout must agree if both state one; "V!" in a layout overrules the file.
 
-    Counts of a file become what the layout says that a count is worth: a voltage, or a unit with its factor. Labels
-    that say nothing are overruled by the layout; ValueError for another unit that is not known.
+    If the file states counts, the layout gives the value of one count: a voltage, or a unit with a factor. The layout
+    overrules meaningless labels. ValueError for any other unknown unit.
 
     Examples
     --------
@@ -140,7 +140,7 @@ def settled_unit(file_unit, layout_unit):
 
 
 def _says_nothing(unit):
-    """Whether a label is none, or a number: a count of something else that stands beside the samples."""
+    """Whether a label is no unit: a placeholder, or a number that some loggers write there."""
     return unit.casefold() in MEANINGLESS or unit.replace(".", "", 1).isdigit()
 
 
@@ -148,15 +148,14 @@ def _both_say(said, layout_unit):
     return f"the file says {said}, the layout {layout_unit!r} ({layout_unit + '!'!r} would overrule the file)"
 
 
-TOO_SHORT = 2  # samples; one sample has neither rate nor spread
+TOO_SHORT = 2  # fewest samples of a record: one sample has neither rate nor spread
 
 
 def describe(raw, description: RawDescription, source, longest=None):
-    """(recordings, errors) of a raw file; a damaged record costs that record only.
+    """(recordings, errors) of a raw file. A damaged record does not affect the other records.
 
-    In a passage, a channel that is dead or not finite costs that channel only: the recording goes without it and
-    the error says so. A hammer test needs all its channels. A record of more than ``longest`` seconds becomes a
-    ``LongRecording`` where the source lets samples stay in the file.
+    In a passage a dead or non-finite channel is left out of the recording and adds an error. A hammer test needs all
+    its channels. A record of more than ``max_duration`` seconds becomes a ``LongRecording`` if the source is lazy.
     """
     if not raw.records and not raw.expected:
         raise source.error("the file", "it holds no record", COPY_AGAIN, reason="empty")
@@ -181,7 +180,7 @@ def describe(raw, description: RawDescription, source, longest=None):
 
 
 def _count_errors(raw, description, source):
-    """What the layout, or the file itself, promises about the number of records, and does not keep."""
+    """Errors where the number of records differs from that stated by the layout or by the file itself."""
     there = len(raw.records)
     of_layout = _or_layout("records", description.n_records)
     promises = (("the layout", description.n_records, of_layout), ("its own header", raw.expected, COPY_AGAIN))
@@ -197,12 +196,12 @@ def _count_errors(raw, description, source):
 
 
 def _or_layout(key, promised):
-    """The remedy where a file holds less than the layout's ``key`` promises: either may be wrong."""
+    """Remedy if a file holds less than the layout's ``key`` states: either may be wrong."""
     return f"{COPY_AGAIN}; if it is whole, correct '{key}: {promised}' in the layout (null: any number)"
 
 
 def _recording(record, k, n_record, description, source, longest):
-    """(recording, errors of its lost channels) of raw record ``k``; ReadError where it cannot be used."""
+    """(recording, errors of channels left out) of raw record ``k``; ReadError if the record cannot be used."""
     where = f"record {k + 1} of {n_record}"
     n_sample = _sample_count(record, where, description.n_samples, source)
     if record.time is not None:
@@ -256,7 +255,7 @@ def _sample_count(record, where, promised, source):
 
 
 def _judged(row):
-    """(samples that are not finite, the first of them, first value, whether all are equal) of a channel (n,)."""
+    """(number of non-finite samples, index of the first, first value, whether all are equal) of a channel (n,)."""
     with np.errstate(over="ignore", invalid="ignore"):
         suspect = not np.isfinite(row.sum())
     n_bad, first_bad = 0, -1

@@ -1,7 +1,4 @@
-"""Samples that stay in their file: what of an array a reader asks for, and stretches of samples on request.
-
-A record that stays in its file: converted stretch by stretch, judged in one pass.
-"""
+"""Lazy arrays: samples of a long record stay in the file and are read and converted in blocks on request."""
 
 from dataclasses import dataclass
 
@@ -10,19 +7,19 @@ import numpy as np
 from turnout.errors import ReadError
 from turnout.readers.source import RawRecord, Source
 
-MANY = 2**16  # numbers: fewer are no long record
+MANY = 2**16  # numbers: smaller datasets are read at once
 
 
 def stays(dataset) -> bool:
-    """Whether a dataset can be samples of a long record: numbers in one or two dimensions, many of them."""
+    """Whether a dataset may be the samples of a long record: many numbers in one or two dimensions."""
     return dataset.dtype.kind in "fiu" and dataset.ndim in (1, 2) and dataset.size >= MANY
 
 
 class Stored:
-    """A matrix in a file: ``shape``, ``ndim``, ``dtype``, ``T`` and rows as an array has them; rows are ``Column``.
+    """A matrix in a file with the ``shape``, ``ndim``, ``dtype``, ``T`` and rows of an array; rows are ``LazyColumn``.
 
-    ``numbers`` is anything with ``shape`` and ``dtype`` that is sliced like an array of two dimensions. The last
-    stretch is kept: all rows of a stretch cost one access to the file.
+    ``numbers`` has ``shape`` and ``dtype`` and is sliced like a two-dimensional array. The last block is cached, so
+    that all rows of a block cost one access to the file.
     """
 
     ndim = 2
@@ -46,11 +43,11 @@ class Stored:
         return (Column(self.row_of(k), self.shape[1], self.dtype) for k in range(len(self)))
 
     def row_of(self, k):
-        """Function (start, stop) -> that stretch of row ``k``."""
+        """Function (start, stop) -> samples of row ``k``."""
         return lambda start, stop: self.stretch(start, stop)[k]
 
     def stretch(self, start, stop) -> np.ndarray:
-        """(n_row, stop - start)."""
+        """All rows from ``start`` to ``stop``, (n_row, stop - start)."""
         if self.last[0] != (start, stop):
             part = self.numbers[start:stop].T if self.turned else self.numbers[:, start:stop]
             self.last = (start, stop), part
@@ -58,7 +55,7 @@ class Stored:
 
 
 class Column:
-    """A row of samples in a file, (n,): sliced, it is read; ``take(start, stop)`` does that.
+    """A row of samples in a file, (n,), which ``take(start, stop)`` reads when it is sliced.
 
     >>> column = Column(lambda start, stop: np.arange(start, stop), 10, np.dtype(float))
     >>> len(column), column[7:99].tolist(), float(np.asarray(column).sum())
@@ -82,7 +79,7 @@ class Column:
 
 
 def stored(numbers):
-    """``Column`` or ``Stored`` of what is sliced like an array; an axis of length 1 is no axis.
+    """``LazyColumn`` or ``LazyMatrix`` of anything that is sliced like an array; axes of length 1 are dropped.
 
     >>> stored(np.ones((1, 5))).shape, stored(np.ones((5, 1))).shape, stored(np.ones((2, 5))).shape
     ((5,), (5,), (2, 5))
@@ -99,14 +96,14 @@ def stored(numbers):
 ARRAYS = (np.ndarray, Stored, Column)
 
 
-PASS = 2**18  # samples of each channel at a time
+PASS = 2**18  # samples of each channel that are read at a time
 
 
 @dataclass(frozen=True)
 class Stretches:
-    """``stretches(start, stop)`` -> (n_channel, stop - start) SI samples of the channels ``mapped`` of a raw record.
+    """``reader(start, stop)`` -> (n_channel, stop - start) SI samples of the channels ``mapped`` of a raw record.
 
-    ReadError where the file is damaged there, or not what it was when this was made.
+    ReadError if the file is damaged there, or has changed since this object was created.
     """
 
     record: RawRecord
@@ -128,14 +125,17 @@ class Stretches:
         return samples
 
     def of(self, rows) -> "Stretches":
-        """Some of the channels."""
+        """The same reader for some of the channels."""
         return Stretches(self.record, tuple(self.mapped[i] for i in rows), self.where, self.source, self.state)
 
 
 @dataclass
 class Soundness:
-    """What is known of each channel (n_channel,) after the stretches so far: samples that are not finite and where the
-    first of them is, the first sample, and whether all others equal it."""
+    """Statistics of each channel (n_channel,) over the blocks read so far.
+
+    ``n_bad`` is the number of non-finite samples, ``first_bad`` the index of the first of them, ``value`` the first
+    sample, ``constant`` whether all samples equal it.
+    """
 
     n_bad: np.ndarray
     first_bad: np.ndarray
@@ -144,7 +144,7 @@ class Soundness:
 
     @classmethod
     def over(cls, stretches: Stretches, n_sample: int):
-        """One pass over a record of ``n_sample`` samples."""
+        """Statistics from one pass over a record of ``n_sample`` samples."""
         n = len(stretches.mapped)
         found = cls(np.zeros(n, int), np.full(n, -1), np.zeros(n), np.ones(n, bool))
         for start in range(0, n_sample, PASS):
@@ -152,7 +152,7 @@ class Soundness:
         return found
 
     def by_channel(self) -> list[tuple]:
-        """What is known, channel by channel."""
+        """(n_bad, first_bad, value, constant) of each channel."""
         return list(zip(self.n_bad, self.first_bad, self.value, self.constant))
 
     def _add(self, samples, start):
@@ -169,7 +169,7 @@ class Soundness:
 
 
 def fault(n_sample, seen, channel, where, source) -> ReadError | None:
-    """ReadError of a channel with NaN, infinity, or no movement at all; None for a sound one."""
+    """ReadError of a channel that is not finite or constant; None for an intact one."""
     place = f"{where}, channel {channel.name!r}"
     n_bad, first_bad, value, constant = seen
     if n_bad:

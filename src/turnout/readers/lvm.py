@@ -1,7 +1,7 @@
-"""LabVIEW measurement files (.lvm): each segment is a record.
+"""Reader of LabVIEW measurement files (.lvm): each segment is a record.
 
-Read by ourselves: lvm_read turns a number it cannot read into NaN, takes a segment that ends early for a whole one, and
-needs some 2 µs per number. Layout: National Instruments, "Specification for the LabVIEW Measurement File".
+The package lvm_read is not used: it turns unreadable numbers into NaN, does not detect truncated segments, and needs
+some 2 µs per number. Layout: National Instruments, "Specification for the LabVIEW Measurement File".
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ SEPARATORS = {"Tab": "\t", "Comma": ",", "Semicolon": ";"}
 
 
 def read_raw(source) -> RawFile:
-    """Records of an LVM file; the file's head may promise their number (``Records``)."""
+    """Records of an LVM file; the head of the file may state their number (``Records``)."""
     lines = source.data[: source.data.find(END_OF_HEADER)].decode("latin-1").splitlines()
     head = _pairs(lines, _separator(lines))
     if END_OF_HEADER not in source.data:
@@ -48,7 +48,7 @@ def _pairs(lines, separator):
 
 
 def _segments(data):
-    """Offsets of the lines "Channels ..." that open the segments."""
+    """Offsets of the lines "Channels ..." at which the segments begin."""
     found, at = [], data.find(END_OF_HEADER)
     while (at := data.find(b"\nChannels", at)) >= 0:
         found.append(at + 1)
@@ -99,7 +99,7 @@ def _record(source, start, stop, head, separator, k, n):
 
 
 def _each(fields, name, count):
-    """The field ``name`` of each channel, "" where there is none."""
+    """The field ``name`` of each channel, "" if absent."""
     return [*fields.get(name, []), *[""] * count][:count]
 
 

@@ -1,7 +1,7 @@
-"""MATLAB files, version 5 and 7.3: named variables, read as ``turnout.readers.named_arrays`` says.
+"""Reader of MATLAB files, versions 5 and 7.3: named variables as in ``turnout.readers.named_arrays``.
 
-pymatreader turns structures into dictionaries and gives both versions alike, except that 7.3 arrays come with their
-axes reversed; the channels' count and the longer axis tell which is which.
+pymatreader turns structures into dictionaries and returns both versions in the same form, except that arrays of 7.3
+have reversed axes. The number of channels and the longer axis identify the axes.
 """
 
 import warnings
@@ -23,7 +23,7 @@ def read_raw(source) -> RawFile:
     if source.size < LEAST:
         raise source.error("the header", f"the file ends after {source.size} bytes", reason="truncated")
     with source.parsed_by("pymatreader"), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # objects and tables it cannot read are no samples
+        warnings.simplefilter("ignore")  # objects and tables that it cannot read are no samples
         large = _large(source) if source.stay and source.head.startswith(NEW) else {}
         read = pymatreader.read_mat(source.path, ignore_fields=list(large)) | large
     kind = Alphabetical if source.head.startswith(NEW) else dict
@@ -31,7 +31,7 @@ def read_raw(source) -> RawFile:
 
 
 def _large(source):
-    """Arrays of version 7.3 that stay in the file: those outside structures. Version 5 cannot be read in parts."""
+    """Arrays of version 7.3 outside structures, which stay in the file. Version 5 cannot be read in parts."""
     file = h5py.File(source.path, "r")  # not closed here: a dataset keeps its file open
     return {
         name: stored(member)
@@ -41,7 +41,7 @@ def _large(source):
 
 
 def _plain(value, kind):
-    """Dictionaries of a ``kind`` and arrays throughout; a structure array becomes numbered records."""
+    """The value with dictionaries of ``mapping_type`` and arrays; a structure array becomes numbered records."""
     if isinstance(value, dict):
         members = {name: _plain(v, kind) for name, v in value.items()}
         return kind({name: v for name, v in members.items() if v is not None})

@@ -1,26 +1,22 @@
-"""Records in named variables: how npz, MATLAB and HDF5 files are laid out, ours and those of others.
+"""Records from named variables, as npz, MATLAB and HDF5 files of this program and of other sources hold them.
 
-What is recognised (names without regard to case, except ``t``):
+What is recognised (names in any case, except ``t``):
 
 * sampling rate [Hz]: ``rate``, ``fs``, ``sample_rate``, ``sampling_rate``, ``sampling_frequency`` ..., or the step
   [s]: ``dt``, ``delta_t`` ..., or a vector ``time`` or ``t`` [s];
 * ``channels`` (or ``channel_names``, ``names``, ``labels``) and ``units``, one per channel;
 * ``started_at`` (or ``start_time`` ...): ISO 8601 text, seconds since 1970 UTC, or a MATLAB datenum, one per file or
   per record;
-* ``n_records``: how many records the file promises; conditions under their own names (``rail_temperature`` ...);
+* ``n_records``: the number of records that the file states; conditions under their names (``rail_temperature`` ...);
 * samples, the first of these that fits:
 
   1. ``record_000``, ``record_001`` ... : one matrix or one group of variables each;
-  2. a structure or group that holds the rest, or several, each a record;
-  3. one array: (record, channel, sample), or (channel, sample) or (sample, channel), whichever has the channels'
-     count along its channel axis, with the longer axis for the samples;
-  4. vectors of equal length, each a channel named like its variable.
+  2. a structure or group that holds the other variables, or several, each a record;
+  3. one array: (record, channel, sample), (channel, sample) or (sample, channel). The channel axis is the one with
+     the number of channels, the longer axis is that of the samples;
+  4. vectors of equal length, each a channel with the name of its variable.
 
-Records that are told by the numbers in their names: their order, and which of them are missing.
-
-A list of units beside channels that are variables of their own: which unit is whose.
-
-What loggers call the start and the count of samples, in the languages of Europe: lower case, no accents, "_".
+The names that loggers use in European languages are listed here in lower case, without accents, with "_" for blanks.
 """
 
 import re
@@ -37,7 +33,7 @@ NUMBERED = re.compile(r"^(?:record|rec|segment|impact|hit)[_ ]?(\d+)$", re.IGNOR
 
 
 def numbered_names(names):
-    """[(number, name)] of the ``names`` that number a record.
+    """[(number, name)] of the ``names`` that are "record", "impact" ... with a number.
 
     >>> numbered_names(["rate", "hit_02", "Record 10"])
     [(2, 'hit_02'), (10, 'Record 10')]
@@ -46,9 +42,9 @@ def numbered_names(names):
 
 
 def by_number(numbered, variables, source):
-    """Values of the records in the order of their numbers, None for one that is missing between its neighbours.
+    """Values of the records in the order of their numbers, None for a missing number.
 
-    None is missing where gaps outnumber the records: these are numbered by a clock or a counter.
+    If the gaps outnumber the records, no record counts as missing: a clock or a counter numbered them.
     """
     names: dict[int, list[str]] = {}
     for number, name in sorted(numbered):
@@ -70,13 +66,13 @@ def natural(name):
 
 
 class Alphabetical(dict):
-    """Variables of a file that keeps them by the alphabet: their order says nothing."""
+    """Variables of a file that sorts them alphabetically: their order carries no information."""
 
 
 def listed_units(names, units, labels, ordered):
-    """Unit of each of ``names``: by the list of ``labels`` beside the units, else by order; "" where none is said.
+    """Unit of each of ``names``: by the ``labels`` that belong to the units, else by order; "" if unknown.
 
-    None where the units differ and the names are not ``ordered``: then nothing says which of them is whose.
+    None if the units differ and the names are not ``ordered``: then the assignment is unknown.
 
     >>> listed_units(["rail", "sleeper"], ["g", "m/s²"], ["Sleeper", "rail"], ordered=False)
     ['m/s²', 'g']
@@ -99,9 +95,9 @@ START = (
     "beginn_der_messung", "heure_de_debut", "debut_de_mesure", "debut_de_la_mesure", "starttijd", "begintijd",
     "begin_meting", "zacatek_mereni", "cas_zacatku", "starttid", "starttidspunkt",
 )  # fmt: skip
-# The day of a start whose time of day stands in a line of its own.
+# The day of a start whose time of day is in a line of its own.
 START_DATE = ("start_date", "startdatum", "date_de_debut", "begindatum", "datum_zacatku", "startdato")
-# Unlike n_samples, which is of each record, these may count the rows of the whole file.
+# Unlike n_samples, which counts per record, these may count the rows of the whole file.
 SAMPLES = (
     "number_of_samples", "anzahl_messwerte", "anzahl_der_messwerte", "anzahl_werte", "anzahl_abtastwerte",
     "anzahl_samples", "anzahl_datenpunkte", "nombre_d_echantillons", "nombre_de_points", "aantal_samples",
@@ -125,14 +121,14 @@ COUNT = ("n_records", "n_record")
 
 
 class Facts:
-    """What a group of variables says about its samples; what it leaves open is asked of the group around it."""
+    """Metadata of the samples of a group of variables; missing entries are taken from the ``parent`` group."""
 
     def __init__(self, variables: Mapping, source, around: "Facts | None" = None):
         self.lower = {(k if k == "t" else k.lower()): v for k, v in variables.items() if k != "T"}
         self.around, self.source = around, source
 
     def get(self, names):
-        """The first variable of ``names``, here or further out; a damaged one is raised."""
+        """The first variable of ``names``, here or in a parent group; ReadError if it is damaged."""
         for name in names:
             if (value := self.lower.get(name)) is not None:
                 if isinstance(value, ReadError):
@@ -141,7 +137,7 @@ class Facts:
         return self.around.get(names) if self.around else None
 
     def one(self, names, k, n):
-        """As ``get``, but entry ``k`` where there is one per record."""
+        """As ``get``, but entry ``k`` if there is one entry per record."""
         value = self.get(names)
         if isinstance(value, (list, tuple)) or (isinstance(value, np.ndarray) and value.ndim):
             value = np.ravel(np.asarray(value))
@@ -149,7 +145,7 @@ class Facts:
         return value.item() if isinstance(value, np.generic) and value.dtype.kind != "M" else value
 
     def number(self, names, k=0, n=1):
-        """As ``one``, but a float; ReadError where it is none."""
+        """As ``record_value``, but a float; ReadError if it is no number."""
         value = self.one(names, k, n)
         try:
             return None if value is None else float(value)
@@ -157,21 +153,21 @@ class Facts:
             raise self.source.error(f"variable {names[0]!r}", f"{value!r} is no number") from error
 
     def count(self, names, k=0, n=1):
-        """As ``number``, but a whole one above 0."""
+        """As ``number``, but a whole number above 0."""
         value = self.number(names, k, n)
         if value is None or (1 <= value < 2**53 and value == int(value)):
             return None if value is None else int(value)
         raise self.source.error(f"variable {names[0]!r}", f"{value!r} is no whole number above 0")
 
     def rate(self):
-        """[Hz] or None."""
+        """Sampling rate [Hz], None if not stated."""
         rate = self.number(RATE)
         if rate is None and (step := self.number(STEP)):
             return 1.0 / step
         return rate
 
     def rated(self, least: float = EXACT) -> dict:
-        """``rate`` [Hz] and ``rate_tolerance`` of a RawRecord; ``least`` is the precision that the format can have."""
+        """``rate`` [Hz] and ``rate_tolerance`` of a RawRecord; ``min_tolerance`` is the precision of the format."""
         rate, step = self.number(RATE), self.number(STEP)
         if rate is None and step:
             return {"rate": 1.0 / step, "rate_tolerance": max(step_precision(step), least)}
@@ -179,13 +175,13 @@ class Facts:
         return {"rate": rate, "rate_tolerance": max(stated, least)}
 
     def conditions(self, k, n):
-        """What was noted beside the samples."""
+        """Conditions that are stored with the samples."""
         noted = {name: self.one((name,), k, n) for name in CONDITIONS}
         return {name: value for name, value in noted.items() if value is not None}
 
 
 def texts(value) -> list[str]:
-    """A list of text out of whatever a library makes of one."""
+    """A list of texts from the form in which a library returns it."""
     if value is None:
         return []
     if isinstance(value, (str, bytes)):
@@ -196,7 +192,7 @@ def texts(value) -> list[str]:
 
 
 def raw_file(variables: Mapping, source, around: Facts | None = None) -> RawFile:
-    """All records that ``variables`` hold; a value may be a ReadError where it is damaged."""
+    """All records in ``variables``; a damaged value is a ReadError."""
     facts = Facts(variables, source, around)
     expected = facts.count(COUNT)
     numbered = numbered_names(variables)
@@ -214,7 +210,7 @@ def raw_file(variables: Mapping, source, around: Facts | None = None) -> RawFile
 
 
 def _part(value, k, n, where, facts, source):
-    """One numbered record, or the error that stands in its place."""
+    """One numbered record, or its error."""
     try:
         if value is None:
             found = "this record is missing between its neighbours"
@@ -234,7 +230,7 @@ def _part(value, k, n, where, facts, source):
 
 
 def _whole(variables, facts, source, k=0, n=1):
-    """The records of variables that hold samples themselves."""
+    """The records of a group whose variables are samples."""
     if damaged := [v for v in variables.values() if isinstance(v, ReadError)]:
         raise damaged[0]
     blocks_by_name = matrices(variables)
@@ -259,7 +255,7 @@ def _whole(variables, facts, source, k=0, n=1):
 
 
 def _units_of(channels, facts, ordered, where, source):
-    """The unit of each variable that is a channel, "" where the file does not say."""
+    """The unit of each variable that is a channel, "" if the file does not state it."""
     noted = facts.get(UNITS)
     if isinstance(noted, Mapping):
         return [noted.get(name, "") for name in channels]
@@ -272,13 +268,13 @@ def _units_of(channels, facts, ordered, where, source):
 
 
 def matrices(variables):
-    """Arrays of samples in two or three dimensions."""
+    """Arrays that can be samples in two or three dimensions."""
     arrays = {name: v for name, v in variables.items() if isinstance(v, ARRAYS) and v.dtype.kind in "fiu"}
     return {name: v for name, v in arrays.items() if v.ndim in (2, 3) and min(v.shape) >= 1 and max(v.shape) > 1}
 
 
 def vectors(variables):
-    """Vectors that can be channels; those much shorter than the longest are notes, not samples."""
+    """Vectors that can be channels; those much shorter than the longest are metadata, not samples."""
     known = {*RATE, *STEP, *TIME, *NAMES, *UNITS, *START, *COUNT, *CONDITIONS}
     found = {
         name: v

@@ -1,4 +1,4 @@
-"""NumPy archives (.npz): named arrays, read as ``turnout.readers.named_arrays`` says. Each member carries a CRC-32."""
+"""Reader of NumPy archives (.npz): named arrays as in ``turnout.readers.named_arrays``, each with a CRC-32."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from turnout.readers.source import RawFile
 
 
 def read_raw(source) -> RawFile:
-    """Records of an archive; a member whose checksum fails costs its record only."""
+    """Records of an archive; a wrong checksum of a member affects only its record."""
     variables = {}
     with source.parsed_by("numpy"), np.load(source.path, allow_pickle=False) as archive:
         for name in archive.files:

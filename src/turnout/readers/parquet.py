@@ -1,7 +1,7 @@
-"""Parquet: a column per channel, a column ``record`` that numbers the records where there are several.
+"""Reader of Parquet: a column per channel, and a column ``record`` that numbers the records if there are several.
 
-``rate``, ``started_at`` and the rest stand in the schema's metadata (JSON under ``turnout``, or plain keys), a unit in
-the metadata of its field. A cut file has lost its footer and cannot be opened; pages carry checksums.
+``rate``, ``started_at`` and other metadata are in the schema (JSON under ``turnout``, or plain keys), a unit is in the
+metadata of its field. A truncated file lacks its footer and cannot be opened; pages have checksums.
 """
 
 import json
@@ -55,7 +55,7 @@ def read_raw(source) -> RawFile:
 
 
 def _columns(file, rows):
-    """Name -> numbers, or the column that reads them; a time column is always read."""
+    """Name -> numbers, or a lazy column if ``rows`` is given; a time column is always read."""
     names = file.schema_arrow.names
     if rows is None:
         table = file.read(use_threads=False)
@@ -69,7 +69,7 @@ def _columns(file, rows):
 
 
 class RowGroups:
-    """Row groups of a file, of which two are held, neighbours: a stretch may lie across a border."""
+    """Reads row groups of a file; two adjacent ones are cached, because a block may lie across their border."""
 
     def __init__(self, file):
         self.file, self.held = file, {}
@@ -77,7 +77,7 @@ class RowGroups:
         self.edges = np.concatenate([[0], np.cumsum(sizes)]).astype(int)
 
     def column(self, name):
-        """The numbers of one column."""
+        """One column, read lazily."""
         dtype = self.file.schema_arrow.field(name).type.to_pandas_dtype()
         return Column(lambda start, stop: self._stretch(name, start, stop), int(self.edges[-1]), dtype)
 
@@ -97,7 +97,7 @@ class RowGroups:
 
 
 def _notes(schema):
-    """The metadata as variables: numbers as numbers."""
+    """The metadata of the schema as variables, decoded from JSON where possible."""
     raw = {k.decode("utf-8", "replace"): v.decode("utf-8", "replace") for k, v in (schema.metadata or {}).items()}
     notes = {}
     for key, text in raw.items():
@@ -114,7 +114,7 @@ def _unit(field):
 
 
 def _seconds(time):
-    """A time column in seconds from its first entry where it holds time stamps."""
+    """A time column in seconds; time stamps are counted from the first one."""
     if time.dtype.kind == "M":
         return (time - time[0]).astype("timedelta64[ns]").astype(float) * 1e-9
     return np.asarray(time, dtype=float)

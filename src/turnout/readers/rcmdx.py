@@ -1,7 +1,7 @@
-"""RCM-DX, the rail condition monitoring data exchange format (HDF5 below a root RCMDX), versions 1 and 2.
+"""Reader of RCM-DX, the rail condition monitoring data exchange format (HDF5 below a root RCMDX), versions 1 and 2.
 
-Each data source with a frequency is a record; one that samples by distance or on events is not. Found by the attribute
-``Element`` (SESSION, DATASOURCE, CHANNEL) wherever the tree has them, because releases moved them. Time stamps are
+Each data source that samples in time is a record; those that sample by distance or on events are left out. Data sources
+are recognised by their time stamps and channels at any level, because releases moved them in the tree. Time stamps are
 nanoseconds since 1970 UTC, one per sample, and must agree with ``CommonTriggerFrequency``.
 
 Layout: OpenRail Association, RCM-DX Specification 2.0.
@@ -45,7 +45,7 @@ def read_raw(source) -> RawFile:
 
 
 def _opened(source):
-    """The file; where samples stay in it, the datasets keep it open."""
+    """The file; with a lazy source the datasets keep it open."""
     file = h5py.File(source.path, "r")
     return nullcontext(file) if source.stay else file
 
@@ -54,7 +54,7 @@ EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
 def _data_sources(group, notes, found):
-    """Every group that holds time stamps and channels, with what the groups around it note."""
+    """Append every group that holds time stamps and channels, with the metadata of its parent groups."""
     notes = {**notes, **{k: group.attrs[k] for k in NOTED.intersection(group.attrs)}}
     if isinstance(group.get("timestamp"), h5py.Dataset) and any(_is_channel(m) for m in group.values()):
         found.append((group, notes))
@@ -73,7 +73,7 @@ def _text(value):
 
 
 def _record(group, notes, source):
-    """The record of one data source; None where it is not sampled in time."""
+    """The record of one data source; None if it is not sampled in time."""
     channels = {name: member for name, member in group.items() if _is_channel(member)}
     modes = {_text(c.attrs.get("TriggerMode", "TIME")).upper() for c in channels.values()}
     if modes != {"TIME"}:

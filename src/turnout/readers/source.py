@@ -1,7 +1,4 @@
-"""What a reader of one format hands over: the numbers as they stand in the file, nothing converted.
-
-From a path to a file that lies inside the raw root and can be opened.
-"""
+"""Input and output of the readers: the ``Source`` of a raw file, and its records as they are in the file."""
 
 import hashlib
 import math
@@ -23,8 +20,8 @@ from turnout.records import NOTHING
 
 COPY_AGAIN = "Copy the file again from the logger"
 SYSTEM_ERROR = re.compile(r"errno = (\d{1,9})\b")
-MOST = 1032  # bytes that one of a file can become: deflate's bound
-# What may stand beside the samples in any format, and reaches Recording.conditions.
+MOST = 1032  # largest ratio of unpacked to packed bytes: the bound of deflate
+# Metadata that any format may store with the samples; they become Recording.conditions.
 CONDITIONS = (
     "rail_temperature",
     "air_temperature",
@@ -40,7 +37,7 @@ CONDITIONS = (
 
 
 def number_or_text(text: str) -> float | str:
-    """A condition as a float where it is one, else as it stands.
+    """A condition as a float if it is a number, else as text.
 
     >>> number_or_text("12.5"), number_or_text("main")
     (12.5, 'main')
@@ -53,11 +50,10 @@ def number_or_text(text: str) -> float | str:
 
 @dataclass(frozen=True)
 class Source:
-    """One file: where it lies, the name that messages use, its size and first bytes. ``data`` is read when asked for.
+    """One raw file: path, name in messages, size and first bytes. ``data`` is read on first access.
 
-    Formats whose library reads from the path leave ``data`` alone: a large block of fresh memory costs as much as the
-    reading. Where samples may ``stay`` in the file, a reader whose format allows it hands over ``Column``s in place of
-    arrays, and goes by ``mapped``.
+    Readers whose library opens the path do not use ``data``: allocating a large block costs as much as reading it.
+    With ``lazy``, readers whose format allows it return ``LazyColumn`` in place of arrays and use ``mapped``.
     """
 
     path: Path
@@ -73,12 +69,12 @@ class Source:
 
     @cached_property
     def mapped(self) -> mmap.mmap:
-        """The bytes of the file, none of them in memory before it is looked at."""
+        """The bytes of the file, mapped into memory and loaded on access."""
         with self.path.open("rb") as file:
             return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
 
     def state(self) -> tuple[int, int] | None:
-        """Size and time of change; None where the file is gone."""
+        """Size and modification time; None if the file is gone."""
         try:
             status = self.path.stat()
         except OSError:
@@ -86,7 +82,7 @@ class Source:
         return status.st_size, status.st_mtime_ns
 
     def sha256(self) -> str:
-        """Of the file's bytes, in hexadecimal."""
+        """sha256 of the file's bytes, in hexadecimal."""
         if "data" in self.__dict__:
             return hashlib.sha256(self.data).hexdigest()
         return sha256_of(self.path)
@@ -97,9 +93,9 @@ class Source:
 
     @contextmanager
     def parsed_by(self, library, where="the file", reason="unreadable"):
-        """Turn whatever ``library`` raises on damaged bytes into a ReadError; for the library's call alone.
+        """Context of a call of ``library``: any exception it raises on damaged bytes becomes a ReadError.
 
-        A fault of the machine is no damage, and goes on as it is.
+        A fault of the machine is no damage and is raised unchanged.
         """
         try:
             yield
@@ -116,7 +112,7 @@ class Source:
 
 
 def _fault_of_the_machine(error):
-    """``error`` where the machine is at fault, an OSError where HDF5 says so in the text of another; else None."""
+    """``error`` if it is a fault of the machine, an OSError if the text of an HDF5 error states one, else None."""
     if of_the_machine(error):
         return error
     told = SYSTEM_ERROR.search(str(error))
@@ -125,20 +121,19 @@ def _fault_of_the_machine(error):
 
 
 def _asks_for_more_than(n_byte, error):
-    """Whether numpy had no memory for an array of more bytes: that is the length which damaged bytes make up."""
+    """Whether numpy failed to allocate an array of more bytes: such a length comes from damaged bytes."""
     shape, dtype = getattr(error, "shape", None), getattr(error, "dtype", None)
     return shape is not None and dtype is not None and math.prod(shape) * dtype.itemsize > n_byte
 
 
 @dataclass(frozen=True)
 class RawRecord:
-    """One stretch of simultaneous samples, as it stands in the file.
+    """One record of simultaneous samples, as it is in the file.
 
-    ``samples`` holds one (n_sample,) array or ``Column`` per name, in ``units`` ("" where the file does not say).
-    ``rate`` [Hz] is None where the file does not say; ``rate_tolerance`` is the relative precision with which
-    its format can state it. ``started_at`` is aware where the format says the zone, naive where it does not.
-    ``time`` [s] is the file's own time column, ``aliases`` are further names by which a channel may be asked for,
-    ``unclear`` are lines that name a frequency [Hz] in words that nobody understood.
+    ``samples`` holds one (n_sample,) array or ``LazyColumn`` per name, in ``units`` ("" if not stated).
+    ``rate`` [Hz] is None if not stated; ``rate_tolerance`` is the relative precision with which the format can state
+    it. ``started_at`` has a time zone only if the format states one. ``time`` [s] is the time column of the file.
+    ``aliases`` are further names of the channels. ``unclear`` are lines with a frequency [Hz] in unknown words.
     """
 
     names: tuple[str, ...]
@@ -160,9 +155,9 @@ class RawRecord:
 
 @dataclass(frozen=True)
 class RawFile:
-    """All records of a file in their order, a damaged one as its ReadError.
+    """All records of a file in their order; a damaged record is its ReadError.
 
-    ``expected`` is how many the file itself promises, None where it does not say.
+    ``expected`` is the number of records that the file itself states, or None.
     """
 
     records: tuple[RawRecord | ReadError, ...]
@@ -173,9 +168,9 @@ HEAD = 4096  # bytes, enough for every signature
 
 
 def load(path, root) -> Source:
-    """The file at ``path`` (relative to ``root``, or absolute inside it); ReadError says why not.
+    """The file at ``path`` (relative to ``root``, or absolute inside it); ReadError if it cannot be used.
 
-    A symbolic link counts by what it points to: one that leads out of the raw root is refused.
+    A symbolic link that leads out of the raw root is an error.
     """
     root = Path(root)
     inside = "Put the file under the raw root or correct the turnout's pattern"
@@ -204,7 +199,7 @@ def load(path, root) -> Source:
 
 
 def _name(path, root, base):
-    """The path relative to the raw root where it has one, with forward slashes."""
+    """The path relative to the raw root if it lies inside, with forward slashes."""
     path = Path(path)
     for start in (root, base):
         if path.is_absolute() and path.is_relative_to(start):

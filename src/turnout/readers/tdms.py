@@ -1,7 +1,7 @@
-"""National Instruments TDMS: each group with samples is a record.
+"""Reader of National Instruments TDMS: each group with samples is a record.
 
-npTDMS gives what it finds of a cut-off file in silence. The lead-ins of the segments say how long the file must be, and
-``wf_samples`` how long a channel is at least; both are compared.
+npTDMS reads a truncated file without an error. Therefore the file size is compared with the lead-ins of the segments,
+and the length of each channel with ``wf_samples``.
 """
 
 import struct
@@ -15,14 +15,14 @@ from turnout.readers.named_arrays import COUNT, START, Facts, natural
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord
 from turnout.readers.timing import check_together, moment, seconds_behind, step_precision
 
-nptdms.log.log_manager.set_level("ERROR")  # what it warns of on the console is found by cut_off and becomes a reason
+nptdms.log.log_manager.set_level("ERROR")  # find_truncation turns what it would warn of into an error
 LEAD_IN = 28  # bytes: tag, mask, version, offset of the next segment, offset of the raw data
 UNFINISHED = 0xFFFFFFFFFFFFFFFF
 
 
 def read_raw(source) -> RawFile:
     """Records of a TDMS file, in the natural order of the groups' names."""
-    file = source.path.open("rb")  # not the path: npTDMS would believe an index file beside it
+    file = source.path.open("rb")  # not the path: npTDMS would use an index file in the same folder
     with nullcontext() if source.stay else file:
         cut = cut_off(file, source.size)
         with source.parsed_by("npTDMS", reason="truncated" if cut else "unreadable"):
@@ -38,7 +38,7 @@ def read_raw(source) -> RawFile:
 
 
 def cut_off(file, size: int) -> str:
-    """In words, where a file of ``size`` bytes ends before its last segment does; "" for a whole one."""
+    """Text that says where a file of ``size`` bytes is truncated; "" for a complete one."""
     at = 0
     while at < size:
         file.seek(at)
@@ -55,13 +55,13 @@ def cut_off(file, size: int) -> str:
 
 
 def _damaged(tdms):
-    """Paths of the channels that the last, incomplete segment holds."""
+    """Paths of the channels of the last, incomplete segment."""
     statuses = tdms.file_status.channel_statuses or {}
     return {path for path, status in statuses.items() if status.read_length < status.expected_length}
 
 
 def _record(group, *context):
-    """One group as a record, or the error that stands for it."""
+    """One group as a record, or its error."""
     try:
         return _sound_record(group, *context)
     except ReadError as error:
@@ -76,7 +76,7 @@ def _sound_record(group, k, n, names, damaged, properties, source):
         raise source.error(where, found, COPY_AGAIN, reason="truncated")
     for channel in channels:
         promised = Facts(channel.properties, source).number(("wf_samples",))
-        # of a channel that was written in several goes it counts the last one's samples
+        # for a channel written in several segments it counts the samples of the last one
         if channel.path in damaged or (promised and len(channel) < promised):
             found = f"ends after {len(channel)}{f' of {promised:g}' if promised else ''} samples"
             place = f"{where}, channel {channel.name!r}"
@@ -98,7 +98,7 @@ def _sound_record(group, k, n, names, damaged, properties, source):
 
 
 def _common_step(channels, where, source):
-    """Step [s] of all channels, 0 where none says it; a channel begins at its time stamp and ``wf_start_offset``."""
+    """Step [s] of all channels, 0 if not stated; a channel begins at its time stamp plus ``wf_start_offset``."""
     facts = [Facts(c.properties, source) for c in channels]
     steps = [f.number(("wf_increment",)) or 0.0 for f in facts]
     stamps = seconds_behind([moment(f.one(("wf_start_time",), 0, 1)) for f in facts])
@@ -108,7 +108,7 @@ def _common_step(channels, where, source):
 
 
 def _numbers(channel, stay):
-    """All numbers of a channel, or the column that reads them when asked: npTDMS steps over what is not asked for."""
+    """All numbers of a channel, or a lazy column: npTDMS can skip what is not requested."""
     if not stay or channel.dtype.kind not in "fiu":
         return channel[:]
     return Column(lambda start, stop: channel.read_data(start, stop - start), len(channel), channel.dtype)

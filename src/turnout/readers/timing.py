@@ -1,12 +1,6 @@
-"""How fast a record was sampled: what the file and its time column say against what was promised.
+"""Timing of records: sampling rate, time column, start times and the simultaneity of channels.
 
-When the records of a file began, and which of their stamps are in order.
-
-Start times as files write them.
-
-How precisely a file can state a sampling rate: as a double, in single precision, or in the digits that it prints.
-
-Channels that stand side by side in a record: of one rate, and from one moment on.
+Rates are compared to the precision with which a file can state them: double, single, or its printed digits.
 """
 
 import math
@@ -20,9 +14,9 @@ import numpy as np
 
 from turnout.errors import ReadError
 
-PART = 2**18  # samples of a time column that are looked at together
-USUAL = 2**21  # samples that the usual step is taken from
-DRIFT = 1e-4  # by which two clocks of one logger, each of its own crystal, may differ
+PART = 2**18  # samples of a time column that are checked at a time
+USUAL = 2**21  # samples whose median step is the usual step
+DRIFT = 1e-4  # relative: two clocks of one logger with separate crystals may differ by this much
 PER_SECOND = (1.0, 1e3, 1e6)  # a time column without unit may be in s, ms or µs
 
 
@@ -43,7 +37,7 @@ def rate_of_time(time):
         [Hz]
     tolerance : float
     gap : int or None
-        Sample after which time jumps by more than half a step (samples are missing), None where it is even.
+        Sample after which time jumps by more than half a step (samples are missing), None if there is none.
 
     Examples
     --------
@@ -66,13 +60,13 @@ def rate_of_time(time):
 
 
 def _parts(time):
-    """(first index, samples) of consecutive parts that share one sample: hours are looked at in little memory."""
+    """(first index, samples) of consecutive blocks that share one sample; so hours need little memory."""
     for start in range(0, max(time.size - 1, 1), PART):
         yield start, time[start : start + PART + 1]
 
 
 def check_time(time, where, source):
-    """ReadError where a time column runs backwards, is not finite, jumps over missing samples, or is not even."""
+    """ReadError if a time column runs backwards, is not finite, jumps over missing samples, or is not even."""
     for start, part in _parts(time):
         if not np.isfinite(part).all():
             found = f"the time of sample {start + int(np.argmin(np.isfinite(part)))} is not a number"
@@ -96,10 +90,10 @@ def check_time(time, where, source):
 
 
 def _check_even(time, rate, where, source):
-    """ReadError where time leaves a straight line by more than a step and what a crystal may drift.
+    """ReadError if time deviates from a straight line by more than one step plus the drift of a crystal.
 
-    Printed digits stay within a step, or it would stand still; each part has a line of its own, for over hours the
-    warmth of the day moves a crystal by many steps.
+    Rounding to printed digits stays within one step, or time would stand still. Each block has its own line, because
+    over hours the temperature shifts a crystal by many steps.
     """
     for start, part in _parts(time):
         steps = np.arange(part.size)
@@ -115,7 +109,7 @@ def _check_even(time, rate, where, source):
 
 
 def _refuse_another(unclear, promised, source):
-    """ReadError where a file names frequencies in words that nobody understood, none of them the promised rate."""
+    """ReadError if a file states frequencies in unknown words and none of them is the rate of the layout."""
     if unclear and all(abs(frequency - promised) > 1e-3 * promised for _, frequency in unclear):
         line = unclear[0][0][:60]
         found = f"{line!r} may be a sampling rate, and the layout's is {promised:.9g} Hz"
@@ -126,10 +120,10 @@ def _refuse_another(unclear, promised, source):
 
 
 def settled_rate(record, promised, where, source):
-    """The promised rate if the file's agrees with it to the file's precision, the file's where none is promised.
+    """The rate of the layout if that of the file agrees with it to the file's precision; without one, that of the file.
 
-    A rate that was printed with few digits (UFF58: 1/51200 s as 1.95312E-05) becomes the whole number of Hz
-    that prints the same, where there is just one.
+    A rate printed with few digits (UFF58: 1/51200 s as 1.95312E-05) becomes the whole number of Hz with the same
+    printed digits, if there is only one.
     """
     rate, tolerance = _stated_rate(record, where, source)
     if rate is None:
@@ -141,7 +135,7 @@ def settled_rate(record, promised, where, source):
         _refuse_another(record.unclear, promised, source)
         return float(promised)
     if promised is not None:
-        drift = DRIFT if record.rate is None else 0.0  # the time column's own clock
+        drift = DRIFT if record.rate is None else 0.0  # a time column has a clock of its own
         if abs(rate - promised) > (tolerance + drift) * promised:
             remedy = "Correct the rate in the layout, or find out why the logger was set differently"
             found = f"sampled at {rate:.9g} Hz instead of {promised:.9g} Hz"
@@ -153,7 +147,7 @@ def settled_rate(record, promised, where, source):
 
 
 def _stated_rate(record, where, source):
-    """(rate [Hz], its tolerance) that a record states, or else its time column; ReadError where these disagree."""
+    """(rate [Hz], tolerance) that a record states, else that of its time column; ReadError if these disagree."""
     rate, tolerance = record.rate, record.rate_tolerance
     if rate is not None and (not isfinite(rate) or rate <= 0):
         raise source.error(where, f"the sampling rate is {rate!r} Hz", reason="wrong_rate")
@@ -192,7 +186,7 @@ def started_at(moment, time_zone):
 def starts_of(moments, time_zone):
     """[(record, naive UTC)] of [(record, time stamp)] of one file, in its order.
 
-    Of an hour that comes twice in autumn the first is meant, unless a record would then begin before the one in front.
+    In the hour that comes twice in autumn a stamp means the first one, unless the record would precede its predecessor.
 
     >>> from datetime import datetime
     >>> stamps = enumerate([datetime(2024, 10, 27, 2, 55), datetime(2024, 10, 27, 2, 5)])
@@ -211,7 +205,7 @@ def starts_of(moments, time_zone):
 
 
 def check_order(starts, source):
-    """{record: ReadError} for the fewest records without which no record began before the one in front of it."""
+    """{record: ReadError} for the fewest records without which all others are in order of time."""
     errors: dict[int, ReadError] = {}
     known = [(record, start) for record, start in starts if start is not None]
     kept = _in_order([start for _, start in known])
@@ -230,14 +224,14 @@ def check_order(starts, source):
 
 
 def _in_order(starts):
-    """Places of the most ``starts`` that never go back; of several such choices the one that keeps the earliest.
+    """Indices of the longest non-decreasing subsequence of ``starts``; of several, the earliest.
 
     >>> _in_order([2099, 2001, 2002, 1970, 2002])
     [1, 2, 4]
     """
     rank = {start: -k for k, start in enumerate(sorted(set(starts)))}
-    ends: list[int] = []  # ends[n]: of all orders of n + 1 starts, read from behind, the latest first one
-    ahead = [0] * len(starts)  # how many can follow in order, the one itself included
+    ends: list[int] = []  # ends[n]: rank of the latest first start of all subsequences of n + 1 starts
+    ahead = [0] * len(starts)  # length of the longest subsequence from here on, this start included
     for i in reversed(range(len(starts))):
         k = bisect_right(ends, rank[starts[i]])
         ends[k : k + 1] = [rank[starts[i]]]
@@ -257,7 +251,7 @@ MONTHS = {m: i for i, m in enumerate("jan feb mar apr may jun jul aug sep oct no
 def moment(value):
     """datetime of ISO 8601 text, numpy datetime64 (UTC), seconds since 1970 (UTC) or a MATLAB datenum; else None.
 
-    With dots the day comes first, "13.05.2024 10:00"; with slashes nobody can tell.
+    With dots the day comes first, "13.05.2024 10:00"; dates with slashes are ambiguous and not read.
 
     Examples
     --------
@@ -287,9 +281,9 @@ def moment(value):
 
 
 def uff_moment(text):
-    """datetime of UFF's ID line 3, DD-MMM-YY HH:MM:SS; None where something else stands there.
+    """datetime of UFF's ID line 3, DD-MMM-YY HH:MM:SS; None for any other text.
 
-    Two-digit years from 70 on are of the last century.
+    Two-digit years from 70 on are 1970 to 1999.
 
     >>> uff_moment("18-Apr-16 13:49:58")
     datetime.datetime(2016, 4, 18, 13, 49, 58)
@@ -312,7 +306,7 @@ FEWEST_DIGITS = 4
 
 
 def single_precision(value: float) -> bool:
-    """Whether a number may have gone through a 32 bit float.
+    """Whether a number may have been stored as a 32 bit float.
 
     >>> single_precision(float(np.float32(1 / 44100))), single_precision(1 / 44100)
     (True, False)
@@ -322,10 +316,10 @@ def single_precision(value: float) -> bool:
 
 
 def step_precision(step: float) -> float:
-    """Relative size of one unit in the last digit of a time step [s], or what single precision leaves of it.
+    """Relative size of one unit in the last digit of a time step [s], or of single precision.
 
-    One unit, not half of it: some exporters cut digits off instead of rounding. Fewer than four digits are taken for a
-    round number as it was meant: 5E-05 is no 6E-05 cut off.
+    One unit, not half a unit: some exporters truncate instead of rounding. A step of fewer than four digits is taken as
+    exact: 5E-05 is not a truncated number.
 
     >>> print(f"{step_precision(2.267574e-05):.1e} {step_precision(5e-05):.1e} {step_precision(1 / 44100):.1e}")
     4.4e-07 1.0e-09 1.0e-09
@@ -336,7 +330,7 @@ def step_precision(step: float) -> float:
 
 
 def seconds_behind(moments):
-    """Seconds of each channel's time stamp behind the first one's; 0 where not all have a comparable one.
+    """Start of each channel relative to the first one [s]; all 0 if not all time stamps are comparable.
 
     >>> from datetime import datetime
     >>> seconds_behind([datetime(2024, 5, 13, 10, 0, 1), datetime(2024, 5, 13, 10, 0, 0, 500_000)])
@@ -348,9 +342,9 @@ def seconds_behind(moments):
 
 
 def check_together(names, steps, starts, where, source):
-    """ReadError where channels state different steps [s] (0: not stated), or starts [s] more than half a step apart.
+    """ReadError if channels state different steps [s] (0: not stated), or starts [s] more than half a step apart.
 
-    Less than that apart are the channels of converters that take turns.
+    Multiplexed converters cause smaller differences of the starts.
     """
     step = steps[0]
     if any(abs(other - step) > TEXT * abs(step) for other in steps):

@@ -1,4 +1,4 @@
-"""Universal File Format 58 and 58b: time responses as records, frequency responses through ``read_frf``."""
+"""Reader of Universal File Format 58 and 58b: time responses as records, frequency responses with ``read_frf``."""
 
 import gzip
 import re
@@ -15,15 +15,18 @@ from turnout.readers.uff_datasets import UffSet, says_si, sets_of
 
 PROMISED = re.compile(r"record \d+ of (\d+)$")
 TIME_RESPONSE, FREQUENCY_RESPONSE, TIME_AXIS = 1, 4, 17
-# Specific data type (records 9 and 10) where there is no label and dataset 164 declares SI.
+# Unit of a specific data type (records 9 and 10) without a label, if dataset 164 declares SI.
 SI_OF_TYPE = {8: "m", 9: "N", 11: "m/s", 12: "m/s²", 13: "N", 15: "Pa"}
 DIRECTIONS = {0: "", 1: "+X", 2: "+Y", 3: "+Z", -1: "-X", -2: "-Y", -3: "-Z", 4: "+RX", 5: "+RY", 6: "+RZ"}
 
 
 @dataclass(frozen=True)
 class FrequencyResponses:
-    """Frequency response functions of a file: ``frequency`` (n_frequency,) [Hz], ``frf`` (n_function, n_frequency)
-    complex in ``units``, and between which degrees of freedom ("12 +Z")."""
+    """Frequency response functions of a file.
+
+    ``frequency`` is (n_frequency,) [Hz], ``frf`` is (n_function, n_frequency), complex, in ``units``. ``responses`` and
+    ``references`` are the degrees of freedom ("12 +Z").
+    """
 
     frequency: np.ndarray
     frf: np.ndarray
@@ -36,10 +39,10 @@ class FrequencyResponses:
 def read_raw(source) -> RawFile:
     """Records of all time responses in the file.
 
-    A channel is called by ID line 1; the response entity, the ordinate's label and the degree of freedom ("12 +Z")
-    serve as well. The version or sequence number (record 6, field 3) says which record a set is of; where all sets
-    carry the same, records are found by the order of the channels. "record k of n" in ID line 5, which our own writer
-    leaves, promises n records.
+    The name of a channel is ID line 1. The response entity, the label of the ordinate and the degree of freedom
+    ("12 +Z") are accepted as well. The version or sequence number (record 6, field 3) is the number of the record. If
+    it is the same in all sets, the order of the channels defines the records. "record k of n" in ID line 5, as this
+    program writes it, states n records.
     """
     data = source.mapped if source.stay else source.data
     everything = sets_of(data)
@@ -54,13 +57,13 @@ def read_raw(source) -> RawFile:
 
 
 def _promised(sets):
-    """Records that the sets say the file has, None where they say nothing."""
+    """Number of records that the sets state for the file, or None."""
     said = [m for s in sets if s.ids and (m := PROMISED.match(s.ids[4]))]
     return max((int(m[1]) for m in said), default=None)
 
 
 def _in_file(numbers, mapped, path):
-    """A column that reads from the file what ``numbers`` is a view of; text, which is none, as it is."""
+    """A lazy column of the bytes of the file that ``numbers`` is a view of; ``numbers`` itself if it is none."""
     base = np.frombuffer(mapped, np.uint8).__array_interface__["data"][0]
     offset = numbers.__array_interface__["data"][0] - base
     if not 0 <= offset <= len(mapped) - numbers.nbytes or not numbers.flags.c_contiguous or not numbers.size:
@@ -87,7 +90,7 @@ def _records(sets, si, source):
     numbers = [s.sequence for s in named]
     if len(set(zip(keys, numbers))) == len(named) and len(set(numbers)) > 1:
         span = range(min(numbers), max(numbers) + 1)
-        whole = len(span) <= len(set(numbers)) + len(nameless)  # else the numbers have gaps of their own
+        whole = len(span) <= len(set(numbers)) + len(nameless)  # else the logger's own numbering has gaps
         groups: dict[int, dict] = {n: {} for n in (span if whole else sorted(set(numbers)))}
         for key, number, one in zip(keys, numbers, named):
             groups[number][key] = one
@@ -116,12 +119,12 @@ def _records(sets, si, source):
 
 
 def _names_of(one: UffSet):
-    """What identifies a set's channel: all its names together."""
+    """Key of a set's channel: all its names."""
     return (one.ids[0] if one.ids[0] not in ("", "NONE") else "", *one.response, one.labels[1][1], one.labels[1][2])
 
 
 def _record(group, channels, k, n, si, source):
-    """One record out of the sets of its channels, or the error that stands for it."""
+    """One record from the sets of its channels, or its error."""
     for key in channels:
         one = group.get(key)
         if one is None:
@@ -159,7 +162,7 @@ def _axis(one):
 
 
 def _call(key):
-    """The name of a channel: ID line 1, or the first of its other names that says something."""
+    """The name of a channel: ID line 1, or the first of its other names that is not empty."""
     return next(
         (part for part in (key[0], key[1], key[4]) if part and part != "NONE"),
         f"{key[2]} {DIRECTIONS.get(key[3], key[3])}",
@@ -167,7 +170,7 @@ def _call(key):
 
 
 def _distinct(channels):
-    """(names, aliases): the first kind of name that differs for all channels."""
+    """(names, aliases): the names are of the first type that differs for all channels."""
     dofs = [_dof(("", *key[2:4])) for key in channels]
     kinds = [[key[i] for key in channels] for i in (0, 1, 4)] + [dofs]
     clear = [names for names in kinds if len(set(names)) == len(names) and not {"", "NONE"} & set(names)]
@@ -177,7 +180,7 @@ def _distinct(channels):
 
 
 def _unit(axis, si):
-    """Unit of an ordinate: its label, else that of its data type where the file declares SI."""
+    """Unit of an ordinate: its label, else the unit of its data type if the file declares SI."""
     kind, _, label = axis
     blank = label.upper() in ("", "NONE", "UNKNOWN")
     return (SI_OF_TYPE.get(kind, "") if si else "") if blank else label
@@ -186,7 +189,7 @@ def _unit(axis, si):
 def _precision(text):
     """Relative size of one unit in the last printed digit: "1.95312E-05" -> 5.1e-6.
 
-    One unit, not half of it: some exporters cut digits off instead of rounding.
+    One unit, not half a unit: some exporters truncate instead of rounding.
     """
     mantissa = text.upper().replace("D", "E").partition("E")[0].lstrip("+-")
     digits = mantissa.replace(".", "").lstrip("0")
@@ -194,7 +197,7 @@ def _precision(text):
 
 
 def _conditions(text):
-    """ID line 4 as "rail_temperature=12.3; track=main"; anything else there is left alone."""
+    """Conditions in ID line 4, as in "rail_temperature=12.3; track=main"; other text is ignored."""
     pairs = dict(part.strip().split("=", 1) for part in text.split(";") if part.count("=") == 1)
     return {name: number_or_text(value) for name, value in pairs.items() if name in CONDITIONS}
 
@@ -202,9 +205,9 @@ def _conditions(text):
 def read_frf(path, root=".") -> FrequencyResponses:
     """Frequency response functions (function type 4) of a Universal File, plain or gzipped.
 
-    ReadError where one is damaged or their frequencies differ.
+    ReadError if one is damaged or their frequencies differ.
 
-    ``units`` are the ordinate's label over that of its denominator where the file has both.
+    ``units`` are the label of the ordinate over that of its denominator if the file has both.
     """
     source = load(path, root)
     data = source.data

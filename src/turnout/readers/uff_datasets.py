@@ -1,12 +1,9 @@
-"""Data sets 58 and 58b of a Universal File: where each one begins and ends, its header, its numbers.
+"""Parser of data sets 58 and 58b of a Universal File: delimiters, headers and numbers.
 
-The file is walked set by set. A binary set (58b) is stepped over by its own byte count, so that bytes inside it which
-look like the delimiter, or like an end of line, cannot part it. Every set says what is wrong with it (``damage``)
-instead of coming back shorter than its header promises.
+The numbers are fixed columns of text (58) or binary (58b). A binary set is skipped by its byte count, so that bytes
+that look like a delimiter or a line break cannot split it. A damaged set has an explanation (``damage``).
 
 Layout: Structural Dynamics Research Laboratory, University of Cincinnati, Universal File Dataset 58.
-
-The numbers of a data set 58 or 58b: fixed columns of text, or binary, up to the closing delimiter.
 """
 
 import re
@@ -22,14 +19,14 @@ REST_OF_LINE = re.compile(rb" *(?:\r?\n|\r|$)")
 
 @dataclass(frozen=True)
 class Delimiter:
-    """A line of -1 in columns 5 and 6, blanks behind it: ``start`` of the line, ``end`` behind its line break."""
+    """A line with -1 in columns 5 and 6, then blanks: ``start`` of the line, ``end`` after its line break."""
 
     start: int
     end: int
 
 
 def delimiter(data: bytes | mmap, position: int) -> Delimiter | None:
-    """The first delimiter from ``position`` on; plain search, because a pattern over megabytes of numbers is slow."""
+    """The first delimiter from ``position`` on; plain search, because a regular expression is slow on large files."""
     at = position
     while (at := data.find(b"    -1", at)) >= 0:
         rest = REST_OF_LINE.match(data, at + 6)
@@ -45,10 +42,10 @@ def _per_value(header):
 
 
 def binary_numbers(data, at, header):
-    """(numbers, position behind the set, damage) of a 58b set.
+    """(numbers, position after the set, damage) of a 58b set.
 
-    Where the header and the closing delimiter disagree, the delimiter decides: some exporters leave the byte count 0,
-    some say single precision and write double.
+    If header and closing delimiter disagree, the delimiter counts: some exporters write 0 as byte count, and some
+    declare single precision and write double.
     """
     if header["float_format"] not in (0, 2):
         end = delimiter(data, at)
@@ -73,7 +70,7 @@ def binary_numbers(data, at, header):
 
 
 def ascii_numbers(data, at, header):
-    """(numbers, position behind the set, damage) of a 58 set: fixed columns, which need not be parted by blanks."""
+    """(numbers, position after the set, damage) of a 58 set: fixed columns, not always separated by blanks."""
     end = delimiter(data, at)
     damage = "" if end else "the set is not closed by -1"
     body = data[at : end.start if end else len(data)]
@@ -92,7 +89,7 @@ def ascii_numbers(data, at, header):
 
 
 def _numbers(body, widths):
-    """Numbers in lines of fixed columns; the last line may hold fewer, some exporters cut blanks off at the end."""
+    """Numbers in lines of fixed columns; the last line may be shorter, and exporters may strip blanks at its end."""
     width = sum(widths)
     lines = [line for line in body.replace(b"\r", b"").split(b"\n") if line and not line.isspace()]
     if not lines:
@@ -115,7 +112,7 @@ def _edges(widths):
 
 
 def columns(values, header):
-    """(ordinates, abscissae or None, damage) of a set's numbers."""
+    """(ordinates, abscissae or None, damage) from the numbers of a set."""
     per = _per_value(header)
     promised = header["set"]["promised"]
     n = min(len(values) // per, promised)
@@ -136,11 +133,11 @@ HEADER_LINES = 12  # from the set's number to record 11
 
 @dataclass(frozen=True)
 class UffSet:
-    """One function at nodal degree of freedom. ``damage`` is empty for a sound set.
+    """One function at nodal degree of freedom. ``damage`` is empty for an intact set.
 
     ``func_type`` 1 is a time response, 4 a frequency response; ``data`` are the ordinates (float or complex),
-    ``x`` the abscissae where they are stored, else None: ``start`` + k ``step``. ``promised`` is the number of
-    values in the header, ``step_text`` the step as printed, ``sequence`` the version or sequence number.
+    ``x`` the abscissae if they are stored, else None: then they are ``start`` + k ``step``. ``promised`` is the number
+    of values in the header, ``step_text`` the step as printed, ``sequence`` the version or sequence number.
     """
 
     offset: int
@@ -161,14 +158,14 @@ class UffSet:
 
 
 def sets_of(data: bytes | mmap) -> tuple[UffSet, ...]:
-    """All data sets of a file, read or mapped, in their order; of other numbers ``kind`` and ``offset`` alone."""
+    """All data sets of a file in their order; sets of other types have only ``dataset_type`` and ``offset``."""
     found = []
     position = 0
     while (begin := delimiter(data, position)) is not None:
         if len(data) - begin.end < 200 and not data[begin.end :].strip():
             found.append(UffSet(begin.start, "", damage="a delimiter opens a set that never comes"))
             break
-        # an unclosed set has taken the opening of the next one for its end
+        # the opening delimiter of this set was used as the end of an unclosed set before it
         if data[begin.end : begin.end + 6] == b"    -1":
             found.append(UffSet(begin.start, "", damage="a delimiter closes a set that was never opened"))
             position = begin.end
@@ -181,7 +178,7 @@ def sets_of(data: bytes | mmap) -> tuple[UffSet, ...]:
 
 
 def says_si(data: bytes, sets) -> bool:
-    """True where dataset 164 declares SI: unit code 1, or factors of 1 from the file's units to SI."""
+    """Whether dataset 164 declares SI: unit code 1, or factors of 1 from the file's units to SI."""
     for one in sets:
         if one.kind == "164":
             lines, _ = _lines(data, data.find(b"\n", one.offset) + 1, 3)
@@ -219,7 +216,7 @@ def _one_set(data, begin):
 
 
 def _lines(data, position, count):
-    """(lines, position behind them) without building a list of all lines of a large file."""
+    """(lines, position after them), without splitting the whole of a large file."""
     lines: list[str] = []
     while len(lines) < count and position < len(data):
         end = data.find(b"\n", position)
@@ -232,7 +229,7 @@ def _lines(data, position, count):
 
 
 def _text(raw):
-    """Header text: UTF-8 where it is valid, Latin-1 (older exporters' "m/s²") where not."""
+    """Header text: UTF-8 if valid, else Latin-1 (older exporters' "m/s²")."""
     try:
         return raw.decode("utf-8")
     except UnicodeDecodeError:
@@ -240,7 +237,7 @@ def _text(raw):
 
 
 def _fields(line, widths):
-    """Fixed columns of one line, blanks cut off."""
+    """Fixed columns of one line, stripped."""
     edges = np.cumsum([0, *widths])
     line = line.ljust(80)
     return [line[a:b].strip() for a, b in pairwise(edges)]
@@ -251,7 +248,7 @@ def _whole(text):
 
 
 def _header(lines):
-    """Records 1 to 11; ValueError where a number is none."""
+    """Fields of records 1 to 11; ValueError for an invalid number."""
     first = _fields(lines[0], [6, 1, 6, 6])
     dof = _fields(lines[6], [5, 10, 5, 10, 11, 10, 4, 11, 10, 4])
     form = _fields(lines[7], [10, 10, 10, 13, 13, 13])

@@ -1,8 +1,8 @@
-"""WAV, RF64 and FLAC: one continuous record.
+"""Reader of WAV, RF64 and FLAC: one continuous record.
 
-libsndfile reads a cut file without a word and makes its header agree; the chunk sizes in the file's own header say how
-long it was. Whole numbers (16, 24 bit) come as parts of full scale, -1 to 1: give the layout ``unit: 10 V`` where full
-scale is 10 V. What a comment in JSON says (``channels``, ``units``, ``started_at``, conditions) is used.
+libsndfile reads a truncated file without an error. Therefore the file size is compared with the chunk sizes in the
+header. Integers (16, 24 bit) are read as fractions of full scale, -1 to 1: set ``unit: 10 V`` in the layout if full
+scale is 10 V. Metadata in a JSON comment are used (``channels``, ``units``, ``started_at``, conditions).
 """
 
 import json
@@ -51,7 +51,7 @@ def read_raw(source) -> RawFile:
 
 @dataclass(frozen=True)
 class Frames:
-    """``n_frame`` frames of ``n_channel`` channels of an audio file, sliced like an array (frame, channel)."""
+    """``n_frame`` frames of ``n_channel`` channels of an audio file; it is sliced like an array (frame, channel)."""
 
     path: Path
     n_frame: int
@@ -71,7 +71,7 @@ class Frames:
 
 
 def cut_off(file, size: int) -> str:
-    """In words, where a RIFF file of ``size`` bytes ends before its chunks do; "" for a whole one or another format."""
+    """Text that says where a RIFF file of ``size`` bytes is truncated; "" if complete or of another format."""
     head = file.read(36)
     if head[:4] not in (b"RIFF", b"RF64"):
         return ""

@@ -1,4 +1,4 @@
-"""Hammer tests: from recordings to impacts with their quality, and to receptance with what can be trusted of it."""
+"""Evaluate hammer tests: impacts with their quality, receptance, and the bands in which it can be trusted."""
 
 from turnout.receptance.frf import receptance_of
 from turnout.receptance.gate import bands_passed, gate_rejections

@@ -1,4 +1,4 @@
-"""Which blow of a test disagrees with all the others: pairwise and leave-one-out coherence."""
+"""Find the impact of a test that disagrees with all others, by pairwise coherence and by response gain."""
 
 import numpy as np
 from scipy.fft import next_fast_len, rfft, rfftfreq
@@ -6,29 +6,30 @@ from scipy.fft import next_fast_len, rfft, rfftfreq
 from turnout.receptance.segmentation import MAD_TO_SD
 from turnout.records import Rejection
 
+# Least number of impacts from which the spread of a test is estimated.
 FEWEST_BLOWS = 5
-# Between two samples a short pulse hides a fifth of its peak.
+# Share of the largest peak above which an impact may be clipped: sampling can miss a fifth of a short pulse's peak.
 AT_THE_TOP = 0.8
 
 
 def pairwise_coherence(force: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
-    r"""Median over frequency of the coherence of every two blows.
+    r"""Median over frequency of the coherence of every two impacts.
 
     .. math:: \gamma^2_{ij} = \frac{|F_i^* A_i + F_j^* A_j|^2}{(|F_i|^2 + |F_j|^2)(|A_i|^2 + |A_j|^2)}
 
     Parameters
     ----------
-    force, acceleration : (n_blow, n_frequency) array of complex
+    force, acceleration : (n_impact, n_frequency) array of complex
         Spectra at the compared lines. [N s], [m/s]
 
     Returns
     -------
-    (n_blow, n_blow) array of float
+    (n_impact, n_impact) array of float
         1 on the diagonal.
 
     Examples
     --------
-    Two blows on one linear structure agree, a third with its sign reversed agrees with none of equal force.
+    Two impacts on one linear structure agree. A third with reversed sign agrees with none of equal force.
 
     >>> f = np.array([[1.0, 2.0, 1.0], [2.0, 1.0, 1.0], [2.0, 1.0, 1.0]], dtype=complex)
     >>> print(pairwise_coherence(f, f * 3j * np.array([[1], [1], [-1]])).round(2)[0])
@@ -46,22 +47,22 @@ def pairwise_coherence(force: np.ndarray, acceleration: np.ndarray) -> np.ndarra
 
 
 def response_gain(force: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
-    r"""Response of each blow over what the test's mean power ratio predicts from its force.
+    r"""Response of each impact over the prediction of the test's mean power ratio from its force.
 
     .. math:: g_i^2 = \frac{\sum_f |A_i|^2}{\sum_f |F_i|^2 W}, \quad
         W(f) = \frac{\sum_j |A_j|^2}{\sum_j |F_j|^2}, \quad g_i \leftarrow g_i / \mathrm{median}(g)
 
-    Powers and no phases: a resonance that lies a little elsewhere in one blow must not look like a change of size.
+    Powers without phases: a slightly shifted resonance in one impact must not appear as a change of gain.
 
     Parameters
     ----------
-    force, acceleration : (n_blow, n_frequency) array of complex
+    force, acceleration : (n_impact, n_frequency) array of complex
         [N s], [m/s]
 
     Returns
     -------
-    (n_blow,) array of float
-        1 for a blow that agrees; above 1 the force that was recorded is too small for what it did.
+    (n_impact,) array of float
+        1 for an impact that agrees; above 1 the recorded force is too small for its response.
 
     Examples
     --------
@@ -80,7 +81,7 @@ def response_gain(force: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
 
 
 def judge_agreement(cuts, settings):
-    """Reject blows that the others of the test contradict, first in shape (coherence), then in size (gain)."""
+    """Reject impacts that disagree with the others of the test, first in shape (coherence), then in gain."""
     cuts = [c for c in cuts if not c.rejections]
     if len(cuts) < 3:
         return
@@ -91,11 +92,11 @@ def judge_agreement(cuts, settings):
 
 
 def _judge_coherence(cuts, force, acceleration, settings):
-    """One at a time, the blow that agrees with no other although these agree among themselves.
+    """Reject, one at a time, the impact that agrees with no other although the others agree among themselves.
 
-    The worst blow is odd if its median pairwise coherence lies ``agreement_gap`` below the others' median, and its
-    incoherence is ``agreement_factor`` times theirs. The coherence of the test with and without it goes into
-    the detail. Of two blows that disagree none can be called odd.
+    The worst impact is an outlier under two conditions. Its median pairwise coherence lies ``agreement_gap`` below the
+    others' median, and its incoherence is ``agreement_factor`` times theirs. The detail gives the coherence of the test
+    with and without it. Of two impacts that disagree none can be called an outlier.
     """
     pairs = pairwise_coherence(force, acceleration)
     left = list(range(len(cuts)))
@@ -121,16 +122,16 @@ def _judge_coherence(cuts, force, acceleration, settings):
 
 
 def _judge_gain(cuts, force, acceleration, settings):
-    """A response too large or too small for its force, in a test of enough blows to know the spread.
+    """Report a response too large or too small for its force, in a test with enough impacts to estimate the spread.
 
-    A force too small for its response, and yet at the top of the test, is what a hammer channel at the end of its range
-    records; a pulse of a few samples shows it in no other way. Any other gain is only noted: it leaves poles alone.
+    A clipped hammer channel records a force too small for its response, and yet among the largest of the test. In a
+    pulse of a few samples clipping shows in no other way. Any other gain is only noted, as it does not affect poles.
     """
     n = len(cuts)
     if n < FEWEST_BLOWS:
         return
     gain = response_gain(force, acceleration)
-    # The median deviation of few blows is itself uncertain by about 1/sqrt(n).
+    # The median deviation of a few impacts is itself uncertain by about 1/sqrt(n).
     spread = MAD_TO_SD * float(np.median(np.abs(gain - 1.0))) * (1.0 + 1.2 / np.sqrt(n))
     limit = max(settings.gain, settings.deviation * spread)
     peak = np.array([abs(c.contact.peak) for c in cuts])

@@ -1,8 +1,7 @@
-"""When the hammer touched the rail: onset, length, peak, impulse, and the noise before.
+"""Measure the contact of the hammer with the rail: onset, length, peak, impulse, and the noise before it.
 
-A hammer that touches the rail twice: further contacts in the force of one blow.
-
-How far up a hammer's tip excites: where its force spectrum has fallen by 20 dB.
+Further contacts in the force of one impact (double hits) are found. The band edge of a hammer's tip is the frequency at
+which its force spectrum has fallen by 20 dB.
 """
 
 from dataclasses import dataclass
@@ -17,7 +16,7 @@ from turnout.receptance.segmentation import MAD_TO_SD
 
 @dataclass(frozen=True)
 class Contact:
-    """The main contact of a blow, in samples of its window and SI units.
+    """The main contact of an impact, in samples of its window and SI units.
 
     ``onset`` and ``end`` are the first and last sample above the contact level around the peak, ``top`` the
     peak's sample, ``half_width`` the number of samples above half the peak (interpolated).
@@ -35,11 +34,11 @@ class Contact:
 
 
 def measure_contact(cut, level):
-    r"""Contact of one cut: the run of samples above ``level`` times the peak that holds the peak.
+    r"""Contact of one cut: the run of samples above ``level`` times the peak that contains the peak.
 
     The impulse is the integral of the force over the contact by the rectangle rule. Noise levels are standard
-    deviations ahead of the first touch; with fewer than 8 samples there, the force's is that of the whole record
-    (by its median absolute deviation) and the acceleration's that of the last tenth.
+    deviations before the first contact. With fewer than 8 samples there, that of the force is taken from the whole
+    record (by its median absolute deviation), and that of the acceleration from the last tenth.
     """
     force = cut.polarity * cut.force
     top = int(np.argmax(force))
@@ -72,7 +71,7 @@ def run_around(x, top, level):
 
 
 def crossing(x, top, level, step):
-    """Where x falls through ``level``, going from ``top`` in direction ``step`` (+1, -1); linear interpolation.
+    """Point at which x falls through ``level``, from ``top`` in direction ``step`` (+1, -1), interpolated linearly.
 
     >>> x = np.array([0.0, 1.0, 4.0, 2.0, 0.0])
     >>> float(crossing(x, 2, 3.0, 1)), float(crossing(x, 2, 2.5, -1))
@@ -84,20 +83,22 @@ def crossing(x, top, level, step):
     return float(first) if first == 0 else first - (x[first] - level) / (x[first] - x[first - 1])
 
 
-# Within this of the main contact a filter's or the hammer's own ringing looks like a small second contact, and behind a
-# pulse of a few samples like a large one; no hammer comes back so soon.
+# s. Within this time of the main contact, ringing of a filter or of the hammer resembles a small second contact, and a
+# large one after a pulse of a few samples; no hammer rebounds so soon. Then a contact needs this prominence (share of
+# the peak), and a main pulse of at least so many samples at half height.
 CLOSE = 1e-3
 CLOSE_PROMINENCE = 0.1
 CLOSE_SAMPLES = 6.0
+# Least height of a further contact, in standard deviations of the noise.
 NOISE_FACTOR = 6.0
 # A further contact lasts as long as it exceeds this share of its own height.
 OWN_LEVEL = 0.1
 
 
 def smoothed_force(force, half_width):
-    """Force behind a Hann kernel as long as the main pulse's half width, at least three samples; sum kept.
+    """Force behind a Hann kernel as long as the main pulse's half width, at least three samples; the sum is kept.
 
-    As wide as the tip's own pulse, it takes off noise without lowering a second pulse more than the first.
+    As it is as wide as the tip's own pulse, it reduces noise and lowers a second pulse no more than the first.
 
     >>> smoothed_force(np.array([0.0, 0.0, 4.0, 0.0, 0.0]), 2.0)
     array([0., 1., 2., 1., 0.])
@@ -119,9 +120,9 @@ class FurtherContact(NamedTuple):
 def further_contacts(cut, contact, settings):
     """Contacts besides the main one: list of FurtherContact in order of time, and the level they exceed.
 
-    A contact is a local maximum of the smoothed force above ``double_hit_level`` of its peak and above six standard
-    deviations of its noise, with a prominence of ``double_hit_prominence``. The noise is the median absolute deviation
-    outside the main contact, so that hum or a drifting zero raise the limit instead of raising alarms.
+    A contact is a local maximum of the smoothed force. It exceeds ``double_hit_level`` of the peak and six standard
+    deviations of the noise, with a prominence of ``double_hit_prominence``. The noise is the median absolute deviation
+    outside the main contact, so that hum or a drifting zero raise the limit instead of causing findings.
     """
     force = smoothed_force(cut.polarity * cut.force, contact.half_width)
     near = max(2, round(CLOSE * cut.rate))
@@ -159,7 +160,7 @@ def band_edges(pulses: list[np.ndarray], rate: float, fall: float = 20.0, resolu
     Returns
     -------
     (n_pulse,) array of float
-        Half the rate where the spectrum never falls that far. [Hz]
+        Half the rate where the spectrum does not fall that far. [Hz]
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The stiffness with which a section resists a force that swings at one frequency."""
+"""Compute the dynamic stiffness of a section at one frequency: force over displacement."""
 
 import numpy as np
 from scipy.stats import f as fisher
@@ -12,15 +12,15 @@ def dynamic_stiffness(frequency, h1, coherence, passed, n: int, at: float) -> tu
     Parameters
     ----------
     frequency, h1, coherence, passed : (n_frequency,) arrays
-        Lines [Hz] and what an average over ``n`` blows has there: complex receptance [m/N], magnitude-squared
-        coherence [-], and whether the coherence gate let them pass.
+        Lines [Hz] and the average over ``n`` impacts there: complex receptance [m/N], magnitude-squared coherence [-],
+        and whether the line passes the coherence gate.
     at : float
         Frequency; the line next to it is taken. [Hz]
 
     Returns
     -------
     (value, low, high) or None
-        [N/m]; None where the gate stopped the line or ``at`` lies outside the lines. ``high`` may be infinite.
+        [N/m]; None where the line does not pass the gate or ``at`` lies outside the lines. ``high`` may be infinite.
 
     References
     ----------
@@ -29,7 +29,7 @@ def dynamic_stiffness(frequency, h1, coherence, passed, n: int, at: float) -> tu
 
     Examples
     --------
-    A spring of 50 MN/m seen by ten blows with a coherence of 0.99:
+    A spring of 50 MN/m, from ten impacts with a coherence of 0.99:
 
     >>> seen = np.array([100.0]), np.array([2e-8 + 0j]), np.array([0.99]), np.array([True])
     >>> print([f"{v / 1e6:.1f}" for v in dynamic_stiffness(*seen, 10, 100.0)])

@@ -1,25 +1,25 @@
-"""The free decay after a blow: where it starts, where it ends, and whether enough of it was recorded."""
+"""Find start and end of the free decay after an impact, and check whether enough of it was recorded."""
 
 import numpy as np
 
 from turnout.receptance.contact import further_contacts
 from turnout.records import Rejection
 
-# The end of a record is judged over a period of the slowest mode.
+# s, end of a record over which its remaining amplitude is taken: a period of the slowest mode.
 TAIL = 0.01
-# Several further contacts, one nearly as hard as the first and this late [ms], may be quick blows of a machine.
+# Several further contacts, one with this share of the main peak and this late [ms], may be quick impacts of a machine.
 AS_HARD, AS_LATE = 0.7, 60.0
 
 
 def judge_second_contact(cut, settings):
-    """Note or reject a double hit; keep what free decay there is on one side of the second contact.
+    """Note or reject a double hit; keep the free decay on one side of the second contact, if there is enough.
 
-    A double hit is a valid input of a linear system, but no free decay. Under ``move``
+    A double hit is a valid input of a linear system, but no free decay follows it at once. Under ``move``
 
-    - a second contact after the vibration has died away costs nothing: the record is cut before it;
-    - otherwise the decay starts behind the last contact, if its amplitude there is at least
-      ``double_hit_remaining`` of the one behind the main contact;
-    - in a damped track that leaves too little, and the blow is rejected.
+    - a second contact after the vibration has decayed has no effect: the record is cut before it;
+    - otherwise the decay starts after the last contact, if its amplitude there is at least
+      ``double_hit_remaining`` of that after the main contact;
+    - in a damped track too little remains, and the impact is rejected.
     """
     further, level = further_contacts(cut, cut.contact, settings)
     if not further:
@@ -47,9 +47,9 @@ def judge_second_contact(cut, settings):
 
 
 def judge_decay(cut, settings):
-    """Set the start of the decay; reject one that is too short or has not died away at its end.
+    """Set the start of the decay; reject one that is too short or has not decayed at its end.
 
-    An exponential window counts as dying away: it ends the leakage that the check is there for.
+    An exponential window counts as decay: it prevents the leakage that the check is for.
     """
     cut.decay_start = cut.contact_end + 1 + round(settings.decay_gap * cut.rate)
     left = max(0.0, (cut.force.size - cut.decay_start) / cut.rate)
@@ -64,7 +64,7 @@ def judge_decay(cut, settings):
 
 
 def _left_at(cut, end, settings):
-    """Amplitude just before sample ``end`` over the peak, and how much of that may be left."""
+    """Amplitude just before sample ``end`` over the peak, and its limit."""
     tail = cut.acceleration[max(0, end - max(round(TAIL * cut.rate), end // 20)) : end]
     window = np.exp(-settings.exponential_window * (end - cut.contact.onset) / cut.rate)
     top = np.max(np.abs(cut.acceleration))
@@ -75,7 +75,7 @@ def _left_at(cut, end, settings):
 
 
 def _died_away(cut, end, settings):
-    """Whether the vibration is over by sample ``end``, at least two shortest decays behind the main contact."""
+    """Whether the vibration has decayed by sample ``end``, at least two shortest decays behind the main contact."""
     if end < cut.contact.end + 1 + 2 * round(settings.minimum_decay * cut.rate):
         return False
     share, limit = _left_at(cut, end, settings)

@@ -1,6 +1,6 @@
-"""Estimators of a frequency response from averaged spectra, and how well they agree.
+"""Estimate the receptance of a section from its accepted impacts, with coherence limits and gate.
 
-Receptance of one section, averaged over its accepted impacts, with what can be trusted of it.
+The estimators H1, H2 and Hv and the coherence are functions of averaged spectra.
 """
 
 from collections.abc import Sequence
@@ -35,7 +35,7 @@ def h1(g_ff: np.ndarray, g_fa: np.ndarray) -> np.ndarray:
 
     Examples
     --------
-    A mass of 2 kg that answers with half its force:
+    A mass of 2 kg, whose acceleration is half the force:
 
     >>> print(h1(np.array([4.0]), np.array([2.0 + 0.0j])))
     [0.5+0.j]
@@ -46,11 +46,11 @@ def h1(g_ff: np.ndarray, g_fa: np.ndarray) -> np.ndarray:
 def h2(g_aa: np.ndarray, g_fa: np.ndarray) -> np.ndarray:
     r"""Accelerance if the noise is on the force: :math:`H_2 = G_{aa} / G_{aF}`, with :math:`G_{aF} = G_{Fa}^*`.
 
-    Always :math:`H_1 / \gamma^2`, so it lies above H1 and closes the bracket.
+    Always :math:`H_1 / \gamma^2`, so it lies above H1 and is the upper bound.
 
     References
     ----------
-    Barkhordari et al., eq. 3, with the conjugate that makes the phase come out right.
+    Barkhordari et al., eq. 3, with the conjugate that gives the correct phase.
 
     Examples
     --------
@@ -68,7 +68,7 @@ def hv(g_ff: np.ndarray, g_aa: np.ndarray, g_fa: np.ndarray, noise_ratio: float)
     r"""Accelerance by total least squares, for noise on both channels.
 
     With :math:`g = r^2 G_{FF}` and r the ratio of the two noise densities' roots, it is the direction of the larger
-    eigenvector of the matrix of spectra, each channel measured in its own noise:
+    eigenvector of the matrix of spectra, each channel in units of its own noise:
 
     .. math:: H_v = \frac{G_{aa} - g + \sqrt{(G_{aa} - g)^2 + 4 r^2 |G_{Fa}|^2}}{2\, G_{Fa}^*}
 
@@ -92,7 +92,7 @@ def hv(g_ff: np.ndarray, g_aa: np.ndarray, g_fa: np.ndarray, noise_ratio: float)
 
     Examples
     --------
-    Equal spectra and equal noise on both leave no doubt that the response is one to one:
+    With equal spectra and equal noise on both channels the response is one to one:
 
     >>> print(hv(np.array([5.0]), np.array([5.0]), np.array([4.0j]), 1.0))
     [0.+1.j]
@@ -103,7 +103,7 @@ def hv(g_ff: np.ndarray, g_aa: np.ndarray, g_fa: np.ndarray, noise_ratio: float)
         return h2(g_aa, g_fa)
     gap = g_aa - noise_ratio**2 * g_ff
     root = np.sqrt(gap**2 + 4.0 * noise_ratio**2 * np.abs(g_fa) ** 2)
-    # Of the two equal forms each is used where it does not subtract neighbours.
+    # Two equal forms: each is used where it has no cancellation.
     steep = _quotient(gap + root, 2.0 * np.conj(g_fa))
     flat = _quotient(2.0 * noise_ratio**2 * g_fa, root - gap)
     return np.where(gap > 0.0, steep, flat)
@@ -112,7 +112,7 @@ def hv(g_ff: np.ndarray, g_aa: np.ndarray, g_fa: np.ndarray, noise_ratio: float)
 def coherence(g_ff: np.ndarray, g_aa: np.ndarray, g_fa: np.ndarray) -> np.ndarray:
     r"""Magnitude-squared coherence :math:`|G_{Fa}|^2 / (G_{FF} G_{aa})`, (n_frequency,), nan without power.
 
-    Of one record it is 1 at every frequency and says nothing.
+    For one record it is 1 at every frequency and has no meaning.
 
     References
     ----------
@@ -138,8 +138,8 @@ def receptance_of(impacts: Sequence[Impact], settings: ReceptanceSettings | None
     Parameters
     ----------
     impacts : sequence of Impact
-        Those with rejections are left out. Records of unequal length are padded with zeros: an accepted decay has
-        died away at its end.
+        Those with rejections are left out. Records of unequal length are padded with zeros, since an accepted decay
+        is complete.
     settings : ReceptanceSettings, optional
 
     Returns
@@ -159,7 +159,7 @@ def receptance_of(impacts: Sequence[Impact], settings: ReceptanceSettings | None
 
     Examples
     --------
-    A free mass of 4 kg moves by F / (m w²) against the force:
+    A free mass of 4 kg has the receptance -1 / (m w²):
 
     >>> from turnout.records import Impact
     >>> f = np.zeros(1000); f[10:40] = np.sin(np.pi * np.arange(30) / 30)
@@ -220,7 +220,7 @@ def _records(impacts, settings):
 
 
 def _noise_ratio(impacts):
-    """Noise of the acceleration over noise of the force; one alone known to be 0 leaves it to the other."""
+    """Noise of the acceleration over noise of the force; infinite where the force has none."""
     force = float(np.sqrt(np.mean([i.noise_force**2 for i in impacts])))
     acceleration = float(np.sqrt(np.mean([i.noise_acceleration**2 for i in impacts])))
     return acceleration / force if force > 0.0 else np.inf

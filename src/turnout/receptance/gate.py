@@ -1,4 +1,4 @@
-"""Which bands a receptance supports: the coherence gate turned into a decision."""
+"""Decide which bands a receptance supports, by the coherence gate."""
 
 import numpy as np
 
@@ -6,8 +6,8 @@ from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.records import Receptance, Rejection
 
 Band = tuple[float, float]
-BALLAST_BAND = (50.0, 200.0)
-RAILPAD_BAND = (300.0, 800.0)
+BALLAST_BAND = (50.0, 200.0)  # Hz
+RAILPAD_BAND = (300.0, 800.0)  # Hz
 
 
 def bands_passed(
@@ -15,8 +15,8 @@ def bands_passed(
 ) -> dict[str, float]:
     """Share of the lines of each band that pass the gate.
 
-    Where the railpad band fails and the ballast band passes, a model of order two is all that the test supports,
-    as at A8 in the paper.
+    Where the railpad band fails and the ballast band passes, the test supports only a model of order two, as at A8 in
+    the paper.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def bands_passed(
 def gate_rejections(
     receptance: Receptance, ballast: Band = BALLAST_BAND, settings: ReceptanceSettings | None = None
 ) -> tuple[Rejection, ...]:
-    """Why a test as a whole cannot be used: too few impacts, or no coherence where the ballast mode lies.
+    """Reasons to reject a whole test: too few impacts, or no coherence in the band of the ballast mode.
 
     Returns
     -------

@@ -1,10 +1,8 @@
-"""Channels that left their range: the range itself reached, or one rail code repeated.
+"""Check the quality of each impact: saturated channels, flat force pulses, repeated impacts and outliers of the test.
 
-Force pulses with a flattened top: what analog clipping and soft saturation leave, however noisy the converter.
-
-The same blow twice: a test that was exported again, in another format or under another name.
-
-A blow held against the others of its test: weak, out of range, noisy.
+A saturated channel reaches its range or repeats one extreme code. A force pulse with a flat top has analog clipping or
+soft saturation. The same impact appears twice where a test was exported again. Impacts are also compared with the
+test's medians: weak, out of range, noisy.
 """
 
 import numpy as np
@@ -14,8 +12,9 @@ from turnout.receptance.contact import crossing
 from turnout.receptance.segmentation import MAD_TO_SD
 from turnout.records import Rejection
 
-# A parabola one code deep over m equal samples falls by 9 codes within as many samples again, one more by rounding.
+# Steps: a parabola one step deep over m equal samples falls by 9 steps within as many samples again, and 1 by rounding.
 NATURAL_FALL = 12.0
+# Probability below which repeated codes are no chance event.
 CHANCE = 1e-3
 
 
@@ -30,18 +29,17 @@ def range_exceeded(x, limit):
 
 
 def rail_code(x, resolution=None, noise=0.0):
-    r"""Samples that repeat one extreme code as only a clipped signal does: (number of samples, code), or None.
+    r"""Samples that repeat one extreme code in the way of a clipped signal: (number of samples, code), or None.
 
     A smooth top may repeat its highest code as well, on a quiet converter with few bits. Then it is nearly a
-    parabola: m equal samples lie within one step (and the noise) of each other, and over as many samples again on
-    either side it falls by less than ``NATURAL_FALL`` times that. A clipped signal arrives with a slope and falls
-    faster.
-    Noise of several steps seldom repeats a code, m times with the probability
+    parabola: m equal samples lie within one step (and the noise) of each other. Over as many samples again on
+    either side it falls by less than ``MAX_NATURAL_FALL`` times that. A clipped signal has a slope there and falls
+    faster. Noise of several steps seldom repeats a code, m times with the probability
 
     .. math:: \left(\frac{q}{2\sqrt{\pi}\,\sigma}\right)^{m-1} \quad (q \text{ step},\ \sigma \text{ noise}),
 
-    and where that is below ``CHANCE`` only the step counts. Fewer than three equal samples prove nothing, and
-    three only where chance is ten times smaller still.
+    and where that is below ``MAX_CHANCE`` only the step counts. Fewer than three equal samples are no evidence. Three
+    are evidence only where the probability is ten times smaller still.
 
     Parameters
     ----------
@@ -79,9 +77,9 @@ def rail_code(x, resolution=None, noise=0.0):
 
 
 def overload(cut, contact):
-    """Rejection for the first sign of an overload on either channel of a blow, or None.
+    """Rejection for the first sign of an overload on either channel of an impact, or None.
 
-    A range ends where the recorded samples end, not those with the zero line taken off.
+    The range applies to the recorded samples, before the zero line is subtracted.
     """
     both = (cut.force, contact.noise_force), (cut.acceleration, contact.noise_acceleration)
     for (x, noise), zero, channel in zip(both, cut.zeros, cut.channels):
@@ -107,25 +105,27 @@ def _smallest_step(y):
 
 # A concave pulse is at most as flat as a parabola, sqrt(0.05 / 0.5) = 0.316 of its half width; half-sine 0.303.
 FLATTEST_TOP = 0.335
-# Flat beyond doubt, whatever the test's other blows look like.
+# Top share that is flat with certainty, whatever the test's other impacts look like.
 CERTAINLY_FLAT = 0.42
-# Samples above half the peak: too few to say anything, and too few to compare with all pulses there are.
+# Samples above half the peak: least number for a top share, and for a comparison with natural pulses.
 FEWEST_SAMPLES, ENOUGH_SAMPLES = 3.0, 8.0
-# A blow's top may be flatter than those of its test by this much, more for few samples and for noise of some percent;
-# tanh(1) makes 0.05 to 0.06.
+# An impact's top share may exceed the median of its test by this much, more for few samples and for noise of some
+# percent; saturation by tanh(1) gives 0.05 to 0.06.
 FLATTER = 0.03
+# Least number of impacts for a comparison within a test.
 FEWEST_BLOWS = 5
+# Largest force noise over the peak for which a top share is used.
 NOISIEST = 0.02
 
 
 def top_share(force, contact, polarity=1):
-    r"""Part of the time above half the peak that a pulse spends within 5 % of its peak.
+    r"""Share of the time above half the peak in which a pulse is within 5 % of its peak.
 
     .. math:: q = w(0.95) / w(0.5)
 
-    Half-sine 0.303, haversine 0.287, Hertzian :math:`\sin^{3/2}` 0.293, parabola 0.316: no pulse that bends most
-    at its top exceeds the parabola, whatever its width, height or skew. Clipped at 90 % of its peak a half-sine has
-    0.49, behind a saturation tanh(1) 0.36. None for pulses of fewer than ``FEWEST_SAMPLES`` at half height.
+    Half-sine 0.303, haversine 0.287, Hertzian :math:`\sin^{3/2}` 0.293, parabola 0.316. No pulse with its largest
+    curvature at the top exceeds the parabola, at any width, height or skew. A half-sine clipped at 90 % of its peak
+    has 0.49, behind a saturation tanh(1) 0.36. None for pulses of fewer than ``MIN_TOP_SAMPLES`` at half height.
 
     Examples
     --------
@@ -148,16 +148,16 @@ def top_share(force, contact, polarity=1):
 
 
 def natural_top(contact):
-    """Largest natural ``top_share``: noise shifts the 5 % line, and dw/w = d(level) / (2 * 0.05), three times over."""
+    """Largest natural ``top_share``: noise shifts the 5 % line, with dw/w = d(level) / (2 * 0.05), at three sigma."""
     return FLATTEST_TOP * float(np.sqrt(1.0 + 60.0 * contact.noise_force / abs(contact.peak)))
 
 
 def judge_tops(cuts, deviation):
-    """Reject the blows whose tops are flatter than nature or than the test allows.
+    """Reject the impacts with a top flatter than a natural pulse or than the others of the test.
 
-    A top flatter than a parabola is rejected unless the test's other blows look the same: then it is the shape of
-    this tip. In a test of ``FEWEST_BLOWS`` or more, one hammer with one tip makes one shape, and a blow that stands
-    out is rejected too: a soft saturation may leave a pointed pulse no flatter than a half-sine is by nature.
+    A top flatter than a parabola is rejected unless the test's other impacts have the same: then it is the shape of
+    this tip. In a test of ``MIN_IMPACTS`` or more, one hammer with one tip makes one shape, and an outlier is rejected
+    too. A soft saturation may leave a pointed pulse no flatter than a natural half-sine.
     """
     known = [(c, share) for c in cuts if (share := _share_if_quiet(c)) is not None]
     shares = np.array([share for _, share in known])
@@ -182,14 +182,15 @@ def _share_if_quiet(cut):
     return top_share(cut.force, cut.contact, cut.polarity)
 
 
-# Of the largest value: what rounding to 16 bits leaves. Two blows of one hammer differ by far more in shape alone.
+# Largest difference of repeated records over their largest value: rounding to 16 bits. Two impacts differ far more.
 ALIKE = 1e-4
 
 
 def judge_repeats(cuts):
-    """Reject every blow whose force and acceleration are those of an earlier one; counted twice it narrows all errors.
+    """Reject every impact whose force and acceleration are those of an earlier one.
 
-    The windows are compared with their peaks upon each other, as far as both go.
+    Counted twice it would make all errors too small. The windows are compared with their peaks aligned, over their
+    common length.
     """
     peaks = np.array([np.max(np.abs(c.force)) for c in cuts])
     order = np.argsort(peaks, kind="stable")
@@ -221,19 +222,21 @@ def difference(one, other) -> float:
 
 
 def repeated(cut) -> bool:
-    """Whether ``judge_repeats`` found the blow in an earlier one."""
+    """Whether ``judge_repeats`` found the impact to repeat an earlier one."""
     return any(r.reason == "duplicate" for r in cut.rejections)
 
 
+# Noise over the peak acceleration that is never rejected by comparison with the test's median.
 NOISE_FLOOR = 0.02
+# Least peak response over its noise; a channel below it is dead.
 DEAD = 5.0
 
 
 def judge_against_median(cuts, settings):
-    """Add to each cut the rejections that only the test as a whole can show.
+    """Add to each cut the rejections that only a comparison with the whole test can show.
 
-    A number is an outlier if it lies ``deviation`` robust standard deviations *and* a stated factor from the median of
-    the test: the factor alone would fail a test of uneven blows, the deviation alone one of very even blows.
+    A number is an outlier if it lies ``deviation`` robust standard deviations *and* a given factor from the median of
+    the test. The factor alone would reject uneven impacts, the deviation alone a test of very even impacts.
     """
     if not cuts:
         return
@@ -250,7 +253,7 @@ def judge_against_median(cuts, settings):
     if len(cuts) < 3:
         return
     middle = float(np.median(peak))
-    # Peaks scatter by ratios: a blow of half and one of double the usual force are equally unusual.
+    # Peaks scatter by ratios: half and double the typical force are equally unusual.
     spread = MAD_TO_SD * float(np.median(np.abs(np.log(peak / middle))))
     usual = float(np.median(noise))
     for k, cut in enumerate(cuts):

@@ -1,4 +1,4 @@
-"""All blows of a hammer test, each with its measurements and the reasons not to use it."""
+"""Find all impacts of a hammer test, each with its measurements and the reasons to reject it."""
 
 from collections.abc import Sequence
 
@@ -12,20 +12,20 @@ from turnout.receptance.impact_quality import judge_against_median, judge_repeat
 from turnout.receptance.segmentation import cut_blows
 from turnout.records import Impact, Recording, Rejection
 
-# Far above any hammer and below what newtons become when they are taken for kilonewtons [N].
+# N, largest peak force: far above any hammer, and below newtons that were read as kilonewtons.
 HARDEST = 1e6
 
 
 def find_impacts(
     recordings: Sequence[Recording], force: str, response: str, settings: ReceptanceSettings | None = None
 ) -> tuple[Impact, ...]:
-    """Find and judge the blows of one hammer test.
+    """Find and judge the impacts of one hammer test.
 
     Parameters
     ----------
     recordings : sequence of Recording
-        All recordings of the test together, each with one blow or with many; the blows are judged against
-        each other, so do not pass them one by one.
+        All recordings of the test together, each with one impact or many. The impacts are compared with each other,
+        so do not pass them one by one.
     force, response : str
         Names of the hammer's and the accelerometer's channel; KeyError if a recording has no such channel.
     settings : ReceptanceSettings, optional
@@ -33,8 +33,8 @@ def find_impacts(
     Returns
     -------
     tuple of Impact
-        In the order of the recordings. One that is not used has ``rejections``; a recording without blow gives one
-        Impact with the reason "no_impact", "dead_channel" or "not_finite".
+        In the order of the recordings. An impact that is not used has ``rejections``. A recording without impact
+        gives one Impact with the reason "no_impact", "dead_channel" or "not_finite".
 
     Examples
     --------
@@ -77,7 +77,7 @@ def _edges(cuts, pulses):
 
 
 def _measure(cut, settings):
-    """Zero lines, contact, further contacts, start of the decay, and what one blow alone can be rejected for."""
+    """Measure zero lines, contacts and start of the decay of one impact, and judge it by itself."""
     contact = measure_contact(cut, settings.contact_level)
     if contact.zero_acceleration:
         zero = _significant_zero(cut, contact)
@@ -100,7 +100,10 @@ def _measure(cut, settings):
 
 
 def _judge_scale(cuts, softest):
-    """Reject a test whose blows are too soft for any hammer on a track; a single soft one is weak, not out of scale."""
+    """Reject a test whose median peak is too small for any hammer on a track.
+
+    A single small impact is weak, not out of scale.
+    """
     peaks = [abs(c.contact.peak) for c in cuts]
     median = float(np.median(peaks)) if cuts else np.inf
     if median >= softest:
@@ -112,7 +115,7 @@ def _judge_scale(cuts, softest):
 
 
 def _judge_start(cut, settings):
-    """Reject a blow that had begun before its record: the force that is missing was answered all the same."""
+    """Reject an impact that began before its record: the response to the missing force is in the record."""
     contact, at_start = cut.contact, cut.polarity * float(cut.force[0])
     least = max(settings.contact_level * abs(contact.peak), 5.0 * contact.noise_force)
     if contact.onset == 0 and at_start > least:
@@ -121,7 +124,7 @@ def _judge_start(cut, settings):
 
 
 def _significant_zero(cut, contact):
-    """Mean before the blow if it is no chance finding; a zero line that is right must not be disturbed."""
+    """Mean before the impact if it is statistically significant, else 0: a correct zero line must not be changed."""
     ahead = max(1, min(cut.first, contact.onset))
     significant = abs(contact.zero_acceleration) > 4.0 * contact.noise_acceleration / np.sqrt(ahead)
     return contact.zero_acceleration if significant else 0.0

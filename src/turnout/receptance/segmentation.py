@@ -1,4 +1,4 @@
-"""Blows cut out of recordings, one window each, whether a record holds one blow or many."""
+"""Cut impacts out of recordings, one window each, whether a record holds one impact or many."""
 
 from dataclasses import dataclass, field
 
@@ -6,16 +6,16 @@ import numpy as np
 
 from turnout.records import Recording, Rejection
 
-MAD_TO_SD = 1.4826
+MAD_TO_SD = 1.4826  # standard deviation of normal values over their median absolute deviation
 
 
 @dataclass
 class Cut:
-    """One window of a recording around one blow, on its way to becoming an ``Impact``.
+    """One window of a recording around one impact, from which an ``Impact`` is made.
 
-    ``force`` [N] has its zero line taken off and ``polarity`` (+1, -1) says where the blow points; ``first`` and
-    ``last`` are the first and last sample above the trigger, counted from the start of the window. ``zeros`` were
-    taken off force and acceleration: with them they are what was recorded.
+    ``force`` [N] has its zero line subtracted; ``polarity`` (+1, -1) is the sign of the impact. ``first`` and ``last``
+    are the first and last sample above the trigger, counted from the start of the window. ``zeros`` were subtracted
+    from force and acceleration: add them to get the recorded values.
     """
 
     force: np.ndarray
@@ -35,9 +35,9 @@ class Cut:
 
 
 def cut_blows(recordings, force, response, settings):
-    """Every blow of a test, in order; a recording without one gives one cut that says so.
+    """Every impact of a test, in order; a recording without one gives one cut with that rejection.
 
-    The number ``record`` is the recording's own where each record of its file holds one blow, else the blow's
+    The number ``record`` is the recording's own where each record of its file holds one impact, else the impact's
     number within the file.
     """
     per_recording = [_cut_one(r, force, response, settings) for r in recordings]
@@ -96,9 +96,9 @@ def _nothing(finite, otherwise, start=0):
 
 
 def _find(f, noise, rate, settings):
-    """(first, last) sample above the trigger for each blow, and the trigger [N].
+    """(first, last) sample above the trigger for each impact, and the trigger [N].
 
-    A usual peak is the upper quartile of all candidates', so that neither handling noise nor one overflow shifts
+    The typical peak is the upper quartile of all candidates, so that neither handling noise nor one overflow shifts
     the trigger.
     """
     size = np.abs(f)

@@ -1,4 +1,4 @@
-"""The nouns that the parts of the program exchange. SI units throughout; times are naive UTC."""
+"""Records that the packages of the program exchange. All values are in SI units; times are naive UTC."""
 
 from turnout.records.modal import Impact, ModalModel, Mode, Receptance
 from turnout.records.raw import RawChannel, RawDescription

@@ -1,9 +1,4 @@
-"""Resonances and the state-space model they stand in.
-
-Averaged frequency response of a section.
-
-One blow of the hammer with its quality.
-"""
+"""Results of a hammer test: the impacts, the averaged receptance of a section, its modes and its state-space model."""
 
 from __future__ import annotations
 
@@ -19,10 +14,10 @@ from turnout.records.unit import Rejection
 class Mode:
     """One resonance: ``frequency`` [Hz] undamped, ``damping`` ratio, with standard errors and interval.
 
-    ``*_se`` is the standard error of the campaign value from the spread of its ``n`` impacts, ``*_sd`` the
-    between-impact spread that is left after the estimation error of each impact is taken off, ``*_low`` and
-    ``*_high`` the two-sided 95 % t interval, ``*_crb`` the Cramér-Rao bound of the same decays (standard error).
-    ``band`` is "ballast", "railpad" or "other". ``energy`` is its share of the decay's energy.
+    ``*_se`` is the standard error of the campaign value, from the spread of its ``n`` impacts. ``*_sd`` is the spread
+    between impacts after subtraction of the estimation error of each impact. ``*_low`` and ``*_high`` are the
+    two-sided 95 % t interval. ``*_crb`` is the Cramér-Rao bound of the same decays, as a standard error.
+    ``band`` is "ballast", "railpad" or "other". ``energy`` is the mode's share of the energy of the decay.
     """
 
     band: str
@@ -46,11 +41,11 @@ class Mode:
 class ModalModel:
     """State-space model of one section: x[k+1] = A x[k], y[k] = c x[k], x[0] = b for a unit impact.
 
-    ``a`` (order, order), ``b`` and ``c`` (order,), ``rate`` [Hz]. ``status`` is "accepted",
-    "second_order_only" (the gate left only the ballast mode, as at the paper's A8) or "rejected" with
-    ``rejections``. ``per_impact`` holds the estimates behind the summary: a structured table with fields
-    impact, band, frequency, damping, frequency_se, damping_se. ``stabilisation`` the same for orders: order,
-    frequency, damping, status. ``rejected_modes`` says which candidate was dropped and why.
+    ``a`` is (order, order), ``b`` and ``c`` are (order,), ``rate`` is in Hz. ``status`` is "accepted", "rejected" with
+    ``rejections``, or "second_order_only": the gate passed only the ballast mode, as at the paper's section A8.
+    ``per_impact`` holds the estimates of each impact: impact, band, frequency, damping, frequency_se, damping_se.
+    ``stabilisation`` holds those of each model order: order, frequency, damping, status. ``rejected_modes`` lists the
+    rejected candidates with the reason.
     """
 
     a: np.ndarray
@@ -79,13 +74,13 @@ class ModalModel:
 
 @dataclass(frozen=True)
 class Receptance:
-    r"""Averaged frequency response of one section, with what can be trusted of it.
+    r"""Averaged receptance of one section with its coherence.
 
     All arrays are (n_frequency,); ``frequency`` [Hz] is above 0. ``h1``, ``h2``, ``hv`` complex [m/N];
-    ``coherence`` with its two-sided 95 % limits ``coherence_low``, ``coherence_high`` and the one-sided lower
-    limit ``gate_level`` that the gate compares; ``passed`` bool; ``n`` number of averaged impacts;
-    ``valid_to`` [Hz] is the hammer's band edge. Behind an exponential window of ``decay`` [1/s] the responses are those
-    at :math:`i\omega + a`: every resonance looks damped by so much more.
+    ``coherence`` has the two-sided 95 % limits ``coherence_low`` and ``coherence_high``. The gate compares its
+    one-sided lower limit ``gate_level``; ``passed`` is the result. ``n`` is the number of averaged impacts.
+    ``valid_to`` [Hz] is the hammer's band edge. With an exponential window of ``decay`` [1/s] the responses are those
+    at :math:`i\omega + a`: the window adds this decay rate to every mode.
     """
 
     frequency: np.ndarray
@@ -105,13 +100,13 @@ class Receptance:
 
 @dataclass(frozen=True)
 class Impact:
-    """One blow of the hammer, cut out of a recording, with its quality.
+    """One hammer impact, cut out of a recording, with its quality.
 
     ``force`` [N] and ``acceleration`` [m/s²] are (n_sample,) from ``onset`` - pre-trigger on; the indices
     ``onset``, ``contact_end`` and ``decay_start`` count from the first of these samples. ``peak`` [N],
     ``contact`` [s], ``impulse`` [N s], ``noise_force`` [N] and ``noise_acceleration`` [m/s²] (pre-trigger rms),
     ``band_edge`` [Hz] where the force spectrum has fallen by 20 dB. ``rejections`` is empty for an accepted
-    impact; ``notes`` are findings that do not reject (a double hit whose decay starts after the last contact).
+    impact; ``notes`` are findings that do not reject it (a double hit whose decay starts after the last contact).
     """
 
     force: np.ndarray
@@ -133,7 +128,7 @@ class Impact:
 
     @property
     def accepted(self) -> bool:
-        """Nothing speaks against the blow."""
+        """Whether the impact has no rejection."""
         return not self.rejections
 
     @property

@@ -1,4 +1,4 @@
-"""What the configuration promises about a raw file, before it is read."""
+"""Description of a raw file by the configuration: its channels, units, rate and counts."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class RawChannel:
-    """How one channel stands in a raw file, and what it becomes.
+    """One channel of a raw file and the channel of a recording that it becomes.
 
     ``source`` is the channel's name in the file, or its index (int). ``unit`` is the unit of the raw numbers:
-    "V", "mV", "count", or already physical ("N", "kN", "m/s²", "g", "°C"); None = as the file says.
-    ``sensitivity`` with ``sensitivity_unit`` ("mV/N", "mV/g", "mV/(m/s²)", "V/count" ...) turns electrical
-    units into physical ones, None where the numbers are physical already. ``sign`` is +1 or -1. ``limit`` and
-    ``resolution`` are in the SI unit. A unit may carry a factor ("0.305 mV" per count, "10 V" full scale); with
-    "!" behind it ("V!") it overrules what the file says. The quantity "ignored" drops the channel.
+    "V", "mV", "count", or physical ("N", "kN", "m/s²", "g", "°C"); None means the unit that the file states.
+    ``sensitivity`` with ``sensitivity_unit`` ("mV/N", "mV/g", "mV/(m/s²)", "V/count" ...) converts electrical
+    units into physical ones; None if the numbers are physical. ``sign`` is +1 or -1. ``limit`` and
+    ``resolution`` are in the SI unit. A unit may have a factor ("0.305 mV" per count, "10 V" full scale). A unit
+    that ends with "!" ("V!") overrules the file. A channel with the quantity "ignored" is not read.
     """
 
     name: str
@@ -33,10 +33,10 @@ class RawChannel:
 
 @dataclass(frozen=True)
 class RawDescription:
-    """What the configuration promises about a raw file: the reader compares, converts and orders.
+    """What the configuration states about a raw file: the reader checks it and converts accordingly.
 
     ``format`` is a key of ``turnout.readers.FORMATS`` or "auto". ``rate`` [Hz], ``n_records`` and
-    ``n_samples`` (per record) are None where not promised. ``channels`` become the rows of the recordings, in
+    ``n_samples`` (per record) are None if not stated. ``channels`` become the rows of the recordings, in
     this order. ``time_zone`` is the zone of the file's time stamps (IANA name).
     """
 

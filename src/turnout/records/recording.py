@@ -1,10 +1,6 @@
-"""A recording: channels sampled together over one stretch of time, and what was noted beside them.
+"""Recordings: channels sampled simultaneously, with their conditions.
 
-A recording that is too long to be held: the same nouns, samples in stretches.
-
-What held and long recordings have in common: channels sampled together at one rate.
-
-One measured quantity of a recording.
+A ``Recording`` holds its samples in memory. A ``LongRecording`` reads them from its file in blocks.
 """
 
 from __future__ import annotations
@@ -24,8 +20,8 @@ class Channel:
 
     ``quantity`` is "force" [N], "acceleration" [m/s²], "velocity" [m/s], "displacement" [m], "strain" [-]
     or "temperature" [°C]; the samples are in that SI unit with the configured sign already applied.
-    ``position`` is the place along the track [m] in the turnout's coordinate, ``mounting`` where the sensor
-    sits ("rail head at sleeper", "rail head mid-span", "rail web", "sleeper", "hammer"). ``limit`` is the
+    ``position`` is along the track [m] in the turnout's coordinate. ``mounting`` is where the sensor
+    is fixed ("rail head at sleeper", "rail head mid-span", "rail web", "sleeper", "hammer"). ``limit`` is the
     range beyond which the instrument clips and ``resolution`` one step of its converter, both in the SI
     unit, None where unknown.
     """
@@ -40,7 +36,7 @@ class Channel:
 
 
 class Samples(Protocol):
-    """``n_sample`` samples of ``channels`` at ``rate`` [Hz], which ``read(start, stop)`` gives in SI."""
+    """``n_sample`` samples of ``channels`` at ``rate`` [Hz]; ``read(start, stop)`` returns them in SI."""
 
     @property
     def rate(self) -> float:
@@ -52,7 +48,7 @@ class Samples(Protocol):
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """One per row."""
+        """One channel per row."""
 
     @property
     def read(self):
@@ -60,7 +56,7 @@ class Samples(Protocol):
 
 
 class Sampled:
-    """Lengths, rows and stretches of ``Samples``."""
+    """Duration, rows and blocks of ``Samples``."""
 
     @property
     def duration(self: Samples) -> float:
@@ -72,7 +68,7 @@ class Sampled:
         return tuple(i for i, c in enumerate(self.channels) if c.quantity == quantity)
 
     def stretches(self: Samples, length: float) -> Iterator[np.ndarray]:
-        """The whole recording in consecutive stretches of ``length`` seconds, (n_channel, n) each."""
+        """The whole recording in consecutive blocks of ``length`` seconds, (n_channel, n) each."""
         step = max(round(length * self.rate), 1)
         for start in range(0, self.n_sample, step):
             yield self.read(start, min(start + step, self.n_sample))
@@ -80,10 +76,10 @@ class Sampled:
 
 @dataclass(frozen=True)
 class LongRecording(Sampled):
-    """Simultaneously sampled channels of a logger that never stops; its samples stay in their file.
+    """Recording of a continuous logger, whose samples stay in the file.
 
-    ``read(start, stop)`` gives (n_channel, stop - start) samples in the SI unit of each channel's quantity, of
-    ``n_sample`` in all; the rest is as in ``Recording``.
+    ``read(start, stop)`` returns (n_channel, stop - start) of its ``n_sample`` samples, in the SI unit of each channel.
+    The other fields are as in ``Recording``.
     """
 
     read: Callable[[int, int], np.ndarray]
@@ -102,7 +98,7 @@ NOTHING: Mapping = MappingProxyType({})
 
 @dataclass(frozen=True)
 class Recording(Sampled):
-    """Simultaneously sampled channels over one stretch of time, measured or simulated.
+    """Simultaneously sampled channels over one period of time, measured or simulated.
 
     Parameters
     ----------
@@ -115,13 +111,13 @@ class Recording(Sampled):
     kind : str
         "hammer" or "passage".
     source : str
-        File the samples came from, relative to the raw root; "record k" is in ``record``.
+        File of the samples, relative to the raw root.
     record : int
         Which record of the file, from 0.
     started_at : datetime or None
         Naive UTC time of the first sample.
     conditions : mapping
-        What was noted beside the samples, SI or named: ``rail_temperature`` [°C], ``train_type``,
+        Conditions stored with the samples, in SI or as text: ``rail_temperature`` [°C], ``train_type``,
         ``speed`` [m/s], ``axle_loads`` [N], ``track`` ("main", "diverging"), ``direction`` ...
     """
 
@@ -165,9 +161,9 @@ class Recording(Sampled):
 
 @dataclass(frozen=True)
 class ReadResult:
-    """What came out of one raw file: its sound records, and an error for each damaged one.
+    """Result of reading one raw file: its intact records, and an error for each damaged one.
 
-    ``long`` are those that stay in the file, where that was asked for.
+    ``long_recordings`` are the records whose samples stay in the file.
     """
 
     recordings: tuple[Recording, ...]

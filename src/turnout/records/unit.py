@@ -1,7 +1,4 @@
-"""The unit of work: what is computed once.
-
-Why something was not used.
-"""
+"""The unit of work of the workflow, and the reason for which a record or a result was rejected."""
 
 from __future__ import annotations
 
@@ -10,11 +7,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Unit:
-    """One thing to compute once: the files of one section and campaign, or one passage file.
+    """One unit of work: the files of one section and campaign, or one passage file. It is computed once.
 
     ``label`` is unique within the turnout and kind ("A7/2024-05-13"). ``files`` are (path relative to the raw
-    root, size, mtime_ns), sorted. ``campaign`` is the ISO date of a hammer campaign. ``config_hash`` is that
-    of the turnout's merged configuration.
+    root, size, mtime_ns), sorted. ``campaign`` is the ISO date of a hammer campaign. ``config_hash`` is the
+    hash of the turnout's merged configuration.
     """
 
     turnout: str
@@ -28,7 +25,7 @@ class Unit:
 
 @dataclass(frozen=True)
 class Rejection:
-    """Why something was not used: a code of ``turnout.errors.REASONS`` and the number behind it."""
+    """Reason of a rejection: a code of ``turnout.errors.REASONS``, the value and the limit it violates."""
 
     reason: str
     value: float | None = None

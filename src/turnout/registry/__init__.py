@@ -1,1 +1,1 @@
-"""The model registry: sorted Parquet files, one list of those that count, and SQL views over them."""
+"""The model registry: sorted Parquet files, a list of the live ones, and SQL views over them."""

@@ -1,4 +1,4 @@
-"""Results of many work batches as one stream sorted by unit, whatever way the batches were cut."""
+"""Merge the results of many work batches into one stream sorted by unit."""
 
 import heapq
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -11,17 +11,17 @@ import pyarrow as pa
 from turnout.registry.ids import content_id
 from turnout.registry.intake import Arrival
 
-CHUNK = 1024
+CHUNK = 1024  # units per chunk that is in memory at once
 
 
 def token(path) -> str:
-    """Name under which a consumed batch is remembered: batches are named by their content and never change."""
+    """Name of a consumed batch in the generation file; batches are named by their content and never change."""
     path = Path(path)
     return f"{path.name}:{path.stat().st_size}"
 
 
 def present(paths: Sequence[PathLike], faults: dict[str, str]) -> tuple[list[PathLike], list[str]]:
-    """(paths, tokens) of the batches that are there; the others are noted in ``faults`` under their path."""
+    """(paths, tokens) of the batches that exist; the others are entered in ``faults`` under their path."""
     there, tokens = [], []
     for path in paths:
         try:
@@ -33,9 +33,10 @@ def present(paths: Sequence[PathLike], faults: dict[str, str]) -> tuple[list[Pat
 
 
 def fresh(tokens: Sequence[str], consumed: Sequence[str]) -> list[int]:
-    """Places of the batches that are new, or newer than they were: in the order of writing, the last word counts.
+    """Positions of the batches to read: those that are new, or that come later in the list than before.
 
-    A configuration that is taken back gives an old batch again, at the end of the list.
+    Batches are in the order of writing, and the last result of a unit counts. A configuration that is changed back
+    gives an old batch again, at the end of the list.
 
     >>> fresh(["a", "b", "c"], ["a", "c"]), fresh(["b", "a"], ["a", "b"])
     ([1], [1])
@@ -51,10 +52,10 @@ def fresh(tokens: Sequence[str], consumed: Sequence[str]) -> list[int]:
 
 
 def merged(paths: Sequence[PathLike], read: Callable, faults: dict[str, str]) -> Iterator[Arrival]:
-    """Units of all batches sorted by name; of a unit that several batches hold, the one of the last batch.
+    """Units of all batches sorted by name; of a unit in several batches the result in the last one.
 
-    ``read(path)`` yields objects with unit, turnout, kind, key, algo and tables, sorted by unit. What cannot be
-    read is noted in ``faults`` under the batch's path, and the other batches go on.
+    ``read(path)`` yields objects with unit, turnout, kind, key, algo and tables, sorted by unit. A batch that cannot be
+    read is entered in ``faults`` under its path, and the others are read.
     """
     streams = [_guarded(path, read, -i, faults) for i, path in enumerate(paths)]
     in_order = heapq.merge(*streams, key=lambda entry: entry[:2])
@@ -67,7 +68,7 @@ def merged(paths: Sequence[PathLike], read: Callable, faults: dict[str, str]) ->
 
 
 def of_tables(tables: Mapping[str, list[dict]], first_index: int) -> list[Arrival]:
-    """Rows that come from no recording, each table as a unit of its own: configuration, alarms, findings."""
+    """Rows that come from no recording, one unit per table: configuration, alarms, findings."""
     return [
         Arrival(
             index=first_index + i, unit=f"registry/{'configuration'}/{table}", turnout="registry",
@@ -78,7 +79,7 @@ def of_tables(tables: Mapping[str, list[dict]], first_index: int) -> list[Arriva
 
 
 def chunks(arrivals: Iterable[Arrival], size: int = CHUNK) -> Iterator[list[Arrival]]:
-    """Lists of at most ``size`` units, so that a whole network never lies in memory at once."""
+    """Lists of at most ``size`` units, which limits the memory."""
     chunk: list[Arrival] = []
     for arrival in arrivals:
         chunk.append(arrival)
@@ -102,7 +103,7 @@ def _said(error: Exception) -> str:
 
 
 def _with_method(tables):
-    """Modes say by which method their model was made, so that charts need not look it up."""
+    """Copy the method of each model to its modes, so that charts need no join."""
     methods = {m.get("model_id"): m.get("method") for m in tables.get("models", ())}
     for mode in tables.get("modes", ()):
         if isinstance(mode, dict) and mode.get("method") is None and mode.get("model_id") in methods:

@@ -1,4 +1,4 @@
-"""Many small files into one sorted file per table and year; the rows stay the same."""
+"""Merge many small files into one sorted file per table and year; the rows stay the same."""
 
 from dataclasses import replace
 from os import PathLike
@@ -25,8 +25,8 @@ from turnout.registry.supersede import LARGE, halves, last_word, with_dead
 def compact(registry_dir: PathLike, at_least: int = 2, patience: float = 600.0) -> dict[str, tuple[int, int]]:
     """Merge the files of every table and year that has ``at_least`` files; (files, rows) merged by folder.
 
-    Readers go on meanwhile: the old files stay for two more generations. RegistryError when the disk is full:
-    nothing is changed.
+    Readers may continue meanwhile: the old files stay for two more generations. RegistryError when the disk is full;
+    then nothing is changed.
     """
     root = Path(registry_dir)
     with locked(root, patience):
@@ -36,9 +36,9 @@ def compact(registry_dir: PathLike, at_least: int = 2, patience: float = 600.0) 
 
 
 def rebuild(registry_dir: PathLike, patience: float = 600.0) -> dict[str, tuple[int, int]]:
-    """Write all files anew under the present ``columns.csv``: values cast, new columns NULL, dropped ones gone.
+    """Rewrite all files with the present ``columns.csv``: values are cast, new columns NULL, old columns removed.
 
-    RegistryError when a value cannot become what the column is now; nothing is changed then.
+    RegistryError when a value cannot be cast; then nothing is changed.
     """
     root = Path(registry_dir)
     with locked(root, patience):
@@ -56,12 +56,12 @@ def _groups(generation: Generation) -> dict[tuple[str, int | None], list[DataFil
 
 
 def _pays(files: list[DataFile], at_least: int) -> bool:
-    """Whether merging helps: enough files with rows that count, or one where such rows lie among others."""
+    """Whether merging is useful: enough files with valid rows, or one with valid and superseded rows."""
     return sum(f.dead < f.rows for f in files) >= at_least or any(0 < f.dead < f.rows for f in files)
 
 
 def _rewrite(root, before, groups, select) -> dict[str, tuple[int, int]]:
-    """Write each group as one file, check that no row was lost, publish."""
+    """Write each group as one file, check that no row was lost, and publish."""
     if not groups:
         build_database(root, before)
         return {}
@@ -87,7 +87,7 @@ def _rewrite(root, before, groups, select) -> dict[str, tuple[int, int]]:
 
 
 def _write(con, root, table, year, merged: list[DataFile], sql: str) -> list[DataFile]:
-    """The rows of ``sql`` as one file, or two where some of them are superseded; none may be lost."""
+    """Write the rows of ``sql`` as one file, or as two if some are superseded; RegistryError if a row was lost."""
     prefix = "all" if table in WHOLE_TABLES else "compact"
     parts = [(prefix, sql)]
     if table in LARGE and any(f.dead for f in merged):
@@ -100,7 +100,7 @@ def _write(con, root, table, year, merged: list[DataFile], sql: str) -> list[Dat
 
 
 def _cast(root: Path, before: Generation, table: str, files: list[DataFile]) -> str:
-    """SQL over files of several schemas, every value as the type that its column has now."""
+    """SQL over files of several schemas, every value cast to the present type of its column."""
     parts = []
     for schema in sorted({f.schema for f in files}):
         held = before.schemas[schema]

@@ -1,8 +1,6 @@
-"""``registry.duckdb``: views over the live files, macros and comments, and no data of its own.
+"""Build and open ``registry.duckdb``: views over the live files, macros and comments, but no data.
 
-The views and macros of the registry: one SQL file per question, created in the order of their needs.
-
-When the newest measurement that counts was made: a date that was corrected no longer does.
+Views and macros are in one SQL file per question and are created in the order of their dependencies.
 """
 
 import csv
@@ -30,7 +28,7 @@ _NEEDS = re.compile(r"^--\s*needs:\s*(.+)$", re.MULTILINE)
 
 @cache
 def view_files() -> dict[str, str]:
-    """SQL text of every file in ``views``, each after those it needs; ties by name.
+    """SQL text of every file in ``views``, each after those it depends on; ties by name.
 
     >>> order = list(view_files())
     >>> order.index("superseded") < order.index("modes_current")
@@ -42,7 +40,7 @@ def view_files() -> dict[str, str]:
 
 
 def in_order(texts: dict[str, str]) -> dict[str, str]:
-    """The files sorted so that each follows what its line ``-- needs: a, b`` names.
+    """Files sorted by dependency: each follows those in its line ``-- needs: a, b``.
 
     >>> list(in_order({"a": "-- needs: c", "b": "", "c": ""}))
     ['b', 'c', 'a']
@@ -66,15 +64,15 @@ def in_order(texts: dict[str, str]) -> dict[str, str]:
 
 
 def reasons_sql() -> str:
-    """View ``reasons``: every reason code with its meaning."""
+    """SQL of the view ``reasons``: every reason code with its meaning."""
     values = ", ".join(f"({literal(code)}, {literal(meaning)})" for code, meaning in REASONS.items())
     return f"create or replace view reasons as select * from (values {values}) as r(reason_code, meaning)"
 
 
 def newest_that_counts(con: duckdb.DuckDBPyConnection, root: Path, generation: Generation) -> str | None:
-    """ISO time of the newest measurement that nothing took back, None without any.
+    """ISO time of the newest measurement that is not superseded, None without any.
 
-    Files are opened from the one that reaches furthest on, until no other can hold a later time.
+    Files are read in the order of their newest time, until no other can hold a later time.
     """
     con.execute(f"create or replace temp table no_longer as {last_word('supersedes')}")
     newest = None
@@ -90,16 +88,16 @@ def newest_that_counts(con: duckdb.DuckDBPyConnection, root: Path, generation: G
 
 
 DATABASE = "registry.duckdb"
-# Every DuckDB since 1.2 opens it; a file in the newest format could not be read by tools that embed an older one.
+# Every DuckDB since 1.2 opens it; tools with an older DuckDB could not read the newest format.
 STORAGE_VERSION = "v1.2.0"
 OFFLINE: dict[str, str | bool | int | float | list[str]] = {
     "autoinstall_known_extensions": False,
     "autoload_known_extensions": False,
 }
 
-# A logger's clock that runs ahead is not believed: nothing was measured after the last run and the last campaign. A
-# campaign's date is written down by people: after the last run it counts where most turnouts have one, for then it is
-# the clock of this machine that is late.
+# No measurement can be later than the last run and the last campaign, so a logger clock that is ahead is ignored. The
+# date of a campaign is entered by people. One after the last run counts only if most turnouts have one: then the clock
+# of this machine is late.
 LAST_POSSIBLE = """
     with clock as (select max(ended_at_utc) as at_utc from runs),
     last as (select turnout_id, max(started_at_utc) as at_utc from campaigns group by turnout_id),
@@ -117,8 +115,8 @@ LAST_POSSIBLE = """
 def open_registry(path, read_only: bool = True) -> duckdb.DuckDBPyConnection:
     """DuckDB connection to a registry, given its folder or its ``registry.duckdb``. Loads no extension.
 
-    Read-only unless told otherwise: the next registration replaces the file, and what was written into it is gone.
-    RegistryError when there is none, when it cannot be opened, or when it was moved and not relocated.
+    It is read-only by default: the next registration replaces the file with all that was written into it. RegistryError
+    when there is none, when it cannot be opened, or when it was moved and not relocated.
     """
     path = Path(path)
     file = path / DATABASE if path.is_dir() else path
@@ -140,9 +138,9 @@ def open_registry(path, read_only: bool = True) -> duckdb.DuckDBPyConnection:
 
 
 def build_database(registry_dir: Path, generation: Generation) -> None:
-    """Make ``registry.duckdb`` for a generation beside the old one and replace it in one step.
+    """Make ``registry.duckdb`` for a generation as a temporary file, then replace the old one in one step.
 
-    The views hold absolute paths: relative ones would break for whoever opens it from another folder.
+    The views hold absolute paths, so that it can be opened from any folder.
     """
     root = Path(registry_dir).resolve()
     unfinished = beside(root / "registry")
@@ -167,7 +165,7 @@ def build_database(registry_dir: Path, generation: Generation) -> None:
 
 
 def is_behind(registry_dir: Path, generation: Generation) -> bool:
-    """Whether ``registry.duckdb`` is missing, of another generation, made for another folder or of other views."""
+    """Whether ``registry.duckdb`` is missing, of another generation, for another folder, or has other views."""
     file = Path(registry_dir) / DATABASE
     if not file.exists():
         return True
@@ -181,7 +179,7 @@ def is_behind(registry_dir: Path, generation: Generation) -> bool:
 
 @cache
 def views_version() -> str:
-    """Changes with any view, reason or description of a column: a newer program makes its views anew."""
+    """Hash of all views, reasons and column descriptions; a program with another one rebuilds the database."""
     described = [(c.table, c.name, c.unit, c.meaning) for t in tables().values() for c in t]
     return content_id("views", view_files(), reasons_sql(), described, list(view_columns()))
 
@@ -220,7 +218,7 @@ def _create_views(con, root: Path, generation: Generation) -> None:
 
 
 def _comment(con) -> None:
-    """Comments on columns, with the unit, for tools that show them; those of macros stand in the documentation."""
+    """Add comments with the unit to columns, for tools that show them; macros are described in the documentation."""
     present = {
         (view, column)
         for view, column in con.execute(

@@ -1,4 +1,4 @@
-"""Tables computed from the registry itself, for all charts at once: written whole, checked, published."""
+"""Check and publish tables that are computed from the registry itself and replaced as a whole."""
 
 from collections.abc import Collection, Mapping
 from os import PathLike
@@ -35,23 +35,23 @@ def publish(
 ) -> Generation:
     """Replace derived tables (charts, baselines, chart_status, alarms) by the rows of ``frames``, in one step.
 
-    NaN becomes NULL, values are rounded to the resolution of ``columns.csv``, a column that a frame lacks is NULL.
-    The same rows give the same files; a table, or a year of it, that did not change is not published again.
+    NaN becomes NULL, values are rounded to the resolution of ``columns.csv``, a missing column is NULL. The same rows
+    give the same files; a table, or a year of it, that did not change is not published again.
 
     Parameters
     ----------
     registry_dir : path
         An existing registry, or a folder to make one in.
     frames : mapping of table to DataFrame or Arrow table
-        All rows of each table, but for the years in ``keep``.
+        All rows of each table, except the years in ``keep``.
     keep : mapping of table to years, optional
-        Years of a table kept by year whose live files stay as they are.
+        Years of a table stored by year whose live files stay as they are.
 
     Raises
     ------
     RegistryError
-        A row breaks a rule of ``columns.csv`` (table, row, column and value are named), a column is unknown,
-        the registry is locked or the disk is full: nothing was changed.
+        A row breaks a rule of ``columns.csv`` (the message names table, row, column and value), a column is unknown,
+        the registry is locked or the disk is full. Then nothing was changed.
     """
     root = Path(registry_dir)
     with locked(root, patience):
@@ -79,7 +79,7 @@ def publish(
 
 
 def _enter(con: duckdb.DuckDBPyConnection, table: str, frame) -> None:
-    """The rows as view ``new_<table>``, typed and rounded; RegistryError at the first bad one."""
+    """Create view ``new_<table>`` of the rows, typed and rounded; RegistryError at the first bad row."""
     if table not in WHOLE_TABLES:
         raise RegistryError(f"{table} is not a table that is replaced whole; those are {', '.join(WHOLE_TABLES)}.")
     present = list(frame.columns if isinstance(frame, pd.DataFrame) else frame.column_names)

@@ -1,8 +1,6 @@
-"""The generated parts of docs/registry.md and docs/reasons.md, from what the program itself goes by.
+"""Describe tables, views and macros, for the command line and for docs/registry.md and docs/reasons.md.
 
-``python -m turnout.registry.documentation docs`` writes them anew; a test compares.
-
-Tables, views and macros in words, for the command line and for docs/registry.md.
+``python -m turnout.registry.documentation docs`` rewrites the generated sections of these pages; a test compares.
 """
 
 import difflib
@@ -18,7 +16,7 @@ from turnout.registry.schema import Column, tables
 
 @cache
 def views() -> dict[str, tuple[str, tuple[dict[str, str], ...]]]:
-    """Every view, and every macro with its parameters: what a row is, and its columns.
+    """Every view, and every macro with its parameters: the meaning of a row, and its columns.
 
     >>> views()["section_trend(section, resonance)"][1][1]["column"]
     'frequency_hz'
@@ -30,7 +28,7 @@ def views() -> dict[str, tuple[str, tuple[dict[str, str], ...]]]:
 
 
 def row_of(name: str) -> str:
-    """What a row of the view is: the comment above the statement that creates it, else the first line of its file."""
+    """Meaning of a row of the view: the SQL comment above the statement that creates it."""
     for sql in view_files().values():
         for keyword in ("view", "macro"):
             head, found, _ = sql.partition(f"create or replace {keyword} {name}")
@@ -86,7 +84,7 @@ def table_tables() -> str:
 
 
 def view_tables() -> str:
-    """One table of columns per view and macro, under what a row of it is."""
+    """One table of columns per view and macro, below the meaning of a row."""
     blocks = []
     for call, (what, rows) in sorted(views().items()):
         lines = [f"### {call}", "", what, "", "| column | type | unit | meaning |", "|---|---|---|---|"]
@@ -96,7 +94,7 @@ def view_tables() -> str:
 
 
 def reasons_page() -> str:
-    """docs/reasons.md."""
+    """Text of docs/reasons.md."""
     lines = [
         "# Reasons",
         "",
@@ -113,7 +111,7 @@ def reasons_page() -> str:
 
 
 def with_parts(page: str, parts: dict[str, str]) -> str:
-    """``page`` with every generated part replaced; KeyError where it has no place for one."""
+    """``page`` with every generated section replaced; KeyError where the page lacks one."""
     for name, body in parts.items():
         found = re.compile(rf"<!-- {name}: generated, do not edit -->\n.*?\n?<!-- end of {name} -->", re.DOTALL)
         if not found.search(page):
@@ -123,7 +121,7 @@ def with_parts(page: str, parts: dict[str, str]) -> str:
 
 
 def write(folder: Path) -> None:
-    """Write the generated parts into the pages of ``folder``."""
+    """Write the generated sections into the pages of ``folder``."""
     page = folder / "registry.md"
     parts = {"tables": table_tables(), "views": view_tables()}
     page.write_text(with_parts(page.read_text(encoding="utf-8"), parts), encoding="utf-8")
@@ -131,7 +129,7 @@ def write(folder: Path) -> None:
 
 
 def _values(column: Column) -> str:
-    """What a value may be: required or not, and its range or its choices."""
+    """Rules of a value in words: required or not, its range or choices, its resolution."""
     parts = ["required"] if column.required and not column.key else []
     if column.allowed:
         parts.append(", ".join(column.allowed))

@@ -1,4 +1,4 @@
-"""The list of live files: what it does not name does not exist. Readers never glob."""
+"""Read, check and commit the generation file, the list of live files; files that it does not name do not count."""
 
 import hashlib
 import json
@@ -12,15 +12,15 @@ from turnout.registry.schema import tables
 
 FILE = "_generation.json"
 FORMAT = 1
-KEPT_GENERATIONS = 2
-NO_DATABASE = {"?", "\\"}  # DuckDB begins options of a path with the one, and takes the other for a slash
+KEPT_GENERATIONS = 2  # for which retired files stay, for readers of an older state
+NO_DATABASE = {"?", "\\"}  # in a path: DuckDB reads options after the first and takes the second for a slash
 
 
 @dataclass(frozen=True)
 class DataFile:
-    """One live Parquet file: its path in the registry, its table, year and row count, its hash, its schema.
+    """One live Parquet file: its path in the registry, its table, year, row count, size, hash and schema.
 
-    ``newest`` is the time of its newest measurement, ``dead`` how many of its rows are superseded (large tables only).
+    ``newest`` is the time of its newest measurement, ``dead`` the number of superseded rows (large tables only).
     """
 
     path: str
@@ -38,9 +38,9 @@ class DataFile:
 class Generation:
     """State of the registry after one commit.
 
-    ``files`` are live; ``retired`` are (path, generation that dropped it), deleted two generations later, so
-    that a reader who opened the registry before still finds them; ``schemas`` says which columns a schema hash
-    stands for; ``consumed`` are the work batches that were taken in by the newest commit and may still be offered.
+    ``files`` are live. ``retired`` are (path, generation that removed it); they are deleted two generations later, so
+    that readers of an older state still find them. ``schemas`` maps a schema hash to its columns. ``consumed`` are the
+    work batches that are already registered and may be offered again.
     """
 
     number: int = 0
@@ -61,8 +61,8 @@ class Generation:
 def load(registry_dir: Path) -> Generation:
     """The generation file, or generation 0 where there is none yet.
 
-    Raises RegistryError when it is not readable: it is written in one step, so somebody else touched it; and for a
-    folder in which DuckDB can make no database.
+    RegistryError when it is not readable, which means that something else changed it, for it is written in one step.
+    RegistryError also for a folder in which DuckDB can make no database.
     """
     path = Path(registry_dir) / FILE
     if forbidden := NO_DATABASE.intersection(path.resolve().as_posix()):
@@ -87,7 +87,7 @@ def load(registry_dir: Path) -> Generation:
 
 
 def schema_hash(table: str) -> str:
-    """Name of the present schema of a table: hash of its columns and types."""
+    """Hash of the columns and types of a table, the name of its present schema."""
     text = json.dumps([[c.name, c.type] for c in tables()[table]])
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
@@ -98,9 +98,9 @@ def schema_of(table: str) -> dict[str, str]:
 
 
 def check_schemas(generation: Generation) -> None:
-    """Refuse a registry whose files hold another type under a name that ``columns.csv`` knows.
+    """RegistryError if files hold another type of a column than ``columns.csv``.
 
-    DuckDB would turn both into text in silence. A column added since is no trouble: it is NULL in old rows.
+    DuckDB would silently convert both to text. A new column is allowed: it is NULL in old rows.
     """
     for name, held in sorted(generation.schemas.items()):
         table, _, _ = name.partition(":")
@@ -114,18 +114,18 @@ def check_schemas(generation: Generation) -> None:
 
 
 def commit(registry_dir: Path, generation: Generation) -> None:
-    """Publish the generation: one replace, after which the new files count and the retired ones do not."""
+    """Publish the generation by replacing one file; from then on the new files count and the retired ones do not."""
     write_durably(Path(registry_dir) / FILE, generation.to_json().encode())
 
 
 def write_durably(path: Path, content: bytes) -> None:
-    """Write beside, fsync, replace, fsync the folder: whole or not at all, also after a power cut."""
+    """Write a temporary file, fsync, replace, fsync the folder: complete or not at all, also after a power cut."""
     write_atomic(path, lambda stream: stream.write(content))
     sync_folder(path.parent)
 
 
 def sync_folder(folder: Path) -> None:
-    """Wait until the names in ``folder`` are on the disk, so that they outlive a power cut."""
+    """Wait until the names in ``folder`` are on the disk, so that they survive a power cut."""
     handle = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -134,9 +134,9 @@ def sync_folder(folder: Path) -> None:
 
 
 def due_for_deletion(generation: Generation) -> list[str]:
-    """Take out of ``retired``, and return, what no reader of the last two generations can still want."""
+    """Remove from ``retired``, and return, the files that no reader of the last two generations can need."""
     live = {f.path for f in generation.files}
-    # a small table that changed and changed back has its old path, by content, live or retired a second time
+    # a small table that was changed back has its old path again, which may be live or retired a second time
     dropped = dict(sorted(generation.retired, key=lambda entry: entry[1]))
     waiting = {path: n for path, n in dropped.items() if path not in live}
     last = generation.number - KEPT_GENERATIONS

@@ -1,13 +1,13 @@
-"""Ids that follow from content: same inputs, same id, nothing appended twice."""
+"""Make ids from content: the same inputs give the same id, so no row is appended twice."""
 
 import hashlib
 import json
 
 
 def content_id(*parts) -> str:
-    """First 128 bits of the sha256 of the parts, as 32 hexadecimal digits.
+    """First 128 bits of the sha256 of the values, as 32 hexadecimal digits.
 
-    Each part is text, bytes, a number, None, or a list or dictionary of these; ("ab", "c") and ("a", "bc")
+    Each value is text, bytes, a number, None, or a list or dictionary of these; ("ab", "c") and ("a", "bc")
     differ. Bytes alone give the plain sha256 of the file's content. [-]
 
     References
@@ -28,7 +28,7 @@ def content_id(*parts) -> str:
 
 
 def _plain(part):
-    """What JSON does not know: bytes by their own hash, times as ISO text, numpy scalars and arrays as numbers."""
+    """Convert types unknown to JSON: bytes to their hash, times to ISO text, numpy scalars and arrays to numbers."""
     if isinstance(part, bytes):
         return {"sha256": hashlib.sha256(part).hexdigest()}
     if hasattr(part, "isoformat"):

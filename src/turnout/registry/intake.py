@@ -1,4 +1,4 @@
-"""Rows of many units as typed columns; what does not fit a column's type is refused by name, never guessed."""
+"""Collect rows of many units as typed columns; a row with a value of another type is rejected, never guessed."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -14,13 +14,13 @@ import pyarrow as pa
 from turnout.registry.ids import content_id
 from turnout.registry.schema import FILLED_BY_REGISTER, Column, names, tables
 
-UNDATED = 0
+UNDATED = 0  # year of units without a time
 _DATE = re.compile(r"(?<!\d)(\d{4})(?:-\d\d-\d\d|\d{4}T?)")
 
 
 @dataclass(frozen=True)
 class Refusal:
-    """A row that may not enter: where it stood, the column and value at fault, and what was asked."""
+    """A rejected row: index of its unit, table and row, column and value at fault, and the ``requirement``."""
 
     unit: int
     table: str
@@ -36,7 +36,7 @@ class Refusal:
 
 @dataclass
 class Arrival:
-    """One computed unit on its way in; ``index`` is its place among all units sorted by name."""
+    """One computed unit to be registered; ``index`` is its position among all units sorted by name."""
 
     index: int
     unit: str
@@ -59,7 +59,7 @@ class Arrival:
 
 
 def unit_year(unit: str, rows: Mapping[str, list[dict]]) -> int:
-    """Year under which all rows of a unit are filed: that in its name, else of its first time, else ``UNDATED``.
+    """Year under which all rows of a unit are stored: that in its name, else of its first time, else ``UNDATED``.
 
     >>> unit_year("t1/hammer/A7/2024-05-13", {}), unit_year("t1/passage/20260105T101112Z", {}), unit_year("t1/x/y", {})
     (2024, 2026, 0)
@@ -71,10 +71,10 @@ def unit_year(unit: str, rows: Mapping[str, list[dict]]) -> int:
 
 
 def gather(table: str, arrivals: Iterable[Arrival]) -> tuple[pa.Table, list[Refusal]]:
-    """Typed columns of one table over all units, with ``_unit``, ``_row`` and ``_year`` beside them.
+    """Typed columns of one table over all units, with additional columns ``_unit``, ``_row`` and ``_year``.
 
-    Returns the table of all rows whose values fit their types, and a refusal for every other row: one with a
-    column that ``columns.csv`` does not know, or with a value of another type.
+    Returns the table of all rows whose values fit their types, and a refusal for every other row: one with a column
+    that is not in ``columns.csv``, or with a value of another type.
     """
     known = frozenset(names(table))
     units, places, years, rows, refusals = [], [], [], [], []
@@ -110,7 +110,7 @@ def _misshapen(arrival, table, place, row, known) -> Refusal:
 
 
 def _by_column(rows: list[dict], wanted: list[str]) -> list[Sequence]:
-    """Values of each column; rows of one maker have the same keys, which is worth knowing: half the time."""
+    """Values of each column. Rows usually have the same keys, and using that halves the time."""
     if not rows:
         return [()] * len(wanted)
     alike = [name for name in wanted if name in rows[0]]
@@ -124,7 +124,7 @@ def _by_column(rows: list[dict], wanted: list[str]) -> list[Sequence]:
 
 
 def typed(column: Column, values: Sequence) -> tuple[pa.Array, list[int]]:
-    """Arrow array of ``values``, None where one does not fit, and the places of those.
+    """Arrow array of ``values``, None where one does not fit the type, and the indices of those.
 
     >>> from turnout.registry.schema import column
     >>> typed(column("modes", "n_impacts"), [30, None, "many"])[1]
@@ -154,13 +154,13 @@ def _convert(column: Column, values: Sequence) -> pa.Array:
         kinds = set(map(type, values))
         if not kinds.isdisjoint((bool, str, np.bool_)):
             raise TypeError("text or truth value where a number belongs")
-        if pa.types.is_integer(column.arrow) and float in kinds:  # pa.array would cut off the fraction in silence
+        if pa.types.is_integer(column.arrow) and float in kinds:  # pa.array would silently truncate
             return pa.array(values, pa.float64()).cast(column.arrow)
     return pa.array(values, column.arrow)
 
 
 def _time(value: Any) -> datetime | None:
-    """Naive UTC from ISO text or a datetime; a zone other than UTC is refused."""
+    """Naive UTC from ISO text or a datetime; ValueError for another time zone."""
     if value is None:
         return None
     time = datetime.fromisoformat(value) if isinstance(value, str) else pd.Timestamp(value).to_pydatetime()
@@ -170,7 +170,7 @@ def _time(value: Any) -> datetime | None:
 
 
 def _lists(column: Column, values: Sequence) -> pa.Array:
-    """List array from lists or numpy arrays, by way of one flat array."""
+    """List array from lists or numpy arrays, through one flat array."""
     if any(isinstance(v, (str, bytes, Mapping)) for v in values):
         raise TypeError("not a list")
     kind = column.arrow.value_type

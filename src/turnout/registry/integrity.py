@@ -1,4 +1,4 @@
-"""Does the registry hold what its list says, and what lies beside the list."""
+"""Check that the registry holds the files of its list, and find files that are not on it."""
 
 import re
 from os import PathLike
@@ -17,9 +17,10 @@ _SCHEMA = re.compile(r"_schema-[0-9a-f]{12}\.parquet")
 
 
 def check(registry_dir: PathLike, hashes: bool = True) -> list[str]:
-    """What is wrong with a registry, one sentence each; empty when all is well.
+    """Problems of a registry, one sentence each; empty without any.
 
-    Compares every live file with the list: size, hash, row count, types. ``hashes=False`` skips reading them whole.
+    Compares every live file with the list: size, hash, row count, types. ``hashes=False`` skips the hash, for which the
+    whole file must be read.
     """
     root = Path(registry_dir)
     generation = load(root)
@@ -34,7 +35,7 @@ def check(registry_dir: PathLike, hashes: bool = True) -> list[str]:
 
 
 def vacuum(registry_dir: PathLike, patience: float = 600.0) -> list[str]:
-    """Delete what killed runs left behind: files on no list. Returns their paths."""
+    """Delete files on no list, which killed runs leave. Returns their paths."""
     root = Path(registry_dir)
     with locked(root, patience):
         lost = orphans(root, load(root))
@@ -44,7 +45,7 @@ def vacuum(registry_dir: PathLike, patience: float = 600.0) -> list[str]:
 
 
 def orphans(root: Path, generation: Generation) -> list[str]:
-    """Files below the tables' folders, and unfinished ones, that neither live nor wait for their deletion."""
+    """Files below the tables' folders, and temporary ones, that are neither live nor retired."""
     kept = {f.path for f in generation.files} | {path for path, _ in generation.retired}
     found = [p for table in tables() for p in (root / table).rglob("*") if p.is_file()]
     found += list(root.glob(".*.tmp"))

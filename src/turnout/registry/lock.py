@@ -1,4 +1,4 @@
-"""One writer at a time: a nightly batch and a manual run then follow each other."""
+"""Lock the registry so that only one process writes at a time, such as a nightly run and a manual one."""
 
 from contextlib import contextmanager
 from pathlib import Path

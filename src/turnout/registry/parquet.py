@@ -1,4 +1,4 @@
-"""Sorted Parquet files, written whole or not at all; the same rows give the same bytes."""
+"""Write and read sorted Parquet files, complete or not at all; the same rows give the same bytes."""
 
 import os
 from pathlib import Path
@@ -11,16 +11,16 @@ from turnout.files import beside
 from turnout.registry.generation import DataFile, schema_hash, sync_folder
 from turnout.registry.schema import file_literal, literal, names, sort_order, tables, time_column
 
-# Rows that are read or skipped together. Among a year of unmerged batches one section is found three times faster
-# with small groups; large files are larger by a tenth with them, and hardly faster.
+# Rows per row group, which is read or skipped as a whole. In a year of unmerged batches one section is read three times
+# faster with small groups. In files above SMALL_FILE rows they add a tenth of size and hardly any speed.
 SMALL_GROUP, LARGE_GROUP, SMALL_FILE = 16_384, 122_880, 250_000
 
-# Tables of measurements, and the id by which a row of them is taken back.
+# Tables of measurements, and the id by which their rows are superseded.
 MEASURED = {"models": "model_id", "modes": "model_id", "passages": "passage_id", "passage_fits": "passage_id"}
 
 
 def folder_of(table: str, year: int | None) -> str:
-    """Where the files of a table lie: by year, small tables and undated rows beside them.
+    """Folder of the files of a table: by year, ``undated`` without one; small tables are not divided.
 
     >>> folder_of("modes", 2026), folder_of("quarantine", 0), folder_of("turnouts", None)
     ('modes/year=2026', 'quarantine/undated', 'turnouts')
@@ -41,10 +41,9 @@ def write_sorted(
 ) -> DataFile | None:
     """Write the rows of ``select`` (all columns of ``table``) as one sorted file; None where there are none.
 
-    The file's name ends with the hash of its content. The rows pass through a table of their own, for the writer's
-    bytes depend on what is known of its source, such as that a column has no NULL; ``always_alike`` says that they
-    come from the same kind of source every time, and saves that. RegistryError when the disk is full: nothing is
-    changed.
+    The file's name ends with the hash of its content. The rows are first copied into a temporary table, because the
+    bytes depend on properties of the source, such as a column without NULL. ``same_source`` skips that copy; use it if
+    the rows always come from the same type of source. RegistryError when the disk is full; then nothing is changed.
     """
     folder = Path(registry_dir) / folder_of(table, year)
     unfinished = beside(folder / prefix)
@@ -71,7 +70,7 @@ def write_sorted(
 
 
 def _copy(con, table: str, select: str, path: Path, small: bool, always_alike: bool) -> int:
-    """Copy the rows, sorted; how many. ``small`` groups of rows only in a file that is small, too."""
+    """Copy the rows, sorted, and return their number. ``small`` row groups are used in small files only."""
     columns = ", ".join(f'"{n}"' for n in names(table))
     source = f"({select})"
     if not always_alike:
@@ -85,7 +84,7 @@ def _copy(con, table: str, select: str, path: Path, small: bool, always_alike: b
 
 
 def write_empty(con: duckdb.DuckDBPyConnection, registry_dir: Path, table: str) -> str:
-    """Zero rows with the types of ``columns.csv``: an empty registry still answers. Returns its path."""
+    """Write a file of zero rows with the types of ``columns.csv``, for an empty table. Returns its path."""
     path = Path(registry_dir) / table / f"_schema-{schema_hash(table)}.parquet"
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -104,7 +103,7 @@ def write_empty(con: duckdb.DuckDBPyConnection, registry_dir: Path, table: str) 
 def read_list(registry_dir: Path, table: str, paths: list[str], alike: bool = False) -> str:
     """SQL that reads the files of one table, its columns by name; a column that a file lacks is NULL.
 
-    ``alike`` files all have the present columns: then only the first needs to be opened to know them.
+    With ``same_schema`` all files have the present columns, and DuckDB opens only the first to get them.
     """
     listed = ", ".join(file_literal(Path(registry_dir) / p) for p in paths)
     columns = ", ".join(f'"{n}"' for n in names(table))
@@ -113,10 +112,10 @@ def read_list(registry_dir: Path, table: str, paths: list[str], alike: bool = Fa
 
 
 def read_live(con: duckdb.DuckDBPyConnection, registry_dir: Path, table: str, files: list[DataFile]) -> str:
-    """SQL that reads all ``files`` of a table, and works where there are none.
+    """SQL that reads all ``files`` of a table, also if there are none.
 
-    The empty file that knows the types stands last and only where it is needed: DuckDB estimates the number of rows
-    from the first file, and plans joins by it.
+    An empty file that defines the types comes last, and only if needed: DuckDB plans joins by the number of rows that
+    it estimates from the first file.
     """
     present = f"{table}:{schema_hash(table)}"
     alike = all(f.schema == present for f in files)
@@ -131,7 +130,7 @@ def _sync_and_hash(path: Path) -> str:
 
 
 def _newest(con, table, path) -> str | None:
-    """Time of the newest measurement in the file; small tables hold no measurements."""
+    """Time of the newest measurement in the file; None for tables without measurements."""
     time = time_column(table)
     if time is None or table not in MEASURED:
         return None

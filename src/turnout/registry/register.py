@@ -1,4 +1,4 @@
-"""Take work batches into the registry: one sorted Parquet file per table, year and run, then one atomic step."""
+"""Register work batches: one sorted Parquet file per table, year and run, then one atomic commit."""
 
 import gc
 from collections.abc import Callable, Mapping, Sequence
@@ -24,31 +24,31 @@ def register(
     started_at: datetime | None = None,
     patience: float = 600.0,
 ) -> Registered:
-    """Bring the results of work batches, and rows from the configuration, into the registry.
+    """Register the results of work batches and rows from the configuration.
 
-    The same results give byte-identical files, however the batches were cut and however often a run was
-    killed before; only ``runs`` knows the time of day. A row that breaks a rule becomes a quarantine row.
+    The same results give byte-identical files, however they are divided into batches and however often a run was killed
+    before; only ``runs`` contains the time of day. A row that breaks a rule becomes a quarantine row.
 
     Parameters
     ----------
     batches : sequence of path
         In the order in which they were written: of a unit in two of them the later counts.
     registry_dir : path
-        Made where it does not exist.
+        Created where it does not exist.
     read : callable
         ``read(path)`` yields results sorted by unit, with unit, turnout, kind, key, algo, tables.
     tables : mapping of table to rows
-        Rows that come from no recording. turnouts, sections, events, campaigns, acknowledgements are replaced
-        whole; of other tables, what an earlier call gave and this one does not is superseded.
+        Rows that come from no recording. turnouts, sections, events, campaigns, acknowledgements are replaced as a
+        whole. In other tables, rows of an earlier call that are missing now are superseded.
     config_hash, code_version, started_at
-        Noted in ``runs``; by default the run began with this call. [UTC, naive]
+        Written to ``runs``; by default the run began with this call. [UTC, naive]
     patience : float
-        How long to wait for another run that holds the registry. [s]
+        How long to wait for another run that holds the lock. [s]
 
     Raises
     ------
     RegistryError
-        Locked, disk full, no permission, or made by another version: nothing was changed.
+        Locked, disk full, no permission, or made by another version. Then nothing was changed.
     """
     root, began = Path(registry_dir), started_at or datetime.now(UTC).replace(tzinfo=None)
     with locked(root, patience):
@@ -71,7 +71,7 @@ def register(
 
 @contextmanager
 def _without_collection():
-    """Rows form no cycles: looking for some in millions of them takes a quarter of the time of a registration."""
+    """Disable garbage collection: rows form no cycles, and searching them takes a quarter of the time."""
     was_on = gc.isenabled()
     gc.disable()
     try:

@@ -1,4 +1,4 @@
-"""One registration: staging tables in memory beside what the registry holds, then files, then one commit."""
+"""Carry out one registration: staging tables in memory, then Parquet files, then one commit."""
 
 import platform
 from collections.abc import Mapping
@@ -28,8 +28,8 @@ from turnout.registry.supersede import last_word, leave_out_known, note_dead, su
 ONE_FILE = (*WHOLE_TABLES, "runs", "supersedes")
 MADE_HERE = ("quarantine", "results", "runs", "supersedes")
 PENDING = "pending"
-# A section with measurements stays known when the configuration drops it, or never named it: charts, and the events
-# that reset them, are looked up here; what the configuration named once has left it.
+# A section with measurements stays in the table if the configuration drops it or never named it, because charts and
+# events refer to it. ``left_layout`` marks a section that was in the configuration before.
 SECTIONS = """
 with given as (select * exclude (_unit, _row, _year) replace (false as left_layout) from new_sections),
 left_over as (
@@ -46,7 +46,7 @@ select section_id, turnout_id, split_part(section_id, '/', -1) as label from mea
 
 @dataclass(frozen=True)
 class Registered:
-    """What a call of ``register`` did. ``rows`` by table are new; ``faults`` are batches that could not be read."""
+    """Result of ``register``. ``rows`` are the numbers of new rows by table, ``faults`` the unreadable batches."""
 
     run_id: str | None
     generation: int
@@ -58,7 +58,7 @@ class Registered:
 
 
 class Registration:
-    """Takes units in chunks, refuses what breaks a rule, and publishes all at once."""
+    """Takes units in chunks, rejects rows that break a rule, and publishes all at once."""
 
     def __init__(self, root: Path, before: Generation):
         self.root, self.before = root, before
@@ -73,9 +73,9 @@ class Registration:
         note_dead(self.con)
 
     def take(self, arrivals: list[Arrival]) -> None:
-        """Admit those units of a chunk whose result is not the live one already."""
+        """Admit those units of a chunk whose result is not live already."""
         arrivals = self._changed(arrivals)
-        # a whole table that was offered unchanged is not in the staging tables and stays as it is
+        # a whole table without a change is not in the staging tables and stays as it is
         self.replaced |= self.whole & {table for a in arrivals for table in a.tables}
         if not arrivals:
             return
@@ -99,11 +99,11 @@ class Registration:
         self.result_ids += [a.result_id for a in arrivals]
 
     def replace_whole(self, names) -> None:
-        """The small tables of which all rows are given anew."""
+        """Name the small tables of which all rows are replaced."""
         self.whole |= set(names) & set(WHOLE_TABLES)
 
     def finish(self, consumed: list[str], faults: dict[str, str], about: dict) -> Registered:
-        """Write the files and publish them; with nothing new, only make good what a killed run left undone."""
+        """Write the files and publish them; without new results, only complete what a killed run left unfinished."""
         before = self.before
         if not self.result_ids:
             if consumed != before.consumed or not (self.root / FILE).exists():
@@ -137,7 +137,7 @@ class Registration:
         return [a for a in arrivals if a.result_id not in known]
 
     def _admit_quarantine(self, arrivals, quarantine) -> None:
-        """Quarantine rows with their ids; one that is itself wrong is replaced by one that says so."""
+        """Admit quarantine rows with their ids; a rejected one is replaced by a row about its rejection."""
         by_index = {a.index: a for a in arrivals}
         for arrival in arrivals:
             arrival.tables["quarantine"] = _by_id(quarantine[arrival.index], arrival.unit)
@@ -159,7 +159,7 @@ class Registration:
         return run_id
 
     def _note_run(self, run_id, about) -> None:
-        """The only place where the time of day enters the registry."""
+        """Enter the run in ``runs``, the only table with the time of day."""
         row = about | {
             "run_id": run_id, "ended_at_utc": datetime.now(UTC).replace(tzinfo=None), "host": platform.node(),
             "n_ok": len(self.result_ids) - self.n_bad, "n_quarantined": self.n_bad,
@@ -169,7 +169,7 @@ class Registration:
         self.con.execute(f"insert into new_runs ({columns}, _year) values ({marks}, 0)", list(row.values()))
 
     def _write(self, run_id: str, number: int) -> tuple[Generation, dict[str, int]]:
-        """One file per table and year; the generation that names them."""
+        """Write one file per table and year; returns the new generation and the number of rows by table."""
         files, retired = list(self.before.files), list(self.before.retired)
         rows: dict[str, int] = {}
         schemas = dict(self.before.schemas)
@@ -193,7 +193,7 @@ class Registration:
         return with_dead(self.con, self.root, files)
 
     def _selects(self, table):
-        """(year, SELECT) of every file that has to be written for a table."""
+        """(year, SELECT) of every file to be written for a table."""
         if table == "sections":
             return [(None, SECTIONS)]
         if table in WHOLE_TABLES:

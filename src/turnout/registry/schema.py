@@ -1,4 +1,4 @@
-"""The tables of the registry as ``columns.csv`` describes them: DDL, checks, comments, Arrow types."""
+"""Tables and columns of the registry from ``columns.csv``, with their DDL, checks and Arrow types."""
 
 import csv
 from dataclasses import dataclass
@@ -18,13 +18,13 @@ ARROW = {
     "boolean": pa.bool_(),
     "timestamp": pa.timestamp("us"),
 }
-# Computed from the others after every run, all charts at once.
+# Computed from other tables after every run, for all charts at once.
 DERIVED_TABLES = ("charts", "baselines", "chart_status", "alarms")
-# Rewritten whole, from configuration, by hand or by computation; the others grow by one file per run and year.
+# Replaced as a whole, from configuration, by hand or by computation; the others get one file per run and year.
 WHOLE_TABLES = ("turnouts", "sections", "events", "campaigns", "acknowledgements", *DERIVED_TABLES)
-# In every row of a result, filled in by the register.
+# Columns of every result row that the registration fills in.
 FILLED_BY_REGISTER = ("run_id", "result_id")
-# Sorted by place, then kind of resonance, then time: one chart lies in one stretch of the file.
+# Rows are sorted by section, then by type of resonance, then by time, so that one chart is contiguous in the file.
 SORT_FIRST = ("turnout_id", "section_id", "channel", "band", "method")
 
 
@@ -57,7 +57,7 @@ class Column:
 
     @property
     def check(self) -> str | None:
-        """SQL condition that every value but NULL fulfils; every double has one, because NaN > 1 is true in SQL.
+        """SQL condition for every value but NULL; every double has one, because NaN > 1 is true in SQL.
 
         >>> column("modes", "damping_ratio").check
         '"damping_ratio" between 1e-06 and 0.999'
@@ -78,14 +78,14 @@ class Column:
 
     @property
     def rounded(self) -> str:
-        """SQL expression of the value at the resolution that is kept."""
+        """SQL expression of the value rounded to its resolution."""
         if self.decimals is None or self.is_list:
             return f'"{self.name}"'
         return f'round("{self.name}", {self.decimals})'
 
     @property
     def rule(self) -> str:
-        """What the check asks, in words."""
+        """The requirement of ``check`` in words."""
         if self.allowed:
             return "one of " + ", ".join(self.allowed)
         if self.is_list:
@@ -96,7 +96,7 @@ class Column:
 
     @property
     def ddl(self) -> str:
-        """Line of CREATE TABLE: name, type, and what every value fulfils."""
+        """Column definition of CREATE TABLE: name, type and constraints."""
         parts = [f'"{self.name}" {self.type}']
         if self.required or self.key:
             parts.append("not null")
@@ -115,7 +115,7 @@ def literal(text: str) -> str:
 
 
 def file_literal(path: PathLike | str) -> str:
-    """SQL string literal of a file to read: what DuckDB would take for a pattern stands for itself.
+    """SQL string literal of a file to read; characters that DuckDB would take for a pattern are escaped.
 
     >>> file_literal("line [1]/modes.parquet")
     "'line [[]1]/modes.parquet'"
@@ -177,13 +177,13 @@ def time_column(table: str) -> str | None:
 
 @cache
 def sort_order(table: str) -> tuple[str, ...]:
-    """Columns by which the rows of a file lie sorted; total, because it ends with the key.
+    """Columns by which the rows of a file are sorted; the order is total, because it ends with the key.
 
     >>> sort_order("modes")
     ('"turnout_id"', '"section_id"', '"band"', '"method"', '"measured_at_utc"', '"model_id"')
     """
     time = time_column(table)
-    if "channel" in key(table):  # all sensors of a passage together: its id and time repeat and cost nothing
+    if "channel" in key(table):  # all sensors of a passage together: repeated ids and times compress well
         return ('"turnout_id"', f'"{time}"', *(f'"{k}"' for k in key(table)))
     order = [f'"{c}"' for c in SORT_FIRST if c in names(table)] + ([f'"{time}"'] if time else [])
     return tuple(order + [f'"{k}"' for k in key(table) if f'"{k}"' not in order])
@@ -198,7 +198,7 @@ def arrow_schema(table: str) -> pa.Schema:
 
 
 def create_table(table: str, name: str, extra: str = "") -> str:
-    """CREATE TABLE with NOT NULL, CHECK and PRIMARY KEY; ``extra`` is more columns, ", x integer"."""
+    """CREATE TABLE with NOT NULL, CHECK and PRIMARY KEY; ``extra`` are further columns, as in ", x integer"."""
     body = ", ".join(c.ddl for c in tables()[table])
     keys = ", ".join(f'"{k}"' for k in key(table))
     return f"create table {name} ({body}{extra}, primary key ({keys}))"

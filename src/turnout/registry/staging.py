@@ -1,6 +1,6 @@
-"""The door of the registry: typed tables with CHECK and PRIMARY KEY, for Parquet itself has no constraints.
+"""Check rows in staging tables with CHECK and PRIMARY KEY, because Parquet has no constraints.
 
-A refused row as a quarantine row: never lost, and never in the way of the others.
+A rejected row becomes a quarantine row, so it is not lost and does not stop the others.
 """
 
 import json
@@ -16,7 +16,7 @@ from turnout.registry.schema import create_table, key, names, tables
 
 UNIQUE = "unique, and another row has it already"
 MARKS = ", _unit integer, _row integer, _year integer"
-# Rows of the second kind mean nothing without their row of the first.
+# Parent table: its id, and the tables whose rows have no meaning without their parent row.
 CHILDREN = {
     "models": ("model_id", ("modes", "impact_modes", "receptances")),
     "passages": ("passage_id", ("passage_fits",)),
@@ -25,22 +25,22 @@ CHILDREN = {
 
 
 def connect(**config) -> duckdb.DuckDBPyConnection:
-    """DuckDB in memory that fetches nothing from anywhere."""
+    """DuckDB connection in memory that downloads no extension."""
     settings = {"autoinstall_known_extensions": False, "autoload_known_extensions": False}
     con = duckdb.connect(":memory:", config=settings | {"memory_limit": "2GB"} | config)
-    con.execute("set enable_progress_bar = false")  # it would stand among what a command prints
+    con.execute("set enable_progress_bar = false")  # it would mix with the output of a command
     return con
 
 
 def create_staging(con: duckdb.DuckDBPyConnection) -> None:
-    """The table of units that came, and an empty staging table for each table of the registry."""
+    """Create the table ``came`` of incoming units, and an empty staging table for each table of the registry."""
     con.execute("create table came (_unit integer, unit_id varchar, result_id varchar, algo varchar)")
     for table in tables():
         con.execute(create_table(table, f"new_{table}", MARKS))
 
 
 def note_arrivals(con: duckdb.DuckDBPyConnection, arrivals: list[Arrival]) -> None:
-    """Enter the units of a chunk, before their rows."""
+    """Enter the units of a chunk in ``came``, before their rows."""
     columns = {"_unit": "index", "unit_id": "unit", "result_id": "result_id", "algo": "algo"}
     came = pa.table({name: pa.array([getattr(a, of) for a in arrivals]) for name, of in columns.items()})
     con.register("_arrivals", came)
@@ -49,9 +49,9 @@ def note_arrivals(con: duckdb.DuckDBPyConnection, arrivals: list[Arrival]) -> No
 
 
 def admit(con: duckdb.DuckDBPyConnection, table: str, gathered: pa.Table, run_id: str) -> list[Refusal]:
-    """Insert the sound rows into ``new_<table>`` and return a refusal for each of the others.
+    """Insert the valid rows into ``new_<table>`` and return a refusal for each of the others.
 
-    All rows are tried at once; only if the database refuses are the bad ones sought out by name.
+    All rows are inserted at once; only if a constraint fails are the bad rows searched.
     """
     if gathered.num_rows == 0:
         return []
@@ -70,7 +70,7 @@ def admit(con: duckdb.DuckDBPyConnection, table: str, gathered: pa.Table, run_id
 
 
 def refuse_orphans(con: duckdb.DuckDBPyConnection, refusals: list[Refusal], arrivals: Mapping[int, Arrival]) -> int:
-    """Take back the rows that belong to a refused model or passage, and what is said of them; how many."""
+    """Remove the rows that belong to a rejected model or passage, and their refusals; returns the number of rows."""
     taken = 0
     for refusal in list(refusals):
         if refusal.table not in CHILDREN:
@@ -91,7 +91,7 @@ def refuse_orphans(con: duckdb.DuckDBPyConnection, refusals: list[Refusal], arri
 
 
 def _select(table: str, run_id: str) -> str:
-    """Rounded values in the order of the table, with what the register fills in."""
+    """SELECT of rounded values in the order of the table, with the columns that the registration fills in."""
     filled = {"run_id": f"'{run_id}'", "result_id": "_result_id"}
     parts = [f'{filled.get(c.name, c.rounded)} as "{c.name}"' for c in tables()[table]]
     came = "(select _unit, result_id as _result_id from came)"
@@ -99,7 +99,7 @@ def _select(table: str, run_id: str) -> str:
 
 
 def _bad_values(con, table) -> list[Refusal]:
-    """Refusals of rows that break a CHECK or lack a value; their rows leave ``arriving``."""
+    """Refusals of rows that break a CHECK or lack a value; these rows are deleted from ``arriving``."""
     refusals = []
     for column in tables()[table]:
         rules = ([f'"{column.name}" is null'] if column.required or column.key else []) + (
@@ -123,7 +123,7 @@ def _bad_values(con, table) -> list[Refusal]:
 
 
 def _second_of_a_key(con, table) -> list[Refusal]:
-    """Refusals of all rows but the first, in the order of the units, that share one key, chunks before included."""
+    """Refusals of all rows but the first of each key, in the order of the units, including earlier chunks."""
     keys = key(table)
     quoted = ", ".join(f'"{k}"' for k in keys)
     numbered = f"select _unit, _row, {quoted}, row_number() over (partition by {quoted} order by _unit, _row) as nth"
@@ -138,11 +138,11 @@ def _second_of_a_key(con, table) -> list[Refusal]:
 
 
 REMEDY = "This is a fault of the stage that made the row, not of the measurement: report it with this"
-_LONGEST = 2000
+_LONGEST = 2000  # characters of the column ``found``
 
 
 def quarantine_of(refusal: Refusal, arrival: Arrival) -> dict:
-    """Quarantine row that names table, row, column and value, and carries the whole row in ``found``."""
+    """Quarantine row that names table, row, column and value, with the whole row in ``found``."""
     given = arrival.tables[refusal.table][refusal.row]
     row = given if isinstance(given, dict) else {}
     recordings = [r for r in arrival.tables.get("recordings", ()) if isinstance(r, dict)] or [{}]
@@ -167,7 +167,7 @@ def quarantine_of(refusal: Refusal, arrival: Arrival) -> dict:
 
 
 def identified(row: dict, unit: str) -> dict:
-    """The quarantine row with its id, which follows from the unit and all that the row says."""
+    """The quarantine row with its id, the hash of the unit and of its content."""
     said = {k: row.get(k) for k in names("quarantine") if k not in ("quarantine_id", "run_id", "result_id")}
     return row | {"quarantine_id": content_id("quarantine", unit, said)}
 

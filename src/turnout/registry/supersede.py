@@ -1,9 +1,7 @@
-"""What no longer counts: rows stay, and a row of ``supersedes`` says what took their place and why.
+"""Mark rows as superseded: they stay, and a row of ``supersedes`` names their successor and the reason.
 
-Which files hold rows that no longer count: the others are read without looking each row up.
-
-Looking up 29 million ids costs more than most questions. So each file of the large tables knows how many of its rows
-are superseded; compaction parts the two kinds, and a file in which nothing counts is not read at all.
+Each file of the large tables knows the number of its superseded rows, because looking up 29 million ids takes longer
+than most queries. Compaction separates valid and superseded rows; a file without valid rows is not read.
 """
 
 from dataclasses import replace
@@ -16,7 +14,7 @@ from turnout.registry.parquet import read_live
 from turnout.registry.schema import file_literal, names
 from turnout.registry.staging import CHILDREN
 
-# kind of row: its table, its id, and the SQL that finds its counterpart in the new result of the same unit
+# type of row: its table, its id, and the SQL of the text that is equal in its counterpart of the new result
 KINDS = {
     "model": ("models", "model_id", "t.section_id || ' ' || t.method"),
     "passage": ("passages", "passage_id", "t.passed_at_utc::varchar"),
@@ -27,18 +25,18 @@ KINDS = {
 
 
 def note_dead(con: duckdb.DuckDBPyConnection) -> None:
-    """Table ``dead``: ids of the registry that no longer count."""
+    """Create table ``dead``: ids of the registry that are superseded."""
     con.execute(f"create temp table dead as {last_word('old_supersedes')}")
 
 
 def last_word(*relations: str) -> str:
-    """SELECT of the ids that no longer count, by what was said last of each in the ``relations``."""
+    """SELECT of the superseded ids, by the last statement about each in the ``relations``."""
     said = " union all ".join(f"select old_id, generation, reason from {r}" for r in relations)
     return f"select old_id from ({said}) group by old_id having arg_max(reason, generation) <> 'reinstated'"
 
 
 def supersede(con: duckdb.DuckDBPyConnection, generation: int, run_id: str) -> int:
-    """Fill ``new_supersedes`` from what came and what earlier results of the same units left; how many rows."""
+    """Fill ``new_supersedes`` by comparing new and earlier results of the same units; returns the number of rows."""
     _note_new_ids(con)
     _note_prior(con)
     _note_causes(con)
@@ -62,7 +60,7 @@ def supersede(con: duckdb.DuckDBPyConnection, generation: int, run_id: str) -> i
 
 
 def leave_out_known(con: duckdb.DuckDBPyConnection) -> None:
-    """Take out of the staging tables what the registry holds already: same id, same content."""
+    """Delete from the staging tables the rows that the registry already has: same id, same content."""
     con.execute(
         "create or replace temp table known_results as "
         "select result_id from new_results semi join old_results using (result_id)"
@@ -81,7 +79,7 @@ def leave_out_known(con: duckdb.DuckDBPyConnection) -> None:
 
 
 def _known_child(child: str, id_column: str) -> str:
-    """A child is known with its parent; a fit only if it was made with the same model, too."""
+    """SQL condition: the child row is known, with its parent; a fit only if it has the same model, too."""
     if child != "passage_fits":
         return f"{id_column} in (from known)"
     keys = "passage_id, section_id, channel, model_id"
@@ -89,7 +87,7 @@ def _known_child(child: str, id_column: str) -> str:
 
 
 def _note_new_ids(con) -> None:
-    """Ids of all that came, before what is already there is taken out of the staging tables."""
+    """Create table ``new_ids``: ids of all incoming rows, before known rows are deleted."""
     parts = [
         f"select '{kind}' as kind, t.{id_column} as id, c.unit_id, {place} as place "
         f"from new_{table} t join (select _unit, unit_id from came) c using (_unit)"
@@ -99,7 +97,7 @@ def _note_new_ids(con) -> None:
 
 
 def _note_prior(con) -> None:
-    """What earlier results of the same units left in the registry, and whether it still counts."""
+    """Create table ``prior``: ids of earlier results of the same units, and whether they are superseded."""
     con.execute(
         "create temp table prior_results as select result_id, unit_id, code_version from old_results "
         "semi join came using (unit_id)"
@@ -114,7 +112,7 @@ def _note_prior(con) -> None:
 
 
 def _note_causes(con: duckdb.DuckDBPyConnection) -> None:
-    """Why each unit was computed again: other raw files, else other code, else another configuration."""
+    """Create table ``causes``: why each unit was computed again: new data, new code or new configuration."""
     con.execute(
         """create temp table causes as
         with live as (select p.* from prior_results p where p.result_id not in (select old_id from dead)),
@@ -129,7 +127,7 @@ def _note_causes(con: duckdb.DuckDBPyConnection) -> None:
     )
 
 
-# The large tables, and the ids by which a row of them can be superseded.
+# The large tables, and the ids by which their rows are superseded.
 LARGE = {"modes": ("model_id",), "impact_modes": ("model_id",), "passage_fits": ("passage_id", "model_id")}
 
 
@@ -139,7 +137,7 @@ def dead_rows(table: str, alias: str = "t") -> str:
 
 
 def with_dead(con: duckdb.DuckDBPyConnection, root: Path, files: list[DataFile]) -> list[DataFile]:
-    """The files with the number of their rows that are superseded, by the table ``superseded`` of ``con``."""
+    """The files with their number of superseded rows, from the table ``superseded`` of ``con``."""
     counted: dict[str, int] = {}
     for table in LARGE:
         paths = {str(root / f.path): f.path for f in files if f.table == table}
@@ -155,7 +153,7 @@ def with_dead(con: duckdb.DuckDBPyConnection, root: Path, files: list[DataFile])
 
 
 def create_parts(con: duckdb.DuckDBPyConnection, root: Path, table: str, files: list[DataFile]) -> None:
-    """Views ``<table>_settled`` of the files in which every row counts, ``<table>_touched`` of those where some do."""
+    """Create view ``<table>_settled`` of files without superseded rows, ``<table>_touched`` of files with some."""
     settled = [f for f in files if f.dead == 0]
     touched = [f for f in files if 0 < f.dead < f.rows]
     for part, chosen in (("settled", settled), ("touched", touched)):
@@ -163,6 +161,6 @@ def create_parts(con: duckdb.DuckDBPyConnection, root: Path, table: str, files: 
 
 
 def halves(table: str, select: str) -> tuple[str, str]:
-    """SELECTs of the rows that count and of those that do not."""
+    """SELECTs of the valid and of the superseded rows."""
     columns = ", ".join(f't."{n}"' for n in names(table))
     return tuple(f"select {columns} from ({select}) t where {sign} ({dead_rows(table)})" for sign in ("not", ""))  # type: ignore[return-value]

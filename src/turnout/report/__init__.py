@@ -1,1 +1,1 @@
-"""Figures and pages: static HTML with drawings in it, made from the registry alone."""
+"""Make figures and static HTML pages from the registry."""

@@ -1,4 +1,4 @@
-"""A page and a table of modes that others published beside those found here, with the responses they are from."""
+"""Write a page and a table that compare published modes of beams with those identified here."""
 
 import csv
 import io
@@ -23,7 +23,7 @@ def write_beams(beams, folder):
     ----------
     beams : sequence
         Each with ``name``, ``origin``, ``frequency`` (n_line,) [Hz], ``responses`` (n_frf, n_line) complex,
-        ``highest`` [Hz] and ``rows`` of (published frequency [Hz], published damping [%], found mode or None).
+        ``highest`` [Hz] and ``rows`` of (published frequency [Hz], published damping [%], identified mode or None).
 
     Returns
     -------
@@ -46,7 +46,7 @@ def write_beams(beams, folder):
 
 
 def beam_panel(beam):
-    """Magnitude of every response, published modes as lines across, found ones as dots with their interval."""
+    """SVG of the magnitude of every response, published modes as vertical lines, identified modes as dots."""
     inside = (beam.frequency > 0.0) & (beam.frequency <= beam.highest)
     frequency, size = beam.frequency[inside], np.abs(beam.responses[:, inside])
     known = size[np.isfinite(size) & (size > 0.0)]
@@ -78,7 +78,7 @@ def _numbers(published, damping, mode):
 
 
 def _words(published, damping, mode):
-    """One line of the table; ± is the half width of the 95 % interval."""
+    """One row of the page's table in words; ± is the half width of the 95 % interval."""
     said = {
         "published": "not published" if published is None else f"{published:.1f}",
         "damping": "–" if damping is None else f"{damping:.2f}",

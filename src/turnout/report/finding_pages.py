@@ -1,4 +1,4 @@
-"""Pages of mismatches: from the registry for a fleet, from the rows of a diagnosis for one turnout."""
+"""Write the pages of findings, from the registry for a fleet or from the rows of one diagnosis."""
 
 from importlib.resources import files
 from pathlib import Path
@@ -20,7 +20,7 @@ SILENT = "select * from quarantine_open where stage = 'mismatch' order by place"
 
 
 def write_finding_pages(connection, folder, generation="", turnouts=None) -> int:
-    """Write ``folder``/findings/<id>.html for every turnout that was diagnosed; how many."""
+    """Write ``folder``/findings/<id>.html for every turnout that was diagnosed; returns their number."""
     kinds = {"mismatch_findings": NEWEST, "quarantine": SILENT}
     rows = {kind: _by_turnout(_fetch(connection, sql)) for kind, sql in kinds.items()}
     diagnosed = sorted(set(rows["mismatch_findings"]) | set(rows["quarantine"]))
@@ -36,7 +36,7 @@ def write_finding_pages(connection, folder, generation="", turnouts=None) -> int
 
 
 def write_own_page(tables, config, turnout_id, folder) -> Path:
-    """Page of one turnout from the rows of its diagnosis, without a registry."""
+    """Write the page of one turnout from the rows of its diagnosis, without a registry."""
     turnout = load_configuration(config).turnout(turnout_id)
     about = {"turnout_id": turnout.id, "name": turnout.name, "layout": turnout.layout}
     sections = [

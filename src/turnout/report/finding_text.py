@@ -1,4 +1,4 @@
-"""What a finding says to somebody who will go and look: what was left out, where, when, how sure."""
+"""Describe a finding in words for the check on site: the missing effect, position, time and certainty."""
 
 import json
 
@@ -25,13 +25,13 @@ def parameters(finding) -> list[dict]:
 
 
 def filed(rows) -> list[dict]:
-    """The same of what the track's file has and the visit estimated anew; ``rows`` of ``mismatch_parameters``."""
+    """The same for effects accepted in the track file and estimated again; ``rows`` of ``mismatch_parameters``."""
     names = ("term", "position_m", "parameter", "value", "value_low", "value_high", "unit")
     return [_parameter(*(row[name] for name in names)) for row in rows if row["accepted"]]
 
 
 def _parameter(term, place, name, value, low, high, unit):
-    digits = 4 if unit == "m" and abs(value) >= 10.0 else 3  # a place along the turnout, to a centimetre
+    digits = 4 if unit == "m" and abs(value) >= 10.0 else 3  # position along the turnout, to a centimetre
     effect = term.replace("_", " ") + (f" at {place:.1f} m" if place is not None else "")
     ends = [number_in_words(end, unit, digits) for end in (low, high) if end is not None]
     return {
@@ -43,7 +43,7 @@ def _parameter(term, place, name, value, low, high, unit):
 
 
 def facts(finding) -> list[tuple[str, str]]:
-    """(question, answer) pairs: where, what it moves with, which band, when, from how much, how sure."""
+    """(question, answer) pairs: position, frame that it is fixed to, band, time, amount of data, certainty."""
     evidence = json.loads(finding["evidence_json"] or "{}")
     found = [("Where", _where(finding)), ("It is fixed to", _locked(finding, evidence))]
     if finding["band_low_hz"] is not None and finding["verdict"] not in ("none", "numerics"):
@@ -72,7 +72,7 @@ def _where(finding):
 
 
 def _locked(finding, evidence):
-    """What the residual moves with: the significant frames, strongest first."""
+    """What the residual is fixed to: the significant frames, strongest first."""
     if finding["train"]:
         return f"the train: {finding['train']}"
     frames = [f for f in evidence.get("frames", ()) if f["q"] is not None and f["q"] < 0.05]
@@ -122,7 +122,7 @@ def _sure(finding, evidence):
 
 
 def _by_itself(said, further):
-    """Name and probability of one of several effects; the reason of a ``further`` one, which stands nowhere else."""
+    """Name and probability of one of several effects; for a ``further`` one also its reason, given only here."""
     why = f" ({said['reason']})" if further and said.get("reason") else ""
     return f"{said['term'].replace('_', ' ')} {said['probability']:.2f}{why}"
 
@@ -144,7 +144,7 @@ def check(finding) -> str:
 
 
 def rivals(finding) -> list[dict]:
-    """What else was tried: name, evidence over the base model [nats], share of the excess explained."""
+    """Rivals: name, evidence over the base model [nats], share of the excess explained."""
     evidence = json.loads(finding["evidence_json"] or "{}")
     return [
         {

@@ -1,4 +1,4 @@
-"""Numbers and states as people read them: never a number without its interval and its n."""
+"""Format numbers with their 95 % interval, days, and states for pages."""
 
 import math
 from functools import cache
@@ -27,7 +27,7 @@ def student_quantile(n):
 
 
 def with_interval(value, standard_error, n, digits=1):
-    """A value with the half width of its 95 % t interval, which has one significant digit at least.
+    """A value with the half width of its 95 % t interval, which gets at least one significant digit.
 
     >>> with_interval(154.55, 0.4, 30)
     '154.6 ± 0.8'
@@ -40,7 +40,7 @@ def with_interval(value, standard_error, n, digits=1):
     """
     if value is None:
         return "none"
-    if not standard_error or n < 2:  # one of nothing was smaller than the registry's resolution
+    if not standard_error or n < 2:  # an error of zero is below the resolution of the registry
         return f"{value:.{digits}f} ± ?"
     half = student_quantile(n) * standard_error
     if 2.0 * half < 10.0**-digits:

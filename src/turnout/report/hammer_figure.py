@@ -1,4 +1,4 @@
-"""One hammer test as a drawing of its own: the panels of the turnout's page in one SVG file."""
+"""Draw one hammer test as an SVG file with the panels of the turnout's page."""
 
 import re
 from html import escape
@@ -8,14 +8,14 @@ from turnout.errors import REASONS
 from turnout.report.hammer_text import heading, resonances, verdict
 from turnout.report.panels.hammer import coherence_panel, decay_panel, impacts_panel, receptance_panel
 
-WIDTH, HEAD, GAP = 462, 52, 12
+WIDTH, HEAD, GAP = 462, 52, 12  # px: width of a panel, height of the header, space between panels
 HEIGHT = re.compile(r' height="(\d+)"')
 
 
 def hammer_figure(rows, unit, turnout) -> str:
-    """SVG: receptance with the bracket of H1 and H2, coherence with its limits, decay with the model's, and the blows.
+    """SVG: receptance between H1 and H2, coherence with its limits, measured and modelled decay, and the impacts.
 
-    ``rows`` by table as ``hammer_unit`` makes them; "" where there is no blow to draw.
+    ``rows`` by table are those of ``hammer_unit``; "" without an impact.
     """
     drawn = _panels(rows)
     if not drawn:
@@ -37,7 +37,7 @@ def hammer_figure(rows, unit, turnout) -> str:
 
 
 def _told(rows) -> list[str]:
-    """The resonances and what the model was refused for."""
+    """The resonances and the reason why the model was rejected."""
     reasons = [REASONS[model["reason"]] for model in rows.get("models", ()) if model["reason"]]
     return ["; ".join([*resonances(rows), *reasons])] if rows.get("models") else []
 
@@ -51,7 +51,7 @@ def _panels(rows) -> list[str]:
 
 
 def _style() -> str:
-    """Rules of the pages for what is inside a drawing, colours written out: programs that draw know no variables."""
+    """Style rules for drawings, with colours written out because drawing programs know no CSS variables."""
     css = (files("turnout.report") / "templates" / "page.css").read_text(encoding="utf-8")
     colours = dict(re.findall(r"(--\w+):([^;}]+)", css))
     inside = css[css.index("svg text{") : css.index("@media print")]

@@ -1,4 +1,4 @@
-"""One hammer test in words, from the rows that the hammer chain hands to the registry."""
+"""Describe one hammer test in words, from the rows that the hammer stage makes for the registry."""
 
 from collections import Counter
 from math import floor
@@ -18,7 +18,7 @@ VERDICTS = {
 
 
 def verdict(rows) -> str:
-    """What came of a test in a few words.
+    """Result of a test in a few words.
 
     >>> verdict({"recordings": [], "quarantine": [{}]})
     'nothing could be used'
@@ -28,12 +28,12 @@ def verdict(rows) -> str:
 
 
 def is_usable(rows) -> bool:
-    """Whether at least one resonance stands."""
+    """Whether at least one resonance is accepted."""
     return any(model["status"] != "rejected" for model in rows.get("models", ()))
 
 
 def heading(unit, turnout) -> str:
-    """Turnout, section with its place, and campaign."""
+    """Turnout, section with its position, and campaign."""
     place = turnout.section(unit.section)
     track = "both tracks" if place.track == "both" else f"{place.track} track" if place.track else ""
     parts = [PANELS.get(place.panel), track, f"{place.position:g} m"]
@@ -41,9 +41,9 @@ def heading(unit, turnout) -> str:
 
 
 def hammer_words(rows, unit, turnout, remarks=()) -> list[str]:
-    """Lines of text: what was read, which blows count, what the coherence is, the resonances or why there is none.
+    """Lines of text: files read, impacts accepted, coherence, resonances or why there is none.
 
-    ``rows`` by table as ``hammer_unit`` makes them; ``remarks`` are put below them.
+    ``rows`` by table are those of ``hammer_unit``; ``remarks`` are added at the end.
     """
     lines = [f"{heading(unit, turnout)}: {verdict(rows)}"]
     names = _names(rows.get("recordings", ()))
@@ -70,7 +70,7 @@ def _line(what, words) -> str:
 
 
 def _names(recordings) -> dict[str, str]:
-    """Names of files by the ids of their recordings; with their folders where two are called the same."""
+    """File names by recording id; with their folders where two have the same name."""
     short = {row["recording_id"]: row["path"].rsplit("/", 1)[-1] for row in recordings}
     count = Counter(short.values())
     return {
@@ -96,9 +96,9 @@ def _channels(hammer, section) -> str:
 
 
 def _quarantined(rows) -> list[str]:
-    """A line for each file or record that is not used; records of a file that lack the same share one.
+    """A line for each file or record that is not used; records of a file with the same problem share one.
 
-    What is filed under another time than it notes is used, and said all the same.
+    A file with another time in its name than inside is used, and has a line, too.
     """
     alike: dict[tuple, list] = {}
     for row in rows:
@@ -112,7 +112,7 @@ def _quarantined(rows) -> list[str]:
 
 
 def _blows(rows, settings) -> list[str]:
-    """A line for each blow with its verdict; they are counted from 1."""
+    """A line for each impact with its verdict; they are counted from 1."""
     names = _names(rows["recordings"])
     blows = rows["impacts"]
     used = sum(blow["status"] == "accepted" for blow in blows)
@@ -139,7 +139,7 @@ def _judged(blow) -> str:
 
 
 def _gate(rows, settings) -> list[str]:
-    """How far the coherence reaches; nothing without a receptance."""
+    """Lines about the coherence and the share of lines that pass the gate; none without a receptance."""
     if not rows.get("receptances"):
         return []
     row, asked = rows["receptances"][0], settings["receptance"]
@@ -161,7 +161,7 @@ def _gate(rows, settings) -> list[str]:
 
 
 def _bands(rows) -> list[str]:
-    """The two main bands, whether or not they hold a resonance, and others that do."""
+    """The two main bands, and others with a resonance."""
     return [*BANDS, *(mode["band"] for mode in rows.get("modes", ()) if mode["band"] not in BANDS)]
 
 
@@ -179,7 +179,7 @@ def _mode(mode) -> str:
 
 
 def _stiffness(mode, rows) -> list[str]:
-    """Dynamic stiffness at the line next to the resonance; an exponential window would make it another one."""
+    """Dynamic stiffness at the line nearest to the resonance; not with an exponential window, which changes it."""
     row = rows["receptances"][0]
     if row["window_decay_per_s"]:
         return []
@@ -196,7 +196,7 @@ def _stiffness(mode, rows) -> list[str]:
 
 
 def _why(model) -> list[str]:
-    """What the model says of itself: why it was refused or holds one resonance alone, and what else was seen."""
+    """Why the model was rejected or has one resonance only, or else its detail."""
     if not model["reason"]:
         return [_line("detail", model["detail"])] if model["detail"] else []
     return [_line("why", f"{REASONS[model['reason']]}: {model['detail']}")]

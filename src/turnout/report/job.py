@@ -1,4 +1,4 @@
-"""The report step of the workflow and of ``turnout report``."""
+"""Run the report step of the workflow and of ``turnout report``."""
 
 import multiprocessing
 from concurrent.futures import ProcessPoolExecutor
@@ -10,9 +10,9 @@ from turnout.report.write import AT_ONCE, write_pages, write_turnouts
 
 
 def report_job(registry, pages, turnouts=None, log=None, threads=1, day=None) -> int:
-    """Write the pages of the registry in folder ``registry`` into ``pages``; returns how many had to be written.
+    """Write the changed pages of the registry in folder ``registry`` into ``pages``; returns their number.
 
-    They are those of ``day`` (YYYY-MM-DD), by default of today.
+    They show the state on ``day`` (YYYY-MM-DD), by default today.
     """
     with open_registry(registry) as connection:
         _check_known(connection, turnouts)
@@ -33,7 +33,10 @@ def report_job(registry, pages, turnouts=None, log=None, threads=1, day=None) ->
 
 
 def _in_processes(registry, pages, content, generation, threads, day):
-    """Shares of AT_ONCE turnouts to fresh processes, each with a connection of its own: DuckDB's cannot be forked."""
+    """Write the pages in new processes, AT_ONCE turnouts each.
+
+    Every process opens its own connection, because DuckDB connections cannot be forked.
+    """
     names = list(content)
     with ProcessPoolExecutor(threads, multiprocessing.get_context("spawn")) as pool:
         shares = [{t: content[t] for t in names[k : k + AT_ONCE]} for k in range(0, len(names), AT_ONCE)]

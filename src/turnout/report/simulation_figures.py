@@ -1,4 +1,4 @@
-"""Figures of the simulation: receptances, a passage wheel by wheel, two sensors in two bands, decay rates."""
+"""Draw the figures of the simulation: receptances, a passage, two sensors in two bands, decay rates."""
 
 from pathlib import Path
 
@@ -40,7 +40,7 @@ def _passage():
 
 
 def _receptances():
-    """Receptance of the track, and what the hammer chain makes of ten simulated blows, at four sections."""
+    """Receptance of the track, and its estimate from ten simulated impacts, at four sections."""
     import matplotlib.pyplot as plt
 
     from turnout.config.settings.receptance import ReceptanceSettings
@@ -73,7 +73,7 @@ def _receptances():
 
 
 def _passage_forces(recording, truth):
-    """Acceleration at the crossing and the contact force of every wheel over its place."""
+    """Acceleration at the crossing, and the contact force of every wheel over its position."""
     import matplotlib.pyplot as plt
 
     figure, (top, bottom) = plt.subplots(2, 1, figsize=(8.5, 6.5), layout="constrained")
@@ -90,7 +90,7 @@ def _passage_forces(recording, truth):
 
 
 def _two_sensors(recording):
-    """The paper's comparison at A1 and A4: 0-40 and 40-1000 Hz, time and power spectral density."""
+    """Sensors A1 and A4 in 0-40 and 40-1000 Hz, time series and power spectral density, as in the paper."""
     import matplotlib.pyplot as plt
     from scipy.signal import butter, sosfiltfilt, welch
 
@@ -112,7 +112,7 @@ def _two_sensors(recording):
 
 
 def _closed_form():
-    """Meshed track against Floquet's solution, and the waves that leave a blow."""
+    """Receptance of the meshed track and of Floquet's solution, and the wave that propagates from an impact."""
     import matplotlib.pyplot as plt
 
     from turnout.simulate import uniform_track

@@ -1,14 +1,14 @@
-"""What the pages need from the registry: sums for the fleet's page, whole rows for some turnouts at a time."""
+"""Query the registry for the pages: sums for the fleet, whole rows for some turnouts at a time."""
 
 from collections import defaultdict
 
 from turnout.registry.as_of import list_day, whole_list
 from turnout.report.trains import train_rows
 
-# One row per section of the newest model, whatever it says.
+# One row per section: that of the newest model, accepted or not.
 NEWEST = "qualify row_number() over (partition by section_id order by measured_at_utc desc, model_id) = 1"
 OF_SOME = "turnout_id in (select unnest($turnouts))"
-ALIKE = 20  # rows of quarantine of one reason that a page shows
+ALIKE = 20  # quarantine rows of one reason that a page shows
 ROWS = {
     "turnouts": f"select * from turnouts where {OF_SOME}",
     "sections": f"select * from sections where {OF_SOME} order by position_m, label",
@@ -35,7 +35,7 @@ ROWS = {
             select section_id, max(campaign_id) as campaign_id from impacts_current where {OF_SOME} group by section_id
         ) newest using (section_id, campaign_id)
         order by i.section_id, i.test, i.record""",
-    # of each reason those that are newest by their names: a sensor may be dead for years
+    # of each reason the newest by name, because a sensor may be dead for years
     "quarantine": f"""
         select *, count(*) over (partition by turnout_id, kind, reason_code) as n_alike
         from quarantine_open where {OF_SOME}
@@ -77,9 +77,9 @@ TREND_VIEWS = {"charts", "chart_states", "worklist"}
 
 
 class FleetSource:
-    """Rows as dictionaries: ``turnouts()``, ``reasons()``, ``states()``, ``worklist()`` of the fleet, ``of_some``.
+    """Rows of the registry as dictionaries, of the fleet or of some turnouts (``rows_of``).
 
-    States and list are those of ``day`` (YYYY-MM-DD), by default of today.
+    States and worklist are those of ``day`` (YYYY-MM-DD), by default of today.
     """
 
     def __init__(self, connection, day=None):
@@ -92,29 +92,29 @@ class FleetSource:
         return self._fetch(TURNOUTS)
 
     def reasons(self):
-        """How many impacts and quarantine rows each reason has."""
+        """Number of impacts and quarantine rows by reason."""
         return self._fetch(REASONS)
 
     def states(self):
-        """Charts by turnout and state, none before the first trend."""
+        """Number of charts by turnout and state; empty before the first trend."""
         sql = "select turnout_id, state, count(*) as n from chart_states_on(:today) group by all order by all"
         return self._fetch(sql) if self.has("chart_states") else []
 
     def worklist(self):
-        """Tomorrow's list, empty before the first trend."""
+        """Tomorrow's worklist; empty before the first trend."""
         return self._fetch("select * from worklist(:today) order by rank") if self.has("worklist") else []
 
     def listed(self):
-        """How many rows of each state the whole list has."""
+        """Number of rows of the whole worklist by state."""
         sql = f"select state, count(*) as n from {whole_list(':today')} group by state"
         return {row["state"]: row["n"] for row in self._fetch(sql)} if self.has("worklist") else {}
 
     def has(self, kind):
-        """Whether the registry has rows of ``kind``: those of the trend come with its first run."""
+        """Whether the registry has ``table``; those of the trend exist after its first run."""
         return kind not in TREND_VIEWS or kind in self.there
 
     def of_some(self, turnout_ids):
-        """Rows of every kind of the turnouts named: {kind: {turnout_id: [row, ...]}}."""
+        """Rows of the given turnouts from all queries: {table: {turnout_id: [row, ...]}}."""
         chosen = {"turnouts": list(turnout_ids)}
         kinds = [kind for kind in ROWS if self.has(kind)]
         rows = {kind: _by_turnout(self._fetch(ROWS[kind], chosen)) for kind in kinds if kind != "receptances"}
@@ -122,7 +122,7 @@ class FleetSource:
         return rows | {"receptances": _by_turnout(self._arrays(ROWS["receptances"], chosen))}
 
     def _arrays(self, sql, parameters):
-        """Rows whose lists come as numpy arrays, which is many times faster than as Python lists."""
+        """Rows with lists as numpy arrays, which is many times faster than Python lists."""
         frame = self.connection.execute(sql, parameters).df()
         return frame.astype(object).where(frame.notna(), None).to_dict("records")
 

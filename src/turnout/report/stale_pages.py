@@ -1,11 +1,11 @@
-"""Which pages say something else than the registry does now: one hash per turnout over all that its page shows."""
+"""Find pages that are out of date, by one hash per turnout of everything that its page shows."""
 
 import re
 
 from turnout.fingerprint import fingerprint
 from turnout.registry.as_of import whole_list
 
-# What a page is made of. A result's id stands for its models, modes, impacts, receptances and passages: it is a
+# Rows that a page shows. The id of a result represents its models, modes, impacts, receptances and passages: it is a
 # hash of the raw files, the configuration and the code that they were computed from.
 SHOWN = {
     "turnouts": "turnouts",
@@ -21,11 +21,11 @@ SHOWN = {
 }
 MARK = '<meta name="turnout-content" content="{}">'
 MARKED = re.compile(re.escape(MARK).replace(r"\{\}", "([0-9a-f]+)"))
-HEAD = 2000
+HEAD = 2000  # characters of a page that contain its hash
 
 
 def contents(source):
-    """Hash of what the page of each turnout shows, with the code that draws it.
+    """Hash of what the page of each turnout shows, including the code that draws it.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def contents(source):
     Returns
     -------
     dict of str
-        32 hex characters by turnout. The order of rows counts for nothing, their number does.
+        32 hexadecimal digits by turnout. The order of rows does not matter, their number does.
     """
     parts = [
         f"select turnout_id, '{kind}' as kind, count(*) as n, sum(hash(r)::hugeint) as total "
@@ -52,7 +52,7 @@ def contents(source):
 
 
 def content_of(path):
-    """Hash of the content that the page ``path`` was made from; None for no page, or somebody else's."""
+    """Hash stored in the page ``path``; None if there is no page, or it is not from this program."""
     try:
         with open(path, encoding="utf-8", errors="replace") as file:
             found = MARKED.search(file.read(HEAD))

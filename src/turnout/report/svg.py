@@ -1,8 +1,6 @@
-"""A small chart in SVG: axes, lines, bands, points with error bars. No script, prints and mails as it is.
+"""Draw small charts in SVG: axes with ticks, lines, bands, and points with error bars. They need no script.
 
-Where the ticks of an axis stand and what they say.
-
-Which points of a long curve a drawing needs: what the eye cannot part is not written out.
+Long curves are reduced to the points that are visible.
 """
 
 import math
@@ -48,7 +46,7 @@ def log_ticks(low, high):
 
 
 def time_ticks(low, high, about=6):
-    """Starts of months or years between two POSIX times [s], at most ``about`` or so.
+    """Starts of months or years between two POSIX times [s], about ``n_target`` of them.
 
     >>> from datetime import UTC
     >>> start = datetime(2024, 1, 10, tzinfo=UTC).timestamp()
@@ -68,7 +66,7 @@ def time_ticks(low, high, about=6):
 
 
 def say_number(value, step=None):
-    """A tick's number, as short as it can be, with the digits that tell it from the next one, ``step`` away.
+    """Short text of a tick's number, with enough digits to differ from the next tick, ``step`` away.
 
     >>> say_number(0.2), say_number(1500.0), say_number(1e-9), say_number(0.0)
     ('0.2', '1500', '10⁻⁹', '0')
@@ -92,7 +90,7 @@ def say_day(seconds):
 
 
 def runs(good):
-    """Slices of the unbroken stretches of True.
+    """Slices of the contiguous runs of True.
 
     >>> runs(np.array([True, True, False, True]))
     [slice(0, 2, None), slice(3, 4, None)]
@@ -102,12 +100,12 @@ def runs(good):
 
 
 def drawn(px, py):
-    """The points that draw the same curve: in every pixel's width the first, the last, the lowest and the highest.
+    """Fewer points that draw the same curve: the first, last, lowest and highest of every pixel column.
 
     Parameters
     ----------
     px, py : (n,) array of float
-        Pixels, finite, from left to right; a curve that turns back is drawn whole.
+        Pixels, finite, from left to right; a curve that turns back is not reduced.
 
     Returns
     -------
@@ -116,7 +114,7 @@ def drawn(px, py):
 
     Examples
     --------
-    Two hundred points of a comb within two pixels; six draw it, first and last of a pixel being its extremes:
+    Two hundred points of a comb within two pixels; four draw it, as first and last of a pixel are its extremes:
 
     >>> px, py = drawn(np.linspace(0.0, 1.99, 200), np.arange(200) % 2.0)
     >>> len(px), sorted(set(py.tolist()))
@@ -133,7 +131,7 @@ def drawn(px, py):
     return px[kept], py[kept]
 
 
-LEFT, RIGHT, TOP, BOTTOM = 62, 14, 26, 40
+LEFT, RIGHT, TOP, BOTTOM = 62, 14, 26, 40  # px, margins around the plot area
 
 
 @dataclass
@@ -152,7 +150,7 @@ class Axis:
             self.low, self.high = self.low - pad, self.high + pad
 
     def share(self, values):
-        """Place of ``values`` along the axis, 0 to 1."""
+        """Relative position of ``values`` along the axis, 0 to 1."""
         values = np.asarray(values, dtype=float)
         if self.scale == "log":
             with np.errstate(divide="ignore", invalid="ignore"):
@@ -160,7 +158,7 @@ class Axis:
         return (values - self.low) / (self.high - self.low)
 
     def ticks(self):
-        """Pairs of value and text."""
+        """Pairs of value and text of the ticks."""
         if self.scale == "names":
             return [(k, escape(name)) for k, name in enumerate(self.names, start=1)]
         if self.scale == "time":
@@ -174,7 +172,7 @@ class Axis:
 
 @dataclass
 class Chart:
-    """One panel. Draw in order, then take ``svg()``; styles are classes of the page's style sheet."""
+    """One panel. Add elements in drawing order, then call ``svg()``; styles are classes of the style sheet."""
 
     x: Axis
     y: Axis
@@ -192,14 +190,14 @@ class Chart:
         return self.height - BOTTOM - self.y.share(values) * (self.height - TOP - BOTTOM)
 
     def line(self, x, y, style, label=""):
-        """A polyline, broken where a value is missing."""
+        """Draw a polyline with gaps at missing values."""
         px, py = self.px(x), self.py(y)
         pieces = (drawn(px[piece], py[piece]) for piece in runs(np.isfinite(px) & np.isfinite(py)))
         path = "".join("M" + _joined(*piece) for piece in pieces)
         self.parts.append(f'<path class="{style}" d="{path}">{_title(label)}</path>')
 
     def band(self, x, low, high, style, label=""):
-        """The area between two lines; pieces with missing values are left out."""
+        """Draw the area between two lines, with gaps at missing values."""
         px, low, high = self.px(x), self.py(low), self.py(high)
         for piece in runs(np.isfinite(px) & np.isfinite(low) & np.isfinite(high)):
             there, (x_back, y_back) = drawn(px[piece], high[piece]), drawn(px[piece], low[piece])
@@ -207,7 +205,7 @@ class Chart:
             self.parts.append(f'<path class="{style}" d="{path}">{_title(label)}</path>')
 
     def points(self, x, y, style, radius=3.0, low=None, high=None, labels=None):
-        """Dots, with bars from ``low`` to ``high`` where given, and a text each on hovering."""
+        """Draw dots, with bars from ``low`` to ``high`` if given, and ``labels`` as text on hovering."""
         px, py = np.atleast_1d(self.px(x)), np.atleast_1d(self.py(y))
         shown = np.isfinite(px) & np.isfinite(py)
         if low is not None and high is not None:
@@ -222,7 +220,7 @@ class Chart:
         self.parts += [dot % (px[i], py[i], texts[i]) for i in np.flatnonzero(shown).tolist()]
 
     def vertical(self, x, style, label="", row=0):
-        """A line across the panel at ``x``, with a word at its head."""
+        """Draw a vertical line at ``x`` with a label at its top."""
         px = float(self.px(x))
         if LEFT - 1 <= px <= self.width - RIGHT + 1:
             self.parts.append(f'<path class="{style}" d="M{px:.1f} {TOP}V{self.height - BOTTOM}"/>')
@@ -233,7 +231,7 @@ class Chart:
                 self.parts.append(f'<text class="{style}" {place} text-anchor="{anchor}">{escape(label)}</text>')
 
     def span(self, x_low, x_high, style, label=""):
-        """A shaded stretch of the horizontal axis."""
+        """Shade an interval of the horizontal axis."""
         left, right = (float(np.clip(self.px(v), LEFT, self.width - RIGHT)) for v in (x_low, x_high))
         if right > left:
             self.parts.append(
@@ -242,7 +240,7 @@ class Chart:
             )
 
     def text(self, x_share, y_share, words, style="note", anchor="start"):
-        """Words at a place of the panel given in shares of its width and height."""
+        """Draw words at a position given in shares of the width and height of the panel."""
         px = LEFT + x_share * (self.width - LEFT - RIGHT)
         py = TOP + y_share * (self.height - TOP - BOTTOM)
         self.parts.append(
@@ -250,7 +248,7 @@ class Chart:
         )
 
     def svg(self):
-        """The whole drawing."""
+        """Text of the complete SVG element."""
         frame = (
             f'<svg class="chart" viewBox="0 0 {self.width} {self.height}" width="{self.width}" '
             f'height="{self.height}" role="img" aria-label="{escape(self.title, quote=True)}">'
@@ -285,7 +283,7 @@ class Chart:
 
 
 def _joined(px, py):
-    """``x y`` of every point, with the letter of a straight line between them."""
+    """Path data of the points: ``x y`` of each, with the letter L of a straight line between them."""
     numbers = np.column_stack([px, py]).ravel().tolist()
     return ("%.1f %.1fL" * len(px) % tuple(numbers))[:-1]
 

@@ -1,11 +1,11 @@
-"""The part about trains of a turnout's page: passages, scores by section, and what type, speed and load do to them."""
+"""Prepare the trains section of a turnout's page: passages, scores by section, effects of type, speed and load."""
 
 from collections import defaultdict
 
 from turnout.registry.schema import literal
 from turnout.report.panels.train_bars import train_bars
 
-# Conditions on a constant list reach the files below the views' windows; a subquery would not.
+# DuckDB pushes a condition on a constant list down to the files, below window functions of the views; not a subquery.
 ROWS = {
     "scores": """
         select
@@ -25,7 +25,7 @@ SCORES = ("fit", "forecast")
 
 
 def train_rows(fetch, turnout_ids):
-    """{kind: {turnout_id: [row, ...]}} of what ``trains_part`` needs; ``fetch`` runs SQL and gives dictionaries."""
+    """Rows that ``trains_part`` needs, {table: {turnout_id: [row, ...]}}; ``fetch`` runs SQL and returns dicts."""
     own, found = ", ".join(literal(t) for t in turnout_ids), {}
     for kind, sql in ROWS.items():
         grouped = defaultdict(list)
@@ -36,7 +36,7 @@ def train_rows(fetch, turnout_ids):
 
 
 def trains_part(rows, sections):
-    """What the template shows of one turnout's trains; None where none was recorded.
+    """Variables of the template for the trains of one turnout; None without a recorded passage.
 
     ``rows`` are those of ``train_rows`` of this turnout, ``sections`` its rows of ``sections`` in order.
     """
@@ -56,7 +56,7 @@ def trains_part(rows, sections):
 
 
 def score_words(scores):
-    """What the scores are worth, counted."""
+    """Sentences on how many scores are better than those of random models and of other sections."""
     if not scores:
         return ""
     n = sum(s["n"] for s in scores)
@@ -98,7 +98,7 @@ def _with_error(value, standard_error):
 
 
 def _effect(effect):
-    """One effect in words, with whether its interval holds zero."""
+    """One effect in words, and whether its interval contains zero."""
     clear = effect["low_pct"] > 0 or effect["high_pct"] < 0
     return {
         "section": effect["section_id"].split("/")[-1],

@@ -1,4 +1,4 @@
-"""Write the pages of a registry: one for the fleet, one for each turnout that has something new to say."""
+"""Write the pages of a registry: one for the fleet, and one for each turnout with a change."""
 
 import os
 from importlib.resources import files
@@ -14,28 +14,28 @@ from turnout.report.pages.turnout import turnout_page
 from turnout.report.source import ROWS, FleetSource
 from turnout.report.stale_pages import MARK, content_of, contents
 
-AT_ONCE = 100
+AT_ONCE = 100  # turnouts whose rows are read by one set of queries
 
 
 def write_pages(connection, folder, generation="", turnouts=None, progress=True, elsewhere=None, day=None):
-    """Write ``folder``/index.html, and ``folder``/turnouts/<id>.html where it does not say what the registry says.
+    """Write ``folder``/index.html, and ``folder``/turnouts/<id>.html where its content has changed.
 
-    Pages of turnouts that the registry does not know any more are removed.
+    Pages of turnouts that are no longer in the registry are removed.
 
     Parameters
     ----------
     connection : duckdb connection
         An open registry, see ``turnout.registry.open_registry``.
     folder : path
-        Made where it does not exist.
+        Created where it does not exist.
     generation : str
         Shown at the foot of every page.
     turnouts : iterable of str, optional
         Only these turnouts' pages; the fleet's page is always written.
-    elsewhere : callable, optional
-        Called with (turnout ids, their contents) instead of writing the turnouts' pages here.
+    writer : callable, optional
+        Called with {turnout id: content hash} of the pages to write, instead of writing them in this process.
     day : str, optional
-        YYYY-MM-DD: what was known on this day is shown, by default today.
+        YYYY-MM-DD: day whose states and worklist are shown, by default today.
 
     Returns
     -------
@@ -59,7 +59,7 @@ def write_pages(connection, folder, generation="", turnouts=None, progress=True,
 
 
 def write_turnouts(connection, folder, content, generation="", progress=False, day=None):
-    """Write the pages of the turnouts in ``content``, a mapping to the hash that each page carries."""
+    """Write the pages of the turnouts in ``content``, which maps each turnout to the hash stored in its page."""
     source, shared = FleetSource(connection, day), shared_by_pages(generation)
     template = page_environment().get_template("turnout.html")
     names = list(content)
@@ -76,25 +76,25 @@ def write_turnouts(connection, folder, content, generation="", progress=False, d
 
 
 def page_environment():
-    """Where the templates are."""
+    """Jinja environment with the templates of the package."""
     return Environment(loader=PackageLoader("turnout.report", "templates"), trim_blocks=True, autoescape=True)
 
 
 def shared_by_pages(generation=""):
-    """What every page shows: its style, and what made it."""
+    """Template variables of every page: style, program version and generation."""
     css = (files("turnout.report") / "templates" / "page.css").read_text()
     return {"css": css, "version": __version__, "generation": generation}
 
 
 def _remove_others(folder, known):
-    """Remove our own pages of turnouts that are not ``known``; other files stay."""
+    """Remove pages of this program for turnouts that are not in ``turnout_ids``; other files stay."""
     for path in folder.glob("*.html"):
         if path.stem not in known and content_of(path):
             path.unlink()
 
 
 def replace_page(path, text):
-    """Put a page in place in one step, so that nobody ever opens half of it."""
+    """Write a page in one step, so that no reader sees an incomplete one."""
     temporary = beside(path)
     try:
         temporary.write_text(text, encoding="utf-8")

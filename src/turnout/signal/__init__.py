@@ -1,1 +1,1 @@
-"""Filters, windows, spectra and the limits of what spectra can say; knows nothing of tracks."""
+"""Filters, windows, spectra and the limits of coherence; without any knowledge of tracks."""

@@ -1,4 +1,4 @@
-"""Sampling distribution of a coherence estimate, and the confidence limits that follow from it."""
+"""Compute the sampling distribution of a coherence estimate and the confidence limits that follow from it."""
 
 from functools import lru_cache
 
@@ -6,17 +6,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
-# The tables run over u = -ln(1 - coherence) from 0 (nothing) to 30 (1 - 1e-13), finer near 0 where u(v) bends most.
+# Tables over u = -ln(1 - coherence) from 0 (none) to 30 (1 - 1e-13), finer near 0 where u(v) has most curvature.
 TABLE_NODES = 30.0 * np.linspace(0.0, 1.0, 201) ** 3
 
 
 def coherence_distribution(estimate: ArrayLike, true: ArrayLike, n: int) -> np.ndarray:
-    r"""Probability that a coherence averaged over n independent records reads at most ``estimate``.
+    r"""Probability that a coherence averaged over n independent records is at most ``estimate``.
 
     .. math:: P = z \left(\frac{1-\gamma^2}{1-\gamma^2 z}\right)^{\!n} \sum_{k=0}^{n-2}
         \left(\frac{1-z}{1-\gamma^2 z}\right)^{\!k} {}_2F_1(-k,\, 1-n;\, 1;\, \gamma^2 z)
 
-    Exact for Gaussian records; force spectra that repeat exactly give a slightly narrower spread.
+    Exact for Gaussian records; force spectra that repeat exactly give a slightly narrower distribution.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def coherence_distribution(estimate: ArrayLike, true: ArrayLike, n: int) -> np.n
 
     Examples
     --------
-    Of incoherent signals, ten averages read below 0.283 in 95 % of all cases: 1 - 0.05^(1/9).
+    For incoherent signals, ten averages are below 0.283 in 95 % of all cases: 1 - 0.05^(1/9).
 
     >>> print(round(float(coherence_distribution(0.28313, 0.0, 10)), 4))
     0.95
@@ -47,13 +47,13 @@ def coherence_distribution(estimate: ArrayLike, true: ArrayLike, n: int) -> np.n
 
 
 def _distribution_of_complements(b, a, n):
-    """The same from b = 1 - estimate and a = 1 - true, which keeps all digits near coherence 1."""
+    """Distribution from b = 1 - estimate and a = 1 - true, which keeps all digits near coherence 1."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return _sum_of_logs(np.asarray(b), np.asarray(a), n)
 
 
 def _sum_of_logs(b, a, n):
-    """Every term is positive; logarithms and the ratio of neighbours keep large n from overflowing."""
+    """Sum of the series; all terms are positive, and logarithms and ratios avoid overflow at large n."""
     rest = a + b - a * b
     x = (1.0 - a) * (1.0 - b)
     log_step = np.log(b) - np.log(rest)
@@ -80,10 +80,10 @@ def _quantile_table(n, probability):
 
 
 def true_coherence_with_quantile(estimate: ArrayLike, n: int, probability: float) -> np.ndarray:
-    """True coherence whose estimates stay below the one seen with the given probability.
+    """True coherence whose estimates are below the given one with the given probability.
 
-    Inverts ``coherence_distribution`` through a table; 0 where even no coherence at all would explain the
-    estimate. One record allows no statement: 0 for probabilities above one half, else 1.
+    Inverts ``coherence_distribution`` through a table; 0 where zero coherence already
+    explains the estimate. One record allows no statement: 0 for probabilities above one half, else 1.
 
     >>> print(true_coherence_with_quantile([0.2, 1.0 - 0.05 ** (1 / 9), 1.0], 10, 0.95).round(3))
     [0. 0. 1.]
@@ -107,7 +107,7 @@ def coherence_limits(estimate: ArrayLike, n: int, level: float = 0.95) -> tuple[
     n : int
         Records averaged. With one record the limits are 0 and 1.
     level : float
-        Probability that the limits enclose the truth.
+        Probability that the limits enclose the true value.
 
     Returns
     -------
@@ -115,8 +115,8 @@ def coherence_limits(estimate: ArrayLike, n: int, level: float = 0.95) -> tuple[
 
     Examples
     --------
-    Thirty records of true coherence 0.8 read between 0.70 and 0.88 in 95 % of all tests (by simulation), so 0.8 is the
-    upper limit of the one reading and the lower limit of the other.
+    Thirty records of true coherence 0.8 give 0.70 to 0.88 in 95 % of all tests (by simulation). So 0.8 is the upper
+    limit of the one estimate and the lower limit of the other.
 
     >>> low, high = coherence_limits(np.array([0.70, 0.88]), 30)
     >>> print(f"{high[0]:.2f} {low[1]:.2f}")
@@ -130,9 +130,9 @@ def coherence_limits(estimate: ArrayLike, n: int, level: float = 0.95) -> tuple[
 
 
 def lower_coherence_limit(estimate: ArrayLike, n: int, level: float = 0.95) -> np.ndarray:
-    """One-sided lower confidence limit of the true coherence: what the gate compares.
+    """One-sided lower confidence limit of the true coherence, which the coherence gate uses.
 
-    To be sure of 0.8 ten averages must read 0.91, thirty 0.87.
+    For a limit of 0.8 ten averages must give 0.91, thirty 0.87.
 
     >>> print(lower_coherence_limit(0.913, 10).round(2), lower_coherence_limit(0.87, 30).round(2))
     0.8 0.8

@@ -1,6 +1,6 @@
-"""Butterworth filters as second-order sections, causal or without phase, and rate reduction.
+"""Provide Butterworth filters as second-order sections, causal or with zero phase, and reduction of the sampling rate.
 
-Shapes of a hammer's contact force, by the names of the field.
+The module also has the usual shapes of a hammer's contact force.
 """
 
 from functools import lru_cache
@@ -54,8 +54,8 @@ def band_pass(
 ) -> np.ndarray:
     """Filter the last axis with ``butterworth_sections``.
 
-    Causal (from rest) by default: what a model has to be filtered with as well. With ``zero_phase`` the filter runs
-    forwards and backwards: no delay, twice the decibels, and energy ahead of every onset.
+    Causal (from rest) by default; a model must pass the same filter. With ``zero_phase`` the filter runs forwards and
+    backwards: no delay, twice the attenuation in dB, and energy before every onset.
 
     >>> t = np.arange(4000) / 4000.0
     >>> y = band_pass(np.sin(2 * np.pi * 30 * t) + np.sin(2 * np.pi * 300 * t), 150.0, 600.0, 4000.0, zero_phase=True)
@@ -79,7 +79,7 @@ def reduce_rate(x: np.ndarray, factor: int) -> np.ndarray:
     return x if factor == 1 else signal.resample_poly(x, 1, int(factor), axis=-1, padtype="line")
 
 
-# Skewed pulse x^p e^(p (1-x)): it rises fast and ebbs slowly; above 2 % of its peak until x = SKEW_END.
+# Skewed pulse x^p e^(p (1-x)): it rises fast and decays slowly; above 2 % of its peak until x = SKEW_END.
 SKEW = 3.0
 SKEW_END = 3.5791
 
@@ -105,7 +105,7 @@ def hertzian(x):
 
 
 def skewed(x):
-    r""":math:`(u e^{1-u})^3` with u = 3.58 x: a soft tip that gives way quickly and recovers slowly."""
+    r""":math:`(u e^{1-u})^3` with u = 3.58 x: a soft tip that yields quickly and recovers slowly."""
     u = SKEW_END * np.asarray(x, dtype=float)
     return (u * np.exp(1.0 - u)) ** SKEW
 
@@ -121,7 +121,7 @@ def force_pulse(family: str, time: np.ndarray, contact: float) -> np.ndarray:
     family : str
         A key of ``FAMILIES``.
     time : array of float
-        Since the first touch; 0 before it and after ``contact`` (the skewed pulse ebbs on). [s]
+        Since the first touch; 0 before it and after ``contact`` (the skewed pulse decays further). [s]
     contact : float
         Contact time. [s]
 

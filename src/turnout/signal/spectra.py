@@ -1,6 +1,6 @@
-"""Auto- and cross-spectra averaged over records, and the interval of an averaged spectral density.
+"""Average auto- and cross-spectra over records, with the confidence interval of a spectral density.
 
-Windows of an impact test, and how they are taken out of the result again.
+The module also has the windows of an impact test and the correction of poles for the exponential window.
 """
 
 import numpy as np
@@ -83,7 +83,7 @@ def spectral_density(x: np.ndarray, rate: float, n_segment: int) -> tuple[np.nda
     rate : float
         [Hz]
     n_segment : int
-        Samples per segment; an incomplete last segment is dropped.
+        Samples per segment; an incomplete last segment is ignored.
 
     Returns
     -------
@@ -133,7 +133,7 @@ def density_interval(n: int, level: float = 0.95) -> tuple[float, float]:
 
     Examples
     --------
-    Thirty impacts know a density to -1.4 and +1.7 dB.
+    Thirty impacts determine a density to -1.4 and +1.7 dB.
 
     >>> print("{:+.1f} {:+.1f} dB".format(*10 * np.log10(density_interval(30))))
     -1.4 +1.7 dB
@@ -145,7 +145,7 @@ def density_interval(n: int, level: float = 0.95) -> tuple[float, float]:
 def force_window(n_sample: int, contact_end: int, taper: int) -> np.ndarray:
     """One until the end of contact, then a half-cosine down to zero over ``taper`` samples.
 
-    It removes noise of the force channel where the hammer touches nothing. Shape (n_sample,), no unit.
+    It removes noise of the force channel after the contact. Shape (n_sample,), no unit.
 
     >>> print(force_window(6, 2, 2).round(2))
     [1.  1.  1.  0.5 0.  0. ]
@@ -157,10 +157,10 @@ def force_window(n_sample: int, contact_end: int, taper: int) -> np.ndarray:
 def exponential_window(n_sample: int, onset: int, decay: float, rate: float) -> np.ndarray:
     r"""Window :math:`e^{-a (t - t_0)}` for response *and* force alike, 1 up to :math:`t_0`.
 
-    Nothing but noise is ahead of the blow, and must not become louder. The windowed pair obeys
-    :math:`A_w(i\omega) = A(i\omega + a)`: the ratio of the two spectra is the frequency response taken on a line that
-    lies ``decay`` to the right of the imaginary axis. Hence its scale is right as it stands, every pole appears shifted
-    by -a (``correct_poles``), and displacement follows from acceleration by :math:`(i\omega + a)^2`, not by
+    Before the impact there is only noise, which must not be amplified. The windowed pair obeys
+    :math:`A_w(i\omega) = A(i\omega + a)`: the ratio of the two spectra is the frequency response on a line that lies
+    ``decay`` to the right of the imaginary axis. Hence its scale needs no correction, every pole appears shifted by -a
+    (``correct_poles``), and displacement follows from acceleration by :math:`(i\omega + a)^2`, not by
     :math:`-\omega^2`.
 
     Parameters
@@ -183,10 +183,10 @@ def exponential_window(n_sample: int, onset: int, decay: float, rate: float) -> 
 
 
 def correct_poles(poles: np.ndarray | complex, decay: float) -> np.ndarray:
-    r"""Poles of the structure from poles seen through an exponential window: :math:`s = s_w + a`.
+    r"""Poles of the structure from poles estimated behind an exponential window: :math:`s = s_w + a`.
 
-    Correct the pole and compute natural frequency and damping ratio from it; a damping ratio alone cannot be
-    corrected, since the window moves the natural frequency too. Amplitudes (residues) are never rescaled.
+    Correct the pole and compute natural frequency and damping ratio from it. A damping ratio alone cannot be
+    corrected, since the window shifts the natural frequency too. Amplitudes (residues) are never rescaled.
 
     Parameters
     ----------

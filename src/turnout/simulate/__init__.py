@@ -1,4 +1,4 @@
-"""Vertical dynamics of train and turnout: hammer tests and passages that are recordings like measured ones."""
+"""Simulate the vertical dynamics of train and turnout: hammer tests and passages as recordings like measured ones."""
 
 from turnout.simulate.hammer import Hammer, hammer_sensors, prepare_hammer, simulate_hammer
 from turnout.simulate.parameters import load_track, load_vehicle

@@ -1,4 +1,4 @@
-"""Compiled kernels for symmetric banded matrices: factor, solve, product, and the inverse near the diagonal."""
+"""Factorise, solve and multiply symmetric banded matrices; compiled, also the inverse near the diagonal."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from turnout.simulate.compiled import kernel
 
 @kernel
 def factorise(upper, lower_rows, inverse_pivot):
-    """L D L^T of a symmetric matrix without pivoting; returns the growth max|l| (large: do not trust it).
+    """L D L^T of a symmetric matrix without pivoting; returns the growth max|l| (a large one means lost digits).
 
     ``upper`` (half + 1, n) holds the upper diagonals; ``lower_rows[i, k]`` becomes L[i, i - 1 - k].
     """
@@ -32,7 +32,7 @@ def factorise(upper, lower_rows, inverse_pivot):
 
 @kernel
 def factorise4(a, lower, upper, inverse_pivot, n):
-    """The same for half bandwidth 4 at most, unrolled: ``a`` (5, n + 4) is used up, ``lower`` has n + 4 rows."""
+    """The same for half bandwidth 4 at most, unrolled: ``a`` (5, n + 4) is overwritten, ``lower`` has n + 4 rows."""
     growth = 0.0
     for i in range(n):
         inverse = 1.0 / a[0, i]
@@ -130,7 +130,7 @@ def _solve_any(low, up, inverse_pivot, x, n):
 
 @kernel
 def multiply(diagonals, x, start, out, n):
-    """``out[:n]`` = matrix times ``x[start:start+n]``; ``diagonals`` are all 2 half + 1, see ``all_diagonals``."""
+    """``out[:n]`` = matrix times ``x[start:start+n]``; ``diagonals`` (2 half + 1, n) from ``all_diagonals``."""
     count = diagonals.shape[0]
     near = x[start - count // 2 : start + n + count // 2]  # indices counted from 0 let the loop be vectorised
     if count == 9:
@@ -165,8 +165,8 @@ def momentum_less_force(mass, stiffness, v, u, by_v, by_u, start, out, n):
 def solve_from_both_ends(low, up, pivot, low_back, up_back, pivot_back, middle, x, start, n):
     """Solve in place with four diagonals, eliminating from both ends to four rows in the middle.
 
-    Two independent recurrences run side by side, so that neither waits for the other's last product.
-    ``low_back`` ... are the factors of the matrix turned round, ``middle`` (4, 4) the inverse's block there.
+    Two independent recurrences run in parallel, so that neither waits for the last product of the other.
+    ``low_back`` ... are the factors of the reversed matrix, ``middle`` (4, 4) is the middle block of the inverse.
     """
     part = x[start : start + n]
     top = (n - 4) // 2

@@ -1,8 +1,8 @@
-r"""What a sensor between two nodes shows beyond their motion: its own element bends under a load on it.
+r"""Add the bending of a rail element under its loads to the signal of a sensor between two nodes.
 
 .. math:: w(x, t) = N(x)^T u(t) + \sum_i l(x, x_i(t)) \, F_i(t)
 
-with l of ``rail.local_compliance``, as a wheel feels it; 0 on a node and for loads in other elements.
+with l of ``rail.local_compliance``, the same as for a wheel. It is 0 on a node and for loads in other elements.
 """
 
 from dataclasses import dataclass
@@ -12,14 +12,16 @@ import numpy as np
 from turnout.simulate.kernels import ramp_at
 from turnout.simulate.rail import local_compliance
 
-ON_NODE = 1e-9  # m, what places are rounded to
+ON_NODE = 1e-9  # m from a node within which a position is on it; positions are rounded to this
 
 
 @dataclass(frozen=True)
 class RailLoads:
-    """Forces on the rail: ``place`` [m] and ``force`` [N], (n_load, n_step + 2), at the middle of every step, of one
-    before the first and of one behind the last. ``from_rest``: they begin at time 0, before it nothing moves.
-    ``ramp``: where the track fades in for them, None: nowhere."""
+    """Forces on the rail: ``position`` [m] and ``force`` [N], both (n_load, n_step + 2).
+
+    Columns are the middles of all steps, of one before the first and of one after the last. ``from_rest``: nothing
+    moves before time 0. ``ramp`` has the positions where the modelled track fades in and out, None without.
+    """
 
     place: np.ndarray
     force: np.ndarray
@@ -28,8 +30,10 @@ class RailLoads:
 
 
 def rail_loads(place, speed, force, dt, from_rest, ramp=None):
-    """``RailLoads`` of forces (n_load, n_step) [N] that roll from ``place`` (n_load,) [m] with ``speed`` [m/s]; behind
-    the end they go straight on."""
+    """``RailLoads`` of forces (n_load, n_step) [N] that roll from ``position`` (n_load,) [m] with ``speed`` [m/s].
+
+    The forces are extrapolated linearly by one step after the end.
+    """
     force = np.column_stack([force[:, :1], force])
     force = np.column_stack([force, 2.0 * force[:, -1] - force[:, -2]])
     time = (np.arange(force.shape[1]) - 0.5) * dt
@@ -37,12 +41,12 @@ def rail_loads(place, speed, force, dt, from_rest, ramp=None):
 
 
 def lies_between_nodes(matrices, place):
-    """Whether a place, a number [m] or a name, is on the rail between two nodes."""
+    """Whether a point is on the rail between two nodes; it is a position [m] or the name of a degree of freedom."""
     return not isinstance(place, tuple) and float(np.min(np.abs(matrices.node - place))) > ON_NODE
 
 
 def bending(matrices, x, loads):
-    """(n_step + 2,) deflection [m] at ``x`` [m] of its element, both ends clamped, under the loads that are on it."""
+    """(n_step + 2,) deflection [m] at ``x`` [m] of its element with both ends clamped, under the loads on it."""
     e = matrices.element_at(x)
     first, last = matrices.node[e : e + 2]
     inside = np.flatnonzero((loads.place > first) & (loads.place < last))
@@ -54,7 +58,7 @@ def bending(matrices, x, loads):
 
 
 def recorded(deflection, order, dt, from_rest):
-    """(n_step,) mean over each step of a deflection (n_step + 2,) [m], its rate or, ``order`` 2, its acceleration."""
+    """(n_step,) means over each step of a deflection (n_step + 2,) [m]; ``order`` 1: its rate, 2: its acceleration."""
     if order == 0:
         return deflection[1:-1]
     ends = np.diff(deflection) / dt if order == 2 else 0.5 * (deflection[1:] + deflection[:-1])

@@ -1,4 +1,4 @@
-"""Fit pads, ballast and damping of a section to measured receptances, with what the data cannot tell."""
+"""Fit pads, ballast and damping of a section to measured receptances, and report what the data do not determine."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from turnout.simulate.matrices import assemble
 from turnout.simulate.modal_calibration import with_section
 from turnout.simulate.turnout_track import stretch_of_track
 
-# Parameter -> (links' tag, what of them, relative sd of the prior, an estimate).
+# Parameter -> (tag of the links, quantity of the links, relative sd of the prior, an estimate).
 PARAMETERS = {
     "pad_stiffness": ("pad", "stiffness", 0.7),
     "pad_damping": ("pad", "damping", 1.0),
@@ -21,15 +21,18 @@ PARAMETERS = {
     "sleeper_mass": ("sleeper", "mass", 0.15),
 }
 BANDS = ((40.0, 100.0), (100.0, 200.0), (200.0, 400.0), (400.0, 600.0), (600.0, 800.0))
-INFORMED = 0.5  # a parameter whose posterior sd is above half its prior sd was not told by the data
-CORRELATED = 0.95
-SMOOTH = 1.0  # octaves over which the model's own error stays what it is
+INFORMED = 0.5  # posterior sd over prior sd below which the data determine a parameter
+CORRELATED = 0.95  # posterior correlation above which two parameters are determined only together
+SMOOTH = 1.0  # octaves over which the model error is the same
 
 
 @dataclass(frozen=True)
 class Measured:
-    """A receptance to be met: ``value`` (n,) complex [m/N] at ``frequency`` [Hz] from a blow at ``excited`` to an
-    accelerometer at ``measured`` [m]; ``sd`` (n,) of real and imaginary part each [m/N]."""
+    """A measured receptance: ``value`` (n,) complex [m/N] at ``frequency`` [Hz].
+
+    It is from an impact at ``excited`` [m] to an accelerometer at ``measured`` [m]. ``sd`` (n,) is the standard
+    deviation of the real and of the imaginary part [m/N].
+    """
 
     frequency: np.ndarray
     value: np.ndarray
@@ -38,16 +41,16 @@ class Measured:
     measured: float
 
 
-MET = 4.0  # chi-squared per degree of freedom: what is left is twice what errors of test and model leave
+MET = 4.0  # chi-squared per degree of freedom: the residual is at most twice the errors of test and model
 
 
 @dataclass(frozen=True)
 class Calibration:
     """``values`` and ``sd`` (posterior, relative) by parameter; ``covariance`` of their logarithms, in order.
 
-    ``informed`` says of each parameter whether the data narrowed its prior to less than half; ``tied`` pairs whose
-    posterior correlation exceeds 0.95. ``misfit`` maps a band to the relative rms misfit that is left,
-    ``misfit_before`` the same at the start, ``reduced`` is chi-squared per degree of freedom.
+    ``informed`` says of each parameter whether the data reduced the sd of its prior to less than half. ``correlated``
+    are the pairs whose posterior correlation exceeds 0.95. ``misfit`` maps a band to the relative rms misfit,
+    ``misfit_before`` to that before the fit. ``reduced`` is chi-squared per degree of freedom.
     """
 
     section: str
@@ -64,11 +67,11 @@ class Calibration:
 
     @property
     def met(self) -> bool:
-        """Whether the model with these values meets the tests."""
+        """Whether the model with these values fits the tests."""
         return self.reduced <= MET
 
     def tells(self, name) -> bool:
-        """Whether the tests tell a parameter, by itself or together with another."""
+        """Whether the tests determine a parameter, alone or together with another one."""
         return self.informed[name] or any(name in pair for pair in self.tied)
 
     def __str__(self):
@@ -87,7 +90,7 @@ class Calibration:
 
 
 def calibrate(turnout, section, measured, location=None, parameters=tuple(PARAMETERS), model_sd=0.03, half_length=24.0):
-    r"""Maximum a posteriori fit of one section's parameters to receptances, all of its supports alike.
+    r"""Maximum a posteriori fit of the parameters of one section to receptances; all its supports are equal.
 
     .. math:: \min_q \sum_i \frac{|H_i(q) - \hat H_i|^2}{\sigma_i^2 + n_i (\epsilon |\hat H_i|)^2}
               + \sum_p \Bigl(\frac{\ln q_p - \ln q_{p0}}{s_p}\Bigr)^2
@@ -95,18 +98,18 @@ def calibrate(turnout, section, measured, location=None, parameters=tuple(PARAME
     Parameters
     ----------
     turnout : TurnoutTrack
-        Its values are the centre of the priors and the start.
+        Its values are the centre of the priors and the start of the fit.
     section : str
         Section whose supports are changed.
-    measured : sequence of Measured
+    measured : sequence of MeasuredReceptance
         At least one.
     location : str or float
         Middle of the stretch that is modelled; by default the section's name.
     parameters : sequence of str
         Keys of ``PARAMETERS``.
     model_sd : float
-        Relative error ε the model itself is granted. It is smooth in frequency: the :math:`n_i` lines within
-        ``SMOOTH`` octaves of a line share one, so that thousands of lines do not claim certainty.
+        Relative error ε of the model. It is smooth in frequency: the :math:`n_i` lines within
+        ``ERROR_BANDWIDTH`` octaves of a line share one error. So thousands of lines do not give certainty.
 
     Returns
     -------
@@ -155,7 +158,7 @@ def calibrate(turnout, section, measured, location=None, parameters=tuple(PARAME
 
 
 def _residual(model, measured, model_sd, centre, spread):
-    """Function of the logarithms: residuals in their standard errors, the prior's behind them, and the Jacobian."""
+    """Function of the logarithms: residuals in standard errors, those of the prior last, and the Jacobian."""
     weights = [1.0 / np.sqrt(m.sd**2 + _lines_alike(m.frequency) * (model_sd * np.abs(m.value)) ** 2) for m in measured]
     newest: dict[bytes, tuple] = {}
 
@@ -178,7 +181,7 @@ def _residual(model, measured, model_sd, centre, spread):
 
 
 def _left(measured, found, model_sd):
-    """Squares of what is left, in standard errors of each line alone."""
+    """Sum of squared residuals in standard errors of each line alone."""
     return float(
         sum(
             np.sum(np.abs(h - m.value) ** 2 / (m.sd**2 + (model_sd * np.abs(m.value)) ** 2))
@@ -188,13 +191,13 @@ def _left(measured, found, model_sd):
 
 
 def _lines_alike(frequency):
-    """(n,) lines that share the model's error with each line, itself among them."""
+    """(n,) number of lines that share the model error with each line, including itself."""
     octaves = np.log2(frequency)
     return np.sum(np.abs(octaves[:, None] - octaves) <= SMOOTH / 2.0, axis=1)
 
 
 def _tied(parameters, correlation):
-    """Pairs of parameters that the records cannot tell apart."""
+    """Pairs of parameters that the data do not separate."""
     return tuple(
         (parameters[a], parameters[b])
         for a in range(len(parameters))
@@ -208,7 +211,7 @@ def _split(value):
 
 
 def _model(track, section, parameters, measured):
-    """Receptance and its derivative by the logarithm of each parameter, for every measured one."""
+    """Modelled receptance and its derivatives by the logarithm of each parameter, for each measured receptance."""
     matrices = assemble(track)
     inside = {j for j, name in enumerate(track.section) if name == section}
     groups, values = [], []

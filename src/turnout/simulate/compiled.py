@@ -1,4 +1,4 @@
-"""Compile a kernel with numba; keep its machine code where it can be written and only as long as it is fresh."""
+"""Compile kernels with numba and cache their machine code in a writable folder, as long as it is up to date."""
 
 import os
 import shutil
@@ -12,21 +12,21 @@ from numba import config, njit
 from turnout.fingerprint import fingerprint
 
 FAST = {"contract", "reassoc", "nsz", "arcp"}
-# numba asks only whether the file of the function itself has changed. A kernel holds the code of those it calls and
-# the numbers they import: machine code is kept in a folder named after all modules behind the march together.
+# numba only checks whether the file of the function itself has changed. But a kernel contains the code of the kernels
+# it calls and the constants they import. So the cache folder has the fingerprint of all modules of the march.
 OUTERMOST = "turnout.simulate.march"
 
 
 def kernel(function):
-    """``function`` compiled on first use, from the kept machine code where there is some.
+    """Decorator: ``function`` compiled on first use, or read from the cached machine code.
 
-    Where no folder can be written it is compiled anew in every process, some 20 s for all kernels.
+    If no folder can be written, every process compiles it again: some 20 s for all kernels.
     """
     return _compiled(function)
 
 
 def inlined(function):
-    """A kernel that becomes part of those that call it: no tuple of arrays is copied for a call, a quarter faster."""
+    """Decorator: a kernel inlined into its callers. No tuple of arrays is copied for a call: a quarter faster."""
     return _compiled(function, forceinline=True)
 
 
@@ -36,14 +36,14 @@ def _compiled(function, **options):
         try:
             with _numba_keeps_in(folder):
                 return njit(cache=True, fastmath=FAST, **options)(function)
-        except RuntimeError:  # "no locator available": the folder went away since it was tried
+        except RuntimeError:  # "no locator available": the folder was removed after it was tested
             pass
     return njit(fastmath=FAST, **options)(function)
 
 
 @cache
 def cache_folder():
-    """First folder of numba's setting, beside the source, of the user's cache that can be written, or None."""
+    """First writable cache folder, or None: that of numba's setting, beside the source, in the user's cache."""
     name = f"kernels-{fingerprint(OUTERMOST)}"
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     beside = Path(__file__).resolve().parent / "__pycache__"

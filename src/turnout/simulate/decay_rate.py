@@ -1,12 +1,12 @@
-"""Track decay rate in one-third octave bands, from the receptance of a track."""
+"""Compute the track decay rate in one-third octave bands from the receptance of a track."""
 
 import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.simulate.frequency_response import responses
 
-# Distances of the blows from the accelerometer in bays after EN 15461:2008+A1, from memory, unverified: the sum is a
-# quadrature over x, so another grid as fine near the accelerometer changes it little.
+# Distances of the impacts from the accelerometer [bays] after EN 15461:2008+A1, from memory, unverified. The sum is a
+# quadrature over x, so another grid that is as fine near the accelerometer changes it little.
 FAR = [8, 10, 12, 16, 20, 24, 30, 36, 42, 48, 54, 66]
 GRID = np.concatenate([np.arange(0.0, 2.0, 0.25), np.arange(2.0, 4.0, 0.5), np.arange(4.0, 8.0), FAR])
 BANDS = np.array([100, 125, 160, 200, 250, 315, 400, 500, 630, 800, 1000, 1250, 1600.0])
@@ -20,8 +20,8 @@ def track_decay_rate(matrices, place, spacing, bands=BANDS, lines_per_band=8):
     Parameters
     ----------
     matrices : TrackMatrices
-        At least 66 bays beyond ``place`` in the direction of growing x.
-    place : float
+        At least 66 bays beyond ``sensor_position`` in the direction of growing x.
+    sensor_position : float
         Accelerometer, between two supports in the standard [m].
     spacing : float
         Bay [m].

@@ -1,4 +1,4 @@
-"""Our own numerical error: repeat a run with half the time step and half the elements, band by band and sensor."""
+"""Estimate the numerical error of a simulated passage: repeat it with half the time step and half the element size."""
 
 from dataclasses import dataclass, replace
 
@@ -10,19 +10,19 @@ from turnout.simulate.track import PER_SUPPORT
 from turnout.simulate.turnout_track import TurnoutTrack
 
 BANDS = ((5.0, 40.0), (40.0, 120.0), (120.0, 300.0), (300.0, 600.0), (600.0, 1000.0))
-# Orders of the waveform. Radau's three is measured (2.9 to 3) where its error is above 0.1 %; below that, and where
-# contacts chatter, all schemes come to about two. Timoshenko elements have two.
+# Convergence orders of the waveform. Order three of Radau is measured (2.9 to 3) where its error is above 0.1 %. Below
+# that, and where contacts open and close quickly, all schemes have about two. Timoshenko elements have two.
 STEP_ORDER, MESH_ORDER = {"radau": 3, "gauss": 2, "midpoint": 2}, 2
 
 
 @dataclass(frozen=True)
 class NumericalError:
-    r"""Per sensor (rows) and band (columns): relative error of waveform and level [dB] by halving step and mesh.
+    r"""Per sensor (rows) and band (columns): relative error of the waveform and change of the level by halving.
 
-    With an error :math:`e = C h^p` the finer run keeps :math:`e / 2^p`, so the two differ by
-    :math:`d = (1 - 2^{-p}) e`. ``step`` and ``mesh`` are the error of the run itself, :math:`d \, 2^p / (2^p - 1)`
-    in norms over that of the finer run. ``level_step``, ``level_mesh`` [dB] are changes of the band's power by halving.
-    ``total`` = step + mesh.
+    With an error :math:`e = C h^p` the finer run has :math:`e / 2^p`, so the two runs differ by
+    :math:`d = (1 - 2^{-p}) e`. ``step`` and ``mesh`` are the errors of the coarser run,
+    :math:`d \, 2^p / (2^p - 1)`, relative to the norm of the finer run. ``level_step`` and ``level_mesh`` [dB] are the
+    changes of the band's power by halving.
     """
 
     bands: tuple
@@ -34,11 +34,11 @@ class NumericalError:
 
     @property
     def total(self):
-        """(n_sensor, n_band) both together, wherever they add up."""
+        """(n_sensor, n_band) sum of both errors."""
         return self.step + self.mesh
 
     def allows(self, mismatch):
-        """(n_sensor, n_band) whether causes may be named: error below a third of the relative ``mismatch``."""
+        """(n_sensor, n_band) whether the error allows a diagnosis: it is below a third of the relative ``mismatch``."""
         return self.total < np.asarray(mismatch) / 3.0
 
     def __str__(self):
@@ -50,7 +50,7 @@ class NumericalError:
 
 @dataclass(frozen=True)
 class PassageCase:
-    """A passage to be judged: the arguments of ``simulate_passage``, sensors bare of noise."""
+    """A passage to be assessed: the arguments of ``simulate_passage``; the noise of the sensors is ignored."""
 
     track: object
     vehicle: object
@@ -62,7 +62,7 @@ class PassageCase:
 def numerical_error(case, bands=BANDS):
     """``NumericalError`` of a ``PassageCase``: three runs, the last two with dt/2 and with twice the elements.
 
-    What was prepared is prepared anew. The finer runs keep the recorded rate: two steps are averaged into one sample.
+    Each run prepares its track again. The finer runs have the same sampling rate: two steps are averaged per sample.
     """
     options = _unprepared(case.options)
     rate, substeps = options.get("rate", 20e3), options.pop("substeps", 1)
@@ -82,7 +82,7 @@ def numerical_error(case, bands=BANDS):
 
 
 def _whole(difference, order):
-    """Error of the coarser of two runs whose difference this is, one having half the step of the other."""
+    """Error of the coarser of two runs from their difference; the finer one has half the step."""
     return difference * 2.0**order / (2.0**order - 1.0)
 
 
@@ -115,14 +115,14 @@ def end_error(case, extra=30.0, bands=BANDS):
 
 
 def _unprepared(options):
-    """The options for another track or step: terms and scheme of what was prepared stay."""
+    """The options for another track or step: those of the prepared track become terms and scheme."""
     rest = {name: value for name, value in options.items() if name != "prepared"}
     prepared = options.get("prepared")
     return rest if prepared is None else rest | {"terms": prepared.terms, "scheme": prepared.scheme_name}
 
 
 def _bare(sensors):
-    """The sensors without their instruments: what is compared is the track."""
+    """The sensors without noise, clipping, resolution and filter: only the track is compared."""
     return tuple(replace(s, noise=0.0, limit=None, resolution=None, cutoff=None) for s in sensors)
 
 
@@ -148,5 +148,5 @@ def _lengthened(track, extra):
 
 
 def _count(track, extra):
-    """Supports that ``extra`` [m] of track have."""
+    """Number of supports of ``extra`` [m] of track."""
     return round(extra / float(track.support[1] - track.support[0]))

@@ -1,4 +1,4 @@
-"""Port laws: a scalar force from a scalar deformation and its rate."""
+"""Force laws of ports: a scalar force from a scalar deformation and its rate."""
 
 from dataclasses import dataclass
 
@@ -74,10 +74,10 @@ class GapLaw:
 
 @dataclass(frozen=True)
 class TableLaw:
-    r"""Any law :math:`F = \varphi(d) + \psi(d)\,\dot d` with φ and ψ piecewise linear through ``deformation``.
+    r"""Any law :math:`F = \varphi(d) + \psi(d)\,\dot d` with φ and ψ piecewise linear in ``deformation``.
 
-    ``deformation`` rising (n,) [m], ``elastic`` φ [N], ``viscous`` ψ [N s/m]; outside, φ goes on with the slope
-    of its last piece and ψ stays.
+    ``deformation`` increasing (n,) [m], ``elastic`` φ [N], ``viscous`` ψ [N s/m]. Outside, φ continues with the slope
+    of its last piece and ψ is constant.
     """
 
     deformation: tuple
@@ -140,9 +140,9 @@ class FrictionLaw:
 
 @dataclass(frozen=True)
 class LiftLaw:
-    r"""What a spring and damper under a ``load`` W would pull, :math:`F = \max(0, -(W + k d + c\dot d))`.
+    r"""Tensile force of a spring and damper under a ``load`` W, :math:`F = \max(0, -(W + k d + c\dot d))`.
 
-    Beside that spring and damper it leaves :math:`\max(0, W + k d + c\dot d) - W`: contact that only presses.
+    Together with that spring and damper it gives :math:`\max(0, W + k d + c\dot d) - W`: contact without tension.
     """
 
     stiffness: float
@@ -162,10 +162,10 @@ class LiftLaw:
 
 @dataclass(frozen=True)
 class Port:
-    """One scalar force of the track on itself or on the ground, added by an effect that matrices cannot hold.
+    """One scalar force of the track on itself or on the ground, for an effect that linear matrices cannot describe.
 
     ``ends`` as in ``Link``: the deformation is d = v·u - ``gap`` and the force on the track -v F(d, rate).
-    ``label`` names it in errors and outputs. What it replaces, the term takes away by a link of negative stiffness.
+    ``label`` names it in errors and outputs. The term removes what it replaces by a link of negative stiffness.
     """
 
     ends: tuple

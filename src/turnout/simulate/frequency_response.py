@@ -1,4 +1,4 @@
-"""Receptance of a track in the frequency domain, with its gradient by the track's parameters."""
+"""Compute the receptance of a track in the frequency domain, and its gradient by the parameters of the track."""
 
 import numpy as np
 
@@ -7,12 +7,12 @@ from turnout.simulate.banded import factorise, factorise4, solve, upper_rows
 from turnout.simulate.compiled import kernel
 from turnout.simulate.matrices import link_vector
 
-GROWTH_LIMIT = 1e6  # factors above this lose six digits: solve with pivoting instead
+GROWTH_LIMIT = 1e6  # largest factor without pivoting: above it six digits are lost, so solve with pivoting
 
 
 @kernel
 def _solve_lines(mass, damping, stiffness, hysteresis, omega, right, keep, width, out):
-    """Rows ``keep`` for all lines and right-hand sides: ``out[line, k]``; returns the largest growth of a factor."""
+    """Rows ``selected`` for all lines and right-hand sides in ``out[line, k]``; returns the largest factor."""
     half, n = mass.shape[0] - 1, mass.shape[1]
     system = np.zeros((width + 1, n + 4), dtype=np.complex128)
     lower = np.zeros((n + 4, width), dtype=np.complex128)
@@ -55,11 +55,11 @@ def _solve_pivoted(matrices, omega, right):
 
 
 def responses(matrices, frequency, places, rows=None, pivoted=False):
-    r"""(n_line, n_place, n) complex displacement of all degrees of freedom, or of ``rows``, under unit forces.
+    r"""(n_line, n_point, n) complex displacement of all degrees of freedom, or of ``rows``, under unit forces.
 
-    ``places`` are numbers (rail at x [m]) or names of degrees of freedom; ``frequency`` [Hz], 0 allowed. A complex one,
+    ``points`` are positions (rail at x [m]) or names of degrees of freedom. ``frequency`` [Hz] may be 0. A complex one,
     :math:`f - i \sigma / 2 \pi`, is that of signals weighted by :math:`e^{-\sigma t}` (Laplace transform).
-    Without pivoting unless a factor grows beyond 1e6 or ``pivoted`` asks for it.
+    It solves without pivoting unless a factor exceeds 1e6 or ``pivoted`` is set.
     """
     omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequency, dtype=complex))
     if not (np.all(np.isfinite(omega)) and np.all(omega.real >= 0.0)):
@@ -81,8 +81,8 @@ def responses(matrices, frequency, places, rows=None, pivoted=False):
 def receptance(matrices, frequency, excited, measured):
     r"""Receptance :math:`H = b_m^T (K + iH_s + i\omega C - \omega^2 M)^{-1} b_e` [m/N], (n_frequency,).
 
-    ``excited`` and ``measured`` are places on the rail [m] or names of degrees of freedom. Between two places of the
-    rail in one element its own compliance is added, so that both may lie between nodes.
+    ``excited`` and ``measured`` are positions on the rail [m] or names of degrees of freedom. If both are in one rail
+    element its local compliance is added, so that both may lie between nodes.
 
     References
     ----------
@@ -108,7 +108,7 @@ def receptance(matrices, frequency, excited, measured):
 
 
 def _within_element(matrices, excited, measured):
-    """What the motion of nodes leaves out between two places of the rail in one element [m/N]."""
+    """Compliance between two positions in one rail element, which the motion of the nodes does not include [m/N]."""
     if isinstance(excited, tuple) or isinstance(measured, tuple):
         return 0.0
     return matrices.compliance(float(excited), float(measured))
@@ -126,9 +126,9 @@ def receptance_gradient(matrices, frequency, excited, measured, parameters):
     frequency : (n,) array of float
         [Hz]
     excited, measured : float or tuple
-        Places.
-    parameters : list of (kind, list of Link)
-        ``kind`` is "stiffness", "damping", "mass" or "loss_factor"; the derivative is by a common value that is
+        Positions [m] or names of degrees of freedom.
+    parameters : list of (quantity, list of Link)
+        ``quantity`` is "stiffness", "damping", "mass" or "loss_factor". The derivative is by a common value that is
         added to all links of the list.
 
     Returns

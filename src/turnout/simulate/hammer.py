@@ -1,4 +1,4 @@
-"""A hammer test: blows of an instrumented hammer on the rail, recorded like measured ones."""
+"""Simulate a hammer test: impacts of an instrumented hammer on the rail, as recordings like measured ones."""
 
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -15,8 +15,8 @@ from turnout.simulate.sensor import Sensor, mean_of, measured, seated
 from turnout.simulate.turnout_track import TurnoutTrack, stretch_of_track, within
 from turnout.simulate.vehicle import lone_wheels
 
-# Stiffness of the plastic tip: gives a contact of 1.2 to 1.5 ms on ballasted track, the time the paper's band
-# of 800 Hz asks for; an estimate, sd 30 %.
+# Stiffness of the plastic tip: it gives a contact of 1.2 to 1.5 ms on ballasted track, as the paper's band of 800 Hz
+# needs; an estimate, sd 30 %.
 PLASTIC_TIP = PowerLaw(1.2e9, 1.5, 0.05)
 
 
@@ -27,8 +27,11 @@ LOAD_CELL = Sensor("hammer", 0.0, "hammer", "force", noise=2.0, limit=22.2e3, re
 
 @dataclass(frozen=True)
 class Hammer:
-    """A free mass with a nonlinear tip. ``mass`` [kg], ``velocity`` [m/s] at contact, its relative spread from
-    blow to blow, scatter of the hit's ``place_spread`` [m]; ``force`` is the channel of its load cell."""
+    """A free mass with a nonlinear tip: ``mass`` [kg] and ``velocity`` [m/s] at contact.
+
+    ``velocity_spread`` (relative) and ``position_spread`` [m] are the scatter between impacts. ``force`` is the channel
+    of the load cell.
+    """
 
     mass: float = 5.5
     velocity: float = 1.2
@@ -40,7 +43,7 @@ class Hammer:
 
 
 class Struck(NamedTuple):
-    """What is true of one blow: its ``place`` [m], the hammer's ``speed`` [m/s], the ``peak_force`` [N]."""
+    """True values of one impact: its ``place`` [m], the hammer's ``speed`` [m/s], the ``peak_force`` [N]."""
 
     place: float
     speed: float
@@ -48,7 +51,7 @@ class Struck(NamedTuple):
 
 
 def hammer_sensors(location, spacing=0.6):
-    """The two accelerometers of a test at ``location`` [m]: rail head at the sleeper and mid-span."""
+    """The two accelerometers of a test at ``location`` [m]: on the rail head at the sleeper and at mid-span."""
     head = Sensor("acc_1", location, "rail head at sleeper", noise=0.05, limit=5e3, resolution=0.01)
     return head, replace(head, name="acc_2", place=location + 0.5 * spacing, mounting="rail head mid-span")
 
@@ -73,45 +76,45 @@ def simulate_hammer(
     scheme="radau",
     truth=False,
 ):
-    """Recordings of a hammer test, one per blow, channel 0 the force [N], down positive as the accelerations.
+    """Recordings of a hammer test, one per impact; channel 0 is the force [N], down positive like the accelerations.
 
     Parameters
     ----------
     track : Track or TurnoutTrack
-        Only ``half_length`` [m] on both sides of the blow is marched, with the track's absorbing ends.
+        Only ``half_length`` [m] on both sides of the impact is simulated, with the absorbing ends of the track.
     location : float or str
-        Place of the blow [m], or the name of a location of the turnout.
+        Position of the impacts [m], or the name of a location of the turnout.
     hammer : Hammer
         Mass, tip and speed; by default 5.5 kg with a plastic tip.
     sensors : sequence of Sensor
         By default ``hammer_sensors(location)``.
     n_blows : int
-        Blows, each with its own speed and place.
+        Number of impacts, each with its own speed and position.
     terms : sequence of PhysicsTerm
-        Effects added to the base model; they count the supports of the whole track.
+        Effects added to the base model; their support numbers are those of the whole track.
     seed : int
-        Of the blows' scatter and the channels' noise.
+        Seed of the scatter of the impacts and of the noise.
     rate, duration, pretrigger : float
-        Of each recording [Hz, s, s].
+        Sampling rate [Hz], duration [s] and time before the impact [s] of each recording.
     substeps : int
         Time steps per sample.
     truth : bool
-        Return (recordings, tuple of ``Struck``), one per blow.
+        Return (recordings, tuple of ``ImpactTruth``), one of each per impact.
     pulse : callable or None
         A given force [N] of time [s] instead of the hammer's mass and tip.
     prepared : Prepared
-        Of ``prepare_hammer`` with this rate, to share one factorisation among tests; its terms and scheme count.
+        Result of ``prepare_hammer`` with this rate, to share one factorisation; its terms and scheme are used.
 
     Returns
     -------
     tuple of Recording
-        kind "hammer"; force and acceleration are means over the same step, so their ratio has no delay.
+        Of kind "hammer". Force and acceleration are means over the same step, so their ratio has no delay.
 
-    Errors: SimulationError for a place outside the track and a track prepared for another rate.
+    Errors: SimulationError for a position outside the track and a track prepared for another rate.
 
     Examples
     --------
-    The blow's impulse is between one and two times mass times speed, as the hammer bounces:
+    The impulse is between one and two times mass times speed, as the hammer bounces:
 
     >>> from turnout.simulate.track import uniform_track
     >>> blow = simulate_hammer(uniform_track(30.0), 15.0, Hammer(velocity_spread=0.0), n_blows=1)[0]
@@ -149,14 +152,14 @@ def simulate_hammer(
 
 
 def prepare_hammer(track, location, terms=(), rate=20e3, substeps=1, half_length=30.0, scheme="radau"):
-    """Factorisation for hammer tests near ``location``, a place [m] or a name."""
+    """Factorisation for hammer tests near ``location``, a position [m] or a name."""
     place, base = located(track, location)
     stretch, terms = stretch_of_track(base, place, half_length), on_stretch(terms, within(base, place, half_length))
     return prepare(stretch, 1.0 / (rate * substeps), scheme, terms)
 
 
 def located(track, location):
-    """Place [m] and track of a named location, or of a place on the first route."""
+    """Position [m] and track of a named location, or of a position on the first route."""
     base = track.track if isinstance(track, TurnoutTrack) else track
     if not isinstance(location, str):
         return float(location), base
@@ -168,7 +171,7 @@ def located(track, location):
 
 
 def _blow(prepared, hammer, velocity, hit, probes, duration, pulse):
-    """(1 + n_probe, n_step) force on the rail and true signals of one blow."""
+    """(1 + n_probe, n_step) force on the rail and true signals of one impact."""
     if pulse is not None:
         outcome = run(prepared, duration, probes, pulses=[(hit, pulse)])
         stages = (np.arange(outcome.time.size)[:, None] + prepared.scheme.node) * prepared.dt

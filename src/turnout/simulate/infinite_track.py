@@ -1,4 +1,4 @@
-"""Closed forms of infinite tracks: beam on Winkler's foundation, and Floquet's solution on discrete supports."""
+"""Closed forms of infinite tracks: beam on a Winkler foundation, and Floquet's solution on discrete supports."""
 
 import numpy as np
 from scipy.linalg import expm
@@ -66,7 +66,7 @@ def _beam_matrix(omega, rail):
 
 
 def _bay(omega, rail, spacing, support):
-    """Transfer from right of one support to right of the next, its multipliers and vectors, decaying ones first."""
+    """Multipliers and vectors of the transfer from one support to the next, the decaying ones first."""
     across = expm(_beam_matrix(omega, rail) * spacing)
     jump = np.eye(4, dtype=complex)
     jump[3, 0] = support
@@ -85,9 +85,9 @@ def floquet_receptance(frequency, track, offset=0.0, distance=0):
     track : Track
         Its rail, first support and spacing are used.
     offset : float
-        Place of the force behind a support [m], from 0 to below the spacing.
+        Distance of the force from the support before it [m], from 0 to below the spacing.
     distance : int
-        Bays from the force to where it is measured, at the same place in the bay.
+        Bays from the force to the response, which is at the same offset in its bay.
 
     References
     ----------
@@ -109,10 +109,10 @@ def floquet_receptance(frequency, track, offset=0.0, distance=0):
 
 
 def propagation(frequency, track):
-    r"""Wavenumbers of the two waves that run away from a force on the infinite periodic track.
+    r"""Wavenumbers of the two waves that propagate away from a force on the infinite periodic track.
 
-    Floquet's multiplier of a bay is :math:`e^{-i\kappa L}`; returns (n, 2) complex κ [rad/m], the less damped
-    wave first; its real part lies in the first Brillouin zone, the decay is -8.686 Im κ [dB/m].
+    Floquet's multiplier of a bay is :math:`e^{-i\kappa L}`. Returns (n, 2) complex κ [rad/m], the less damped wave
+    first. The real part is in the first Brillouin zone, the decay is -8.686 Im κ [dB/m].
     """
     spacing = float(track.support[1] - track.support[0])
     stiffness = support_stiffness(frequency, track)

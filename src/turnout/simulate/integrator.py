@@ -19,11 +19,11 @@ TABLEAUX = {
 
 @dataclass(frozen=True)
 class Scheme:
-    r"""A scheme as the march uses it: stage increments :math:`Z_a = \mathrm{scale}\,\mathrm{Re}(t_a D)`.
+    r"""A scheme as the time march uses it: stage increments :math:`Z_a = \mathrm{scale}\,\mathrm{Re}(t_a D)`.
 
-    ``rate`` is an eigenvalue λ of the inverse tableau, ``t`` its eigenvector and ``tau`` its left vector,
-    ``weight`` the sum of ``tau``; the step ends at u + scale Re(δ D), v → R v + scale Re(δ s D), s = λ/dt.
-    ``node`` are the stages' times in steps, ``quadrature`` their weights, ``inverse`` the inverse tableau.
+    ``rate`` is an eigenvalue λ of the inverse tableau, ``t`` its eigenvector and ``tau`` its left eigenvector,
+    ``weight`` is the sum of ``tau``. The step ends at u + scale Re(δ D), v → R v + scale Re(δ s D), s = λ/dt.
+    ``node`` are the times of the stages in steps, ``quadrature`` their weights, ``inverse`` the inverse tableau.
     The two-stage schemes are complex (scale 2), the midpoint rule is real (scale 1).
     """
 

@@ -1,4 +1,4 @@
-"""Compiled pieces of the port system: laws, paths, the rail under a port, windows of the inverse."""
+"""Compiled functions of the port system: force laws, paths, the rail under a port, windows of the inverse."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from turnout.simulate.force_laws import FRICTION, GAP, LIFT, LINEAR, POWER
 
 @kernel
 def law_force(kind, numbers, i, table, first, last, d, rate):
-    """Force of a law, its numbers in row ``i``, and the force's derivatives by deformation and by rate."""
+    """Force of a law with its numbers in row ``i``, and its derivatives by deformation and by rate."""
     if kind == POWER:
         if d <= 0.0:
             return 0.0, 0.0, 0.0
@@ -48,7 +48,7 @@ def law_force(kind, numbers, i, table, first, last, d, rate):
 
 @kernel
 def path_at(path, which, start, step, x):
-    """Dip of path ``which`` at ``x``; constant beyond the ends of its grid."""
+    """Dip of path ``path_index`` at ``x``; constant beyond the ends of its grid."""
     place = (x - start) / step
     k = min(max(int(np.floor(place)), 0), path.shape[1] - 1)
     r = min(max(place - k, 0.0), 1.0)
@@ -96,7 +96,7 @@ def window_product(window, pad, rows, weights, a, b):
         base = pad - row
         for j in range(4):
             k = base + rows[b, j]
-            if 0 <= k <= 2 * pad:  # else too far apart to matter; weights of unused places are 0
+            if 0 <= k <= 2 * pad:  # else too far apart to matter; unused entries have weight 0
                 total += weight * weights[b, j] * window[row, k]
     return total
 

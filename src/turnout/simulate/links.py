@@ -1,8 +1,7 @@
-"""A link: one scalar deformation of the track with its spring, damper and mass.
+"""Links of the track, each one scalar deformation with a spring, a damper and a mass, and the links that terms add.
 
-What terms add to a track together: each builds on the springs that the others leave, so that none turns negative.
-
-Terms that count a track's supports, on a track whose supports are counted from elsewhere.
+Several terms are added one after the other, so that the sum of all springs stays positive. Terms with support numbers
+can be moved to a track whose supports are numbered differently.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -15,11 +14,11 @@ class Link:
     r"""Adds :math:`k v v^T`, :math:`c v v^T` and :math:`m v v^T` to the track's matrices.
 
     ``ends`` is the sparse vector v: pairs of a degree of freedom and its weight. Degrees of freedom are
-    named: ("rail", j) the rail over support j, ("rail", j, k) the k-th node from there, ("sleeper", j),
-    ("ballast", j), or a further one of support j such as ("zener", j), which is created by naming it.
-    ``stiffness`` k [N/m], ``damping`` c [N s/m], ``mass`` m [kg], ``loss_factor`` hysteretic, frequency domain
-    only. A negative stiffness takes away what the base track has; the sum must stay positive definite.
-    ``tag`` says what the link stands for ("pad", "ballast", ...) so that gradients find it.
+    named: ("rail", j) is the rail over support j, ("rail", j, k) the k-th node from there, ("sleeper", j),
+    ("ballast", j), or a further one of support j such as ("zener", j). Naming it creates it.
+    ``stiffness`` k [N/m], ``damping`` c [N s/m], ``mass`` m [kg]; ``loss_factor`` is hysteretic, used in the frequency
+    domain only. A negative stiffness removes stiffness of the base track; the sum must be positive definite.
+    ``tag`` names the component ("pad", "ballast", ...); gradients use it.
     """
 
     ends: tuple
@@ -42,11 +41,11 @@ OWN = {
     "ballast": ("ballast_stiffness", "ballast_damping"),
     "subgrade": ("subgrade_stiffness", "subgrade_damping"),
 }
-ROUNDING = 1e-9  # of shares that add up to all
+ROUNDING = 1e-9  # rounding error of shares that add up to 1
 
 
 def links_of(terms, track):
-    """Links that ``terms`` add to ``track``: those first that scale its springs, so that the others build on these."""
+    """Links that ``terms`` add to ``track``; terms that scale its springs come first, the others act on the result."""
     found: list = []
     for term in sorted(terms, key=lambda term: not term.scales):
         found += term.links(left(track, found) if term.kind == "matrix" else track)
@@ -54,9 +53,9 @@ def links_of(terms, track):
 
 
 def ports_of(terms, track):
-    """Ports that ``terms`` add to ``track``, each law made of the springs that the other terms' links leave.
+    """Ports that ``terms`` add to ``track``; each law uses the springs of the track with the links of the other terms.
 
-    SimulationError where two terms withhold the ballast of one sleeper: together they would push where it pulls.
+    SimulationError if terms withhold more than the whole ballast of one sleeper: it would act in the wrong direction.
     """
     found: list = []
     taken: dict[tuple, list] = {}
@@ -73,7 +72,7 @@ def ports_of(terms, track):
 
 
 def left(track, links):
-    """``track`` with what ``links`` add to its own pads, ballast and subgrade as part of these."""
+    """``track`` with the ``links`` that act on its pads, ballast and subgrade added to the values of these."""
     values: dict = {}
     for link in links:
         j = link.ends[0][0][1]
@@ -83,18 +82,18 @@ def left(track, links):
     return track.with_(**values) if values else track
 
 
-COUNTED = ("sleeper", "support", "first", "last")  # fields of terms that count supports from the track's start
+COUNTED = ("sleeper", "support", "first", "last")  # fields of terms that are support numbers
 
 
 def moved(term, count):
-    """The term at the same places of a track that has ``count`` supports more in front."""
+    """The term at the same positions of a track that has ``count`` more supports at its start."""
     return replace(term, **{name: getattr(term, name) + count for name in _counted(term)})
 
 
 def on_stretch(terms, keep):
-    """The terms as a stretch counts its supports, ``keep`` (n_support,) of the whole track; none of what lies outside.
+    """The terms with the support numbers of a stretch, which has the supports ``inside`` (n_support,) of the track.
 
-    Of a run of supports that lies partly outside, the part inside is left.
+    Terms outside it are dropped. A range of supports that is partly outside is cut to the part inside.
     """
     first, last = int(keep.argmax()), len(keep) - 1 - int(keep[::-1].argmax())
     found = []

@@ -1,4 +1,7 @@
-"""The time march, compiled: free motion, the small system of all ports, their response, advance, record."""
+"""Integrate the equations of motion in time; compiled.
+
+Each step: free motion, the small system of all ports, their response, sensor records, the state at the end.
+"""
 
 import numpy as np
 
@@ -6,9 +9,9 @@ from turnout.simulate.banded import momentum_less_force, multiply, solve, solve_
 from turnout.simulate.compiled import inlined, kernel
 from turnout.simulate.port_system import evaluate, flexibility, newton_update, place_ports
 
-ITERATIONS = 60
-PLAIN = 12  # of them without a look at whether they come nearer
-ROUNDED = 1000.0  # tolerances; a law as steep as stuck friction is not known closer from rounded velocities
+ITERATIONS = 60  # Newton iterations of a step
+PLAIN = 12  # iterations before the residual is checked for progress
+ROUNDED = 1000.0  # tolerances; stuck friction is so steep that rounded velocities do not determine it better
 CONVERGED, NEWTON, LEFT_TRACK = range(3)
 
 
@@ -51,7 +54,7 @@ def free_motion(track, scheme, bodies, run, motion, step, d, e, e_stand_in, mass
 
 @inlined
 def free_deformation(track, scheme, ports, motion, d, e, e_stand_in, rows, weights, share, dip, d0):
-    """Deformation of every port stage as if no port pushed."""
+    """Deformation of every port stage without any port force."""
     stages, pad, t = scheme.node.size, track.pad, scheme.t
     u, z, y, bodies_of, wheels = motion.u, motion.z, motion.y, ports.body, ports.wheel
     for i in range(bodies_of.size):
@@ -110,7 +113,7 @@ def add_window(d, window, r, width, c):
 
 @inlined
 def record(track, scheme, run, motion, d, step, out):
-    """Sensors: mean acceleration or velocity, or displacement, of the step that ends now; all stamped mid-step."""
+    """Sensor signals of the current step: mean acceleration, mean velocity or mid-step displacement."""
     for m in range(out.shape[0]):
         value = 0.0
         for j in range(4):
@@ -143,7 +146,7 @@ def advance(scheme, motion, d, e, e_stand_in):
 
 @kernel
 def march(track, scheme, bodies, ports, run, motion, n_step, out, out_force):
-    """March ``n_step`` steps; returns (status, step, port, value, iterations) and leaves ``motion`` at the end."""
+    """March ``n_step`` steps; returns (status, step, port, value, iterations) and updates ``motion``."""
     stages, n_port = scheme.node.size, ports.body.size
     n = n_port * stages
     zero = scheme.tau[0] * 0.0
@@ -180,7 +183,7 @@ def march(track, scheme, bodies, ports, run, motion, n_step, out, out_force):
                 converged = True
                 break
             iterations += 1
-            if trial > PLAIN and worst > 0.99 * before:  # to and fro over a knee: shorten the last step
+            if trial > PLAIN and worst > 0.99 * before:  # oscillation about a kink: halve the last change
                 for i in range(n):
                     change[i] *= 0.5
                     motion.force[i] -= change[i]

@@ -1,4 +1,4 @@
-"""Banded mass, damping and stiffness of a track, and the place of every degree of freedom in them."""
+"""Assemble banded mass, damping and stiffness matrices of a track, and number its degrees of freedom."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,8 +17,8 @@ ORDER = {"sleeper": 0, "ballast": 1}
 class TrackMatrices:
     """Matrices as upper diagonals, (half + 1, n): ``mass[k, i]`` is M[i, i + k]; ``node`` (n_node,) [m].
 
-    ``index`` maps the name of a degree of freedom to its row; ``node_index`` (n_node,) is the row of a node's
-    deflection, its rotation follows. ``rails`` has the profile of each element, ``links`` all that was added.
+    ``index`` maps the name of a degree of freedom to its row. ``node_index`` (n_node,) is the row of a node's
+    deflection; its rotation is the next row. ``rails`` has the profile of each element, ``links`` all links.
     """
 
     mass: np.ndarray
@@ -61,19 +61,21 @@ class TrackMatrices:
         return np.array([i, i + 1, j, j + 1]), shape_functions((x - self.node[e]) / h, h, p)
 
     def compliance(self, x, other=None):
-        """Compliance within the element between ``x`` and ``other`` [m/N], by default ``x`` itself; 0 where the other
-        lies in another element."""
+        """Local compliance of the element between ``x`` and ``x_load`` [m/N], by default ``x`` itself.
+
+        It is 0 if ``x_load`` is in another element.
+        """
         e, other = self.element_at(x), x if other is None else other
         h = self.node[e + 1] - self.node[e]
         shares = (x - self.node[e]) / h, (other - self.node[e]) / h
         return float(local_compliance(*shares, h, self.rails[e])) if 0.0 <= shares[1] <= 1.0 else 0.0
 
     def element_at(self, x):
-        """Index of the element at ``x`` [m]; on a node the one behind it."""
+        """Index of the element at ``x`` [m]; on a node the one after it."""
         return min(int(np.searchsorted(self.node, x, side="right")) - 1, self.node.size - 2)
 
     def weights(self, place):
-        """Rows and weights of a place: a number is the rail at x [m], a tuple names a degree of freedom."""
+        """Rows and weights of a point: a number is the rail at x [m], a tuple names a degree of freedom."""
         if isinstance(place, tuple):
             if place not in self.index:
                 raise SimulationError(f"the track has no degree of freedom {place!r}.")
@@ -82,7 +84,7 @@ class TrackMatrices:
 
 
 def link_vector(link, index):
-    """Rows and weights of a link; a name that the track does not have is a SimulationError."""
+    """Rows and weights of a link; an unknown degree of freedom is a SimulationError."""
     try:
         return np.array([index[name] for name, _ in link.ends]), np.array([weight for _, weight in link.ends])
     except KeyError as error:
@@ -97,7 +99,7 @@ def assemble(track, terms=()):
 
 
 def linked(track, links):
-    """Matrices of links alone, as the nodes of ``track`` number them: no rail is in them."""
+    """Matrices of links alone, with the numbering of ``track`` and without its rail."""
     node, node_index, index = _number(track, links)
     vectors = [link_vector(link, index) for link in links]
     half = max([1 + int(np.max(np.diff(node_index))), *(int(np.ptp(rows)) for rows, _ in vectors)])
@@ -115,7 +117,7 @@ def linked(track, links):
 
 
 def railed(matrices, track):
-    """The matrices with the rails of ``track`` in them."""
+    """The matrices with the rails of ``track`` added."""
     rails = tuple(track.rail_over(a, b) for a, b in pairwise(matrices.node.tolist()))
     mass, damping, stiffness = (x.copy() for x in (matrices.mass, matrices.damping, matrices.stiffness))
     _add_rail(track, rails, matrices.node, matrices.node_index, mass, damping, stiffness)
@@ -123,7 +125,7 @@ def railed(matrices, track):
 
 
 def _number(track, links):
-    """Nodes, their rows and the row of every named degree of freedom, supports' own ones after their node."""
+    """Nodes, their rows and the row of every named degree of freedom; those of a support follow its node."""
     per_bay = track.elements_per_bay
     bays = [np.linspace(a, b, per_bay + 1)[:-1] for a, b in zip(track.support[:-1], track.support[1:])]
     node = np.append(np.concatenate(bays), track.support[-1])
@@ -170,7 +172,7 @@ def _add_rail(track, rails, node, node_index, mass, damping, stiffness):
 
 
 def _end_rate(track, x):
-    """Damping rate [1/s] of an absorbing end, growing as the square of the way into it."""
+    """Damping rate [1/s] of an absorbing end; it grows with the square of the distance into the end."""
     if not track.end_length:
         return 0.0
     depth = max(track.start + track.end_length - x, x - track.end + track.end_length, 0.0)

@@ -1,4 +1,4 @@
-"""Fit pads and ballast of a section so that a simulated hammer test has given resonances and dampings."""
+"""Fit pads and ballast of a section so that a simulated hammer test has given resonances and damping ratios."""
 
 from dataclasses import dataclass, replace
 
@@ -9,7 +9,7 @@ from turnout.errors import SimulationError
 from turnout.simulate.hammer import Hammer, located, prepare_hammer, simulate_hammer
 
 FREE = ("pad_stiffness", "pad_damping", "ballast_stiffness", "ballast_damping")
-# Relative accuracy that is asked for: far inside the printed uncertainties, and the prior's pull on what is free.
+# Relative accuracy of the fit, far better than the printed uncertainties, and the weak prior on the logarithms.
 FREQUENCY_SD, DAMPING_SD, PRIOR_SD = 0.002, 0.02, 3.0
 BOUNDS = {
     "pad_stiffness": (20e6, 3e9),
@@ -22,7 +22,7 @@ QUIET = Hammer(velocity_spread=0.05, place_spread=0.0)
 
 @dataclass(frozen=True)
 class ModeFit:
-    """``values`` of the section's parameters [SI]; ``found`` and ``wanted`` map band to (frequency, damping)."""
+    """``values`` of the section's parameters [SI]; ``fitted`` and ``targets`` map a band to (frequency, damping)."""
 
     section: str
     values: dict
@@ -48,27 +48,27 @@ def with_section(turnout, label, **values):
 
 
 def section_modes(turnout, location, modes_of, blows=2, half_length=20.0):
-    """What ``modes_of`` finds in a simulated test at ``location``: band -> (frequency [Hz], damping)."""
+    """Modes of a simulated test at ``location`` by ``modes_of``: band -> (frequency [Hz], damping)."""
     prepared = prepare_hammer(turnout, location, half_length=half_length)
     recordings = simulate_hammer(turnout, location, QUIET, n_blows=blows, duration=0.15, prepared=prepared)
     return modes_of(recordings)
 
 
 def fit_modes(turnout, location, wanted, modes_of, section=None, evaluations=14):
-    """``ModeFit`` of one section, the rest of the turnout as it is.
+    """``ModeFit`` of one section; the rest of the turnout does not change.
 
     Parameters
     ----------
     turnout : TurnoutTrack
-        Start values are those it has.
+        Its values are the start of the fit.
     location : str
         Named location of the hammer test.
-    wanted : dict
+    targets : dict
         "ballast" and, where known, "railpad" -> (frequency [Hz], damping ratio).
     modes_of : callable
-        Recordings -> the same kind of dict; missing bands were not found.
+        Recordings -> a dict like ``targets``; bands without a mode are missing.
     section : str
-        Whose supports are changed, by default the one called like the location.
+        Section whose supports are changed, by default the one with the name of the location.
     """
     section = section or location
     place, track = located(turnout, location)

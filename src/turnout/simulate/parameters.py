@@ -1,6 +1,6 @@
-"""Tracks and vehicles by name or path: ``config/tracks/<name>.yaml`` and ``config/vehicles/<name>.yaml``.
+"""Load tracks and vehicles by name or path: ``config/tracks/<name>.yaml`` and ``config/vehicles/<name>.yaml``.
 
-Places of a track's file that lie off the track itself: nothing refuses them before they are simulated.
+Also here: a check for entries of a track file that are outside its track.
 """
 
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ REPOSITORY = Path(__file__).resolve().parents[3]
 def load_track(name, seed=0, folder=None):
     """``TurnoutTrack`` called ``name`` or in the file of that path; ``seed`` draws its scatter along the track.
 
-    A file with ``extends`` takes what it does not say itself from the file of that name.
+    A file with ``extends`` takes the keys that it does not have from the file of that name.
     """
     return turnout_track(track_parameters(track_path(name, folder), folder), seed)
 
@@ -28,7 +28,7 @@ def track_path(name, folder=None):
 
 
 def track_parameters(path, folder, below=()):
-    """Parameters of a track's file, with those of the file that it extends where it says nothing itself."""
+    """Parameters of a track file; keys that it does not have come from the file that it extends."""
     own = read_parameters(path)
     if "extends" not in own:
         return own
@@ -40,13 +40,13 @@ def track_parameters(path, folder, below=()):
 
 
 def extended(own, path, folder=None):
-    """File of the track that the parameters ``own`` of the file ``path`` extend: beside it, else in ``folder``."""
+    """File that the track ``parameters`` of the file ``path`` extend: in its folder, else in ``folder``."""
     beside = path.parent / f"{own['extends']}.yaml"
     return beside if beside.is_file() else _file(own["extends"], folder, "tracks")
 
 
 def load_vehicle(name, load=0.5, folder=None, units=1):
-    """``Vehicle`` called ``name``; ``load`` from 0 (empty) to 1 (full) or 1.5, ``units`` coupled one behind the other.
+    """``Vehicle`` called ``name``; ``load`` from 0 (empty) to 1 (full) or 1.5, ``units`` coupled in a row.
 
     A file with ``compose`` is a train of other files' vehicles, front first; a locomotive has no payload.
     """
@@ -74,12 +74,15 @@ def _file(name, folder, kind):
     raise SimulationError(f"no file config/{kind}/{name}.yaml; there are {', '.join(there) or 'none'}.")
 
 
-REACH = (("place", "place"), ("start", "end"), ("from", "to"))  # keys of the first and the last place of an entry
+REACH = (("place", "place"), ("start", "end"), ("from", "to"))  # keys of the first and last position of an entry
 
 
 def off_track(path: Path) -> Iterator[ConfigError]:
-    """An error at each entry of a sound track file that lies wholly off its track: locations, parts of routes,
-    stretches of supports and rails. What was taken over from another file may lie outside."""
+    """An error for each entry of a valid track file that is completely outside its track.
+
+    Entries are locations, parts of routes, stretches of supports and of rails. Those taken from another file may be
+    outside.
+    """
     p = track_parameters(path, path.parent)
     extent = p.part("extent")
     start, end = extent.number("from", "m"), extent.number("to", "m")

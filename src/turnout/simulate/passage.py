@@ -1,4 +1,4 @@
-"""A train passage: the train in equilibrium rolls over the turnout and is recorded like a measured one."""
+"""Simulate a train passage: the train starts in equilibrium, rolls over the turnout and is recorded by its sensors."""
 
 from dataclasses import dataclass
 
@@ -12,14 +12,17 @@ from turnout.simulate.sensor import mean_of, measured, seated
 from turnout.simulate.turnout_track import TurnoutTrack
 from turnout.simulate.wheel_path import check_path
 
-CLOSE = 1e-6  # m, what places are rounded to
+CLOSE = 1e-6  # m; positions are rounded to this
 
 
 @dataclass(frozen=True)
 class PassageTruth:
-    """What no measuring system sees. ``time`` (n,) [s] of the samples, ``force`` (n_wheel, n) [N] mean over the
-    step, ``surface_force`` (n_wheel, n_surface, n), ``wheel_place`` (n_wheel, n) [m], ``port_force`` of terms,
-    ``clean`` (n_channel, n) before the sensors, ``iterations`` of Newton per step."""
+    """True values that no sensor measures.
+
+    ``time`` (n,) [s] of the samples, ``force`` (n_wheel, n) [N] mean over the step, ``surface_force``
+    (n_wheel, n_surface, n), ``wheel_position`` (n_wheel, n) [m], ``port_force`` of terms, ``clean`` (n_channel, n)
+    signals before the sensors, ``iterations`` of Newton per step.
+    """
 
     time: np.ndarray
     force: np.ndarray
@@ -58,9 +61,9 @@ def simulate_passage(
     Parameters
     ----------
     track : TurnoutTrack or Track
-        What is passed. A plain Track is smooth and has one route.
+        The track. A plain Track is smooth and has one route.
     vehicle : Vehicle
-        Of ``turnout.simulate.vehicle`` or read from config/vehicles.
+        From ``turnout.simulate.vehicle`` or read from config/vehicles.
     speed : float
         Above 0. [m/s]
     sensors : sequence of Sensor
@@ -70,22 +73,22 @@ def simulate_passage(
     route : str
         Route of the turnout: "main", "diverging".
     roughness : float or None
-        Level above the limit curve of ISO 3095 [dB]; None: as the turnout says.
+        Level above the limit curve of ISO 3095 [dB]; None: that of the turnout.
     terms : sequence of PhysicsTerm
         Effects added to the base model.
     seed, rail_seed : int, int or None
-        Of the noise, and of the rail's roughness (None: ``seed``): trains over one rail share the latter.
+        Seeds of the noise and of the rail roughness (None: ``seed``). Trains over one rail share the latter.
     rate, substeps : float, int
         Samples per second [Hz] and time steps per sample.
     lead, tail : float
-        Time before the first wheel reaches the first sensor and after the last has left the last one. [s]
+        Time before the first wheel reaches the first sensor, and after the last wheel has passed the last one. [s]
     irregularities : sequence of path parts
-        Further ones of this train: WheelFlat, OutOfRound ...
+        Further irregularities of this train: WheelFlat, OutOfRound ...
     entry : float
         Length over which wheels roll from their stand-in track onto the modelled one; 0: they must stay on the
-        modelled track all the time. Sensors lie no nearer to the track's ends than this and ``Drive.margin``. [m]
+        modelled track all the time. Sensors must be at least this and ``Drive.margin`` from the track's ends. [m]
     prepared : Prepared
-        Of ``prepare_passage`` with this rate, shared among trains, speeds and paths; its terms and scheme count.
+        Result of ``prepare_passage`` with this rate, for any train, speed and path; its terms and scheme are used.
     truth : bool
         Also return the PassageTruth.
 
@@ -94,8 +97,8 @@ def simulate_passage(
     Recording or (Recording, PassageTruth)
         Acceleration [m/s²] down positive; sample k is the mean over the time step around (k + 1/2) / rate.
 
-    Errors: SimulationError for a speed of zero, an unknown route, a sensor outside or where wheels are not yet on the
-    modelled track, a wheel that leaves the track, a track prepared for another rate.
+    Errors: SimulationError for a speed of zero, an unknown route, a sensor outside the track or where wheels are not
+    yet on the modelled track, a wheel that leaves the track, a track prepared for another rate.
 
     Examples
     --------
@@ -153,7 +156,7 @@ def simulate_passage(
 
 
 def prepare_passage(track, terms=(), rate=20e3, substeps=1, scheme="radau", route="main"):
-    """Factorisation of a turnout for passages along ``route`` at this rate, shared among trains, speeds, seeds."""
+    """Factorisation of a turnout for passages along ``route`` at this rate, shared by trains, speeds and seeds."""
     base = track.track_of(route) if isinstance(track, TurnoutTrack) else track
     return prepare(base, 1.0 / (rate * substeps), scheme, terms)
 
@@ -172,7 +175,7 @@ def _drive(turnout, vehicle, speed, sensors, sign, route, level, seed, lead, tai
 
 
 def _check_carried(seats, track, drive):
-    """Refuse sensors where the track does not yet, or no more, carry the whole of a wheel: they record faded loads."""
+    """Reject sensors where wheels are partly on the stand-in track: they would record reduced loads."""
     if drive.entry == 0.0:
         return
     first, last = track.start + drive.margin + drive.entry, track.end - drive.margin - drive.entry

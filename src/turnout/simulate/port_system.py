@@ -1,4 +1,4 @@
-"""The small nonlinear system of a step, compiled: where the ports are, what they do to each other, Newton."""
+"""The small nonlinear system of the ports in a time step, compiled: positions, mutual flexibility, Newton's method."""
 
 import numpy as np
 
@@ -8,9 +8,9 @@ from turnout.simulate.kernels import law_force, path_at, rail_weights, ramp_at, 
 
 @inlined
 def place_ports(track, scheme, ports, run, step, element, x, rows, weights, local, share, dip):
-    """Rows, weights, local compliance, stand-in share and dip of every port and stage; -1 or the lost port."""
+    """Rows, weights, local compliance, stand-in share and dip of every port and stage; -1 or a port off the track."""
     stages, n_port = scheme.node.size, ports.body.size
-    # Locals, here and below: taking an array out of a tuple counts a reference, too dear inside a loop.
+    # Local names here and below: taking an array out of a tuple counts a reference, which is slow inside a loop.
     body, start, fixed_rows, fixed_weights, gap = ports.body, ports.place, ports.rows, ports.weights, ports.gap
     node, node_row, shear_ratio = track.node, track.node_row, track.shear_ratio
     flexible, shear_flexible = track.flexibility, track.shear_flexibility
@@ -47,7 +47,7 @@ def place_ports(track, scheme, ports, run, step, element, x, rows, weights, loca
 
 @inlined
 def flexibility(track, scheme, bodies, ports, rows, weights, local, share, g):
-    """Fill ``g``: how much a force at port stage b takes off the deformation of port stage a."""
+    """Fill ``g``: by how much a unit force at port stage b reduces the deformation of port stage a."""
     stages, n_port, pad = scheme.node.size, ports.body.size, track.pad
     body, wheel, window, t, tau = ports.body, ports.wheel, track.window, scheme.t, scheme.tau
     block_of, block_start, answer = bodies.block_of, bodies.block_start, bodies.answer
@@ -79,7 +79,7 @@ def flexibility(track, scheme, bodies, ports, rows, weights, local, share, g):
 
 @inlined
 def evaluate(scheme, ports, n, g, d0, force, before, d, f, by_d, by_rate):
-    """Deformations and law forces of all port stages; returns the largest residual and where it is."""
+    """Deformations and law forces of all port stages; returns the largest residual and its port."""
     stages, inverse = scheme.node.size, scheme.inverse
     kind, numbers, table, table_start = ports.kind, ports.numbers, ports.table, ports.table_start
     for k in range(n):
@@ -104,7 +104,7 @@ def evaluate(scheme, ports, n, g, d0, force, before, d, f, by_d, by_rate):
 
 @inlined
 def newton_update(scheme, ports, order, x, cut, g, force, f, by_d, by_rate, change, matrix, right, active):
-    """One Newton step, cluster by cluster of neighbouring ports; far coupling is left to the iteration."""
+    """One Newton step for each cluster of neighbouring ports; the iteration resolves the coupling of distant ports."""
     stages, inverse = scheme.node.size, scheme.inverse
     n_port = order.size
     first = 0

@@ -1,4 +1,4 @@
-"""Gather wheels' contacts and terms' ports, in order of place, as the march takes them."""
+"""Collect the wheel contacts and the ports of terms into the arrays of the time march, in order of position."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from turnout.simulate.state import PortArrays
 
 
 def contact_ports(vehicle, surfaces, start, direction):
-    """(place, body row, wheel, surface, law) of each contact: every wheel on every surface of the route."""
+    """(position, body row, wheel, surface, law) of each contact: every wheel on every surface of the route."""
     rows, found = vehicle.wheel_rows, []
     for wheel, (behind, law) in enumerate(zip(vehicle.wheel_places, vehicle.each("contact"))):
         for surface in range(len(surfaces)):
@@ -23,7 +23,7 @@ def fixed_ports(prepared):
 
 
 def port_arrays(prepared, contacts, fixed, path_of):
-    """``PortArrays`` in order of place and the order itself: contacts first, then fixed ports.
+    """``PortArrays`` in order of position, and this order as indices: contacts first, then fixed ports.
 
     ``path_of`` (wheel, surface) -> index of the path.
     """

@@ -1,4 +1,4 @@
-"""Factorise a track once for a time step and scheme; many trains, speeds and paths then share it."""
+"""Factorise a track for a time step and scheme; trains, speeds and paths share the result."""
 
 from dataclasses import dataclass, field
 
@@ -11,14 +11,16 @@ from turnout.simulate.matrices import TrackMatrices, assemble
 from turnout.simulate.state import SchemeArrays, TrackArrays
 from turnout.simulate.track import Track
 
-LOOSE = 1e-11  # a pivot this small beside its diagonal is what rounding leaves of 0
+LOOSE = 1e-11  # pivot over its diagonal element below which the pivot is a rounded 0
 WINDOW_DECAY = 30.0  # exp(-30) = 1e-13: windows of the inverse are exact to rounding
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """A track ready to march: ``matrices`` for sensors and statics, ``arrays`` and ``scheme`` for the kernels;
-    ``stand_ins`` remembers what stands in for the track at each place where wheels came on."""
+    """A factorised track: ``matrices`` for sensors and statics, ``arrays`` and ``scheme`` for the kernels.
+
+    ``stand_ins`` caches the stand-in track for each position at which wheels enter.
+    """
 
     track: Track
     terms: tuple
@@ -41,7 +43,7 @@ class Prepared:
         return x
 
     def check_step(self, rate, substeps):
-        """Refuse with SimulationError a ``rate`` [Hz] and ``substeps`` per sample for which this was not prepared."""
+        """Raise SimulationError if this was prepared for another ``rate`` [Hz] or other ``substeps`` per sample."""
         if not abs(self.dt * rate * substeps - 1.0) < 1e-9:
             raise SimulationError(
                 f"the track is prepared for steps of {self.dt:.9g} s, but {rate!r} Hz with {substeps!r} per sample "
@@ -52,8 +54,8 @@ class Prepared:
 def prepare(track, dt=5e-5, scheme="radau", terms=(), decay=WINDOW_DECAY, matrices=None):
     """Assemble and factorise ``track`` with the matrix entries of ``terms`` for steps of ``dt`` [s].
 
-    What a wheel's force does at a distance is left out where it has fallen by exp(-``decay``). ``matrices`` are those
-    of this track with these terms, where they are assembled already.
+    The response to a force is neglected where it has decayed to exp(-``decay``). ``matrices`` are those of this track
+    with these terms, if they are assembled already.
 
     Errors: SimulationError where the track carries no load (its stiffness is not positive definite).
     """
@@ -107,7 +109,7 @@ def _factors(system):
 
 
 def _from_both_ends(system, window, reach):
-    """Factors of the matrix turned round and the inverse's block in the middle, for half bandwidth 4 at most."""
+    """Factors of the reversed matrix and the middle block of the inverse, for half bandwidth 4 at most."""
     half, n = system.shape[0] - 1, system.shape[1]
     if half > 4 or n < 16 or reach < 4:
         nothing = np.zeros((0, 4), dtype=system.dtype)

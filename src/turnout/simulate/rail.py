@@ -1,4 +1,4 @@
-"""The rail as a beam: Timoshenko or Euler-Bernoulli element, shape functions, compliance within an element."""
+"""Rail elements as Timoshenko or Euler-Bernoulli beams: matrices, shape functions, compliance within an element."""
 
 from dataclasses import dataclass
 
@@ -46,10 +46,10 @@ class Rail:
 
 
 def in_series(rails, shares):
-    r"""One profile for an element in which ``rails`` follow one another, each over its share of the length.
+    r"""One profile for an element with several ``rails`` in a row, each over its share of the length.
 
-    What yields adds up, and so does what weighs: :math:`1/EI = \sum p_k / EI_k`, the same of shear,
-    :math:`m = \sum p_k m_k`: its turn under a moment and its stretch of shear under a force are exact, and its mass is.
+    Flexibilities and masses add up: :math:`1/EI = \sum p_k / EI_k`, the same for shear, :math:`m = \sum p_k m_k`.
+    Rotation under a moment, shear deflection under a force and mass are exact.
 
     >>> soft, stiff = Rail(4e6, 50.0, 2e8), Rail(12e6, 150.0, 6e8)
     >>> half = in_series((soft, stiff), (0.5, 0.5))

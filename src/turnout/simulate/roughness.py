@@ -1,4 +1,4 @@
-"""Random roughness of rail and wheel with the spectrum's shape of ISO 3095."""
+"""Generate random roughness of rail and wheel with the spectrum of ISO 3095."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ LIMIT = np.array([*LONG, *SHORT])
 def level(wavelength, offset=0.0):
     """One-third octave roughness level [dB re 1 µm] at ``wavelength`` [m], ``offset`` [dB] above the limit curve.
 
-    Constant beyond 2 m and below 3.15 mm, where the standard gives none.
+    Constant above 2 m and below 3.15 mm, where the standard has no values.
 
     >>> [round(float(level(w)), 1) for w in (1.0, 0.4, 0.1, 0.01)], round(float(level(0.1, offset=6.0)), 1)
     ([17.1, 17.1, 4.9, -8.0], 10.9)
@@ -24,20 +24,20 @@ def level(wavelength, offset=0.0):
 
 
 def roughness(start, end, seed, offset=0.0, shortest=0.02, longest=3.0, step=0.005, fade=3.0):
-    r"""A realisation of roughness between two places, as a path.
+    r"""A realisation of roughness between two positions, as a path.
 
     The variance of a one-third octave band is :math:`10^{L/10}` µm²; it is spread evenly over the band.
 
     Parameters
     ----------
     start, end : float
-        Places [m]; it fades in and out over ``fade`` metres.
+        Positions [m]; the roughness fades in and out over ``fade`` metres.
     seed : int or sequence of int
         Seed of numpy's default generator: the same seed gives the same rail.
     offset : float
         Level above the limit curve. [dB]
     shortest, longest : float
-        Wavelengths that are in it [m]. Waves shorter than the contact patch, about 15 mm, do not lift a wheel.
+        Range of wavelengths [m]. Waves shorter than the contact patch, about 15 mm, do not lift a wheel.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""One run: put a train (or a hammer) on a prepared track, march, and say what happened."""
+"""Run one simulation: put a train or a hammer on a prepared track, integrate in time, return the signals."""
 
 from dataclasses import dataclass
 
@@ -18,8 +18,10 @@ CLUSTER_CUT = 0.9  # ports closer than this [m] share one Newton system, the oth
 
 @dataclass(frozen=True)
 class Probe:
-    """What to record: ``place`` is the rail at x [m] or a named degree of freedom; ``order`` 2 acceleration,
-    1 velocity, 0 displacement."""
+    """A signal to record: ``place`` is the rail at x [m] or a named degree of freedom.
+
+    ``order`` is 2 for acceleration, 1 for velocity, 0 for displacement.
+    """
 
     place: object
     order: int = 2
@@ -27,9 +29,12 @@ class Probe:
 
 @dataclass(frozen=True)
 class Outcome:
-    """``time`` (n_step,) mid-step [s]; ``signals`` (n_probe, n_step); ``force`` (n_wheel, n_step) mean over the
-    step [N], by wheel, front first; ``surface_force`` (n_wheel, n_surface, n_step); ``port_force`` of the terms'
-    ports; ``iterations`` of Newton per step; ``motion`` the state at the end."""
+    """Result of a run: ``time`` (n_step,) mid-step [s] and ``signals`` (n_probe, n_step).
+
+    ``force`` (n_wheel, n_step) is the mean over the step [N] of each wheel, front wheel first; ``surface_force`` is
+    (n_wheel, n_surface, n_step). ``port_force`` is that of the ports of terms, ``iterations`` those of Newton per step,
+    ``motion`` the state at the end.
+    """
 
     time: np.ndarray
     signals: np.ndarray
@@ -44,9 +49,9 @@ class Outcome:
 class Drive:
     """How a vehicle moves: front wheel at ``start`` [m] at time 0, ``speed`` [m/s], ``direction`` +1 or -1.
 
-    ``surfaces``: for each rail surface a wheel can touch the parts of its path. ``entry`` [m] is the length over
-    which the modelled track takes the wheels over from their stand-ins, 0: all wheels stay on the modelled track.
-    ``thrown`` = (clearance [m], velocity [m/s]) starts a body above the rail instead of in equilibrium.
+    ``surfaces``: the parts of the path on each rail surface that a wheel can touch. ``entry`` [m] is the length over
+    which wheels change from their stand-in tracks to the modelled track, 0: all wheels stay on the modelled track.
+    ``free_fall`` = (clearance [m], velocity [m/s]) starts a body above the rail instead of in equilibrium.
     """
 
     start: float
@@ -69,17 +74,17 @@ def run(prepared, duration, probes=(), vehicle=None, drive=None, pulses=(), forc
     probes : sequence of Probe
         Signals to record.
     vehicle, drive : Vehicle, Drive or None
-        What runs over the track and how.
-    pulses : sequence of (place, callable)
-        Given forces [N] of time [s], down positive.
+        The vehicle on the track and its motion.
+    pulses : sequence of (point, callable)
+        Given forces [N] as functions of time [s], down positive.
     marcher : callable
-        ``march`` (compiled) or the plain numpy one of ``march_numpy``.
+        ``march`` (compiled) or the reference implementation in numpy.
 
     Returns
     -------
     Outcome
 
-    Errors: SimulationError where a wheel leaves the track or Newton's iteration fails, with time, place and value.
+    Errors: SimulationError where a wheel leaves the track or Newton's iteration fails, with time, position and value.
     """
     n_step = round(duration / prepared.dt)
     if n_step < 1:
@@ -142,12 +147,12 @@ def _stand_in(prepared, drive):
 
 
 def _paths(prepared, vehicle, drive, n_step):
-    """Cubic pieces of every path that differs, and which path each wheel uses on each surface."""
+    """Cubic pieces of every distinct path, and the path of each wheel on each surface."""
     way = drive.speed * n_step * prepared.dt
     length = float(vehicle.wheel_places[-1])
     ends = (drive.start - drive.direction * length, drive.start + drive.direction * way)
     low, high = min(ends) - 0.1, max(ends) + 0.1
-    rolls = drive.thrown is None  # a hammer falls on the rail's head whatever wheels find there
+    rolls = drive.thrown is None  # the paths of wheels do not apply to a hammer
     term_parts = [part for term in prepared.terms for part in term.paths(prepared.track, vehicle)] if rolls else []
     pieces: list[np.ndarray] = []
     known: dict[tuple, int] = {}
@@ -199,7 +204,7 @@ def _run_arrays(prepared, drive, use_stand_in, paths, path_start, probes, pulses
 
 
 def _loads(prepared, vehicle, drive, pulses, arrays, force):
-    """What presses the rail itself: the wheels, and the pulses that do not act on a named degree of freedom."""
+    """Loads on the rail itself: wheels, and pulses that do not act on a named degree of freedom."""
     found = []
     if vehicle is not None:
         place = drive.start - drive.direction * np.asarray(vehicle.wheel_places)

@@ -1,4 +1,4 @@
-"""The measuring chain: mounting, gain, anti-alias filter, offset, noise, clipping, converter."""
+"""Simulate the measuring system: mounting, gain, anti-alias filter, offset, noise, clipping, converter."""
 
 from dataclasses import dataclass
 
@@ -16,8 +16,8 @@ ALIAS_TAPS = 63
 class Sensor:
     """One channel of the measuring system. SI units; None switches a stage off.
 
-    ``place`` [m]; ``mounting`` as in ``Channel``: one that begins with "sleeper" sits on the nearest sleeper,
-    all others on the rail (the vertical model does not tell head from web). ``mount_frequency`` [Hz] and
+    ``place`` [m]; ``mounting`` as in ``Channel``: one that begins with "sleeper" is on the nearest sleeper,
+    all others are on the rail (the vertical model does not distinguish head and web). ``mount_frequency`` [Hz] and
     ``mount_quality`` of the mounting's resonance, ``gain`` relative, ``cutoff`` of the anti-alias filter as a
     share of the rate, ``noise`` rms, ``limit`` where it clips and ``resolution`` of the converter in the
     unit of the quantity, ``delay`` [s].
@@ -39,11 +39,11 @@ class Sensor:
     serial: str = ""
 
     def channel(self):
-        """The channel as a recording names it."""
+        """The channel of a recording."""
         return Channel(self.name, self.quantity, self.place, self.mounting, self.serial, self.limit, self.resolution)
 
     def probe(self, track):
-        """Where the simulation has to look."""
+        """Signal that the simulation must record."""
         if self.quantity not in ORDERS:
             raise SimulationError(f"sensor {self.name!r}: cannot record {self.quantity!r} on the track.")
         if not track.start <= self.place <= track.end:
@@ -57,24 +57,24 @@ class Sensor:
 
 
 def seated(sensor, terms):
-    """The sensor where ``terms`` say it really sits."""
+    """The sensor at its true position according to ``terms``."""
     for term in terms:
         sensor = term.sensor(sensor)
     return sensor
 
 
 def mean_of(signals, substeps):
-    """(..., n) means over ``substeps`` time steps of signals (..., n * substeps); what is left over is dropped."""
+    """(..., n) means over ``substeps`` time steps of signals (..., n * substeps); a remainder is dropped."""
     n = signals.shape[-1] // substeps
     return signals[..., : n * substeps].reshape(*signals.shape[:-1], n, substeps).mean(axis=-1)
 
 
 def measured(sensor, signal, rate, rng, terms=(), substeps=1):
-    r"""The samples (n,) at ``rate`` [Hz] that a ``sensor`` makes of the true ``signal`` (n * substeps,).
+    r"""Samples (n,) at ``rate`` [Hz] that a ``sensor`` records of the true ``signal`` (n * substeps,).
 
-    What lies above the sampled band is filtered before samples are taken, or it would fold into the band.
+    The signal is filtered before it is sampled, to prevent aliasing.
     Mounting: :math:`1 / (1 - (f/f_0)^2 + i f / (Q f_0))`. The anti-alias filter has linear phase and its delay
-    is taken off, as in a sigma-delta converter. Terms of kind "channel" act before the gain.
+    is removed, as in a sigma-delta converter. Terms of type "channel" act before the gain.
     """
     for term in terms:
         signal = term.channel(signal, rate * substeps, sensor)
@@ -90,7 +90,7 @@ def measured(sensor, signal, rate, rng, terms=(), substeps=1):
 
 
 def _filtered(sensor, signal, rate, substeps):
-    """Mounting, delay and anti-alias filter in one transform, padded so that nothing wraps round."""
+    """Mounting, delay and anti-alias filter in one transform, padded so that the signal does not wrap around."""
     if not (sensor.mount_frequency or sensor.delay or sensor.cutoff):
         return signal
     padded = _fast_length(signal.size + max(4096, signal.size // 8))

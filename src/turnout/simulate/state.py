@@ -1,7 +1,4 @@
-"""Arrays that the march works on, grouped as the compiled code takes them.
-
-Vehicle matrices and stand-in tracks as the march takes them.
-"""
+"""Arrays of the time march in the groups that the compiled code uses, with those of vehicles and stand-in tracks."""
 
 from itertools import pairwise
 from typing import NamedTuple
@@ -54,9 +51,9 @@ class SchemeArrays(NamedTuple):
 
 
 class VehicleArrays(NamedTuple):
-    """Blocks of coupled bodies: E = from_velocity v - from_position z + from_weight; ``answer`` is the inverse.
+    """Blocks of coupled bodies: E = from_velocity v - from_position z + from_weight; ``response`` is the inverse.
 
-    ``stand_in_*`` are the scalar oscillators that carry a wheel off the modelled track, (n_wheel,).
+    ``stand_in_*`` are the scalar oscillators that carry a wheel outside the modelled track, (n_wheel,).
     """
 
     block_start: np.ndarray
@@ -71,10 +68,10 @@ class VehicleArrays(NamedTuple):
 
 
 class PortArrays(NamedTuple):
-    """Ports in order of their place; ``body`` -1: between track and ground, else a wheel on path ``path``.
+    """Ports in order of their position; ``body`` -1: between track and ground, else a wheel on path ``path``.
 
-    ``place`` [m] at time 0, ``rows``, ``weights`` (n, 4) for fixed ports, ``gap`` [m]; ``kind`` and ``numbers``
-    (n, 3) of the law, ``table_start`` (n + 1,) into the three table columns.
+    ``place`` [m] at time 0, ``rows``, ``weights`` (n, 4) for fixed ports, ``gap`` [m]; ``law_code`` and ``numbers``
+    (n, 3) of the force law, ``table_start`` (n + 1,) into the three table columns.
     """
 
     body: np.ndarray
@@ -91,10 +88,10 @@ class PortArrays(NamedTuple):
 
 
 class RunArrays(NamedTuple):
-    """What is particular to one run. ``ramp`` are the four places where the modelled track fades in and out [m].
+    """Arrays of one run. ``ramp`` are the four positions where the modelled track fades in and out [m].
 
-    ``path`` (n_path, n_piece, 4) are cubics in steps of ``path_step`` from ``path_start``; ``known_force``
-    (n_known, n_step, n_stage) acts at ``known_rows``; sensors have rows, weights and ``sensor_order``:
+    ``path`` (n_path, n_piece, 4) are cubics in steps of ``path_step`` from ``path_start``. ``pulse_force``
+    (n_pulse, n_step, n_stage) acts at ``pulse_rows``. Sensors have rows, weights and ``sensor_order``:
     2 acceleration, 1 velocity, 0 displacement.
     """
 
@@ -154,10 +151,10 @@ def vehicle_arrays(vehicle, scheme, stand_in):
 
 
 def stand_in_of(prepared, place):
-    """Mass, damping and stiffness of one oscillator that answers like the track at ``place``, 5-200 Hz.
+    """Mass, damping and stiffness of one oscillator that responds like the track at ``position``, 5-200 Hz.
 
-    The stiffness is the static one, so that a wheel rolls on to the modelled track without a step; mass and
-    damping are the least-squares fit of the dynamic stiffness.
+    The stiffness is the static one, so that a wheel rolls onto the modelled track without a step. Mass and damping are
+    fitted to the dynamic stiffness by least squares.
     """
     rows, weights = prepared.matrices.rail_weights(place)
     compliance = weights @ prepared.static_response(rows, weights)[rows] + prepared.matrices.compliance(place)

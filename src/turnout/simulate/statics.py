@@ -1,4 +1,4 @@
-"""Static equilibrium of train and track, the state every march starts from."""
+"""Compute the static equilibrium of train and track, the initial state of a simulation."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from turnout.simulate.state import Motion
 
 
 def resting(prepared, ports, vehicle=None):
-    """Motion of a track at rest without any force; ``vehicle`` hangs free at its own zero."""
+    """Motion of a track at rest without any force; ``vehicle`` is at its zero position without contact."""
     t, n_port = prepared.arrays, ports.body.size
     wide = t.n + 2 * t.pad
     n, wheels = (vehicle.n, len(vehicle.wheels)) if vehicle else (0, 0)
@@ -29,8 +29,8 @@ def resting(prepared, ports, vehicle=None):
 def equilibrium(prepared, vehicle, ports, placed, stand_in_stiffness, tolerance=1e-7):
     """Motion in static equilibrium under the weight of ``vehicle``, all velocities 0.
 
-    ``placed`` is (rows, weights, local compliance, stand-in share, dip) of every port at time 0. Newton on all
-    port forces and wheel positions; not reaching 1e-7 N in 50 steps is a SimulationError.
+    ``initial_ports`` is (rows, weights, local compliance, stand-in share, dip) of every port at time 0. Newton's method
+    on all port forces and wheel positions; SimulationError if the residual is not below 1e-7 N after 50 steps.
     """
     rows, weights, local, share, dip = placed
     n_port = ports.body.size
@@ -56,7 +56,7 @@ def equilibrium(prepared, vehicle, ports, placed, stand_in_stiffness, tolerance=
         jacobian[:n_port, :n_port] = np.eye(n_port) + slope[:, None] * flexibility
         jacobian[:n_port, n_port:] = -slope[:, None] * touches.T
         jacobian[n_port:, :n_port], jacobian[n_port:, n_port:] = touches, stiff
-        # Least squares: a wheel whose force does not depend on where it is (a given load) may be anywhere.
+        # Least squares: the position of a wheel with a given force is not determined.
         change = np.linalg.lstsq(jacobian, residual, rcond=1e-15)[0]
         force, wheel_z = force - change[:n_port], wheel_z - change[n_port:]
     worst = int(np.argmax(np.abs(residual)))
@@ -67,7 +67,7 @@ def equilibrium(prepared, vehicle, ports, placed, stand_in_stiffness, tolerance=
 
 
 def _condensed(vehicle, ports):
-    """Stiffness and load of the wheels with the sprung rows eliminated; which port touches which wheel."""
+    """Stiffness and load of the wheels with the sprung rows eliminated; matrix of the ports of each wheel."""
     _, _, stiffness, weight = vehicle.matrices
     wheels = vehicle.wheel_rows
     sprung = np.setdiff1d(np.arange(vehicle.n), wheels)

@@ -1,4 +1,4 @@
-"""A track: one rail on supports, each with its own pad, sleeper and ballast, and what the wheels roll on."""
+"""Model of a track: one rail on supports, each with its own pad, sleeper and ballast."""
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -34,8 +34,8 @@ class RailStretch:
     rail: Rail
 
 
-SAME = 1e-6  # m; ends this near to a node lie on it
-# One number stands for all supports; it becomes an array when the track is made.
+SAME = 1e-6  # m from a node within which an end is on it
+# One number is the value of all supports; it becomes an array when the track is created.
 NOTHING: Any = 0.0
 
 
@@ -43,7 +43,7 @@ NOTHING: Any = 0.0
 class Track:
     """Half a track (one rail, half sleepers), everything per support.
 
-    ``support`` (n,) places of the supports [m], rising. Per support, (n,) or one number for all:
+    ``support`` (n,) positions of the supports [m], increasing. Per support, (n,) or one number for all:
     ``pad_stiffness`` [N/m], ``pad_damping`` [N s/m], ``sleeper_mass`` of half a sleeper [kg],
     ``ballast_stiffness``, ``ballast_damping``; with ``layers`` 3 also ``ballast_mass`` [kg],
     ``subgrade_stiffness``, ``subgrade_damping`` and the shear between neighbouring ballast masses
@@ -98,7 +98,7 @@ class Track:
         self._check_pad_width()
 
     def _check_pad_width(self):
-        """Three nodes hold a pad until the outer ones would bear as much as the one between them: 8/3 elements."""
+        """A pad on three nodes is at most 8/3 elements wide: then all three nodes carry the same."""
         element = float(np.min(np.diff(self.support))) / self.elements_per_bay
         if not 0.0 <= self.pad_width <= 8.0 / 3.0 * element:
             raise SimulationError(
@@ -117,12 +117,12 @@ class Track:
 
     @property
     def start(self):
-        """Place of the first node [m]."""
+        """Position of the first node [m]."""
         return float(self.support[0])
 
     @property
     def end(self):
-        """Place of the last node [m]."""
+        """Position of the last node [m]."""
         return float(self.support[-1])
 
     def with_(self, **changes):
@@ -130,16 +130,16 @@ class Track:
         return replace(self, **changes)
 
     def nearest_support(self, place):
-        """Index of the support nearest to ``place`` [m]."""
+        """Index of the support nearest to ``position`` [m]."""
         return int(np.argmin(np.abs(self.support - place)))
 
     def rail_between(self, x):
-        """Rail profile at ``x`` [m]; the last stretch that covers it wins."""
+        """Rail profile at ``x`` [m]; if stretches overlap that of the last one."""
         found = [stretch.rail for stretch in self.stretches if stretch.start <= x < stretch.end]
         return found[-1] if found else self.rail
 
     def rail_over(self, start, end):
-        """Rail profile of an element from ``start`` to ``end`` [m]: that of all profiles which meet in it."""
+        """Rail profile of an element from ``start`` to ``end`` [m]; several profiles are combined in series."""
         inside = {x for s in self.stretches for x in (s.start, s.end) if start + SAME < x < end - SAME}
         cuts = [start, *sorted(inside), end]
         rails = [self.rail_between(0.5 * (a + b)) for a, b in pairwise(cuts)]
@@ -163,18 +163,18 @@ class Track:
         return Link(ends, self.pad_stiffness[j], self.pad_damping[j], 0.0, self.pad_loss_factor[j], "pad")
 
     def _beside(self, j):
-        """Shares of the nodes before and behind support ``j`` in its pad.
+        """Shares of the nodes before and after support ``j`` in its pad.
 
-        Two points of an even pressure over the width b are b/3 apart on average, as are shares a, 1 - 2a, a at -h, 0, h
-        with 4 h a (1 - a) = b/3. This counts for a rail that shears, whose influence line has a kink under the load.
-        One that only bends asks for the second moment, a = b²/24h², which misses half of the effect on the other.
+        Two points of a uniform pressure over the width b are b/3 apart on average. So are shares a, 1 - 2a, a at
+        -h, 0, h with 4 h a (1 - a) = b/3. This is right for a rail with shear, whose influence line has a kink.
+        A rail that only bends needs the second moment, a = b²/24h², which has half of the effect on a rail with shear.
         """
         nearness = self.elements_per_bay / np.diff(self.support[j - 1 : j + 2])
         both = nearness.sum()
         return (nearness * (1.0 - np.sqrt(1.0 - both * self.pad_width / 6.0)) / both).tolist()
 
     def ballast_link(self, j):
-        """The ballast under sleeper ``j``: to the ground, or to the ballast's mass with 3 layers."""
+        """The ballast under sleeper ``j``: to the ground, or to the ballast mass with 3 layers."""
         if self.layers == 1:
             raise SimulationError(f"{self.name}: a track of one layer has no ballast under support {j}.")
         ends: tuple = ((("sleeper", j), 1.0),)
@@ -184,7 +184,7 @@ class Track:
         return Link(ends, *values, "ballast")
 
     def support_links(self, j):
-        """Springs, dampers and masses of support ``j``: what a term scales or takes away."""
+        """Springs, dampers and masses of support ``j``, which terms can scale or remove."""
         pad = self.pad_link(j)
         if self.layers == 1:
             return [pad]

@@ -1,4 +1,4 @@
-"""A turnout's track from its file: every key is known, every number has its unit, every route is one of the file's."""
+"""Read the track of a turnout from its file, with checks of keys, units and routes."""
 
 import numpy as np
 
@@ -56,7 +56,7 @@ def turnout_track(parameters, seed=0):
     ``sections`` change values of ``support`` between ``from`` and ``to`` [m], later ones over earlier ones;
     ``scatter`` gives relative standard deviations that are drawn, log-normally, with ``seed``.
 
-    Errors: ConfigError with file and place where a key is unknown or missing, or a value cannot be used.
+    Errors: ConfigError with file and entry where a key is unknown or missing, or a value cannot be used.
     """
     p = parameters.only(*TRACK_KEYS)
     routes = _routes(p)
@@ -89,7 +89,7 @@ def _surfaces(routes, name):
 
 
 def _spreads(routes):
-    """(part, field -> relative standard deviation) of every part that has a prior; the largest one of a list."""
+    """(part, field -> relative standard deviation) of every part that has a prior; for a list its largest."""
     for entry in entries_of_routes(routes):
         spread: dict[str, float] = {}
         for place, number in entry.numbers():
@@ -114,14 +114,14 @@ def entries_of_routes(routes):
 
 
 def _locations(p, routes):
-    """Name -> (place [m], route); the first route where none is named."""
+    """Name -> (position [m], route); the first route where none is named."""
     found = p.maybe("locations")
     entries = {name: found.part(name).only("place", "route") for name in found}
     return {name: (e.number("place", "m"), _route_of(e, routes)) for name, e in entries.items()}
 
 
 def _route_of(entry, routes, otherwise=None):
-    """Route that an entry names, ``otherwise`` or the first one where it names none."""
+    """Route that an entry names; if it names none ``otherwise`` or the first route."""
     route = entry.get("route", otherwise or next(iter(routes)))
     if route not in list(routes):
         remedy = f"Write one of {', '.join(routes)}, or leave it out"
@@ -181,7 +181,7 @@ def _draw_scatter(p, values, seed):
 
 
 def _stretches(p, support, elements, route, routes):
-    """Stretches of other rail on ``route``; one that no element lies in would change nothing, and is refused."""
+    """Stretches of other rail on ``route``; one without the middle of an element has no effect and is rejected."""
     nodes = np.interp(np.arange(elements * (support.size - 1) + 1) / elements, np.arange(support.size), support)
     middle = 0.5 * (nodes[:-1] + nodes[1:])
     for entry in p.parts("stretches"):
@@ -232,7 +232,7 @@ OPTIONAL = ("share", "power")
 
 
 def _path(p):
-    """One part of what a wheel rolls on."""
+    """One part of the path of a wheel."""
     kind = p["kind"]
     if kind == "sections":
         listed = [p.only("kind", "places", "dips").listed(name) for name in ("places", "dips")]

@@ -1,7 +1,4 @@
-"""Trains from parameter sets: cars on bogies of their own or shared ones, wagons on two axles, coupled units.
-
-Trains of several vehicles behind each other.
-"""
+"""Build trains from parameter sets: cars on single or shared bogies, wagons on two axles, coupled units."""
 
 from dataclasses import replace
 
@@ -29,9 +26,9 @@ KEYS = ("name", "title", "car_types", "bogie_types", "axle_types", "cars", "bogi
 def train(parameters, load=0.5, units=1):
     """Half a train (one rail) from a parameter set whose masses and springs are those of whole vehicles.
 
-    ``cars`` list their type, ``centre`` [m] and what they rest on, ``bogies`` and ``axles`` their type and centre,
-    measured from the unit's front end; a bogie that two cars name is shared (Jacobs), each resting on half of
-    its secondary springs. ``load`` is the share of the payload, ``units`` the number of units coupled.
+    ``cars`` list their type, ``centre`` [m] and the bogies or axles below them; ``bogies`` and ``axles`` list type
+    and centre. Centres are from the unit's front end. A bogie of two cars is shared (Jacobs): each car rests on half of
+    its secondary springs. ``load`` is the share of the payload, ``units`` the number of coupled units.
     """
     p = parameters.only(*KEYS)
     if not 0.0 <= load <= 1.5:
@@ -70,7 +67,7 @@ def _add_unit(p, load, offset, bodies, suspensions, wheels):
     carriers = [("bogie", b) for b in bogies] + [("axle", a) for a in axles]
     names = {str(entry.only("label", "type", "centre")["label"]): k for k, (_, entry) in enumerate(carriers)}
     users = {label: sum(label in _rests_on(car) for car in cars) for label in names}
-    # Bodies in order of place keep a car's rows together, so that uncoupled cars are blocks of their own.
+    # Bodies in order of position keep the rows of a car together, so that uncoupled cars are separate blocks.
     order = sorted(range(len(carriers)), key=lambda k: carriers[k][1].number("centre", "m"))
     placed, at = {}, {}
     pending = sorted(cars, key=lambda c: c.number("centre", "m"))
@@ -110,7 +107,7 @@ def _kind(p, table, entry, keys):
 
 
 def _add_carrier(p, kind, entry, offset, bodies, suspensions, wheels):
-    """Add a bogie or axle; returns its body and the half of the springs on top of it."""
+    """Add a bogie or axle; returns its body and half of the springs above it."""
     place = offset + entry.number("centre", "m")
     if kind == "axle":
         table = _kind(p, "axle_types", entry, AXLE_UNITS)
@@ -133,7 +130,7 @@ def _add_carrier(p, kind, entry, offset, bodies, suspensions, wheels):
 
 
 def coupled(name, vehicles):
-    """One train of ``vehicles`` behind each other; every wheel keeps its contact, radius and pressing force.
+    """One train of ``vehicles`` in a row; every wheel has the contact, radius and pressing force of its vehicle.
 
     >>> from turnout.simulate.vehicle import car
     >>> two = coupled("two cars", [car(length=26.0, overhang=1.9)] * 2)

@@ -1,4 +1,4 @@
-"""A turnout as the simulation knows it: the track, and what a wheel rolls on along each of its routes."""
+"""Model of a turnout: its track, and the path of a wheel along each of its routes."""
 
 from dataclasses import dataclass, field, replace
 
@@ -14,10 +14,10 @@ class TurnoutTrack:
     """``track`` with its ``routes``: name -> surfaces, each the parts of a wheel's path along it.
 
     ``roughness_level`` [dB above the limit curve of ISO 3095], None for a smooth rail. ``locations`` are named
-    (place [m], route); ``numbers`` the parameters with unit, source and prior as read. ``tracks`` holds the track
-    of a route that has rails of its own, as behind a crossing. ``terms`` are the entries of effects that recordings
-    showed to be missing from the base track, as read; ``turnout.stages.accepted_effects`` makes terms of them.
-    ``spreads`` has for parts of routes the relative standard deviation of each number with a prior, by its field.
+    (position [m], route), ``numbers`` the parameters with unit, source and prior as read. ``tracks`` holds the track
+    of a route that has separate rails, as behind a crossing. ``terms`` are entries of effects that were diagnosed as
+    missing in the base track; ``turnout.stages.accepted_effects`` converts them to terms. ``spreads`` has, for parts
+    of routes, the relative standard deviation of each number with a prior, by field.
     """
 
     track: Track
@@ -39,7 +39,7 @@ class TurnoutTrack:
         return self.tracks.get(route, self.track)
 
     def parts_at(self, place):
-        """Whether the routes have supports of their own at ``place`` [m], as behind a crossing."""
+        """Whether the routes have separate supports at ``position`` [m], as behind a crossing."""
         return len({track.section[track.nearest_support(place)] for track in self.tracks.values()}) > 1
 
     def surfaces(self, route):
@@ -49,7 +49,7 @@ class TurnoutTrack:
         return self.routes[route]
 
     def rolling(self, start, end, seed, level=None):
-        """The roughness part between two places, () for a smooth rail."""
+        """The roughness between two positions as path parts, () for a smooth rail."""
         level = self.roughness_level if level is None else level
         return () if level is None else (roughness(start, end, seed, level),)
 
@@ -60,12 +60,12 @@ class TurnoutTrack:
 
 
 def within(track, place, half_length):
-    """(n_support,) whether each support lies in the ``stretch_of_track``."""
+    """(n_support,) whether each support is in the ``stretch_of_track``."""
     return np.abs(track.support - place) <= half_length
 
 
 def stretch_of_track(track, place, half_length=30.0):
-    """The track within ``half_length`` [m] of ``place``, for a hammer test that needs no more."""
+    """The track within ``half_length`` [m] of ``position``, which is enough for a hammer test."""
     keep = within(track, place, half_length)
     if keep.sum() < 3:
         raise SimulationError(f"{track.name}: no three supports within {half_length} m of {place} m.")

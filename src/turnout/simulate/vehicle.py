@@ -1,4 +1,4 @@
-"""Vehicles: car bodies and bogies that bounce and pitch, wheels that bounce, springs and dampers between them."""
+"""Vehicle models: car bodies and bogies with bounce and pitch, wheels with bounce, springs and dampers between them."""
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -10,7 +10,7 @@ from turnout.simulate.force_laws import PowerLaw
 
 GRAVITY = 9.81
 HERTZ = PowerLaw(93e9)
-EACH = ("contact", "radius", "pressing")  # what wheels of one train may differ in
+EACH = ("contact", "radius", "pressing")  # fields that may differ between the wheels of a train
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Suspension:
 
 @dataclass(frozen=True)
 class Body:
-    """``mass`` [kg]; ``inertia`` in pitch [kg m²], None for a wheel; centre ``place`` [m] behind the front axle."""
+    """``mass`` [kg]; pitch ``inertia`` [kg m²], None for a wheel; centre ``position`` [m] behind the front axle."""
 
     name: str
     mass: float
@@ -40,11 +40,11 @@ class Vehicle:
     """Half a train (one rail). ``wheels`` are the bodies that touch the rail, front first.
 
     ``contact`` is the law of a wheel's contact with any rail surface it can touch (a crossing's wing and nose),
-    ``radius`` of the wheels [m] and ``pressing`` [N] a force without mass on each: one for all wheels or a tuple with
+    ``radius`` of the wheels [m] and ``pressing`` [N] a massless force on each: one value for all wheels or a tuple with
     one for each. ``extra_links`` holds (ends, k, c, m) with ends pairs of a row and a weight.
     ``length`` over buffers and ``overhang`` from the front end to the first wheel [m], for coupling.
 
-    Errors: SimulationError where a mass is not above 0, a spring negative or a body rests on nothing.
+    Errors: SimulationError where a mass is not above 0, a spring negative or a body without support.
     """
 
     name: str
@@ -82,7 +82,7 @@ class Vehicle:
 
     @cached_property
     def row(self):
-        """Row of each body's bounce; its pitch, where it has one, is the next row."""
+        """Row of the bounce of each body; its pitch, if it has one, is the next row."""
         sizes = [1 if body.inertia is None else 2 for body in self.bodies]
         return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
 
@@ -163,7 +163,7 @@ class Vehicle:
         return replace(self, **changes)
 
     def turned(self):
-        """The same vehicle running the other way round, its last wheel first."""
+        """The same vehicle in the opposite direction, its last wheel first."""
         last = float(self.wheel_places[-1])
         pitch = {int(r) + 1 for r, b in zip(self.row, self.bodies) if b.inertia is not None}
         links = tuple((tuple((r, -w if r in pitch else w) for r, w in ends), *rest) for ends, *rest in self.extra_links)
@@ -177,7 +177,7 @@ class Vehicle:
 
 
 def one_or_all(values):
-    """What a ``Vehicle`` holds of its wheels' ``values``: the one that all share, or the tuple of them."""
+    """The common value of all wheels, or the tuple of their ``values`` if they differ."""
     return values[0] if all(value == values[0] for value in values) else tuple(values)
 
 
@@ -200,7 +200,7 @@ def car(
     half_pivot=8.85,
     **more,
 ):
-    """Half a four-axle car of 10 degrees of freedom; the defaults press each wheel with 53.96 kN.
+    """Half a four-axle car of 10 degrees of freedom; the default load of each wheel is 53.96 kN.
 
     >>> [f"{load / 1e3:.2f} kN" for load in car().static_loads]
     ['53.95 kN', '53.95 kN', '53.95 kN', '53.95 kN']
@@ -220,6 +220,6 @@ def car(
 
 
 def lone_wheels(mass, places=(0.0,), **more):
-    """Wheels of ``mass`` [kg] without suspension at ``places`` [m]; more is passed to ``Vehicle``."""
+    """Wheels of ``mass`` [kg] without suspension at ``positions`` [m]; ``more`` is passed to ``Vehicle``."""
     bodies = tuple(Body(f"wheel {k}", mass, None, place) for k, place in enumerate(places))
     return Vehicle("wheels", bodies, (), tuple(range(len(bodies))), **more)

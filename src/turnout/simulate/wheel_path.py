@@ -1,6 +1,6 @@
-"""What a wheel rolls on: dips, kinks, joints, crossing and blade, corrugation, flats. A dip is positive.
+"""Parts of the path of a wheel: dips, kinks, joints, crossings, corrugation, wheel flats; a dip is positive.
 
-Cubic spline on a uniform grid, C2, with straight ends.
+The sum of all parts is a cubic spline on a uniform grid, C2, with straight ends.
 """
 
 from dataclasses import dataclass
@@ -89,8 +89,8 @@ class Cosine:
 class Kink:
     r"""Dip of two curves, flat at its ends, that meet in a kink: :math:`p = d\,(1 - |x - x_0| / a)^n`.
 
-    A wheel that leaves the wing of a crossing falls slowly and is thrown up by the nose. ``depth`` d [m] at
-    ``place``; a is ``share`` of ``length`` [m] before the kink and the rest behind it; ``power`` n, 2 of parabolas.
+    A wheel that leaves the wing of a crossing falls slowly and is lifted abruptly by the nose. ``depth`` d [m] at
+    ``place``. a is ``share`` of ``length`` [m] before the kink, the remainder after it. ``power`` n: 2 for parabolas.
 
     >>> kink = Kink(60.0, depth=2e-3, length=0.5, share=0.5)
     >>> float(kink(60.125)), round(kink.angle, 6)
@@ -123,10 +123,10 @@ class Kink:
 
 @dataclass(frozen=True)
 class Sections:
-    """Path measured at some places, a monotone-safe cubic between them (C1). ``places`` rising [m], ``dips`` [m].
+    """Path measured at some positions, a monotone cubic between them (C1). ``places`` increasing [m], ``dips`` [m].
 
-    Constant outside. The spacing of the sections is part of the model: 0.25 m apart they take 8 dB off the
-    response of a crossing that needs 10 mm.
+    Constant outside. The spacing of the sections is part of the model: a spacing of 0.25 m reduces the response of a
+    crossing by 8 dB, which needs 10 mm.
     """
 
     places: tuple
@@ -165,7 +165,7 @@ class Corrugation:
 
 @dataclass(frozen=True)
 class WheelFlat:
-    r"""Rounded flat of one wheel: once a turn the wheel drops by :math:`d = l^2/16R` along a cosine of length l.
+    r"""Rounded flat of one wheel: once per revolution it drops by :math:`d = l^2/16R` along a cosine of length l.
 
     ``wheel`` counts from the front, ``length`` l and ``radius`` R [m], ``phase`` [m] of rolling to the first
     flat. Newton and Clark 1979, An investigation into the dynamic effects on track of wheelflats on railway
@@ -232,7 +232,7 @@ def _check_length(kind, place, length):
 
 
 def check_path(parts, start, end, step=0.005, limit=1e-3):
-    """Refuse a path that jumps: more than ``limit`` [m] between places 1 µm apart around any of its corners."""
+    """Reject a path with a jump of more than ``limit`` [m] that remains on a grid 2000 times finer."""
     x = np.arange(start, end + step, step)
     for part in parts:
         p = part(x, 0)
@@ -247,7 +247,7 @@ def check_path(parts, start, end, step=0.005, limit=1e-3):
 
 
 def spline_pieces(parts, wheel, start, end, step):
-    """Cubic coefficients (n, 4) in steps of ``step`` of the sum of ``parts`` for one wheel, C2 spline."""
+    """Cubic coefficients (n, 4) in steps of ``step`` of the sum of ``path_parts`` for one wheel, C2 spline."""
     x = np.arange(start, end + 1.5 * step, step)
     dip = np.zeros_like(x)
     for part in parts:

@@ -1,1 +1,1 @@
-"""Raw files of one unit in, rows of the registry out: each chain joins the parts in one order."""
+"""Stages of the workflow: each takes the raw files of one unit and returns rows of the registry."""

@@ -1,4 +1,4 @@
-"""Write what was found into the turnout's track file: readable, with source, date and interval."""
+"""Write an accepted finding into the turnout's track file, readable, with source, date and interval."""
 
 import json
 import re
@@ -13,7 +13,7 @@ from turnout.simulate import load_track
 from turnout.stages.accepted_effects import KINDS, OF_A_WHEELSET, SUPPORTS, accepted_of
 from turnout.stages.mismatch_inputs import track_file
 
-# Units in which a small number reads better: SI unit -> (unit, its size)
+# Units for values below 0.1 in SI units: SI unit -> (unit, its size in the SI unit)
 SMALLER = {"m": ("mm", 1e-3), "s": ("ms", 1e-3)}
 PLACES = ("place", "start", "end")
 PLACED = {*SUPPORTS, *PLACES}
@@ -27,14 +27,14 @@ ENTRY = re.compile(r"^ *- term:", re.MULTILINE)
 def accept(finding, config, turnout_id, track=None, anyway=False) -> tuple[Path, str]:
     """Write the terms of ``finding`` (row of ``mismatch_findings``) into the turnout's own track file.
 
-    A turnout that shares its layout's file gets one of its own that extends it. A term that stands there already, at
-    the same place, is replaced. Returns the file and what was done in words.
+    A turnout that shares its layout's file gets a file of its own that extends it. A term that is already there, at
+    the same position, is replaced. Returns the file and a sentence on the change.
 
     Raises
     ------
     SimulationError
-        The verdict is not named with grade A or B and ``anyway`` is not set; it carries no term; or the term belongs
-        to a wheelset. Nothing is changed then.
+        The verdict is not "named" with grade A or B and ``anyway`` is not set, the finding has no term, or the term
+        belongs to a wheelset. The file is then unchanged.
     """
     turnout = load_configuration(config).turnout(turnout_id)
     _refuse(finding, turnout_id, anyway)
@@ -68,13 +68,13 @@ def _refuse(finding, turnout_id, anyway):
 
 
 def _material(term):
-    """Whether a parameter of a term lies further from neutral than its 95 % interval reaches."""
+    """Whether a parameter differs from its neutral value by more than half its 95 % interval."""
     neutral = {p.name: p.neutral for p in KINDS[term["term"]].parameters}
     return any(abs(p["value"] - neutral[name]) > 1.96 * p["se"] for name, p in term["parameters"].items())
 
 
 def _write(path, text):
-    """Put the file in place once it can be read and its terms be made."""
+    """Write the file if a trial copy can be read and all its terms are valid."""
     trial = path.with_name(f".{path.stem}.trial.yaml")
     try:
         write_text(trial, text)
@@ -93,8 +93,10 @@ def _write(path, text):
 
 
 def entry_text(term, finding, track) -> str:
-    """The YAML of one entry of ``terms``, numbers on one line each as in the rest of the file; with its route where
-    those of ``track``, a TurnoutTrack, have supports of their own."""
+    """YAML text of one entry of ``terms``, one number per line.
+
+    The route is included if a route of ``track``, a TurnoutTrack, has its own supports at that position.
+    """
     day = f"{_time(finding['found_at_utc']):%Y-%m-%d}"
     source = f"turnout diagnose, recordings up to {day}, finding {finding['finding_id'][:12]}"
     lines = [f"  - term: {term['term']}"]
@@ -132,7 +134,7 @@ def _number(p, source, finding):
 
 
 def with_entry(text: str, entry: str) -> str:
-    """``text`` of a track file with ``entry`` at the end of its ``terms``, in the place of one for the same thing.
+    """Track file ``text`` with ``entry`` at the end of its ``terms``; it replaces an entry of the same effect.
 
     >>> text = "name: a\\nterms:\\n  - term: hum\\n    sine: 1\\nspacing: 2\\n"
     >>> print(with_entry(text, "  - term: hum\\n    sine: 3\\n"))
@@ -155,12 +157,12 @@ def with_entry(text: str, entry: str) -> str:
 
 
 def _same(one, other) -> bool:
-    """Whether two identities are one effect; one without a route is on all of them."""
+    """Whether two identities are the same effect; an identity without route applies to all routes."""
     return one[1:] == other[1:] and (one[0] == other[0] or not (one[0] and other[0]))
 
 
 def _identity(entry: str) -> tuple[str, ...]:
-    """What an entry is about: route, effect and place, sensor or train."""
+    """Identity of an entry: route, effect, and position, sensor or train."""
     names = ("route", "term", *SUPPORTS, *PLACES, "channel_name", "train")
     found = []
     for name in names:

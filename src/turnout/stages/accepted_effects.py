@@ -1,4 +1,4 @@
-"""Effects that recordings showed to be missing from a track: as entries of its file, and as terms of physics."""
+"""Accepted effects of a track: read from the entries of its file and turned into physics terms."""
 
 from __future__ import annotations
 
@@ -11,20 +11,22 @@ from turnout.config.parameters import Number
 from turnout.errors import SimulationError
 from turnout.simulate.links import COUNTED
 
-SUPPORTS = COUNTED  # in a file the support's place [m] stands for its number
-# Effects that belong to a wheelset: it leaves with its train, the track's file is no place for it.
+SUPPORTS = COUNTED  # a file gives the support's position [m] instead of its number
+# Effects of a wheelset do not belong in a track's file: the wheelset leaves with its train.
 OF_A_WHEELSET = ("wheel_flat", "out_of_round")
 KINDS: dict[str, Any] = {term.name: term for term in physics.TERMS}
 NOT_FIELDS = ("term", "accepted", "finding", "route")
 ROUTES = ("main", "diverging")
-NEAR = 0.35  # two places closer than this [m] are one support
+NEAR = 0.35  # m: positions closer than this are the same support
 
 
 @dataclass(frozen=True)
 class Accepted:
-    """One entry of ``terms``: ``family`` of the effect, ``fixed`` fields (places of supports in m), ``values``
-    parameter -> (value, standard error or None) in the parameter's own unit, ``route`` whose track has it, "" for
-    all."""
+    """One entry of ``terms`` in a track's file.
+
+    ``family`` is the name of the effect and ``fixed`` holds its fixed fields, positions of supports in m. ``values``
+    maps a parameter to (value, standard error or None) in its own unit. ``route`` is the route that has it, "" for all.
+    """
 
     family: str
     fixed: Mapping[str, Any]
@@ -33,18 +35,18 @@ class Accepted:
 
     @property
     def parameters(self):
-        """The parameters of its term that were fitted, with units, neutral values and bounds."""
+        """Fitted parameters of its term, with units, neutral values and bounds."""
         return tuple(p for p in KINDS[self.family].parameters if p.name in self.values)
 
     @property
     def place(self) -> float | None:
-        """Where it is [m], None where it has no place."""
+        """Mean position [m], None for an effect without a position."""
         found = [float(self.fixed[name]) for name in (*SUPPORTS, "place", "start", "end") if name in self.fixed]
         return sum(found) / len(found) if found else None
 
     @property
     def key(self) -> str:
-        """Family and what it is fixed to, in one word."""
+        """Name of the effect with its position, channel and train, such as "hum[acc_1]"."""
         place = f"{self.place:.1f} m" if self.place is not None else ""
         parts = [place, *(str(self.fixed[k]) for k in ("channel_name", "train") if self.fixed.get(k))]
         where = ",".join(p for p in parts if p)
@@ -52,15 +54,15 @@ class Accepted:
 
     @property
     def told(self) -> dict:
-        """The entry in plain numbers: family, fixed fields with places in m, parameters in their own units."""
+        """The entry as plain values: effect, fixed fields (positions in m), parameters in their own units."""
         return {"term": self.family, **self.fixed, **{name: value for name, (value, _) in self.values.items()}}
 
     def is_on(self, route) -> bool:
-        """Whether the track under ``route`` has it."""
+        """Whether the effect applies to ``route``."""
         return self.route in ("", route)
 
     def is_of(self, family, where) -> bool:
-        """Whether it is the effect ``family`` at the place, sensor or train in ``where``."""
+        """Whether it is the effect ``family`` at the position, sensor or train in ``where``."""
         if family != self.family:
             return False
         place = where.get("place")
@@ -70,7 +72,7 @@ class Accepted:
         return all(where.get(k) in (None, v) for k, v in said.items())
 
     def term(self, track, values: Mapping[str, float] | None = None):
-        """The term on a track of ``turnout.simulate``, of a range what lies on that track; None where nothing does."""
+        """The physics term on a track of ``turnout.simulate``; None if no part of it lies on that track."""
         chosen = {name: value for name, (value, _) in self.values.items()} | dict(values or {})
         given: dict[str, Any] = {}
         if not self._reaches(track):
@@ -80,7 +82,7 @@ class Accepted:
         return KINDS[self.family](**given, **chosen)
 
     def _reaches(self, track):
-        """Whether any support of the effect is on the track."""
+        """Whether at least one support of the effect is on the track."""
         low, high = float(track.support[0]) - NEAR, float(track.support[-1]) + NEAR
         if "first" in self.fixed and "last" in self.fixed:
             return self.fixed["first"] <= high and self.fixed["last"] >= low
@@ -89,7 +91,7 @@ class Accepted:
 
 
 def accepted_of(entries) -> tuple[Accepted, ...]:
-    """Entries of ``TurnoutTrack.terms``; SimulationError where one names no effect or a field it has not."""
+    """Accepted effects of ``TurnoutTrack.terms``; SimulationError for an unknown effect or field."""
     return tuple(_accepted(entry) for entry in entries)
 
 
@@ -124,7 +126,7 @@ def _accepted(entry) -> Accepted:
 
 
 def _fixed(entry, name):
-    """Value of a field that is not fitted: a place in m, with its unit or without; anything else as it stands."""
+    """Value of a field that is not fitted: a position in m, or any other value unchanged."""
     found = entry[name]
     if name in (*SUPPORTS, "place", "start", "end"):
         plain = isinstance(found, int | float) and not isinstance(found, bool)
@@ -133,14 +135,16 @@ def _fixed(entry, name):
 
 
 def terms_on(turnout, track, conditions: Mapping | None = None, route: str = "main") -> tuple:
-    """Accepted terms of a ``TurnoutTrack`` on its track under ``route``, or a stretch of it, under a recording's
-    conditions."""
+    """Accepted terms of ``turnout``, a TurnoutTrack, on ``track``, under the conditions of a recording.
+
+    ``track`` is the track of ``route`` or a stretch of it.
+    """
     made = (entry.term(track) for entry in accepted_of(turnout.terms) if entry.is_on(route))
     return tuple(term.under(conditions or {}) for term in made if term is not None)
 
 
 def described(term, candidate, standard_errors, track) -> dict:
-    """A fitted term as plain data: family, fixed fields with places in m, fitted parameters with errors and units."""
+    """A fitted term as plain data: effect, fixed fields (positions in m), parameters with errors and units."""
     fitted = {p.name: p for p in candidate.parameters}
     errors = dict(zip(fitted, standard_errors))
     fixed: dict[str, Any] = {}

@@ -1,4 +1,4 @@
-"""A case with what was accepted before in it, that tells how far it is and stops when its time is up."""
+"""A diagnosis case that simulates accepted effects, reports its progress and stops when its time is spent."""
 
 import time
 from collections.abc import Callable
@@ -11,14 +11,14 @@ from turnout.errors import SimulationError, TurnoutError
 from turnout.mismatch.engine.case import Nuisance
 from turnout.mismatch.engine.map_fit import CHEAP_STEPS, fit_jointly
 
-WIDE = 0.5  # prior sd of an accepted value on its next visit, as a share of its way from neutral: it may well grow
-NO_LIMIT = 100.0  # times a value, beyond which its neutral one stands for "no limit at all"
-LEAST_ERRORS = 3.0  # and at least so many of its standard errors
-STEP = 0.02  # of the prior sd, for derivatives
+WIDE = 0.5  # prior sd of an accepted value, as a share of its distance from neutral: it may grow
+NO_LIMIT = 100.0  # a neutral value above this multiple of the accepted one means "no limit"
+LEAST_ERRORS = 3.0  # least prior sd, in standard errors of the accepted value
+STEP = 0.02  # step of a difference quotient, as a share of the prior sd
 
 
 class BudgetSpentError(TurnoutError):
-    """The time that a diagnosis was given is up; what is done is kept, ``rows`` by table of the groups that are."""
+    """The time of a diagnosis is spent; ``rows`` are those of the ``n_done`` finished groups, by table."""
 
     def __init__(self, done=0, count=1, rows=None):
         super().__init__(f"the time given is up, {done} of {count} groups done; the same command goes on from there.")
@@ -27,14 +27,20 @@ class BudgetSpentError(TurnoutError):
 
 @dataclass
 class Watch:
-    """``deadline`` on the monotonic clock [s] or None; ``tell`` is called with the number of predictions so far."""
+    """Time limit and progress: ``deadline`` on the monotonic clock [s] or None, ``count`` of predictions so far.
+
+    ``tell`` is called with that count.
+    """
 
     deadline: float | None = None
     tell: Callable[[int], object] | None = None
     count: int = 0
 
     def tick(self):
-        """One more prediction; BudgetSpentError after the deadline, but for the first: every run gets on."""
+        """Count one prediction; BudgetSpentError after the deadline.
+
+    The first prediction never raises, so every run makes progress.
+    """
         self.count += 1
         if self.tell is not None:
             self.tell(self.count)
@@ -43,11 +49,11 @@ class Watch:
 
 
 class GuidedCase:
-    """``case`` with ``accepted`` effects in its simulation, each of whose parameters is free as a nuisance.
+    """``case`` with ``accepted`` effects in its simulation; their parameters are nuisance parameters.
 
-    An effect that was accepted does not come back as a finding; its parameters are estimated anew at every visit,
-    about their accepted values with a prior wide enough for them to grow. ``replay``, a mapping or None, keeps every
-    prediction: an interrupted diagnosis asks for the same ones again and goes on within a fit.
+    An accepted effect is not reported again. Its parameters are estimated at every visit. Their prior is centred on
+    the accepted values and wide enough for growth. ``replay``, a mapping or None, stores every prediction: an
+    interrupted diagnosis repeats the same requests and continues within a fit.
     """
 
     def __init__(self, case, accepted=(), watch=None, replay=None, track=None):
@@ -60,7 +66,10 @@ class GuidedCase:
         self.start_values = self._started() if self.own else case.start_values
 
     def _started(self):
-        """Where fits start: those of the case have bent its supports to what was accepted, these know of it."""
+        """Start values of fits that include the accepted effects, from a fit of the hammer tests.
+
+    The case's own start values would explain the accepted effects by its supports.
+    """
         cheap = self.cheap_part()
         if cheap is None:
             return self.case.start_values
@@ -71,21 +80,21 @@ class GuidedCase:
         return {**self.case.start_values, **told}
 
     def __getattr__(self, name):
-        if "case" not in self.__dict__:  # a copy that is being made
+        if "case" not in self.__dict__:  # while it is being copied
             raise AttributeError(name)
         return getattr(self.case, name)
 
     def _new(self, candidates):
-        """Those that are not accepted already."""
+        """Candidates that are not accepted already."""
         return tuple(c for c in candidates if not any(a.is_of(c.family, c.where) for a in self.accepted))
 
     def _around(self, case):
-        """A cheap view of the same case, with the same accepted effects; it takes seconds and is never cut short."""
+        """``case``, a cheap version of this one, with the same accepted effects and without a deadline."""
         watch = Watch(None, self.watch.tell)
         return None if case is None else GuidedCase(case, self.accepted, watch, None, self.base_track)
 
     def standing(self, values):
-        """Terms of the accepted effects at these values of their nuisances."""
+        """Terms of the accepted effects at these values of their nuisance parameters."""
         made = []
         for a in self.accepted:
             chosen = {p.name: float(values[_name(a, p)]) for p in a.parameters}
@@ -93,12 +102,12 @@ class GuidedCase:
         return tuple(made)
 
     def predict(self, values, terms, observations):
-        """Predictions with the accepted effects in them."""
+        """Predictions that include the accepted effects."""
         all_terms = (*self.standing(values), *terms)
         return self._once("p", values, all_terms, observations, self.case.predict)
 
     def moved(self, values, terms, new, observations, predictions):
-        """Predictions a small step away, with the accepted effects in them."""
+        """Predictions a small step away that include the accepted effects."""
         standing = self.standing(values)
 
         def beside(values, terms, observations):
@@ -107,7 +116,7 @@ class GuidedCase:
         return self._once(f"m:{new!r}", values, terms, observations, beside)
 
     def nuisance_jacobian(self, values, terms, observations, base):
-        """The case's own columns, and one by a difference for each parameter that was accepted."""
+        """Columns of the case, and a difference quotient for each accepted parameter."""
         all_terms = (*self.standing(values), *terms)
 
         def differentiate(*arguments):
@@ -120,7 +129,7 @@ class GuidedCase:
         return [np.column_stack([j, *(c[k] for c in columns)]) for k, j in enumerate(inner)]
 
     def _once(self, kind, values, terms, observations, compute):
-        """Computed where the replay lacks it."""
+        """Result from the replay, computed if it is not there."""
         if self.replay is None:
             self.watch.tick()
             return compute(values, terms, observations)
@@ -138,25 +147,25 @@ class GuidedCase:
             step = -step
         try:
             moved = self.predict({**values, nuisance.name: values[nuisance.name] + step}, terms, observations)
-        except SimulationError:  # it may go to the other side
+        except SimulationError:  # step to the other side
             step = -step
             moved = self.predict({**values, nuisance.name: values[nuisance.name] + step}, terms, observations)
         return [(new - old) / step for new, old in zip(moved, base)]
 
     def own_jacobian(self, values, terms, observation, predicted, names):
-        """Derivatives of an observation by nuisances of its own, with the accepted effects."""
+        """Derivatives of an observation by its own nuisance parameters, with the accepted effects."""
         return self.case.own_jacobian(values, (*self.standing(values), *terms), observation, predicted, names)
 
     def cheap_part(self):
-        """The case's, with the accepted effects in it."""
+        """The case's cheap part, with the accepted effects."""
         return self._around(self.case.cheap_part())
 
     def roughened(self):
-        """The case's, with the accepted effects in it."""
+        """The case with broad errors, with the accepted effects."""
         return self._around(self.case.roughened())
 
     def renewed(self, fit):
-        """With errors of the observations as ``fit`` has them."""
+        """The case with the errors of its observations updated from ``fit``."""
         inner = self.case.renewed(self._seen(fit))
         if inner is self.case:
             return self
@@ -165,23 +174,23 @@ class GuidedCase:
         return found
 
     def further(self, fit):
-        """Candidates that the residual suggests beside what was accepted."""
+        """Further candidates suggested by the residual, without the accepted effects."""
         return self._new(self.case.further(self._seen(fit)))
 
     def screen(self, fit):
-        """Linear columns of the candidates beside what was accepted."""
+        """Linear columns of the candidates, with the accepted effects in the fit."""
         return self.case.screen(self._seen(fit))
 
     def spaces(self, fit):
-        """What the residual may be locked to beside what was accepted."""
+        """Spaces that the residual may be locked to, with the accepted effects in the fit."""
         return self.case.spaces(self._seen(fit))
 
     def latent(self, fit):
-        """The force that is missing beside what was accepted."""
+        """Latent force that remains missing beside the accepted effects."""
         return self.case.latent(self._seen(fit))
 
     def numerical_error(self, fit):
-        """Own numerical error with what was accepted."""
+        """Numerical error of the simulation with the accepted effects."""
         return self.case.numerical_error(self._seen(fit))
 
     def _seen(self, fit):
@@ -189,8 +198,11 @@ class GuidedCase:
 
 
 class _Seen:
-    """A fit whose terms begin with the accepted ones, as the case inside has to see it: with its ``n`` nuisances and
-    without the ``own`` ones of what was accepted, which come behind them."""
+    """A fit as the inner case needs it: its terms begin with the accepted ones.
+
+    Its Jacobian has the ``n`` nuisance parameters of the case, without the ``n_own`` of the accepted effects that
+    follow them.
+    """
 
     def __init__(self, fit, standing, n, own):
         self._fit, self.terms = fit, (*standing, *fit.terms)
@@ -214,14 +226,14 @@ def _nuisances(accepted):
 
 
 def _reach(p, value):
-    """How far an accepted value may go: a share of its way from neutral, or of itself where neutral is no limit."""
+    """Prior sd of an accepted value: a share of its distance from neutral, or of itself if neutral means no limit."""
     if abs(p.neutral) > NO_LIMIT * abs(value):
         return WIDE * abs(value)
     return max(WIDE * abs(value - p.neutral), 1e-3 * (p.bounds[1] - p.bounds[0]))
 
 
 def visit_of(case, fit) -> list[dict]:
-    """What a fit says of the accepted effects now: dicts with term, key, fixed, name, value, se, unit."""
+    """Estimates of the accepted effects in a fit: dicts with accepted, name, value, se and unit."""
     found: list[dict] = []
     if not getattr(case, "accepted", ()):
         return found

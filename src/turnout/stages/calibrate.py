@@ -21,7 +21,7 @@ from turnout.simulate.parameters import track_path
 from turnout.stages.mismatch_inputs import track_file
 
 LOG = logging.getLogger("turnout.simulate")
-BAND = (60.0, 800.0)
+BAND = (60.0, 800.0)  # Hz: receptance lines used
 UNDESCRIBED = RawDescription(
     (
         RawChannel("hammer", "hammer", "force"),
@@ -32,14 +32,14 @@ UNDESCRIBED = RawDescription(
 
 
 def track_asked(track, turnout_id=None, config="config"):
-    """File of the ``track`` that is named, else of the turnout's own, else of Tommerup's; SimulationError without."""
+    """Track file: of ``track`` if given, else the turnout's own, else Tommerup's; SimulationError if there is none."""
     if turnout_id is not None:
         return track_file(load_configuration(config).turnout(turnout_id), track)
     return track_path(track or "tommerup")
 
 
 def calibrate_to_files(track_name, section, files, turnout_id=None, config="config", seed=0):
-    """``Calibration`` of ``section`` of a track, by name or file, to the hammer tests in ``files``, all of it.
+    """``Calibration`` of ``section`` of a track, by name or file, to the hammer tests in ``files``.
 
     The receptance is H1 of all accepted impacts; its random error is that of its coherence,
     :math:`\\sigma = |H| \\sqrt{(1-\\gamma^2) / 2n\\gamma^2}` (Bendat and Piersol, eq. 9.90), lines 60-800 Hz.
@@ -66,7 +66,7 @@ def calibrate_to_files(track_name, section, files, turnout_id=None, config="conf
 
 
 def _recordings(files, description):
-    """The recordings of all files, and what is wrong with those that cannot be used."""
+    """(recordings of all files, errors of those that cannot be read)."""
     recordings: list[Recording] = []
     refused: list[str] = []
     for file in (Path(f).resolve() for f in files):  # a link may lead anywhere
@@ -81,12 +81,12 @@ def _recordings(files, description):
 
 
 def calibrate_to_modes(track_name, section, wanted, seed=0, evaluations=14):
-    """``ModeFit`` of ``section`` to ``wanted`` {band: (frequency [Hz], damping)} as the program identifies them."""
+    """``ModeFit`` of ``section`` to the modes ``wanted``: {band: (frequency [Hz], damping ratio)}."""
     return fit_modes(load_track(str(track_name), seed=seed), section, wanted, identified_modes, evaluations=evaluations)
 
 
 def identified_modes(recordings, force="hammer", response="acc_1"):
-    """Band -> (frequency [Hz], damping) of a hammer test, as the hammer chain identifies it."""
+    """Band -> (frequency [Hz], damping ratio) of a hammer test, as the hammer stage identifies them."""
     impacts = [i for i in find_impacts(recordings, force, response, ReceptanceSettings()) if i.accepted]
     if not impacts:
         return {}

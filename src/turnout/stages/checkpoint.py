@@ -1,4 +1,4 @@
-"""Fits of an interrupted diagnosis, kept on disk until it is done."""
+"""Store the fits of a diagnosis on disk, so that an interrupted one can continue."""
 
 import hashlib
 import pickle
@@ -6,9 +6,9 @@ from collections.abc import MutableMapping
 
 
 class Checkpoint(MutableMapping):
-    """A mapping whose values live in files below ``folder``; files of another ``version`` are not seen.
+    """A mapping whose values are files below ``folder``; files of another ``version`` are ignored.
 
-    Values are written whole or not at all. They hold no work of others: only what this program wrote is read.
+    A value is written completely or not at all. The files are pickles: only files that this program wrote are read.
     """
 
     def __init__(self, folder, name, version=()):
@@ -46,7 +46,7 @@ class Checkpoint(MutableMapping):
         return len(self.seen)
 
     def done(self):
-        """Forget everything."""
+        """Delete all values and the folder."""
         if self.folder.is_dir():
             for path in self.folder.iterdir():
                 path.unlink()
@@ -55,7 +55,7 @@ class Checkpoint(MutableMapping):
 
 
 class Replay(Checkpoint):
-    """The same for what is large and many: nothing is held in memory."""
+    """A checkpoint for many large values: nothing stays in memory."""
 
     def __getitem__(self, key):
         try:

@@ -1,6 +1,6 @@
-"""A raw file on its way in: its row, or the quarantine rows that say why it or a part of it is not used.
+"""Read a raw file into its registry row, or into quarantine rows with the reasons why it is not used.
 
-Numbers that recordings carry as notes, as people write them.
+Also reads the numbers that people note in recordings.
 """
 
 from collections.abc import Iterable, Mapping
@@ -17,7 +17,7 @@ from turnout.registry.ids import content_id
 def read_or_quarantine(path, raw_root, description, base, quarantine, kind, known=None, longest=None):
     """ReadResult of one file, or None; a quarantine row for the file or for each damaged record.
 
-    Records of more than ``longest`` seconds of a large file stay in it. ``known`` maps the files that were read before
+    Records longer than ``longest`` seconds of a large file are not loaded. ``ids_by_path`` maps the files read before
     to their ids: the same bytes are not used twice.
     """
     try:
@@ -39,9 +39,9 @@ def read_or_quarantine(path, raw_root, description, base, quarantine, kind, know
 def contradiction(
     path: str, recordings: Iterable, named: datetime | None, apart: timedelta, remedy: str
 ) -> ReadError | None:
-    """What is wrong where the first time that a file notes lies further than ``apart`` from the one it is filed under.
+    """Error if the first time noted in a file differs from ``filed_at``, the time it is filed under.
 
-    None where both agree, or one of them is not known.
+    ``tolerance`` is the largest accepted difference. None if both agree or one is not known.
     """
     told = min((r.started_at for r in recordings if r.started_at is not None), default=None)
     if named is None or told is None or abs(told - named) <= apart:
@@ -51,7 +51,7 @@ def contradiction(
 
 
 def quarantine_row(error: ReadError, base, kind, stage, record=None, recording_id=None) -> dict:
-    """Row of ``quarantine``: what the error says, in columns."""
+    """Row of ``quarantine``: the error in columns."""
     return {
         "quarantine_id": content_id("quarantine", error.path, str(record), stage, error.reason, error.found),
         "turnout_id": base["turnout_id"],
@@ -90,11 +90,11 @@ def recording_row(result, path, size, description, base, kind, **more) -> dict:
     }
 
 
-COLDEST, HOTTEST = -50.0, 80.0  # of a rail [°C]
+COLDEST, HOTTEST = -50.0, 80.0  # °C: a noted rail temperature outside is a broken thermometer
 
 
 def number(said: Mapping, name: str) -> float | None:
-    """What a file notes under ``name`` as a number, None where there is none to be read.
+    """The value that a file notes under ``name`` as a number, None if it cannot be read.
 
     >>> number({"speed": "27,8"}, "speed"), number({"speed": "fast"}, "speed")
     (27.8, None)
@@ -107,8 +107,9 @@ def number(said: Mapping, name: str) -> float | None:
 
 
 def temperature(said: Mapping) -> float | None:
-    """The rail temperature that a file notes [°C], None without one and where no rail is as cold or hot: a thermometer
-    that is broken says 85 or 999.
+    """The rail temperature that a file notes [°C], None without one or outside the plausible range.
+
+    A broken thermometer notes 85 or 999.
 
     >>> temperature({"rail_temperature": "21,5"}), temperature({"rail_temperature": 999.0})
     (21.5, None)
@@ -118,6 +119,6 @@ def temperature(said: Mapping) -> float | None:
 
 
 def rail_temperature(recordings: Iterable) -> float | None:
-    """Median of the rail temperatures that recordings note [°C], None without any."""
+    """Median of the rail temperatures noted in recordings [°C], None without any."""
     told = [t for r in recordings if (t := temperature(r.conditions)) is not None]
     return median(told) if told else None

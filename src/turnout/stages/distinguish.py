@@ -1,4 +1,4 @@
-"""The distinguishability of effects under a planned campaign, and the cheapest addition to it."""
+"""Distinguishability of effects in a planned campaign, and the addition that gains most for its effort."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -9,15 +9,15 @@ from turnout.mismatch.turnout.candidates.catalogue import library
 from turnout.mismatch.turnout.planned_case import Plan, PlannedCase, Train
 from turnout.simulate import Sensor, load_track, load_vehicle
 
-# Effort of one more of each, in hours of two people on site.
+# Effort of one addition, in hours of two people on site.
 COST = {"a second rail temperature": 8.0, "hammer tests at the sensors": 4.0, "a second speed": 1.0}
 
 
 def planned_matrix(track, sensors, blows, temperatures, trains, speeds, families=None, config=None):
-    """(Distinguishability, advice) of a plan: places [m], temperatures [°C], vehicle files, speeds [km/h].
+    """(Distinguishability, advice) of a plan: positions [m], temperatures [°C], vehicle files, speeds [km/h].
 
-    ``config`` is the folder whose tracks and vehicles are meant, that of the place it is run in by default.
-    SimulationError where nothing is planned, or an effect of ``families`` is none that such a plan could show.
+    ``config`` is the configuration folder with tracks and vehicles, by default "config". SimulationError if nothing is
+    planned, or if one of ``effects`` is not a candidate in such a plan.
     """
     if not blows and not trains:
         raise SimulationError("nothing is planned: give --blows, --trains or both.")
@@ -37,7 +37,7 @@ def planned_matrix(track, sensors, blows, temperatures, trains, speeds, families
 
 
 def _folder(config, kind):
-    """A folder of the configuration, None where there is none: the program's own then serve."""
+    """A folder of the configuration, None if it does not exist: the program's own files are then used."""
     folder = Path(config or "config") / kind
     return folder if folder.is_dir() else None
 

@@ -1,6 +1,6 @@
-"""docs/effects.md: the effects that a diagnosis knows, from the catalogue itself.
+"""Write docs/effects.md, the list of effects that a diagnosis can name, from the catalogue itself.
 
-``python -m turnout.stages.effects_page docs`` writes it anew; a test compares.
+Run ``python -m turnout.stages.effects_page docs`` to update it; a test compares.
 """
 
 import sys
@@ -12,7 +12,7 @@ from turnout.physics import TERMS
 from turnout.stages.mismatch_rows import CHECKS
 from turnout.stages.mismatch_text import number_in_words
 
-NEVER_ASKED = ("lifting_sleepers", "rail_bending", "roughness_level")  # can be simulated, and written in a track file
+NEVER_ASKED = ("lifting_sleepers", "rail_bending", "roughness_level")  # simulated only
 FIXED_TO = {
     "place": "a place", "amplitude": "a place, and how far it moves", "frequency": "a frequency band",
     "condition": "the whole track, under a condition", "sensor": "a sensor", "clock": "a channel's clock",
@@ -34,7 +34,7 @@ Not asked for, but known to the simulation and to track files: {}.
 
 
 def page() -> str:
-    """The whole page."""
+    """Text of the page."""
     asked = [t for t in TERMS if t.name not in NEVER_ASKED]
     others = ", ".join(_what(t)[0].lower() + _what(t)[1:] for t in TERMS if t.name in NEVER_ASKED)
     return HEAD + "".join(_row(t) for t in asked) + FOOT.format(others)
@@ -49,7 +49,7 @@ def _row(term) -> str:
 
 
 def _what(term) -> str:
-    """First sentence of the file that the term is in."""
+    """First sentence of the module docstring of the term."""
     return (import_module(term.__module__).__doc__ or "").strip().splitlines()[0].split(": ")[0].removesuffix(".")
 
 

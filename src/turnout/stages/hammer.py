@@ -1,4 +1,4 @@
-"""Hammer tests of one section and campaign: raw files in, rows of the registry out."""
+"""Stage hammer: registry rows of the hammer tests of one section and campaign."""
 
 from collections import Counter
 from dataclasses import replace
@@ -18,9 +18,9 @@ from turnout.registry.ids import content_id
 from turnout.stages.common import contradiction, quarantine_row, rail_temperature, read_or_quarantine, recording_row
 from turnout.stages.hammer_rows import impact_mode_row, impact_row, mode_row, model_row, receptance_row
 
-# A campaign may go on into the night after its day, and a clock may show local time.
+# Largest time between a recording and its campaign: it may last into the night, and a clock may show local time.
 OTHER_CAMPAIGN = timedelta(days=2)
-# What the column `test` of the registry holds.
+# Largest value of the registry's column `test`.
 LARGEST_TEST = 2**31 - 1
 REFILE = "It is used. Move it to its day's campaign if it is another's; a logger's clock that was wrong does no harm"
 
@@ -28,10 +28,9 @@ REFILE = "It is used. Move it to its day's campaign if it is another's; a logger
 def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root, algo: str = "") -> dict[str, list[dict]]:
     """Rows by table for one section and campaign.
 
-    A file that cannot be read, or one damaged record of a sound file, becomes a quarantine row; the rest is used,
-    and so is a file whose own time is not its campaign's, with a row that says so. An impact that is not good enough
-    becomes a row with its reason. Too few impacts, a failed gate or no stable mode give a model row with status
-    "rejected".
+    An unreadable file or a damaged record becomes a quarantine row; the other records are used. A file whose time is
+    not that of its campaign is used too, with a quarantine row. A rejected impact is a row with its reason. Too few
+    impacts, a failed gate or no stable mode give a model row with status "rejected".
 
     Parameters
     ----------
@@ -69,7 +68,7 @@ def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root, algo: str = "") ->
     if not rows["recordings"]:
         return rows
     recordings = _of_one_rate(recordings, base, rows["quarantine"], ids)
-    # all blows of the campaign at once: what is wrong with a whole file shows against the others
+    # all impacts of the campaign at once: a fault of a whole file shows in comparison with the others
     impacts = find_impacts(recordings, force, response, turnout.settings["receptance"])
     impacts, receptance, model = _identified(impacts, turnout)
     tests = {path: _test_number(turnout, unit, path) for path in ids}
@@ -101,7 +100,7 @@ def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root, algo: str = "") ->
 
 
 def _of_one_rate(recordings, base, quarantine, ids):
-    """The recordings of the rate that most have; a quarantine row for each file of another one."""
+    """Recordings of the most common sampling rate; a quarantine row for each file of another rate."""
     rates = Counter(_rounded(r.rate) for r in recordings)
     most = max(rates, key=lambda rate: (rates[rate], rate))
     for path in sorted({r.source for r in recordings if _rounded(r.rate) != most}):
@@ -115,14 +114,14 @@ def _of_one_rate(recordings, base, quarantine, ids):
 
 
 def _rounded(rate):
-    """A clock that was printed gives its rate to six digits, whatever those behind them say."""
+    """Sampling rate rounded to six digits: times printed in a file are no more exact."""
     return float(f"{rate:.6g}")
 
 
 def _identified(impacts, turnout):
-    """(impacts, receptance, model); blows that the model does not describe are rejected, and the others asked again.
+    """(impacts, receptance, model); impacts that the model does not describe are rejected, and the rest fitted again.
 
-    Without enough blows there is no receptance, and the model says so.
+    With too few impacts there is no receptance, and the model is rejected.
     """
     needed = turnout.settings["receptance"].minimum_impacts
     settings = turnout.settings["identify"]
@@ -142,7 +141,7 @@ def _identified(impacts, turnout):
 
 
 def _test_number(turnout, unit, path):
-    """Number of the test from the file's name; 0 where the pattern has none, or letters or a time in its place."""
+    """Number of the test from the file's name; 0 if the name has no number there."""
     inside = str(PurePosixPath(path).relative_to(turnout.raw))
     labels = tuple(s.label for s in turnout.sections)
     match = compiled(turnout.hammer.files, "hammer", labels).fullmatch(inside)
@@ -151,7 +150,7 @@ def _test_number(turnout, unit, path):
 
 
 def _too_few(n, needed, impacts):
-    """A rejected model without modes: it says how many impacts were left, and why the others went."""
+    """A rejected model without modes, with the number of accepted impacts and the reasons of the others."""
     reasons = sorted({r.reason for i in impacts for r in i.rejections})
     words = f"{n} of {len(impacts)} impacts accepted, {needed} needed"
     if reasons:
@@ -165,7 +164,7 @@ def _too_few(n, needed, impacts):
 
 
 def _lowest(receptance, model):
-    """Lowest gate level within the half-power bandwidth of the modes, None without modes."""
+    """Lowest gate level within the half-power bandwidths of the modes, None without modes."""
     lowest = []
     for mode in model.modes:
         half = max(mode.damping, 0.02) * mode.frequency

@@ -1,6 +1,6 @@
-"""Files of a hammer test that somebody asks about, wherever they lie, as the unit that the nightly run would make.
+"""Compute hammer tests on request, from files in any folder, as the nightly run would compute them.
 
-Section and day of hammer files that the nightly run does not see: by option, by name, or by what they note.
+Section and day of a file come from the options, its name, or the time noted in it.
 """
 
 import os
@@ -22,7 +22,7 @@ from turnout.workflow.scan import scan
 
 
 def check_asked(turnout, section, campaign):
-    """ConfigError for a turnout without hammer tests, a section that it has not, and a day of no calendar."""
+    """ConfigError for a turnout without hammer tests, an unknown section, or an invalid day."""
     if turnout.hammer is None:
         raise ConfigError(turnout.layout, "hammer", "nothing about hammer tests", "Add them to the layout")
     if section is not None and section not in (known := turnout.hammer.descriptions):
@@ -42,7 +42,7 @@ def _is_day(text) -> bool:
 
 
 def agree(path, named, day, section, campaign):
-    """ConfigError where an option says another section or day than the file's name."""
+    """ConfigError if an option contradicts the section or day in the file's name."""
     pairs = (("--section", section, named, "section"), ("--campaign", campaign, day, "campaign"))
     for option, asked, told, what in pairs:
         if asked is not None and told is not None and asked != told:
@@ -51,7 +51,7 @@ def agree(path, named, day, section, campaign):
 
 
 def _named(path, turnout) -> tuple[str | None, str | None]:
-    """Section and day by as much of a path as follows the end of the layout's pattern, None where it does not say."""
+    """(section, day) from the end of a path that matches the layout's pattern, None where not given."""
     labels, pattern = tuple(s.label for s in turnout.sections), turnout.hammer.files.split("/")
     for n in range(min(len(pattern), len(path.parts) - 1), 0, -1):
         tail, name = "/".join(pattern[-n:]), "/".join(path.parts[-n:])
@@ -67,7 +67,7 @@ def _named(path, turnout) -> tuple[str | None, str | None]:
 
 
 def section_of(path, turnout, section, campaign) -> str:
-    """Label of a file's section, as told or as named; ConfigError where neither says it, or the two contradict."""
+    """Label of a file's section, from the option or its name; ConfigError if unknown or contradictory."""
     named, day = _named(path, turnout)
     agree(path, named, day, section, campaign)
     label = section or named
@@ -79,7 +79,7 @@ def section_of(path, turnout, section, campaign) -> str:
 
 
 def by_day(paths, turnout, label, campaign) -> dict[str, list[Path]]:
-    """Files of one section by the day of their campaign: as told, as named, or as the first time that they note."""
+    """Files of one section by the day of their campaign: from the option, their names, or the first time noted."""
     days: dict[str, list[Path]] = {}
     unknown = []
     for path in paths:
@@ -91,7 +91,7 @@ def by_day(paths, turnout, label, campaign) -> dict[str, list[Path]]:
 
 
 def _noted_day(paths, description) -> str:
-    """Day of the first time that files note; ReadError where none of them holds a sound record."""
+    """Day of the first time noted in files; ReadError if none of them holds a usable record."""
     faults: list[ReadError] = []
     times, n_sound = [], 0
     for path in paths:
@@ -113,15 +113,15 @@ def _noted_day(paths, description) -> str:
 
 
 def _called(path, error: ReadError) -> ReadError:
-    """The same error of a file called as it was by whoever asked."""
+    """The same error, with the path as the user gave it."""
     return ReadError(path, error.where, error.found, error.remedy, error.reason)
 
 
 @dataclass(frozen=True)
 class AskedFor:
-    """A ``unit`` to be computed as the night would: ``turnout`` with its notes, and ``root``, where the paths start.
+    """A ``unit`` to compute as the nightly run would, with its ``turnout`` and the ``root`` of its paths.
 
-    ``remarks`` say what the night will see otherwise: further files, or none of these.
+    ``remarks`` say how the nightly run will differ: further files, or none of these.
     """
 
     unit: Unit
@@ -130,7 +130,7 @@ class AskedFor:
     remarks: tuple[str, ...] = ()
 
     def rows(self) -> dict[str, list[dict]]:
-        """Rows by table, as the nightly run gets them; a file that cannot be used is a quarantine row."""
+        """Rows by table, as in the nightly run; a file that cannot be used is a quarantine row."""
         return guarded(hammer_unit, self.unit, self.turnout, self.root, "", "", strict=False).tables
 
 
@@ -151,19 +151,19 @@ def asked_for(
     turnout : TurnoutConfig
         Its notes are read from its raw folder here.
     raw_root : path
-        Folder that holds those of the turnouts; it need not be there.
+        Folder that holds those of the turnouts; it need not exist.
     section, campaign : str, optional
-        Label and day (YYYY-MM-DD) of files whose names do not say them; a file's own time may stand for the day.
+        Label and day (YYYY-MM-DD) of files whose names do not give them; else the day is the time noted in the file.
     folders : mapping, optional
-        Raw folder of every turnout by its id: a file of another one is refused.
+        Raw folder of every turnout by its id: a file of another turnout is an error.
 
     Raises
     ------
     ConfigError
-        No hammer tests in the layout, no such section, a section or day that is not known, or contradicts a name;
-        a file of a passage, or of another turnout.
+        No hammer tests in the layout, an unknown section or day, a contradiction with a file's name, or a file of
+        a passage or of another turnout.
     ReadError
-        A path that leads to no file, and a file that cannot be read where only it could say its day.
+        A path that is no file, or an unreadable file whose day is needed.
     """
     raw_root = Path(raw_root)
     check_asked(turnout, section, campaign)
@@ -188,7 +188,7 @@ def asked_for(
 
 
 class _Night:
-    """What the nightly run finds in the turnout's raw folder: (unit, path) and what it leaves out, by real path."""
+    """Scan of the turnout's raw folder, as in the nightly run: (unit, path) and problems by real path."""
 
     def __init__(self, turnout, raw_root, wrong):
         self.turnout, self.raw_root, self.wrong = turnout, raw_root, wrong
@@ -207,11 +207,11 @@ class _Night:
                 raise ConfigError(path, "--turnout", found, f"Write --turnout {turnout}")
 
     def notes(self, day) -> tuple[str, ...]:
-        """What is wrong with campaigns.csv, where no sound row of it is of this day."""
+        """Errors of campaigns.csv, if none of its valid rows is of this day."""
         return () if self.turnout.campaigns[day].noted else tuple(str(error) for error in self.wrong)
 
     def part(self, unit, names) -> AskedFor:
-        """The files of a unit that were asked for, and which others the night takes with them."""
+        """The requested files of a unit, with a remark on the others that the nightly run includes."""
         if unit.kind != "hammer":
             command = f"Use turnout passage {names.pop()} --turnout {unit.turnout}"
             raise ConfigError(unit.files[0][0], "file name", "is that of a passage, not of a hammer test", command)
@@ -222,7 +222,7 @@ class _Night:
         return AskedFor(some, self.turnout, self.raw_root, remarks)
 
     def misses(self, paths, label, day) -> tuple[str, ...]:
-        """Why the nightly run does not take files, and what would make it."""
+        """Why the nightly run does not use these files, and what to change."""
         said, strange = [], []
         for path in paths:
             problem = self.problems.get(os.path.realpath(path))
@@ -240,7 +240,7 @@ class _Night:
 
 
 def _filled(pattern, paths, label, day) -> str:
-    """The layout's pattern with what is known of files."""
+    """The layout's file pattern with day, section and file extension filled in."""
     endings = {path.suffix.lstrip(".") for path in paths}
     ending = endings.pop() if len(endings) == 1 else ""
     for field, value in (("campaign", day), ("section", label), ("ext", ending or "{ext}")):
@@ -253,7 +253,7 @@ def _within(path, folder) -> bool:
 
 
 def _file(path) -> str:
-    """Where the file really lies."""
+    """Real path of a file, links resolved; ReadError if it is none."""
     if os.path.isdir(path):
         remedy = f"Name the files in it, such as {path.name}/*"
         raise ReadError(path, "the path", "it is a folder", remedy)
@@ -263,7 +263,7 @@ def _file(path) -> str:
 
 
 def _brought(paths, turnout, label, day, night) -> AskedFor:
-    """Files that the night does not see; their paths start from the folder that they share."""
+    """Unit of files that the nightly run does not see; its root is their common folder."""
     real = [os.path.realpath(path) for path in paths]
     root = os.path.commonpath([os.path.dirname(path) for path in real])
     sizes = sorted((os.path.relpath(path, root), os.stat(path)) for path in dict.fromkeys(real))

@@ -6,10 +6,10 @@ import numpy as np
 
 from turnout.records import Impact, ModalModel, Mode, Receptance
 
-SHOWN = (20.0, 1600.0)
-SHOWN_LINES = 240
-SHOWN_DECAY = 0.04
-# Poles far outside the track's two resonances come and go with the noise; nobody asks why they were not used.
+SHOWN = (20.0, 1600.0)  # Hz: band of the receptances in the registry
+SHOWN_LINES = 240  # lines of a receptance in the registry
+SHOWN_DECAY = 0.04  # s of a decay in the registry
+# Hz: rejected poles in this band are reported. Others vary with the noise, far from the track's two resonances.
 WORTH_SAYING = (30.0, 1000.0)
 
 
@@ -101,9 +101,9 @@ def impact_mode_row(entry, base: dict, identity: dict, impact_id: str) -> dict:
 def receptance_row(
     receptance: Receptance, required: float, model: ModalModel, decay, base: dict, identity: dict
 ) -> dict:
-    """Row of ``receptances``: what a person wants to see, at a resolution that can be drawn.
+    """Row of ``receptances``, at the resolution of a figure.
 
-    ``required`` is the level that the gate asks for.
+    ``required`` is the level that the gate requires.
     """
     lines = shown_lines(receptance.frequency)
     measured, predicted = shown_decay(model, decay)
@@ -133,7 +133,7 @@ def receptance_row(
 
 
 def shown_lines(frequency):
-    """Indices of at most ``SHOWN_LINES`` lines, evenly spread over the logarithm of ``SHOWN``.
+    """Indices of at most ``MAX_PLOT_LINES`` lines, evenly spaced over the logarithm of ``PLOT_BAND``.
 
     >>> frequency = np.arange(1.0, 4000.0)
     >>> lines = shown_lines(frequency)

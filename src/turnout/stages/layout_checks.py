@@ -1,4 +1,4 @@
-"""Whether the places of a layout can be those of the track that stands for it."""
+"""Check the positions of a layout against the track that simulates it."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,13 +10,13 @@ from turnout.simulate import load_track
 from turnout.simulate.parameters import off_track
 from turnout.simulate.run import Drive
 
-OFF = 0.5  # m: a place in the layout further than this from the one in the track's file is somebody's mistake
-ENTRY = Drive.entry + Drive.margin  # m: nearer to the track's ends its wheels are not wholly on it
-NO_PLACE = ("force", "temperature", "ignored")  # quantities of channels that trains do not roll over
+OFF = 0.5  # m: a larger difference between layout and track file is an error
+ENTRY = Drive.entry + Drive.margin  # m: closer to an end of the track a train is not completely on it
+NO_PLACE = ("force", "temperature", "ignored")  # channels that need no position
 
 
 def misplaced(label, place, track) -> str:
-    """Why a place of the layout cannot be that of the track, "" where it can."""
+    """Why a position in the layout contradicts the track, "" if it does not."""
     base = track.track
     if not base.start < place < base.end:
         return f"section {label}: {place:.1f} m in the layout, the track goes from {base.start:.0f} to {base.end:.0f} m"
@@ -29,7 +29,7 @@ def misplaced(label, place, track) -> str:
 
 
 def faults_of_tracks(configuration: Configuration) -> Iterator[str]:
-    """What is wrong with each track file, with places off its track, and with places of layouts that have one."""
+    """Faults of each track file: unreadable, positions off the track, and contradictions with its layout."""
     tracks = {}
     for path in sorted((configuration.folder / "tracks").glob("*.yaml")):
         try:
@@ -51,7 +51,7 @@ def faults_of_tracks(configuration: Configuration) -> Iterator[str]:
 
 
 def _misplaced(tree: Branch, track, path: Path) -> Iterator[ConfigError]:
-    """An error at each section that lies elsewhere than on the track, and at each sensor too near to its ends."""
+    """An error for each section that contradicts the track, and for each sensor too close to its ends."""
     wrong = {label: misplaced(label, section["position"].value, track) for label, section in tree["sections"].items()}
     for label, found in wrong.items():
         if found:

@@ -1,4 +1,4 @@
-"""One visit of a turnout: its hammer tests and passages against the simulation, from raw files to findings."""
+"""Stage mismatch: compare the hammer tests and passages of one visit with the simulation."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -30,8 +30,10 @@ GRAVITY = ("named", "a_or_b", "unknown", "numerics", "none")
 
 @dataclass
 class Options:
-    """How to diagnose: ``track`` file or None, ``sections`` or all, folder of ``fits``, ``watch`` and ``progress``
-    (group, number, count) -> callable(done, total, what)."""
+    """Options of a diagnosis: ``track`` file or None, ``sections`` or () for all, folder of ``fits`` and ``watch``.
+
+    ``progress`` is a callable (group, number, count) -> callable(done, total, what).
+    """
 
     track: str | None = None
     sections: Sequence[str] = ()
@@ -41,24 +43,25 @@ class Options:
 
 
 def mismatch_unit(unit: Unit, turnout: TurnoutConfig, raw_root, context=None, algo: str = "") -> dict[str, list[dict]]:
-    """Rows by table (findings, parameters, curves, quarantine) for one visit: the fleet's stage.
+    """Rows by table (findings, parameters, curves, quarantine) for one visit, for the workflow.
 
-    Sections about which nothing can be said are quarantine rows with the reason; the others have a finding each,
-    one row per group of neighbouring sections.
+    There is one finding per group of neighbouring sections. Sections that cannot be diagnosed are quarantine rows with
+    the reason.
     """
     try:
         return diagnose_visit(unit, turnout, raw_root, context or {}, algo)
     except ReadError:
         raise
-    except TurnoutError as error:  # no track, a vehicle or a configuration that is wrong: this turnout's own affair
+    except TurnoutError as error:  # no track, or a wrong vehicle or configuration: a fault of this turnout only
         return {**{name: [] for name in TABLES}, "quarantine": [_nothing(unit, turnout, str(error)[:1000])]}
 
 
 def diagnose_visit(unit, turnout, raw_root, told, algo="", options: Options | None = None) -> dict[str, list[dict]]:
-    """Rows by table of one visit; ``told`` are the passage stage's tables by unit, {} to analyse them here.
+    """Rows by table of one visit.
 
-    SimulationError where the turnout has no track to simulate or no section has a recording that can be used;
-    BudgetSpentError, with the rows of the groups that are done, where the time is up before the last of them.
+    ``passage_tables`` are the tables of the passage stage by unit; passages without one are analysed here.
+    SimulationError if the turnout has no track. BudgetSpentError, with the rows of the finished groups, if the time is
+    spent before the last group.
     """
     options = options or Options()
     track, accepted = track_of(turnout, options.track)
@@ -93,12 +96,12 @@ def _graver_first(rows):
 def _content(path):
     try:
         return sha256_of(path)
-    except OSError:  # gone since it was planned: the notes say so
+    except OSError:  # deleted since it was planned: the notes say so
         return ""
 
 
 def _one(group: Group, turnout, accepted, about, options, number) -> dict[str, list[dict]]:
-    """Rows of one group, from the store where an interrupted run left them."""
+    """Rows of one group, read from the store if an earlier run computed them."""
     name = f"{turnout.id}-{about['visit']}-{'+'.join(group.labels)}"
     store = Checkpoint(Path(options.fits), name, (about["identity"],))
     if "rows" in store:
@@ -120,7 +123,7 @@ def _one(group: Group, turnout, accepted, about, options, number) -> dict[str, l
 
 
 def _nothing(unit, turnout, said, group=None) -> dict[str, Any]:
-    """Quarantine row: why nothing can be said."""
+    """Quarantine row with the reason why sections cannot be diagnosed."""
     place = f"sections {', '.join(group.labels)}" if group else "all sections"
     remedy = "See docs/mismatch.md: what a diagnosis needs"
     error = ReadError(turnout.raw, place, said, remedy, "simulation_failed")

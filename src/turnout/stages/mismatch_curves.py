@@ -1,4 +1,4 @@
-"""What a diagnosis shows: waveform, spectrum, receptance and missing force, before and after, as rows with lists."""
+"""Curves of a diagnosis as rows: waveform, spectrum, receptance and latent force, before and after."""
 
 from dataclasses import dataclass
 
@@ -7,23 +7,26 @@ from scipy.signal import welch
 
 from turnout.mismatch.engine.reserved_data import fit_of_reserved
 
-WINDOW = 0.8  # s of waveform shown
-SEGMENT = 0.5  # s of a piece of Welch's estimate: 2 Hz lines
-TELLS = 0.1  # share of the missing force that a law must explain to be worth a look
-AGAINST = {  # covariate of the missing force -> in words, with its unit
+WINDOW = 0.8  # s of waveform in a row
+SEGMENT = 0.5  # s: segment of Welch's estimate, 2 Hz lines
+TELLS = 0.1  # least share of the latent force that a covariate explains
+AGAINST = {  # covariate of the latent force -> (text, unit)
     "displacement": ("displacement of the sleeper", "m"),
     "velocity": ("velocity of the sleeper", "m/s"),
     "position": ("nearest wheel from the sleeper", "m"),
     "time": ("time of the recording", "s"),
     "temperature": ("rail temperature", "°C"),
 }
-CORE = (0.1, 0.9)  # shares of the gain between which band and reach are quoted
+CORE = (0.1, 0.9)  # shares of the cumulative gain between which a band is quoted
 
 
 @dataclass(frozen=True)
 class Shown:
-    """One recording at one sensor: ``time`` [s], ``measured``, ``before``, ``after``, ``rival`` (n,) [m/s²]; ``wheel``
-    (n,) distance of the nearest wheel [m]; ``held_out``: nothing was fitted to it."""
+    """One recording at one sensor, measured and predicted.
+
+    ``time`` [s]; ``measured`` and the predictions ``before``, ``after``, ``rival`` [m/s²]; ``wheel``, the distance of
+    the nearest wheel [m]; all (n,). ``held_out``: no fit used it.
+    """
 
     recording: str
     sensor: str
@@ -37,12 +40,12 @@ class Shown:
 
     @property
     def gain(self):
-        """(n,) squared error before less after."""
+        """(n,) squared error before minus squared error after."""
         return (self.measured - self.before) ** 2 - (self.measured - self.after) ** 2
 
 
 def passages_shown(case, found) -> list[Shown]:
-    """Every passage at every sensor; those held out first."""
+    """Comparison of every passage at every sensor, held out passages first."""
     rival = _rival(found)
     shown: list[Shown] = []
     if case.reserved:
@@ -79,7 +82,7 @@ def _split(case, observations, sets, held_out):
 
 
 def best_shown(shown, case, found):
-    """The passage and sensor to draw: held out if there is one, at the place or sensor found, where most is gained."""
+    """The comparison to draw: held out if possible, at the position or sensor of the finding, with the largest gain."""
     if not shown:
         return None
     where = found.fit.candidates[0].where if found.fit.candidates else {}
@@ -108,7 +111,7 @@ def spectra(shown):
 
 
 def band_of(shown, changed):
-    """(low, high) [Hz] between which four fifths of what is explained (or missing) lie, None without a passage."""
+    """(low, high) [Hz] of four fifths of the explained (else missing) power, None without a passage."""
     if shown is None:
         return None
     rate = 1.0 / float(np.mean(np.diff(shown.time)))
@@ -120,7 +123,7 @@ def band_of(shown, changed):
 
 
 def band_of_blows(case, found):
-    """The same from the hammer tests, where they gain more than the passages do; None elsewhere."""
+    """The same from the hammer tests, None if they gain less than the passages."""
     lines, weights, rolling = [], [], 0.0
     for k, o in enumerate(case.observations):
         gain = _gain_in_sigma(o, found, k)
@@ -138,7 +141,7 @@ def band_of_blows(case, found):
 
 
 def _gain_in_sigma(o, found, k):
-    """(n,) squares explained by the term, or missing where none was found, in units of sigma."""
+    """(n,) squared errors in units of sigma: explained by the term, else missing."""
     left = ((o.data - found.base.predictions[k]) / o.sigma) ** 2
     if found.fit is found.base:
         return left
@@ -146,7 +149,7 @@ def _gain_in_sigma(o, found, k):
 
 
 def reach_of(shown, changed):
-    """Distance of the nearest wheel [m] within which four fifths of what is explained (or missing) happen."""
+    """Distance of the nearest wheel [m] within which four fifths of the gain (else of the error) occur."""
     if shown is None:
         return None
     gain = np.maximum(shown.gain if changed else (shown.measured - shown.before) ** 2, 0.0)
@@ -183,7 +186,7 @@ def curve_rows(case, found, shown, identity) -> list[dict]:
 
 
 def _window(shown, changed):
-    """The stretch where most is gained."""
+    """Slice of ``SHOWN_DURATION`` with the largest gain."""
     gain = shown.gain if changed else (shown.measured - shown.before) ** 2
     n = min(shown.time.size, round(WINDOW / float(np.mean(np.diff(shown.time)))))
     total = np.concatenate([[0.0], np.cumsum(gain)])
@@ -208,7 +211,7 @@ def _row(curve, label, x, unit, lists, shown=None):
 
 
 def _receptance(case, found):
-    """Receptance magnitude of the hammer pair that the term changes most, or that fits worst."""
+    """Receptance magnitude of the pair that the term improves most, else that fits worst."""
     best, worst = None, -1.0
     for k, o in enumerate(case.observations):
         pair = case.pairs.get(o.name)
@@ -234,7 +237,7 @@ def _magnitude(value, pair):
 
 
 def _latent(found):
-    """Missing force against the covariate that explains most of it."""
+    """Latent force against the covariate that explains most of it."""
     if found.latent is None or not found.latent.best:
         return []
     name = found.latent.best

@@ -1,6 +1,7 @@
-"""Neighbouring sections of one track are one case: what lies further apart does not feel the same effect.
+"""Group the recordings of a turnout into visits, and the sections of a visit into cases.
 
-Visits of a turnout: what was measured together is diagnosed together.
+A visit is a campaign with the passages around it. Neighbouring sections are one case: sections further apart do not
+respond to the same effect.
 """
 
 import json
@@ -21,11 +22,11 @@ from turnout.simulate import Sensor, TurnoutTrack
 from turnout.stages.mismatch_inputs import Gathered, digest_of_model
 from turnout.workflow.plan import Planned, read_plan
 
-GAP = 6.0  # m: sections further apart than this do not hear the same sleeper
-MOST_PASSAGES = 8  # of one case: each is simulated hundreds of times, and more of the same kind tell little more
-MOST_AXLES = 96  # of all of them: the time of a simulation goes with the axles
-RESERVED_EVERY = 5  # of so many recordings one is kept back from all fits
-FEWEST_TO_RESERVE = 4
+GAP = 6.0  # m: sections further apart do not respond to the same sleeper
+MOST_PASSAGES = 8  # of a case: each is simulated hundreds of times, and more alike add little
+MOST_AXLES = 96  # of all passages of a case: the simulation time is proportional to them
+RESERVED_EVERY = 5  # one of so many recordings is held out from all fits
+FEWEST_TO_RESERVE = 4  # recordings; with fewer none is held out
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class Group:
 
 
 def groups(turnout: TurnoutConfig, track: TurnoutTrack, found: Gathered, only: Sequence[str] = ()) -> Iterator[Group]:
-    """The cases of a visit, by place; sections without any recording are left out."""
+    """Groups of a visit in order of position; sections without a recording are left out."""
     for route, labels in _neighbours(turnout, only):
         campaign = _campaign(turnout, track, found, route, labels)
         if campaign is not None and route not in ("main", *track.routes):
@@ -48,7 +49,7 @@ def groups(turnout: TurnoutConfig, track: TurnoutTrack, found: Gathered, only: S
 
 
 def _neighbours(turnout, only):
-    """(route, labels) of sections that follow each other within ``GAP``, or of ``only`` these, all together."""
+    """(route, labels) of sections with gaps up to ``MAX_SECTION_GAP``, or of all sections in ``only``."""
     for route in ("main", "diverging"):
         mine = [s for s in turnout.sections if _route(s) == route and (not only or s.label in only)]
         mine.sort(key=lambda s: s.position)
@@ -63,7 +64,7 @@ def _neighbours(turnout, only):
 
 
 def _measured(turnout, found, campaign, labels):
-    """The labels that have a recording in the campaign."""
+    """Labels of sections with a recording in the campaign."""
     struck = {found.sections[t.name] for t in campaign.hammer}
     watched = {turnout.passages.sections[s.name] for s in campaign.sensors} if turnout.passages else set()
     return tuple(label for label in labels if label in struck | watched)
@@ -104,14 +105,14 @@ def _sensors(turnout, labels):
 
 
 def _as_main(track, route, passages):
-    """The turnout seen from another route: its track is the one that blows and trains of the case meet."""
+    """(track, passages) with the track of ``route`` as the main one."""
     own = track.track_of(route)
     seen = replace(track, track=own, tracks={"main": own}, routes={"main": track.routes[route]})
     return seen, [replace(p, route="main") for p in passages]
 
 
 def formations(passages):
-    """The passages, trains of one type that came in several lengths as trains of their own: wheels are counted."""
+    """Passages with a separate train name for each number of axles of one type."""
     axles = {id(p): len(p.vehicle.wheels) for p in passages}
     lengths: dict[str, set] = {}
     for p in passages:
@@ -121,8 +122,10 @@ def formations(passages):
 
 
 def telling(passages, most=MOST_PASSAGES, axles=MOST_AXLES):
-    """At most ``most`` passages and ``axles``: one train of each type in turn, short ones first, of each type the
-    extremes of speed first."""
+    """At most ``max_passages`` passages with ``max_axles`` axles in all.
+
+    One train of each type in turn, short trains first, and in each type the extremes of speed first.
+    """
     kinds: dict[str, list] = {}
     for p in sorted(passages, key=lambda p: (len(p.vehicle.wheels), p.train, p.speed)):
         kinds.setdefault(p.train, []).append(p)
@@ -137,14 +140,16 @@ def telling(passages, most=MOST_PASSAGES, axles=MOST_AXLES):
 
 
 def _extremes_first(members):
-    """Slowest, fastest, second slowest, second fastest ... of passages in order of speed."""
+    """Slowest, fastest, second slowest, second fastest ... of passages sorted by speed."""
     n = len(members)
     return [members[k // 2 if k % 2 == 0 else n - 1 - k // 2] for k in range(n)]
 
 
 def reserved(passages, tests) -> tuple[str, ...]:
-    """Names that no fit reads: of passages in order of speed every fifth, else of the tests. A train's only passage
-    stays for the fits where another one, the nearest in speed, can be kept back in its place."""
+    """Names of the held out recordings: every fifth passage in order of speed, else every fifth test.
+
+    The only passage of a train is not held out if another passage, the nearest in speed, can be.
+    """
     items = sorted(passages, key=lambda p: p.speed) or sorted(tests, key=lambda t: t.place)
     if len(items) < FEWEST_TO_RESERVE:
         return ()
@@ -157,16 +162,16 @@ def reserved(passages, tests) -> tuple[str, ...]:
 
 
 def _train(item):
-    """Type of a passage's train; all hammer tests are of one kind."""
+    """Train type of a passage, "" for all hammer tests."""
     return getattr(item, "train", "")
 
 
-NEAR_DAYS = 31  # a passage further than this from every campaign is a visit of its calendar month
-NEWEST = 1  # visits of a turnout that the fleet's stage looks at: older ones were looked at when they were new
+NEAR_DAYS = 31  # a passage further from every campaign belongs to the visit of its month
+NEWEST = 1  # visits per turnout in the workflow: older ones were diagnosed before
 
 
 def visits(units: Iterable[Unit]) -> dict[str, list[Unit]]:
-    """Units by visit, oldest first: the day of a campaign with the passages nearest to it, else a month.
+    """Units by visit, oldest first: a campaign's day with the passages nearest to it, else a month.
 
     >>> def at(kind, label, campaign=None):
     ...     return Unit("t", kind, label, (), "", None, campaign)
@@ -197,14 +202,14 @@ def _visit_of(label: str, days: Sequence[date]) -> str:
 
 
 def enabled_visit(plan: Path, configuration: Configuration) -> Iterator[Planned]:
-    """Newest visits, as units, of the turnouts whose settings say ``mismatch: enabled: true``."""
+    """Newest visits, as units, of the turnouts with the setting ``mismatch: enabled: true``."""
     for planned in every_visit(plan, configuration):
         if configuration.turnout(planned.unit.turnout).settings["mismatch"].enabled:
             yield planned
 
 
 def every_visit(plan: Path, configuration: Configuration) -> Iterator[Planned]:
-    """Newest visits of all turnouts of a plan; the note changes with notes, track and vehicles."""
+    """Newest visits of all turnouts of a plan; their note changes with notes, track and vehicle files."""
     by_turnout: dict[str, list[Planned]] = {}
     for planned in read_plan(plan):
         by_turnout.setdefault(planned.unit.turnout, []).append(planned)
@@ -218,13 +223,13 @@ def every_visit(plan: Path, configuration: Configuration) -> Iterator[Planned]:
 
 
 def unit_of(turnout: str, label: str, units: Sequence[Unit], config_hash: str) -> Unit:
-    """One unit of all files of a visit."""
+    """Unit of all files of a visit."""
     files = tuple(sorted(f for u in units for f in u.files))
     return Unit(turnout, "mismatch", label, files, config_hash)
 
 
 def members_of(unit: Unit, scanned: Iterable[Unit]) -> list[Unit]:
-    """The hammer tests and passages, as scanned, whose files a visit's unit holds."""
+    """Scanned hammer tests and passages whose files belong to the unit of a visit."""
     wanted = {f[0] for f in unit.files}
     found = []
     for u in scanned:

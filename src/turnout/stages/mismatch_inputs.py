@@ -1,6 +1,6 @@
-"""A visit's raw files as hammer tests and passages of the engine; what cannot be used is said.
+"""Gather the inputs of a diagnosis: hammer tests, passages, track file, vehicles and the passage stage's results.
 
-What a diagnosis of a turnout needs beside its files: its track's file, vehicles, what the passage stage found.
+Recordings that cannot be used are noted with the reason.
 """
 
 import hashlib
@@ -31,15 +31,15 @@ from turnout.stages.passage_context import known_patterns
 from turnout.workflow.current_results import current_results
 from turnout.workflow.scan import unit_id
 
-HALF_BAY = 0.3  # m: an accelerometer "mid-span" sits this far from the sleeper struck
-TOPS = 0.002  # share of samples at the range that leaves the band of the diagnosis as it is: tops of blows above it
-MOST_ALIKE = 16  # passages of one train kept of a visit: twice as many as a case has of all
+HALF_BAY = 0.3  # m: distance of a "mid-span" accelerometer from the sleeper of the impact
+TOPS = 0.002  # share of clipped samples that leaves the band of the diagnosis unchanged
+MOST_ALIKE = 16  # similar passages per visit: twice the limit of a case
 UNSOUND = ("clipped", "dead_channel", "not_finite", "sensor_lost", "channels_swapped")
 
 
 @dataclass
 class Gathered:
-    """What can be used of a visit, and ``notes`` on what cannot; ``sections`` of each test, ``unsound`` channels."""
+    """Usable hammer ``tests`` and ``passages`` of a visit, and ``notes`` on the rest; ``sections`` by test name."""
 
     tests: list[HammerTest] = field(default_factory=list)
     sections: dict[str, str] = field(default_factory=dict)
@@ -47,7 +47,7 @@ class Gathered:
     notes: list[str] = field(default_factory=list)
 
     def said(self) -> list:
-        """All that notes and the passage stage said of the recordings: another word is another diagnosis."""
+        """Content of the digest: all notes and passage results that a diagnosis depends on."""
         tests = [[t.name, t.place, t.conditions] for t in self.tests]
         vehicles: list[Any] = [p.vehicle for p in self.passages]
         loads = [[float(load) for load in v.static_loads] for v in vehicles]
@@ -56,7 +56,10 @@ class Gathered:
 
 
 def gather(units: Iterable[Unit], turnout: TurnoutConfig, raw_root, track, told: Mapping[str, dict]) -> Gathered:
-    """Read all units of a visit. ``track`` is the TurnoutTrack, ``told`` the passage stage's tables by unit."""
+    """Read all units of a visit.
+
+    ``track`` is the TurnoutTrack, ``passage_tables`` are the tables of the passage stage by unit.
+    """
     found = Gathered()
     for unit in units:
         if unit.kind == "hammer" and turnout.hammer is not None:
@@ -68,7 +71,7 @@ def gather(units: Iterable[Unit], turnout: TurnoutConfig, raw_root, track, told:
 
 
 def _read(unit, description, raw_root, notes, longest=None):
-    """Recordings of a unit, those that stay in their file as well; what cannot be read goes to the notes."""
+    """Recordings of a unit, long ones included; read errors are added to ``notes``."""
     for path, *_ in unit.files:
         try:
             result = read(path, raw_root, description, longest)
@@ -100,7 +103,7 @@ def _test(unit, turnout, raw_root, track, found):
 
 
 def _seated(recording, place):
-    """The recording with places for accelerometers that have none: at the blow, or half a bay on if mid-span."""
+    """The recording with positions for accelerometers that have none: at the impact, or half a bay further."""
     channels = tuple(
         c
         if c.quantity != "acceleration" or c.position is not None
@@ -111,7 +114,7 @@ def _seated(recording, place):
 
 
 def _analysed(unit, turnout, raw_root) -> dict[str, list[dict]]:
-    """What the passage stage would find."""
+    """Tables that the passage stage would compute."""
     path = Path(turnout.settings["passage"].axle_patterns)
     if not path.is_file():
         path = Path(turnout.folder) / "vehicles" / path.name
@@ -120,8 +123,10 @@ def _analysed(unit, turnout, raw_root) -> dict[str, list[dict]]:
 
 
 def _passages(unit, turnout, raw_root, track, tables, found):
-    """The trains of a unit, each with its row of the passage stage; with none, which is said, where these are more or
-    fewer: nobody could tell whose they are."""
+    """Add the trains of a unit, each with its row of the passage stage.
+
+    If the numbers of trains and rows differ, the rows are not used, with a note: they cannot be assigned.
+    """
     rows, bad = tables["passages"], tables["quarantine"]
     own, n = _taken(unit, turnout, raw_root, track, rows, bad)
     if n != len(rows):
@@ -139,7 +144,7 @@ def _name(unit):
 
 
 def _taken(unit, turnout, raw_root, track, rows, bad):
-    """(Gathered of a unit's trains, how many these are); a day of a logger never is in memory as a whole."""
+    """(VisitInputs of a unit's trains, number of trains); a long recording is never loaded as a whole."""
     own, n = Gathered(), 0
     for recording in _trains(unit, turnout, raw_root, own.notes):
         name = _name(unit) + (f":{n}" if len(rows) > 1 else "")
@@ -152,7 +157,7 @@ def _taken(unit, turnout, raw_root, track, rows, bad):
 
 
 def _passage(name, recording, row: Mapping[str, Any], turnout, track, bad, notes):
-    """Passage of a train, None where it cannot be used; why not, and what is doubtful, goes to the notes."""
+    """Passage of a train, None if it cannot be used; reasons and doubts are added to ``notes``."""
     unsound = {name for q in bad if _spoils(q) for name in _channels_of(q)}
     unsound |= _misplaced_sensors(turnout, track, notes)
     if ANOTHER in (row.get("detail") or ""):
@@ -176,7 +181,7 @@ def _passage(name, recording, row: Mapping[str, Any], turnout, track, bad, notes
 
 
 def _trains(unit, turnout, raw_root, notes):
-    """The recordings of a unit, those of a logger that never stops cut into trains as the passage stage cuts them."""
+    """Recordings of a unit, continuous ones cut into trains as in the passage stage."""
     settings, sensors = turnout.settings["passage"], sensors_of(turnout)
     for recording in _read(unit, turnout.passages.description, raw_root, notes, settings.longest):
         try:
@@ -187,7 +192,7 @@ def _trains(unit, turnout, raw_root, notes):
 
 
 def _thin_out(passages):
-    """Of more trains alike than anybody will ask for the one of middling speed goes: a month of them fills a memory."""
+    """Remove the train of middle speed if there are too many similar ones: memory is limited."""
     new = passages[-1]
     alike = [p for p in passages if _kind(p) == _kind(new)]
     if len(alike) > MOST_ALIKE:
@@ -202,18 +207,18 @@ def _kind(passage):
 
 
 def _channels_of(row):
-    """Names of the channels that a quarantine row is about: one, or two that are swapped."""
+    """Channel names in a quarantine row: one, or two that are swapped."""
     return row["place"].split(", ")[-1].split(":")[0].split(" and ")
 
 
 def _spoils(row):
-    """A channel that this quarantine row speaks of is of no use: one that cut off the very top of some blows is."""
+    """Whether the channel of a quarantine row cannot be used; a slightly clipped one can."""
     slightly = row["reason_code"] == "clipped" and (row.get("measured_value") or 1.0) < TOPS
     return row["reason_code"] in UNSOUND and not slightly
 
 
 def _misplaced_sensors(turnout, track, notes):
-    """Sensors whose section lies elsewhere in the layout than on the track."""
+    """Names of sensors whose position contradicts the track, with notes."""
     found = {s.name: wrong for s in sensors_of(turnout) if (wrong := misplaced(s.section, s.position, track))}
     notes += [wrong for wrong in found.values() if wrong not in notes]
     return set(found)
@@ -231,7 +236,7 @@ def _noted(row, recording):
 
 
 def _sound_channels(recording, turnout, route, unsound):
-    """The recording with those channels alone that feel trains of this route and are sound, at their places."""
+    """The recording with the usable channels of this route only, at their positions."""
     sensors = {s.name: s for s in sensors_of(turnout) if s.track in ("both", route) and s.name not in unsound}
     keep = [i for i, c in enumerate(recording.channels) if c.name in sensors]
     channels = tuple(
@@ -241,7 +246,7 @@ def _sound_channels(recording, turnout, route, unsound):
 
 
 def track_file(turnout: TurnoutConfig, name: str | None = None) -> Path:
-    """The turnout's own file in the configuration's tracks, else that of its layout; SimulationError without one."""
+    """The turnout's own track file in the configuration, else that of its layout; SimulationError without one."""
     if name and name.endswith((".yaml", ".yml")):
         return Path(name)
     folder = Path(turnout.folder) / "tracks"
@@ -263,8 +268,10 @@ def track_of(turnout: TurnoutConfig, name: str | None = None):
 
 
 def digest_of_model(turnout: TurnoutConfig, name: str | None = None) -> str:
-    """Changes when a track's or a vehicle's file of the configuration does, "" where there are none; beside a track
-    that is asked for by ``name`` all in its folder count, since it may extend any of them."""
+    """Digest of the track and vehicle files of the configuration, "" without a track.
+
+    For a track given by ``name``, all files in its folder count, since it may extend any of them.
+    """
     folder = Path(turnout.folder)
     try:
         own = track_file(turnout, name)
@@ -278,8 +285,10 @@ def digest_of_model(turnout: TurnoutConfig, name: str | None = None) -> str:
 
 
 def _extended(path: Path) -> list[Path]:
-    """A track's file and those that it extends, one after the other, as far as they can be read: the diagnosis says
-    what is wrong with the rest."""
+    """A track's file and the files that it extends, as far as they can be read.
+
+    Errors in them are reported by the diagnosis.
+    """
     found = [path]
     try:
         while "extends" in (own := read_parameters(found[-1])):
@@ -293,7 +302,7 @@ def _extended(path: Path) -> list[Path]:
 
 
 def mismatch_context(turnout: str, settings=None, work="work") -> tuple[str, dict[str, dict]]:
-    """(token, tables of each passage unit by its id) as the passage stage left them in ``work``."""
+    """(token, tables by passage unit) from the results of the passage stage in ``work``."""
     found = {}
     for result in current_results(work, "passage", turnout):
         found[result.unit] = {k: result.tables.get(k, []) for k in ("passages", "quarantine")}

@@ -1,4 +1,4 @@
-"""One turnout on request: its visit diagnosed, the result kept until it is accepted or asked for again."""
+"""Diagnose a turnout on request, and save its result until it is accepted or computed again."""
 
 import time
 from pathlib import Path
@@ -15,20 +15,20 @@ from turnout.stages.mismatch_inputs import mismatch_context
 from turnout.workflow.batches import decode, encode
 from turnout.workflow.scan import scan
 
-ALL = "all"  # every visit in one case: what depends on temperature or time needs more than one
+ALL = "all"  # every visit in one case: effects of temperature or time need several
 
 
 def diagnose_turnout(
     turnout_id, config="config", raw_root="raw", work="work", visit=None, track=None, sections=(), budget=None, bar=None
 ):
-    """Rows by table of one visit of a turnout, the newest where none is named; for "all" every visit as one.
+    """Rows by table of one visit of a turnout, by default the newest; "all" takes every visit as one.
 
     Parameters
     ----------
     budget : float or None
-        Seconds after which BudgetSpentError is raised; the fits that are done are kept.
+        Seconds after which BudgetSpentError is raised; finished fits are stored.
     bar : object with ``group`` and ``simulations``, or None
-        Told how far it is.
+        Called with the progress.
 
     Raises
     ------
@@ -59,18 +59,18 @@ def _visit(turnout_id, found, wanted, raw_root):
 
 
 class Results:
-    """The last result of a turnout below ``work``, else what the ``registry`` holds of it."""
+    """The last result of a turnout, below ``work`` or in the ``registry``."""
 
     def __init__(self, work, turnout_id, registry=None):
         self.turnout_id, self.registry = turnout_id, registry
         self.path = Path(work) / "mismatch-fits" / f"{turnout_id}.json"
 
     def keep(self, tables):
-        """Write it."""
+        """Write the result below ``work``."""
         write_text(self.path, encode(tables))
 
     def finding(self, finding_id=None):
-        """The finding called ``finding_id``, or the only one with a term; SimulationError where that is not clear."""
+        """The finding with this id, or the only one with a term; SimulationError if that is ambiguous."""
         rows = self._rows()
         if finding_id:
             chosen = [r for r in rows if r["finding_id"].startswith(finding_id)]
@@ -85,7 +85,7 @@ class Results:
         raise SimulationError(f"{self.turnout_id}: {wrong}; say which with --finding. There are {there or 'none'}.")
 
     def _rows(self):
-        """The rows kept below ``work`` or those of the registry, whichever are of newer recordings."""
+        """Rows saved below ``work`` or those of the registry, whichever are of newer recordings."""
         kept, registered = self._kept(), self._registered()
         if not kept and not registered:
             said = f"{self.turnout_id} has no result below {self.path.parent}, nor in the registry"
@@ -99,7 +99,7 @@ class Results:
             return []
 
     def _registered(self):
-        """Newest findings of the turnout in the registry, where there is one: the fleet's stage left them."""
+        """Newest findings of the turnout in the registry, [] without a registry."""
         if self.registry is None or not (Path(self.registry) / "registry.duckdb").exists():
             return []
         with open_registry(self.registry) as connection:
@@ -109,5 +109,5 @@ class Results:
 
 
 def _newest(rows):
-    """Time of the newest finding as text that sorts, "" without any."""
+    """Time of the newest finding as sortable text, "" without any."""
     return max((str(r["found_at_utc"]).replace("T", " ")[:19] for r in rows), default="")

@@ -1,7 +1,4 @@
-"""A diagnosis as rows of the registry: the finding, its parameters, the curves that show it.
-
-A diagnosis as a row of the registry, its sentence and its recommendation.
-"""
+"""Registry rows of a diagnosis: the finding with its sentence and recommendation, its parameters and curves."""
 
 import json
 from datetime import datetime
@@ -14,8 +11,8 @@ from turnout.stages.accepted_effects_case import visit_of
 from turnout.stages.mismatch_curves import band_of, band_of_blows, best_shown, curve_rows, passages_shown, reach_of
 from turnout.stages.mismatch_text import headline, interval, otherwise
 
-HALF_BAY = 0.3  # m: nearer than this are the place of a finding and that of a cell of the residual
-FALSE_DISCOVERY = 0.05  # expected share of wrong ones among the frames named
+HALF_BAY = 0.3  # m: a cell of the residual closer than this is at the finding
+FALSE_DISCOVERY = 0.05  # expected share of false ones among the frames reported
 CHECKS = {
     "hanging_sleeper": "Look under this sleeper while a train passes; tamp it",
     "local_ballast": "Compare the ballast of this sleeper with its neighbours'; tamp or drain",
@@ -59,12 +56,12 @@ SEPARATES = {
     "sensor_position": "passages at another speed",
     "attached_resonator": "a hammer test above and beside this place",
 }
-BAY = 0.6  # m between supports, where places are looked into
+BAY = 0.6  # m between supports
 ELSE = "hammer tests at the points between, and a train of another load and speed"
 
 
 def sentence(diagnosis):
-    """The verdict in words for an engineer of the track."""
+    """The verdict as sentences for a track engineer."""
     verdict = diagnosis.verdict
     if verdict.answer == "none":
         return "Simulation and recordings agree as well as those of sound turnouts do."
@@ -81,7 +78,7 @@ def sentence(diagnosis):
 
 
 def place_in_words(diagnosis):
-    """Where what is missing acts, else where the residual is concentrated by the frame attribution."""
+    """Location of the missing effect in words, else the frames in which the residual is concentrated."""
     if diagnosis.where is not None:
         return str(diagnosis.where)
     found = [f for f in diagnosis.frames if f.q < FALSE_DISCOVERY]
@@ -91,7 +88,7 @@ def place_in_words(diagnosis):
 
 
 def recommendation(diagnosis):
-    """What to check on site, and the measurement that would tell more."""
+    """What to check on site, or which measurement would decide."""
     verdict = diagnosis.verdict
     if verdict.answer == "named":
         return CHECKS.get(verdict.names[0], "Look at the place; repeat the measurement after the work")
@@ -133,14 +130,14 @@ def finding_row(diagnosis, identity):
 
 
 def in_train(where):
-    """Train and axle of a place of action, in words; None where it has none."""
+    """Train and axle of a location in words, None without a train."""
     if not where.get("train"):
         return None
     return f"{where['train']}, axle {where['axle']}" if where.get("axle") else where["train"]
 
 
 def acts(found):
-    """Frame, place with standard error, sensor, train and axle of the ``Whereabouts``, {} of None."""
+    """Frame, position with standard error, sensor, train and axle of the location of a residual, {} of None."""
     if found is None:
         return {}
     said = {"frame": found.frame, "sensor": found.sensor, "train": found.train, "axle": found.axle}
@@ -150,7 +147,7 @@ def acts(found):
 
 
 def parameters(diagnosis):
-    """Name, value, standard error and unit of each parameter of the terms found."""
+    """Name, value, standard error and unit of each fitted parameter."""
     fitted = [(c, p) for c in diagnosis.fit.candidates for p in c.parameters]
     values = zip(fitted, diagnosis.fit.psi, diagnosis.fit.psi_se)
     return [
@@ -160,7 +157,7 @@ def parameters(diagnosis):
 
 
 def _position(diagnosis, term, where):
-    """Place [m] and its standard error; of a term that is fitted a ``shift`` beyond the place scanned, with it."""
+    """Position [m] and its standard error; a fitted ``shift`` from the scanned position is added."""
     place, se = where.get("place"), where.get("place_se")
     names = [p.name for p in term.parameters] if term else []
     if place is not None and "shift" in names:
@@ -170,7 +167,7 @@ def _position(diagnosis, term, where):
 
 
 def _is_there(level, where):
-    """Whether the level of a frame is where the finding is; one that has no place, sensor or train cannot be elsewhere.
+    """Whether the level of a frame is at the finding; True for a finding without position, sensor and train.
 
     >>> _is_there("12.0", {"place": 12.2}), _is_there("12.0", {"place": 18.0}), _is_there("A1", {"sensor": "A2"})
     (True, False, False)
@@ -257,13 +254,13 @@ def _numbers(found, case, group, about) -> dict:
 
 
 def _kept(notes):
-    """The first notes, and how many more there are."""
+    """The first ``MAX_NOTES`` notes and the number of others."""
     more = len(notes) - NOTES_KEPT
     return [*notes[:NOTES_KEPT], *([f"and {more} more"] if more > 0 else [])]
 
 
 def _of_visit(about, campaign):
-    """Notes of the visit, those on passages that this group has before those that say nothing of it."""
+    """Notes of the visit, those on passages of other groups last."""
     mine = tuple(f"passage {p.name}: " for p in campaign.passages)
     return sorted(about["notes"], key=lambda note: not note.startswith(mine) if note.startswith("passage ") else False)
 
@@ -277,13 +274,13 @@ def _errors(fit):
 
 
 def _said_of(verdict) -> dict:
-    """Probability of a term of its own, and the family that it may be as well, if there is one."""
+    """Probability of a term, and the other effect of an "a_or_b" verdict."""
     other = {"or": verdict.names[1]} if len(verdict.names) > 1 else {}
     return {"probability": _plain(verdict.probability), **other}
 
 
 def _evidence(found) -> dict:
-    """Frames, and what each verdict rests on: that on the first effect, those on others ``beside`` it."""
+    """Frames, and the evidence of each verdict: of the first effect, and of further ones under ``beside``."""
     frames = [
         {"frame": f.frame, "level": str(f.level), "effect_db": _plain(f.effect), "q": _plain(f.q), "n": f.n}
         for f in found.frames[:6]
@@ -293,7 +290,7 @@ def _evidence(found) -> dict:
 
 
 def _rests_on(verdict) -> dict:
-    """Probabilities, rivals, and nats by condition."""
+    """Probabilities, ranking of rivals, and evidence [nats] by condition."""
     best = verdict.scores[:4]
     return {
         "term": verdict.names[0] if verdict.names else None,
@@ -314,8 +311,11 @@ def _plain(value):
 
 
 def parameter_rows(found, case, row) -> list[dict]:
-    """Rows of ``mismatch_parameters``: of what was found, and of what the track's file has, as it is now: effects that
-    were accepted before, and uncertain numbers of the running surface."""
+    """Rows of ``mismatch_parameters``.
+
+    They hold the new terms, and the present estimates of the track file: accepted effects and uncertain numbers of the
+    running surface.
+    """
     base = {k: row[k] for k in ("finding_id", "turnout_id", "found_at_utc")}
     rows = []
     for term in json.loads(row["term_json"] or "[]"):
@@ -333,7 +333,7 @@ def parameter_rows(found, case, row) -> list[dict]:
 
 
 def surface_told(case, fit) -> list[dict]:
-    """What recordings say of uncertain numbers of the running surface in the track's file."""
+    """Estimates of uncertain numbers of the running surface in the track's file."""
     surface = getattr(case, "surface", None)
     return list(surface.told(case, fit)) if surface else []
 

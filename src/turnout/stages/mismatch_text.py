@@ -1,4 +1,4 @@
-"""What a finding says in a sentence to somebody who will go and look."""
+"""Sentences that describe a finding to the person who inspects the track."""
 
 import json
 
@@ -7,8 +7,8 @@ import numpy as np
 from turnout.mismatch.engine.score import NO_UPPER_END
 from turnout.stages.accepted_effects import KINDS
 
-# What the simulation lacked, in words; {place}, {channel}, {train}, {wheel}, every parameter with its
-# unit, and its size without the sign as {<parameter>_size}.
+# One sentence per effect. Fields: {place}, {channel}, {train}, {wheel}, every parameter with its unit, and its
+# absolute value as {<parameter>_size}.
 SENTENCES = {
     "hanging_sleeper": "The sleeper at {place} hangs {gap} above its ballast",
     "lifting_sleepers": "The sleepers about {place} lift off their ballast",
@@ -40,21 +40,21 @@ SENTENCES = {
     "high_pass": "Channel {channel} loses what is slower than {corner}",
     "low_pass": "Channel {channel} loses what is fast",
 }
-# The same where the recordings leave a parameter open by more than half of its value.
+# effect -> (parameter, sentence if its standard error is too large for an upper limit)
 OPEN = {"hanging_sleeper": ("gap", "The sleeper at {place} hangs above its ballast, and no train here closes the gap")}
-# And where it is below 0.
+# effect -> (parameter, sentence if it is negative)
 REVERSED = {
     "sensor_gain": ("gain", "Sensor {channel} has the wrong polarity: it reads {gain} times what it should"),
     "time_offset": ("delay", "Channel {channel} is early by {delay_size}"),
 }
-OTHERWISE = 2.0  # standard deviations of what the file says of itself
-Z95 = 1.959964
+OTHERWISE = 2.0  # prior standard deviations from the track file's value that are worth a sentence
+Z95 = 1.959964  # half width of a 95 % interval in standard errors
 MILLI = {"m": "mm", "s": "ms"}
 PERCENT = {"1/K": "% per kelvin"}
 
 
 def number_in_words(value, unit, digits=2):
-    """A value in the unit that reads best.
+    """A value with its unit, small ones in mm or ms.
 
     >>> number_in_words(0.00112, "m"), number_in_words(1.31, "-"), number_in_words(0.012, "1/K")
     ('1.1 mm', '1.3', '1.2 % per kelvin')
@@ -68,7 +68,7 @@ def number_in_words(value, unit, digits=2):
 
 
 def interval(term, name, value, se) -> tuple[float, float]:
-    """95 % interval of a term's parameter; what cannot be below 0 is not.
+    """95 % interval of a term's parameter; not below 0 if the parameter cannot be negative.
 
     >>> [round(interval(*what, 0.1, 0.1)[0], 3) for what in (("hanging_sleeper", "seated"), ("kink", "depth"))]
     [0.0, -0.096]
@@ -79,7 +79,7 @@ def interval(term, name, value, se) -> tuple[float, float]:
 
 
 def parameter_in_words(term, name) -> str:
-    """Name and meaning of a term's parameter, the bare name where the term is not of the library.
+    """Name and meaning of a term's parameter; the name only for a term outside the library.
 
     >>> parameter_in_words("hanging_sleeper", "gap"), parameter_in_words("kink", "depth")
     ('gap: clearance when unloaded', 'depth')
@@ -92,7 +92,7 @@ NAMES = {"power": "power of the flanks (1 straight, 2 parabolas)", "share": "sha
 
 
 def headline(finding) -> str:
-    """The ``title``, and behind a name what else shows or speaks for it."""
+    """The ``title``, followed by the reason of a named verdict."""
     said, reason = title(finding), json.loads(finding["evidence_json"] or "{}").get("reason")
     if finding["verdict"] != "named" or not reason or not json.loads(finding["term_json"] or "[]"):
         return said
@@ -100,7 +100,7 @@ def headline(finding) -> str:
 
 
 def title(finding) -> str:
-    """One sentence: what the simulation left out, or what is known instead."""
+    """One sentence: the effect that the simulation left out, or the verdict instead."""
     terms = json.loads(finding["term_json"] or "[]")
     if finding["verdict"] in ("named", "a_or_b") and terms:
         rivals = [finding["rival_term"] if finding["verdict"] == "a_or_b" else None, *(None for _ in terms[1:])]
@@ -112,7 +112,7 @@ def title(finding) -> str:
 
 
 def otherwise(told) -> str:
-    """A sentence on a number of the running surface that is not what the track's file has; "" where it may be.
+    """A sentence on a number of the running surface that differs from the track's file, "" if it agrees.
 
     >>> depth = {"term": "running_surface_kink", "place": 26.7, "name": "depth", "unit": "m", "filed": 1e-3}
     >>> otherwise({**depth, "value": 4e-3, "se": 1e-4, "off": 2.8})
@@ -136,7 +136,7 @@ def _or(other) -> str:
 
 
 def _somewhere(finding, low, high):
-    """Where it acts, else between which places was measured."""
+    """Location of the effect in words, else the range of the measurements."""
     if finding["position_m"] is not None:
         return f"at {finding['position_m']:.1f} m"
     if finding["train"]:
@@ -149,7 +149,7 @@ def _somewhere(finding, low, high):
 
 
 def _wheel(said):
-    """Axle and train the other way round.
+    """Axle of a train in words, from the text "train, axle n".
 
     >>> _wheel("IC 2000, axle 3"), _wheel("a train")
     ('axle 3 of IC 2000', 'an axle of a train')

@@ -1,4 +1,4 @@
-"""The train of a passage as the simulation knows it: vehicle file, number of units, load, speed, direction, route."""
+"""Identify the train of a passage for the simulation: vehicle, units, load, speed, direction and route."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,17 +11,19 @@ from turnout.mismatch.turnout.campaign import LOAD_SD
 from turnout.simulate import load_vehicle
 from turnout.stages.common import number
 
-PATTERN = 0.4  # m rms between axles heard and those of the vehicle's file: half of a short bogie is 0.9
-LEAST_REACH = 0.03  # share by which the vehicle's axle distances may correct the speed found
-LEAST_HEARD = 0.6  # share of a noted train's axles: a flat or a dip adds axles and hides some, it does not halve them
+PATTERN = 0.4  # m rms between measured axles and the vehicle file's: half a short bogie is 0.9
+LEAST_REACH = 0.03  # least share by which the axle distances may correct the speed
+LEAST_HEARD = 0.6  # share of a noted train's axles that are measured: flats and dips do not halve them
 NEWTON_PER_TONNE = 9806.65
 KMH = 3.6
 
 
 @dataclass(frozen=True)
 class TrainFound:
-    """``vehicle`` of ``turnout.simulate`` called ``name``, ``speed`` [m/s], ``doubts`` in words, and the standard
-    deviation ``load_sd`` of its sprung mass, as a share of it."""
+    """Train of a passage: ``vehicle`` of ``turnout.simulate`` called ``name``, ``speed`` [m/s], ``doubts`` in words.
+
+    ``load_sd`` is the standard deviation of its sprung mass, as a share of it.
+    """
 
     name: str
     vehicle: object
@@ -33,16 +35,15 @@ class TrainFound:
 
 
 class TrainUnknownError(Exception):
-    """Why a passage cannot be simulated, in words."""
+    """The train of a passage is not known, so it cannot be simulated; the message says why."""
 
 
 def train_of(row: Mapping, said: Mapping, folder: Path) -> TrainFound:
-    """Train from the passage stage's ``row`` and what the file itself notes (``said``), vehicles in ``folder``.
+    """Train from the passage stage's ``row`` and the ``notes`` in the file; vehicle files are in ``folder``.
 
-    The recording comes before the notes. TrainUnknownError where type or speed are not known, no vehicle has a file, or
-    its axles are not those that were heard. A train that the notes name, with its speed, is believed against axles that
-    do not fit, with a doubt: flats, dips and polygonal wheels sound like axles, and whoever simulates the passage sees
-    whether it is that train.
+    The recording takes precedence over the notes. TrainUnknownError if type or speed are not known, there is no vehicle
+    file, or its axles do not match. A train noted with its speed is accepted even if its axles do not match, with a
+    doubt: flats, dips and polygonal wheels look like axles, and the simulation shows whether it is that train.
     """
     noted = KMH * (number(said, "speed") or 0.0) or row.get("speed_listed_kmh")
     speed = row.get("speed_kmh") or noted
@@ -54,12 +55,12 @@ def train_of(row: Mapping, said: Mapping, folder: Path) -> TrainFound:
     believed = noted if name in _types({**row, "train_type": None}, said) else None
     vehicle, load_sd, doubts, wrong = _vehicle(name, row.get("n_axles") or None, row, said, folder, bool(believed))
     if believed and (name != names[0] or wrong):
-        speed = believed  # the one heard is that of another train's axle distances, or of bangs between the axles
+        speed = believed  # the measured one is from axle distances of another train, or from impacts between axles
     speed = float(speed) / KMH
     try:
         speed, turned = _by_its_axles(name, vehicle, row, speed)
         more: tuple[str, ...] = (f"{name} runs the other way round",) if turned else ()
-        if turned:  # its axles count from the other end: a train of its own
+        if turned:  # its axles count from the other end: a separate train
             name, vehicle = f"{name} reversed", vehicle.turned()
     except TrainUnknownError as error:
         if not believed:
@@ -75,7 +76,7 @@ def train_of(row: Mapping, said: Mapping, folder: Path) -> TrainFound:
 
 
 def _one_of(known, name, row, said):
-    """(word, doubts): what was heard, else noted, else the first of the ``known`` words, which is said."""
+    """(word, doubts): the measured word, else the noted one, else the first of ``words`` with a doubt."""
     for value in (row.get(name), said.get(name)):
         word = str(value or "").strip().lower()
         if word in known:
@@ -85,19 +86,19 @@ def _one_of(known, name, row, said):
 
 
 def _types(row, said) -> list[str]:
-    """Types heard, listed and noted, in this order."""
+    """Train types: measured, listed, noted, in this order."""
     found = (row.get("train_type"), row.get("train_type_listed"), said.get("train_type"))
     return [str(name).lower().replace(" ", "_") for name in found if name and name != "unknown"]
 
 
 def _with_a_file(names, folder) -> str:
-    """The first type that has a vehicle file, else the first, "" without any."""
+    """The first type with a vehicle file, else the first type, "" without any."""
     there = [name for name in names if (Path(folder) / f"{name}.yaml").is_file()]
     return next(iter([*there, *names]), "")
 
 
 def _vehicle(name, heard, row, said, folder, believed):
-    """(vehicle, ``load_sd``, doubts on its load, what is wrong with the axles heard), the latter two in words."""
+    """(vehicle, ``load_sd``, doubts on its load, doubts on its axles)."""
     try:
         one = load_vehicle(name, 0.0, folder)
     except (SimulationError, ConfigError) as error:
@@ -115,8 +116,10 @@ def _vehicle(name, heard, row, said, folder, believed):
 
 
 def _axles_by_length(name, row, speed, folder):
-    """Number of axles of as many units as reach, at ``speed`` [m/s], as far as the axles heard: a dip is crossed with a
-    bang behind every axle, which make the train no longer."""
+    """Number of axles of as many units as are as long as the measured train at ``speed`` [m/s].
+
+    A dip adds an impact behind every axle, but does not lengthen the train.
+    """
     one, two = (load_vehicle(name, 0.0, folder, units) for units in (1, 2))
     times, n, length = row["axle_times_s"], len(one.wheels), float(one.wheel_places[-1])
     more = (speed * float(np.ptp(times)) - length) / (float(two.wheel_places[-1]) - length)
@@ -124,8 +127,10 @@ def _axles_by_length(name, row, speed, folder):
 
 
 def _load_share(name, row, said, folder, units):
-    """(share of the payload that gives the measured axle load, ``load_sd``, doubts); where none is known half of it, as
-    likely empty as full and as anything between."""
+    """(share of the payload that gives the measured axle load, ``load_sd``, doubts).
+
+    Without an axle load it is half the payload, uniformly distributed between empty and full.
+    """
     vehicles = [load_vehicle(name, s, folder, units) for s in (0.0, 1.0)]
     empty, full = (float(np.mean(v.static_loads)) for v in vehicles)
     if full <= empty:
@@ -143,15 +148,14 @@ def _load_share(name, row, said, folder, units):
 
 
 def _sprung(vehicle):
-    """Mass of all but the wheelsets [kg]."""
+    """Mass of all bodies but the wheelsets [kg]."""
     return sum(b.mass for k, b in enumerate(vehicle.bodies) if k not in set(vehicle.wheels))
 
 
 def _by_its_axles(name, vehicle, row, speed):
-    """(speed [m/s], whether it runs the other way round): the vehicle's own axle distances over the times heard tell
-    the speed best.
+    """(speed [m/s], whether the train is reversed), from the vehicle's axle distances and the axle times.
 
-    TrainUnknownError where the axles are not those of the vehicle at any speed near the one found.
+    TrainUnknownError if the axles do not match the vehicle at any speed near ``speed``.
     """
     times = np.asarray(row.get("axle_times_s") if row.get("axle_times_s") is not None else (), dtype=float)
     places = np.asarray(vehicle.wheel_places, dtype=float)
@@ -168,7 +172,10 @@ def _by_its_axles(name, vehicle, row, speed):
 
 
 def _fitted(times, places, speed, reach):
-    """(rms distance [m], speed [m/s]) of axles at ``times`` laid on ``places`` at a speed within ``reach``."""
+    """(rms distance [m], speed [m/s]) of axles at ``times`` [s] fitted to ``positions`` [m].
+
+    The speed stays within the relative ``tolerance``.
+    """
     t, x = times - times.mean(), places - places.mean()
     own = float(np.clip(t @ x / (t @ t), (1.0 - reach) * speed, (1.0 + reach) * speed))
     return float(np.sqrt(np.mean((own * t - x) ** 2))), own

@@ -1,4 +1,4 @@
-"""One passage file: raw file in, rows of the registry out."""
+"""Stage passage: registry rows of one passage file."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from turnout.registry.ids import content_id
 from turnout.stages.common import contradiction, quarantine_row, read_or_quarantine, recording_row
 from turnout.stages.passage_rows import finding_rows, fit_row, passage_row
 
-# Names in local time differ by less.
+# Largest time between the file's name and its content; names in local time differ by less.
 OTHER_TIME = timedelta(days=1)
 RENAME = "Nobody can tell which is right. Rename it, or export it anew with the right time"
 
@@ -35,10 +35,10 @@ class SectionModel:
 
 @dataclass(frozen=True)
 class PassageContext:
-    """What passages of a turnout need beside their files.
+    """What the analysis of a turnout's passages needs beside their files.
 
-    ``models`` maps a section's label to its accepted models in order of time, ``patterns`` are those of known
-    trains, ``clusters`` the current ``Clusters`` or None, ``loads`` maps a channel to its ``LoadCalibration``.
+    ``models`` maps a section's label to its accepted models in order of time, ``patterns`` are the axle patterns of
+    known trains, ``clusters`` the current ``Clusters`` or None, ``loads`` maps a channel to its ``LoadCalibration``.
     """
 
     models: dict[str, tuple[SectionModel, ...]] = field(default_factory=dict)
@@ -52,8 +52,8 @@ def passage_unit(
 ) -> dict[str, list[dict]]:
     """Rows by table (recordings, passages, passage_fits, quarantine) for one passage file.
 
-    A file that cannot be read, that holds no train, or whose name contradicts the time in it, is a quarantine row; a
-    channel that is clipped, dead, swapped or lost is one too, and the passage is used as far as it is sound.
+    A file that cannot be read, has no train, or has a time that contradicts its name is a quarantine row. A clipped,
+    dead, swapped or lost channel is a quarantine row too; the other channels of the passage are used.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def passage_unit(
     Raises
     ------
     PartlyComputed
-        With the rows of the other records, where one met a fault of the program.
+        With the rows of the other records, if a record caused a program error.
     """
     context = context or PassageContext()
     faults: list[tuple] = []
@@ -102,7 +102,7 @@ def passage_unit(
                 for part, late, name in trains_in(recording, turnout.settings["passage"]):
                     moment = started_at + timedelta(seconds=late)
                     _one_train(part, moment, recording_id, path, turnout, context, rows, name)
-            except ReadError as error:  # a long record is read as it goes: its file may be damaged or change meanwhile
+            except ReadError as error:  # a long record is read in pieces: its file may be damaged or change meanwhile
                 rows["quarantine"].append(
                     quarantine_row(error, base, "passage", "passage", recording.record, recording_id)
                 )
@@ -129,23 +129,23 @@ def sensors_of(turnout: TurnoutConfig) -> tuple[PassageSensor, ...]:
 
 
 def model_at(models, moment: datetime) -> SectionModel | None:
-    """The latest model identified at or before ``moment``, the first one where all are later, None without any."""
+    """The latest model identified at or before ``moment``, else the first one, None without any."""
     before = [m for m in models if m.measured_at <= moment]
     return before[-1] if before else models[0] if models else None
 
 
 def _described(turnout: TurnoutConfig) -> PassageConfig:
-    """What the configuration says about passages; ValueError for a turnout that has none."""
+    """The passage configuration of a turnout; ValueError if it has none."""
     if turnout.passages is None:
         raise ValueError(f"{turnout.id} has no passages in its configuration")
     return turnout.passages
 
 
 def trains_in(recording, settings):
-    """(recording, seconds after the start, name) of every passage in a record: itself, unless it is a continuous one.
+    """(recording, seconds after the start, name) of every passage in a record.
 
-    What is longer than ``settings.longest`` comes from a logger that never stops, and is cut at the quiet times; a
-    ``LongRecording`` is read stretch by stretch meanwhile, with a ReadError where its file turns out damaged.
+    A record longer than ``settings.longest`` is continuous and is cut at the quiet times. A ``LongRecording`` is read
+    in pieces, with a ReadError if its file is damaged.
     """
     if recording.duration <= settings.longest:
         yield recording, 0.0, ()
@@ -162,7 +162,7 @@ def trains_in(recording, settings):
 
 
 def _one_train(recording, started_at, recording_id, path, turnout, context, rows, name=()):
-    """Rows of the train in one record; ``name`` tells it from others in the same record."""
+    """Add the rows of one train; ``name`` distinguishes it from others in the same record."""
     settings = turnout.settings["passage"]
     sensors = sensors_of(turnout)
     if not sensors:
@@ -182,15 +182,15 @@ def _one_train(recording, started_at, recording_id, path, turnout, context, rows
         known = (row.get(name) for name in ("train_type", "speed_kmh", "axle_load_t"))
         row["cluster_id"] = context.clusters.assign(*known)
     fits = _fit_rows(recording, passage, sensors, turnout, context, identity, settings) if passage.n_axle else []
-    # of all that it says: train data, models, clusters and loads change it as well as the file does; and of where it
-    # lies, so that a copy's row stays when its original's is taken back
+    # The id depends on the whole row: train data, models, clusters and loads change it as well as the file does.
+    # It depends on the path too, so that the row of a copy stays when that of its original is withdrawn.
     passage_id = {"passage_id": content_id("passage", path, str(recording.record), *name, row, fits)}
     rows["passages"].append(passage_id | row)
     rows["passage_fits"] += [passage_id | fit for fit in fits]
 
 
 def _fit_rows(recording, passage, sensors, turnout, context, identity, settings):
-    """One row per sensor that heard the train and whose section has a model."""
+    """One row per sensor that recorded the train and whose section has a model."""
     unsound = {r.detail.split(":")[0] for r in passage.findings if r.reason in ("clipped", "sensor_lost")}
     found = []
     latest = {label: model_at(models, identity["passed_at_utc"]) for label, models in context.models.items()}

@@ -1,4 +1,4 @@
-"""Models, axle patterns, clusters and load calibrations that the passages of one turnout are judged with."""
+"""Models, axle patterns, clusters and load calibrations for the passages of one turnout."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ from turnout.workflow.notes import LONGEST, start_of
 def passage_context(
     turnout: str, settings: Mapping | None = None, work="work"
 ) -> tuple[Callable[[Unit], str], PassageContext]:
-    """(token, context) of one turnout with these ``settings``, by part: the token of a passage changes when a model it
-    may be fitted with, a pattern, a cluster or a calibration does.
+    """(token, context) of one turnout; ``settings`` are by section of the configuration.
 
-    Models are read from what the hammer stage left in ``work``; a passage is fitted with the latest one identified
-    before it, so a new campaign changes the scores of later passages only.
+    ``token(unit)`` changes with the models that may be fitted to the passage, the patterns, clusters and calibrations.
+    Models are read from the results of the hammer stage in ``work``. A passage is fitted with the latest model before
+    it, so a new campaign changes the scores of later passages only.
     """
     own = settings["passage"] if settings else PassageSettings()
     models, clusters_file = section_models(turnout, work), Path(own.assets) / "clusters.json"
@@ -49,8 +49,10 @@ def passage_context(
 
 
 def near(models: tuple[SectionModel, ...], label: str) -> tuple[SectionModel, ...]:
-    """Of ``models`` in order of time, those that the passages of a file may be fitted with, by the time in its name;
-    all where it has none."""
+    """Those of ``models``, in order of time, that may be fitted to a file's passages, by the time in its name.
+
+    All models if the name has no time.
+    """
     start = start_of(label)
     if start is None:
         return models
@@ -80,8 +82,10 @@ def _section_model(row) -> SectionModel:
 
 
 def known_patterns(path: str):
-    """Axle patterns of a YAML file, () where the usual one is not there; ConfigError where it cannot be used, or where
-    another that the settings name is not there."""
+    """Axle patterns of a YAML file, () if the default file does not exist.
+
+    ConfigError if the file cannot be used, or if another file named in the settings does not exist.
+    """
     if Path(path).is_file():
         return _patterns(path, sha256_of(path))
     if path != PassageSettings().axle_patterns:
@@ -91,7 +95,7 @@ def known_patterns(path: str):
 
 @lru_cache(maxsize=4)
 def _patterns(path: str, content: str):
-    """Of a file of this ``content``: the same name is another file from another folder, or later."""
+    """Axle patterns of a file; ``content`` is its hash, since the same name may be another file."""
     try:
         with legible(path, "the file"):
             return read_patterns(YAML(typ="safe").load(Path(path)))
@@ -101,12 +105,12 @@ def _patterns(path: str, content: str):
 
 
 def read_clusters(path: Path) -> Clusters | None:
-    """The current clusters, None where none were fitted."""
+    """The current clusters, None if none were fitted."""
     return Clusters.of(json.loads(path.read_text(encoding="utf-8"))) if path.is_file() else None
 
 
 def read_loads(path: Path) -> dict[str, dict[str, LoadCalibration]]:
-    """Turnout -> channel -> calibration; empty where none was made."""
+    """Turnout -> channel -> calibration; empty without a file."""
     if not path.is_file():
         return {}
     document = json.loads(path.read_text(encoding="utf-8"))

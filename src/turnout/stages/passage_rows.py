@@ -1,4 +1,4 @@
-"""A passage and its fits as rows of the registry."""
+"""Registry rows of a passage and its fits."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ REMEDIES = {
 
 
 def finding_rows(passage, base, path, record, recording_id) -> list[dict]:
-    """Rows of ``quarantine`` for what is not used: the whole record, or single channels of it."""
+    """Rows of ``quarantine`` for unused data: the whole record, or single channels."""
     rows: list[dict] = []
     for finding in passage.findings:
         whole = finding.reason in ("no_train", "two_trains", "train_cut_off")
@@ -42,7 +42,7 @@ def finding_rows(passage, base, path, record, recording_id) -> list[dict]:
 
 
 def passage_row(passage, identity, listed, load, conditions) -> dict:
-    """Row of ``passages``: what the recording says, what the train data say, and where they differ."""
+    """Row of ``passages``: values from the recording and the train data, and their differences."""
     speed, type_ = passage.speed, passage.type
     row = {
         **identity,
@@ -78,7 +78,7 @@ def passage_row(passage, identity, listed, load, conditions) -> dict:
 
 
 def _listed(row, listed) -> list[str]:
-    """Enter what the train data say, and return where they differ from the recording."""
+    """Enter the values of the train data, and return their differences from the recording in words."""
     words = []
     if listed.speed is not None:
         row |= {"speed_listed_kmh": listed.speed, "speed_source": "both"}
@@ -110,7 +110,7 @@ def _listed(row, listed) -> list[str]:
 
 
 def fit_row(fit, sensor, model_id, turnout, identity) -> dict:
-    """Row of ``passage_fits``; ``fit`` None where the channel is not sound enough to be fitted."""
+    """Row of ``passage_fits``; ``fit`` is None if the channel cannot be fitted."""
     row = {
         "section_id": turnout.section_id(sensor.section),
         "channel": sensor.name,
@@ -144,5 +144,5 @@ def fit_row(fit, sensor, model_id, turnout, identity) -> dict:
 
 
 def _plain(value):
-    """A float, None where it is not finite."""
+    """A float, None if it is not finite."""
     return float(value) if value is not None and np.isfinite(value) else None

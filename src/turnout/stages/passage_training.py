@@ -1,4 +1,4 @@
-"""What passages so far teach: the axle load that a sensor's slow part means, and clusters of like passages."""
+"""Learn from past passages: axle load calibrations of the sensors, and clusters of similar passages."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from turnout.stages.passage import _time_in, sensors_of, trains_in
 from turnout.stages.passage_context import read_clusters, read_loads
 from turnout.workflow.scan import scan
 
-MOST_PASSAGES = 20_000  # for the clusters: more change no boundary, and mixtures take time
+MOST_PASSAGES = 20_000  # for the clusters: more do not change them, and a mixture fit takes time
 RECENT = """
     select train_type, speed_kmh, axle_load_t from passages_current
     where status <> 'rejected' and train_type is not null and speed_kmh is not null
@@ -29,14 +29,14 @@ RECENT = """
 
 
 def learn_clusters(connection, settings) -> Clusters:
-    """Clusters of the latest passages of a registry, written beside the configuration; known ones keep their ids.
+    """Clusters of the latest passages of a registry, written to a file; existing clusters keep their ids.
 
     Parameters
     ----------
     connection : duckdb connection
         An open registry.
     settings : PassageSettings
-        Where they are kept, and how many there may be.
+        Folder of the clusters, and their largest number.
     """
     path = Path(settings.assets) / "clusters.json"
     cursor = connection.execute(RECENT, [MOST_PASSAGES])
@@ -47,11 +47,11 @@ def learn_clusters(connection, settings) -> Clusters:
 
 
 def weighed_trains(turnout: TurnoutConfig, raw_root, patterns, settings, most: int = 60) -> list[dict]:
-    """Trains of known axle load in a turnout's raw folder, the latest ``most``, with what each sensor says of them.
+    """The latest ``max_trains`` trains of known axle load in a turnout's raw folder, with each sensor's amplitude.
 
     Each is {"file", "load" [t], "speed" [m/s], "amplitudes": {channel: (mean, standard error) [m/s²]}}. A train counts
-    where trains.csv gives its axle load, its time and its number of axles fit one passage only, and nothing is wrong
-    with the recording.
+    if trains.csv gives its axle load, its time and number of axles match one passage only, and the recording is
+    accepted.
     """
     listed, _ = listed_trains([row for row in turnout.trains if row.get("axle_load_t")])
     found: list[dict] = []
@@ -80,12 +80,12 @@ def _weighed(unit, turnout, raw_root, patterns, settings, listed):
                     moment = started + timedelta(seconds=late)
                     found += _weighed_train(part, moment, path, turnout, patterns, settings, listed)
         except ReadError:
-            continue  # the passage stage has put it into quarantine
+            continue  # the passage stage puts it into quarantine
     return found
 
 
 def _weighed_train(recording, started, path, turnout, patterns, settings, listed):
-    """What the sensors say of one passage, [] where it is not sound or its weight is not known."""
+    """Amplitudes of one passage as a list of one, [] if it is rejected or its load is not known."""
     passage = analyse(recording, sensors_of(turnout), patterns, settings)
     if passage.status != "accepted":
         return []
@@ -104,7 +104,7 @@ def _what_sensors_say(path, recording, passage, sensors, train):
 
 
 def learn_loads(turnout: TurnoutConfig, trains, settings) -> dict[str, LoadCalibration]:
-    """Calibration of every sensor that heard enough trains of ``weighed_trains``, written beside other turnouts'."""
+    """Calibration of every sensor that recorded enough of ``trains``, written to the file of all turnouts."""
     made = {}
     for name in sorted({name for t in trains for name in t["amplitudes"]}):
         heard = [t for t in trains if name in t["amplitudes"]]

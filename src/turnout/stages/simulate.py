@@ -1,6 +1,6 @@
-"""Simulated hammer tests and passages as raw files, with the channels a turnout's configuration promises.
+"""Write simulated hammer tests and passages as raw files, with the channels of a turnout's configuration.
 
-What `turnout simulate` is asked for, checked before anything is simulated.
+A request is checked before anything is simulated.
 """
 
 import json
@@ -27,7 +27,7 @@ WHOLE = {"tests": 1, "blows": 1, "units": 1, "seed": 0}
 
 
 def check_request(request) -> None:
-    """ConfigError for options that cannot be followed to the letter.
+    """ConfigError for options that are invalid or contradict each other.
 
     >>> check_request({"format": "hdf5", "at": "2024-05-13", "seed": 0, "tests": 2, "out": "a.h5"})
     Traceback (most recent call last):
@@ -45,7 +45,7 @@ def check_request(request) -> None:
 
 
 def with_format(request) -> dict:
-    """The request with the format that the ending of its file says, where none is named; HDF5 where nothing does.
+    """The request with its format: as given, else by the file's extension, else HDF5.
 
     >>> with_format({"format": None, "out": "a.npz"})["format"], with_format({"format": None, "out": None})["format"]
     ('npz', 'hdf5')
@@ -61,7 +61,7 @@ def with_format(request) -> dict:
 
 
 def ending_of(format_name: str) -> str:
-    """Ending of files of a format.
+    """File extension of a format.
 
     >>> ending_of("hdf5")
     'h5'
@@ -75,7 +75,7 @@ def time_of(request) -> datetime:
 
 
 def section_channels(turnout, section: float | str):
-    """What the files of a section's hammer tests hold; ConfigError where the turnout has no tests of ``section``."""
+    """Description of a section's hammer files; ConfigError if the turnout has no tests of ``section``."""
     if turnout.hammer is None:
         raise _wrong("turnout", f"{turnout.id} has no hammer tests in its layout", "Name another one, or none")
     known = turnout.hammer.descriptions
@@ -94,7 +94,7 @@ NOISE = {"acceleration": 0.05, "force": 2.0, "velocity": 1e-6, "displacement": 1
 
 
 def write_hammer(request):
-    """Simulate the tests of a request and write them; yields (path, what it holds).
+    """Simulate the tests of a request and write them; yields (path, summary).
 
     ``request`` holds the options of `turnout simulate hammer`: track, section, tests, blows, turnout, config, raw,
     out, format, at, temperature, truth, seed.
@@ -137,7 +137,7 @@ def write_hammer(request):
 
 
 def write_passage(request):
-    """Simulate the passage of a request and write it; yields (path, what it holds)."""
+    """Simulate the passage of a request and write it; yields (path, summary)."""
     request = with_format(request)
     check_request(request)
     turnout, settings = _turnout(request)
@@ -200,7 +200,7 @@ def _turnout(request):
 
 
 def _track(request, turnout):
-    """The track asked for, else the turnout's own, else that of Tommerup."""
+    """The track of the request, else the turnout's own, else that of Tommerup."""
     if request["track"] is None and turnout is not None:
         path = track_file(turnout)
         return load_track(str(path), request["seed"], path.parent)
@@ -221,13 +221,13 @@ def _noted(request):
 
 
 def _said(vehicle, request):
-    """What accepted terms depend on: temperature, axle loads, train."""
+    """Conditions that accepted terms depend on: temperature, axle loads, train."""
     loads = tuple(2.0 * float(load) for load in vehicle.static_loads)
     return {"axle_loads": loads, "train": vehicle.name.lower(), **_noted(request)}
 
 
 def _sensor(channel, place):
-    """Sensor of a configured channel; ``place`` where the configuration gives none."""
+    """Sensor of a configured channel, at ``position`` if the configuration gives none."""
     return Sensor(
         channel.name,
         place if channel.position is None else channel.position,
@@ -283,7 +283,7 @@ def _struck(blow):
 
 
 def _write_truth(request, path, track, route, recording, more):
-    """What is true of the file at ``path``, where the request says that it is wanted and whereto."""
+    """Write the truth of the file at ``path`` to the targets of the request, if any."""
     wanted = [Path(request["truth"]) / Path(path).with_suffix(".json").name] if request.get("truth") else []
     wanted += [Path(request["truth_file"])] if request.get("truth_file") else []
     content = {

@@ -1,4 +1,4 @@
-"""Stage trend: from the registry as it stands to charts, alarms, states and the worklist."""
+"""Stage trend: charts, alarms, states and the worklist from the registry."""
 
 import json
 import logging
@@ -19,14 +19,14 @@ def trend_job(generation, state, worklist, configuration, day=None) -> dict:
     generation : path
         ``_generation.json`` of the registry.
     state : path
-        What the last update wrote, JSON; a new one is put in its place. It may be missing, or cut.
+        JSON file of the last update, which is replaced. It may be missing or truncated.
     worklist : path
-        The list as CSV; ``asof_utc`` tells a list that could not be made anew from that of today.
+        The list as CSV; ``asof_utc`` shows whether it is of today.
     configuration : path
-        Folder of the configuration: settings of the trend, acknowledgements.csv. A row of that file that cannot be
-        used is a warning in the log and in ``state``; the others count.
+        Folder of the configuration: settings of the trend, acknowledgements.csv. An invalid row of that file is a
+        warning in the log and in ``state``; the others count.
     day : str, optional
-        YYYY-MM-DD: the list is that of this day, by default of today.
+        Day of the list, YYYY-MM-DD; by default today.
     """
     registry, state = Path(generation).parent, Path(state)
     before = read_json(state, {})

@@ -1,4 +1,4 @@
-"""Trends of the resonances: charts with their false-alarm rate, states, drift, dates, tomorrow's worklist."""
+"""Monitor resonances over time: control charts with a set false-alarm rate, chart states, drift and forecast."""
 
 from turnout.trend.alarms import candidates, describe_flagged
 from turnout.trend.cusum import Charts, finish

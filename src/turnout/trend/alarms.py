@@ -1,6 +1,7 @@
-"""Charts that raised their hand: since when, how much, how fast, and when the limit is reached.
+"""Describe flagged charts: onset and size of the change, drift, and when the limit is reached.
 
-Open alarms that are not raised again when everything is computed anew: closed in sight, never gone silently.
+Flagged are charts with an open alarm and sections with a significant drift. All alarms are recomputed each night. An
+open alarm that is not raised again is not removed: it stays in the table, closed by ``recomputed``.
 """
 
 import logging
@@ -36,9 +37,11 @@ COLUMNS = {
 
 @dataclass(frozen=True)
 class Flag:
-    """What is needed to tell the story of one chart: its present epoch, its sums over their limits.
+    """What is needed to describe one chart: the values of its present epoch and its CUSUM over the threshold.
 
-    ``opened`` is the campaign that raised each open alarm, by direction.
+    ``time`` [d] and ``values`` [%] are (n,) arrays; ``autocorrelation`` is their lag-one coefficient. ``temperature``
+    (n,) [°C] is None for a whole turnout. ``slope_weight`` is that of ``fit_onsets``. ``ratio`` (CUSUM over threshold)
+    and ``opening_campaign`` (the campaign that raised each open alarm) are by direction.
     """
 
     time: np.ndarray
@@ -61,7 +64,7 @@ def candidates(charts, status, settings) -> dict[int, Flag]:
         ratio = {d: getattr(charts, d)[i, -1] / getattr(charts, f"threshold_{d}")[i] for d in ("down", "up")}
         alarms = {d: getattr(charts, f"{d}_open")[i] for d in ("down", "up")}
         opened = {d: _raised(alarm) for d, alarm in alarms.items() if alarm[-1]}
-        if len(opened) == 2:  # the later one is news against the level that the earlier one had found
+        if len(opened) == 2:  # describe the later alarm, relative to the level after the earlier one
             column = column[column >= min(opened.values())]
         temperature, known = _heat(charts, i, column)
         found[int(i)] = Flag(
@@ -86,7 +89,7 @@ def _raised(alarm) -> int:
 
 
 def _heat(charts, i, column):
-    """Temperatures of a section's values, and how well other values than these know its slope (0: none do)."""
+    """Temperatures of a section's values [°C], and the weight of the slope that other values give (0: none do)."""
     p = charts.prepared
     if i >= len(p.panel.charts):
         return None, 0.0
@@ -96,11 +99,10 @@ def _heat(charts, i, column):
 
 
 def describe_flagged(status, flags, settings) -> pd.DataFrame:
-    """Add to ``chart_status`` the adjusted p value of the drift, and the story of each flagged chart.
+    """Add to ``chart_status`` the adjusted p value of the drift, and the description of each flagged chart.
 
-    ``flags`` are the ``candidates`` by row of ``status``. Flagged are charts with an open alarm and charts of
-    sections whose drift is among the discoveries at the rate ``settings.false_discovery``; the costly steps run
-    on them alone.
+    ``flags`` are the ``candidates`` by row of ``status``. Flagged are charts with an open alarm, and sections whose
+    adjusted p value of the drift is at most ``settings.false_discovery``. The costly steps run on them alone.
     """
     status = status.copy()
     judged = status["complete"].to_numpy() & (status["section_id"].to_numpy() != WHOLE)
@@ -118,7 +120,7 @@ def describe_flagged(status, flags, settings) -> pd.DataFrame:
 
 
 def _story(flag, settings):
-    """One flagged chart. The change is looked for in its present epoch only."""
+    """Columns that describe one flagged chart. The change point is sought in its present epoch only."""
     time, values = flag.time, flag.values
     found = find_change(time, values, flag.memory, flag.temperature, flag.known)
     at = int(np.searchsorted(time, found.since)) if np.isfinite(found.since) else 0
@@ -148,26 +150,25 @@ def _story(flag, settings):
 
 
 CHART = ["turnout_id", "section_id", "band", "source", "direction"]
-# What the tables of the last update say that the next one has to account for.
+# Published alarms that the next update must raise again or close: open ones, and those closed as recomputed.
 ACCOUNTED = "select * from alarms where closed_at_utc is null or closed_by = 'recomputed' order by alarm_id"
 
 
 def with_withdrawn(alarms, before, newest) -> pd.DataFrame:
-    """Rows of ``alarms`` and, closed by ``recomputed``, those open ones of ``before`` that have no counterpart there.
+    """Rows of ``alarms``, and those open ones of ``before`` without a counterpart there, closed by ``recomputed``.
 
-    Every alarm is computed anew each night, and a value that was corrected, an event that was entered late or another
-    memory of the fleet can take one back. A counterpart is an alarm of the same chart and direction that was open when
-    the old one was raised or later; of an old one that was closed like this before, one that was open in its time: what
-    is raised after that is another alarm.
+    Every alarm is recomputed each night. A corrected value, an event entered late or another autocorrelation of the
+    fleet can remove one. A counterpart has the same chart and direction, and is open when the old alarm was raised or
+    later. If the old alarm is already closed as recomputed, the counterpart must also be raised before that closing.
 
     Parameters
     ----------
     alarms : DataFrame
         Rows of the table ``alarms`` as computed now.
     before : DataFrame
-        Published rows that are open, or were closed like this before: these stay.
+        Published rows that are open, or already closed by ``recomputed``: these stay.
     newest : float
-        Newest campaign of the fleet: when they are closed. [d]
+        Time of the newest campaign of the fleet, at which they are closed. [d]
     """
     if before.empty:
         return alarms

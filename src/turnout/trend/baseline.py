@@ -6,18 +6,18 @@ import numpy as np
 
 from turnout.trend.epochs import by_epoch, spread_out
 
-# %/°C, standard deviation of slopes among tracks, about 0: resonances fall by 0.15 to 0.4 %/°C (docs/measuring.md), so
-# all lie within one of it; a judgement, of no weight beside a year of temperatures
+# Prior standard deviation of the temperature slope about 0. [%/°C] Resonances fall by 0.15 to 0.4 %/°C
+# (docs/measuring.md), so all slopes lie within one sd. A choice; a year of temperatures outweighs it.
 USUAL_SLOPE = 0.5
 
 
 @dataclass(frozen=True)
 class Baseline:
-    """What the baseline says about each chart; arrays over charts.
+    """Baseline of each chart; (n_chart,) arrays unless stated.
 
-    ``frequency`` f0 [Hz] at ``reference`` [°C]; ``slope`` and its standard error ``slope_se`` [%/°C];
-    ``count`` campaigns; ``freedom`` left after f0, slope and one level per further epoch; ``complete`` where
-    the baseline is long enough; ``without_temperature`` campaigns that had a frequency but no temperature.
+    ``frequency`` f0 [Hz] at ``reference`` temperature [°C]; ``slope`` and its standard error ``slope_se`` [%/°C].
+    ``count`` campaigns; ``freedom``: degrees of freedom after f0, slope and one level per further epoch. ``complete``
+    where the baseline is long enough. ``without_temperature``: campaigns with a frequency but no temperature.
     ``inside`` is the (n_chart, n_campaign) mask of its campaigns.
     """
 
@@ -33,10 +33,10 @@ class Baseline:
 
 
 def baseline_window(usable, time, least_days, least_campaigns) -> tuple[np.ndarray, np.ndarray]:
-    """Campaigns of the baseline: from the first usable one until it is long and full enough.
+    """Campaigns of the baseline: from the first usable one until both minimum length and minimum number are reached.
 
-    Returns the (n_chart, n_campaign) mask and the (n_chart,) flag of a complete baseline; an incomplete one
-    holds all that there is.
+    Returns the (n_chart, n_campaign) mask and the (n_chart,) flag of a complete baseline. An incomplete baseline
+    holds all usable campaigns.
 
     >>> time = np.array([[0.0, 10.0, 20.0, 30.0]])
     >>> baseline_window(np.array([[True, False, True, True]]), time, 15.0, 2)
@@ -50,15 +50,15 @@ def baseline_window(usable, time, least_days, least_campaigns) -> tuple[np.ndarr
 
 
 def fit_baseline(frequency, temperature, time, epoch, settings) -> tuple[Baseline, np.ndarray]:
-    r"""Level and temperature slope by least squares on the baseline, one level per epoch it reaches into.
+    r"""Fit level and temperature slope by least squares on the baseline, with one level per epoch in it.
 
     .. math:: 100 (f_i / f_0 - 1) = l_{e(i)} + b (T_i - T_0) + r_i
 
-    Beforehand b is 0 ± ``USUAL_SLOPE``: a year of temperatures outweighs that a thousand times, and where the
-    thermometer stood still nothing else keeps b from any value.
+    The prior of b is 0 ± ``SLOPE_PRIOR_SD``. A year of temperatures outweighs it a thousand times. Where the
+    temperature hardly varied, it keeps b bounded.
 
-    Returns the baseline and the (n_chart, n_campaign) frequencies in percent of f0 with the temperature taken
-    out, nan without frequency or temperature. f0 and T0 are means over the first epoch of the baseline.
+    Returns the baseline and the (n_chart, n_campaign) frequencies in percent of f0, corrected for temperature; nan
+    without frequency or temperature. f0 and T0 are means over the first epoch of the baseline.
     """
     usable = np.isfinite(frequency) & np.isfinite(temperature)
     inside, complete = baseline_window(usable, time, settings.baseline_days, settings.baseline_campaigns)
@@ -94,16 +94,16 @@ def spread_and_memory(residual, inside, epoch, freedom, time) -> tuple[np.ndarra
               \rho = \frac{\sum_B r_i r_{i-1}}{\sum_B r_i^2}, \quad
               \rho \leftarrow \frac{n_B \rho + p}{n_B - p - 2}, \quad p = n_B - \nu
 
-    The second takes out the bias of a short series, -(p + (p + 2) rho) / n: for an estimated mean, p = 1, that of
-    Marriott and Pope (Biometrika 41, 1954); a temperature slope, smooth over the year, costs as much as another
-    mean. Clipped to 0 ... 0.9. Neighbours further apart than 1.5 usual intervals do not count as a pair.
+    The second step removes the bias of a short series, -(p + (p + 2) rho) / n. For an estimated mean, p = 1, it is
+    that of Marriott and Pope (Biometrika 41, 1954). A temperature slope, smooth over the year, counts as another
+    mean. rho is clipped to 0 ... 0.9. Neighbours more than 1.5 usual intervals apart are no pair.
 
     Returns
     -------
     spread : (n_chart,) array of float
-        nan where no freedom is left. [unit of residual]
+        nan without degrees of freedom. [unit of residual]
     memory : (n_chart,) array of float
-        nan where fewer than 6 pairs.
+        rho; nan with fewer than 6 pairs.
     """
     inside = inside & np.isfinite(residual)
     n_epoch = int(epoch.max(initial=0)) + 1
@@ -153,10 +153,10 @@ def usual_interval(time, inside) -> np.ndarray:
 
 
 def pooled_memory(memory, classes) -> np.ndarray:
-    """Mean of the charts' autocorrelation within each class, laid back on the charts; 0 where none is known.
+    """Autocorrelation of each chart: the mean over the charts of its class; 0 where none is known.
 
-    A chart's own estimate from 52 campaigns scatters by 0.13 and its misses become false alarms: the mean of
-    the fleet does not.
+    The estimate of one chart from 52 campaigns scatters by 0.13, which would cause false alarms. The mean scatters
+    far less.
 
     >>> pooled_memory(np.array([0.2, 0.4, np.nan, 0.1]), np.array([0, 0, 0, 1]))
     array([0.3, 0.3, 0.3, 0.1])

@@ -1,4 +1,4 @@
-"""When a flagged chart changed, and by how much, whether it stepped or drifted."""
+"""Estimate when a flagged chart changed and by how much, as a step or as a drift."""
 
 from dataclasses import dataclass
 
@@ -8,15 +8,16 @@ from scipy.special import stdtr
 
 from turnout.trend.forecast import YEAR, memory_of_steps
 
-FEWEST = 4
+FEWEST = 4  # values, fewer give no change point: level, size, onset and scatter are estimated
 
 
 @dataclass(frozen=True)
 class Change:
-    """``kind`` "step" or "drift", the likelier; times in days; the change [%] is that at the newest campaign.
+    """One change: ``shape`` is "step" or "drift", the more probable one; times in days.
 
-    ``since`` is the median of the time of the onset under that kind; the intervals hold both kinds, each with its
-    probability, so that a wrong choice of the kind does not make them narrow.
+    ``size`` is the change at the newest campaign, ``low`` and ``high`` its interval [%]. ``since`` is the median onset
+    under that shape, ``earliest`` and ``latest`` its interval. The intervals average over both shapes, each with its
+    probability, so a wrong choice of the shape does not narrow them.
     """
 
     kind: str
@@ -31,10 +32,11 @@ class Change:
 
 @dataclass(frozen=True)
 class Fits:
-    """Least squares of every onset of one kind; (n_onset,) arrays.
+    """Least-squares fits for every onset of one shape; (n_onset,) arrays.
 
-    ``onset`` [a before the newest value, negative] stands for a piece ``width`` of time; ``size`` [%] is the change
-    at the newest value, ``weight`` its precision (sum of squares of the regressor), ``rss`` what is left.
+    ``onset`` [a, relative to the newest value, negative] represents a time interval of ``width`` [a]. ``size`` [%] is
+    the change at the newest value, ``weight`` its precision (sum of squares of the regressor), ``rss`` the residual sum
+    of squares.
     """
 
     onset: np.ndarray
@@ -45,14 +47,14 @@ class Fits:
 
 
 def fits(time, values, memory, pieces=4, temperature=None, known=0.0) -> dict[str, Fits]:
-    r"""A level and a change after every onset, by generalised least squares with an AR(1) memory.
+    r"""Fit a level and a change for every onset, by generalised least squares with AR(1) errors.
 
     .. math:: y_i = l + b\,T_i + c\, x_i,\quad x_i = [t_i \ge \tau]\ \text{(step)},\quad
               x_i = \max(0, t_i - \tau) / (t_n - \tau)\ \text{(drift)}
 
-    The values have their temperature taken out already, by a slope that the baseline knows with an error: b is what
-    that error leaves. A summer left in the residual would else shift the onset. The onset lies between two values,
-    at the middle of one of ``pieces`` parts of every gap from the second value on. The precision matrix of an AR(1)
+    The values are already corrected for temperature with the slope of the baseline, which has an error. b is the
+    remaining slope; without it a warm season could shift the onset. Every gap between values from the second one on is
+    divided into ``pieces``, and the onset lies in the middle of one of them. The precision matrix of an AR(1) process
     is tridiagonal, so every sum over the values after an onset is a running sum: all onsets cost no more than one.
 
     Parameters
@@ -63,9 +65,9 @@ def fits(time, values, memory, pieces=4, temperature=None, known=0.0) -> dict[st
         phi at the usual spacing.
     temperature : (n,) array of float, optional
         [°C]; without it b = 0.
-    known : float
-        Squared ratio of the scatter to the error of the slope, where the slope comes from other values than these;
-        0 where it comes from these.
+    slope_weight : float
+        Squared ratio of the scatter to the error of the slope, if the slope was fitted to other values; 0 if it was
+        fitted to these.
 
     Examples
     --------
@@ -117,7 +119,7 @@ def fits(time, values, memory, pieces=4, temperature=None, known=0.0) -> dict[st
 
 
 def _precision(time, memory):
-    """Diagonal of the precision matrix of an AR(1), and what stands beside it: (n,) arrays, the last of these 0."""
+    """Diagonal and off-diagonal of the precision matrix of an AR(1) process: (n,) arrays, the last off-diagonal 0."""
     phi = memory_of_steps(time, memory)
     share = 1.0 / (1.0 - phi**2)
     diagonal, beside = np.append(1.0, share), np.append(-phi * share, 0.0)
@@ -126,16 +128,16 @@ def _precision(time, memory):
 
 
 def find_change(time, values, memory, temperature=None, known=0.0, level=0.95) -> Change:
-    r"""Onset and size of one change, averaged over its kind and its onset.
+    r"""Onset and size of one change, averaged over its shape and its onset.
 
-    Step and drift are equally likely beforehand, as is every onset and every size; the scatter is unknown. Then
-    an onset of a kind has the probability
+    The prior is uniform over step and drift, over the onset and over the size; the scatter is unknown. Then an onset
+    of one shape has the posterior probability
 
     .. math:: p \propto \Delta\tau\ w_\tau^{-1/2}\ RSS_\tau^{-\nu/2}
 
-    :math:`\nu` values less level, size and temperature slope; and the size given the onset is Student's t about its
-    least-squares value, :math:`\nu - 1` degrees of freedom (one for the onset). Intervals are the central ones of
-    the mixture. ``temperature`` and ``known`` are those of ``fits``.
+    with :math:`\nu` = number of values less level, size and temperature slope. Given the onset, the size has a Student
+    t distribution about its least-squares value with :math:`\nu - 1` degrees of freedom (one for the onset). Intervals
+    are the central ones of the mixture. ``temperature`` and ``slope_weight`` are those of ``fit_onsets``.
 
     References
     ----------
@@ -171,14 +173,14 @@ def find_change(time, values, memory, temperature=None, known=0.0, level=0.95) -
 
 
 def _quantiles(fit, weight, levels):
-    """Quantiles of the onset, spread evenly over the width of each piece."""
+    """Quantiles of the onset, its probability uniform over the width of each interval."""
     running = np.append(0.0, np.cumsum(weight) / weight.sum())
     edges = np.append(fit.onset[0] - 0.5 * fit.width[0], fit.onset + 0.5 * fit.width)
     return [float(np.interp(q, running, edges)) for q in levels]
 
 
 def _sizes(fit, p, freedom, levels):
-    """Quantiles of a mixture of Student's t distributions; what weighs less than 1e-6 of the largest is left out."""
+    """Quantiles of a mixture of Student t distributions; components below 1e-6 of the largest weight are left out."""
     use = p > 1e-6 * p.max()
     p, size = p[use] / p[use].sum(), fit.size[use]
     scale = np.sqrt(fit.rss[use] / freedom / fit.weight[use])

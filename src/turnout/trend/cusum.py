@@ -1,6 +1,6 @@
-"""The chart: temperature out, siblings out, standardised, summed; all sections of a fleet at once.
+"""Compute the CUSUM charts of all sections and turnouts at once.
 
-The cumulative sum with resets, for all charts at once.
+Residuals are corrected for temperature and for the median of the sibling sections, then standardised and summed.
 """
 
 from dataclasses import dataclass
@@ -17,9 +17,9 @@ def cusum(z, allowance, threshold, active, fresh) -> tuple[np.ndarray, np.ndarra
 
     .. math:: S_i = \max(0, S_{i-1} - z_i - k)
 
-    The sum starts at 0 with every epoch and holds its value over campaigns that are not ``active`` (learning,
-    no value, no temperature). An alarm opens when S > h and closes when S is back at 0 or the epoch ends. For a
-    rising mean pass ``-z``.
+    The sum starts at 0 with every epoch. It keeps its value over campaigns that are not ``active`` (learning, no value,
+    no temperature). An alarm opens when S > h and closes when S is back at 0 or the epoch ends. For a rising mean pass
+    ``-z``.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def cusum(z, allowance, threshold, active, fresh) -> tuple[np.ndarray, np.ndarra
     statistic : (n_chart, n_campaign) array of float
     open_alarm : (n_chart, n_campaign) array of bool
     began : (n_chart, n_campaign) array of int
-        Last campaign with a value at which the sum was 0: the change came after it; -1 before the first.
+        Last campaign with a value at which the sum was 0, -1 before the first. The change came after it.
 
     References
     ----------
@@ -66,18 +66,19 @@ def cusum(z, allowance, threshold, active, fresh) -> tuple[np.ndarray, np.ndarra
     return np.ascontiguousarray(statistic.T), np.ascontiguousarray(opened.T), np.ascontiguousarray(began.T)
 
 
-SIBLING_ROUNDS = 3
+SIBLING_ROUNDS = 3  # iterations of section residuals and alarms, each of which decides which sections are siblings
 
 
 @dataclass
 class Charts:
-    """Charts of a panel, finished: see ``chart_rows``, ``baseline_rows``, ``alarm_rows`` for the tables.
+    """Finished charts of a panel; ``chart_rows``, ``baseline_rows`` and ``alarm_rows`` make tables of them.
 
     (n_chart, n_campaign) arrays: ``residual`` and ``sigma`` [%], ``z``, ``down``, ``up`` (CUSUM), ``down_open``,
     ``up_open`` (alarm open), ``down_began``, ``up_began`` (last campaign before the change), ``learning``,
-    ``fitted`` (expected value, % of f0); ``serving`` (siblings of others), of the sections alone. (n_chart,):
-    ``allowance, learn, guard, memory, spread, threshold_down, threshold_up``; ``level`` and ``learned`` are
-    (n_chart, n_epoch).
+    ``fitted`` (expected value, % of f0), ``extra`` (allowance for the level of a later epoch). ``is_sibling``
+    (serves as sibling of other sections) has the sections alone. (n_chart,) arrays: ``allowance``, ``n_learning``,
+    ``guard``, ``autocorrelation``, ``widening``, ``threshold_down``, ``threshold_up``. (n_chart, n_epoch) arrays:
+    ``level``, ``shift``, ``n_learned``.
     """
 
     prepared: Prepared
@@ -107,7 +108,7 @@ class Charts:
 
 
 def guard_factor(count, small, settings) -> np.ndarray:
-    """Widening of sigma for an estimated baseline of ``count`` campaigns; see docs/decisions/guard_factor.md.
+    """Factor on sigma for the error of a baseline of ``count`` campaigns; see docs/decisions/guard_factor.md.
 
     >>> from turnout.config.settings.trend import TrendSettings
     >>> guard_factor(np.array([52, 13]), np.array([False, False]), TrendSettings()).round(2)
@@ -118,7 +119,7 @@ def guard_factor(count, small, settings) -> np.ndarray:
 
 
 def finish(p: Prepared, memory, settings) -> Charts:
-    """Residuals, CUSUM and alarms of prepared charts; ``memory`` is the pooled autocorrelation of each chart."""
+    """Residuals, CUSUM and alarms of prepared charts; ``phi`` is the pooled autocorrelation of each chart."""
     n = len(p.panel.charts)
     widening = np.sqrt((1.0 + memory) / (1.0 - memory))
     with np.errstate(invalid="ignore"):
@@ -143,15 +144,15 @@ def finish(p: Prepared, memory, settings) -> Charts:
 
 
 def _siblings_without_alarm(p, window, settled, summing, settings):
-    """Residuals and sums of the sections, and which of their campaigns are siblings: none that is in alarm.
+    """Residuals and sums of the sections, and which of their campaigns serve as siblings: none that is in alarm.
 
-    Sections that have fallen far may raise an alarm in a sound one first; without them it is quiet, and a sibling
-    again.
+    Sections with a large change may first raise a false alarm in an unchanged one. Without them its alarm closes, and
+    it is a sibling again.
     """
     n = len(p.panel.charts)
     serving = settled[:n]
     for _ in range(SIBLING_ROUNDS):
-        sections = sums = None  # both rounds' arrays together would be the peak of memory
+        sections = sums = None  # free the arrays of the last round before the next: they set the peak of memory
         sections = of_sections(p, window, settled, serving, settings)
         sums = summing(slice(0, n), sections)
         before, serving = serving, settled[:n] & ~(sums["down_open"] | sums["up_open"])
@@ -161,7 +162,7 @@ def _siblings_without_alarm(p, window, settled, summing, settings):
 
 
 def _thresholds(length, allowance):
-    """(n_chart,) thresholds that give each chart its run ``length`` with its ``allowance``."""
+    """(n_chart,) thresholds for the mean run ``length`` and the ``allowance`` of each chart."""
     pairs, where = np.unique(np.column_stack([length, allowance]), axis=0, return_inverse=True)
     return np.array([threshold_for(float(n), float(k)) for n, k in pairs] or [0.0])[where.ravel()]
 

@@ -1,11 +1,11 @@
-"""Slope of a residual over time with an honest standard error, and control of false discoveries."""
+"""Fit the slope of residuals over time, with autocorrelated errors, and control the false-discovery rate."""
 
 import numpy as np
 from scipy import stats
 
 
 def slopes(residual, time, mask, memory):
-    r"""Least-squares slope of each chart against time, its standard error widened for the AR(1) memory.
+    r"""Least-squares slope of each chart against time, its standard error widened for AR(1) errors.
 
     .. math:: s_b^2 = \frac{\sum r^2}{\nu \sum (t - \bar t)^2}, \quad \nu = n \frac{1 - \phi}{1 + \phi} - 2
 
@@ -13,7 +13,7 @@ def slopes(residual, time, mask, memory):
     ----------
     residual, time, mask : (n_chart, n_campaign) arrays
         Residual [%], time [d], campaigns that count.
-    memory : (n_chart,) array of float
+    autocorrelation : (n_chart,) array of float
         phi.
 
     Returns

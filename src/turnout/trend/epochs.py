@@ -1,4 +1,4 @@
-"""Epochs: which campaigns of a chart lie between the same two resets."""
+"""Number the epochs of each chart: the campaigns between two maintenance events that reset it."""
 
 import numpy as np
 
@@ -8,16 +8,16 @@ from turnout.trend.panel import days, truth
 def epochs_of(charts, time, events) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Number the epochs of every chart from the maintenance events.
 
-    An event resets the charts of its band (``resets_ballast``, ``resets_railpad``) in its section, or in the
-    whole turnout where ``section_id`` is empty; the flags alone decide, so a sensor or method change resets as
-    tamping does. A campaign at or after the event is after it. An event before the first campaign changes
-    nothing, two events between the same two campaigns make one epoch, and an event after the last campaign is
-    pending. Bands other than ballast and railpad are reset by either flag.
+    An event resets the charts of its band (``resets_ballast``, ``resets_railpad``) in its section, or in the whole
+    turnout where ``section_id`` is empty. The flags alone decide, so a change of sensor or method resets as tamping
+    does. Bands other than ballast and railpad are reset by either flag. A campaign at the time of the event belongs to
+    the new epoch. An event before the first campaign changes nothing. Two events between the same two campaigns make
+    one epoch. An event after the last campaign is pending.
 
     Parameters
     ----------
     charts : DataFrame
-        ``turnout_id, band, section_id``; section "*" stands for the whole turnout and follows whole events only.
+        ``turnout_id, band, section_id``; section "*" is the whole turnout, reset by events of the whole turnout only.
     time : (n_chart, n_campaign) array of float
         Campaign times, ascending, nan where there was none. [d]
     events : DataFrame or None
@@ -28,7 +28,7 @@ def epochs_of(charts, time, events) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     epoch : (n_chart, n_campaign) array of int
         0 from the first campaign on.
     pending : (n_chart,) array of bool
-        An event has come after the last campaign.
+        An event is later than the last campaign.
     started : (n_chart, n_epoch) array of float
         Time of the event that started each epoch; nan for the first. [d]
     """
@@ -46,7 +46,7 @@ def epochs_of(charts, time, events) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def _mark(reset, charts, time, events):
-    """Enter each event at the first campaign at or after it; column n_campaign means none yet."""
+    """Enter each event in ``reset`` at the first campaign at or after it; column n_campaign means none yet."""
     filled = np.where(np.isnan(time), np.inf, time)
     members = charts.groupby("turnout_id", sort=False, observed=True).indices
     band = charts["band"].to_numpy()
@@ -87,5 +87,5 @@ def by_epoch(values, mask, epoch, n_epoch) -> tuple[np.ndarray, np.ndarray]:
 
 
 def spread_out(per_epoch, epoch) -> np.ndarray:
-    """(n_chart, n_epoch) values laid out over the campaigns, (n_chart, n_campaign)."""
+    """Expand (n_chart, n_epoch) values to the campaigns of each epoch, (n_chart, n_campaign)."""
     return np.take_along_axis(per_epoch, epoch.astype(np.intp), axis=1)

@@ -1,4 +1,4 @@
-"""All charts of a fleet: the baselines first, then what they share, then the sums."""
+"""Evaluate all charts of a fleet: baselines, then the shared autocorrelation, then the CUSUM charts."""
 
 import numpy as np
 
@@ -9,10 +9,10 @@ from turnout.trend.residuals import prepare
 
 
 def memory_classes(prepared) -> list[np.ndarray]:
-    """Charts that share their autocorrelation: same band and source, section or whole turnout, like spacing.
+    """Class number of every chart; charts of a class share one autocorrelation.
 
-    Spacing is classed in octaves of a week, so that a fleet measured weekly and one measured every two months
-    do not lend each other their memory.
+    A class has the same band and source, section or whole turnout, and similar spacing. Spacing is classed in octaves
+    of a week, so weekly and two-monthly measurements are separate classes.
     """
     names: dict[tuple, int] = {}
     classes = []
@@ -24,17 +24,17 @@ def memory_classes(prepared) -> list[np.ndarray]:
 
 
 def evaluate_panels(panels, events, settings):
-    """Yield the finished ``Charts`` of each panel; the panels are parts of one fleet and share its memory."""
+    """Yield the finished ``Charts`` of each panel; the panels are parts of one fleet and share its autocorrelation."""
     prepared = [prepare(panel, events, settings) for panel in panels]
     for p, own in zip(prepared, shared_memory(prepared)):
         yield finish(p, own, settings)
 
 
 def shared_memory(prepared) -> list[np.ndarray]:
-    """Autocorrelation of every chart of each part: the mean over the charts of its class in the whole fleet.
+    """Autocorrelation of every chart of each panel: the mean over its class in the whole fleet.
 
-    Charts whose baseline is complete speak for their class; only where there is none do the others. So the
-    value moves when a baseline is completed, and not with every campaign.
+    Only charts with a complete baseline count, unless their class has none. So the value changes when a baseline is
+    completed, and not with every campaign.
     """
     if not prepared:
         return []
@@ -60,7 +60,7 @@ def evaluate(modes, events, settings, as_of=None):
         ``turnout_id, section_id, event_at_utc, kind, resets_ballast, resets_railpad``.
     settings : TrendSettings
     as_of : time or None
-        Look at the fleet as it was then; None: at its newest believable campaign.
+        Evaluate the fleet as it was then; None: at its newest campaign with a plausible time.
 
     Returns
     -------

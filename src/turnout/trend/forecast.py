@@ -1,4 +1,4 @@
-"""When a resonance reaches its limit: an interval of dates, or none."""
+"""Forecast when a resonance reaches its limit, as an interval of dates or none."""
 
 from dataclasses import dataclass
 
@@ -6,17 +6,17 @@ import numpy as np
 from scipy import stats
 
 YEAR = 365.25
-RECENT = 8  # values whose mean says where a chart is now
-SETTLING_YEARS = np.geomspace(0.05, 10.0, 40)
+RECENT = 8  # newest values, whose mean is the present level of a chart
+SETTLING_YEARS = np.geomspace(0.05, 10.0, 40)  # time constants of the settling curve that are tried [a]
 
 
 @dataclass(frozen=True)
 class Forecast:
     """``verdict``: line, line_or_settling, settling, no_limit, too_short or reached.
 
-    ``slope`` and ``slope_error`` [%/a] by generalised least squares; ``not_before`` and ``not_after`` [a after
-    the last value] are the ends of the interval of the crossing, nan where there is none. ``not_after`` is given
-    for the verdict line alone; ``preference`` is AIC(line) - AIC(settling).
+    ``slope`` and its standard error ``slope_error`` [%/a] are from generalised least squares. ``not_before`` and
+    ``not_after`` [a after the last value] are the ends of the interval of the crossing, nan where there is none.
+    ``not_after`` is given for the verdict line alone. ``preference`` is AIC(line) - AIC(settling).
     """
 
     verdict: str
@@ -43,7 +43,7 @@ class Forecast:
 
 
 def memory_of_steps(time, memory) -> np.ndarray:
-    """AR(1) coefficient from each value to the next, ``memory`` being that of the median spacing.
+    """AR(1) coefficient from each value to the next; ``autocorrelation`` is that at the median spacing.
 
     >>> memory_of_steps(np.array([0.0, 1.0, 2.0, 4.0]), 0.5)
     array([0.5 , 0.5 , 0.25])
@@ -55,12 +55,12 @@ def memory_of_steps(time, memory) -> np.ndarray:
 
 
 def whitened(design, values, time, memory):
-    r"""Divide the AR(1) memory out of a regression with unequal spacing.
+    r"""Whiten a regression with AR(1) errors and unequal spacing.
 
     .. math:: y_i' = \frac{y_i - \phi_i y_{i-1}}{\sqrt{1 - \phi_i^2}}, \quad
               \phi_i = \phi^{(t_i - t_{i-1}) / \tilde{\Delta t}}
 
-    with the median spacing; the first value stays as it is (Prais and Winsten 1954).
+    with the median spacing :math:`\tilde{\Delta t}`; the first value stays as it is (Prais and Winsten 1954).
     """
     phi = memory_of_steps(time, memory)
     scale = 1.0 / np.sqrt(1.0 - phi**2)
@@ -69,7 +69,9 @@ def whitened(design, values, time, memory):
 
 
 def line(time, values, memory):
-    """Level at the last value, slope [1/a], their covariance, residual sum of squares and freedom; GLS.
+    """Fit a line by generalised least squares.
+
+    Returns (level at the last value, slope [1/a]), their covariance, residual sum of squares and degrees of freedom.
 
     >>> fit = line(np.arange(5.0) * 365.25, np.array([1.0, 0.0, -1.0, -2.0, -3.0]), 0.3)
     >>> fit[0].round(6)
@@ -85,7 +87,7 @@ def line(time, values, memory):
 
 
 def settling_rss(time, values, memory) -> float:
-    """Smallest residual sum of squares of a curve that settles, a + c exp(-t / tau), tau over a grid."""
+    """Smallest residual sum of squares of a settling curve, a + c exp(-t / tau), over a grid of tau."""
     years = (time - time[0]) / YEAR
     best = np.inf
     for tau in SETTLING_YEARS:
@@ -98,8 +100,8 @@ def settling_rss(time, values, memory) -> float:
 def crossing(coefficient, covariance, freedom, limit, level) -> tuple[float, float]:
     r"""Interval of the time at which a line reaches ``limit`` (Fieller).
 
-    All t >= 0 with :math:`|a + b t - L| \le q\, \mathrm{se}(a + b t)`; (nan, nan) where the line may never get
-    there before the interval opens, (t, nan) where there is no latest time. Student's t quantile.
+    All t >= 0 with :math:`|a + b t - L| \le q\, \mathrm{se}(a + b t)`, with q a quantile of Student's t. Returns
+    (earliest, latest) [a]: (nan, nan) where the line never reaches the limit, (t, nan) where there is no latest time.
 
     References
     ----------
@@ -130,15 +132,15 @@ def crossing(coefficient, covariance, freedom, limit, level) -> tuple[float, flo
 def forecast(time, values, memory, settings) -> Forecast:
     """When the values reach ``settings.limit_percent``, with the interval of ``settings.interval_level``.
 
-    Where the mean of the last ``RECENT`` values is beyond it already that is the answer, whatever they do. Else a line
-    against a settling curve by AIC: where the curve wins there is no date, since a line through a curve that settles
-    promises a date that never comes; where neither wins by 2 there is no latest date.
+    If the mean of the last ``N_RECENT`` values is beyond the limit, it is reached. Otherwise a line is compared with a
+    settling curve by AIC. If the curve is better, there is no date: a line through settling values would give a date
+    that never comes. If neither is better by 2, there is no latest date.
 
     Parameters
     ----------
     time, values : (n,) arrays of float
         Ascending [d] and [%] relative to the level before the change.
-    memory : float
+    autocorrelation : float
         AR(1) coefficient at the usual spacing.
     """
     nan = float("nan")

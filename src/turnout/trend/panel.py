@@ -1,6 +1,6 @@
-"""Rows of modes laid out as charts x campaigns, so that all charts are computed at once.
+"""Arrange rows of modes as a matrix of charts x campaigns, so that all charts are computed at once.
 
-Which values of a turnout are one campaign.
+Also decides which values of a turnout form one campaign, and which times are plausible.
 """
 
 from dataclasses import dataclass
@@ -8,24 +8,24 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-DAY = 86400.0
-# A lone campaign so long before all others of its turnout [d]: a mistyped year or a clock that was reset; of one that
-# was meant, an acceptance test, nobody needs to know more than that it begins no year of measurement.
+DAY = 86400.0  # s
+# [d] A first campaign isolated by more than this from the next is left out: a mistyped year or a clock that was reset.
+# A true one, such as an acceptance test, must not start the baseline either.
 LONG_BEFORE = 5 * 365.25
 
 
 def truth(flag) -> bool:
-    """A flag from a CSV or from the registry: true only when it says so."""
+    """Whether a flag from a CSV or from the registry is true; missing or unknown texts are false."""
     return flag is True or str(flag).strip().lower() in ("true", "1", "yes")
 
 
 def keys_of(visits, time):
-    """Row of visits and time [d] in one number, in their order."""
+    """Row of visits and time [d] combined in one sortable integer."""
     return visits * 2**40 + np.round((time + 2e6) * DAY).astype(np.int64)
 
 
 def unique_of(key):
-    """``np.unique(key, return_inverse=True)`` by hashing: the rows are many, the charts few."""
+    """``np.unique(key, return_inverse=True)`` by hashing, which is faster for many rows and few charts."""
     code, unique = pd.factorize(key)
     order = np.argsort(unique, kind="stable")
     rank = np.empty_like(order)
@@ -34,11 +34,12 @@ def unique_of(key):
 
 
 def campaigns_of(visits, time, gap, n_visits, works):
-    """Number of the campaign of each row within its turnout, and (n_visits, n_campaign) times they started.
+    """Number of the campaign of each row within its turnout, and (n_visits, n_campaign) start times.
 
-    A campaign lasts ``gap`` from its first value on and ends at work that resets: ``works`` are sorted ``keys_of``.
+    A campaign lasts ``gap`` [d] from its first value on, and ends at an event that resets charts. ``resets`` are the
+    sorted ``keys_of`` these events.
     """
-    if not time.size:  # one column of none: what comes after needs no case of its own
+    if not time.size:  # one empty column, so that later steps need no special case
         return np.zeros(0, dtype=np.int64), np.full((n_visits, 1), np.nan)
     stamp, row = unique_of(keys_of(visits, time))
     visit, moment = stamp >> 40, (stamp & (2**40 - 1)) / DAY - 2e6
@@ -55,9 +56,9 @@ def campaigns_of(visits, time, gap, n_visits, works):
 
 
 def long_before(visits, time, gap, n_visits) -> np.ndarray:
-    """Which rows are of a lone first campaign ``LONG_BEFORE`` the next, where at least two follow.
+    """Which rows belong to a first campaign more than ``ISOLATED_FIRST_GAP`` before the next, if at least two follow.
 
-    A baseline that begins with it would have its year before it has seen a summer.
+    A baseline that begins with it would last a year without a value in summer.
 
     >>> long_before(np.zeros(4, int), np.array([0.0, 9000.0, 1.0, 9007.0]), 1.5, 1)
     array([ True, False,  True, False])
@@ -73,7 +74,9 @@ def long_before(visits, time, gap, n_visits) -> np.ndarray:
 
 
 def split(new, moment, gap):
-    """``new`` with runs that last longer than ``gap`` begun anew so often: who measures daily has campaigns, too.
+    """Start a new campaign after every ``gap`` within a long run of values, as with daily measurements.
+
+    ``new`` marks the first value of each campaign, ``moment`` are the times.
 
     >>> split(np.array([True, False, False, False, True]), np.array([0.0, 1.0, 2.0, 3.0, 9.0]), 1.5)
     array([ True, False,  True, False,  True])
@@ -94,7 +97,7 @@ WHOLE = "*"
 
 @dataclass(frozen=True)
 class Panel:
-    """Charts x campaigns. A chart is one section, band and source; a campaign is one visit to its turnout.
+    """Values of charts x campaigns. A chart is one section, band and source; a campaign is one visit to its turnout.
 
     Parameters
     ----------
@@ -106,9 +109,9 @@ class Panel:
     frequency, error, temperature : (n_chart, n_campaign) arrays of float
         Natural frequency and its standard error [Hz], rail temperature [°C]; nan where not known.
     left_out : DataFrame
-        Rows that cannot stand in a chart, with ``reason``.
+        Rows that enter no chart, with ``reason``.
     as_of : float
-        Newest campaign of the fleet whose clock can be believed. [d]
+        Newest campaign of the fleet with a plausible time. [d]
     """
 
     charts: pd.DataFrame
@@ -147,10 +150,10 @@ def timestamps(day) -> np.ndarray:
 
 
 def believable(time, settings, until=np.inf) -> tuple[np.ndarray, float]:
-    """Which times of a fleet a clock can have shown, and the newest of them.
+    """Which times of a fleet are plausible, and the newest of them. [d]
 
-    A time is not believed before ``earliest_year`` or after ``until`` [d]; nor, with everything after it, where one
-    lone last day of measurement lies more than ``clock_gap_days`` after every other in the fleet.
+    A time before ``earliest_year`` or after ``until`` [d] is implausible. So is a single last day of measurement more
+    than ``clock_gap_days`` after all others of the fleet.
 
     >>> from turnout.config.settings.trend import TrendSettings
     >>> believable(np.array([-3.0, 15000.0, 15007.0, 26000.0]), TrendSettings())
@@ -165,13 +168,12 @@ def believable(time, settings, until=np.inf) -> tuple[np.ndarray, float]:
 
 
 def panel_of(modes, settings, as_of=None, events=None) -> Panel:
-    """Lay rows of the table ``modes`` out as charts x campaigns.
+    """Arrange rows of the table ``modes`` as charts x campaigns.
 
-    ``modes`` is a DataFrame with the columns of that table (``source`` may be missing: hammer). Values of one
-    turnout and source within ``campaign_gap_hours`` of the first are one campaign, but what was measured after a
-    resetting one of the ``events`` is another than what was measured before. ``as_of`` is a time after which rows do
-    not count yet (a wrong clock, or a look back). Of two values of one chart in one campaign the later counts.
-    Values from passages come by the week, as the view ``passage_values`` makes them.
+    ``modes`` is a DataFrame with the columns of that table; without ``source`` it is hammer. Values of one turnout and
+    source within ``campaign_gap_hours`` of the first are one campaign. An event of ``events`` that resets charts starts
+    a new campaign. Rows after ``as_of`` do not count (a wrong clock, or an evaluation of an earlier day). Of two values
+    of one chart in one campaign the later counts. Values from passages are weekly, from the view ``passage_values``.
     """
     rows = modes if "source" in modes else modes.assign(source="hammer")
     time = days(rows["measured_at_utc"])
@@ -189,11 +191,11 @@ def panel_of(modes, settings, as_of=None, events=None) -> Panel:
 
 
 def lay_out(charts, chart, time, frequency, error, temperature, newest, settings, events=None) -> Panel:
-    """The panel of rows whose chart is known by number.
+    """Panel of rows whose chart is given by number.
 
-    ``charts`` has the columns of ``CHART``, sorted by them; ``chart, time, frequency, error, temperature`` are
-    (n_row,) arrays. Rows without a frequency, before ``settings.earliest_year``, after ``newest`` or of a lone campaign
-    ``long_before`` all others of its turnout are left out.
+    ``charts`` has the columns of ``CHART_KEYS`` and is sorted by them; ``chart, time, frequency, error, temperature``
+    are (n_row,) arrays. Left out are rows without a frequency, before ``settings.earliest_year``, after ``newest``, and
+    those of an isolated first campaign (``is_isolated_first``).
     """
     earliest = days([pd.Timestamp(settings.earliest_year, 1, 1)])[0]
     good = (time >= earliest) & (time <= newest)
@@ -228,14 +230,14 @@ def lay_out(charts, chart, time, frequency, error, temperature, newest, settings
 
 
 def _later_last(chart, column, n_column, time):
-    """Order in which rows are written into cells: by time only where two rows share a cell."""
+    """Order in which rows are written into cells: by time if two rows share a cell, so that the later one stays."""
     taken = np.zeros((int(chart.max(initial=-1)) + 1, n_column), dtype=bool)
     taken[chart, column] = True
     return slice(None) if np.count_nonzero(taken) == time.size else np.argsort(time, kind="stable")
 
 
 def _charts(rows):
-    """Charts in sorted order and the chart of each row; categories are never expanded to text per row."""
+    """Charts in sorted order, and the chart number of each row; categories are not expanded to text per row."""
     codes, names = [], []
     for name in CHART:
         column = rows[name]
@@ -256,7 +258,7 @@ def _charts(rows):
 
 
 def _works(charts, events):
-    """Sorted keys of the resetting ``events`` of every row of visits, as ``keys_of`` makes them."""
+    """Sorted ``keys_of`` the events that reset charts, for every row of visits."""
     if events is None or not len(events):
         return np.zeros(0, dtype=np.int64)
     flags = zip(events["resets_ballast"], events["resets_railpad"])

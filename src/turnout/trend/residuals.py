@@ -1,6 +1,6 @@
-"""Residuals of all charts: level of the epoch out, median of the siblings out, and the spread that is left.
+"""Compute baselines and residuals of all charts of a panel, sections and whole turnouts.
 
-Baselines of all charts of a panel, sections and whole turnouts, before the fleet's memory is known.
+The residual of a section is its value less the level of the epoch and less the median of its sibling sections.
 """
 
 from dataclasses import dataclass
@@ -16,11 +16,12 @@ from turnout.trend.siblings import median_of_group, median_of_others
 
 @dataclass
 class Prepared:
-    """A panel with its baselines, before the fleet's autocorrelation is known. Charts include the whole turnouts.
+    """A panel with its baselines, before the autocorrelation is pooled over the fleet.
 
-    The last charts (``section_id`` "*") are the medians of their turnout, one per turnout, band and source.
-    ``values`` is the frequency in percent of f0 with the temperature taken out, levels not yet; the arrays
-    ``spread, spread_alone, memory`` hold one value per chart.
+    ``charts`` are those of the panel and, at the end, the medians of whole turnouts (``section_id`` "*"), one per
+    turnout, band and source. ``values`` (sections alone) is the frequency in percent of f0, corrected for temperature,
+    with the level still in it. ``spread`` [%] is that of the residual in the baseline, ``spread_alone`` that without
+    siblings, ``autocorrelation`` the lag-one coefficient; each has one value per chart.
     """
 
     panel: Panel
@@ -64,7 +65,7 @@ def prepare(panel: Panel, events, settings) -> Prepared:
 
 
 def _siblings_pay(beside, alone, group):
-    """Whether a turnout's sections scatter less about their median than alone: decided for all of them together."""
+    """Whether a turnout's sections scatter less about their median than alone; one answer for all of them."""
     with np.errstate(invalid="ignore", divide="ignore"):
         gain = np.log(alone / beside)
     known = np.isfinite(gain)
@@ -73,7 +74,7 @@ def _siblings_pay(beside, alone, group):
 
 
 def _with_whole(p: Prepared, centred, inside, stretch, events, settings) -> Prepared:
-    """Append one chart per turnout, band and source: the median of its sections, which siblings cannot hide."""
+    """Append one chart per turnout, band and source: the median of its sections, to detect a change common to all."""
     group = p.charts["group"].to_numpy()
     median, count = median_of_group(centred, inside, group)
     first = np.flatnonzero(np.diff(group, prepend=-1))
@@ -103,24 +104,27 @@ def _with_whole(p: Prepared, centred, inside, stretch, events, settings) -> Prep
 
 
 def stacked(a, b):
-    """One array below the other, the narrower filled with nan on the right."""
+    """Stack two arrays vertically; the narrower one is filled with nan on the right."""
     width = max(a.shape[1], b.shape[1])
     return np.vstack([np.pad(x, ((0, 0), (0, width - x.shape[1])), constant_values=np.nan) for x in (a, b)])
 
 
 def first_epoch(p):
-    """Epoch in which each chart's baseline begins: its level needs no allowance, the guard covers it."""
+    """Epoch in which each chart's baseline begins. Its level needs no extra allowance: the guard factor covers it."""
     column = np.argmax(p.baseline.inside, axis=1)
     return p.epoch[np.arange(len(p.epoch)), column]
 
 
-RESOLUTION = 0.001
+RESOLUTION = 0.001  # Hz, of frequencies in the registry; values that differ by less are equal
 
 
 @dataclass
 class Residuals:
-    """(n_chart, n_campaign) ``values``, ``residual`` and its ``sigma`` [%]; (n_chart, n_epoch) ``level`` and
-    ``shift`` against the siblings [%]; ``centred`` are the values with their own level out."""
+    """Residuals of charts, all in percent of f0.
+
+    (n_chart, n_campaign): ``values``, ``residual``, its ``sigma``, and ``centred``, the values less their own level.
+    (n_chart, n_epoch): ``level`` and ``shift``, the mean difference to the siblings.
+    """
 
     values: np.ndarray
     residual: np.ndarray
@@ -136,10 +140,11 @@ def _usable(p, n_section):
 
 
 def learning(p, learn, n_section, need):
-    """Campaigns that learn a level: the baseline and the first of every later epoch; and settled campaigns.
+    """Masks of campaigns from which a level is learned, and of settled campaigns.
 
-    A settled campaign lies in the first epoch's finished baseline or behind the learning of its epoch: only
-    such campaigns serve as siblings of settled ones.
+    A level is learned from the baseline and from the first ``n_learning`` campaigns of every later epoch. A settled
+    campaign has a complete baseline and is not one from which a later level is learned. Only settled campaigns serve
+    as siblings of settled ones.
     """
     usable = _usable(p, n_section)
     group = p.panel.charts["group"].to_numpy()
@@ -156,10 +161,10 @@ def learning(p, learn, n_section, need):
 
 
 def of_sections(p: Prepared, window, settled, serving, settings) -> Residuals:
-    """Residuals of the sections. ``window`` and ``settled`` are those of ``learning``.
+    """Residuals of the sections. ``window`` and ``settled`` are those of ``learning_campaigns``.
 
-    (n_chart, n_campaign) ``serving`` says which settled campaigns are siblings of others: not those in alarm, for
-    one section that has fallen far would pull the median of a few with it and raise an alarm in sound ones.
+    (n_chart, n_campaign) ``is_sibling`` marks the settled campaigns that serve as siblings of others. Those in alarm do
+    not: a large change of one section would shift the median of a few and raise false alarms in the others.
     """
     n = len(p.panel.charts)
     group, epoch = p.panel.charts["group"].to_numpy(), p.epoch[:n]
@@ -181,8 +186,8 @@ def of_sections(p: Prepared, window, settled, serving, settings) -> Residuals:
 def _compared(window, beside, epoch, first, share) -> np.ndarray:
     """Campaigns of epochs in which the usual difference to the siblings is known, (n_chart, n_campaign).
 
-    After work it is if siblings stood ``beside`` so large a ``share`` of the campaigns that learned the level: who
-    followed one section alone knows its level, and not how it differs from the others.
+    In a later epoch it is known if a ``share`` of the campaigns that learned the level were ``with_siblings``. A
+    section measured alone gives its level, but not its difference to the others.
     """
     n_epoch = int(epoch.max(initial=0)) + 1
     learned, together = (by_epoch(epoch, mask, epoch, n_epoch)[1] for mask in (window, window & beside))
@@ -191,10 +196,10 @@ def _compared(window, beside, epoch, first, share) -> np.ndarray:
 
 
 def of_turnouts(p: Prepared, sections: Residuals, window, settled, alarmed, settings) -> Residuals:
-    """Residuals of the medians of the turnouts, which a change of all sections moves.
+    """Residuals of the medians of the turnouts, which show a change common to all sections.
 
-    Sections in ``alarmed``, whose own alarm is open, do not count: one section that has fallen far would pull the
-    median of a few with it.
+    Sections in ``alarmed``, whose own alarm is open, do not count: a large change of one section would shift the median
+    of a few.
     """
     n, need = len(p.panel.charts), settings.siblings_minimum + 1
     group, epoch = p.panel.charts["group"].to_numpy(), p.epoch[n:]
@@ -208,17 +213,17 @@ def of_turnouts(p: Prepared, sections: Residuals, window, settled, alarmed, sett
 
 
 def _centred(values, window, epoch):
-    """Take the level of each epoch out; it is learned from the campaigns of ``window``."""
+    """Level of each epoch, learned from the campaigns of ``window``, and the values less that level."""
     n_epoch = int(epoch.max(initial=0)) + 1
     level, _ = by_epoch(np.where(window, values, 0.0), window, epoch, n_epoch)
     return level, values - spread_out(level, epoch)
 
 
 def slope_variance(p, window):
-    """What the error of the temperature slope adds to each value beyond the temperatures of its baseline. [%²]
+    """Variance that the error of the temperature slope adds to each value, (n_section, n_campaign). [%²]
 
-    (n_section, n_campaign). Within them the guard allows for it; a summer after a baseline in which the thermometer
-    stood still is judged by a slope that nobody measured.
+    Only temperatures outside the range of the baseline add to it; within that range the guard factor covers the error.
+    It matters, for instance, in the first summer after a baseline with nearly constant temperature.
     """
     n, base = len(window), p.baseline
     _, away = _centred(p.panel.temperature, window & np.isfinite(p.panel.temperature), p.epoch[:n])
@@ -229,9 +234,9 @@ def slope_variance(p, window):
 
 
 def _sigma(p, enough, beyond):
-    """Spread of each value [%]: the baseline's, with or without siblings, and more where its own error is larger.
+    """Spread of each value [%]: that of the baseline, with or without siblings, and more where its own error is larger.
 
-    ``beyond`` (n_section, n_campaign) is the variance of what temperatures make of it that the baseline never saw. [%²]
+    ``slope_variance_excess`` is the (n_section, n_campaign) variance from ``slope_variance``. [%²]
     """
     n = len(enough)
     sigma = np.where(enough, p.spread[:n, None], p.spread_alone[:n, None])

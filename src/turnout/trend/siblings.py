@@ -4,9 +4,9 @@ import numpy as np
 
 
 def blocks(group):
-    """Charts of equally large groups together: yields (n_group, size) arrays of chart numbers.
+    """Yield (n_group, size) arrays of chart numbers, one for all groups of equal size.
 
-    ``group`` is sorted. Stacking equal sizes lets numpy work on all turnouts at once.
+    ``group`` is sorted. Equal sizes are stacked so that numpy computes many turnouts at once.
     """
     start = np.flatnonzero(np.diff(group, prepend=-1))
     size = np.diff(np.append(start, len(group)))
@@ -15,21 +15,21 @@ def blocks(group):
 
 
 def median_of_others(values, mask, group) -> tuple[np.ndarray, np.ndarray]:
-    """Median over the other charts of the group, and how many others there are.
+    """Median over the siblings of each chart, that is the other charts of its group, and their number.
 
     Parameters
     ----------
     values : (n_chart, n_campaign) array of float
     mask : (n_chart, n_campaign) array of bool
-        Values that may serve as someone's sibling.
+        Values that may serve as sibling of others.
     group : (n_chart,) array of int
         Sorted number of the group.
 
     Returns
     -------
     median : (n_chart, n_campaign) array of float
-        nan where there is no other.
-    others : (n_chart, n_campaign) array of int
+        nan without a sibling.
+    n_siblings : (n_chart, n_campaign) array of int
 
     Examples
     --------
@@ -59,7 +59,7 @@ def median_of_others(values, mask, group) -> tuple[np.ndarray, np.ndarray]:
 
 
 def median_of_group(values, mask, group) -> tuple[np.ndarray, np.ndarray]:
-    """Median of each group and how many charts it rests on, (n_group, n_campaign) each."""
+    """Median of each group, and the number of charts it is computed from, (n_group, n_campaign) each."""
     n_group = int(group[-1]) + 1 if len(group) else 0
     median = np.full((n_group, values.shape[1]), np.nan)
     count = np.zeros((n_group, values.shape[1]), dtype=np.int16)

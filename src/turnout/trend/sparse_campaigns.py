@@ -1,8 +1,8 @@
-"""A few campaigns, several sections, many quantities: who changed, when, and how sure is that.
+"""Detect changes from a few campaigns of several sections with many quantities.
 
-A chart needs a year of campaigns; where there are only a handful, sections and quantities must lend each other
-strength. Every section has one level per quantity, at most one step between two campaigns, and all share a
-temperature slope per quantity.
+A control chart needs a year of campaigns. With only a few, all sections and quantities are evaluated together. Every
+section has one level per quantity and at most one step between two campaigns. All sections share one temperature slope
+per quantity.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from scipy.special import logsumexp
 
 @dataclass(frozen=True)
 class Block:
-    """Quantities measured at one temperature: ``values`` (n_quantity, n_section, n_campaign), logarithms.
+    """Quantities measured at the same temperatures: ``values`` (n_quantity, n_section, n_campaign) are logarithms.
 
     ``temperature`` is (n_section, n_campaign) [°C]. No value may be missing.
     """
@@ -31,10 +31,10 @@ class Block:
 
 @dataclass(frozen=True)
 class Verdict:
-    """One section: ``split`` is the campaign from which on it differs in the likeliest model, None for no step.
+    """Change of one section: ``split`` is its first campaign after the step in the likeliest model, None for no step.
 
-    ``probability`` of no change and of each split; ``p_value`` of any change at all, by permutation. A split is
-    only as good as these two.
+    ``probability`` is that of no change and of each split; ``p_value`` is that of any change, by permutation. Use a
+    split together with these two.
     """
 
     split: int | None
@@ -43,7 +43,7 @@ class Verdict:
 
 
 def design(splits, temperature, common="temperature") -> np.ndarray:
-    """Columns: a level per section, a step per section that has a split, and what all sections share.
+    """Design matrix: a level per section, a step per section that has a split, and the terms common to all sections.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def design(splits, temperature, common="temperature") -> np.ndarray:
 
 
 def _projector(matrix):
-    """I - H of a regression, from an orthonormal basis of its columns."""
+    """Projector on the residual space, I - H, of a regression, from an orthonormal basis of its columns."""
     basis = np.linalg.svd(matrix, full_matrices=False)
     kept = basis.U[:, basis.S > 1e-10 * basis.S[0]]
     return np.eye(len(matrix)) - kept @ kept.T
@@ -89,10 +89,10 @@ def deviance(blocks, splits, common="temperature") -> float:
 
     .. math:: \ln B = \tfrac12 (n - p) \ln(1 + g) - \tfrac12 n \ln(1 + g (1 - R^2))
 
-    for each quantity and each choice of the sections whose step it shows, n its cells less one level per section,
-    p the columns beyond those levels, R² what they explain, g = n (unit information). A change need not show in
-    every quantity: all choices count alike. To this comes 2 ln(number of splits) for every section that changes,
-    since it might have changed at any.
+    for each quantity and each choice of the sections whose step it shows. n is the number of its cells less one level
+    per section, p the number of further columns, R² the share that they explain, g = n (unit information). A change
+    need not show in every quantity: all choices have equal weight. 2 ln(number of splits) is added for every section
+    that changes, for it might have changed at any of them.
 
     References
     ----------
@@ -120,9 +120,9 @@ def _log_factor(cells, matrix, n_section) -> np.ndarray:
 
 
 def find_splits(blocks) -> tuple[int, ...]:
-    """The splits of all sections with the smallest deviance, by improving one section at a time until none improves.
+    """Splits of all sections with the smallest deviance, by coordinate descent over the sections.
 
-    Started from no change and from each common change, since one section at a time cannot see past a change that
+    It starts from no change and from each change common to all: one section at a time would not find a change that
     most sections share.
     """
     n_section, n_campaign = blocks[0].shape
@@ -143,9 +143,9 @@ def find_splits(blocks) -> tuple[int, ...]:
 
 
 def independent_quantities(blocks, splits) -> float:
-    r"""How many independent quantities there are, :math:`(\sum \lambda)^2 / \sum \lambda^2` of their correlation.
+    r"""Effective number of independent quantities, :math:`(\sum \lambda)^2 / \sum \lambda^2` of their correlation.
 
-    Neighbouring frequency bands err together; to count each as a witness of its own would be too sure.
+    Errors of neighbouring frequency bands are correlated; to count each band fully would overstate the evidence.
     """
     parts = []
     for block in blocks:
@@ -160,10 +160,10 @@ def independent_quantities(blocks, splits) -> float:
 def verdicts(blocks, n_permutation=2000, seed=0) -> list[Verdict]:
     """For every section: when it changed, with what probability, and the p value of a change.
 
-    The probability weighs the deviances of the section's splits, the others at their best, each block scaled to
-    its number of independent quantities. The p value is that of Freedman and Lane (J. Business Econ. Stat. 1,
-    1983): residual vectors of the model without the section's step are shuffled among cells, all quantities of a
-    cell together, and the best gain over all splits is compared.
+    The probability follows from the deviances of the section's splits, with the other sections at their best splits and
+    each block scaled to its number of independent quantities. The p value is that of Freedman and Lane (J. Business
+    Econ. Stat. 1, 1983): residuals of the model without the section's step are permuted among cells, all quantities of
+    a cell together, and the largest gain over all splits is compared.
     """
     best = find_splits(blocks)
     shares = [independent_quantities([b], best) / len(b.values) for b in blocks]
@@ -202,7 +202,7 @@ def _permuted(blocks, options, n_permutation, rng) -> float:
 
 
 def steps(block, splits):
-    """Step of every changed section in every quantity, with its standard error and p value, and the slopes.
+    """Step of every changed section in every quantity, with standard error and p value, and the temperature slopes.
 
     Returns
     -------
@@ -228,9 +228,9 @@ def steps(block, splits):
 
 
 def left_out_error(block, splits, common="temperature") -> np.ndarray:
-    """Root mean square error of each quantity in a campaign that was left out of the fit, over all campaigns.
+    """Root mean square prediction error of each quantity, leaving out one campaign after the other.
 
-    A section whose level is known from the left-out campaign alone cannot be predicted and is not counted.
+    A section with a level that only the left-out campaign determines cannot be predicted and is not counted.
     """
     matrix = design(splits, block.temperature, common)
     cells = block.values.reshape(len(block.values), -1)

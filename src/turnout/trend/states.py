@@ -1,4 +1,4 @@
-"""What each chart says today: ok, alarm, learning, cannot tell or not measured, and why."""
+"""Decide the state of each chart today: ok, alarm, learning, cannot tell or not measured, and the reason."""
 
 import numpy as np
 import pandas as pd
@@ -13,10 +13,10 @@ YEAR = 365.25
 
 
 def detectable_change(charts, settings) -> tuple[np.ndarray, np.ndarray]:
-    """Smallest change [%] that each chart shows within a year with the settings' probability, and its campaigns a year.
+    """Smallest change [%] that each chart detects within a year with the set probability, and its campaigns a year.
 
-    It rests on the spread of the baseline, an unknown temperature slope, the guard, the fleet's memory and the
-    allowance of the present epoch.
+    It depends on the spread of the baseline, the unknown part of the temperature slope, the guard factor, the pooled
+    autocorrelation and the allowance of the present epoch.
     """
     campaigns = campaigns_a_year(charts.prepared)
     extra = charts.extra[:, -1] if charts.extra.shape[1] else np.zeros(len(charts.allowance))
@@ -31,7 +31,7 @@ def campaigns_a_year(p) -> np.ndarray:
 
 
 def spread_in(charts, chart, epoch) -> np.ndarray:
-    """Spread [%] of the charts numbered ``chart`` in an ``epoch``: alone where siblings did not help to learn it."""
+    """Spread [%] of the charts numbered ``chart`` in an ``epoch``: that without siblings where none was known."""
     alone = (charts.learned[chart, epoch] > 0) & ~np.isfinite(charts.shift[chart, epoch])
     return np.where(alone, charts.prepared.spread_alone[chart], charts.prepared.spread[chart])
 
@@ -47,8 +47,11 @@ def change_seen(charts, chart, epoch, allowance, campaigns, settings) -> np.ndar
 
 
 def of_unknown_temperatures(charts) -> np.ndarray:
-    """What an unknown temperature slope adds to the spread of each epoch [%], (n_chart, n_epoch): the root mean square
-    over its campaigns, counting those at temperatures that the slope says nothing of."""
+    """Spread that the unknown temperature slope adds in each epoch, (n_chart, n_epoch). [%]
+
+    It is the root mean square over the campaigns of the epoch. Only campaigns where this part exceeds the spread add to
+    it.
+    """
     p = charts.prepared
     variance, n_epoch = _of_slopes(charts), int(p.epoch.max(initial=0)) + 1
     unknown = variance > p.spread[:, None] ** 2
@@ -61,11 +64,11 @@ def of_unknown_temperatures(charts) -> np.ndarray:
 
 
 def chart_status(charts, settings) -> pd.DataFrame:
-    """One row per chart: its state today, why, the change it can see, its slope.
+    """One row per chart: its state today, the reason, the detectable change and the slope.
 
-    States in the order in which they are decided: ``alarm``, which no silence ends; ``not_measured`` (too long
-    ago), ``cannot_tell`` (values that never change; no temperature for as long, or too few), ``learning`` (baseline or
-    level after an event not complete), ``cannot_tell`` (detectable change above the target), ``ok``.
+    States in the order of decision: ``alarm``, also if no longer measured; ``not_measured`` (too long ago);
+    ``cannot_tell`` (constant values, no temperature for as long, or too few temperatures); ``learning`` (baseline or
+    level after an event not complete); ``cannot_tell`` (detectable change above the target); ``ok``.
     """
     p = charts.prepared
     n_section = len(p.panel.charts)
@@ -100,25 +103,30 @@ def chart_status(charts, settings) -> pd.DataFrame:
 
 
 def at_known_temperatures(charts) -> np.ndarray:
-    """Campaigns at which the error of the temperature slope is less than the spread, (n_chart, n_campaign): a drift of
-    the others may be that of the seasons."""
+    """Campaigns at which the error of the temperature slope is less than the spread, (n_chart, n_campaign).
+
+    A drift of the other campaigns may be seasonal.
+    """
     return _of_slopes(charts) <= charts.prepared.spread[:, None] ** 2
 
 
 def _of_slopes(charts) -> np.ndarray:
-    """What the errors of the temperature slopes add to the variance of each value, (n_chart, n_campaign). [%²]"""
+    """Variance that the error of the temperature slope adds to each value, (n_chart, n_campaign). [%²]"""
     p, n = charts.prepared, len(charts.prepared.panel.charts)
     return np.vstack([slope_variance(p, charts.learning[:n]), charts.sigma[n:] ** 2 - p.spread[n:, None] ** 2])
 
 
 def mask_count(charts, present) -> np.ndarray:
-    """Campaigns that have learned the level of the present epoch."""
+    """Number of campaigns from which the level of the present epoch is learned."""
     learned = np.sum(charts.learning & present & np.isfinite(charts.residual), axis=1)
     return np.where(charts.prepared.pending, 0, learned)
 
 
 def baseline_until(p, settings) -> np.ndarray:
-    """Time of the campaign that completed each baseline, nan where it is not; a turnout's needs enough sections. [d]"""
+    """Time of the campaign that completed each baseline, nan where incomplete. [d]
+
+    That of a whole turnout is complete when those of enough sections are.
+    """
     n_section = len(p.panel.charts)
     until = np.max(np.where(p.baseline.inside, p.time, -np.inf), axis=1, initial=-np.inf)
     until = np.where(p.baseline.complete, until, np.inf)
@@ -129,7 +137,7 @@ def baseline_until(p, settings) -> np.ndarray:
 
 
 def _members(group):
-    """Charts of each group in turn."""
+    """Arrays of the chart numbers of each group."""
     return np.split(np.arange(len(group)), np.flatnonzero(np.diff(group)) + 1) if len(group) else []
 
 
@@ -139,7 +147,7 @@ def stale_after(p, settings) -> np.ndarray:
 
 
 def _newest_of_sections(p, last) -> np.ndarray:
-    """Last measurement of any section of a whole turnout's chart, its own of any other. [d]"""
+    """Time of the last measurement; for the chart of a whole turnout that of any of its sections. [d]"""
     newest = last.copy()
     for whole, members in enumerate(_members(p.panel.charts["group"].to_numpy()), start=len(p.panel.charts)):
         newest[whole] = np.max(last[members])
@@ -147,13 +155,13 @@ def _newest_of_sections(p, last) -> np.ndarray:
 
 
 def _states(charts, settings, status, last, present):
-    """The state and the reason of every chart; the first that applies."""
+    """The state and the reason of every chart: the first rule that applies."""
     p = charts.prepared
-    as_of = np.nan_to_num(p.panel.as_of, neginf=0.0)  # no campaign of the fleet can be used: none is old
+    as_of = np.nan_to_num(p.panel.as_of, neginf=0.0)  # without any usable campaign in the fleet no chart is old
     stale = stale_after(p, settings)
     old = as_of - last > stale
     whole = status["section_id"].to_numpy() == WHOLE
-    # sections are measured, but too few of them without an alarm for the median of the others
+    # sections are measured, but too few of them are without an alarm for a median
     unjudged = whole & old & (as_of - _newest_of_sections(p, last) <= stale)
     open_now = _last(charts.down_open) | _last(charts.up_open)
     stuck = ~np.isfinite(charts.sigma).any(axis=1) | ~(p.spread > 0.0)
@@ -185,7 +193,7 @@ def _states(charts, settings, status, last, present):
 
 
 def never_changes(frequency, least=8) -> np.ndarray:
-    """Whether the last ``least`` values of a chart, or all if there are so many, are one and the same.
+    """Whether the last ``least`` values of a chart are all equal; False with fewer values.
 
     >>> never_changes(np.array([[1.0] * 8 + [np.nan], [1.0] * 8 + [2.0]]))
     array([ True, False])

@@ -1,6 +1,6 @@
-"""Finished charts as rows of the tables ``charts``, ``baselines`` and ``alarms``.
+"""Convert finished charts into rows of the tables ``charts``, ``baselines`` and ``alarms``.
 
-Frames of the trend as Arrow tables of the registry: NULL for what cannot be said, rounded to resolution.
+``arrow_rows`` makes Arrow tables of the registry from them: unknown values are NULL, numbers are rounded.
 """
 
 import numpy as np
@@ -23,7 +23,7 @@ BAND = float(stats.norm.isf(0.025))
 
 
 def cell_states(charts) -> np.ndarray:
-    """(n_chart, n_campaign) place in ``STATES`` of every campaign of every chart."""
+    """(n_chart, n_campaign) index in ``CELL_STATES`` of every campaign of every chart."""
     p = charts.prepared
     n_section = len(p.panel.charts)
     cold = np.zeros(charts.z.shape, dtype=bool)
@@ -38,7 +38,7 @@ def cell_states(charts) -> np.ndarray:
 
 
 def measured(charts) -> np.ndarray:
-    """Cells that make a row: a frequency was measured, or the turnout's median could be formed."""
+    """Cells with a row: a frequency was measured, or the median of the turnout exists."""
     n_section = len(charts.prepared.panel.charts)
     return np.isfinite(np.vstack([charts.prepared.panel.frequency, charts.residual[n_section:]]))
 
@@ -46,7 +46,7 @@ def measured(charts) -> np.ndarray:
 def chart_rows(charts) -> pd.DataFrame:
     """Table ``charts``: one row per chart and campaign, in the order of the charts, keys as categories.
 
-    The expected band is that of one campaign at its temperature: 95 % by the guarded spread of the baseline.
+    The expected band is the 95 % interval of one campaign at its temperature, from the guarded spread of the baseline.
     """
     p = charts.prepared
     n_section = len(p.panel.charts)
@@ -92,7 +92,7 @@ def reference_frequency(p) -> np.ndarray:
 
 
 def _with_wrong_times(rows, left_out):
-    """Campaigns whose clock cannot be believed stay in sight, without a verdict; keys remain categories."""
+    """Add campaigns with an implausible time, without values; keys remain categories."""
     wrong = left_out[(left_out["reason"] == "wrong_time") & left_out["measured_at_utc"].notna()]
     if wrong.empty:
         return rows
@@ -152,10 +152,10 @@ def baseline_rows(charts, settings) -> pd.DataFrame:
 
 
 def alarm_rows(charts, settings) -> pd.DataFrame:
-    """Table ``alarms``: one row per alarm ever raised, open or closed.
+    """Table ``alarms``: one row per alarm, open or closed.
 
-    ``began_at_utc`` is the last campaign at which the sum stood at 0: the change came after it. An alarm closes
-    when its sum is back at 0 or an event starts a new epoch.
+    ``began_at_utc`` is the last campaign at which the sum was 0: the change came after it. An alarm closes when its sum
+    is back at 0 or an event starts a new epoch.
     """
     parts = [_alarms(charts, way, run_lengths(charts.prepared.charts["band"], way, settings)) for way in ("down", "up")]
     rows = pd.concat(parts, ignore_index=True)
@@ -194,8 +194,8 @@ def _alarms(charts, direction, run_length):
 def arrow_rows(table, frame, rounded=True, single=False) -> pa.Table:
     """``frame`` with the columns and types of ``table``; NaN, infinity and NaT become NULL.
 
-    A column that the frame lacks is NULL. ``rounded`` False keeps full precision, for tests of the views; ``single``
-    halves what numbers with a stated resolution take in memory, 7 digits being more than they have.
+    A column that the frame lacks is NULL. ``rounded=False`` keeps full precision, for tests of the views. ``single``
+    stores numbers with a stated resolution in single precision, which has enough digits and halves the memory.
     """
     schema, columns = arrow_schema(table), tables()[table]
     arrays = [_array(frame, c, field.type, rounded, single) for c, field in zip(columns, schema)]

@@ -1,4 +1,4 @@
-"""Thresholds of the CUSUM from the false alarms allowed, and the change a chart can see."""
+"""Compute CUSUM thresholds from the allowed false-alarm rate, and the shift that a chart detects."""
 
 from functools import lru_cache
 
@@ -6,8 +6,8 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import ndtr
 
-OVERSHOOT = 1.166
-STATES = 80
+OVERSHOOT = 1.166  # sd; twice Siegmund's correction of 0.583 for the excess over the threshold
+STATES = 80  # cells of the Markov chain that approximates the statistic
 
 
 def run_length(threshold, allowance, shift=0.0):
@@ -40,7 +40,7 @@ def run_length(threshold, allowance, shift=0.0):
 
 
 def threshold_for(campaigns, allowance) -> float:
-    """Threshold h at which a sound chart gives one false alarm in ``campaigns`` (inverse of ``run_length``).
+    """Threshold h that gives one false alarm in ``campaigns`` on average (inverse of ``run_length``).
 
     >>> print(f"{threshold_for(5600, 1.0):.2f} {threshold_for(56000, 0.5):.2f}")
     3.50 9.07
@@ -51,9 +51,9 @@ def threshold_for(campaigns, allowance) -> float:
 
 
 def alarm_probability(shift, threshold, allowance, campaigns) -> float:
-    r"""Probability that a CUSUM starting at 0 alarms within ``campaigns`` when the mean has moved by ``shift``.
+    r"""Probability that a CUSUM starting at 0 raises an alarm within ``campaigns`` after a ``shift`` of the mean.
 
-    The statistic as a Markov chain of ``STATES`` cells of width w, cell 0 half as wide:
+    The statistic is a Markov chain of ``N_CELLS`` cells of width w, cell 0 half as wide:
     :math:`P_{ij} = \Phi(d_{ij} + w/2) - \Phi(d_{ij} - w/2)`, :math:`d_{ij} = (j - i) w + k - \delta`.
 
     References
@@ -96,7 +96,9 @@ def detectable_shift(threshold, allowance, campaigns, probability=0.9) -> float:
 
 
 def run_lengths(bands, direction, settings) -> np.ndarray:
-    """(n_chart,) campaigns between false alarms: fewer for the harmful way, down for stiffness, up for acceleration.
+    """(n_chart,) mean campaigns between false alarms: fewer for the harmful direction.
+
+    Harmful is down for stiffness, up for acceleration.
 
     >>> from turnout.config.settings.trend import TrendSettings
     >>> run_lengths(np.array(["ballast", "amplitude"], dtype=object), "down", TrendSettings())

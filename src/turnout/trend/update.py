@@ -1,6 +1,6 @@
-"""After every registration: all charts of the registry anew, in parts that fit into memory.
+"""Recompute all charts of the registry after a registration, in groups of turnouts that fit into memory.
 
-Rows of ``charts`` by year, so that a night writes only the years in which something changed.
+Rows of ``charts`` are stored by year, so only years with a change are written again.
 """
 
 import hashlib
@@ -40,7 +40,7 @@ def split_by_year(rows: pa.Table) -> dict[int, pa.Table]:
 
 
 def digest(parts, *about) -> str:
-    """Hash of the content of Arrow tables laid end to end, however they are cut, and of what else decides.
+    """Hash of the content of concatenated Arrow tables, however they are split, and of the ``settings``.
 
     >>> whole, other = pa.table({"z": [1.0, 2.0]}), pa.table({"z": [1.0, 3.0]})
     >>> digest([whole]) == digest([whole.slice(0, 1), whole.slice(1)]), digest([whole]) == digest([other])
@@ -58,7 +58,7 @@ def digest(parts, *about) -> str:
 
 
 def _plain(chunk) -> memoryview:
-    """Bytes of the values one by one: NULL as NaN or 0, text as a hash of its own."""
+    """Bytes of the values: NULL as NaN or 0, text as its CRC-32."""
     if pa.types.is_string(chunk.type) or pa.types.is_large_string(chunk.type):
         chunk = chunk.dictionary_encode()
     if pa.types.is_dictionary(chunk.type):
@@ -70,7 +70,7 @@ def _plain(chunk) -> memoryview:
     return np.ascontiguousarray(chunk.to_numpy(zero_copy_only=False)).view(np.uint8).data
 
 
-CELLS_PER_PART = 1_500_000
+CELLS_PER_PART = 1_500_000  # values per group of turnouts that is evaluated at once; limits the memory
 HAMMER = (
     "select turnout_id, section_id, band, source, measured_at_utc, frequency_hz, frequency_se_hz, rail_temperature_c "
     "from modes_current where source = 'hammer' and coalesce(method, 'joint') = 'joint'"
@@ -79,7 +79,10 @@ HAMMER = (
 
 @dataclass(frozen=True)
 class Updated:
-    """Rows by table, years of ``charts`` written, ``generation``, ``digests`` of rows and file by year."""
+    """Result of an update: rows by table, years of ``charts`` written, registry ``generation``.
+
+    ``newest`` is the time of the newest plausible campaign; ``digests`` are hash of the rows and file, by year.
+    """
 
     rows: dict[str, int]
     written: tuple[int, ...]
@@ -89,22 +92,22 @@ class Updated:
 
 
 def update(registry_dir, settings, digests=None, as_of=None, acknowledgements=None, day=None) -> Updated:
-    """Compute every chart of a registry and put charts, baselines, alarms and states in the place of the old ones.
+    """Compute every chart of a registry and replace the tables of charts, baselines, alarms and states.
 
     Parameters
     ----------
     registry_dir : path
     settings : TrendSettings
     digests : dict, optional
-        Those of the last update: a year of ``charts`` that is still the same, in the same file, is not written again.
+        Those of the last update: an unchanged year of ``charts``, in the same file, is not written again.
     as_of : time, optional
-        Look back: newer campaigns and later events are as if they had not been. By default everything up to the
-        newest campaign of the fleet whose clock can be believed.
+        Evaluate as of this time: newer campaigns and later events are ignored. By default everything counts up to the
+        newest campaign of the fleet with a plausible time.
     acknowledgements : list of dict, optional
         All rows of the table of that name; None leaves it alone.
     day : date, optional
-        The day it is, by default this machine's in UTC: work that is planned for later resets nothing yet, and a
-        campaign of later is not believed.
+        The present day, by default that of this machine in UTC. Events planned for later do not reset charts yet, and
+        later campaigns are implausible.
     """
     end = np.floor(days([datetime.now(UTC).replace(tzinfo=None) if day is None else day])[0]) + 1.0
     with open_registry(registry_dir) as con:
@@ -118,7 +121,7 @@ def update(registry_dir, settings, digests=None, as_of=None, acknowledgements=No
     rows = {name: table.num_rows for name, table in tables.items()}
     rows["charts"] = sum(part.num_rows for found in years.values() for part in found)
     now = {str(year): digest(found, names("charts")) for year, found in years.items()}
-    live = _files(load(Path(registry_dir)))  # after a backup was put back they are others than the last update's
+    live = _files(load(Path(registry_dir)))  # after a restored backup these differ from those of the last update
     same = {year for year in now if year in live and (digests or {}).get(year) == f"{now[year]} {live[year]}"}
     changed = [part for year, found in sorted(years.items()) if str(year) not in same for part in found]
     tables["charts"] = (
@@ -138,14 +141,14 @@ def update(registry_dir, settings, digests=None, as_of=None, acknowledgements=No
 
 
 def _files(generation) -> dict[str, str]:
-    """File of each year of ``charts``; its name ends with the hash of its content."""
+    """Path of the file of each year of ``charts``; it ends with the hash of the content."""
     return {str(f.year): f.path for f in generation.of("charts")}
 
 
 def _tables(prepared, settings, account):
-    """Rows of ``charts`` by year, in parts, and rows of the other derived tables, the alarms as ``account`` makes them.
+    """Arrow tables of ``charts`` by year, and those of the other derived tables; ``account`` completes the alarms.
 
-    ``prepared`` is emptied on the way, so that the arrays of a part go when it is done.
+    ``prepared`` is emptied meanwhile, to free the arrays of each finished group.
     """
     frames: dict[str, list[pd.DataFrame]] = {name: [] for name in ("chart_status", "baselines", "alarms")}
     years: dict[int, list[pa.Table]] = {}
@@ -170,8 +173,8 @@ def _tables(prepared, settings, account):
 
 
 def _parts(con, settings, as_of, end):
-    """Charts in parts of whole turnouts, and the newest time that counts; ``end`` of the day it is. [d]"""
-    # What trains say is aggregated once; what hammers say is read part by part.
+    """Charts in groups of whole turnouts, and the newest time that counts; ``end`` is that of the present day. [d]"""
+    # values from passages are aggregated once; values from hammer tests are read group by group
     con.execute("create temp table by_trains as select * from passage_values")
     later = "" if as_of is None else f" where measured_at_utc <= timestamp '{timestamps(days([as_of]))[0]}'"
     con.execute(f"create temp view charted as select * from ({HAMMER} union all select * from by_trains){later}")
@@ -194,10 +197,10 @@ def _parts(con, settings, as_of, end):
 
 
 def _until(charts, last, until):
-    """Time [d] after which no campaign is believed: ``until``, or none where most charts have such a campaign.
+    """Time [d] after which campaigns are implausible: ``until``, or infinity if most charts have a later campaign.
 
-    Then it is the clock of this machine that is late, or the fleet is a simulated one. ``last`` are the newest
-    campaigns of the charts. [d]
+    Then the clock of this machine is late, or the fleet is simulated. ``last`` are the newest campaigns of the charts.
+    [d]
     """
     ahead = last > until
     if 2 * ahead.sum() > len(ahead):
@@ -212,7 +215,7 @@ def _until(charts, last, until):
 
 
 def _panel(con, charts, newest, events, settings):
-    """Rows of the turnouts of one part, their chart as a number."""
+    """Panel of the turnouts of one group."""
     con.register("_part", charts.assign(chart=np.arange(len(charts), dtype=np.int32)))
     names = ("frequency_hz", "frequency_se_hz", "rail_temperature_c")
     rows = con.execute(

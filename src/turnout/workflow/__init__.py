@@ -1,1 +1,1 @@
-"""Plan, compute and judge a whole fleet: which units are new, their results in batches, what went wrong."""
+"""Plan, compute and check a whole fleet: new units, their results in batches, quality gate."""

@@ -1,4 +1,4 @@
-"""The file in which a shard job leaves its results: one row per unit, never changed once written.
+"""Write and read batches, the files of results of a shard job: one row per unit, never changed once written.
 
 A batch is ``work/<stage>/<shard>/batch-<hash of its content>.parquet`` with the columns
 
@@ -13,8 +13,8 @@ rows      string JSON object {table of columns.csv: [row, ...]} without ``run_id
 ========= ====== ==================================================================================
 
 Values inside ``rows``: times are ISO 8601 in naive UTC, numbers that are not finite are null, numpy arrays are
-packed with their type and come back as numpy arrays. Only batches that a state file names count: a batch
-without one was left by a killed job.
+packed with their type and are read as numpy arrays. Only batches that a state file names count; others were left by a
+killed job.
 """
 
 import base64
@@ -37,7 +37,7 @@ COLUMNS = ("unit", "turnout", "kind", "key", "algo", "status", "rows")
 
 @dataclass(frozen=True)
 class UnitResult:
-    """What one unit gave: ``tables`` maps a table of columns.csv to its rows, ``run_id`` left out."""
+    """Result of one unit: ``tables`` maps a table of columns.csv to its rows, without ``run_id``."""
 
     unit: str
     turnout: str
@@ -57,13 +57,13 @@ def write_batch(folder: Path, results: Iterable[UnitResult]) -> Path:
     digest = hashlib.sha256(json.dumps(rows).encode()).hexdigest()[:24]
     path = Path(folder) / f"batch-{digest}.parquet"
     table = pa.Table.from_arrays([_strings(values) for values in zip(*rows)], names=list(COLUMNS))
-    # small groups, for a stage that builds on another one wants the few units of one turnout
+    # small groups, because a stage that uses results of another one reads the few units of one turnout
     write_atomic(path, lambda stream: pq.write_table(table, stream, compression="zstd", row_group_size=8))
     return path
 
 
 def read_results(path: os.PathLike, units: Container[str] | None = None) -> Iterator[UnitResult]:
-    """Results of one batch, sorted by unit; of the ``units`` alone where given: the others' rows stay packed."""
+    """Results of one batch, sorted by unit; only those of ``units`` if given, other rows are not decoded."""
     import pyarrow.parquet as pq
 
     file = pq.ParquetFile(path)
@@ -98,7 +98,7 @@ def read_batch(path: os.PathLike) -> Iterator[tuple[str, str, list[dict]]]:
 
 
 def is_sound(path: os.PathLike) -> bool:
-    """Whether a batch is there and whole to its end; what stands in its columns is not looked at."""
+    """Whether a batch exists and its Parquet footer can be read; the columns are not checked."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -109,12 +109,12 @@ def is_sound(path: os.PathLike) -> bool:
     except OSError as error:
         if error.errno == errno.EIO:
             return False
-        raise  # of the machine: the batch may be sound
+        raise  # fault of the machine: the batch may be intact
     return True
 
 
 def read_column(path: os.PathLike, *names: str) -> list[tuple]:
-    """Only the columns ``names`` of a batch, for all its units; cheap, ``rows`` is not touched."""
+    """The columns ``names`` of a batch for all its units; fast, because ``rows`` is not read."""
     import pyarrow.parquet as pq
 
     groups = pq.ParquetFile(path).iter_batches(columns=list(names))
@@ -131,12 +131,12 @@ def encode(tables: dict[str, list[dict]]) -> str:
 
 
 def decode(text: str) -> dict[str, list[dict]]:
-    """Rows from the JSON of ``encode``; packed arrays come back as numpy arrays."""
+    """Rows from the JSON of ``encode``; packed arrays become numpy arrays."""
     return json.loads(text, object_hook=_unpack)
 
 
 def _strings(values: Iterable[str]):
-    """Arrow strings; ``pa.array`` would import pandas, which takes as long as all the rest of a small job."""
+    """Arrow strings without ``pa.array``, which imports pandas and doubles the time of a small job."""
     import pyarrow as pa
 
     encoded = [value.encode() for value in values]
@@ -149,7 +149,7 @@ def _header(result: UnitResult) -> tuple[str, ...]:
 
 
 def _plain(value):
-    """``value`` in JSON's own types."""
+    """``value`` converted to JSON types."""
     if isinstance(value, dict):
         return {str(k): _plain(v) for k, v in value.items()}
     if isinstance(value, np.ndarray):

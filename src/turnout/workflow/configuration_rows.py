@@ -1,4 +1,4 @@
-"""Rows of the registry that come from no recording: turnouts, sections, events, campaigns, files left out."""
+"""Make registry rows of the configuration: turnouts, sections, events, campaigns, and excluded files."""
 
 import json
 from collections.abc import Iterable
@@ -10,7 +10,7 @@ from turnout.workflow.plan import read_plan, read_problems
 
 
 def configuration_rows(configuration: Configuration, raw_root: Path, plans: Iterable[Path]) -> dict[str, list[dict]]:
-    """Rows by table, sorted; a campaign that campaigns.csv does not know but has files is a row, too."""
+    """Rows by table, sorted; a campaign with files that is missing in campaigns.csv has a row, too."""
     plans = [p for p in plans if Path(p).exists()]
     measured: dict[str, set[str]] = {}
     for plan in plans:
@@ -108,7 +108,7 @@ def _left_out(plan: Path) -> list[dict]:
 
 
 def fleet_hash(configuration: Configuration) -> str:
-    """Changes when a turnout, its configuration or an event does."""
+    """Hash of all turnouts, their configurations and events."""
     hashes = [
         [t, configuration.hash_of(t), json.dumps(configuration.rows[t].values)] for t in sorted(configuration.ids)
     ]

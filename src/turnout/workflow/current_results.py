@@ -1,4 +1,4 @@
-"""The results of one turnout that count now, for a stage that builds on another one."""
+"""Read the current results of one turnout, for a stage that uses results of another stage."""
 
 from collections.abc import Iterator
 from functools import lru_cache
@@ -10,7 +10,7 @@ from turnout.workflow.state import batch_folder, load_state
 
 
 class DamagedBatch(TurnoutError):
-    """Results that another stage builds on cannot be read; ``batch`` is their file."""
+    """Results that another stage needs cannot be read; ``batch`` is their file."""
 
     def __init__(self, batch: Path, error: Exception):
         super().__init__(f"{batch} cannot be read ({error}). The next run computes its units again.")
@@ -18,10 +18,10 @@ class DamagedBatch(TurnoutError):
 
 
 def current_results(work, kind: str, turnout: str) -> Iterator[UnitResult]:
-    """Results of the stage ``kind`` below ``work``: of each unit that of the batch which its state names.
+    """Current results of ``stage`` below ``work``: of each unit the one in the batch that the state names.
 
-    Earlier batches hold what has been computed again since. Where the number of shards was changed, several states
-    know the turnout: the one written last counts.
+    Results in earlier batches are out of date. If the number of shards was changed, several states may contain the
+    turnout; the one written last counts.
     """
     states = sorted((Path(work) / kind).glob("*.json"), key=lambda p: (p.stat().st_mtime_ns, p.name), reverse=True)
     for state in states:
@@ -44,7 +44,7 @@ def _read(batch: Path, units: frozenset[str]) -> Iterator[UnitResult]:
 
 @lru_cache(maxsize=256)
 def _batches(state: Path, written: int) -> dict[str, dict[str, frozenset[str]]]:
-    """Turnout -> batch -> its units that count."""
+    """Turnout -> batch -> its current units."""
     found: dict[str, dict[str, set[str]]] = {}
     for unit, known in load_state(state).units.items():
         found.setdefault(unit.split("/", 1)[0], {}).setdefault(known.batch, set()).add(unit)

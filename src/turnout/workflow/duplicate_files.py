@@ -1,6 +1,7 @@
-"""The same files twice in one turnout's folder: they count in one unit, the other says whose copies it holds.
+"""Handle copied and moved files.
 
-A measurement whose files were moved counts at its new place alone, in whichever folder or turnout that is.
+Files that are twice in a turnout's folder count in one unit; the other unit names the original in its quarantine row. A
+measurement whose files were moved counts in the new unit only, also in another turnout.
 """
 
 from collections.abc import Collection, Iterable, Mapping
@@ -23,22 +24,22 @@ KEY = "copy of "
 
 @dataclass(frozen=True)
 class Original:
-    """The ``unit`` in which a copied file counts, and its ``path`` there."""
+    """Original of a copied file: the ``unit`` in which it counts, and its ``path`` there."""
 
     unit: str
     path: str
 
 
 def originals_of(known: Known) -> list[str]:
-    """The units of which it was found to hold copies."""
+    """Units whose files a unit holds as copies."""
     return [line.removeprefix(KEY) for line in known.key.split("\n") if line.startswith(KEY)]
 
 
 def copies(units: Mapping[str, Known]) -> dict[str, dict[str, str]]:
-    """Copy -> {content: unit in which it counts}, of units that have rows, within one turnout and kind.
+    """Copy -> {content: unit in which it counts}, of units with rows, within one turnout and kind.
 
-    A unit whose every file lies in another one, too, is a copy as a whole. Of others that share files, and of two that
-    hold the same, the first by name keeps them. What a unit was computed without before is not forgotten.
+    A unit is a copy as a whole if another one has all of its files. Of units that share some files, and of two with the
+    same files, the first by name keeps them. Files that were already excluded from a unit remain excluded.
 
     >>> units = {name: Known("", "", "", "ok", "", held) for name, held in
     ...          {"t/passage/b": "1", "t/passage/a": "1 3", "t/passage/c": "2 3", "u/passage/a": "1"}.items()}
@@ -76,7 +77,7 @@ def _whole_copies(held: Mapping[str, frozenset[str]], holders: Mapping) -> dict[
 def originals(
     name: str, counts_in: Mapping[str, str], units: Mapping[str, Known], wanted: Mapping[str, Planned]
 ) -> dict[str, Original]:
-    """Path -> original, of the files of a unit whose content ``counts_in`` another one."""
+    """Path -> original, of the files of a unit whose content counts in another one, ``counts_in``."""
     return {
         path: Original(other, _path_of(content, wanted[other].unit, units[other]))
         for (path, *_), content in zip(wanted[name].unit.files, units[name].held)
@@ -85,12 +86,12 @@ def originals(
 
 
 def without(unit: Unit, copied: Mapping[str, Original]) -> Unit:
-    """The unit without the files that count elsewhere."""
+    """The unit without the files that count in other units."""
     return replace(unit, files=tuple(file for file in unit.files if file[0] not in copied))
 
 
 def key_without(key: str, copied: Mapping[str, Original]) -> str:
-    """The ``key`` of a unit that is computed without its copies; it names their originals."""
+    """The ``key`` of a unit that is computed without its copied files; it names the units of the originals."""
     if not copied:
         return key
     named = "".join(f"\n{KEY}{unit}" for unit in sorted({o.unit for o in copied.values()}))
@@ -98,7 +99,7 @@ def key_without(key: str, copied: Mapping[str, Original]) -> str:
 
 
 def with_copies_said(result: UnitResult, unit: Unit, copied: Mapping[str, Original]) -> UnitResult:
-    """The ``result`` of the other files of ``unit``, and rows of quarantine that name the copies."""
+    """The ``result`` of the remaining files of ``unit``, with quarantine rows that name the copies."""
     if not copied:
         return result
     there = {path: copied[path].path for path, *_ in unit.files if path in copied}
@@ -115,7 +116,7 @@ def _row(unit: Unit, path: str, what: str, originals: str) -> dict:
 
 
 def _path_of(content: str, unit: Unit, known: Known) -> str:
-    """Where ``unit`` holds a content; its first file where its files were exchanged since it was computed."""
+    """Path of a content in ``unit``; that of its first file if its files have changed since it was computed."""
     held = (path for (path, *_), held in zip(unit.files, known.held) if held == content)
     return next(held, unit.files[0][0])
 
@@ -133,22 +134,22 @@ Units = Mapping[str, Known]
 
 
 def moved(units: Units, wanted: Collection[str]) -> list[str]:
-    """Units that are gone while others of the same state have rows from all the files that they held."""
+    """Missing units of which all files have rows in other units of the same state."""
     held = _holders({content for name in _gone(units, wanted) for content in units[name].counted}, [(units, wanted)])
     return [name for name in _gone(units, wanted) if all(held[content] for content in units[name].counted)]
 
 
 def withdrawn(name: str, known: Known) -> UnitResult:
-    """The empty result that takes the rows of a unit back."""
+    """The empty result that supersedes the rows of a unit."""
     turnout, kind, _ = name.split("/", 2)
     return UnitResult(name, turnout, kind, VANISHED, known.algo, VANISHED, {})
 
 
 def withdraw_moved(work: Path, stages: Iterable[str], shards: Iterable[str], limits: FleetSettings) -> int:
-    """Withdraw what was moved to a turnout of another shard, once the jobs of all are done; how many units.
+    """Withdraw units that were moved to a turnout of another shard, after the jobs of all shards; returns their number.
 
-    The shard is asked for again, so that the stages which build on its results do without them, too. A stage that
-    gathers its own units looks at some of them only: one of them has moved when no file of it is left at its turnout.
+    A rerun of the shard is requested, so that stages that use its results omit them, too. A stage that gathers its own
+    units plans only some of them: one of these has moved when its turnout holds none of its files.
     """
     plans = {shard: work / "plan" / f"{shard}.json" for shard in shards}
     wanted = {shard: {unit_id(p.unit) for p in read_plan(plan)} for shard, plan in plans.items() if plan.exists()}
@@ -172,7 +173,7 @@ def withdraw_moved(work: Path, stages: Iterable[str], shards: Iterable[str], lim
 def _withdraw(state: Path, left: Units, limits: FleetSettings) -> None:
     if not left:
         return
-    ask_again(state)  # first: who is killed in between has asked once too often, not once too seldom
+    ask_again(state)  # first: a job killed in between then causes one rerun too many, not one too few
     with locked(state):
         ledger = Ledger(state, limits)
         for name, known in left.items():
@@ -185,7 +186,7 @@ def _gone(units: Units, wanted: Collection[str]) -> list[str]:
 
 
 def _holders(asked: Collection[str], places: Iterable[tuple[Units, Collection[str]]]) -> dict[str, set[str]]:
-    """Content -> turnouts with a unit that is there and has rows from it."""
+    """Content -> turnouts with a planned unit that has rows from it."""
     holders: dict[str, set[str]] = {content: set() for content in asked}
     for units, wanted in places:
         for name in wanted if asked else ():

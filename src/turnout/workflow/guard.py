@@ -1,4 +1,4 @@
-"""One unit, computed so that nothing it meets stops the fleet."""
+"""Compute one unit so that no fault stops the fleet."""
 
 import logging
 import traceback
@@ -20,8 +20,8 @@ def guarded(
 ) -> UnitResult:
     """Result of ``compute(unit, turnout, raw_root, algo=algo)``.
 
-    A ReadError becomes a quarantine row, and so does each record that PartlyComputed names. Any other exception is
-    a fault of the program: a quarantine row with reason internal_error, and its traceback in the log; with
+    A ReadError becomes a quarantine row, and so does each record named by PartlyComputed. Any other exception is a
+    fault of the program: it becomes a quarantine row with reason internal_error, with the traceback in the log. With
     ``strict`` it is raised. Faults of the machine (bad sector, disk full, out of memory) are always raised.
     """
     try:
@@ -43,7 +43,7 @@ def guarded(
 
 
 def died_of(unit: Unit, *_, **__) -> dict[str, list[dict]]:
-    """What is known of a unit of which the process that computes it dies."""
+    """Rows of a unit whose process dies each time it is computed."""
     found = "the process died that computed it, and again where it was computed alone"
     remedy = (
         "Look in the machine's log whether its memory ended, and whether its files are whole; "
@@ -55,7 +55,7 @@ def died_of(unit: Unit, *_, **__) -> dict[str, list[dict]]:
 
 
 def _computed(compute, *args, **more):
-    """(tables, faults): faults of single records leave the rows of the others."""
+    """(tables, faults); the faults of single records do not affect the rows of the others."""
     try:
         return compute(*args, **more), ()
     except PartlyComputed as part:
@@ -63,7 +63,7 @@ def _computed(compute, *args, **more):
 
 
 def status_of(tables: dict[str, list[dict]]) -> str:
-    """ "ok", "partly", "quarantined" or "internal_error", from the rows of a unit.
+    """Status of a unit from its rows: "ok", "partly", "quarantined" or "internal_error".
 
     >>> status_of({"quarantine": [{"reason_code": "truncated"}], "recordings": [{}]})
     'partly'
@@ -94,7 +94,7 @@ def quarantine_row(unit: Unit, path: str, reason: str, where: str, found: str, r
 
 
 def _fault(unit: Unit, error: Exception, path: str | None = None, record: int | None = None) -> dict:
-    """Where in the program it happened, without the machine's paths, so that the row is the same everywhere."""
+    """Quarantine row of a fault of the program; its trace has no machine paths, so it is the same everywhere."""
     LOG.error("%s: internal error\n%s", unit_id(unit), "".join(traceback.format_exception(error)))
     frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename != __file__]
     trace = " < ".join(f"{Path(f.filename).name}:{f.lineno} {f.name}" for f in reversed(frames[-6:]))
@@ -104,5 +104,5 @@ def _fault(unit: Unit, error: Exception, path: str | None = None, record: int | 
 
 
 def _first_of(unit: Unit) -> str:
-    """The path that a row names which speaks of no file alone."""
+    """Path in a row that concerns no single file."""
     return unit.files[0][0] if unit.files else unit.turnout

@@ -1,4 +1,4 @@
-"""The jobs of the workflow: what a script hands over from Snakemake, and what it says when it is done."""
+"""Run the jobs of the workflow with the parameters that their scripts get from Snakemake."""
 
 import logging
 import os
@@ -22,7 +22,7 @@ from turnout.workflow.tasks import Stage
 
 
 def stage_job(plan, mark, log, params, threads: int) -> Summary:
-    """Run one stage of one shard and leave its ``mark``, beside which its state lies.
+    """Run one stage of one shard and write its ``mark``; the state file is in the same folder.
 
     ``params`` holds kind, chain, algo, job and, where needed, context and gather.
     """
@@ -44,7 +44,7 @@ def stage_job(plan, mark, log, params, threads: int) -> Summary:
 
 
 def verdict_job(marks, output, log, params) -> Verdict:
-    """Judge the run; SystemExit with 1 where it is not sound."""
+    """Check the quality of the run; SystemExit with 1 where it fails."""
     _log_to(log)
     states = [state_of_mark(mark) for mark in marks]
     try:
@@ -58,8 +58,10 @@ def verdict_job(marks, output, log, params) -> Verdict:
 
 
 def register_job(register, generation, log, params) -> None:
-    """Hand every shard's batches to ``register``, those of shards that take no part in this run, too; before that, what
-    was moved from a turnout to one of another shard is withdrawn at its old place."""
+    """Register the batches of all shards, including those that take no part in this run.
+
+    Before that, units that were moved to a turnout of another shard are withdrawn from the old one.
+    """
     _log_to(log)
     configuration = load_configuration(params.job["configuration"])
     plans = [Path("work/plan") / f"{shard}.json" for shard in params.shards]
@@ -78,7 +80,7 @@ def register_job(register, generation, log, params) -> None:
 
 
 def _log_to(log) -> None:
-    """Messages go to the job's log file and, from warnings on, to the screen."""
+    """Write messages to the log file of the job, and warnings to the screen, too."""
     Path(str(log)).parent.mkdir(parents=True, exist_ok=True)
     form = logging.Formatter("%(levelname)s %(message)s")
     to_file, to_screen = logging.FileHandler(str(log), mode="w", encoding="utf-8"), logging.StreamHandler(sys.stderr)

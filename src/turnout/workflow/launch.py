@@ -1,4 +1,4 @@
-"""What the workflow needs to know before its first job: options, shards, plan files."""
+"""Prepare the workflow before its first job: options, shards, plan files."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -26,16 +26,19 @@ OPTIONS = {
     "chains": "for each stage module:function, instead of the program's own",
 }
 PLANS = "work/plan"
-# When the newest run began that came as far as its jobs, UTC; no rule knows of it: it makes nothing run again.
+# Start time of the newest run that reached its jobs, UTC. It is no input of a rule, so it causes no rerun.
 LAUNCHED = "work/launched"
 
 
 @dataclass(frozen=True)
 class Launch:
-    """``shards`` take part in this run, ``every_shard`` names all; ``job`` is what a stage job is told;
-    ``diagnose`` whose mismatches are diagnosed: "every" turnout's, those "enabled" in their settings, "" none;
-    ``learned`` are the files of clusters, calibrations and axle patterns that passages are judged with;
-    ``day`` is that of list and pages, YYYY-MM-DD: what is silenced, planned or not measured changes without a file."""
+    """Parameters of a run.
+
+    ``shards`` take part in it, ``every_shard`` names all; ``job`` are the parameters of stage jobs. ``diagnose`` says
+    which turnouts are diagnosed: "every", those "enabled" in their settings, or "" for none. ``learned`` are the files
+    of clusters, calibrations and axle patterns used for passages. ``day`` (YYYY-MM-DD) is that of worklist and pages, a
+    parameter because what is suppressed, planned or not measured changes with it.
+    """
 
     shards: list[str]
     every_shard: list[str]
@@ -53,9 +56,9 @@ class Launch:
 
 
 def launch(options: Mapping, scan: bool, formats=None, to_si=None) -> Launch:
-    """Read the configuration, and where ``scan`` is set bring the plan files up to date.
+    """Read the configuration and, with ``scan``, update the plan files.
 
-    ``options`` are those of ``snakemake --config``; ConfigErrors where they or the configuration are unsound.
+    ``options`` are those of ``snakemake --config``; ConfigErrors where they or the configuration are invalid.
     """
     for name in options:
         if name not in OPTIONS:
@@ -86,7 +89,7 @@ def launch(options: Mapping, scan: bool, formats=None, to_si=None) -> Launch:
 
 
 def _learned(configuration: Configuration) -> tuple[str, ...]:
-    """Those that the settings of any turnout name and that are there, each once."""
+    """Existing files of learned parameters that the settings of any turnout name, each once."""
     files: dict[Path, None] = {}
     for settings in _different(configuration):
         own = settings["passage"]
@@ -96,7 +99,7 @@ def _learned(configuration: Configuration) -> tuple[str, ...]:
 
 
 def launched_at() -> datetime | None:
-    """When the run began that this job belongs to; None outside a run."""
+    """Start time of the run that this job belongs to; None outside a run."""
     try:
         return datetime.fromisoformat(Path(LAUNCHED).read_text(encoding="utf-8"))
     except (FileNotFoundError, ValueError):
@@ -104,7 +107,7 @@ def launched_at() -> datetime | None:
 
 
 def _day(said) -> str:
-    """The day asked for, else that on which the run began, of which all of its jobs are."""
+    """The given day, else the day on which the run began, which is the same for all of its jobs."""
     if not said:
         return (launched_at() or datetime.now(UTC)).date().isoformat()
     try:
@@ -114,14 +117,14 @@ def _day(said) -> str:
 
 
 def _diagnosed(options: Mapping, configuration: Configuration) -> str:
-    """Whose mismatches are diagnosed: by the option, else by ``mismatch: enabled`` of any turnout."""
+    """Which turnouts are diagnosed: by the option, else by ``mismatch: enabled`` of any turnout."""
     if "diagnose" in options:
         return "every" if _flag(options, "diagnose") else ""
     return "enabled" if any(settings["mismatch"].enabled for settings in _different(configuration)) else ""
 
 
 def _different(configuration: Configuration) -> list[Mapping]:
-    """Settings by part, each once though many turnouts share them."""
+    """The different settings of all turnouts, each by its parts."""
     variants = {id(v): v for v in configuration.variants.values()}.values()
     return [variant.parts["settings"] for variant in variants]
 
@@ -142,7 +145,7 @@ def _number(said) -> int:
 
 
 def _flag(options: Mapping, name: str) -> bool:
-    """An option that is true or false; Snakemake hands some spellings on as text."""
+    """An option that is true or false; Snakemake passes some spellings on as text."""
     said = str(options.get(name, False)).lower()
     if said not in ("true", "false"):
         raise ConfigError("--config", name, repr(options[name]), "Write true or false")

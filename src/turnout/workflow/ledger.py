@@ -1,4 +1,4 @@
-"""What a shard keeps while it computes: results wait for their batch, which counts once the state file names it."""
+"""Store the results of a shard while it computes: they are written in batches, which the state file then names."""
 
 import logging
 import time
@@ -14,7 +14,7 @@ LOG = logging.getLogger("turnout.workflow")
 class Ledger:
     """State of one shard, written to ``path`` at every checkpoint.
 
-    A kill or a fault at any moment loses what waits for a batch, and nothing else.
+    A kill or a fault at any time loses only the results that are not yet in a batch.
     """
 
     def __init__(self, path: Path, limits: FleetSettings):
@@ -33,14 +33,14 @@ class Ledger:
             LOG.warning("%s cannot be read: %d units are computed again where their files are there", names, n_unit)
 
     def keep(self, result: UnitResult, stamp: str, contents: str = "") -> None:
-        """Take a result in; ``stamp`` and ``contents`` tell what it was computed from."""
+        """Add a result; ``stamp`` and ``contents`` identify what it was computed from."""
         self._waiting.append((result, stamp, contents))
         late = time.monotonic() - self._saved_at >= self.limits.checkpoint_time
         if late or len(self._waiting) >= self.limits.checkpoint_units:
             self.checkpoint()
 
     def checkpoint(self) -> None:
-        """Write what waits; it counts from now on."""
+        """Write the waiting results as a batch; from then on they count."""
         if self._waiting:
             batch = write_batch(self.folder, [result for result, *_ in self._waiting]).name
             self.state.batches = [b for b in self.state.batches if b != batch] + [batch]

@@ -1,4 +1,4 @@
-"""One unattended run: nothing beside it, remains of a killed one cleared away, one line at the end."""
+"""Run the workflow once, unattended: no other run at the same time, cleanup of a killed run, one line of report."""
 
 import os
 import shutil
@@ -21,9 +21,9 @@ from turnout.workflow.scan import unit_id
 from turnout.workflow.state import load_state, states_below
 
 JOB_NAMES = "turnouts"
-TOO_LATE = 124
-TO_PUBLISH = 1 / 6  # of the limit
-WORST = 3
+TOO_LATE = 124  # exit code of a run ended by the time limit, as of timeout(1)
+TO_PUBLISH = 1 / 6  # share of the time limit reserved for publishing
+WORST = 3  # turnouts named in the report
 LOOK = 'turnout query "from quarantine_open" and "from rejected"'
 GENERATION = Path("results/registry/_generation.json")
 PUBLISHING = ("all", "register", "verdict", "trend", "report")
@@ -31,9 +31,12 @@ PUBLISHING = ("all", "register", "verdict", "trend", "report")
 
 @dataclass(frozen=True)
 class Night:
-    """What a run did; ``code`` is 0 only where all went well, ``reason`` else says why not. ``vanished`` are units gone
-    since the last run. ``worst`` are the turnouts of which most was not used, with the number of units; ``unused``
-    those of which nothing ever was, ``useless`` whether that is so of the whole fleet."""
+    """Report of a run; ``code`` is 0 only if all went well, else ``reason`` says why not.
+
+    ``vanished`` is the number of units gone since the last run. ``worst`` are the turnouts with most unused units, and
+    their numbers. ``unused`` are the turnouts without any usable unit so far; ``nothing_usable`` is True if that holds
+    for the whole fleet.
+    """
 
     code: int
     units: int
@@ -68,11 +71,11 @@ class Night:
 
 
 def nightly(options: Sequence[str], profile: str, limit: float | None = None, work: Path = Path("work")) -> Night:
-    """Run the workflow once, with ``options`` handed on to Snakemake.
+    """Run the workflow once, with ``options`` passed to Snakemake.
 
-    ``profile`` is a folder of profiles/; ``limit`` [s] ends a run that hangs or has more to do than the night is long.
-    Where jobs die or are ended, what was computed is published without the rest. A signal that ends this process ends
-    Snakemake first. TurnoutError where there is no such profile, or another run is still going on.
+    ``profile`` is a folder of profiles/; ``limit`` [s] ends a run that hangs or takes longer than the night. If jobs
+    die or are ended, the finished results are published without the rest. A signal that ends this process ends
+    Snakemake first. TurnoutError where there is no such profile, or another run is active.
     """
     _refuse_no_profile(Path(profile))
     work.mkdir(exist_ok=True)
@@ -90,7 +93,7 @@ def nightly(options: Sequence[str], profile: str, limit: float | None = None, wo
 
 
 def _refuse_no_profile(profile: Path) -> None:
-    """TurnoutError before anything begins: Snakemake would only ask for cores."""
+    """TurnoutError without the profile; Snakemake's own message would only be about cores."""
     if not any(profile.glob("config*.yaml")):
         there = sorted(str(p.parent) for p in profile.parent.glob("*/config*.yaml"))
         found = "holds no config.yaml" if profile.is_dir() else "there is no such folder"
@@ -100,7 +103,7 @@ def _refuse_no_profile(profile: Path) -> None:
 
 @contextmanager
 def _signals_raise():
-    """SIGTERM and SIGHUP raise SystemExit, as Ctrl-C raises KeyboardInterrupt, so that what was begun is ended."""
+    """Let SIGTERM and SIGHUP raise SystemExit, as Ctrl-C raises KeyboardInterrupt, so that Snakemake is ended."""
 
     def end(number, frame):
         raise SystemExit(128 + number)
@@ -115,13 +118,13 @@ def _signals_raise():
 
 
 def _refuse_beside_another() -> None:
-    """TurnoutError where somebody's own Snakemake works in this folder: its lock is not a killed run's."""
+    """TurnoutError if another Snakemake works in this folder, for then its lock is not that of a killed run."""
     here = os.getcwd()
     for process in Path("/proc").glob("[0-9]*"):
         try:
             words = (process / "cmdline").read_bytes().split(b"\0")
             works_here = os.readlink(process / "cwd") == here
-        except OSError:  # it has ended, or is another user's
+        except OSError:  # it has ended, or belongs to another user
             continue
         head = any(w == b"snakemake" or w.endswith(b"/snakemake") for w in words[:3]) and b"--mode" not in words
         if works_here and head:  # with --mode it is one job of a run, such as _clear cancels
@@ -129,13 +132,13 @@ def _refuse_beside_another() -> None:
 
 
 def _release() -> None:
-    """Take away what a Snakemake that was killed keeps others out with."""
+    """Remove the lock and the backups of a killed Snakemake."""
     shutil.rmtree(Path(".snakemake") / "backups", ignore_errors=True)
     shutil.rmtree(Path(".snakemake") / "locks", ignore_errors=True)
 
 
 def _clear(options: Sequence[str], profile: str) -> None:
-    """Release Snakemake's lock, drop its backups, and cancel what a killed run left in the queue."""
+    """Remove Snakemake's lock and backups, and cancel jobs that a killed run left in the queue."""
     _release()
     if profile == "slurm" and shutil.which("scancel"):
         asked = ["squeue", "--me", "-h", "-o", "%i %j %Z"]  # number, name, folder
@@ -147,7 +150,7 @@ def _clear(options: Sequence[str], profile: str) -> None:
 
 
 def _run(options: Sequence[str], limit: float | None, work: Path) -> int:
-    """Exit code of Snakemake; where jobs died or were ended before the registry, it goes out all the same."""
+    """Exit code of Snakemake; if jobs died or were ended before the registry was published, publish it afterwards."""
     began, launched, generation = time.monotonic(), _changed_at(work / "launched"), _changed_at(GENERATION)
     code = _snakemake(options, None if limit is None else (1.0 - TO_PUBLISH) * limit)
     had_jobs, registered = _changed_at(work / "launched") != launched, _changed_at(GENERATION) != generation
@@ -164,7 +167,7 @@ def _changed_at(path: Path) -> int:
 
 
 def _snakemake(options: Sequence[str], limit: float | None) -> int:
-    """Exit code of Snakemake in a process group of its own, so that the limit or a signal ends its jobs, too."""
+    """Exit code of Snakemake, run in its own process group so that the limit or a signal ends its jobs, too."""
     process = subprocess.Popen([sys.executable, "-m", "snakemake", *options], start_new_session=True)
     try:
         return process.wait(limit)
@@ -177,7 +180,7 @@ def _snakemake(options: Sequence[str], limit: float | None) -> int:
 
 
 def _end(process: subprocess.Popen) -> None:
-    """End a process and its group: asked first, killed after a minute or when somebody loses patience."""
+    """End a process and its group: SIGTERM first, SIGKILL after a minute or at another interrupt."""
     try:
         os.killpg(process.pid, signal.SIGTERM)
         process.wait(60)
@@ -194,14 +197,14 @@ def _batches(work: Path) -> set[tuple[Path, str]]:
 
 
 def _planned(work: Path) -> set[str]:
-    """Units that the plans name."""
+    """Units in the plans."""
     plans = [plan for plan in sorted((work / "plan").glob("*.json")) if not is_cut_plan(plan)]
     return {unit_id(p.unit) for plan in plans for p in read_plan(plan)}
 
 
 def _night(code: int, before: set, planned_before: set[str], reason: str, work: Path) -> Night:
     gone = planned_before - _planned(work)
-    units: set[str] = set()  # another number of shards leaves the states of the earlier one
+    units: set[str] = set()  # states of an earlier number of shards may remain
     processed, quarantined = [], []
     for path in states_below(work):
         for name, known in load_state(path).units.items():

@@ -1,4 +1,4 @@
-"""What was noted beside the files of a unit and changes its result: its campaign, the trains of its hour."""
+"""Make a digest per unit of the notes beside its files that change its result: its campaign and the trains."""
 
 import re
 from bisect import bisect_left, bisect_right
@@ -9,14 +9,14 @@ from turnout.config import TurnoutConfig
 from turnout.config.merge import digest
 from turnout.records import Unit
 
-AROUND = timedelta(hours=1)  # that the clocks of a logger and of the train data may differ by
-LONGEST = timedelta(days=2)  # that one file of a logger that never stops may last
+AROUND = timedelta(hours=1)  # maximum difference between the clocks of a logger and of the train data
+LONGEST = timedelta(days=2)  # maximum duration of one file of a continuous logger
 
 
 def notes_of(turnout: TurnoutConfig, units: Sequence[Unit]) -> list[str]:
-    """A digest per unit; it changes when the unit's campaign, or a train noted within its time, is corrected.
+    """A digest per unit; it changes when its campaign is corrected, or a train in its time.
 
-    A file lasts until the next one begins: one of a logger that never stops holds the trains of a day.
+    A file lasts until the next one begins; one of a continuous logger contains the trains of a day.
     """
     campaigns: dict[str, str] = {}
     trains = sorted(_timed(turnout.trains), key=lambda entry: entry[0])
@@ -33,7 +33,7 @@ def notes_of(turnout: TurnoutConfig, units: Sequence[Unit]) -> list[str]:
 
 
 def _timed(rows: Sequence[Mapping]) -> list[tuple[datetime, list]]:
-    """(time, row) of the rows of trains.csv that have one in their first time column."""
+    """(time, row) of the rows of trains.csv with a valid time in their first time column."""
     found = []
     for row in rows:
         said = next((value for name, value in row.items() if name.endswith("_at_utc")), "")
@@ -46,16 +46,16 @@ def _timed(rows: Sequence[Mapping]) -> list[tuple[datetime, list]]:
 
 
 def start_of(label: str) -> datetime | None:
-    """When a passage file begins, by its name; None where that holds no time."""
+    """Start time of a passage file from its name; None without a time."""
     stamp = re.search(r"\d{8}T\d{6}Z", label)
     try:
         return datetime.strptime(stamp[0], "%Y%m%dT%H%M%SZ") if stamp else None
-    except ValueError:  # digits that are no time
+    except ValueError:  # digits that form no valid time
         return None
 
 
 def _within(start: datetime | None, starts: list[datetime], trains: list[tuple[datetime, list]]) -> str:
-    """Digest of the trains noted while a file lasts that begins at ``start``, "" without any."""
+    """Digest of the trains during a file that begins at ``start``, "" without any."""
     if start is None or not trains:
         return ""
     after = bisect_right(starts, start)

@@ -1,4 +1,4 @@
-"""What campaigns.csv and trains.csv say, held against the files beside them."""
+"""Check campaigns.csv and trains.csv against the raw files."""
 
 from bisect import bisect_left
 from collections import Counter
@@ -13,14 +13,14 @@ from turnout.errors import ReadError
 from turnout.records import Unit
 from turnout.workflow.notes import start_of
 
-SHIFTS = sorted((h for h in range(-14, 15) if h), key=abs)  # hours from UTC to the clocks of the world
-FEWEST = 3  # trains of which one shift makes passages: fewer may be chance
+SHIFTS = sorted((h for h in range(-14, 15) if h), key=abs)  # h, offsets of local times from UTC
+FEWEST = 3  # passages that a shift must match to trains: fewer may match by chance
 
 
 def contradicted_notes(turnout: TurnoutConfig, raw_root: Path, units: Iterable[Unit]) -> Iterator[ReadError]:
-    """An error for each row without its files, and for files without their row; ``turnout`` has its notes.
+    """An error for each row without files, and for files without a row; ``turnout`` includes its notes.
 
-    Without campaigns.csv no row is missed. Rows that cannot be used are said by ``read_notes``.
+    Without campaigns.csv no row is required. Invalid rows are reported by ``read_notes``.
     """
     units = list(units)
     yield from _campaigns(Path(raw_root) / turnout.raw / "campaigns.csv", f"{turnout.raw}/campaigns.csv", units)
@@ -61,7 +61,7 @@ def _day(text: str) -> str | None:
 
 
 def _trains(rows, name: str, units, tolerance: timedelta) -> Iterator[ReadError]:
-    """An error where no train fits a passage, and most do once whole hours are taken off."""
+    """An error if no train matches a passage, but many match after a shift by whole hours."""
     passages = [start for unit in units if unit.kind == "passage" and (start := start_of(unit.label))]
     trains = sorted(datetime.fromisoformat(row["passed_at_utc"].removesuffix("Z")) for row in rows)
 

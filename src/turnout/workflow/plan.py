@@ -1,6 +1,6 @@
-"""One plan file per shard: every unit of its turnouts, what it is computed from, and what was left out.
+"""Write and read one plan file per shard: the units of its turnouts, their files, and excluded files.
 
-Which shard a turnout belongs to, and what the files of a shard are called.
+The shard of a turnout follows from a checksum of its id.
 """
 
 import json
@@ -34,19 +34,19 @@ def shard_of(turnout: str, shards: int) -> str:
 
 
 def shard_name(number: int, shards: int) -> str:
-    """``number`` counts from 0."""
+    """Name of a shard from its ``number``, counted from 0."""
     return f"{number:02d}of{shards:02d}"
 
 
 def shard_names(shards: int, turnouts=None) -> list[str]:
-    """All shards, or those that the ``turnouts`` belong to."""
+    """Names of all shards, or of those of the ``turnouts``."""
     if turnouts is None:
         return [shard_name(i, shards) for i in range(shards)]
     return sorted({shard_of(t, shards) for t in turnouts})
 
 
 def parse(name: str) -> tuple[int, int]:
-    """Number and count of a shard from its name."""
+    """Number of a shard and number of shards from its name."""
     if not re.fullmatch(NAME, name):
         raise ConfigError("shard", "name", repr(name), "Write a name like 00of64")
     number, count = name.split("of")
@@ -58,7 +58,7 @@ END = "\n]}\n"
 
 @dataclass(frozen=True)
 class Planned:
-    """A unit and the digest of what was noted about it beside its files (campaign, trains)."""
+    """A unit and the digest of the notes about it (campaign, trains)."""
 
     unit: Unit
     note: str = ""
@@ -72,11 +72,11 @@ def write_plans(
     turnouts: Iterable[str] | None = None,
     accept_vanished: bool = False,
 ) -> list[str]:
-    """Scan the raw folders and write ``folder``/<shard>.json where the content changed; names of the shards.
+    """Scan the raw folders and write ``folder``/<shard>.json where the content changed; returns the names of shards.
 
-    ``turnouts`` limits the scan to their shards, and to those whose plan is cut. Nothing in a plan changes without
-    meaning: no time of scan, no absolute path. Plans of another number of shards go: nobody would bring them up to
-    date. ConfigError where so many known files are gone that a disk must be missing.
+    ``turnouts`` limits the scan to their shards, and to those with a truncated plan. A plan contains no time of scan
+    and no absolute path, so it changes only with its content. Plans of another number of shards are deleted, because
+    they would not be updated. ConfigError if so many known files are missing that a disk is probably not mounted.
     """
     texts, gone = _looked(configuration, raw_root, folder, shards, turnouts)
     if not accept_vanished and (error := gone.error(configuration.settings["fleet"], raw_root)):
@@ -92,13 +92,13 @@ def write_plans(
 
 @dataclass(frozen=True)
 class Gone:
-    """Sorted ``files`` that the plans know and no scan finds, of turnouts that are still there; of ``known`` ones."""
+    """Sorted ``files`` in the plans that the scan does not find, of configured turnouts; ``n_known`` are in plans."""
 
     files: list[str]
     known: int
 
     def error(self, settings: FleetSettings, raw_root: Path) -> ConfigError | None:
-        """What a run is stopped with where these are so many that a disk must be missing."""
+        """Error that stops a run if so many files are missing that a disk is probably not mounted, else None."""
         if len(self.files) <= max(settings.vanished_files, settings.vanished_share * self.known):
             return None
         remedy = (
@@ -114,12 +114,12 @@ class Gone:
 def gone_files(
     configuration: Configuration, raw_root: Path, folder: Path, shards: int, turnouts: Iterable[str] | None = None
 ) -> Gone:
-    """What the next run will find gone, by the plans that the last one left in ``folder``; nothing is written."""
+    """Files that the next run will find missing, compared with the plans in ``folder``; nothing is written."""
     return _looked(configuration, raw_root, folder, shards, turnouts)[1]
 
 
 def _looked(configuration, raw_root, folder, shards, turnouts) -> tuple[dict[Path, str], Gone]:
-    """New text of each plan, and what is gone of that which the plans there knew."""
+    """New text of each plan, and the files of the existing plans that are missing now."""
     for turnout in turnouts or ():
         configuration.turnout(turnout)
     asked = set(shard_names(shards, turnouts))
@@ -134,7 +134,7 @@ def _looked(configuration, raw_root, folder, shards, turnouts) -> tuple[dict[Pat
         texts[path] = _text(name, entries)
         before = path.read_text(encoding="utf-8") if path.exists() and not is_cut_plan(path) else ""
         if before and before != texts[path]:
-            # a turnout that was taken out, or given another name, was so on purpose
+            # files of a turnout that was removed or renamed in the configuration do not count as missing
             files = _paths(e for e in json.loads(before)["turnouts"] if e["turnout"] in configuration.rows)
             gone += sorted(files - _paths(entries))
             known += len(files)
@@ -144,7 +144,7 @@ def _looked(configuration, raw_root, folder, shards, turnouts) -> tuple[dict[Pat
 
 
 def is_cut_plan(path: Path) -> bool:
-    """Whether a plan file is there of which the end is missing."""
+    """Whether a plan file exists and is truncated."""
     return is_cut(path, END)
 
 
@@ -165,7 +165,7 @@ def read_problems(path: Path) -> Iterator[tuple[str, dict]]:
 
 
 def _entry(turnout: TurnoutConfig, raw_root: Path) -> dict:
-    """What the plan says of one turnout."""
+    """Plan entry of one turnout."""
     scanned = scan(turnout, raw_root)
     turnout, errors = read_notes(turnout, raw_root)
     notes, start = notes_of(turnout, scanned.units), len(turnout.raw) + 1

@@ -1,6 +1,6 @@
-"""The same call for many things, on one processor or several; a process that dies takes none of the others along.
+"""Call a function for many tasks, in one process or several; a process that dies does not end the others.
 
-Only the one that began them all does: they end with it, for nobody would ask for what they find.
+The processes end with their parent, because nothing would use their results.
 """
 
 import multiprocessing
@@ -18,13 +18,13 @@ _CALL: Callable | None = None
 
 @dataclass(frozen=True)
 class Died:
-    """``thing`` may be what a process died of: it was computed by that one, or by another beside it."""
+    """A ``task`` without a result because a process of the pool died; it may have caused that or not."""
 
     thing: Any
 
 
 def in_order(call: Callable, things: Sequence, threads: int) -> Iterator:
-    """``call(thing)`` for each of ``things``, in their order; in this process where one is enough."""
+    """``function(task)`` for each of ``tasks``, in their order; in this process if one is enough."""
     if threads <= 1 or len(things) <= 1:
         yield from map(call, things)
     else:
@@ -32,10 +32,10 @@ def in_order(call: Callable, things: Sequence, threads: int) -> Iterator:
 
 
 def in_processes(call: Callable, things: Sequence, threads: int) -> Iterator:
-    """``call(thing)`` for each of ``things``, in their order, in other processes than this one.
+    """``function(task)`` for each of ``tasks``, in their order, in child processes.
 
-    Where one of these dies, ``Died`` stands for what they had at hand, and new ones go on with the rest, later.
-    Processes are forked before the first result is asked for, so ``call`` may hold anything; it must not
+    If one of them dies, ``LostTask`` takes the place of the results in progress, and new processes continue with the
+    remaining tasks. Processes are forked before the first result, so ``function`` need not be picklable; it must not
     have started threads by then.
     """
     global _CALL
@@ -44,7 +44,7 @@ def in_processes(call: Callable, things: Sequence, threads: int) -> Iterator:
         while left:
             lost: list = []
             yield from _until_one_dies(left, threads, lost)
-            # things are handed out in their order: the first that are missing were at hand
+            # tasks are started in their order: the first lost ones were in progress
             yield from map(Died, lost[:threads])
             left = lost[threads:]
     finally:
@@ -52,7 +52,7 @@ def in_processes(call: Callable, things: Sequence, threads: int) -> Iterator:
 
 
 def _until_one_dies(things: Sequence, threads: int, lost: list) -> Iterator:
-    """What the processes of one pool give; the things that were lost with it go into ``lost``."""
+    """Results of the processes of one pool until one dies; tasks without a result are appended to ``lost``."""
     n = min(threads, len(things))
     with ProcessPoolExecutor(n, multiprocessing.get_context("fork"), _end_with_parent) as pool:
         futures = deque(_asked(pool, thing) for thing in things)
@@ -69,7 +69,7 @@ def _until_one_dies(things: Sequence, threads: int, lost: list) -> Iterator:
 
 
 def _end_with_parent() -> None:
-    """End this process when its parent does: it waits for more to do for ever else, and holds its memory."""
+    """End this process with its parent; otherwise it would wait for tasks for ever and keep its memory."""
 
     parent = multiprocessing.parent_process()
     assert parent is not None, "it is called in the processes of a pool"
@@ -82,7 +82,7 @@ def _end_with_parent() -> None:
 
 
 def _asked(pool: ProcessPoolExecutor, thing) -> Future:
-    """The future of a thing, of a pool that has died meanwhile, too."""
+    """Future of a task; it holds an exception if the pool is broken already."""
     try:
         return pool.submit(_call, thing)
     except BrokenProcessPool as error:

@@ -1,4 +1,4 @@
-"""Whether the results that came since the last sound run may be trusted: the breaker, after the registry is out."""
+"""Check the quality of new results after the registry is published, and fail the run if too many are bad."""
 
 import json
 from collections import Counter
@@ -20,9 +20,11 @@ IN_QUARANTINE, FAULTS = ("partly", "quarantined"), ("internal_error",)
 
 @dataclass(frozen=True)
 class Verdict:
-    """Units that are new since they were last judged; ``complaints`` is empty for a sound run, and ``unsound`` tells
-    whether one of them is about units; ``batches`` are all that the states name, ``damaged`` those that cannot be
-    read."""
+    """Result of the check of all units that are new since the last one.
+
+    ``complaints`` is empty if the run passes; ``unsound`` is True if one of them is about units. ``batches`` are all
+    batches in the states, ``damaged`` those that cannot be read.
+    """
 
     units: int
     quarantined: int
@@ -39,10 +41,11 @@ class Verdict:
 
 
 def judge(states: Iterable[Path], configuration: Configuration, judged: Iterable[str] = ()) -> Verdict:
-    """Judge all batches that ``states`` name, those ``judged`` before left out.
+    """Judge all batches that ``states`` name, except those already ``judged``.
 
-    Complaints: a batch that cannot be read; an internal error; a unit that the machine failed; and over the fleet or
-    over one line a share of units in quarantine above ``quarantine_share``, where there are ``quarantine_units``.
+    Complaints: a batch that cannot be read; an internal error; a unit without a result because of a fault of the
+    machine; and, for the fleet or for one line with at least ``quarantine_units`` units, a share in quarantine above
+    ``quarantine_share``.
     """
     states, before, names = list(states), set(judged), []
     status, lines = {}, {}
@@ -89,7 +92,7 @@ def _shares(status: Mapping[str, str], lines: Mapping[str, str], limits: FleetSe
 
 
 def _read(path: Path, damaged: dict[Path, str]) -> list[tuple]:
-    """(unit, turnout, status) of a batch; one that cannot be read is noted in ``damaged``."""
+    """(unit, turnout, status) of a batch; one that cannot be read is entered in ``damaged``."""
     import pyarrow as pa
 
     try:
@@ -100,14 +103,14 @@ def _read(path: Path, damaged: dict[Path, str]) -> list[tuple]:
 
 
 def verdict(states: Iterable[Path], configuration: Configuration, output: Path) -> Verdict:
-    """Judge what ``output`` does not name yet, and write it; TurnoutError, ``output`` as it was, if unsound.
+    """Judge the batches that ``output`` does not name yet, and write it; TurnoutError, ``output`` unchanged, if bad.
 
-    Nights with too few units to be judged add up. Units that were found wrong are judged again, with what came since,
-    until there are enough newer ones to be judged by themselves: a small fleet would else be unsound for months, until
-    its bad units are a small share of all. A run over some turnouts forgets nothing of the others.
+    Nights with too few units to be judged are added up. Bad units are judged again together with later ones, until
+    there are enough newer units to be judged by themselves. Otherwise a small fleet would fail for months, until its
+    bad units are a small share of all. A run over some turnouts keeps the state of the others.
     """
     output, states, enough = Path(output), list(states), configuration.settings["fleet"].quarantine_units
-    doubts = output.with_name("doubts.json")  # not in the output: Snakemake puts that of a failed job back
+    doubts = output.with_name("doubts.json")  # not in the output, which Snakemake restores after a failed job
     judged, said = read_json(output, {"judged": []})["judged"], read_json(doubts, {"told": [], "doubted": []})
     told, doubted = said["told"], said["doubted"]
     found = newer = judge(states, configuration, [*judged, *told, *doubted])

@@ -1,17 +1,16 @@
-"""Units that are being computed: a note beside the state from the moment one is begun until it has come to its end.
+"""Keep track of started units, postponed units and job attempts, so that interrupted work is done again.
 
-A job that finds notes follows one that was ended in the midst of these units. Which of them ended it, or whether all
-are innocent of what a user, a time limit or a power failure did, nobody knows: it computes them after all others, each
-in a process of its own. Where that dies while the job lives on, and not in the run that had begun it first (whose jobs
-may all have met the same shortage), the unit is what it died of. A job that is ended as a whole condemns no unit,
-however often.
+Started units: a mark file beside the state exists while a unit is computed. Marks that a job finds are from a job that
+was ended during these units. The cause may be one of them, or a user, a time limit or a power failure. So it computes
+them after all others, each in its own process. If that process dies while the job continues, the unit is the cause.
+That does not hold in the run that first started the unit, whose jobs may share a lack of memory. A job that is ended as
+a whole never blames a unit.
 
-Units that met a fault of the machine have no result; the file that notes them asks for the shard's next job.
+Postponed units have no result because of a fault of the machine. The number in their file is a parameter of the next
+job, so that it runs again.
 
-A job that was begun and did not come to its end is asked for again.
-
-Snakemake gives the old output of a failed job the time of now and notes its parameters as if it had been made: nothing
-would run it again. The number of this file is one of those parameters; it is another one until the job has ended.
+Attempts: Snakemake gives the old output of a failed job a new time and stores its parameters as if it had succeeded, so
+nothing would run it again. The number of attempts is one of these parameters. It changes until the job has succeeded.
 """
 
 import hashlib
@@ -26,28 +25,28 @@ from turnout.files import read_json, write_text
 from turnout.workflow.state import batch_folder
 
 PREFIX = "begun-"
-# What the verdict says of a unit that such a job left.
+# Complaint about a unit whose job ended while it was computed.
 LEFT = "its job ended while it was computed"
 
 
 def begun(state: Path) -> dict[str, str]:
-    """Units that were begun and have not ended, and the run that began each first; ``state`` is their shard's file.
+    """Units that were started and have not ended, and the run that first started each; ``state`` is the state file.
 
-    That which was begun last is the last: who ends every job keeps none waiting that was only begun beside it.
+    The unit started last comes last, for it is the most probable cause; so the others are not delayed by it.
     """
     found = {}
     for note in sorted(batch_folder(state).glob(f"{PREFIX}*"), key=_changed_at):
         run, unit = _said(note)
-        if note == _note(state, unit):  # else it is cut: the unit was not even begun
+        if note == _note(state, unit):  # else it is truncated: the unit was not started
             found[unit] = run
     return found
 
 
 @contextmanager
 def noted(state: Path, unit: str, run: str) -> Iterator[None]:
-    """Note a unit until the block has come to its end, by an exception, too; a whole note that is there keeps its run.
+    """Mark a unit as started until the block ends, also by an exception; an existing complete mark keeps its run.
 
-    The note is not flushed to the disk: it tells of a process that died, not of a machine that did.
+    The mark is not flushed to the disk: it is for a process that dies, not for a machine that does.
     """
     note = _note(state, unit)
     if _said(note)[1] != unit:
@@ -62,12 +61,12 @@ def noted(state: Path, unit: str, run: str) -> Iterator[None]:
 
 
 def forget(state: Path, unit: str) -> None:
-    """Take the note of a unit away, where there is one."""
+    """Remove the mark of a unit if there is one."""
     _note(state, unit).unlink(missing_ok=True)
 
 
 def _said(note: Path) -> tuple[str, str]:
-    """(run, unit) of a note, as far as it is there and whole."""
+    """(run, unit) of a mark; empty texts as far as it is missing or truncated."""
     try:
         run, _, unit = note.read_bytes().decode(errors="replace").partition("\n")
     except FileNotFoundError:  # its unit has ended meanwhile
@@ -88,30 +87,30 @@ def _note(state: Path, unit: str) -> Path:
 
 @dataclass(frozen=True)
 class Postponed:
-    """A unit, and the fault that it ``met``."""
+    """A unit without a result, and the ``fault`` of the machine that caused it."""
 
     unit: str
     met: str
 
 
 def read_postponed(state: Path) -> tuple[int, dict[str, str]]:
-    """(how often the next job of a shard was asked for, {unit: what it met}); ``state`` is its state file.
+    """(number of requested reruns of a shard, {unit: fault}); ``state`` is its state file.
 
-    The number is a parameter of that job: one more makes it run again, though no plan has changed.
+    The number is a parameter of the job: a higher one makes it run again without a change of the plan.
     """
     content = read_json(_path(state), {"jobs": 0, "units": {}})
     return content["jobs"], content["units"]
 
 
 def note_postponed(state: Path, units: Mapping[str, str]) -> None:
-    """Note the ``units`` that the job of a shard leaves; without any, and none before, there is no file."""
+    """Write the postponed ``units`` of a shard; no file if there are none and were none before."""
     jobs, before = read_postponed(state)
     if units or before:
         _write(state, jobs + bool(units), units)
 
 
 def ask_again(state: Path) -> None:
-    """Let the job of a shard run again, though no unit of it was left: one of its batches is damaged."""
+    """Make the job of a shard run again without postponed units, for instance because a batch is damaged."""
     jobs, units = read_postponed(state)
     _write(state, jobs + 1, units)
 
@@ -128,7 +127,7 @@ FOLDER = Path("work/attempts")
 
 
 def attempts(job: str) -> int:
-    """How often ``job`` was begun without coming to its end; a number it never was where the file is cut."""
+    """Number of unfinished attempts of ``job``; -1, a new value, where the file is truncated."""
     try:
         return int((FOLDER / job).read_text(encoding="utf-8"))
     except FileNotFoundError:
@@ -139,7 +138,7 @@ def attempts(job: str) -> int:
 
 @contextmanager
 def attempt(job: str, before: int) -> Iterator[None]:
-    """One more attempt until the block has come to its end without an exception; ``before`` it was begun so often."""
+    """Count one more attempt than ``before`` until the block ends without an exception."""
     write_text(FOLDER / job, str(before + 1))
     yield
     write_text(FOLDER / job, str(before))

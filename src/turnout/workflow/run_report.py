@@ -1,7 +1,4 @@
-"""Why a run failed, in a few words: from what Snakemake and its jobs have written.
-
-What of a night cannot be used, though every job came to its end: as far as the registry has it.
-"""
+"""Report why a run failed, from the logs of Snakemake and its jobs, and which units could not be used."""
 
 import re
 from collections.abc import Collection
@@ -20,12 +17,15 @@ FAILED = re.compile(
 )
 FINISHED = re.compile(r"^Finished jobid: (\d+) ", re.M)
 STOPPED = re.compile(r"^\w+(?:Errors?|Exception)(?: in (?:file|rule) .*)?:\n(.+)$", re.M)
-LONGEST = 300
+LONGEST = 300  # characters of a message in the report
 
 
 def why(since: int = 0) -> str:
-    """The verdict's first complaint, else the first rule that failed and its log, else what stopped the run before any
-    job; "" where nothing tells. ``since`` is when the run began [ns since 1970]."""
+    """Reason of a failed run in a few words; "" if unknown. ``since`` is its start [ns since 1970].
+
+    It is the first failed rule with its log. If only the rule verdict failed, it is the first complaint of the quality
+    gate. If no rule failed, it is the message that stopped the run before any job.
+    """
     written = sorted((path.stat().st_mtime_ns, path) for path in LOGS.glob("*.snakemake.log"))
     texts = [path.read_text(encoding="utf-8", errors="replace") for time, path in written if time >= since]
     failed = [found for text in texts for found in _failed(text)]
@@ -41,13 +41,13 @@ def why(since: int = 0) -> str:
 
 
 def _failed(text: str) -> list[tuple[str, str]]:
-    """(rule, log) of each job that failed and did not come to its end when it was tried again, once."""
+    """(rule, log) of each job that failed and did not succeed in a later attempt, each job once."""
     ended = set(FINISHED.findall(text))
     return list({job: (rule, log) for rule, job, log in FAILED.findall(text) if job not in ended}.values())
 
 
 def _complaint() -> str:
-    """The first complaint of the verdict, which stands below what it counts."""
+    """First complaint of the quality gate; in its log it follows the line of counts."""
     lines = VERDICT.read_text(encoding="utf-8").splitlines() if VERDICT.exists() else []
     if len(lines) < 2:
         return f"rule verdict failed, see {VERDICT}"
@@ -69,12 +69,12 @@ group by turnout_id order by turnout_id"""
 
 
 def rejected(units: Collection[str], registry: Path) -> list[str]:
-    """Those of the ``units`` whose hammer test gave no model."""
+    """Those of the ``units`` whose hammer test was rejected."""
     return [unit for (unit,) in _asked(registry, REJECTED, [list(units)])] if units else []
 
 
 def unused_turnouts(registry: Path) -> tuple[list[str], bool]:
-    """Turnouts of which files have come and no test and no passage ever counted; and whether that is so of all."""
+    """Turnouts with files but without any accepted test or passage; and whether that holds for all."""
     rows = _asked(registry, UNUSED, [])
     return [turnout for turnout, _ in rows], any(nothing for _, nothing in rows)
 
@@ -85,5 +85,5 @@ def _asked(registry: Path, sql: str, values: list) -> list[tuple]:
     try:
         with open_registry(registry) as connection:
             return connection.execute(sql, values).fetchall()
-    except (RegistryError, duckdb.Error):  # the line of a night that failed must come all the same
+    except (RegistryError, duckdb.Error):  # the report of a failed night must be printed all the same
         return []

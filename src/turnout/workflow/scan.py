@@ -1,7 +1,4 @@
-"""The raw folder of one turnout: which files make which unit, and which files no pattern knows.
-
-Every file below the raw folder of one turnout, and the entries that nobody can use.
-"""
+"""Scan the raw folder of one turnout: group files into units, and report files that match no pattern."""
 
 import os
 from collections.abc import Iterable, Iterator
@@ -17,7 +14,7 @@ from turnout.errors import ReadError
 from turnout.records import Unit
 
 NOTES = ("campaigns.csv", "trains.csv")
-# Names that upload programs give to files they have not finished, and notes for people.
+# Suffixes that upload programs give to unfinished files, and names of files for people; both are ignored.
 UNFINISHED = (".tmp", ".part", ".partial", ".crdownload", ".filepart")
 FOR_PEOPLE = ("README", "README.txt", "README.md", "Thumbs.db", "desktop.ini")
 
@@ -25,7 +22,7 @@ _name = attrgetter("name")
 
 
 class RawFolder:
-    """``files`` are (path below the folder, entry), depth first, sorted; ``problems`` say what was left out and why."""
+    """All files below a raw folder: ``files`` are (path below it, entry), sorted; ``problems`` are excluded entries."""
 
     def __init__(self, raw_root: Path, raw: str):
         self.root, self.raw = os.path.realpath(raw_root), raw
@@ -35,8 +32,10 @@ class RawFolder:
         self._collect(top, "", (os.path.realpath(top),))
 
     def stat(self, inside: str, entry: os.DirEntry) -> tuple[str, int, int] | None:
-        """(path below the raw root, size, time of change [ns]); None for a file that went away meanwhile, and a
-        problem for one that cannot be looked at."""
+        """(path below the raw root, size, time of change [ns]); None for a file that is gone or cannot be read.
+
+        The latter is added to ``problems``.
+        """
         try:
             status = entry.stat()
         except FileNotFoundError:
@@ -46,14 +45,14 @@ class RawFolder:
         except OSError as error:
             self._cannot(inside, "file", error)
             return None
-        # neither size nor time changes when reading is allowed again: until then the file is none
+        # allowing to read it changes neither size nor time, so until then the file is not part of a unit
         if status.st_mode & 0o444 != 0o444 and not os.access(entry.path, os.R_OK):
             self._leave_out(inside, "file", "may not be read", "Allow reading it")
             return None
         return f"{self.raw}/{inside}", status.st_size, status.st_mtime_ns
 
     def _collect(self, folder: str, inside: str, way: tuple[str, ...]) -> None:
-        """``way`` holds the folders that lead here as they are called without links."""
+        """Collect the files of a folder and below; ``ancestors`` are the real paths of the folders that lead here."""
         try:
             with os.scandir(folder) as listing:
                 entries = sorted(listing, key=_name)
@@ -97,7 +96,7 @@ class RawFolder:
 
 
 def _is_text(name: str) -> bool:
-    """Whether a name is UTF-8; one of another encoding holds what no plan and no registry can write."""
+    """Whether a name is UTF-8; another encoding cannot be written into a plan or the registry."""
     try:
         name.encode()
     except UnicodeEncodeError:
@@ -111,14 +110,14 @@ def _within(path: str, root: str) -> bool:
 
 @dataclass
 class Scan:
-    """``units`` sorted by kind and label; ``problems`` say what was left out and why."""
+    """Result of a scan: ``units`` sorted by kind and label; ``problems`` are excluded files with reasons."""
 
     units: list[Unit] = field(default_factory=list)
     problems: list[ReadError] = field(default_factory=list)
 
 
 def scan(turnout: TurnoutConfig, raw_root: Path) -> Scan:
-    """Units of one turnout from the names in its raw folder; no file is opened."""
+    """Units of one turnout from the file names in its raw folder; no file is opened."""
     found, names = Scan(), _names(turnout)
     by_unit: dict[tuple, list] = {}
     matched, unmatched = set(), []
@@ -170,7 +169,7 @@ def _label(kind, match, inside, turnout) -> tuple:
 
 
 def _no_time(match) -> tuple[str, str] | None:
-    """What is wrong with the day or time in a name, and what to do; None where it is in the calendar.
+    """Problem of the day or time in a file name, and its remedy; None if it is a valid date.
 
     >>> import re
     >>> _no_time(re.fullmatch("(?P<campaign>.*)", "2024-13-45"))[0]
@@ -185,7 +184,7 @@ def _no_time(match) -> tuple[str, str] | None:
 
 @lru_cache(maxsize=10_000)
 def _in_the_calendar(text: str, form: str) -> bool:
-    """Remembered: a network has 140,000 files and a few hundred days, and reading a day is a third of the scan."""
+    """Whether a text is a valid time. Cached: a network has 140,000 files, but a few hundred days."""
     try:
         datetime.strptime(text, form)
     except ValueError:

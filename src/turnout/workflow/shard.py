@@ -1,7 +1,4 @@
-"""One stage of one shard: compute the units whose key changed, keep the results of all others.
-
-How far a shard is: a bar for a person, lines for a log.
-"""
+"""Compute one stage of one shard: units whose key changed are computed, the results of all others stay."""
 
 import logging
 import sys
@@ -26,12 +23,12 @@ from turnout.workflow.scan import unit_id
 from turnout.workflow.state import locked
 from turnout.workflow.tasks import Stage, Task, Tasks, contents_of, key_of, named, short
 
-# Seconds between two lines in a log.
+# Seconds between two lines of progress in a log.
 PAUSE = 30.0
 
 
 class Progress:
-    """Counts units; on a terminal a bar, elsewhere a line now and then."""
+    """Shows how many units are done: a bar on a terminal, else a line every ``LOG_INTERVAL`` seconds."""
 
     def __init__(self, name: str, total: int, stream=None):
         self.name, self.total, self.done, self.quarantined = name, total, 0, 0
@@ -55,21 +52,24 @@ class Progress:
             print(f"{self.name}: {self.done} of {self.total} units", file=self.stream, flush=True)
 
     def close(self) -> None:
-        """End the bar; a log needs nothing."""
+        """Close the bar if there is one."""
         if self.bar:
             self.bar.close()
 
 
 LOG = logging.getLogger("turnout.workflow")
 DIED = "the process died that computed it"
-# A result, and the stamp and the contents it was computed from.
+# A result, and the stamp and the contents that it was computed from.
 Computed = tuple[UnitResult, str, str]
 
 
 @dataclass(frozen=True)
 class Summary:
-    """What a shard job did; ``stale`` units wait for a new plan because the configuration changed after it,
-    ``postponed`` ones for the next run because the machine failed them."""
+    """Summary of a shard job, in numbers of units.
+
+    ``stale`` units wait for a new plan, because the configuration changed after it. ``postponed`` ones wait for the
+    next run, because of a fault of the machine.
+    """
 
     shard: str
     known: int = 0
@@ -101,16 +101,16 @@ def run_shard(
     strict: bool = False,
     launched: datetime | None = None,
 ) -> Summary:
-    """Bring the results of one shard up to its plan.
+    """Update the results of one shard to its plan.
 
     Parameters
     ----------
     plan, state : path
-        work/plan/<shard>.json, read after the lock is held, and work/<stage>/<shard>.json, whose batches lie in
-        work/<stage>/<shard>/. Results count once the state file names their batch; it is written in one step,
-        at every checkpoint and at the end, so a kill at any time loses a checkpoint's work and nothing else.
+        work/plan/<shard>.json, read after the lock is acquired, and work/<stage>/<shard>.json, whose batches are in
+        work/<stage>/<shard>/. Results count once the state file names their batch. It is written in one step, at every
+        checkpoint and at the end, so a kill loses at most the work since the last checkpoint.
     stage : Stage
-        What is computed.
+        The computation.
     threads : int
         Processes; the results do not depend on it.
     only : sequence of str, optional
@@ -118,7 +118,7 @@ def run_shard(
     strict : bool
         Raise faults of the program instead of noting them.
     launched : datetime, optional
-        When the run began that this job belongs to: what is tried again in the same run is tried for the first time.
+        Start of the run that this job belongs to; a further attempt in the same run counts as the first one.
     """
     with locked(state):
         run = _Run(Path(state), stage, configuration, Path(raw_root), threads, strict, launched)
@@ -142,7 +142,7 @@ class _Run:
         self.suspects = begun(path)
 
     def bring_up(self, planned: list[Planned], only: Sequence[str] | None) -> Summary:
-        """Compute what is missing, write batches and state."""
+        """Compute missing units, write batches and state."""
         wanted = {unit_id(p.unit): p for p in planned if p.unit.kind == self.stage.kind}
         due, stale = self.tasks.due(wanted, only)
         self._clear_notes(due, only)
@@ -157,21 +157,21 @@ class _Run:
         )  # fmt: skip
 
     def _clear_notes(self, due: list[Task], only: Sequence[str] | None) -> None:
-        """Forget that units were begun which are asked for no more, or known meanwhile."""
+        """Clear the marks of started units that need no computation any more."""
         asked = {name for name in self.suspects if only is None or name.split("/", 1)[0] in only}
         for name in asked - {_name(task) for task in due}:
             forget(self.path, name)
             del self.suspects[name]
 
     def _compute_all(self, tasks: list[Task]) -> Counter[str]:
-        """Keep every result; how many there are of each status."""
+        """Compute the tasks and store every result; returns the number of units by status."""
         if tasks:
-            # before processes are forked: each of them would import it anew
+            # import it before processes are forked, or each of them would import it again
             self.compute = named(self.stage.compute)
         self.progress, self.statuses = Progress(self.name, len(tasks)), Counter[str]()
         asked = {_name(task): task for task in tasks}
         alone = [asked[name] for name in self.suspects if name in asked]
-        each = in_processes if alone else in_order  # a process that has computed may have threads, which no fork takes
+        each = in_processes if alone else in_order  # a process that has computed may have threads, no fork then
         try:
             for found in each(self._compute, [t for t in tasks if _name(t) not in self.suspects], self.threads):
                 if isinstance(found, Died):
@@ -188,7 +188,10 @@ class _Run:
         return self.statuses
 
     def _compute_alone(self, task: Task) -> None:
-        """Compute what a process, or the job before, may have died of; where another one dies of it, that is noted."""
+        """Compute a task that may have ended a process or an earlier job, in its own process.
+
+        If that dies as well, and not in the run that first started the unit, the unit gets a quarantine row.
+        """
         name = _name(task)
         LOG.warning("%s: a process or a job died while it was computed: it is computed by itself", name)
         (found,) = in_processes(self._compute, [task], 1)
@@ -200,7 +203,7 @@ class _Run:
             self._keep(Postponed(name, DIED))
         else:
             self._keep(found := _for_now(self._guarded(task, died_of)))
-            self.ledger.checkpoint()  # before it is forgotten
+            self.ledger.checkpoint()  # before its mark is cleared
             if not isinstance(found, Postponed):
                 forget(self.path, name)
 
@@ -236,14 +239,14 @@ class _Run:
         return with_copies_said(result, unit, task.copied), task.stamp, short(contents, elsewhere)
 
     def _note_postponed(self, wanted: Container[str], tried: Container[str]) -> int:
-        """Note the units that the machine failed, those of turnouts that were not asked for as before; how many."""
+        """Write the postponed units and return their number; those of turnouts that did not take part stay."""
         before = read_postponed(self.path)[1]
         left = {unit: met for unit, met in before.items() if unit in wanted and unit not in tried}
         note_postponed(self.path, left | self.postponed)
         return len(self.postponed)
 
     def _set_copies_aside(self, wanted: dict[str, Planned], only: Sequence[str] | None) -> None:
-        """Units that hold files of others of their turnout, too, are computed again without these."""
+        """Compute units again that contain copies of files of other units of their turnout, without these files."""
         if self.stage.gather:
             return
         asked = {name for name, p in wanted.items() if only is None or p.unit.turnout in only}
@@ -255,9 +258,12 @@ class _Run:
         self._compute_all(again)
 
     def _withdraw_vanished(self, wanted: Collection[str]) -> int:
-        """Count units whose files are all gone. Their rows stay; an empty result takes them back of a unit that only
-        ever was in quarantine, for nothing is left to repair, and of one whose files were moved to others, for they
-        would count twice. A stage that gathers its own units looks at some of them only: none has vanished for that."""
+        """Number of units whose files are all gone; their rows stay.
+
+        An empty result withdraws the rows of a unit that was only in quarantine, as there is nothing left to repair. It
+        also withdraws those of a unit whose files were moved to other units, as they would count twice. A stage that
+        gathers its own units plans only some of them, so none of its units counts as vanished.
+        """
         units = self.state.units
         gone = [name for name in units if name not in wanted]
         left = {name for name in gone if units[name].status == "quarantined"}
@@ -269,7 +275,7 @@ class _Run:
 
 
 def _for_now(found: Computed | Postponed) -> Computed | Postponed:
-    """A result that no content is known by: a file that is touched is tried again, for the machine may be another."""
+    """A result whose key matches no content, so that touching a file repeats it, perhaps on another machine."""
     if isinstance(found, Postponed):
         return found
     return replace(found[0], key=f"{DIED} {found[0].key}"), *found[1:]
@@ -280,5 +286,5 @@ def _name(task: Task) -> str:
 
 
 def _no_rows(*_, **__) -> dict[str, list[dict]]:
-    """Of a unit that holds nothing but files which count elsewhere."""
+    """Rows of a unit with no other files than copies: none."""
     return {}

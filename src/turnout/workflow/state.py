@@ -1,4 +1,4 @@
-"""What a shard has computed: per unit the key of its result and the batch that holds it."""
+"""Read and write the state of a shard: for each unit the key of its result and the batch that contains it."""
 
 import json
 import logging
@@ -15,17 +15,20 @@ from turnout.workflow.batches import is_sound, read_column
 
 LOG = logging.getLogger("turnout.workflow")
 
-# Of a unit: its rows count; all its files are gone and it has no rows.
+# Status of units whose rows count, and of a unit whose files are gone and which has no rows.
 WITH_ROWS, VANISHED = ("ok", "partly"), "vanished"
-ELSEWHERE = "-"
+ELSEWHERE = "-"  # before the content of a file that counts in another unit
 END = "\n}}\n"
 
 
 @dataclass(frozen=True)
 class Known:
-    """``stamp``: names, sizes and times it was computed from; ``key``: the same by content; ``batch``: file name;
-    ``contents``: of its files in their order, a - before those that count elsewhere, "" in states of earlier
-    versions."""
+    """State of one unit.
+
+    ``stamp`` is the digest of configuration, notes, and names, sizes and times of its files; ``key`` the same with
+    their contents; ``batch`` the file name. ``contents`` are hashes of its files in their order, with "-" before those
+    that count in other units; "" in states of earlier versions.
+    """
 
     stamp: str
     key: str
@@ -36,44 +39,46 @@ class Known:
 
     @property
     def held(self) -> list[str]:
-        """Contents of all its files, in their order."""
+        """Content hashes of all its files, in their order."""
         return [content.removeprefix(ELSEWHERE) for content in self.contents.split()]
 
     @property
     def elsewhere(self) -> list[str]:
-        """Contents of the files that count in other units."""
+        """Content hashes of the files that count in other units."""
         return [c.removeprefix(ELSEWHERE) for c in self.contents.split() if c.startswith(ELSEWHERE)]
 
     @property
     def counted(self) -> list[str]:
-        """Contents of the files that its rows come from."""
+        """Content hashes of the files that its rows come from."""
         return [content for content in self.contents.split() if not content.startswith(ELSEWHERE)]
 
 
 @dataclass
 class State:
-    """State of one shard; ``batches`` in the order in which they were written."""
+    """State of one shard: its units by name, and its ``batches`` in the order of writing."""
 
     units: dict[str, Known] = field(default_factory=dict)
     batches: list[str] = field(default_factory=list)
 
     def forget(self, batches: Collection[str]) -> int:
-        """Drop ``batches`` and the units that count by them, which are new from now on; how many units."""
+        """Remove ``batches`` and their units, which then count as new; returns the number of units."""
         before = len(self.units)
         self.units = {unit: known for unit, known in self.units.items() if known.batch not in batches}
         self.batches = [b for b in self.batches if b not in batches]
         return before - len(self.units)
 
     def save(self, path: Path) -> None:
-        """Write it in one step: the results of a batch count from now on."""
+        """Write the state in one step; from then on the results of its batches count."""
         units = {u: [k.stamp, k.key, k.algo, k.status, k.batch, k.contents] for u, k in sorted(self.units.items())}
         lines = ",\n".join(f"{json.dumps(u, ensure_ascii=False)}:{json.dumps(v)}" for u, v in units.items())
         write_text(path, f'{{"batches":{json.dumps(self.batches)},"units":{{\n{lines}{END}')
 
 
 def load_state(path: Path) -> State:
-    """State in ``path``, empty where there is none, from its batches where the file is cut; TurnoutError where somebody
-    else changed it."""
+    """State in ``path``; empty without a file, and rebuilt from the batches if the file is truncated.
+
+    TurnoutError if the file has other content.
+    """
     if is_cut_state(path):
         LOG.warning("%s is cut: it is made again from its batches", path)
         return _from_batches(batch_folder(path))
@@ -89,14 +94,15 @@ def load_state(path: Path) -> State:
 
 
 def is_cut_state(path: Path) -> bool:
-    """Whether a state file is there of which the end is missing."""
+    """Whether a state file exists and is truncated."""
     return is_cut(path, END)
 
 
 def _from_batches(folder: Path) -> State:
-    """The state that the batches of a shard tell: of a unit in two of them the one written last counts.
+    """State rebuilt from the batches of a shard; of a unit in two of them the last one counts.
 
-    It lacks what no batch holds: the job of the shard reads its raw files, and computes none of which the key is known.
+    Stamps and contents are not in batches. The job of the shard reads the raw files, and computes only units with
+    another key.
     """
     written = sorted(folder.glob("batch-*.parquet"), key=lambda path: (path.stat().st_mtime_ns, path.name))
     state = State(batches=[path.name for path in written])
@@ -107,26 +113,26 @@ def _from_batches(folder: Path) -> State:
 
 
 def locked(state: Path) -> FileLock:
-    """The lock of whoever writes a state."""
+    """Lock for writing a state."""
     state.parent.mkdir(parents=True, exist_ok=True)
     return FileLock(state.parent / f".{state.stem}.lock")
 
 
 def mark_of(state: Path) -> Path:
-    """What Snakemake knows of a state: work/hammer/00of01.json -> work/hammer/00of01.done.
+    """Mark file, the output that Snakemake knows: work/hammer/00of01.json -> work/hammer/00of01.done.
 
-    It deletes the output of a job that fails; what the job has kept until then must stay.
+    The state itself is no output, because Snakemake deletes the output of a failed job.
     """
     return Path(state).with_suffix(".done")
 
 
 def states_below(work: Path) -> list[Path]:
-    """State files of all stages and shards, of earlier numbers of shards, too."""
+    """State files of all stages and shards, including those of earlier numbers of shards."""
     return sorted(p for p in work.glob("*/*of*.json") if p.parent.name != "plan")
 
 
 def state_of_mark(mark: os.PathLike) -> Path:
-    """work/hammer/00of01.done -> work/hammer/00of01.json."""
+    """State file of a mark: work/hammer/00of01.done -> work/hammer/00of01.json."""
     return Path(mark).with_suffix(".json")
 
 
@@ -141,12 +147,12 @@ def state_of(batch: Path) -> Path:
 
 
 def batch_paths(states: Iterable[Path]) -> list[Path]:
-    """Batch files that the ``states`` name, shard by shard in the order in which they were written."""
+    """Batch files that the ``states`` name, shard by shard in the order of writing."""
     return [batch_folder(Path(s)) / name for s in states for name in load_state(Path(s)).batches]
 
 
 def remove_orphans(state: State, folder: Path) -> int:
-    """Delete batches that ``state`` does not name, and temporary files: a killed job left them. Returns how many."""
+    """Delete batches that ``state`` does not name, and temporary files, left by a killed job; returns their number."""
     named, count = set(state.batches), 0
     for path in [*folder.glob("batch-*.parquet"), *folder.glob(".*.tmp")]:
         if path.name not in named:

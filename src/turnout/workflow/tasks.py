@@ -1,8 +1,7 @@
-"""What a shard has to compute: units that are new, and those of which anything changed that they are computed from.
+"""Find the units of a shard to compute: new ones, and those whose inputs or code have changed.
 
-From what a unit is computed: quickly by names, sizes and times of its files, surely by their content.
-
-A stage: what is computed of each unit, by which code, with what from other stages.
+A change is first looked for in names, sizes and times of files, then confirmed by their content. ``Stage`` describes
+the computation: its function, the version of its code, and what it uses of other stages.
 """
 
 import os
@@ -24,27 +23,27 @@ from turnout.workflow.state import ELSEWHERE, State
 
 
 def stamp_of(planned: Planned) -> str:
-    """Digest of configuration, note, and name, size and time of each file; no file is opened."""
+    """Digest of configuration, notes, and name, size and time of each file; no file is opened."""
     unit = planned.unit
     return digest([unit.config_hash, planned.note, unit.files])
 
 
 def contents_of(planned: Planned, raw_root: Path) -> list[str | None]:
-    """sha256 of each file of a unit, None for one that is gone; OSError where one cannot be read."""
+    """sha256 of each file of a unit, None for a missing one; OSError where one cannot be read."""
     return [_content(os.path.join(raw_root, path)) for path, *_ in planned.unit.files]
 
 
 def key_of(planned: Planned, contents: Sequence[str | None]) -> str:
-    """Digest of configuration, note, and name and content of each file."""
+    """Digest of configuration, notes, and name and content of each file."""
     unit = planned.unit
     files = [[path, content] for (path, *_), content in zip(unit.files, contents, strict=True)]
     return digest([unit.config_hash, planned.note, files])
 
 
 def short(contents: Sequence[str | None], elsewhere: Container[int] = ()) -> str:
-    """The contents as a state keeps them: enough to tell the files of a fleet; "" where one was gone.
+    """Text of the contents for a state: the first 16 digits of each hash; "" if a file was missing.
 
-    The files whose numbers are in ``elsewhere`` count elsewhere.
+    ``elsewhere`` are the indices of files that count in other units.
 
     >>> short(["e3b0c44298fc1c149afbf4c8996fb924", "0123456789abcdef0123456789abcdef"], {1})
     'e3b0c44298fc1c14 -0123456789abcdef'
@@ -65,13 +64,13 @@ Token = str | Callable[[Unit], str]
 
 @dataclass(frozen=True)
 class Stage:
-    """What a stage computes: units of ``kind`` by ``compute(unit, turnout, raw_root, algo=...)``.
+    """A stage computes units of ``kind`` by ``compute(unit, turnout, raw_root, algo=...)``.
 
-    ``algo`` is the version of its code, part of every key. ``context(turnout_id, settings)``, where given, returns
-    (token, value): the token, or what it says of a unit where it is a function, enters the key; the value is passed on
-    as ``context=``. ``settings`` are those of the turnout, by part. ``gather(plan, configuration)``,
-    where given, makes units of the stage's own from a plan file, else they are the plan's. All three may be named,
-    "package.module:function", and are then imported when there is something to compute.
+    ``algo`` is the version of its code, part of every key. ``context(turnout_id, settings)``, if given, returns (token,
+    value). The token is text, or a function of the unit that returns text; that text is part of the key. The value is
+    passed to ``compute`` as ``context=``. ``settings`` are those of the turnout, by part. ``gather(plan,
+    configuration)``, if given, makes the units of the stage from a plan file; otherwise they are those of the plan. All
+    three may be names, "package.module:function", which are imported when there is something to compute.
     """
 
     kind: str
@@ -82,7 +81,7 @@ class Stage:
 
 
 def named(function: Callable | str) -> Callable:
-    """The function that "package.module:name" names; a module of one's own lies in the folder of the run."""
+    """Function from its name "package.module:name"; a user's own module must be in the folder of the run."""
     if callable(function):
         return function
     module, _, name = function.partition(":")
@@ -92,13 +91,13 @@ def named(function: Callable | str) -> Callable:
 
 
 def with_token(planned: Planned, token: Token) -> Planned:
-    """The unit as planned, its note with what the stage's context says of it."""
+    """The planned unit, with the token of the stage's context appended to its note."""
     return replace(planned, note=planned.note + (token if isinstance(token, str) else token(planned.unit)))
 
 
 @dataclass(frozen=True)
 class Task:
-    """A unit to compute and what that takes; of its files those ``copied`` are left out, for they count elsewhere."""
+    """A unit to compute with its inputs; files in ``copied`` are excluded, because they count in other units."""
 
     planned: Planned
     turnout: TurnoutConfig
@@ -108,7 +107,7 @@ class Task:
 
 
 class Tasks:
-    """Compares a plan with the state of its shard; each turnout's configuration is read once, and when it is needed."""
+    """Compares a plan with the state of its shard; the configuration of each turnout is read once, when needed."""
 
     def __init__(self, state: State, stage: Stage, configuration: Configuration, raw_root: Path):
         self.state, self.stage, self.configuration, self.raw_root = state, stage, configuration, raw_root
@@ -116,7 +115,7 @@ class Tasks:
         self._turnouts: dict[str, TurnoutConfig | None] = {}
 
     def due(self, wanted: Mapping[str, Planned], only: Sequence[str] | None) -> tuple[list[Task], int]:
-        """Tasks of all units to compute, sorted; and how many units wait for a plan."""
+        """Tasks of all units to compute, sorted, and the number of units that wait for a new plan."""
         due, stale = [], 0
         for name in sorted(wanted):
             if only is not None and wanted[name].unit.turnout not in only:
@@ -131,7 +130,7 @@ class Tasks:
         return due, stale
 
     def task(self, planned: Planned) -> Task | None:
-        """The task of one unit; None where the configuration is not the one of the plan any more."""
+        """The task of one unit; None if the configuration has changed since the plan."""
         unit = planned.unit
         turnout = self._turnout(unit.turnout)
         if turnout is None or turnout.hashes[unit.kind] != unit.config_hash:
@@ -141,7 +140,7 @@ class Tasks:
         return Task(planned, turnout, stamp_of(planned), value)
 
     def is_known(self, name: str, wanted: Mapping[str, Planned]) -> bool:
-        """Whether the state holds the result of the unit as it is planned now."""
+        """Whether the state has the result of the unit as it is planned now."""
         known = self.state.units.get(name)
         return known is not None and (known.stamp, known.algo) == (self._stamp(wanted[name]), self.stage.algo)
 
@@ -149,7 +148,7 @@ class Tasks:
         return stamp_of(with_token(planned, self._context(planned.unit.turnout)[0]))
 
     def _still_a_copy(self, name: str, wanted: Mapping[str, Planned]) -> bool:
-        """True for what holds no copies, and where their originals are as they were."""
+        """True for a unit without copies, and for one whose originals have not changed."""
         return all(o in wanted and self.is_known(o, wanted) for o in originals_of(self.state.units[name]))
 
     def _context(self, turnout: str) -> tuple[Token, object]:
@@ -167,7 +166,7 @@ class Tasks:
         return named(self.stage.context)(turnout, settings)
 
     def _turnout(self, turnout: str) -> TurnoutConfig | None:
-        """Configuration with the notes of the raw folder; None for a turnout that has none any more."""
+        """Configuration with the notes of the raw folder; None for a turnout that is no longer configured."""
         if turnout not in self._turnouts:
             try:
                 self._turnouts[turnout] = with_raw(self.configuration.turnout(turnout), self.raw_root)
@@ -176,14 +175,14 @@ class Tasks:
         return self._turnouts[turnout]
 
     def _same_content(self, task: Task) -> bool:
-        """Whether only times changed; the state then notes the new ones."""
+        """Whether only file times changed; the state then gets the new stamp."""
         name = unit_id(task.planned.unit)
         known = self.state.units.get(name)
         if known is None or known.algo != self.stage.algo:
             return False
         try:
             contents = contents_of(task.planned, self.raw_root)
-        except OSError:  # met again, and told, when it is computed
+        except OSError:  # reported when the unit is computed
             return False
         if same := known.key == key_of(task.planned, contents):
             self.state.units[name] = replace(known, stamp=task.stamp, contents=short(contents))

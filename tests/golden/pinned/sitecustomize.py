@@ -4,6 +4,7 @@ Whoever compiles kernels keeps the real fingerprint: it names the folder of mach
 """
 
 import datetime
+import os
 import sys
 from importlib.machinery import SourceFileLoader
 from types import FunctionType
@@ -56,4 +57,5 @@ def exec_module(self, module):
         _patch(module)
 
 
-SourceFileLoader.exec_module = exec_module
+if "TURNOUT_GOLDEN" in os.environ:
+    SourceFileLoader.exec_module = exec_module

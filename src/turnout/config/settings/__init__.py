@@ -1,4 +1,4 @@
-"""Method settings: one dataclass per part, each field with unit, limits and the reason of its default."""
+"""Settings of the methods: one dataclass per section, each field with unit, limits and the reason of its default."""
 
 import pkgutil
 from functools import cache
@@ -7,7 +7,7 @@ from importlib import import_module
 
 @cache
 def parts() -> dict[str, type]:
-    """Settings class of every part: module ``<part>.py`` of this folder holds the class ``<Part>Settings``.
+    """Settings class of every section: the module ``<section>.py`` holds the class ``<Section>Settings``.
 
     >>> parts()["fleet"].__name__
     'FleetSettings'

@@ -1,4 +1,4 @@
-"""How a run over the whole fleet is cut up and judged."""
+"""Settings of a run over the whole fleet: shards, checkpoints and limits for failed runs."""
 
 from dataclasses import dataclass
 

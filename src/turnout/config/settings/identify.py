@@ -1,4 +1,4 @@
-"""How modes are identified from the free decays of hammer tests."""
+"""Settings of the identification of modes from the free decays of hammer tests."""
 
 from dataclasses import dataclass
 

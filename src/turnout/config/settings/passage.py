@@ -1,4 +1,4 @@
-"""Settings of the passage part: axles, speed, train type, joint fit of all wheels, honest scores, clusters."""
+"""Settings of the passage analysis: axles, speed, train type, joint fit of all wheels, scores, clusters."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class PassageSettings:
         0.5,
     )
     load_trains_minimum: int = setting(5, "", "trains of known weight that a calibration needs", 2)
-    # what is kept beside the recordings
+    # files of the analysis
     axle_patterns: str = setting(
         "config/vehicles/axle_patterns.yaml", "", "axle patterns of known trains, from the folder of the run"
     )

@@ -1,4 +1,4 @@
-"""A field of a settings dataclass that carries its unit, its limits and its reason."""
+"""Field of a settings dataclass with unit, limits and the reason of its default."""
 
 from dataclasses import field
 

@@ -1,4 +1,4 @@
-"""Settings of the simulation: scheme, rates, how much track and time is marched."""
+"""Settings of the simulation: integration scheme, rates, simulated length of track and time."""
 
 from dataclasses import dataclass
 

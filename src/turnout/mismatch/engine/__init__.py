@@ -1,1 +1,1 @@
-"""The diagnosis: cases, candidate effects, evidence and decisions. Nothing here knows of tracks."""
+"""Diagnosis engine: cases, candidate effects, evidence and decisions. It knows nothing of tracks."""

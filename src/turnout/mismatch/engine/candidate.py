@@ -1,4 +1,4 @@
-"""One effect at one place, as the engine may try it: its term, parameters, starts, and what is known of it."""
+"""Candidate effects: one effect at one position, wheelset or sensor, with its term, parameters and starts."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -8,30 +8,68 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Candidate:
-    """One effect at one place: ``make(psi)`` gives the term for parameter values ``psi`` (dict).
+    """One effect at one site. ``make(psi)`` gives the term for parameter values ``psi`` (dict).
 
-    ``family`` is the name that a verdict may give, ``where`` the place scanned, ``frame`` what it is fixed to,
-    ``scanned`` how many places the family has; ``starts`` are parameter sets that do not depend on the base fit;
-    with ``start_from_base`` off the nuisances, too, start from their priors; ``always``: tried on the cheap
-    observations at every place, whatever the residual promises; families with the same word are alike there;
-    ``least``: distance of the first ``sized`` parameters from neutral below which nobody would act, and which it has to
-    exceed by ``sure`` standard errors of the first; ``even``: the cheap observations hardly tell a value from its
-    mirror image about neutral; ``twin``: nuisance that hides it, which would have ``twin_sd`` with the effect;
-    ``from_twin`` makes the first parameter of it, None: its exponential.
-    ``parameters`` have name, unit, neutral, bounds and prior as ``turnout.physics.Parameter``.
-    One found by a look at the residual has the gain it promises [nats] in ``promise``, starts as it is, from the
-    nuisances ``begin``; ``aside`` is evidence from data that are no observations [nats], of a ``sounding`` one so much
-    its own that it need not explain what the observations miss.
-    ``kin``: laws of one part; where one leads at a place, all with that word are refitted there. ``limit`` is the
-    family that it cannot be told from at the lower bound of its first parameter; ``plain`` is (family, k): where its
-    first parameter does not matter it is that law, of the size of its k-th; ``open_as`` is the family that shows the
-    same where its first parameter is only known from below. ``whole``: its response turns with its
-    size, so that a start promises what it is and says nothing of a larger or smaller one.
-    ``loose`` is the share by which the size of an effect errs since its law is not quite the one out there; an
-    ``exact`` one is what it says (a gain, a lag, a place): nothing that it leaves is due to its shape. ``told_by`` is a
-    kind of observations that must speak for it, too: to all others it is another law; ``unopposed`` names observations
-    that together must not speak against it. ``leaves_nothing``: one that may bend what a channel shows into much else,
-    and is therefore named only where it leaves no more than sound turnouts do.
+    Attributes
+    ----------
+    family : str
+        Name of the effect, which a verdict may give.
+    parameters : tuple
+        With name, unit, neutral, bounds and prior as ``turnout.physics.Parameter``. The first one is the size.
+    make : callable
+        Parameter values (dict) -> term.
+    starts : tuple of tuple of float
+        Parameter sets from which refits start. They do not depend on the base fit.
+    where : mapping
+        The site: position, sensor, train, axle.
+    frame : str
+        What the effect is fixed to.
+    n_scanned : int
+        Number of sites at which this effect is tested.
+    start_from_base : bool
+        False: refits start with the nuisance parameters at their priors, not at the base fit.
+    prescreen_group : str
+        Not empty: tried on the cheap observations at every site, whatever the residual promises. Families with the same
+        word share these trials.
+    smallest_reportable : float
+        Distance of the first ``n_size_parameters`` parameters from neutral below which nobody would act.
+    sign_ambiguous : bool
+        The cheap observations hardly tell a value from its mirror image about neutral.
+    masking_parameter : str
+        Nuisance parameter that can absorb the effect. ``masking_sd`` is its prior standard deviation if the effect is
+        there. ``from_masking`` computes the first parameter from it; None: the exponential.
+    promise : float or None
+        Gain that a look at the residual promises [nats]. Such a candidate starts at its first start as it is, with the
+        nuisance parameters ``start_nuisances``.
+    external_evidence : float
+        Evidence from data that are not among the observations [nats].
+    evidence_suffices : bool
+        The external evidence alone is enough: the effect need not explain the residual of the observations.
+    model_error_share : float
+        Share by which an estimated size errs, since the model of the effect is only approximate.
+    exact : bool
+        The model of the effect is exact (a gain, a lag, a position): no residual is due to its shape.
+    required_data_type : str
+        Data type of observations that must support the effect. To all others it looks like another effect.
+    must_not_oppose : tuple of str
+        Observations that together must not contradict the effect.
+    component : str
+        Component that the effect changes. Where one effect of a component leads, all of them are refitted there.
+    limit_form : str
+        Family that looks the same at the lower bound of the first parameter.
+    simpler_form : tuple
+        (family, k): where the first parameter does not matter, the effect equals that family with parameter k as its
+        size.
+    unbounded_form : str
+        Family that looks the same where only a lower limit of the first parameter is known.
+    nonlinear_in_size : bool
+        The response changes its shape with the size. A start says nothing of larger or smaller sizes.
+    must_reach_control_level : bool
+        The effect can imitate many others. It is named only if the residual falls to the control level.
+    n_size_parameters : int
+        Number of parameters that make up the size.
+    min_significance : float
+        Standard errors of the first parameter by which the size must exceed ``smallest_reportable``.
     """
 
     family: str
@@ -67,13 +105,13 @@ class Candidate:
 
     @property
     def key(self):
-        """Family and place in one word."""
+        """Family and site in one word."""
         place = ",".join(f"{k}={v}" for k, v in sorted(self.where.items()))
         return f"{self.family}[{place}]" if place else self.family
 
     @property
     def part(self):
-        """(kin, place or sensor): what it is a law of."""
+        """(component, position or sensor) that the effect changes."""
         return self.kin, self.where.get("place", self.where.get("sensor"))
 
     @property
@@ -82,7 +120,7 @@ class Candidate:
         return np.array([p.neutral for p in self.parameters])
 
     def mirrored(self, values):
-        """``values`` (n_parameter,) with the first parameter on the other side of neutral."""
+        """``values`` (n_parameter,) with the first parameter mirrored about neutral."""
         found = np.array(values, dtype=float)
         found[0] = 2.0 * self.parameters[0].neutral - found[0]
         return found

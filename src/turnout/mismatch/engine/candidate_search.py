@@ -1,6 +1,8 @@
-"""Which candidates are refitted jointly, and from where: scores order the queue, they never speak the verdict.
+"""Selection of the candidates that are refitted jointly, and of their starts.
 
-What a nuisance of the base model has taken in: an effect's size and evidence in closed form, from the base fit.
+Scores order the queue and decide nothing.
+
+The size and evidence of an effect that a nuisance parameter may have absorbed follow in closed form from the base fit.
 """
 
 from dataclasses import dataclass, replace
@@ -12,10 +14,10 @@ from turnout.mismatch.engine.map_fit import Joint
 
 
 def absorbed(case, fit):
-    """(gain [nats], candidate, start, values) of every candidate that has a ``twin`` among the nuisances.
+    """(gain [nats], candidate, start, values) of every candidate with a ``masking_parameter`` among the nuisances.
 
-    The twin's estimate is what the effect has been taken for, drawn towards its prior; ``values`` are all nuisances
-    where they would lie with the twin back at its mean and the effect in its place.
+    The estimate of the masking parameter is the effect, drawn towards the prior. ``values`` are all nuisance parameters
+    with the masking parameter back at its mean and the effect in its place.
     """
     index = {n.name: k for k, n in enumerate(case.nuisances)}
     found = []
@@ -45,7 +47,7 @@ def gain_when_opened(m, s, tau, wide):
     .. math:: s'^{-2} = s^{-2} - \tau^{-2}, \quad m' = m\, s'^2 / s^2, \quad
               g = \ln N(m'; 0, s'^2 + T^2) - \ln N(m'; 0, s'^2 + \tau^2)
 
-    The estimate is that under the wide prior, :math:`m' T^2 / (s'^2 + T^2)`. None where the data say nothing.
+    The estimate is that under the wide prior, :math:`m' T^2 / (s'^2 + T^2)`. None if the data add nothing to the prior.
 
     >>> gain_when_opened(0.0, 0.1, 0.1, 0.7) is None
     True
@@ -59,16 +61,22 @@ def gain_when_opened(m, s, tau, wide):
     return float(gain), float(free * wide**2 / after)
 
 
-NEAR = 0.95  # m: one bay and a half
-ALIKE = 1.5  # m: two bays, of any sleepers; a second of the same kind there is what the first one's shape leaves
-CHEAP = 0.5  # of what a second effect must promise, where the cheap observations alone do: the others come on top
-HOPELESS = 0.1  # of the leader's estimated gain; what promises less is not refitted, but the second is
+NEAR = 0.95  # m, one and a half sleeper bays: effects of two families that are closer count as one
+# m, two sleeper bays. A second effect of the same family that is closer is an error in the shape of the first.
+ALIKE = 1.5
+# Share of the required promise of a second effect, if only the cheap observations promise it: others will add to it.
+CHEAP = 0.5
+# Share of the leader's estimated gain. From the third candidate on, those that promise less are not refitted.
+HOPELESS = 0.1
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A ``candidate`` to refit from ``start`` (n_term,) and ``values`` of nuisances; ``promised`` is what the cheap
-    observations alone gained [nats]; a ``rival`` is refitted only where the laws that it is kin to gain something."""
+    """A ``candidate`` to refit from ``start`` (n_term,) and nuisance ``values``.
+
+    ``cheap_gain`` is the gain from the cheap observations alone [nats]. A ``rival`` is refitted only if another effect
+    of its component gains something.
+    """
 
     candidate: object
     start: np.ndarray
@@ -78,13 +86,13 @@ class Entry:
 
 
 def shortlist(case, fit, settings, promising=()):
-    """Entries in order of promise.
+    """Tasks in order of promise.
 
-    A case whose predictions are cheap has every family refitted from every start. For a dear one ``scout`` fits the
-    families that show in the cheap observations; the others are scored by the columns of their starts
-    (``Case.screen``), or predicted where they have none. On top of an effect only the families of the whole track,
-    which common values hide, and those that were ``promising`` beside it are scouted (all where it is None): for the
-    others what is left is small enough for columns.
+    If predictions are cheap, every family is refitted from every start. In an expensive case, ``prescreen`` fits the
+    families that show in the cheap observations. The others are scored by the columns of their starts
+    (``Case.screen``), or by a prediction if there is no column. On top of a first effect, ``prescreen`` takes only
+    families of the whole track, which the common parameters mask, and the ``promising`` ones (None: all). For the
+    others the residual is small enough for columns.
     """
     from turnout.mismatch.engine.hammer_prescreen import scout
 
@@ -130,7 +138,7 @@ def shortlist(case, fit, settings, promising=()):
 
 
 def _from_afar(case, fit, projector, at_start, candidate):
-    """Entry of a ``candidate`` as it is ``at_start``, simulated, with its twin back at the mean: neither is small."""
+    """Entry of a ``candidate`` simulated ``at_start``, with its masking parameter at the mean: no change is small."""
     back = {n.name: n.mean for n in case.nuisances if n.name == candidate.twin}
     parts = _predicted(case, replace(fit, values={**fit.values, **back}), at_start, 0)
     gain, _ = projector.score(parts, at_start, 0)
@@ -138,7 +146,7 @@ def _from_afar(case, fit, projector, at_start, candidate):
 
 
 def _asked(entry, fit, scouted, settings):
-    """Promise from which an entry is refitted: beside an effect the residual must promise another name. [nats]"""
+    """Promise from which an entry is refitted. Beside a first effect it must be that of a separate name. [nats]"""
     if not fit.candidates:
         return settings.promise
     by_cheap = entry[0] == scouted.get(entry[1].key)
@@ -146,14 +154,16 @@ def _asked(entry, fit, scouted, settings):
 
 
 def _fitted_already(entry, scored):
-    """The entry, with start and nuisances of the best fit that was made of this candidate already, where one was: a
-    column is straight, and the nuisances have to come back all the way."""
+    """The entry, with start and nuisance parameters of the best fit of the same candidate, if there is one.
+
+    A column is linear, and from it all nuisance parameters would have to return.
+    """
     made = [e for e in scored[entry[1].family] if e[1].key == entry[1].key and e[3]]
     return max(made, key=lambda e: e[0], default=entry)
 
 
 def _kin(chosen, scored):
-    """Best starts of the laws that act on the same parts as the first chosen: columns hardly tell them apart."""
+    """Best starts of other effects on the components of the first two chosen: columns hardly separate them."""
     parts = [e[1].part for e in chosen if e[1].kin][:2]
     known, best = {(entry[1].family, entry[1].part) for entry in chosen}, {}
     for entry in sorted((e for entries in scored.values() for e in entries), key=lambda e: e[0]):
@@ -164,8 +174,11 @@ def _kin(chosen, scored):
 
 
 def _same_place(candidate, accepted):
-    """A second law at the place, sensor or train of an accepted effect would only mend its shape, where it can: not
-    one that says what it is, nor what is of all wheels beside what is of one and known by its blows."""
+    """Whether a second effect at the position, sensor or train of an accepted one would only correct its shape.
+
+    Not so for two exact effects, nor for an effect of all wheels beside one of a single wheel that is known by its
+    impacts.
+    """
     if candidate.key == accepted.key:
         return True
     a, b = candidate.where, accepted.where
@@ -178,14 +191,14 @@ def _same_place(candidate, accepted):
 
 
 def amplified(candidate, k, share):
-    """A start with ``share`` of the way from neutral in its first parameter; the others are its shape."""
+    """The start with its first parameter at ``share`` of the distance from neutral. The others define its shape."""
     start = np.array(candidate.starts[k], dtype=float)
     start[0] = candidate.neutral[0] + share * (start[0] - candidate.neutral[0])
     return start
 
 
 def _predicted(case, fit, candidate, k):
-    """Change of the prediction at a start; None where this effect cannot be simulated at this strength here."""
+    """Change of the prediction at a start. None if the effect cannot be simulated at this size."""
     try:
         new = case.predict(fit.values, (*fit.terms, candidate.term(candidate.starts[k])), case.observations)
     except SimulationError:
@@ -194,7 +207,7 @@ def _predicted(case, fit, candidate, k):
 
 
 def _promising(scored, settings):
-    """The best start of each of the first ``refits`` families; of the first three also their second best place."""
+    """The best start of each of the first ``refits`` families. Of the first three also their second best site."""
     ranked = [sorted(entries, key=lambda e: -e[0]) for entries in scored.values()]
     ranked.sort(key=lambda entries: -entries[0][0])
     chosen = []
@@ -222,7 +235,7 @@ class Projector:
 
         .. math:: g = \max_a\, 2a\,c^T P r - a^2 c^T P c, \quad P = I - J (J^T J + I)^{-1} J^T
 
-        with the nuisances' distance from their priors taken along. A column that nuisances imitate scores low.
+        with the distance of the nuisances from their priors included. A column that nuisances imitate scores low.
         """
         if parts is None:
             return 0.0, 1.0
@@ -240,7 +253,7 @@ class Projector:
 
 
 def _furthest(candidate, start):
-    """Largest multiple of the way from neutral to ``start`` within the bounds, at most 3."""
+    """Largest multiple of the distance from neutral to ``start`` within the bounds, at most 3."""
     reach = 3.0
     for p, s in list(zip(candidate.parameters, start))[:1]:
         way = s - p.neutral

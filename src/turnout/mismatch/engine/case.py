@@ -1,6 +1,6 @@
-"""A case: conditions, inputs and outputs, a simulator, terms, nuisances. The engine knows nothing else.
+"""Cases: observations, nuisance parameters, candidate effects and a simulator. The engine knows nothing else.
 
-One recording as the engine sees it: data, errors, conditions, and the cells its mismatch may be locked to.
+An observation is one recording with its data, errors, condition and time-frequency cells.
 """
 
 from collections.abc import Mapping
@@ -14,15 +14,18 @@ from turnout.mismatch.engine.candidate import Candidate
 
 @dataclass(frozen=True)
 class Observation:
-    """One recording under one condition, as a vector the simulator can predict.
+    """One recording under one condition, as a vector that the simulator can predict.
 
-    ``data``, ``sigma`` (n,) in the same unit: noise and materiality floor; ``effective`` share of the samples
-    that are independent, 0 to 1. Folds leave out a ``condition``; ``kind`` shares one noise scale. ``cells`` (n,)
-    numbers the time-frequency cell of each sample, -1 for none; ``labels`` frame -> (n_cell,) level of each cell.
-    ``rows`` of equal length lie one behind the other, of sensors or of Re and Im: what one misses in a stretch, others
-    may miss as well. ``modes`` (n, m) in the unit of the data are errors of this recording's own with unit variance
-    each (roughness of its wheels, tolerance of a model that errs smoothly): they are integrated out, see ``whitened``;
-    in single precision, where they are many, what is whitened is right to 1e-6 of its size.
+    ``data``, ``sigma`` (n,) in the same unit: noise and materiality floor. ``effective`` is the share of independent
+    samples, 0 to 1. Folds leave out a ``condition``. Observations of one ``data_type`` share a noise scale.
+
+    ``cells`` (n,) numbers the time-frequency cell of each sample, -1 for none. ``labels`` frame -> (n_cell,) level of
+    each cell. ``rows`` of equal length follow one another, of sensors or of Re and Im. Errors in one stretch may appear
+    in all rows at once.
+
+    ``modes`` (n, m) in the unit of the data are errors of this recording with unit variance each, for example roughness
+    of its wheels. They are integrated out, see ``whiten``. In single precision, the result is right to 1e-6 of its
+    size.
     """
 
     name: str
@@ -51,7 +54,7 @@ class Observation:
 
     @cached_property
     def _subspace(self):
-        """Orthonormal directions (n, m) of the modes over sigma, and how much each is shrunk (m,)."""
+        """Orthonormal directions (n, m) of the modes over sigma, and the shrinkage of each (m,)."""
         if self.modes is None or not self.modes.shape[1]:
             return None
         scaled = self.modes / self.sigma[:, None]
@@ -62,7 +65,7 @@ class Observation:
         return along, 1.0 - 1.0 / np.sqrt(1.0 + power)
 
     def whitened(self, values):
-        r"""``values`` (n,) or (n, k) over the standard deviation of all that is random: :math:`C^{-1/2} x`,
+        r"""``values`` (n,) or (n, k) over the standard deviation of all random errors: :math:`C^{-1/2} x`,
         :math:`C = \mathrm{diag}(\sigma^2) + M M^T` with M the ``modes``.
 
         >>> o = Observation("a", "a", np.zeros(3), 2.0, modes=np.array([[2.0], [2.0], [2.0]]))
@@ -88,7 +91,7 @@ class Observation:
 
 
 class Whitened(np.ndarray):
-    """Values of an observation that are whitened already."""
+    """Values of an observation that are already whitened."""
 
     def __new__(cls, values):
         return np.asarray(values, dtype=float).view(cls)
@@ -96,11 +99,11 @@ class Whitened(np.ndarray):
 
 @dataclass(frozen=True)
 class Nuisance:
-    """A number of the base model that is not exactly known, free under a normal prior.
+    """A parameter of the base model that is not exactly known, free under a normal prior.
 
-    ``mean`` and ``sd`` of the prior in ``unit``; ``owner`` is the observation it belongs to, None where shared;
-    ``trust`` the largest step in prior standard deviations; it ``bends`` where the base model may have bent it to hide
-    an effect, as it may what the track is made of.
+    ``mean`` and ``sd`` of the prior in ``unit``. ``owner`` is the observation that it belongs to, None if shared.
+    ``max_step_sd`` is the largest step of a fit in prior standard deviations. ``can_mask``: the base fit may have
+    changed it to hide an effect.
     """
 
     name: str
@@ -115,16 +118,31 @@ class Nuisance:
 
 
 class Case:
-    """Base of all cases: give it observations, nuisances, candidates and override ``predict``.
+    """Base of all cases: give it observations, nuisances, candidates, and override ``predict``.
 
-    ``reserved`` are observations that no fit reads: they may withdraw a name, and verify it. ``frozen_jacobian`` tells
-    the engine that a prediction is dear: the nuisances' derivatives are then kept and updated by Broyden's formula, but
-    for observations that are ``cheap``. ``start_values`` are values of nuisances where fits start, else their means;
-    ``control_level`` the weighted mean square by kind that cases without an effect reach, else that of the settings;
-    ``cell_level`` the same for one channel of one recording, by kind;
-    ``disturbed`` recordings not used, since something else than the known inputs shows in them (``track.quiet``);
-    ``foreign`` trains, most recordings of which do not look as their description has it; ``measured`` the first and the
-    last place where anything was [m].
+    Attributes
+    ----------
+    observations : tuple of Observation
+        Those that are fitted.
+    reserved : tuple of Observation
+        Those that no fit uses. They may withdraw a name, and verify it.
+    nuisances : tuple of Nuisance
+    candidates : tuple of Candidate
+    expensive : bool
+        Predictions are expensive. Derivatives of the nuisances are then kept and updated by Broyden's formula, except
+        for the observations for which ``is_cheap`` holds.
+    start_values : mapping
+        Values of nuisances where fits start, else their means.
+    control_level : mapping
+        Data type -> weighted mean square that controls, cases without an effect, reach. Else that of the settings.
+    cell_level : mapping
+        Data type -> the same for one channel of one recording.
+    disturbed_recordings : tuple
+        Recordings that are not used, since a source other than the known inputs shows in them.
+    mismatched_trains : tuple of str
+        Trains, most recordings of which do not agree with their vehicle file.
+    measured_range : (float, float)
+        First and last measured position. [m]
     """
 
     observations: tuple[Observation, ...] = ()
@@ -140,7 +158,7 @@ class Case:
     measured = (-np.inf, np.inf)
 
     def cheap(self, observation):
-        """Derivatives of this observation cost next to nothing."""
+        """Whether derivatives of this observation cost next to nothing."""
         return False
 
     def predict(self, values, terms, observations):
@@ -148,13 +166,13 @@ class Case:
         raise NotImplementedError
 
     def moved(self, values, terms, new, observations, predictions):
-        """Predictions with ``new`` terms, a small step from ``terms`` with known ``predictions``: for derivatives."""
+        """Predictions with ``new`` terms, a small step from ``terms`` with known ``predictions``, for derivatives."""
         return self.predict(values, new, observations)
 
     def nuisance_jacobian(self, values, terms, observations, base):
-        """List of (n, n_nuisance) derivatives; by forward differences unless a case knows better.
+        """List of (n, n_nuisance) derivatives, by forward differences unless a case overrides this.
 
-        Nuisances owned by different observations are moved together: one prediction serves them all.
+        Nuisances of different owners are shifted together: one prediction serves them all.
         """
         groups, seen = {}, {}
         for k, nuisance in enumerate(self.nuisances):
@@ -177,48 +195,47 @@ class Case:
         return found
 
     def own_jacobian(self, values, terms, observation, predicted, names):
-        """(n, n_name) derivatives of an observation by nuisances of its own."""
+        """(n, n_name) derivatives of an observation by the nuisances that it owns."""
         full = self.nuisance_jacobian(values, terms, [observation], [predicted])[0]
         order = [n.name for n in self.nuisances]
         return full[:, [order.index(name) for name in names]]
 
     def screen(self, fit):
-        """Columns for candidates at their starts, (key, start) -> list of (n,) per observation; those that are missing
-        are predicted."""
+        """Columns of candidates at their starts, (key, start) -> list of (n,) per observation. Others are predicted."""
         return {}
 
     def further(self, fit):
-        """Candidates that only a look at the residual of ``fit`` suggests."""
+        """Candidates that only the residual of ``fit`` suggests."""
         return ()
 
     def distant(self, fit):
-        """(candidate, start) too far from neutral for what a column says: predicted, with the twin at its mean."""
+        """(candidate, start) too far from neutral for a column: predicted, with the masking parameter at its mean."""
         return ()
 
     def roughened(self):
-        """The same case with broad, independent errors: its optimum has a wide basin."""
+        """The same case with large independent errors: its optimum has a wide basin."""
         return self
 
     def struck(self):
-        """Condition -> where the hammer fell [m], for those that are hammer tests."""
+        """Condition -> position of the impacts [m], for hammer tests."""
         return {}
 
     def renewed(self, fit):
-        """The same case with errors of its observations as the model of ``fit`` makes them; itself where they stay."""
+        """The same case with errors of its observations as the model of ``fit`` gives them. Itself if unchanged."""
         return self
 
     def cheap_part(self):
-        """A case of the cheap observations alone, with the same shared nuisances; None where there is none."""
+        """A case of the cheap observations alone, with the same shared nuisances. None if there are none."""
         return None
 
     def spaces(self, fit):
-        """Subspaces of the observations that a cause could be locked to, ``spaces.Space``; none by default."""
+        """``ResidualSpace`` objects: subspaces of the observations to which a cause may be fixed. None by default."""
         return ()
 
     def latent(self, fit):
-        """Covariates of the latent force: name -> (n,), with "force"; None where the case has no such view."""
+        """Covariates of the latent force: name -> (n,), with "force". None if the case has no such view."""
         return None
 
     def numerical_error(self, fit):
-        """Own numerical error of each observation's prediction, list of (n,), or None where it is exact."""
+        """Numerical error of each observation's prediction, list of (n,), or None if it is exact."""
         return None

@@ -1,8 +1,7 @@
-"""Score of a model on conditions that were left out, with what belongs to them alone integrated out.
+"""Scores on held-out conditions, single witnesses of a name, and the overlap of two effects.
 
-Whether a name hangs on one recording alone, though others should show it as plainly, or on the blows at one spot.
-
-Where two effects show: how much of one is seen by the sensors and in the recordings that the other changes.
+A single witness is one recording, or all impacts at one position, without which a name has no support. The overlap is
+the share of the change by one effect in sensors and recordings that another effect changes as well.
 """
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.map_fit import Joint
 
-FEWEST = 3  # recordings of which two may disagree with the third
+FEWEST = 3  # recordings; a jackknife over fewer has no meaning
 
 
 def held_out_score(case, fit):
@@ -19,9 +18,9 @@ def held_out_score(case, fit):
     .. math:: \ln p(y_c \mid y_{-c}) = \ln N(r_c;\; J_c(\hat\theta_{-c} - \hat\theta),\;
               S + J_c C_{-c} J_c^T)
 
-    The fit without condition c follows from the full fit by one Gauss-Newton step; nuisances that belong to the
-    left-out condition go back to their prior and are integrated out, not fitted. S holds sigma times the noise
-    scale that the other conditions gave; correlated samples count by their ``effective`` share.
+    The fit without condition c follows from the full fit by one Gauss-Newton step. Nuisances of the left-out condition
+    return to their prior and are integrated out, not fitted. S holds sigma times the noise scale of the other
+    conditions. Correlated samples count by their ``effective`` share.
     """
     joint, theta, parts = _taken_apart(case, fit)
     conditions = [o.condition for o in joint.observations]
@@ -35,11 +34,11 @@ def held_out_score(case, fit):
 
 
 def disagreement(case, fit, kind):
-    r"""Standard errors of all parameters of ``fit`` by what its recordings of a ``kind`` say without one another.
+    r"""Jackknife standard errors of all parameters of ``fit`` over its recordings of one ``data_type``.
 
-    Jackknife (Efron and Stein 1981) over these m recordings, with one Gauss-Newton step for each:
-    :math:`\sqrt{(m - 1) / m \sum (\theta_i - \bar\theta)^2}`. An error that is each recording's own, but no noise,
-    as of a vehicle's file or a coarse step, is in it. Zeros where there are fewer than three.
+    :math:`\sqrt{(m - 1) / m \sum (\theta_i - \bar\theta)^2}` (Efron and Stein 1981) over the m recordings, with one
+    Gauss-Newton step for each. It includes errors of single recordings that are no noise, for example of a vehicle
+    file or a coarse time step. Zeros for fewer than three recordings.
     """
     joint, theta, parts = _taken_apart(case, fit)
     normal = np.eye(theta.size) + sum(p.gram / fit.scale[p.kind] for p in parts)
@@ -53,8 +52,11 @@ def disagreement(case, fit, kind):
 
 
 def told_alone(case, fit, kind, name, sd):
-    """What the observations of a ``kind`` say alone of the nuisance ``name``, whose prior is opened to ``sd``: its
-    value one Gauss-Newton step from ``fit``, all other nuisances free under their priors."""
+    """Estimate of the nuisance ``name`` from the observations of one ``data_type`` alone, with its prior widened to
+    ``sd``.
+
+    It is one Gauss-Newton step from ``fit``, with all other nuisances free under their priors.
+    """
     joint = Joint(case)
     theta = np.array([fit.values[n.name] for n in case.nuisances])
     k, n = [n.name for n in case.nuisances].index(name), theta.size
@@ -76,7 +78,7 @@ def _taken_apart(case, fit):
 
 
 class _Part:
-    """Sums over one observation, at noise scale 1, distances in prior standard deviations."""
+    """Sums over one observation, at noise scale 1, with distances in prior standard deviations."""
 
     def __init__(self, joint, observation, jacobian, white):
         rows = np.sqrt(observation.effective) * jacobian * joint.sd
@@ -87,7 +89,7 @@ class _Part:
 
 
 def _scales(fit, kept):
-    """Noise scale by kind from the kept observations; a kind that is wholly left out keeps that of the full fit."""
+    """Noise scale by data type from the retained observations. A type wholly left out keeps that of the full fit."""
     total, count = {}, {}
     for p in kept:
         total[p.kind] = total.get(p.kind, 0.0) + p.square
@@ -104,7 +106,7 @@ def _density(joint, fit, theta, out, kept):
     square = sum(p.square / scale[p.kind] for p in out)
     n = sum(p.n for p in out)
     log_sigma = sum(p.log_sigma + 0.5 * p.n * np.log(scale[p.kind]) for p in out)
-    # missed = right - rows shift; Woodbury on the p by p side: N(missed; 0, 1 + rows normal^-1 rows')
+    # residual = right - rows shift; Woodbury on the p by p side: N(residual; 0, 1 + rows normal^-1 rows')
     missed = square - 2.0 * shift @ across + shift @ gram @ shift
     projected = across - gram @ shift
     inner = normal + gram
@@ -120,8 +122,10 @@ def mean_square_out(observations, predictions):
 
 
 def changed(case, fit, candidate):
-    """What ``candidate``, of those in ``fit``, changes in each observation at its nuisances, whitened; [] where the
-    simulation cannot go without it."""
+    """Change by ``candidate``, one of those in ``fit``, in each observation at its nuisances, whitened.
+
+    [] if the simulation fails without it.
+    """
     others = tuple(t for c, t in zip(fit.candidates, fit.terms) if c.key != candidate.key)
     try:
         without = case.predict(fit.values, others, case.observations)
@@ -131,12 +135,12 @@ def changed(case, fit, candidate):
 
 
 def shared(case, fit, first, second):
-    r"""How far two effects show at the same sensors in the same recordings: 0 apart, 1 alike.
+    r"""Overlap of two effects in sensors and recordings: 0 if they show apart, 1 if alike.
 
     .. math:: \sum_k \sqrt{p_k q_k}
 
-    with p and q the shares of the energy that each changes in the samples k of one sensor in one recording
-    (Bhattacharyya 1943). 1 where the simulation cannot go without one of them.
+    with p and q the shares of energy of each change in sensor and recording k (Bhattacharyya 1943). 1 if the simulation
+    fails without one of them.
     """
     parts = [_energies(case.observations, changed(case, fit, c)) for c in (first, second)]
     if any(p is None for p in parts):
@@ -145,14 +149,14 @@ def shared(case, fit, first, second):
 
 
 def _energies(observations, changes):
-    """(n_sensor_and_recording,) shares of the energy of ``changes``, None where there is none."""
+    """(n_sensor_and_recording,) shares of the energy of ``changes``. None if it is zero."""
     found = [e for o, d in zip(observations, changes) for e in _by_sensor(o, o.effective * np.square(d))]
     total = float(np.sum(found))
     return np.array(found) / total if total > 0.0 else None
 
 
 def _by_sensor(observation, energy):
-    """Sums of ``energy`` (n,) by sensor, of all where the observation tells none."""
+    """Sums of ``energy`` (n,) by sensor. One sum if the observation has no sensor labels."""
     if observation.cells is None or "sensor" not in observation.labels:
         return [float(np.sum(energy))]
     level, code = np.unique(observation.labels["sensor"].astype(str), return_inverse=True)
@@ -160,22 +164,29 @@ def _by_sensor(observation, energy):
     return np.bincount(code[observation.cells[inside]], energy[inside], minlength=level.size)
 
 
-AS_PLAIN, WITNESSES = 0.5, 2  # of the energy that the effect has in the recording that speaks for it; so many others
-HIDDEN = 0.01  # of the energy that an effect has where it shows most: there it does not show, a tenth in amplitude
-TOLD = 0.5  # of the evidence; where conditions left out tell less, the rest is what nuisances pay for the effect
-SPOTS = 3  # at which the hammer fell; of fewer none can be called the odd one
-SPOKEN = (1.0, 0.5)  # of the threshold: what the blows at the odd spot say, and all else together does not
+# A recording that must confirm an effect: share of the effect's energy in the main witness, and number of them.
+AS_PLAIN, WITNESSES = 0.5, 2
+# Share of the largest energy of an effect in a recording below which it does not show: a tenth in amplitude.
+HIDDEN = 0.01
+# Share of the evidence that held-out conditions must show. Less: most of it is the prior penalty of nuisances.
+TOLD = 0.5
+SPOTS = 3  # positions of impacts; of fewer none can be called the exception
+# Levels in thresholds: the impacts at one position gain more, all other conditions together gain less.
+SPOKEN = (1.0, 0.5)
 
 
 def hangs_on(case, fit, candidate, gain, by_condition, settings):
-    """The condition whose gain alone passes for a name where all others' together does not, "" elsewhere.
+    """The condition whose gain alone supports a name while the gain of all others together does not.
 
-    What is there shows wherever it acts: a gain of one recording that others, which show the effect at least half as
-    plainly, do not share is that recording's. It takes two such others, since nuisances may take one's share; and
-    trains are not asked, which come at another speed and with another roughness each time. Blows at one spot are one
-    witness however often they are repeated: they share the spot's fittings, the twist of the rail and the mark on it.
-    What nuisances pay in their priors to stand for an effect no condition left out can show, since the others still
-    bend them: where that is most of the ``gain``, and all else speaks for the name, it hangs on no spot.
+    "" if there is none.
+
+    A real effect shows wherever it acts. A gain in one recording that others do not share belongs to that recording, if
+    at least two others show the effect with half its energy. Two are needed, since nuisances may absorb the gain of
+    one. Trains are exempt: speed and roughness differ at each passage.
+
+    Impacts at one position are one witness, however often they are repeated. They share the fittings, the twist of the
+    rail and the mark on it. No held-out condition shows the prior penalty that nuisances pay to imitate an effect. If
+    that penalty is most of the ``gain``, and all other conditions support the name, no single position is the witness.
 
     Parameters
     ----------
@@ -202,7 +213,10 @@ def hangs_on(case, fit, candidate, gain, by_condition, settings):
 
 
 def _one_spot(struck, gain, by_condition, threshold):
-    """The spot whose blows pass for a name, or half of one, where all else together does not, in words, "" without."""
+    """Position, in words, whose impacts alone support a name, or half of one, while all others do not.
+
+    "" if there is none.
+    """
     gains = {}
     for condition, told in by_condition.items():
         if condition in struck:
@@ -217,8 +231,10 @@ def _one_spot(struck, gain, by_condition, threshold):
 
 
 def plainness(case, fit, candidate):
-    """Condition -> weighted energy of what ``candidate`` changes in it at the nuisances of ``fit``; {} where the
-    simulation cannot go without it."""
+    """Condition -> weighted energy of the change by ``candidate`` at the nuisances of ``fit``.
+
+    {} if the simulation fails without it.
+    """
     found = {}
     for o, change in zip(case.observations, changed(case, fit, candidate)):
         energy = o.effective * float(np.sum(change**2))
@@ -227,7 +243,7 @@ def plainness(case, fit, candidate):
 
 
 def told_apart(case, fit, by_condition):
-    """Gain of the conditions in which none of the effects of ``fit`` shows, 0 where it has none. [nats]"""
+    """Gain of the conditions in which no effect of ``fit`` shows, 0 if it has none. [nats]"""
     quiet = dict(by_condition) if fit.candidates else {}
     for candidate in fit.candidates:
         shown = plainness(case, fit, candidate)

@@ -1,20 +1,26 @@
-"""The one answer: none, named, a or b, unknown, numerics - with its probability and what it rests on."""
+"""Decision of a diagnosis: none, named, a or b, unknown or numerics, with its probability and reason."""
 
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-WEAK = 2.0  # thresholds; below it a name that held-out recordings refuse is no evidence that anything is missing
-EVEN = 3.0  # nats, 20 to 1: by so much a law with a number more falls behind where that number means nothing
-TORN = 0.2  # of the gain; a condition that loses more than this, and half a threshold, speaks against the name
+# Thresholds of gain. A weaker name that held-out recordings contradict is no evidence of any effect.
+WEAK = 2.0
+# nats, odds of 20 to 1: lead of the simpler form over one with an extra parameter that has no effect.
+EVEN = 3.0
+# Share of the gain. A held-out condition that loses more, and more than half a threshold, contradicts the name.
+TORN = 0.2
 VERDICTS = ("none", "named", "a_or_b", "unknown", "numerics")
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """``answer`` of ``VERDICTS``; ``names`` the families (two for a or b); ``grade`` "A" or "B"; ``probability``
-    of the answer; ``posterior`` over families, "none" and "unknown"; ``scores`` best of each family; ``reason``, and
-    ``cause`` "clock" or "train" where it is recordings that are not among those fitted, "" elsewhere."""
+    """Outcome for one effect.
+
+    ``answer`` of ``ANSWERS``. ``names`` are the families (two for a or b). ``grade`` "A" or "B". ``probability`` of the
+    answer. ``posterior`` over families, "none" and "unknown". ``scores`` best of each family. ``reason`` in words.
+    ``cause`` is "clock" or "train" if the verdict rests on recordings that were not fitted, else "".
+    """
 
     answer: str
     names: tuple[str, ...] = ()
@@ -29,10 +35,10 @@ class Verdict:
 def posterior(scores, excess, settings):
     r"""Probabilities by a softmax of score over temperature, over families, "none" and "unknown".
 
-    Half of the prior is on "none", a tenth on "unknown", the rest spread over the families. "none" scores 0.
-    "unknown" scores what a perfect explanation could gain at most, cut at the threshold, with an offset of its own,
-    and gains by what the best candidate leaves unexplained. ``excess`` is the base model's weighted mean square over
-    the level of controls, 1 meaning none.
+    Half of the prior is on "none", a tenth on "unknown", the rest is spread over the families. "none" scores 0.
+    "unknown" scores an offset plus the largest possible gain of a perfect explanation, limited at the threshold. It
+    rises with the share that the best candidate leaves unexplained. ``excess`` is the weighted mean square of the base
+    model over the control level; 1 means none.
 
     >>> from turnout.config.settings.mismatch import MismatchSettings
     >>> p = posterior([], 1.0, MismatchSettings())
@@ -56,7 +62,7 @@ def posterior(scores, excess, settings):
 
 
 def withdraw(probabilities):
-    """A test beyond the score has refused the best name: "unknown" changes places with what stood above it."""
+    """A test beyond the score rejects the best name: swap the probabilities of "unknown" and the likeliest name."""
     top = max(probabilities, key=probabilities.get)
     probabilities[top], probabilities["unknown"] = probabilities["unknown"], probabilities[top]
 
@@ -66,8 +72,8 @@ def calibrate(probabilities, chosen, certainty, settings):
 
     .. math:: \mathrm{logit}\,p' = (1 - s)\,\mathrm{logit}\,c + s\,\mathrm{logit}\,p
 
-    with c the share of such answers that were right in opened cases and s how much the softmax p says beyond it:
-    Platt scaling (1999) with an offset per kind of answer.
+    with c the share of such answers that were right in opened cases, and s the weight of the softmax p: Platt scaling
+    (1999) with an offset per type of answer.
 
     >>> from turnout.config.settings.mismatch import MismatchSettings
     >>> round(calibrate({"a": 0.5, "none": 0.5}, ("a",), 0.5, MismatchSettings()), 6)
@@ -91,20 +97,22 @@ def _logit(p):
 
 
 def objected(worst, gain, settings):
-    """Whether a condition left out, in which a name gains ``worst``, speaks against one that gains ``gain`` in all."""
+    """Whether a held-out condition, with gain ``worst_gain``, contradicts a name that gains ``gain`` in all."""
     return worst < -max(0.5 * settings.threshold, TORN * gain)
 
 
 def leading(scores, excess, settings):
-    """The likeliest of ``scores``; where it explains too little, the likeliest that is told by other data, if any."""
+    """The likeliest of ``scores``. If it explains too little, the likeliest that other data support, if any."""
     ranked = sorted(scores, key=lambda s: -s.gain)
     sure = [s for s in ranked if s.told_elsewhere(settings)]
     return sure[0] if sure and ranked[0].faint(excess, settings) else ranked[0]
 
 
 def opened(verdict, settings):
-    """A name whose size has no upper end, as that or what shows the same beyond it: a gap that no train closes, or no
-    ballast at all. Others stay."""
+    """A name whose size has no upper limit becomes "a or b" with its ``unbounded_form``. Others stay.
+
+    Example: a gap that no train closes looks like a sleeper without ballast.
+    """
     if verdict.answer != "named" or not verdict.scores[0].is_open:
         return verdict
     names, probabilities = (verdict.names[0], verdict.scores[0].candidate.open_as), dict(verdict.posterior)
@@ -123,17 +131,17 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
     scores : list of Score
         Best of each family, any order.
     excess : float
-        Weighted mean square of the base model over the level of controls.
+        Weighted mean square of the base model over the control level.
     consistent : bool
         The best candidate predicts reserved conditions about as well as those it was fitted to.
     structure : float
-        Share of the residual of the best candidate that a free law of the state still explains.
-    left : float
-        Weighted mean square that the best candidate leaves over the level of controls.
+        Share of the residual of the best candidate that a free force law of the state still explains.
+    residual_excess : float
+        Weighted mean square of the residual of the best candidate over the control level.
     disturbed : bool
-        Something that is no train shakes the sensors in some recordings; these are not among those fitted.
-    foreign : tuple of str
-        Trains, most recordings of which are not among those fitted, since they do not look like its vehicle file.
+        Another source than a train shakes the sensors in some recordings. These are not among those fitted.
+    mismatched_trains : tuple of str
+        Trains, most recordings of which are not among those fitted, since they do not agree with the vehicle file.
     """
     ranked = sorted(scores, key=lambda s: -s.gain)
     probabilities = posterior(scores, excess, settings)
@@ -177,7 +185,7 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
     if torn:
         return verdict("unknown", reason=f"{best.family} makes one condition worse by {-best.worst:.0f} nats")
     same = [s for s in found if s.is_limit_of(best) and s.explained >= settings.explained]
-    if same:  # what carries nothing hangs
+    if same:  # ballast without stiffness equals a hanging sleeper
         return verdict("a_or_b", (best.family, same[0].family), reason=f"{best.family} is at its limit")
     rivals = [s for s in ranked if s is not best and s.material and best.gain - s.gain < settings.margin]
     rivals = [s for s in rivals if not (best.is_plain_form_of(s) and best.gain - s.gain > EVEN)]

@@ -1,4 +1,4 @@
-"""The ten steps, from a case to a verdict with everything it rests on."""
+"""Diagnosis of a case: fit, localize, name, model and verify, with everything that the verdict rests on."""
 
 from dataclasses import dataclass, replace
 
@@ -29,18 +29,21 @@ from turnout.mismatch.engine.two_effects import (
     unforetold,
 )
 
-# Share of the first effect's evidence that a law of not quite its shape leaves where that shows: sizes err by a fifth.
+# Share of the first effect's evidence that an error in its shape may leave to a second one: sizes err by a fifth.
 SHAPE = 0.05
-# Level of controls, times: where more is left of recordings never used, nothing agrees. Three opened controls leave
-# 0.37 to 0.54 of it, as in those that were fitted; trains of a kind that was not among those may leave more.
+# Multiple of the control level. A larger residual of reserved recordings contradicts the answer "none". Three opened
+# controls reach 0.37 to 0.54, as for fitted recordings. Trains of a type that was not fitted may leave more.
 UNFORETOLD = 2.0
 
 
 @dataclass(frozen=True)
 class Verification:
-    """Fit [%] on ``n`` reserved recordings ``before``, ``after`` with the named term, with ``rival`` and ``decoy``;
-    ``error`` is the standard error of ``after`` less ``before``, ``over`` the weighted mean square left without a term
-    over the level of controls."""
+    """Fit [%] of ``n`` reserved recordings: ``before``, ``after`` with the named term, with ``rival`` and with
+    ``decoy``.
+
+    ``error`` is the standard error of ``after`` less ``before``. ``reserved_excess`` is the weighted mean square
+    without a term over the control level.
+    """
 
     n: int
     before: float
@@ -52,14 +55,17 @@ class Verification:
 
     @property
     def fell(self):
-        """The named model foretells the reserved recordings worse, by more than the difference's standard error."""
+        """Whether the named model predicts the reserved recordings worse, by more than the standard error."""
         return self.error is not None and self.after < self.before - self.error
 
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Outcome of ``diagnose``: one verdict per effect found, the fits, the frames, the latent force, and ``where`` that
-    acts which got no name."""
+    """Outcome of ``diagnose``: one verdict per effect, the fits, the attributions, the verification and the latent
+    force.
+
+    ``where`` is the location of a residual that got no name.
+    """
 
     verdicts: tuple[Verdict, ...]
     base: object
@@ -77,17 +83,17 @@ class Diagnosis:
 
     @property
     def probability(self):
-        """Of all that is stated: that of the least sure verdict."""
+        """Probability of all that is stated: that of the least certain verdict."""
         return min(v.probability for v in self.verdicts)
 
     @property
     def names(self):
-        """Families named, in order of discovery."""
+        """Families named, in the order in which they were found."""
         return tuple(v.names[0] for v in self.verdicts if v.answer == "named")
 
 
 def diagnose(case, settings=None, progress=None, store=None):
-    """Locate, name, model and verify what the simulator of ``case`` leaves out.
+    """Localize, name, model and verify what the simulator of ``case`` lacks.
 
     Parameters
     ----------
@@ -96,7 +102,7 @@ def diagnose(case, settings=None, progress=None, store=None):
     settings : MismatchSettings or None
         Thresholds; their reasons are in the configuration.
     progress : callable or None
-        Called with (done, total, what) after every joint fit.
+        Called with (number done, total, key of the candidate) after every joint fit.
     store : mapping or None
         Fits by key, kept from an interrupted run and filled by this one.
 
@@ -134,15 +140,15 @@ def diagnose(case, settings=None, progress=None, store=None):
         if verdict.answer == "none" or best is None or best.gain <= settings.threshold:
             break
         found = with_derivatives(case, best.fit, settings)
-        if not found.jacobian and effect:  # the simulation fails beside it: it can be neither weighed nor built on
+        if not found.jacobian and effect:  # the simulation fails close to it: no evidence, no next effect
             verdicts.pop()
             break
         fit = found
         if not fit.jacobian:
             break
-        if of_one_part(verdict) and not refused(verdicts):  # these are weighed against the base's errors
+        if of_one_part(verdict) and not refused(verdicts):  # these were compared with the errors of the base
             case, fit = _with_its_errors(case, fit, settings, store)
-        if verdict.answer == "a_or_b" and not of_one_part(verdict):  # both may be there
+        if verdict.answer == "a_or_b" and not of_one_part(verdict):  # both may be present
             choice = case, [verdict], fit, scores
         elif not case.frozen_jacobian and over(case, fit, settings) <= 1.0:
             break
@@ -166,7 +172,7 @@ def diagnose(case, settings=None, progress=None, store=None):
 
 
 def _with_its_errors(case, fit, settings, store):
-    """(case, fit) with the errors of the observations as the model of ``fit`` makes them, and fitted again."""
+    """(case, fit) with errors of the observations as the model of ``fit`` gives them, and fitted again."""
     new = case.renewed(fit)
     if new is case:
         return case, fit
@@ -178,7 +184,7 @@ def _with_its_errors(case, fit, settings, store):
 
 
 def _as_it_ends(verdict, case, fit, settings):
-    """A name as the last fit has it: graded by what that leaves, "a or b" where its size has no upper end there."""
+    """A name by the last fit: graded by its residual, "a or b" if its size has no upper limit there. Others stay."""
     if verdict.answer != "named":
         return verdict
     own, grade = replace(verdict.scores[0], fit=fit), "A" if heard(case, fit, settings) <= 1.0 else "B"
@@ -186,14 +192,14 @@ def _as_it_ends(verdict, case, fit, settings):
 
 
 def _shape_of(case, first, second):
-    """Evidence that a law of not quite the shape out there may leave to another name. [nats]"""
+    """Evidence that an error in the shape of the first effect may leave to another name. [nats]"""
     if first.candidate.exact or second.gain >= SHAPE * first.gain:
         return 0.0
     return SHAPE * first.gain * shared(case, second.fit, first.candidate, second.candidate)
 
 
 def _own_numerics(case, base, settings):
-    """A sentence where our own error reaches a third of the mismatch, "" otherwise."""
+    """A sentence if the numerical error reaches a third of the mismatch, else ""."""
     errors = case.numerical_error(base)
     if errors is None:
         return ""

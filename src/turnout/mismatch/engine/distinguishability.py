@@ -1,4 +1,4 @@
-"""Which effects a planned campaign can tell apart: expected log evidence lost when one is explained by another."""
+"""Effects that a planned campaign can distinguish: expected loss of log evidence if one is explained by another."""
 
 from dataclasses import dataclass
 
@@ -7,21 +7,24 @@ import numpy as np
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.map_fit import Joint, fit_jointly
 
-SMALL = 0.02  # share of an effect at which it is linear; a law with a threshold is taken whole
-ENOUGH = 5.0  # nats: odds of 150 to 1
+SMALL = 0.02  # share of a size at which an effect is linear; effects with a threshold are taken at full size
+ENOUGH = 5.0  # nats, odds of 150 to 1: two effects are distinguished
 
 
 @dataclass(frozen=True)
 class Distinguishability:
-    """``names`` (n,) effects; ``lost`` (n, n) nats lost when the row's effect is explained by the column's best
-    amplitude; ``seen`` (n,) nats lost when it is explained by nuisances alone."""
+    """Expected evidence between effects.
+
+    ``names`` (n,) effects. ``loss`` (n, n) nats lost if the effect of the row is explained by the best amplitude of the
+    effect of the column. ``detectability`` (n,) nats lost if it is explained by nuisances alone.
+    """
 
     names: tuple[str, ...]
     lost: np.ndarray
     seen: np.ndarray
 
     def confused(self, name, enough=ENOUGH):
-        """Effects that ``name`` cannot be told from, "none" among them where it cannot be seen at all."""
+        """Effects that cannot be distinguished from ``name``, with "none" if it cannot be detected at all."""
         row = self.names.index(name)
         found = [] if self.seen[row] >= enough else ["none"]
         return found + [n for k, n in enumerate(self.names) if k != row and self.lost[row, k] < enough]
@@ -36,11 +39,11 @@ class Distinguishability:
 
 
 def distinguishability(case, strengths=None):
-    r"""Matrix for the ``case``: no data are needed, only what a recording would look like.
+    r"""Matrix for the ``case``. No data are needed, only predictions of recordings.
 
     .. math:: L_{AB} = \tfrac12 \min_a (c_A - a c_B)^T P (c_A - a c_B)
 
-    with c the change that an effect makes and P the nuisances projected out under their priors.
+    with c the change by an effect. P projects out the nuisances under their priors.
 
     Parameters
     ----------
@@ -80,7 +83,7 @@ def distinguishability(case, strengths=None):
 
 
 def _one_of_each(candidates, strengths):
-    """The strengthened candidates, and the middle place of every other family."""
+    """The candidates with given strengths, and the middle site of every other family."""
     found = {}
     for candidate in candidates:
         found.setdefault(candidate.family, []).append(candidate)
@@ -90,7 +93,7 @@ def _one_of_each(candidates, strengths):
 
 
 def cheapest_addition(base, additions, enough=ENOUGH):
-    """(name, pairs told apart, nats won) of the addition that resolves most pairs, cheapest first among equals.
+    """(name, pairs distinguished, nats gained) of the addition that resolves most pairs, the cheapest among equals.
 
     ``base`` is a Distinguishability, ``additions`` name -> (cost, Distinguishability of the plan with it).
     """

@@ -1,4 +1,6 @@
-"""How good a candidate is: its gain, the share of the excess that it explains, what it leaves; and the verdict."""
+"""Value of a candidate: its gain, the share of the excess that it explains, its residual; and the verdict on
+candidates.
+"""
 
 import numpy as np
 
@@ -8,15 +10,15 @@ from turnout.mismatch.engine.latent_force import latent_law
 from turnout.mismatch.engine.reserved_data import falls, fit_of_reserved
 from turnout.mismatch.engine.score import Score
 
-ODD = 3.0  # times the spread of like parts: one in 370 of sound ones
-FEWEST = 6  # like parts that make a spread
+ODD = 3.0  # spreads of similar components: one in 370 intact ones is beyond
+FEWEST = 6  # similar components; fewer give no spread
 
 
 def explained_of(case, fit, refit, settings):
-    """Share of the excess over the level of controls that ``refit`` takes away, 1 where there is none.
+    """Share of the excess over the control level that ``refit`` removes, 1 if there is none.
 
-    Of a first effect that of the loudest channel counts where no kind has any; beside a name it may be what the name
-    left, which is no matter of a second effect.
+    For a first effect without excess in any data type, the excess of the worst channel counts. Beside a name that
+    excess may be the residual of the name, which a second effect need not explain.
     """
     control = _control(case, fit, settings)
     before, after = _excess(fit.level, control), _excess(refit.level, control)
@@ -26,7 +28,7 @@ def explained_of(case, fit, refit, settings):
 
 
 def _control(case, fit, settings):
-    """Weighted mean square by kind that controls reach."""
+    """Control level: data type -> weighted mean square of controls."""
     return {kind: case.control_level.get(kind, settings.control_level) for kind in fit.level}
 
 
@@ -35,8 +37,11 @@ def _excess(level, control):
 
 
 def score_of(case, fit, refit, candidate, settings):
-    """Gain less the logarithm of the places scanned: held out condition by condition, or, where nuisances are many and
-    predictions dear, in evidence, in which the first condition is predicted from the priors."""
+    """Score of a candidate: gain less the logarithm of the number of sites.
+
+    The gain is that of held-out conditions. In an expensive case with many nuisances it is the evidence, in which the
+    first condition is predicted from the priors.
+    """
     gain, by_condition = refit.evidence - fit.evidence, {}
     if not case.frozen_jacobian:
         mine, reference = held_out_score(case, refit), held_out_score(case, fit)
@@ -50,8 +55,7 @@ def score_of(case, fit, refit, candidate, settings):
 
 
 def _shown(case, fit, refit, candidate, settings):
-    """Whether the observations that must speak for a candidate, if any, fit better with it by a margin, and those that
-    must not speak against it do not."""
+    """Whether the required observations, if any, fit better by a margin, and those that must not oppose do not."""
     gained = 0.5 * sum(
         o.effective * float(np.sum(np.square(a)) - np.sum(np.square(b))) / fit.scale[o.kind]
         for o, a, b in zip(case.observations, fit.white, refit.white)
@@ -62,8 +66,11 @@ def _shown(case, fit, refit, candidate, settings):
 
 
 def _opposed(case, fit, refit, candidate):
-    """Whether observations that must not speak against a candidate put its twin, with a prior as wide as the effect's,
-    nearer to what it is without the effect than to where the effect would have it."""
+    """Whether observations that must not oppose a candidate contradict it.
+
+    They do so if they put its masking parameter, with a prior as wide as the effect's, nearer to its value without the
+    effect than to its value with it.
+    """
     kinds = {o.kind for o in case.observations if o.name in candidate.unopposed}
     if not kinds or not fit.jacobian:
         return False
@@ -73,15 +80,15 @@ def _opposed(case, fit, refit, candidate):
 
 
 def _usual(case, refit, candidate):
-    r"""Whether a part is odd by no more than ``ODD`` times what its like differ by, with the effect in the model.
+    r"""Whether a component differs by no more than ``MAX_ORDINARY_SPREADS`` from similar ones, the effect included.
 
     .. math:: |\ln \psi| < 3 s, \quad s^2 = \overline{(v_j - ar v)^2} + \overline{\sigma_j^2}
 
-    with :math:`v_j` the logarithms that the other parts were given and :math:`\sigma_j` their standard errors.
+    with :math:`v_j` the fitted logarithms of the other components and :math:`\sigma_j` their standard errors.
     """
     if not candidate.twin or candidate.from_twin:
         return False
-    stem = candidate.twin.rsplit("_", 1)[0]  # of pad_31; pad_stiffness is that of all
+    stem = candidate.twin.rsplit("_", 1)[0]  # of pad_31; pad_stiffness is the common value
     like = [k for k, n in enumerate(case.nuisances) if n.name.removeprefix(f"{stem}_").isdigit()]
     like = [k for k in like if case.nuisances[k].name != candidate.twin]
     first = refit.psi[refit.part(candidate).start]
@@ -93,13 +100,13 @@ def _usual(case, refit, candidate):
 
 
 def over(case, fit, settings):
-    """Weighted mean square over the level of controls, the largest of the kinds."""
+    """Weighted mean square over the control level, the largest of the data types."""
     control = _control(case, fit, settings)
     return max(fit.level[kind] / control[kind] for kind in fit.level)
 
 
 def over_reserved(case, predictions, settings):
-    """The same of what ``predictions`` leave of the reserved recordings; 0 where there are none."""
+    """The same for the reserved recordings with these ``predictions``; 0 if there are none."""
     found = [0.0]
     for kind in {o.kind for o in case.reserved}:
         mine = [(o, p) for o, p in zip(case.reserved, predictions) if o.kind == kind]
@@ -108,12 +115,12 @@ def over_reserved(case, predictions, settings):
 
 
 def heard(case, fit, settings):
-    """What of ``fit`` stands most above the level of controls: a kind, or one channel of one recording."""
+    """Largest excess ratio of ``fit``: of a data type, or of one channel of one recording."""
     return max(over(case, fit, settings), loudest(case, fit))
 
 
 def loudest(case, fit):
-    """Largest mean square of one channel in one recording over what it is in controls, of the kinds that tell."""
+    """Largest mean square of one channel in one recording over that of controls, for data types with such a level."""
     found = [0.0]
     for o, white in zip(case.observations, fit.white):
         if o.kind not in case.cell_level or o.cells is None or "sensor" not in o.labels:
@@ -128,7 +135,7 @@ def loudest(case, fit):
 
 
 def judged(case, fit, scored, settings):
-    """(Verdict on the ``scored`` candidates on top of ``fit``, the Score that it names or would have, or None)."""
+    """(Verdict on these candidates on top of ``fit``, the Score that it names or would name, or None)."""
     excess = heard(case, fit, settings)
     scored = tuple(s for s in scored if s.material)
     if not scored:
@@ -144,14 +151,17 @@ def judged(case, fit, scored, settings):
 
 
 def structure_left(case, fit):
-    """Share of what ``fit`` leaves that a free law of the state still explains."""
+    """Share of the residual of ``fit`` that a free force law of the state still explains."""
     left = latent_of(case, fit)
     return max(left.r2.values(), default=0.0) if left else 0.0
 
 
 def consistent_elsewhere(case, base, best, settings):
-    """Reserved conditions are predicted no worse than without the effect: neither at twice the mean square, nor at a
-    lower fit that costs as much of the evidence as no condition may (``verdict.objected``), nor not at all."""
+    """Whether reserved conditions are predicted no worse than without the effect.
+
+    Worse means: twice the mean square, or a lower fit that costs more evidence than one condition may lose
+    (``decision.is_contradicted``), or no prediction at all.
+    """
     if not case.reserved:
         return True
     before, after = (fit_of_reserved(case, f)[0] for f in (base, best.fit))
@@ -164,7 +174,7 @@ def consistent_elsewhere(case, base, best, settings):
 
 
 def latent_of(case, fit):
-    """``Latent`` of the force that ``fit`` misses, None where the case has no such view."""
+    """``LatentForce`` that ``fit`` lacks. None if the case has no such view."""
     seen = case.latent(fit)
     if not seen:
         return None

@@ -1,8 +1,8 @@
-"""Joint fits to the cheap observations alone: every family at its likeliest places, before anything dear is fitted.
+"""Prescreening: joint fits to the cheap observations alone, before any expensive fit.
 
-What the base model may have bent to hide an effect does not matter here: each fit starts from the priors with the
-effect in it. A first fit with broad, independent errors finds the basin, a second one with the errors as they are
-finds the bottom: smooth errors would excuse a resonance that is out of place.
+Every family is fitted at its likeliest sites. The base model may have changed to hide an effect, so each fit starts
+from the priors with the effect in it. A first fit with large independent errors finds the basin, a second one with the
+actual errors finds the minimum: smooth errors would accept a resonance at a wrong frequency.
 """
 
 from dataclasses import dataclass
@@ -13,15 +13,18 @@ from turnout.errors import SimulationError
 from turnout.mismatch.engine.candidate_search import Projector, amplified
 from turnout.mismatch.engine.map_fit import CHEAP_STEPS, fit_jointly
 
-GLANCE, GLANCED = 4, 5
-BLIND = 0.999  # of the prior standard deviation is left: nothing was learnt
-ENOUGH = 0.5  # nats; a step that gains less ends a scout's fit
+GLANCE, GLANCED = 4, 5  # steps of a trial fit; largest number of starts that are tried by trial fits
+BLIND = 0.999  # share of the prior standard deviation that remains: the data say nothing
+ENOUGH = 0.5  # nats; a step that gains less ends a fit of the prescreening
 
 
 @dataclass(frozen=True)
 class Found:
-    """A candidate fitted to the cheap observations: ``gain`` in evidence less the logarithm of its places [nats],
-    ``psi`` its parameters, ``values`` of nuisances that they show, ``level`` left, ``before`` the level without it."""
+    """A candidate fitted to the cheap observations.
+
+    ``gain`` in evidence less the logarithm of the number of sites [nats]. ``psi`` its parameters. ``values`` of
+    nuisances that the cheap observations determine. ``level`` with it, ``before`` without it: weighted mean square.
+    """
 
     gain: float
     candidate: object
@@ -32,8 +35,11 @@ class Found:
 
 
 def scout(case, fit, settings, families=None):
-    """Found at the best place of every family, or of these ``families``, that the cheap observations show, on top of
-    ``fit``; [] without them."""
+    """Fits at the best site of every family, or of these ``families``, that the cheap observations show on top of
+    ``fit``.
+
+    [] without cheap observations.
+    """
     cheap = case.cheap_part()
     if cheap is None or (families is not None and not families):
         return []
@@ -62,8 +68,10 @@ def scout(case, fit, settings, families=None):
 
 
 def _seen(case, fit, candidate):
-    """Values of the nuisances that the cheap observations say anything about, and of the twin, of which they say
-    nothing beside the candidate: what the base model took it for must not come on top."""
+    """Values of the nuisances that the cheap observations determine, and of the masking parameter.
+
+    They do not determine the masking parameter beside the candidate. Its value in the base fit must not come on top.
+    """
     sd = np.sqrt(np.diag(fit.covariance))
     known = {n.name: s < BLIND * n.sd or n.name == candidate.twin for n, s in zip(case.nuisances, sd)}
     return {name: fit.values[name] for name, seen in known.items() if seen}
@@ -91,10 +99,11 @@ def _by_family(entries):
 
 
 def _likeliest(members, rough, first, held, settings, glances):
-    """The places of a family that promise most, each with its best start.
+    """The most promising sites of a family, each with its best start.
 
-    Families that the base model swallows (``always``) are tried at every place by a few steps of the broad fit; those
-    alike share these ``glances``. One of the whole track is tried so from its ``GLANCED`` most promising starts.
+    Families that the base model absorbs (``prescreen_group``) are tried at every site by a few steps of the broad fit.
+    Families of one group share these ``trial_gains``. A family of the whole track is tried from its
+    ``MAX_TRIAL_STARTS`` most promising starts.
     """
     best = {}
     for gain, candidate, start in sorted(members, key=lambda m: m[0]):
@@ -126,8 +135,11 @@ def _glance(rough, first, held, candidate, start):
 
 
 def _fitted(rough, cheap, candidates, psi, hopeless):
-    """From the priors through the broad errors to the narrow ones; None where the simulation cannot go there, or where
-    the broad fit costs as much as the ``hopeless`` one without the effect: it was asked on no other promise."""
+    """Fit from the priors with the broad errors, then with the actual ones.
+
+    None if the simulation fails, or if the broad fit costs more than ``max_cost``, the limit for candidates that were
+    tried without any promise.
+    """
     try:
         first = fit_jointly(
             rough, candidates, psi, {n.name: n.mean for n in rough.nuisances}, iterations=CHEAP_STEPS, done=ENOUGH

@@ -1,16 +1,19 @@
-"""The force that is missing, without a law: against displacement, velocity, position, time and temperature."""
+"""Missing force without a model: against displacement, velocity, position, time and temperature."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-LEVELS = 24  # pieces of the free law; each needs at least 20 samples
+LEVELS = 24  # largest number of pieces of the free law; each needs at least 20 samples
 
 
 @dataclass(frozen=True)
 class Latent:
-    """``r2`` covariate -> share of the force's variance a free law of it explains on samples not used for it;
-    ``curves`` covariate -> (centres, mean force, its standard error); ``unit`` of the force."""
+    """Missing force as a free function of covariates.
+
+    ``r2`` covariate -> share of the force's variance that a free law explains on held-out samples. ``curves`` covariate
+    -> (centres, mean force, its standard error). ``unit`` of the force.
+    """
 
     r2: dict
     curves: dict
@@ -18,13 +21,13 @@ class Latent:
 
     @property
     def best(self):
-        """Covariate that explains most, "" where none explains anything."""
+        """Covariate that explains most, "" if none explains anything."""
         name = max(self.r2, key=self.r2.get, default="")
         return name if name and self.r2[name] > 0.0 else ""
 
 
 def latent_law(force, covariates, unit="N", blocks=10):
-    r"""Free law of a missing force for each covariate, judged on left-out blocks of time.
+    r"""Free law of a missing force for each covariate, tested on held-out blocks of time.
 
     A piecewise constant law over equally filled classes; :math:`R^2 = 1 - \overline{(f - \hat f_{-b})^2} /
     \overline{(f - \bar f)^2}` with law and mean from the other blocks.
@@ -51,7 +54,7 @@ def latent_law(force, covariates, unit="N", blocks=10):
 
 
 def _left_out(force, code, block, levels):
-    """Sums by block make every left-out mean a subtraction."""
+    """Share of the variance on held-out blocks. Sums by block make every held-out mean a subtraction."""
     n_block = int(block.max()) + 1
     flat = block * levels + code
     count = np.bincount(flat, minlength=n_block * levels).reshape(n_block, levels)

@@ -1,18 +1,22 @@
-"""Steps of the joint fit: damped more and more until the cost falls (Marquardt 1963), within a trust region, and what
-they teach its Jacobian."""
+"""Damped Gauss-Newton steps of the joint fit (Marquardt 1963) within a trust region, and Broyden's update.
+
+The damping rises until the cost falls.
+"""
 
 import numpy as np
 
-TRIES = 8  # of one step, each more damped than the last
-MORE, LESS = 6.0, 0.2  # factors on the damping after a step that failed, and after one that was taken
-HELD = 1e12  # of the diagonal: this one does not move
-SETTLED = 0.1  # of what is enough to go on; a step that promises less is not tried
-FIRST, LEAST = 1e-2, 1e-4  # of the diagonal: the first damping, and one that is as good as none
+TRIES = 8  # trials of one step, each with more damping than the last
+MORE, LESS = 6.0, 0.2  # factors on the damping after a failed and after an accepted step
+HELD = 1e12  # times the diagonal: the parameter does not move
+SETTLED = 0.1  # share of the least decrease for which the fit goes on; steps that predict less are not tried
+FIRST, LEAST = 1e-2, 1e-4  # times the diagonal: the first damping, and the one below which it is set to 0
 
 
 class Steps:
-    """Damped steps from ``theta``; the noise scale is the one that the undamped step will leave, else a bad start would
-    trust its priors."""
+    """Damped steps from ``theta``.
+
+    The noise scale is that after the undamped step. With the scale of a bad start, the priors would weigh too much.
+    """
 
     def __init__(self, joint, theta, residuals, jacobian):
         self.joint, self.theta, parts = joint, theta, {}
@@ -32,8 +36,11 @@ class Steps:
             left = {k: max(0.0, p[2] - 2.0 * step @ p[1] + step @ p[0] @ step) for k, p in parts.items()}
 
     def damped(self, damping):
-        """(n,) step with ``damping`` times the diagonal added to it; what would leave its trust region is damped alone,
-        what is at its bound and would go beyond stays there, and the others move on."""
+        """(n,) step with ``damping`` times the diagonal added.
+
+        A parameter that would leave its trust region gets more damping. One at its bound that would go beyond stays
+        there, while the others move.
+        """
         joint, diagonal = self.joint, np.diag(self.normal)
         reach, more = joint.reach / joint.sd, np.full(self.theta.size, damping)
         lowest, highest = self.theta <= joint.low, self.theta >= joint.high
@@ -47,13 +54,15 @@ class Steps:
         return joint.sd * np.clip(step, -reach, reach)
 
     def promised(self, step):
-        """By how much the cost would fall if everything were straight."""
+        """Decrease of the cost if the problem were linear."""
         step = step / self.joint.sd
         return float(2.0 * step @ self.right - step @ self.normal @ step)
 
     def taken(self, cost, damping):
-        """((theta, predictions, residuals, cost), damping for the next) of the first step that costs less, damped ever
-        more; (None, 0) where none does, or none promises a tenth of what is enough to go on."""
+        """((theta, predictions, residuals, cost), next damping) of the first step that costs less, with rising damping.
+
+        (None, 0) if there is none, or if none predicts a tenth of the least decrease for which the fit goes on.
+        """
         joint = self.joint
         for _ in range(TRIES):
             step = self.damped(damping)
@@ -71,7 +80,7 @@ class Steps:
 
 
 def broyden(jacobian, weight, moved, old, new):
-    """Rank-one update that makes the Jacobian say what the last step did to the residuals, in prior deviations."""
+    """Rank-one update by which the Jacobian agrees with the last ``step``, in prior standard deviations."""
     size = float(weight @ moved)
     change = [
         np.outer((a - b - j @ moved).astype(j.dtype), (weight / size).astype(j.dtype))

@@ -1,15 +1,13 @@
-r"""Where what is missing acts, when it has no name: place, channel, wheel or clock, from independent witnesses.
+r"""Localization of a residual that has no name: position, channel, wheel or clock, by evidence for linear subspaces.
 
-What the residual is locked to: evidence for linear subspaces of the recordings.
-
-A cause that is fixed to a place acts by a force there, whatever its history: what it adds to all sensors lies in the
-subspace that the track's transfer functions from that place span. A fault of a channel lies in the channel, a
-disturbance of one recording in all its channels at once. With an unknown amplitude each is a random effect,
+A cause that is fixed to a position acts by a force there. Whatever the force is, its effect on all sensors lies in the
+subspace of the track's transfer functions from that position. A fault of a channel lies in the channel, a disturbance
+of one recording in all its channels at once. With an unknown amplitude each is a random effect,
 
 .. math:: r \sim N(0,\; \nu I + a^2 B B^T)
 
-whose evidence over :math:`N(0, \nu I)` is found in closed form from the eigenvalues of :math:`B^T B`, with ν and a at
-their best values, ν not below what sound recordings leave.
+whose evidence over :math:`N(0, \nu I)` follows in closed form from the eigenvalues of :math:`B^T B`, with ν and a at
+their best values, ν not below the level of intact recordings.
 """
 
 from dataclasses import dataclass, field, replace
@@ -24,10 +22,10 @@ NOISE = np.geomspace(1.0, 100.0, 25)
 
 @dataclass(frozen=True)
 class Space:
-    """Columns on some observations, and what subspaces of them belong to.
+    """Columns on some observations, and the subspaces of them.
 
-    ``names`` of the observations, ``columns`` (n, k) on them one behind the other in the unit of the data;
-    ``parts`` (frame, level) -> (k, m) combinations of the columns, None for all of them.
+    ``names`` of the observations. ``columns`` (n, k) on them one behind the other, in the unit of the data.
+    ``combinations`` (frame, level) -> (k, m) combinations of the columns, None for all of them.
     """
 
     names: tuple[str, ...]
@@ -37,7 +35,7 @@ class Space:
 
 @dataclass(frozen=True)
 class Witness:
-    """Evidence [nats] that the residual is locked to ``level`` of ``frame``, ``by`` name of the space."""
+    """Evidence [nats] that the residual is fixed to ``level`` of ``frame``; ``by_space`` nats by name of the space."""
 
     frame: str
     level: object
@@ -78,9 +76,10 @@ def evidence(gram, inner, square, n, floor):
 
 
 def weigh(case, fit, floor):
-    """Witnesses in order of evidence, for the residual of ``fit``; ``floor`` by kind: mean square of sound recordings.
+    """Evidence for each level, largest first, for the residual of ``fit``.
 
-    Columns are whitened and the nuisances projected out of them under their priors, as they are out of the residual.
+    ``floor`` by data type is the mean square of intact recordings. Columns are whitened. The nuisances are projected
+    out of them under their priors, as they are out of the residual.
     """
     projector, where, first = Projector(case, fit), {}, 0
     for k, o in enumerate(case.observations):
@@ -118,16 +117,20 @@ def _weighed(space, columns, residual, floor):
             yield key, evidence(part.T @ gram @ part, part.T @ inner, square, residual.size, floor)
 
 
-HEARD = 6.0  # nats that blows must add before a channel is blamed: what is wrong with it is wrong in blows, too
-AS_GOOD = 6.0  # nats within which places are not told apart: odds of 400 to 1, a model's errors taken off
-EXPLAINS = 0.25  # share of the excess from which a refused candidate is heard as a witness
+HEARD = 6.0  # nats that impacts must add before a channel is blamed: its fault shows in impacts, too
+AS_GOOD = 6.0  # nats within which positions are not distinguished: odds of 400 to 1, less the errors of the model
+EXPLAINS = 0.25  # share of the excess from which a rejected candidate counts as evidence for its site
 
 
 @dataclass(frozen=True)
 class Whereabouts:
-    """``frame`` and ``level`` of the strongest witness with its evidence ``nats``; ``place`` with its interval ``low``
-    to ``high`` [m], ``sensor``, ``train`` and ``axle`` where it has them; ``others`` frame -> nats of the next best;
-    ``measured`` first and last place of sensors and blows [m]: beyond them nothing tells one place from another."""
+    """Location of a residual.
+
+    ``frame`` and ``level`` with the largest evidence ``nats``. ``place`` with its interval ``low`` to ``high`` [m],
+    ``sensor``, ``train`` and ``axle`` if it has them. ``next_best`` frame -> nats of the other frames.
+    ``measured_range`` first and last position of sensors and impacts [m]: beyond them positions cannot be
+    distinguished.
+    """
 
     frame: str
     level: object
@@ -162,10 +165,10 @@ class Whereabouts:
 
 
 def whereabouts(case, fit, refused=None, cause=""):
-    """Whereabouts of what ``fit`` leaves; ``refused`` is the Score of the best candidate that got no name, or None.
+    """Location of the residual of ``fit``. ``leader`` is the Score of the best candidate that got no name, or None.
 
-    Where recordings that were not fitted are the ``cause`` of the verdict, they say where. None where the case has no
-    spaces to look into, or none of them holds more than sound recordings leave.
+    If recordings that were not fitted are the ``cause`` of the verdict, they give the location. None if the case has no
+    residual spaces, or none of them exceeds the level of intact recordings.
     """
     if cause == "clock":
         names = ", ".join(d.name for d in case.disturbed)
@@ -181,8 +184,9 @@ def whereabouts(case, fit, refused=None, cause=""):
 
 
 def _alone(case, witnesses):
-    """Witnesses that are heard: what a wheel shows less what the wheels of other trains show, which is the rail's; a
-    channel where blows, if any, say so too."""
+    """Evidence that counts: of a wheel, less that of wheels of other trains, which belongs to the rail; of a channel,
+    only if impacts, if any, support it.
+    """
     blows = {o.name for o in case.observations if case.cheap(o)}
     for w in witnesses:
         nats = w.nats

@@ -1,6 +1,6 @@
-"""The joint fit: nuisances and the parameters of a term together, damped, within a trust region.
+"""Joint maximum a posteriori fit of nuisances and term parameters: damped Gauss-Newton steps within a trust region.
 
-A fit: what the joint fit of a case ended at, with all that is asked of it afterwards.
+The result is a ``Fit``, with all that later steps of the diagnosis need.
 """
 
 from dataclasses import dataclass, replace
@@ -13,11 +13,12 @@ from turnout.mismatch.engine.levenberg_marquardt import FIRST, Steps, broyden
 
 @dataclass(frozen=True)
 class Fit:
-    """``values`` of nuisances, ``psi`` (n_term,) of the terms; ``residuals`` a list by observation, ``white`` the same
-    whitened, ``jacobian`` whitened too, [] in one that is ``light``; that of a dear case is in single precision.
+    """Result of a joint fit.
 
-    ``scale`` noise scale by kind, at least 1; ``cost`` minus twice the log posterior up to a constant;
-    ``covariance`` of nuisances and psi; ``level`` weighted mean square by kind, in units of ``sigma``;
+    ``values`` of nuisances, ``psi`` (n_term,) of the terms. ``residuals`` list by observation, ``white`` the same
+    whitened. ``jacobian`` whitened too; [] in a fit ``without_jacobian``, in single precision in an expensive case.
+    ``scale`` noise scale by data type, at least 1. ``cost`` minus twice the log posterior up to a constant.
+    ``covariance`` of nuisances and psi. ``level`` weighted mean square by data type, in units of ``sigma``.
     ``evidence`` log probability of the data by Laplace's approximation, up to a constant of the case. [nats]
     """
 
@@ -41,15 +42,15 @@ class Fit:
         return terms_of(self.candidates, self.psi)
 
     def light(self):
-        """The same fit without its Jacobian, by far the largest part of it."""
+        """The same fit without its Jacobian, by far its largest item."""
         return replace(self, jacobian=[])
 
     def with_candidates(self, candidates):
-        """The same fit with these candidates, which carry functions and are not kept on disk."""
+        """The same fit with these candidates, which carry functions and are not stored on disk."""
         return replace(self, candidates=tuple(candidates))
 
     def part(self, candidate):
-        """Where the parameters of ``candidate`` are in ``psi``, a slice."""
+        """Slice of the parameters of ``candidate`` in ``psi``."""
         first = 0
         for known in self.candidates:
             last = first + len(known.parameters)
@@ -60,7 +61,7 @@ class Fit:
 
     @property
     def psi_se(self):
-        """(n_term,) standard errors of the terms' parameters; a size errs by the ``loose`` share of it as well."""
+        """(n_term,) standard errors of the terms' parameters; a size also errs by its ``model_error_share``."""
         found, first = np.sqrt(np.maximum(np.diag(self.covariance)[len(self.values) :], 0.0)), 0
         for candidate in self.candidates:
             if candidate.parameters:
@@ -82,14 +83,14 @@ def terms_of(candidates, psi):
 
 TRUST_TERM = 0.35  # largest step of a term's parameter as a share of its bounds
 DONE = 0.05  # nats; a smaller gain ends the iteration
-CHEAP_STEPS = 60  # at most, of a fit to cheap observations alone: some valleys are long
-RENEWED = 4  # steps after which a dear Jacobian is made anew
-STALL = 5e-4  # of minus twice the log posterior per sample; a dear fit that gains less ends
-FINE = 1e-4  # the same where the verdict rests on it
+CHEAP_STEPS = 60  # steps of a fit to cheap observations alone: some valleys are long
+RENEWED = 4  # steps after which the Jacobian of an expensive case is computed anew
+STALL = 5e-4  # of minus twice the log posterior per sample; a fit of an expensive case that gains less ends
+FINE = 1e-4  # the same for fits on which the verdict rests
 
 
 class Joint:
-    """Least squares of a case with some candidates in it; holds what does not change between steps."""
+    """Least-squares problem of a case with some candidates: all that does not change between steps."""
 
     def __init__(self, case, candidates=(), observations=None, iterations=6, done=DONE, stall=STALL):
         self.case, self.candidates = case, tuple(candidates)
@@ -106,7 +107,7 @@ class Joint:
         self.reach = np.array([n.trust * n.sd for n in case.nuisances] + [_reach(p) for p in self.parameters])
 
     def split(self, theta):
-        """Nuisances by name, and the rest."""
+        """Nuisances by name, and the term parameters."""
         return {n.name: float(v) for n, v in zip(self.case.nuisances, theta)}, np.asarray(theta[self.n :])
 
     def predict(self, theta):
@@ -116,7 +117,7 @@ class Joint:
         return self.case.predict(values, terms_of(self.candidates, psi), self.observations)
 
     def tried(self, theta):
-        """Predictions at ``theta``, None where the simulation cannot go there."""
+        """Predictions at ``theta``, None if the simulation fails."""
         try:
             return self.predict(theta)
         except SimulationError:
@@ -127,7 +128,7 @@ class Joint:
         return [o.whitened(o.data - p) for o, p in zip(self.observations, predictions)]
 
     def level(self, residuals):
-        """Mean square of whitened residuals, by kind."""
+        """Mean square of whitened residuals, by data type."""
         total, count = {}, {}
         for o, r in zip(self.observations, residuals):
             total[o.kind] = total.get(o.kind, 0.0) + o.effective * float(np.sum(r**2))
@@ -153,7 +154,7 @@ class Joint:
         return np.concatenate(rows), np.concatenate(right)
 
     def jacobian(self, theta, predictions, keep=None):
-        """Whitened derivatives at ``theta``; the nuisances' from ``keep`` where given."""
+        """Whitened derivatives at ``theta``; those by nuisances from ``reused``, if given."""
         values, psi = self.split(theta)
         terms = terms_of(self.candidates, psi)
         if keep is None:
@@ -166,7 +167,7 @@ class Joint:
         return [j.astype(np.float32) for j in whole] if self.case.frozen_jacobian else whole
 
     def renewed(self, theta, predictions, jacobian):
-        """The Jacobian with that of cheap observations made anew."""
+        """The Jacobian with new derivatives of cheap observations."""
         chosen = [i for i, o in enumerate(self.observations) if self.case.cheap(o)]
         if not chosen:
             return jacobian
@@ -183,7 +184,7 @@ class Joint:
         step = -step if theta[k] + step > p.bounds[1] else step
         values, psi = self.split(theta)
         terms = terms_of(self.candidates, psi)
-        for way in (step, -step):  # the simulation may not go to one side
+        for way in (step, -step):  # the simulation may fail on one side
             moved = np.array(psi)
             moved[k - self.n] += way
             self.evaluations += 1
@@ -207,7 +208,7 @@ def _reach(p):
 
 
 def cost_at(case, candidates, psi, values):
-    """Minus twice the log posterior at these parameters and nuisances, nothing fitted."""
+    """Minus twice the log posterior at these parameters and nuisances, without a fit."""
     joint = Joint(case, candidates)
     theta = np.concatenate([[values.get(n.name, n.mean) for n in case.nuisances], psi])
     return joint.cost(theta, joint.residuals(joint.predict(theta)))
@@ -221,10 +222,9 @@ def fit_jointly(
     .. math:: \min_{\eta,\psi} \sum_k n_k \left[\ln s_k^2 + \overline{r^2}_k / s_k^2\right]
               + \sum (\eta - \mu)^2 / \sigma_\eta^2, \quad s_k \ge 1
 
-    Gauss-Newton steps, damped ever more until the cost falls (Levenberg and Marquardt), until a step gains less than
-    ``done`` nats, or in a dear case ``stall`` of the cost per sample. ``start`` (n_term,) of psi; ``values`` of the
-    nuisances; ``keep`` a Jacobian whose nuisance columns are used instead of new ones and then updated by Broyden's
-    formula.
+    Damped Gauss-Newton steps (Levenberg and Marquardt), until a step gains less than ``min_gain`` nats, or in an
+    expensive case ``stall`` of the cost per sample. ``start`` (n_term,) of psi. ``values`` of the nuisances. The
+    nuisance columns of ``reused_jacobian`` are used instead of new ones, and updated by Broyden's formula.
     """
     joint = Joint(case, candidates, observations, iterations, done, stall)
     psi = np.array([p.neutral for p in joint.parameters]) if start is None else np.asarray(start, dtype=float)
@@ -245,8 +245,11 @@ def fit_jointly(
 
 
 def _iterate(joint, theta, predictions, residuals, jacobian, cost, renew):
-    """Steps until nothing is gained; a dear Jacobian is updated, and made anew after every ``renew`` steps (0: never)
-    and before the last: on a long way it comes to point elsewhere."""
+    """Steps until nothing is gained.
+
+    The Jacobian of an expensive case is updated. It is computed anew after every ``refresh_steps`` steps (0: never) and
+    before the last one, since after many updates its directions are wrong.
+    """
     frozen = joint.case.frozen_jacobian
     enough, since, damping = joint.enough, 0, 0.0
     for _ in range(joint.iterations):
@@ -270,7 +273,7 @@ def _iterate(joint, theta, predictions, residuals, jacobian, cost, renew):
 
 
 def _anew(joint, theta, predictions, updated):
-    """The Jacobian made anew; of a dear case the ``updated`` one where the simulation fails beside ``theta``."""
+    """A new Jacobian. In an expensive case the ``updated`` one if the simulation fails close to ``theta``."""
     try:
         return joint.jacobian(theta, predictions)
     except SimulationError:

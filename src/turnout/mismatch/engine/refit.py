@@ -1,8 +1,6 @@
-"""Joint refits of the shortlist on top of a fit: from which start, how far, kept where, and what each is worth.
+"""Joint refits of the shortlisted candidates on top of a fit: starts, convergence, and the score of each.
 
-A leader that explains too little, begun again from smaller sizes and an unbent base.
-
-Fits continued to where nothing is gained any more, and kept by their key.
+A leader that explains too little is restarted from smaller sizes. Fits are cached by key.
 """
 
 from dataclasses import replace
@@ -16,11 +14,11 @@ from turnout.mismatch.engine.cross_validation import hangs_on, held_out_score, t
 from turnout.mismatch.engine.evidence import score_of
 from turnout.mismatch.engine.map_fit import FINE, STALL, Joint, cost_at, fit_jointly
 
-ROUNDS = 3  # of steps for a leader; one that still gains afterwards is far from any law
+ROUNDS = 3  # rounds of steps for a leader; one that still gains afterwards is far from any optimum
 
 
 def ended(case, fit, settings):
-    """Continued until a round of steps gains less than a name needs; each begins with new derivatives."""
+    """The fit, continued until a round of steps gains less than a name needs. Each round computes new derivatives."""
     for _ in range(ROUNDS):
         try:
             before, fit = fit, to_the_end(case, fit, settings, FINE)
@@ -32,12 +30,12 @@ def ended(case, fit, settings):
 
 
 def to_the_end(case, fit, settings, stall=STALL):
-    """The fit continued from where it is, with derivatives of its own."""
+    """The fit continued from where it is, with new derivatives."""
     return fit_jointly(case, fit.candidates, fit.psi, fit.values, iterations=settings.iterations, stall=stall)
 
 
 def with_derivatives(case, fit, settings):
-    """The fit, continued if it has no derivatives; as it is where the simulation fails beside it."""
+    """The fit, continued if it has no Jacobian; unchanged if the simulation fails close to it."""
     try:
         return fit if fit.jacobian else to_the_end(case, fit, settings)
     except SimulationError:
@@ -45,7 +43,7 @@ def with_derivatives(case, fit, settings):
 
 
 def kept(store, key, compute, candidates=()):
-    """A fit by its key, computed where the store lacks it; stores hold fits without their candidates' functions."""
+    """A fit by its key, computed if the store lacks it; stores hold fits without their candidates' functions."""
     if key not in store:
         fit = compute()
         store[key] = fit.with_candidates(()) if fit is not None else None
@@ -53,13 +51,15 @@ def kept(store, key, compute, candidates=()):
     return None if fit is None else fit.with_candidates(candidates)
 
 
-SIZES = (1.0, 0.75, 0.5)  # of a leader's first two parameters: its waves turn with both
+SIZES = (1.0, 0.75, 0.5)  # shares of a leader's first two parameters: its response is nonlinear in both
 
 
 def begun_anew(case, fit, score, settings, store, effect):
-    """A leader that explains too little of what is there, begun again at the least costly of smaller sizes about its
-    own, with what the base may have bent at its prior: a base bent to stand for a large effect, and an effect that
-    throws wheels off the rail, have valleys beside the one that is deepest. The better of both."""
+    """The better of a leader that explains too little and its restart. Other leaders stay.
+
+    The restart begins at the least costly of smaller sizes, with all nuisances that can mask an effect at their priors.
+    A base fit that imitates a large effect has local minima, and so has an effect that lifts wheels off the rail.
+    """
     if score.explained >= settings.explained or not score.candidate.parameters:
         return score
     unbent = score.fit.values | {n.name: n.mean for n in case.nuisances if n.owner is None and n.bends}
@@ -79,7 +79,7 @@ def begun_anew(case, fit, score, settings, store, effect):
 
 
 def _cheapest(case, score, values):
-    """``psi`` with the first two parameters of the leader at the shares of its own that cost least."""
+    """``psi`` with the first two parameters of the leader at those shares of their values that cost least."""
     candidate, mine = score.candidate, score.fit.part(score.candidate)
     own, found = score.fit.psi[mine], []
     for shares in product(SIZES, repeat=min(2, own.size)):
@@ -96,24 +96,29 @@ def _cheapest(case, score, values):
     return np.array(min(found)[1])
 
 
-HELD = 0.5  # of what the cheap observations gained; a refit that holds less has not come to its end
-PROMISING = 0.5  # of the threshold, which laws of a part must gain before its other laws are asked
-NEARLY = 0.5  # of the threshold, from which a leader is fitted to its end
-FAR = 4.0  # thresholds promised by the cheap observations, beyond which the base fit's derivatives point elsewhere
-FARTHER = 2.0  # times its promise, from which a law is begun again that gained too little: the base holds part of it
-HALVINGS = 4  # of a start that costs more than nothing; a sixteenth of it is a straight line
+HELD = 0.5  # share of the gain from the cheap observations; a refit that gains less has not converged
+PROMISING = 0.5  # thresholds that an effect of a component must gain before its other effects are refitted
+NEARLY = 0.5  # thresholds of gain from which a leader is fitted to convergence
+# Thresholds promised by the cheap observations beyond which a start needs derivatives of its own.
+FAR = 4.0
+# Multiple of the promised size from which an effect that gained too little is restarted: the base fit masks part of it.
+FARTHER = 2.0
+HALVINGS = 4  # halvings of a start that costs more than no effect; a sixteenth of it is linear
 
 
 def scored(case, fit, settings, tell, store, effect, promising):
-    """(best Score of each family, ``fit``), all refitted jointly on top of ``fit``. Where that proves to have stopped a
-    threshold short of its end, it is continued from the leader's nuisances and all are asked again on top of it."""
+    """(best Score of each family, ``fit``), all refitted jointly on top of ``fit``.
+
+    If ``fit`` proves to have stopped a threshold before its optimum, it is continued from the leader's nuisances, and
+    all candidates are scored again on top of it.
+    """
     ranked = _ranked(case, fit, settings, tell, store, effect, promising)
     further = _owed(case, fit, ranked, settings, store, effect)
     if further is not None and further.evidence - fit.evidence > settings.threshold:
         fit, effect = further, f"{effect}:again"
         ranked = _ranked(case, fit, settings, tell, store, effect, promising)
         further = _owed(case, fit, ranked, settings, store, effect)
-    if further is not None:  # what it owes is no evidence
+    if further is not None:  # the shortfall of the base fit is no evidence
         short = max(0.0, further.evidence - fit.evidence)
         ranked = [replace(s, gain=s.gain - short) for s in ranked]
     if case.frozen_jacobian and ranked:
@@ -122,7 +127,7 @@ def scored(case, fit, settings, tell, store, effect, promising):
 
 
 def _ranked(case, fit, settings, tell, store, effect, promising):
-    """Best Score of each family on top of ``fit``, leaders fitted to their end."""
+    """Best Score of each family on top of ``fit``, leaders fitted to convergence."""
     plan = shortlist(case, fit, settings, promising)
     scores, best = {}, -np.inf
     for done, entry in enumerate(plan):
@@ -144,15 +149,17 @@ def _ranked(case, fit, settings, tell, store, effect, promising):
         close = min(material[0].gain - settings.margin, HELD * material[0].gain) if material else 0.0
         leaders = [s for s in material if s.gain > max(NEARLY * settings.threshold, close)]
         polished = [_polished(case, fit, s, settings, store, effect) for s in leaders]
-        if polished and not fit.candidates:  # beside another effect what is left is that one's shape as well
+        if polished and not fit.candidates:  # beside another effect the residual is also an error in its shape
             polished[0] = begun_anew(case, fit, polished[0], settings, store, effect)
         ranked = sorted([*polished, *(s for s in ranked if all(s is not x for x in leaders))], key=lambda s: -s.gain)
     return ranked
 
 
 def _owed(case, fit, ranked, settings, store, effect):
-    """``fit`` made again from the leader's nuisances, to its end; None where nobody leads, the case is no dear one or
-    the simulation cannot go there."""
+    """``fit`` computed again from the leader's nuisances, to convergence.
+
+    None if nobody leads, the case is not expensive, or the simulation fails.
+    """
     if not case.frozen_jacobian or not ranked or ranked[0].gain <= settings.threshold:
         return None
     leader = ranked[0]
@@ -169,8 +176,11 @@ def _back(case, fit, values, settings):
 
 
 def _same_law_beside(case, fit, ranked, settings, store, effect):
-    """The scores, with families that the leader cannot be told from as it was found (its ``limit``, its ``plain`` form)
-    fitted anew from the leader's nuisances: they are their own as well."""
+    """The scores, with equivalent families refitted from the leader's nuisances, which suit them as well.
+
+    Equivalent are families that cannot be distinguished from the leader as fitted: its ``limit_form`` and
+    ``simpler_form``.
+    """
     leader = ranked[0]
     for k, score in enumerate(ranked[1:], 1):
         alike = score.is_limit_of(leader) or score.is_plain_form_of(leader)
@@ -183,15 +193,18 @@ def _same_law_beside(case, fit, ranked, settings, store, effect):
 
 
 def beside(case, fit, ranked, settings):
-    """The scores, the best one that matters with what it gains on top of one that leads by more than the margin and
-    does not: a law of the whole track too small to act on may be what another law has taken for itself."""
+    """The scores, with the best reportable one reduced to its gain on top of the leader.
+
+    This applies if a leader that is not reportable leads by more than the margin. An effect of the whole track that is
+    too small to matter may be what another effect took for itself.
+    """
     leader, best = ranked[0], next((s for s in ranked if s.material), None)
     if best is None or leader.gain - best.gain <= settings.margin or best.gain <= settings.threshold:
         return ranked
     held, own = leader.fit, best.fit.psi[fit.psi.size :]
     none = np.concatenate([fit.psi, leader.candidate.neutral])
     found, both = [], (*held.candidates, best.candidate)
-    for psi, values in ((held.psi, held.values), (none, best.fit.values)):  # from what either has ended at
+    for psi, values in ((held.psi, held.values), (none, best.fit.values)):  # from the optimum of either
         start = np.concatenate([psi, own])
         try:
             found.append(fit_jointly(case, both, start, values, iterations=settings.iterations))
@@ -204,16 +217,18 @@ def beside(case, fit, ranked, settings):
 
 
 def _after_its_kin(entry, scores):
-    """The rival with the nuisances that the best law of its part was given: they are nearly its own."""
+    """The rival with the nuisances of the best effect of its component: they nearly suit it."""
     candidate = entry.candidate
     kin = [s for s in scores.values() if s.candidate.part == candidate.part]
     return replace(entry, values=max(kin, key=lambda s: s.gain).fit.values) if kin else entry
 
 
 def _tried(case, fit, entry, settings, store, effect, best=0.0):
-    """Score of an entry of the shortlist after its joint refit; None where the simulation cannot go there. What holds
-    less than it promised goes on. A fault of a channel starts with derivatives of its own where it promises much, and
-    goes on only if the ``best`` so far is within its reach."""
+    """Score of a task of the shortlist after its joint refit. None if the simulation fails.
+
+    A refit that gains less than its promise is continued. A fault of a channel starts with derivatives of its own if it
+    promises much. It is continued only if ``best_gain`` so far is within its reach.
+    """
     candidate, start, of_channel = entry.candidate, entry.start, entry.candidate.frame == "sensor"
     key = f"{effect}:{'+'.join(c.key for c in fit.candidates)}:{candidate.key}:{tuple(np.round(start, 12))}"
     both, far = (*fit.candidates, candidate), of_channel and entry.promised > FAR * settings.threshold
@@ -231,10 +246,12 @@ def _tried(case, fit, entry, settings, store, effect, best=0.0):
 
 
 def _from_farther(case, fit, entry, score, settings, store, key):
-    """Best Score of the entry begun at more than it promised, and with what the base may have bent at its prior: where
-    common values of the base fit have taken a part of what the whole track has, a small size costs less than none and a
-    large one more, until these come back; where the waves of the rail have, they come back on no straight way.
-    ``score`` where none is better or the simulation cannot go there."""
+    """Best Score of a task restarted at more than its promised size, once also with maskable nuisances at their priors.
+
+    If common values of the base fit have absorbed part of an effect of the whole track, a small size gains nothing and
+    a large one costs more, until these values return. If the waves of the rail absorbed it, they return on no straight
+    path. ``score`` if no restart is better, or the simulation fails.
+    """
     candidate = entry.candidate
     first, start = candidate.parameters[0], np.array(entry.start, dtype=float)
     start[0] = np.clip(first.neutral + FARTHER * (start[0] - first.neutral), *first.bounds)
@@ -257,14 +274,14 @@ def _from_farther(case, fit, entry, score, settings, store, key):
 
 
 def _polished(case, fit, score, settings, store, effect):
-    """A leader refitted to the end, with derivatives of its own: the verdict rests on these."""
+    """A leader refitted to convergence, with derivatives of its own: the verdict rests on these."""
     key = f"{effect}:polished:{score.candidate.key}:{len(fit.candidates)}:{tuple(np.round(score.fit.psi, 12))}"
     refit = kept(store, key, lambda: ended(case, score.fit, settings), score.fit.candidates)
     return score_of(case, fit, refit, score.candidate, settings)
 
 
 def _checked(case, fit, score, settings):
-    """A leader of a dear case with its gain condition by condition, each left out in turn."""
+    """A leader of an expensive case with its gain condition by condition, each left out in turn."""
     if not case.frozen_jacobian or not score.fit.jacobian:
         return score
     mine, reference = held_out_score(case, score.fit), held_out_score(case, fit)
@@ -275,11 +292,11 @@ def _checked(case, fit, score, settings):
 
 
 def _refit(case, fit, candidate, start, back, far, settings):
-    """Joint refit from this start; None where the simulation cannot go there."""
+    """Joint refit from this start. None if the simulation fails."""
     psi = np.concatenate([fit.psi, start])
     candidates = (*fit.candidates, candidate)
     values = {**fit.values, **back}
-    if not candidate.start_from_base and not back:  # what the base may have bent goes back to its prior
+    if not candidate.start_from_base and not back:  # nuisances that can mask an effect return to their priors
         values |= {n.name: n.mean for n in case.nuisances if n.owner is None and n.bends}
     try:
         psi = _best_start(case, candidates, psi, values)
@@ -293,7 +310,7 @@ def _refit(case, fit, candidate, start, back, far, settings):
 
 
 def _derivatives(case, fit, candidates, psi, values, far):
-    """A dear case's derivatives from which a refit starts: those of ``fit``, but for a start ``far`` from it."""
+    """Derivatives from which a refit of an expensive case starts: those of ``fit``, new ones if ``is_far``."""
     if not case.frozen_jacobian or not far:
         return fit.jacobian if case.frozen_jacobian else None
     joint = Joint(case, candidates)
@@ -302,7 +319,10 @@ def _derivatives(case, fit, candidates, psi, values, far):
 
 
 def _best_start(case, candidates, psi, values):
-    """``psi`` or the last candidate's own starts: what the cheap observations cannot see is asked of the dear ones."""
+    """``psi`` or the last candidate's own starts, whichever costs least.
+
+    The expensive observations decide what the cheap ones cannot see.
+    """
     candidate = candidates[-1]
     if candidate.start_from_base and not candidate.even:
         return psi
@@ -318,8 +338,10 @@ def _best_start(case, candidates, psi, values):
 
 
 def _sobered(case, candidates, psi, fit):
-    """``psi`` with the last candidate nearer to neutral, by halves, until it costs no more than ``fit`` without it:
-    what a column promises of a large size need not hold."""
+    """``psi`` with the last candidate nearer to neutral, by halves, until it costs no more than ``fit`` without it.
+
+    The promise of a column need not hold at a large size.
+    """
     n, psi = len(candidates[-1].parameters), np.array(psi, dtype=float)
     neutral = candidates[-1].parameters[0].neutral
     for _ in range(HALVINGS):

@@ -1,13 +1,13 @@
-"""Verification on recordings never used: before, named, best rival and a decoy of as many parameters."""
+"""Verification on reserved recordings: fit of base, named effect, best rival and a decoy of as many parameters."""
 
 import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.map_fit import Joint
 
-FITTED_STEPS = 8
-SETTLED = 1.0  # of minus twice the log posterior
-BLOCKS = 25
+FITTED_STEPS = 8  # Gauss-Newton steps of a reserved recording's own nuisances
+SETTLED = 1.0  # decrease of minus twice the log posterior; a step that gains less is the last
+BLOCKS = 25  # stretches of a recording over which scatter is estimated
 
 
 def fit_percent(observations, predictions, centre=True):
@@ -27,7 +27,7 @@ def fit_percent(observations, predictions, centre=True):
 
 
 def fit_of_reserved(case, fit):
-    """(predictions of the reserved recordings, fit [%]) by a fitted model; (None, None) where none can be made."""
+    """(predictions of the reserved recordings, fit [%]) by a fitted model. (None, None) if the simulation fails."""
     try:
         found = predict_reserved(case, fit, case.reserved)
     except SimulationError:
@@ -38,9 +38,9 @@ def fit_of_reserved(case, fit):
 def gain_error(observations, before, after):
     r"""Standard error of ``fit_percent`` of ``after`` less that of ``before``, in points.
 
-    Jackknife over ``BLOCKS`` stretches of each observation, each in all of its rows (Efron and Stein 1981): with the
-    gain :math:`d_i` of all stretches but one, :math:`\sqrt{(m - 1) / m \sum (d_i - \bar d)^2}`. Both miss the same
-    roughness, so that the gain is known better than either fit; so do all sensors under one train.
+    Jackknife over ``N_BLOCKS`` stretches of each observation, each in all of its rows (Efron and Stein 1981): with the
+    gain :math:`d_i` of all stretches but one, :math:`\sqrt{(m - 1) / m \sum (d_i - \bar d)^2}`. Both fits lack the same
+    roughness, and so do all sensors under one train. The gain is therefore more certain than either fit.
     """
     sums = np.array([_squares(o, b, a) for o, b, a in zip(observations, before, after)]).transpose(1, 0, 2)
     missed_before, missed_after, total = (np.sum(s) - s.ravel() for s in sums)
@@ -49,13 +49,13 @@ def gain_error(observations, before, after):
 
 
 def _squares(o, before, after):
-    """(3, BLOCKS) weighted sums of squares of what ``before`` and ``after`` miss, and of the recording."""
+    """(3, N_BLOCKS) weighted sums of squares of the residuals ``before`` and ``after``, and of the recording."""
     parts = (o.data - before, o.data - after, o.data - np.mean(o.data))
     return [_stretches(o, (p / o.sigma) ** 2) for p in parts]
 
 
 def _stretches(o, squares):
-    """(BLOCKS,) sums of ``squares`` (n,) over stretches of the observation, each in all of its rows."""
+    """(N_BLOCKS,) sums of ``squares`` (n,) over stretches of the observation, each in all of its rows."""
     together = squares.reshape(o.rows, -1).sum(axis=0)
     return [o.effective * float(np.sum(b)) for b in np.array_split(together, BLOCKS)]
 
@@ -63,8 +63,8 @@ def _stretches(o, squares):
 def falls(observations, before, after, points):
     """Whether ``after`` fits worse than ``before`` by more than ``points`` of fit and than two standard errors.
 
-    The difference of weighted squares is taken over ``BLOCKS`` stretches of each observation, each in all of its rows;
-    these scatter. One standard error is reached by one in six names that say nothing about these observations.
+    The standard error is that of the difference of weighted squares over ``N_BLOCKS`` stretches of each observation,
+    each in all of its rows. One in six names that say nothing about these observations reaches one standard error.
     """
     lost = (((o.data - a) ** 2 - (o.data - b) ** 2) / o.sigma**2 for o, b, a in zip(observations, before, after))
     parts = [part for o, d in zip(observations, lost) for part in _stretches(o, d)]
@@ -73,10 +73,10 @@ def falls(observations, before, after, points):
 
 
 def predict_reserved(case, fit, observations):
-    """Predictions of ``observations`` by the fitted model; only nuisances they own themselves are fitted to them.
+    """Predictions of ``observations`` by the fitted model; only nuisances that they own are fitted to them.
 
-    Any model gets that same freedom (a passage's own speed, time and load), so that models stay comparable.
-    SimulationError where the model cannot be simulated there.
+    Any model gets the same freedom (speed, time and load of a passage), so that models stay comparable. SimulationError
+    if the model cannot be simulated there.
     """
     joint = Joint(case, fit.candidates, observations)
     theta = np.concatenate([[fit.values[n.name] for n in case.nuisances], fit.psi])
@@ -101,7 +101,7 @@ def predict_reserved(case, fit, observations):
 
 
 def _own_step(case, joint, theta, terms, predictions, residuals, own):
-    """Gauss-Newton step of what the observations own themselves, at most one prior standard deviation each."""
+    """Gauss-Newton step of the nuisances that the observations own, at most one prior standard deviation each."""
     white = _own_columns(case, joint, theta, terms, predictions, own)
     scale = {kind: max(1.0, v) for kind, v in joint.level(residuals).items()}
     rows, right = joint.stacked(white, residuals, scale)
@@ -122,7 +122,7 @@ def _moved(joint, theta, own, step):
 
 
 def _own_columns(case, joint, theta, terms, predictions, own):
-    """Whitened derivatives by what the observations own themselves, each of its own alone."""
+    """Whitened derivatives by the owned nuisances, for each observation by its own alone."""
     values, found = joint.split(theta)[0], []
     owned = [n for n, mine in zip(case.nuisances, own) if mine]
     for o, p in zip(joint.observations, predictions):
@@ -135,10 +135,10 @@ def _own_columns(case, joint, theta, terms, predictions, own):
 
 
 def decoy(observations, predictions, reserved, reserved_predictions, n):
-    """Predictions of ``reserved`` by the base model with a filter of ``n`` free taps behind it.
+    """Predictions of ``reserved`` by the base model and a filter of ``n`` free taps behind it.
 
-    The taps (on the prediction delayed and advanced) are fitted to those of the ``observations`` that are of a kind
-    with the reserved ones: what any n free numbers gain.
+    The taps (on the prediction delayed and advanced) are fitted to the ``observations`` of the reserved data types.
+    They show what any n free numbers gain.
     """
     kinds = {o.kind for o in reserved}
     seen = [(o, p, np.sqrt(o.effective) / o.sigma) for o, p in zip(observations, predictions) if o.kind in kinds]

@@ -1,8 +1,8 @@
-r"""What a mismatch is locked to: residual energy by frame, with the false discovery rate.
+r"""Attribution of residual energy to levels of frames (sensor, axle, passage ...), with the false discovery rate.
 
-Cells of one sensor, one axle or one passage are alike, and sensors, bays and wheels of a sound turnout differ in level.
-So a level stands out only by what the other levels of its frame do not differ by among themselves: Grubbs' test on
-their means, right for any dependence of the cells within a level.
+Cells of one sensor, axle or passage are alike. Sensors, bays and wheels of an intact turnout differ in level. So a
+level stands out only by more than the other levels of its frame differ among themselves: Grubbs' test on their means,
+valid for any dependence of the cells within a level.
 """
 
 from dataclasses import dataclass, replace
@@ -10,15 +10,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import t as student
 
-FEWEST_CELLS = 8
-FEWEST = 3  # levels; of two nobody can say which is the odd one
-THIN = 0.5  # of the median number of cells; the mean of a level with fewer scatters more than the others'
+FEWEST_CELLS = 8  # cells of a frame; fewer are not tested
+FEWEST = 3  # levels; of two none can be called the exception
+THIN = 0.5  # share of the median number of cells; the mean of a level with fewer scatters too much
 
 
 @dataclass(frozen=True)
 class Frame:
-    """One frame's share: ``level`` stands out with ``effect`` [dB] over the rest; ``p`` by Grubbs' test, ``q``
-    after Benjamini and Hochberg over all frames; ``share`` of the variance of log energy; ``n`` cells."""
+    """Residual energy of one frame.
+
+    ``level`` stands out by ``effect`` [dB] over the others. ``p`` by Grubbs' test, ``q`` after Benjamini and Hochberg
+    over all frames. ``share`` of the variance of log energy. ``n`` cells.
+    """
 
     frame: str
     level: object
@@ -53,12 +56,12 @@ def cell_energies(observations, residuals):
 def attribute(energy, labels):
     r"""Frames in order of evidence.
 
-    After the means of the other frames' levels are taken off (two-way), the largest of the means of L levels is held
-    against the others', with their mean m and standard deviation s:
+    The means of the other frames' levels are subtracted first (two-way). The largest of the means of L levels is then
+    compared with the others, with their mean m and standard deviation s:
 
     .. math:: t = \frac{m_{max} - m}{s \sqrt{1 + 1/(L-1)}}, \qquad p = \min(1,\; L\, P(T_{L-2} > t))
 
-    p is 1 where fewer than ``FEWEST`` levels have cells enough to be compared.
+    p is 1 if fewer than ``MIN_LEVELS`` levels have enough cells to be compared.
 
     Parameters
     ----------
@@ -96,7 +99,7 @@ def attribute(energy, labels):
 
 
 def outlying(means):
-    """Chance that the largest of ``means`` (n,) stands out as it does, or further, where all are alike.
+    """Probability that the largest of ``means`` (n,) stands out as much, or more, if all are alike.
 
     >>> round(outlying(np.array([0.0, 0.1, -0.1, 3.0])), 3), outlying(np.array([0.0, 3.0]))
     (0.003, 1.0)
@@ -109,8 +112,11 @@ def outlying(means):
 
 
 def _without_others(e, name, codes):
-    """Log energy with the level means of all other frames taken off, two sweeps; not of those whose every level lies
-    within one of this frame, as the axles of a train do: they would take it along."""
+    """Log energy less the level means of all other frames, in two sweeps.
+
+    A frame is skipped if each of its levels lies within one level of this frame, as axles within trains: it would
+    absorb the difference.
+    """
     e = e - e.mean()
     for _ in range(2):
         for other, code in codes.items():

@@ -1,18 +1,23 @@
-"""A candidate after its joint refit: what it is worth, and what speaks for and against it."""
+"""Score of a candidate after its joint refit: its gain, and what supports and contradicts it."""
 
 from dataclasses import dataclass, field
 
 import numpy as np
 
-NO_UPPER_END = 0.5  # of a size; one that errs by more is known from below alone: 95 % reach beyond twice of it
+# Standard error as a share of a size above which only a lower limit is known: 95 % reach beyond twice the size.
+NO_UPPER_END = 0.5
 
 
 @dataclass(frozen=True)
 class Score:
-    """A candidate after its joint refit: ``gain`` in held-out log density over the base model less the log of the
-    places scanned [nats], ``worst`` the least gain of a fold, ``explained`` share of the excess, ``fit``; ``usual``: of
-    a size by which like parts of this very case differ anyway, or not shown by those who would have to; ``alone`` the
-    one condition that it hangs on (``alone.hangs_on``)."""
+    """A candidate after its joint refit.
+
+    ``gain`` in held-out log density over the base model, less the log of the number of sites [nats]. ``worst_gain``
+    least gain of a condition. ``explained`` share of the excess. ``is_ordinary``: similar components of this case
+    differ by this size anyway, or the required observations do not support it. ``single_witness`` the one condition on
+    which it rests (``cross_validation.single_witness``). ``unmasked_gain`` gain of conditions in which no earlier
+    effect shows.
+    """
 
     candidate: object
     gain: float
@@ -37,7 +42,7 @@ class Score:
 
     @property
     def material(self):
-        """It is large enough that somebody would act."""
+        """Whether it is so large that somebody would act."""
         if self.usual:
             return False
         known, sized = self.candidate.parameters, self.candidate.sized
@@ -46,9 +51,11 @@ class Score:
         return size - open_by >= self.candidate.least
 
     def told_elsewhere(self, settings):
-        """Why what is left of the fit is no witness against it, in words, "" where it is one: data that are not those
-        of the fit are evidence enough, and it makes the fit worse by no more than a margin, which its own numbers cost;
-        or conditions are in which nothing shows that was named before, whose shape may be what is left elsewhere."""
+        """Reason, in words, why the residual of the fit does not count against it, "" if there is none.
+
+        Either external evidence alone is enough, and the fit becomes worse by no more than a margin. Or conditions
+        support it in which no earlier effect shows, whose shape may be the residual elsewhere.
+        """
         places = np.log(self.candidate.scanned)
         told = self.candidate.aside - places
         if self.candidate.sounding and told > settings.threshold and self.gain > told - settings.margin:
@@ -57,26 +64,26 @@ class Score:
         return "seen where the effect named before does not show" if apart else ""
 
     def faint(self, excess, settings):
-        """It explains too little of an ``excess`` over controls to be what makes it."""
+        """Whether it explains too little of an ``excess`` over controls to be its cause."""
         return excess > 1.0 and self.explained < settings.explained
 
     @property
     def is_open(self):
-        """Its size is only known from below, and beyond it is what ``open_as`` names."""
+        """Whether only a lower limit of its size is known, and beyond it is its ``unbounded_form``."""
         if not self.candidate.open_as:
             return False
         sizes, errors = self.own
         return bool(errors[0] > NO_UPPER_END * abs(sizes[0] - self.candidate.neutral[0]))
 
     def is_limit_of(self, other):
-        """``other`` is at the bound, within its standard error, where it cannot be told from this at the same place."""
+        """Whether ``rival`` at the same site is at its bound, within a standard error, where it looks like this one."""
         if getattr(other.candidate, "limit", "") != self.family or other.candidate.where != self.candidate.where:
             return False
         sizes, errors = other.own
         return float(sizes[0] - errors[0]) <= other.candidate.parameters[0].bounds[0]
 
     def is_plain_form_of(self, other):
-        """``other`` at the same place says the same with a parameter more: its size is this one's."""
+        """Whether ``rival`` at the same site is the same effect with one more parameter: the sizes agree."""
         family, k = other.candidate.plain or ("", 0)
         if family != self.family or other.candidate.where != self.candidate.where:
             return False

@@ -1,6 +1,6 @@
-"""Two effects at once: a name that was refused alone is asked again with the other effect in the model.
+"""Two effects at once: a name that was rejected alone is tested again with a second effect in the model.
 
-What the first leaves, or bends, may be the second: either alone explains too little, and neither would be named.
+The residual of the first effect, or an error in it, may be the second. Alone each explains too little to be named.
 """
 
 from dataclasses import replace
@@ -15,44 +15,48 @@ from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.refit import ended
 from turnout.mismatch.engine.reserved_data import fit_of_reserved, gain_error
 
-RIVALS = 2  # that are fitted anew beside the second effect
-KEPT = 0.5  # of what a rival gains alone; one that gains more on top of the leader explains something else
-COSTLY = 3.0  # points of fit on recordings never used; the proof counts what moves more
+RIVALS = 2  # rivals that are refitted beside the second effect
+KEPT = 0.5  # share of a rival's gain; one that keeps more on top of the leader explains something else
+COSTLY = 3.0  # points of fit on reserved recordings; a larger loss counts
 
 
 def refused(verdicts):
-    """Whether the first verdict, on an effect that was found, is "unknown"."""
+    """Whether the first verdict is "unknown"."""
     return bool(verdicts) and verdicts[0].answer == "unknown"
 
 
 def told_beside(first, second):
-    """The ``first`` verdict, a name, with the reason of a ``second`` on what shows beside it, which got none: it does
-    not take the name away, but nobody should think that all is said."""
+    """The ``first`` verdict, a name, with the reason of a ``second`` one that got no name.
+
+    The name stays, but the reader must know that a residual remains.
+    """
     if first.answer != "named" or second.answer != "unknown":
         return first
     return replace(first, reason=f"something else shows beside it: {second.reason}")
 
 
 def of_one_part(verdict):
-    """Whether a verdict says what one effect is: by a name, or by two laws of one part that nothing tells apart."""
+    """Whether a verdict states one effect: by a name, or by two forms of it that cannot be distinguished."""
     return verdict.answer == "named" or (verdict.answer == "a_or_b" and _other_of(verdict) is None)
 
 
 def both_stand(verdicts):
-    """Whether there are two verdicts, and each says what one effect is."""
+    """Whether there are two verdicts, each of which states one effect."""
     return len(verdicts) == 2 and all(of_one_part(v) for v in verdicts)
 
 
 def _other_of(torn):
-    """The Score of the second of two rivals that may both be there, None where one is a form of the other."""
+    """Score of the second of two rivals that may both be present. None if one is a form of the other."""
     other = next((s for s in torn.scores[1:] if s.family == torn.names[1]), None)
     return other if other is not None and _vouches(torn.scores[0], other) else None
 
 
 def parted(case, base, torn, second, settings):
-    """The verdict on the first of two rivals where the ``second`` effect, found on top of it, is the other: what each
-    gains alone is as much by chance, and they do not explain the same; nor do others that keep their gain on top of it.
-    ``torn`` itself where it is another effect."""
+    """The verdict on the first of two rivals if the ``second`` effect, found on top of it, is the other one.
+
+    Their gains alone are similar by chance, and they explain different things. Other scores that keep their gain on top
+    of the first are left out as well. ``verdict`` itself if the second effect is another one.
+    """
     other = _other_of(torn)
     if other is None or second.names[:1] != (other.family,):
         return torn
@@ -63,8 +67,10 @@ def parted(case, base, torn, second, settings):
 
 
 def reconsidered(case, base, fit, verdicts, settings):
-    """(verdicts, fit) after a second effect was sought on top of a first one that was refused: both stand where the
-    second is named and the first, or a close rival of it, passes with the second in the model."""
+    """(verdicts, fit) after a second effect was sought on top of a rejected first one.
+
+    Both stand if the second is named, and the first or a close rival passes with the second in the model.
+    """
     alone = _second_alone(case, fit, settings) if len(verdicts) > 1 else None
     if alone is not None and _vouches(verdicts[0].scores[0], verdicts[1].scores[0]):
         pairs = list(_beside_second(case, base, fit, alone, verdicts[0].scores, settings))
@@ -79,8 +85,10 @@ def reconsidered(case, base, fit, verdicts, settings):
 
 
 def needed(case, base, fit, verdicts, settings):
-    """(verdicts, fit) without a first name that is worth no name beside the second: what it had taken for itself before
-    the second was found. Both stay where each is worth one."""
+    """(verdicts, fit) without a first name that deserves no name beside the second: it had absorbed the second effect.
+
+    Both stay if each deserves one.
+    """
     if not both_stand(verdicts):
         return verdicts, fit
     alone = _second_alone(case, fit, settings)
@@ -97,8 +105,10 @@ def needed(case, base, fit, verdicts, settings):
 
 
 def borne_out(case, fit, verdicts, settings):
-    """(verdicts, fit) without a second name beside which the first foretells recordings never used worse than alone, by
-    more than ``COSTLY`` points and the standard error of that."""
+    """(verdicts, fit) without a second name with which reserved recordings are predicted worse than by the first alone.
+
+    Worse means by more than ``MAX_FIT_LOSS`` points and the standard error of the difference.
+    """
     if not both_stand(verdicts) or not case.reserved:
         return verdicts, fit
     first, second = verdicts
@@ -113,7 +123,7 @@ def borne_out(case, fit, verdicts, settings):
 
 
 def _costs(case, alone, both):
-    """Whether ``both`` foretell the reserved recordings worse than one ``alone``."""
+    """Whether ``pair_fit`` predicts the reserved recordings worse than ``first_only``."""
     (before, one), (after, two) = (fit_of_reserved(case, fit) for fit in (alone, both))
     known = before is not None and after is not None
     return known and one - two > max(COSTLY, gain_error(case.reserved, before, after))
@@ -125,16 +135,20 @@ def _gained(fit, without, candidate):
 
 
 def _vouches(first, second):
-    """Two of one kind, or laws of one part, do not vouch for one another: they can mend nearly any shape. Those of two
-    trains do: there is no recording that shows both."""
+    """Whether two effects confirm one another.
+
+    Two of one family, or of one component, do not: together they can correct nearly any shape. Those of two trains do:
+    no recording shows both.
+    """
     trains = {s.candidate.where.get("train") for s in (first, second)}
     alike = first.family == second.family or (first.candidate.kin and first.candidate.part == second.candidate.part)
     return not alike or (len(trains) == 2 and None not in trains)
 
 
 def _second_alone(case, fit, settings):
-    """The fit with the second effect and nothing else, None where it cannot be simulated: what the first is worth is
-    what the pair gains over it."""
+    """The fit with the second effect alone, None if it cannot be simulated. The first is worth what the pair gains over
+    it.
+    """
     second = fit.candidates[1]
     try:
         return fit_jointly(case, (second,), fit.psi[fit.part(second)], fit.values, iterations=settings.iterations)
@@ -143,7 +157,7 @@ def _second_alone(case, fit, settings):
 
 
 def _beside_second(case, base, fit, alone, scores, settings):
-    """The first effect's leader and its close rivals, each with what it is worth beside the second effect."""
+    """The first effect's leader and its close rivals, each with its gain beside the second effect."""
     leader, second = scores[0], fit.candidates[1]
     yield _worth(case, base, fit, alone, leader, settings)
     close = leader.gain - max(settings.margin, TORN * leader.gain)
@@ -157,8 +171,9 @@ def _beside_second(case, base, fit, alone, scores, settings):
 
 
 def _worth(case, base, both, alone, score, settings):
-    """The score of a first effect by what the fit with ``both`` gains over that of the second ``alone``; it explains
-    what the pair does."""
+    """Score of a first effect by the gain of ``pair_fit`` over ``second_only``. Its explained share is that of the
+    pair.
+    """
     mine, reference = held_out_score(case, both), held_out_score(case, alone)
     by_condition = {c: mine[c] - reference[c] for c in reference}
     gain = _gained(both, alone, score.candidate)
@@ -167,7 +182,7 @@ def _worth(case, base, both, alone, score, settings):
 
 
 def unconfirmed(verdict, settings):
-    """A name of grade B that foretells recordings never used worse than nothing does: unknown. Others stay."""
+    """A name of grade B that predicts reserved recordings worse than no effect: unknown. Others stay."""
     if verdict.answer != "named" or verdict.grade != "B":
         return verdict
     reason = f"{verdict.names[0]} leaves more than sound turnouts do and foretells recordings never used worse"
@@ -175,8 +190,9 @@ def unconfirmed(verdict, settings):
 
 
 def finished(base, fit, verdicts, settings):
-    """(verdicts, fit) as they are, or "unknown" where one of the names would leave nothing
-    (``Candidate.leaves_nothing``) and the last fit, of grade B, leaves more than sound turnouts do."""
+    """(verdicts, fit), or "unknown" if a name must reach the control level (``Candidate.must_reach_control_level``) and
+    the last fit, of grade B, does not.
+    """
     named = [v for v in verdicts if v.answer == "named" and v.grade == "B"]
     bent = next((v.names[0] for v in named if v.scores[0].candidate.leaves_nothing), None)
     if bent is None:
@@ -186,7 +202,7 @@ def finished(base, fit, verdicts, settings):
 
 
 def unforetold(verdict, settings):
-    """Nothing missing, by recordings that were fitted, but those never used are not foretold: unknown. Others stay."""
+    """Answer "none" while reserved recordings are not predicted as on intact track: unknown. Others stay."""
     if verdict.answer != "none":
         return verdict
     return _unknown(verdict, "recordings that were never used are not foretold as in sound turnouts", settings)

@@ -1,4 +1,4 @@
-"""The case of a turnout: hammer tests and passages against the simulation of track and train."""
+"""Cases built from the hammer tests and train passages of a turnout, compared with a simulation of track and train."""
 
 from turnout.mismatch.turnout.campaign import Campaign, HammerTest, Passage
 from turnout.mismatch.turnout.case import TrackCase

@@ -1,4 +1,4 @@
-"""What was measured at one turnout, and the models it is held against."""
+"""Input data of one turnout: hammer tests, train passages, sensors and the nominal model they are compared with."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -8,13 +8,17 @@ from turnout.errors import SimulationError
 from turnout.records import Recording
 from turnout.simulate.sensor import Sensor
 
-LOAD_SD = 0.05  # of all that is sprung, where its load was measured or noted
+LOAD_SD = 0.05  # standard deviation of the sprung mass, as a share, where its load was measured or noted
 
 
 @dataclass(frozen=True)
 class HammerTest:
-    """Blows at one place [m]: ``force`` is the hammer's channel, all accelerations are responses. ``conditions``
-    such as rail_temperature [°C]; ``judged`` says how its blows are found and judged, by default as everywhere."""
+    """A hammer test at the position ``place`` [m].
+
+    ``force`` names the channel of the hammer; every channel of acceleration is a response. ``conditions`` hold values
+    such as ``rail_temperature`` [°C]. ``impact_settings`` control how impacts are detected and checked; None: the
+    defaults.
+    """
 
     name: str
     place: float
@@ -27,8 +31,11 @@ class HammerTest:
 
 @dataclass(frozen=True)
 class Passage:
-    """One train: ``vehicle`` of ``turnout.simulate``, ``speed`` [m/s] as noted, ``train`` its type or number;
-    ``load_sd`` is the standard deviation of its sprung mass, as a share of the vehicle's."""
+    """One train passage.
+
+    ``vehicle`` is a model of ``turnout.simulate``, ``speed`` [m/s] the recorded speed, ``train`` its type or number.
+    ``load_sd`` is the standard deviation of the sprung mass, as a share of the mass of the vehicle.
+    """
 
     name: str
     recording: Recording
@@ -43,8 +50,10 @@ class Passage:
 
 @dataclass(frozen=True)
 class Campaign:
-    """``turnout`` a TurnoutTrack; ``sensors`` by name with place and mounting; ``reserved`` names of tests and
-    passages that no fit reads: they may withdraw a name, and verify it."""
+    """``turnout`` is a TurnoutTrack; ``sensors`` have names, positions and mountings.
+
+    ``reserved`` names the tests and passages that no fit reads. They may confirm a named effect or withdraw it.
+    """
 
     turnout: object
     sensors: tuple[Sensor, ...]
@@ -75,5 +84,5 @@ class Campaign:
         return tuple(s for s in self.sensors if s.name in names)
 
     def places(self):
-        """Places of sensors and blows [m]."""
+        """Positions of sensors and impacts [m]."""
         return [s.place for s in self.sensors] + [t.place for t in self.hammer]

@@ -26,14 +26,18 @@ from turnout.mismatch.turnout.saturation import ceilings, highest, within_range
 from turnout.mismatch.turnout.track_parameters import SEAT_SD, rail_spreads, track_nuisances, with_rail, zone_of
 from turnout.mismatch.turnout.wheel_roughness import heavier
 
-GAIN_SD = 0.02
-WARMTH, SPAN = "pad_temperature", 4.0  # K, chosen: at 1 % per kelvin two per cent of frequency
-# ln of unsprung mass: what roughness does near P2 then changes by a fifth of its amplitude; and of what the rail has.
+GAIN_SD = 0.02  # relative standard deviation of the gain of a sensor
+WARMTH, SPAN = "pad_temperature", 4.0  # [-, K]; at 1 % per kelvin: 2 % of frequency
+# Change of ln unsprung mass, or of a rail value, above which errors are computed again. The response to
+# roughness near the P2 resonance then changes by a fifth of its amplitude.
 FOLLOWED = 0.15
 
 
 class TrackCase(Predicting, Case):
-    """``Case`` of a ``Campaign``; ``families`` restricts the candidates, ``solver`` the simulation used in fits."""
+    """``Case`` of a ``CampaignInput``.
+
+    ``families`` restricts the candidates, ``solver`` gives the settings of the simulation used in fits.
+    """
 
     frozen_jacobian = True
     ceilings: dict = {}
@@ -59,13 +63,16 @@ class TrackCase(Predicting, Case):
         self.families = families
 
     def _warmed(self):
-        """Every recording says how warm the rail was, and that differs: else warmth is a name for anything."""
+        """Whether every recording has a rail temperature and these differ by ``MIN_TEMPERATURE_RANGE``.
+
+        Otherwise temperature could explain any difference between recordings.
+        """
         seen = [p.conditions for p in self.pairs.values()] + [self.said(made) for made in self.rollings.values()]
         found = [said.get("rail_temperature") for said in seen]
         return None not in found and max(found) - min(found) >= SPAN
 
     def _from_blows(self, observations):
-        """Values of the nuisances of track and sensors that the hammer tests alone give: where all fits start."""
+        """Values of the nuisances of track and sensors from the hammer tests alone: the start of all fits."""
         self.nuisances, self.observations = tuple(self.listed()), tuple(observations)
         if not observations:
             return {}
@@ -77,7 +84,7 @@ class TrackCase(Predicting, Case):
         return found
 
     def _prepare(self, campaign, settings, solver):
-        """What does not depend on recordings."""
+        """Set up everything that does not depend on recordings."""
         self.settings, self.solver, self.campaign = settings, solver, campaign
         self.nominal, self._railed = zone_of(campaign.turnout, campaign.places()), {}
         self.recentre({})
@@ -88,22 +95,24 @@ class TrackCase(Predicting, Case):
         self.surface = self.waves and RunningSurface(self.nominal.turnout, self.waves, routes)
 
     def recentre(self, values):
-        """The track gets the rail of ``values``, about which receptances are straight in what it may differ by; nothing
-        simulated is remembered any more."""
+        """Linearise receptances about the rail given by ``values``, and clear the caches.
+
+        Receptances are linear in deviations of the rail from there.
+        """
         self.rail = {name: values.get(name, 0.0) for name in rail_spreads(self.nominal)}
         self.zone = with_rail(self.nominal, self.rail)
         self._forget()
 
     def struck(self):
-        """Condition -> where the hammer fell [m], for those that are hammer tests."""
+        """Condition -> position of the impacts [m], for hammer tests."""
         return {o.condition: self.pairs[o.name].test.place for o in self.observations if o.name in self.pairs}
 
     def fitted(self):
-        """``Rolling`` of each passage that is fitted: all that may suggest a candidate, or speak against one."""
+        """``AlignedPassage`` of each passage that is fitted; reserved passages may not suggest a candidate."""
         return [self.rollings[o.name] for o in self.observations if o.name in self.rollings]
 
     def peak(self, channel):
-        """Largest value a channel showed in the passages, 0 where it showed none. [m/s²]"""
+        """Largest value of a channel in the passages, within their band; 0 where it has none. [m/s²]"""
         found = [0.0]
         for o in self.observations:
             made = self.rollings.get(o.name)
@@ -113,7 +122,7 @@ class TrackCase(Predicting, Case):
         return max(found)
 
     def highest(self, channel):
-        """Largest value that a channel has shown at its full rate, in recordings kept back as well. [m/s²]"""
+        """Largest value of a channel at its full sampling rate, reserved recordings included. [m/s²]"""
         return highest(self.campaign, channel)
 
     def _waves(self):
@@ -123,7 +132,7 @@ class TrackCase(Predicting, Case):
         return Waves([s.place for s in self.campaign.sensors], 0.0 if offset is None else offset)
 
     def listed(self):
-        """All nuisances of track, trains, sensors, waves and passages."""
+        """All nuisances of track, trains, sensors, rail roughness and passages."""
         yield from track_nuisances(self.zone, self.trains)
         for sensor in self.campaign.sensors:
             yield Nuisance(f"gain_{sensor.name}", "-", 0.0, GAIN_SD, meaning="gain of a sensor less one", bends=False)
@@ -137,39 +146,42 @@ class TrackCase(Predicting, Case):
 
     @property
     def measured(self):
-        """First and last place of sensors and blows [m]."""
+        """First and last position of sensors and impacts [m]."""
         places = self.campaign.places()
         return min(places), max(places)
 
     @property
     def control_level(self):
-        """What controls reach, by kind."""
+        """Level that controls reach, by kind of observation."""
         return {"hammer": self.settings.hammer_control, "passage": self.settings.passage_control}
 
     @property
     def cell_level(self):
-        """What one channel of one passage reaches in controls."""
+        """Level that one channel of one passage reaches in controls."""
         return {"passage": self.settings.cell_control}
 
     def cheap_part(self):
-        """The hammer tests."""
+        """Case of the hammer tests alone; None without hammer tests."""
         return Blows(self) if self.pairs else None
 
     def cheap(self, observation):
-        """Blows are; passages have to be simulated."""
+        """Hammer tests are cheap to predict; passages have to be simulated."""
         return observation.name in self.pairs
 
     def own_jacobian(self, values, terms, observation, predicted, names):
-        """Columns of a passage's own time, speed and load."""
+        """Derivatives of a passage by its own time, speed and load."""
         return sensitivity.own_jacobian(self, values, terms, observation, predicted, names)
 
     def nuisance_jacobian(self, values, terms, observations, base):
-        """Exact for receptances, gains and times; the others of passages as ``derivatives`` has them."""
+        """Derivatives by all nuisances, see ``sensitivity.nuisance_jacobian``."""
         return sensitivity.nuisance_jacobian(self, values, terms, observations, base)
 
     def renewed(self, fit):
-        """With passages on the rail, and with the roughness of wheels as heavy, as ``fit`` has them; itself where all
-        are within ``FOLLOWED``. Blows tell the rail, and had bent it to what the effect now explains."""
+        """The case with the rail under the passages and the roughness errors of the wheels as ``fit`` has them.
+
+        Returns the case itself where all changes are within ``UPDATE_THRESHOLD``. The rail was first fitted to the
+        hammer tests alone, where it may have absorbed part of the effect that ``fit`` explains now.
+        """
         now = heavier(self, fit) if self.rollings else {}
         moved = {train: m for train, m in now.items() if abs(m - self.heavier.get(train, 0.0)) > FOLLOWED}
         bent = bool(self.rollings) and any(abs(fit.values[n] - at) > FOLLOWED for n, at in self.rail.items())
@@ -189,7 +201,7 @@ class TrackCase(Predicting, Case):
         return found
 
     def further(self, fit):
-        """Dips, corrugation and wheels, as the residual and the loudness of passages suggest them."""
+        """Dips, corrugation and wheel defects, as the residual and the sound level of passages suggest them."""
         from turnout.mismatch.turnout.candidates.rail_defects import geometry_scan
 
         rolled = any(o.name in self.rollings for o in self.observations)
@@ -197,7 +209,7 @@ class TrackCase(Predicting, Case):
         return tuple(replace(c, loose=LOOSE) for c in found)
 
     def distant(self, fit):
-        """Wheelsets of other masses, of trains that leave more than sound ones do."""
+        """Wheelsets of other masses, for trains whose residual exceeds the control level."""
         return distant_wheels(self, fit)
 
     def screen(self, fit):
@@ -207,7 +219,7 @@ class TrackCase(Predicting, Case):
         return screen_columns(self, fit, self.observations)
 
     def spaces(self, fit):
-        """Forces at places, faults of channels, wheels and single passages that the residual may be locked to."""
+        """Subspaces of the residual: forces at supports, faults of channels, wheels and single passages."""
         from turnout.mismatch.turnout.residual_spaces import missing_sources
 
         return missing_sources(self, fit)

@@ -1,8 +1,8 @@
-"""Quiet before the first and after the last wheel: what shakes the sensors then is no wheel of this train.
+"""Detect passages in which another source shakes the sensors, from the signal before and after the train.
 
 The mean square of a quiet segment in a band of width W over a time T is chi-squared with 2 W T degrees of freedom, so
-that the ratio of one passage's to that of the others follows Fisher's F. Half of the sensors must show it: a noisy
-channel is another matter.
+that the ratio of one passage to the others follows Fisher's F. Half of the sensors must show it: a single noisy channel
+is another matter.
 """
 
 from dataclasses import dataclass
@@ -10,19 +10,21 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import binom, f
 
-AWAY = 12.0  # m from a wheel to the nearest sensor: what the train itself sends ahead has died down
-CAR = 26.0  # m
-SHORTEST = 0.15  # s of quiet that are worth a look
-BAND = (5.0, 100.0)  # Hz
-LOUDER = 3.0  # dB over the other passages; sound passages differ by 1 dB
-CORRELATED = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0)  # lines of a Hann window
-DISTURBED = 1e-4  # chance of one such segment among all
+AWAY = 12.0  # m from a wheel to the nearest sensor: vibration of the train has decayed there
+CAR = 26.0  # m, length of a car
+SHORTEST = 0.15  # s, shortest segment that is tested
+BAND = (5.0, 100.0)  # Hz, of the level
+LOUDER = 3.0  # dB over the other passages; undisturbed ones differ by 1 dB
+CORRELATED = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0)  # variance factor of correlated lines of a Hann window
+DISTURBED = 1e-4  # probability by chance, over all segments
 
 
 @dataclass(frozen=True)
 class Disturbance:
-    """A passage whose quiet segment, ``when`` "before" or "after" its train, is ``louder`` [dB] than the others', with
-    the chance ``p`` of that, for all segments looked at."""
+    """A disturbed passage: its segment ``when`` "before" or "after" the train exceeds the others by ``excess`` [dB].
+
+    ``p`` is the probability of that by chance, over all segments tested.
+    """
 
     name: str
     when: str
@@ -31,9 +33,9 @@ class Disturbance:
 
 
 def disturbances(rollings, strange=None):
-    """Disturbance of every passage in which something else shook the sensors; ``rollings`` by name.
+    """Disturbance of every passage in which another source shook the sensors; ``passages`` by name.
 
-    ``strange`` passages look like no train of their file, maybe for that reason: their trains may be longer by a car.
+    ``unmatched`` passages do not match their vehicle file, maybe for that reason. Their trains may be longer by a car.
     """
     found, segments = [], {"before": {}, "after": {}}
     for made in (*rollings.values(), *(strange or {}).values()):
@@ -60,7 +62,7 @@ def _quiet(made):
 
 
 def _comparable(levels, name):
-    """Level of a passage and those of the others, of the sensors that it shares; nan where another lacks one."""
+    """Level of a passage and those of the others, for the sensors that it shares; nan where another lacks one."""
     own, freedom = levels[name]
     rest = [level for other, level in levels.items() if other != name]
     sensors = [s for s in own if any(s in power for power, _ in rest)]
@@ -80,7 +82,7 @@ def _level(made, start, stop):
 def band_level(samples, rate):
     """Mean square of rows of ``samples`` within ``BAND`` per line (n,), and its degrees of freedom.
 
-    A Hann window keeps the strong low frequencies at the segment's end out; neighbouring lines then are correlated by
+    A Hann window keeps the strong low frequencies at the end of the segment out. It correlates neighbouring lines by
     2/3 and 1/6, so that two degrees per line become 2 / (1 + 2 (4/9 + 1/36)) (Welch 1967).
     """
     n = samples.shape[1]
@@ -93,8 +95,11 @@ def band_level(samples, rate):
 
 
 def louder_than(level, others):
-    """(dB, chance) of a segment against others: the lower median over the sensors of its excess over their median, and
-    the binomial chance that as many sensors exceed the F ratio at that rank."""
+    """(dB, probability) of the excess of a segment over others.
+
+    The excess is the lower median over the sensors of the ratio to the median of the others. The probability is
+    binomial, that as many sensors exceed the F ratio at that rank.
+    """
     power, freedom = level
     if power.size < 2:  # one channel alone may be noisy
         return 0.0, 1.0

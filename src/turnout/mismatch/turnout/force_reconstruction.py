@@ -1,4 +1,4 @@
-"""The force missing at a support, by regularised deconvolution of the passages' residuals, without a law."""
+"""Reconstruction of an unknown force at a support from the residuals of passages, by regularised deconvolution."""
 
 import numpy as np
 
@@ -8,9 +8,9 @@ from turnout.mismatch.turnout.wave_response import shown_by
 
 
 def latent_force(case, fit):
-    """Force on the sleeper that explains most of the residual, with its covariates; None without passages.
+    r"""Force on the sleeper that explains most of the residual, with its covariates; None without passages.
 
-    .. math:: \\hat f_j = \\frac{\\sum_s G_{sj}^* r_s}{\\sum_s |G_{sj}|^2 + \\lambda}
+    .. math:: \hat f_j = \frac{\sum_s G_{sj}^* r_s}{\sum_s |G_{sj}|^2 + \lambda}
     """
     passages = [(o, r) for o, r in zip(case.observations, fit.residuals) if o.name in case.rollings]
     if not passages:

@@ -1,4 +1,4 @@
-"""The hammer tests of a turnout as a case of their own: what is cheap to predict is asked first."""
+"""Hammer tests of a turnout as a case of their own, which is cheap to predict."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ from turnout.mismatch.engine.case import Case
 from turnout.mismatch.turnout.screening import screen_columns
 from turnout.mismatch.turnout.sensitivity import pair_columns
 
-ROUGHLY = 0.1  # relative error of a receptance in the first fit
+ROUGHLY = 0.1  # relative error of a receptance in the first, broad fit
 
 
 class Blows(Case):
@@ -23,16 +23,19 @@ class Blows(Case):
         self.predict, self.moved = case.predict, case.moved
 
     def roughened(self):
-        """With one broad error of every line: smooth errors would excuse a resonance out of place."""
+        """The same case with one broad, independent error for every line.
+
+        Smoothly varying errors would excuse a resonance at the wrong frequency.
+        """
         plain = [replace(o, sigma=np.hypot(o.sigma, ROUGHLY), modes=None) for o in self.observations]
         return Blows(self.whole, plain)
 
     def screen(self, fit):
-        """Columns of all candidates that blows show."""
+        """Columns of all candidates that show in hammer tests."""
         return screen_columns(self.whole, fit, self.observations)
 
     def nuisance_jacobian(self, values, terms, observations, base):
-        """Exact."""
+        """Exact derivatives by all nuisances of the case."""
         index = {n.name: k for k, n in enumerate(self.nuisances)}
         found = [np.zeros((o.data.size, len(self.nuisances))) for o in observations]
         heard_by = self.whole.blow_models(values, terms)

@@ -1,4 +1,4 @@
-"""Matrices of tracks that differ in the values of their supports alone: rails, rows and bandwidth are found once."""
+"""Cached matrices of tracks that differ in their support values alone: rails, rows and bandwidth are computed once."""
 
 from collections import OrderedDict
 from dataclasses import replace
@@ -9,8 +9,8 @@ from turnout.physics.term import PhysicsTerm
 from turnout.simulate.links import links_of
 from turnout.simulate.matrices import TrackMatrices, assemble, link_vector, linked, railed
 
-KEPT = 24
-VALUES = (  # field of a Track, what of the link, tag
+KEPT = 24  # templates, and rails and link sets per template
+VALUES = (  # field of a Track, quantity of the link, tag
     ("pad_stiffness", "stiffness", "pad"),
     ("pad_damping", "damping", "pad"),
     ("ballast_stiffness", "stiffness", "ballast"),
@@ -21,7 +21,7 @@ _known = OrderedDict()
 
 
 def matrices_of(track, terms=()):
-    """``assemble(track, terms)`` for a track of two layers, in a twentieth of the time once its like is known."""
+    """``assemble(track, terms)`` for a track of two layers, in a twentieth of the time once a template is cached."""
     for term in terms:
         track = term.rail(track)
     links = links_of(terms, track)
@@ -37,7 +37,7 @@ def matrices_of(track, terms=()):
 
 
 def _remembered(known, key, compute):
-    """``compute()`` kept by its key among the last ``KEPT``."""
+    """``compute()``, cached under ``key`` among the last ``CACHE_SIZE``."""
     if key not in known:
         known[key] = compute()
         while len(known) > KEPT:
@@ -46,19 +46,21 @@ def _remembered(known, key, compute):
 
 
 class FixedLinks(PhysicsTerm):
-    """Links that are known already, as a term: matrix entries and nothing else."""
+    """A term that only adds given links to the matrices."""
 
     def __init__(self, links):
         self._links = links
 
     def links(self, track):
-        """The links, whatever the track."""
+        """The links, for any track."""
         return self._links
 
 
 class Skeleton:
-    """Everything of the matrices but the supports' values: these are 1 in it, so that no rounding hangs on the track
-    that came first."""
+    """Matrices without the support values, which are 1 in it.
+
+    So rounding errors do not depend on the track that came first.
+    """
 
     def __init__(self, track, links):
         nothing = [replace(k, stiffness=0.0, damping=0.0, mass=0.0, loss_factor=0.0) for k in links]
@@ -69,7 +71,7 @@ class Skeleton:
         self.railed, self.entries = OrderedDict(), OrderedDict()
 
     def _spread(self, owned):
-        """Diagonal, row, product of weights and owner of every entry that links make, ``owned`` (owner, link)."""
+        """Diagonal, row, product of weights and owner of every entry of ``links`` [(owner, link)]."""
         found = []
         for owner, link in owned:
             rows, weights = link_vector(link, self.base.index)
@@ -79,16 +81,16 @@ class Skeleton:
         return tuple(map(np.array, zip(*found)))
 
     def _railed(self, track):
-        """``base`` with the rail of ``track`` in it, remembered."""
+        """``base`` with the rail of ``track``, cached."""
         key = track.rail, track.stretches, track.end_length, track.end_damping
         return _remembered(self.railed, key, lambda: railed(self.base, track))
 
     def _entries(self, links):
-        """Where ``links`` of terms come in, remembered."""
+        """Matrix entries of ``links`` of terms, cached."""
         return _remembered(self.entries, tuple(k.ends for k in links), lambda: self._spread(enumerate(links)))
 
     def filled(self, track, links):
-        """TrackMatrices with the values of ``track`` and of further links."""
+        """TrackMatrices with the values of ``track`` and of additional links."""
         base = self._railed(track)
         made = {what: getattr(base, what).copy() for what in ("stiffness", "damping", "mass")}
         hysteresis = base.hysteresis
@@ -96,14 +98,14 @@ class Skeleton:
             diagonal, row, weight, support = self.places[tag]
             np.add.at(made[what], (diagonal, row), weight * (getattr(track, name) - 1.0)[support])
         if any(k.loss_factor for k in links) or track.pad_loss_factor.any() or track.ballast_loss_factor.any():
-            return assemble(track, (FixedLinks(links),))  # hysteresis goes with the stiffness: the plain way
+            return assemble(track, (FixedLinks(links),))  # hysteresis depends on the stiffness: assembled in full
         if links:
             diagonal, row, weight, which = self._entries(links)
             for what, matrix in made.items():
                 np.add.at(matrix, (diagonal, row), weight * np.array([getattr(k, what) for k in links])[which])
         found = TrackMatrices(
-            made["mass"], made["damping"], made["stiffness"], hysteresis, base.node, base.node_index, base.index,
-            base.rails, base.links,
+            made["mass"], made["damping"], made["stiffness"], hysteresis,
+            base.node, base.node_index, base.index, base.rails, base.links,
         )  # fmt: skip
         found.__dict__["elements"] = base.elements
         return found

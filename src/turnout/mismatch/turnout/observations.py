@@ -1,4 +1,4 @@
-"""The recordings of a campaign as observations of a case, and why some are none."""
+"""Recordings of a campaign as observations of a case, with the reasons why some are rejected."""
 
 from collections import Counter
 from dataclasses import replace
@@ -12,12 +12,15 @@ from turnout.mismatch.turnout.passage_alignment import aligned, seated
 from turnout.mismatch.turnout.wheel_roughness import wheel_modes
 from turnout.simulate.sensor import Sensor
 
-FAR = 8.0  # m from blow to sensor: a model's tolerance is so wide there that a receptance says a thirtieth
-TIMED = 0.25  # likeness above which it is sure when a train came; one found at a wrong time reached 0.10
+FAR = 8.0  # m from impact to sensor: beyond, the model error leaves 1/30 of the information
+TIMED = 0.25  # correlation above which the time of a train is certain; at wrong times: 0.10
 
 
 def hammer_observations(case):
-    """(name of the test, Observation) of every response channel with sound blows; pairs and notes go to the case."""
+    """Yield (name of the test, Observation) of every response channel with accepted impacts.
+
+    Stores the pairs and notes in the case.
+    """
     for test in case.campaign.hammer:
         sensors = [*case.campaign.sensors, *_loose(test, case.campaign.sensors)]
         sensors = [s for s in sensors if s.name not in case.ceilings and abs(s.place - test.place) <= FAR]
@@ -32,7 +35,10 @@ def hammer_observations(case):
 
 
 def passage_observations(case):
-    """(name, Observation) of every passage that looks like its train; rollings and notes go to the case."""
+    """Yield (name, Observation) of every passage that correlates with the simulation of its train.
+
+    Stores the aligned passages and notes in the case.
+    """
     if not case.campaign.passages:
         return
     values = {n.name: 0.0 for n in case.listed()} | case.start_values
@@ -71,7 +77,7 @@ def passage_observations(case):
 
 
 def with_errors(case, values, made, observation):
-    """The observation with the errors of a passage's own on the track and the wheels that ``values`` give."""
+    """The observation with the error modes of its passage: track and wheels as ``values`` give them."""
     modes = (
         passage_observation.coupling_modes(made, observation.data).astype(np.float32),
         wheel_modes(case, values, made, observation.sigma),
@@ -80,7 +86,10 @@ def with_errors(case, values, made, observation):
 
 
 def undisturbed(case, found):
-    """The passages in which nothing but their train shakes the sensors; all where fewer than two would be left."""
+    """Recordings without the passages in which another source shakes the sensors.
+
+    All of them where fewer than two would remain.
+    """
     case.disturbed = tuple(disturbances(case.rollings, case.strange))
     shaken = {d.name: d for d in case.disturbed if d.name in case.rollings}
     if len(found) - len(shaken) < 2:
@@ -92,8 +101,11 @@ def undisturbed(case, found):
 
 
 def foreign(case):
-    """Trains of which more passages do not look like their vehicle file than do, though several came: another train's
-    do, or not all of its own are alike. What could not be looked at, or not simulated, says nothing of its train."""
+    """Trains of which more passages contradict their vehicle file than match it, from two passages on.
+
+    Either another train came, or the trains of this type differ. Passages that were disturbed or could not be simulated
+    do not count.
+    """
     unlike = Counter(p.train for p in case.unlike if p.train)
     known = Counter(case.said(made)["train"] for made in case.rollings.values())
     shaken = {d.name for d in case.disturbed}

@@ -1,10 +1,8 @@
-"""Where on a recording its train lies: lag and speed at which the base simulation looks most like it.
+"""Align passages with their simulation: time and speed of the train, and uncertain numbers of the running surface.
 
-Where blade, nose and joints lie: a rough search, without which straight steps do not find them.
-
-A nose that lies 0.3 m further is met 7 ms later at 44 m/s: three quarters of a period at 112 Hz, and no fit gets from
-there to the truth; at 30 Hz it is a fifth. So the numbers are moved, one by one, to where a few passages look most like
-the simulation below 30 Hz.
+The surface needs a search, since linear steps do not converge from afar. A nose that lies 0.3 m further is reached 7 ms
+later at 44 m/s: three quarters of a period at 112 Hz, but a fifth at 30 Hz. So the numbers are changed one by one, to
+where a few passages correlate best with the simulation below 30 Hz.
 """
 
 import numpy as np
@@ -14,27 +12,28 @@ from turnout.mismatch.turnout.passage_band import band_limited, limited, read_at
 from turnout.mismatch.turnout.passage_model import LEAD
 from turnout.mismatch.turnout.running_surface import PLACES
 
-# The rail's deflection under the axles: with a dip of 1.5 mm the right train is 0.8 alike, with a flat of 80 mm 0.6 to
-# 0.7, a wrong one at most 0.6
+# Hz, end of the band of the rail's deflection under the axles; least correlation of a passage with its train.
+# The right train correlates by 0.8 with a dip of 1.5 mm, by 0.6 to 0.7 with a flat of 80 mm, a wrong one at most 0.6.
 ALIGNED, ALIKE = 30.0, 0.65  # [Hz], -
-STEP = 1.0 / 800.0  # between samples of what is compared [s]
+STEP = 1.0 / 800.0  # s, sampling step of signals that are correlated
 
 
 def slow(recording, sensors):
-    """(n_sensor, n) what the sensors recorded below ``ALIGNED``, every ``STEP``."""
+    """(n_sensor, n) signals of the sensors below ``ALIGNMENT_BAND_END``, every ``SAMPLE_STEP``."""
     grid = np.arange(0.0, recording.duration, STEP)
     return read_at(limited(recording, sensors, ALIGNED), recording.rate, grid)
 
 
 def align(passage, data, simulated, rate):
-    """(reference time [s], speed [m/s], correlation) at which the base simulation lies best on a recording that is
-    ``slow``.
+    """(reference time [s], speed [m/s], correlation) of the best alignment of a recording with its simulation.
 
-    Searches all lags and speeds within 1.5 % of the noted one; the simulation is stretched in time about the first
-    wheel's arrival. The band ends at ``ALIGNED``, below which roughness and dips have no say. Where the sensors
-    together look like no such train, the one that disagrees most is not asked, if three or more are there: what is
-    wrong with it is for the fit to find. Where that does not help either, no sample counts for more than the largest of
-    the simulation: the blows of a long flat are many times as strong, and no axle's.
+    ``data`` are signals of ``low_pass``. All lags are searched, and speeds within 1.5 % of the recorded one; the
+    simulation is stretched in time about the arrival of the first wheel. Roughness and dips have no influence in this
+    band.
+
+    If no alignment reaches ``MIN_CORRELATION`` with all sensors, the one that correlates least is left out, where three
+    or more are there: its fault is left to the fit. Failing that, samples are clipped at the largest value of the
+    simulation. The impacts of a long flat are many times larger than any axle's response.
     """
     low = band_limited(simulated, rate, high=ALIGNED)
     best = _best(data, low, rate)
@@ -46,7 +45,7 @@ def align(passage, data, simulated, rate):
 
 
 def _best(data, low, rate):
-    """(likeness, lag in steps, stretch) at which the simulation ``low`` lies best on ``data``."""
+    """(correlation, lag in steps, stretch) of the best alignment of the simulation ``low`` with ``data``."""
     n_sensor, model_time = len(data), np.arange(0.0, low.shape[-1] / rate, STEP)
     size = 1 << int(np.ceil(np.log2(data.shape[1] + model_time.size)))
     spectrum = np.fft.rfft(data, size)
@@ -68,21 +67,24 @@ def _best(data, low, rate):
 
 
 def _likest(score, stretch):
-    """(likeness, lag in steps, stretch) where the score is best."""
+    """(correlation, lag in steps, stretch) at the largest score."""
     k = int(np.argmax(score))
     return float(score[k]), k, float(stretch)
 
 
-TRIED = 3  # passages that fits read, those of the shortest trains: each is simulated twenty times a number, or more
-APART, FAR = 0.15, 2.0  # m between places tried, and how far, in standard deviations of the file's
-FACTORS = (-1.0, -0.5, 0.5, 1.0)  # standard deviations by which another number is moved
-FINER, AROUND = 4, 3  # steps of places in the second round, and how many of them to each side
-SAMPLES = 20.0  # independent ones of a passage below 30 Hz, about: what its likeness counts for against the file
-HIGHEST = 0.999  # likeness: beyond, it says nothing of the surface
+TRIED = 3  # passages used, those of the shortest trains; each is simulated 20 times a number, or more
+APART, FAR = 0.15, 2.0  # m between trial positions; largest deviation in prior standard deviations
+FACTORS = (-1.0, -0.5, 0.5, 1.0)  # trial changes of other numbers, in prior standard deviations
+FINER, AROUND = 4, 3  # subdivision of the position step in the second round; steps to each side
+SAMPLES = 20.0  # independent samples of a passage below 30 Hz, approximately; its weight against the prior
+HIGHEST = 0.999  # correlation is limited to this: beyond, it contains no information on the surface
 
 
 def seated(case, values):
-    """Nuisances of the running surface as a few passages have it, dict name -> value; {} where nothing is unsure."""
+    """Nuisances of the running surface as a few passages have it, dict name -> value.
+
+    {} where no number is uncertain.
+    """
     heard = [p for p in case.campaign.passages if case.campaign.sensors_of(p)]
     heard = [p for p in heard if p.name not in case.campaign.reserved] or heard
     passages = sorted(heard, key=lambda p: len(p.vehicle.wheels))[:TRIED]
@@ -111,8 +113,11 @@ def _moves(field, sd, again):
 
 
 def _score(case, values, passages):
-    """Twice the logarithm of the likelihood of ``passages``, of which the simulation explains the square of their
-    likeness, less the squares by which the numbers of the surface leave the file's."""
+    """Twice the logarithm of likelihood and prior of numbers of the surface.
+
+    The simulation explains the square of the correlation of each of the ``passages``. The prior is that of the track
+    file.
+    """
     away = sum((values[u.name] / u.nuisance.sd) ** 2 for u in case.surface.unsure)
     return -away - SAMPLES * sum(np.log(1.0 - min(_likeness(case, values, p), HIGHEST) ** 2) for p in passages)
 
@@ -125,7 +130,7 @@ def _likeness(case, values, passage):
 
 
 def aligned(case, values, passage):
-    """``alignment.align`` of a passage with its simulation at ``values``; SimulationError where there is none."""
+    """``align`` of a passage with its simulation at ``values``; SimulationError if it cannot be simulated."""
     sensors, surfaces = case.campaign.sensors_of(passage), case.surface.surfaces(passage.route, values)
     roll = case.roll(values, (), passage)
     signals = roll(passage, passage.vehicle, passage.speed, sensors, surfaces=surfaces)

@@ -1,12 +1,12 @@
-"""The band of passages: what is kept of a signal, read between its samples, and the clocks that hold it."""
+"""Frequency band and sampling rates of passages: filters, interpolation between samples, resampling."""
 
 import numpy as np
 from scipy.fft import next_fast_len
 
-SHORTEST_WAVE = 0.3  # of the rail's roughness as modelled [m]
-LOW, HIGH = 5.0, 112.0  # band in which the deterministic part dominates the roughness [Hz]
-RATE = 1800.0  # of the simulation: with Radau IIA 1 to 2 % of the waveform of a band, a third of the materiality floor
-FOLDS = (9, 6, 5)  # steps of the simulation per sample of an observation, the first that holds its band
+SHORTEST_WAVE = 0.3  # m, shortest modelled wave of the rail's roughness
+LOW, HIGH = 5.0, 112.0  # Hz, band in which the deterministic part dominates the roughness
+RATE = 1800.0  # Hz, of the simulation; errors 1 to 2 % of the waveform with Radau IIA
+FOLDS = (9, 6, 5)  # simulation steps per sample of an observation; the first that suffices is used
 
 
 def band_limited(samples, rate, low=LOW, high=HIGH):
@@ -18,7 +18,7 @@ def band_limited(samples, rate, low=LOW, high=HIGH):
 
 
 def gate(frequency, low, high):
-    """What ``band_limited`` lets through at each frequency [Hz], 0 to 1."""
+    """Factor of ``limit_band`` at each frequency [Hz], 0 to 1."""
     f = np.asarray(frequency)
     passed = np.clip((f - 0.67 * low) / (0.33 * low), 0.0, 1.0) * np.clip((1.25 * high - f) / (0.25 * high), 0.0, 1.0)
     return 0.5 - 0.5 * np.cos(np.pi * passed)
@@ -47,12 +47,12 @@ def finer(samples, factor=4):
 
 
 def band_end(speed):
-    """Upper end of the band of a passage [Hz]: its edge is 1.25 times this, where the shortest wave lies."""
+    """Upper end of the band of a passage [Hz]: its edge is 1.25 times this, at the shortest wave."""
     return min(HIGH, speed / SHORTEST_WAVE / 1.25)
 
 
 def clock_of(speed):
-    """Samples per second that hold the band of a passage at this speed, a whole part of ``RATE`` [Hz]."""
+    """Sampling rate for the band of a passage at this speed, an integer fraction of ``SIMULATION_RATE`` [Hz]."""
     enough = [RATE / fold for fold in FOLDS if RATE / fold > 2.4 * 1.25 * band_end(speed)]
     return enough[0] if enough else RATE / FOLDS[-1]
 

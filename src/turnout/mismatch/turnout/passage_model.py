@@ -1,4 +1,4 @@
-"""Passages simulated for a fit: coarse in time and mesh, many trains on one factorised track."""
+"""Fast simulation of passages for fits: coarse in time and mesh, with one factorised track for many trains."""
 
 from dataclasses import dataclass
 
@@ -9,15 +9,15 @@ from turnout.mismatch.turnout.passage_band import RATE
 from turnout.simulate.prepare import prepare
 from turnout.simulate.run import Drive, run
 
-ELEMENTS = 2  # per bay: 0.2 to 0.5 % of the waveform below 112 Hz from four, which 1.8 kHz misses by 0.4 to 1 %
-DECAY = 8.0  # of a force's effect along the rail within a step, as exponent: 3e-6 of the waveform, 6 % faster than 12
-LEAD = 0.25  # s of rolling before the first wheel reaches the first sensor
-EDGE = 0.08  # s kept before the first and behind the last wheel
+ELEMENTS = 2  # per bay; differs by 0.2 to 0.5 % of the waveform below 112 Hz from 4 elements
+DECAY = 8.0  # exponent at which a force's effect along the rail is cut off in a step; error 3e-6
+LEAD = 0.25  # s before the first wheel reaches the first sensor
+EDGE = 0.08  # s of signal before the first and after the last wheel
 
 
 @dataclass(frozen=True)
 class Track1D:
-    """Settings of the simulation used for fitting; ``elements`` per bay, None as in the track's file."""
+    """Settings of the simulation used in fits; ``elements`` per bay, None: as in the track file."""
 
     rate: float = RATE
     scheme: str = "radau"
@@ -25,7 +25,7 @@ class Track1D:
 
 
 class Roll:
-    """Simulated passages on one track with one set of terms; the factorisation is shared among them."""
+    """Simulates passages on one track with one set of terms; they share one factorisation."""
 
     def __init__(self, turnout, track, terms, settings):
         self.turnout, self.terms, self.settings = turnout, tuple(terms), settings
@@ -36,8 +36,10 @@ class Roll:
         self.prepared = prepare(track, 1.0 / settings.rate, settings.scheme, self.terms, DECAY, matrices)
 
     def __call__(self, passage, vehicle, speed, sensors, probes=(), surfaces=None, described=None):
-        """(n_sensor + n_probe, n) signals of the march over ``surfaces``, by default the file's; time 0: first wheel
-        ``LEAD`` before the first sensor where it is ``described`` to be."""
+        """(n_sensor + n_probe, n) signals over ``surfaces``, by default those of the file.
+
+        At time 0 the first wheel is ``LEAD_TIME`` before the first sensor, at its position in ``described``.
+        """
         for term in self.terms:
             vehicle = term.vehicle(vehicle)
         sign = 1 if passage.direction == "facing" else -1
@@ -51,7 +53,7 @@ class Roll:
 
 
 def seat(sensor, terms):
-    """The sensor where the terms say it sits."""
+    """The sensor at the position that the terms give."""
     for term in terms:
         sensor = term.sensor(sensor)
     return sensor

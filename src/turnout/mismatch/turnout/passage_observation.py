@@ -1,4 +1,4 @@
-"""Passages as observations: accelerations below 112 Hz, aligned, on a coarse clock."""
+"""Passages as observations: aligned accelerations below 112 Hz at a low sampling rate."""
 
 from dataclasses import dataclass
 
@@ -10,21 +10,25 @@ from turnout.mismatch.turnout.campaign import LOAD_SD
 from turnout.mismatch.turnout.passage_band import band_end, band_limited, clock_of, finer, limited, read_at
 from turnout.mismatch.turnout.passage_model import EDGE
 
-# m, s, s: of what is heard as a channel's own noise; 4.2 m before a wheel it is that, 1.4 m before six times as loud
+# m, s, s: distance, margin and least time for a channel's noise. 4.2 m before a wheel there is noise alone, 1.4 m
+# before it the level is six times higher.
 CLEAR, MARGIN, SHORTEST_QUIET = 5.0, 0.02, 0.1
-BLURRED = 0.03  # s about a sample at the range
-COUPLING = 0.7  # an amplifier's lower corner that no data sheet mentions [Hz]
-FINE = 2500.0  # samples per second between which a cubic reads 112 Hz to 0.03 %
-SLOWEST = 3.0  # samples in the shortest period of the band, whose edge ends at 1.25 times that: Nyquist asks for 2.5
-FEWEST, AROUND = 20, 31  # samples of a passage, and those over which its amplitude is taken
-SPEED_SD, TIME_SD = 0.004, 1.5e-3
-ASSUMED = 2.0  # prior sd of a load that nobody knows, between which it lies: a seventh beyond empty and full
+BLURRED = 0.03  # s about a sample at the range, which is disturbed by clipping
+COUPLING = 0.7  # Hz, standard deviation of the lower corner of an amplifier without a data sheet
+FINE = 2500.0  # Hz, sampling rate at which cubic interpolation is right to 0.03 % at 112 Hz
+SLOWEST = 3.0  # samples per shortest period of the band; its edge ends at 1.25 times that: Nyquist needs 2.5
+FEWEST, AROUND = 20, 31  # least samples of a passage; samples over which its amplitude is taken
+SPEED_SD, TIME_SD = 0.004, 1.5e-3  # relative, s; errors of the alignment
+ASSUMED = 2.0  # bounds of an unknown load in prior standard deviations: a seventh beyond empty and full
 
 
 @dataclass(frozen=True)
 class Rolling:
-    """One aligned passage: ``time`` (n,) [s] since the recording's start, ``reference`` when the first wheel reaches
-    the first sensor, ``speed`` after alignment; the observation holds the sensors one behind the other."""
+    """One passage aligned with its simulation; its observation holds the sensors one after the other.
+
+    ``time`` (n,) [s] counts from the start of the recording. At ``reference`` [s] the first wheel reaches the first
+    sensor. ``speed`` [m/s] is that after alignment.
+    """
 
     name: str
     passage: object
@@ -35,7 +39,7 @@ class Rolling:
 
     @property
     def high(self):
-        """Upper end of the band [Hz]: at low speed the waves of the rail that are modelled end there."""
+        """Upper end of the band [Hz]: at low speed the modelled waves of the rail end there."""
         return band_end(self.speed)
 
     @property
@@ -44,11 +48,11 @@ class Rolling:
         return clock_of(self.speed)
 
     def limited(self, samples, rate):
-        """Rows of ``samples`` within the passage's band."""
+        """Rows of ``samples`` within the band of the passage."""
         return band_limited(samples, rate, high=self.high)
 
     def places(self):
-        """(n_wheel, n) place of every wheel [m]."""
+        """(n_wheel, n) position of every wheel [m]."""
         sign = 1.0 if self.passage.direction == "facing" else -1.0
         first = sign * min(sign * s.place for s in self.sensors)
         way = self.speed * (self.time - self.reference)
@@ -56,13 +60,13 @@ class Rolling:
 
 
 def duration_of(passage, speed, sensors):
-    """Time from the first wheel at the first sensor to the last wheel at the last one [s]."""
+    """Time from the first wheel at the first sensor to the last wheel at the last sensor [s]."""
     places = [s.place for s in sensors]
     return (np.ptp(places) + float(passage.vehicle.wheel_places[-1])) / speed
 
 
 def rolling_of(passage, sensors, reference, speed, tolerance):
-    """(Rolling, Observation) of an aligned passage."""
+    """(AlignedPassage, Observation) of a passage."""
     recording = passage.recording
     kept = limited(recording, sensors, band_end(speed))
     stop = reference + duration_of(passage, speed, sensors) + EDGE
@@ -85,15 +89,17 @@ def rolling_of(passage, sensors, reference, speed, tolerance):
 
 
 def _without_wheels(rolling):
-    """(start, end) of the times before and after the train, no wheel within ``CLEAR`` of a sensor [s]."""
+    """(start, end) [s] before and after the train, with no wheel within ``CLEAR_DISTANCE`` of a sensor."""
     far, passage = CLEAR / rolling.speed, rolling.passage
     behind = rolling.reference + duration_of(passage, rolling.speed, rolling.sensors) + far
     return (MARGIN, rolling.reference - far), (behind, passage.recording.duration - MARGIN)
 
 
 def _topped(recording, sensors, time):
-    """(n_sensor, n) whether the channel was at its range within ``BLURRED`` of each time: what it missed there rings in
-    the whole band."""
+    """(n_sensor, n) whether the channel reached its range within ``CLIPPING_BLUR`` of each time.
+
+    The samples that were cut off disturb the whole band there.
+    """
     found = np.zeros((len(sensors), time.size), dtype=bool)
     for row, sensor in zip(found, sensors):
         k = recording.index(sensor.name)
@@ -105,8 +111,10 @@ def _topped(recording, sensors, time):
 
 
 def observed(rolling, data, noise, tolerance, topped=None):
-    """Observation of (n_sensor, n) samples with ``noise`` (n_sensor,) and a materiality floor; where ``topped`` they
-    say no more than their own size."""
+    """Observation of (n_sensor, n) samples with ``noise`` (n_sensor,) and a materiality floor.
+
+    ``clipped`` samples have an error as large as the largest sample of their channel.
+    """
     width = min(AROUND, data.shape[1])
     wide = np.array([np.convolve(row**2, np.ones(width) / width, mode="same") for row in data])
     floor = 0.02 * np.sqrt(np.mean(data**2, axis=1)) + 1e-9
@@ -128,9 +136,9 @@ def observed(rolling, data, noise, tolerance, topped=None):
 
 
 def coupling_modes(rolling, data):
-    r"""(n_sensor * n_time, n_sensor) modes of amplifiers whose lower corner is not exactly known.
+    r"""(n_sensor * n_time, n_sensor) error modes of amplifiers whose lower corner frequency is uncertain.
 
-    Well above its corner a high-pass adds :math:`-2 \pi f_c \int a\,dt`; f_c is known to ``COUPLING``.
+    Well above its corner a high-pass adds :math:`-2 \pi f_c \int a\,dt`; f_c is known to ``COUPLING_CORNER_SD``.
     """
     rows = data.reshape(len(rolling.sensors), -1)
     velocity = np.cumsum(rows - rows.mean(axis=1, keepdims=True), axis=1) / rolling.clock
@@ -141,7 +149,10 @@ def coupling_modes(rolling, data):
 
 
 def _cells(rolling):
-    """Cells of one axle within 3 m of a sensor, one bay long, labelled by what a cause could be locked to."""
+    """Cells of one axle within 3 m of a sensor, one sleeper bay long.
+
+    Their labels are what a cause may be bound to: sensor, train, wheel, position, condition.
+    """
     passage, place = rolling.passage, rolling.places()
     train, speed = passage.train or passage.name, f"{passage.speed * 3.6:.0f} km/h"
     index, known, n = [], {}, rolling.time.size
@@ -164,7 +175,7 @@ def _cells(rolling):
 
 
 def rolling_nuisances(passage):
-    """Time, speed and load of one passage; owned by all its sensors, so named by the passage."""
+    """Time, speed and load of one passage. They are named after the passage, since all its sensors share them."""
     reach = np.inf if passage.load_sd <= LOAD_SD else ASSUMED * passage.load_sd
     parts = (
         ("time", "s", TIME_SD, np.inf),

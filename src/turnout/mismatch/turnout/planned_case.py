@@ -1,6 +1,6 @@
-"""A planned campaign as a case: its data are what the base model predicts, its sigma what such recordings have.
+"""A planned campaign as a case: its data are predictions of the base model with errors typical of such recordings.
 
-A campaign as planned, measured by the simulation: for the distinguishability of effects and for exercises.
+It serves to compute which effects a campaign can distinguish, and to make simulated campaigns for exercises and tests.
 """
 
 from dataclasses import dataclass, field, replace
@@ -21,12 +21,12 @@ from turnout.simulate.train import coupled
 from turnout.simulate.turnout_track import TurnoutTrack
 from turnout.simulate.vehicle import car
 
-NOISE = 0.02  # of a sensor over its own rms
+NOISE = 0.02  # standard deviation of a sensor's noise over its own rms
 
 
 @dataclass(frozen=True)
 class Planned:
-    """A passage or test that has not taken place."""
+    """A planned passage or hammer test."""
 
     name: str
     vehicle: object = None
@@ -41,7 +41,7 @@ class Planned:
 
 
 class PlannedCase(TrackCase):
-    """``TrackCase`` of a ``Plan``: nothing is measured, nothing is fitted."""
+    """``TrackCase`` of a ``Plan``: nothing is measured and nothing is fitted."""
 
     def __init__(self, plan, settings=None, families=None, solver=None):
         self.plan = plan
@@ -67,7 +67,7 @@ class PlannedCase(TrackCase):
         self.candidates, self.families = library(self, families), ()
 
     def highest(self, channel):
-        """What a channel shows in the band: nothing else is simulated of a campaign to come. [m/s²]"""
+        """Peak of a channel within the band; a planned campaign has no signals at the full rate. [m/s²]"""
         return self.peak(channel)
 
     def _expected(self):
@@ -84,7 +84,7 @@ class PlannedCase(TrackCase):
 
 
 class _Intended:
-    """What ``TrackCase`` asks a campaign for."""
+    """The part of ``CampaignInput`` that ``TrackCase`` uses, for a plan."""
 
     def __init__(self, plan):
         self.turnout, self.sensors, self.hammer, self.reserved = plan.turnout, plan.sensors, (), ()
@@ -92,7 +92,7 @@ class _Intended:
         self._blows = plan.blows
 
     def places(self):
-        """Places of sensors and blows [m]."""
+        """Positions of sensors and impacts [m]."""
         return [s.place for s in self.sensors] + [x for x, _ in self._blows]
 
 
@@ -108,10 +108,11 @@ class Train:
 
 @dataclass(frozen=True)
 class Plan:
-    """``turnout``, installed ``sensors``, ``blows`` as (place [m], temperature [°C]), ``trains``; ``reserved`` names.
+    """What a campaign will measure: sensors, hammer tests and passages on one turnout.
 
-    ``scatter`` of supports, ``roughness`` [dB over ISO 3095's limit], ``clock`` errors and noise are what a real
-    campaign has beside an effect.
+    ``hammer_points`` are (position [m], temperature [°C]); ``reserved`` are names of recordings that no fit reads.
+    ``scatter`` of support values, ``roughness`` [dB over the limit of ISO 3095] and ``noise`` make the simulated
+    campaign as irregular as a measured one.
     """
 
     turnout: TurnoutTrack
@@ -157,9 +158,9 @@ def turnout_plan(temperatures=(5.0, 25.0), speeds=(22.0, 25.0, 28.0, 32.0, 36.0)
 
 
 def measured_campaign(plan, terms=(), seed=0):
-    """The ``Campaign`` that measuring under ``plan`` would give if ``terms`` were in the track, the wheels or sensors.
+    """Simulated ``CampaignInput`` of a ``plan`` with ``terms`` in the track, the wheels or the sensors.
 
-    Supports scatter, the rail is rough, speeds and loads are noted with errors, gains are off, channels are noisy.
+    Supports scatter, the rail is rough, speeds and loads have errors, sensors have wrong gains and noise.
     """
     rng = np.random.default_rng([seed, 7])
     true = _scattered(plan, rng)
@@ -194,8 +195,8 @@ def _test(plan, true, sensors, terms, k, seed):
     under = tuple(t.under(noted) for t in terms)
     own = tuple(replace(s, noise=0.02) for s in sensors)
     recordings = simulate_hammer(
-        true, place, Hammer(place_spread=0.004), own, plan.n_blows, under, seed=1000 * seed + k, half_length=200.0,
-        conditions=noted,
+        true, place, Hammer(place_spread=0.004), own, plan.n_blows, under, seed=1000 * seed + k,
+        half_length=200.0, conditions=noted,
     )  # fmt: skip
     visit = f"{temperature:.0f} °C"
     return HammerTest(f"blows {k + 1}", place, recordings, "hammer", visit, noted)

@@ -1,4 +1,4 @@
-"""Predictions of a track's recordings: receptances of hammer tests and signals of passages, remembered."""
+"""Predictions of the recordings of a track with caches: receptances of hammer tests and signals of passages."""
 
 from collections import OrderedDict
 from dataclasses import replace
@@ -13,28 +13,34 @@ from turnout.mismatch.turnout.receptance_sensitivity import Heard
 from turnout.mismatch.turnout.track_parameters import inner_values, near_rail, track_with, vehicle_with, with_rail
 from turnout.physics.term import PhysicsTerm
 
-KEPT = 150  # simulated passages remembered
-SPARE = 4  # and so many more than there are passages with all their probes
+KEPT = 150  # simulated passages in the cache
+SPARE = 4  # cached passages with probes beyond the number of passages
 
 
 class Predicting:
-    """What of a ``TrackCase`` makes predictions, on its ``nominal`` zone and on the ``zone`` with the rail that blows
-    tell; ``pairs`` of hammer tests and ``rollings`` of passages say what was seen."""
+    """The part of ``TrackCase`` that predicts recordings.
+
+    ``nominal`` is the zone as filed, ``zone`` the same with the rail fitted to the hammer tests. ``frf_pairs`` of
+    hammer tests and ``aligned_passages`` describe the measurements.
+    """
 
     def _forget(self):
-        """Nothing simulated is remembered any more."""
+        """Clear all caches of simulations."""
         self._simulated, self._whole = OrderedDict(), OrderedDict()
         self._rolls, self._models, self._filed = OrderedDict(), OrderedDict(), {}
 
     def track(self, route="main", terms=()):
-        """The kept part of the base track under a route; what ``terms`` change of the rail is as in its file."""
+        """Base track of a route, cut to the zone.
+
+        Rail values that ``terms`` set themselves are as in the track file.
+        """
         own = tuple(sorted({t.name for t in terms} & set(self.rail)))
         if own and own not in self._filed:
             self._filed[own] = with_rail(self.nominal, {n: 0.0 if n in own else v for n, v in self.rail.items()})
         return (self._filed[own] if own else self.zone).turnout.track_of(route)
 
     def predict(self, values, terms, observations):
-        """Prediction of receptances and passages."""
+        """Predictions of receptances and passages."""
         found, heard_by = [], self.blow_models(values, terms)
         for o in observations:
             if o.name in self.pairs:
@@ -45,11 +51,11 @@ class Predicting:
         return found
 
     def moved(self, values, terms, new, observations, predictions):
-        """Predictions a small step away: receptances without solving the track again."""
+        """Predictions a small step away: receptances follow without solving the track again."""
         return receptance_model.moved(self, values, terms, new, observations, predictions)
 
     def blow_models(self, values, terms):
-        """``blow_model`` of any pair at these values, asked for once per conditions."""
+        """Function that gives ``pair_sensitivity`` of a pair at these values, computed once per conditions."""
         known = {}
 
         def of(pair):
@@ -61,7 +67,7 @@ class Predicting:
         return of
 
     def blow_model(self, values, terms, pair):
-        """The track of a hammer pair as all under its conditions heard it, remembered."""
+        """``ReceptanceSensitivity`` of all pairs under the conditions of ``pair``, cached."""
         under = receptance_observation.shown(terms, pair.conditions)
         near = near_rail(values, self.rail)
         heard, seats = self._touched(values, terms, pair.conditions)
@@ -69,13 +75,14 @@ class Predicting:
         if key not in self._models:
             made = BlowModel(track_with(self._on_grid(near), self.zone, values), under)
             self._models[key] = Heard(made, heard, seats, self.zone)
-            made.solve((*(place for place, _ in heard), *seats.values()))  # together: rounding hangs on what else is
+            # all positions at once: rounding depends on what is solved together
+            made.solve((*(place for place, _ in heard), *seats.values()))
             while len(self._models) > 8:
                 self._models.popitem(last=False)
         return self._models[key]
 
     def _on_grid(self, near):
-        """The main track with its rail where ``near_rail`` has it, remembered."""
+        """The main track with ``rail`` values on the grid of ``rail_on_grid``; cached."""
         key = tuple(near.values())
         if key not in self._railed:
             if len(self._railed) > 8:
@@ -84,24 +91,24 @@ class Predicting:
         return self._railed[key]
 
     def _touched(self, values, terms, conditions):
-        """(place of the blow, ``Pair.seat``) of all pairs under these conditions, and the places of these seats."""
+        """(position of the impact, ``FrfPair.seat``) of all pairs under these conditions; positions of these seats."""
         alike = [p for p in self.pairs.values() if p.conditions == conditions]
         sensors, track = {p.seat: p.sensor for p in alike}, self.track()
         seats = {seat: self.seat(s, values, terms).probe(track).place for seat, s in sensors.items()}
         return tuple((p.test.place, p.seat) for p in alike), seats
 
     def seat(self, sensor, values, terms):
-        """The sensor where ``values`` and ``terms`` say that it sits."""
+        """The sensor at the position that ``values`` and ``terms`` give."""
         more = values.get(f"seat_{sensor.name}", 0.0)
         return passage_model.seat(replace(sensor, place=sensor.place + more) if more else sensor, terms)
 
     def chain(self, values, terms, pair):
-        """What the channel makes of a receptance, (n_line,) complex."""
+        """(n_line,) complex factor of the channel of a pair."""
         factor = receptance_observation.channel_factor(terms, pair.sensor, receptance_observation.SHIFTED)
         return factor * (1.0 + values.get(f"gain_{pair.channel}", 0.0))
 
     def receptance(self, values, pair, heard):
-        """(n_line,) receptance of a pair [m/N], with what the rail differs from that of the model."""
+        """(n_line,) receptance of a pair [m/N], corrected to first order for the rail of ``values``."""
         off = [values[k] - at for k, at in near_rail(values, self.rail).items()]
         return heard.receptance(pair) + heard.rail_gradient(pair) @ off
 
@@ -111,12 +118,12 @@ class Predicting:
         )
 
     def passage_of(self, values, terms, made):
-        """(n_sensor * n_time,) what the channels of a passage show, one sensor behind the other."""
+        """(n_sensor * n_time,) predicted signals of a passage, one sensor after the other."""
         clean = self.clean(values, terms, made)
         return np.concatenate([self.shown(values, terms, made, s, row) for s, row in zip(made.sensors, clean)])
 
     def shown(self, values, terms, made, sensor, row):
-        """What the channel of a sensor shows of the simulated signal ``row``, on the clock of the recording."""
+        """Output of the channel of a sensor for the simulated signal ``signal``, at the times of the recording."""
         start = made.reference + values[f"time@{made.name}"] - passage_model.LEAD
         rate, time = 4.0 * self.solver.rate, made.time - start
         for term in terms:
@@ -125,21 +132,21 @@ class Predicting:
         return (1.0 + values[f"gain_{sensor.name}"]) * passage_band.read_at(made.limited(row, rate), rate, time)
 
     def clean(self, values, terms, made):
-        """Simulated signals of the sensors before their channels, four times as fine as the march, remembered."""
+        """Simulated signals of the sensors before their channels, at four times the rate of the simulation; cached."""
         under, key = self._asked(values, terms, made)
         if key not in self._simulated:
             self._march(values, terms, made, under, key)
         return passage_band.finer(self._simulated[key])
 
     def marched(self, values, terms, made):
-        """Simulated signals of the sensors and of ``probes`` on the simulation's clock, the latest remembered."""
+        """Simulated signals of the sensors and of ``probes`` at the rate of the simulation; the latest are cached."""
         under, key = self._asked(values, terms, made)
         if key not in self._whole:
             self._march(values, terms, made, under, key)
         return self._whole[key]
 
     def _asked(self, values, terms, made):
-        """(terms as a passage meets them, all that its simulation hangs on)."""
+        """(terms under the conditions of a passage, cache key of its simulation)."""
         under = tuple(t.under(self.said(made)) for t in terms if t.kind != "channel" or _moves(t))
         path = self.waves.path(values)
         shape, surfaces = path[0].dip.tobytes() if path else b"", self.surface.surfaces(made.passage.route, values)
@@ -153,7 +160,7 @@ class Predicting:
         return values[f"wheels_{train}"], values[f"speed@{made.name}"], values[f"load@{made.name}"]
 
     def _march(self, values, terms, made, under, key):
-        """Simulate a passage; of its probes, which are many, only what a set of derivatives asks for is remembered."""
+        """Simulate a passage and cache it. Probe signals are large: their cache is small."""
         _, speed, load = self._own(values, made)
         vehicle = vehicle_with(made.passage.vehicle, values, made.passage.train or made.passage.name, load)
         roll, path = self.roll(values, under, made.passage), self.waves.path(values)
@@ -167,13 +174,13 @@ class Predicting:
                 held.popitem(last=False)
 
     def said(self, made):
-        """Conditions of a passage, as terms ask for them."""
+        """Conditions of a passage, as terms need them."""
         passage = made.passage
         loads = tuple(2.0 * load for load in passage.vehicle.static_loads)
         return {"axle_loads": loads, "train": passage.train or passage.name, "name": made.name, **passage.conditions}
 
     def roll(self, values, terms, passage):
-        """The simulation of passages on this track with these terms, remembered."""
+        """``PassageSimulator`` of a passage's route with these terms, cached."""
         key = passage.route, inner_values(self.zone, values), repr(terms)
         if key not in self._rolls:
             track = track_with(self.track(passage.route, terms), self.zone, values)
@@ -183,8 +190,10 @@ class Predicting:
         return self._rolls[key]
 
     def numerical_error(self, fit):
-        """Difference to half the step and half the mesh (but under pads that are spread over nodes), where passages are
-        there; 0 where these cannot be simulated."""
+        """Difference of each prediction to one with half the step and half the mesh; None without passages.
+
+        It is 0 for hammer tests and where the finer simulation fails. The mesh stays where pads are spread over nodes.
+        """
         if not self.rollings:
             return None
         finer = passage_model.Track1D(2.0 * self.solver.rate, self.solver.scheme, 2 * (self.solver.elements or 4))
@@ -204,5 +213,5 @@ class Predicting:
 
 
 def _moves(term):
-    """A channel term that changes what is simulated: the sensor's seat."""
+    """Whether a channel term changes the simulation itself, by the position of the sensor."""
     return type(term).sensor is not PhysicsTerm.sensor

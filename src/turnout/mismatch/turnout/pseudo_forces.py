@@ -1,7 +1,7 @@
-"""Linear columns from pseudo-forces: what a small force at a support does to a passage's sensors.
+"""Linear response of a passage's sensors to small forces at supports (pseudo-forces), without another simulation.
 
-The free track carries the force to the sensors and to the wheels; these answer to the motion of the rail under them as
-to a wave of its surface (``rolled_waves``).
+The free track carries the force to the sensors and to the wheels. The wheels respond to the motion of the rail under
+them as to a wave of its surface (``wave_response``).
 """
 
 from dataclasses import replace
@@ -15,13 +15,14 @@ from turnout.mismatch.turnout.wave_response import Carrier
 from turnout.simulate.frequency_response import responses
 from turnout.simulate.run import Probe
 
-FURTHER = 0.01  # way over which a derivative by a sensor's place is taken [m]
-RAIL, SLEEPER, PAD = range(3)  # a pad's force presses the rail and lifts the sleeper
+FURTHER = 0.01  # m, step of the derivative by the position of a sensor
+RAIL, SLEEPER, PAD = range(3)  # targets; the force of a pad acts on the rail and reversed on the sleeper
 
 
 def probes(case, values, terms, made):
-    """Displacements of rail and sleeper at every support of the zone, of which pseudo-forces are made; then each
-    sensor a little further along."""
+    """Probes of rail and sleeper at every support of the zone, for pseudo-forces, and of sensors moved by
+    ``POSITION_STEP``.
+    """
     seated = [case.seat(s, values, terms) for s in made.sensors]
     track = case.track(made.passage.route)
     further = [replace(s, place=s.place + FURTHER).probe(track) for s in seated]
@@ -29,7 +30,7 @@ def probes(case, values, terms, made):
 
 
 def support_forces(case, values, terms, made):
-    """Histories at the zone's supports on the simulation's clock: rail and sleeper displacement (n_support, n) [m]."""
+    """Displacement of rail and sleeper at the zone's supports, each (n_support, n) at the simulation's rate [m]."""
     signals = case.marched(values, terms, made)[len(made.sensors) :]
     last = 2 * len(case.zone.supports)
     return signals[0:last:2], signals[1:last:2]
@@ -49,7 +50,7 @@ def green(case, values, terms, made):
 
 
 def _sag(case, values, terms, made, way):
-    """(n_support, 2, n_x) static motion of the rail at ``way`` per force on rail seat and sleeper [m/N]."""
+    """(n_support, 2, n_x) static deflection of the rail at ``positions`` per force on rail seat and sleeper [m/N]."""
     under = [t.under(case.said(made)) for t in terms]
     track = track_with(case.track(made.passage.route, under), case.zone, values)
     matrices = linear(track, under)
@@ -60,10 +61,10 @@ def _sag(case, values, terms, made, way):
 
 
 def carried(case, values, terms, made, forces):
-    """Sensors' response to force histories, dict key -> (support, kind, (n,) force on the simulation's clock), or to a
-    list of such that act together.
+    """Response of the sensors to force histories, key -> (n_sensor * n_time,) at the times of the observation.
 
-    Returns key -> (n_sensor * n_time,) on the observation's clock.
+    ``forces`` maps a key to (support, target, (n,) force at the rate of the simulation), or to a list of such that act
+    together.
     """
     carrier = Carrier(case, values, made, terms)
     _, g = green(case, values, terms, made)
@@ -88,8 +89,11 @@ def carried(case, values, terms, made, forces):
 
 
 def columns_of(case, values, terms, made, histories):
-    """Derivatives of a passage by the logarithm of each support's own pad and ballast stiffness, and by what all
-    supports have in common: what those beyond the zone add to it is left out."""
+    """Derivatives of a passage by support values.
+
+    By the logarithm of each support's own pad and ballast stiffness, and by the values that all supports have in
+    common. Of the latter the contribution of supports beyond the zone is left out.
+    """
     rail, sleeper = histories
     track = track_with(case.track(made.passage.route), case.zone, values)
     zone, forces = case.zone.supports, {}

@@ -1,7 +1,7 @@
-"""The rail's own roughness as a nuisance: waves whose amplitudes are free under the spectrum of ISO 3095.
+"""Roughness of the rail as nuisances: waves with free amplitudes, whose prior is the spectrum of ISO 3095.
 
-All trains roll over the same waves. They enter the simulation as a path; the derivatives are those of a free track
-under the contact force that a wave makes, see ``rolled_waves``.
+All trains roll over the same waves. They enter the simulation as a path. The derivatives are the response of a free
+track to the contact force of a wave, see ``wave_response``.
 """
 
 from functools import cached_property
@@ -14,13 +14,13 @@ from turnout.mismatch.turnout.wave_response import Carrier
 from turnout.simulate.roughness import level
 from turnout.simulate.wheel_path import Sampled
 
-REACH = 3.0  # rolling before the first and behind the last sensor that still shakes them [m]
-LONGEST, SHORTEST = 3.0, passage_band.SHORTEST_WAVE  # [m]
-STEP = 0.02  # m
+REACH = 3.0  # m before the first and behind the last sensor, from where a wheel still excites them
+LONGEST, SHORTEST = 3.0, passage_band.SHORTEST_WAVE  # m, of the free waves
+STEP = 0.02  # m, between samples of the path
 
 
 class Waves:
-    """Cosines and sines over the reach of the sensors; ``names`` of their amplitudes."""
+    """Cosines and sines over the range of the sensors; ``names`` of their amplitudes."""
 
     def __init__(self, places, offset):
         self.start, self.end = min(places) - REACH, max(places) + REACH
@@ -32,7 +32,7 @@ class Waves:
         self.names = tuple(
             f"{'cos' if q == 0.0 else 'sin'}_wave_{o}" for o, q in zip(np.repeat(orders, 2), self.quarter)
         )
-        # the limit curve is an upper limit for sound rails: more hides dips of half a millimetre
+        # the limit curve is an upper limit for intact rails: with more, waves hide dips of half a millimetre
         self.sd = amplitude_sd(self.wavelength, self.length, offset)
 
     def nuisances(self):
@@ -40,7 +40,7 @@ class Waves:
         return [Nuisance(n, "m", 0.0, float(sd), bends=False) for n, sd in zip(self.names, self.sd)]
 
     def fade(self, x):
-        """(n,) 0 to 1: the waves come and go at both ends."""
+        """(n,) 0 to 1: envelope that fades the waves at both ends."""
         edge = np.clip(np.minimum(x - self.start, self.end - x) / 0.8, 0.0, 1.0)
         return edge * edge * (3.0 - 2.0 * edge)
 
@@ -54,7 +54,7 @@ class Waves:
         return np.array([values[n] for n in self.names])
 
     def path(self, values):
-        """The waves as a part of a wheel's path; () where all are 0."""
+        """The waves as a component of a wheel's path; () where all are 0."""
         amplitude = self.amplitudes(values)
         if not amplitude.any():
             return ()
@@ -62,7 +62,7 @@ class Waves:
 
     @cached_property
     def _sampled(self):
-        """(n_wave, n) waves every ``STEP``."""
+        """(n_wave, n) waves every ``PATH_STEP``."""
         return self.shapes(np.arange(self.start, self.end + STEP, STEP))
 
 
@@ -76,6 +76,6 @@ def amplitude_sd(wavelength, length, offset):
 
 
 def wave_columns(case, values, terms, made):
-    """(n_sensor * n_time, n_wave) derivative of a passage by the waves' amplitudes."""
+    """(n_sensor * n_time, n_wave) derivative of a passage by the amplitudes of the waves."""
     carrier = Carrier(case, values, made, terms)
     return carrier.signals(case.waves.lengths, case.waves.fade(carrier.node), carrier.train())

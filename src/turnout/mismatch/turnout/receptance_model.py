@@ -1,8 +1,7 @@
-"""Receptances of a track as blows find it: its matrices with terms in them, solved once per place.
+"""Receptances of a track with terms, as hammer tests measure them: its matrices are solved once per position.
 
-What links added to a track change in its receptances, exactly and without solving it again.
-
-Receptances with parameters of terms moved a little: exact to first order, and nothing is solved again.
+Links that are added, or whose values change, change the receptances without another solution. For added links this is
+exact, for small changes of values it is exact to first order.
 """
 
 from functools import cached_property
@@ -19,15 +18,15 @@ from turnout.simulate.frequency_response import responses
 from turnout.simulate.links import Link, left, links_of, ports_of
 from turnout.simulate.matrices import link_vector
 
-SWING = 1e-6  # motion of a blow for the tangent of a law [m]
-# Rate of a joint under a blow: from that of a free one to that of one which is held, over so much force against it.
-# Blows of 5 kN on a simulated track with friction of 0.3 to 8 kN are met best at 20, 13, 8, 3 and 1.5 mm/s.
+SWING = 1e-6  # m, motion under an impact, for the secant of a port
+# Sliding rate of a joint under an impact, free and stuck, and the friction force between both.
+# For impacts of 5 kN on a simulated track, friction of 0.3 to 8 kN fits best with 20, 13, 8, 3 and 1.5 mm/s.
 FREE, HELD, HOLDING = 0.021, 1.5e-3, 2e3  # [m/s, m/s, N]
-SHARE = 1e-3  # of a support's value, by which what follows it is found
+SHARE = 1e-3  # relative change of a support's value, for derivatives of links that follow it
 
 
 def tangent(terms, track):
-    """Links of the terms' ports as a blow finds them: their secant over a micrometre and the rate that they leave."""
+    """Links that replace the nonlinear ports of terms: secant stiffness over 1 µm, and damping at the sliding rate."""
     found = []
     for port in ports_of(terms, track):
         law, d = port.law, -port.gap
@@ -39,17 +38,17 @@ def tangent(terms, track):
 
 
 def linear(track, terms):
-    """Matrices of a track with ``terms`` in it, their ports by ``tangent``."""
+    """Matrices of a track with ``terms``, their ports replaced by ``tangent_links``."""
     return matrices_of(track, (*terms, FixedLinks(tangent(terms, track))))
 
 
 def _against(law, d, rate):
-    """Half of what the force of a law changes by when the rate turns round [N]."""
+    """Half the change of a port's force when its rate reverses [N]."""
     return 0.5 * (float(law.force(d, rate)) - float(law.force(d, -rate)))
 
 
 def _own_shear(track, terms):
-    """Share of the rail's flexibility in shear that is the file's, the rest being that of ``terms``."""
+    """Share of the file's value in the shear flexibility of the rail; ``terms`` add the rest."""
     if track.rail.beam == "euler":
         return 0.0
     changed = track
@@ -68,26 +67,26 @@ class BlowModel:
         self.by_place, self.weight = {}, {}
 
     def solve(self, places):
-        """Remember the displacements under unit forces at these places: together they need one factorisation."""
+        """Compute and keep the displacements under unit forces at these positions, with one factorisation."""
         new = [p for p in dict.fromkeys(places) if p not in self.by_place]
         if new:
             found = responses(self.matrices, SHIFTED, new)
             self.by_place |= {p: found[:, k] for k, p in enumerate(new)}
 
     def displacement(self, place):
-        """(n_line, n) of all degrees of freedom under a unit force at a place."""
+        """(n_line, n) displacement of all degrees of freedom under a unit force at a position."""
         self.solve([place])
         return self.by_place[place]
 
     def moved(self, excited, measured):
-        """(n_line,) displacement at one place under a unit force at another, nodes' motion alone. [m/N]"""
+        """(n_line,) displacement at one position under a unit force at another, from nodal motion alone. [m/N]"""
         if measured not in self.weight:
             self.weight[measured] = self.matrices.weights(measured)
         rows, weights = self.weight[measured]
         return self.displacement(excited)[:, rows] @ weights
 
     def place_of(self, sensor):
-        """Place of a sensor on the model."""
+        """Position of a sensor on the model."""
         return sensor.probe(self.track).place
 
     def receptance(self, excited, measured):
@@ -96,7 +95,7 @@ class BlowModel:
         return h if isinstance(measured, tuple) else h + self.matrices.compliance(float(excited), float(measured))
 
     def seat_gradient(self, excited, measured, way=0.01):
-        """Derivative by the sensor's place on the rail, (n_line,) [1/N]; 0 on a sleeper."""
+        """Derivative by the position of the sensor on the rail, (n_line,) [1/N]; 0 on a sleeper."""
         if isinstance(measured, tuple):
             return np.zeros(LINES.size, dtype=complex)
         return (self.receptance(excited, measured + way) - self.receptance(excited, measured - way)) / (2.0 * way)
@@ -109,8 +108,11 @@ class BlowModel:
 
     @cached_property
     def following(self):
-        """Links of the terms that follow a value of their support: [(field, support, rows, weights, (k, c, m) per
-        logarithm of the value)]. Soft ballast has a share of it, a pad's branch goes with the pad, a gap has none."""
+        """Links of the terms that depend on a value of their support.
+
+        List of (field, support, rows, weights, (k, c, m) per logarithm of the value). Soft ballast has a share of the
+        ballast stiffness and a pad's branch follows the pad, for example; a gap has none.
+        """
         if not self.terms:
             return []
         found, known = [], self.links(self.terms)
@@ -123,24 +125,26 @@ class BlowModel:
         return found
 
     def links(self, terms, track=None):
-        """Links of ``terms`` on this track or another, tangents of their ports behind."""
+        """Links of ``terms`` on this track or another, followed by the tangents of their ports."""
         track = track or self.track
         return [*links_of(terms, track), *tangent(terms, track)]
 
 
 class AddedLinks:
-    """Changes of receptances about a fit by each of ``chosen`` [(candidate, start)]; what these add is asked once for
-    all pairs under the same conditions."""
+    """Changes of receptances about a fit by each of ``chosen`` [(candidate, start)].
+
+    The response of the added links is computed once for all pairs under the same conditions.
+    """
 
     def __init__(self, case, fit, chosen):
         self.case, self.fit, self.chosen, self.known = case, fit, chosen, {}
 
     def changes(self, pair):
-        r"""(key, start) -> (n,) change of a pair's observation.
+        r"""(key, start) -> (n,) change of the observation of a pair.
 
-        One link w with impedance z changes a receptance by :math:`-z\,u_w v_w / (1 + z\,g_w)`, u and v the motion of
-        its ends under the blow and under a force at the sensor, g under a pair of forces at its own ends; several links
-        of one candidate are taken as if each were alone.
+        One link w with impedance z changes a receptance by :math:`-z\,u_w v_w / (1 + z\,g_w)`. Here u and v are the
+        motion of its ends under unit forces at impact and sensor, g that under unit forces at its own ends. Several
+        links of one candidate are treated as independent.
         """
         case, fit, chosen = self.case, self.fit, self.chosen
         if not chosen:
@@ -160,7 +164,7 @@ class AddedLinks:
 
 
 def _answers(model, conditions, chosen):
-    """(ends (n_end, n), which end each link has, z / (1 + z g) of each (n_line, n_link), candidate of each link)."""
+    """(ends (n_end, n), end of each link, z / (1 + z g) of each (n_line, n_link), candidate of each link)."""
     omega, known, index, impedance, owner = 2.0 * np.pi * receptance_observation.SHIFTED, {}, [], [], []
     track = left(model.track, links_of(model.terms, model.track))
     for i, (c, k) in enumerate(chosen):
@@ -193,8 +197,10 @@ WHAT = ("stiffness", "damping", "mass")
 
 
 def moved(case, values, terms, new, observations, predictions):
-    """Predictions of a track case with ``new`` terms, a small step from ``terms``: passages are simulated, receptances
-    follow the links where these differ by their values alone."""
+    """Predictions of a track case with ``new`` terms, a small step from ``terms``.
+
+    Passages are simulated. Receptances follow the links where these differ by their values alone.
+    """
     found, heard_by, known = [], case.blow_models(values, terms), {}
     anew = any(a != b and b.kind == "channel" for a, b in zip(terms, new))
     for o, old in zip(observations, predictions):
@@ -217,8 +223,10 @@ def moved(case, values, terms, new, observations, predictions):
 
 
 def nudged(model, terms):
-    """Ends (n_link, n) and impedances (n_link, n_line) by which the links of ``terms`` differ from the model's own;
-    None where they differ by more than values: another rail, a link that was not there."""
+    """Ends (n_link, n) and impedances (n_link, n_line) by which links of ``terms`` differ from those of the model.
+
+    None where more than values differ: another rail, or a link that the model has not.
+    """
     pairs = list(zip(model.terms, terms))
     if any(type(a) is not type(b) or (a != b and type(b).rail is not PhysicsTerm.rail) for a, b in pairs):
         return None
@@ -237,7 +245,9 @@ def nudged(model, terms):
 
 
 def changed(heard, pair, ends, impedance):
-    r"""(n_line,) complex change of a pair's receptance [m/N] by links whose impedance changes by z:
-    :math:`-\sum z\,u_w v_w`, u and v the motion of their ends under unit forces at blow and sensor."""
+    r"""(n_line,) complex change of a pair's receptance [m/N] by links whose impedance changes by z.
+
+    It is :math:`-\sum z\,u_w v_w` with u and v the motion of their ends under unit forces at impact and sensor.
+    """
     u, v = heard.motion(ends, pair)
     return -np.sum(impedance * u * v, axis=0)

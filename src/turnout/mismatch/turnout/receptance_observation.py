@@ -1,4 +1,4 @@
-"""Hammer tests as observations: receptances of accepted blows, their errors, and how their lines are counted."""
+"""Hammer tests as observations: receptances of accepted impacts, their errors and their cells in frequency."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -8,21 +8,24 @@ import numpy as np
 from turnout.mismatch.engine.case import Observation
 from turnout.receptance import find_impacts
 
-LINES = np.unique(np.round(np.geomspace(35.0, 900.0, 44) / 2.0) * 2.0)  # [Hz]; two blows' worth of resolution
-# 1/s: records are weighted by exp(-SETTLING t), so that what still rings at their end is not cut off; models are asked
-# at the frequencies that this makes complex, which is exact. 20 leave 5 % of a track that does not settle in 0.15 s.
+LINES = np.unique(np.round(np.geomspace(35.0, 900.0, 44) / 2.0) * 2.0)  # [Hz]
+# 1/s: records are weighted by exp(-DECAY_RATE t), so that ringing at their end is not truncated. Models are evaluated
+# at the corresponding complex frequencies, which is exact. After 0.15 s a weight of 5 % remains.
 SETTLING = 20.0
 SHIFTED = LINES - 1j * SETTLING / (2.0 * np.pi)  # [Hz]
-DELAY = 8e-6  # sd of a hammer pair's delay: 2 degrees at 700 Hz [s]
-FEWEST = 2
-SMOOTH = 0.3  # octaves over which the errors of a model of the track hang together
-FARTHER = 1.5  # m; over this way an error of the waves' speed and decay doubles the variance of a receptance's error
-LINE_SHARE = 0.4  # of the tolerance that differs from line to line
+DELAY = 8e-6  # s, standard deviation of the delay of a pair: 2 degrees at 700 Hz
+FEWEST = 2  # accepted impacts of a channel, at least
+SMOOTH = 0.3  # octaves, correlation length of model errors
+FARTHER = 1.5  # m, distance that doubles the error variance, by errors of wave speed and decay
+LINE_SHARE = 0.4  # share of the tolerance that is independent from line to line
 
 
 @dataclass(frozen=True)
 class Pair:
-    """One response channel of one hammer test: ``frequency`` (n,) lines with a measured receptance."""
+    """One response channel of one hammer test.
+
+    ``frequency`` (n,) are the lines with a measured receptance, ``size`` (n,) its magnitude.
+    """
 
     name: str
     test: object
@@ -34,7 +37,7 @@ class Pair:
 
     @property
     def seat(self):
-        """Which sensor it is: a channel's may have moved on with the blows, or from the rail to a sleeper."""
+        """Identity of the sensor: a channel may have been moved during the test, or from the rail to a sleeper."""
         return self.channel, self.sensor.place, self.sensor.mounting
 
     @cached_property
@@ -44,10 +47,10 @@ class Pair:
 
 
 def pairs_of(test, sensors, tolerance):
-    """(Pair, Observation) of every response channel of a test; channels without sound blows are left out.
+    """(FrfPair, Observation) of every response channel of a test; channels without accepted impacts are left out.
 
-    The observation is Re and Im of the receptance over its own magnitude, so that all lines weigh alike; sigma is
-    the blows' spread and ``tolerance``.
+    The observation is Re and Im of the receptance over its own magnitude, so that all lines have equal weight. Its
+    sigma combines the scatter between impacts and ``tolerance``.
     """
     found = []
     for sensor in sensors:
@@ -69,12 +72,12 @@ def pairs_of(test, sensors, tolerance):
 
 @lru_cache(maxsize=4)
 def _kernel(n, rate):
-    """(n_line, n) of the transform at ``SHIFTED``."""
+    """(n_line, n) Fourier kernel at ``SHIFTED_LINES``."""
     return np.exp(-2j * np.pi * SHIFTED[:, None] * np.arange(n) / rate)
 
 
 def _receptance(impacts):
-    """H1 over whole blows and its standard error from blow to blow, both (n_line,)."""
+    """H1 estimate over the accepted impacts and its standard error from their scatter, both (n_line,)."""
     force, response = [], []
     for i in impacts:
         kernel = _kernel(i.force.size, i.rate)
@@ -89,12 +92,12 @@ def _receptance(impacts):
 
 
 def sized(pair, size):
-    """The pair with other magnitudes of its receptance."""
+    """The pair with another magnitude ``size`` of its receptance."""
     return replace(pair, size=size)
 
 
 def observed(pair, h, spread, tolerance):
-    """Observation of a receptance (n,) with its standard error ``spread``."""
+    """Observation of a receptance (n,) with standard error ``spread`` (n,)."""
     sigma = np.sqrt((spread / pair.size) ** 2 / 2.0 + (LINE_SHARE * tolerance * _around(pair)) ** 2)
     data = np.concatenate([h.real, h.imag]) / np.tile(pair.size, 2)
     octave = np.floor(np.log2(pair.frequency / 31.25)).astype(int)
@@ -111,18 +114,20 @@ def observed(pair, h, spread, tolerance):
 
 
 def _around(pair):
-    """Root mean square of the magnitude over a third of an octave about each line, over its own (n,), at least 1:
-    errors of a model fill the antiresonances."""
+    """(n,) rms magnitude over a third of an octave about each line, over the magnitude of the line; at least 1.
+
+    Model errors fill the antiresonances.
+    """
     near = np.abs(np.log2(pair.frequency[:, None] / pair.frequency)) < 0.34
     return np.maximum(np.sqrt(near @ pair.size**2 / near.sum(axis=1)) / pair.size, 1.0)
 
 
 def tolerated(pair, h, tolerance):
-    r"""(2n, m) modes of what a receptance may differ by without a cause worth a name.
+    r"""(2n, m) modes of errors of a receptance that no effect explains.
 
-    Gain, tilt over frequency and delay of the pair (hammer, calibration, mounting), and an error of the model that is
-    smooth over :math:`\ell = 0.3` octaves: :math:`\epsilon h` with complex normal ε of covariance
-    :math:`\tau^2 (1 + d^2 / d_0^2) \exp(-\Delta^2 / 2 \ell^2)`, Δ in octaves, d the way from blow to sensor.
+    Gain, tilt over frequency and delay of the pair come from hammer, calibration and mounting. The model has an error
+    that is smooth over :math:`\ell = 0.3` octaves: :math:`\epsilon h` with complex normal ε of covariance :math:`\tau^2
+    (1 + d^2 / d_0^2) \exp(-\Delta^2 / 2 \ell^2)`, Δ in octaves, d the distance from impact to sensor.
     """
     octave = np.log2(pair.frequency)
     place = getattr(pair.sensor, "place", pair.test.place)
@@ -139,12 +144,12 @@ def tolerated(pair, h, tolerance):
 
 
 def shown(terms, conditions):
-    """Those of ``terms`` that are in a track's receptances, as they are under ``conditions``."""
+    """Those of ``terms`` that act in receptances of the track, as they are under ``conditions``."""
     return tuple(t.under(conditions) for t in terms if t.kind in ("matrix", "port"))
 
 
 def channel_factor(terms, sensor, frequency):
-    """What linear channel terms make of a spectrum, (n,) complex."""
+    """(n,) complex factor by which linear channel terms change a spectrum."""
     factor = np.ones(frequency.size, dtype=complex)
     for term in terms:
         if hasattr(term, "transfer") and term.channel_name == sensor.name:
@@ -153,12 +158,14 @@ def channel_factor(terms, sensor, frequency):
 
 
 def split(value):
-    """Re and Im one behind the other, along the first axis."""
+    """Re and Im one after the other, along the first axis."""
     return np.concatenate([value.real, value.imag])
 
 
 def scaled(pair, h, chain=None):
-    """The pair's lines of a receptance on ``LINES``, times what the ``chain`` (n_line,) makes of it, over its measured
-    magnitude, complex (n,) or (n, k)."""
+    """A receptance on ``LINES`` at the lines of a pair, over its measured magnitude; complex (n,) or (n, k).
+
+    ``channel_response`` (n_line,) multiplies it.
+    """
     size = 1.0 / pair.size if chain is None else chain[pair.lines] / pair.size
     return h[pair.lines] * (size if h.ndim == 1 else size[:, None])

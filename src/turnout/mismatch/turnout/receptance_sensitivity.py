@@ -1,6 +1,6 @@
-"""What the pairs of hammer tests under the same conditions share on one model of the track, found once for all.
+"""Receptances of all hammer pairs under the same conditions, and their derivatives, on one model of the track.
 
-Compiled sums over the rail's elements of products of strains under two unit forces.
+The derivatives are sums of products of strains under two unit forces; those over the rail's elements are compiled.
 """
 
 from dataclasses import replace
@@ -17,11 +17,11 @@ from turnout.simulate.rail import element_mass
 
 @kernel
 def by_rail(moved, pairs, row, length, weights):
-    """(n_pair, n_line, 2) derivatives of receptances by the logarithms of the rail's bending and shear stiffness.
+    """(n_pair, n_line, 2) derivatives of receptances by the logarithms of bending and shear stiffness of the rail.
 
-    ``moved`` (n_place, n_line, n) are displacements under unit forces, ``pairs`` (2, n_pair) the places of blow and
-    sensor, ``row`` (n_node,) that of a node's deflection, ``length`` (n_element,), ``weights`` (3, n_element) what
-    bending, shearing and shearing by the shear stiffness alone of each element weigh.
+    ``displacements`` (n_place, n_line, n) are those under unit forces, ``pairs`` (2, n_pair) the positions of impact
+    and sensor, ``row`` (n_node,) the row of a node's deflection, ``length`` (n_element,). ``weights`` (3, n_element)
+    are those of bending, of shear, and of shear by the shear stiffness alone.
     """
     n_place, n_line, n_element = moved.shape[0], moved.shape[1], length.size
     found = np.zeros((pairs.shape[1], n_line, 2), dtype=np.complex128)
@@ -56,8 +56,11 @@ FACTOR = {"stiffness": -1.0 + 0j * OMEGA, "damping": -1j * OMEGA, "mass": OMEGA*
 
 
 class Heard:
-    """A ``model`` (``BlowModel``), the ``pairs`` (place struck, ``Pair.seat``) that were heard, ``seats`` from the
-    latter to the place of the sensor, and the ``zone`` whose supports have values of their own."""
+    """Receptances of one ``model`` (``ReceptanceModel``) and their derivatives.
+
+    ``pairs`` are (position of the impact, ``FrfPair.seat``); ``seats`` maps the latter to the position of the sensor.
+    The supports of ``zone`` have values of their own.
+    """
 
     def __init__(self, model, pairs, seats, zone):
         self.model, self.seats, self.zone = model, seats, zone
@@ -71,31 +74,31 @@ class Heard:
         return self.model.receptance(pair.test.place, self.seats[pair.seat])
 
     def seat_gradient(self, pair):
-        """Derivative by the sensor's place on the rail, (n_line,) [1/N]; 0 on a sleeper."""
+        """Derivative by the position of the sensor on the rail, (n_line,) [1/N]; 0 on a sleeper."""
         return self.model.seat_gradient(pair.test.place, self.seats[pair.seat])
 
     def rail_gradient(self, pair):
-        """Derivatives by the logarithms of what is not known of the rail (``rail_spreads``), (n_line, n)."""
+        """Derivatives by the logarithms of the uncertain rail values (``rail_sds``), (n_line, n)."""
         return np.concatenate([self._by_rail[self._of(pair)], self._by_castings[self._of(pair)]], axis=-1)
 
     def gradient(self, pair):
-        """Derivatives by the logarithm of each common and own value, (n_line, n) in the order of ``inner_names``."""
+        """Derivatives by the logarithms of common and support values, (n_line, n) in order of ``track_value_names``."""
         return self._by_supports[self._of(pair)]
 
     def motion(self, ends, pair):
-        """((n_link, n_line), the same) motion of links' ``ends`` (n_link, n) under unit forces at blow and sensor."""
+        """((n_link, n_line), the same) motion of ``ends`` (n_link, n) under unit forces at impact and sensor."""
         return tuple(ends @ self._moved[place].T for place in self._places[1][:, self._of(pair)])
 
     @cached_property
     def _places(self):
-        """Index of every place that was struck or where a sensor sat, and (2, n_pair) those of each pair."""
+        """Index of the position of every impact and sensor, and (2, n_pair) indices of each pair."""
         ends = [(place, self.seats[seat]) for place, seat in self.row]
         index = {place: k for k, place in enumerate(dict.fromkeys(p for pair in ends for p in pair))}
         return index, np.array([[index[p] for p in pair] for pair in ends]).T
 
     @cached_property
     def _moved(self):
-        """(n_place, n_line, n) of all degrees of freedom under unit forces at the places."""
+        """(n_place, n_line, n) displacement of all degrees of freedom under unit forces at the positions."""
         return np.array([self.model.displacement(place) for place in self._places[0]])
 
     @cached_property
@@ -106,7 +109,7 @@ class Heard:
                   -\sum_e \frac{12 EI P}{h (1+P)^2} a_u a_v
 
         with :math:`s = \theta_2 - \theta_1`, :math:`a = (w_2 - w_1)/h - (\theta_1 + \theta_2)/2` of each element and P
-        its share of shear: the element's two modes (Przemieniecki 1968, ch. 11). Its mass hardly hangs on them.
+        its share of shear: the two modes of the element (Przemieniecki 1968, ch. 11). Its mass hardly depends on them.
         """
         matrices = self.model.matrices
         h, p, ei, _ = matrices.elements
@@ -116,9 +119,11 @@ class Heard:
 
     @cached_property
     def _by_castings(self):
-        r"""(n_pair, n_line, 2 n_casting) by the logarithms of bending stiffness and mass of each: the same sums over
-        the elements it covers, and :math:`\omega^2 \sum_e u^T M_e v` with their masses, each by the casting's part in
-        what the element yields and weighs."""
+        r"""(n_pair, n_line, 2 n_casting) by the logarithms of bending stiffness and mass of each casting.
+
+        The same sums over the elements that it covers, and :math:`\omega^2 \sum_e u^T M_e v` with their masses. Each
+        element counts by the share of the casting in its flexibility and mass.
+        """
         matrices, (first, second) = self.model.matrices, self._places[1]
         h, p, ei, _ = matrices.elements
         row = matrices.node_index
@@ -139,8 +144,10 @@ class Heard:
         return np.concatenate(found, axis=-1)
 
     def _part_of(self, piece, elements, shares):
-        """(2, n) parts of a piece in the flexibility and in the mass of the elements of which it covers ``shares``; 0
-        where a term has put another rail instead."""
+        """(2, n) share of a piece in flexibility and mass of the elements, of whose length it covers ``shares``.
+
+        It is 0 where a term has replaced the rail.
+        """
         matrices, track, parts = self.model.matrices, self.model.track, np.zeros((2, elements.size))
         own = track.rail_between(0.5 * (piece.start + piece.end))
         for k, (e, share) in enumerate(zip(elements, shares)):
@@ -151,7 +158,7 @@ class Heard:
 
     @cached_property
     def _by_supports(self):
-        """(n_pair, n_line, n) of all values."""
+        """(n_pair, n_line, n) derivatives by all common and support values."""
         zone, track = self.zone, self.model.track
         inside, n = slice(zone.first, zone.last + 1), zone.last + 1 - zone.first
         first, second = self._places[1]
@@ -168,12 +175,12 @@ class Heard:
         return found
 
     def _at_supports(self, u):
-        """Stretch of every pad and motion of every sleeper, each (..., n_support)."""
+        """Compression of every pad and motion of every sleeper, each (..., n_support)."""
         rail, sleeper = self.model.rows
         return u[..., rail] - u[..., sleeper], u[..., sleeper]
 
     def _followed(self, shape, n):
-        """What links of terms add that follow a value of their support."""
+        """Contribution of those links of terms that depend on a value of their support."""
         fields, supports, rows, weights, changes = zip(*self.model.following)
         first = np.cumsum([0, *(r.size for r in rows)])
         ends = csr_array((np.concatenate(weights), np.concatenate(rows), first), (len(rows), self.model.matrices.n))

@@ -1,8 +1,8 @@
-"""Subspaces of a turnout's recordings: a force at a place, a fault of a channel, a wheel, one recording alone.
+r"""Subspaces of the residual of a turnout: a force at a support, a fault of a channel, a wheel, one recording alone.
 
-In a passage the force at a place x is free in time: all sensors see it through the track's transfer functions. In
-blows a change at x adds :math:`q(f)\\,H_{bx}(f)\\,H_{xs}(f)`, by reciprocity, with one free q(f) for all blows b and
-sensors s: a change of a support, a mass, a loose fastening alike.
+In a passage the force at a position x is free in time: all sensors respond by the track's transfer functions. In hammer
+tests a change at x adds :math:`q(f)\,H_{bx}(f)\,H_{xs}(f)`, by reciprocity, with one free q(f) for all impacts b and
+sensors s. This holds for a change of a support, a mass or a loose fastening alike.
 """
 
 import numpy as np
@@ -14,7 +14,7 @@ from turnout.mismatch.turnout.rail_roughness import amplitude_sd
 from turnout.mismatch.turnout.wave_response import Carrier, shown_by
 from turnout.mismatch.turnout.wheel_roughness import WHEEL_LEVEL
 
-BEYOND = 8  # supports beyond the zone that a change of the whole track takes along
+BEYOND = 8  # supports beyond the zone that a change of the whole track includes
 
 
 def missing_sources(case, fit):
@@ -30,7 +30,10 @@ def missing_sources(case, fit):
 
 
 def _forces(case, fit, made):
-    """Harmonics of each sensor over the passage, combined as a force at each support, a channel's fault, or freely."""
+    """Harmonics of each sensor over a passage.
+
+    They are combined as a force at each support, a channel's fault, or freely.
+    """
     n, n_sensor = made.time.size, len(made.sensors)
     step = made.clock / n
     lines = step * np.arange(np.ceil(passage_band.LOW / step), np.floor(1.1 * made.high / step) + 1)
@@ -41,7 +44,7 @@ def _forces(case, fit, made):
     g = g * shown_by(fit.values, fit.terms, made, frequency)[:, :, None, None]
     g = g[np.clip(np.searchsorted(frequency, lines), 0, frequency.size - 1), :, :, 0]
     parts, size = {("clock", made.name): None}, one.shape[1]
-    for k, j in enumerate(case.zone.supports if n_sensor > 1 else ()):  # one sensor hears no place
+    for k, j in enumerate(case.zone.supports if n_sensor > 1 else ()):  # one sensor cannot locate a force
         seen = g[:, :, k] / np.sqrt(np.mean(np.abs(g[:, :, k]) ** 2, axis=1))[:, None]
         parts["place", _place(case, j)] = np.concatenate([_turned(row) for row in seen.T])
     for s, sensor in enumerate(made.sensors):
@@ -50,7 +53,7 @@ def _forces(case, fit, made):
 
 
 def _turned(transfer):
-    """(2n, 2n) what a complex transfer (n,) makes of cosines and sines."""
+    """(2n, 2n) real matrix by which a complex transfer (n,) acts on cosines and sines."""
     found = np.zeros((2 * transfer.size, 2 * transfer.size))
     k = 2 * np.arange(transfer.size)
     found[k, k] = found[k + 1, k + 1] = transfer.real
@@ -59,7 +62,7 @@ def _turned(transfer):
 
 
 def _wheels(case, fit, made):
-    """Waves of each wheel, which the passage knows as errors of ordinary size."""
+    """Waves of each wheel, which are errors of ordinary size in the model of the passage."""
     waves, carrier = case.waves, Carrier(case, fit.values, made, fit.terms)
     sd = np.repeat(amplitude_sd(waves.lengths, waves.length, WHEEL_LEVEL), 2)
     spectra = carrier.spectra(waves.lengths, np.ones(carrier.node.size))
@@ -73,7 +76,7 @@ def _wheels(case, fit, made):
 
 
 def _changes(case, fit, pairs):
-    """A change at each support, of each channel, of all supports, in all tests or in those of one visit."""
+    """A change at each support, of each channel, of all supports; in all tests or in those of one visit."""
     names = tuple(o.name for o, _ in pairs)
     heard_by, wide = case.blow_models(fit.values, fit.terms), _wide(case)
     through = [_through(case, fit, pair, heard_by(pair), wide) for _, pair in pairs]
@@ -95,7 +98,7 @@ def _changes(case, fit, pairs):
 
 
 def _through(case, fit, pair, heard, supports):
-    """(n_line, n_support) receptance from blow to support times that from support to sensor, as the channel has it."""
+    """(n_line, n_support) receptance from impact to support times that from support to sensor, with the channel."""
     rows = [heard.model.matrices.index["rail", j] for j in supports]
     u, v = (heard.model.displacement(place)[:, rows] for place in (pair.test.place, heard.seats[pair.seat]))
     return u * v * case.chain(fit.values, fit.terms, pair)[:, None]
@@ -109,7 +112,7 @@ def _receptance(pair, predicted):
 
 
 def _lines(pair, change):
-    """(2n, 2 n_line) columns: the change of a pair's observation per real and imaginary part of q on each line."""
+    """(2n, 2 n_line) columns: change of a pair's observation per real and imaginary part of q on each line."""
     n, scaled = pair.lines.size, change[pair.lines] / pair.size
     found, k = np.zeros((2 * n, 2 * receptance_observation.LINES.size)), np.arange(n)
     found[k, 2 * pair.lines] = found[n + k, 2 * pair.lines + 1] = scaled.real

@@ -1,6 +1,6 @@
-"""Blade, nose and joints as the track's file has them: each number is known as well as its prior says, a nuisance.
+"""Running surface of blade, nose and joints, with the uncertain numbers of the track file as nuisances.
 
-A nose that is an estimate may be half as deep again. What that does to a passage is no effect that the model left out.
+The depth of a nose may only be an estimate, for example. Its error must not count as evidence for an effect.
 """
 
 from dataclasses import dataclass, replace
@@ -11,23 +11,26 @@ from turnout.mismatch.engine.case import Nuisance
 from turnout.mismatch.engine.cross_validation import disagreement
 from turnout.mismatch.turnout.wheel_roughness import BEYOND
 
-PLACES = ("place", "start", "end")  # known to a share of their distance from the origin, all else to a factor
+PLACES = ("place", "start", "end")  # their spread is a share of the distance from the origin
 LENGTHS = ("length", "wavelength")
-SHAPE = 0.25  # ln of the power of a kink whose depth is an estimate: 1.2 to 3.3, from a V to a cusp
-STEP = 0.02  # m, or of a factor's logarithm: over which a passage's derivative is taken
-MOVED = 0.3  # of its own length a part may move in one step of a fit: beyond, its derivative says nothing
-LEAST = 1e-6  # m: a part that is nowhere deeper is not there
-# What the model does wrong at every axle alike, of a logarithm and in metres: long trains had depth 15 and length 19 %
-# too small, a place 4 cm off, where the fit's own errors were a tenth of that.
+SHAPE = 0.25  # sd of ln power of a kink with an estimated depth: 1.2 to 3.3, from a V to a cusp
+STEP = 0.02  # m, or change of a logarithm, for the derivative of a passage
+MOVED = 0.3  # share of its length by which a component may move in one fit step: the derivative is local
+LEAST = 1e-6  # m; shallower components are ignored
+# Model errors that are the same at every axle, of a logarithm and in metres. With long trains depth was 15 % and
+# length 19 % too small and a position 4 cm off, ten times the errors of the fit.
 MODEL, MODEL_PLACE = 0.1, 0.02
-TELLS = 0.5  # of the prior's standard deviation: a number that is known no better than that is the file's,
-OTHERWISE = 2.0  # unless it is off by so many of the prior's and of its own
-ALONE = 0.5  # least share of what is known of a number that recordings are taken to have said
+TELLS = 0.5  # largest error of a reported number over its prior sd,
+OTHERWISE = 2.0  # unless it deviates by so many prior sd and so many errors
+ALONE = 0.5  # least share of the information on a number that is attributed to the recordings
 
 
 @dataclass(frozen=True)
 class Unsure:
-    """A number of a part: ``field`` of ``part``, off by a factor, a place by a way [m], with relative ``spread``."""
+    """An uncertain number of a surface component: ``field`` of ``component``, with relative ``spread``.
+
+    Positions have an additive error [m], all others a factor.
+    """
 
     name: str
     part: object
@@ -36,7 +39,7 @@ class Unsure:
 
     @property
     def nuisance(self):
-        """Its prior."""
+        """The nuisance with its prior."""
         said = f"{self.field} of the {type(self.part).__name__.lower()} at {_where(self.part):.2f} m"
         if self.field in PLACES:
             sd = self.spread * abs(getattr(self.part, self.field))
@@ -50,7 +53,7 @@ class Unsure:
         return Nuisance(self.name, "-", 0.0, self.spread, None, bounds, f"ln {said}", bends=False)
 
     def moved(self, by):
-        """Its value where it is off by ``by``; of a profile all values."""
+        """Its value with deviation ``by``; of a profile all values."""
         value = getattr(self.part, self.field)
         if self.field in PLACES:
             return value + by
@@ -58,7 +61,7 @@ class Unsure:
         return tuple(factor * v for v in value) if isinstance(value, tuple) else factor * value
 
     def told(self, by, error):
-        """What a fit that has it off by ``by`` with standard ``error`` says of it; of a profile its factor."""
+        """Dict with its value for a deviation ``by`` with standard ``error``; of a profile its factor."""
         profile = isinstance(getattr(self.part, self.field), tuple)
         value, filed = (float(np.exp(by)), 1.0) if profile else (self.moved(by), getattr(self.part, self.field))
         return {
@@ -74,10 +77,10 @@ class Unsure:
 
 
 class RunningSurface:
-    """The ``routes`` of ``turnout`` that trains took; numbers of what lies on one of them within ``BEYOND`` of the
-    rail's free ``waves`` may be off.
+    """Surfaces of the ``routes`` of ``turnout`` that trains took.
 
-    ``unsure`` are these numbers, ``names`` of their nuisances.
+    Numbers of components within ``ROUGHNESS_MARGIN`` of the free ``waves`` of the rail may be off: ``parameters`` are
+    these numbers, ``names`` those of their nuisances.
     """
 
     def __init__(self, turnout, waves, routes):
@@ -90,11 +93,11 @@ class RunningSurface:
         self.names = tuple(u.name for u in self.unsure)
 
     def nuisances(self):
-        """Of every number that may be off."""
+        """Nuisances of every number that may be off."""
         return [u.nuisance for u in self.unsure]
 
     def surfaces(self, route, values):
-        """Surfaces of ``route``, each a tuple of parts, with the numbers that ``values`` have."""
+        """Surfaces of ``route``, each a tuple of components, with the numbers of ``values``."""
         changes: dict = {}
         for u in self.unsure:
             if values[u.name]:
@@ -103,12 +106,13 @@ class RunningSurface:
         return tuple(tuple(changed.get(part, part) for part in parts) for parts in self.turnout.surfaces(route))
 
     def told(self, case, fit):
-        r"""What ``fit`` says of the numbers that its recordings tell more of than the file does, or otherwise, a dict
-        each; with what the trains disagree by, and what the model does wrong at every axle alike, in their errors.
+        r"""Yield a dict for each number that ``fit`` determines better than the file, or that contradicts the file.
 
-        It is what recordings say without the file, which each visit would be drawn to: with the fit's :math:`m, s^2`
-        under a prior of variance :math:`\tau^2` it is :math:`m / c` of variance :math:`s^2 / c`,
-        :math:`c = 1 - s^2 / \tau^2`, at least ``ALONE``.
+        The errors include the scatter between trains, and errors of the model that are the same at every axle.
+
+        Values are those of the recordings without the prior, so that repeated visits are not all drawn to the file.
+        With the fit's :math:`m, s^2` under a prior of variance :math:`\tau^2` they are :math:`m / c` of variance
+        :math:`s^2 / c`, :math:`c = 1 - s^2 / \tau^2`, at least ``MIN_DATA_SHARE``.
         """
         index = {n.name: k for k, n in enumerate(case.nuisances)}
         apart = disagreement(case, fit, "passage") if self.unsure and fit.jacobian else np.zeros(len(index))
@@ -123,13 +127,13 @@ class RunningSurface:
 
 
 def _spreads(turnout, part):
-    """How well the numbers of a part are known; the shape of an estimated nose is an estimate as well."""
+    """Relative spreads of the numbers of a component; the shape of an estimated nose is an estimate as well."""
     said = turnout.spreads[part]
     return {**said, "power": SHAPE} if hasattr(part, "power") and "depth" in said and "power" not in said else said
 
 
 def _may_move(part, field):
-    """Whether a number that has a prior can be off: a place at the origin is known to a share of nothing."""
+    """Whether a number with a prior can be off: the spread of a position is a share, which is 0 at the origin."""
     return field != "places" and (field not in PLACES or getattr(part, field) != 0.0)
 
 

@@ -1,6 +1,6 @@
-"""Channels that show no more than so much: their peaks stay where trains grow louder, or blows harder.
+"""Saturated channels: their peaks stay at a limit while trains get louder, or impacts harder.
 
-Channels that show no more than so much under the hammer: harder blows, the same peak.
+The limit is found from peaks of hammer tests and from peaks of passages, and both are combined.
 """
 
 from dataclasses import dataclass, replace
@@ -9,19 +9,19 @@ import numpy as np
 
 from turnout.receptance import find_impacts
 
-FEWEST = 3  # blows of a test, so that its own level and the scatter about it are known
-FLOOR = 0.02  # ln; peaks fall between samples, mountings ring and blows fall beside the mark
-STRUCK = 0.3  # m, half a bay: so near the blow a channel shows what the rail does there
-SHOWN = 0.9  # of the largest peak: no limit lies below what a channel has shown
-STEP = 0.25 * FLOOR  # between limits that are tried
+FEWEST = 3  # accepted impacts of a test, at least, to estimate its level and scatter
+FLOOR = 0.02  # ln, least scatter of peaks: sampling, ringing mountings, impacts beside the mark
+STRUCK = 0.3  # m, half a bay: a sensor this near the impact measures the motion there
+SHOWN = 0.9  # least limit as a share of the largest peak of the channel
+STEP = 0.25 * FLOOR  # ln, between trial limits
 
 
 def blow_ceiling(hammer, sensor):
-    """(limit [m/s²], gain [nats]) of a sensor's channel in the tests ``hammer``; (nan, 0.0) where blows show none.
+    """(limit [m/s²], gain [nats]) of the channel of a sensor in the tests ``hammer``; (nan, 0.0) without evidence.
 
-    Each side of an amplifier for itself; the limit is the mean of those that hold. Where the rail is struck its peaks
-    grow with the force: the plainer side speaks. Beside it waves of all lengths meet, which may hold one side while the
-    pulse grows shorter, but not both: the lesser side speaks.
+    Each side of an amplifier is tested by itself; the limit is the mean of those with a positive gain. Near the impact
+    peaks grow with the force, and the larger gain counts. Elsewhere waves of all lengths meet. They may limit the peaks
+    of one side as the pulse gets shorter, but not of both: the smaller gain counts.
     """
     tests = [(test.place, _peaks(test, sensor.name)) for test in hammer]
     tests = [(x, peaks) for x, peaks in tests if peaks is not None]
@@ -37,8 +37,10 @@ def blow_ceiling(hammer, sensor):
 
 
 def _peaks(test, name):
-    """(ln peak of the force (n,), ln peaks of the channel (2, n), upward and downward) of a test's sound blows, none of
-    which reaches the range that its file states; None where there are too few."""
+    """(ln force peaks (n,), ln channel peaks (2, n), upward and downward) of the accepted impacts of a test.
+
+    None where they are fewer than ``MIN_IMPACTS``. Impacts that reach the range stated in the file are not accepted.
+    """
     heard = [r for r in test.recordings if any(c.name == name for c in r.channels)]
     blows = [i for i in find_impacts(heard, test.force, name, test.judged) if i.accepted]
     if len(blows) < FEWEST:
@@ -53,8 +55,9 @@ def held(tests):
     .. math:: y = \min(c,\, a_t + b_t x) + e \quad\text{against}\quad y = a_t + b_t x + e,\ b_t \ge 1, \qquad
               g = \tfrac n2 \ln\frac{s_0^2 + f^2}{s_1^2 + f^2} - \tfrac12 \ln n
 
-    with the mean squares s² of the residuals and the least scatter f. The tip of a hammer stiffens under a harder blow,
-    which is shorter then: peaks of a linear track grow at least as the force. At least two blows must reach the limit.
+    with the mean squares s² of the residuals and the least scatter f. The tip of a hammer stiffens under a harder
+    impact, which gets shorter: peaks of a linear track grow at least as the force. At least two impacts must reach the
+    limit.
     """
     n, top = sum(x.size for x, _ in tests), max(y.max() for _, y in tests)
     free = sum(_line(x, y)[1] for x, y in tests) / n
@@ -67,14 +70,17 @@ def held(tests):
 
 
 def _line(x, y):
-    """(slope, squares left) of a line through peaks that grow at least as the force."""
+    """(slope, residual sum of squares) of a line through peaks that grow at least as the force."""
     x, y = x - x.mean(), y - y.mean()
     slope = max(1.0, float(x @ y) / max(float(x @ x), 1e-12))
     return slope, float(np.sum((y - slope * x) ** 2))
 
 
 def _capped(x, y, c):
-    """(squares left, blows that reach it) of the best of: the weaker blows grow up to ``c``, the harder ones hold."""
+    """(residual sum of squares, impacts at the limit) of the best split of the impacts.
+
+    The peaks of the weaker ones grow up to ``c``, those of the harder ones stay there.
+    """
     order = np.argsort(x)
     x, y = x[order], y[order]
     best = float(np.sum((y - c) ** 2)), x.size
@@ -86,25 +92,25 @@ def _capped(x, y, c):
     return best
 
 
-FEWEST_PASSAGES, FEWEST_SENSORS = 4, 3
-TOP = 0.8  # of the peak; above it a clipped channel spends its time
-RINGS = np.pi / 4.0  # what is cut off to a square rings in a recorder's filter, which passes the first of its waves
-UNLIKE_SIDES = 0.9  # one side of an amplifier, of the other that saturates later
-LIMIT_SD = 0.1  # of the limit; the two sides of an amplifier seldom saturate alike
+FEWEST_PASSAGES, FEWEST_SENSORS = 4, 3  # at least, for a limit from passages
+TOP = 0.8  # share of the peak above which a clipped channel stays for long
+RINGS = np.pi / 4.0  # limit over peak of a clipped wave, of which a recorder's filter passes the first harmonic
+UNLIKE_SIDES = 0.9  # limit of one side of an amplifier over that of the other, at least
+LIMIT_SD = 0.1  # relative standard deviation of the limit: both sides of an amplifier differ
 
 
 @dataclass(frozen=True)
 class Ceiling:
-    """A channel's ``limit`` [m/s²] and what speaks for it, ``gain`` [nats]."""
+    """The ``limit`` of a channel [m/s²] and its evidence, ``gain`` [nats]."""
 
     limit: float
     gain: float
 
 
 def ceilings(campaign, threshold):
-    """Ceiling of every sensor, by name, whose passages and blows show one beyond ``threshold`` [nats].
+    """SaturationLimit of every sensor, by name, with evidence beyond ``threshold`` [nats] from passages and impacts.
 
-    Reserved recordings count as well: whether a channel may be used is no prediction, and holds for them too.
+    Reserved recordings count as well: whether a channel is usable is no prediction, and applies to them, too.
     """
     rolled, found = _rolled(campaign), {}
     for sensor in campaign.sensors:
@@ -117,7 +123,7 @@ def ceilings(campaign, threshold):
 
 
 def _together(rolled, struck):
-    """The plainer of two ceilings, with what speaks for both where they are of one limit."""
+    """The limit with more evidence; the sum of both gains where they agree on the limit."""
     plainer = max(rolled, struck, key=lambda c: c.gain)
     if rolled is struck or min(rolled.gain, struck.gain) <= 0.0:
         return plainer
@@ -126,7 +132,7 @@ def _together(rolled, struck):
 
 
 def _rolled(campaign):
-    """Ceiling of every sensor, by name, that passages speak for."""
+    """SaturationLimit of every sensor, by name, for which passages give evidence."""
     names = [s.name for s in campaign.sensors]
     recordings = [p.recording for p in campaign.passages]
     recordings = [r for r in recordings if set(names) <= {c.name for c in r.channels} and not _at_its_range(r)]
@@ -142,18 +148,18 @@ def _rolled(campaign):
 
 
 def _at_its_range(recording):
-    """A channel reaches the range that its file states: that it goes no higher is known."""
+    """Whether a channel reaches the range stated in its file, beyond which it is known to be clipped."""
     limits = [np.inf if c.limit is None else 0.999 * c.limit for c in recording.channels]
     return bool(np.any(np.max(np.abs(recording.samples), axis=1) >= limits))
 
 
 def saturation(peaks, others):
-    r"""Gain [nats] of a ceiling over peaks that follow ``others``; both (n,) logarithms of peaks, one per passage.
+    r"""Gain [nats] of a limit over peaks that follow ``reference``; both (n,) logarithms of peaks, one per passage.
 
     .. math:: y_k = \min(c,\, a + x_k) + e_k \quad\text{against}\quad y_k = a + x_k + e_k, \qquad
               g = \tfrac n2 \ln\frac{s_0^2 + f^2}{s_1^2 + f^2} - \tfrac12 \ln n
 
-    with the mean squares s² of the residuals and the least scatter f. At least two passages must reach the ceiling.
+    with the mean squares s² of the residuals and the least scatter f. At least two passages must reach the limit.
     """
     order = np.argsort(others)
     y, x = np.asarray(peaks)[order], np.asarray(others)[order]
@@ -167,8 +173,11 @@ def saturation(peaks, others):
 
 
 def _limit(sizes):
-    """Median of what lies near the peak, of the passage that spends most of its time there [m/s²]; None where that is
-    none of the loudest: a channel that is cut off dwells at its limit, one that hears a flat or a nose bangs once."""
+    """Median of the samples near the peak, in the passage that spends most of its time there [m/s²].
+
+    None where that passage is not among the loudest. A clipped channel stays at its limit; a flat or a nose gives
+    single peaks.
+    """
     crowded = max(sizes, key=lambda x: (np.mean(x > TOP * x.max()), x.max()))
     if crowded.max() < TOP * max(x.max() for x in sizes):
         return None
@@ -176,14 +185,14 @@ def _limit(sizes):
 
 
 def within_range(campaign, found):
-    """The campaign without the sensors that have a ceiling: what these show is no response of the track."""
+    """The campaign without the ``saturated`` sensors, whose signals are no response of the track."""
     return replace(campaign, sensors=tuple(s for s in campaign.sensors if s.name not in found))
 
 
 def highest(campaign, name):
-    """Largest value that a channel shows in any passage, reserved or not, at its full rate; 0 where none has it. [m/s²]
+    """Largest value of a channel in any passage at its full rate, reserved ones included; 0 where none has it. [m/s²]
 
-    What a channel has shown it can show: it is cut off nowhere below.
+    The channel cannot be clipped below that value.
     """
     recordings = [p.recording for p in campaign.passages]
     seen = [r.samples[r.index(name)] for r in recordings if name in {c.name for c in r.channels}]

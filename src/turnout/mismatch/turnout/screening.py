@@ -1,7 +1,7 @@
-"""What each candidate would change, without a simulation of its own: the columns that order the queue.
+"""Screening of candidates: estimated change of each prediction, without a simulation, which orders the candidate queue.
 
-At supports a law is a pseudo-force of the base simulation, in a receptance an exact change of one link; a dip is a path
-that all wheels follow; whole-track terms act through the base fit's own derivatives.
+A support effect acts as a pseudo-force of the base simulation, and in receptances as an exact change of one link. A dip
+is a path that all wheels follow. Effects of the whole track use derivatives of the base fit.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ from turnout.physics.pad_temperature import REFERENCE
 
 LAWS = ("hanging_sleeper", "local_ballast", "local_pad", "dry_friction", "ballast_hardening", "attached_resonator")
 WHOLE = ("pad_temperature", "unsprung_mass", "zener_pad", "rail_shear", "ballast_inertia", "sleeper_mode")
-TOLD = ("pad_temperature", "unsprung_mass")  # those whose columns passages have; without blows others are simulated
+TOLD = ("pad_temperature", "unsprung_mass")  # passages have columns for these
 PATHS = ("surface_dip", "rail_corrugation")
 CHANNELS = (
     "sensor_gain", "mount_resonance", "time_offset", "low_pass", "high_pass", "clock_drift", "clipping", "hum",
@@ -26,7 +26,7 @@ CHANNELS = (
 def screen_columns(case, fit, observations):
     """(key, start) -> list of (n,) per observation: change of the prediction when a candidate takes that start.
 
-    ``fit`` is of ``observations``, all of the case or some. In single precision; columns that vanish share their zeros.
+    ``fit`` is of ``observations``, all of the case or some. In single precision; zero columns share one array.
     """
     chosen = [(c, k) for c in case.candidates for k in range(len(c.starts)) if c.family in (*LAWS, *PATHS, *CHANNELS)]
     blank = [np.zeros(o.data.size, dtype=np.float32) for o in observations]
@@ -50,7 +50,10 @@ def screen_columns(case, fit, observations):
 
 
 def _whole(case, fit, candidate, k, observations):
-    """A term of the whole track or a train: blows exactly, passages by the base fit's derivatives where it has them."""
+    """Change by a term of the whole track or a train.
+
+    Hammer tests exactly, passages by derivatives of the base fit where it has them.
+    """
     start, found = candidate.starts[k], []
     names = {n.name: i for i, n in enumerate(case.nuisances)}
     terms = (*fit.terms, candidate.term(start))
@@ -71,7 +74,7 @@ def _whole(case, fit, candidate, k, observations):
 
 
 def _pair_channels(case, fit, observation, old, chosen):
-    """What a channel's term makes of a receptance; that of a sensor elsewhere is read there off the same motion."""
+    """Change of a receptance by channel terms; for a moved sensor the same motion is read at its new position."""
     pair, found = case.pairs[observation.name], {}
     heard, track = case.blow_model(fit.values, fit.terms, pair), case.track()
     here, corrected = heard.receptance(pair), case.receptance(fit.values, pair, heard)
@@ -79,7 +82,7 @@ def _pair_channels(case, fit, observation, old, chosen):
         if c.where["sensor"] == pair.channel:
             terms = (*fit.terms, c.term(c.starts[k]))
             place = case.seat(pair.sensor, fit.values, terms).probe(track).place
-            h = corrected + (heard.model.receptance(pair.test.place, place) - here)  # 0 where it stays
+            h = corrected + (heard.model.receptance(pair.test.place, place) - here)  # 0 where the sensor stays
             found[c.key, k] = (
                 receptance_observation.split(
                     receptance_observation.scaled(pair, h, case.chain(fit.values, terms, pair))
@@ -90,7 +93,7 @@ def _pair_channels(case, fit, observation, old, chosen):
 
 
 def _passage_channels(case, fit, observation, old, chosen):
-    """A channel's term acts on signals that are known; where a sensor sits is asked of blows alone."""
+    """Change of a passage by channel terms, from known signals; sensor positions are tested in hammer tests only."""
     made, found = case.rollings[observation.name], {}
     clean, rows = case.clean(fit.values, fit.terms, made), old.reshape(len(made.sensors), -1)
     for c, k in chosen:
@@ -117,7 +120,7 @@ def _paths(case, fit, made, chosen):
 
 
 def _passage(case, fit, made, chosen):
-    """Response to the pseudo-forces of laws at supports."""
+    """Response to the pseudo-forces of support effects."""
     if not chosen:
         return {}
     rail, sleeper = support_forces(case, fit.values, fit.terms, made)
@@ -146,6 +149,6 @@ def _passage(case, fit, made, chosen):
 
 
 def _sleepers(candidate):
-    """Supports that its law acts at."""
+    """Supports that the effect acts at."""
     half = (candidate.where.get("sleepers", 1) - 1) // 2
     return range(candidate.where["sleeper"] - half, candidate.where["sleeper"] + half + 1)

@@ -1,4 +1,4 @@
-"""Derivatives of receptances and passages by the nuisances of a turnout: exact where they can be, else differences."""
+"""Derivatives of receptances and passages by the nuisances of a turnout: analytic where possible, else differences."""
 
 import numpy as np
 
@@ -9,11 +9,11 @@ from turnout.mismatch.turnout.pseudo_forces import FURTHER, columns_of, support_
 from turnout.mismatch.turnout.rail_roughness import wave_columns
 from turnout.mismatch.turnout.running_surface import STEP as SURFACE_STEP
 
-STEP = 0.04  # of a logarithm
+STEP = 0.04  # difference of a logarithm
 
 
 def own_jacobian(case, values, terms, observation, predicted, names):
-    """Columns of a passage's own time, speed and load."""
+    """Derivatives of a passage by its own time, speed and load."""
     if observation.name in case.pairs:
         return Case.own_jacobian(case, values, terms, observation, predicted, names)
     found = dict(_own_columns(case, values, terms, case.rollings[observation.name], predicted))
@@ -21,8 +21,11 @@ def own_jacobian(case, values, terms, observation, predicted, names):
 
 
 def nuisance_jacobian(case, values, terms, observations, base):
-    """Exact for receptances, gains and times; of passages, what supports have or share by pseudo-forces, wheels and
-    running surface by differences."""
+    """Derivatives of ``observations`` by all nuisances.
+
+    Exact for receptances, gains and times. Of passages, those by support values come from pseudo-forces, those by
+    wheels and running surface from differences.
+    """
     index = {n.name: k for k, n in enumerate(case.nuisances)}
     found = [np.zeros((o.data.size, len(case.nuisances))) for o in observations]
     heard_by = case.blow_models(values, terms)
@@ -43,7 +46,7 @@ def nuisance_jacobian(case, values, terms, observations, base):
 
 
 def pair_columns(case, values, terms, pair, heard, predicted, jacobian, index):
-    """Fill the columns of a pair; the track's own values come first among the nuisances."""
+    """Fill the columns of a pair; the values of the track come first among the nuisances."""
     chain = case.chain(values, terms, pair)
     block = receptance_observation.scaled(pair, heard.gradient(pair), chain)
     n, width = block.shape
@@ -71,7 +74,7 @@ def _common_columns(case, values, terms, passages, index):
 
 
 def _difference(case, values, terms, made, predicted, name, step):
-    """Derivative of a passage by one value, to the side where the simulation can go."""
+    """Derivative of a passage by one value, to the side that can be simulated."""
     try:
         return (case.passage_of({**values, name: values[name] + step}, terms, made) - predicted) / step
     except SimulationError:

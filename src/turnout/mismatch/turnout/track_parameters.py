@@ -1,4 +1,4 @@
-"""The base model of a turnout: which of its numbers are free, how free, and the track that they give."""
+"""Free parameters of the base model of a turnout, their priors, and the track for given values."""
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -10,7 +10,7 @@ import numpy as np
 from turnout.mismatch.engine.case import Nuisance
 from turnout.simulate.track import PER_SUPPORT, SAME, RailStretch
 
-# Common logarithmic factor on a value of all supports: field, tag of its links, what of the link, prior sd.
+# Common logarithmic factor on a value of all supports: field, tag of its links, quantity of the link, prior sd.
 # Priors: spread of published values, Knothe and Grassie 1993, tables 1 to 3.
 COMMON = (
     ("pad_stiffness", "pad", "stiffness", 0.25),
@@ -23,8 +23,11 @@ COMMON = (
 
 @dataclass(frozen=True)
 class Own:
-    """A value that every support of the zone has of its own: ``field`` of the track, short ``tag``, the ``link`` it
-    belongs to, ``what`` of it, and the standard deviation ``sd`` of its logarithm from support to support."""
+    """A value that every support of the zone has of its own.
+
+    ``field`` of the track, short ``tag``, the ``link`` it belongs to and the ``quantity`` of that. ``sd`` is the
+    standard deviation of its logarithm from support to support.
+    """
 
     field: str
     tag: str
@@ -33,7 +36,7 @@ class Own:
     sd: float
 
 
-# Scatter from support to support: Oscarsson 2002; dampers were never measured one by one, sleepers are cast alike.
+# Scatter from support to support: Oscarsson 2002. Dampers were never measured singly; sleepers are cast alike.
 OWN = (
     Own("pad_stiffness", "pad", "pad", "stiffness", 0.10),
     Own("ballast_stiffness", "ballast", "ballast", "stiffness", 0.10),
@@ -41,25 +44,27 @@ OWN = (
     Own("ballast_damping", "ballast_damper", "ballast", "damping", 0.15),
     Own("sleeper_mass", "sleeper", "sleeper", "mass", 0.03),
 )
-# ln of the profile's stiffness: wear and rolling tolerances; published shear coefficients of 60E1 go from 0.34 to 0.41,
-# and 14 controls of another simulator, right by its own closed forms, asked for 0.12 ± 0.02 less (95 %).
+# Prior sd of ln stiffness of the rail: wear and rolling tolerances. Published shear coefficients of 60E1 are 0.34 to
+# 0.41; 14 controls of another simulator, checked against closed forms, needed 0.12 ± 0.02 less (95 %).
 RAIL = (("rail_bending", 0.015), ("rail_shear", 0.12))
-# The same of a piece of other rail, and of one at its ends: a file's one section stands for a casting that changes.
+# The same for a piece of other rail, inner and at an end: the file has one section for a casting that varies.
 CAST = (("cast_bending", 0.10, 0.30), ("cast_mass", 0.10, 0.30))
-SHORT = 0.02  # m: pieces that two ends happen to leave, shorter than any element
-RAMP = 0.3  # over which a casting's section grows beyond and before its ends [m]
-RAIL_STEP = 0.05  # of their logarithms; derivatives by pads err by 8 % over 0.12
-WHEELS_SD = 0.06  # ln unsprung mass: reprofiling takes a tenth of it; 42 of another simulator: 0.054
-SEAT_SD = 0.02  # a sensor's place is known to this [m]
-REACH = 1.9  # supports this far beyond sensors and blows have values of their own [m]
-ASKED = 0.7  # and this far laws of their own: the outermost ones are given what all beyond them differ by [m]
-MARGIN = 18.0  # track kept beyond them [m]
+SHORT = 0.02  # m; shorter pieces between two ends are ignored
+RAMP = 0.3  # m, over which the section of a casting grows at its ends
+RAIL_STEP = 0.05  # of logarithms of rail values; derivatives by pads err by 8 % over 0.12
+WHEELS_SD = 0.06  # sd of ln unsprung mass: reprofiling takes 10 %; 42 wheelsets of another simulator: 0.054
+SEAT_SD = 0.02  # m, standard deviation of the position of a sensor
+REACH = 1.9  # m beyond sensors and impacts; supports there have values of their own
+ASKED = 0.7  # m, the same for effects; the outermost supports absorb deviations of those beyond
+MARGIN = 18.0  # m of track modelled beyond sensors and impacts
 
 
 @dataclass(frozen=True)
 class Casting:
-    """A ``piece`` of the stretch ``of`` other rail, or just beyond, with its rail as in the file; ``inner``: not at an
-    end."""
+    """A ``piece`` of the ``stretch`` of other rail, or just beyond it, with its rail as in the file.
+
+    ``inner``: not at an end of the stretch.
+    """
 
     of: RailStretch
     piece: RailStretch
@@ -68,8 +73,10 @@ class Casting:
 
 @dataclass(frozen=True)
 class Zone:
-    """Supports ``first`` to ``last`` (inclusive) of the kept track lie among sensors and blows; those of ``asked`` may
-    have an effect; ``castings`` are pieces of other rail there."""
+    """Supports ``first`` to ``last`` (inclusive) lie among sensors and impacts and have values of their own.
+
+    Supports of ``effect_supports`` may have an effect; ``castings`` are pieces of other rail there.
+    """
 
     turnout: object
     first: int
@@ -84,7 +91,7 @@ class Zone:
 
 
 def zone_of(turnout, places):
-    """The part of a turnout that matters, with absorbing ends kept as they are."""
+    """The relevant part of a turnout, with absorbing ends as they are."""
     low, high = min(places), max(places)
 
     def cut(track):
@@ -97,13 +104,16 @@ def zone_of(turnout, places):
     smaller = replace(turnout, track=cut(turnout.track), tracks=tracks)
     support = smaller.track.support
     inside, asked = (np.flatnonzero((support >= low - r) & (support <= high + r)) for r in (REACH, ASKED))
-    castings = castings_of(smaller.track_of("main"), low - REACH, high + REACH)  # blows are modelled on it
+    castings = castings_of(smaller.track_of("main"), low - REACH, high + REACH)  # receptances are modelled on it
     return Zone(smaller, int(inside[0]), int(inside[-1]), range(int(asked[0]), int(asked[-1]) + 1), castings)
 
 
 def castings_of(track, low, high):
-    """Pieces of other rail, and of what lies within ``RAMP`` of it, that reach between ``low`` and ``high`` [m]: cut at
-    all ends, at ``RAMP`` from them, where a section grows from the rail's, and every metre or so."""
+    """Pieces of other rail, and of what lies within ``SECTION_RAMP`` of it, between ``low`` and ``high`` [m].
+
+    Cuts are at all ends, at ``SECTION_RAMP`` from them, where a section grows from that of the rail, and every metre or
+    so.
+    """
     cuts = {x for s in track.stretches for x in (s.start - RAMP, s.start, s.end, s.end + RAMP)}
     for s in track.stretches:
         if s.end - s.start > 2.0 * RAMP:
@@ -120,13 +130,13 @@ def castings_of(track, low, high):
 
 
 def rail_spreads(zone):
-    """{name: standard deviation} of what is not known of the rail: its stiffness, and that and the mass of castings."""
+    """{name: standard deviation} of uncertain rail values: its stiffness, stiffness and mass of castings."""
     cast = [(f"{name}_{k}", sds[not c.inner]) for k, c in enumerate(zone.castings) for name, *sds in CAST]
     return dict([*RAIL, *cast])
 
 
 def cast_elements(zone, node):
-    """[((n,) elements, (n,) shares of their length)] that each casting covers, between nodes (n_element + 1,) [m]."""
+    """[((n,) elements, (n,) shares of their length)] that each casting covers; nodes (n_element + 1,) [m]."""
     length, found = np.diff(node), []
     for c in zone.castings:
         covered = np.minimum(node[1:], c.piece.end) - np.maximum(node[:-1], c.piece.start)
@@ -136,7 +146,7 @@ def cast_elements(zone, node):
 
 
 def with_rail(zone, values):
-    """The zone with its rails' stiffness, and the mass of castings, multiplied by the exponentials of ``values``."""
+    """The zone with rail stiffness and casting mass multiplied by the exponentials of ``values``."""
     factor = {name: float(np.exp(value)) for name, value in values.items()}
 
     def changed(rail, bending=1.0, mass=1.0):
@@ -159,12 +169,12 @@ def with_rail(zone, values):
 
 
 def near_rail(values, names):
-    """Rail's values on a grid of ``RAIL_STEP``: models are made there, and are straight from there to ``values``."""
+    """Rail values rounded to a grid of ``RAIL_STEP``: models are made there and linear from there to ``values``."""
     return {name: RAIL_STEP * round(values[name] / RAIL_STEP) for name in names}
 
 
 def track_nuisances(zone, trains):
-    """Nuisances of track and vehicles, all as logarithms of a factor on the file's value."""
+    """Nuisances of track and vehicles, all as logarithms of a factor on the value of the file."""
     found = [Nuisance(name, "-", 0.0, sd, bounds=(-2.0, 2.0), meaning=f"ln {name}") for name, _, _, sd in COMMON]
     for own in OWN:
         steps = steps_of(getattr(zone.turnout.track, own.field))
@@ -200,7 +210,7 @@ def track_with(track, zone, values):
 
 
 def inner_names(zone):
-    """Names of all that ``track_with`` reads, first among the nuisances of a case."""
+    """Names of all values that ``track_with`` reads, first among the nuisances of a case."""
     return _names_of(zone.supports)
 
 
@@ -210,12 +220,12 @@ def _names_of(supports):
 
 
 def inner_values(zone, values):
-    """All that ``track_with`` reads, as one row: a key for what was computed with it."""
+    """All values that ``track_with`` reads as bytes: a cache key."""
     return np.array(itemgetter(*inner_names(zone))(values)).tobytes()
 
 
 def vehicle_with(vehicle, values, train, load):
-    """The vehicle with its wheels' mass and its load changed; ``load`` is relative, on all that is sprung."""
+    """The vehicle with another wheel mass and load; ``load`` is relative, on all that is sprung."""
     factor, wheels = float(np.exp(values.get(f"wheels_{train}", 0.0))), set(vehicle.wheels)
     bodies = tuple(
         replace(b, mass=b.mass * (factor if i in wheels else 1.0 + load)) for i, b in enumerate(vehicle.bodies)

@@ -1,4 +1,4 @@
-r"""What sensors show while wheels roll over a wave, to first order, without a simulation.
+r"""First-order response of sensors to wheels that roll over a wave, without a simulation.
 
 A wave p of the rail or of a tread makes the contact force :math:`F = -p / (A_{wheel} + A_{contact} + A_{rail})`, which
 a free track carries to the sensors. A force of frequency :math:`f_0` that moves at v past nodes with transfer
@@ -6,8 +6,8 @@ a free track carries to the sensors. A force of frequency :math:`f_0` that moves
 
 .. math:: S_s(f) = T \mathrm{sinc}^2((f - f_0) T) \sum_n F_n G_{sn}(f) e^{-2 \pi i (f - f_0) \tau_n}
 
-with :math:`\tau_n` when it passes the node, T the way between nodes over v and :math:`F_n` the force on the rail that
-is about there: its receptance is averaged over ``MET``, as a wheel rings on for a few bays.
+Here :math:`\tau_n` is the time at the node and T the distance between nodes over v. :math:`F_n` is the force on the
+rail about the node: its receptance is averaged over ``AVERAGING_LENGTH``, since a wheel rings on for a few bays.
 """
 
 import numpy as np
@@ -18,15 +18,17 @@ from turnout.mismatch.turnout.receptance_observation import channel_factor
 from turnout.mismatch.turnout.track_parameters import track_with, vehicle_with
 from turnout.simulate.frequency_response import responses
 
-STRIDE = 2  # nodes; between them a force is shared linearly
-FINE = 0.01  # m
-RING = 0.35  # s that the track rings on
-MET = 2.4  # m: against simulated waves 0.6 and 1.2 are worse about the wheel's resonance, all of the rail beyond it
+STRIDE = 2  # every second node is used; in between a force is shared linearly
+FINE = 0.01  # m, step of a fine path
+RING = 0.35  # s, ringing of the track after the last wheel
+MET = 2.4  # m; with 0.6 and 1.2 errors near the wheel resonance are larger, with the whole rail above it
 
 
 class Carrier:
-    """Waves of one passage on the track that ``values`` and ``terms`` give, as its sensors show them where they sit;
-    ``node`` (n,) places where forces are carried, to ``beyond`` the free waves' ends [m]."""
+    """Transfer from waves to the sensors of one passage, on the track that ``values`` and ``terms`` give.
+
+    ``node`` (n,) are positions of the forces, up to ``beyond`` the ends of the free waves [m].
+    """
 
     def __init__(self, case, values, made, terms=(), beyond=0.0):
         terms = [t.under(case.said(made)) for t in terms]
@@ -78,7 +80,7 @@ class Carrier:
         return self.shown(self.spectra(lengths, envelope), delay)
 
     def shown(self, spectra, delay):
-        """On the observation's clock."""
+        """(n_sensor * n_time, 2 n_wave) signals of ``spectra`` at the times of the observation."""
         plus, minus = spectra
         both = np.stack([plus + minus, (plus - minus) * (-1j * self.sign)], axis=-1)
         return self._on_clock(both.reshape(*both.shape[:2], -1) * delay[:, None, None])
@@ -94,7 +96,7 @@ class Carrier:
         return self._on_clock((plus @ a.T + minus @ a.T.conj()) * self.wheel(w)[:, None, None])
 
     def _harmonics(self, paths):
-        """Spectra of the waves of ``way``, and amplitudes (..., n_wave) of paths (..., n_x) by them."""
+        """Spectra of the waves of ``path_grid``, and amplitudes (..., n_wave) of paths (..., n_x) in them."""
         n_x = paths.shape[-1]
         orders = np.arange(1, min(n_x // 2, int(self.period / passage_band.SHORTEST_WAVE)) + 1)
         amplitude = 2.0 / n_x * np.fft.rfft(paths, axis=-1)[..., orders]
@@ -104,8 +106,10 @@ class Carrier:
         return *self.spectra(self.period / orders, np.ones(self.node.size)), amplitude
 
     def reactions(self, paths):
-        """(n_sensor * n_time, n_key) response when each wheel follows a path of its own, (n_key, n_wheel, n_x) [m] at
-        ``self.way``: the wheels' answer to what moves the rail under them."""
+        """(n_sensor * n_time, n_key) response when each wheel follows a path of its own.
+
+        ``paths`` (n_key, n_wheel, n_x) [m] are at ``path_grid``: how wheels respond to motion of the rail under them.
+        """
         plus, minus, amplitude = self._harmonics(paths)
         total = 0.0
         for w in range(self.behind.size):
@@ -115,27 +119,29 @@ class Carrier:
 
     @property
     def way(self):
-        """(n_x,) places of the paths of ``reactions``: one period, so that nothing is seen at its ends."""
+        """(n_x,) positions of the paths of ``reactions``: one period, so that its ends have no effect."""
         return self._places(2 * int(np.ceil(self.period / passage_band.SHORTEST_WAVE)) + 2)
 
     @property
     def course(self):
-        """The same for paths of ``followed`` and ``alone`` whose waves are shorter than those modelled: a kink's would
-        pass for longer ones between places that lie as far apart as those of ``way``."""
+        """The same for paths of ``train_response`` and ``wheel_response`` with waves shorter than those modelled.
+
+        Sampled as coarsely as ``path_grid``, a kink would alias to longer waves.
+        """
         return self._places(int(self.period / FINE))
 
     def _places(self, n):
         return self.start + self.period * np.arange(n) / n
 
     def times(self, w, lead):
-        """(n_x,) when wheel ``w`` is at ``way``, in the simulation's time [s]."""
+        """(n_x,) time of wheel ``w`` at ``path_grid``, in the time of the simulation [s]."""
         return lead + self.sign * (self.way - self.first) / self.speed + self.behind[w]
 
     def pressed(self, histories, transfer, first):
-        """(n_sensor * n_time, n_key) response of the free track to forces (n_force, n) on the simulation's clock; those
-        from ``first`` (n_key,) of each key on act together.
+        """(n_sensor * n_time, n_key) response of the free track to forces (n_force, n) at the rate of the simulation.
 
-        ``transfer`` (n_line, n_sensor, n_force) are accelerations per force on ``self.lines``.
+        The forces from ``first`` (n_key,) of each key on act together. ``transfer`` (n_line, n_sensor, n_force) are
+        accelerations per force on ``self.lines``.
         """
         fold = round(self.fine / self.rate)
         n = min(histories.shape[1] // fold, self.size)
@@ -164,14 +170,15 @@ def _vehicle(values, made, terms):
 
 
 def shown_by(values, terms, made, frequency):
-    """(m, n_sensor) complex: what the channels make of a signal, by the linear ones of ``terms`` and their gains."""
+    """(m, n_sensor) complex factor of each channel: linear channel terms and gains."""
     factors = [channel_factor(terms, s, frequency) * (1.0 + values[f"gain_{s.name}"]) for s in made.sensors]
     return np.column_stack(factors)
 
 
 def _transfers(case, values, made, terms, beyond):
     """Lines, acceleration of the sensors per force on rail nodes (m, n_sensor, n_node), receptance of the rail about
-    each node (m, n_node), nodes."""
+    each node (m, n_node), and nodes.
+    """
     track = track_with(case.track(made.passage.route, terms), case.zone, values)
     matrices = linear(track, terms)
     frequency = np.arange(4.0, 1.3 * passage_band.HIGH, 2.0)
@@ -184,8 +191,10 @@ def _transfers(case, values, made, terms, beyond):
 
 
 def carried(matrices, frequency, near, places):
-    """(m, n_place, n) receptances between places and nodes ``near``, and (m, n) of the rail about each of these, over
-    ``MET`` [m/N]."""
+    """(m, n_place, n) receptances between positions and nodes ``near``, and (m, n) rail receptance at these nodes.
+
+    The latter is averaged over ``AVERAGING_LENGTH``. [m/N]
+    """
     node = matrices.node[near]
     h = responses(matrices, frequency, [*places, *node.tolist()], matrices.node_index[near])
     about = np.abs(node[:, None] - node) < 0.5 * MET

@@ -1,13 +1,12 @@
-"""Roughness of single wheels: errors of a passage's own, integrated out.
+"""Roughness and profile of single wheels as error modes of a passage, which are integrated out.
 
-Every wheel has waves of its own round its tread, at an angle nobody knows, so that no other passage tells them. The
-radius is known to a few per cent only: over the sensors' reach the waves are taken as those of any rough surface.
-What they do to the sensors hangs on the wheels' mass: where a fit finds other wheels than the file, it is made anew.
+Every wheel has its own waves round its tread, at an unknown angle, so that no other passage predicts them. The radius
+is known to a few per cent only: within the range of the sensors the waves are those of any rough surface. Their effect
+depends on the mass of the wheels. Where a fit finds another mass than the file, the modes are computed again.
 
-What each wheel meets at a nose, a blade or a joint: errors of a passage's own, integrated out.
-
-The file has one path for all wheels. Where one leaves the wing and how deep it falls hangs on its profile, new or worn
-hollow (Palsson and Nielsen 2012, Vehicle System Dynamics 50), and no shape of a file is that of the rail.
+At a nose, blade or joint each wheel takes its own path, whereas the file has one for all. Where a wheel leaves the wing
+rail and how deep it falls depend on its profile, new or hollow worn (Palsson and Nielsen 2012, Vehicle System Dynamics
+50), and the shape in the file is only approximate.
 """
 
 import numpy as np
@@ -17,15 +16,15 @@ from turnout.mismatch.engine.candidate_search import absorbed
 from turnout.mismatch.turnout.rail_roughness import amplitude_sd
 from turnout.mismatch.turnout.wave_response import Carrier
 
-DEPTH, LENGTH = 0.2, 0.15  # of a part's own: standard deviations from wheel to wheel
-PLACE = 0.03  # m
-SHARP = 0.5  # of what a law of the power 1.5 differs by from one of the power 2
-FAR = 1.0  # m: no nose is longer on either side
-LEAST = 1e-6  # m: a part that is nowhere deeper is not there
+DEPTH, LENGTH = 0.2, 0.15  # relative sd of depth and length of a component from wheel to wheel
+PLACE = 0.03  # m, sd of its position from wheel to wheel
+SHARP = 0.5  # sd of its shape, as a share of the difference between powers 1.5 and 2
+FAR = 1.0  # m to either side of the deepest point
+LEAST = 1e-6  # m; shallower components are ignored
 
 
 def profile_modes(case, values, made, carrier):
-    """(n_sensor * n_time, n_mode) signals of one standard deviation of each wheel's way over each part of the file."""
+    """(n_sensor * n_time, n_mode) signals of one standard deviation of each wheel's path over each component."""
     way = carrier.course
     paths = [path for part in _parts(case, values, made) for path in _otherwise(part, way)]
     if not paths:
@@ -34,14 +33,16 @@ def profile_modes(case, values, made, carrier):
 
 
 def _parts(case, values, made):
-    """All parts of a passage's route that are met once: waves of a rail are the same to all wheels."""
+    """Components of a passage's route except waves, which are the same for all wheels."""
     parts = [part for parts in case.surface.surfaces(made.passage.route, values) for part in parts]
     return [part for part in parts if not hasattr(part, "wavelength")]
 
 
 def _otherwise(part, way):
-    """Standard deviations of a part of the surface at ``way`` (n,) [m]: deeper, further, longer, sharper; a step from
-    one of its ends to the other is no wheel's."""
+    """Standard deviations of a surface component at ``grid`` (n,) [m]: deeper, further, longer, sharper.
+
+    A height step between its ends is the same for all wheels.
+    """
     ends = getattr(part, "places", way)[0], getattr(part, "places", way)[-1]
     inside = (way >= ends[0]) & (way <= ends[1])
     dip = np.where(inside, part(way, 0) - np.interp(way, ends, part(np.array(ends), 0)), 0.0)
@@ -55,18 +56,18 @@ def _otherwise(part, way):
     return [DEPTH * dip, PLACE * slope, LENGTH * from_middle * slope, SHARP * sharper]
 
 
-TURNED = 1.5e-5  # m; each of the first three harmonics of wheels in service, Johansson 2006, Vehicle System Dynamics 44
-WHEEL_LEVEL = -2.0  # dB on the limit curve of rails: disc-braked wheels
-KEPT = 0.02  # share of a sample's own variance below which a mode is not worth keeping
-FAINT = 0.1  # of that: single waves fainter than this are left out before they are put together
-BEYOND = 6.0  # m before and behind the rail's free waves, from where lightly damped track still carries a wheel's noise
+TURNED = 1.5e-5  # m, first three harmonics of wheels in service (Johansson 2006, Vehicle System Dynamics 44)
+WHEEL_LEVEL = -2.0  # dB over the limit curve of rails: disc-braked wheels
+KEPT = 0.02  # share of a sample's own variance below which a mode is left out
+FAINT = 0.1  # of that: single waves below this are left out before they are combined
+BEYOND = 6.0  # m beyond the free waves; lightly damped track carries a wheel's noise that far
 
 
 def wheel_modes(case, values, made, sigma):
-    """(n_sensor * n_time, n_mode) signals of one standard deviation of the waves of all wheels, and of how each meets
-    what the file has of the surface; ``sigma`` (n,).
+    """(n_sensor * n_time, n_mode) signals of one standard deviation of the roughness and profile of all wheels.
 
-    In single precision: a long train over many sensors has a thousand modes of ten thousand samples each.
+    ``sigma`` (n,) is the error of the observation. In single precision: a long train over many sensors has a thousand
+    modes of ten thousand samples each.
     """
     waves, scale = case.waves, sigma[:, None].astype(np.float32)
     radii, carrier = made.passage.vehicle.each("radius"), Carrier(case, values, made, beyond=BEYOND)
@@ -94,16 +95,20 @@ def _amplitudes(waves, radius):
 
 
 def _stretches(waves, node):
-    """Envelopes (n_node,) of where the rail's waves are free, of what lies before and of what lies behind: there the
-    roughness of the rail is each wheel's own error as well."""
+    """Envelopes (n_node,) of the region with free rail waves, of that before and of that behind it.
+
+    In the latter two the roughness of the rail is an error of each wheel as well.
+    """
     inside = (node >= waves.start - 0.3) & (node <= waves.end + 0.3)
     outside, ahead = 1.0 - waves.fade(node), node < 0.5 * (waves.start + waves.end)
     return inside.astype(float), outside * ahead, outside * ~ahead
 
 
 def heavier(case, fit):
-    """Logarithm of each train's unsprung mass in ``fit`` over the file's, dict train -> float; where it is a
-    nuisance, as it would be without the narrow prior of the base model."""
+    """Logarithm of each train's unsprung mass in ``fit`` over that of the file, dict train -> float.
+
+    Where it is a nuisance, the value is that without its narrow prior in the base model.
+    """
     wheels = [(c.where["train"], start) for _, c, start, _ in absorbed(case, fit) if c.family == "unsprung_mass"]
     opened = {train: float(np.log(start[0])) for train, start in wheels}
     found = {}

@@ -1,7 +1,7 @@
-"""Recordings -> raw files in every format that ``turnout.readers`` reads: for tests, demonstrations and exchange.
+"""Writers of raw files in every format that ``turnout.readers`` reads, for tests, demonstrations and exchange.
 
-What is written is what a logger would have left: with a ``RawDescription`` the numbers are turned back into its units
-through its sensitivities and signs, so that ``read(write(x)) == x``.
+The files are like those of a logger: a ``RawDescription`` gives the units, sensitivities and signs of the numbers, so
+that ``read(write(x)) == x``.
 """
 
 from collections.abc import Sequence
@@ -36,22 +36,22 @@ def write(
     single: bool = False,
     **options,
 ) -> Path:
-    """Write recordings (one per record, same channels) to ``path`` and return it.
+    """Write recordings (one per record, with the same channels) to ``path`` and return it.
 
     Parameters
     ----------
     recordings : sequence of Recording
-        In SI. WAV holds just one.
+        In SI. A WAV file holds only one.
     path : path-like
-        Overwritten where it exists; its folder must be there.
+        Overwritten if it exists; its folder must exist.
     format : str
         A key of ``WRITERS``.
     description : RawDescription or None
-        Units, sensitivities, signs and names to write in; None: SI under the channels' own names, times in UTC.
+        Units, sensitivities, signs and names of the file; None: SI, names of the channels, times in UTC.
     single : bool
         Store the numbers in 4 bytes instead of 8.
     **options
-        Of the format's writer: ``decimal_comma`` (csv), ``subtype`` and ``full_scale`` (wav), ``station`` (rcmdx).
+        Options of the writer: ``decimal_comma`` (csv), ``subtype`` and ``full_scale`` (wav), ``station`` (rcmdx).
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Text: ``# name: value`` lines, names with units in brackets, numbers with 17 digits."""
+"""Writer of text: ``# name: value`` lines, names with units in brackets, numbers with 17 digits."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from turnout.readers.writing.encode import iso, noted
 
 
 def write_raw(records, path, decimal_comma=False):
-    """A column ``record`` where there are several; with ``decimal_comma`` semicolons part the columns."""
+    """Write a column ``record`` and one per channel; with ``decimal_comma`` the separator is a semicolon."""
     first = records[0]
     separator = ";" if decimal_comma else ","
     lengths = {len(record.samples[0]) for record in records}

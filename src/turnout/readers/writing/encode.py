@@ -1,4 +1,4 @@
-"""SI samples back to the numbers that a raw file holds: the inverse of ``turnout.readers.interpret``."""
+"""Conversion of SI samples to the numbers of a raw file: the inverse of ``turnout.readers.interpret``."""
 
 from datetime import UTC
 from zoneinfo import ZoneInfo
@@ -11,7 +11,7 @@ from turnout.units import IGNORED, SI, to_si
 
 
 def raw_records(recordings, description, dtype):
-    """One RawRecord per recording, in the units, names, signs and order of ``description`` (None: SI as it is)."""
+    """One RawRecord per recording, in the units, names, signs and order of ``description`` (None: SI)."""
     if not recordings:
         raise ValueError("there is no recording to write")
     first = recordings[0]
@@ -50,7 +50,7 @@ def _column(recording, channel):
 
 
 def iso(moment):
-    """ISO 8601 with the zone's offset, "" for None."""
+    """ISO 8601 text with the offset of the time zone, "" for None."""
     return "" if moment is None else moment.isoformat()
 
 
@@ -60,8 +60,10 @@ def noted(conditions):
 
 
 def fixed_text(text):
-    """Text for an HDF5 attribute, of fixed length: variable length goes through the global heap, and the HDF5 library
-    can loop for ever over a damaged one."""
+    """Text for an HDF5 attribute, of fixed length.
+
+    Text of variable length is stored in the global heap, and the HDF5 library can loop forever over a damaged heap.
+    """
     data = text.encode("utf-8") or b" "
     return np.array(data, dtype=h5py.string_dtype("utf-8", len(data)))
 

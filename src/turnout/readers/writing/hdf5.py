@@ -1,4 +1,4 @@
-"""HDF5: a group per record, a checksummed dataset per channel; the layout of ``turnout.readers.hdf5``."""
+"""Writer of HDF5 in the layout of ``turnout.readers.hdf5``: a group per record, a dataset per channel, checksums."""
 
 import h5py
 
@@ -6,7 +6,7 @@ from turnout.readers.writing.encode import attributes, fixed_text, iso, noted
 
 
 def write_raw(records, path):
-    """Attributes ``rate`` and ``n_records`` at the root; ``started_at`` and conditions at each record."""
+    """Write attributes ``rate`` and ``n_records`` at the root, ``started_at`` and conditions at each record."""
     with h5py.File(path, "w", libver=("v110", "latest")) as file:
         file.attrs["rate"] = records[0].rate
         file.attrs["n_records"] = len(records)

@@ -1,4 +1,4 @@
-"""LabVIEW measurement file: a segment per record, tabulators, no X column."""
+"""Writer of LabVIEW measurement files: a segment per record, separated by tabs, no X column."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ END = "***End_of_Header***"
 
 
 def write_raw(records, path, decimal_comma=False):
-    """Rows of numbers with 17 digits (9 in single precision)."""
+    """Write rows of numbers with 17 digits (9 in single precision)."""
     first = records[0]
     head = ["LabVIEW Measurement", "Writer_Version\t2", "Reader_Version\t2", "Separator\tTab"]
     head += [f"Decimal_Separator\t{',' if decimal_comma else '.'}", "Multi_Headings\tYes", "X_Columns\tNo"]

@@ -1,4 +1,4 @@
-"""MATLAB version 5: ``record_000`` ... as (sample, channel) matrices, and named variables beside them."""
+"""Writer of MATLAB version 5: ``record_000`` ... as (sample, channel) matrices, and named variables."""
 
 import numpy as np
 import scipy.io
@@ -7,7 +7,7 @@ from turnout.readers.writing.named import variables
 
 
 def write_raw(records, path):
-    """Text goes into cell arrays, one cell per channel or record. Compressed, as MATLAB does, which adds checksums."""
+    """Write text as cell arrays, one cell per channel or record. Compression, as in MATLAB, adds checksums."""
     named = {k: _cells(v) for k, v in variables(records).items()}
     samples = {f"record_{k:03d}": np.column_stack(record.samples) for k, record in enumerate(records)}
     scipy.io.savemat(path, {**named, **samples}, appendmat=False, do_compression=True, oned_as="row")

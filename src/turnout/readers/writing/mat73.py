@@ -1,4 +1,4 @@
-"""MATLAB version 7.3: HDF5 with MATLAB's header, classes and reversed axes."""
+"""Writer of MATLAB version 7.3: HDF5 with MATLAB's header, classes and reversed axes."""
 
 import h5py
 import numpy as np
@@ -9,7 +9,7 @@ HEADER = b"MATLAB 7.3 MAT-file, Platform: GLNXA64, Created on: Mon Jan 01 00:00:
 
 
 def write_raw(records, path):
-    """``record_000`` ... as (sample, channel) matrices, and named variables beside them; text in cell arrays."""
+    """Write ``record_000`` ... as (sample, channel) matrices, and named variables; text in cell arrays."""
     with h5py.File(path, "w", userblock_size=512) as file:
         for name, value in variables(records).items():
             cells = isinstance(value, list) and isinstance(value[0], str)

@@ -1,10 +1,10 @@
-"""The named variables that npz and MATLAB files share; the layout of ``turnout.readers.named_arrays``."""
+"""Named variables of npz and MATLAB files, in the layout of ``turnout.readers.named_arrays``."""
 
 from turnout.readers.writing.encode import iso, noted
 
 
 def variables(records):
-    """``rate``, ``channels``, ``units``, ``n_records``, ``started_at``, conditions, all but the samples."""
+    """All variables but the samples: ``rate``, ``channels``, ``units``, ``n_records``, ``started_at``, conditions."""
     first = records[0]
     named = {
         "rate": first.rate,

@@ -1,4 +1,4 @@
-"""NumPy archive: ``record_000`` ... as (channel, sample), and named variables beside them."""
+"""Writer of NumPy archives: ``record_000`` ... as (channel, sample), and named variables."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ from turnout.readers.writing.named import variables
 
 
 def write_raw(records, path):
-    """Every member carries its own CRC-32, so that a damaged record costs that record only."""
+    """Write one member per record; each has its own CRC-32, so that damage is limited to one record."""
     members: dict[str, Any] = {k: np.asarray(v) for k, v in variables(records).items()}
     members |= {f"record_{k:03d}": np.vstack(record.samples) for k, record in enumerate(records)}
     with path.open("wb") as file:

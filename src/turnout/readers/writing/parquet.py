@@ -1,4 +1,4 @@
-"""Parquet: the layout of ``turnout.readers.parquet``, with a checksum on every page."""
+"""Writer of Parquet in the layout of ``turnout.readers.parquet``, with a checksum on every page."""
 
 import json
 
@@ -10,7 +10,7 @@ from turnout.readers.writing.named import variables
 
 
 def write_raw(records, path):
-    """A column ``record``, a column per channel, everything else as JSON in the schema's metadata."""
+    """Write a column ``record``, a column per channel, and the metadata as JSON in the schema."""
     first = records[0]
     lengths = [len(record.samples[0]) for record in records]
     notes = {**variables(records), "n_samples": lengths}

@@ -1,6 +1,6 @@
-"""RCM-DX 2.0: a session per record, a measuring system, one data source, a channel group per channel.
+"""Writer of RCM-DX 2.0: a session per record, a measuring system, one data source, a channel group per channel.
 
-Without SECTION, POSITION and TOPOLOGY, which are of a vehicle under way, and without the search tree ``timeindex``.
+SECTION, POSITION and TOPOLOGY are left out because they describe a moving vehicle; so is the index ``timeindex``.
 """
 
 from datetime import UTC, datetime, timedelta
@@ -23,7 +23,7 @@ CHANNEL = {
 
 
 def write_raw(records, path, station="TURNOUT"):
-    """Sessions are named by their first time stamp, so records need start times; those without are set 1 min apart."""
+    """Write sessions, named by their first time stamp; records without a start time are put 1 min apart."""
     with h5py.File(path, "w") as file:
         root = file.create_group("RCMDX")
         root.attrs.update({"Major": np.int16(2), "Minor": np.int16(0), "RecordCount": np.int32(len(records))})

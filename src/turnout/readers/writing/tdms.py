@@ -1,4 +1,4 @@
-"""TDMS: a group and a segment per record, waveform properties on every channel."""
+"""Writer of TDMS: a group and a segment per record, waveform properties on every channel."""
 
 import numpy as np
 from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
@@ -7,7 +7,7 @@ from turnout.readers.writing.encode import noted
 
 
 def write_raw(records, path):
-    """One segment per record, so that a cut file loses its last records only."""
+    """Write one segment per record, so that a truncated file loses its last records only."""
     with TdmsWriter(str(path)) as writer:
         for k, record in enumerate(records):
             root = RootObject(properties={"n_records": len(records)})
@@ -32,5 +32,5 @@ def write_raw(records, path):
 
 
 def _utc(moment):
-    """TDMS keeps time stamps in UTC."""
+    """A time stamp in UTC, as TDMS stores it."""
     return np.datetime64(int(moment.timestamp() * 1_000_000), "us")

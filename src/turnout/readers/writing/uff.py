@@ -1,6 +1,7 @@
-"""Universal File Format 58 (ASCII) and 58b (binary): one set per record and channel, numbered in record 6, field 3.
+"""Writer of Universal File Format 58 (ASCII) and 58b (binary): one set per record and channel.
 
-ID line 5 says which record of how many a set is of: a file cut between two sets is otherwise a whole, shorter one.
+Record 6, field 3 is the number of the record. ID line 5 states that number and the number of records, because a file
+that is truncated between two sets would otherwise look complete.
 """
 
 import numpy as np
@@ -11,7 +12,7 @@ DATA_TYPES = {"N": 13, "m/s²": 12, "g": 12, "m/s": 11, "m": 8, "Pa": 15}
 
 
 def write_raw(records, path, binary):
-    """Write the sets record by record; ASCII has 6 or 13 digits, as the format lays down."""
+    """Write the sets record by record; ASCII has 6 or 13 digits, as the format requires."""
     with path.open("wb") as file:
         for k, record in enumerate(records):
             for i in range(len(record.names)):
@@ -50,7 +51,7 @@ def _head(record, i, k, n, binary, double, n_bytes):
 
 
 def _text(samples, double):
-    """6E13.5 or 4E20.12."""
+    """Numbers as text in the Fortran format 6E13.5 or 4E20.12."""
     one, per_line = ("%20.12e", 4) if double else ("%13.5e", 6)
     lines = [samples[a : a + per_line] for a in range(0, len(samples), per_line)]
     return "".join((one * len(line) + "\n") % tuple(line) for line in lines).encode()

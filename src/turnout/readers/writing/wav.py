@@ -1,4 +1,4 @@
-"""WAV: one continuous record; names, units and start time go into the comment as JSON."""
+"""Writer of WAV: one continuous record; names, units and start time are JSON in the comment."""
 
 import json
 
@@ -9,7 +9,7 @@ from turnout.readers.writing.encode import iso, noted
 
 
 def write_raw(records, path, subtype=None, full_scale=1.0):
-    """``subtype`` PCM_16 or PCM_24 stores numbers as parts of ``full_scale`` (in the channels' unit)."""
+    """Write one record; ``subtype`` PCM_16 or PCM_24 stores fractions of ``full_scale`` (in the channels' unit)."""
     if len(records) != 1:
         raise ValueError(f"a WAV file holds one record, not {len(records)}: write one file per record")
     (record,) = records
@@ -19,7 +19,7 @@ def write_raw(records, path, subtype=None, full_scale=1.0):
         samples = samples / full_scale
         if (worst := float(np.abs(samples).max())) > 1.0:
             raise ValueError(f"a sample is {worst:.3g} of full scale: raise full_scale")
-        bits = int(subtype.removeprefix("PCM_"))  # rounded here: libsndfile cuts off
+        bits = int(subtype.removeprefix("PCM_"))  # rounded here: libsndfile truncates
         steps = np.clip(np.rint(samples * 2.0 ** (bits - 1)), -(2.0 ** (bits - 1)), 2.0 ** (bits - 1) - 1)
         samples = steps.astype("int32") << (32 - bits)
     rate = round(record.rate)

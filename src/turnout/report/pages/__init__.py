@@ -1,1 +1,1 @@
-"""Whole pages, one file each."""
+"""Render whole pages, one module each."""

@@ -1,4 +1,4 @@
-"""The page of a turnout's mismatches: understood in one minute, evidence below."""
+"""Render the page of a turnout's findings: the answer first, the evidence below."""
 
 from turnout.report.finding_text import answer, check, facts, filed, parameters, rivals, title
 from turnout.report.formatting import day
@@ -63,7 +63,7 @@ def _of(rows, finding):
 
 
 def _histories(rows, finding):
-    """A chart for each parameter of this finding that earlier visits know, too."""
+    """A chart for each parameter of this finding that earlier visits have estimated, too."""
     for own in _of(rows, finding):
         same = [p for p in rows["mismatch_parameters"] if _same(p, own)]
         yield history_of_parameter(sorted(same, key=lambda p: p["found_at_utc"]))

@@ -1,4 +1,4 @@
-"""The first page: tomorrow's list, every turnout in one line, and what was not used."""
+"""Render the first page: tomorrow's worklist, one line per turnout, and what was not used."""
 
 from collections import Counter
 

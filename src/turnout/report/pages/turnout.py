@@ -1,4 +1,4 @@
-"""The page of one turnout: where it stands, how its resonances moved, and the evidence behind the latest values."""
+"""Render the page of one turnout: its state, the history of its resonances, and the latest measurements."""
 
 from collections import Counter
 
@@ -15,7 +15,7 @@ from turnout.report.panels.history import history_panel
 from turnout.report.trains import trains_part
 
 BANDS = ("ballast", "railpad")
-SHOWN = 5  # earlier tests that were not used, of one section
+SHOWN = 5  # earlier unused tests that are listed per section
 TRACKS = {"main": "main track", "diverging": "diverging track", "both": "both tracks"}
 PANELS = {
     "OT": "open track",
@@ -52,12 +52,12 @@ def turnout_page(rows, turnout, template, shared):
 
 
 def _of(rows, kind, section):
-    """Rows of one kind that belong to one section."""
+    """Rows of one table that belong to one section."""
     return [r for r in rows[kind] if r["section_id"] == section["section_id"]]
 
 
 def line_of(work):
-    """A row of the list as a line of the page; a sentence without a change does not say of what it speaks."""
+    """A row of the worklist as a line of the page; a sentence without a change gets the section and band in front."""
     of = "" if work["change_pct"] is not None else f"{work['sections']}, {work['band']}: "
     return {"state": work["state"], "badge": badge(work["state"]), "words": of + work["sentence"]}
 
@@ -92,7 +92,7 @@ def _section(rows, section, models, states):
     key = section["section_id"]
     model, modes = models.get(key), _of(rows, "modes", section)
     own = (r for r in _of(rows, "receptances", section) if model and r["model_id"] == model["model_id"])
-    receptance = next(own, None)  # a test with too few blows has none
+    receptance = next(own, None)  # a test with too few impacts has none
     charts, events = _of(rows, "charts", section), [e for e in rows["events"] if e["section_id"] in (None, key)]
     history = "".join(
         history_panel(
@@ -118,14 +118,14 @@ def _section(rows, section, models, states):
 
 
 def _unshown(quarantine):
-    """(reason, how many more rows of it there are than are shown), of the reasons that have more."""
+    """(reason, number of its rows that are not shown), for reasons with more rows than are shown."""
     shown = Counter((q["kind"], q["reason_code"]) for q in quarantine)
     more = {(q["kind"], q["reason_code"]): q["n_alike"] for q in quarantine}
     return [(reason, more[kind, reason] - n) for (kind, reason), n in shown.items() if more[kind, reason] > n]
 
 
 def _unused(tests):
-    """Earlier tests of a section that gave no model, the newest first, for they are no point of its history."""
+    """Earlier tests of a section that gave no model, the newest first; they are not in its history."""
     said = [f"{day(t['measured_at_utc'])} ({_reason(t)})" for t in tests[:SHOWN]]
     more = len(tests) - SHOWN
     return ", ".join(said) + (f" and {more} before" if more > 0 else "")

@@ -1,1 +1,1 @@
-"""The drawings of a page, one file each: rows of the registry in, SVG out."""
+"""Draw the panels of a page: rows of the registry in, SVG out."""

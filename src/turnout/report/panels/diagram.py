@@ -1,4 +1,4 @@
-"""The turnout as a line drawing with its measured sections, coloured by state, hatched where nothing can be said."""
+"""Draw the turnout as a diagram with its measured sections, coloured by state; hatched means unknown."""
 
 from html import escape
 
@@ -14,9 +14,9 @@ STYLE = {
 
 
 def diagram(sections, states, width=920, height=200):
-    """``sections`` rows of ``sections``; ``states`` maps section_id to a state of the worklist."""
+    """SVG of the turnout; ``sections`` are its rows, ``states`` maps section_id to a state of the worklist."""
     positions = [s["position_m"] or 0.0 for s in sections]
-    toe = 0.0  # positions count from it
+    toe = 0.0  # origin of positions
     low, high = min([toe, *positions]) - 4.0, max([toe, *positions]) + 4.0
 
     def px(metres):
@@ -63,7 +63,7 @@ def _metres(section):
 
 
 def _lifts(sections, px, needed=42, height=26):
-    """How far each label must go out of its neighbour's way: every second one of a crowd is lifted."""
+    """Vertical shift of each label [px]: where labels are closer than ``min_distance``, every second one is shifted."""
     lifts: list[int] = []
     last: dict[bool, tuple[float, int]] = {}
     for section in sections:

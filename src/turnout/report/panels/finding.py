@@ -1,7 +1,4 @@
-"""Measured against simulated, before and after: waveform, spectrum, receptance, missing force.
-
-The turnout as a drawing with what was diagnosed: each group's answer, and the place that a finding points at.
-"""
+"""Draw the panels of a finding: measured and simulated curves, fit, history, and its position on the turnout."""
 
 from html import escape
 
@@ -15,11 +12,11 @@ TITLES = {
     "receptance": "Receptance",
     "latent": "The missing force",
 }
-WIDE = 944
+WIDE = 944  # px, width of a waveform panel
 
 
 def curve_panel(row, changed="what was left out"):
-    """One row of ``mismatch_curves``; ``changed``: what is in the simulation after, "" where there is no after."""
+    """SVG of one row of ``mismatch_curves``; ``changed`` names the effect added in "after", "" without one."""
     if row["curve"] == "latent":
         return _latent(row)
     x = np.asarray(row["x"], dtype=float)
@@ -45,7 +42,7 @@ def _across(row, x, log):
 
 
 def _up(row, values, log):
-    """Axis that holds what was measured and, as far as it is near, what was simulated."""
+    """Vertical axis that contains the measured values, and the simulated ones within a limit."""
     every = np.concatenate([v[np.isfinite(v)] for v in values.values()])
     label = {"waveform": "acceleration", "spectrum": "PSD", "receptance": "receptance"}[row["curve"]]
     if log:
@@ -58,7 +55,7 @@ def _up(row, values, log):
 
 
 def _key(chart, names, words):
-    """Which line is which, in a row at the head of the panel."""
+    """Legend of the lines at the top of the panel."""
     x = 0.01
     for name in names:
         chart.text(x, 0.06, words[name], f"key-{name}")
@@ -71,7 +68,7 @@ def _named(row):
 
 
 def _latent(row):
-    """Mean missing force with its 95 % limits over the covariate that explains most."""
+    """SVG of the mean missing force with its 95 % limits over the covariate that explains most."""
     x, mean = np.asarray(row["x"], dtype=float), np.asarray(row["measured"], dtype=float)
     low, high = np.asarray(row["before"], dtype=float), np.asarray(row["after"], dtype=float)
     pad = 0.1 * float(np.ptp(np.concatenate([low, high]))) or 1.0
@@ -87,7 +84,7 @@ def _latent(row):
 
 
 def fit_panel(finding):
-    """Bars of the fit on recordings never used: before, with the term, best rival, decoy; "" without any."""
+    """Bars of the fit on held-out recordings: before, with the term, best rival, decoy; "" without any."""
     entries = [
         ("before", finding["fit_before_pct"], "bar-before"),
         ("with it", finding["fit_after_pct"], "bar-after"),
@@ -116,13 +113,13 @@ def fit_panel(finding):
 
 
 def _gain(finding):
-    """What the term gains with its standard error, in words; "" where that is not known."""
+    """Gain of the term with its standard error, in words; "" if unknown."""
     before, after, error = (finding.get(k) for k in ("fit_before_pct", "fit_after_pct", "fit_gain_se_pct"))
     return "" if None in (before, after, error) else f": {after - before:+.1f} ± {error:.1f} points"
 
 
 def history_of_parameter(rows):
-    """A parameter over the visits with its 95 % intervals; rows of ``mismatch_parameters``, oldest first."""
+    """SVG of a parameter over the visits with 95 % intervals; rows of ``mismatch_parameters``, oldest first."""
     if len(rows) < 2:
         return ""
     seconds = [r["found_at_utc"].timestamp() for r in rows]
@@ -152,9 +149,9 @@ MAIN, SPREAD = 92.0, 58.0
 
 
 class Drawing:
-    """Places [m] along the turnout to pixels; the diverging track leaves the main one at the switch toe."""
+    """Drawing of a turnout with positions [m] mapped to pixels; the diverging track begins at the switch toe."""
 
-    toe = 0.0  # places count from it
+    toe = 0.0  # origin of positions
 
     def __init__(self, sections):
         self.branches = any(s["track"] == "diverging" for s in sections)
@@ -163,16 +160,16 @@ class Drawing:
         self.parts: list[str] = []
 
     def px(self, metres):
-        """Horizontal pixel of a place."""
+        """Horizontal pixel of a position."""
         return 20 + (WIDTH - 40) * (metres - self.low) / (self.high - self.low)
 
     def py(self, metres, diverging):
-        """Vertical pixel of a place on the main or the diverging track."""
+        """Vertical pixel of a position on the main or the diverging track."""
         share = max(0.0, (metres - self.toe) / (self.high - self.toe)) if diverging else 0.0
         return MAIN + SPREAD * share**1.6
 
     def rails(self):
-        """The main track, and the diverging one where it is measured."""
+        """Draw the main track, and the diverging one where it is measured."""
         steps = [self.toe + (self.high - self.toe) * k / 24 for k in range(25)]
         curve = " ".join(f"L{self.px(m):.1f} {self.py(m, True):.1f}" for m in steps)
         self.parts.append(f'<path class="rail" d="M{self.px(self.low):.1f} {MAIN}H{self.px(self.high):.1f}"/>')
@@ -180,7 +177,7 @@ class Drawing:
             self.parts.append(f'<path class="rail" d="M{self.px(self.toe):.1f} {MAIN} {curve}"/>')
 
     def stretch(self, finding):
-        """What a group covers, in the colour of its answer."""
+        """Draw the part of the track that a group covers, in the colour of its verdict."""
         diverging = finding["route"] == "diverging"
         low, high = finding["place_low_m"] - 1.3, finding["place_high_m"] + 1.3
         steps = [low + (high - low) * k / 12 for k in range(13)]
@@ -190,7 +187,7 @@ class Drawing:
         self.parts.append(f'<path class="stretch {style}" d="M{path}"><title>{words}</title></path>')
 
     def sensor(self, section, row, unnamed=False):
-        """A measured section with its label, or ``unnamed``; crowded labels take turns."""
+        """Draw a measured section with its label, or ``unnamed``; labels alternate between two rows."""
         diverging = section["track"] == "diverging"
         x, y = self.px(section["position_m"] or 0.0), self.py(section["position_m"] or 0.0, diverging)
         side = 24 + 13 * (row % 2) if diverging else -16 - 13 * (row % 2)
@@ -201,7 +198,7 @@ class Drawing:
             self.parts.append(text)
 
     def mark(self, place, diverging, words):
-        """An arrow to a place, with words at its tail."""
+        """Draw an arrow to a position, with words at its tail."""
         x, y = self.px(place), self.py(place, diverging)
         anchor = "end" if x > WIDTH - 260 else "start"
         beside = x - 10 if anchor == "end" else x + 10
@@ -221,7 +218,7 @@ class Drawing:
 
 
 def place_panel(sections, findings, marked=None):
-    """Drawing of ``sections`` (rows) with the answers of ``findings``; ``marked`` is the one that gets the arrow."""
+    """SVG of ``sections`` (rows) with the verdicts of ``findings``; ``marked`` is the finding that gets the arrow."""
     drawing = Drawing(sections)
     drawing.rails()
     for finding in findings:
@@ -244,7 +241,7 @@ def _under(section, place, route):
 
 
 def marked_place(finding, sections):
-    """(place [m] or None, words) that the arrow points at: the effect's place, or its sensor's."""
+    """(position [m] or None, words) of the arrow: that of the effect, or of its sensor."""
     if finding["position_m"] is not None:
         return finding["position_m"], f"{finding['position_m']:.1f} m"
     if finding["channel"]:

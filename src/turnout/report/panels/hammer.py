@@ -1,11 +1,4 @@
-"""Receptance of one section with its H1-H2 bracket, and the coherence that says where to trust it.
-
-The free decay of one impact and the model's decay laid over it.
-
-Poles over model order: the ones that stay where they are as the order grows are the track's.
-
-The impacts of a campaign by peak force: which were used, which were not and why.
-"""
+"""Draw the panels of a hammer test: receptance, coherence, free decay, stabilisation diagram and impacts."""
 
 import json
 
@@ -13,7 +6,7 @@ import numpy as np
 
 from turnout.report.svg import Axis, Chart
 
-SPAN = (30.0, 1600.0)
+SPAN = (30.0, 1600.0)  # Hz, frequency axis of the panels
 
 
 def receptance_panel(row, modes):
@@ -45,7 +38,7 @@ def receptance_panel(row, modes):
 
 
 def coherence_panel(row):
-    """Coherence with its 95 % limits and the gate it is held against."""
+    """Coherence with its 95 % limits and the required level of the gate."""
     frequency = np.asarray(row["frequency_hz"], dtype=float)
     chart = Chart(
         Axis(*SPAN, "frequency [Hz]", "log"),
@@ -62,13 +55,13 @@ def coherence_panel(row):
 
 
 def _window(row):
-    """What an exponential window did to the curve; nothing to say without one."""
+    """Note on the damping added by an exponential window; "" without one."""
     decay = row.get("window_decay_per_s")
     return f"; a window exp(-{decay:g}/s t) adds to its damping, not to the model's" if decay else ""
 
 
 def _grey_out(chart, frequency, passed, row):
-    """Shade the lines that the gate refused, and what lies beyond the hammer."""
+    """Shade the lines that fail the gate, and mark the band edge of the hammer."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], (~passed).astype(int), [0]])))
     for first, last in zip(edges[::2], edges[1::2] - 1):
         half = 0.5 * (frequency[1] - frequency[0])
@@ -77,12 +70,15 @@ def _grey_out(chart, frequency, passed, row):
         chart.vertical(row["valid_to_hz"], "edge", "hammer's band edge", row=1)
 
 
-# Points of a drawn decay: ten a period at 1 kHz.
+# Maximum points of a decay curve of 30 ms: ten per period at 1 kHz.
 DRAWN = 300
 
 
 def decay_panel(row, model):
-    """``row`` of ``receptances`` and ``model`` of ``models``; 30 ms are shown."""
+    """Measured and modelled free decay of one impact, 30 ms.
+
+    ``row`` is one row of ``receptances``, ``model`` one of ``models``.
+    """
     if row["decay_ms2"] is None or row["decay_model_ms2"] is None:
         return ""
     measured = np.asarray(row["decay_ms2"], dtype=float)
@@ -111,7 +107,7 @@ def _known(value):
 
 
 def stabilisation_panel(row, modes):
-    """``stabilisation_json`` of one row of ``receptances``; ``modes`` are marked."""
+    """Stabilisation diagram: poles over model order, from one row of ``receptances``; ``modes`` are marked."""
     poles = json.loads(row["stabilisation_json"] or "[]")
     if not poles:
         return ""
@@ -136,7 +132,10 @@ def stabilisation_panel(row, modes):
 
 
 def impacts_panel(rows):
-    """``rows`` of ``impacts`` of one section and campaign, in order of test and record."""
+    """Peak force of the impacts, used and rejected.
+
+    ``rows`` of ``impacts`` are those of one section and campaign, in order of test and record.
+    """
     if not rows:
         return ""
     peaks = [abs(r["peak_n"] or 0.0) / 1e3 for r in rows]

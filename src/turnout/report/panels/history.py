@@ -1,4 +1,4 @@
-"""One resonance over the years: campaign values with intervals, what was to be expected, events, epochs."""
+"""Draw the history of one resonance: campaign values with intervals, expected band and events."""
 
 from datetime import datetime
 
@@ -13,8 +13,8 @@ EPOCH = datetime(1970, 1, 1)
 def history_panel(band, modes, charts, events, width=462):
     """Frequency over time.
 
-    ``modes`` are rows of ``modes_current`` of one section and band, ``charts`` rows of the trend's chart of
-    the same (may be empty), ``events`` rows of ``events`` that touch the section.
+    ``modes`` are rows of ``modes_current`` of one section and band, ``charts`` the rows of its control chart (may be
+    empty), ``events`` rows of ``events`` that affect the section.
     """
     if not modes:
         return ""
@@ -52,7 +52,7 @@ def history_panel(band, modes, charts, events, width=462):
 
 
 def _alarmed(modes, charts):
-    """Whether each value's campaign is in alarm: the last one that began before it, for one may last two days."""
+    """Whether the campaign of each value is in alarm: the last one that began before it, for one may last two days."""
     rows = sorted(charts, key=lambda c: c["measured_at_utc"])
     began = np.array([_seconds(c["measured_at_utc"]) for c in rows])
     of = np.searchsorted(began, [_seconds(m["measured_at_utc"]) for m in modes], side="right") - 1

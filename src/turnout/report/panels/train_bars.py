@@ -1,4 +1,4 @@
-"""The paper's bar charts: mean and spread of a score by train type, speed or axle load, section by section."""
+"""Draw bar charts of the mean and spread of a score by train type, speed or axle load, for each section."""
 
 from collections import Counter
 from html import escape
@@ -8,23 +8,23 @@ import numpy as np
 from turnout.report.svg import LEFT, TOP, Axis, Chart
 
 WIDTH = 952
-# Light to dark, told apart in print and by colour-blind readers.
+# Light to dark, distinct in print and for colour-blind readers.
 KEY = "○ others held fixed, 95 %, magenta: random models"
 COLOURS = ("#c6dbef", "#6baed6", "#2171b5", "#08306b", "#fdd0a2", "#fd8d3c", "#d94801", "#7f2704")
 
 
 def train_bars(factor, rows, sections):
-    """SVG of one factor, "" where no class of it is known.
+    """SVG of one factor, "" without a class of it.
 
     Parameters
     ----------
     factor : str
         "train type", "speed" or "axle load".
     rows : list of dict
-        Of ``fit_adjusted``: one score of one turnout. Bars are ``score_pct`` with its standard deviation, dots with
-        95 % intervals ``adjusted_pct``, magenta lines, in no class's colour, the null.
+        Rows of ``fit_adjusted``: one score of one turnout. Bars are ``score_pct`` with its standard deviation, dots are
+        ``adjusted_pct`` with 95 % intervals; magenta lines are the null.
     sections : list of dict
-        In the order of the track.
+        In the order along the track.
     """
     rows = [r for r in rows if r["factor"] == factor]
     if not rows:
@@ -57,7 +57,7 @@ def train_bars(factor, rows, sections):
 
 
 def _left(n):
-    """How many classes have no colour of their own, in words."""
+    """Number of classes that are not drawn, in words."""
     return f"; {n} class{'es' * (n > 1)} with fewer passages {'are' if n > 1 else 'is'} not drawn" if n else ""
 
 
@@ -74,7 +74,7 @@ def _high(row):
 
 
 def _bar(chart, x, width, colour, row):
-    """One bar with its spread, its null, and beside it the mean with the other factors held fixed."""
+    """Draw one bar with its spread, its null, and the mean with the other factors held fixed."""
     left, right = (float(chart.px(x + side * 0.45 * width)) for side in (-1, 1))
     top, zero = float(chart.py(row["score_pct"])), float(chart.py(0.0))
     words = f"{row['class']}: {row['score_pct']:.1f} %, n = {row['n']}"
@@ -97,7 +97,7 @@ def _bar(chart, x, width, colour, row):
 
 
 def _key(chart, names):
-    """Colours of the classes."""
+    """Draw the legend: the colours of the classes."""
     x, y = float(LEFT + 8), TOP + 6
     for colour, name in zip(COLOURS, names):
         chart.parts.append(f'<rect x="{x:.0f}" y="{y}" width="10" height="10" fill="{colour}" stroke="#65727f"/>')

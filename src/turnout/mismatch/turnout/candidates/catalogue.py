@@ -1,9 +1,8 @@
-"""Candidates of a turnout: every term of the catalogue at every place it could be.
+"""Candidates of a turnout: every effect of the catalogue at every position where it may act.
 
-Wheelsets far from the mass of their vehicle's file: a derivative does not reach there, so they are simulated.
-
-The P2 resonance goes as the inverse root of the unsprung mass. Where it has moved by more than its own width, a few per
-cent more make the fit worse, and so says the derivative; what gains lies behind that hump.
+Wheelsets with a mass far from that of the file are simulated, since a derivative does not extend that far. The P2
+resonance goes as the inverse root of the unsprung mass. Where it has moved by more than its width, a few per cent more
+mass make the fit worse, and the derivative points the wrong way.
 """
 
 from dataclasses import replace
@@ -14,18 +13,18 @@ from turnout import physics
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.turnout.saturation import LIMIT_SD, UNLIKE_SIDES
 
-LOOSE = 0.15  # share by which sizes err: nine effects of another simulator, opened, had a median of 0.12, rms 0.18
-EXACT = 0.03  # the same of gains and lags, which are what they are: ten, opened, had a median of 0.01
-GAPS = (1.3e-4, 3e-4, 7e-4, 1.6e-3)  # below the first a train closes it at once, behind the last it never does [m]
-SEATED = (0.0, 0.4)  # share of the bed that still bears: nothing, or nearly a half
-MOUNTINGS = tuple(np.geomspace(150.0, 1500.0, 12))  # a width at Q = 5 apart [Hz]
-DELAYS = (1e-4, 2.5e-4, *np.arange(5e-4, 5.6e-3, 5e-4))  # a quarter of a turn at 500 Hz apart [s]
-LIMITS = (0.05, 0.2, 0.5)  # of the way from what a channel has shown to what it never reaches, where it may clip
-DRIFTS = (2.5e-4, 5e-4, 1e-3, 2e-3, 4e-3)  # a sensor is passed within some seconds
-RINGING = tuple(np.geomspace(90.0, 500.0, 6))  # a hung mass shows over half an octave [Hz]
-BENDING = tuple(np.geomspace(85.0, 760.0, 20))  # two widths of the resonance apart [Hz]
-DIP_STEP = 0.6  # places of a dip scanned [m]; its own shift covers what lies between
-# Least size worth a name, in the unit of the first parameter: below it nobody would go to the site.
+LOOSE = 0.15  # error of an effect's size by its form; nine of another simulator: median 0.12
+EXACT = 0.03  # the same of gains and delays; ten of another simulator: median 0.01
+GAPS = (1.3e-4, 3e-4, 7e-4, 1.6e-3)  # m; a train closes the first at once and the last never
+SEATED = (0.0, 0.4)  # share of the ballast that still bears
+MOUNTINGS = tuple(np.geomspace(150.0, 1500.0, 12))  # Hz, one half-power width apart at Q = 5
+DELAYS = (1e-4, 2.5e-4, *np.arange(5e-4, 5.6e-3, 5e-4))  # s, a quarter period at 500 Hz apart
+LIMITS = (0.05, 0.2, 0.5)  # from the largest recorded value (0) to twice the band's peak (1)
+DRIFTS = (2.5e-4, 5e-4, 1e-3, 2e-3, 4e-3)  # relative; a train passes within some seconds
+RINGING = tuple(np.geomspace(90.0, 500.0, 6))  # Hz; an attached mass acts over half an octave
+BENDING = tuple(np.geomspace(85.0, 760.0, 20))  # Hz, two widths of the resonance apart
+DIP_STEP = 0.6  # m, between dip positions; the shift parameter covers positions in between
+# Smallest size that is reported, in the unit of the first parameter: a smaller effect needs no action.
 LEAST = {
     "high_pass": 2.0, "sensor_gain": 0.04, "sensor_position": 0.05, "time_offset": 5e-5, "clock_drift": 2e-4,
     "local_pad": 0.15, "local_ballast": 0.15, "hanging_sleeper": 5e-5, "surface_dip": 3e-5, "pad_temperature": 1e-3,
@@ -34,8 +33,8 @@ LEAST = {
     "ballast_hardening": 0.3, "pad_preload": 500.0, "low_pass": 1 / 2000.0, "sleeper_mode": 0.05,
     "ballast_inertia": 20.0,
 }  # fmt: skip
-STRETCHES = (1, 2, 4)  # sleepers to either side that stiffen alike
-LIMIT = {"local_ballast": "hanging_sleeper"}  # ballast without stiffness is a gap that no train closes
+STRETCHES = (1, 2, 4)  # sleepers to either side that harden alike
+LIMIT = {"local_ballast": "hanging_sleeper"}  # ballast without stiffness acts as a gap that no train closes
 
 
 def library(case, families=None):
@@ -54,30 +53,35 @@ def _candidate(term, make, starts, where=None, scanned=1, base=True, parameters=
 
 
 def _supports(case):
-    """One place per support that is asked."""
+    """One candidate per effect and support of the zone's ``effect_supports``."""
     places, n = case.track().support, len(case.zone.asked)
-    for j in case.zone.asked:  # ballast first: what hangs looks like soft ballast to a hammer
+    for j in case.zone.asked:  # ballast first: a hanging sleeper looks like soft ballast to a hammer
         where = {"sleeper": j, "place": round(float(places[j]), 3)}
         for term, alike in ((physics.LocalBallast, "ballast"), (physics.LocalPad, "pad")):
             yield _candidate(term, lambda p, j=j, t=term: t(j, **p), ((0.4,), (2.5,)), where, n, always=alike,
                              twin=f"{alike}_{j}", kin=alike, limit=LIMIT.get(term.name, ""))  # fmt: skip
         yield _candidate(physics.HangingSleeper, lambda p, j=j: physics.HangingSleeper(j, **p),
-                         tuple((g, s) for s in SEATED for g in GAPS), where, n, base=False, always="ballast",
-                         kin="ballast", plain=("local_ballast", 1), open_as="local_ballast")  # fmt: skip
+                         tuple((g, s) for s in SEATED for g in GAPS), where, n, base=False,
+                         always="ballast", kin="ballast", plain=("local_ballast", 1),
+                         open_as="local_ballast")  # fmt: skip
         yield _candidate(physics.AttachedResonator, lambda p, j=j: physics.AttachedResonator(j, **p),
                          tuple((15.0, f, 0.03) for f in RINGING), where, n, sure=1.0)  # fmt: skip
-        if case.rollings:  # for a blow of one strength friction is a damper: it takes trains to call it by its name
+        if case.rollings:  # for impacts of one force friction is a damper: only trains distinguish it
             yield _candidate(physics.DryFriction, lambda p, j=j: physics.DryFriction(j, **p), ((1500.0,),), where, n,
                              told_by="passage")  # fmt: skip
         for half in STRETCHES if case.rollings else ():
             if case.zone.first <= j - half and j + half <= case.zone.last:
                 yield _candidate(physics.BallastHardening,
                                  lambda p, a=j - half, b=j + half: physics.BallastHardening(a, b, **p), ((2.0,),),
-                                 {**where, "sleepers": 2 * half + 1}, len(STRETCHES) * n, kin="ballast")  # fmt: skip
+                                 {**where, "sleepers": 2 * half + 1}, len(STRETCHES) * n,
+                                 kin="ballast")  # fmt: skip
 
 
 def _whole_track(case):
-    """Common values of the base model bend first to hide what the whole track has: blows are asked whatever is left."""
+    """Effects of the whole track.
+
+    Common values of the base model bend first to hide them: they are tested on hammer tests whatever the residual.
+    """
 
     def everywhere(term, starts, **more):
         return _candidate(term, lambda p: term(**p), starts, always=term.name, **more)
@@ -100,13 +104,14 @@ def _sensors(case):
         name = sensor.name
         where = {"sensor": name}
 
-        struck = tuple(pair.name for pair in case.pairs.values() if pair.channel == name)  # blows that it read as well
+        struck = tuple(pair.name for pair in case.pairs.values() if pair.channel == name)  # hammer tests
 
         def per(term, starts, name=name, where=where, **more):
             return _candidate(term, lambda p: term(name, **p), starts, where, n, **more)
 
         yield per(physics.SensorGain, ((0.8,), (1.25,), (-1.0,)), twin=f"gain_{name}", twin_sd=0.3,
-                  from_twin=lambda gain: 1.0 + gain, loose=EXACT, exact=True, unopposed=struck)  # fmt: skip
+                  from_twin=lambda gain: 1.0 + gain, loose=EXACT, exact=True,
+                  unopposed=struck)  # fmt: skip
         yield per(physics.MountResonance, tuple((1.0 / f, 5.0) for f in MOUNTINGS), whole=True, kin="channel")
         yield per(physics.TimeOffset, tuple((sign * d,) for d in DELAYS for sign in (1.0, -1.0)), whole=True,
                   loose=EXACT, exact=True, kin="channel")  # fmt: skip
@@ -127,7 +132,10 @@ def _sensors(case):
 
 
 def _clipping(per, peak, highest):
-    """A limit within the channel's own peak [m/s²], twice of which is none, and not below what it has ever shown."""
+    """A clipping limit below the channel's peak in the band [m/s²].
+
+    At twice that peak it has no effect; it is never below a value that the channel has recorded.
+    """
     least, none = UNLIKE_SIDES * highest, 2.0 * peak
     if least >= none:
         return
@@ -137,11 +145,11 @@ def _clipping(per, peak, highest):
 
 
 def _clipped(name, ceiling):
-    """A channel that is used no more; its limit is known from the peaks, not from a fit."""
+    """A saturated channel, which is not used; its limit is known from the peaks, not from a fit."""
     limit = replace(physics.Clipping.parameters[0], prior=(ceiling.limit, LIMIT_SD * ceiling.limit))
     return Candidate(
-        physics.Clipping.name, (limit,), lambda p: physics.Clipping(name, **p), ((ceiling.limit,),), {"sensor": name},
-        physics.Clipping.frame, promise=ceiling.gain, aside=ceiling.gain,
+        physics.Clipping.name, (limit,), lambda p: physics.Clipping(name, **p), ((ceiling.limit,),),
+        {"sensor": name}, physics.Clipping.frame, promise=ceiling.gain, aside=ceiling.gain,
     )  # fmt: skip
 
 
@@ -171,11 +179,11 @@ def _wheels(case):
                          ((1.4,), (0.7,)), where, len(case.trains), twin=f"wheels_{train}", twin_sd=0.3)  # fmt: skip
 
 
-MASSES = (0.65, 1.3, 1.6, 2.0)  # times that of the file: an eighth of the P2 frequency apart
+MASSES = (0.65, 1.3, 1.6, 2.0)  # times the mass of the file: the P2 frequency changes by an eighth
 
 
 def distant_wheels(case, fit):
-    """(candidate, start) of masses to simulate, for trains that leave more than those of sound turnouts do."""
+    """(candidate, start) of masses to simulate, for trains whose residual exceeds the control level."""
     level = case.control_level["passage"]
     heavy = [c for c in case.candidates if c.family == "unsprung_mass"]
     loud = [c for c in heavy if left_by(case, fit, c.where["train"]) > level]
@@ -183,7 +191,7 @@ def distant_wheels(case, fit):
 
 
 def left_by(case, fit, train):
-    """Weighted mean square that ``fit`` leaves of the passages of a train, 0 without one."""
+    """Weighted mean square residual of ``fit`` in the passages of a train; 0 without one."""
     mine = [
         (o.n_effective, o.effective * float(np.sum(np.square(w))))
         for o, w in zip(case.observations, fit.white)

@@ -1,21 +1,20 @@
-r"""Polygonal wheels, sought in the residual: which wheel of which train, and how long the waves round its tread are.
+r"""Find polygonal wheels in the residual of passages: which wheel of which train, order and amplitude.
 
-One wheel's wave is a line at v/λ in every passage of its train, at an angle that nobody knows. With C its two signals,
-a quarter wave apart, whitened, and amplitudes of standard deviation a, the same in all passages, each passage gives
+Waves longer than ``SHORTEST_WAVE`` are found in the band of the fit. The wave of a wheel is a line at v/λ in every
+passage of its train, at an unknown angle. C are its two whitened signals, a quarter wave apart. Their amplitudes have
+the standard deviation a, the same in all passages. Each passage gives, with the angle integrated out,
 
 .. math:: \ln \Lambda = \tfrac12 s^T (M + a^{-2})^{-1} s - \tfrac12 \ln |1 + a^2 M|, \quad s = C^T r, \; M = C^T C
 
-with the angle integrated out. M is that of the first wheel: all wheels of a train are alike in it.
+M is that of the first wheel: it is the same for all wheels of a train.
 
-Polygonal wheels whose waves are shorter than those simulated: one wheel loud at one wavelength, wherever it passes.
-
-While a wheel is within ``REACH`` of a sensor the sensor hears that wheel above all. With P the power then and there in
-bins of :math:`\lambda = v/f` and B that of the bins around it,
+Shorter waves are found in the sound level. While a wheel is within ``WHEEL_REACH`` of a sensor, it dominates the
+signal. With P the power at that time in bins of :math:`\lambda = v/f` and B that of the bins around it,
 
 .. math:: z = \ln (P / B) - \mathrm{median}_{wheels} \ln (P / B)
 
-is near 0 for a sound wheel: hum, resonances and corrugation are common to all wheels of a passage and fall out. The
-evidence is that of the mean of z over sensors and passages, for a loud wheel over a sound one.
+is near 0 for a round wheel: hum, resonances and corrugation are common to all wheels of a passage and cancel. The
+evidence compares the mean of z over sensors and passages for a polygonal wheel with that for a round one.
 """
 
 from dataclasses import dataclass, replace
@@ -28,14 +27,14 @@ from turnout.mismatch.turnout.candidates.short_corrugation import HIGHEST, SHORT
 from turnout.mismatch.turnout.passage_band import SHORTEST_WAVE
 from turnout.mismatch.turnout.wave_response import Carrier
 
-WAVELENGTHS = np.geomspace(SHORTEST_WAVE, 1.0, 100)  # m; neighbours differ by a third of a period over 10 m
-FINER = np.linspace(0.985, 1.015, 13)
-AMPLITUDES = np.geomspace(1e-5, 4e-4, 5)  # m
-TURNS = 12.0  # angles that a passage can tell from each other
+WAVELENGTHS = np.geomspace(SHORTEST_WAVE, 1.0, 100)  # m; over 10 m neighbours differ by a third of a period
+FINER = np.linspace(0.985, 1.015, 13)  # of the wavelength, for its refinement
+AMPLITUDES = np.geomspace(1e-5, 4e-4, 5)  # m, prior sd of cosine and sine
+TURNS = 12.0  # distinguishable angles per passage
 
 
 def polygons(case, fit):
-    """The likeliest polygonal wheel as a candidate, () where none is likelier than a round one."""
+    """The likeliest polygonal wheel as a candidate, () where a round one is likelier."""
     found = [s for train in case.trains for s in of_train(case, fit, train)]
     if not found:
         return ()
@@ -114,19 +113,22 @@ def _candidate(case, train, wheel, wavelength, parts, nats, scanned):
     )  # fmt: skip
 
 
-REACH = 1.2  # m; axles of a bogie are 1.8 m apart or more
-STEP, NEAR, FAR = 0.04, 0.2, 0.6  # of the logarithm of the wavelength: bins, from where to where others are around
-TELL_APART = 0.16  # in the same unit: what 2.4 m of way tell apart at 0.2 m
-SPREAD, ONE = 0.5, 0.8  # of z: of wheels, twice that of sound ones in another simulator; of one sensor in one passage
-LOUD = 2.5  # of z where a wheel is polygonal, as a prior
-WHEELS = 3  # fewer have no median
-LEAST = 2e-5  # m
+REACH = 1.2  # m from wheel to sensor; axles of a bogie are at least 1.8 m apart
+STEP, NEAR, FAR = 0.04, 0.2, 0.6  # of ln wavelength: bin width, nearest and farthest bins of the background
+TELL_APART = 0.16  # of ln wavelength: resolution of 2.4 m of rail at 0.2 m
+SPREAD, ONE = 0.5, 0.8  # sd of z: between wheels (twice that in another simulator), of one spectrum
+LOUD = 2.5  # prior sd of z of a polygonal wheel
+WHEELS = 3  # least wheels of a train, for a median
+LEAST = 2e-5  # m, smallest reported amplitude
 
 
 @dataclass(frozen=True)
 class Slots:
-    """One passage: ``level`` (n_sensor, n_wheel, n_bin) logarithm of the power while a wheel passes a sensor, nan where
-    it was not recorded; ``width`` (n_bin,) lines per bin, ``size`` of the transform, ``window`` (n,) of the samples."""
+    """Spectra of one passage while each wheel passes each sensor.
+
+    ``level`` (n_sensor, n_wheel, n_bin) is the logarithm of the power, nan where it was not recorded; ``width``
+    (n_bin,) lines per bin, ``size`` of the transform, ``window`` (n,) of the samples.
+    """
 
     made: object
     level: np.ndarray
@@ -163,19 +165,19 @@ def short_polygons(case, fit):
 
 
 def _holds(levels):
-    """Either half of a train's passages shows at least half of what the other does."""
+    """Whether either half of a train's passages shows at least half the level of the other."""
     return min(levels) > 0.5 * max(levels)
 
 
 def wavelengths(mades):
-    """(n,) middles of the bins, longest first; those at both ends are there to be compared with. [m]"""
+    """(n,) centres of the bins, longest first; those at both ends serve as background. [m]"""
     shortest = max([SHORTEST * np.exp(-FAR), *(m.speed / (HIGHEST * m.passage.recording.rate) for m in mades)])
     longest = SHORTEST_WAVE * np.exp(FAR)
     return longest * np.exp(-np.arange(0.0, np.log(longest / shortest), STEP))
 
 
 def slots_of(made, lengths):
-    """``Slots`` of a passage."""
+    """``WheelSpectra`` of a passage."""
     recording, speed = made.passage.recording, made.speed
     n = round(2.0 * REACH / speed * recording.rate)
     window, size = np.hanning(n), 1 << int(np.ceil(np.log2(8 * n)))
@@ -198,14 +200,14 @@ def slots_of(made, lengths):
 
 
 def _usual(level, k, lengths):
-    """(n_sensor, n_wheel) level of bin k as those around it have it, the mean of both sides."""
+    """(n_sensor, n_wheel) background level of bin k from the bins around it, mean of both sides."""
     away = np.log(lengths[k] / lengths)
     sides = [(away > NEAR) & (away < FAR), (-away > NEAR) & (-away < FAR)]
     return np.mean([np.median(level[..., side], axis=-1) for side in sides], axis=0)
 
 
 def louder(slots, tried, lengths):
-    """(n_wheel, n_tried) mean of z over sensors and passages, and the number of slots of a wheel behind it."""
+    """(n_wheel, n_tried) mean of z over sensors and passages, and the number of spectra per wheel."""
     above = [np.stack([s.level[..., k] - _usual(s.level, k, lengths) for k in tried], axis=-1) for s in slots]
     heard = [a - np.nanmedian(a, axis=1, keepdims=True) for a in above if not np.isnan(a).all()]
     z = np.concatenate([*heard, np.full((0, *above[0].shape[1:]), np.nan)])
@@ -215,7 +217,7 @@ def louder(slots, tried, lengths):
 
 
 def evidence(z, slots):
-    """Nats for a polygonal wheel over a round one, by its mean z over so many slots."""
+    """Nats for a polygonal wheel over a round one, from its mean z over so many spectra."""
     spread = SPREAD**2 + ONE**2 / slots
     wide = spread + LOUD**2
     z = max(float(z), 0.0)
@@ -242,7 +244,7 @@ def _short_candidate(case, fit, train, wheel, lengths, k, nats, scanned, seen):
 
 
 def _amplitudes(case, fit, slots, wheel, lengths, k):
-    r"""(n,) amplitude of the wheel's wave [m] by each sensor that heard it, from the energy over that around:
+    r"""(n,) amplitude of the wheel's wave [m] from each sensor, by its energy over the background:
 
     .. math:: \sum_f |Y|^2 = \tfrac{N}{2} f_s \int y^2 h^2 dt, \quad
               \int y^2 h^2 dt = \tfrac12 a^2 |F|^2 \omega^4 \int |G(x)|^2 h(x)^2 dx / v

@@ -1,14 +1,14 @@
-r"""Dips and corrugation sought in what the free waves of the rail have taken in: everywhere, of many lengths.
+r"""Find dips and corrugation of many lengths at any position, from the free waves of the rail.
 
-A dip of the running surface is a sum of the waves that every base fit has free, and these take it in, at the price of
-amplitudes that no sound rail has. With J the whitened derivatives by all nuisances, in prior standard deviations, and c
-the amplitudes of the waves that make up the shape, a shape of height a costs nothing of that price:
+The waves of every base fit absorb a dip of the running surface, at amplitudes that are improbable for intact rail. J
+are the whitened derivatives by all nuisances, in prior standard deviations, and c the wave amplitudes of a shape. Of
+height a, the shape itself has no prior penalty:
 
 .. math:: g = \frac{(c^T r')^2}{c^T G c - c^T G (G + 1)^{-1} G c}, \quad G = J^T J
 
-is the gain in chi-squared when the waves give it back, without a simulation.
+is the gain in chi-squared when the waves give way to the shape, without a simulation.
 
-What passages themselves suggest about rail and wheels: candidates that no grid of the library could hold.
+``scan_geometry`` collects these candidates and those of wheels and short corrugation, which no fixed grid could hold.
 """
 
 from dataclasses import replace
@@ -23,18 +23,18 @@ from turnout.mismatch.turnout.candidates.short_corrugation import short_waves
 from turnout.mismatch.turnout.candidates.wheel_flats import flats
 from turnout.mismatch.turnout.passage_band import SHORTEST_WAVE
 
-PLACE_STEP, BEYOND = 0.1, 1.0  # m: between places of a dip tried, and how far beyond the sensors
-LENGTHS, SHARPNESSES = (0.25, 0.4, 0.6, 0.9), (0.2, 0.9)
-APART = 0.3  # m; dips closer than this look alike
-DEPTH = 1e-3
-WAVELENGTHS = np.geomspace(1.02 * SHORTEST_WAVE, 0.75, 34)  # m; the shorter ones are no free waves
-REACHES = (1.8, 3.2, 5.0)  # m: half the stretch of a corrugation
-HIGH = 3e-5  # m; amplitude of corrugation that is ground away
-LINES = 12.0  # wavelengths in that range that sensors 6 m apart tell from each other
+PLACE_STEP, BEYOND = 0.1, 1.0  # m, between trial positions of a dip; margin beyond the sensors
+LENGTHS, SHARPNESSES = (0.25, 0.4, 0.6, 0.9), (0.2, 0.9)  # m, -; trial values of a dip
+APART = 0.3  # m; closer dips cannot be distinguished
+DEPTH = 1e-3  # m, of a trial dip
+WAVELENGTHS = np.geomspace(1.02 * SHORTEST_WAVE, 0.75, 34)  # m; shorter ones are no free waves
+REACHES = (1.8, 3.2, 5.0)  # m, half the length of a corrugated stretch
+HIGH = 3e-5  # m, prior sd of the amplitude: corrugation that is ground away
+LINES = 12.0  # distinguishable wavelengths in that range for sensors 6 m apart
 
 
 class RailScan:
-    """Scores of shapes of the rail's surface against the residual and the waves of ``fit``."""
+    """Scores of shapes of the running surface, from the residual and the waves of ``fit``."""
 
     def __init__(self, case, fit):
         self.case, self.waves = case, case.waves
@@ -52,13 +52,13 @@ class RailScan:
         self.basis = 0.01 * 2.0 / self.waves.length * self.waves.shapes(self.x).T / self.sd
 
     def scored(self, shapes):
-        """(slope (m,), size (m, m)) of shapes (m, n) at ``x``, for which the waves give way."""
+        """(slope (m,), size (m, m)) of shapes (m, n) at ``x``, with the waves free."""
         c = shapes @ self.basis
         across = self.gram[:, self.of_waves] @ c.T
         return c @ self.inner, c @ self.gram[self.of_waves, self.of_waves] @ c.T - across.T @ self.normal @ across
 
     def released(self, shape):
-        """Waves that are left when ``shape`` (n,) of the surface gets a name of its own: where a joint fit starts."""
+        """Wave amplitudes without ``shape`` (n,), which is an effect of its own: start of a joint fit."""
         c = shape @ self.basis
         moved = self.shift - (self.normal @ (self.gram[:, self.of_waves] @ c))[self.of_waves]
         return dict(zip(self.waves.names, (self.theta + self.sd * moved).tolist()))
@@ -83,7 +83,8 @@ def _dip(case, scan):
     depth = float(np.clip(depth, -2.5e-3, 5e-3))
     scanned = np.ptp(grid) / APART
     return Candidate(
-        "surface_dip", _about(physics.SurfaceDip, shift=(0.0, APART)), lambda p: physics.SurfaceDip(float(x), **p),
+        "surface_dip", _about(physics.SurfaceDip, shift=(0.0, APART)),
+        lambda p: physics.SurfaceDip(float(x), **p),
         ((depth, length, sharp, 0.0),), {"place": round(float(x), 3)}, "place", scanned, least=3e-5,
         promise=float(0.5 * slope[best] ** 2 / size[best] - np.log(scanned)),
         begin=scan.released(shapes[best] * depth / DEPTH),
@@ -108,7 +109,8 @@ def _corrugation(case, scan):
     scanned = LINES * len(middles)
     priors = {"sine": (0.0, HIGH), "cosine": (0.0, HIGH), "wavelength": (float(wavelength), 0.03 * float(wavelength))}
     return Candidate(
-        "rail_corrugation", _about(physics.RailCorrugation, **priors), lambda p: physics.RailCorrugation(a, b, **p),
+        "rail_corrugation", _about(physics.RailCorrugation, **priors),
+        lambda p: physics.RailCorrugation(a, b, **p),
         ((sine, cosine, float(wavelength)),), {"wavelength": round(float(wavelength), 3), "place": 0.5 * (a + b)},
         "wavelength", scanned, promise=float(0.5 * gain - np.log(scanned)),
         begin=scan.released(1e5 * np.array([sine, cosine]) @ pair),
@@ -116,7 +118,7 @@ def _corrugation(case, scan):
 
 
 def _about(term, **priors):
-    """Parameters of a term whose place was scanned: what the scan has paid for is not paid for again."""
+    """Parameters of a term with priors about the values of a scan, whose cost is already counted."""
     return tuple(replace(p, prior=priors[p.name]) if p.name in priors else p for p in term.parameters)
 
 

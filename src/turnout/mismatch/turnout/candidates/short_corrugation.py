@@ -1,14 +1,14 @@
-r"""Corrugation shorter than the waves that are simulated: a line at one wavelength in the loudness of all trains.
+r"""Find corrugation shorter than the simulated waves: a line at one wavelength in the sound level of all trains.
 
-The band in which passages are fitted ends where the shortest free wave of the rail lies; most corrugation is shorter.
-Above that band a passage is roughness, whose level is smooth in the wavelength. With P the mean power of a sensor in
-bins of :math:`\lambda = v/f`, and B the median of the bins around it,
+The band in which passages are fitted ends at the shortest free wave of the rail; most corrugation is shorter. Above
+that band the signal is roughness with a level that is smooth in the wavelength. With P the mean power of a sensor in
+bins of :math:`\lambda = v/f` and B the median of the bins around it,
 
 .. math:: z = \overline{\ln (P / B)}
 
-is scattered by what roughness happens to be under that sensor, alike in all passages, and stands out where the rail has
-waves of that length. A wave of a wheel shows in its train alone, a hum or a resonance at one frequency: at different
-wavelengths in slow and in fast passages.
+scatters with the roughness under that sensor, which is the same in all passages, and is large where the rail has waves
+of that length. A wave of a wheel shows in its train alone. A hum or a resonance has one frequency: its wavelength
+differs between slow and fast passages.
 """
 
 from dataclasses import dataclass, replace
@@ -23,26 +23,29 @@ from turnout.mismatch.turnout.matrix_cache import matrices_of
 from turnout.mismatch.turnout.track_parameters import track_with
 from turnout.mismatch.turnout.wave_response import carried, wheel_and_contact
 
-SHORTEST, WIDTH = 0.05, 0.05  # m; of a bin, in the logarithm: what 5 m of rail tell apart at 0.2 m
+SHORTEST, WIDTH = 0.05, 0.05  # m; bin width in ln wavelength, the resolution of 5 m of rail at 0.2 m
 LINE = 2  # bins to either side over which a line spreads
-AWAY, AROUND = 2, 6  # bins from one to those that its background is taken of
-HIGHEST = 0.35  # of the sampling rate: above it the anti-alias filter may speak
-SPREAD = 0.8  # of z of one sensor on sound rail: 0.62 and 1.0 in two simulators, three degrees of freedom give 0.97
-LOUD = 2.0  # of z where there is corrugation, as a prior
-TRAINS = 2  # fewer cannot tell a rail from wheels
-SPEEDS = 1.25  # fastest over slowest passage; closer ones cannot tell a wavelength from a frequency
-HEARD = 2.0  # m; sensors closer than this hear the same rail
-REACHES = (1.0, 1.8, 3.2, 5.0)  # m: half the stretch
-AMPLITUDES = np.geomspace(2e-6, 3e-4, 60)  # m
-TRANSFER = 0.15  # by which the response at one frequency errs
-STRIDE = 2  # nodes
-LEAST = 1e-5  # m; what EN 13231-3 lets a ground rail keep of waves up to 0.3 m
+AWAY, AROUND = 2, 6  # bins, nearest and farthest of the background
+HIGHEST = 0.35  # highest frequency over the sampling rate: above, the anti-alias filter may act
+SPREAD = 0.8  # sd of z of one sensor on intact rail: 0.62 and 1.0 in two simulators
+LOUD = 2.0  # prior sd of z of corrugation
+TRAINS = 2  # least trains, to distinguish the rail from wheels
+SPEEDS = 1.25  # least ratio of fastest to slowest passage, to distinguish a wavelength from a frequency
+HEARD = 2.0  # m; closer sensors measure the same rail
+REACHES = (1.0, 1.8, 3.2, 5.0)  # m, half the length of the stretch
+AMPLITUDES = np.geomspace(2e-6, 3e-4, 60)  # m, tested
+TRANSFER = 0.15  # relative error of the response at one frequency
+STRIDE = 2  # every second node is used
+LEAST = 1e-5  # m, smallest reported amplitude: EN 13231-3 allows it on a ground rail for waves up to 0.3 m
 
 
 @dataclass(frozen=True)
 class Loud:
-    """One passage: ``train``, ``speed`` [m/s], power (n_alive, n_bin) and its background, both means of the spectrum's
-    squares, of the sensors (n_sensor,) that are ``alive``."""
+    """Power of one passage in bins of the wavelength.
+
+    ``power`` and its ``background`` (n_recorded, n_bin) are means of the squared spectrum. ``recorded`` (n_sensor,)
+    marks the sensors with a signal.
+    """
 
     name: str
     train: str
@@ -53,19 +56,19 @@ class Loud:
 
     @property
     def above(self):
-        """(n_sensor, n_bin) logarithm of the power over its background."""
+        """(n_recorded, n_bin) logarithm of the power over its background."""
         return np.log(self.power / self.usual)
 
 
 def bins(mades):
-    """(n,) wavelengths that every passage holds, longest first [m]."""
+    """(n,) wavelengths that every passage covers, longest first [m]."""
     shortest = max([SHORTEST, *(m.speed / (HIGHEST * m.passage.recording.rate) for m in mades)])
     longest = passage_band.SHORTEST_WAVE * np.exp(WIDTH * (AROUND + 1))  # the first bins are background alone
     return longest * np.exp(-np.arange(0.0, np.log(longest / shortest), WIDTH))
 
 
 def loud_of(case, made, wavelengths):
-    """``Loud`` of a passage."""
+    """``BandPower`` of a passage."""
     recording = made.passage.recording
     rows = [recording.index(s.name) for s in made.sensors]
     first, last = (round(t * recording.rate) for t in (made.time[0], made.time[-1]))
@@ -86,7 +89,7 @@ def loud_of(case, made, wavelengths):
 
 
 def groups(passages):
-    """Passages of each train, and the slower and the faster ones: all must show what is the rail's."""
+    """Passages of each train, the slower and the faster ones: corrugation must show in all groups."""
     trains = sorted({p.train for p in passages})
     middle = np.sqrt(min(p.speed for p in passages) * max(p.speed for p in passages))
     found = [[p for p in passages if p.train == t] for t in trains]
@@ -94,8 +97,10 @@ def groups(passages):
 
 
 def evidence(passages, apart):
-    """(n_bin,) nats for a line that all trains show at all speeds, over roughness alone; ``apart`` is the number of
-    sensors that hear different rail."""
+    """(n_bin,) nats for a line that all trains show at all speeds, over roughness alone.
+
+    ``n_sensors`` is the number of sensors on different rail.
+    """
     z = np.min([np.mean([p.above.mean(axis=0) for p in group], axis=0) for group in groups(passages)], axis=0)
     z, spread = np.maximum(z, 0.0), SPREAD**2 / apart
     wide = spread + LOUD**2
@@ -103,7 +108,7 @@ def evidence(passages, apart):
 
 
 def short_waves(case, fit):
-    """The likeliest short corrugation as a candidate, () where sound rail is likelier or nothing could tell."""
+    """The likeliest short corrugation as a candidate, () where intact rail is likelier or the data cannot tell."""
     mades = sorted((m for m in case.fitted() if m.passage.train), key=lambda m: m.speed)
     if any(c.family == "rail_corrugation" for c in fit.candidates) or not _telling(mades):
         return ()
@@ -122,13 +127,13 @@ def short_waves(case, fit):
 
 
 def _telling(mades):
-    """Whether trains and speeds differ enough to tell the rail from wheels and from frequencies."""
+    """Whether trains and speeds differ enough to distinguish the rail from wheels and from frequencies."""
     speeds = [m.speed for m in mades]
     return len({m.passage.train for m in mades}) >= TRAINS and max(speeds) > SPEEDS * min(speeds)
 
 
 def _apart(case):
-    """Number of sensors that hear different rail."""
+    """Effective number of sensors on different rail."""
     places = sorted(s.place for s in case.campaign.sensors)
     return 1.0 + float(np.sum(np.minimum(np.diff(places) / HEARD, 1.0)))
 
@@ -141,8 +146,10 @@ def _known(case, wavelengths):
 
 
 def _holds(seen, k):
-    """Of the passages in order of speed every other one shows at least half of the line that the rest does, and the
-    other way round: what does not predict the rest is no finding."""
+    """Whether the line repeats: passages in order of speed are split into two halves.
+
+    Either half must show at least half the level of the other.
+    """
     levels = [np.mean([p.above[:, k].mean() for p in half]) for half in (seen[::2], seen[1::2])]
     return min(levels) > 0.5 * max(levels)
 
@@ -170,8 +177,10 @@ def _about(k):
 
 
 def _sized(case, fit, length, about, seen):
-    """(middle, half the stretch, amplitude, its standard error) [m] of the waves of this length that explain best how
-    loud each sensor is in each passage."""
+    """(middle, half the stretch, amplitude, its standard error) [m] of waves of this length.
+
+    These explain the power of each sensor in each passage best.
+    """
     places = [s.place for s in case.campaign.sensors]
     middles = np.arange(min(places), max(places) + 0.1, 0.5)
     shapes = [(m, r) for m in middles for r in REACHES]
@@ -191,8 +200,9 @@ def _sized(case, fit, length, about, seen):
 
 
 def _unit_energy(case, fit, made, length, shapes):
-    r"""(n_shape, n_sensor) power, as ``Loud`` has it, of waves one metre high: the wheel's force at v/λ, carried from
-    where the wheel is.
+    r"""(n_shape, n_sensor) power, as in ``BandPower``, of waves one metre high.
+
+    The force of the wheel at v/λ is carried to the sensor from the position of the wheel:
 
     .. math:: \int y^2 dt = \tfrac12 \sum_w |F|^2 \int |G(x)|^2 e(x)^2 \, dx / v, \quad
               F = 1 / (A_{wheel} + A_{contact} + A_{rail})
@@ -204,8 +214,10 @@ def _unit_energy(case, fit, made, length, shapes):
 
 
 def carried_energy(case, fit, made, length):
-    """Nodes (n,) [m], and the square of the acceleration at each sensor while one wheel rolls there over a wave of this
-    length and one metre high, (n_sensor, n) [1/s^4]."""
+    """Nodes (n,) [m], and squared acceleration (n_sensor, n) [1/s^4] at each sensor for one wheel at the node.
+
+    The wheel rolls over a wave of this length, one metre high.
+    """
     track = track_with(case.track(made.passage.route), case.zone, fit.values)
     matrices, frequency = matrices_of(track), np.array([made.speed / length])
     near = np.flatnonzero((matrices.node >= case.waves.start) & (matrices.node <= case.waves.end))[::STRIDE]

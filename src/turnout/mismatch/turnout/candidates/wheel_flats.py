@@ -1,20 +1,19 @@
-r"""Wheels with a flat: found by their blows in the loudness of passages, then sized by their signal in the band.
+r"""Find wheels with a flat by their impacts in the sound level of passages, then size them by their signal in the band.
 
-A flat's length is common to all passages of the train, the angle at which the wheel comes is not: every passage has a
-phase of its own. The blows tell it to some centimetres; the simulation, with loss of contact, tells the rest.
-
-Blows of a flat in the loudness of a passage above the band that is simulated: which wheel, and where it strikes.
-
-A flat strikes once a turn. What it does below 100 Hz drowns in the roughness of eight wheels; above 250 Hz it stands 10
-to 30 dB over their noise at the moment of the blow, in all sensors near the place where the wheel then is. One blow may
-be anything; a row of blows a turn apart, each loudest where one wheel is, is a flat on that wheel. The datum is the
-loudest moment z around each expected blow, one per sensor; with x the way from blow to sensor
+A flat causes an impact at each turn. Below 100 Hz it is hidden by the roughness of the other wheels. Above 250 Hz it is
+10 to 30 dB above their noise at the moment of the impact, in all sensors near the wheel. A single impact may have any
+cause. A row of impacts one turn apart, each loudest near one wheel, is a flat on that wheel. The datum is the loudest
+moment z around each expected impact, one per sensor; with x the distance from impact to sensor
 
 .. math:: \Lambda = \sum \ln \frac{(1-\epsilon) N(z; m, 1 + m/4) + \epsilon U}
           {(1-\epsilon) N(z; 0, 1) + \epsilon U}, \quad m = \max(A - \beta x, 0)
 
-(blows differ from one to the next: on a sleeper, between two), so that no single bang, whatever its cause, says more
-than :math:`\ln(1/\epsilon U)`.
+Impacts scatter, on a sleeper or between two. The outlier term limits the evidence of a single impact, whatever its
+cause, to :math:`\ln(1/\epsilon U)`.
+
+The length of a flat is common to all passages of the train; the angle at which the wheel arrives is not, so that every
+passage has its own phase. The impacts give it to some centimetres; the simulation, with loss of contact, gives the
+rest.
 """
 
 from dataclasses import dataclass
@@ -26,26 +25,28 @@ from turnout.errors import SimulationError
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.turnout.passage_band import band_limited
 
-LOW, HIGH = 250.0, 900.0  # [Hz]
-BIN, ABOUT_STRIKES, AROUND = 0.002, 0.006, 0.12  # s: of the loudness, of a blow, of the noise that it is compared with
-RADII = np.arange(-0.05, 0.031, 0.01)  # a wheel is turned down in service; its file is right to a few per cent
-STEP = 0.06  # m between the phases tried
-FINE = 0.02  # m between the places where wheels are compared
-COMMON = 2.0  # deviations: a median over the wheels that is no noise
+LOW, HIGH = 250.0, 900.0  # Hz, band of the level
+BIN, ABOUT_STRIKES, AROUND = 0.002, 0.006, 0.12  # s: bin, half width of an impact, half width of its background
+RADII = np.arange(-0.05, 0.031, 0.01)  # relative to the file: a wheel is turned down in service
+STEP = 0.06  # m, between trial phases
+FINE = 0.02  # m, between positions where wheels are compared
+COMMON = 2.0  # deviations, least median over the wheels that is no noise
 STRENGTHS, DECAYS = (
     (2.0, 4.0, 7.0, 12.0, 20.0),
     (0.3, 0.8, 1.6, 3.0),
 )  # A in deviations of the noise, beta in deviations per metre
-ODD, WIDE = 0.05, 1.0 / 20.0  # share and density of what neither noise nor flat explains
-UNEVEN = 0.25  # spread of the blows, as a share of their expected loudness
-HEARD = 5.0  # m; farther blows are lost among nearer wheels
-TOGETHER = 0.5  # sensors hear the same bang: their data count half
+ODD, WIDE = 0.05, 1.0 / 20.0  # share and density of outliers
+UNEVEN = 0.25  # scatter of the impacts, as a share of their expected level
+HEARD = 5.0  # m; farther impacts are masked by nearer wheels
+TOGETHER = 0.5  # sensors measure the same impact: their data count half
 
 
 @dataclass(frozen=True)
 class Strikes:
-    """Evidence [nats] that a wheel (0 first) of a train carries a flat, ``radius`` over that of its file, ``phases``
-    (recording -> rolling way to the first blow) [m]."""
+    """Evidence [nats] that a wheel (0 first) of a train has a flat.
+
+    ``radius`` is that of the wheel [m], ``phases`` (recording, rolling distance to the first impact [m]).
+    """
 
     nats: float
     train: str
@@ -55,7 +56,7 @@ class Strikes:
 
 
 def loudness(samples, rate, start, stop):
-    """(time (n,) [s], (n_channel, n)) loudest moment around each time, in robust deviations from what is usual."""
+    """(time (n,) [s], (n_channel, n)) loudest moment around each time, in robust deviations from the background."""
     fold = max(1, round(BIN * rate))
     power = band_limited(samples, rate, low=LOW, high=min(HIGH, 0.35 * rate)) ** 2
     n = power.shape[1] // fold
@@ -72,13 +73,13 @@ def loudness(samples, rate, start, stop):
 
 
 def _shifted(rows, steps):
-    """(n_step, n_row, n) copies of rows (n_row, n) moved by steps, their ends held."""
+    """(n_step, n_row, n) copies of rows (n_row, n) shifted by steps, with constant ends."""
     index = np.clip(np.arange(rows.shape[1]) + np.asarray(steps)[:, None], 0, rows.shape[1] - 1)
     return np.moveaxis(rows[:, index], 1, 0)
 
 
 def likelihood(seen, expected):
-    """Log ratio of likelihoods of ``seen`` deviations under a blow of ``expected`` deviations and under none. [nats]"""
+    """Log likelihood ratio of ``deviations`` for an impact of ``expected`` deviations against none. [nats]"""
     noise, blow = (_normal(seen - m, 1.0 + UNEVEN * m) for m in (0.0, expected))
     return np.log((1.0 - ODD) * blow + ODD * WIDE) - np.log((1.0 - ODD) * noise + ODD * WIDE)
 
@@ -88,7 +89,7 @@ def _normal(off, spread):
 
 
 def heard(made):
-    """(time, loudness) of a ``Rolling``'s sensors, less what every wheel makes where one of them is."""
+    """(time, band level) of the sensors of an ``AlignedPassage``, without the level that all wheels share."""
     recording = made.passage.recording
     rows = [recording.index(s.name) for s in made.sensors]
     time, loud = loudness(recording.samples[rows], recording.rate, made.time[0], made.time[-1])
@@ -96,9 +97,12 @@ def heard(made):
 
 
 def _common(made, time, loud):
-    """(n_sensor, n) the median over the wheels of the loudness when they are at a place, where that is no noise, of the
-    place of any wheel at these times: where all of them bang, at a nose or a joint, the cause is in the rail. Of an
-    even number it is the lower one, so that a flat of one of two wheels stays its own; one wheel tells no place."""
+    """(n_sensor, n) level that all wheels have at a position, for the position of any wheel at these times.
+
+    It is the median over the wheels, 0 where that is noise. Where all of them cause impacts, at a nose or a joint, the
+    cause is in the rail. Of an even number of wheels it is the lower median, so that a flat of one of two wheels stays.
+    One wheel alone gives no such level.
+    """
     behind = made.passage.vehicle.wheel_places[:, None]
     if len(behind) < 2:
         return np.zeros_like(loud)
@@ -113,7 +117,7 @@ def _common(made, time, loud):
 
 
 def of_wheel(mades, loud, wheel):
-    """(nats, radius, phases) of the flat on one wheel that explains best what passages of one train sound like."""
+    """(nats, radius, phases) of the flat on one wheel that explains the band levels of one train best."""
     radius, found = mades[0].passage.vehicle.each("radius")[wheel], []
     for share in 1.0 + RADII:
         turn = 2.0 * np.pi * radius * share
@@ -128,7 +132,7 @@ def of_wheel(mades, loud, wheel):
 
 
 def _mean(ratio, axis):
-    """Logarithm of the mean of likelihoods: what was free is integrated out."""
+    """Logarithm of the mean of likelihoods, which integrates out the parameter of this axis."""
     top = np.max(ratio, axis=axis)
     return top + np.log(np.mean(np.exp(ratio - np.expand_dims(top, axis)), axis=axis))
 
@@ -140,7 +144,7 @@ def _ratios(made, time, loud, wheel, turn):
     sensors = np.array([s.place for s in made.sensors])
     first = sign * np.min(sign * sensors)
     reach = np.arange(np.floor((sensors.min() - HEARD) / turn) - 1, np.ceil((sensors.max() + HEARD) / turn) + 1)
-    place = phases[:, None] + turn * reach  # (n_phase, n_blow)
+    place = phases[:, None] + turn * reach  # (n_phase, n_impact)
     when = made.reference + (sign * (place - first) + made.passage.vehicle.wheel_places[wheel]) / made.speed
     way = np.abs(place[..., None] - sensors)
     known = ((when > time[0]) & (when < time[-1]))[..., None] & (way < HEARD)
@@ -154,7 +158,7 @@ def _ratios(made, time, loud, wheel, turn):
 
 
 def strikes(case):
-    """``Strikes`` of every wheel of every train of a case, the likeliest first."""
+    """``FlatEvidence`` of every wheel of every train of a case, the likeliest first."""
     found = []
     for train in case.trains:
         names = [o.name for o in case.observations if o.name in case.rollings]
@@ -168,15 +172,15 @@ def strikes(case):
     return sorted(found, key=lambda s: -s.nats)
 
 
-NAMED, CLOSE = 2, 3.0  # wheels offered, and nats of the blows that the second may be behind the first
-LEAST = 3.0  # nats of the blows, less the logarithm of the wheels, below which nobody looks closer
-ABOUT, APART = np.arange(-0.24, 0.25, 0.06), 0.15  # m: phases tried about that of the blows; closer ones look alike
-NEAR = (-0.03, 0.0, 0.03)  # m: and about the best of them
-MIDDLING, LENGTHS = 0.05, (0.025, 0.035, 0.045, 0.055, 0.07, 0.09)  # m
+NAMED, CLOSE = 2, 3.0  # wheels proposed; nats by which the second may lie behind the first
+LEAST = 3.0  # nats of the impacts, less the logarithm of the number of wheels, at least
+ABOUT, APART = np.arange(-0.24, 0.25, 0.06), 0.15  # m, trial phases about that of the impacts; their resolution
+NEAR = (-0.03, 0.0, 0.03)  # m, about the best of them
+MIDDLING, LENGTHS = 0.05, (0.025, 0.035, 0.045, 0.055, 0.07, 0.09)  # m, first and trial lengths
 
 
 def flats(case, fit):
-    """Candidates of the wheels that most likely carry a flat."""
+    """Candidates of the wheels that most likely have a flat."""
     found, known = strikes(case), {c.where.get("train") for c in fit.candidates if "axle" in c.where}
     loud = [s for s in found if s.nats > LEAST + np.log(len(found)) and s.train not in known]
     loud = [s for s in loud if s.nats > loud[0].nats - CLOSE]
@@ -198,17 +202,17 @@ def _candidate(case, fit, struck, wheels):
 
 
 def _sized(case, fit, struck):
-    """(length [m], phases, nats) at which the simulated flat explains most of the band, loss of contact included."""
+    """(length [m], phases, nats) at which the simulated flat explains most of the band, with loss of contact."""
     phases = _turned(case, fit, struck, struck.phases, ABOUT, MIDDLING)
     length, gain = _longest(case, fit, struck, phases)
-    if gain > 0.0:  # else none of any length explains anything
+    if gain > 0.0:  # else a flat of no length explains anything
         phases = _turned(case, fit, struck, phases, NEAR, length)
         length, gain = _longest(case, fit, struck, phases)
     return length, phases, max(gain, 0.0)
 
 
 def _turned(case, fit, struck, phases, about, length):
-    """The phases moved to where a flat of this length explains most."""
+    """The phases shifted to where a flat of this length explains most."""
     found = []
     for name, phase in phases:
         tried = [(_gain(case, fit, struck, name, phase + more, length), float(phase + more)) for more in about]
@@ -224,7 +228,7 @@ def _longest(case, fit, struck, phases):
 
 
 def _gain(case, fit, struck, name, phase, length):
-    """Nats that a flat explains of one passage, all else as fitted."""
+    """Nats that a flat explains in one passage, all else as fitted."""
     k = next(i for i, o in enumerate(case.observations) if o.name == name)
     o = case.observations[k]
     term = physics.WheelFlat(struck.wheel, length, struck.radius, phase, struck.train)

@@ -1,0 +1,139 @@
+"""Names are words of the field: read from the syntax trees of every module of the two packages."""
+
+import ast
+import re
+
+import pytest
+
+# Words that say nothing of what is in a variable. Stored names (assigned names and parameters) are counted.
+EMPTY = frozenset(
+    """asked begun best both done found given heard held kept kind known left made mine noted other others own part
+    parts rest said seen shown stuff taken thing things told way ways""".split()
+)
+MAX_EMPTY_SHARE = 0.005  # of all stored names
+
+# Past participles that do not end in "ed", as they were once used for functions and modules.
+IRREGULAR = frozenset(
+    """begun bent borne bound broken brought built chosen cut drawn driven fallen felt found given gone heard held
+    hidden hung kept known laid led left lost made meant met paid put read said seen sent set shown shut sought
+    spent split spun struck stuck sunk swept taken taught thought thrown told torn understood won worn written""".split()
+)
+NOT_PARTICIPLES = frozenset({"seed", "speed", "feed", "need", "embed", "exceed", "read", "set", "put", "split", "cut"})
+NO_NOUNS = frozenset(
+    """above absorbed accept across add afresh again against alone aloud anew apart aside away before behind below
+    beside between beyond by calibrate compare compute distinguish far frozen heard identify legible make moved near
+    often only prepare quiet register settled stored together unlike unused visible why write""".split()
+)
+# Words of the private dialect of former versions, and the term of docs/glossary.md that replaces each.
+DIALECT = {
+    "blow": "impact",
+    "blows": "impacts",
+    "foretell": "predict",
+    "foretold": "predicted",
+    "mended": "fixed",
+    "struck": "position of an impact",
+    "unforetold": "unpredicted",
+    "whereabouts": "localization",
+}
+
+# At most 20 names may break a rule, each with its reason.
+EXCEPTIONS: dict[str, str] = {}
+
+
+def modules(repository):
+    for package in ("turnout", "turnout_blind"):
+        for path in sorted((repository / "src" / package).rglob("*.py")):
+            yield path.relative_to(repository / "src"), ast.parse(path.read_text(encoding="utf-8"))
+
+
+def stored_names(tree):
+    """(line, name) of every assigned name and parameter."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            yield node.lineno, node.id
+        elif isinstance(node, ast.arg):
+            yield node.lineno, node.arg
+
+
+def functions(tree):
+    """(line, name) of every function and method."""
+    for node in ast.walk(tree):
+        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+            yield node.lineno, node.name
+
+
+def is_bare_participle(name):
+    """Whether a function is named by one past participle, which hides if it asks, changes or searches.
+
+    >>> [is_bare_participle(name) for name in ("scored", "_heard", "with_errors", "speed", "score_candidates")]
+    [True, True, False, False, False]
+    """
+    word = name.strip("_").lower()
+    if "_" in word or word in NOT_PARTICIPLES:
+        return False
+    return word.endswith("ed") or word in IRREGULAR
+
+
+def is_no_noun(module):
+    """Whether the name of a module is a participle, an adverb, a preposition or a verb.
+
+    >>> [is_no_noun(name) for name in ("anew", "judged", "receptance_model", "wheel_flats")]
+    [True, True, False, False]
+    """
+    return is_bare_participle(module) or module in NO_NOUNS
+
+
+def test_few_stored_names_say_nothing_of_their_content(repository):
+    total, empty = 0, []
+    for path, tree in modules(repository):
+        for line, name in stored_names(tree):
+            total += 1
+            if name in EMPTY:
+                empty.append(f"src/{path}:{line} {name}")
+    assert len(empty) < MAX_EMPTY_SHARE * total, f"{len(empty)} of {total} stored names:\n" + "\n".join(empty)
+
+
+def test_no_function_is_named_by_a_bare_participle(repository):
+    wrong = [
+        f"src/{path}:{line} {name}"
+        for path, tree in modules(repository)
+        for line, name in functions(tree)
+        if is_bare_participle(name) and name not in EXCEPTIONS
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_every_module_is_named_by_a_noun(repository):
+    """Commands and the stages that they start are verbs of the command line and are not asked."""
+    wrong = [
+        f"src/{path}"
+        for path, _ in modules(repository)
+        if path.parts[1:2] not in (("cli",), ("stages",))
+        and path.parts[0] != "turnout_blind"
+        and is_no_noun(path.stem)
+        and path.stem not in EXCEPTIONS
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+@pytest.mark.parametrize("word", sorted(DIALECT))
+def test_no_name_uses_a_word_of_the_dialect(repository, word):
+    pattern = re.compile(rf"(?:^|_){word}(?:_|$)", re.IGNORECASE)
+    wrong = []
+    for path, tree in modules(repository):
+        for node in ast.walk(tree):
+            name = getattr(node, "id", None) or getattr(node, "name", None) or getattr(node, "arg", None)
+            if isinstance(name, str) and pattern.search(name) and name not in EXCEPTIONS:
+                wrong.append(f"src/{path}:{getattr(node, 'lineno', 0)} {name}: say {DIALECT[word]!r}")
+    assert not wrong, "\n".join(sorted(set(wrong)))
+
+
+def test_the_exceptions_are_few():
+    assert len(EXCEPTIONS) <= 20
+    assert all(EXCEPTIONS.values())
+
+
+def test_the_rules_find_what_they_forbid():
+    tree = ast.parse("def judged(found):\n    made = 1\n    return made")
+    assert [name for _, name in stored_names(tree)] == ["found", "made"]
+    assert [name for _, name in functions(tree) if is_bare_participle(name)] == ["judged"]
