@@ -31,7 +31,7 @@ class Trial:
     errors: list = field(default_factory=list)
     bounds: list = field(default_factory=list)
     covered: list = field(default_factory=list)
-    found: list = field(default_factory=list)
+    detected: list = field(default_factory=list)
     false_modes: list = field(default_factory=list)
 
     def rms(self):
@@ -55,7 +55,7 @@ def trial(location, n_test, seed, with_bound=False, **conditions) -> Trial:
         answer = identify(decays, test.rate, SETTINGS)
         modes = [answer.mode(band) for band in model.bands]
         near = [m is not None and abs(np.log(m.frequency) - truth[i, 0]) < 0.2 for i, m in enumerate(modes)]
-        result.found.append(near)
+        result.detected.append(near)
         seen = [f for f in answer.diagnostics.get("modes_in_fit", ()) if IN_BAND[0] <= f <= IN_BAND[1]]
         true = np.mean(test.frequency, axis=0)
         result.false_modes.append(sum(np.min(np.abs(f / true - 1.0)) > 0.1 for f in seen))
@@ -94,7 +94,7 @@ def accuracy():
         biased = max(trials, key=lambda name: trials[name].bias().max())
         bias = trials[biased].bias().max()
         yield Bar(f"B1 |bias| / rms, {snr:.0f} dB", bias, 0.3, n="n=200 x 8", note=f"worst at {biased}")
-        found = min(float(np.mean(t.found, axis=0).min()) for t in trials.values())
+        found = min(float(np.mean(t.detected, axis=0).min()) for t in trials.values())
         yield Bar(f"B1 found, {snr:.0f} dB", found, 1.0, sense=">=", n="n=200 x 8")
 
 
@@ -111,7 +111,7 @@ def unmodelled():
             figure = np.sqrt(np.mean(rms[:, i] ** 2))
             yield Bar(f"B2 ballast {what} rms, {snr:.0f} dB", figure, limits[i], "%", n="n=100 x 8", note=note)
         yield Bar(f"B2 rms / CRB with all modes unknown, largest, {snr:.0f} dB", (rms / bound).max(), 1.3)
-        found = min(float(np.mean(t.found, axis=0).min()) for t in trials)
+        found = min(float(np.mean(t.detected, axis=0).min()) for t in trials)
         yield Bar(f"B2 found, worst location and mode, {snr:.0f} dB", found, 0.95, sense=">=", n="n=100 x 8")
         false = max(float(np.mean(t.false_modes)) for t in trials)
         yield Bar(f"B2 false modes per test in 20-800 Hz, {snr:.0f} dB", false, 0.3, n="n=100 x 8")
@@ -236,8 +236,8 @@ def power():
                 identify(hammer_test("CP A7", 10, [9, k, i], spread=spread, shift=s).decays(), 20e3, SETTINGS)
                 for i, s in enumerate(((1.0, 1.0), (1.0, 1.0), shift))
             )
-            found.append(compare_tests(first, moved, band).found)
-            false.append(compare_tests(first, again, band).found)
+            found.append(compare_tests(first, moved, band).detected)
+            false.append(compare_tests(first, again, band).detected)
             fits.append(first.fit - moved.fit)
         change = 100.0 * (1.0 - min(shift))
         name = f"B10 {change:.0f} % {band} shift found, spread {100 * spread:.1f} %"

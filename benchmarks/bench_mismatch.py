@@ -21,7 +21,7 @@ from turnout.mismatch.engine.distinguishability import distinguishability
 from turnout.mismatch.engine.reserved_data import fit_percent, predict_reserved
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.planned_case import PlannedCase, measured_campaign, small_plan, turnout_plan
-from turnout.stages.mismatch_groups import reserved, telling
+from turnout.stages.mismatch_groups import reserved_names, select_passages
 
 EFFECTS = {
     "hanging_sleeper": (physics.HangingSleeper(39, 5e-4), {"place": 23.4}),
@@ -108,10 +108,10 @@ def planned():
 
     def seen(plan, family):
         matrix = distinguishability(PlannedCase(plan, families=(family,)))
-        return float(matrix.seen[0])
+        return float(matrix.detectability[0])
 
     one, two = small_plan((30.0,), passages=False), small_plan((5.0, 30.0), passages=False)
-    rolling = replace(small_plan((15.0,), speeds=(40.0,)), blows=())
+    rolling = replace(small_plan((15.0,), speeds=(40.0,)), hammer_points=())
     yield Bar("pad temperature from one temperature", seen(one, "pad_temperature"), 5.0, "nats")
     yield Bar("pad temperature from two", seen(two, "pad_temperature"), 1000.0, "nats", ">=")
     yield Bar("frequency-dependent pads from passages alone", seen(rolling, "zener_pad"), 5.0, "nats")
@@ -152,8 +152,8 @@ def whole_turnout():
     if WHOLE not in os.environ.get("TURNOUT_MISMATCH_CASES", ""):
         return
     campaign = measured_campaign(turnout_plan(), (physics.HangingSleeper(52, 8e-4),), 700)
-    chosen = telling(campaign.passages)  # as turnout diagnose does
-    campaign = replace(campaign, passages=tuple(chosen), reserved=reserved(chosen, campaign.hammer))
+    chosen = select_passages(campaign.passages)  # as turnout diagnose does
+    campaign = replace(campaign, passages=tuple(chosen), reserved=reserved_names(chosen, campaign.hammer))
     started = time.monotonic()
     with stopwatch() as watch:
         found = diagnose(TrackCase(campaign), progress=_said)
@@ -189,6 +189,6 @@ def inside(found, term):
         waves = [names.index("sine"), names.index("cosine")]
         size, covariance = found.fit.psi[waves], found.fit.covariance[n:, n:][np.ix_(waves, waves)]
         amplitude = np.hypot(*size)
-        se = np.hypot(np.sqrt(size @ covariance @ size) / amplitude, candidate.loose * amplitude)
+        se = np.hypot(np.sqrt(size @ covariance @ size) / amplitude, candidate.model_error_share * amplitude)
         return abs(amplitude - np.hypot(term.sine, term.cosine)) <= 1.96 * se
     return abs(found.fit.psi[0] - getattr(term, names[0])) <= 1.96 * found.fit.psi_se[0]

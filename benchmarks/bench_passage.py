@@ -27,7 +27,7 @@ from turnout.passage.score_regression import effects
 from turnout.passage.scores import fit_percent, score
 from turnout.passage.segmentation import cut_passages
 from turnout.passage.train_type import find_type
-from turnout.passage.wheel_basis import band_pass, filtered, wheel_basis
+from turnout.passage.wheel_basis import apply_filter, band_pass, wheel_basis
 
 ROOT = Path(__file__).resolve().parents[1]
 SETTINGS = PassageSettings()
@@ -60,7 +60,7 @@ def scores_and_times() -> Iterator[Bar]:
         for _ in range(5):
             p = struck(rng, location, start=1.2)
             detected = p.times / RATE + rng.normal(0.004, 0.001, p.times.size)
-            fit = fit_channel(p.samples, RATE, detected, 44.4, paper_model(location), SETTINGS, nulls=False)
+            fit = fit_channel(p.samples, RATE, detected, 44.4, paper_model(location), SETTINGS, with_null=False)
             fits.setdefault(location, []).append((fit.scores.fit, fit.scores.forecast, *_ceilings(p)))
     median = {k: np.median(v, axis=0) for k, v in fits.items()}
     for k, name in enumerate(("in-sample fit", "forecast")):
@@ -100,7 +100,7 @@ def scores_and_times() -> Iterator[Bar]:
 def _ceilings(passage):
     """Fit and forecast that the true response itself reaches on the noisy data. [%]"""
     through = band_pass(80, 800, 4, RATE)
-    data, clean = filtered(passage.samples, through), filtered(passage.clean, through)
+    data, clean = apply_filter(passage.samples, through), apply_filter(passage.clean, through)
     found = []
     for first, last in ((0.0, SETTINGS.score_window), (SETTINGS.forecast_train, 0.020)):
         rows = [np.arange(int(t + first * RATE), int(t + last * RATE)) for t in passage.times]
@@ -117,7 +117,7 @@ def noise_passages() -> Iterator[Bar]:
     own, best, left, null_left = [], [], [], []
     for _ in range(40):
         times = (0.3 + IC3 / 44.4) * RATE
-        data = filtered(rng.standard_normal(int(times[-1] + 5000)), through)
+        data = apply_filter(rng.standard_normal(int(times[-1] + 5000)), through)
         found, null = score(data, times, basis, SETTINGS), null_scores(data, times, random, SETTINGS)
         own.append(found.forecast)
         left.append(found.leave_one_out)
@@ -179,8 +179,8 @@ def axle_geometry() -> Iterator[Bar]:
         for _ in range(10):
             times = tools.passing_times(pattern, rng)
             total += 1
-            named += find_type(times, tools.both_ways(types), SETTINGS, place_se=0.03).type == pattern.type
-            unknown += find_type(times, others, SETTINGS, place_se=0.03).type == "unknown"
+            named += find_type(times, tools.both_ways(types), SETTINGS, position_se=0.03).type == pattern.type
+            unknown += find_type(times, others, SETTINGS, position_se=0.03).type == "unknown"
     yield Bar("30 types: named, speed unknown, axles 3 cm off", 100 * named / total, 99.0, "%", ">=", f"n={total}")
     yield Bar("30 types: unknown without the own template", 100 * unknown / total, 95.0, "%", ">=", f"n={total}")
 

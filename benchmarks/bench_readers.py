@@ -115,7 +115,7 @@ def bars():
 
 def _vendors():
     """B11: every set of pyuff's problem files, as pyuff reads it where pyuff gives all of it."""
-    from turnout.readers.uff_datasets import sets_of
+    from turnout.readers.uff_datasets import read_datasets
 
     folder = Path(__file__).resolve().parents[2] / "shared" / "data" / "uff58_reader_samples"
     files = sorted(folder.glob("*.uff"))
@@ -126,7 +126,7 @@ def _vendors():
     for path in files:
         theirs = pyuff.UFF(str(path)).read_sets()
         theirs = theirs if isinstance(theirs, list) else [theirs]
-        ours = sets_of(path.read_bytes())
+        ours = read_datasets(path.read_bytes())
         pairs = [(a.data, b["data"]) for a, b in zip(ours, theirs, strict=True) if b["type"] == 58]
         equal += all(np.array_equal(a, b) for a, b in pairs)
     yield Bar("B11: vendor files of UFF 58 and 58b that read", equal, len(files), "files", ">=", n=f"n={len(files)}")

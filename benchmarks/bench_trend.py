@@ -19,7 +19,7 @@ from benchmarks.trend_changes import bars as changes
 from benchmarks.trend_fleet import Fleet, drift, modes, step
 from turnout.config.settings.trend import TrendSettings
 from turnout.trend import chart_status, evaluate
-from turnout.trend.forecast import crossing, forecast, line
+from turnout.trend.forecast import crossing_interval, fit_line, forecast
 
 SETTINGS = TrendSettings()
 YEAR = 52
@@ -172,7 +172,7 @@ def dates(draws=2000):
         time = np.arange(YEAR * years) * 7.0
         truth = 5.0 - time[-1] / 365.25
         for values in noise - time / 365.25:
-            low, high = crossing(*[line(time, values, 0.2)[i] for i in (0, 1, 3)], -5.0, 0.8)
+            low, high = crossing_interval(*[fit_line(time, values, 0.2)[i] for i in (0, 1, 3)], -5.0, 0.8)
             inside += low <= truth and not (high < truth)
             verdicts.append(forecast(time, values, 0.2, SETTINGS).verdict if len(verdicts) < 300 else None)
         share = {v: verdicts[:300].count(v) / 300 for v in ("line", "line_or_settling", "no_limit", "settling")}
@@ -279,7 +279,7 @@ def drift_discoveries(turnouts=875):
 def real_track():
     """The real record: error of a campaign left out, with and without temperature; docs/niederwangen_decay_rate.md."""
     from benchmarks.niederwangen import analyse, verdict_words
-    from turnout.trend.drift import discoveries
+    from turnout.trend.drift import adjusted_p_values
 
     folder = Path(__file__).resolve().parents[2] / "shared" / "data" / "track_sbb_niederwangen"
     if not folder.is_dir():
@@ -298,7 +298,7 @@ def real_track():
         for name, error in (("with", with_t), ("without", without)):
             yield Bar(f"decay rate, {direction}, campaign left out, {name} temperature, median band",
                       100 * float(np.median(error)), None, "%", "", f"n = {error.size} bands")  # fmt: skip
-    q = discoveries(np.array([v.p_value for v in found["found"]]))
+    q = adjusted_p_values(np.array([v.p_value for v in found["found"]]))
     words = ", ".join(f"{s} {verdict_words(v, x)}" for s, v, x in zip(found["sections"], found["found"], q))
     yield Bar(
         "decay rate, sections that changed", sum(v.split is not None for v in found["found"]), None, "", "", "", words

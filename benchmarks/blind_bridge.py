@@ -21,8 +21,8 @@ from turnout.mismatch.engine.diagnose import diagnose
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.turnout.case import TrackCase
 from turnout.stages.mismatch_groups import groups
-from turnout.stages.mismatch_inputs import gather, track_of
-from turnout.stages.mismatch_rows import acts
+from turnout.stages.mismatch_inputs import gather_inputs, track_of
+from turnout.stages.mismatch_rows import location_fields
 from turnout.workflow.scan import scan
 
 LESSER = {
@@ -41,7 +41,7 @@ def campaigns_of(folder, case):
     raw = folder / "raw"
     turnout = with_raw(load_configuration(folder / "config").turnout(case), raw)
     track, _ = track_of(turnout)
-    found = gather(scan(turnout, raw).units, turnout, raw, track, {})
+    found = gather_inputs(scan(turnout, raw).units, turnout, raw, track, {})
     return [group.campaign for group in groups(turnout, track, found)]
 
 
@@ -107,7 +107,7 @@ def rows_of(diagnosis):
 
 
 def _row(verdict, candidate, fit, seen, found=None):
-    where = dict(candidate.where) if candidate else acts(found) if verdict == "unknown" else {}
+    where = dict(candidate.where) if candidate else location_fields(found) if verdict == "unknown" else {}
     mine = fit.part(candidate) if candidate and fit else None
     values = zip(candidate.parameters, fit.psi[mine], fit.psi_se[mine]) if mine else ()
     numbers = {p.name: {"value": float(v), "se": float(s), "unit": p.unit} for p, v, s in values}

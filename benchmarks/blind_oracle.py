@@ -57,7 +57,7 @@ def _with(case, fit, effect):
     """The best fit with this effect in it, where it is, from the truth itself and from the likeliest starts; what
     nuisances may have bent to take the effect's place starts at its prior as well."""
     found = {}
-    unbent = fit.values | {n.name: n.mean for n in case.nuisances if n.owner is None and n.bends}
+    unbent = fit.values | {n.name: n.mean for n in case.nuisances if n.owner is None and n.can_mask}
     for candidate in _candidates(case, effect):
         told = _told(candidate, effect)
         starts = [(told, fit.values), (told, unbent), *((s, fit.values) for s in _likeliest(case, fit, candidate))]

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from turnout.trend.drift import discoveries
+from turnout.trend.drift import adjusted_p_values
 from turnout.trend.sparse_campaigns import (
     Block,
     deviance,
@@ -65,7 +65,7 @@ def analyse(folder, n_permutation=4000):
             for s, section in enumerate(sections):
                 table.append([name, band, section, at[s], step[i, s], error[i, s], p_value[i, s], freedom])
     table = pd.DataFrame(table, columns=["direction", "band", "section", "split", "log", "error", "p", "freedom"])
-    table["q"] = discoveries(table["p"].to_numpy())
+    table["q"] = adjusted_p_values(table["p"].to_numpy())
     best = find_splits(together)
     loco = {name: (left_out_error(b, best), left_out_error(b, best, "")) for name, b in blocks.items()}
     slopes = {name: steps(b, best)[3:] for name, b in blocks.items()}
@@ -100,7 +100,7 @@ def verdict_words(v, q):
 
 def section_rows(a):
     """One line per section of the table of verdicts."""
-    q = discoveries(np.array([v.p_value for v in a["found"]]))
+    q = adjusted_p_values(np.array([v.p_value for v in a["found"]]))
     for s, (section, v) in enumerate(zip(a["sections"], a["found"])):
         part = a["table"].query("section == @section and q <= 0.05")
         named = []
@@ -261,7 +261,7 @@ def open_case(a, s):
 
 def page(a):
     """The page as text."""
-    q = discoveries(np.array([v.p_value for v in a["found"]]))
+    q = adjusted_p_values(np.array([v.p_value for v in a["found"]]))
     quiet = [s for s, v, x in zip(a["sections"], a["found"], q) if not v.split and x > 0.1]
     lateral = a["table"].query("direction == 'lateral'")
     spread = {s: np.ptp(unchanged_ratio(a, s)) for s in quiet or a["sections"]}
@@ -286,7 +286,7 @@ def page(a):
         common=when(a["common"], a["campaigns"]), section_names=" | ".join(a["sections"]),
         section_rule="---|" * len(a["sections"]), bands="\n".join(band_rows(a)),
         better=sum(int((w < o).sum()) for w, o in a["loco"].values()), hottest=means.max(),
-        second=means.drop(means.idxmax()).max(), significant=int((discoveries(p_slope) <= 0.05).sum()),
+        second=means.drop(means.idxmax()).max(), significant=int((adjusted_p_values(p_slope) <= 0.05).sum()),
     )  # fmt: skip
 
 

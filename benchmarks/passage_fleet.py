@@ -7,7 +7,7 @@ import numpy as np
 from turnout.passage.result import PassageSensor
 from turnout.records import Channel, Recording
 from turnout.simulate import Sensor, car, load_track, load_vehicle, prepare_passage, simulate_passage
-from turnout.simulate.train import coupled
+from turnout.simulate.train import couple
 
 RATE = 20000.0
 # Places [m] of twelve sensors of the train's track; two of the other one feel it faintly.
@@ -43,7 +43,7 @@ def strangers():
     short = car("stranger", half_base=1.05, half_pivot=6.4, length=17.6, overhang=1.35)
     long = car("stranger", half_base=1.40, half_pivot=9.9, length=27.1, overhang=2.25)
     mixed = [short, long, short]
-    return [coupled("stranger", [short] * 4), coupled("stranger", [long] * 3), coupled("stranger", mixed)]
+    return [couple("stranger", [short] * 4), couple("stranger", [long] * 3), couple("stranger", mixed)]
 
 
 def simulate(vehicle, name, speed_kmh, direction, route, prepared, track, seed=1):
@@ -64,7 +64,7 @@ def simulate(vehicle, name, speed_kmh, direction, route, prepared, track, seed=1
     )
     load = float(np.mean(2.0 * vehicle.static_loads)) / 9806.65
     return Run(
-        recording.samples.astype(np.float32), name, speed_kmh / 3.6, direction, route, vehicle.wheel_places, load
+        recording.samples.astype(np.float32), name, speed_kmh / 3.6, direction, route, vehicle.wheel_positions, load
     )
 
 

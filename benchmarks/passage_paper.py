@@ -12,7 +12,7 @@ from benchmarks.passage_truth import RATE, paper_model
 from turnout.passage.channel_fit import fit_channel
 from turnout.passage.model_tests import random_models
 from turnout.passage.score_regression import effects
-from turnout.passage.wheel_basis import band_pass, filtered
+from turnout.passage.wheel_basis import apply_filter, band_pass
 
 SENSOR, PLACE, LOCATION = 7, 24.6, "CP A7"
 INTERVALS = (0.02, 0.005, 0.002, 0.001)
@@ -39,7 +39,7 @@ def paper_trends(runs, settings, noise=0.2) -> Iterator[Bar]:
     for run in (r for r in runs if r.route == "main"):
         samples = run.samples[SENSOR] + noise * rng.standard_normal(run.samples.shape[1])
         times = _passing(run, len(samples) / RATE)
-        data = filtered(samples, through)[int(times[0] * RATE) : int((times[-1] + 0.05) * RATE)]
+        data = apply_filter(samples, through)[int(times[0] * RATE) : int((times[-1] + 0.05) * RATE)]
         for t in INTERVALS:
             null = [reestimated_fit(data, m, t) for m in random]
             by_interval[t].append((reestimated_fit(data, model, t), np.median(null), np.quantile(null, 0.95)))

@@ -10,7 +10,7 @@ from turnout.registry.generation import Generation, commit, schema_of
 from turnout.registry.parquet import read_live, write_sorted
 from turnout.registry.schema import names, tables
 from turnout.registry.staging import connect
-from turnout.registry.supersede import last_word, with_dead
+from turnout.registry.supersede import count_superseded, latest_supersession
 
 WEEKS, WEEKS_A_YEAR, FIRST = 520, 52, "2016-01-04 10:00:00"
 # Two uniform numbers from a hash, one normal number from them: the same rows on every machine.
@@ -75,8 +75,8 @@ def make_network(root: Path, turnouts: int = 3500) -> Generation:
     con.execute(
         "create view said as " + read_live(con, root, "supersedes", [f for f in files if f.table == "supersedes"])
     )
-    con.execute(f"create table superseded as {last_word('said')}")
-    files = with_dead(con, root, files)
+    con.execute(f"create table superseded as {latest_supersession('said')}")
+    files = count_superseded(con, root, files)
     schemas = {f.schema: schema_of(f.table) for f in files}
     generation = Generation(1, sorted(files, key=lambda f: f.path), [], schemas)
     commit(root, generation)

@@ -11,7 +11,7 @@ import duckdb
 from turnout.registry.compaction import compact
 from turnout.registry.database import build_database, open_registry
 from turnout.registry.generation import commit, delete_files, due_for_deletion, load, schema_of
-from turnout.registry.lock import locked
+from turnout.registry.lock import registry_lock
 from turnout.registry.parquet import write_sorted
 from turnout.registry.staging import connect
 
@@ -36,7 +36,7 @@ class Outcome:
 
 def append(root: Path, k: int) -> None:
     """One batch of ``ROWS`` rows, by the steps of a registration."""
-    with locked(root):
+    with registry_lock(root):
         now, con = load(root), connect()
         now.number += 1
         file = write_sorted(con, root, "modes", 2026, BATCH.format(k=k, rows=ROWS), f"batch-{k}")

@@ -7,7 +7,7 @@ that in which ``turnout demo`` was run.
 import sys
 from pathlib import Path
 
-from turnout.cli.query import shown
+from turnout.cli.query import format_table
 from turnout.registry.database import open_registry
 
 MARKS = "<!-- examples: generated, do not edit -->", "<!-- end of examples -->"
@@ -32,7 +32,7 @@ def examples(registry) -> str:
     parts = []
     with open_registry(registry) as con:
         for title, sql in QUERIES.items():
-            parts.append(f"{title}:\n\n```sql\n{sql}\n```\n```\n{shown(con.sql(sql))}\n```\n")
+            parts.append(f"{title}:\n\n```sql\n{sql}\n```\n```\n{format_table(con.sql(sql))}\n```\n")
     return "\n".join(parts)
 
 

@@ -170,7 +170,7 @@ class DecayCase(Case):
     ``reserved`` is a campaign that only the verification reads; ``priors`` {name: (mean, sd)} from ``calibrate``.
     """
 
-    frozen_jacobian = True
+    expensive = True
 
     def __init__(self, measured, reserved=None, priors=None, only=None):
         self.measured, kept = measured, only or measured.campaigns
@@ -193,18 +193,18 @@ class DecayCase(Case):
 
     def predict(self, values, terms, observations):
         """Whitened logarithm of the decay rate of each band, with the changes that are there by then."""
-        return [self.white[o.kind] @ self.logarithm(values, terms, o) for o in observations]
+        return [self.white[o.data_type] @ self.logarithm(values, terms, o) for o in observations]
 
     def logarithm(self, values, terms, o):
         """(n_band,) logarithm of the decay rate that the model has under the conditions of an observation."""
         temperature = o.covariates["rail_temperature"]
-        support, gain = track_of(values, o.kind, temperature), 0.0
+        support, gain = track_of(values, o.data_type, temperature), 0.0
         for change in terms:
             if o.condition >= change.since:
-                support = changed(support, change, o.kind, temperature)
+                support = changed(support, change, o.data_type, temperature)
                 gain += change.amounts[0] if change.what == "measured_gain" else 0.0
-        offset = np.array([values[f"{o.kind}_{b:.0f}"] for b in BANDS])
-        return _logarithm(o.kind, support) + offset + gain
+        offset = np.array([values[f"{o.data_type}_{b:.0f}"] for b in BANDS])
+        return _logarithm(o.data_type, support) + offset + gain
 
     def nuisance_jacobian(self, values, terms, observations, base):
         """The bands' own errors exactly, the rest by differences."""
@@ -218,7 +218,7 @@ class DecayCase(Case):
             else:
                 direction, band = nuisance.name.split("_")
                 for o, jacobian in zip(observations, found):
-                    if o.kind == direction:
+                    if o.data_type == direction:
                         jacobian[:, k] = self.white[direction][:, BANDS == float(band)][:, 0]
         return found
 
@@ -232,4 +232,4 @@ def _nuisances(priors):
             sd = next(s for top, s in OPEN if band <= top)
             name = f"{direction}_{band:.0f}"
             mean, sd = priors.get(name, (0.0, sd))
-            yield Nuisance(name, "ln", mean, sd, meaning="error of the model in this band", bends=False)
+            yield Nuisance(name, "ln", mean, sd, meaning="error of the model in this band", can_mask=False)

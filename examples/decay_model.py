@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm
 
-from turnout.simulate.decay_rate import GRID
+from turnout.simulate.decay_rate import DISTANCES
 
 BANDS = np.array([100, 125, 160, 200, 250, 315, 400, 500, 630, 800, 1000, 1250, 1600, 2000, 2500, 3150, 4000, 5000.0])
 LINES = 5  # per band
@@ -55,7 +55,7 @@ def decay_rate(beam, support, bands=BANDS, lines=LINES):
     frequency = (np.asarray(bands)[:, None] * np.geomspace(1.0 / edge, edge, lines)).ravel()
     h = responses(beam, support, frequency) * (frequency**2)[:, None]
     energy = np.mean(np.abs(h.reshape(len(bands), lines, -1)) ** 2, axis=1)
-    x = SPACING * GRID
+    x = SPACING * DISTANCES
     middle = 0.5 * (x[1:] + x[:-1])
     width = np.diff(np.concatenate([[x[0]], middle, [x[-1] + 0.5 * (x[-1] - x[-2])]]))
     return 4.343 / ((energy / energy[:, :1]) @ width)
@@ -79,8 +79,8 @@ def responses(beam, support, frequency):
     for _ in range(3):
         step = quarter @ step
         parts.append(step[:, 0, :])
-    found = np.empty((omega.size, GRID.size), dtype=complex)
-    for k, x in enumerate(GRID):
+    found = np.empty((omega.size, DISTANCES.size), dtype=complex)
+    for k, x in enumerate(DISTANCES):
         bays, rest = divmod(round(4.0 * x) + 2, 4)  # quarters of a bay behind the support before the force
         found[:, k] = np.sum(parts[rest] * amount * multiplier[:, :2] ** bays, axis=1)
     return found

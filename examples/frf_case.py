@@ -57,7 +57,7 @@ class FrfCase(Case):
     first is free. ``reserved`` blows are read by the verification alone.
     """
 
-    frozen_jacobian = True
+    expensive = True
 
     def __init__(self, frequency, h, band, peaks, reserved=(), rigid=0, beam=False, without=(), step=3, blown=None):
         inside = np.flatnonzero((frequency >= band[0]) & (frequency <= band[1]))[::step]
@@ -90,20 +90,20 @@ class FrfCase(Case):
         for r, peak in enumerate(peaks):
             f, zeta, shape = self.read_off(peak)
             if r == 0 or not self.beam:
-                yield Nuisance(f"log_frequency_{r}", "ln(Hz)", float(np.log(f)), 0.01, trust=STEP)
-            yield Nuisance(f"log_damping_{r}", "ln", float(np.log(zeta)), 0.5, trust=STEP)
+                yield Nuisance(f"log_frequency_{r}", "ln(Hz)", float(np.log(f)), 0.01, max_step_sd=STEP)
+            yield Nuisance(f"log_damping_{r}", "ln", float(np.log(zeta)), 0.5, max_step_sd=STEP)
             widest = float(np.max(np.abs(shape)))
             for s, value in enumerate(shape):
-                yield Nuisance(f"shape_{r}_{s}", "kg^-1/2", float(value), 0.3 * widest, trust=2.0, bends=False)
+                yield Nuisance(f"shape_{r}_{s}", "kg^-1/2", float(value), 0.3 * widest, max_step_sd=2.0, can_mask=False)
         for r in range(self.rigid):
-            yield Nuisance(f"log_frequency_rigid{r}", "ln(Hz)", float(np.log(SOFT)), 0.4, trust=STEP)
+            yield Nuisance(f"log_frequency_rigid{r}", "ln(Hz)", float(np.log(SOFT)), 0.4, max_step_sd=STEP)
             shape = self.stiff_shape(r)
             widest = float(np.max(np.abs(shape)))
             for s, value in enumerate(shape):
-                yield Nuisance(f"shape_rigid{r}_{s}", "kg^-1/2", value, 0.5 * widest, trust=2.0, bends=False)
+                yield Nuisance(f"shape_rigid{r}_{s}", "kg^-1/2", value, 0.5 * widest, max_step_sd=2.0, can_mask=False)
         for o in (*self.observations, *self.reserved):
-            yield Nuisance(f"hammer@{o.name}", "-", 0.0, 0.05, o.name, (-0.2, 0.2), trust=STEP)
-            yield Nuisance(f"stretch@{o.name}", "-", 0.0, 5e-4, o.name, trust=STEP)
+            yield Nuisance(f"hammer@{o.name}", "-", 0.0, 0.05, o.name, (-0.2, 0.2), max_step_sd=STEP)
+            yield Nuisance(f"stretch@{o.name}", "-", 0.0, 5e-4, o.name, max_step_sd=STEP)
 
     def read_off(self, about, share=1.0 / 6.0):
         """(frequency, damping ratio, shape (n_place,)) of the highest line within ``share`` octaves of ``about``."""
@@ -134,7 +134,7 @@ class FrfCase(Case):
         near = (frequency > 2.0 * SOFT) & (frequency < 3.0 * SOFT)
         return self._shape(np.mean(h[:, :, near].real, axis=2), rank)
 
-    def cheap(self, observation):
+    def is_cheap(self, observation):
         """All are: their derivatives are made anew at every step."""
         return True
 

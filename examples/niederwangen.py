@@ -117,7 +117,7 @@ def bands_changed(measured, priors):
     values = {name: mean for name, (mean, _) in priors.items()}
     found = {}
     for direction in DIRECTIONS:
-        mine = [o for o in case.observations if o.kind == direction and o.condition != measured.campaigns[0]]
+        mine = [o for o in case.observations if o.data_type == direction and o.condition != measured.campaigns[0]]
         factor = np.array([measured.log[direction, o.condition] - case.logarithm(values, (), o) for o in mine])
         error = np.sqrt(measured.spread[direction] ** 2 + measured.repeat[direction] ** 2)
         found[direction] = factor, error * np.sqrt(1.0 + 1.0 / len(mine))

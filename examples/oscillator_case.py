@@ -49,7 +49,7 @@ def law_candidates(without=()):
             starts = ((0.05,), (0.5 if bounds[0] < 0.0 else 0.2,))
             found.append(
                 Candidate(name, (parameter,), lambda psi, n=name, k=kind: LawTerm(n, k, psi["amount"]), starts,
-                          frame="amplitude", kin="oscillator")
+                          frame="amplitude", component="oscillator")
             )  # fmt: skip
     return tuple(found)
 
@@ -155,7 +155,7 @@ class OscillatorCase(Case):
             found.append(y[self.skipped : self.skipped + o.data.size] + values.get("offset", 0.0))
         return found
 
-    def latent(self, fit):
+    def latent_covariates(self, fit):
         """Missing feedback from the recorded motion: what the model's equation lacks, over ω²."""
         omega, damping = 2.0 * np.pi * fit.values["frequency"], fit.values["damping"]
         parts = []

@@ -50,22 +50,22 @@ def study(planned):
     """(case, fit to blows alone, its passages, diagnosis) of a plan under the concealed effect."""
     campaign = measured_campaign(planned, (physics.PadPreload(SLOPE),), SEED)
     case = TrackCase(campaign)
-    blows = [o for o in case.observations if o.kind == "hammer"]
+    blows = [o for o in case.observations if o.data_type == "hammer"]
     unloaded = fit_jointly(case, observations=blows, iterations=15)
-    passages = [o for o in case.observations if o.kind == "passage"]
+    passages = [o for o in case.observations if o.data_type == "passage"]
     return case, case.predict(unloaded.values, (), passages), diagnose(case)
 
 
 def densities(case, values):
     """sensor -> (frequency, PSD) of the first passage's ``values`` (n_sensor * n,)."""
-    made = next(iter(case.rollings.values()))
+    made = next(iter(case.aligned_passages.values()))
     rows, rate = np.reshape(values, (len(made.sensors), -1)), 1.0 / float(np.mean(np.diff(made.time)))
     return {s.name: welch(row, rate, nperseg=min(row.size, 256)) for s, row in zip(made.sensors, rows)}
 
 
 def models(case, unloaded, found):
     """name -> values of the first passage: recorded, and by each model."""
-    k = next(i for i, o in enumerate(case.observations) if o.kind == "passage")
+    k = next(i for i, o in enumerate(case.observations) if o.data_type == "passage")
     shown = {
         "recorded": case.observations[k].data,
         "calibrated on blows alone": unloaded[0],
@@ -112,7 +112,7 @@ def answer_row(name, case, found):
     """What the diagnosis says of one campaign."""
     v = found.verdict
     said = v.answer.replace("_", " ") + (f" {v.grade}" if v.grade else "")
-    n = sum(o.kind == "passage" for o in (*case.observations, *case.reserved))
+    n = sum(o.data_type == "passage" for o in (*case.observations, *case.reserved))
     names = ", ".join(v.names).replace("_", " ") or "–"
     return [name, n, f"**{said}**", names, f"{v.probability:.2f}", v.reason or "–", _unseen(found.verification)]
 
@@ -209,7 +209,7 @@ def outcome(found):
 
 def _sized(score):
     """Whether the size of a right name holds the truth."""
-    (slope, *_), (se, *_) = score.own
+    (slope, *_), (se, *_) = score.estimates
     low, high = slope - 1.96 * se, slope + 1.96 * se
     told = f"{slope:.0f} ({low:.0f} to {high:.0f}, 95 %) N/m per N where {SLOPE:.0f} were concealed"
     if low <= SLOPE <= high:

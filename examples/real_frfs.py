@@ -207,7 +207,7 @@ def nothing_known(d):
         return (
             f"said to be unknown**: {reason}. The fit of the blow never used is {check.before:.1f} %, best of series A."
         )
-    told = "a false name, not withdrawn" if check.fell else "named, and we cannot check it"
+    told = "a false name, not withdrawn" if check.is_worse else "named, and we cannot check it"
     return (
         f"{told}.** Nothing was left out that we know of; the fit of the blow never used goes from {check.before:.1f}\n"
         f"  to {check.after:.1f} % (standard error of the difference {check.error:.1f}). Resonances above the band\n"
@@ -219,7 +219,7 @@ def plain_beam(d):
     """What was said of a beam without shear and rotatory inertia, beside what its printed frequencies say."""
     if d.verdict.names[:1] != ("shear_and_rotation",):
         return f"said to be unknown**: {d.verdict.reason.replace('_', ' ')}."
-    (size, *_), (error, *_) = d.verdict.scores[0].own
+    (size, *_), (error, *_) = d.verdict.scores[0].estimates
     printed, half, above = beam_printed()
     mine, theirs = f"{1e4 * size:.3f} ± {1.96e4 * error:.3f}", f"{1e4 * printed:.2f} ± {1e4 * half:.2f}"
     return (

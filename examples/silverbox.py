@@ -54,14 +54,14 @@ def law_rows(case, diagnosis):
         return [f"{percent:.1f} % ({missed:.2f} mV)" for percent, missed in held_out(case, fit)]
 
     yield ["linear base", "0", "", *shown(diagnosis.base)]
-    for score in diagnosis.scored or diagnosis.verdict.scores:
+    for score in diagnosis.scores or diagnosis.verdict.scores:
         amount = f"{score.fit.psi[0]:.3f} ± {1.96 * score.fit.psi_se[0]:.3f}"
         yield [score.family.replace("_", " "), f"{score.gain:.0f}", amount, *shown(score.fit)]
 
 
 def missing_force(case, fit):
     """Free law of the force that ``fit`` lacks."""
-    seen = case.latent(fit)
+    seen = case.latent_covariates(fit)
     return latent_law(seen["force"], {k: seen[k] for k in ("displacement", "velocity", "time")}, seen["unit"])
 
 

@@ -1,8 +1,8 @@
 """Rule of any stage: the plan of one shard in, its new units computed, its mark out."""
 
-from turnout.threads import one_thread
+from turnout.threads import use_one_thread
 
-one_thread()
+use_one_thread()
 
 from turnout.workflow.jobs import stage_job  # noqa: E402
 

@@ -81,7 +81,7 @@ class Row(Case):
                 starts,
                 {"spring": spring},
                 "place",
-                scanned=3,
+                n_scanned=3,
             )
             for kind, unit, bounds, starts in (
                 ("play", "m", (0.0, 2e-3), ((1e-4,), (4e-4,))),

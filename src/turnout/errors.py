@@ -31,11 +31,11 @@ class ReadError(TurnoutError):
     A7_1.uff, record 7 of 30: ends after 1312 of 4096 samples. Copy the file again.
     """
 
-    def __init__(self, path, where, found, remedy, reason="unreadable"):
-        super().__init__(f"{path}, {where}: {found}. {remedy}.")
+    def __init__(self, path, where, problem, remedy, reason="unreadable"):
+        super().__init__(f"{path}, {where}: {problem}. {remedy}.")
         if reason not in REASONS:
             raise ValueError(f"reason {reason!r} is not in turnout.errors.REASONS")
-        self.path, self.where, self.found, self.remedy, self.reason = str(path), where, found, remedy, reason
+        self.path, self.where, self.problem, self.remedy, self.reason = str(path), where, problem, remedy, reason
 
 
 class PartlyComputed(Exception):
@@ -56,9 +56,9 @@ class ConfigError(TurnoutError):
     ``place`` is "line 12, column 5" or the key; ``remedy`` is what to write instead.
     """
 
-    def __init__(self, path, place, found, remedy):
-        super().__init__(f"{path}, {place}: {found}. {remedy}.")
-        self.path, self.place, self.found, self.remedy = str(path), place, found, remedy
+    def __init__(self, path, place, problem, remedy):
+        super().__init__(f"{path}, {place}: {problem}. {remedy}.")
+        self.path, self.place, self.problem, self.remedy = str(path), place, problem, remedy
 
 
 class ConfigErrors(TurnoutError):
@@ -79,25 +79,25 @@ class RegistryError(TurnoutError):
 
 # errno codes of the machine, not of the data. Transient ones concern one file: the next run tries it again.
 # The others concern every file and end the job.
-ONE_FILE = {errno.EIO, errno.ESTALE, errno.EREMOTEIO, errno.ETIMEDOUT, errno.ENOMEM, errno.EACCES}
-EVERY_FILE = {errno.ENOSPC, errno.EDQUOT, errno.EMFILE, errno.ENFILE}
+TRANSIENT_ERRNOS = {errno.EIO, errno.ESTALE, errno.EREMOTEIO, errno.ETIMEDOUT, errno.ENOMEM, errno.EACCES}
+SYSTEM_ERRNOS = {errno.ENOSPC, errno.EDQUOT, errno.EMFILE, errno.ENFILE}
 
 
-def of_the_machine(error: BaseException) -> bool:
+def is_infrastructure(error: BaseException) -> bool:
     """Whether ``error`` is a fault of the machine or the network, not of the data of the unit."""
-    return passing(error) or (isinstance(error, OSError) and error.errno in EVERY_FILE)
+    return is_transient(error) or (isinstance(error, OSError) and error.errno in SYSTEM_ERRNOS)
 
 
-def passing(error: BaseException) -> bool:
+def is_transient(error: BaseException) -> bool:
     """Whether ``error`` is a transient fault: its unit is left for the next run while the other units continue.
 
     Examples are a bad sector, a server that does not answer, a file without read permission, and too little free
     memory.
 
-    >>> passing(OSError(errno.EIO, "Input/output error")), passing(OSError(errno.ENOSPC, "No space left on device"))
-    (True, False)
+    >>> [is_transient(OSError(code, "")) for code in (errno.EIO, errno.ENOSPC)]
+    [True, False]
     """
-    return isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno in ONE_FILE)
+    return isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno in TRANSIENT_ERRNOS)
 
 
 # All reasons of a quarantine row or of a rejected impact, with their meaning.

@@ -13,11 +13,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 
-def beside(path: Path) -> Path:
+def temporary_path(path: Path) -> Path:
     """Hidden name in the folder of ``path`` for an unfinished file; no other process or machine uses it.
 
-    >>> name = beside(Path("pages/a.html"))
-    >>> name.parent.name, name.name.startswith(".a.html."), name.suffix, name == beside(Path("pages/a.html"))
+    >>> name = temporary_path(Path("pages/a.html"))
+    >>> name.parent.name, name.name.startswith(".a.html."), name.suffix, name == temporary_path(Path("pages/a.html"))
     ('pages', True, '.tmp', False)
     """
     return path.with_name(f".{path.name}.{secrets.token_hex(6)}.tmp")
@@ -30,7 +30,7 @@ def write_atomic(path: os.PathLike, write: Callable) -> None:
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = beside(path)
+    temporary = temporary_path(path)
     try:
         with open(temporary, "wb") as stream:
             if path.exists():
@@ -63,7 +63,7 @@ def write_if_changed(path: os.PathLike, text: str) -> bool:
     return True
 
 
-def is_cut(path: os.PathLike, end: str) -> bool:
+def is_truncated(path: os.PathLike, end: str) -> bool:
     """Whether an existing file lacks its last line ``end``; only the end of the file is read."""
     try:
         with open(path, "rb") as stream:
@@ -73,12 +73,12 @@ def is_cut(path: os.PathLike, end: str) -> bool:
         return False
 
 
-def read_json(path: os.PathLike, otherwise):
+def read_json(path: os.PathLike, default):
     """Content of a JSON file of ``work/``; ``default`` if it is absent, or (with a warning) if it is truncated."""
     try:
         return json.loads(Path(path).read_text(encoding="utf-8"))
     except FileNotFoundError:
-        return otherwise
+        return default
     except ValueError as error:
         logging.getLogger("turnout.workflow").warning("%s is cut or no JSON (%s): it is made again", path, error)
-        return otherwise
+        return default

@@ -22,34 +22,34 @@ def fingerprint(*modules: str) -> str:
     >>> fingerprint("turnout.errors") == fingerprint("turnout.records")
     False
     """
-    found = closure(*modules)
-    text = "\n".join(f"{name} {_tree(name)[0]}" for name in sorted(found))
+    names = closure(*modules)
+    text = "\n".join(f"{name} {_digest_and_imports(name)[0]}" for name in sorted(names))
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def closure(*modules: str) -> frozenset[str]:
     """Names of ``modules`` and of every module of this package that they import, directly or not."""
-    found, waiting = set(), list(modules)
+    names, queue = set(), list(modules)
     for name in modules:
-        if _file(name) is None:
+        if _module_path(name) is None:
             raise ValueError(f"no module {name} in the package {PACKAGE}")
-    while waiting:
-        name = waiting.pop()
-        if name not in found and _file(name):
-            found.add(name)
-            waiting += _tree(name)[1]
-    return frozenset(found)
+    while queue:
+        name = queue.pop()
+        if name not in names and _module_path(name):
+            names.add(name)
+            queue += _digest_and_imports(name)[1]
+    return frozenset(names)
 
 
-def forget() -> None:
+def clear_caches() -> None:
     """Forget the cached hashes: source files changed while this process was running."""
-    _file.cache_clear()
-    _tree.cache_clear()
-    _beside.cache_clear()
+    _module_path.cache_clear()
+    _digest_and_imports.cache_clear()
+    _data_in_folder.cache_clear()
 
 
 @cache
-def _file(name: str) -> Path | None:
+def _module_path(name: str) -> Path | None:
     if name.partition(".")[0] != PACKAGE:
         return None
     path = ROOT.joinpath(*name.split(".")[1:])
@@ -59,9 +59,9 @@ def _file(name: str) -> Path | None:
 
 
 @cache
-def _tree(name: str) -> tuple[str, tuple[str, ...]]:
+def _digest_and_imports(name: str) -> tuple[str, tuple[str, ...]]:
     """Hash of one module without its docstrings, and the names of the modules that it may import."""
-    path = _file(name)
+    path = _module_path(name)
     if path is None:
         raise ValueError(f"no module {name} in the package {PACKAGE}")
     tree = ast.parse(path.read_text(encoding="utf-8"))
@@ -71,26 +71,26 @@ def _tree(name: str) -> tuple[str, tuple[str, ...]]:
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)) and _has_docstring(node):
             node.body = node.body[1:] or [ast.Pass()]
     digest = hashlib.sha256(ast.dump(tree).encode())
-    for data in _data(path.parent, nodes):
+    for data in _data_files(path.parent, nodes):
         digest.update(data.name.encode() + data.read_bytes())
     return digest.hexdigest(), tuple(imported)
 
 
-def _data(folder: Path, nodes: list[ast.AST]) -> list[Path]:
+def _data_files(folder: Path, nodes: list[ast.AST]) -> list[Path]:
     """Tables in the folder of a module, and all files of the data folders that it names."""
-    tables, folders = _beside(folder)
+    tables, folders = _data_in_folder(folder)
     if not folders:
         return list(tables)
-    named = {node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)}
-    return sorted([*tables, *(p for inner in folders if inner.name in named for p in inner.iterdir() if p.is_file())])
+    strings = {node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)}
+    return sorted([*tables, *(p for inner in folders if inner.name in strings for p in inner.iterdir() if p.is_file())])
 
 
 @cache
-def _beside(folder: Path) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
+def _data_in_folder(folder: Path) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
     """Tables in a folder, and its subfolders without modules."""
-    found = sorted(folder.iterdir())
-    inner = (p for p in found if p.is_dir() and p.name != "__pycache__" and not any(p.glob("*.py")))
-    return tuple(p for p in found if p.suffix in (".csv", ".sql")), tuple(inner)
+    entries = sorted(folder.iterdir())
+    folders = (p for p in entries if p.is_dir() and p.name != "__pycache__" and not any(p.glob("*.py")))
+    return tuple(p for p in entries if p.suffix in (".csv", ".sql")), tuple(folders)
 
 
 def _has_docstring(node) -> bool:
@@ -99,22 +99,22 @@ def _has_docstring(node) -> bool:
 
 
 def _imports(nodes: list[ast.AST], name: str, is_package: bool) -> list[str]:
-    found: list[str] = []
+    names: list[str] = []
     for node in nodes:
         if isinstance(node, ast.Import):
-            found += [alias.name for alias in node.names]
+            names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             base = node.module or ""
             if node.level:
                 parents = name.split(".") if is_package else name.split(".")[:-1]
                 base = ".".join(parents[: len(parents) - node.level + 1] + ([base] if base else []))
-            found += [base, *(f"{base}.{alias.name}" for alias in node.names)]
+            names += [base, *(f"{base}.{alias.name}" for alias in node.names)]
         elif isinstance(node, ast.JoinedStr):
-            found += _family(node)
-    return found
+            names += _matching_modules(node)
+    return names
 
 
-def _family(node: ast.JoinedStr) -> list[str]:
+def _matching_modules(node: ast.JoinedStr) -> list[str]:
     """All modules that match a name like f"turnout.readers.{format}"."""
     start = node.values[0].value if node.values and isinstance(node.values[0], ast.Constant) else ""
     if not (isinstance(start, str) and start.startswith(PACKAGE + ".") and start.endswith(".")):

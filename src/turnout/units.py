@@ -73,7 +73,7 @@ SI = {
     "temperature": "°C",
 }
 _CANONICAL = {name: name for units in UNITS.values() for name in units}
-_CANONICAL |= {other: name for name, others in SPELLINGS.items() for other in others.split()}
+_CANONICAL |= {spelling: name for name, spellings in SPELLINGS.items() for spelling in spellings.split()}
 _CANONICAL |= {"deg C": "°C", "Deg C": "°C", "deg F": "°F", "Deg F": "°F"}
 _NUMBER = re.compile(r"^([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.+)$")
 
@@ -154,26 +154,26 @@ def to_si(quantity: str, unit: str, sensitivity: float | None = None, sensitivit
         raise ValueError(f"{unit!r} is no unit of {quantity} and no sensitivity is given")
     if not math.isfinite(sensitivity) or sensitivity <= 0:
         raise ValueError(f"the sensitivity must be above 0, not {sensitivity!r}; use the sign to turn a channel around")
-    top, bottom = _fraction(sensitivity_unit)
-    ratio = sensitivity * top.scale / bottom.scale
-    if (top.dimension, bottom.dimension) == (raw.dimension, quantity):
+    numerator, denominator = _split_fraction(sensitivity_unit)
+    ratio = sensitivity * numerator.scale / denominator.scale
+    if (numerator.dimension, denominator.dimension) == (raw.dimension, quantity):
         return Conversion(quantity, raw.scale / ratio)
-    if (top.dimension, bottom.dimension) == (quantity, raw.dimension):
+    if (numerator.dimension, denominator.dimension) == (quantity, raw.dimension):
         return Conversion(quantity, raw.scale * ratio)
     raise ValueError(f"a sensitivity in {sensitivity_unit!r} does not lead from {unit!r} to {SI[quantity]!r}")
 
 
-def _fraction(unit):
+def _split_fraction(unit):
     """Numerator and denominator of a unit: "mV/(m/s²)" -> voltage, acceleration; "m/s²/V" -> acceleration, voltage."""
     text = unit.strip()
-    for top, _, bottom in (text.partition("/"), text.rpartition("/")):
+    for numerator, _, denominator in (text.partition("/"), text.rpartition("/")):
         try:
-            return conversion(_bare(top)), conversion(_bare(bottom))
+            return conversion(_strip_brackets(numerator)), conversion(_strip_brackets(denominator))
         except ValueError:
             continue
     raise ValueError(f"the sensitivity's unit {unit!r} is not of the form mV/N, mV/(m/s²), N/count")
 
 
-def _bare(text):
+def _strip_brackets(text):
     text = text.strip()
     return text[1:-1] if text.startswith("(") and text.endswith(")") else text

@@ -10,7 +10,7 @@ MISSING = {
     "turnout/passage/envelope.py Levels.n_bin",
     "turnout/passage/result.py Passage.n_axle",
     "turnout/passage/result.py Passage.times",
-    "turnout/passage/result.py Passage.heard",
+    "turnout/passage/result.py Passage.audible_sensors",
 }
 
 

@@ -16,7 +16,8 @@ MAX_EMPTY_SHARE = 0.005  # of all stored names
 IRREGULAR = frozenset(
     """begun bent borne bound broken brought built chosen cut drawn driven fallen felt found given gone heard held
     hidden hung kept known laid led left lost made meant met paid put read said seen sent set shown shut sought
-    spent split spun struck stuck sunk swept taken taught thought thrown told torn understood won worn written""".split()
+    spent split spun struck stuck sunk swept taken taught thought thrown told torn understood won worn
+    written""".split()
 )
 NOT_PARTICIPLES = frozenset({"seed", "speed", "feed", "need", "embed", "exceed", "read", "set", "put", "split", "cut"})
 NO_NOUNS = frozenset(

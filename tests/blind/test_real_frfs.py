@@ -46,7 +46,7 @@ def test_what_was_left_out_is_found_or_said_to_be_unknown(shared_data):
     beam = found["A4"][2]
     assert said["A4"] == ("named", ("shear_and_rotation",)) and beam.verdict.grade == "B"
     size, half, above = real_frfs.beam_printed()  # by six frequencies, three of which lie beyond the fitted band
-    assert beam.verdict.scores[0].own[0][0] == pytest.approx(size, abs=half)
+    assert beam.verdict.scores[0].estimates[0][0] == pytest.approx(size, abs=half)
     assert above > 0.01  # what no law of the library holds: so B, not A
     assert beam.verification.after > beam.verification.before + 10.0
     assert said["B1"] == ("named", ("blow_gain",))

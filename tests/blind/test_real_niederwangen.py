@@ -81,7 +81,7 @@ def test_a_change_of_pads_would_have_been_told_from_one_of_the_rail(folder):
     log = {}
     for o in everything:
         with_it, without = (case.logarithm(values, terms, o) for terms in ((change.term([-1.2]),), ()))
-        log[o.kind, o.condition] = quiet.log[o.kind, o.condition] + with_it - without
+        log[o.data_type, o.condition] = quiet.log[o.data_type, o.condition] + with_it - without
     planted = niederwangen.Measured("planted", log, quiet.spread, quiet.repeat, quiet.temperature, quiet.campaigns)
     verdict = niederwangen.diagnose(DecayCase(planted, "2015-09", priors)).verdict
     assert verdict.names and not set(verdict.names) & niederwangen.DAMPS

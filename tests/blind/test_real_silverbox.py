@@ -16,7 +16,7 @@ def test_the_page_follows_from_the_recording(shared_data):
     (multisine, _), (arrow, _) = silverbox.held_out(case, told.fit)
     assert multisine >= 98.0 and arrow >= 96.0
     other, removed = found["law removed"]
-    assert silverbox.missing_force(other, removed.base).best == "displacement"
+    assert silverbox.missing_force(other, removed.base).best_covariate == "displacement"
 
 
 def test_without_a_recording_it_says_so(tmp_path):

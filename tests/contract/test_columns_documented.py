@@ -9,9 +9,9 @@ from turnout.registry import documentation
 from turnout.registry.database import open_registry, view_files
 from turnout.registry.documentation import views
 from turnout.registry.register import register
-from turnout.registry.schema import ARROW, FILLED_BY_REGISTER, key, sort_order, tables, time_column
+from turnout.registry.schema import ARROW_TYPES, FILLED_BY_REGISTER, key, sort_order, tables, time_column
 from turnout.registry.staging import CHILDREN
-from turnout.registry.supersede import KINDS, LARGE
+from turnout.registry.supersede import KINDS, LARGE_TABLES
 
 UNIT_SUFFIX = {
     "_hz": "Hz", "_pct": "%", "_c": "°C", "_t": "t", "_kmh": "km/h", "_ms2": "m/s²", "_at_utc": "UTC", "_utc": "UTC",
@@ -35,7 +35,7 @@ def reported(tmp_path_factory):
             "select function_name, parameters from duckdb_functions() where function_type = 'table_macro' "
             "and not internal and database_name = 'registry'"
         ).fetchall()
-    inner = {f"{table}_{part}" for table in LARGE for part in ("settled", "touched")}
+    inner = {f"{table}_{part}" for table in LARGE_TABLES for part in ("settled", "touched")}
     rows = [row for row in rows if row[0] not in inner]
     found: dict[str, list[tuple[str, str]]] = {}
     for table, column, kind in rows:
@@ -73,7 +73,7 @@ def test_every_view_says_what_a_row_is_and_every_column_what_it_means(call):
 
 @pytest.mark.parametrize("column", ALL, ids=lambda c: f"{c.table}.{c.name}")
 def test_a_column_is_fully_described(column):
-    assert column.meaning and column.type.removesuffix("[]") in ARROW
+    assert column.meaning and column.type.removesuffix("[]") in ARROW_TYPES
     if column.type.removesuffix("[]") in ("double", "float"):
         assert column.check, "a double without a two-sided check lets NaN in"
     if column.type == "double" and column.minimum is not None:
@@ -117,6 +117,6 @@ def test_views_use_no_clock_and_no_newer_syntax():
 def test_the_pages_are_those_that_the_lists_give(repository):
     page = (repository / "docs" / "registry.md").read_text(encoding="utf-8")
     parts = {"tables": documentation.table_tables(), "views": documentation.view_tables()}
-    assert documentation.with_parts(page, parts) == page, "run: python -m turnout.registry.documentation docs"
+    assert documentation.with_sections(page, parts) == page, "run: python -m turnout.registry.documentation docs"
     assert (repository / "docs" / "reasons.md").read_text(encoding="utf-8") == documentation.reasons_page()
     assert len(REASONS) > 30

@@ -9,11 +9,11 @@ import pytest
 
 from turnout.config.parameters import UNITS
 from turnout.physics import TERMS, PhysicsTerm
-from turnout.physics.term import KINDS
+from turnout.physics.term import EFFECT_TYPES
 from turnout.simulate import Sensor, car, simulate_hammer, simulate_passage, uniform_track
 from turnout.simulate.prepare import prepare
 from turnout.simulate.run import run
-from turnout.simulate.sensor import measured
+from turnout.simulate.sensor import record_signal
 from turnout.simulate.turnout_track import TurnoutTrack
 from turnout.simulate.wheel_path import Cosine
 
@@ -46,7 +46,7 @@ class TestTerm:
     def test_it_is_described(self, term):
         example = term.example()
         assert issubclass(term, PhysicsTerm) and dataclasses.is_dataclass(term)
-        assert term.kind in KINDS and re.fullmatch(r"[a-z0-9_]+", term.name)
+        assert term.effect_type in EFFECT_TYPES and re.fullmatch(r"[a-z0-9_]+", term.name)
         words = example.sentence()
         assert len(words.split()) >= 5 and "{" not in words
         assert term.parameters, "a term without a parameter cannot be fitted"
@@ -76,8 +76,8 @@ class TestTerm:
         prepared = prepare(TRACK, 1e-4, terms=(term.example(),))
         motion = run(prepared, 0.005).motion
         assert np.all(motion.u == 0.0) and np.all(motion.v == 0.0)
-        if term.kind == "channel":
-            silent = measured(Sensor("A", 12.1, cutoff=None), np.zeros(512), 20e3, None, (term.example(),))
+        if term.effect_type == "channel":
+            silent = record_signal(Sensor("A", 12.1, cutoff=None), np.zeros(512), 20e3, None, (term.example(),))
             assert np.ptp(silent) < 1e-3 or "hum" in term.name
 
     def test_small_values_have_small_effects(self, term, base):
@@ -95,7 +95,7 @@ class TestTerm:
         assert small < 0.2 * whole
 
     def test_forces_on_sleepers_vanish_in_every_state(self, term):
-        if term.kind != "port":
+        if term.effect_type != "port":
             pytest.skip("acts without ports")
         position = np.linspace(-4e-4, 8e-4, TRACK.support.size)  # lifted and pressed
         state = SimpleNamespace(track=TRACK, sleeper_position=position, sleeper_velocity=0.1 * np.cos(9.0 * position))

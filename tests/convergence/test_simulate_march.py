@@ -78,7 +78,7 @@ def dense(upper, n):
 class Gaps(PhysicsTerm):
     """Three sleepers on unilateral ballast with gaps; the linear ballast under them is taken away."""
 
-    kind = "port"
+    effect_type = "port"
     places, gaps = (8, 9, 10), (0.0, 1.5e-4, 5e-5)
 
     def links(self, track):

@@ -63,6 +63,7 @@ class Recording:
         code, out, err = self.run(["-c", MAIN, *words], folder)
         with open(self.out / "cpu.txt", "a") as file:
             file.write(f"{_cpu() - before:6.1f} s {name}\n")
+        err = re.sub(r"[^\r\n]*\d+%\|[^\r\n]*[\r\n]+", "", err)  # bars of progress tell the time
         self.keep(name, f"$ turnout {shlex.join(words)}\n{out}--- stderr\n{err}--- exit code {code}\n")
         return out
 
@@ -117,10 +118,7 @@ class Recording:
             con.execute("set threads = 1")
             con.execute("set timezone = 'UTC'")
             for (table,) in con.execute("select table_name from information_schema.tables order by all").fetchall():
-                columns = [c for c, *_ in con.execute(f'describe "{table}"').fetchall()]
-                rows = con.execute(f'select * from "{table}"').fetchall()
-                lines = sorted("\t".join(map(repr, row)) for row in rows)
-                self.keep(f"{name}/{table}.tsv", "\n".join(["\t".join(columns), *lines, ""]))
+                self.keep(f"{name}/{table}.tsv", _rows(con, f'"{table}"'))
 
 
 def fleet(rec):
@@ -131,9 +129,19 @@ def fleet(rec):
         words = [_file(folder, word) for word in shlex.split(line)]
         rec.command(words, folder, f"fleet/asked/{k + 1:02d} {re.sub(r'[^a-z0-9]+', '_', line.lower())[:40]}.txt")
     rec.keep_files(folder, "a8.svg", "fleet/asked")
-    for made in ("exported", "asked_pages", "simulated", "config"):
+    with duckdb.connect() as con:  # exports have no order
+        for path in sorted((folder / "exported").iterdir()):
+            rec.keep(f"fleet/exported/{path.name}.tsv", _rows(con, f"'{path}'"))
+    for made in ("asked_pages", "simulated", "config"):
         rec.keep_files(folder / made, "**/*", f"fleet/{made}")
     rec.rows(folder / "results/registry/registry.duckdb", "fleet/rows_compacted")
+
+
+def _rows(con, table):
+    """Rows of a table or file as text, sorted."""
+    found = con.execute(f"select * from {table}")
+    columns = "\t".join(c for c, *_ in found.description)
+    return "\n".join([columns, *sorted("\t".join(map(repr, row)) for row in found.fetchall()), ""])
 
 
 def _file(folder, word):

@@ -9,7 +9,7 @@ from scipy.linalg.lapack import zgbtrf, zgbtrs
 
 from turnout.simulate.kernels import law_force
 from turnout.simulate.march import CONVERGED, LEFT_TRACK, NEWTON
-from turnout.simulate.port_system import place_ports
+from turnout.simulate.port_system import locate_ports
 
 ITERATIONS = 30
 
@@ -61,10 +61,10 @@ def march_numpy(track, scheme, bodies, ports, run, motion, n_step, out, out_forc
     for step in range(n_step):
         u, v = motion.u[inner], motion.v[inner]
         right = scheme.weight * (scheme.s * _times(track.mass, v) - _times(track.stiffness, u))
-        for k in range(len(run.known_rows)):
-            amount = scheme.tau @ run.known_force[k, step]
-            np.add.at(right, run.known_rows[k], amount * run.known_weights[k])
-        lost = place_ports(track, scheme, ports, run, step, element, x, rows, weights, local, share, dip)
+        for k in range(len(run.pulse_rows)):
+            amount = scheme.tau @ run.pulse_force[k, step]
+            np.add.at(right, run.pulse_rows[k], amount * run.pulse_weights[k])
+        lost = locate_ports(track, scheme, ports, run, step, element, x, rows, weights, local, share, dip)
         if lost >= 0:
             return LEFT_TRACK, step, lost, x[lost * stages], total
         b = np.zeros((n, track.n))
@@ -101,7 +101,7 @@ def _bodies_free(scheme, bodies, motion):
     e = e[: motion.z.size]
     wheels = motion.y.size
     rest = scheme.s * bodies.stand_in_mass[:wheels] * motion.x - bodies.stand_in_stiffness[:wheels] * motion.y
-    return e, bodies.stand_in_answer[:wheels] * scheme.weight * rest
+    return e, bodies.stand_in_response[:wheels] * scheme.weight * rest
 
 
 def _free(scheme, ports, motion, b, u, d, e, e_stand_in, share, dip):
@@ -125,9 +125,9 @@ def _flexibility(scheme, bodies, ports, b, columns, local, share):
             if body[p] >= 0 and body[q] >= 0 and bodies.block_of[body[p]] == bodies.block_of[body[q]]:
                 block = bodies.block_of[body[p]]
                 start = bodies.block_start[block]
-                h[p, q] += bodies.answer[block, body[p] - start, body[q] - start]
+                h[p, q] += bodies.response[block, body[p] - start, body[q] - start]
             if wheel[p] >= 0 and wheel[p] == wheel[q]:
-                h[p, q] += share[p] * share[q] * bodies.stand_in_answer[wheel[p]]
+                h[p, q] += share[p] * share[q] * bodies.stand_in_response[wheel[p]]
     t, tau = np.tile(scheme.t, n // stages), np.tile(scheme.tau, n // stages)
     g = scheme.scale * (t[:, None] * tau[None, :] * h).real
     stage = np.arange(n) % stages
@@ -147,7 +147,7 @@ def _newton(scheme, ports, g, d0, force, before, tolerance):
         values = np.array(
             [
                 law_force(
-                    ports.kind[k // stages],
+                    ports.law_code[k // stages],
                     ports.numbers,
                     k // stages,
                     ports.table,
@@ -175,8 +175,8 @@ def _bodies_forced(bodies, ports, amount, share, stages, e, e_stand_in):
         if body >= 0:
             block = bodies.block_of[body]
             i, j = bodies.block_start[block], bodies.block_start[block + 1]
-            e[i:j] -= a * bodies.answer[block, : j - i, body - i]
-            e_stand_in[wheel] += a * share[k] * bodies.stand_in_answer[wheel]
+            e[i:j] -= a * bodies.response[block, : j - i, body - i]
+            e_stand_in[wheel] += a * share[k] * bodies.stand_in_response[wheel]
 
 
 def _record(scheme, run, u, v, d, step, out):

@@ -66,7 +66,7 @@ def test_without_the_right_law_the_answer_is_unknown_and_the_force_is_shown(reco
     case = case_of(records, without=("cubic_spring",))
     found = diagnose(case)
     assert found.verdict.answer == "unknown" and not found.names
-    assert found.latent.best == "displacement"
+    assert found.latent.best_covariate == "displacement"
     centre, force, _ = found.latent.curves["displacement"]
     odd = np.polyfit(centre, force, 3)
     assert odd[0] > 0.0  # what the base lacks is a spring that hardens

@@ -37,7 +37,7 @@ def read_train(path, vehicles) -> Pattern:
     for item in order.split(","):
         name, turned, count = re.fullmatch(r"(.*?)(\[R\])?(?:\((\d+)\))?", item.strip()).groups()
         vehicle = vehicles[name if name in vehicles else name.split()[-1]]
-        row += [vehicle.reversed() if turned else vehicle] * int(count or 1)
+        row += [vehicle.reverse() if turned else vehicle] * int(count or 1)
     return Pattern(path.stem, tuple(Group((v,)) for v in row))
 
 
@@ -52,9 +52,9 @@ def collection(shared_data):
 
 def passing_times(pattern, rng, place_error=0.03):
     """Axle times at one sensor: any speed, some acceleration, either direction, places off by 3 cm."""
-    vehicles = pattern.only_row()[1]
+    vehicles = pattern.fixed_row()[1]
     if rng.random() < 0.5:
-        vehicles = tuple(v.reversed() for v in reversed(vehicles))
+        vehicles = tuple(v.reverse() for v in reversed(vehicles))
     motion = Motion(rng.uniform(12, 55), 1.0, rng.uniform(-0.15, 0.15))
     return motion.time(offsets(vehicles) + rng.normal(0, place_error, len(offsets(vehicles))))
 
@@ -67,12 +67,12 @@ def test_the_collection_holds_thirty_types_with_the_axles_their_names_say(collec
 
 
 def both_ways(patterns):
-    return [p for pattern in patterns for p in (pattern, pattern.reversed())]
+    return [p for pattern in patterns for p in (pattern, pattern.reverse())]
 
 
 def family(pattern):
     """Types whose axles stand at the same places to 5 cm cannot be told apart by them: one name for all."""
-    return tuple(np.round(offsets(pattern.only_row()[1]) / 0.05).astype(int))
+    return tuple(np.round(offsets(pattern.fixed_row()[1]) / 0.05).astype(int))
 
 
 def test_each_type_is_named_and_a_type_without_template_is_unknown(collection):
@@ -84,7 +84,7 @@ def test_each_type_is_named_and_a_type_without_template_is_unknown(collection):
         for _ in range(4):
             times = passing_times(pattern, rng)
             total += 1
-            named += find_type(times, both_ways(collection), settings, place_se=0.03).type == pattern.type
-            unknown += find_type(times, both_ways(others), settings, place_se=0.03).type == "unknown"
+            named += find_type(times, both_ways(collection), settings, position_se=0.03).type == pattern.type
+            unknown += find_type(times, both_ways(others), settings, position_se=0.03).type == "unknown"
     assert named >= 0.99 * total
     assert unknown >= 0.95 * total

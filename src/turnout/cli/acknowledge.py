@@ -9,7 +9,7 @@ chart is off the list until the date. Both are lines of config/acknowledgements.
 
 import argparse
 
-OPEN = """
+OPEN_ALARMS_QUERY = """
     select 1 from alarms
     where closed_at_utc is null and turnout_id = $1 and section_id = coalesce($2, section_id)
         and band = coalesce($3, band) and raised_at_utc <= $4
@@ -37,32 +37,32 @@ def run(args: argparse.Namespace) -> int:
     from pathlib import Path
 
     from turnout.config import load_configuration
-    from turnout.config.acknowledgements import COLUMNS, acknowledgement, faults
-    from turnout.config.turnouts_table import append_csv, one_line, taken_back
+    from turnout.config.acknowledgements import COLUMNS, acknowledgement_row, row_problems
+    from turnout.config.turnouts_table import append_csv, one_line, restore_on_error
     from turnout.errors import ConfigError, ConfigErrors
 
     turnout, _, label = args.place.partition("/")
-    read = load_configuration(args.configuration)
+    configuration = load_configuration(args.configuration)
     at = args.at or datetime.now(UTC).replace(tzinfo=None).isoformat(timespec="minutes")
     action = "suppress" if args.suppress_until else "acknowledge"
     cells = dict(turnout=turnout, section=label, band=args.band, action=action, by=args.by, at=at)
     cells |= dict(until=args.suppress_until, reason=args.reason)
-    cells = {column: one_line(said) for column, said in cells.items()}
-    if wrong := list(faults(cells, read.ids, read.variants)):
-        raise ConfigErrors([ConfigError("acknowledge", column, *said) for column, *said in wrong])
+    cells = {column: one_line(content) for column, content in cells.items()}
+    if problems := list(row_problems(cells, configuration.ids, configuration.variants)):
+        raise ConfigErrors([ConfigError("acknowledge", column, *content) for column, *content in problems])
     path = Path(args.configuration) / "acknowledgements.csv"
-    with taken_back(path):
+    with restore_on_error(path):
         append_csv(path, cells, COLUMNS)
         after = load_configuration(args.configuration)
-        if acknowledgement(cells) not in after.acknowledgements:
+        if acknowledgement_row(cells) not in after.acknowledgements:
             raise ConfigErrors(after.warnings)
     print(f"{path}: {action} {args.place} {args.band or 'all its charts'}. It counts from the next run.")
-    if action == "acknowledge" and _no_alarm(args.registry, acknowledgement(cells)):
+    if action == "acknowledge" and _has_no_alarm(args.registry, acknowledgement_row(cells)):
         print(f"Note: no alarm is open there in {args.registry} that was raised by then: nothing on the list changes.")
     return 0
 
 
-def _no_alarm(registry, row):
+def _has_no_alarm(registry, row):
     """Whether there is a registry without an open alarm that the row of ``acknowledgements`` refers to."""
     from pathlib import Path
 
@@ -71,5 +71,5 @@ def _no_alarm(registry, row):
     if not (Path(registry) / DATABASE).exists():
         return False
     with open_registry(registry) as con:
-        asked = [row[name] for name in ("turnout_id", "section_id", "band", "at_utc")]
-        return not con.execute(OPEN, asked).fetchall()
+        values = [row[name] for name in ("turnout_id", "section_id", "band", "at_utc")]
+        return not con.execute(OPEN_ALARMS_QUERY, values).fetchall()

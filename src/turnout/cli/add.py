@@ -27,17 +27,17 @@ def run(args: argparse.Namespace) -> int:
     from pathlib import Path
 
     from turnout.config import load_configuration
-    from turnout.config.turnouts_table import ROW, append_tsv, taken_back
+    from turnout.config.turnouts_table import ROW, append_tsv, restore_on_error
     from turnout.readers.formats import FORMATS
     from turnout.units import to_si
 
     path = Path(args.configuration) / "turnouts.tsv"
-    with taken_back(path):
+    with restore_on_error(path):
         append_tsv(path, {column: getattr(args, column) for column in ROW}, tuple(ROW))
         turnout = load_configuration(args.configuration, FORMATS, to_si).turnout(args.turnout)
     labels = ", ".join(s.label for s in turnout.sections)
     print(f"{path}: added {turnout.id} with the sections {labels}.")
-    for kind, what in (("hammer tests", turnout.hammer), ("passages", turnout.passages)):
-        if what:
-            print(f"Its {kind} are looked for as <raw root>/{turnout.raw}/{what.files}")
+    for recordings, source in (("hammer tests", turnout.hammer), ("passages", turnout.passages)):
+        if source:
+            print(f"Its {recordings} are looked for as <raw root>/{turnout.raw}/{source.files}")
     return 0

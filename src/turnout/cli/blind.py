@@ -101,22 +101,22 @@ def _make(args):
     print(f"sealed: SHA-256 of commit.json is {sha}; the truth lies in {_truth(args)}")
 
 
-def _bar(done, total):
+def _bar(results, total):
     from tqdm import tqdm
 
-    return tqdm(done, desc="cases", unit="case", total=total, disable=None)
+    return tqdm(results, desc="cases", unit="case", total=total, disable=None)
 
 
 def _diagnose(args):
     from turnout_blind.diagnose import COMMAND, diagnose_set
 
     only = args.cases.split(",") if args.cases else None
-    held = diagnose_set(
+    record = diagnose_set(
         args.out, _truth(args), args.tool or COMMAND, only, args.timeout, args.workers, cpu=args.cpu,
         again=args.again, progress=_bar, label=args.ablation,
     )  # fmt: skip
-    failed = sum(run["status"] != "answered" for run in held["cases"].values())
-    print(f"{len(held['cases'])} cases diagnosed, {failed} without an answer; truth hidden by {held['isolation']}")
+    failed = sum(run["status"] != "answered" for run in record["cases"].values())
+    print(f"{len(record['cases'])} cases diagnosed, {failed} without an answer; truth hidden by {record['isolation']}")
 
 
 def _reveal(args):

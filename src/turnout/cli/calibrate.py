@@ -33,32 +33,36 @@ def add_arguments(parser):
 def run(args):
     """Fit and print."""
     from turnout.errors import SimulationError
-    from turnout.stages.calibrate import calibrate_to_files, calibrate_to_modes, track_asked
+    from turnout.stages.calibrate import calibrate_to_files, calibrate_to_modes, resolve_track
 
     if bool(args.files) == bool(args.modes):
         raise SimulationError("give either hammer tests or --modes.")
-    wanted = _wanted(args.modes or ())
-    track = track_asked(args.track, args.turnout, args.configuration)
+    targets = _target_modes(args.modes or ())
+    track = resolve_track(args.track, args.turnout, args.configuration)
     print(f"track: {track}" + ("" if args.track or args.turnout else " (no turnout and no track was named)"))
     if args.modes:
-        fit = calibrate_to_modes(track, args.section, wanted)
-        for band, (frequency, damping) in fit.wanted.items():
-            got = fit.found.get(band)
-            reached = f"{got[0]:.1f} Hz, {got[1]:.4f}" if got else "not found"
+        fit = calibrate_to_modes(track, args.section, targets)
+        for band, (frequency, damping) in fit.targets.items():
+            fitted = fit.fitted.get(band)
+            reached = f"{fitted[0]:.1f} Hz, {fitted[1]:.4f}" if fitted else "not found"
             print(f"{band}: wanted {frequency:.1f} Hz, {damping:.4f}; reached {reached}")
-        lost = sorted(fit.wanted.keys() - fit.found.keys())
-        missed = f"has no resonance in the band {', '.join(lost)}" if lost else ""
-        print(_block(args.section, fit.values, {}, missed))
+        missing = sorted(fit.targets.keys() - fit.fitted.keys())
+        missed = f"has no resonance in the band {', '.join(missing)}" if missing else ""
+        print(_track_entry(args.section, fit.values, {}, missed))
         return 0
-    found = calibrate_to_files(track, args.section, args.files, args.turnout, args.configuration)
-    print(found)
-    missed = "" if found.met else f"does not meet these tests (chi-squared per degree of freedom {found.reduced:.0f})"
-    told = {name: value for name, value in found.values.items() if missed or found.tells(name)}
-    print(_block(args.section, told, found.sd, missed))
+    calibration = calibrate_to_files(track, args.section, args.files, args.turnout, args.configuration)
+    print(calibration)
+    missed = (
+        ""
+        if calibration.is_adequate
+        else f"does not meet these tests (chi-squared per degree of freedom {calibration.reduced:.0f})"
+    )
+    values = {name: value for name, value in calibration.values.items() if missed or calibration.is_determined(name)}
+    print(_track_entry(args.section, values, calibration.sd, missed))
     return 0
 
 
-def _block(section, values, sd, missed) -> str:
+def _track_entry(section, values, sd, missed) -> str:
     """The values as lines of the track file, or as comments if the fit ``missed`` the tests."""
     if missed:
         head = f"# do not paste: section {section} with these values {missed}"
@@ -75,15 +79,15 @@ def _block(section, values, sd, missed) -> str:
     return "\n".join(lines)
 
 
-def _wanted(modes):
+def _target_modes(modes):
     from turnout.errors import SimulationError
 
-    wanted = {}
+    targets = {}
     for mode in modes:
         try:
-            band, rest = mode.split("=")
-            frequency, damping = (float(v) for v in rest.split("/"))
+            band, figures = mode.split("=")
+            frequency, damping = (float(v) for v in figures.split("/"))
         except ValueError:
             raise SimulationError(f"--modes {mode!r} is not of the form ballast=99.6/0.292.") from None
-        wanted[band] = (frequency, damping)
-    return wanted
+        targets[band] = (frequency, damping)
+    return targets

@@ -33,12 +33,12 @@ def run(args: argparse.Namespace) -> int:
     faults = [*_faults(configuration, FORMATS, to_si)]
     layouts = {row.values["layout"] for row in configuration.rows.values()}
     n_events = len(configuration.events)
-    n_said = len(configuration.acknowledgements)
-    counts = f"{len(configuration.ids)} turnouts, {len(layouts)} layouts, {n_events} events, {n_said} acknowledgements"
+    n_acks = len(configuration.acknowledgements)
+    counts = f"{len(configuration.ids)} turnouts, {len(layouts)} layouts, {n_events} events, {n_acks} acknowledgements"
     print(f"{args.configuration}: {counts}, {'with faults' if faults else 'sound'}.")
     for fault in faults:
         print(f"  {fault}")
-    for event in _planned(configuration.events):
+    for event in _planned_events(configuration.events):
         print(f"  {event}")
     raw = Path(args.raw or "raw")
     if not raw.is_dir() and args.raw:
@@ -46,47 +46,47 @@ def run(args: argparse.Namespace) -> int:
     if not raw.is_dir():
         print(f"{raw}: no such folder, file names not checked.")
         return 1 if faults else 0
-    return 1 if _left_out(configuration, raw) or faults else 0
+    return 1 if _report_left_out(configuration, raw) or faults else 0
 
 
 def _faults(configuration, formats, to_si):
     """Each fault that stops no turnout, with its consequence."""
-    from turnout.config.load import faults_of_unused_layouts
+    from turnout.config.load import errors_of_unused_layouts
     from turnout.stages.layout_checks import faults_of_tracks
 
     for warning in configuration.warnings:
         yield f"does not count: {warning}"
-    for error in faults_of_unused_layouts(configuration, formats, to_si):
+    for error in errors_of_unused_layouts(configuration, formats, to_si):
         yield f"used by no turnout: {error}"
     yield from faults_of_tracks(configuration)
 
 
-def _planned(events):
+def _planned_events(events):
     """Each event of the next year, which may be a typing error; later ones are warnings already."""
     from datetime import timedelta
 
-    from turnout.config.events import AHEAD, now
+    from turnout.config.events import MAX_LEAD_TIME, now
 
     for e in events:
-        if timedelta(days=1) < e.at - now() <= AHEAD:
+        if timedelta(days=1) < e.at - now() <= MAX_LEAD_TIME:
             where = f"{e.turnout}/{e.section}" if e.section else e.turnout
             yield f"planned, counts from its day: {e.kind} at {where}, {e.at:%Y-%m-%d} (events.csv)"
 
 
-def _left_out(configuration, raw) -> int:
+def _report_left_out(configuration, raw) -> int:
     """Print the number of raw files and each problem with them; returns the number of problems."""
     from turnout.config.load import read_notes
-    from turnout.workflow.notes_check import contradicted_notes
+    from turnout.workflow.notes_check import note_contradictions
     from turnout.workflow.scan import scan
 
     n_units = n_files = 0
     problems = []
     for turnout in map(configuration.turnout, configuration.ids):
-        found = scan(turnout, raw)
-        n_units += len(found.units)
-        n_files += sum(len(u.files) for u in found.units)
-        noted, wrong = read_notes(turnout, raw)
-        problems += [*found.problems, *wrong, *contradicted_notes(noted, raw, found.units)]
+        scanned = scan(turnout, raw)
+        n_units += len(scanned.units)
+        n_files += sum(len(u.files) for u in scanned.units)
+        noted_turnout, note_errors = read_notes(turnout, raw)
+        problems += [*scanned.problems, *note_errors, *note_contradictions(noted_turnout, raw, scanned.units)]
     print(f"{raw}: {n_files} files in {n_units} units, {len(problems)} left out or unsound.")
     for problem in problems:
         print(f"  {problem}")

@@ -39,22 +39,22 @@ def _show(args) -> int:
 
     configuration = load_configuration(args.configuration)
     configuration.turnout(args.turnout)
-    shown = [found for found in sources(configuration, args.turnout) if args.only in found[0]]
-    for key, value, source in shown:
+    entries = [entry for entry in sources(configuration, args.turnout) if args.only in entry[0]]
+    for key, value, source in entries:
         print(f"{key:<44} {value!s:<28} {source}")
-    if not shown:
+    if not entries:
         print(f"no key of {args.turnout} contains {args.only!r}; without --only all are shown", file=sys.stderr)
-    return 0 if shown else 1
+    return 0 if entries else 1
 
 
 def _generate(args) -> int:
     from pathlib import Path
 
-    from turnout.config.generate import generated
+    from turnout.config.generate import generate_files
     from turnout.files import write_if_changed
 
     stale = 0
-    for path, text in generated(Path(args.configuration), Path(args.docs), args.defaults).items():
+    for path, text in generate_files(Path(args.configuration), Path(args.docs), args.defaults).items():
         if args.check:
             differs = not path.exists() or path.read_text(encoding="utf-8") != text
             print(f"{path}: out of date" if differs else f"{path}: up to date")

@@ -27,13 +27,13 @@ def run(args):
 
     from turnout.demo.make import make_fleet, run_pipeline
     from turnout.demo.scenario import campaign_days
-    from turnout.demo.summary import tell
+    from turnout.demo.summary import print_summary
     from turnout.errors import ConfigError
 
-    for option, least in (("campaigns", 1), ("passages", 0)):
-        if getattr(args, option) < least:
-            said = f"{getattr(args, option)}, and the fewest are {least}"
-            raise ConfigError(f"--{option}", "number", said, f"Write {least} or more")
+    for option, minimum in (("campaigns", 1), ("passages", 0)):
+        if getattr(args, option) < minimum:
+            observation = f"{getattr(args, option)}, and the fewest are {minimum}"
+            raise ConfigError(f"--{option}", "number", observation, f"Write {minimum} or more")
     cores = args.cores or os.cpu_count()
     print("1. Raw files of the demonstration fleet", flush=True)
     n = make_fleet("raw", "truth", seed=args.seed, n_campaign=args.campaigns, n_passage=args.passages, workers=cores)
@@ -45,5 +45,5 @@ def run(args):
     code = run_pipeline(cores, "--config", f"day={last}")
     if code == 0:
         print("3. What was found\n", flush=True)
-        tell("results/registry", "results/pages")
+        print_summary("results/registry", "results/pages")
     return code

@@ -47,27 +47,27 @@ def run(args):
     from turnout.stages.accepted_effects_case import BudgetSpentError
 
     try:
-        _show(args, results, _diagnosed(args))
+        _save_and_print(args, results, _diagnose(args))
     except BudgetSpentError as spent:
-        if spent.done:  # with no finished group the older result of all groups stays
-            _show(args, results, spent.rows)
+        if spent.n_done:  # with no finished group the older result of all groups stays
+            _save_and_print(args, results, spent.rows)
         raise
     return 0
 
 
-def _show(args, results, rows):
+def _save_and_print(args, results, rows):
     """Save, draw and print the rows."""
     import json
 
-    from turnout.report.finding_pages import write_own_page
+    from turnout.report.finding_pages import write_diagnosis_page
 
-    results.keep(rows)
-    page = write_own_page(rows, args.configuration, args.turnout, args.pages)
-    print(json.dumps(rows["mismatch_findings"], default=str, indent=1) if args.json else _words(rows))
+    results.save(rows)
+    page = write_diagnosis_page(rows, args.configuration, args.turnout, args.pages)
+    print(json.dumps(rows["mismatch_findings"], default=str, indent=1) if args.json else _findings_text(rows))
     print(f"page: {page}")
 
 
-def _diagnosed(args):
+def _diagnose(args):
     """Rows by table of the requested visit."""
     from turnout.stages.mismatch_results import diagnose_turnout
 
@@ -88,12 +88,12 @@ def _accept(args, results):
     return 0
 
 
-def _words(rows):
+def _findings_text(rows):
     """Findings, quarantine and notes in words."""
     lines = []
     for row in rows["mismatch_findings"]:
-        said = row["verdict"].replace("_", " ") + (f", grade {row['grade']}" if row["grade"] else "")
-        lines.append(f"sections {row['sections']}: {said}, probability {row['probability']:.2f}. {row['sentence']}")
+        verdict = row["verdict"].replace("_", " ") + (f", grade {row['grade']}" if row["grade"] else "")
+        lines.append(f"sections {row['sections']}: {verdict}, probability {row['probability']:.2f}. {row['sentence']}")
         lines += [f"   {line}" for line in _details(row)]
     for row in rows["quarantine"]:
         lines.append(f"nothing can be said of {row['place']}: {row['found']}")
@@ -104,15 +104,15 @@ def _words(rows):
 def _details(row):
     if row["n_held_out"]:
         names = ("before", "after", "rival", "decoy")
-        shown = ", ".join(f"{n} {row[f'fit_{n}_pct']:.1f} %" for n in names if row[f"fit_{n}_pct"] is not None)
-        yield f"fit on {row['n_held_out']} recordings never used: {shown}"
+        fits_text = ", ".join(f"{n} {row[f'fit_{n}_pct']:.1f} %" for n in names if row[f"fit_{n}_pct"] is not None)
+        yield f"fit on {row['n_held_out']} recordings never used: {fits_text}"
     if row["next_measurement"]:
         yield row["next_measurement"] + "."
     yield f"from {row['n_hammer_tests']} hammer tests, {row['n_passages']} passages, {row['n_sensors']} sensors"
 
 
-PAUSE = 20.0  # s between two lines in a log
-USUAL = "neighbouring sections together; a group takes a minute to ten, more with many axles"
+LOG_INTERVAL = 20.0  # s between two lines in a log
+TIME_HINT = "neighbouring sections together; a group takes a minute to ten, more with many axles"
 
 
 class DiagnoseBar:
@@ -121,8 +121,8 @@ class DiagnoseBar:
     def __init__(self, stream=None):
         self.stream = stream or sys.stderr
         self.bar = None
-        self.said, self.next_line, self.what = "", time.monotonic() + PAUSE, ""
-        self.began = None
+        self.group_text, self.next_line, self.stage_text = "", time.monotonic() + LOG_INTERVAL, ""
+        self.started_at = None
 
     def __enter__(self):
         if self.stream.isatty():
@@ -138,28 +138,28 @@ class DiagnoseBar:
 
     def group(self, group, number, count):
         """Begin a group; returns the callable that reports its joint fits."""
-        self._plan(number, count)
-        self.said = f"{'+'.join(group.labels)} ({number + 1} of {count})"
-        self.what = "base fit"
+        self._print_extent(number, count)
+        self.group_text = f"{'+'.join(group.labels)} ({number + 1} of {count})"
+        self.stage_text = "base fit"
         if self.bar is not None:
             self.bar.reset()
         self.simulations(0)
 
-        def fits(done, total, what):
-            self.what = f"{done} of {total} joint fits, {what}"
+        def fits(n_done, n_total, what):
+            self.stage_text = f"{n_done} of {n_total} joint fits, {what}"
             if self.bar is not None:
-                self.bar.total = total
-                self.bar.update(done - self.bar.n)
+                self.bar.total = n_total
+                self.bar.update(n_done - self.bar.n)
 
         return fits
 
-    def _plan(self, number, count):
+    def _print_extent(self, number, count):
         """Print the number of groups at the start, and the finished ones later."""
-        if self.began is None:
-            self.began = time.monotonic()
-            text = f"{count} {'group' if count == 1 else 'groups'}: {USUAL}"
+        if self.started_at is None:
+            self.started_at = time.monotonic()
+            text = f"{count} {'group' if count == 1 else 'groups'}: {TIME_HINT}"
         else:
-            text = f"{number} of {count} groups done, {(time.monotonic() - self.began) / 60.0:.1f} minutes so far"
+            text = f"{number} of {count} groups done, {(time.monotonic() - self.started_at) / 60.0:.1f} minutes so far"
         if self.bar is not None:
             self.bar.write(text, file=self.stream)
         else:
@@ -167,9 +167,9 @@ class DiagnoseBar:
 
     def simulations(self, count):
         """Called at every prediction."""
-        text = f"{self.said}: {self.what[:60]}, {count} simulations"
+        text = f"{self.group_text}: {self.stage_text[:60]}, {count} simulations"
         if self.bar is not None:
             self.bar.set_description(text, refresh=count % 10 == 0)
         elif time.monotonic() >= self.next_line:
-            self.next_line = time.monotonic() + PAUSE
+            self.next_line = time.monotonic() + LOG_INTERVAL
             print(text, file=self.stream, flush=True)

@@ -39,7 +39,7 @@ def run(args):
     )
     print(matrix)
     for name in matrix.names:
-        confused = matrix.confused(name)
+        confused = matrix.confused_with(name)
         if confused:
             print(f"{name} cannot be told from {', '.join(confused)}")
     print(advice)

@@ -50,18 +50,18 @@ def _enter(args) -> int:
     from pathlib import Path
 
     from turnout.config import load_configuration
-    from turnout.config.events import COLUMNS, wrong_place
-    from turnout.config.turnouts_table import append_csv, taken_back
+    from turnout.config.events import COLUMNS, turnout_problems
+    from turnout.config.turnouts_table import append_csv, restore_on_error
     from turnout.errors import ConfigError, ConfigErrors
 
     path = Path(args.configuration) / "events.csv"
     turnout, _, label = args.place.partition("/")
-    given = dict(turnout=turnout, section=label, date=args.date, kind=args.kind, resets=args.resets, note=args.note)
-    with taken_back(path):
-        append_csv(path, given, COLUMNS)
+    cells = dict(turnout=turnout, section=label, date=args.date, kind=args.kind, resets=args.resets, note=args.note)
+    with restore_on_error(path):
+        append_csv(path, cells, COLUMNS)
         after = load_configuration(args.configuration)
-        if wrong := list(wrong_place(given, after.ids, after.variants)):
-            raise ConfigErrors([ConfigError("events", column, *said) for column, *said in wrong])
+        if problems := list(turnout_problems(cells, after.ids, after.variants)):
+            raise ConfigErrors([ConfigError("events", column, *content) for column, *content in problems])
     print(f"{path}: {args.kind} at {args.place}, {args.date}. It counts from the next run.")
     return 0
 
@@ -75,13 +75,17 @@ def _effect(registry) -> int:
             "n_before, n_after, held_until_utc, last_measured_at_utc from maintenance_effect "
             "order by event_at_utc, section_id, band"
         ).fetchall()
-    for at, section, band, kinds, verdict, gain, low, high, before, after, held, last in rows:
-        held = f"half of it lost by {held:%Y-%m-%d}" if held else f"holds until {last:%Y-%m-%d}, the newest campaign"
-        sure = "no interval" if low is None or high is None else f"{low:+.1f} to {high:+.1f}, 95 %"
+    for at, section, band, kinds, verdict, gain, low, high, before, after, retention, last in rows:
+        retention = (
+            f"half of it lost by {retention:%Y-%m-%d}"
+            if retention
+            else f"holds until {last:%Y-%m-%d}, the newest campaign"
+        )
+        interval = "no interval" if low is None or high is None else f"{low:+.1f} to {high:+.1f}, 95 %"
         size = "" if gain is None else f", {gain:+.1f} %"
         print(
-            f"{at:%Y-%m-%d} {section} {band}, {kinds}: {verdict}{size} ({sure}; {before} and {after} campaigns)"
-            + (f"; {held}" if verdict == "stiffer" else "")
+            f"{at:%Y-%m-%d} {section} {band}, {kinds}: {verdict}{size} ({interval}; {before} and {after} campaigns)"
+            + (f"; {retention}" if verdict == "stiffer" else "")
         )
     if not rows:
         print("No event that resets a resonance has campaigns on both sides yet; of others ask change_since_event().")

@@ -10,14 +10,16 @@ Delta Lake needs the extra: pip install -e '.[lakehouse]'
 import argparse
 
 HELP = "write tables and views as Parquet, CSV or Delta Lake"
-USUAL = ("turnouts", "sections", "events", "campaigns", "modes_current", "charts", "baselines", "alarms",
+DEFAULT_TABLES = ("turnouts", "sections", "events", "campaigns", "modes_current", "charts", "baselines", "alarms",
          "chart_states", "worklist")  # fmt: skip
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Folder, names and format."""
     parser.add_argument("folder", help="where to write; made where it does not exist")
-    parser.add_argument("--only", nargs="+", metavar="NAME", help=f"tables and views; usually {', '.join(USUAL)}")
+    parser.add_argument(
+        "--only", nargs="+", metavar="NAME", help=f"tables and views; usually {', '.join(DEFAULT_TABLES)}"
+    )
     parser.add_argument("--format", choices=("parquet", "csv", "delta"), default="parquet", help="(%(default)s)")
     parser.add_argument("--registry", default="results/registry", help="folder of the registry (%(default)s)")
 
@@ -37,14 +39,14 @@ def run(args: argparse.Namespace) -> int:
     except OSError as error:
         raise RegistryError(f"{folder} cannot be made: {error.strerror}. Name another folder.") from None
     with open_registry(args.registry) as con:
-        for name in args.only or USUAL:
+        for name in args.only or DEFAULT_TABLES:
             try:
                 path, n = _write(con, name, folder, args.format)
             except duckdb.CatalogException:
                 raise RegistryError(f"no table or view {name!r}. 'turnout query --list' names them.") from None
             except duckdb.Error as error:
-                said = str(error).splitlines()[0]
-                raise RegistryError(f"{name} cannot be written to {folder}: {said}. Make room or allow it.") from None
+                reason = str(error).splitlines()[0]
+                raise RegistryError(f"{name} cannot be written to {folder}: {reason}. Make room or allow it.") from None
             print(f"{path}: {n} rows")
     return 0
 

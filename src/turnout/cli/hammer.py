@@ -39,14 +39,14 @@ def run(args: argparse.Namespace) -> int:
     from turnout.config import load_configuration
     from turnout.errors import ConfigError
     from turnout.report.hammer_text import hammer_words, is_usable
-    from turnout.stages.hammer_adhoc import asked_for
+    from turnout.stages.hammer_adhoc import requested_units
 
     if args.raw and not Path(args.raw).is_dir():
         raise ConfigError(args.raw, "--raw", "no such folder", "Write the folder that holds those of the turnouts")
     configuration = load_configuration(args.configuration)
     folders = {name: row.raw for name, row in configuration.rows.items()}
     turnout, raw = configuration.turnout(args.turnout), Path(args.raw or "raw")
-    tests = asked_for(args.file, turnout, raw, args.section, args.campaign, folders)
+    tests = requested_units(args.file, turnout, raw, args.section, args.campaign, folders)
     if args.figure:
         _check_figure(Path(args.figure), tests)
     usable = True
@@ -73,8 +73,8 @@ def _check_figure(path, tests):
     if not path.parent.is_dir():
         raise ConfigError(path, "--figure", f"no folder {path.parent}", "Make it, or write another one")
     if len(tests) > 1:
-        told = ", ".join(test.unit.label for test in tests)
-        raise ConfigError(path, "--figure", f"one figure for {told}", "Name the files of one section and campaign")
+        labels = ", ".join(test.unit.label for test in tests)
+        raise ConfigError(path, "--figure", f"one figure for {labels}", "Name the files of one section and campaign")
 
 
 def _draw(path, rows, test):

@@ -41,80 +41,80 @@ def run(args: argparse.Namespace) -> int:
     for error in result.errors:
         print(f"Not used: {error}")
     _, context = passage_context(turnout.id, turnout.settings, args.work)
-    found = False
-    for whole in (*result.recordings, *result.long):
-        for recording, late, name in trains_in(whole, settings):
-            found |= _show(recording, late if name else None, turnout, context, settings, args.no_fit)
-    return 0 if found else 1
+    has_train = False
+    for record in (*result.recordings, *result.long_recordings):
+        for recording, offset, name in trains_in(record, settings):
+            has_train |= _show(recording, offset if name else None, turnout, context, settings, args.no_fit)
+    return 0 if has_train else 1
 
 
-def _show(recording, late, turnout, context, settings, no_fit) -> bool:
+def _show(recording, offset, turnout, context, settings, no_fit) -> bool:
     """Print one train and its fits; returns whether there is a train."""
     from turnout.passage.analysis import analyse
     from turnout.stages.passage import sensors_of
 
-    if late is not None:
-        print(f"{late:.1f} s after the start of the record:")
+    if offset is not None:
+        print(f"{offset:.1f} s after the start of the record:")
     passage = analyse(recording, sensors_of(turnout), context.patterns, settings)
-    print("\n".join(_train(recording, passage)))
+    print("\n".join(_train_lines(recording, passage)))
     if passage.n_axle and not no_fit:
-        print("\n".join(_fits(recording, passage, turnout, context, settings)))
+        print("\n".join(_fit_lines(recording, passage, turnout, context, settings)))
     return bool(passage.n_axle)
 
 
-def _train(recording, passage) -> list[str]:
+def _train_lines(recording, passage) -> list[str]:
     """The train in words."""
-    words = [f"{recording.source}, record {recording.record + 1}: {recording.duration:.1f} s, {passage.status}"]
-    words += [f"  {f.reason}: {f.detail}" for f in passage.findings]
+    lines = [f"{recording.source}, record {recording.record + 1}: {recording.duration:.1f} s, {passage.status}"]
+    lines += [f"  {f.reason}: {f.detail}" for f in passage.findings]
     if not passage.n_axle:
-        return words
+        return lines
     speed, type_ = passage.speed, passage.type
-    words.append(f"  axles      {passage.n_axle}, the clearest cut between them and the rest is {passage.contrast:.1f}")
-    words.append(f"  speed      {3.6 * speed.speed:.1f} ± {3.6 * speed.se:.1f} km/h halfway, from {speed.source}")
-    words.append(f"  change     {speed.acceleration:+z.2f} ± {speed.acceleration_se:.2f} m/s²")
+    lines.append(f"  axles      {passage.n_axle}, the clearest cut between them and the rest is {passage.contrast:.1f}")
+    lines.append(f"  speed      {3.6 * speed.speed:.1f} ± {3.6 * speed.se:.1f} km/h halfway, from {speed.source}")
+    lines.append(f"  change     {speed.acceleration:+z.2f} ± {speed.acceleration_se:.2f} m/s²")
     if speed.disagreement is not None and abs(speed.disagreement) > 3:
-        words.append(f"  sensors and axle spacing differ by {abs(speed.disagreement):.1f} standard errors")
-    words.append(f"  direction  {passage.direction}, track {passage.track}")
-    words.append(f"  type       {type_.type}, probability {type_.probability:.3f}")
+        lines.append(f"  sensors and axle spacing differ by {abs(speed.disagreement):.1f} standard errors")
+    lines.append(f"  direction  {passage.direction}, track {passage.track}")
+    lines.append(f"  type       {type_.type}, probability {type_.probability:.3f}")
     if type_.residual is not None:
         row = " ".join(v.name for v in type_.vehicles)
-        words.append(f"             axle spacings differ by {100 * type_.residual:.1f} cm rms from {row}")
+        lines.append(f"             axle spacings differ by {100 * type_.residual:.1f} cm rms from {row}")
     spacing = ", ".join(f"{d:.2f}" for d in passage.offsets[:12])
-    words.append(f"  axles at   {spacing}{' ...' if passage.n_axle > 12 else ''} m behind the first")
-    return words
+    lines.append(f"  axles at   {spacing}{' ...' if passage.n_axle > 12 else ''} m behind the first")
+    return lines
 
 
-def _fits(recording, passage, turnout, context, settings) -> list[str]:
+def _fit_lines(recording, passage, turnout, context, settings) -> list[str]:
     """A line per sensor: each score with that of its null models."""
     from datetime import datetime
 
     from turnout.passage.channel_fit import fit_channel
     from turnout.stages.passage import model_at, sensors_of
 
-    words = ["  sensor      fit / null   forecast / null  left out / null   along b  peak m/s²  status"]
+    lines = ["  sensor      fit / null   forecast / null  left out / null   along b  peak m/s²  status"]
     for sensor in sensors_of(turnout):
         models = context.models.get(sensor.section, ())
         model = model_at(models, recording.started_at or datetime.max)
         if sensor.name not in passage.at_sensor or model is None:
-            why = "does not hear the train" if models else "no model of its section"
-            words.append(f"  {sensor.name:<10}{why}")
+            reason = "does not hear the train" if models else "no model of its section"
+            lines.append(f"  {sensor.name:<10}{reason}")
             continue
         samples, times = recording.signal(sensor.name), passage.at_sensor[sensor.name]
         fit = fit_channel(samples, recording.rate, times, passage.motion.speed, model.model, settings)
         if fit.scores is None:
-            words.append(f"  {sensor.name:<10}{fit.detail}")
+            lines.append(f"  {sensor.name:<10}{fit.detail}")
             continue
         s, null = fit.scores, fit.null
-        words.append(
+        lines.append(
             f"  {sensor.name:<10}{s.fit:6.1f} /{null.fit:5.1f} {s.forecast:9.1f} /{null.forecast:6.1f} "
             f"{s.leave_one_out:9.1f} /{null.leave_one_out:6.1f} {fit.test.along_share:10.0%} {fit.peak:10.1f}"
             f"  {fit.status}"
         )
-    words.append(f"  {fit_rate(settings)}")
-    return words
+    lines.append(f"  {score_basis(settings)}")
+    return lines
 
 
-def fit_rate(settings) -> str:
+def score_basis(settings) -> str:
     """The settings behind the scores, in words."""
     return (
         f"band {settings.band_low:g}-{settings.band_high:g} Hz, two numbers per wheel, "

@@ -44,19 +44,19 @@ def run(args: argparse.Namespace) -> int:
     if args.raw and not Path(args.raw).is_dir():
         raise ConfigError(args.raw, "--raw", "no such folder", "Write the folder that holds those of the turnouts")
     counts = dict.fromkeys(("all", "new", "changed"), 0)
-    known = _Known(Path(args.work), shards)
+    earlier = _EarlierResults(Path(args.work), shards)
     for turnout in map(configuration.turnout, args.turnout or configuration.ids):
-        _say(turnout, Path(args.raw or "raw"), known, counts)
+        _print_changes(turnout, Path(args.raw or "raw"), earlier, counts)
     print(f"{counts['all']} units, {counts['new']} never computed, {counts['changed']} changed since.")
-    _say_gone(configuration, Path(args.raw or "raw"), Path(args.work) / "plan", shards, args.turnout)
+    _print_gone(configuration, Path(args.raw or "raw"), Path(args.work) / "plan", shards, args.turnout)
     return 0
 
 
-def _say_gone(configuration, raw, plans, shards, turnouts) -> None:
+def _print_gone(configuration, raw, plans, shards, turnouts) -> None:
     """Print which files of the last run are missing, and the error of the next run, if any."""
-    from turnout.workflow.plan import gone_files
+    from turnout.workflow.plan import missing_files
 
-    gone = gone_files(configuration, raw, plans, shards, turnouts)
+    gone = missing_files(configuration, raw, plans, shards, turnouts)
     if error := gone.error(configuration.settings["fleet"], raw):
         print(f"the next run will stop: {error}")
     elif len(gone.files) == 1:
@@ -65,26 +65,26 @@ def _say_gone(configuration, raw, plans, shards, turnouts) -> None:
         print(f"{gone}, first {gone.files[0]}: what they gave stays in the registry.")
 
 
-def _say(turnout, raw, known, counts) -> None:
+def _print_changes(turnout, raw, earlier, counts) -> None:
     """Print and count the new and changed units of one turnout, and print the files left out."""
     from turnout.config.load import read_notes
     from turnout.workflow.notes import notes_of
-    from turnout.workflow.plan import Planned
+    from turnout.workflow.plan import PlannedUnit
     from turnout.workflow.scan import scan, unit_id
 
-    found = scan(turnout, raw)
-    noted, wrong = read_notes(turnout, raw)
-    for unit, note in zip(found.units, notes_of(noted, found.units)):
-        word = known.judged(Planned(unit, note), turnout.settings)
+    scanned = scan(turnout, raw)
+    noted_turnout, note_errors = read_notes(turnout, raw)
+    for unit, note in zip(scanned.units, notes_of(noted_turnout, scanned.units)):
+        change = earlier.change_of(PlannedUnit(unit, note), turnout.settings)
         counts["all"] += 1
-        if word:
-            counts[word] += 1
-            print(f"{word:<8} {unit_id(unit)}: {len(unit.files)} files")
-    for problem in (*found.problems, *wrong):
+        if change:
+            counts[change] += 1
+            print(f"{change:<8} {unit_id(unit)}: {len(unit.files)} files")
+    for problem in (*scanned.problems, *note_errors):
         print(f"left out {problem}")
 
 
-class _Known:
+class _EarlierResults:
     """Results of earlier runs, read when a shard is first needed."""
 
     def __init__(self, work, shards) -> None:
@@ -93,7 +93,7 @@ class _Known:
         self.tokens: dict = {}
         self.algo: dict[str, str] = {}
 
-    def judged(self, planned, settings) -> str:
+    def change_of(self, planned, settings) -> str:
         """ "new", "changed", or "" if its result is current."""
         from turnout.fingerprint import fingerprint
         from turnout.workflow.plan import shard_of
@@ -116,9 +116,9 @@ class _Known:
 
     def _token(self, unit, settings):
         """Token of what a stage takes from another one, such as the models that passages are fitted with."""
-        from turnout.workflow.tasks import named
+        from turnout.workflow.tasks import load_function
 
         context = STAGES[unit.kind][1]
         if context and (unit.kind, unit.turnout) not in self.tokens:
-            self.tokens[unit.kind, unit.turnout] = named(context)(unit.turnout, settings, work=self.work)[0]
+            self.tokens[unit.kind, unit.turnout] = load_function(context)(unit.turnout, settings, work=self.work)[0]
         return self.tokens.get((unit.kind, unit.turnout), "")

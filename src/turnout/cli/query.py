@@ -46,25 +46,25 @@ def run(args: argparse.Namespace) -> int:
             if args.csv:
                 _write_csv(result, args.csv)
             else:
-                print(shown(result, args.rows))
+                print(format_table(result, args.rows))
         except duckdb.Error as error:
             raise RegistryError(f"{error}\n'turnout query --list' names the tables, views and macros") from None
     return 0
 
 
 def _write_csv(result, path):
-    with opened(path) as stream:
+    with open_output(path) as stream:
         writer = csv.writer(stream)
         writer.writerow(result.columns)
         writer.writerows(result.fetchall())
 
 
-def opened(path):
+def open_output(path):
     """The file at ``path`` open for writing, standard output for "-"; RegistryError if it cannot be written."""
     from turnout.errors import RegistryError
 
     if path == "-":
-        return _Standard()
+        return _StandardOutput()
     try:
         return open(path, "w", newline="", encoding="utf-8")
     except OSError as error:
@@ -72,7 +72,7 @@ def opened(path):
         raise RegistryError(f"{path} cannot be written: {error.strerror}. {remedy}.") from None
 
 
-class _Standard:
+class _StandardOutput:
     """Standard output as a context that does not close it."""
 
     def __enter__(self):
@@ -82,10 +82,10 @@ class _Standard:
         return False
 
 
-def shown(result, limit: int = 60) -> str:
+def format_table(result, limit: int = 60) -> str:
     """Text table of a result: numbers right aligned, NULL empty, and the number of rows."""
     rows = result.limit(limit + 1).fetchall()
-    more, rows = len(rows) > limit, rows[:limit]
+    is_longer, rows = len(rows) > limit, rows[:limit]
     text = [[_cell(value) for value in row] for row in rows]
     widths = [max(len(name), *(len(row[i]) for row in text), 0) for i, name in enumerate(result.columns)]
     right = [
@@ -95,8 +95,8 @@ def shown(result, limit: int = 60) -> str:
     def line(cells):
         return "  ".join(c.rjust(w) if r else c.ljust(w) for c, w, r in zip(cells, widths, right)).rstrip()
 
-    total = result.count("*").fetchall()[0][0] if more else len(rows)
-    count = f"({len(rows)} of {total} rows)" if more else f"({total} row{'s' if total != 1 else ''})"
+    total = result.count("*").fetchall()[0][0] if is_longer else len(rows)
+    count = f"({len(rows)} of {total} rows)" if is_longer else f"({total} row{'s' if total != 1 else ''})"
     return "\n".join([line(result.columns), line(["-" * w for w in widths]), *map(line, text), count])
 
 

@@ -31,17 +31,17 @@ def run(args):
     code = run_pipeline(args.cores, "--directory", str(folder), "--config", f"configuration={examples}")
     if code:
         return code
-    _tell_hits(folder)
+    _print_impacts(folder)
     beams = list(beam_modes(folder / "raw"))
-    _tell_modes(beams)
+    _print_modes(beams)
     page = write_beams(beams, folder / "results" / "pages")
-    _tell_uff(folder)
+    _print_uff(folder)
     print(f"\nPages: {folder}/results/pages/index.html")
     print(f"Modes of the beams, drawn: {page}; as a table: {page.with_suffix('.csv')}")
     return 0
 
 
-def _tell_hits(folder):
+def _print_impacts(folder):
     from turnout.demo.published_modes import HITS
     from turnout.registry.database import open_registry
 
@@ -53,24 +53,24 @@ def _tell_hits(folder):
         print(f"{record:>4}  {HITS[record]:<24} {status:<10} {detail or ''}")
 
 
-def _tell_modes(beams):
+def _print_modes(beams):
     for beam in beams:
         print(f"\nModes of the {beam.name} ({beam.origin}): found without being told how many, nor where")
         print(f"{'published [Hz]':>15} {'found [Hz]':>22} {'published damping':>19} {'found damping [%]':>20} {'n':>4}")
         for f, damping, mode in beam.rows:
-            said = "not published" if f is None else f"{f:.1f}"
+            published = "not published" if f is None else f"{f:.1f}"
             zeta = "" if damping is None else f"{damping:.2f} %"
             if mode is None:
-                print(f"{said:>15} {'not found':>22} {zeta:>19}")
+                print(f"{published:>15} {'not found':>22} {zeta:>19}")
                 continue
-            at, d = mode.frequency, mode.damping
-            frequency = f"{at.mean:.2f} ± {(at.high - at.low) / 2:.2f}"
-            ratio = f"{100 * d.mean:.3f} ± {50 * (d.high - d.low):.3f}"
-            print(f"{said:>15} {frequency:>22} {zeta:>19} {ratio:>20} {at.n:>4}")
+            estimate, damping_estimate = mode.frequency, mode.damping
+            frequency = f"{estimate.mean:.2f} ± {(estimate.high - estimate.low) / 2:.2f}"
+            ratio = f"{100 * damping_estimate.mean:.3f} ± {50 * (damping_estimate.high - damping_estimate.low):.3f}"
+            print(f"{published:>15} {frequency:>22} {zeta:>19} {ratio:>20} {estimate.n:>4}")
     print("± is the 95 % t interval of the mean over n responses, as if independent; those of one sensor are not.")
 
 
-def _tell_uff(folder):
+def _print_uff(folder):
     from turnout.demo.published_modes import uff_contents
 
     print("\nVendors' UFF files")

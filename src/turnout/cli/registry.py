@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
 def _check(args) -> int:
     from turnout.registry.integrity import check
 
-    problems = check(_existing(args), hashes=not args.quick)
+    problems = check(_registry_folder(args), hashes=not args.quick)
     print("\n".join(problems) or "The registry holds what its list says.")
     return 1 if problems else 0
 
@@ -45,19 +45,19 @@ def _check(args) -> int:
 def _compact(args) -> int:
     from turnout.registry.compaction import compact
 
-    return _say(compact(_existing(args), args.at_least), "merged")
+    return _print_changes(compact(_registry_folder(args), args.at_least), "merged")
 
 
 def _rebuild(args) -> int:
     from turnout.registry.compaction import rebuild
 
-    return _say(rebuild(_existing(args)), "written anew")
+    return _print_changes(rebuild(_registry_folder(args)), "written anew")
 
 
-def _say(done, verb) -> int:
-    for folder, (files, rows) in sorted(done.items()):
+def _print_changes(changes, verb) -> int:
+    for folder, (files, rows) in sorted(changes.items()):
         print(f"{folder}: {files} files with {rows} rows {verb}")
-    if not done:
+    if not changes:
         print("Nothing to do.")
     return 0
 
@@ -65,15 +65,15 @@ def _say(done, verb) -> int:
 def _vacuum(args) -> int:
     from turnout.registry.integrity import vacuum
 
-    gone = vacuum(_existing(args))
-    print("\n".join(gone) or "Nothing to delete.")
+    deleted = vacuum(_registry_folder(args))
+    print("\n".join(deleted) or "Nothing to delete.")
     return 0
 
 
 def _relocate(args) -> int:
     from turnout.registry.database import rebuild_database
 
-    folder = _existing(args)
+    folder = _registry_folder(args)
     generation = rebuild_database(folder)
     print(f"{folder.resolve() / 'registry.duckdb'}: views over {len(generation.files)} files")
     return 0
@@ -86,13 +86,13 @@ def _describe(args) -> int:
     return 0
 
 
-def _existing(args):
+def _registry_folder(args):
     from pathlib import Path
 
     from turnout.errors import RegistryError
-    from turnout.registry.generation import FILE
+    from turnout.registry.generation import GENERATION_FILE
 
     folder = Path(args.registry)
-    if not (folder / FILE).exists():
+    if not (folder / GENERATION_FILE).exists():
         raise RegistryError(f"{folder}: there is no registry here. Run the pipeline, or give --registry")
     return folder

@@ -28,27 +28,27 @@ def run(args):
     day = _day(args.day)
     n = report_job(args.registry, args.pages, args.turnouts, threads=args.cores, day=day)
     print(f"{n} pages written, the others had not changed: {args.pages}/index.html")
-    if said := f"As of {day}." if day else _of_then(args.registry):
-        print(said)
+    if note := f"As of {day}." if day else _older_day_hint(args.registry):
+        print(note)
 
 
-def _day(said):
+def _day(text):
     """The requested day, None without one; ConfigError if it is invalid."""
     from datetime import date
 
     from turnout.errors import ConfigError
 
     try:
-        return date.fromisoformat(said).isoformat() if said else None
+        return date.fromisoformat(text).isoformat() if text else None
     except ValueError:
-        raise ConfigError("--day", "date", repr(said), "Write YYYY-MM-DD") from None
+        raise ConfigError("--day", "date", repr(text), "Write YYYY-MM-DD") from None
 
 
-def _of_then(registry):
+def _older_day_hint(registry):
     """A hint to an earlier day if charts of today's pages are too old, else ""."""
-    from turnout.registry.as_of import counts_of, list_day, of_then
+    from turnout.registry.as_of import counts_of, list_day, past_day_hint
     from turnout.registry.database import open_registry
 
     with open_registry(registry) as con:
         *_, n_unmeasured, newest = counts_of(con, list_day(con))
-    return of_then(newest, "turnout report --day", "pages") if n_unmeasured and newest else ""
+    return past_day_hint(newest, "turnout report --day", "pages") if n_unmeasured and newest else ""

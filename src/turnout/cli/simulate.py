@@ -14,14 +14,14 @@ HELP = "simulate a hammer test or a train passage"
 
 def add_arguments(parser):
     """Options of the command."""
-    kinds = parser.add_subparsers(dest="kind", metavar="kind", required=True)
-    hammer = kinds.add_parser("hammer", help="blows of a hammer at one section")
+    subcommands = parser.add_subparsers(dest="kind", metavar="kind", required=True)
+    hammer = subcommands.add_parser("hammer", help="blows of a hammer at one section")
     hammer.add_argument(
         "--section", required=True, help="location of the track file, or, without --turnout, a place in metres"
     )
     hammer.add_argument("--tests", type=int, default=1, help="tests, one file each; --out takes one (default 1)")
     hammer.add_argument("--blows", type=int, default=10, help="blows per test (default 10)")
-    passage = kinds.add_parser("passage", help="one train over the turnout")
+    passage = subcommands.add_parser("passage", help="one train over the turnout")
     passage.add_argument("--vehicle", default="ic3", help="file in config/vehicles, or its path (default ic3)")
     passage.add_argument("--speed", type=float, default=160.0, help="km/h (default 160)")
     passage.add_argument(
@@ -53,7 +53,7 @@ def add_arguments(parser):
             default=0,
             help="of noise, supports' scatter and the rail's roughness: trains over one rail share it (default 0)",
         )
-    figures = kinds.add_parser("figures", help="the figures of docs/simulation.md")
+    figures = subcommands.add_parser("figures", help="the figures of docs/simulation.md")
     figures.add_argument("--out", default="docs/gallery", help="folder (default docs/gallery)")
 
 

@@ -43,35 +43,35 @@ def run(args: argparse.Namespace) -> int:
         settings = turnout.settings["passage"]
         patterns = known_patterns(settings.axle_patterns)
         trains = weighed_trains(turnout, args.raw, patterns, settings)
-        print("\n".join(_loads(name, trains, learn_loads(turnout, trains, settings), settings)))
+        print("\n".join(_load_lines(name, trains, learn_loads(turnout, trains, settings), settings)))
     with open_registry(args.registry) as connection:
         clusters = learn_clusters(connection, settings)
-    print("\n".join(_clusters(clusters)))
+    print("\n".join(_cluster_lines(clusters)))
     return 0
 
 
-def _loads(name, trains, made, settings) -> list[str]:
+def _load_lines(name, trains, calibrations, settings) -> list[str]:
     """The calibrations of one turnout in words."""
-    if not made:
-        need = settings.load_trains_minimum
-        return [f"{name}: {len(trains)} trains of known weight, {need} are needed: axle loads stay unavailable"]
-    words = [f"{name}: {len(trains)} trains of known weight, {min(t['load'] for t in trains):.1f} to "]
-    words[0] += f"{max(t['load'] for t in trains):.1f} t per axle"
-    for channel, c in made.items():
-        words.append(
+    if not calibrations:
+        n_required = settings.load_trains_minimum
+        return [f"{name}: {len(trains)} trains of known weight, {n_required} are needed: axle loads stay unavailable"]
+    lines = [f"{name}: {len(trains)} trains of known weight, {min(t['load'] for t in trains):.1f} to "]
+    lines[0] += f"{max(t['load'] for t in trains):.1f} t per axle"
+    for channel, c in calibrations.items():
+        lines.append(
             f"  {channel:<6} one train scatters by {100 * c.scatter:.1f} %, amplitude with speed to the power "
             f"{c.exponent:.2f}, {3.6 * c.slowest:.0f} to {3.6 * c.fastest:.0f} km/h, n = {c.n}"
         )
-    return words
+    return lines
 
 
-def _clusters(found) -> list[str]:
+def _cluster_lines(clusters) -> list[str]:
     """The clusters in words."""
     import numpy as np
 
-    words = [f"clusters, version {found.version}:"]
-    for c in found.clusters:
+    lines = [f"clusters, version {clusters.version}:"]
+    for c in clusters.clusters:
         centre = np.exp(c.mean)
         load = f", {centre[1]:.1f} t per axle" if len(centre) > 1 else ""
-        words.append(f"  {c.id:<14}{centre[0]:.0f} km/h{load}, n = {c.n}")
-    return words if found.clusters else ["no clusters: no train of a known type yet"]
+        lines.append(f"  {c.id:<14}{centre[0]:.0f} km/h{load}, n = {c.n}")
+    return lines if clusters.clusters else ["no clusters: no train of a known type yet"]

@@ -9,9 +9,9 @@ turnout worklist --csv list.csv
 import argparse
 import csv
 
-from turnout.cli.query import opened
+from turnout.cli.query import open_output
 
-FIRST = "select min(measured_at_utc) from charts where state <> 'wrong_time'"
+FIRST_MEASUREMENT_QUERY = "select min(measured_at_utc) from charts where state <> 'wrong_time'"
 HELP = "tomorrow's list: what to inspect, what to plan, where nothing can be said"
 
 
@@ -37,12 +37,12 @@ def run(args: argparse.Namespace) -> int:
         cursor = con.execute(question, day)
         names = [d[0] for d in cursor.description]
         rows = cursor.fetchall()
-        known = counts_of(con, today)
+        counts = counts_of(con, today)
     if args.csv:
-        with opened(args.csv) as stream:
+        with open_output(args.csv) as stream:
             _write(stream, names, rows)
     else:
-        print(as_text([dict(zip(names, row)) for row in rows], *(known[:1] if args.asof else known)))
+        print(as_text([dict(zip(names, row)) for row in rows], *(counts[:1] if args.asof else counts)))
     return 0
 
 
@@ -57,15 +57,17 @@ def as_text(rows, n_charts=0, n_silenced=0, n_unmeasured=0, newest=None) -> str:
         return "\n".join([*text, "No chart has been computed yet: alarms and plans come with the first trend."])
     if newest is None:  # a list of another day: silenced and unmeasured charts are counted for today only
         return "\n".join(text)
-    from turnout.registry.as_of import of_then
+    from turnout.registry.as_of import past_day_hint
 
-    left = [(n_silenced, "silenced by somebody"), (n_unmeasured, "not measured for too long")]
-    parts = [f"{n} {word}" for n, word in left if n]
+    exclusions = [(n_silenced, "silenced by somebody"), (n_unmeasured, "not measured for too long")]
+    phrases = [f"{n} {word}" for n, word in exclusions if n]
     text.append(
-        f"Of {n_charts} charts, newest campaign {newest:%Y-%m-%d}" + (": " + ", ".join(parts) if parts else "") + "."
+        f"Of {n_charts} charts, newest campaign {newest:%Y-%m-%d}"
+        + (": " + ", ".join(phrases) if phrases else "")
+        + "."
     )
     if n_unmeasured:
-        text.append(of_then(newest, "turnout worklist --asof", "list"))
+        text.append(past_day_hint(newest, "turnout worklist --asof", "list"))
     return "\n".join(text)
 
 
@@ -91,14 +93,14 @@ def _day(text, con):
     """The time of ``--asof``; ConfigError if it is invalid or before the first measurement."""
     from datetime import datetime
 
-    from turnout.config.events import wrong_time
+    from turnout.config.events import time_problem
     from turnout.errors import ConfigError
 
-    if wrong := wrong_time(text):
-        raise ConfigError("--asof", "date", f"{text!r}{wrong[0]}", wrong[1])
+    if fault := time_problem(text):
+        raise ConfigError("--asof", "date", f"{text!r}{fault[0]}", fault[1])
     day = datetime.fromisoformat(text.removesuffix("Z"))
-    ((first,),) = con.execute(FIRST).fetchall()
+    ((first,),) = con.execute(FIRST_MEASUREMENT_QUERY).fetchall()
     if first is not None and day < first:
-        found = f"{text!r}: nothing was measured by then, the first measurement is of {first:%Y-%m-%d %H:%M} UTC"
-        raise ConfigError("--asof", "date", found, "Ask for a later day")
+        observation = f"{text!r}: nothing was measured by then, the first measurement is of {first:%Y-%m-%d %H:%M} UTC"
+        raise ConfigError("--asof", "date", observation, "Ask for a later day")
     return day

@@ -4,7 +4,7 @@
 ``with_raw(turnout, raw_root)`` adds the campaigns and trains that are listed in the raw folder.
 """
 
-from turnout.config.campaign_notes import unnoted
+from turnout.config.campaign_notes import unlisted_campaign
 from turnout.config.events import Event
 from turnout.config.load import Configuration, load_configuration, with_raw
 from turnout.config.turnout import Campaign, HammerConfig, PassageConfig, Section, TurnoutConfig
@@ -18,6 +18,6 @@ __all__ = [
     "Section",
     "TurnoutConfig",
     "load_configuration",
-    "unnoted",
+    "unlisted_campaign",
     "with_raw",
 ]

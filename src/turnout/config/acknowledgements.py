@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 from datetime import datetime, timedelta
 from pathlib import Path
 
-from turnout.config.csv_table import TableFault, read_csv, unreadable
-from turnout.config.events import now, wrong_place, wrong_time
+from turnout.config.csv_table import TableError, read_csv, row_problem
+from turnout.config.events import now, time_problem, turnout_problems
 from turnout.config.schema import suggestion
 from turnout.errors import ConfigError
 
@@ -18,7 +18,7 @@ BANDS = ("ballast", "railpad", "amplitude")
 
 
 def read_acknowledgements(
-    path: Path, name: str = "acknowledgements.csv", known=None, variants: Mapping | None = None
+    path: Path, name: str = "acknowledgements.csv", turnout_ids=None, variants: Mapping | None = None
 ) -> tuple[list[dict], list[ConfigError]]:
     """Valid rows as rows of the table ``acknowledgements``, and every error of the other rows.
 
@@ -29,69 +29,69 @@ def read_acknowledgements(
     if not os.path.lexists(path):
         return [], []
     try:
-        table = read_csv(Path(path), name, COLUMNS, needed=6)
-    except TableFault as fault:
+        table = read_csv(Path(path), name, COLUMNS, n_required=6)
+    except TableError as fault:
         return [], [fault.error]
     if table.faults:  # an unknown title may be a misspelt "until": no row counts
         return [], [fault.error for fault in table.faults]
     rows: list[dict] = []
     errors: list[ConfigError] = []
     for line, cells in table.rows:
-        found = list(faults(cells, known, variants or {}))
-        errors += [cells.place(name, line, column).error(*said) for column, *said in found]
-        if not found:
-            rows.append(acknowledgement(cells))
+        problems = list(row_problems(cells, turnout_ids, variants or {}))
+        errors += [cells.place(name, line, column).error(*problem) for column, *problem in problems]
+        if not problems:
+            rows.append(acknowledgement_row(cells))
     return rows, errors
 
 
-def faults(cells: Mapping, known, variants) -> Iterator[tuple[str, str, str]]:
+def row_problems(cells: Mapping, turnout_ids, variants) -> Iterator[tuple[str, str, str]]:
     """(column, problem, remedy) of every error in a row."""
-    said = {column: cells.get(column, "") for column in COLUMNS}
-    if no_row := unreadable(cells):
-        yield no_row
+    values = {column: cells.get(column, "") for column in COLUMNS}
+    if line_problem := row_problem(cells):
+        yield line_problem
         return
-    if not said["turnout"]:
+    if not values["turnout"]:
         yield "turnout", "turnout is empty", "Write the id of the turnout"
     else:
-        yield from wrong_place(said | {"section": said["section"].removesuffix("*")}, known, variants)
-    if said["action"] not in ACTIONS:
-        yield "action", f"action is {said['action']!r}", suggestion(said["action"], ACTIONS)
-    if said["band"] and said["band"] not in BANDS:
-        yield "band", f"band is {said['band']!r}", suggestion(said["band"], BANDS)
-    if said["action"] == "suppress" and not said["until"]:
+        yield from turnout_problems(values | {"section": values["section"].removesuffix("*")}, turnout_ids, variants)
+    if values["action"] not in ACTIONS:
+        yield "action", f"action is {values['action']!r}", suggestion(values["action"], ACTIONS)
+    if values["band"] and values["band"] not in BANDS:
+        yield "band", f"band is {values['band']!r}", suggestion(values["band"], BANDS)
+    if values["action"] == "suppress" and not values["until"]:
         yield "until", "until is empty", "Write the day on which it is to speak again"
     for column in ("by", "reason"):
-        if not said[column]:
+        if not values[column]:
             yield column, f"{column} is empty", "Write who and why: it stays in the record"
-    times = ["at"] + ["until"] * bool(said["until"])
-    wrong = {column: fault for column in times if (fault := wrong_time(said[column]))}
-    for column, (more, remedy) in wrong.items():
-        yield column, f"{column} is {said[column]!r}{more}", remedy
-    if said["action"] == "acknowledge" and not wrong and _time(said["at"]) > now() + timedelta(days=1):
-        yield "at", f"at {said['at']} has not come yet", "Write the day on which the alarm was seen"
-    if said["until"] and not wrong and _time(said["until"]) <= _time(said["at"]):
+    times = ["at"] + ["until"] * bool(values["until"])
+    time_problems = {column: fault for column in times if (fault := time_problem(values[column]))}
+    for column, (addition, remedy) in time_problems.items():
+        yield column, f"{column} is {values[column]!r}{addition}", remedy
+    if values["action"] == "acknowledge" and not time_problems and _time(values["at"]) > now() + timedelta(days=1):
+        yield "at", f"at {values['at']} has not come yet", "Write the day on which the alarm was seen"
+    if values["until"] and not time_problems and _time(values["until"]) <= _time(values["at"]):
         yield (
             "until",
-            f"until {said['until']} is not after at {said['at']}",
+            f"until {values['until']} is not after at {values['at']}",
             "Write the day on which it is to speak again",
         )
 
 
-def acknowledgement(cells: Mapping) -> dict:
+def acknowledgement_row(cells: Mapping) -> dict:
     """The row of the table ``acknowledgements`` for a valid row of the file."""
-    said = {column: cells.get(column, "") for column in COLUMNS}
-    section = said["section"]
+    values = {column: cells.get(column, "") for column in COLUMNS}
+    section = values["section"]
     if section and section != "*" and "/" not in section:
-        section = f"{said['turnout']}/{section}"
+        section = f"{values['turnout']}/{section}"
     row = {
-        "turnout_id": said["turnout"],
+        "turnout_id": values["turnout"],
         "section_id": section or None,
-        "band": said["band"] or None,
-        "action": said["action"],
-        "by_whom": said["by"],
-        "at_utc": _time(said["at"]),
-        "until_utc": _time(said["until"]) if said["until"] else None,
-        "reason": said["reason"],
+        "band": values["band"] or None,
+        "action": values["action"],
+        "by_whom": values["by"],
+        "at_utc": _time(values["at"]),
+        "until_utc": _time(values["until"]) if values["until"] else None,
+        "reason": values["reason"],
     }
     return {"acknowledgement_id": _id(row)} | row
 

@@ -4,12 +4,12 @@ from collections.abc import Callable, Iterator
 from zoneinfo import available_timezones
 
 from turnout.config.document import Branch, merge_branches
-from turnout.config.filename_pattern import compiled
+from turnout.config.filename_pattern import compile_pattern
 from turnout.config.schema import settings_keys, suggestion
 from turnout.errors import ConfigError
 
 
-def check_meaning(tree: Branch, to_si: Callable | None = None) -> Iterator[ConfigError]:
+def check_consistency(tree: Branch, to_si: Callable | None = None) -> Iterator[ConfigError]:
     """Every consistency error of a merged layout whose single keys are valid.
 
     ``to_si(quantity, unit, sensitivity, sensitivity_unit)`` raises ValueError for units that cannot be
@@ -17,22 +17,22 @@ def check_meaning(tree: Branch, to_si: Callable | None = None) -> Iterator[Confi
     """
     labels = tuple(tree["sections"])
     if "hammer" in tree:
-        yield from _files(tree["hammer"], "hammer", labels)
-        softest = _softest_blow(tree)
-        yield from _hammer(tree["hammer"], to_si, softest)
+        yield from _pattern_errors(tree["hammer"], "hammer", labels)
+        min_peak_force = _min_peak_force(tree)
+        yield from _hammer_errors(tree["hammer"], to_si, min_peak_force)
         for section in tree["sections"].values():
             if "hammer" in section:
-                yield from _hammer(merge_branches(tree["hammer"], section["hammer"]), to_si, softest)
+                yield from _hammer_errors(merge_branches(tree["hammer"], section["hammer"]), to_si, min_peak_force)
     if "passages" in tree:
-        yield from _files(tree["passages"], "passages", labels)
-        yield from _channels(tree["passages"], to_si)
+        yield from _pattern_errors(tree["passages"], "passages", labels)
+        yield from _channel_errors(tree["passages"], to_si)
         for channel in tree["passages"]["channels"].values():
             leaf = channel["section"]
             if leaf.value not in labels:
                 yield leaf.place.error(f"no section {leaf.value!r}", suggestion(leaf.value, labels))
 
 
-def _hammer(tree: Branch, to_si, softest: float) -> Iterator[ConfigError]:
+def _hammer_errors(tree: Branch, to_si, min_peak_force: float) -> Iterator[ConfigError]:
     channels = tree["channels"]
     for role in ("force", "response", "validation"):
         leaf = tree.get(role)
@@ -41,31 +41,33 @@ def _hammer(tree: Branch, to_si, softest: float) -> Iterator[ConfigError]:
         if leaf.value not in channels:
             yield leaf.place.error(f"{role} is {leaf.value!r}, no channel", suggestion(leaf.value, channels))
         elif (channels[leaf.value]["quantity"].value == "force") != (role == "force"):
-            found = channels[leaf.value]["quantity"].value
-            yield leaf.place.error(f"{role} is {leaf.value!r}, which measures {found}", "Name another channel")
-        elif role == "force" and (limit := _value(channels[leaf.value], "limit")) and limit <= softest:
-            found = f"limit is {limit} N for the hammer's force, and receptance.softest_blow is {softest} N"
+            detail = channels[leaf.value]["quantity"].value
+            yield leaf.place.error(f"{role} is {leaf.value!r}, which measures {detail}", "Name another channel")
+        elif role == "force" and (limit := _value(channels[leaf.value], "limit")) and limit <= min_peak_force:
+            detail = f"limit is {limit} N for the hammer's force, and receptance.softest_blow is {min_peak_force} N"
             remedy = "Write the limit in N, or a lower softest_blow where the hammer is a small one"
-            yield channels[leaf.value]["limit"].place.error(f"{found}: no blow could count", remedy)
-    yield from _channels(tree, to_si)
+            yield channels[leaf.value]["limit"].place.error(f"{detail}: no blow could count", remedy)
+    yield from _channel_errors(tree, to_si)
 
 
-def _channels(tree: Branch, to_si) -> Iterator[ConfigError]:
+def _channel_errors(tree: Branch, to_si) -> Iterator[ConfigError]:
     if zone := tree.get("time_zone"):
         if zone.value not in available_timezones():
             yield zone.place.error(f"time_zone is {zone.value!r}", "Write an IANA name such as Europe/Copenhagen")
     sources: dict[str | int, str] = {}
     for name, channel in tree["channels"].items():
         if to_si:
-            yield from _units(name, channel, to_si)
+            yield from _unit_errors(name, channel, to_si)
         limit, step = _value(channel, "limit"), _value(channel, "resolution")
         if limit and step and step >= limit:
-            found = f"resolution is {step}, and limit is {limit}"
-            yield channel["resolution"].place.error(found, "Write one step of the converter, in the unit of the limit")
+            problem = f"resolution is {step}, and limit is {limit}"
+            yield channel["resolution"].place.error(
+                problem, "Write one step of the converter, in the unit of the limit"
+            )
         source = channel["source"]
         if source.value in sources:
-            found = f"channel {name} reads {source.value!r}, as {sources[source.value]} does"
-            yield source.place.error(found, "Give each channel its own source")
+            problem = f"channel {name} reads {source.value!r}, as {sources[source.value]} does"
+            yield source.place.error(problem, "Give each channel its own source")
         sources[source.value] = name
 
 
@@ -73,27 +75,27 @@ def _value(channel: Branch, key: str):
     return channel[key].value if key in channel else None
 
 
-def _softest_blow(tree: Branch) -> float:
+def _min_peak_force(tree: Branch) -> float:
     """The setting receptance.softest_blow, else its default [N]."""
     written = tree.get("settings", {}).get("receptance", {}).get("softest_blow")
     return written.value if written else settings_keys()["receptance"].spec["softest_blow"].default
 
 
-def _units(name: str, channel: Branch, to_si: Callable) -> Iterator[ConfigError]:
-    given = {k: channel[k].value for k in ("unit", "sensitivity", "sensitivity_unit") if k in channel}
-    if given.get("unit") is None:
+def _unit_errors(name: str, channel: Branch, to_si: Callable) -> Iterator[ConfigError]:
+    values = {k: channel[k].value for k in ("unit", "sensitivity", "sensitivity_unit") if k in channel}
+    if values.get("unit") is None:
         return
     try:
-        to_si(channel["quantity"].value, given["unit"], given.get("sensitivity"), given.get("sensitivity_unit", ""))
+        to_si(channel["quantity"].value, values["unit"], values.get("sensitivity"), values.get("sensitivity_unit", ""))
     except ValueError as error:
-        found = f"unit {given['unit']!r} for the {channel['quantity'].value} of channel {name}: {error}"
-        yield channel["unit"].place.error(found, "Correct unit, sensitivity or sensitivity_unit")
+        problem = f"unit {values['unit']!r} for the {channel['quantity'].value} of channel {name}: {error}"
+        yield channel["unit"].place.error(problem, "Correct unit, sensitivity or sensitivity_unit")
 
 
-def _files(tree: Branch, kind: str, labels: tuple[str, ...]) -> Iterator[ConfigError]:
+def _pattern_errors(tree: Branch, branch: str, labels: tuple[str, ...]) -> Iterator[ConfigError]:
     leaf = tree["files"]
     try:
-        compiled(leaf.value, kind, labels)
+        compile_pattern(leaf.value, branch, labels)
     except ValueError as error:
-        example = "hammer/{campaign}/{section}_{test}.{ext}" if kind == "hammer" else "passages/{time}.{ext}"
+        example = "hammer/{campaign}/{section}_{test}.{ext}" if branch == "hammer" else "passages/{time}.{ext}"
         yield leaf.place.error(f"files is {leaf.value!r}: {error}", f"Write a pattern like {example}")

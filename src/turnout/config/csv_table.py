@@ -10,17 +10,17 @@ from pathlib import Path
 from turnout.config.document import Place
 from turnout.config.schema import suggestion
 
-TOO_MANY = "cells beyond the header"
-BROKEN = "a line that is no row"
+EXTRA_CELLS = "cells beyond the header"
+BROKEN_LINE = "a line that is no row"
 
 
-class TableFault(Exception):
+class TableError(Exception):
     """Error of a whole table: place, problem and remedy; ``error`` is the same as ConfigError."""
 
-    def __init__(self, place: Place, found: str, remedy: str):
-        super().__init__(found)
-        self.place, self.found, self.remedy = place, found, remedy
-        self.error = place.error(found, remedy)
+    def __init__(self, place: Place, problem: str, remedy: str):
+        super().__init__(problem)
+        self.place, self.problem, self.remedy = place, problem, remedy
+        self.error = place.error(problem, remedy)
 
 
 class Cells(dict):
@@ -31,7 +31,7 @@ class Cells(dict):
 
     def place(self, name: str, line: int, column: str) -> Place:
         """Where the cell of ``column`` starts; the start of the line if it has no such cell."""
-        return Place(name, line, dict(zip((*self.titles, TOO_MANY), _starts(self.text))).get(column, 1))
+        return Place(name, line, dict(zip((*self.titles, EXTRA_CELLS), _cell_columns(self.text))).get(column, 1))
 
 
 @dataclass(frozen=True)
@@ -39,10 +39,10 @@ class CsvTable:
     """``rows`` are (line, cells); ``faults`` are errors of the header despite which the rows can be read."""
 
     rows: tuple[tuple[int, Cells], ...]
-    faults: tuple[TableFault, ...]
+    faults: tuple[TableError, ...]
 
 
-def read_csv(path: Path, name: str, known: tuple[str, ...], needed: int, free: bool = False) -> CsvTable:
+def read_csv(path: Path, name: str, columns: tuple[str, ...], n_required: int, allow_others: bool = False) -> CsvTable:
     """Read a CSV. Its header must have the first ``n_required`` of ``columns``, and no titles outside ``columns``.
 
     With ``allow_others`` an unknown title is an error only if it resembles a title that is missing. Errors call the
@@ -53,28 +53,30 @@ def read_csv(path: Path, name: str, known: tuple[str, ...], needed: int, free: b
     lines = [(n, line) for n, line in enumerate(_text(path, name).split("\n"), 1) if line.strip()]
     first, header = lines[0] if lines else (1, "")
     titles = _titles(header)
-    for title in known[:needed]:
+    for title in columns[:n_required]:
         if title not in titles:
-            found = f"no column {title!r}; the header has {', '.join(titles) or 'nothing'}"
-            raise TableFault(Place(name, first, 1), found, f"Write the header {','.join(known)}, with commas between")
+            problem = f"no column {title!r}; the header has {', '.join(titles) or 'nothing'}"
+            raise TableError(
+                Place(name, first, 1), problem, f"Write the header {','.join(columns)}, with commas between"
+            )
     faults = [
-        TableFault(Place(name, first, start), *fault)
-        for (k, title), start in zip(enumerate(titles), _starts(header))
-        if (fault := _title_fault(title, titles, k, known, free))
+        TableError(Place(name, first, start), *fault)
+        for (k, title), start in zip(enumerate(titles), _cell_columns(header))
+        if (fault := _title_problem(title, titles, k, columns, allow_others))
     ]
     return CsvTable(tuple((n, _cells(line, titles)) for n, line in lines[1:]), tuple(faults))
 
 
-def unreadable(cells: Mapping) -> tuple[str, str, str] | None:
+def row_problem(cells: Mapping) -> tuple[str, str, str] | None:
     """(column, problem, remedy) if a line is no valid row of its table, else None.
 
-    >>> unreadable(_cells('tamping,"machine 09-3X', ("kind", "note")))[1]
+    >>> row_problem(_cells('tamping,"machine 09-3X', ("kind", "note")))[1]
     'a double quote that is not closed in its line'
     """
-    if BROKEN in cells:
-        return BROKEN, cells[BROKEN], "Write each row in one line; double quotes go around a whole cell"
-    if TOO_MANY in cells:
-        return TOO_MANY, "more cells than columns", "Put a text with commas in double quotes"
+    if BROKEN_LINE in cells:
+        return BROKEN_LINE, cells[BROKEN_LINE], "Write each row in one line; double quotes go around a whole cell"
+    if EXTRA_CELLS in cells:
+        return EXTRA_CELLS, "more cells than columns", "Put a text with commas in double quotes"
     return None
 
 
@@ -82,7 +84,7 @@ def header_of(path: Path, name: str) -> tuple[str, ...]:
     """Titles of a CSV; TableError if it has none, is not UTF-8 or cannot be read."""
     lines = [(n, line) for n, line in enumerate(_text(path, name).split("\n"), 1) if line.strip()]
     if not lines:
-        raise TableFault(Place(name, 1, 1), "an empty table", "Write its header, or remove the file")
+        raise TableError(Place(name, 1, 1), "an empty table", "Write its header, or remove the file")
     return _titles(lines[0][1])
 
 
@@ -92,13 +94,13 @@ def _text(path: Path, name: str) -> str:
     except OSError as error:
         if not os.path.lexists(path):
             raise
-        raise TableFault(Place(name, 1, 1), str(error.strerror), "Put a file there that may be read") from None
+        raise TableError(Place(name, 1, 1), str(error.strerror), "Put a file there that may be read") from None
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
         column = error.start - data.rfind(b"\n", 0, error.start)
-        raise TableFault(Place(name, line, column), "a byte that is not UTF-8", "Save the file as UTF-8") from None
+        raise TableError(Place(name, line, column), "a byte that is not UTF-8", "Save the file as UTF-8") from None
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
@@ -113,39 +115,39 @@ def _titles(header: str) -> tuple[str, ...]:
     return tuple(titles)
 
 
-def _title_fault(title, titles, k, known, free) -> tuple[str, str] | None:
+def _title_problem(title, titles, k, columns, allow_others) -> tuple[str, str] | None:
     """(problem, remedy) of the ``k``-th title if it cannot be used, else None."""
     if title in titles[:k]:
         return f"column {title!r} for the second time", "Keep one of them"
-    if title in known:
+    if title in columns:
         return None
-    missing = [t for t in known if t not in titles]
-    if free and not get_close_matches(title, missing, cutoff=0.7):
+    missing = [t for t in columns if t not in titles]
+    if allow_others and not get_close_matches(title, missing, cutoff=0.7):
         return None
-    return f"unknown column {title!r}", suggestion(title, known)
+    return f"unknown column {title!r}", suggestion(title, columns)
 
 
 def _cells(line: str, titles: tuple[str, ...]) -> Cells:
     cells = Cells(dict.fromkeys(titles, ""))
     cells.text, cells.titles = line, titles
     try:
-        found = [cell.strip() for cell in next(csv.reader([line], strict=True))]
+        values = [cell.strip() for cell in next(csv.reader([line], strict=True))]
     except csv.Error as error:
         open_quote = "unexpected end" in str(error)
-        cells[BROKEN] = "a double quote that is not closed in its line" if open_quote else str(error)
+        cells[BROKEN_LINE] = "a double quote that is not closed in its line" if open_quote else str(error)
         return cells
-    while len(found) > len(titles) and not found[-1]:
-        found.pop()
-    cells.update(zip(titles, found))
-    if len(found) > len(titles):
-        cells[TOO_MANY] = ",".join(found[len(titles) :])
+    while len(values) > len(titles) and not values[-1]:
+        values.pop()
+    cells.update(zip(titles, values))
+    if len(values) > len(titles):
+        cells[EXTRA_CELLS] = ",".join(values[len(titles) :])
     return cells
 
 
-def _starts(line: str) -> Iterator[int]:
+def _cell_columns(line: str) -> Iterator[int]:
     """Columns, counted from 1, at which the cells of a line of CSV begin.
 
-    >>> list(_starts('a,"b,c",d'))
+    >>> list(_cell_columns('a,"b,c",d'))
     [1, 3, 9]
     """
     quoted = False

@@ -13,7 +13,7 @@ from turnout.errors import ConfigError
 
 
 @contextmanager
-def legible(path: object, where: str) -> Iterator[None]:
+def as_config_errors(path: object, where: str) -> Iterator[None]:
     """Context in which a file is read and parsed; errors become a ConfigError for ``path``.
 
     Covered are files that cannot be opened (error at ``where``) or are not UTF-8, characters that YAML does not allow,
@@ -24,16 +24,16 @@ def legible(path: object, where: str) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        found = f"cannot be read: {error.strerror}"
-        raise ConfigError(path, where, found, "Put a file of that name there, or take it away") from None
+        problem = f"cannot be read: {error.strerror}"
+        raise ConfigError(path, where, problem, "Put a file of that name there, or take it away") from None
     except UnicodeDecodeError as error:
         raise ConfigError(path, f"byte {error.start}", "a byte that is not UTF-8", "Save the file as UTF-8") from None
     except ReaderError as error:
-        found = f"the character {chr(error.character)!r}, which no YAML file may hold"
-        raise ConfigError(path, f"character {error.position + 1}", found, "Take it away") from None
+        problem = f"the character {chr(error.character)!r}, which no YAML file may hold"
+        raise ConfigError(path, f"character {error.position + 1}", problem, "Take it away") from None
     except RecursionError:
-        found = "content without an end, as of an anchor that holds itself"
-        raise ConfigError(path, where, found, "Write the values out there") from None
+        problem = "content without an end, as of an anchor that holds itself"
+        raise ConfigError(path, where, problem, "Write the values out there") from None
 
 
 @dataclass(frozen=True)
@@ -47,9 +47,9 @@ class Place:
     def __str__(self):
         return f"line {self.line}, column {self.column}"
 
-    def error(self, found: str, remedy: str) -> ConfigError:
+    def error(self, problem: str, remedy: str) -> ConfigError:
         """A ``ConfigError`` that points here."""
-        return ConfigError(self.path, str(self), found, remedy)
+        return ConfigError(self.path, str(self), problem, remedy)
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def load(path: Path, name: str | None = None) -> Branch:
     name = name or str(path)
     yaml = YAML(typ="safe", pure=True)
     try:
-        with legible(name, "line 1"):
+        with as_config_errors(name, "line 1"):
             node = yaml.compose(Path(path).read_text(encoding="utf-8"))
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
@@ -108,9 +108,9 @@ def merge_branches(*branches: Branch) -> Branch:
     return merged
 
 
-def plain(tree):
+def plain_values(tree):
     """The values without their places: dict, tuple, text, numbers."""
-    return {k: plain(v) for k, v in tree.items()} if isinstance(tree, Branch) else tree.value
+    return {k: plain_values(v) for k, v in tree.items()} if isinstance(tree, Branch) else tree.value
 
 
 def leaves(tree: Branch, prefix: str = "") -> Iterator[tuple[str, Leaf]]:
@@ -122,10 +122,10 @@ def leaves(tree: Branch, prefix: str = "") -> Iterator[tuple[str, Leaf]]:
             yield prefix + name, value
 
 
-def _tree(node, path, constructor, above=()):
+def _tree(node, path, constructor, ancestors=()):
     place = Place(path, node.start_mark.line + 1, node.start_mark.column + 1)
     if node.id == "mapping":
-        if any(node is other for other in above):
+        if any(node is ancestor for ancestor in ancestors):
             raise place.error("an anchor whose content holds the anchor itself", "Write the values out there")
         branch = Branch(place)
         for key, value in node.value:
@@ -134,7 +134,7 @@ def _tree(node, path, constructor, above=()):
             if name in branch:
                 first = branch.key_places[name].line
                 raise key_place.error(f"{name!r} for the second time, first in line {first}", "Keep one of them")
-            branch.put(name, _tree(value, path, constructor, (*above, node)), key_place)
+            branch.put(name, _tree(value, path, constructor, (*ancestors, node)), key_place)
         return branch
     if node.id == "sequence":
         return Leaf(tuple(_scalar(item, path, constructor) for item in node.value), place)
@@ -153,11 +153,11 @@ def _scalar(node, path, constructor):
         return constructor.construct_object(node)
     except (MarkedYAMLError, ValueError):
         place = Place(path, node.start_mark.line + 1, node.start_mark.column + 1)
-        found = f"{node.value!r} with the tag {node.tag!r}, which is none of a configuration"
-        raise place.error(found, "Write a plain value without a tag") from None
+        problem = f"{node.value!r} with the tag {node.tag!r}, which is none of a configuration"
+        raise place.error(problem, "Write a plain value without a tag") from None
 
 
-KEYS = re.compile(r"[^.\[\]]+")
+ENTRY_KEYS = re.compile(r"[^.\[\]]+")
 
 
 def line_of(path, place: str) -> int | None:
@@ -173,37 +173,37 @@ def line_of(path, place: str) -> int | None:
     except (OSError, UnicodeDecodeError, YAMLError):
         return None
     line = None
-    for key in KEYS.findall(place):
-        if (found := _below(node, key)) is None:
+    for key in ENTRY_KEYS.findall(place):
+        if (entry := _find_entry(node, key)) is None:
             break
-        line, node = found
+        line, node = entry
     return line
 
 
-def where(path, place: str, at: str = "") -> str:
+def describe_place(path, place: str, entry: str = "") -> str:
     """``place`` as errors name it, with the line of ``entry`` below it if that exists.
 
-    >>> where("nowhere.yaml", "rail.mass"), where("nowhere.yaml", "")
+    >>> describe_place("nowhere.yaml", "rail.mass"), describe_place("nowhere.yaml", "")
     ('rail.mass', 'the file')
     """
-    line = line_of(path, f"{place}.{at}")
-    said = [f"line {line}"] if line else []
-    return ", ".join([*said, place] if place else said or ["the file"])
+    line = line_of(path, f"{place}.{entry}")
+    pieces = [f"line {line}"] if line else []
+    return ", ".join([*pieces, place] if place else pieces or ["the file"])
 
 
-def _below(node, key):
+def _find_entry(node, key):
     """(line, node) of the entry ``key`` of a node, merge keys (<<) included; None if there is none."""
-    kind = getattr(node, "id", "")
-    if kind == "sequence":
+    node_type = getattr(node, "id", "")
+    if node_type == "sequence":
         item = node.value[int(key)] if key.isdigit() and int(key) < len(node.value) else None
         return item and (item.start_mark.line + 1, item)
-    if kind != "mapping":
+    if node_type != "mapping":
         return None
     for name, value in node.value:
         if name.value == key:
             return name.start_mark.line + 1, value
-    taken = [value for name, value in node.value if name.value == "<<"]
-    return next((found for value in taken if (found := _below(value, key))), None)
+    merged = [value for name, value in node.value if name.value == "<<"]
+    return next((entry for value in merged if (entry := _find_entry(value, key))), None)
 
 
 class Frozen(Mapping):

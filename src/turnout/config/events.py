@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-from turnout.config.csv_table import TableFault, read_csv, unreadable
+from turnout.config.csv_table import TableError, read_csv, row_problem
 from turnout.config.schema import NO_TURNOUT, suggestion
 from turnout.errors import ConfigError
 
@@ -22,7 +22,7 @@ RESETS = {
     "method_change": ("ballast", "railpad"),
     "other": (),
 }
-AHEAD = timedelta(days=366)  # how far ahead work may be planned; a later date is taken for a mistake
+MAX_LEAD_TIME = timedelta(days=366)  # how far ahead work may be planned; a later date is taken for a mistake
 COLUMNS = ("turnout", "section", "date", "kind", "resets", "note")
 
 
@@ -38,7 +38,9 @@ class Event:
     note: str = ""
 
 
-def read_events(path: Path, name: str, known, variants) -> tuple[list[Event], list[ConfigError], list[ConfigError]]:
+def read_events(
+    path: Path, name: str, turnout_ids, variants
+) -> tuple[list[Event], list[ConfigError], list[ConfigError]]:
     """(events in order of time, errors of rows that cannot be used, warnings). Without the file there are no events.
 
     Warnings concern events of an unknown turnout or section and events dated more than a year ahead. An unknown
@@ -49,54 +51,54 @@ def read_events(path: Path, name: str, known, variants) -> tuple[list[Event], li
         return [], [], []
     events: list[Event] = []
     try:
-        table = read_csv(path, name, COLUMNS, needed=4)
-    except TableFault as fault:
+        table = read_csv(path, name, COLUMNS, n_required=4)
+    except TableError as fault:
         return [], [fault.error], []
     errors, warnings = [fault.error for fault in table.faults], []
     for line, cells in table.rows:
-        found = list(_wrong(cells))
-        errors += [cells.place(name, line, column).error(*said) for column, *said in found]
-        if found:
+        problems = list(_row_problems(cells))
+        errors += [cells.place(name, line, column).error(*problem) for column, *problem in problems]
+        if problems:
             continue
         events.append(_event(cells))
-        strange = wrong_place(cells, known, variants)
-        warnings += [cells.place(name, line, column).error(*said) for column, *said in strange]
-        if events[-1].at > now() + AHEAD:
-            late = f"date {cells['date']} is more than a year ahead"
-            warnings.append(cells.place(name, line, "date").error(late, "Correct it, or enter it nearer to its day"))
+        unknown_turnouts = turnout_problems(cells, turnout_ids, variants)
+        warnings += [cells.place(name, line, column).error(*problem) for column, *problem in unknown_turnouts]
+        if events[-1].at > now() + MAX_LEAD_TIME:
+            message = f"date {cells['date']} is more than a year ahead"
+            warnings.append(cells.place(name, line, "date").error(message, "Correct it, or enter it nearer to its day"))
     return sorted(events, key=lambda e: (e.at, e.turnout, e.section or "", e.kind)), errors, warnings
 
 
-def _wrong(cells) -> Iterator[tuple[str, str, str]]:
+def _row_problems(cells) -> Iterator[tuple[str, str, str]]:
     """(column, problem, remedy) of every error in a row."""
-    if no_row := unreadable(cells):
-        yield no_row
+    if line_problem := row_problem(cells):
+        yield line_problem
         return
     if not cells["turnout"]:
         yield "turnout", "turnout is empty", "Write the id of the turnout"
-    if wrong := wrong_time(cells["date"]):
-        yield "date", f"date is {cells['date']!r}{wrong[0]}", wrong[1]
+    if problem := time_problem(cells["date"]):
+        yield "date", f"date is {cells['date']!r}{problem[0]}", problem[1]
     if cells["kind"] not in RESETS:
         yield "kind", f"kind is {cells['kind']!r}", suggestion(cells["kind"], RESETS)
-    if unknown := set(_words(cells)) - {"ballast", "railpad"}:
+    if unknown := set(_reset_bands(cells)) - {"ballast", "railpad"}:
         yield "resets", f"resets is {cells['resets']!r}", suggestion(min(unknown), ("ballast", "railpad", "none"))
 
 
-def wrong_place(cells, known, variants) -> Iterator[tuple[str, str, str]]:
+def turnout_problems(cells, turnout_ids, variants) -> Iterator[tuple[str, str, str]]:
     """Errors in ``turnout`` and ``section`` of a row; none if ``turnout_ids`` is None (turnouts.tsv has errors)."""
     turnout, label = cells["turnout"], cells["section"].removeprefix(f"{cells['turnout']}/")
-    if known is not None and turnout not in known:
-        yield "turnout", f"turnout {turnout!r} has no row in turnouts.tsv", suggestion(turnout, known, NO_TURNOUT)
+    if turnout_ids is not None and turnout not in turnout_ids:
+        yield "turnout", f"turnout {turnout!r} has no row in turnouts.tsv", suggestion(turnout, turnout_ids, NO_TURNOUT)
     elif label and turnout in variants:
         labels = variants[turnout].tree["sections"]
         if label not in labels:
             yield "section", f"turnout {turnout!r} has no section {label!r}", suggestion(label, labels)
 
 
-def wrong_time(text: str) -> tuple[str, str] | None:
+def time_problem(text: str) -> tuple[str, str] | None:
     """(problem, remedy) of a time in UTC; None if it is valid.
 
-    >>> wrong_time("2026-04-02") is None, wrong_time("2.4.2026")
+    >>> time_problem("2026-04-02") is None, time_problem("2.4.2026")
     (True, ('', 'Write YYYY-MM-DD or YYYY-MM-DDTHH:MM in UTC'))
     """
     try:
@@ -111,7 +113,7 @@ def now() -> datetime:
     return datetime.now(UTC).replace(tzinfo=None)
 
 
-def _words(cells) -> tuple[str, ...]:
+def _reset_bands(cells) -> tuple[str, ...]:
     return tuple(sorted(word for word in cells.get("resets", "").replace("+", " ").split() if word != "none"))
 
 
@@ -119,6 +121,6 @@ def _event(cells) -> Event:
     """The event of a valid row."""
     turnout, kind = cells["turnout"], cells["kind"]
     label = cells["section"].removeprefix(f"{turnout}/") or None
-    resets = _words(cells) if cells.get("resets") else RESETS[kind]
+    resets = _reset_bands(cells) if cells.get("resets") else RESETS[kind]
     at = datetime.fromisoformat(cells["date"].removesuffix("Z"))
     return Event(turnout, label, at, kind, resets, cells.get("note", ""))

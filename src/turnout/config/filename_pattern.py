@@ -9,34 +9,34 @@ FIELDS = {
     "hammer": {"campaign": r"\d{4}-\d{2}-\d{2}", "test": r"[A-Za-z0-9]+", "ext": r"[A-Za-z0-9]+"},
     "passages": {"time": r"\d{8}T\d{6}Z", "ext": r"[A-Za-z0-9]+"},
 }
-NEEDED = {"hammer": ("campaign", "section"), "passages": ("time",)}
+REQUIRED_FIELDS = {"hammer": ("campaign", "section"), "passages": ("time",)}
 
 
 @lru_cache(maxsize=256)
-def compiled(pattern: str, kind: str, sections: tuple[str, ...] = ()) -> re.Pattern:
+def compile_pattern(pattern: str, branch: str, sections: tuple[str, ...] = ()) -> re.Pattern:
     """Regular expression of a pattern: one named group per field; ``*`` is anything but a slash.
 
     ``branch`` is "hammer" or "passages". Raises ValueError with the remedy.
 
-    >>> match = compiled("hammer/{campaign}/{section}_{test}.{ext}", "hammer", ("A7", "AS"))
+    >>> match = compile_pattern("hammer/{campaign}/{section}_{test}.{ext}", "hammer", ("A7", "AS"))
     >>> match.fullmatch("hammer/2024-05-13/A7_2.uff").groupdict()
     {'campaign': '2024-05-13', 'section': 'A7', 'test': '2', 'ext': 'uff'}
     """
-    fields = dict(FIELDS[kind])
-    if kind == "hammer":
+    fields = dict(FIELDS[branch])
+    if branch == "hammer":
         fields["section"] = "|".join(re.escape(s) for s in sorted(sections, key=len, reverse=True)) or "[^/]+"
-    expression, seen = "", set()
-    for part in re.split(r"(\{\w*\}|\*)", pattern):
-        if part == "*":
+    expression, names = "", set()
+    for token in re.split(r"(\{\w*\}|\*)", pattern):
+        if token == "*":
             expression += "[^/]*"
-        elif part.startswith("{"):
-            name = part[1:-1]
+        elif token.startswith("{"):
+            name = token[1:-1]
             if name not in fields:
-                raise ValueError(f"unknown field {part} in the pattern. {suggestion(name, fields)}")
-            expression += f"(?P={name})" if name in seen else f"(?P<{name}>{fields[name]})"
-            seen.add(name)
+                raise ValueError(f"unknown field {token} in the pattern. {suggestion(name, fields)}")
+            expression += f"(?P={name})" if name in names else f"(?P<{name}>{fields[name]})"
+            names.add(name)
         else:
-            expression += re.escape(part)
-    if missing := [f"{{{name}}}" for name in NEEDED[kind] if name not in seen]:
+            expression += re.escape(token)
+    if missing := [f"{{{name}}}" for name in REQUIRED_FIELDS[branch] if name not in names]:
         raise ValueError(f"the pattern lacks {', '.join(missing)}")
     return re.compile(expression)

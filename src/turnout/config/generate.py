@@ -5,11 +5,11 @@ import textwrap
 from dataclasses import fields
 from pathlib import Path
 
-from turnout.config.document import load, plain
+from turnout.config.document import load, plain_values
 from turnout.config.events import COLUMNS as EVENT_COLUMNS
 from turnout.config.events import RESETS
 from turnout.config.filename_pattern import FIELDS
-from turnout.config.schema import Each, Elsewhere, Group, Key, default_of, layout_keys, settings_keys
+from turnout.config.schema import FleetWideKey, Group, Key, NamedEntries, default_of, layout_keys, settings_keys
 from turnout.config.settings import parts
 from turnout.config.turnouts_table import ROW
 
@@ -23,10 +23,10 @@ HEAD = """\
 JSON_TYPE = {"text": "string", "number": "number", "integer": "integer", "flag": "boolean"}
 
 
-def generated(folder: Path, docs: Path, defaults: bool = False) -> dict[Path, str]:
+def generate_files(folder: Path, docs: Path, defaults: bool = False) -> dict[Path, str]:
     """Text of every generated file; changed values in config.yaml stay unless ``defaults`` is set."""
     path = Path(folder) / "config.yaml"
-    present = plain(load(path)) if path.exists() and not defaults else {}
+    present = plain_values(load(path)) if path.exists() and not defaults else {}
     layout, override = layout_keys(), layout_keys()
     return {
         path: config_yaml(present),
@@ -51,15 +51,15 @@ def config_yaml(present: dict) -> str:
             key, default = keys[field.name], default_of(field)
             value = present.get(name, {}).get(field.name, default)
             changed = "" if value == default else f"default {_yaml(default)}; "
-            lines += textwrap.wrap(changed + said(key), WIDTH, initial_indent="  # ", subsequent_indent="  # ")
+            lines += textwrap.wrap(changed + describe_key(key), WIDTH, initial_indent="  # ", subsequent_indent="  # ")
             lines.append(f"  {field.name}: {_yaml(value)}")
     return "\n".join(lines).replace("\n\n\n", "\n\n") + "\n"
 
 
-def said(key: Key) -> str:
+def describe_key(key: Key) -> str:
     """Unit, limits and reason of a key as text.
 
-    >>> said(Key("number", "the paper's gate", minimum=0.0, maximum=1.0))
+    >>> describe_key(Key("number", "the paper's gate", minimum=0.0, maximum=1.0))
     "0 to 1: the paper's gate"
     """
     unit = "" if key.unit in ("", "-", "1") else f"[{key.unit}]"
@@ -74,60 +74,60 @@ def said(key: Key) -> str:
         limits = f"at least {key.minimum:g}"
     elif key.maximum is not None:
         limits = f"at most {key.maximum:g}"
-    head = " ".join(part for part in (limits, unit) if part)
+    head = " ".join(text for text in (limits, unit) if text)
     return f"{head}: {key.meaning}" if head else key.meaning
 
 
 def schema(keys: dict, title: str, whole: bool) -> str:
     """JSON schema for editors. The program itself checks with the same keys and gives more detailed errors."""
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title}
-    return json.dumps(head | _object(keys, whole), indent=1, ensure_ascii=False) + "\n"
+    return json.dumps(head | _object_schema(keys, whole), indent=1, ensure_ascii=False) + "\n"
 
 
-def _object(keys: dict, whole: bool) -> dict:
-    found = {"type": "object", "additionalProperties": False}
-    found["properties"] = {
-        name: _property(rule, whole) for name, rule in keys.items() if not isinstance(rule, Elsewhere)
+def _object_schema(keys: dict, whole: bool) -> dict:
+    result = {"type": "object", "additionalProperties": False}
+    result["properties"] = {
+        name: _property_schema(rule, whole) for name, rule in keys.items() if not isinstance(rule, FleetWideKey)
     }
     if whole and (required := [name for name, rule in keys.items() if rule.required]):
-        found["required"] = required
-    return found
+        result["required"] = required
+    return result
 
 
-def _property(rule, whole: bool) -> dict:
+def _property_schema(rule, whole: bool) -> dict:
     if isinstance(rule, Group):
-        return {"description": rule.meaning} | _object(rule.spec, whole and not rule.fragment)
-    if isinstance(rule, Each):
-        names = {f"^{rule.pattern}$": _object(rule.spec, whole)}
+        return {"description": rule.meaning} | _object_schema(rule.spec, whole and not rule.fragment)
+    if isinstance(rule, NamedEntries):
+        names = {f"^{rule.pattern}$": _object_schema(rule.spec, whole)}
         return {
             "description": rule.meaning,
             "type": "object",
             "additionalProperties": False,
             "patternProperties": names,
         }
-    types: list[str] = ["string", "integer"] if rule.kind == "name_or_index" else [JSON_TYPE[rule.kind]]
+    types: list[str] = ["string", "integer"] if rule.value_type == "name_or_index" else [JSON_TYPE[rule.value_type]]
     if rule.many:
-        return {"description": said(rule), "type": "array", "items": {"type": types[0]}}
+        return {"description": describe_key(rule), "type": "array", "items": {"type": types[0]}}
     types += ["null"] if rule.nullable else []
-    found: dict = {"description": said(rule), "type": types if len(types) > 1 else types[0]}
+    result: dict = {"description": describe_key(rule), "type": types if len(types) > 1 else types[0]}
     if rule.choices:
-        found["enum"] = [*rule.choices, None] if rule.nullable else [*rule.choices]
+        result["enum"] = [*rule.choices, None] if rule.nullable else [*rule.choices]
     if rule.pattern:
-        found["pattern"] = f"^{rule.pattern}$"
+        result["pattern"] = f"^{rule.pattern}$"
     limits = {"minimum": rule.minimum, "maximum": rule.maximum, "exclusiveMinimum": rule.above}
-    return found | {k: v for k, v in limits.items() if v is not None}
+    return result | {k: v for k, v in limits.items() if v is not None}
 
 
-MARK = "<!-- below: made by `turnout config generate` -->"
+GENERATED_MARK = "<!-- below: made by `turnout config generate` -->"
 
 
 def _docs(path: Path) -> str:
     """docs/configuration.md: the text above the mark stays, the tables below it are generated."""
-    above = path.read_text(encoding="utf-8").partition(MARK)[0] if path.exists() else "# Configuration\n\n"
-    return f"{above}{MARK}\n\n{tables()}"
+    above = path.read_text(encoding="utf-8").partition(GENERATED_MARK)[0] if path.exists() else "# Configuration\n\n"
+    return f"{above}{GENERATED_MARK}\n\n{tables()}"
 
 
-RESETTING = """An empty `section` is the whole turnout. `resets` overrules the kind: `ballast`, `railpad`,
+RESETS_NOTE = """An empty `section` is the whole turnout. `resets` overrules the kind: `ballast`, `railpad`,
 `ballast railpad` or `none`. Crossing or blade renewed: `rail_change`; bearers: `sleeper_change`; deposit welding:
 `grinding`; clips tightened: `other` with `railpad`.
 """
@@ -135,36 +135,36 @@ RESETTING = """An empty `section` is the whole turnout. `resets` overrules the k
 
 def tables() -> str:
     """Tables of all columns and keys in Markdown."""
-    blocks = ["## Columns of config/turnouts.tsv\n", _table(_flat(ROW))]
+    blocks = ["## Columns of config/turnouts.tsv\n", _table(_flatten_keys(ROW))]
     blocks += ["## Columns of config/events.csv\n", f"`{','.join(EVENT_COLUMNS)}`. `kind` and what it resets:\n"]
-    blocks.append("\n".join(f"- `{kind}`: {' and '.join(what) or 'nothing'}" for kind, what in RESETS.items()) + "\n")
-    blocks += [RESETTING, "## Fields of a file pattern\n"]
-    blocks += [f"- `{kind}`: " + ", ".join(f"`{{{name}}}`" for name in names) for kind, names in FIELDS.items()]
+    blocks.append("\n".join(f"- `{key}`: {' and '.join(bands) or 'nothing'}" for key, bands in RESETS.items()) + "\n")
+    blocks += [RESETS_NOTE, "## Fields of a file pattern\n"]
+    blocks += [f"- `{key}`: " + ", ".join(f"`{{{name}}}`" for name in names) for key, names in FIELDS.items()]
     blocks += ["\n`{section}` in `hammer` is a label of the layout; `*` is anything but a slash.\n"]
     layout = {name: rule for name, rule in layout_keys().items() if name != "settings"}
-    blocks += ["## Keys of config/layouts/*.yaml and config/overrides/*.yaml\n", _table(_flat(layout))]
+    blocks += ["## Keys of config/layouts/*.yaml and config/overrides/*.yaml\n", _table(_flatten_keys(layout))]
     for name, group in settings_keys().items():
-        blocks += [f"## Settings: {name}\n", group.meaning + "\n", _table(_flat(group.spec, f"{name}."), True)]
+        blocks += [f"## Settings: {name}\n", group.meaning + "\n", _table(_flatten_keys(group.spec, f"{name}."), True)]
     return "\n".join(blocks)
 
 
-def _flat(keys: dict, prefix: str = "") -> list[tuple[str, Key]]:
-    found = []
+def _flatten_keys(keys: dict, prefix: str = "") -> list[tuple[str, Key]]:
+    entries = []
     for name, rule in keys.items():
         if isinstance(rule, Key):
-            found.append((prefix + name, rule))
+            entries.append((prefix + name, rule))
         else:
-            inner = f"{prefix}{name}." + ("<name>." if isinstance(rule, Each) else "")
-            found += _flat(rule.spec, inner)
-    return found
+            inner = f"{prefix}{name}." + ("<name>." if isinstance(rule, NamedEntries) else "")
+            entries += _flatten_keys(rule.spec, inner)
+    return entries
 
 
 def _table(keys: list[tuple[str, Key]], with_default: bool = False) -> str:
     lines = [f"| key | {'default' if with_default else 'needed'} | meaning |", "|---|---|---|"]
     for name, key in keys:
-        middle = f"`{_yaml(key.default)}`" if with_default else ("yes" if key.required else "")
-        words = said(key).replace("|", "\\|").replace("<", "&lt;")
-        lines.append(f"| `{name}` | {middle} | {words} |")
+        second_cell = f"`{_yaml(key.default)}`" if with_default else ("yes" if key.required else "")
+        text = describe_key(key).replace("|", "\\|").replace("<", "&lt;")
+        lines.append(f"| `{name}` | {second_cell} | {text} |")
     return "\n".join(lines) + "\n"
 
 

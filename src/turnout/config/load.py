@@ -9,16 +9,16 @@ from typing import Any
 from turnout.config import merge
 from turnout.config.acknowledgements import read_acknowledgements
 from turnout.config.campaign_notes import Campaigns, read_campaigns, read_trains
-from turnout.config.consistency import check_meaning
-from turnout.config.document import Branch, Frozen, Place, leaves, load, merge_branches, plain
+from turnout.config.consistency import check_consistency
+from turnout.config.document import Branch, Frozen, Place, leaves, load, merge_branches, plain_values
 from turnout.config.events import Event, read_events
-from turnout.config.merge import FROM_ROW, OF_SECTIONS, Variant, with_row
+from turnout.config.merge import ROW_KEYS, SECTION_ROW_KEYS, Variant, with_row
 from turnout.config.schema import NO_TURNOUT, check, check_ranges, layout_keys, settings_keys, suggestion
 from turnout.config.turnout import TurnoutConfig
 from turnout.config.turnouts_table import Row, read_table
 from turnout.errors import ConfigError, ConfigErrors, ReadError
 
-ABOUT = {"lat_deg": "latitude", "lon_deg": "longitude"}
+FIELD_OF_COLUMN = {"lat_deg": "latitude", "lon_deg": "longitude"}
 
 
 @dataclass(frozen=True)
@@ -42,21 +42,23 @@ class Configuration:
         """Ids of all turnouts, in the order of turnouts.tsv."""
         return tuple(self.rows)
 
-    def hash_of(self, turnout: str, kind: str = "") -> str:
+    def hash_of(self, turnout: str, unit_kind: str = "") -> str:
         """Hash of the configuration of one turnout: of all of it, or of what units of ``unit_kind`` use."""
-        return self.variants[turnout].hashes[kind]
+        return self.variants[turnout].hashes[unit_kind]
 
     def turnout(self, turnout: str) -> TurnoutConfig:
         """The merged configuration of one turnout; ConfigError for an unknown id."""
         if turnout not in self.rows:
             place = Place(str(self.folder / "turnouts.tsv"), 1, 1)
             raise place.error(f"no turnout {turnout!r}", suggestion(turnout, self.rows, NO_TURNOUT))
-        row, about = self.rows[turnout], {}
+        row, details = self.rows[turnout], {}
         for column in ("name", "line", "km", "lat_deg", "lon_deg", "external_id", "id_scheme"):
             if column in row.values:
-                about[ABOUT.get(column, column)] = row.values[column]
-        parts = self.variants[turnout].parts
-        return TurnoutConfig(id=row.id, layout=row.values["layout"], raw=row.raw, folder=self.folder, **about, **parts)
+                details[FIELD_OF_COLUMN.get(column, column)] = row.values[column]
+        fields = self.variants[turnout].turnout_fields
+        return TurnoutConfig(
+            id=row.id, layout=row.values["layout"], raw=row.raw, folder=self.folder, **details, **fields
+        )
 
 
 def with_raw(turnout: TurnoutConfig, raw_root: Path) -> TurnoutConfig:
@@ -67,9 +69,9 @@ def with_raw(turnout: TurnoutConfig, raw_root: Path) -> TurnoutConfig:
 def read_notes(turnout: TurnoutConfig, raw_root: Path) -> tuple[TurnoutConfig, list[ReadError]]:
     """The turnout with the campaigns and trains of its raw folder, and an error for each invalid row."""
     folder = Path(raw_root) / turnout.raw
-    campaigns, wrong = read_campaigns(folder / "campaigns.csv", f"{turnout.raw}/campaigns.csv")
-    trains, bad = read_trains(folder / "trains.csv", f"{turnout.raw}/trains.csv")
-    return replace(turnout, campaigns=Campaigns(campaigns), trains=trains), wrong + bad
+    campaigns, campaign_errors = read_campaigns(folder / "campaigns.csv", f"{turnout.raw}/campaigns.csv")
+    trains, train_errors = read_trains(folder / "trains.csv", f"{turnout.raw}/trains.csv")
+    return replace(turnout, campaigns=Campaigns(campaigns), trains=trains), campaign_errors + train_errors
 
 
 def load_configuration(folder: Path | str = "config", formats=None, to_si=None) -> Configuration:
@@ -79,30 +81,38 @@ def load_configuration(folder: Path | str = "config", formats=None, to_si=None) 
     ``formats`` are the names of the readers, ``to_si`` converts units. Without them formats and units of channels
     are not checked.
     """
-    reading = _Reading(Path(folder), formats, to_si)
-    reading.misnamed()
+    reading = _ConfigurationReader(Path(folder), formats, to_si)
+    reading.check_extensions()
     settings = reading.document(reading.folder / "config.yaml", settings_keys())
     reading.errors += check_ranges(settings)
     rows, errors = read_table(reading.folder / "turnouts.tsv", reading.name("turnouts.tsv"))
     reading.errors += errors
     variants = reading.variants(rows, settings)
-    known = None if errors else {row.id for row in rows}
-    events, errors, strange = read_events(reading.folder / "events.csv", reading.name("events.csv"), known, variants)
+    turnout_ids = None if errors else {row.id for row in rows}
+    events, errors, event_warnings = read_events(
+        reading.folder / "events.csv", reading.name("events.csv"), turnout_ids, variants
+    )
     reading.errors += errors
     if reading.errors:
         raise ConfigErrors(list({str(e): e for e in reading.errors}.values()))
-    said = "acknowledgements.csv"
-    spoken, warnings = read_acknowledgements(reading.folder / said, reading.name(said), known, variants)
+    name = "acknowledgements.csv"
+    acknowledgements, warnings = read_acknowledgements(reading.folder / name, reading.name(name), turnout_ids, variants)
     by_id = {row.id: row for row in rows}
-    base = merge.settings(plain(settings))
+    base = merge.settings(plain_values(settings))
     return Configuration(
-        reading.folder, base, Frozen(by_id), tuple(events), Frozen(variants), tuple(spoken), (*strange, *warnings)
+        reading.folder,
+        base,
+        Frozen(by_id),
+        tuple(events),
+        Frozen(variants),
+        tuple(acknowledgements),
+        (*event_warnings, *warnings),
     )
 
 
-def faults_of_unused_layouts(configuration: Configuration, formats=None, to_si=None) -> list[ConfigError]:
+def errors_of_unused_layouts(configuration: Configuration, formats=None, to_si=None) -> list[ConfigError]:
     """Errors of the layouts that no turnout uses."""
-    reading = _Reading(configuration.folder, formats, to_si)
+    reading = _ConfigurationReader(configuration.folder, formats, to_si)
     settings = reading.document(reading.folder / "config.yaml", settings_keys())
     used = {row.values["layout"] for row in configuration.rows.values()}
     for path in sorted((reading.folder / "layouts").glob("*.yaml")):
@@ -111,7 +121,7 @@ def faults_of_unused_layouts(configuration: Configuration, formats=None, to_si=N
     return reading.errors
 
 
-class _Reading:
+class _ConfigurationReader:
     """Reads the files of the configuration and collects all errors."""
 
     def __init__(self, folder: Path, formats, to_si):
@@ -124,7 +134,7 @@ class _Reading:
         """Name of a file in errors: its path below the configuration folder, with the name of that folder in front."""
         return "/".join((self.folder.name, *parts))
 
-    def misnamed(self) -> None:
+    def check_extensions(self) -> None:
         """Add an error for every YAML file that is not read because its name does not end in .yaml."""
         for parts in ((), ("layouts",), ("overrides",)):
             for path in sorted(self.folder.joinpath(*parts).glob("*")):
@@ -144,8 +154,8 @@ class _Reading:
         except ConfigError as error:
             self.errors.append(error)
             return empty
-        if found := list(check(spec, tree, whole)):
-            self.errors += found
+        if problems := list(check(spec, tree, whole)):
+            self.errors += problems
             return empty
         return tree
 
@@ -156,7 +166,7 @@ class _Reading:
         if name not in self.layouts:
             self.layouts[name] = self.layout_of(path, settings) if os.path.lexists(path) else None
         if self.layouts[name] is None and not os.path.lexists(path):
-            self._unknown(name, row)
+            self._add_unknown_layout(name, row)
         return self.layouts[name]
 
     def layout_of(self, path: Path, settings: Branch) -> Branch | None:
@@ -167,45 +177,45 @@ class _Reading:
         base = Branch(settings.place)
         base.put("settings", settings, settings.place)
         tree = merge_branches(base, tree)
-        return None if self._wrong(tree) else tree
+        return None if self._has_errors(tree) else tree
 
-    def _unknown(self, name: str, row: Row) -> None:
-        none = f"There are no layouts yet: write layouts/{name}.yaml"
-        there = [p.stem for p in (self.folder / "layouts").glob("*.yaml")]
-        self.errors.append(row.place("layout").error(f"no layout {name!r}", suggestion(name, there, none)))
+    def _add_unknown_layout(self, name: str, row: Row) -> None:
+        nothing_to_choose = f"There are no layouts yet: write layouts/{name}.yaml"
+        names = [p.stem for p in (self.folder / "layouts").glob("*.yaml")]
+        self.errors.append(row.place("layout").error(f"no layout {name!r}", suggestion(name, names, nothing_to_choose)))
 
-    def _wrong(self, tree: Branch) -> bool:
-        found = [*check_meaning(tree, self.to_si), *self._formats(tree), *check_ranges(tree["settings"])]
-        self.errors += found
-        return bool(found)
+    def _has_errors(self, tree: Branch) -> bool:
+        errors = [*check_consistency(tree, self.to_si), *self._format_errors(tree), *check_ranges(tree["settings"])]
+        self.errors += errors
+        return bool(errors)
 
-    def _formats(self, tree: Branch):
-        for kind in ("hammer", "passages"):
-            leaf = tree.get(kind, {}).get("format")
+    def _format_errors(self, tree: Branch):
+        for branch in ("hammer", "passages"):
+            leaf = tree.get(branch, {}).get("format")
             if leaf and self.formats is not None and leaf.value not in (allowed := ("auto", *self.formats)):
                 yield leaf.place.error(f"format is {leaf.value!r}", suggestion(leaf.value, allowed))
 
     def variants(self, rows: list[Row], settings: Branch) -> dict[str, Variant]:
         """Merged configuration of every row; rows with the same technical columns share one."""
         overrides = {p.stem: p for p in sorted((self.folder / "overrides").glob("*.yaml"))}
-        found = {}
+        merged = {}
         for row in rows:
             layout = self.layout(row, settings)
             override = overrides.pop(row.id, None)
             if layout is not None:
-                found[row.id] = self._variant(row, layout, override)
+                merged[row.id] = self._variant(row, layout, override)
         for stem, path in overrides.items():
             place = Place(self.name("overrides", path.name), 1, 1)
             remedy = suggestion(stem, [row.id for row in rows], NO_TURNOUT)
             self.errors.append(place.error(f"an override without a turnout {stem!r}", remedy))
-        return found
+        return merged
 
     def _variant(self, row: Row, layout: Branch, override: Path | None) -> Variant:
-        key = (row.values["layout"], *(row.values.get(c) for c in (*FROM_ROW, *OF_SECTIONS)))
+        key = (row.values["layout"], *(row.values.get(c) for c in (*ROW_KEYS, *SECTION_ROW_KEYS)))
         if key not in self.shared:
             tree = with_row(layout, row)
             if tree is not layout:
-                self._wrong(tree)
+                self._has_errors(tree)
             self.shared[key] = Variant(tree)
         if override is None:
             return self.shared[key]
@@ -213,7 +223,7 @@ class _Reading:
         before = len(self.errors)
         self.errors += check(layout_keys(merged=True), tree)
         if len(self.errors) == before:
-            self._wrong(tree)
+            self._has_errors(tree)
         return Variant(tree)
 
 
@@ -221,17 +231,17 @@ def sources(configuration: Configuration, turnout: str) -> Iterator[tuple[str, o
     """``(key, value, "file, line")`` of every value, defaults included."""
     row = configuration.rows[turnout]
     for column, value in row.values.items():
-        yield column, value, _said(row.place(column))
+        yield column, value, _place_text(row.place(column))
     tree = configuration.variants[turnout].tree
     written = dict(leaves(tree))
     for key, leaf in written.items():
         if not key.startswith("settings."):
-            yield key, leaf.value, _said(leaf.place)
-    for part, settings in configuration.turnout(turnout).settings.items():
+            yield key, leaf.value, _place_text(leaf.place)
+    for section, settings in configuration.turnout(turnout).settings.items():
         for name, value in asdict(settings).items():
-            key = f"settings.{part}.{name}"
-            yield key, value, _said(written[key].place) if key in written else "default"
+            key = f"settings.{section}.{name}"
+            yield key, value, _place_text(written[key].place) if key in written else "default"
 
 
-def _said(place) -> str:
+def _place_text(place) -> str:
     return f"{place.path}, line {place.line}"

@@ -8,15 +8,15 @@ import json
 from dataclasses import asdict, dataclass
 from functools import cached_property
 
-from turnout.config.document import Branch, Frozen, Leaf, Place, merge_branches, plain
-from turnout.config.schema import filled
+from turnout.config.document import Branch, Frozen, Leaf, Place, merge_branches, plain_values
+from turnout.config.schema import fill_settings
 from turnout.config.settings import parts
 from turnout.config.turnout import HammerConfig, PassageConfig, Section
 from turnout.config.turnouts_table import Row
 from turnout.records import RawChannel, RawDescription
 
 # What each kind of unit uses of a turnout's configuration: sections of the settings, branches of the layout.
-USED = {
+USED_BY_UNIT = {
     "hammer": (("receptance", "identify"), ("sections", "hammer")),
     "passage": (("passage",), ("sections", "passages")),
     "mismatch": (("mismatch", "passage", "receptance"), ("sections", "hammer", "passages")),
@@ -32,16 +32,16 @@ def hashes(values: dict) -> dict[str, str]:
     """``config_hash`` under "", and the hash of what each kind of unit uses. Defaults count like written values."""
     branches = {k: v for k, v in values.items() if k not in ("description", "settings")}
     # the division of a run into shards changes no result
-    filled_in = {name: asdict(s) for name, s in settings(values["settings"]).items() if name != "fleet"}
-    found = {"": digest([filled_in, branches])}
-    for kind, (used, names) in USED.items():
-        found[kind] = digest([{p: filled_in.get(p) for p in used}, {b: branches.get(b) for b in names}])
-    return found
+    filled_settings = {name: asdict(s) for name, s in settings(values["settings"]).items() if name != "fleet"}
+    result = {"": digest([filled_settings, branches])}
+    for unit_kind, (groups, names) in USED_BY_UNIT.items():
+        result[unit_kind] = digest([{p: filled_settings.get(p) for p in groups}, {b: branches.get(b) for b in names}])
+    return result
 
 
 def settings(values: dict) -> Frozen:
     """Settings of every section."""
-    return Frozen({name: filled(cls, values.get(name, {})) for name, cls in parts().items()})
+    return Frozen({name: fill_settings(cls, values.get(name, {})) for name, cls in parts().items()})
 
 
 def sections(values: dict) -> tuple[Section, ...]:
@@ -60,55 +60,57 @@ def hammer(tree: Branch) -> HammerConfig | None:
     descriptions: dict[str, RawDescription] = {}
     roles: dict[str, dict] = {"force": {}, "response": {}, "validation": {}}
     for label, section in tree["sections"].items():
-        own = plain(merge_branches(tree["hammer"], section["hammer"]) if "hammer" in section else tree["hammer"])
+        values = plain_values(
+            merge_branches(tree["hammer"], section["hammer"]) if "hammer" in section else tree["hammer"]
+        )
         position = float(section["position"].value)
-        descriptions[label] = description(own, "hammer", {name: position for name in own["channels"]})
+        descriptions[label] = description(values, "hammer", {name: position for name in values["channels"]})
         for role, names in roles.items():
-            names[label] = own.get(role)
-    frozen = {role: Frozen(names) for role, names in roles.items()}
-    return HammerConfig(plain(tree["hammer"])["files"], Frozen(descriptions), **frozen)
+            names[label] = values.get(role)
+    roles_by_section = {role: Frozen(names) for role, names in roles.items()}
+    return HammerConfig(plain_values(tree["hammer"])["files"], Frozen(descriptions), **roles_by_section)
 
 
 def passages(tree: Branch) -> PassageConfig | None:
     """Configuration of the passage recordings, with the section of every channel."""
     if "passages" not in tree:
         return None
-    own = plain(tree["passages"])
-    watched = {name: channel["section"] for name, channel in own["channels"].items()}
-    positions = {name: float(tree["sections"][label]["position"].value) for name, label in watched.items()}
-    return PassageConfig(own["files"], description(own, "passage", positions), Frozen(watched))
+    values = plain_values(tree["passages"])
+    sections = {name: channel["section"] for name, channel in values["channels"].items()}
+    positions = {name: float(tree["sections"][label]["position"].value) for name, label in sections.items()}
+    return PassageConfig(values["files"], description(values, "passage", positions), Frozen(sections))
 
 
 def description(values: dict, kind: str, positions: dict[str, float]) -> RawDescription:
     """Description of the raw files of one kind; the position of a sensor is that in ``positions`` plus its offset."""
     channels = []
     for name, channel in values["channels"].items():
-        given = {k: _real(k, v) for k, v in channel.items() if k not in ("offset", "section") and v is not None}
+        fields = {k: _as_float(k, v) for k, v in channel.items() if k not in ("offset", "section") and v is not None}
         position = None if channel["quantity"] == "force" else positions[name] + channel.get("offset", 0.0)
-        channels.append(RawChannel(name=name, position=position, **given))
+        channels.append(RawChannel(name=name, position=position, **fields))
     return RawDescription(
         channels=tuple(channels),
         kind=kind,
         format=values.get("format", "auto"),
-        rate=_real("rate", values.get("rate")),
+        rate=_as_float("rate", values.get("rate")),
         n_records=values.get("records"),
         n_samples=values.get("samples"),
         time_zone=values.get("time_zone", "UTC"),
     )
 
 
-def _real(name: str, value):
+def _as_float(name: str, value):
     """Physical values as float, even if written as integers."""
     return float(value) if name in ("rate", "sensitivity", "limit", "resolution") and value is not None else value
 
 
-FROM_ROW = {
+ROW_KEYS = {
     "hammer_rate_hz": ("hammer", "rate"),
     "hammer_format": ("hammer", "format"),
     "passage_rate_hz": ("passages", "rate"),
     "passage_format": ("passages", "format"),
 }
-OF_SECTIONS = {"pad_type": "pad", "sleeper_type": "sleeper"}
+SECTION_ROW_KEYS = {"pad_type": "pad", "sleeper_type": "sleeper"}
 
 
 @dataclass(frozen=True)
@@ -120,7 +122,7 @@ class Variant:
     @cached_property
     def values(self) -> dict:
         """The merged tree as plain values, without their places in files."""
-        return plain(self.tree)
+        return plain_values(self.tree)
 
     @cached_property
     def hashes(self) -> dict[str, str]:
@@ -128,7 +130,7 @@ class Variant:
         return hashes(self.values)
 
     @cached_property
-    def parts(self) -> dict:
+    def turnout_fields(self) -> dict:
         """Fields of ``TurnoutConfig`` that come from this configuration."""
         return {
             "sections": sections(self.values["sections"]),
@@ -143,20 +145,20 @@ class Variant:
 def with_row(layout: Branch, row: Row) -> Branch:
     """The layout, changed by the technical columns of a row."""
     changes = Branch(layout.place)
-    for column, (group, key) in FROM_ROW.items():
+    for column, (group, key) in ROW_KEYS.items():
         if column in row.values and group in layout:
-            _at(changes, group, row.place(column)).put(
+            _child(changes, group, row.place(column)).put(
                 key, Leaf(row.values[column], row.place(column)), row.place(column)
             )
-    for column, key in OF_SECTIONS.items():
+    for column, key in SECTION_ROW_KEYS.items():
         if column in row.values:
             for label in layout["sections"]:
-                section = _at(_at(changes, "sections", row.place(column)), label, row.place(column))
+                section = _child(_child(changes, "sections", row.place(column)), label, row.place(column))
                 section.put(key, Leaf(row.values[column], row.place(column)), row.place(column))
     return merge_branches(layout, changes) if changes else layout
 
 
-def _at(tree: Branch, name: str, place: Place) -> Branch:
+def _child(tree: Branch, name: str, place: Place) -> Branch:
     if name not in tree:
         tree.put(name, Branch(place), place)
     return tree[name]

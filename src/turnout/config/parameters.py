@@ -8,7 +8,7 @@ from pathlib import Path
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError
 
-from turnout.config.document import legible, where
+from turnout.config.document import as_config_errors, describe_place
 from turnout.errors import ConfigError, SimulationError
 
 # Unit: (SI unit, factor)
@@ -81,14 +81,14 @@ class ParameterSet(Mapping):
     def __init__(self, content, path, place):
         self.content, self.path, self.place = content, str(path), place
 
-    def error(self, key, found, remedy, at=""):
+    def error(self, key, problem, remedy, entry=""):
         """A ``ConfigError`` at ``key`` of this mapping, or at the mapping itself if ``key`` is None.
 
         Its line is that of ``entry`` below that place.
         """
-        inside = f"[{key}]" if isinstance(key, int) else f".{key}"
-        place = f"{self.place}{inside if key is not None else ''}".lstrip(".")
-        return ConfigError(self.path, where(self.path, place, at), found, remedy)
+        suffix = f"[{key}]" if isinstance(key, int) else f".{key}"
+        place = f"{self.place}{suffix if key is not None else ''}".lstrip(".")
+        return ConfigError(self.path, describe_place(self.path, place, entry), problem, remedy)
 
     def __getitem__(self, key):
         if key not in self.content:
@@ -112,52 +112,56 @@ class ParameterSet(Mapping):
         """Value of ``key`` in the SI unit ``unit``; ``default`` if it is absent and a default exists."""
         if key not in self.content and default is not None:
             return default
-        found = self[key]
-        if not isinstance(found, Number):
-            raise self.error(key, f"{_said(found)} has no unit and source", "Write value, unit and source")
-        if found.unit != unit:
-            raise self.error(key, f"the unit {found.unit!r} is not one of {unit!r}", "Correct the unit")
-        return found.value
+        entry = self[key]
+        if not isinstance(entry, Number):
+            raise self.error(key, f"{_describe_value(entry)} has no unit and source", "Write value, unit and source")
+        if entry.unit != unit:
+            raise self.error(key, f"the unit {entry.unit!r} is not one of {unit!r}", "Correct the unit")
+        return entry.value
 
-    def count(self, key, default, least=1):
+    def count(self, key, default, minimum=1):
         """Whole number at ``key``, at least ``minimum``; ``default`` if it is absent."""
-        found = self.get(key, default)
-        if not isinstance(found, int) or isinstance(found, bool) or found < least:
-            remedy = f"Write a whole number of at least {least}, without unit and source"
-            raise self.error(key, f"{_said(found)} is no such number", remedy)
-        return found
+        value = self.get(key, default)
+        if not isinstance(value, int) or isinstance(value, bool) or value < minimum:
+            remedy = f"Write a whole number of at least {minimum}, without unit and source"
+            raise self.error(key, f"{_describe_value(value)} is no such number", remedy)
+        return value
 
-    def part(self, key):
+    def mapping_at(self, key):
         """The mapping at ``key``."""
-        found = self[key]
-        if not isinstance(found, ParameterSet):
-            raise self.error(key, f"{_said(found)} instead of names with values", "Write 'name: value' lines below it")
-        return found
+        entry = self[key]
+        if not isinstance(entry, ParameterSet):
+            raise self.error(
+                key, f"{_describe_value(entry)} instead of names with values", "Write 'name: value' lines below it"
+            )
+        return entry
 
-    def maybe(self, key):
+    def optional_mapping_at(self, key):
         """The mapping at ``key``, an empty one if it is absent."""
-        return ParameterSet({}, self.path, self.place) if self.get(key) is None else self.part(key)
+        return ParameterSet({}, self.path, self.place) if self.get(key) is None else self.mapping_at(key)
 
-    def listed(self, key):
+    def list_at(self, key):
         """The list at ``key`` as a ParameterSet with the keys 0, 1, 2 ...; an empty one if it is absent."""
-        found = [] if self.get(key) is None else self[key]
-        if not isinstance(found, list):
-            raise self.error(key, f"{_said(found)} instead of a list", "Write each entry with a dash before it")
-        return ParameterSet(dict(enumerate(found)), self.path, f"{self.place}.{key}".lstrip("."))
+        entries = [] if self.get(key) is None else self[key]
+        if not isinstance(entries, list):
+            raise self.error(
+                key, f"{_describe_value(entries)} instead of a list", "Write each entry with a dash before it"
+            )
+        return ParameterSet(dict(enumerate(entries)), self.path, f"{self.place}.{key}".lstrip("."))
 
-    def parts(self, key):
+    def mappings_at(self, key):
         """The mappings listed at ``key``."""
-        listed = self.listed(key)
-        return [listed.part(k) for k in listed]
+        entries = self.list_at(key)
+        return [entries.mapping_at(k) for k in entries]
 
-    def make(self, kind, *values, **named):
+    def build(self, factory, *values, **named):
         """``factory(*values, **named)``; its SimulationError becomes a ``ConfigError`` that names this place."""
         try:
-            return kind(*values, **named)
+            return factory(*values, **named)
         except SimulationError as error:
             raise self.error(None, str(error).rstrip("."), "Correct the value") from None
 
-    def only(self, *allowed):
+    def allow_only(self, *allowed):
         """Raise ConfigError for a key that is not in ``allowed``; return the mapping itself."""
         for key in self.content:
             if key not in allowed:
@@ -170,11 +174,11 @@ class ParameterSet(Mapping):
             yield from _numbers(value, f"{self.place}.{key}" if self.place else str(key))
 
 
-def _said(found):
+def _describe_value(value):
     """An entry as errors describe it."""
-    if isinstance(found, Number):
-        return f"{found.value:g} {found.unit}"
-    return "a mapping" if isinstance(found, ParameterSet) else repr(found)
+    if isinstance(value, Number):
+        return f"{value.value:g} {value.unit}"
+    return "a mapping" if isinstance(value, ParameterSet) else repr(value)
 
 
 def _numbers(value, place):
@@ -195,7 +199,7 @@ def read_parameters(path):
     """
     path = Path(path)
     try:
-        with legible(path, "the file"):
+        with as_config_errors(path, "the file"):
             content = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
     except MarkedYAMLError as error:
         mark = error.problem_mark
@@ -204,8 +208,10 @@ def read_parameters(path):
     if not isinstance(content, dict):
         raise ConfigError(path, "the file", "is not a mapping", "Write 'key: value' lines")
     if not isinstance(sources := content.pop("sources", None) or {}, dict):
-        raise ConfigError(path, where(path, "sources"), "is not a mapping", "Write 'key: source' lines below it")
-    with legible(path, "the file"):
+        raise ConfigError(
+            path, describe_place(path, "sources"), "is not a mapping", "Write 'key: source' lines below it"
+        )
+    with as_config_errors(path, "the file"):
         return _parse(content, path, "", sources)
 
 
@@ -224,27 +230,31 @@ def _parse(value, path, place, sources):
 def _parse_number(entry, path, place, sources):
     for key in ("unit", "source"):
         if isinstance(entry.get(key), (list, dict, type(None))):
-            raise ConfigError(path, where(path, place), f"a number without {key}", f"Give its {key}")
+            raise ConfigError(path, describe_place(path, place), f"a number without {key}", f"Give its {key}")
     if unknown := set(entry) - KEYS:
-        raise ConfigError(path, where(path, place), f"unknown key {min(unknown)!r}", f"Use {', '.join(sorted(KEYS))}")
+        raise ConfigError(
+            path, describe_place(path, place), f"unknown key {min(unknown)!r}", f"Use {', '.join(sorted(KEYS))}"
+        )
     if entry["unit"] not in UNITS:
-        raise ConfigError(path, where(path, place), f"unknown unit {entry['unit']!r}", f"Use one of {', '.join(UNITS)}")
+        raise ConfigError(
+            path, describe_place(path, place), f"unknown unit {entry['unit']!r}", f"Use one of {', '.join(UNITS)}"
+        )
     source = sources.get(entry["source"], entry["source"])
     prior = entry.get("prior")
     spread = None if prior is None else _finite(prior, path, place)
     if (spread is None and str(source).startswith("estimate")) or (spread is not None and spread <= 0.0):
-        found = "an estimate without a prior" if spread is None else f"a prior of {prior}"
+        problem = "an estimate without a prior" if spread is None else f"a prior of {prior}"
         remedy = "Give its relative standard deviation, above 0, as prior"
-        raise ConfigError(path, where(path, place), found, remedy)
+        raise ConfigError(path, describe_place(path, place), problem, remedy)
     unit, factor = UNITS[entry["unit"]]
     return Number(factor * _finite(entry["value"], path, place), unit, str(source), spread)
 
 
-def _finite(said, path, place) -> float:
+def _finite(value, path, place) -> float:
     try:
-        number = float(said)
+        number = float(value)
     except (TypeError, ValueError):
-        raise ConfigError(path, where(path, place), f"{said!r} is not a number", "Write a number") from None
+        raise ConfigError(path, describe_place(path, place), f"{value!r} is not a number", "Write a number") from None
     if not isfinite(number):
-        raise ConfigError(path, where(path, place), f"{said!r} is not finite", "Write a number")
+        raise ConfigError(path, describe_place(path, place), f"{value!r} is not finite", "Write a number")
     return number

@@ -18,21 +18,21 @@ from turnout.config.settings import parts
 from turnout.errors import ConfigError
 
 NO_TURNOUT = "There are no turnouts yet: add one with 'turnout add ID LAYOUT'"
-KINDS = {
+VALUE_TYPES = {
     "text": (str,),
     "number": (int, float),
     "integer": (int,),
     "flag": (bool,),
     "name_or_index": (str, int),
 }
-SAID = {"text": "text", "number": "a number", "integer": "a whole number", "flag": "true or false"}
+TYPE_TEXTS = {"text": "text", "number": "a number", "integer": "a whole number", "flag": "true or false"}
 
 
 @dataclass(frozen=True)
 class Key:
     """One value: its ``value_type`` (``many``: a list of these), unit, limits and meaning."""
 
-    kind: str
+    value_type: str
     meaning: str
     unit: str = ""
     required: bool = False
@@ -47,7 +47,7 @@ class Key:
 
 
 @dataclass(frozen=True)
-class Each:
+class NamedEntries:
     """A mapping with free names that match ``pattern`` and with values that all follow ``spec``."""
 
     spec: dict
@@ -67,7 +67,7 @@ class Group:
 
 
 @dataclass(frozen=True)
-class Elsewhere:
+class FleetWideKey:
     """A name that is allowed only in ``file``, because it holds for the whole fleet."""
 
     file: str
@@ -88,10 +88,10 @@ def suggestion(name: str, allowed, none: str = "There is none to choose from") -
     return (f"Did you mean {close[0]!r}? " if close else "") + f"Allowed: {listed}"
 
 
-def problem(key: Key, value) -> tuple[str, str] | None:
+def value_problem(key: Key, value) -> tuple[str, str] | None:
     """None if ``value`` fits ``key``, else (problem, remedy).
 
-    >>> problem(Key("number", "rate", unit="Hz", above=0), -1)
+    >>> value_problem(Key("number", "rate", unit="Hz", above=0), -1)
     ('-1', 'Write a number above 0 Hz')
     """
     if value is None and key.nullable:
@@ -100,20 +100,20 @@ def problem(key: Key, value) -> tuple[str, str] | None:
         if not isinstance(value, tuple):
             return repr(value), "Write a list, [a, b]"
         single = Key(**{**key.__dict__, "many": False})
-        return next((p for v in value if (p := problem(single, v))), None)
-    if not isinstance(value, KINDS[key.kind]) or (isinstance(value, bool) and key.kind != "flag"):
-        return repr(value), f"Write {_wanted(key)}"
+        return next((p for v in value if (p := value_problem(single, v))), None)
+    if not isinstance(value, VALUE_TYPES[key.value_type]) or (isinstance(value, bool) and key.value_type != "flag"):
+        return repr(value), f"Write {_expected_text(key)}"
     if isinstance(value, float) and not math.isfinite(value):
-        return repr(value), f"Write {_wanted(key)}"
+        return repr(value), f"Write {_expected_text(key)}"
     if key.choices and value not in key.choices:
         return repr(value), suggestion(str(value), key.choices)
     if key.pattern and isinstance(value, str) and not re.fullmatch(key.pattern, value):
-        return repr(value), f"Write {_wanted(key)}"
+        return repr(value), f"Write {_expected_text(key)}"
     if not isinstance(value, (int, float)):
         return None
     low = key.minimum is not None and value < key.minimum
     if low or (key.maximum is not None and value > key.maximum) or (key.above is not None and value <= key.above):
-        return repr(value), f"Write {_wanted(key)}"
+        return repr(value), f"Write {_expected_text(key)}"
     return None
 
 
@@ -124,16 +124,16 @@ def check(spec: dict, tree: Branch, whole: bool = True) -> Iterator[ConfigError]
         rule = spec.get(name)
         if rule is None:
             misspelt.update(get_close_matches(name, spec, n=1))
-            allowed = [known for known, rule in spec.items() if not isinstance(rule, Elsewhere)]
+            allowed = [allowed_name for allowed_name, rule in spec.items() if not isinstance(rule, FleetWideKey)]
             yield tree.key_places[name].error(f"unknown key {name!r}", suggestion(name, allowed))
-        elif isinstance(rule, Elsewhere):
-            whose = f"{name!r} holds for the whole fleet and would be ignored here"
-            yield tree.key_places[name].error(whose, f"It belongs into {rule.file}: move it there")
+        elif isinstance(rule, FleetWideKey):
+            message = f"{name!r} holds for the whole fleet and would be ignored here"
+            yield tree.key_places[name].error(message, f"It belongs into {rule.file}: move it there")
         elif isinstance(rule, Key):
             if isinstance(value, Branch):
-                yield value.place.error(f"names under {name!r}", f"Write {_wanted(rule)}")
-            elif found := problem(rule, value.value):
-                yield value.place.error(f"{name} is {found[0]}", found[1])
+                yield value.place.error(f"names under {name!r}", f"Write {_expected_text(rule)}")
+            elif problem := value_problem(rule, value.value):
+                yield value.place.error(f"{name} is {problem[0]}", problem[1])
         elif isinstance(value, Leaf):
             if value.value is not None or whole:
                 yield value.place.error(f"{name} is {value.value!r}", "Write 'name: value' lines below it")
@@ -147,7 +147,7 @@ def check(spec: dict, tree: Branch, whole: bool = True) -> Iterator[ConfigError]
                 yield tree.place.error(f"{name!r} is missing", f"Add '{name}:', {rule.meaning}")
 
 
-def _check_each(rule: Each, name: str, tree: Branch, whole: bool) -> Iterator[ConfigError]:
+def _check_each(rule: NamedEntries, name: str, tree: Branch, whole: bool) -> Iterator[ConfigError]:
     for label, value in tree.items():
         if not re.fullmatch(rule.pattern, label):
             yield tree.key_places[label].error(f"{label!r} under {name!r}", f"Write a name like {rule.pattern}")
@@ -159,25 +159,25 @@ def _check_each(rule: Each, name: str, tree: Branch, whole: bool) -> Iterator[Co
         yield tree.place.error(f"{name!r} is empty", f"Add at least one, {rule.meaning}")
 
 
-def _wanted(key: Key) -> str:
+def _expected_text(key: Key) -> str:
     if key.choices:
         return "one of " + ", ".join(map(str, key.choices))
-    said = SAID.get(key.kind, "a name, or a number counted from 0")
+    text = TYPE_TEXTS.get(key.value_type, "a name, or a number counted from 0")
     unit = f" {key.unit}" if key.unit not in ("", None, "-", "1") else ""
     if key.above is not None:
-        said += f" above {key.above:g}{unit}"
+        text += f" above {key.above:g}{unit}"
     elif key.minimum is not None and key.maximum is not None:
-        said += f" from {key.minimum:g} to {key.maximum:g}{unit}"
+        text += f" from {key.minimum:g} to {key.maximum:g}{unit}"
     elif key.minimum is not None:
-        said += f" of at least {key.minimum:g}{unit}"
+        text += f" of at least {key.minimum:g}{unit}"
     elif key.maximum is not None:
-        said += f" of at most {key.maximum:g}{unit}"
+        text += f" of at most {key.maximum:g}{unit}"
     elif unit:
-        said += f" in{unit}"
-    return said + (f" like {key.pattern}" if key.pattern else "")
+        text += f" in{unit}"
+    return text + (f" like {key.pattern}" if key.pattern else "")
 
 
-KIND_OF = {int: "integer", float: "number", str: "text", bool: "flag"}
+TYPE_NAMES = {int: "integer", float: "number", str: "text", bool: "flag"}
 
 
 @cache
@@ -197,18 +197,18 @@ def keys_of(cls: type) -> dict[str, Key | Group]:
     return {f.name: _key(cls, f, hints[f.name]) for f in fields(cls)}
 
 
-def filled(cls: type, values: dict):
+def fill_settings(cls: type, values: dict):
     """Instance of ``cls`` with ``values`` in place of its defaults."""
-    given = {}
+    arguments = {}
     for field in fields(cls):
         if field.name in values:
             value, default = values[field.name], default_of(field)
             if is_dataclass(default):
-                value = filled(type(default), value)
+                value = fill_settings(type(default), value)
             elif isinstance(default, float) and isinstance(value, int):
                 value = float(value)
-            given[field.name] = value
-    return cls(**given)
+            arguments[field.name] = value
+    return cls(**arguments)
 
 
 def default_of(field):
@@ -217,7 +217,7 @@ def default_of(field):
 
 
 def _key(cls, field, hint) -> Key | Group:
-    default, said = default_of(field), field.metadata
+    default, metadata = default_of(field), field.metadata
     if is_dataclass(default):
         return Group(keys_of(type(default)), _first_line(type(default)))
     nullable = get_origin(hint) in (Union, UnionType) and type(None) in get_args(hint)
@@ -226,15 +226,15 @@ def _key(cls, field, hint) -> Key | Group:
     many = get_origin(hint) is tuple or hint is tuple
     if many:
         hint = get_args(hint)[0] if get_args(hint) else type(default[0])
-    if hint not in KIND_OF:
+    if hint not in TYPE_NAMES:
         raise TypeError(f"{cls.__name__}.{field.name}: a setting is int, float, str, bool or a tuple, not {hint}")
     return Key(
-        KIND_OF[hint],
-        said.get("why", ""),
-        unit=said.get("unit", ""),
-        minimum=said.get("minimum"),
-        maximum=said.get("maximum"),
-        choices=tuple(said.get("choices") or ()),
+        TYPE_NAMES[hint],
+        metadata.get("why", ""),
+        unit=metadata.get("unit", ""),
+        minimum=metadata.get("minimum"),
+        maximum=metadata.get("maximum"),
+        choices=tuple(metadata.get("choices") or ()),
         many=many,
         nullable=nullable,
         default=default,
@@ -284,12 +284,12 @@ HAMMER = {
     "force": Key("text", "channel of the hammer", required=True),
     "response": Key("text", "channel that the models are identified from", required=True),
     "validation": Key("text", "second channel, only compared with; null: none", nullable=True),
-    "channels": Each(CHANNEL, NAME, "one entry per channel", required=True),
+    "channels": NamedEntries(CHANNEL, NAME, "one entry per channel", required=True),
 }
 PASSAGES = {
     **FILES,
     "rate": PASSAGE_RATE,
-    "channels": Each(PASSAGE_CHANNEL, NAME, "one entry per channel", required=True),
+    "channels": NamedEntries(PASSAGE_CHANNEL, NAME, "one entry per channel", required=True),
 }
 # Keys that a single section may set differently from the turnout.
 SECTION_HAMMER = {name: rule for name, rule in HAMMER.items() if name != "files"}
@@ -313,29 +313,31 @@ def layout_keys(merged: bool = False) -> dict:
     """Keys of a layout or an override, its own settings included; ``merged``: with the settings of the fleet."""
     return {
         "description": Key("text", "what this layout is, for people"),
-        "sections": Each(SECTION, LABEL, "one entry per monitored section", required=True),
+        "sections": NamedEntries(SECTION, LABEL, "one entry per monitored section", required=True),
         "hammer": Group(HAMMER, "how the hammer tests lie on the disk"),
         "passages": Group(PASSAGES, "how the recordings of train passages lie on the disk"),
         "settings": Group(
-            settings_keys() if merged else _own_settings(), "method settings of config.yaml that differ here"
+            settings_keys() if merged else _layout_settings(), "method settings of config.yaml that differ here"
         ),
     }
 
 
-def _own_settings() -> dict:
+def _layout_settings() -> dict:
     """The keys of the settings; those that hold for the whole fleet are marked as such."""
-    found: dict = dict(settings_keys())
-    for part, names in FLEET_WIDE.items():
+    keys: dict = dict(settings_keys())
+    for section, names in FLEET_WIDE.items():
         if names:
-            spec = found[part].spec | {name: Elsewhere("config.yaml") for name in names}
-            found[part] = Group(spec, found[part].meaning)
+            spec = keys[section].spec | {name: FleetWideKey("config.yaml") for name in names}
+            keys[section] = Group(spec, keys[section].meaning)
         else:
-            found[part] = Elsewhere("config.yaml")
-    return found
+            keys[section] = FleetWideKey("config.yaml")
+    return keys
 
 
-ENDS = (("_low", "_high"), ("_minimum", "_maximum"))
-BESIDE = (("identify", "ballast_high", "railpad_low"),)  # one range ends before the next begins, or where it does
+RANGE_SUFFIXES = (("_low", "_high"), ("_minimum", "_maximum"))
+ADJACENT_RANGES = (
+    ("identify", "ballast_high", "railpad_low"),
+)  # one range ends before the next begins, or where it does
 
 
 def ends_of_ranges() -> Iterator[tuple[str, str, str]]:
@@ -344,26 +346,27 @@ def ends_of_ranges() -> Iterator[tuple[str, str, str]]:
     >>> ("identify", "ballast_low", "ballast_high") in list(ends_of_ranges())
     True
     """
-    for part, group in settings_keys().items():
+    for section, group in settings_keys().items():
         for name in group.spec:
-            for low, high in ENDS:
-                if name.endswith(low) and (other := name.removesuffix(low) + high) in group.spec:
-                    yield part, name, other
+            for low, high in RANGE_SUFFIXES:
+                if name.endswith(low) and (high_name := name.removesuffix(low) + high) in group.spec:
+                    yield section, name, high_name
 
 
 def check_ranges(settings: Branch) -> Iterator[ConfigError]:
     """An error for every range of ``settings`` whose low end is not below its high end. Single keys must be valid."""
-    for part, low, high in (*ends_of_ranges(), *BESIDE):
-        written = settings.get(part, {})
+    for section, low, high in (*ends_of_ranges(), *ADJACENT_RANGES):
+        written = settings.get(section, {})
         leaves = [written[name] for name in (low, high) if name in written]
         values = [
-            written[name].value if name in written else settings_keys()[part].spec[name].default for name in (low, high)
+            written[name].value if name in written else settings_keys()[section].spec[name].default
+            for name in (low, high)
         ]
-        meet = (part, low, high) in BESIDE and values[0] == values[1]
-        if leaves and not (values[0] < values[1] or meet):
-            beside = f" in {leaves[1].place.path}, {leaves[1].place}" if len(leaves) > 1 else ""
-            found = f"{part}.{low} is {values[0]}, and {high} is {values[1]}{beside}"
-            yield leaves[0].place.error(found, f"Write a {low} below {high}")
+        can_meet = (section, low, high) in ADJACENT_RANGES and values[0] == values[1]
+        if leaves and not (values[0] < values[1] or can_meet):
+            high_place = f" in {leaves[1].place.path}, {leaves[1].place}" if len(leaves) > 1 else ""
+            problem = f"{section}.{low} is {values[0]}, and {high} is {values[1]}{high_place}"
+            yield leaves[0].place.error(problem, f"Write a {low} below {high}")
     bands = settings.get("identify", {}).get("extra_bands")
     if bands and not _rising_pairs(bands.value):
         yield bands.place.error(f"extra_bands is {list(bands.value)}", "Write pairs [low, high, low, high, ...]")

@@ -57,7 +57,7 @@ class Campaign:
     hammer_id: str = ""
     tip: str = ""
     operator: str = ""
-    noted: bool = True
+    listed: bool = True
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from turnout.config.csv_table import TableFault, header_of
-from turnout.config.document import Place, legible
-from turnout.config.schema import HAMMER_RATE, PASSAGE_RATE, Key, problem, suggestion
+from turnout.config.csv_table import TableError, header_of
+from turnout.config.document import Place, as_config_errors
+from turnout.config.schema import HAMMER_RATE, PASSAGE_RATE, Key, suggestion, value_problem
 from turnout.errors import ConfigError
 from turnout.files import write_atomic
 
@@ -70,7 +70,7 @@ def read_table(path: Path, name: str) -> tuple[list[Row], list[ConfigError]]:
     if not os.path.lexists(path):
         return [], [ConfigError(name, "line 1", "no such file", "Run 'turnout add ID LAYOUT' to begin one")]
     try:
-        with legible(name, "line 1"):
+        with as_config_errors(name, "line 1"):
             lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
     except ConfigError as error:
         return [], [error]
@@ -81,29 +81,29 @@ def read_table(path: Path, name: str) -> tuple[list[Row], list[ConfigError]]:
     if errors := list(_header_errors(header, name, numbered[0][0])):
         return [], errors
     rows: list[Row] = []
-    seen: dict[str, int] = {}
+    line_of_id: dict[str, int] = {}
     folders: dict[str, str] = {}
     for line, text in numbered[1:]:
-        row, found = _row(text, line, header, name)
-        errors += found
-        if found:
+        row, row_errors = _row(text, line, header, name)
+        errors += row_errors
+        if row_errors:
             continue
-        if row.id in seen:
-            remedy = f"Give it another id, or remove one of the lines {seen[row.id]} and {line}"
+        if row.id in line_of_id:
+            remedy = f"Give it another id, or remove one of the lines {line_of_id[row.id]} and {line}"
             errors.append(row.place("turnout").error(f"turnout {row.id!r} for the second time", remedy))
         elif row.raw in folders:
-            said = f"raw folder {row.raw!r} is also that of turnout {folders[row.raw]!r}"
-            errors.append(row.place("raw").error(said, "Give each turnout its own folder"))
+            problem = f"raw folder {row.raw!r} is also that of turnout {folders[row.raw]!r}"
+            errors.append(row.place("raw").error(problem, "Give each turnout its own folder"))
         else:
-            seen[row.id], folders[row.raw] = line, row.id
+            line_of_id[row.id], folders[row.raw] = line, row.id
             rows.append(row)
     return rows, errors
 
 
 def _header_errors(header, name, line) -> Iterator[ConfigError]:
     column = 1
-    if wrong := no_tabs(header):
-        yield Place(name, line, 1).error(*wrong)
+    if problem := separator_problem(header):
+        yield Place(name, line, 1).error(*problem)
         return
     for i, title in enumerate(header):
         place = Place(name, line, column)
@@ -117,23 +117,23 @@ def _header_errors(header, name, line) -> Iterator[ConfigError]:
             yield Place(name, line, 1).error(f"no column {title!r}", f"Add it: {key.meaning}")
 
 
-def no_tabs(cells) -> tuple[str, str] | None:
+def separator_problem(cells) -> tuple[str, str] | None:
     """(problem, remedy) if the cells of a line are separated by something other than tabs, else None.
 
-    >>> no_tabs(("turnout;layout",)), no_tabs(("turnout", "layout"))
+    >>> separator_problem(("turnout;layout",)), separator_problem(("turnout", "layout"))
     (('semicolons between the columns', 'Put tabs between the columns'), None)
     """
-    for mark, said in ((";", "semicolons"), (",", "commas"), (None, "blanks")):
+    for mark, name in ((";", "semicolons"), (",", "commas"), (None, "blanks")):
         if len(cells) == 1 and len(cells[0].split(mark)) > 1:
-            return f"{said} between the columns", "Put tabs between the columns"
+            return f"{name} between the columns", "Put tabs between the columns"
     return None
 
 
 def _row(text, line, header, name) -> tuple[Row, list[ConfigError]]:
     cells = tuple(text.split("\t"))
     row = Row({}, line, cells, header, name)
-    if wrong := no_tabs(cells):
-        return row, [Place(name, line, 1).error(*wrong)]
+    if separator_error := separator_problem(cells):
+        return row, [Place(name, line, 1).error(*separator_error)]
     if len(cells) > len(header):
         place = Place(name, line, 1 + sum(len(c) + 1 for c in cells[: len(header)]))
         return row, [place.error(f"{len(cells)} cells under {len(header)} columns", "Remove what is too much")]
@@ -143,20 +143,20 @@ def _row(text, line, header, name) -> tuple[Row, list[ConfigError]]:
         if not cell:
             continue
         value, key = cell, ROW[title]
-        if key.kind == "number":
+        if key.value_type == "number":
             try:
                 value = float(cell)
             except ValueError:
                 value = cell
-        if found := problem(key, value):
-            errors.append(row.place(title).error(f"{title} is {found[0]}", found[1]))
+        if problem := value_problem(key, value):
+            errors.append(row.place(title).error(f"{title} is {problem[0]}", problem[1]))
         row.values[title] = value
     for title, key in ROW.items():
         if key.required and title not in row.values:
             errors.append(row.place(title).error(f"{title} is empty", f"Write {key.meaning}"))
     if not errors and leads_out(row.raw):
-        said = f"raw is {row.raw!r}, outside the raw root"
-        errors.append(row.place("raw").error(said, "Write a folder below the raw root, without '..'"))
+        message = f"raw is {row.raw!r}, outside the raw root"
+        errors.append(row.place("raw").error(message, "Write a folder below the raw root, without '..'"))
     elif "raw" in row.values:
         row.values["raw"] = str(PurePosixPath(row.raw))  # "t1/" and "./t1" are the folder "t1"
     return row, errors
@@ -172,7 +172,7 @@ def leads_out(path: str) -> bool:
 
 
 @contextmanager
-def taken_back(path: Path) -> Iterator[None]:
+def restore_on_error(path: Path) -> Iterator[None]:
     """Context that restores the content of ``path`` if an exception is raised inside it."""
     path = Path(path)
     before = path.read_bytes() if os.path.lexists(path) else None
@@ -199,10 +199,10 @@ def append_csv(path: Path, values: Mapping[str, str], columns: tuple[str, ...]) 
     """Add one row to a CSV and return its line; a new table gets ``columns``. ConfigError if a value has no column."""
     try:
         header = header_of(path, str(path)) if path.exists() else columns
-    except TableFault as fault:
+    except TableError as fault:
         raise fault.error from None
     text = io.StringIO()
-    csv.writer(text, lineterminator="").writerow(_in_order(path, values, header))
+    csv.writer(text, lineterminator="").writerow(_ordered_cells(path, values, header))
     return _append(path, text.getvalue(), ",".join(columns))
 
 
@@ -213,24 +213,24 @@ def append_tsv(path: Path, values: Mapping[str, str], columns: tuple[str, ...]) 
         try:
             lines = path.read_text(encoding="utf-8-sig").splitlines()
         except UnicodeDecodeError as error:
-            found = "a byte that is not UTF-8"
-            raise ConfigError(path, f"byte {error.start}", found, "Save the file as UTF-8") from None
+            problem = "a byte that is not UTF-8"
+            raise ConfigError(path, f"byte {error.start}", problem, "Save the file as UTF-8") from None
         titles = next((line for line in lines if line.strip() and not line.startswith("#")), "")
         if not titles:
             raise Place(str(path), 1, 1).error("an empty table", "Write a header: turnout<tab>layout<tab>...")
         header = tuple(title.strip() for title in titles.split("\t"))
-        if wrong := no_tabs(header):
-            raise Place(str(path), 1 + lines.index(titles), 1).error(*wrong)
-    return _append(path, "\t".join(_in_order(path, values, header)), "\t".join(columns))
+        if separator_error := separator_problem(header):
+            raise Place(str(path), 1 + lines.index(titles), 1).error(*separator_error)
+    return _append(path, "\t".join(_ordered_cells(path, values, header)), "\t".join(columns))
 
 
-def _in_order(path: Path, values: Mapping[str, str], header: tuple[str, ...]) -> list[str]:
-    said = {title: one_line(value) for title, value in values.items()}
-    for title, value in said.items():
+def _ordered_cells(path: Path, values: Mapping[str, str], header: tuple[str, ...]) -> list[str]:
+    texts = {title: one_line(value) for title, value in values.items()}
+    for title, value in texts.items():
         if value and title not in header:
             remedy = "Add it to the header, or leave the value out"
             raise Place(str(path), 1, 1).error(f"no column {title!r} for {value!r}", remedy)
-    return [said.get(title, "") for title in header]
+    return [texts.get(title, "") for title in header]
 
 
 def _append(path: Path, line: str, header: str) -> str:

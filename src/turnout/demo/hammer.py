@@ -12,22 +12,22 @@ import numpy as np
 from turnout.demo import scenario
 from turnout.records import Channel, Recording
 from turnout.simulate.frequency_response import receptance
-from turnout.simulate.hammer import located
+from turnout.simulate.hammer import resolve_location
 from turnout.simulate.matrices import assemble
 from turnout.simulate.parameters import load_track
 from turnout.simulate.turnout_track import stretch_of_track
 
 RATE = 20_000.0  # Hz
-N_SAMPLE = 3_000  # of a record
-TRIGGER = 100  # sample of the impact
+N_SAMPLES = 3_000  # of a record
+TRIGGER_SAMPLE = 100  # sample of the impact
 FORCE_LIMIT, ACCELERATION_LIMIT = 22_000.0, 2_000.0  # N and m/s²: ranges of the channels
-DOUBLE_HIT_SHARE, OVERLOAD_SHARE = 0.02, 0.01  # of the impacts
-FORCE = Channel("force", "force", mounting="hammer", limit=FORCE_LIMIT)
-RAIL = Channel("rail", "acceleration", mounting="rail head at sleeper", limit=ACCELERATION_LIMIT)
+DOUBLE_IMPACT_SHARE, OVERLOAD_SHARE = 0.02, 0.01  # of the impacts
+FORCE_CHANNEL = Channel("force", "force", mounting="hammer", limit=FORCE_LIMIT)
+RAIL_CHANNEL = Channel("rail", "acceleration", mounting="rail head at sleeper", limit=ACCELERATION_LIMIT)
 
 
 @dataclass(frozen=True)
-class Blow:
+class ImpactTruth:
     """Truth of one impact: ``peak`` force [N], and its ``fault``, "" for none."""
 
     test: int
@@ -38,7 +38,7 @@ class Blow:
 
 def pulse(peak, contact, start):
     """Half-sine force of a soft tip [N], (N_SAMPLE,); ``contact`` and ``start`` in s, any sub-sample start."""
-    t = np.arange(N_SAMPLE) / RATE - start
+    t = np.arange(N_SAMPLES) / RATE - start
     return np.where((t > 0) & (t < contact), peak * np.sin(np.pi * t / contact), 0.0)
 
 
@@ -49,10 +49,10 @@ def response_to(force, impulse_response):
     part is at the end of the record. Without it the mass-like jump at the impact is halved, and the receptance at all
     lower frequencies is wrong.
     """
-    return np.fft.irfft(np.fft.rfft(force) * np.fft.rfft(impulse_response, N_SAMPLE), N_SAMPLE) / RATE
+    return np.fft.irfft(np.fft.rfft(force) * np.fft.rfft(impulse_response, N_SAMPLES), N_SAMPLES) / RATE
 
 
-def hammer_test(impulse_response, temperature, day, test, rng, n_blow=10):
+def hammer_test(impulse_response, temperature, day, test, rng, n_impacts=10):
     """Recordings of one test and the truth of each impact.
 
     Parameters
@@ -66,27 +66,27 @@ def hammer_test(impulse_response, temperature, day, test, rng, n_blow=10):
     recordings, truth = [], []
     conditions = {} if temperature is None else {"rail_temperature": round(temperature, 1)}
     started = datetime.combine(day, time(9, 0), UTC).replace(tzinfo=None) + timedelta(minutes=12 * test)
-    for record in range(n_blow):
-        fault = rng.choice(["double_hit", "overload", ""], p=[DOUBLE_HIT_SHARE, OVERLOAD_SHARE, 0.97])
+    for record in range(n_impacts):
+        fault = rng.choice(["double_hit", "overload", ""], p=[DOUBLE_IMPACT_SHARE, OVERLOAD_SHARE, 0.97])
         peak = 8_000.0 * rng.normal(1.0, 0.10)
-        contact, start = 1.5e-3 * rng.normal(1.0, 0.08), (TRIGGER + rng.uniform()) / RATE
+        contact, start = 1.5e-3 * rng.normal(1.0, 0.08), (TRIGGER_SAMPLE + rng.uniform()) / RATE
         force = pulse(peak, contact, start)
         if fault == "double_hit":
             force += pulse(peak * rng.uniform(0.08, 0.3), contact, start + rng.uniform(0.008, 0.030))
         acceleration = response_to(force, impulse_response(rng))
         samples = np.stack([force, acceleration]) + _noise(peak, acceleration, rng)
         recording = Recording(
-            samples, RATE, (FORCE, RAIL), "hammer", record=record, conditions=conditions,
+            samples, RATE, (FORCE_CHANNEL, RAIL_CHANNEL), "hammer", record=record, conditions=conditions,
             started_at=started + timedelta(seconds=20 * record),
         )  # fmt: skip
         recordings.append(_convert(scenario.overload(recording) if fault == "overload" else recording))
-        truth.append(Blow(test, record, peak, str(fault)))
+        truth.append(ImpactTruth(test, record, peak, str(fault)))
     return recordings, truth
 
 
 def _noise(peak, acceleration, rng):
     levels = [[1e-3 * peak], [1e-2 * np.max(np.abs(acceleration))]]
-    return rng.normal(size=(2, N_SAMPLE)) * np.array(levels)
+    return rng.normal(size=(2, N_SAMPLES)) * np.array(levels)
 
 
 def _convert(recording):
@@ -96,10 +96,10 @@ def _convert(recording):
     return replace(recording, samples=np.clip(np.round(recording.samples / step) * step, -limits, limits))
 
 
-SPREAD = 0.006  # relative sd of the track's frequencies between impacts: hammer and sensor move a little
+FREQUENCY_SPREAD = 0.006  # relative sd of the track's frequencies between impacts: hammer and sensor move a little
 HALF_LENGTH = 18.0  # m of track on each side of the impact
 # Hz: taper of the accelerance. The hammer's pulse has no power above; a smooth end keeps the impulse response short.
-PASS, STOP = 2_500.0, 4_000.0
+PASS_FREQUENCY, STOP_FREQUENCY = 2_500.0, 4_000.0
 
 
 def simulated_response(section, ballast, railpad, hangs=False):
@@ -113,8 +113,8 @@ def simulated_response(section, ballast, railpad, hangs=False):
     frequency, accelerance = _accelerance(section, round(ballast, 6), round(railpad, 6), hangs)
 
     def response(rng):
-        stretched = np.interp(frequency * (1.0 + SPREAD * rng.standard_normal()), frequency, accelerance)
-        return np.fft.irfft(stretched, N_SAMPLE) * RATE
+        scaled = np.interp(frequency * (1.0 + FREQUENCY_SPREAD * rng.standard_normal()), frequency, accelerance)
+        return np.fft.irfft(scaled, N_SAMPLES) * RATE
 
     return response
 
@@ -122,23 +122,26 @@ def simulated_response(section, ballast, railpad, hangs=False):
 @lru_cache(maxsize=8)
 def _accelerance(section, ballast, railpad, hangs):
     """Frequencies [Hz] and accelerance [m/s²/N] up to the Nyquist frequency."""
-    place, track = located(_turnout(), section)
-    stretch = stretch_of_track(track, place, HALF_LENGTH)
-    under = stretch.nearest_support(place)
-    place = float(stretch.support[under])
-    touched = np.ones(stretch.support.size)
-    touched[under] = 0.0 if hangs else 1.0
-    changed = stretch.with_(
-        ballast_stiffness=ballast * touched * stretch.ballast_stiffness,
-        ballast_damping=touched * stretch.ballast_damping,
+    position, track = resolve_location(_turnout(), section)
+    stretch = stretch_of_track(track, position, HALF_LENGTH)
+    support = stretch.nearest_support(position)
+    position = float(stretch.support[support])
+    contact = np.ones(stretch.support.size)
+    contact[support] = 0.0 if hangs else 1.0
+    modified = stretch.with_(
+        ballast_stiffness=ballast * contact * stretch.ballast_stiffness,
+        ballast_damping=contact * stretch.ballast_damping,
         pad_stiffness=railpad * stretch.pad_stiffness,
     )
-    frequency = np.fft.rfftfreq(N_SAMPLE, 1.0 / RATE)
-    inside = (frequency > 0) & (frequency < STOP)
-    h = receptance(assemble(changed), frequency[inside], place, place)
-    taper = 0.5 * (1.0 + np.cos(np.pi * np.clip((frequency[inside] - PASS) / (STOP - PASS), 0.0, 1.0)))
+    frequency = np.fft.rfftfreq(N_SAMPLES, 1.0 / RATE)
+    in_band = (frequency > 0) & (frequency < STOP_FREQUENCY)
+    receptances = receptance(assemble(modified), frequency[in_band], position, position)
+    taper = 0.5 * (
+        1.0
+        + np.cos(np.pi * np.clip((frequency[in_band] - PASS_FREQUENCY) / (STOP_FREQUENCY - PASS_FREQUENCY), 0.0, 1.0))
+    )
     accelerance = np.zeros(frequency.size, complex)
-    accelerance[inside] = -((2 * np.pi * frequency[inside]) ** 2) * h * taper
+    accelerance[in_band] = -((2 * np.pi * frequency[in_band]) ** 2) * receptances * taper
     return frequency, accelerance
 
 

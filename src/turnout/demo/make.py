@@ -74,12 +74,12 @@ def make_fleet(raw, truth, seed=1, n_campaign=24, n_passage=12, turnouts=None, w
     with ProcessPoolExecutor(workers or os.cpu_count()) as pool:
         counts = pool.map(_make_tests, jobs, chunksize=4)
         total = sum(tqdm(counts, total=len(jobs), desc="hammer tests", unit="section", disable=not progress))
-        passed = pool.map(make_passage, trains)
-        told = list(tqdm(passed, total=len(trains), desc="passages", unit="train", disable=not progress))
+        results = pool.map(make_passage, trains)
+        passage_truths = list(tqdm(results, total=len(trains), desc="passages", unit="train", disable=not progress))
     for scenario in chosen if trains else ():
-        own = [t for job, t in zip(trains, told) if job[1].turnout == scenario.turnout]
-        (Path(truth) / f"{scenario.turnout}_passages.json").write_text(json.dumps(own, indent=1))
-    return total + len(told)
+        turnout_truths = [t for job, t in zip(trains, passage_truths) if job[1].turnout == scenario.turnout]
+        (Path(truth) / f"{scenario.turnout}_passages.json").write_text(json.dumps(turnout_truths, indent=1))
+    return total + len(passage_truths)
 
 
 def _make_tests(job):
@@ -89,14 +89,14 @@ def _make_tests(job):
     ballast, railpad = stiffness_factors(scenario, section, day, temperature)
     hangs = gap_under(scenario, section, day) > 0.0
     response = simulated_response(section, ballast * scenario.stiffness, railpad * scenario.stiffness, hangs)
-    known = None if (scenario.turnout, number) == MISSING_TEMPERATURE else temperature
-    odd = scenario.odd_campaign and scenario.odd_campaign[0] == number
-    file_format = scenario.odd_campaign[1] if odd else scenario.format
+    noted_temperature = None if (scenario.turnout, number) == MISSING_TEMPERATURE else temperature
+    is_odd = scenario.odd_campaign and scenario.odd_campaign[0] == number
+    file_format = scenario.odd_campaign[1] if is_odd else scenario.format
     folder = Path(raw) / scenario.turnout / "hammer" / day.isoformat()
     folder.mkdir(parents=True, exist_ok=True)
-    blows = []
+    impacts = []
     for test in (1, 2, 3):
-        recordings, befallen = hammer_test(response, known, day, test, rng)
+        recordings, truths = hammer_test(response, noted_temperature, day, test, rng)
         fault = FILE_FAULTS.get((scenario.turnout, number, section, test), "")
         if fault and fault != "cut_off":
             recordings = [getattr(faults, fault)(r) for r in recordings]
@@ -104,11 +104,11 @@ def _make_tests(job):
         write(recordings, path, file_format, single=True)
         if fault == "cut_off":
             faults.cut_off(path)
-        blows += [asdict(b) | {"file_fault": fault} for b in befallen if b.fault or fault]
-    if blows:
+        impacts += [asdict(impact) | {"file_fault": fault} for impact in truths if impact.fault or fault]
+    if impacts:
         name = f"{scenario.turnout}_{day.isoformat()}_{section}.json"
         (Path(truth) / "blows").mkdir(parents=True, exist_ok=True)
-        (Path(truth) / "blows" / name).write_text(json.dumps(blows))
+        (Path(truth) / "blows" / name).write_text(json.dumps(impacts))
     return 3
 
 
@@ -121,8 +121,8 @@ def _write_campaigns(raw, scenario, days, temperatures):
         for number, (day, temperature) in enumerate(zip(days, temperatures)):
             missing = (scenario.turnout, number) == MISSING_TEMPERATURE
             start = datetime.combine(day, time(9, 0)).isoformat()
-            shown = "" if missing else f"{temperature:.1f}"
-            writer.writerow([day.isoformat(), start, shown, "086D50-1", "plastic", "survey crew"])
+            temperature_text = "" if missing else f"{temperature:.1f}"
+            writer.writerow([day.isoformat(), start, temperature_text, "086D50-1", "plastic", "survey crew"])
 
 
 def _write_truth(truth, scenario, days, temperatures, seed):

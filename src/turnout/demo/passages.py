@@ -32,7 +32,7 @@ NOISE, LIMIT = 0.3, 5_000.0
 def make_passages(raw, scenario, turnout, seed, n_passage, last_day):
     """Jobs for ``make_passage``, one per train of the weeks before ``last_day``; writes trains.csv of the turnout."""
     rng = np.random.default_rng([seed, 77, crc32(scenario.turnout.encode())])
-    places = {s.label: (s.position, s.track) for s in turnout.sections}
+    positions = {s.label: (s.position, s.track) for s in turnout.sections}
     jobs, listed = [], []
     start = datetime.combine(last_day, datetime.min.time()) - timedelta(days=20)
     for k in range(n_passage):
@@ -47,11 +47,11 @@ def make_passages(raw, scenario, turnout, seed, n_passage, last_day):
             "started_at_utc": moment.isoformat(), "vehicle": name, "speed_kmh": speed, "load_share": load,
             "track": route, "direction": direction, "rail_temperature_c": temperature,
         }  # fmt: skip
-        jobs.append((str(raw), scenario, places, vehicle, truth, [seed, k]))
+        jobs.append((str(raw), scenario, positions, vehicle, truth, [seed, k]))
         # the train data have most trains, and their speed to some km/h
         if rng.uniform() < 0.7:
-            said = {"passed_at_utc": (moment + timedelta(seconds=int(rng.integers(-20, 20)))).isoformat()}
-            listed.append(said | {"train_type": name, "speed_kmh": f"{speed * rng.normal(1.0, 0.02):.0f}"})
+            entry = {"passed_at_utc": (moment + timedelta(seconds=int(rng.integers(-20, 20)))).isoformat()}
+            listed.append(entry | {"train_type": name, "speed_kmh": f"{speed * rng.normal(1.0, 0.02):.0f}"})
     folder = Path(raw) / scenario.turnout
     (folder / "passages").mkdir(parents=True, exist_ok=True)
     with open(folder / "trains.csv", "w", newline="") as file:
@@ -63,10 +63,10 @@ def make_passages(raw, scenario, turnout, seed, n_passage, last_day):
 
 def make_passage(job):
     """Simulate one passage and write its file; returns its truth."""
-    raw, scenario, places, vehicle, truth, seed = job
+    raw, scenario, positions, vehicle, truth, seed = job
     moment = datetime.fromisoformat(truth["started_at_utc"])
     track = _track_of(scenario, moment.date(), round(truth["rail_temperature_c"]))
-    sensors = [_sensor(label, place, side, truth["track"]) for label, (place, side) in places.items()]
+    sensors = [_sensor(label, position, side, truth["track"]) for label, (position, side) in positions.items()]
     recording = simulate_passage(
         track,
         _vehicle(vehicle, round(truth["load_share"], 1)),
@@ -80,27 +80,32 @@ def make_passage(job):
         started_at=moment,
         conditions={"rail_temperature": round(truth["rail_temperature_c"], 1)},
     )
-    told = {k: v for k, v in recording.conditions.items() if k == "rail_temperature"}
+    conditions = {k: v for k, v in recording.conditions.items() if k == "rail_temperature"}
     name = moment.strftime("%Y%m%dT%H%M%SZ.h5")
-    write([replace(recording, conditions=told)], Path(raw) / scenario.turnout / "passages" / name, "hdf5", single=True)
+    write(
+        [replace(recording, conditions=conditions)],
+        Path(raw) / scenario.turnout / "passages" / name,
+        "hdf5",
+        single=True,
+    )
     loads = recording.conditions["axle_loads"]
     return truth | {"file": name, "n_axles": len(loads), "axle_load_t": float(np.mean(loads)) / 9.81e3}
 
 
-def _sensor(label, place, side, route):
+def _sensor(label, position, side, route):
     gain = 1.0 if side in ("both", route) else NEIGHBOUR_GAIN
-    return Sensor(label, place, "rail web", gain=gain, noise=NOISE, limit=LIMIT, resolution=LIMIT / 2**15)
+    return Sensor(label, position, "rail web", gain=gain, noise=NOISE, limit=LIMIT, resolution=LIMIT / 2**15)
 
 
 def _terms_of(scenario, turnout, route, day):
     """Terms of the hanging sleepers of that day on ``route``."""
-    track, found = turnout.track_of(route), []
+    track, terms = turnout.track_of(route), []
     for section in sorted({g.section for g in scenario.gaps}):
         gap = gap_under(scenario, section, day)
-        place, own = turnout.locations[section]
-        if gap > 0.0 and own in (route, None):
-            found.append(HangingSleeper(track.nearest_support(place), gap))
-    return tuple(found)
+        position, section_route = turnout.locations[section]
+        if gap > 0.0 and section_route in (route, None):
+            terms.append(HangingSleeper(track.nearest_support(position), gap))
+    return tuple(terms)
 
 
 @lru_cache(maxsize=32)
@@ -113,10 +118,10 @@ def _track_of(scenario, day, temperature):
     """The turnout with the stiffness of every section on that day, on both routes."""
     turnout = load_track("tommerup")
 
-    def changed(track):
+    def scale_stiffness(track):
         factors = np.array([stiffness_factors(scenario, section, day, temperature) for section in track.section])
         ballast, pad = factors.T * scenario.stiffness
         return track.with_(ballast_stiffness=ballast * track.ballast_stiffness, pad_stiffness=pad * track.pad_stiffness)
 
-    tracks = {route: changed(track) for route, track in turnout.tracks.items()}
-    return replace(turnout, track=changed(turnout.track), tracks=tracks)
+    tracks = {route: scale_stiffness(track) for route, track in turnout.tracks.items()}
+    return replace(turnout, track=scale_stiffness(turnout.track), tracks=tracks)

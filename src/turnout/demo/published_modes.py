@@ -11,7 +11,7 @@ from turnout.demo.others import SDYPY_FILE, SDYPY_SHA256
 from turnout.errors import TurnoutError
 from turnout.modal.frf import modes_of_frf
 from turnout.readers.uff import read_frf
-from turnout.readers.uff_datasets import sets_of
+from turnout.readers.uff_datasets import read_datasets
 
 # (frequency [Hz], damping [%]) of the seven modes in the makers' own showcase.
 SDYPY_BEAM = (
@@ -58,27 +58,29 @@ def _beam(name, origin, frequency, responses, published, highest):
 
 def _rows(frequency, responses, published, highest):
     """Every published mode with the nearest identified mode, then the identified modes that are not published."""
-    found = list(modes_of_frf(frequency, responses, highest=highest).modes)
+    modes = list(modes_of_frf(frequency, responses, highest=highest).modes)
     rows = []
     for f, damping in published:
-        nearest = min(found, key=lambda m: abs(m.frequency.mean - f), default=None)
+        nearest = min(modes, key=lambda m: abs(m.frequency.mean - f), default=None)
         if nearest is not None and abs(nearest.frequency.mean - f) > 0.02 * f:
             nearest = None
         rows.append((f, damping, nearest))
-        if nearest in found:
-            found.remove(nearest)
-    return rows + [(None, None, mode) for mode in found]
+        if nearest in modes:
+            modes.remove(nearest)
+    return rows + [(None, None, mode) for mode in modes]
 
 
 def uff_contents(path):
     """Content of a vendor's UFF file in words: sets by type, lengths, damage."""
-    sets = [s for s in sets_of(Path(path).read_bytes()) if s.kind in ("58", "58b")]
+    sets = [s for s in read_datasets(Path(path).read_bytes()) if s.dataset_type in ("58", "58b")]
     damaged = [s.damage for s in sets if s.damage]
-    names = [
-        FUNCTIONS.get(s.func_type, f"functions of type {s.func_type}") + f" ({s.kind})" for s in sets if not s.damage
+    set_names = [
+        FUNCTIONS.get(s.func_type, f"functions of type {s.func_type}") + f" ({s.dataset_type})"
+        for s in sets
+        if not s.damage
     ]
-    kinds = Counter(names)
+    counts = Counter(set_names)
     lengths = sorted({len(s.data) for s in sets if not s.damage})
-    words = ", ".join(f"{n} {kind}" for kind, n in kinds.items())
+    contents = ", ".join(f"{n} {name}" for name, n in counts.items())
     span = f"; {' to '.join(dict.fromkeys(str(n) for n in (lengths[0], lengths[-1])))} values" if lengths else ""
-    return f"{words or 'no sound set'}{span}" + (f"; damaged: {damaged}" if damaged else "")
+    return f"{contents or 'no sound set'}{span}" + (f"; damaged: {damaged}" if damaged else "")

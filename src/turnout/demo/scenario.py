@@ -46,10 +46,10 @@ class Gap:
     gap: float
     per_year: float
 
-    def on(self, day):
+    def size_on(self, day):
         """Gap [m] on ``day``.
 
-        >>> Gap("A7", date(2025, 1, 1), 0.4e-3, 1.0e-3).on(date(2024, 1, 1))
+        >>> Gap("A7", date(2025, 1, 1), 0.4e-3, 1.0e-3).size_on(date(2024, 1, 1))
         0.0
         """
         if day < self.since:
@@ -109,7 +109,7 @@ def rail_temperature(day, rng):
 
 def gap_under(scenario, section, day):
     """Gap [m] under the sleeper of a section's sensor, 0 if it lies on its ballast."""
-    return max((g.on(day) for g in scenario.gaps if g.section == section), default=0.0)
+    return max((g.size_on(day) for g in scenario.gaps if g.section == section), default=0.0)
 
 
 def stiffness_factors(scenario, section, day, temperature):

@@ -14,7 +14,7 @@ QUESTIONS = (
     ("Which turnouts need a look tomorrow?", "select * from worklist"),
     ("What was not used, and why?", "select reason, count(*) as n from impacts_current group by all order by n desc"),
 )
-COUNTS = """
+COUNTS_QUERY = """
     select
         (select count(*) from recordings_current) as recordings,
         (select count(*) from impacts_current) as impacts,
@@ -24,25 +24,25 @@ COUNTS = """
         (select count(*) from quarantine_open) as quarantined,
         (select count(*) from passages_current) as passages
 """
-REASONS = """
+QUARANTINE_QUERY = """
     select path, reason_code, min_by(found, coalesce(record, -1)), count(*) from quarantine_open
     group by all order by path limit 8
 """
-WORK = "select coalesce(section_id, turnout_id), band, state, sentence from worklist order by rank limit 5"
+WORKLIST_QUERY = "select coalesce(section_id, turnout_id), band, state, sentence from worklist order by rank limit 5"
 
 
-def tell(registry, pages, say=print):
+def print_summary(registry, pages, say=print):
     """Print counts, quarantine, tomorrow's list, the folder of the pages, and three queries to try."""
     with open_registry(registry) as connection:
-        counts = dict(zip((d[0] for d in connection.execute(COUNTS).description), connection.fetchall()[0]))
+        counts = dict(zip((d[0] for d in connection.execute(COUNTS_QUERY).description), connection.fetchall()[0]))
         say(
             "   {recordings} recordings, {impacts} impacts of which {rejected} were rejected, {passages} passages\n"
             "   {models} models of a section and campaign, {models_rejected} rejected; "
             "{quarantined} rows in quarantine:".format(**counts)
         )
-        for path, reason, found, n in connection.execute(REASONS).fetchall():
-            say(f"      {path}: {reason}, {found}" + (f" ({n} such records)" if n > 1 else ""))
-        rows = connection.execute(WORK).fetchall()
+        for path, reason, observation, n in connection.execute(QUARANTINE_QUERY).fetchall():
+            say(f"      {path}: {reason}, {observation}" + (f" ({n} such records)" if n > 1 else ""))
+        rows = connection.execute(WORKLIST_QUERY).fetchall()
     say("\n   Tomorrow's list, its first rows:" if rows else "\n   Tomorrow's list is empty.")
     for section, band, state, sentence in rows:
         say(f"      {section} {band}: {state}. {sentence}")
@@ -54,6 +54,6 @@ def tell(registry, pages, say=print):
 
 def _command():
     """Command of this program: its name if it is on the path, else its file."""
-    beside = Path(sys.executable).parent / "turnout"
-    on_path = str(beside.parent) in os.environ.get("PATH", "").split(os.pathsep)
-    return "turnout" if on_path else os.path.relpath(beside)
+    program = Path(sys.executable).parent / "turnout"
+    on_path = str(program.parent) in os.environ.get("PATH", "").split(os.pathsep)
+    return "turnout" if on_path else os.path.relpath(program)

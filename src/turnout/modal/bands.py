@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from turnout.modal.mixed_effects import LOWEST_DAMPING
+from turnout.modal.mixed_effects import MIN_DAMPING
 from turnout.modal.poles import continuous_pole
 from turnout.modal.selection import Selection
 from turnout.records import Rejection
@@ -60,7 +60,9 @@ def residues_of_receptance(receptance, frequency, damping) -> np.ndarray | None:
 
 
 MAIN_BANDS = ("ballast", "railpad")
-EDGE = 0.1  # relative distance from the edge of its band up to which a mode still belongs to it: warm pads soften
+MAX_EDGE_DISTANCE = (
+    0.1  # relative distance from the edge of its band up to which a mode still belongs to it: warm pads soften
+)
 
 
 @dataclass
@@ -77,66 +79,68 @@ class BandChoice:
     @property
     def status(self) -> str:
         """ "accepted" with both main resonances, "second_order_only" with one, "rejected" with none."""
-        found = [band for band in MAIN_BANDS if band in self.modes]
-        return ("rejected", "second_order_only", "accepted")[len(found)]
+        main_modes = [band for band in MAIN_BANDS if band in self.modes]
+        return ("rejected", "second_order_only", "accepted")[len(main_modes)]
 
 
 def choose_bands(selection: Selection, settings, receptance=None) -> BandChoice:
     """The mode of each band that is most significant for its bandwidth, if it passes the gate of ``receptance``."""
     choice = BandChoice(rejected_modes=list(selection.rejected))
     if selection.fit is not None:
-        _strongest(choice, selection, settings)
+        _choose_strongest(choice, selection, settings)
         if receptance is not None:
-            _gate(choice, selection, settings, receptance)
-    stopped = {r.detail.split()[0] for r in choice.rejections}
+            _apply_gate(choice, selection, settings, receptance)
+    gated_bands = {r.detail.split()[0] for r in choice.rejections}
     for band in MAIN_BANDS:
-        if band not in choice.modes and band not in stopped:
+        if band not in choice.modes and band not in gated_bands:
             choice.rejections.append(Rejection("not_identified", None, None, f"{band} band holds no stable mode"))
     return choice
 
 
-def _strongest(choice, selection, settings):
+def _choose_strongest(choice, selection, settings):
     frequency, damping = np.exp(selection.fit.mean[:, 0]), selection.fit.mean[:, 1]
     # Divided by the bandwidth: a broad pole below a stronger mode takes up much of the residual of that mode.
     # Not by energy: two close, heavily damped poles have large opposite amplitudes.
-    significance = np.median(selection.chi_squared, axis=0) / np.maximum(damping, LOWEST_DAMPING)
+    significance = np.median(selection.chi_squared, axis=0) / np.maximum(damping, MIN_DAMPING)
     for band, low, high in settings.bands():
         inside = np.flatnonzero((frequency >= low) & (frequency < high)).tolist()
-        inside = [m for m in inside if m not in selection.unfit and m not in choice.modes.values()]
+        inside = [m for m in inside if m not in selection.failed_tests and m not in choice.modes.values()]
         if inside:
             choice.modes[band] = max(inside, key=lambda m: significance[m])
-    _across_edges(choice, frequency, damping, significance, selection.unfit, settings)
+    _assign_across_edge(choice, frequency, damping, significance, selection.failed_tests, settings)
     for m in sorted(set(range(len(frequency))) - set(choice.modes.values())):
         bands = [band for band, low, high in settings.bands() if low <= frequency[m] < high]
         reason = f"weaker than the {bands[0]} mode of its band" if bands else "outside all bands"
-        reason, *limits = selection.unfit.get(m, (reason,))
-        choice.rejected_modes.append(_entry(selection, m, reason + "; kept in the fit", *limits))
+        reason, *limits = selection.failed_tests.get(m, (reason,))
+        choice.rejected_modes.append(_rejected_mode(selection, m, reason + "; kept in the fit", *limits))
 
 
-def _across_edges(choice, frequency, damping, significance, unfit, settings):
+def _assign_across_edge(choice, frequency, damping, significance, failed_tests, settings):
     """Give an empty main band a mode just outside its edge, if the neighbouring band has another mode for itself.
 
     The resonance of a soft pad may lie a hertz below the edge. It would then hide the ballast resonance.
     """
     edges = {band: (low, high) for band, low, high in settings.bands()}
-    for band, beside in zip(MAIN_BANDS, MAIN_BANDS[::-1]):
-        if band in choice.modes or beside not in choice.modes:
+    for band, neighbour in zip(MAIN_BANDS, MAIN_BANDS[::-1]):
+        if band in choice.modes or neighbour not in choice.modes:
             continue
-        (low, high), (floor, top) = edges[band], edges[beside]
-        there = [m for m in range(len(frequency)) if floor <= frequency[m] < top and m not in unfit]
-        beyond = np.maximum(low / frequency, frequency / high) - 1.0
+        (low, high), (floor, top) = edges[band], edges[neighbour]
+        neighbour_modes = [m for m in range(len(frequency)) if floor <= frequency[m] < top and m not in failed_tests]
+        edge_distance = np.maximum(low / frequency, frequency / high) - 1.0
         pairs = [
-            (m, other)
-            for m in there
-            for other in there
-            if beyond[m] < min(damping[m], EDGE) and (frequency[m] > frequency[other]) == (low >= top) and m != other
+            (m, partner)
+            for m in neighbour_modes
+            for partner in neighbour_modes
+            if edge_distance[m] < min(damping[m], MAX_EDGE_DISTANCE)
+            and (frequency[m] > frequency[partner]) == (low >= top)
+            and m != partner
         ]
         if pairs:
-            best = max(pairs, key=lambda pair: significance[list(pair)].sum())
-            choice.modes[band], choice.modes[beside] = best
+            best_pair = max(pairs, key=lambda pair: significance[list(pair)].sum())
+            choice.modes[band], choice.modes[neighbour] = best_pair
 
 
-def _gate(choice, selection, settings, receptance):
+def _apply_gate(choice, selection, settings, receptance):
     for band, m in list(choice.modes.items()):
         log_frequency, damping = selection.fit.mean[m]
         share, level = passed_share(receptance, float(np.exp(log_frequency)), float(damping))
@@ -145,11 +149,11 @@ def _gate(choice, selection, settings, receptance):
         del choice.modes[band]
         detail = f"{band} mode: share of its half-power band that passes the gate; lowest level {level:.2f}"
         choice.rejections.append(Rejection("low_coherence", share, settings.gate_share, detail))
-        entry = _entry(selection, m, "fails the coherence gate", share, settings.gate_share)
+        entry = _rejected_mode(selection, m, "fails the coherence gate", share, settings.gate_share)
         choice.rejected_modes.append(entry)
 
 
-def _entry(selection, m, reason, value=None, limit=None):
+def _rejected_mode(selection, m, reason, value=None, limit=None):
     return {
         "frequency": float(np.exp(selection.fit.mean[m, 0])),
         "damping": float(selection.fit.mean[m, 1]),

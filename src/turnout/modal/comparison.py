@@ -34,13 +34,13 @@ class Shift:
     level: float
 
     @property
-    def found(self) -> bool:
+    def detected(self) -> bool:
         """Whether the difference is significant at its level."""
         return self.probability < self.level
 
     def __str__(self) -> str:
         unit = " Hz" if self.parameter == "frequency" else ""
-        verdict = "moved" if self.found else "no shift found"
+        verdict = "moved" if self.detected else "no shift found"
         return (
             f"{self.band} {self.parameter}: {verdict}, {self.difference:+.4g} ± {self.se:.2g}{unit}"
             f" (p = {self.probability:.2g}, n = {self.n[0]} and {self.n[1]});"
@@ -80,11 +80,13 @@ def welch_test(first, second, level: float = 0.01, power: float = 0.8):
     first, second = np.asarray(first, float), np.asarray(second, float)
     if min(len(first), len(second)) < 2:
         raise ValueError(f"need two impacts in each test, got {len(first)} and {len(second)}")
-    parts = [sample.var(ddof=1) / len(sample) for sample in (first, second)]
-    difference, se = float(second.mean() - first.mean()), float(np.sqrt(sum(parts)))
+    mean_variances = [sample.var(ddof=1) / len(sample) for sample in (first, second)]
+    difference, se = float(second.mean() - first.mean()), float(np.sqrt(sum(mean_variances)))
     if se == 0.0:
         return difference, 0.0, np.inf, float(difference == 0.0), 0.0
-    freedom = sum(parts) ** 2 / sum(p**2 / (len(s) - 1) for p, s in zip(parts, (first, second), strict=True))
+    freedom = sum(mean_variances) ** 2 / sum(
+        p**2 / (len(s) - 1) for p, s in zip(mean_variances, (first, second), strict=True)
+    )
     probability = float(2.0 * t.sf(abs(difference) / se, freedom))
     return difference, se, float(freedom), probability, se * detectable_shift(freedom, level, power)
 

@@ -40,9 +40,9 @@ def hankel_operator(y, rows: int, shift: int = 0) -> LinearOperator:
     columns = len(y) - rows
     if rows < 1 or columns < 1:
         raise ValueError(f"{len(y)} samples do not fill a Hankel matrix of {rows} rows")
-    part = y[shift : shift + rows + columns - 1]
-    length = next_fast_len(len(part) + max(rows, columns) - 1, real=True)
-    spectrum = rfft(part, length)
+    samples = y[shift : shift + rows + columns - 1]
+    length = next_fast_len(len(samples) + max(rows, columns) - 1, real=True)
+    spectrum = rfft(samples, length)
 
     def correlate(x, n_in, n_out):
         reversed_x = np.ravel(x)[::-1]
@@ -89,20 +89,20 @@ def gram_matrices(decays, rows: int, starts=(0,)) -> list[np.ndarray]:
     if rows < 1 or columns <= max(starts):
         raise ValueError(f"{decays.shape[1]} samples do not fill a Hankel matrix of {rows} rows")
     grams = [np.empty((rows + 1, rows + 1)) for _ in starts]
-    running = np.zeros(decays.shape[1] + 1)
+    running_sum = np.zeros(decays.shape[1] + 1)
     for lag in range(rows + 1):
         length = decays.shape[1] - lag
         product = np.einsum("ij,ij->j", decays[:, :length], decays[:, lag:])
-        np.cumsum(product, out=running[1 : length + 1])
+        np.cumsum(product, out=running_sum[1 : length + 1])
         count = rows + 1 - lag
         for start, gram in zip(starts, grams, strict=True):
-            diagonal = running[columns : columns + count] - running[start : start + count]
+            diagonal = running_sum[columns : columns + count] - running_sum[start : start + count]
             gram.ravel()[lag :: rows + 2][:count] = diagonal
             gram.ravel()[lag * (rows + 1) :: rows + 2] = diagonal
     return grams
 
 
-DENSE_BELOW = 64  # rows or columns: smaller Hankel matrices are decomposed as dense ones, which is faster
+MIN_SPARSE_SIZE = 64  # rows or columns: smaller Hankel matrices are decomposed as dense ones, which is faster
 
 
 @dataclass(frozen=True)
@@ -128,8 +128,8 @@ class Realisation:
         """Frequencies [Hz] and damping ratios of the underdamped stable poles, lowest frequency first."""
         z = self.poles
         frequency, damping = modal_parameters(z[(z.imag > 0.0) & (np.abs(z) < 1.0)], self.rate)
-        up = np.argsort(frequency)
-        return frequency[up], damping[up]
+        ascending = np.argsort(frequency)
+        return frequency[ascending], damping[ascending]
 
 
 def era(decay, order: int, rows: int | None = None, rate: float = 1.0) -> Realisation:
@@ -201,17 +201,17 @@ def _era_single(y, order, rows, rate):
 def _largest_eigenpairs(h, order):
     """Eigenpairs of a symmetric operator that are largest in magnitude, largest first."""
     n = h.shape[0]
-    if n < DENSE_BELOW or order >= n - 1:
+    if n < MIN_SPARSE_SIZE or order >= n - 1:
         w, u = np.linalg.eigh(h @ np.eye(n))
     else:
-        w, u = eigsh(h, k=order, which="LM", v0=_start(h), ncv=min(n, max(2 * order + 8, 20)))
+        w, u = eigsh(h, k=order, which="LM", v0=_start_vector(h), ncv=min(n, max(2 * order + 8, 20)))
     leading = np.argsort(-np.abs(w), kind="stable")[:order]
     return w[leading], u[:, leading]
 
 
 def _largest_singular_triplets(h, order):
     n = min(h.shape)
-    if n < DENSE_BELOW or order >= n - 1:
+    if n < MIN_SPARSE_SIZE or order >= n - 1:
         u, s, vt = np.linalg.svd(h @ np.eye(h.shape[1]), full_matrices=False)
     else:
         # PROPACK works on H itself: eigenpairs of H H^T would lose half of the digits.
@@ -220,7 +220,7 @@ def _largest_singular_triplets(h, order):
     return u[:, leading], s[leading], vt[leading].T
 
 
-def _start(h: LinearOperator):
+def _start_vector(h: LinearOperator):
     """Start vector of the iteration: the first column of H, which has a share in every singular vector."""
     return h @ np.eye(1, h.shape[1]).ravel() + 1e-3 * np.random.default_rng(1).standard_normal(h.shape[0])
 
@@ -237,7 +237,7 @@ def _era_side_by_side(decays, order, rows, rate):
     return Realisation(a, (root * v0).T, u[0] * root, s, rate)
 
 
-MOST_ROWS = 300  # rows of the Hankel matrices of several decays; limits the time of a decomposition
+MAX_ROWS = 300  # rows of the Hankel matrices of several decays; limits the time of a decomposition
 
 
 @dataclass(frozen=True)
@@ -250,16 +250,16 @@ class Subspace:
 
     u: np.ndarray
     index: np.ndarray
-    step: np.ndarray
-    last: np.ndarray | None
+    transition: np.ndarray
+    last_row: np.ndarray | None
 
     def state_matrix(self, order: int) -> np.ndarray:
         """(order, order) one-sample state matrix."""
-        block = self.step[:order, :order]
-        if self.last is None:
+        block = self.transition[:order, :order]
+        if self.last_row is None:
             return block
-        tip = self.last[:order]
-        return block + np.outer(tip, tip @ block) / max(1.0 - tip @ tip, 1e-12)
+        row = self.last_row[:order]
+        return block + np.outer(row, row @ block) / max(1.0 - row @ row, 1e-12)
 
 
 def subspaces(decays, rows: int, order: int, starts=(0,)) -> list[Subspace]:
@@ -269,30 +269,30 @@ def subspaces(decays, rows: int, order: int, starts=(0,)) -> list[Subspace]:
     A longer record uses only every q-th row over its full length. :math:`A = S^{-1} U^T H_1 V S^{-1}` still advances by
     one sample, so there is no decimation and no aliasing.
     """
-    stride = -(-rows // MOST_ROWS)
+    stride = -(-rows // MAX_ROWS)
     if stride == 1:
-        return [_shifted(gram, order) for gram in gram_matrices(decays, rows, starts)]
-    return [_strided(decays, rows, order, start, stride) for start in starts]
+        return [_subspace_by_shift(gram, order) for gram in gram_matrices(decays, rows, starts)]
+    return [_subspace_by_stride(decays, rows, order, start, stride) for start in starts]
 
 
-def _leading(gram, order):
+def _leading_eigenpairs(gram, order):
     n = len(gram)
     w, u = eigh(gram, subset_by_index=(n - order, n - 1))
     return w[::-1], u[:, ::-1]
 
 
-def _shifted(gram, order):
-    _, u = _leading(gram[:-1, :-1], order)
+def _subspace_by_shift(gram, order):
+    _, u = _leading_eigenpairs(gram[:-1, :-1], order)
     return Subspace(u, np.arange(len(u)), u[:-1].T @ u[1:], u[-1])
 
 
-def _strided(decays, rows, order, start, stride):
+def _subspace_by_stride(decays, rows, order, start, stride):
     index = np.arange(0, rows, stride)
     columns = decays.shape[1] - rows
     products = np.zeros((2, len(index), len(index)))
     for y in decays:
         windows = np.lib.stride_tricks.sliding_window_view(y[start:], columns - start)
-        here, next_sample = windows[index], windows[index + 1]
-        products += here @ here.T, next_sample @ here.T
-    w, u = _leading(products[0], order)
+        current, next_sample = windows[index], windows[index + 1]
+        products += current @ current.T, next_sample @ current.T
+    w, u = _leading_eigenpairs(products[0], order)
     return Subspace(u, index, (u.T @ products[1] @ u) / np.maximum(w, np.finfo(float).tiny), None)

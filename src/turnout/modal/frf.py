@@ -14,7 +14,7 @@ from turnout.modal.frf_fit import FrfFit, fit_each
 from turnout.modal.summary import Summary, summarise
 
 ORDERS = range(1, 9)  # model orders at which the band around a peak is realised
-REAPPEARS = 0.5  # share of the orders at which a pole must occur
+MIN_ORDER_SHARE = 0.5  # share of the orders at which a pole must occur
 
 
 def zoomed_poles(frequency, frf, centre: float, width: float, damping_maximum: float) -> np.ndarray:
@@ -33,15 +33,15 @@ def zoomed_poles(frequency, frf, centre: float, width: float, damping_maximum: f
     order = min(max(ORDERS), rows - 1)
     _, u = eigh(gram, subset_by_index=(len(gram) - order, len(gram) - 1))
     u = u[:, ::-1]
-    found = []
+    candidates = []
     for r in ORDERS[:order]:
         z = np.linalg.eigvals(np.linalg.lstsq(u[:-1, :r], u[1:, :r], rcond=None)[0])
         s = np.log(np.maximum(np.abs(z), 1e-12)) + 1j * np.mod(np.angle(z), 2.0 * np.pi)
         s = s * rate + 2j * np.pi * frequency[0]
         zeta = -s.real / np.abs(s)
-        keep = (zeta > 0.0) & (zeta < damping_maximum) & (np.abs(s.imag / (2 * np.pi) - centre) < 1.5 * width)
-        found += [(r, pole) for pole in s[keep]]
-    starts = _reappearing(found, order)
+        usable = (zeta > 0.0) & (zeta < damping_maximum) & (np.abs(s.imag / (2 * np.pi) - centre) < 1.5 * width)
+        candidates += [(r, pole) for pole in s[usable]]
+    starts = _recurring_poles(candidates, order)
     if not starts:
         starts = [2.0 * np.pi * (-0.5 * width + 1j * centre)]
     s = np.array(starts)
@@ -54,24 +54,24 @@ def _gram(decay, rows):
     return np.einsum("iak,ibk->ab", windows, windows.conj(), optimize=True)
 
 
-def _reappearing(found, n_order):
+def _recurring_poles(candidates, n_order):
     """Medians of groups of poles closer than half their decay rate, if they occur at half of the orders."""
-    starts, left = [], list(found)
-    while left:
-        groups = [[p for p in left if abs(p[1] - q[1]) < 0.5 * min(-p[1].real, -q[1].real)] for q in left]
+    starts, remaining = [], list(candidates)
+    while remaining:
+        groups = [[p for p in remaining if abs(p[1] - q[1]) < 0.5 * min(-p[1].real, -q[1].real)] for q in remaining]
         largest = max(groups, key=len)
         orders = {r for r, _ in largest}
-        if len(orders) < REAPPEARS * (n_order - min(orders) + 1) or len(orders) < 3:
+        if len(orders) < MIN_ORDER_SHARE * (n_order - min(orders) + 1) or len(orders) < 3:
             break
         poles = np.array([p for _, p in largest])
         starts.append(complex(np.median(poles.real), np.median(poles.imag)))
-        left = [p for p in left if p not in largest]
+        remaining = [p for p in remaining if p not in largest]
     return starts
 
 
-WIDTHS = 12.0  # half-power widths in the band that is fitted around a peak
-FEWEST_LINES = 40  # frequency lines of that band
-MOST_LINES = 600
+BAND_WIDTHS = 12.0  # half-power widths in the band that is fitted around a peak
+MIN_LINES = 40  # frequency lines of that band
+MAX_LINES = 600
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ def modes_of_frf(
     100.00 Hz, 1.00 %
     """
     frequency, frf = np.asarray(frequency, float), np.atleast_2d(np.asarray(frf))
-    _check(frequency, frf)
+    _check_responses(frequency, frf)
     step = frequency[1] - frequency[0]
     power = np.mean(np.abs(frf) ** 2, axis=0)
     level = 10.0 * np.log10(np.maximum(power, 1e-30 * power.max()))
@@ -157,19 +157,19 @@ def modes_of_frf(
     modes: list[FrfMode] = []
     rejected: list[dict] = []
     for peak, width in zip(peaks, widths, strict=True):
-        half = int(np.clip(WIDTHS * width, FEWEST_LINES, MOST_LINES) / 2)
+        half = int(np.clip(BAND_WIDTHS * width, MIN_LINES, MAX_LINES) / 2)
         band = slice(max(0, peak - half), peak + half + 1)
-        near = (frequency[peak], max(width, 1.0) * step)
-        start = zoomed_poles(frequency[band], frf[:, band], *near, damping_maximum)
-        fits = fit_each(start, frequency[band], frf[:, band], near)
-        _sort(fits, near, contrast, damping_maximum, modes, rejected)
+        peak_and_width = (frequency[peak], max(width, 1.0) * step)
+        start = zoomed_poles(frequency[band], frf[:, band], *peak_and_width, damping_maximum)
+        fits = fit_each(start, frequency[band], frf[:, band], peak_and_width)
+        _sort_modes(fits, peak_and_width, contrast, damping_maximum, modes, rejected)
     modes.sort(key=lambda m: m.frequency.mean)
-    return FrfModes(tuple(_without_doubles(modes, rejected)), tuple(rejected))
+    return FrfModes(tuple(_without_duplicates(modes, rejected)), tuple(rejected))
 
 
-def _check(frequency, frf):
-    if frf.shape[1] != len(frequency) or len(frequency) < FEWEST_LINES:
-        raise ValueError(f"{frf.shape} responses over {len(frequency)} lines; need at least {FEWEST_LINES} lines")
+def _check_responses(frequency, frf):
+    if frf.shape[1] != len(frequency) or len(frequency) < MIN_LINES:
+        raise ValueError(f"{frf.shape} responses over {len(frequency)} lines; need at least {MIN_LINES} lines")
     if not (np.all(np.isfinite(frf)) and np.all(np.isfinite(frequency))):
         raise ValueError("the responses or their frequencies hold values that are not finite")
     gap = np.diff(frequency)
@@ -177,46 +177,46 @@ def _check(frequency, frf):
         raise ValueError(f"need evenly spaced frequencies, the steps go from {gap.min():g} to {gap.max():g} Hz")
 
 
-def _sort(fits: list[FrfFit], near, least_contrast, damping_maximum, modes, rejected):
+def _sort_modes(fits: list[FrfFit], peak_and_width, min_contrast, damping_maximum, modes, rejected):
     """Append every mode of a band to ``modes``, or to ``rejected`` with the reason."""
     theta = np.array([fit.theta for fit in fits])
     error = np.array([fit.error for fit in fits])
     height = np.median([fit.contrast for fit in fits], axis=0)
     for m in range(theta.shape[1]):
         log_f, damping = (summarise(theta[:, m, p], error[:, m, p]) for p in range(2))
-        frequency = _exponential(log_f)
+        frequency = _from_logarithm(log_f)
         checks = (
             ("damping not above zero", damping.mean, 1e-6, False),
             ("damping too high", damping.mean, damping_maximum, True),
-            ("outside its peak", abs(frequency.mean - near[0]), 2.0 * near[1], True),
-            ("too weak over the residual", height[m], least_contrast, False),
+            ("outside its peak", abs(frequency.mean - peak_and_width[0]), 2.0 * peak_and_width[1], True),
+            ("too weak over the residual", height[m], min_contrast, False),
             ("damping too uncertain", damping.se / max(abs(damping.mean), 1e-300), 0.3, True),
         )
-        failed = [(why, v, limit) for why, v, limit, upper in checks if ((v > limit) if upper else (v < limit))]
+        failed = [(reason, v, limit) for reason, v, limit, upper in checks if ((v > limit) if upper else (v < limit))]
         if failed:
-            why, value, limit = failed[0]
-            entry = {"frequency": frequency.mean, "damping": damping.mean, "reason": why}
+            reason, value, limit = failed[0]
+            entry = {"frequency": frequency.mean, "damping": damping.mean, "reason": reason}
             rejected.append(entry | {"value": float(value), "limit": limit})
         else:
             residue = np.array([fit.residue[m, 0] for fit in fits])
             modes.append(FrfMode(frequency, damping, residue, float(height[m])))
 
 
-def _exponential(s: Summary) -> Summary:
+def _from_logarithm(s: Summary) -> Summary:
     """Summary of ln f as one of f."""
     mean = float(np.exp(s.mean))
     return Summary(mean, mean * s.se, float(np.exp(s.low)), float(np.exp(s.high)), mean * s.spread, s.n)
 
 
-def _without_doubles(modes, rejected):
+def _without_duplicates(modes, rejected):
     """One mode per resonance: of two closer than half their half-power width, the one with more contrast."""
-    kept: list[FrfMode] = []
+    unique: list[FrfMode] = []
     for mode in modes:
         f, zeta = mode.frequency.mean, mode.damping.mean
-        if kept and f - kept[-1].frequency.mean < 0.5 * zeta * f:
-            weaker = min(kept[-1], mode, key=lambda m: m.contrast)
-            if weaker is kept[-1]:
-                kept[-1] = mode
+        if unique and f - unique[-1].frequency.mean < 0.5 * zeta * f:
+            weaker = min(unique[-1], mode, key=lambda m: m.contrast)
+            if weaker is unique[-1]:
+                unique[-1] = mode
             rejected.append(
                 {
                     "frequency": weaker.frequency.mean,
@@ -227,8 +227,8 @@ def _without_doubles(modes, rejected):
                 }
             )
         else:
-            kept.append(mode)
-    return kept
+            unique.append(mode)
+    return unique
 
 
 def haversine_pulse(time, duration):
@@ -274,11 +274,11 @@ def pulse_response(time, pole, residue, duration):
     """
     time, pole, residue = np.asarray(time, float), np.asarray(pole), np.asarray(residue)
     duration = np.asarray(duration, float)[..., None]
-    until = np.clip(time, 0.0, duration)[..., None, :]
+    upper_limit = np.clip(time, 0.0, duration)[..., None, :]
     turn = 2j * np.pi / duration[..., None]
     s = pole[..., None]
     total = 0.0
     for weight, a in ((0.5, 0.0), (-0.25, turn), (-0.25, -turn)):
-        total = total + weight * np.expm1((a - s) * until) / (a - s)
+        total = total + weight * np.expm1((a - s) * upper_limit) / (a - s)
     wave = residue[..., None] * np.exp(s * np.clip(time, 0.0, None)[..., None, :]) * total
     return np.where(time > 0.0, wave.sum(axis=-2).real, 0.0)

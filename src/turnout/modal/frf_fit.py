@@ -6,8 +6,8 @@ import numpy as np
 
 from turnout.modal.poles import continuous_pole
 
-LOCAL_TERMS = 3  # coefficients of the polynomial in frequency that stands for modes outside the band
-SINGLE_CONTRAST = 30.0  # dB over the residual from which on one mode is enough for a peak
+POLYNOMIAL_TERMS = 3  # coefficients of the polynomial in frequency that stands for modes outside the band
+MIN_SINGLE_CONTRAST = 30.0  # dB over the residual from which on one mode is enough for a peak
 
 
 @dataclass(frozen=True)
@@ -28,16 +28,16 @@ class FrfFit:
     @property
     def error(self) -> np.ndarray:
         """(n_mode, 2) standard errors of ln f and zeta from the residual."""
-        own = np.linalg.pinv(self.information.sum(axis=0), hermitian=True)
-        return np.sqrt(np.maximum(np.diag(own), 1e-300)).reshape(-1, 2)
+        covariance = np.linalg.pinv(self.information.sum(axis=0), hermitian=True)
+        return np.sqrt(np.maximum(np.diag(covariance), 1e-300)).reshape(-1, 2)
 
     @property
     def contrast(self) -> np.ndarray:
         """(n_mode,) height of each resonance over the residual. [dB]"""
         decay_rate = 2.0 * np.pi * np.exp(self.theta[:, 0]) * np.abs(self.theta[:, 1])
         height = np.sqrt(np.mean(np.abs(self.residue) ** 2, axis=1)) / np.maximum(decay_rate, 1e-300)
-        left = np.sqrt(np.mean(np.abs(self.residual) ** 2))
-        return 20.0 * np.log10(np.maximum(height, 1e-300) / max(left, 1e-300))
+        residual_level = np.sqrt(np.mean(np.abs(self.residual) ** 2))
+        return 20.0 * np.log10(np.maximum(height, 1e-300) / max(residual_level, 1e-300))
 
     @property
     def cost(self) -> float:
@@ -58,7 +58,7 @@ def linearise_frf(theta, frequency, frf, noise) -> FrfFit:
     middle, width = omega.mean(), np.ptp(omega) / 2.0
     pole_part = 1.0 / (1j * omega[:, None] - s)
     scale = np.abs(s.real)
-    basis = np.hstack([pole_part * scale, ((omega[:, None] - middle) / width) ** np.arange(LOCAL_TERMS)])
+    basis = np.hstack([pole_part * scale, ((omega[:, None] - middle) / width) ** np.arange(POLYNOMIAL_TERMS)])
     q, r = np.linalg.qr(basis)
     projection = q.conj().T @ frf.T
     coefficient = np.linalg.solve(r, projection)
@@ -81,7 +81,7 @@ def fit_frf(theta, frequency, frf, iterations: int = 25) -> FrfFit:
     noise = np.full(len(frf), np.sqrt(np.mean(np.abs(frf) ** 2)))
     fit = linearise_frf(np.asarray(theta, float), frequency, frf, noise)
     for _ in range(iterations):
-        freedom = max(1, 2 * len(frequency) - 2 * (len(fit.theta) + LOCAL_TERMS))
+        freedom = max(1, 2 * len(frequency) - 2 * (len(fit.theta) + POLYNOMIAL_TERMS))
         noise = np.sqrt(np.sum(np.abs(fit.residual) ** 2, axis=1) / freedom)
         fit = linearise_frf(fit.theta, frequency, frf, np.maximum(noise, 1e-12 * np.abs(frf).max()))
         information = fit.information.sum(axis=0)
@@ -97,27 +97,27 @@ def fit_frf(theta, frequency, frf, iterations: int = 25) -> FrfFit:
             step = 0.5 * step
         if better is None:
             return fit
-        settled = step.ravel() @ information @ step.ravel() < 1e-6
+        converged = step.ravel() @ information @ step.ravel() < 1e-6
         fit = better
-        if settled:
+        if converged:
             return fit
     return fit
 
 
-def fit_each(start, frequency, frf, near) -> list[FrfFit]:
+def fit_each(start, frequency, frf, peak_and_width) -> list[FrfFit]:
     """Fit each response alone, from the modes of the common fit and with as few modes as possible.
 
     Poles that differ between responses look like close poles to a common fit. So the mode nearest to the peak
     (``peak_and_width``: its frequency and half-power width [Hz]) is tried alone first. It stays the only one if it
     stands ``MIN_SINGLE_CONTRAST`` over the residual.
     """
-    nearest = int(np.argmin(np.abs(np.exp(start[:, 0]) - near[0])))
-    alone = [_fit_alone(start[[nearest]], frequency, response) for response in frf]
-    if len(start) == 1 or np.median([fit.contrast[0] for fit in alone]) >= SINGLE_CONTRAST:
-        return alone
+    nearest = int(np.argmin(np.abs(np.exp(start[:, 0]) - peak_and_width[0])))
+    single_fits = [_fit_single(start[[nearest]], frequency, response) for response in frf]
+    if len(start) == 1 or np.median([fit.contrast[0] for fit in single_fits]) >= MIN_SINGLE_CONTRAST:
+        return single_fits
     common = fit_frf(start, frequency, frf)
-    return [_fit_alone(common.theta, frequency, response) for response in frf]
+    return [_fit_single(common.theta, frequency, response) for response in frf]
 
 
-def _fit_alone(theta, frequency, response):
+def _fit_single(theta, frequency, response):
     return fit_frf(theta, frequency, response[None])

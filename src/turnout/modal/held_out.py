@@ -33,9 +33,9 @@ def held_out_fit(theta, decays, rate) -> np.ndarray:
     n = len(decays)
     if n < 2:
         return np.full(n, np.nan)
-    others = (theta.sum(axis=0) - theta) / (n - 1)
-    others[..., 1] = np.clip(others[..., 1], 1e-5, 0.95)
-    return fit_percent(decays, linearise(others, decays, rate, drift_columns(decays.shape[1], -1)).residual)
+    mean_modes = (theta.sum(axis=0) - theta) / (n - 1)
+    mean_modes[..., 1] = np.clip(mean_modes[..., 1], 1e-5, 0.95)
+    return fit_percent(decays, linearise(mean_modes, decays, rate, drift_columns(decays.shape[1], -1)).residual)
 
 
 def random_mode_fits(decays, rate, bands, draws: int, seed: int = 20171001) -> np.ndarray:
@@ -55,5 +55,5 @@ def random_mode_fits(decays, rate, bands, draws: int, seed: int = 20171001) -> n
     centred = np.linalg.norm(decays - decays.mean(axis=1, keepdims=True), axis=1)
     product = basis @ decays.T
     explained = np.einsum("dki,dki->di", product, np.linalg.solve(gram, product))
-    left = np.sqrt(np.maximum(np.sum(decays**2, axis=1) - explained, 0.0))
-    return np.median(100.0 * (1.0 - left / centred), axis=1)
+    residual = np.sqrt(np.maximum(np.sum(decays**2, axis=1) - explained, 0.0))
+    return np.median(100.0 * (1.0 - residual / centred), axis=1)

@@ -7,7 +7,7 @@ the impacts. The model also holds the error of the choice between explanations, 
 import numpy as np
 
 from turnout.modal.bands import choose_bands, residues_of_receptance
-from turnout.modal.mixed_effects import LOWEST_DAMPING
+from turnout.modal.mixed_effects import MIN_DAMPING
 from turnout.modal.noise import whiten
 from turnout.modal.selection import Selection, select_modes
 from turnout.modal.state_space import assemble, no_decays, no_model
@@ -37,12 +37,12 @@ def stabilisation_rows(selection: Selection, tolerance: float) -> tuple[dict, ..
 
 def fit_diagnostics(selection: Selection, index, dropped) -> dict:
     """Diagnostics of the fit; ``index`` are the impacts in it, ``dropped`` (impact, Rejection) those that are not."""
-    told = {"impacts": tuple(int(i) for i in index), "dropped_impacts": tuple(dropped)}
+    diagnostics = {"impacts": tuple(int(i) for i in index), "dropped_impacts": tuple(dropped)}
     fit = selection.fit
     if fit is None:
-        return told
-    absent = np.argwhere(~selection.shows)
-    return told | {
+        return diagnostics
+    absent = np.argwhere(~selection.is_visible)
+    return diagnostics | {
         "noise": float(np.sqrt(fit.sigma2)),
         "noise_order": len(selection.whitening) - 1,
         "drift_degree": selection.background.drift_degree,
@@ -50,12 +50,12 @@ def fit_diagnostics(selection: Selection, index, dropped) -> dict:
         "modes_in_fit": tuple(float(f) for f in np.exp(fit.mean[:, 0])),
         "damping_in_fit": tuple(float(zeta) for zeta in fit.mean[:, 1]),
         "converged": fit.converged,
-        "explanations": 1 + len(selection.others),
+        "explanations": 1 + len(selection.rival_modes),
         "impacts_without_mode": tuple((int(index[i]), float(np.exp(fit.mean[m, 0]))) for i, m in absent),
     }
 
 
-def choice_error(mode, others, farthest: float) -> np.ndarray:
+def choice_error(mode, rival_modes, max_distance: float) -> np.ndarray:
     r"""Root mean square distance of a mode in all explanations from its value in the chosen one.
 
     .. math:: \sqrt{\frac{1}{J} \sum_{j=1}^{J} (\theta_j - \theta)^2}, \quad \theta_1 = \theta
@@ -88,34 +88,36 @@ def choice_error(mode, others, farthest: float) -> np.ndarray:
     [0.035 0.026] [0. 0.]
     """
     square, n = np.zeros(2), 1
-    for modes in others:
-        away = np.abs(modes - mode)
-        nearest = int(np.argmin(away @ [1.0, 0.5]))
-        if away[nearest, 0] < farthest:
-            square += away[nearest] ** 2
+    for modes in rival_modes:
+        distance = np.abs(modes - mode)
+        nearest = int(np.argmin(distance @ [1.0, 0.5]))
+        if distance[nearest, 0] < max_distance:
+            square += distance[nearest] ** 2
             n += 1
     return np.sqrt(square / n)
 
 
-TIMES_MEDIAN = 9.0  # residual power of an impact over that of the median impact
-LARGEST_SHARE = 1.0 / 3.0  # share of the impacts that may be outliers; beyond it the model is wrong, not they
+MAX_POWER_RATIO = 9.0  # residual power of an impact over that of the median impact
+MAX_OUTLIER_SHARE = 1.0 / 3.0  # share of the impacts that may be outliers; beyond it the model is wrong, not they
 
 
-def odd_blows(residual_power) -> list[tuple[int, Rejection]]:
+def outlier_impacts(residual_power) -> list[tuple[int, Rejection]]:
     """Impacts whose residual is three times (in power nine) that of the median impact: (row, Rejection) each.
 
     ``residual_power`` is (n_impact,). The power of white noise over some hundred samples is known to ten per cent, so
     such a ratio is not due to chance. Empty where more than a third would be dropped: then the model is wrong.
 
-    >>> [row for row, _ in odd_blows(np.array([1.0, 1.1, 20.0, 0.9]))]
+    >>> [row for row, _ in outlier_impacts(np.array([1.0, 1.1, 20.0, 0.9]))]
     [2]
     """
     median = float(np.median(residual_power))
-    odd = np.flatnonzero(residual_power > TIMES_MEDIAN * median)
-    if not 0 < len(odd) <= LARGEST_SHARE * len(residual_power):
+    outliers = np.flatnonzero(residual_power > MAX_POWER_RATIO * median)
+    if not 0 < len(outliers) <= MAX_OUTLIER_SHARE * len(residual_power):
         return []
-    words = "power of what the modes of the test leave of this impact, over the median of all"
-    return [(int(i), Rejection("odd_one_out", float(residual_power[i] / median), TIMES_MEDIAN, words)) for i in odd]
+    detail = "power of what the modes of the test leave of this impact, over the median of all"
+    return [
+        (int(i), Rejection("odd_one_out", float(residual_power[i] / median), MAX_POWER_RATIO, detail)) for i in outliers
+    ]
 
 
 def common_length(decays, rate: float, settings) -> tuple[np.ndarray, np.ndarray, list[tuple[int, Rejection]]]:
@@ -136,25 +138,27 @@ def common_length(decays, rate: float, settings) -> tuple[np.ndarray, np.ndarray
         Index of each in ``decays``.
     dropped : list of (index, Rejection)
     """
-    aim, least = round(settings.duration * rate), round(settings.shortest_decay * rate)
-    kept, dropped = [], []
+    target_length, min_length = round(settings.duration * rate), round(settings.shortest_decay * rate)
+    usable, dropped = [], []
     for i, decay in enumerate(decays):
         decay = np.asarray(decay, dtype=float)
         if decay.ndim != 1:
             raise ValueError(f"decay {i} has shape {decay.shape}, need (n,)")
-        if len(decay) < least:
+        if len(decay) < min_length:
             dropped.append((i, Rejection("late", len(decay) / rate, settings.shortest_decay, "decay too short [s]")))
-        elif not np.all(np.isfinite(decay[:aim])):
-            bad = int(np.argmin(np.isfinite(decay)))
-            dropped.append((i, Rejection("not_finite", bad, None, "first sample of the decay that is not finite")))
-        elif np.ptp(decay[:aim]) == 0.0:
+        elif not np.all(np.isfinite(decay[:target_length])):
+            first_bad = int(np.argmin(np.isfinite(decay)))
+            dropped.append(
+                (i, Rejection("not_finite", first_bad, None, "first sample of the decay that is not finite"))
+            )
+        elif np.ptp(decay[:target_length]) == 0.0:
             dropped.append((i, Rejection("dead_channel", 0.0, 0.0, "the decay is constant")))
         else:
-            kept.append((i, decay))
-    if not kept:
+            usable.append((i, decay))
+    if not usable:
         return np.empty((0, 0)), np.empty(0, dtype=int), dropped
-    n = min(aim, *(len(d) for _, d in kept))
-    return np.array([d[:n] for _, d in kept]), np.array([i for i, _ in kept]), dropped
+    n = min(target_length, *(len(d) for _, d in usable))
+    return np.array([d[:n] for _, d in usable]), np.array([i for i, _ in usable]), dropped
 
 
 def identify_joint(decays, rate: float, settings, receptance=None, leads=None) -> ModalModel:
@@ -165,57 +169,57 @@ def identify_joint(decays, rate: float, settings, receptance=None, leads=None) -
     records, index, dropped = common_length(decays, rate, settings)
     if not len(records):
         return no_decays(rate, "joint", dropped)
-    selection, records, index, dropped = _select_without_odd_blows(records, index, dropped, rate, settings)
+    selection, records, index, dropped = _select_without_outliers(records, index, dropped, rate, settings)
     choice = choose_bands(selection, settings, receptance)
-    estimates, modes = _named(selection, choice, records, index, rate, settings)
-    told = fit_diagnostics(selection, index, dropped)
-    rest = {
+    estimates, modes = _band_modes(selection, choice, records, index, rate, settings)
+    diagnostics = fit_diagnostics(selection, index, dropped)
+    model_fields = {
         "rejections": tuple(choice.rejections),
         "rejected_modes": tuple(choice.rejected_modes),
         "stabilisation": stabilisation_rows(selection, settings.pole_tolerance),
     }
     if choice.status == "rejected":
-        return no_model(rate, "joint", diagnostics=told, **rest)
+        return no_model(rate, "joint", diagnostics=diagnostics, **model_fields)
     residues, scale = _residues(modes, choice, selection, receptance)
     return assemble(
         estimates,
         modes,
         residues,
-        (selection.fit.free[:, list(choice.modes.values())], records),
+        (selection.fit.unshrunken[:, list(choice.modes.values())], records),
         rate,
         settings,
         method="joint",
         status=choice.status,
-        diagnostics=told,
+        diagnostics=diagnostics,
         scale=scale,
-        **rest,
+        **model_fields,
     )
 
 
-def _select_without_odd_blows(records, index, dropped, rate, settings):
+def _select_without_outliers(records, index, dropped, rate, settings):
     """Select the modes from all impacts, and once more without the outliers if there are any."""
     selection = select_modes(records, rate, settings)
-    odd = [] if selection.fit is None else odd_blows(selection.residual_power)
-    if odd:
-        rows = [row for row, _ in odd]
-        dropped = [*dropped, *((int(index[row]), rejection) for row, rejection in odd)]
+    outliers = [] if selection.fit is None else outlier_impacts(selection.residual_power)
+    if outliers:
+        rows = [row for row, _ in outliers]
+        dropped = [*dropped, *((int(index[row]), rejection) for row, rejection in outliers)]
         records, index = np.delete(records, rows, axis=0), np.delete(index, rows)
         selection = select_modes(records, rate, settings)
     return selection, records, index, dropped
 
 
-def _named(selection, choice, records, index, rate, settings):
+def _band_modes(selection, choice, records, index, rate, settings):
     """(estimates, modes) of the chosen bands; a mode with a mean damping of zero or less is removed from ``choice``."""
-    found = []
+    accepted = []
     for e in _estimates(selection, choice, records, index, rate, settings) if choice.modes else ():
         mode = e.mode(settings.confidence)
-        if mode.damping > LOWEST_DAMPING:
-            found.append((e, mode))
+        if mode.damping > MIN_DAMPING:
+            accepted.append((e, mode))
             continue
         del choice.modes[e.band]
         detail = f"{e.band} mode at {mode.frequency:.0f} Hz: damping, mean over its blows"
-        choice.rejections.append(Rejection("not_identified", mode.damping, LOWEST_DAMPING, detail))
-    return [e for e, _ in found], tuple(mode for _, mode in found)
+        choice.rejections.append(Rejection("not_identified", mode.damping, MIN_DAMPING, detail))
+    return [e for e, _ in accepted], tuple(mode for _, mode in accepted)
 
 
 def _estimates(selection, choice, records, index, rate, settings):
@@ -223,21 +227,21 @@ def _estimates(selection, choice, records, index, rate, settings):
     white = whiten(records, selection.whitening)
     columns = selection.background.columns(white.shape[1], rate)
     bound = cramer_rao_bound(fit.theta, white, rate, fit.sigma2, columns)
-    error = np.sqrt(np.einsum("ijj->ij", fit.covariance)).reshape(fit.free.shape)
+    error = np.sqrt(np.einsum("ijj->ij", fit.covariance)).reshape(fit.unshrunken.shape)
     strength = np.linalg.norm(records, axis=1)
     return [
         ImpactEstimates(
             band,
-            index[shows],
-            fit.free[shows, m],
-            error[shows, m],
-            strength[shows],
+            index[visible],
+            fit.unshrunken[visible, m],
+            error[visible, m],
+            strength[visible],
             float(selection.energy[m]),
             bound[m],
-            choice_error(fit.mean[m], selection.others, settings.spread_maximum),
+            choice_error(fit.mean[m], selection.rival_modes, settings.spread_maximum),
         )
         for band, m in choice.modes.items()
-        for shows in (selection.shows[:, m],)
+        for visible in (selection.is_visible[:, m],)
     ]
 
 
@@ -245,16 +249,18 @@ def _residues(modes, choice, selection, receptance):
     """Residues per unit impulse from the receptance if there is one, else those of the mean decay."""
     named = [(m.frequency, m.damping) for m in modes]
     if receptance is not None:
-        for all_modes in (named + _unnamed(choice, selection, receptance), named):
+        for all_modes in (named + _unassigned_modes(choice, selection, receptance), named):
             residues = residues_of_receptance(receptance, *np.transpose(all_modes))
             if residues is not None:
                 return residues[: len(named)], "unit impulse [m/s² per N s]"
     return selection.amplitude.mean(axis=0)[list(choice.modes.values())], "mean decay [m/s²]"
 
 
-def _unnamed(choice, selection, receptance):
+def _unassigned_modes(choice, selection, receptance):
     """(frequency [Hz], damping) of the fit's modes without a band that lie among the lines that passed the gate."""
     lines = receptance.frequency[receptance.passed]
     pairs = [(float(np.exp(f)), float(damping)) for f, damping in selection.fit.mean]
-    rest = [pairs[m] for m in range(len(pairs)) if m not in choice.modes.values()]
-    return [(f, damping) for f, damping in rest if len(lines) and lines[0] < f < lines[-1] and 0.0 < damping < 0.95]
+    unassigned = [pairs[m] for m in range(len(pairs)) if m not in choice.modes.values()]
+    return [
+        (f, damping) for f, damping in unassigned if len(lines) and lines[0] < f < lines[-1] and 0.0 < damping < 0.95
+    ]

@@ -10,7 +10,7 @@ from numpy.polynomial import legendre
 from scipy.special import factorial
 
 # Limit of |1 - q| n below which the series is summed. At it the differences still have 14 digits, the series all 16.
-NEAR_ONE = 0.5
+SERIES_LIMIT = 0.5
 SERIES_TERMS = 14  # terms of the exponential series
 
 
@@ -37,9 +37,9 @@ class WaveTable:
 
     def last(self) -> np.ndarray:
         """(..., n_wave) the power z^n, one sample after the last one."""
-        block, rest = divmod(self.n, self.fine.shape[-1])
+        block, offset = divmod(self.n, self.fine.shape[-1])
         if block < self.coarse.shape[-1]:
-            return self.coarse[..., block] * self.fine[..., rest]
+            return self.coarse[..., block] * self.fine[..., offset]
         return self.coarse[..., -1] * self.fine[..., -1] * self.z
 
     def blocks(self, series) -> np.ndarray:
@@ -59,9 +59,9 @@ class WaveTable:
         array([[4.]])
         """
         n_wave = self.fine.shape[-2]
-        both = np.concatenate([self.fine.real, self.fine.imag], axis=-2) @ blocks
-        both = both.reshape(*both.shape[:-1], -1, self.coarse.shape[-1])
-        inner = both[..., :n_wave, :, :] + 1j * both[..., n_wave:, :, :]
+        stacked = np.concatenate([self.fine.real, self.fine.imag], axis=-2) @ blocks
+        stacked = stacked.reshape(*stacked.shape[:-1], -1, self.coarse.shape[-1])
+        inner = stacked[..., :n_wave, :, :] + 1j * stacked[..., n_wave:, :, :]
         return (inner @ self.coarse[..., None])[..., 0]
 
     def series(self, amplitude) -> np.ndarray:
@@ -70,11 +70,11 @@ class WaveTable:
         >>> WaveTable.of(np.array([0.5 + 0j]), 4).series(np.array([[8.0]]))
         array([[8., 4., 2., 1.]])
         """
-        turned = amplitude[..., None, :] * np.swapaxes(self.coarse, -1, -2)[..., None, :, :]
-        both = np.concatenate([turned.real, -turned.imag], axis=-1)
-        flat = both.reshape(*both.shape[:-3], -1, both.shape[-1])
-        whole = flat @ np.concatenate([self.fine.real, self.fine.imag], axis=-2)
-        return whole.reshape(*amplitude.shape[:-1], -1)[..., : self.n]
+        rotated = amplitude[..., None, :] * np.swapaxes(self.coarse, -1, -2)[..., None, :, :]
+        stacked = np.concatenate([rotated.real, -rotated.imag], axis=-1)
+        flat = stacked.reshape(*stacked.shape[:-3], -1, stacked.shape[-1])
+        samples = flat @ np.concatenate([self.fine.real, self.fine.imag], axis=-2)
+        return samples.reshape(*amplitude.shape[:-1], -1)[..., : self.n]
 
 
 def geometric_sums(q, q_to_n, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -96,13 +96,13 @@ def geometric_sums(q, q_to_n, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarra
     >>> print(*geometric_sums(q, q**3, 3), *geometric_sums(one, one, 3))
     [1.75] [1.] [1.5] [3.] [3.] [5.]
     """
-    near = np.abs(1.0 - q) * n < NEAR_ONE
-    over = 1.0 / np.where(near, 1.0, 1.0 - q)
-    zero = (1.0 - q_to_n) * over
-    one = (q * zero - n * q_to_n) * over
-    two = (q * (2.0 * one + zero) - n**2 * q_to_n) * over
-    if near.any():
-        zero[near], one[near], two[near] = _sums_near_one(np.log(q[near]), n)
+    near_one = np.abs(1.0 - q) * n < SERIES_LIMIT
+    inverse = 1.0 / np.where(near_one, 1.0, 1.0 - q)
+    zero = (1.0 - q_to_n) * inverse
+    one = (q * zero - n * q_to_n) * inverse
+    two = (q * (2.0 * one + zero) - n**2 * q_to_n) * inverse
+    if near_one.any():
+        zero[near_one], one[near_one], two[near_one] = _sums_near_one(np.log(q[near_one]), n)
     return zero, one, two
 
 
@@ -176,8 +176,8 @@ def powers(z, n: int) -> np.ndarray:
     array([[1., 2., 4., 8.]])
     """
     table = WaveTable.of(z, n)
-    whole = table.coarse[..., :, None] * table.fine[..., None, :]
-    return whole.reshape(*np.shape(z), -1)[..., :n]
+    products = table.coarse[..., :, None] * table.fine[..., None, :]
+    return products.reshape(*np.shape(z), -1)[..., :n]
 
 
 def linearise(theta, decays, rate, drift) -> Linearisation:
@@ -209,7 +209,9 @@ def linearise(theta, decays, rate, drift) -> Linearisation:
     waves = WaveTable.of(np.exp(pole), n)
     plus, minus = pair_sums(waves)
     gram, of_drift = _gram(waves, plus, minus, drift)
-    right = np.concatenate([_stacked(waves.products(waves.blocks(group))), drift @ np.swapaxes(group, -1, -2)], axis=-2)
+    right = np.concatenate(
+        [_stack_real_imag(waves.products(waves.blocks(group))), drift @ np.swapaxes(group, -1, -2)], axis=-2
+    )
     coefficient = np.swapaxes(np.linalg.solve(gram, right), -1, -2)
     n_mode = theta.shape[1]
     amplitude = coefficient[..., :n_mode] - 1j * coefficient[..., n_mode : 2 * n_mode]
@@ -241,7 +243,7 @@ def _poles(theta, rate):
     return pole, np.stack([pole, omega * (-1.0 - 1j * zeta / damped)], axis=-1)
 
 
-def _stacked(z):
+def _stack_real_imag(z):
     """Real above imaginary parts along the axis before the last."""
     return np.concatenate([z.real, z.imag], axis=-2)
 
@@ -256,9 +258,9 @@ def _gram(waves, plus, minus, drift):
     gram[:, m : 2 * m, :m] = np.swapaxes(gram[:, :m, m : 2 * m], -1, -2)
     of_drift = np.empty((len(p), m, 0))
     if len(drift):
-        both = np.concatenate([drift, drift * np.arange(drift.shape[1])])
-        sums = waves.products(waves.blocks(both))
-        gram[:, 2 * m :, : 2 * m] = np.swapaxes(_stacked(sums[..., : len(drift)]), -1, -2)
+        drift_and_ramp = np.concatenate([drift, drift * np.arange(drift.shape[1])])
+        sums = waves.products(waves.blocks(drift_and_ramp))
+        gram[:, 2 * m :, : 2 * m] = np.swapaxes(_stack_real_imag(sums[..., : len(drift)]), -1, -2)
         gram[:, : 2 * m, 2 * m :] = np.swapaxes(gram[:, 2 * m :, : 2 * m], -1, -2)
         gram[:, 2 * m :, 2 * m :] = drift @ drift.T
         of_drift = sums[..., len(drift) :]
@@ -283,5 +285,5 @@ def _information(tilt, gram, plus, minus, of_drift):
         axis=-1,
     )
     right = np.swapaxes(across.reshape(n_group, n_decay * 2 * m, -1), -1, -2)
-    taken = np.swapaxes(np.linalg.solve(gram, right), -1, -2).reshape(across.shape)
-    return square - across @ np.swapaxes(taken, -1, -2)
+    projected = np.swapaxes(np.linalg.solve(gram, right), -1, -2).reshape(across.shape)
+    return square - across @ np.swapaxes(projected, -1, -2)

@@ -6,10 +6,10 @@ import numpy as np
 
 from turnout.modal.least_squares import Linearisation, linearise
 
-LARGEST_STEP = np.array([0.2, 0.15])  # of ln f and of zeta in one iteration
-PRINCIPAL = 8  # combinations of the decays that hold the signal
+MAX_STEP = np.array([0.2, 0.15])  # of ln f and of zeta in one iteration
+MAX_PRINCIPAL = 8  # combinations of the decays that hold the signal
 RIDGE = 1e-10  # keeps matrices of two nearly equal modes invertible; distinct modes differ by 1e-6 and more
-LOWEST_DAMPING, HIGHEST_DAMPING = 1e-5, 0.95  # damping ratios during the fit
+MIN_DAMPING, MAX_DAMPING = 1e-5, 0.95  # damping ratios during the fit
 
 
 @dataclass(frozen=True)
@@ -24,22 +24,22 @@ class MixedFit:
 
     mean: np.ndarray
     theta: np.ndarray
-    free: np.ndarray
+    unshrunken: np.ndarray
     covariance: np.ndarray
     spread: np.ndarray
     sigma2: float
-    at: Linearisation
+    linearisation: Linearisation
     converged: bool
 
     @property
-    def inside(self) -> np.ndarray:
+    def shrunken_mean(self) -> np.ndarray:
         """(n_mode, 2) mean of the shrunken modes: a safe start, as it is always underdamped, unlike ``mean``."""
         return self.theta.mean(axis=0)
 
     @property
     def rss(self) -> float:
         """Sum of squared residuals over all decays."""
-        return float(self.at.rss.sum())
+        return float(self.linearisation.rss.sum())
 
 
 def degrees_of_freedom(decays, n_mode: int, n_drift: int) -> int:
@@ -81,40 +81,40 @@ def fit_common(start, decays, rate, drift, iterations=12, tolerance=1e-3):
     n_mode = len(start)
     mean = np.array(start, dtype=float)
     dof = degrees_of_freedom(decays, n_mode, len(drift))
-    decays, rest = _principal(decays)
+    decays, dropped_power = _principal_decays(decays)
 
-    def at(theta):
+    def linearise_at(theta):
         return linearise(theta[None], decays, rate, drift)
 
-    here = at(mean)
+    current = linearise_at(mean)
     for _ in range(iterations):
-        information = here.information.sum(axis=0)
-        step = _solve(information, here.score.sum(axis=0)).reshape(n_mode, 2)
-        scale = min(1.0, *(LARGEST_STEP / np.maximum(np.abs(step).max(axis=0), 1e-300)))
-        sigma2 = (here.rss.sum() + rest) / dof
+        information = current.information.sum(axis=0)
+        step = _solve(information, current.score.sum(axis=0)).reshape(n_mode, 2)
+        scale = min(1.0, *(MAX_STEP / np.maximum(np.abs(step).max(axis=0), 1e-300)))
+        sigma2 = (current.rss.sum() + dropped_power) / dof
         size = np.sqrt(max(0.0, step.ravel() @ information @ step.ravel()) / max(sigma2, 1e-300))
         for _ in range(8):
             trial = mean + scale * step
-            trial[:, 1] = np.clip(trial[:, 1], LOWEST_DAMPING, HIGHEST_DAMPING)
-            there = at(trial)
-            if there.rss.sum() <= here.rss.sum():
+            trial[:, 1] = np.clip(trial[:, 1], MIN_DAMPING, MAX_DAMPING)
+            candidate = linearise_at(trial)
+            if candidate.rss.sum() <= current.rss.sum():
                 break
             scale *= 0.4
         else:
             return mean, True
-        settled = np.max(np.abs(trial - mean)) < 1e-12 or size < tolerance
-        mean, here = trial, there
-        if settled:
+        converged = np.max(np.abs(trial - mean)) < 1e-12 or size < tolerance
+        mean, current = trial, candidate
+        if converged:
             return mean, True
     return mean, False
 
 
-def _principal(decays):
+def _principal_decays(decays):
     """The decays' principal combinations (at most ``MAX_PRINCIPAL``, n), and the power of the others."""
-    if len(decays) <= PRINCIPAL:
+    if len(decays) <= MAX_PRINCIPAL:
         return decays, 0.0
     power, turn = np.linalg.eigh(decays @ decays.T)
-    return turn[:, -PRINCIPAL:].T @ decays, float(np.sum(np.maximum(power[:-PRINCIPAL], 0.0)))
+    return turn[:, -MAX_PRINCIPAL:].T @ decays, float(np.sum(np.maximum(power[:-MAX_PRINCIPAL], 0.0)))
 
 
 def fit_mixed(start, decays, rate, drift, theta=None, iterations=12, tolerance=0.01) -> MixedFit:
@@ -147,41 +147,41 @@ def fit_mixed(start, decays, rate, drift, theta=None, iterations=12, tolerance=0
     n_decay, n_mode = theta.shape[:2]
     dof = degrees_of_freedom(decays, n_mode, len(drift))
     for count in range(1, iterations + 1):
-        at = linearise(theta, decays, rate, drift)
-        sigma2 = max(at.rss.sum() / dof, 1e-300)
-        inverse = _inverse(at.information)
-        free = theta.reshape(n_decay, -1) + np.einsum("ijk,ik->ij", inverse, at.score)
+        linearisation = linearise(theta, decays, rate, drift)
+        sigma2 = max(linearisation.rss.sum() / dof, 1e-300)
+        inverse = _inverse(linearisation.information)
+        free = theta.reshape(n_decay, -1) + np.einsum("ijk,ik->ij", inverse, linearisation.score)
         covariance = sigma2 * inverse
-        own = np.einsum("ijj->ij", covariance)
-        spread = between_variance(free, own)
+        variance = np.einsum("ijj->ij", covariance)
+        spread = between_variance(free, variance)
         weight = _inverse(covariance + np.diag(spread))
         centre = np.linalg.solve(weight.sum(axis=0), np.einsum("ijk,ik->j", weight, free))
-        drawn = centre + spread * np.einsum("ijk,ik->ij", weight, free - centre)
-        drawn = _inside(drawn.reshape(theta.shape), theta)
-        change = np.max(np.abs((drawn - theta).reshape(n_decay, -1)) / np.sqrt(own + spread))
+        shrunken = centre + spread * np.einsum("ijk,ik->ij", weight, free - centre)
+        shrunken = _limit_step(shrunken.reshape(theta.shape), theta)
+        change = np.max(np.abs((shrunken - theta).reshape(n_decay, -1)) / np.sqrt(variance + spread))
         result = MixedFit(
-            centre.reshape(n_mode, 2), theta, free.reshape(theta.shape), covariance, spread, sigma2, at, True
+            centre.reshape(n_mode, 2), theta, free.reshape(theta.shape), covariance, spread, sigma2, linearisation, True
         )
-        theta = drawn
+        theta = shrunken
         if change < tolerance and count > 1:
             return result
     return result if n_decay == 1 else MixedFit(**{**result.__dict__, "converged": False})
 
 
-def _inside(theta, before):
+def _limit_step(theta, previous):
     """The new modes, with the step limited and the damping between its limits."""
-    theta = before + np.clip(theta - before, -LARGEST_STEP, LARGEST_STEP)
-    theta[..., 1] = np.clip(theta[..., 1], LOWEST_DAMPING, HIGHEST_DAMPING)
+    theta = previous + np.clip(theta - previous, -MAX_STEP, MAX_STEP)
+    theta[..., 1] = np.clip(theta[..., 1], MIN_DAMPING, MAX_DAMPING)
     return theta
 
 
-def _scaled(matrix):
+def _normalise(matrix):
     diagonal = np.sqrt(np.maximum(np.einsum("...jj->...j", matrix), 1e-300))
     return diagonal, matrix / (diagonal[..., :, None] * diagonal[..., None, :])
 
 
 def _inverse(matrix):
-    diagonal, scaled = _scaled(matrix)
+    diagonal, scaled = _normalise(matrix)
     size = matrix.shape[-1]
     return np.linalg.inv(scaled + RIDGE * np.eye(size)) / (diagonal[..., :, None] * diagonal[..., None, :])
 

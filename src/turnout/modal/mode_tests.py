@@ -12,26 +12,26 @@ from turnout.modal.least_squares import Linearisation, linearise
 from turnout.modal.mixed_effects import MixedFit, degrees_of_freedom, fit_mixed
 
 
-def mode_chi_squared(at: Linearisation, sigma2: float) -> np.ndarray:
+def mode_chi_squared(linearisation: Linearisation, sigma2: float) -> np.ndarray:
     r"""Squared amplitude of each mode in each impact over its covariance: chi-squared(2) if the mode is absent.
 
     .. math:: \chi^2 = a^T \left(\sigma^2 [(B^T B)^{-1}]_{mm}\right)^{-1} a
 
     Returns (n_decay, n_mode); ``sigma2`` is the variance of the noise.
     """
-    n_mode = at.amplitude.shape[1]
-    inverse = np.linalg.inv(at.gram)
+    n_mode = linearisation.amplitude.shape[1]
+    inverse = np.linalg.inv(linearisation.gram)
     cosine, sine = np.arange(n_mode), n_mode + np.arange(n_mode)
     cc, ss, cs = inverse[:, cosine, cosine], inverse[:, sine, sine], inverse[:, cosine, sine]
-    a, b = at.coefficient[:, cosine], at.coefficient[:, sine]
+    a, b = linearisation.coefficient[:, cosine], linearisation.coefficient[:, sine]
     return (a**2 * ss - 2.0 * a * b * cs + b**2 * cc) / (np.maximum(cc * ss - cs**2, 1e-300) * sigma2)
 
 
-def columns_chi_squared(at: Linearisation, sigma2: float, columns) -> float:
+def columns_chi_squared(linearisation: Linearisation, sigma2: float, columns) -> float:
     """Statistic of columns of the model (a drift, a hum): chi-squared(n_decay times columns) if they are absent."""
     columns = np.asarray(columns)
-    block = np.linalg.inv(at.gram)[:, columns[:, None], columns]
-    value = at.coefficient[:, columns]
+    block = np.linalg.inv(linearisation.gram)[:, columns[:, None], columns]
+    value = linearisation.coefficient[:, columns]
     return float(np.sum(value * np.linalg.solve(block, value[..., None])[..., 0]) / sigma2)
 
 
@@ -44,15 +44,17 @@ def common_probability(statistic: np.ndarray) -> np.ndarray:
     return chi2.sf(statistic.sum(axis=0), 2 * len(statistic))
 
 
-def share_of_blows(statistic: np.ndarray, probability: float = 0.01) -> np.ndarray:
+def share_of_impacts(statistic: np.ndarray, probability: float = 0.01) -> np.ndarray:
     """Share of impacts in which the mode alone is significant at ``probability``; (n_mode,)."""
     return (statistic > chi2.isf(probability, 2)).mean(axis=0)
 
 
-HOPELESS = 0.01  # probability of being absent above which all modes are dropped at once, not one by one
-LISTED_PRESENCE = 0.2  # share of orders and starts from which on a rejected pole is listed
+MAX_SCREENING_PROBABILITY = (
+    0.01  # probability of being absent above which all modes are dropped at once, not one by one
+)
+MIN_LISTED_PRESENCE = 0.2  # share of orders and starts from which on a rejected pole is listed
 # During the search a fit within a tenth of the errors of single impacts is accurate enough to choose modes.
-SEARCH = {"iterations": 24, "tolerance": 0.1}
+SEARCH_OPTIONS = {"iterations": 24, "tolerance": 0.1}
 
 
 def rejection(candidate, reason, value, limit) -> dict:
@@ -68,133 +70,135 @@ def rejection(candidate, reason, value, limit) -> dict:
     }
 
 
-def reappearing(found, rate, settings):
+def filter_reappearing(candidates, rate, settings):
     """Candidates that occur at enough orders and starts, and above the lowest frequency that a record can resolve."""
-    lowest = 0.5 / settings.duration
-    listed = 1.5 * max(high for _, _, high in settings.bands())
-    kept, rejected = [], []
-    for c in found:
-        if c.frequency < lowest or c.frequency > 0.45 * rate:
+    min_frequency = 0.5 / settings.duration
+    max_listed_frequency = 1.5 * max(high for _, _, high in settings.bands())
+    accepted, rejected = [], []
+    for c in candidates:
+        if c.frequency < min_frequency or c.frequency > 0.45 * rate:
             continue
         if c.presence >= settings.presence_minimum:
-            kept.append(c)
-        elif c.presence > LISTED_PRESENCE and c.frequency < listed:
+            accepted.append(c)
+        elif c.presence > MIN_LISTED_PRESENCE and c.frequency < max_listed_frequency:
             rejected.append(rejection(c, "does not reappear over orders", c.presence, settings.presence_minimum))
-    kept.sort(key=lambda c: -c.energy)
-    most = settings.order_maximum // 2 + 2
-    for c in kept[most:]:
-        rejected.append(rejection(c, "weaker than enough others", c.energy, kept[most - 1].energy))
-    return kept[:most], rejected
+    accepted.sort(key=lambda c: -c.energy)
+    max_modes = settings.order_maximum // 2 + 2
+    for c in accepted[max_modes:]:
+        rejected.append(rejection(c, "weaker than enough others", c.energy, accepted[max_modes - 1].energy))
+    return accepted[:max_modes], rejected
 
 
-def start_of(kept) -> np.ndarray:
+def start_values(candidates) -> np.ndarray:
     """(n_mode, 2) ln f and zeta of candidates."""
-    return np.array([[np.log(c.frequency), c.damping] for c in kept]).reshape(-1, 2)
+    return np.array([[np.log(c.frequency), c.damping] for c in candidates]).reshape(-1, 2)
 
 
-def screen(kept, decays, rate, columns, settings, rejected):
+def screen(candidates, decays, rate, columns, settings, rejected):
     """Drop candidates that are not significant at the poles of the realisation: the clear ones first, then singly."""
     limit = settings.false_mode_probability
-    while kept:
-        at = linearise(start_of(kept)[None], decays, rate, columns)
-        sigma2 = at.rss.sum() / degrees_of_freedom(decays, len(kept), len(columns))
-        probability = common_probability(mode_chi_squared(at, sigma2))
-        out = set(np.flatnonzero(probability > HOPELESS).tolist()) or {int(np.argmax(probability))}
-        out = {m for m in out if probability[m] > limit}
-        if not out:
+    while candidates:
+        linearisation = linearise(start_values(candidates)[None], decays, rate, columns)
+        sigma2 = linearisation.rss.sum() / degrees_of_freedom(decays, len(candidates), len(columns))
+        probability = common_probability(mode_chi_squared(linearisation, sigma2))
+        dropped = set(np.flatnonzero(probability > MAX_SCREENING_PROBABILITY).tolist()) or {int(np.argmax(probability))}
+        dropped = {m for m in dropped if probability[m] > limit}
+        if not dropped:
             break
-        rejected += [rejection(kept[m], "not significant", probability[m], limit) for m in sorted(out)]
-        kept = [c for m, c in enumerate(kept) if m not in out]
-    return kept
+        rejected += [rejection(candidates[m], "not significant", probability[m], limit) for m in sorted(dropped)]
+        candidates = [c for m, c in enumerate(candidates) if m not in dropped]
+    return candidates
 
 
 def fit_and_prune(
-    kept,
+    candidates,
     decays,
     rate,
     columns,
     settings,
     rejected,
-    before: MixedFit | None = None,
-    heaviest: float | None = None,
-    needed: set | None = None,
+    previous: MixedFit | None = None,
+    max_damping: float | None = None,
+    indispensable: set | None = None,
 ):
     """Maximum likelihood with all modes; drops the worst mode that fails a test until none does: (fit, candidates).
 
     ``indispensable`` collects the candidates (by identity) that are not redundant; they are not tested again.
     The fits have the accuracy of ``SEARCH_OPTIONS``, enough to choose modes.
     """
-    if not kept:
-        return None, kept
-    needed = set() if needed is None else needed
-    theta = None if before is None else before.theta
-    fit = fit_mixed(start_of(kept), decays, rate, columns, theta=theta, **SEARCH)
+    if not candidates:
+        return None, candidates
+    indispensable = set() if indispensable is None else indispensable
+    theta = None if previous is None else previous.theta
+    fit = fit_mixed(start_values(candidates), decays, rate, columns, theta=theta, **SEARCH_OPTIONS)
     while True:
-        failures = mode_failures(fit, settings, heaviest)
+        failures = mode_failures(fit, settings, max_damping)
         if failures:
             worst, (reason, value, limit) = failures[0]
             smaller = None
         else:
-            worst, smaller, probability = _needless_twin(fit, kept, decays, rate, columns, settings, needed)
+            worst, smaller, probability = _redundant_mode(
+                fit, candidates, decays, rate, columns, settings, indispensable
+            )
             if worst is None:
-                return fit, kept
+                return fit, candidates
             reason, value, limit = "splits a stronger mode", probability, settings.false_mode_probability
-        moved = replace(kept[worst], frequency=np.exp(fit.inside[worst, 0]), damping=fit.mean[worst, 1])
-        rejected.append(rejection(moved, reason, value, limit))
-        kept = kept[:worst] + kept[worst + 1 :]
-        if not kept:
-            return None, kept
-        fit = smaller or fit_mixed(np.delete(fit.inside, worst, axis=0), decays, rate, columns, **SEARCH)
+        fitted = replace(candidates[worst], frequency=np.exp(fit.shrunken_mean[worst, 0]), damping=fit.mean[worst, 1])
+        rejected.append(rejection(fitted, reason, value, limit))
+        candidates = candidates[:worst] + candidates[worst + 1 :]
+        if not candidates:
+            return None, candidates
+        fit = smaller or fit_mixed(np.delete(fit.shrunken_mean, worst, axis=0), decays, rate, columns, **SEARCH_OPTIONS)
 
 
-def _needless_twin(fit, kept, decays, rate, columns, settings, needed):
+def _redundant_mode(fit, candidates, decays, rate, columns, settings, indispensable):
     """A mode that overlaps a stronger one and is not needed for the fit: (index, fit without it, probability).
 
     Poles that differ between impacts look like two poles to a realisation of all impacts, but not to a fit of each.
     """
-    statistic = mode_chi_squared(fit.at, fit.sigma2).sum(axis=0)
+    statistic = mode_chi_squared(fit.linearisation, fit.sigma2).sum(axis=0)
     for weak in np.argsort(statistic):
-        if id(kept[weak]) in needed:
+        if id(candidates[weak]) in indispensable:
             continue
         gap = np.abs(fit.mean[:, 0] - fit.mean[weak, 0])
         overlaps = (gap < fit.mean[:, 1] + fit.mean[weak, 1]) & (statistic > statistic[weak])
         if not overlaps.any():
             continue
         # start from common modes: the remaining mode must be free to move between the two
-        without = fit_mixed(np.delete(fit.inside, weak, axis=0), decays, rate, columns, **SEARCH)
+        without = fit_mixed(np.delete(fit.shrunken_mean, weak, axis=0), decays, rate, columns, **SEARCH_OPTIONS)
         probability = float(chi2.sf((without.rss - fit.rss) / fit.sigma2, 4 * len(decays)))
         if probability > settings.false_mode_probability:
             return int(weak), without, probability
-        needed.add(id(kept[weak]))
+        indispensable.add(id(candidates[weak]))
     return None, None, 1.0
 
 
-def mode_failures(fit: MixedFit, settings, heaviest=None) -> list[tuple[int, tuple[str, float, float]]]:
+def mode_failures(fit: MixedFit, settings, max_damping=None) -> list[tuple[int, tuple[str, float, float]]]:
     """Every mode that fails a test, as (index, (reason, value, limit)), the weakest first.
 
     With ``max_damping`` only the tests for a pole to stay in a fit apply: it is present and damped less than this.
     """
     n_mode = len(fit.mean)
-    statistic = mode_chi_squared(fit.at, fit.sigma2)
+    statistic = mode_chi_squared(fit.linearisation, fit.sigma2)
     weight = 1.0 / (np.einsum("ijj->ij", fit.covariance) + fit.spread)
     se = np.sqrt(1.0 / weight.sum(axis=0)).reshape(n_mode, 2)
     spread = np.sqrt(fit.spread).reshape(n_mode, 2)
-    probability, share = common_probability(statistic), share_of_blows(statistic)
+    probability, share = common_probability(statistic), share_of_impacts(statistic)
     failures = []
     for m in range(n_mode):
         damping = fit.mean[m, 1]
-        shows = (
+        presence_tests = (
             ("not significant", probability[m], settings.false_mode_probability, True),
             ("shows in too few impacts", share[m], settings.impact_share, False),
-            ("damping too high", damping, heaviest or settings.damping_maximum, True),
+            ("damping too high", damping, max_damping or settings.damping_maximum, True),
             ("damping not above zero", damping, 1e-4, False),
         )
-        known = (
+        precision_tests = (
             ("frequency too uncertain", se[m, 0], settings.frequency_se_maximum, True),
             ("damping too uncertain", se[m, 1] / abs(damping), settings.damping_se_maximum, True),
             ("differs between impacts", spread[m, 0], settings.spread_maximum, True),
         )
-        for reason, value, limit, upper in shows if heaviest else shows + known:
+        for reason, value, limit, upper in presence_tests if max_damping else presence_tests + precision_tests:
             if (value > limit) if upper else (value < limit):
                 failures.append((m, (reason, float(value), limit)))
                 break

@@ -35,16 +35,16 @@ def noise_filter(residual, order_maximum: int) -> np.ndarray:
     n = residual.size
     length = residual.shape[1]
     lags = np.array([np.sum(residual[:, : length - k] * residual[:, k:]) for k in range(order_maximum + 1)]) / n
-    best, chosen = n * np.log(max(lags[0], 1e-300)), np.ones(1)
+    lowest_criterion, coefficients = n * np.log(max(lags[0], 1e-300)), np.ones(1)
     for order in range(1, order_maximum + 1):
         if not lags[0] > 0.0:
             break
         a = solve_toeplitz(lags[:order], lags[1 : order + 1])
         variance = lags[0] - a @ lags[1 : order + 1]
         criterion = n * np.log(max(variance, 1e-300)) + order * np.log(n)
-        if criterion < best:
-            best, chosen = criterion, np.concatenate(([1.0], -a))
-    return chosen
+        if criterion < lowest_criterion:
+            lowest_criterion, coefficients = criterion, np.concatenate(([1.0], -a))
+    return coefficients
 
 
 def whiten(decays, whitening) -> np.ndarray:
@@ -59,10 +59,10 @@ def whiten(decays, whitening) -> np.ndarray:
     return lfilter(whitening, 1.0, decays, axis=-1)[:, order:] if order else decays
 
 
-PROBABILITY = 1e-3  # significance level of a drift or a hum
-CHANCE = 1e-2  # significance level of equal phases in all impacts
-NEAR_HARMONIC = 0.06  # relative distance from a harmonic
-HARMONICS = 5  # harmonics of each source
+BACKGROUND_SIGNIFICANCE = 1e-3  # significance level of a drift or a hum
+PHASE_SIGNIFICANCE = 1e-2  # significance level of equal phases in all impacts
+HARMONIC_TOLERANCE = 0.06  # relative distance from a harmonic
+N_HARMONICS = 5  # harmonics of each source
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class Background:
         return np.vstack([scale * np.cos(phase), scale * np.sin(phase), drift_columns(n, self.drift_degree)])
 
 
-def highest_drift(n: int, rate: float, settings) -> int:
+def max_drift_degree(n: int, rate: float, settings) -> int:
     """Highest degree of a drift below the ballast band, at most ``settings.drift_maximum``.
 
     A polynomial of degree d over a record of length T holds frequencies up to (d + 1) / (2 T).
@@ -92,20 +92,20 @@ def hum_frequencies(table, n: int, rate: float, settings) -> tuple[float, ...]:
 
     Undamped: it decays or grows by less than a factor of two over the ``n`` samples. ``table`` is a Stabilisation.
     """
-    found: list[float] = []
+    hum: list[float] = []
     for source in settings.hum_sources:
-        for harmonic in source * np.arange(1, HARMONICS + 1):
-            near = np.abs(table.frequency / harmonic - 1.0) < NEAR_HARMONIC
+        for harmonic in source * np.arange(1, N_HARMONICS + 1):
+            near = np.abs(table.frequency / harmonic - 1.0) < HARMONIC_TOLERANCE
             steady = np.abs(table.damping) * 2.0 * np.pi * table.frequency * n / rate < np.log(2.0)
-            seen = np.unique(table.start[near & steady] * 1000 + table.order[near & steady])
-            if len(seen) >= settings.presence_minimum * table.n_cell and not np.any(
-                np.abs(np.array(found) / harmonic - 1.0) < NEAR_HARMONIC
+            cells = np.unique(table.start[near & steady] * 1000 + table.order[near & steady])
+            if len(cells) >= settings.presence_minimum * table.n_cell and not np.any(
+                np.abs(np.array(hum) / harmonic - 1.0) < HARMONIC_TOLERANCE
             ):
-                found.append(float(harmonic))
-    return tuple(found)
+                hum.append(float(harmonic))
+    return tuple(hum)
 
 
-def of_the_blow(frequency: float, theta, decays, rate: float) -> bool:
+def is_locked_to_impact(frequency: float, theta, decays, rate: float) -> bool:
     """Whether the oscillation at ``frequency`` [Hz] beside the modes ``theta`` (n_mode, 2) starts with every impact.
 
     The phases of hum are random, those of a lightly damped mode agree between impacts. This is Rayleigh's test at
@@ -116,17 +116,17 @@ def of_the_blow(frequency: float, theta, decays, rate: float) -> bool:
     Zar 1999, Biostatistical Analysis, eq. 27.4: probability of the mean resultant length by chance.
     """
     n_decay, n = decays.shape
-    theta = theta[np.abs(np.exp(theta[:, 0]) / frequency - 1.0) > NEAR_HARMONIC]
+    theta = theta[np.abs(np.exp(theta[:, 0]) / frequency - 1.0) > HARMONIC_TOLERANCE]
     if n_decay < 4 or not len(theta):
         return False
-    at = linearise(theta[None], decays, rate, Background(0, (frequency,)).columns(n, rate))
-    cosine, sine = at.coefficient[:, 2 * len(theta) : 2 * len(theta) + 2].T
+    linearisation = linearise(theta[None], decays, rate, Background(0, (frequency,)).columns(n, rate))
+    cosine, sine = linearisation.coefficient[:, 2 * len(theta) : 2 * len(theta) + 2].T
     resultant = abs(np.sum(np.exp(1j * np.arctan2(sine, cosine))))
-    chance = np.exp(np.sqrt(1 + 4 * n_decay + 4 * (n_decay**2 - resultant**2)) - (1 + 2 * n_decay))
-    return bool(chance < CHANCE)
+    probability = np.exp(np.sqrt(1 + 4 * n_decay + 4 * (n_decay**2 - resultant**2)) - (1 + 2 * n_decay))
+    return bool(probability < PHASE_SIGNIFICANCE)
 
 
-def needed_background(theta, decays, rate, most: Background) -> Background:
+def significant_background(theta, decays, rate, largest: Background) -> Background:
     """The part of ``largest`` that is significant beside the modes ``theta`` (n_decay, n_mode, 2).
 
     First each hum is tested. The drift gets the lowest degree above which no term is significant.
@@ -135,16 +135,19 @@ def needed_background(theta, decays, rate, most: Background) -> Background:
     n_mode = theta.shape[1]
 
     def probability(background, columns):
-        at = linearise(theta, decays, rate, background.columns(n, rate))
-        drift = at.gram.shape[-1] - 2 * n_mode
-        sigma2 = at.rss.sum() / degrees_of_freedom(decays, n_mode, drift)
+        linearisation = linearise(theta, decays, rate, background.columns(n, rate))
+        drift = linearisation.gram.shape[-1] - 2 * n_mode
+        sigma2 = linearisation.rss.sum() / degrees_of_freedom(decays, n_mode, drift)
         index = 2 * n_mode + np.asarray(columns)
-        return chi2.sf(columns_chi_squared(at, sigma2, index), n_decay * len(index))
+        return chi2.sf(columns_chi_squared(linearisation, sigma2, index), n_decay * len(index))
 
-    n_hum = len(most.hum)
-    hum = tuple(h for i, h in enumerate(most.hum) if probability(most, [i, n_hum + i]) < PROBABILITY)
-    most, n_hum = Background(most.drift_degree, hum), len(hum)
-    for lowest in range(most.drift_degree + 1):
-        if probability(most, range(2 * n_hum + lowest, 2 * n_hum + most.drift_degree + 1)) > PROBABILITY:
+    n_hum = len(largest.hum)
+    hum = tuple(h for i, h in enumerate(largest.hum) if probability(largest, [i, n_hum + i]) < BACKGROUND_SIGNIFICANCE)
+    largest, n_hum = Background(largest.drift_degree, hum), len(hum)
+    for lowest in range(largest.drift_degree + 1):
+        if (
+            probability(largest, range(2 * n_hum + lowest, 2 * n_hum + largest.drift_degree + 1))
+            > BACKGROUND_SIGNIFICANCE
+        ):
             return Background(lowest - 1, hum)
-    return most
+    return largest

@@ -17,10 +17,10 @@ from turnout.modal.state_space import assemble, no_decays, no_model
 from turnout.modal.summary import ImpactEstimates
 from turnout.records import ModalModel, Rejection
 
-TOP = 0.45  # highest edge of a filter as a share of the sampling rate
+MAX_EDGE_SHARE = 0.45  # highest edge of a filter as a share of the sampling rate
 
 
-def split(records, rate: float, settings) -> tuple[np.ndarray, ...]:
+def split_bands(records, rate: float, settings) -> tuple[np.ndarray, ...]:
     """Records below and above the split frequency, (n, n_sample) each; filtered over their whole length.
 
     At a low sampling rate the upper band ends earlier; if nothing remains of it there is only the lower one.
@@ -33,12 +33,12 @@ def split(records, rate: float, settings) -> tuple[np.ndarray, ...]:
     Barkhordari et al., section on model validation: 10-200 Hz and 200-800 Hz.
     """
     order, edge = settings.paper_filter_order, settings.split_frequency
-    top = min(settings.paper_band_high, TOP * rate)
-    filters = [butter(order, min(edge, top), fs=rate, output="sos")]
-    if top > edge:
-        filters.append(butter(order, [edge, top], btype="band", fs=rate, output="sos"))
-    through = sosfiltfilt if settings.paper_zero_phase else sosfilt
-    return tuple(through(sos, np.asarray(records, dtype=float), axis=-1) for sos in filters)
+    upper_edge = min(settings.paper_band_high, MAX_EDGE_SHARE * rate)
+    filters = [butter(order, min(edge, upper_edge), fs=rate, output="sos")]
+    if upper_edge > edge:
+        filters.append(butter(order, [edge, upper_edge], btype="band", fs=rate, output="sos"))
+    apply_filter = sosfiltfilt if settings.paper_zero_phase else sosfilt
+    return tuple(apply_filter(sos, np.asarray(records, dtype=float), axis=-1) for sos in filters)
 
 
 def second_order_mode(decay, rate: float) -> tuple[float, float]:
@@ -57,16 +57,16 @@ def band_modes(records, starts, n: int, rate: float, settings) -> np.ndarray:
 
     ``records`` include the contact. ``starts`` are the first samples of the decays, ``n`` is their length.
     """
-    found = np.full((2, len(records), 2), np.nan)
+    modes = np.full((2, len(records), 2), np.nan)
     for i, (record, start) in enumerate(zip(records, starts, strict=True)):
-        for band, filtered in enumerate(split(record, rate, settings)):
-            found[band, i] = second_order_mode(filtered[start : start + n], rate)
-    return found
+        for band, filtered in enumerate(split_bands(record, rate, settings)):
+            modes[band, i] = second_order_mode(filtered[start : start + n], rate)
+    return modes
 
 
-CONTACT = 1.5e-3  # s, mean contact time of the simulated impacts, that of a soft tip
-LEAD = 0.01  # s before contact
-AFTER_CONTACT = 2e-4  # s from the end of contact to the start of the decay
+CONTACT_DURATION = 1.5e-3  # s, mean contact time of the simulated impacts, that of a soft tip
+LEAD_TIME = 0.01  # s before contact
+DECAY_DELAY = 2e-4  # s from the end of contact to the start of the decay
 
 
 def simulated_bias(
@@ -103,47 +103,47 @@ def simulated_bias(
     rng = np.random.default_rng(20171001)
     draws = settings.paper_bias_tests
     s = continuous_pole(np.asarray(frequency), np.asarray(damping))
-    contact = CONTACT * (1.0 + 0.08 * rng.standard_normal(draws))
-    lead = round(LEAD * rate)
-    time = (np.arange(lead + round((2.0 * CONTACT + AFTER_CONTACT) * rate) + n) - lead) / rate
+    contact = CONTACT_DURATION * (1.0 + 0.08 * rng.standard_normal(draws))
+    lead = round(LEAD_TIME * rate)
+    time = (np.arange(lead + round((2.0 * CONTACT_DURATION + DECAY_DELAY) * rate) + n) - lead) / rate
     time = time - rng.random(draws)[:, None] / rate
     # The residue that gives this amplitude at the start of the decay.
-    turn = 2.0 * np.pi / CONTACT
-    spectrum = -np.expm1(-s * CONTACT) / s * 0.5 * turn**2 / (s**2 + turn**2)
-    residue = amplitude * np.exp(-s * (CONTACT + AFTER_CONTACT)) / spectrum
+    turn = 2.0 * np.pi / CONTACT_DURATION
+    spectrum = -np.expm1(-s * CONTACT_DURATION) / s * 0.5 * turn**2 / (s**2 + turn**2)
+    residue = amplitude * np.exp(-s * (CONTACT_DURATION + DECAY_DELAY)) / spectrum
     clean = pulse_response(
         time, np.broadcast_to(s, (draws, len(s))), np.broadcast_to(residue, (draws, len(s))), contact
     )
     records = clean + noise * rng.standard_normal(clean.shape)
-    starts = lead + np.ceil((contact + AFTER_CONTACT) * rate).astype(int)
-    found = band_modes(records, starts, n, rate, settings)
-    told = {}
+    starts = lead + np.ceil((contact + DECAY_DELAY) * rate).astype(int)
+    modes = band_modes(records, starts, n, rate, settings)
+    bias = {}
     for m, name in enumerate(bands):
-        band = found[("ballast", "railpad").index(name)]
-        there = np.isfinite(band[:, 0])
-        error = 100.0 * (band[there] / (frequency[m], damping[m]) - 1.0)
-        mean = error.mean(axis=0) if there.any() else np.full(2, np.nan)
-        told[name] = {
+        band = modes[("ballast", "railpad").index(name)]
+        is_found = np.isfinite(band[:, 0])
+        error = 100.0 * (band[is_found] / (frequency[m], damping[m]) - 1.0)
+        mean = error.mean(axis=0) if is_found.any() else np.full(2, np.nan)
+        bias[name] = {
             "frequency_percent": float(mean[0]),
             "damping_percent": float(mean[1]),
-            "found": float(there.mean()),
+            "found": float(is_found.mean()),
             "n": draws,
         }
-    return told
+    return bias
 
 
-def in_words(bias: dict) -> str:
+def bias_sentence(bias: dict) -> str:
     """The bias as a sentence, printed with every result of the paper's procedure.
 
-    >>> in_words({"ballast": {"frequency_percent": -10.9, "damping_percent": -10.0, "found": 1.0, "n": 12}})
+    >>> bias_sentence({"ballast": {"frequency_percent": -10.9, "damping_percent": -10.0, "found": 1.0, "n": 12}})
     'simulated bias of method paper at this model (12 blows): ballast f -10.9 %, zeta -10.0 %, found 100 %'
     """
     n = next(iter(bias.values()))["n"] if bias else 0
-    parts = [
+    clauses = [
         f"{band} f {b['frequency_percent']:+.1f} %, zeta {b['damping_percent']:+.1f} %, found {100 * b['found']:.0f} %"
         for band, b in bias.items()
     ]
-    return f"simulated bias of method paper at this model ({n} blows): " + "; ".join(parts)
+    return f"simulated bias of method paper at this model ({n} blows): " + "; ".join(clauses)
 
 
 def identify_paper(decays, rate: float, settings, receptance=None, leads=None) -> ModalModel:
@@ -157,46 +157,50 @@ def identify_paper(decays, rate: float, settings, receptance=None, leads=None) -
     records, index, dropped = common_length(decays, rate, settings)
     if not len(records):
         return no_decays(rate, "paper", dropped)
-    before = [np.asarray(leads[i], dtype=float) if leads is not None else np.empty(0) for i in index]
-    whole = [np.concatenate([lead, np.asarray(decays[i], float)]) for lead, i in zip(before, index, strict=True)]
-    found = band_modes(whole, [len(lead) for lead in before], records.shape[1], rate, settings)
+    lead_ins = [np.asarray(leads[i], dtype=float) if leads is not None else np.empty(0) for i in index]
+    full_records = [
+        np.concatenate([lead, np.asarray(decays[i], float)]) for lead, i in zip(lead_ins, index, strict=True)
+    ]
+    band_values = band_modes(full_records, [len(lead) for lead in lead_ins], records.shape[1], rate, settings)
     selection = select_modes(records, rate, settings)
-    told = fit_diagnostics(selection, index, dropped) | {"filters_start_at": "decay" if leads is None else "record"}
-    estimates, rejections = _estimates(found, records, index, settings, receptance)
-    rest = {
+    diagnostics = fit_diagnostics(selection, index, dropped) | {
+        "filters_start_at": "decay" if leads is None else "record"
+    }
+    estimates, rejections = _estimates(band_values, records, index, settings, receptance)
+    model_fields = {
         "rejections": tuple(rejections),
         "stabilisation": stabilisation_rows(selection, settings.pole_tolerance),
     }
     if not estimates:
-        return no_model(rate, "paper", diagnostics=told, **rest)
+        return no_model(rate, "paper", diagnostics=diagnostics, **model_fields)
     modes = tuple(e.mode(settings.confidence) for e in estimates)
     amplitude = _amplitude(modes, records, rate)
-    told |= _bias(selection, modes, amplitude, records.shape[1], rate, settings)
+    diagnostics |= _model_bias(selection, modes, amplitude, records.shape[1], rate, settings)
     return assemble(
         estimates,
         modes,
         amplitude,
-        _in_common(estimates, records, index),
+        _common_impacts(estimates, records, index),
         rate,
         settings,
         method="paper",
         status="accepted" if len(modes) == 2 else "second_order_only",
-        diagnostics=told,
+        diagnostics=diagnostics,
         scale="mean decay [m/s²]",
-        **rest,
+        **model_fields,
     )
 
 
-def _edges(band, settings):
+def _band_edges(band, settings):
     return next((low, high) for name, low, high in settings.bands() if name == band)
 
 
-def _estimates(found, records, index, settings, receptance):
+def _estimates(band_values, records, index, settings, receptance):
     """Second-order estimates of each band over the impacts, without errors: the procedure gives none."""
     strength = np.linalg.norm(records, axis=1)
     estimates, rejections = [], []
-    for band, values in zip(("ballast", "railpad"), found, strict=True):
-        low, high = _edges(band, settings)
+    for band, values in zip(("ballast", "railpad"), band_values, strict=True):
+        low, high = _band_edges(band, settings)
         use = np.isfinite(values[:, 0]) & (values[:, 0] >= low) & (values[:, 0] < high) & (values[:, 1] < 0.95)
         if np.mean(use) < settings.impact_share:
             detail = f"{band} band: share of impacts in which order 2 finds a mode there"
@@ -221,14 +225,14 @@ def _amplitude(modes, records, rate):
     return linearise(common, records, rate, drift_columns(records.shape[1], -1)).amplitude.mean(axis=0)
 
 
-def _bias(selection, modes, amplitude, n, rate, settings):
+def _model_bias(selection, modes, amplitude, n, rate, settings):
     """Bias at the modes of the joint fit if it has modes in these bands, else at those of the procedure."""
     truth = {m.band: (m.frequency, m.damping, amplitude[i]) for i, m in enumerate(modes)}
     noise = np.sqrt(selection.fit.sigma2) if selection.fit is not None else 0.0
     if selection.fit is not None:
         frequency = np.exp(selection.fit.mean[:, 0])
         for band in truth:
-            low, high = _edges(band, settings)
+            low, high = _band_edges(band, settings)
             inside = np.flatnonzero((frequency >= low) & (frequency < high))
             if len(inside):
                 m = max(inside, key=lambda k: np.median(selection.chi_squared[:, k]))
@@ -237,10 +241,10 @@ def _bias(selection, modes, amplitude, n, rate, settings):
     named = [band for band in ("ballast", "railpad") if band in truth]
     f, zeta, alpha = (np.array(column) for column in zip(*(truth[band] for band in named), strict=True))
     bias = simulated_bias(f, zeta, alpha, float(noise), n, rate, settings, named)
-    return {"simulated_bias": bias, "bias_words": in_words(bias)}
+    return {"simulated_bias": bias, "bias_words": bias_sentence(bias)}
 
 
-def _in_common(estimates, records, index):
+def _common_impacts(estimates, records, index):
     """Modes and decays of the impacts in which every band has a mode, for the validation fit."""
     common = set(index)
     for e in estimates:

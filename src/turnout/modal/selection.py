@@ -12,21 +12,28 @@ from scipy.stats import chi2
 from turnout.modal.era import hankel_rows
 from turnout.modal.least_squares import linearise
 from turnout.modal.mixed_effects import MixedFit, fit_mixed
-from turnout.modal.mode_tests import fit_and_prune, mode_chi_squared, mode_failures, reappearing, screen, start_of
+from turnout.modal.mode_tests import (
+    filter_reappearing,
+    fit_and_prune,
+    mode_chi_squared,
+    mode_failures,
+    screen,
+    start_values,
+)
 from turnout.modal.noise import (
     Background,
-    highest_drift,
     hum_frequencies,
-    needed_background,
+    is_locked_to_impact,
+    max_drift_degree,
     noise_filter,
-    of_the_blow,
+    significant_background,
     whiten,
 )
-from turnout.modal.stabilization import DAMPING, Stabilisation, candidates, likely_poles, stabilisation
+from turnout.modal.stabilization import DAMPING_RANGE, Stabilisation, candidates, likely_poles, stabilisation
 
-NOISE_PASSES = 3  # fits with a new whitening filter
+MAX_NOISE_PASSES = 3  # fits with a new whitening filter
 # Relative difference of residual sums up to which two fits are the same. Two distinct optima differ by more.
-SAME = 1e-4
+RSS_TOLERANCE = 1e-4
 
 
 @dataclass
@@ -37,18 +44,20 @@ class Explanation:
     """
 
     fit: MixedFit | None
-    kept: list
+    candidates: list
     background: Background
     whitening: np.ndarray = field(default_factory=lambda: np.ones(1))
     rejected: list = field(default_factory=list)
 
     @property
-    def doubtful(self) -> bool:
+    def is_doubtful(self) -> bool:
         """Whether there is coloured noise or a drift: it may be the remainder of overlooked modes."""
         return len(self.whitening) > 1 or self.background.drift_degree >= 0
 
 
-def explain(start, decays, rate, background, settings, most=None, heaviest=None, known=None) -> Explanation:
+def explain(
+    start, decays, rate, background, settings, largest_background=None, max_damping=None, known_fits=None
+) -> Explanation:
     """Maximum likelihood from candidates ``start``, pruned until each mode passes its tests.
 
     Parameters
@@ -68,52 +77,62 @@ def explain(start, decays, rate, background, settings, most=None, heaviest=None,
         First fits of explanations with this ``background``; this one is added. If it is there already it is not
         continued: ``fit`` is then None.
     """
-    told = Explanation(None, [], background)
+    explanation = Explanation(None, [], background)
     columns = background.columns(decays.shape[1], rate)
-    kept = screen(start, decays, rate, columns, settings, told.rejected)
-    told.fit, told.kept = fit_and_prune(kept, decays, rate, columns, settings, told.rejected, heaviest=heaviest)
-    if told.fit is not None and known is not None:
-        if any(_same(told.fit, other) for other in known):
+    screened = screen(start, decays, rate, columns, settings, explanation.rejected)
+    explanation.fit, explanation.candidates = fit_and_prune(
+        screened, decays, rate, columns, settings, explanation.rejected, max_damping=max_damping
+    )
+    if explanation.fit is not None and known_fits is not None:
+        if any(_is_same_fit(explanation.fit, known_fit) for known_fit in known_fits):
             return Explanation(None, [], background)
-        known.append(told.fit)
-    if told.fit is not None:
-        if most is not None:
-            told.background = needed_background(told.fit.theta, decays, rate, most)
-        _settle_noise(told, decays, rate, settings, heaviest)
-    return told
+        known_fits.append(explanation.fit)
+    if explanation.fit is not None:
+        if largest_background is not None:
+            explanation.background = significant_background(explanation.fit.theta, decays, rate, largest_background)
+        _refine_noise(explanation, decays, rate, settings, max_damping)
+    return explanation
 
 
-def _same(fit, other):
+def _is_same_fit(fit, reference):
     """Whether two fits of the same decays have converged to the same modes."""
-    return len(fit.mean) == len(other.mean) and abs(fit.rss / other.rss - 1.0) < SAME
+    return len(fit.mean) == len(reference.mean) and abs(fit.rss / reference.rss - 1.0) < RSS_TOLERANCE
 
 
-def _settle_noise(told, decays, rate, settings, heaviest):
+def _refine_noise(explanation, decays, rate, settings, max_damping):
     """Fit the decays whitened by the residual noise of the last fit, until the order of the noise is constant."""
-    columns = told.background.columns(decays.shape[1], rate)
-    needed: set = set()
-    for _ in range(NOISE_PASSES):
-        residual = linearise(told.fit.theta, decays, rate, columns).residual
-        before, told.whitening = told.whitening, noise_filter(residual, settings.noise_order_maximum)
-        white = whiten(decays, told.whitening)
-        short = told.background.columns(white.shape[1], rate)
-        told.fit, told.kept = fit_and_prune(
-            told.kept, white, rate, short, settings, told.rejected, told.fit, heaviest, needed
+    columns = explanation.background.columns(decays.shape[1], rate)
+    indispensable: set = set()
+    for _ in range(MAX_NOISE_PASSES):
+        residual = linearise(explanation.fit.theta, decays, rate, columns).residual
+        previous, explanation.whitening = explanation.whitening, noise_filter(residual, settings.noise_order_maximum)
+        white = whiten(decays, explanation.whitening)
+        white_columns = explanation.background.columns(white.shape[1], rate)
+        explanation.fit, explanation.candidates = fit_and_prune(
+            explanation.candidates,
+            white,
+            rate,
+            white_columns,
+            settings,
+            explanation.rejected,
+            explanation.fit,
+            max_damping,
+            indispensable,
         )
-        if told.fit is None or len(told.whitening) == 1 or len(told.whitening) == len(before):
+        if explanation.fit is None or len(explanation.whitening) == 1 or len(explanation.whitening) == len(previous):
             break
 
 
-def polished(told: Explanation, decays, rate) -> Explanation:
+def polish(explanation: Explanation, decays, rate) -> Explanation:
     """The same explanation with its fit iterated to convergence."""
-    if told.fit is None:
-        return told
-    white = whiten(decays, told.whitening)
-    columns = told.background.columns(white.shape[1], rate)
-    return replace(told, fit=fit_mixed(None, white, rate, columns, theta=told.fit.theta))
+    if explanation.fit is None:
+        return explanation
+    white = whiten(decays, explanation.whitening)
+    columns = explanation.background.columns(white.shape[1], rate)
+    return replace(explanation, fit=fit_mixed(None, white, rate, columns, theta=explanation.fit.theta))
 
 
-def criterion(told: Explanation, decays) -> float:
+def akaike_criterion(explanation: Explanation, decays) -> float:
     r"""Akaike information criterion of an explanation: the smaller one is the likelier.
 
     .. math:: N \ln\frac{\sum r^2}{N} + 2 k
@@ -126,21 +145,21 @@ def criterion(told: Explanation, decays) -> float:
     ----------
     Akaike 1974; number of parameters of a shrunken fit after Hodges and Sargent 2001.
     """
-    fit, order = told.fit, len(told.whitening) - 1
+    fit, order = explanation.fit, len(explanation.whitening) - 1
     if fit is None:
         raise ValueError("an explanation without modes has no criterion")
     n_decay, n_mode = fit.theta.shape[:2]
-    own = np.einsum("ijj->ij", fit.covariance)
-    background = told.background.drift_degree + 1 + 2 * len(told.background.hum)
-    each = n_decay * (2 * n_mode + background) + float(np.sum(fit.spread / (fit.spread + own)))
+    variance = np.einsum("ijj->ij", fit.covariance)
+    background = explanation.background.drift_degree + 1 + 2 * len(explanation.background.hum)
+    per_decay = n_decay * (2 * n_mode + background) + float(np.sum(fit.spread / (fit.spread + variance)))
     total = n_decay * (decays.shape[1] - order)
     # Per sample, as whitening removes a few of them.
-    return decays.size * np.log(fit.rss / total) + 2.0 * (2 * n_mode + order + each)
+    return decays.size * np.log(fit.rss / total) + 2.0 * (2 * n_mode + order + per_decay)
 
 
-STARTS = (0.0, 5e-4, 1e-3)  # s, times at which the realisations start
-BUILD_DRIFT = 2  # degree of the drift of the first fit
-MOST_STARTS = 2  # lists of likely poles that are tried
+START_TIMES = (0.0, 5e-4, 1e-3)  # s, times at which the realisations start
+INITIAL_DRIFT_DEGREE = 2  # degree of the drift of the first fit
+MAX_START_LISTS = 2  # lists of likely poles that are tried
 
 
 @dataclass
@@ -165,11 +184,11 @@ class Selection:
     residual_power: np.ndarray | None = None
     whitening: np.ndarray = field(default_factory=lambda: np.ones(1))
     background: Background = field(default_factory=Background)
-    unfit: dict = field(default_factory=dict)
-    others: list = field(default_factory=list)
+    failed_tests: dict = field(default_factory=dict)
+    rival_modes: list = field(default_factory=list)
 
     @property
-    def shows(self) -> np.ndarray:
+    def is_visible(self) -> np.ndarray:
         """(n_decay, n_mode) bool: the mode is significant in this impact alone, at 1 %."""
         return self.chi_squared > chi2.isf(0.01, 2)
 
@@ -191,44 +210,55 @@ def select_modes(decays, rate, settings) -> Selection:
     n = decays.shape[1]
     rows = hankel_rows(n)
     order = min(settings.order_maximum, rows // 2)
-    table = stabilisation(decays, rate, rows, order, tuple(round(t * rate) for t in STARTS))
-    found = candidates(table, settings.pole_tolerance, settings.damping_maximum)
-    kept, rejected = reappearing(found, rate, settings)
+    table = stabilisation(decays, rate, rows, order, tuple(round(t * rate) for t in START_TIMES))
+    poles = candidates(table, settings.pole_tolerance, settings.damping_maximum)
+    accepted, rejected = filter_reappearing(poles, rate, settings)
     hum = hum_frequencies(table, n, rate, settings)
-    hum = tuple(f for f in hum if not of_the_blow(f, start_of(kept), decays, rate))
-    most = Background(highest_drift(n, rate, settings), hum)
-    told = explain(kept, decays, rate, Background(min(BUILD_DRIFT, most.drift_degree), hum), settings, most)
-    told_all = [told]
-    if told.fit is not None and told.doubtful:
-        told_all += _others(told, table, decays, rate, settings)
-        told = min(told_all, key=lambda e: criterion(e, decays))
-    others = [e.fit.mean for e in told_all if e is not told and e.fit is not None]
-    told = polished(told, decays, rate)
-    result = Selection(table, rejected + told.rejected, others=others)
-    if told.fit is not None:
-        fit = result.fit = told.fit
-        result.background, result.whitening = told.background, told.whitening
-        result.unfit = dict(mode_failures(fit, settings))
-        result.presence = np.array([c.presence for c in told.kept])
-        result.chi_squared = mode_chi_squared(fit.at, fit.sigma2)
-        raw = linearise(fit.theta, decays, rate, told.background.columns(n, rate))
+    hum = tuple(f for f in hum if not is_locked_to_impact(f, start_values(accepted), decays, rate))
+    largest_background = Background(max_drift_degree(n, rate, settings), hum)
+    explanation = explain(
+        accepted,
+        decays,
+        rate,
+        Background(min(INITIAL_DRIFT_DEGREE, largest_background.drift_degree), hum),
+        settings,
+        largest_background,
+    )
+    explanations = [explanation]
+    if explanation.fit is not None and explanation.is_doubtful:
+        explanations += _alternative_explanations(explanation, table, decays, rate, settings)
+        explanation = min(explanations, key=lambda e: akaike_criterion(e, decays))
+    rival_modes = [e.fit.mean for e in explanations if e is not explanation and e.fit is not None]
+    explanation = polish(explanation, decays, rate)
+    result = Selection(table, rejected + explanation.rejected, rival_modes=rival_modes)
+    if explanation.fit is not None:
+        fit = result.fit = explanation.fit
+        result.background, result.whitening = explanation.background, explanation.whitening
+        result.failed_tests = dict(mode_failures(fit, settings))
+        result.presence = np.array([c.presence for c in explanation.candidates])
+        result.chi_squared = mode_chi_squared(fit.linearisation, fit.sigma2)
+        raw = linearise(fit.theta, decays, rate, explanation.background.columns(n, rate))
         result.amplitude, result.residual_power = raw.amplitude, raw.rss
         result.energy = energy_shares(raw.amplitude, fit.theta)
     return result
 
 
-def _others(told, table, decays, rate, settings):
+def _alternative_explanations(explanation, table, decays, rate, settings):
     """Explanations from the likeliest poles until one is not doubtful: without a drift, then with the one found."""
-    hum, drift = told.background.hum, told.background.drift_degree
-    for background, most in ((Background(-1, hum), MOST_STARTS), (Background(drift, hum), 1))[: 1 + (drift >= 0)]:
+    hum, drift = explanation.background.hum, explanation.background.drift_degree
+    for background, max_lists in ((Background(-1, hum), MAX_START_LISTS), (Background(drift, hum), 1))[
+        : 1 + (drift >= 0)
+    ]:
         columns = background.columns(decays.shape[1], rate)
-        known: list = []
-        for start in likely_poles(table, decays, rate, columns, settings, most):
+        known_fits: list = []
+        for start in likely_poles(table, decays, rate, columns, settings, max_lists):
             # a pole that stands for many weak modes stays in the fit, even if it is too uncertain to be a mode
-            other = explain(start, decays, rate, background, settings, heaviest=DAMPING[1], known=known)
-            if other.fit is not None:
-                yield other
-                if not other.doubtful:
+            alternative = explain(
+                start, decays, rate, background, settings, max_damping=DAMPING_RANGE[1], known_fits=known_fits
+            )
+            if alternative.fit is not None:
+                yield alternative
+                if not alternative.is_doubtful:
                     return
 
 

@@ -13,7 +13,7 @@ from turnout.modal.mixed_effects import fit_common
 from turnout.modal.mode_tests import mode_chi_squared
 from turnout.modal.poles import continuous_pole, modal_parameters
 
-GROWTH = 1.002  # factor per sample by which an oscillation may grow: a hum may seem to grow this much
+MAX_POLE_RADIUS = 1.002  # factor per sample by which an oscillation may grow: a hum may seem to grow this much
 
 
 @dataclass(frozen=True)
@@ -66,10 +66,10 @@ def stabilisation(decays, rate, rows, order_maximum, starts=(0,)) -> Stabilisati
         for order in range(2, order_maximum + 1, 2):
             z, v = np.linalg.eig(space.state_matrix(order))
             amplitude = 2.0 * (space.u[0, :order] @ v)[:, None] * np.linalg.solve(v, state[:order])
-            keep = (z.imag > 1e-9) & (np.abs(z) < GROWTH)
-            energy = _energy(amplitude[keep], z[keep], decays.shape[1] - start) / total
-            frequency, damping = modal_parameters(z[keep], rate)
-            emac = amplitude_coherence(space.u[:, :order] @ v[:, keep], z[keep], space.index)
+            oscillating = (z.imag > 1e-9) & (np.abs(z) < MAX_POLE_RADIUS)
+            energy = _energy(amplitude[oscillating], z[oscillating], decays.shape[1] - start) / total
+            frequency, damping = modal_parameters(z[oscillating], rate)
+            emac = amplitude_coherence(space.u[:, :order] @ v[:, oscillating], z[oscillating], space.index)
             cell = (np.full(len(energy), start), np.full(len(energy), order))
             columns.append((*cell, frequency, damping, energy, emac))
     cells = len(starts) * (order_maximum // 2)
@@ -128,47 +128,47 @@ def candidates(table: Stabilisation, tolerance: float, damping_maximum: float) -
     plausible = (table.damping > 0.0) & (table.damping < damping_maximum)
     pole = np.full(len(table.frequency), np.nan, dtype=complex)
     pole[plausible] = continuous_pole(table.frequency[plausible], table.damping[plausible])
-    free = plausible.copy()
+    ungrouped = plausible.copy()
     highest, lowest = (table.order.max(), table.order.min()) if len(table.order) else (0, 0)
     n_start = len(np.unique(table.start))
-    found = []
-    while free.any():
-        near = _fullest_neighbourhood(pole, free, tolerance, table)
-        free &= ~near
-        orders = table.order[near]
+    groups = []
+    while ungrouped.any():
+        members = _largest_group(pole, ungrouped, tolerance, table)
+        ungrouped &= ~members
+        orders = table.order[members]
         possible = n_start * ((highest - max(orders.min(), lowest)) // 2 + 1)
-        seen = len(np.unique(table.start[near] * 1000 + orders))
-        presence = seen / max(possible, n_start * 3)
-        found.append(
+        n_cell = len(np.unique(table.start[members] * 1000 + orders))
+        presence = n_cell / max(possible, n_start * 3)
+        groups.append(
             Candidate(
-                float(np.median(table.frequency[near])),
-                float(np.median(table.damping[near])),
-                float(np.median(table.energy[near])),
-                float(np.median(table.emac[near])),
+                float(np.median(table.frequency[members])),
+                float(np.median(table.damping[members])),
+                float(np.median(table.energy[members])),
+                float(np.median(table.emac[members])),
                 float(min(1.0, presence)),
-                near,
+                members,
             )
         )
-    return sorted(found, key=lambda c: -c.energy)
+    return sorted(groups, key=lambda c: -c.energy)
 
 
-def _fullest_neighbourhood(pole, free, tolerance, table):
+def _largest_group(pole, ungrouped, tolerance, table):
     """Ungrouped poles near the one with the most neighbours; in a tie that of the most energetic."""
-    index = np.flatnonzero(free)
+    index = np.flatnonzero(ungrouped)
     distance = np.abs(pole[index, None] - pole[None, index])
     near = distance < tolerance * np.minimum(np.abs(pole[index, None]), np.abs(pole[None, index]))
     count = near.sum(axis=1)
-    best = np.lexsort((-table.energy[index], -count))[0]
+    largest = np.lexsort((-table.energy[index], -count))[0]
     mask = np.zeros(len(pole), dtype=bool)
-    mask[index[near[best]]] = True
+    mask[index[near[largest]]] = True
     return mask
 
 
-LOWEST_ORDER = 8  # lowest model order whose poles are fitted
-DAMPING = (2e-3, 0.9)  # damping ratios of usable poles
+MIN_ORDER = 8  # lowest model order whose poles are fitted
+DAMPING_RANGE = (2e-3, 0.9)  # damping ratios of usable poles
 
 
-def likely_poles(table: Stabilisation, decays, rate: float, columns, settings, most=1) -> list[list[Candidate]]:
+def likely_poles(table: Stabilisation, decays, rate: float, columns, settings, max_lists=1) -> list[list[Candidate]]:
     """Up to ``max_lists`` lists of candidates: each has the poles of one order, the likeliest list first.
 
     These poles need not recur. The leading right singular vector of the decays is their weighted mean: as long as one
@@ -187,40 +187,42 @@ def likely_poles(table: Stabilisation, decays, rate: float, columns, settings, m
     """
     _, size, shape = np.linalg.svd(decays, full_matrices=False)
     shared = size[:1, None] * shape[:1]
-    usable = (table.start == 0) & (table.damping > DAMPING[0]) & (table.damping < DAMPING[1])
+    usable = (table.start == 0) & (table.damping > DAMPING_RANGE[0]) & (table.damping < DAMPING_RANGE[1])
     usable &= (table.frequency > 0.5 / settings.duration) & (table.frequency < 0.45 * rate)
-    found = []
-    for order in np.unique(table.order[table.order >= LOWEST_ORDER]):
-        here = usable & (table.order == order)
-        start = np.stack([np.log(table.frequency[here]), table.damping[here]], axis=1)
-        found.append(_thinned(start, shared, rate, columns))
-    found.sort(key=lambda item: item[0])
+    fits = []
+    for order in np.unique(table.order[table.order >= MIN_ORDER]):
+        selected = usable & (table.order == order)
+        start = np.stack([np.log(table.frequency[selected]), table.damping[selected]], axis=1)
+        fits.append(_prune_poles(start, shared, rate, columns))
+    fits.sort(key=lambda item: item[0])
     # orders with the same optimum agree to more digits than two different optima
-    lists = {round(value, 2): poles for value, poles in found if len(poles)}
-    return [_as_candidates(poles, shared, rate, columns, len(table.order)) for poles in list(lists.values())[:most]]
+    lists = {round(value, 2): poles for value, poles in fits if len(poles)}
+    return [
+        _as_candidates(poles, shared, rate, columns, len(table.order)) for poles in list(lists.values())[:max_lists]
+    ]
 
 
 def _as_candidates(poles, shared, rate, columns, n_pole):
-    at = linearise(poles[None], shared, rate, columns)
-    share = np.abs(at.amplitude[0]) ** 2 / (poles[:, 1] * np.exp(poles[:, 0]))
+    linearisation = linearise(poles[None], shared, rate, columns)
+    share = np.abs(linearisation.amplitude[0]) ** 2 / (poles[:, 1] * np.exp(poles[:, 0]))
     return [
         Candidate(float(np.exp(f)), float(damping), float(e), float("nan"), 1.0, np.zeros(n_pole, dtype=bool))
         for (f, damping), e in zip(poles, share / share.sum(), strict=True)
     ]
 
 
-def _thinned(theta, shared, rate, columns):
+def _prune_poles(theta, shared, rate, columns):
     """(criterion, modes) at which dropping the least significant mode no longer reduces the criterion."""
     n = shared.size
-    best, poles = np.inf, theta[:0]
+    lowest_criterion, poles = np.inf, theta[:0]
     while len(theta):
         theta, _ = fit_common(theta, shared, rate, columns)
-        at = linearise(theta[None], shared, rate, columns)
-        rss = float(at.rss.sum())
-        value = n * np.log(rss / n) + 4 * len(theta) * np.log(n)
-        if value > best:
+        linearisation = linearise(theta[None], shared, rate, columns)
+        rss = float(linearisation.rss.sum())
+        criterion = n * np.log(rss / n) + 4 * len(theta) * np.log(n)
+        if criterion > lowest_criterion:
             break
-        best, poles = value, theta
-        weakest = int(np.argmin(mode_chi_squared(at, rss / n)[0]))
+        lowest_criterion, poles = criterion, theta
+        weakest = int(np.argmin(mode_chi_squared(linearisation, rss / n)[0]))
         theta = np.delete(theta, weakest, axis=0)
-    return best, poles
+    return lowest_criterion, poles

@@ -43,8 +43,8 @@ def balanced_pair(pole: complex, residue: complex) -> tuple[np.ndarray, np.ndarr
     c = np.sqrt(2.0) * np.array([root.real, -root.imag])
     gramian = solve_discrete_lyapunov(a.T, np.outer(c, c))
     # Only hyperbolic rotations preserve diag(1, -1): rotate until the observability Gramian is diagonal.
-    turn = -0.5 * np.arctanh(2.0 * gramian[0, 1] / (gramian[0, 0] + gramian[1, 1]))
-    rotation = np.array([[np.cosh(turn), np.sinh(turn)], [np.sinh(turn), np.cosh(turn)]])
+    angle = -0.5 * np.arctanh(2.0 * gramian[0, 1] / (gramian[0, 0] + gramian[1, 1]))
+    rotation = np.array([[np.cosh(angle), np.sinh(angle)], [np.sinh(angle), np.cosh(angle)]])
     a = np.linalg.solve(rotation, a @ rotation)
     c = c @ rotation
     signs = np.array([1.0, 1.0])
@@ -61,13 +61,24 @@ def block_model(poles, residues) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     order = 2 * len(poles)
     a, b, c = np.zeros((order, order)), np.zeros(order), np.zeros(order)
     for i, (pole, residue) in enumerate(zip(poles, residues, strict=True)):
-        part = slice(2 * i, 2 * i + 2)
-        a[part, part], b[part], c[part] = balanced_pair(complex(pole), complex(residue))
+        block = slice(2 * i, 2 * i + 2)
+        a[block, block], b[block], c[block] = balanced_pair(complex(pole), complex(residue))
     return a, b, c
 
 
 def assemble(
-    estimates, modes, residues, scored, rate: float, settings, *, method, status, diagnostics, scale, **rest
+    estimates,
+    modes,
+    residues,
+    validation_set,
+    rate: float,
+    settings,
+    *,
+    method,
+    status,
+    diagnostics,
+    scale,
+    **model_fields,
 ) -> ModalModel:
     """Modal model of one section.
 
@@ -88,14 +99,14 @@ def assemble(
         ``rejections``, ``rejected_modes``, ``stabilisation`` of the model.
     """
     a, b, c = block_model([discrete_pole(m.frequency, m.damping, rate) for m in modes], residues)
-    theta, records = scored
+    theta, records = validation_set
     fits = held_out_fit(theta, records, rate)
     edges = {name: (low, high) for name, low, high in settings.bands()}
     bands = [edges[mode.band] for mode in modes]
-    null = random_mode_fits(records, rate, bands, settings.null_draws) if len(records) else None
-    told = {
+    random_fits = random_mode_fits(records, rate, bands, settings.null_draws) if len(records) else None
+    fit_results = {
         "fit_per_impact": tuple(float(f) for f in fits),
-        "fit_null": None if null is None else float(np.quantile(null, 0.95)),
+        "fit_null": None if random_fits is None else float(np.quantile(random_fits, 0.95)),
         "fit_null_draws": settings.null_draws,
         "scale": scale,
     }
@@ -109,20 +120,20 @@ def assemble(
         status=status,
         per_impact=tuple(row for e in estimates for row in e.rows()),
         fit=float(np.median(fits)) if len(fits) and np.all(np.isfinite(fits)) else None,
-        diagnostics=diagnostics | told,
-        **rest,
+        diagnostics=diagnostics | fit_results,
+        **model_fields,
     )
 
 
 def no_model(rate, method, rejections, diagnostics, **extras) -> ModalModel:
     """A rejected model, with its reasons."""
-    nothing = np.empty(0)
+    empty = np.empty(0)
     return ModalModel(
-        np.empty((0, 0)), nothing, nothing, rate, (), method, "rejected", rejections, diagnostics=diagnostics, **extras
+        np.empty((0, 0)), empty, empty, rate, (), method, "rejected", rejections, diagnostics=diagnostics, **extras
     )
 
 
 def no_decays(rate, method, dropped) -> ModalModel:
     """A rejected model without a usable decay; ``dropped`` are (impact, Rejection)."""
-    found = Rejection("not_identified", 0, 1, "no decay is long enough" if dropped else "no decays")
-    return no_model(rate, method, (found, *(r for _, r in dropped)), {"dropped_impacts": tuple(dropped)})
+    rejection = Rejection("not_identified", 0, 1, "no decay is long enough" if dropped else "no decays")
+    return no_model(rate, method, (rejection, *(r for _, r in dropped)), {"dropped_impacts": tuple(dropped)})

@@ -22,7 +22,7 @@ class Summary:
     n: int
 
 
-def summarise(value, se, confidence: float = 0.95, choice: float = 0.0) -> Summary:
+def summarise(value, se, confidence: float = 0.95, shared_se: float = 0.0) -> Summary:
     r"""Random-effects mean of estimates that each have a standard error.
 
     .. math:: m = \frac{\sum w_i x_i}{\sum w_i}, \quad w_i = \frac{1}{s_i^2 + \tau^2}, \quad
@@ -55,19 +55,19 @@ def summarise(value, se, confidence: float = 0.95, choice: float = 0.0) -> Summa
     if n == 0:
         raise ValueError("no estimates to summarise")
     if n == 1:
-        error = float(np.hypot(se[0], choice))
+        error = float(np.hypot(se[0], shared_se))
         half = norm.ppf(0.5 + confidence / 2.0) * error
         return Summary(float(value[0]), error, float(value[0] - half), float(value[0] + half), 0.0, 1)
     spread2 = float(between_variance(value, np.maximum(se**2, 1e-300)))
     weight = 1.0 / (np.maximum(se**2, 1e-300) + spread2)
     mean = float(np.sum(weight * value) / weight.sum())
     error = float(np.sqrt(np.sum(weight * (value - mean) ** 2) / ((n - 1) * weight.sum())))
-    error = float(np.hypot(error, choice))
+    error = float(np.hypot(error, shared_se))
     half = t.ppf(0.5 + confidence / 2.0, n - 1) * error
     return Summary(mean, error, float(mean - half), float(mean + half), float(np.sqrt(spread2)), n)
 
 
-NEXT_TO_NOTHING = 1e-12  # stands for an unknown standard error: the spread between impacts then is all the error
+MIN_ERROR = 1e-12  # stands for an unknown standard error: the spread between impacts then is all the error
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class ImpactEstimates:
     strength: np.ndarray
     energy: float | None = None
     bound: np.ndarray | None = None
-    choice: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    shared_se: np.ndarray = field(default_factory=lambda: np.zeros(2))
 
     def rows(self) -> list[dict]:
         """The table ``per_impact`` of a modal model."""
@@ -97,8 +97,8 @@ class ImpactEstimates:
                 "band": self.band,
                 "frequency": float(frequency[i]),
                 "damping": float(self.estimate[i, 1]),
-                "frequency_se": _known(frequency[i] * self.error[i, 0]),
-                "damping_se": _known(self.error[i, 1]),
+                "frequency_se": _none_if_nan(frequency[i] * self.error[i, 0]),
+                "damping_se": _none_if_nan(self.error[i, 1]),
             }
             for i in range(len(self.impact))
         ]
@@ -110,22 +110,22 @@ class ImpactEstimates:
         its estimate, so weighting by it would bias the mean.
         """
         error = np.median(self.error * self.strength[:, None], axis=0) / self.strength[:, None]
-        error = np.nan_to_num(error, nan=NEXT_TO_NOTHING) if len(error) > 1 else error
-        log_f = summarise(self.estimate[:, 0], error[:, 0], confidence, self.choice[0])
-        zeta = summarise(self.estimate[:, 1], error[:, 1], confidence, self.choice[1])
+        error = np.nan_to_num(error, nan=MIN_ERROR) if len(error) > 1 else error
+        log_f = summarise(self.estimate[:, 0], error[:, 0], confidence, self.shared_se[0])
+        zeta = summarise(self.estimate[:, 1], error[:, 1], confidence, self.shared_se[1])
         f = float(np.exp(log_f.mean))
         return Mode(
             band=self.band,
             frequency=f,
             damping=zeta.mean,
-            frequency_se=_known(f * log_f.se),
-            damping_se=_known(zeta.se),
+            frequency_se=_none_if_nan(f * log_f.se),
+            damping_se=_none_if_nan(zeta.se),
             frequency_sd=f * log_f.spread,
             damping_sd=zeta.spread,
-            frequency_low=_known(np.exp(log_f.low)),
-            frequency_high=_known(np.exp(log_f.high)),
-            damping_low=_known(zeta.low),
-            damping_high=_known(zeta.high),
+            frequency_low=_none_if_nan(np.exp(log_f.low)),
+            frequency_high=_none_if_nan(np.exp(log_f.high)),
+            damping_low=_none_if_nan(zeta.low),
+            damping_high=_none_if_nan(zeta.high),
             frequency_crb=None if self.bound is None else f * float(self.bound[0]),
             damping_crb=None if self.bound is None else float(self.bound[1]),
             energy=self.energy,
@@ -133,7 +133,7 @@ class ImpactEstimates:
         )
 
 
-def _known(value) -> float | None:
+def _none_if_nan(value) -> float | None:
     return None if np.isnan(value) else float(value)
 
 
@@ -165,9 +165,9 @@ def cramer_rao_bound(theta, decays, rate, sigma2, columns=None):
     Rao 1945; for damped sinusoids Yao and Pandit 1995.
     """
     columns = drift_columns(decays.shape[1], -1) if columns is None else columns
-    at = linearise(theta, decays, rate, columns)
+    linearisation = linearise(theta, decays, rate, columns)
     weight = 1.0 / np.broadcast_to(sigma2, len(decays))
-    information = np.einsum("i,ijk->jk", weight, at.information)
+    information = np.einsum("i,ijk->jk", weight, linearisation.information)
     scale = np.sqrt(np.diag(information))
     covariance = np.linalg.inv(information / np.outer(scale, scale)) / np.outer(scale, scale)
     return np.sqrt(np.diag(covariance)).reshape(-1, 2)

@@ -8,22 +8,22 @@ import numpy as np
 
 from turnout.passage.axle_count import best_count, count_without_distance
 from turnout.passage.axle_positions import sensor_times
-from turnout.passage.channel_checks import channel_states, fell_silent, without_pulses
-from turnout.passage.crossing_nose import AT_ONCE, at_a_nose, blows_at_one_place, heard_at_once
+from turnout.passage.channel_checks import channel_states, lost_sensors, without_pulses
+from turnout.passage.crossing_nose import MIN_MOTION_GAIN, detect_at_nose, fixed_impact_correlation, simultaneity
 from turnout.passage.kinematics import Motion
 from turnout.passage.result import Passage
 from turnout.passage.second_train import second_train
-from turnout.passage.sensor_consistency import wrong_channels, wrong_places
-from turnout.passage.sensor_stack import aligned
-from turnout.passage.slowness import pair_likeness, refine_slowness, scan_slowness
-from turnout.passage.speed import combine, motion_of, slowness_from_sensors, with_change
-from turnout.passage.train_detection import hearing, listen, narrowed, track_taken
+from turnout.passage.sensor_consistency import inconsistent_channels, inconsistent_positions
+from turnout.passage.sensor_stack import align_sensors
+from turnout.passage.slowness import pair_correlations, refine_slowness, scan_slowness
+from turnout.passage.speed import combine_speeds, motion_of, slowness_from_sensors, with_acceleration
+from turnout.passage.train_detection import audible_sensors, restrict_to, sensor_envelopes, train_track
 from turnout.passage.train_type import UNKNOWN
 from turnout.records import Recording, Rejection
 
-SHORT_SPAN, PLACE_ALONE = 10.0, 0.3  # m: span of a short row of sensors; position error of each in it
-SHORTEST = 0.1  # s, least duration of a recording: two blocks of the quiet level
-CLEAR = 1.5  # least ratio of accepted to rejected peaks of an unknown train
+MAX_SHORT_SPAN, SHORT_SPAN_ERROR = 10.0, 0.3  # m: span of a short row of sensors; position error of each in it
+MIN_DURATION = 0.1  # s, least duration of a recording: two blocks of the quiet level
+MIN_CONTRAST = 1.5  # least ratio of accepted to rejected peaks of an unknown train
 
 
 def analyse(recording: Recording, sensors, patterns, settings) -> Passage:
@@ -46,187 +46,209 @@ def analyse(recording: Recording, sensors, patterns, settings) -> Passage:
     """
     recording, pulses = without_pulses(recording, sensors)
     states = {s.name: s for s in channel_states(recording)}
-    known = {s.name: s for s in sensors}
-    findings = [*pulses, *(f for s in states.values() if s.name in known for f in s.findings)]
-    used = [known[name] for name, state in states.items() if name in known and state.usable and state.until is None]
-    lost = [known[name] for name, state in states.items() if name in known and state.until is not None]
-    used, lost = (used, lost) if used else (lost, [])
-    if not used:
+    by_name = {s.name: s for s in sensors}
+    findings = [*pulses, *(f for s in states.values() if s.name in by_name for f in s.findings)]
+    usable = [
+        by_name[name] for name, state in states.items() if name in by_name and state.usable and state.lost_at is None
+    ]
+    lost = [by_name[name] for name, state in states.items() if name in by_name and state.lost_at is not None]
+    usable, lost = (usable, lost) if usable else (lost, [])
+    if not usable:
         return Passage("rejected", (*findings, Rejection("no_train", 0.0, 1.0, "no channel can be used")))
-    if recording.duration < SHORTEST:
+    if recording.duration < MIN_DURATION:
         text = f"only {recording.duration:.3f} s were recorded"
-        return Passage("rejected", (*findings, Rejection("no_train", recording.duration, SHORTEST, text)))
-    samples = np.array([recording.signal(s.name) for s in used])
+        return Passage("rejected", (*findings, Rejection("no_train", recording.duration, MIN_DURATION, text)))
+    samples = np.array([recording.signal(s.name) for s in usable])
     samples = samples - np.median(samples, axis=1, keepdims=True)  # a zero offset is no vibration
-    heard = listen(samples, recording.rate, [s.position for s in used], settings.envelope_step)
-    if heard is None:
+    envelopes = sensor_envelopes(samples, recording.rate, [s.position for s in usable], settings.envelope_step)
+    if envelopes is None:
         return Passage("rejected", (*findings, Rejection("no_train", 0.0, None, "nothing stands out of the noise")))
-    track, _ = track_taken(heard, [s.track for s in used])
-    rows = hearing(heard)
+    track, _ = train_track(envelopes, [s.track for s in usable])
+    rows = audible_sensors(envelopes)
     if rows.size == 0:
         return Passage("rejected", (*findings, Rejection("no_train", 0.0, None, "no sensor hears more than noise")))
-    own = [used[i] for i in rows]
-    passage = _of_train(narrowed(heard, rows), own, track, findings, recording.duration, patterns, settings)
-    return _with_silent(passage, heard, used, lost) if passage.n_axle else passage
+    audible = [usable[i] for i in rows]
+    passage = _analyse_train(
+        restrict_to(envelopes, rows), audible, track, findings, recording.duration, patterns, settings
+    )
+    return _with_lost_sensors(passage, envelopes, usable, lost) if passage.n_axle else passage
 
 
-def _with_silent(passage, heard, used, lost):
+def _with_lost_sensors(passage, envelopes, sensors, lost):
     """Passage completed with the sensors that were lost: they say nothing about the train.
 
     Their data up to that moment can still be fitted.
     """
-    side = [i for i, s in enumerate(used) if s.track in ("both", passage.track)]
-    times = {used[i].name: passage.motion.passing(passage.offsets, used[i].position) for i in side}
-    wrong = {f.detail.split(":")[0] for f in passage.findings}
-    side = [i for i in side if used[i].name not in wrong]
-    if not side and not lost:
+    on_track = [i for i, s in enumerate(sensors) if s.track in ("both", passage.track)]
+    times = {sensors[i].name: passage.motion.passing(passage.offsets, sensors[i].position) for i in on_track}
+    wrong_names = {f.detail.split(":")[0] for f in passage.findings}
+    on_track = [i for i in on_track if sensors[i].name not in wrong_names]
+    if not on_track and not lost:
         return passage
-    names = [used[i].name for i in side]
-    silent = fell_silent(heard.only(side), names, times, passage.motion.speed) if side else ()
-    later = {s.name: passage.motion.passing(passage.offsets, s.position) for s in lost}
-    later |= {f.detail.split(":")[0]: times[f.detail.split(":")[0]] for f in silent}
+    names = [sensors[i].name for i in on_track]
+    silent = lost_sensors(envelopes.select(on_track), names, times, passage.motion.speed) if on_track else ()
+    lost_times = {s.name: passage.motion.passing(passage.offsets, s.position) for s in lost}
+    lost_times |= {f.detail.split(":")[0]: times[f.detail.split(":")[0]] for f in silent}
     findings = (*passage.findings, *silent)
     return replace(
         passage,
-        at_sensor={**passage.at_sensor, **later},
+        at_sensor={**passage.at_sensor, **lost_times},
         findings=findings,
         status="partly" if findings else passage.status,
     )
 
 
-def _of_train(heard, used, track, findings, duration, patterns, settings) -> Passage:
+def _analyse_train(envelopes, sensors, track, findings, duration, patterns, settings) -> Passage:
     """Passage of the train that ``sensors`` record."""
-    several, direction, every = bool(np.ptp(heard.positions) > 0.05), "unknown", heard
-    if several:
-        heard, used, direction, counted = _by_several(heard, used, findings, patterns, settings)
+    is_multi_sensor, direction, all_envelopes = bool(np.ptp(envelopes.positions) > 0.05), "unknown", envelopes
+    if is_multi_sensor:
+        envelopes, sensors, direction, count = _count_by_several_sensors(
+            envelopes, sensors, findings, patterns, settings
+        )
     else:
-        counted = count_without_distance(heard, patterns, settings)
-    start, offer, found = counted
-    if offer is None:
+        count = count_without_distance(envelopes, patterns, settings)
+    motion, axles, train_type = count
+    if axles is None:
         return Passage("rejected", (*findings, Rejection("no_train", 0.0, None, "sound, but no axles in it")))
-    passage = _settled(heard, used, start, offer, found, settings, several)
-    passage = replace(passage, direction=direction, track=track, begin=heard.begin, end=heard.end)
+    passage = _estimate_motion(envelopes, sensors, motion, axles, train_type, settings, is_multi_sensor)
+    passage = replace(passage, direction=direction, track=track, begin=envelopes.begin, end=envelopes.end)
     if passage.type.type == UNKNOWN:
-        findings += _doubts(passage, every, several)
-    findings += _cut_off(heard, passage, duration) + second_train(heard, passage, settings)
+        findings += _axle_count_doubts(passage, all_envelopes, is_multi_sensor)
+    findings += _truncation_findings(envelopes, passage, duration) + second_train(envelopes, passage, settings)
     return replace(passage, status="partly" if findings else "accepted", findings=tuple(findings))
 
 
-def _by_several(heard, used, findings, patterns, settings):
+def _count_by_several_sensors(envelopes, sensors, findings, patterns, settings):
     """(envelopes, sensors, direction, (motion, axle finding, type)) from several sensors along the rail.
 
     Sensors that agree on no motion go into ``findings``. They do not if a known train's impacts at a nose explain the
     data.
     """
-    trouble, own, start, direction = _agreeing(heard, used, settings)
-    counted = best_count(own[0], aligned(own[0], start), np.ptp(heard.positions), patterns, settings)
-    accused = bool(trouble) and heard_at_once(heard, start) > -AT_ONCE  # impacts at one moment look like wrong clocks
-    if counted[1] is None or counted[2].type == UNKNOWN or accused:
-        banging = at_a_nose(heard, patterns, settings)
-        if banging is not None:
-            return heard, used, "facing" if banging[0].direction > 0 else "trailing", banging
-    findings += trouble
-    return *own, direction, counted
+    inconsistencies, consistent, motion, direction = _consistent_sensors(envelopes, sensors, settings)
+    count = best_count(
+        consistent[0], align_sensors(consistent[0], motion), np.ptp(envelopes.positions), patterns, settings
+    )
+    is_simultaneous = (
+        bool(inconsistencies) and simultaneity(envelopes, motion) > -MIN_MOTION_GAIN
+    )  # impacts at one moment look like wrong clocks
+    if count[1] is None or count[2].type == UNKNOWN or is_simultaneous:
+        at_nose = detect_at_nose(envelopes, patterns, settings)
+        if at_nose is not None:
+            return envelopes, sensors, "facing" if at_nose[0].direction > 0 else "trailing", at_nose
+    findings += inconsistencies
+    return *consistent, direction, count
 
 
-def _doubts(passage, heard, several) -> list[Rejection]:
+def _axle_count_doubts(passage, envelopes, is_multi_sensor) -> list[Rejection]:
     """Reasons to doubt the number of axles of a train without template."""
-    clear, found = CLEAR if several else 2.0 * CLEAR, []
-    if passage.contrast < clear:
+    min_contrast, doubts = MIN_CONTRAST if is_multi_sensor else 2.0 * MIN_CONTRAST, []
+    if passage.contrast < min_contrast:
         text = f"{passage.n_axle} axles, but the weakest peak is only {passage.contrast:.2f} times the next one"
-        found.append(Rejection("axles_uncertain", passage.contrast, clear, text))
-    if several and (blows := blows_at_one_place(heard, passage.motion)):
+        doubts.append(Rejection("axles_uncertain", passage.contrast, min_contrast, text))
+    if is_multi_sensor and (impacts := fixed_impact_correlation(envelopes, passage.motion)):
         text = f"{passage.n_axle} axles, but sensors hear blows at one moment, as of a crossing's nose or a deep dip"
-        found.append(Rejection("axles_uncertain", *blows, text))
-    return found
+        doubts.append(Rejection("axles_uncertain", *impacts, text))
+    return doubts
 
 
-def _agreeing(heard, used, settings):
+def _consistent_sensors(envelopes, sensors, settings):
     """(findings on inconsistent sensors, (envelopes, sensors) of the consistent ones, their motion, its direction)."""
-    found, keep = wrong_channels(heard, used, settings)
-    used, heard = [s for s, k in zip(used, keep) if k], heard.only(np.flatnonzero(keep))
-    start, direction = _from_scan(heard, settings)
-    trouble, keep = wrong_places(heard, start, used)
-    if trouble and np.ptp(heard.positions[keep]) > 0.05:
-        found += trouble
-        used, heard = [s for s, k in zip(used, keep) if k], heard.only(np.flatnonzero(keep))
-        start, direction = _from_scan(heard, settings)
-    return found, (heard, used), start, direction
+    findings, keep = inconsistent_channels(envelopes, sensors, settings)
+    sensors, envelopes = [s for s, k in zip(sensors, keep) if k], envelopes.select(np.flatnonzero(keep))
+    motion, direction = _motion_from_scan(envelopes, settings)
+    position_findings, keep = inconsistent_positions(envelopes, motion, sensors)
+    if position_findings and np.ptp(envelopes.positions[keep]) > 0.05:
+        findings += position_findings
+        sensors, envelopes = [s for s, k in zip(sensors, keep) if k], envelopes.select(np.flatnonzero(keep))
+        motion, direction = _motion_from_scan(envelopes, settings)
+    return findings, (envelopes, sensors), motion, direction
 
 
-def _from_scan(heard, settings):
+def _motion_from_scan(envelopes, settings):
     """First motion, and the name of its direction, from the slant stack."""
-    scan = scan_slowness(heard.levels.values, heard.levels.step, heard.positions, settings)
-    values, step, positions = heard.levels.values, heard.levels.step, heard.positions
+    scan = scan_slowness(envelopes.levels.values, envelopes.levels.step, envelopes.positions, settings)
+    values, step, positions = envelopes.levels.values, envelopes.levels.step, envelopes.positions
     # a wheel is audible over about a third of a metre
-    near = [n for n, _ in scan.peaks(3)]
-    pairs = pair_likeness(values, step, float(np.clip(0.3 * abs(near[0]), 0.004, 0.03)))
-    found = [refine_slowness(pairs, step, positions, n) for n in near]
-    slowness, likeness = max(found, key=lambda f: f[1])
+    peaks = [n for n, _ in scan.peaks(3)]
+    correlations = pair_correlations(values, step, float(np.clip(0.3 * abs(peaks[0]), 0.004, 0.03)))
+    refined = [refine_slowness(correlations, step, positions, n) for n in peaks]
+    slowness, correlation = max(refined, key=lambda f: f[1])
     sign = 1 if slowness > 0 else -1
-    opposite = np.where(np.sign(scan.slowness) == -sign, scan.likeness, -np.inf)
-    against = refine_slowness(pairs, step, positions, scan.slowness[int(np.argmax(opposite))])[1]
-    name = "unknown" if likeness - against < 0.01 else "facing" if sign > 0 else "trailing"
-    reference = float(np.mean(heard.positions))
-    start = heard.begin - sign * reference * abs(slowness)
+    opposite_correlations = np.where(np.sign(scan.slowness) == -sign, scan.correlation, -np.inf)
+    opposite_correlation = refine_slowness(
+        correlations, step, positions, scan.slowness[int(np.argmax(opposite_correlations))]
+    )[1]
+    name = "unknown" if correlation - opposite_correlation < 0.01 else "facing" if sign > 0 else "trailing"
+    reference = float(np.mean(envelopes.positions))
+    start = envelopes.begin - sign * reference * abs(slowness)
     steady = Motion(1 / abs(slowness), start, 0.0, sign)
-    return with_change(heard, steady, settings.acceleration_limit), name
+    return with_acceleration(envelopes, steady, settings.acceleration_limit), name
 
 
-def _settled(heard, used, start, offer, found, settings, several) -> Passage:
+def _estimate_motion(envelopes, sensors, initial, axles, train_type, settings, is_multi_sensor) -> Passage:
     """Passage with motion from sensors and template together: axle offsets on its scale, times at the sensors."""
-    motion, offsets = start, offer.offsets
+    motion, offsets = initial, axles.offsets
     # a short row of sensors and no template: the position error of each sensor decides
-    alone = several and found.type == UNKNOWN and np.ptp(heard.positions) < SHORT_SPAN
-    place_error = PLACE_ALONE if alone else settings.place_error
+    unaided = is_multi_sensor and train_type.type == UNKNOWN and np.ptp(envelopes.positions) < MAX_SHORT_SPAN
+    position_error = SHORT_SPAN_ERROR if unaided else settings.place_error
     for _ in range(2):
-        times = sensor_times(heard, motion, offsets) if several else motion.time(offsets)[None]
-        from_sensors = _sensor_speed(times, heard, motion.direction, place_error, settings) if several else None
+        times = sensor_times(envelopes, motion, offsets) if is_multi_sensor else motion.time(offsets)[None]
+        from_sensors = (
+            _sensor_speed(times, envelopes, motion.direction, position_error, settings) if is_multi_sensor else None
+        )
         from_type = None
         centre = motion.time(offsets)
         middle = 0.5 * float(centre[0] + centre[-1])
-        if found.type != UNKNOWN:
-            from_type = (found.middle, found.middle_se, found.acceleration, found.acceleration_se, middle)
+        if train_type.type != UNKNOWN:
+            from_type = (
+                train_type.middle_speed,
+                train_type.middle_speed_se,
+                train_type.acceleration,
+                train_type.acceleration_se,
+                middle,
+            )
         if from_sensors is None and from_type is None:
             # an unknown train at one sensor: its bogies give the speed to one sixth
             from_type = (motion.speed, 0.16 * motion.speed, 0.0, 0.3, middle)
-        speed = combine(from_sensors, from_type, middle)
-        settled = abs(speed.at(centre[0]) / motion.speed - 1) < 2e-3
+        speed = combine_speeds(from_sensors, from_type, middle)
+        converged = abs(speed.at(centre[0]) / motion.speed - 1) < 2e-3
         motion = motion_of(speed, float(centre[0]), motion.direction)
-        offsets = motion.way(centre)
-        if settled:
+        offsets = motion.distance(centre)
+        if converged:
             break
-    if found.type == UNKNOWN and not several:
+    if train_type.type == UNKNOWN and not is_multi_sensor:
         speed = replace(speed, source="bogie")
-    at_sensor = {s.name: motion.passing(offsets, x) for s, x in zip(used, heard.positions)}
-    return Passage("accepted", (), motion, speed, offsets, type=found, at_sensor=at_sensor, contrast=offer.contrast)
+    at_sensor = {s.name: motion.passing(offsets, x) for s, x in zip(sensors, envelopes.positions)}
+    return Passage(
+        "accepted", (), motion, speed, offsets, type=train_type, at_sensor=at_sensor, contrast=axles.contrast
+    )
 
 
-def _sensor_speed(times, heard, direction, place_error, settings):
+def _sensor_speed(times, envelopes, direction, position_error, settings):
     """(v, se, a, a_se, time) from delays between sensors; None where fewer than two axles have times at two sensors."""
-    good = np.isfinite(times)
-    axles = good.sum(axis=0) >= 2
+    is_timed = np.isfinite(times)
+    axles = is_timed.sum(axis=0) >= 2
     if axles.sum() < 2:
         return None
-    q, change, se, change_se, at, _ = slowness_from_sensors(
-        times[:, axles], heard.positions, direction, place_error, settings.acceleration_limit
+    q, change, se, change_se, mean_time, _ = slowness_from_sensors(
+        times[:, axles], envelopes.positions, direction, position_error, settings.acceleration_limit
     )
     if not q > 0:
         return None
-    return 1 / q, se / q**2, -change / q**2, max(change_se / q**2, 1e-4), at
+    return 1 / q, se / q**2, -change / q**2, max(change_se / q**2, 1e-4), mean_time
 
 
-def _cut_off(heard, passage, duration):
+def _truncation_findings(envelopes, passage, duration):
     """Findings where the train is present at the start or at the end of the recording."""
-    found = []
+    findings = []
     # an unknown train may have a further bogie, as far away as its bogies are from each other
     gap = 3.0 if passage.type.type != UNKNOWN else 1.05 * max(np.diff(passage.offsets).max(initial=3.0), 3.0)
     reach = gap / passage.motion.speed
     first = min(t[0] for t in passage.at_sensor.values())
     last = max(t[-1] for t in passage.at_sensor.values())
-    if first < reach or heard.begin < 0.05:
-        found.append(Rejection("train_cut_off", first, reach, f"first axle {first:.2f} s after the start"))
-    if duration - last < reach or duration - heard.end < 0.05:
-        left = duration - last
-        found.append(Rejection("train_cut_off", left, reach, f"last axle {left:.2f} s before the end"))
-    return found
+    if first < reach or envelopes.begin < 0.05:
+        findings.append(Rejection("train_cut_off", first, reach, f"first axle {first:.2f} s after the start"))
+    if duration - last < reach or duration - envelopes.end < 0.05:
+        remaining = duration - last
+        findings.append(Rejection("train_cut_off", remaining, reach, f"last axle {remaining:.2f} s before the end"))
+    return findings

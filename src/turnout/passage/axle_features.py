@@ -9,7 +9,7 @@ from scipy import ndimage, signal
 
 from turnout.passage.kinematics import Motion
 
-GRID = 0.04  # m, step of the grid along the train
+GRID_STEP = 0.04  # m, step of the grid along the train
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class AxleFinding:
 
 def along_train(values, step: float, positions, motion: Motion, start: float, stop: float) -> np.ndarray:
     """(n_sensor, n) values at every ``GRID_STEP`` metres along the train between ``start`` and ``stop`` [m]."""
-    offsets = np.arange(start, stop, GRID)
+    offsets = np.arange(start, stop, GRID_STEP)
     bins = np.arange(values.shape[1])
     rows = [
         np.interp(motion.passing(offsets, x) / step - 0.5, bins, row, left=0.0, right=0.0)
@@ -43,8 +43,8 @@ def axle_candidates(profile, start: float, spacing: float, noise: float, feature
     ``noise``. The cut lies where the ratio between neighbouring ranks is large. It never rejects peaks of more than 60
     % of the typical height.
     """
-    peaks, found = signal.find_peaks(profile, distance=max(int(spacing / GRID), 1), prominence=0.2 * noise)
-    height = np.minimum(found["prominences"], 2.0 * profile[peaks])
+    peaks, properties = signal.find_peaks(profile, distance=max(int(spacing / GRID_STEP), 1), prominence=0.2 * noise)
+    height = np.minimum(properties["prominences"], 2.0 * profile[peaks])
     ranked = np.sort(height)[::-1]
     n_sure = int(np.sum(ranked >= noise))
     if n_sure < 2:
@@ -54,14 +54,16 @@ def axle_candidates(profile, start: float, spacing: float, noise: float, feature
     ratio = np.where((ranked >= noise) & (following < 0.6 * typical), ranked / following, 0.0)
     ratio[0] = 0.0
     cuts = [k for k in np.argsort(-ratio, kind="stable")[:n] if ratio[k] > 0] or [n_sure - 1]
-    place = start + _refined(profile, peaks) * GRID
+    positions = start + _refine_peaks(profile, peaks) * GRID_STEP
     return [
-        AxleFinding(place[height >= ranked[k]], height[height >= ranked[k]], float(ranked[k] / following[k]), feature)
+        AxleFinding(
+            positions[height >= ranked[k]], height[height >= ranked[k]], float(ranked[k] / following[k]), feature
+        )
         for k in cuts
     ]
 
 
-def _refined(profile, peaks):
+def _refine_peaks(profile, peaks):
     low, mid, high = (profile[np.clip(peaks + d, 0, len(profile) - 1)] for d in (-1, 0, 1))
     curve = low - 2 * mid + high
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -81,7 +83,7 @@ def deflection_feature(stack, wavenumber: float = 1.1) -> np.ndarray:
     k near 1 per metre for standard rails on ballast. The regularised inverse of that kernel is applied, then a
     Gaussian of 0.25 m. Wheels press in one direction: the sign is that of the larger skewness.
     """
-    x = np.arange(-4.0, 4.0 + GRID / 2, GRID)
+    x = np.arange(-4.0, 4.0 + GRID_STEP / 2, GRID_STEP)
     kx = wavenumber * np.abs(x)
     kernel = np.exp(-kx) * (np.cos(kx) - np.sin(kx))
     n = int(2 ** np.ceil(np.log2(stack.shape[-1] + 2 * len(x))))
@@ -94,11 +96,11 @@ def deflection_feature(stack, wavenumber: float = 1.1) -> np.ndarray:
     return np.where(skew < 0, -1.0, 1.0) * sharp
 
 
-def _smooth(profile, width):
-    return ndimage.gaussian_filter1d(profile, width / GRID, axis=-1)
+def _smooth(profile, deviation):
+    return ndimage.gaussian_filter1d(profile, deviation / GRID_STEP, axis=-1)
 
 
-def scaled(profile, inside) -> tuple[np.ndarray, float]:
+def scale_profile(profile, inside) -> tuple[np.ndarray, float]:
     """Profile divided by its own large values within the train, and its noise on that scale.
 
     The noise is the standard deviation that the quietest 30 % of the values would have if they were normal. They lie

@@ -8,11 +8,11 @@ from itertools import combinations
 import numpy as np
 from scipy import signal
 
-from turnout.passage.axle_features import GRID, along_train
+from turnout.passage.axle_features import GRID_STEP, along_train
 
-STEP = 0.001  # s, bins of the slow acceleration
-HEARD = 0.3  # relative standard error of an amplitude; above it the logarithm has no normal error
-TRUSTED = (0.12, 0.9)  # cycles per metre: below is drift, above is vibration
+TIME_STEP = 0.001  # s, bins of the slow acceleration
+MAX_AMPLITUDE_ERROR = 0.3  # relative standard error of an amplitude; above it the logarithm has no normal error
+WAVENUMBER_BAND = (0.12, 0.9)  # cycles per metre: below is drift, above is vibration
 
 
 @dataclass(frozen=True)
@@ -52,15 +52,15 @@ def quasi_static(samples, rate: float, passage, position: float) -> np.ndarray:
     with wavenumber 1.1 per metre. Data and κ are both limited to ``WAVENUMBER_BAND`` along the train. v_j is the speed
     of axle j at the sensor; v_0 is the speed of the motion, which is that of the calibration.
     """
-    per_bin = max(round(STEP * rate), 1)
+    per_bin = max(round(TIME_STEP * rate), 1)
     n = len(samples) // per_bin
     slow = np.asarray(samples[: n * per_bin], float).reshape(n, per_bin).mean(axis=1)
     start, stop = passage.offsets[0] - 12.0, passage.offsets[-1] + 12.0
     motion = passage.motion
     row = along_train((slow - np.median(slow))[None], per_bin / rate, [position], motion, start, stop)[0]
-    sections = signal.butter(3, TRUSTED, btype="bandpass", fs=1.0 / GRID, output="sos")
-    place = np.arange(len(row)) * GRID + start
-    kx = 1.1 * np.abs(place[:, None] - passage.offsets)
+    sections = signal.butter(3, WAVENUMBER_BAND, btype="bandpass", fs=1.0 / GRID_STEP, output="sos")
+    grid = np.arange(len(row)) * GRID_STEP + start
+    kx = 1.1 * np.abs(grid[:, None] - passage.offsets)
     columns = np.exp(-kx) * (np.cos(kx) - np.sin(kx))
     columns *= (motion.speed_at(motion.passing(passage.offsets, position)) / motion.speed) ** 2
     columns = signal.sosfiltfilt(sections, columns, axis=0)
@@ -82,7 +82,7 @@ def train_amplitude(per_axle) -> tuple[float, float]:
     return float(per_axle.mean()), float(per_axle.std(ddof=1) / np.sqrt(per_axle.size))
 
 
-def calibrate(amplitudes, loads, speeds, fewest: int = 5, errors=None) -> LoadCalibration | None:
+def calibrate(amplitudes, loads, speeds, min_trains: int = 5, errors=None) -> LoadCalibration | None:
     """Calibration of one channel from trains of known mean axle load; None from fewer than ``min_trains``.
 
     Parameters
@@ -100,54 +100,66 @@ def calibrate(amplitudes, loads, speeds, fewest: int = 5, errors=None) -> LoadCa
     amplitudes, loads, speeds = (np.asarray(x, dtype=float) for x in (amplitudes, loads, speeds))
     amplitudes = np.abs(amplitudes)
     errors = np.zeros(amplitudes.shape) if errors is None else np.asarray(errors, dtype=float)
-    good = (amplitudes > 0) & (loads > 0) & (errors <= HEARD * amplitudes)
-    if good.sum() < max(fewest, 3):
+    is_usable = (amplitudes > 0) & (loads > 0) & (errors <= MAX_AMPLITUDE_ERROR * amplitudes)
+    if is_usable.sum() < max(min_trains, 3):
         return None
-    reference = float(np.exp(np.mean(np.log(speeds[good]))))
-    relative = np.log(speeds[good] / reference)
-    target = np.log(amplitudes[good] / loads[good])
+    reference = float(np.exp(np.mean(np.log(speeds[is_usable]))))
+    relative = np.log(speeds[is_usable] / reference)
+    target = np.log(amplitudes[is_usable] / loads[is_usable])
     # acceleration goes with v²; trains of one speed cannot show anything else
     prior = np.array([[0.0, 0.0], [0.0, 1 / 0.3**2]])
-    scatter, own = 0.05, (errors[good] / amplitudes[good]) ** 2
-    design = np.column_stack([np.ones(good.sum()), relative])
+    scatter, own_variance = 0.05, (errors[is_usable] / amplitudes[is_usable]) ** 2
+    design = np.column_stack([np.ones(is_usable.sum()), relative])
     for _ in range(10):
-        weight = 1.0 / (scatter**2 + own)
+        weight = 1.0 / (scatter**2 + own_variance)
         normal = (design * weight[:, None]).T @ design + prior
         solution = np.linalg.solve(normal, design.T @ (weight * target) + prior @ [0.0, 2.0])
         residual = target - design @ solution
         # variance beyond the trains' own errors, weighted as the fit is
-        excess = np.sum(weight * (residual**2 * good.sum() / max(good.sum() - 2, 1) - own)) / weight.sum()
+        excess = (
+            np.sum(weight * (residual**2 * is_usable.sum() / max(is_usable.sum() - 2, 1) - own_variance)) / weight.sum()
+        )
         scatter = float(np.sqrt(max(excess, 1e-6)))
-    low, high = speeds[good].min(), speeds[good].max()
+    low, high = speeds[is_usable].min(), speeds[is_usable].max()
     covariance = np.linalg.inv(normal)
     return LoadCalibration(
-        float(solution[0]), float(solution[1]), covariance, scatter, int(good.sum()), reference, float(low), float(high)
+        float(solution[0]),
+        float(solution[1]),
+        covariance,
+        scatter,
+        int(is_usable.sum()),
+        reference,
+        float(low),
+        float(high),
     )
 
 
-def with_shared(calibrations, trains) -> dict[str, LoadCalibration]:
+def with_error_correlation(calibrations, trains) -> dict[str, LoadCalibration]:
     """The ``calibrations`` by channel, with the correlation of the trains' residuals in any two channels.
 
     A wrong speed, frozen ballast and the train's own roughness are the same in all sensors: more sensors do not help.
     ``trains`` are dicts with "load" [t], "speed" [m/s] and "amplitudes", channel -> (mean, standard error) [m/s²].
     """
-    left = {name: [_left(found, train, name) for train in trains] for name, found in calibrations.items()}
-    together, alone = 0.0, 0.0
-    for one, other in combinations(left.values(), 2):
-        a, b = np.array([pair for pair in zip(one, other) if None not in pair], dtype=float).reshape(-1, 2).T
-        together += float(a @ b)
-        alone += float(np.sqrt((a @ a) * (b @ b)))
-    shared = min(max(together / alone, 0.0), 1.0) if alone > 0.0 else 1.0
-    return {name: replace(found, shared=shared) for name, found in calibrations.items()}
+    residuals = {
+        name: [_standardised_residual(calibration, train, name) for train in trains]
+        for name, calibration in calibrations.items()
+    }
+    covariance_sum, power_sum = 0.0, 0.0
+    for first, second in combinations(residuals.values(), 2):
+        a, b = np.array([pair for pair in zip(first, second) if None not in pair], dtype=float).reshape(-1, 2).T
+        covariance_sum += float(a @ b)
+        power_sum += float(np.sqrt((a @ a) * (b @ b)))
+    shared = min(max(covariance_sum / power_sum, 0.0), 1.0) if power_sum > 0.0 else 1.0
+    return {name: replace(calibration, shared=shared) for name, calibration in calibrations.items()}
 
 
-def _left(found, train, name):
+def _standardised_residual(calibration, train, name):
     """Residual of one train in one channel, in standard deviations; None where the train did not count."""
     mean, error = np.abs(train["amplitudes"].get(name, (0.0, 0.0)))
-    if mean == 0.0 or train["load"] <= 0.0 or error > HEARD * mean:
+    if mean == 0.0 or train["load"] <= 0.0 or error > MAX_AMPLITUDE_ERROR * mean:
         return None
-    expected = found.log_gain + found.exponent * np.log(train["speed"] / found.speed)
-    return float((np.log(mean / train["load"]) - expected) / np.hypot(found.scatter, error / mean))
+    expected = calibration.log_gain + calibration.exponent * np.log(train["speed"] / calibration.speed)
+    return float((np.log(mean / train["load"]) - expected) / np.hypot(calibration.scatter, error / mean))
 
 
 def axle_load(recording, passage, calibrations, settings) -> LoadFinding | None:
@@ -156,30 +168,32 @@ def axle_load(recording, passage, calibrations, settings) -> LoadFinding | None:
     A calibration is used between 0.8 times its slowest and 1.25 times its fastest train.
     """
     logs, errors, shapes, shared = [], [], [], 1.0
-    known = {c.name: c for c in recording.channels}
+    channels = {c.name: c for c in recording.channels}
     for name in passage.at_sensor:
-        found = calibrations.get(name)
+        calibration = calibrations.get(name)
         speed = passage.motion.speed
-        if found is None or not 0.8 * found.slowest <= speed <= 1.25 * found.fastest:
+        if calibration is None or not 0.8 * calibration.slowest <= speed <= 1.25 * calibration.fastest:
             continue
-        amplitudes = quasi_static(recording.signal(name), recording.rate, passage, known[name].position)
+        amplitudes = quasi_static(recording.signal(name), recording.rate, passage, channels[name].position)
         mean, error = np.abs(train_amplitude(amplitudes))
-        if mean == 0 or error > HEARD * mean:
+        if mean == 0 or error > MAX_AMPLITUDE_ERROR * mean:
             continue
-        where = np.array([1.0, np.log(speed / found.speed)])
-        logs.append(np.log(mean) - where @ [found.log_gain, found.exponent])
-        errors.append(np.sqrt(where @ found.covariance @ where + found.scatter**2 + (error / mean) ** 2))
+        regressors = np.array([1.0, np.log(speed / calibration.speed)])
+        logs.append(np.log(mean) - regressors @ [calibration.log_gain, calibration.exponent])
+        errors.append(
+            np.sqrt(regressors @ calibration.covariance @ regressors + calibration.scatter**2 + (error / mean) ** 2)
+        )
         shapes.append(amplitudes / np.mean(amplitudes))
-        shared = found.shared
+        shared = calibration.shared
     if not logs:
         return None
     weight = np.array(errors) ** -2
-    log = float(np.sum(weight * logs) / weight.sum())
-    each = weight * np.array(errors) / weight.sum()
-    variance = shared * each.sum() ** 2 + (1.0 - shared) * np.sum(each**2)
-    between = float(np.sqrt(np.sum(weight * (np.array(logs) - log) ** 2) / weight.sum())) if len(logs) > 1 else 0.0
+    log_mean = float(np.sum(weight * logs) / weight.sum())
+    contributions = weight * np.array(errors) / weight.sum()
+    variance = shared * contributions.sum() ** 2 + (1.0 - shared) * np.sum(contributions**2)
+    between = float(np.sqrt(np.sum(weight * (np.array(logs) - log_mean) ** 2) / weight.sum())) if len(logs) > 1 else 0.0
     relative = float(max(np.sqrt(variance), between / np.sqrt(len(logs))))
     if relative > settings.load_relative_error_maximum:
         return None
-    mean = float(np.exp(log))
+    mean = float(np.exp(log_mean))
     return LoadFinding(mean, relative * mean, mean * np.mean(shapes, axis=0))

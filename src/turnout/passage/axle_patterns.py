@@ -28,13 +28,13 @@ class Vehicle:
         """Rear overhang. [m]"""
         return self.length - self.axles[-1]
 
-    def reversed(self) -> Vehicle:
+    def reverse(self) -> Vehicle:
         """The vehicle in the other direction; itself where it is symmetric to a millimetre."""
-        turned = tuple(round(self.length - x, 4) for x in reversed(self.axles))
-        if np.allclose(turned, self.axles, atol=1e-3):
+        axles = tuple(round(self.length - x, 4) for x in reversed(self.axles))
+        if np.allclose(axles, self.axles, atol=1e-3):
             return self
         name = self.name.removesuffix("'") if self.name.endswith("'") else self.name + "'"
-        return Vehicle(name, self.length, turned)
+        return Vehicle(name, self.length, axles)
 
     @classmethod
     def of(cls, name: str, values: Mapping) -> Vehicle:
@@ -67,20 +67,20 @@ class Pattern:
     type: str
     groups: tuple[Group, ...]
 
-    def reversed(self) -> Pattern:
+    def reverse(self) -> Pattern:
         """The same train in the other direction."""
         groups = tuple(
-            Group(tuple(v.reversed() for v in g.vehicles), g.minimum, g.maximum) for g in reversed(self.groups)
+            Group(tuple(v.reverse() for v in g.vehicles), g.minimum, g.maximum) for g in reversed(self.groups)
         )
         return Pattern(self.type, groups)
 
-    def only_row(self):
+    def fixed_row(self):
         """(0.0, vehicles, 0.0) where the pattern has one composition only, else None."""
         if any(len(g.vehicles) > 1 or g.minimum != g.maximum for g in self.groups):
             return None
         return 0.0, tuple(v for g in self.groups for v in g.vehicles * g.minimum), 0.0
 
-    def following(self, g: int, count: int):
+    def next_vehicles(self, g: int, count: int):
         """(group, vehicles used of it) of each possible next vehicle behind ``count`` vehicles of group ``g``."""
         if count < self.groups[g].maximum:
             yield g, count + 1
@@ -90,7 +90,7 @@ class Pattern:
                 if self.groups[later].minimum > 0:
                     return
 
-    def may_end(self, g: int, count: int) -> bool:
+    def can_end(self, g: int, count: int) -> bool:
         """Whether the train can end behind ``count`` vehicles of group ``g``."""
         return count >= self.groups[g].minimum and all(group.minimum == 0 for group in self.groups[g + 1 :])
 
@@ -110,7 +110,7 @@ class Pattern:
         return {v.name: np.diff(v.axles).tolist() for g in self.groups for v in g.vehicles}
 
     @cached_property
-    def log_choices(self) -> list[float]:
+    def log_n_choices(self) -> list[float]:
         """Logarithm of the number of vehicles that each group offers."""
         return [float(np.log(len(g.vehicles))) for g in self.groups]
 
@@ -129,8 +129,8 @@ def offsets(vehicles) -> np.ndarray:
     [0.0, 6.0, 10.0, 16.0]
     """
     front = np.concatenate([[0.0], np.cumsum([v.length for v in vehicles])])
-    places = np.concatenate([start + np.asarray(v.axles) for start, v in zip(front, vehicles)])
-    return places - places[0]
+    positions = np.concatenate([start + np.asarray(v.axles) for start, v in zip(front, vehicles)])
+    return positions - positions[0]
 
 
 def read_patterns(document: Mapping) -> tuple[Pattern, ...]:
@@ -145,12 +145,12 @@ def read_patterns(document: Mapping) -> tuple[Pattern, ...]:
     for name, values in document["trains"].items():
         type_ = values.get("type", name)
         groups = tuple(_group(item, vehicles, name) for item in values["units"])
-        turned = Pattern(type_, groups).reversed().groups
+        reversed_groups = Pattern(type_, groups).reverse().groups
         for n in range(1, int(values.get("coupled", 1)) + 1):
-            made = {Pattern(type_, groups * n), Pattern(type_, turned * n)}
+            compositions = {Pattern(type_, groups * n), Pattern(type_, reversed_groups * n)}
             if values.get("mixed", False) and n == 2:
-                made |= {Pattern(type_, groups + turned), Pattern(type_, turned + groups)}
-            patterns += sorted(made, key=repr)
+                compositions |= {Pattern(type_, groups + reversed_groups), Pattern(type_, reversed_groups + groups)}
+            patterns += sorted(compositions, key=repr)
     return tuple(patterns)
 
 
@@ -158,11 +158,11 @@ def _group(item, vehicles, type_) -> Group:
     if isinstance(item, str):
         item = {"any": [item]}
     names = item["any"] if isinstance(item["any"], list) else [item["any"]]
-    found = []
+    choices = []
     for name in names:
         base = str(name).removesuffix("'")
         if base not in vehicles:
             raise KeyError(f"train {type_}: no vehicle {base!r}; there are {sorted(vehicles)}")
-        found.append(vehicles[base].reversed() if str(name).endswith("'") else vehicles[base])
-    least, most = item.get("count", (1, 1))
-    return Group(tuple(found), int(least), int(most))
+        choices.append(vehicles[base].reverse() if str(name).endswith("'") else vehicles[base])
+    minimum, maximum = item.get("count", (1, 1))
+    return Group(tuple(choices), int(minimum), int(maximum))

@@ -7,18 +7,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from turnout.passage.axle_features import GRID, along_train
+from turnout.passage.axle_features import GRID_STEP, along_train
 from turnout.passage.kinematics import Motion
-from turnout.passage.sensor_stack import Listening
+from turnout.passage.sensor_stack import SensorEnvelopes
 
-REACH = 2.0  # m compared on either side of an axle
-ROUND = 0.12  # m: contact patch and sleepers round the cusp at a wheel
-MOST = 0.6  # m that an axle may move in the fit
-APART = 3.5  # m: axles further from each other are fitted one by one
-EVERY = 2  # every second point of the grid is compared
+FIT_REACH = 2.0  # m compared on either side of an axle
+CONTACT_ROUNDING = 0.12  # m: contact patch and sleepers round the cusp at a wheel
+MAX_SHIFT = 0.6  # m that an axle may move in the fit
+MIN_SEPARATION = 3.5  # m: axles further from each other are fitted one by one
+GRID_STRIDE = 2  # every second point of the grid is compared
 
 
-def axle_places(listening: Listening, motion: Motion, offsets) -> np.ndarray:
+def fit_axle_positions(envelopes: SensorEnvelopes, motion: Motion, offsets) -> np.ndarray:
     r"""(n_axle,) offsets [m] of the model that comes closest to the level along the train.
 
     .. math:: L(s) = \ln\Bigl(1 + \sum_j e^{\alpha_j - 2 r_j/\ell}\Bigr), \qquad r_j = \sqrt{(s - d_j)^2 + \rho^2}
@@ -28,47 +28,47 @@ def axle_places(listening: Listening, motion: Motion, offsets) -> np.ndarray:
     axle that would move more than 0.6 m stays where it was.
     """
     offsets = np.asarray(offsets, dtype=float)
-    start, stop = offsets[0] - REACH, offsets[-1] + REACH
-    values, positions = listening.levels.values, listening.positions
-    level = along_train(values, listening.levels.step, positions, motion, start, stop).mean(axis=0)
-    place, level = (start + np.arange(level.size) * GRID)[::EVERY], level[::EVERY]
-    height = np.maximum(np.interp(offsets, place, level), 0.1)
-    moved = offsets.copy()
-    for part in np.split(np.arange(offsets.size), np.flatnonzero(np.diff(offsets) > APART) + 1):
-        inside = slice(*np.searchsorted(place, [offsets[part[0]] - REACH, offsets[part[-1]] + REACH]))
-        first = np.concatenate([offsets[part], height[part], [0.0]])
-        found = _fitted(place[inside], level[inside], first, part.size)
-        moved[part] = np.where(np.abs(found - offsets[part]) <= MOST, found, offsets[part])
-    return moved if np.all(np.diff(moved) > 0.5) else offsets
+    start, stop = offsets[0] - FIT_REACH, offsets[-1] + FIT_REACH
+    values, positions = envelopes.levels.values, envelopes.positions
+    level = along_train(values, envelopes.levels.step, positions, motion, start, stop).mean(axis=0)
+    grid, level = (start + np.arange(level.size) * GRID_STEP)[::GRID_STRIDE], level[::GRID_STRIDE]
+    height = np.maximum(np.interp(offsets, grid, level), 0.1)
+    new_offsets = offsets.copy()
+    for group in np.split(np.arange(offsets.size), np.flatnonzero(np.diff(offsets) > MIN_SEPARATION) + 1):
+        inside = slice(*np.searchsorted(grid, [offsets[group[0]] - FIT_REACH, offsets[group[-1]] + FIT_REACH]))
+        initial = np.concatenate([offsets[group], height[group], [0.0]])
+        candidates = _fit_positions(grid[inside], level[inside], initial, group.size)
+        new_offsets[group] = np.where(np.abs(candidates - offsets[group]) <= MAX_SHIFT, candidates, offsets[group])
+    return new_offsets if np.all(np.diff(new_offsets) > 0.5) else offsets
 
 
-def _fitted(place, level, x, n, passes=15):
+def _fit_positions(grid, level, x, n, passes=15):
     """(n,) positions by Levenberg and Marquardt from ``x``: positions, heights, logarithm of the decay length."""
-    misfit, jacobian = _model(place, level, x, n)
-    square, damping = misfit @ misfit, 1e-2
+    misfit, jacobian = _level_misfit(grid, level, x, n)
+    cost, damping = misfit @ misfit, 1e-2
     for _ in range(passes):
         normal = jacobian.T @ jacobian
         normal[np.diag_indices_from(normal)] *= 1.0 + damping
         normal[np.diag_indices_from(normal)] += 1e-9
         trial = x - np.clip(np.linalg.solve(normal, jacobian.T @ misfit), -0.5, 0.5)
-        new_misfit, new_jacobian = _model(place, level, trial, n)
-        new_square = new_misfit @ new_misfit
-        if new_square >= square:
+        new_misfit, new_jacobian = _level_misfit(grid, level, trial, n)
+        new_cost = new_misfit @ new_misfit
+        if new_cost >= cost:
             damping *= 10.0
             if damping > 1e6:
                 break
             continue
-        done = square - new_square < 1e-4 * square
-        x, misfit, jacobian, square, damping = trial, new_misfit, new_jacobian, new_square, damping / 5.0
-        if done:
+        converged = cost - new_cost < 1e-4 * cost
+        x, misfit, jacobian, cost, damping = trial, new_misfit, new_jacobian, new_cost, damping / 5.0
+        if converged:
             break
     return x[:n]
 
 
-def _model(place, level, x, n):
+def _level_misfit(grid, level, x, n):
     """Misfit (n_grid,) and its derivatives (n_grid, 2 n + 1)."""
-    distance = place[:, None] - x[:n]
-    r, length = np.hypot(distance, ROUND), np.exp(x[-1])
+    distance = grid[:, None] - x[:n]
+    r, length = np.hypot(distance, CONTACT_ROUNDING), np.exp(x[-1])
     u = np.exp(np.minimum(x[n:-1] - 2.0 * r / length, 50.0))
     total = 1.0 + u.sum(axis=1, keepdims=True)
     share = u / total
@@ -76,11 +76,11 @@ def _model(place, level, x, n):
     return np.log(total[:, 0]) - level, np.hstack([share * 2.0 / length * distance / r, share, by_length])
 
 
-def sensor_times(listening: Listening, motion: Motion, offsets) -> np.ndarray:
+def sensor_times(envelopes: SensorEnvelopes, motion: Motion, offsets) -> np.ndarray:
     """(n_sensor, n_axle) passing times [s]; nan where a sensor's axle position deviates much from the common one."""
     rows = []
-    for i, x in enumerate(listening.positions):
-        places = axle_places(listening.only([i]), motion, offsets)
-        moved = np.abs(places - offsets - np.median(places - offsets))
-        rows.append(np.where(moved < 0.7 * MOST, motion.passing(places, x), np.nan))
+    for i, x in enumerate(envelopes.positions):
+        axle_positions = fit_axle_positions(envelopes.select([i]), motion, offsets)
+        deviation = np.abs(axle_positions - offsets - np.median(axle_positions - offsets))
+        rows.append(np.where(deviation < 0.7 * MAX_SHIFT, motion.passing(axle_positions, x), np.nan))
     return np.array(rows)

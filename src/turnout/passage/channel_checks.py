@@ -24,22 +24,22 @@ class ChannelState:
 
     name: str
     usable: bool
-    sound: bool
+    fit_for_model: bool
     findings: tuple[Rejection, ...] = ()
-    until: float | None = None
+    lost_at: float | None = None
 
 
 def channel_states(recording: Recording) -> tuple[ChannelState, ...]:
     """State of every acceleration channel, in the order of ``recording.of_quantity("acceleration")``."""
     rows = recording.of_quantity("acceleration")
-    return tuple(_state(recording.channels[i], recording.samples[i], recording.rate) for i in rows)
+    return tuple(_channel_state(recording.channels[i], recording.samples[i], recording.rate) for i in rows)
 
 
-def _state(channel, samples, rate) -> ChannelState:
+def _channel_state(channel, samples, rate) -> ChannelState:
     if not np.all(np.isfinite(samples)):
         bad = np.flatnonzero(~np.isfinite(samples))
-        found = Rejection("not_finite", float(bad.size), 0.0, f"{channel.name}: first at {bad[0] / rate:.3f} s")
-        return ChannelState(channel.name, False, False, (found,))
+        finding = Rejection("not_finite", float(bad.size), 0.0, f"{channel.name}: first at {bad[0] / rate:.3f} s")
+        return ChannelState(channel.name, False, False, (finding,))
     spread = float(np.ptp(samples))
     if spread == 0.0:
         return ChannelState(channel.name, False, False, (Rejection("dead_channel", 0.0, 0.0, channel.name),))
@@ -48,11 +48,11 @@ def _state(channel, samples, rate) -> ChannelState:
     if share > 0:
         text = f"{channel.name}: {100 * share:.3f} % of the samples at ±{level:.4g} m/s²"
         findings.append(Rejection("clipped", share, 0.0, text))
-    silent = silent_from(samples, rate)
-    if silent is not None:
-        text = f"{channel.name}: constant from {silent:.2f} s on"
-        findings.append(Rejection("sensor_lost", silent, None, text))
-    return ChannelState(channel.name, share < 0.2, not findings, tuple(findings), silent)
+    lost_at = silent_from(samples, rate)
+    if lost_at is not None:
+        text = f"{channel.name}: constant from {lost_at:.2f} s on"
+        findings.append(Rejection("sensor_lost", lost_at, None, text))
+    return ChannelState(channel.name, share < 0.2, not findings, tuple(findings), lost_at)
 
 
 def clipped_share(samples, limit: float | None, run: int = 3) -> tuple[float, float]:
@@ -70,13 +70,13 @@ def clipped_share(samples, limit: float | None, run: int = 3) -> tuple[float, fl
     """
     top = float(np.max(np.abs(samples)))
     if limit is not None:
-        at = np.abs(samples) >= 0.999 * limit
-        return float(at.mean()), float(limit)
-    at = np.abs(samples) >= top * (1 - 1e-6)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], at.astype(int), [0]])))
+        at_limit = np.abs(samples) >= 0.999 * limit
+        return float(at_limit.mean()), float(limit)
+    at_limit = np.abs(samples) >= top * (1 - 1e-6)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], at_limit.astype(int), [0]])))
     lengths = edges[1::2] - edges[::2]
     clipped = np.sum(lengths >= run) >= 2
-    return (float(at.mean()), top) if clipped else (0.0, top)
+    return (float(at_limit.mean()), top) if clipped else (0.0, top)
 
 
 def silent_from(samples, rate: float, block: float = 0.05) -> float | None:
@@ -103,9 +103,9 @@ def converter_step(samples) -> float:
     return float(np.min(change, where=change > 0, initial=np.inf)) if change.any() else 0.0
 
 
-TIMES = 8.0  # least height of a pulse, in units of the 99.9 % quantile of the channel
-SAME, APART = 2e-4, 2.0  # s: largest delay between sensors; m: least span of the sensors
-AROUND, LONGEST = 3e-3, 1e-2  # s: filter ringing on both sides of a pulse; longest pulse
+PULSE_FACTOR = 8.0  # least height of a pulse, in units of the 99.9 % quantile of the channel
+MAX_PULSE_DELAY, MIN_SENSOR_SPAN = 2e-4, 2.0  # s: largest delay between sensors; m: least span of the sensors
+PULSE_MARGIN, MAX_PULSE_DURATION = 3e-3, 1e-2  # s: filter ringing on both sides of a pulse; longest pulse
 
 
 def without_pulses(recording: Recording, sensors) -> tuple[Recording, tuple[Rejection, ...]]:
@@ -114,47 +114,49 @@ def without_pulses(recording: Recording, sensors) -> tuple[Recording, tuple[Reje
     ``sensors`` are PassageSensors. Nothing is cut where the live ones are less than 2 m from each other. A channel
     that is constant or not finite stays as it is and is not asked.
     """
-    places = {s.name: s.position for s in sensors}
-    rows = [i for i, c in enumerate(recording.channels) if c.name in places and _lives(recording.samples[i])]
-    if len(rows) < 2 or np.ptp([places[recording.channels[i].name] for i in rows]) < APART:
+    positions = {s.name: s.position for s in sensors}
+    rows = [i for i, c in enumerate(recording.channels) if c.name in positions and _is_live(recording.samples[i])]
+    if len(rows) < 2 or np.ptp([positions[recording.channels[i].name] for i in rows]) < MIN_SENSOR_SPAN:
         return recording, ()
-    near = 2 * max(round(SAME * recording.rate), 1) + 1
-    shared = np.ones(recording.n_sample, dtype=bool)
+    window = 2 * max(round(MAX_PULSE_DELAY * recording.rate), 1) + 1
+    is_pulse = np.ones(recording.n_sample, dtype=bool)
     for i in rows:
-        size = np.abs(recording.samples[i] - np.median(recording.samples[i]))
-        shared &= ndimage.maximum_filter1d(size, near) > TIMES * np.quantile(size, 0.999)
-        if not shared.any():
+        magnitude = np.abs(recording.samples[i] - np.median(recording.samples[i]))
+        is_pulse &= ndimage.maximum_filter1d(magnitude, window) > PULSE_FACTOR * np.quantile(magnitude, 0.999)
+        if not is_pulse.any():
             return recording, ()
-    cut, n = _regions(shared, recording.rate)
+    cut, n = _pulse_regions(is_pulse, recording.rate)
     if not n:
         return recording, ()
-    samples, at, kept = recording.samples.copy(), np.flatnonzero(cut), np.flatnonzero(~cut)
+    samples, in_pulse, valid = recording.samples.copy(), np.flatnonzero(cut), np.flatnonzero(~cut)
     for i in rows:
-        samples[i, at] = np.interp(at, kept, samples[i, kept])
-    text = f"all channels: {n} electrical pulse{'s' * (n > 1)} cut out, the first at {at[0] / recording.rate:.3f} s"
+        samples[i, in_pulse] = np.interp(in_pulse, valid, samples[i, valid])
+    text = (
+        f"all channels: {n} electrical pulse{'s' * (n > 1)} cut out, the first at {in_pulse[0] / recording.rate:.3f} s"
+    )
     return replace(recording, samples=samples), (Rejection("interference", float(n), 0.0, text),)
 
 
-def _lives(samples) -> bool:
+def _is_live(samples) -> bool:
     return bool(np.isfinite(samples).all()) and np.ptp(samples) > 0.0
 
 
-def _regions(shared, rate):
+def _pulse_regions(is_pulse, rate):
     """((n_sample,) bool to cut, number of pulses): pulses with their ringing; longer events are not pulses."""
-    label, _n = ndimage.label(ndimage.maximum_filter1d(shared, 2 * round(AROUND * rate) + 1))
+    label, _n = ndimage.label(ndimage.maximum_filter1d(is_pulse, 2 * round(PULSE_MARGIN * rate) + 1))
     runs = ndimage.find_objects(label)
-    short = [run for (run,) in runs if run.stop - run.start <= (LONGEST + 2 * AROUND) * rate]
-    cut = np.zeros(shared.size, dtype=bool)
+    short = [run for (run,) in runs if run.stop - run.start <= (MAX_PULSE_DURATION + 2 * PULSE_MARGIN) * rate]
+    cut = np.zeros(is_pulse.size, dtype=bool)
     for run in short:
         cut[run] = True
     return cut, len(short)
 
 
-FAINT = 0.2  # of a sensor's typical log level at axles: below it an axle is not audible
-REACH = 0.5  # m around an axle in which its level is taken
+MIN_RELATIVE_LEVEL = 0.2  # of a sensor's typical log level at axles: below it an axle is not audible
+AXLE_REACH = 0.5  # m around an axle in which its level is taken
 
 
-def fell_silent(heard, names, at_sensor, speed: float) -> list[Rejection]:
+def lost_sensors(envelopes, names, at_sensor, speed: float) -> list[Rejection]:
     """A finding "sensor_lost" for every sensor that records the first half of the train and not its last two axles.
 
     Parameters
@@ -172,22 +174,22 @@ def fell_silent(heard, names, at_sensor, speed: float) -> list[Rejection]:
     list of Rejection
         With the time of the last audible sample as their value. [s]
     """
-    step, found = heard.levels.step, []
-    reach = max(int(REACH / speed / step), 1)
-    loudest = ndimage.maximum_filter1d(heard.levels.values, 2 * reach + 1, axis=1)
-    for name, level, row in zip(names, heard.levels.values, loudest):
+    step, findings = envelopes.levels.step, []
+    reach = max(int(AXLE_REACH / speed / step), 1)
+    loudest = ndimage.maximum_filter1d(envelopes.levels.values, 2 * reach + 1, axis=1)
+    for name, level, row in zip(names, envelopes.levels.values, loudest):
         times = np.asarray(at_sensor.get(name, ()))
         inside = times[(times > 0) & (times < len(row) * step)]
         if inside.size < 4:
             continue
         at_axles = row[(inside / step).astype(int)]
-        usual = np.median(at_axles[: inside.size // 2])
-        silent = at_axles < FAINT * usual
-        if usual <= 0 or not silent[-2:].all() or silent[: inside.size // 2].mean() > 0.25:
+        typical = np.median(at_axles[: inside.size // 2])
+        is_silent = at_axles < MIN_RELATIVE_LEVEL * typical
+        if typical <= 0 or not is_silent[-2:].all() or is_silent[: inside.size // 2].mean() > 0.25:
             continue
-        first_silent = int(np.flatnonzero(~silent)[-1]) + 1
+        first_silent = int(np.flatnonzero(~is_silent)[-1]) + 1
         stop = int(inside[first_silent] / step)
-        until = (np.flatnonzero(level[:stop] >= FAINT * usual)[-1] + 1) * step
-        text = f"{name}: hears nothing from {until:.2f} s on, {inside.size - first_silent} axles before the last"
-        found.append(Rejection("sensor_lost", float(until), None, text))
-    return found
+        lost_at = (np.flatnonzero(level[:stop] >= MIN_RELATIVE_LEVEL * typical)[-1] + 1) * step
+        text = f"{name}: hears nothing from {lost_at:.2f} s on, {inside.size - first_silent} axles before the last"
+        findings.append(Rejection("sensor_lost", float(lost_at), None, text))
+    return findings

@@ -12,11 +12,11 @@ from turnout.passage.impact_timing import ImpactTimes, impact_times
 from turnout.passage.impulse_fit import joint_fit, whitener
 from turnout.passage.model_tests import DirectionTest, NullBand, direction_test, null_bases, null_scores
 from turnout.passage.scores import Scores, common_delay, delay_power, forecast, score
-from turnout.passage.wheel_basis import band_pass, filtered, wheel_basis
+from turnout.passage.wheel_basis import apply_filter, band_pass, wheel_basis
 from turnout.records import ModalModel
 
 ACCEPTED, NULL, NOT_AN_IMPULSE, REJECTED = "accepted", "null_explains", "not_an_impulse", "rejected"
-LEAD = 0.25  # s before the first wheel, in which the band-pass settles
+LEAD_TIME = 0.25  # s before the first wheel, in which the band-pass settles
 
 
 @dataclass(frozen=True)
@@ -40,8 +40,8 @@ class ChannelFit:
     test: DirectionTest | None = None
     scores: Scores | None = None
     null: NullBand | None = None
-    others: dict = field(default_factory=dict)
-    ceiling: float = float("nan")
+    other_skills: dict = field(default_factory=dict)
+    max_fit: float = float("nan")
     peak: float = float("nan")
     parameters_per_second: float = float("nan")
 
@@ -50,10 +50,12 @@ class ChannelFit:
         """Forecast skill on a scale from its null (0) to the limit set by the noise (1)."""
         if self.null is None or self.scores is None:
             return float("nan")
-        return (self.scores.forecast - self.null.forecast) / (self.ceiling - self.null.forecast)
+        return (self.scores.forecast - self.null.forecast) / (self.max_fit - self.null.forecast)
 
 
-def fit_channel(samples, rate: float, axle_times, speed: float, model: ModalModel, settings, others=None, nulls=True):
+def fit_channel(
+    samples, rate: float, axle_times, speed: float, model: ModalModel, settings, other_models=None, with_null=True
+):
     """Fit ``model`` to one sensor.
 
     Parameters
@@ -80,64 +82,73 @@ def fit_channel(samples, rate: float, axle_times, speed: float, model: ModalMode
     """
     samples = np.asarray(samples, dtype=float)
     samples = samples - np.median(samples)  # the filters start from zero: an offset would act as an impact
-    part, expected = _cut(samples, rate, axle_times, settings)
+    excerpt, expected = _cut_excerpt(samples, rate, axle_times, settings)
     if expected.size < 2:
         return ChannelFit(REJECTED, "fewer than two wheels with a whole window in the recording")
-    through = band_pass(settings.band_low, settings.band_high, settings.filter_order, rate)
-    data = filtered(part, through)
-    quiet = _quiet(samples, rate, axle_times, speed)
-    least = converter_step(samples) / np.sqrt(12.0)  # a record constant within one step has at least this noise
-    if not least > 0.0:
+    band_filter = band_pass(settings.band_low, settings.band_high, settings.filter_order, rate)
+    data = apply_filter(excerpt, band_filter)
+    quiet = _quiet_samples(samples, rate, axle_times, speed)
+    min_noise = converter_step(samples) / np.sqrt(12.0)  # a record constant within one step has at least this noise
+    if not min_noise > 0.0:
         return ChannelFit(REJECTED, "it never changes")
-    basis = _basis(model, rate, settings)
-    late = common_delay(delay_power(data, expected, basis, settings))
-    times, test = _impacts(part, expected + late, quiet, speed, model, rate, settings, least)
+    basis = _filtered_basis(model, rate, settings)
+    delay = common_delay(delay_power(data, expected, basis, settings))
+    times, test = _impacts_and_test(excerpt, expected + delay, quiet, speed, model, rate, settings, min_noise)
     scores = score(data, expected, basis, settings)
-    null = NullBand.of(null_scores(data, expected, _bases(model.order, rate, settings), settings)) if nulls else None
-    beside = {
-        name: forecast(data, expected, _basis(m, rate, settings), settings)[0] for name, m in (others or {}).items()
+    null = (
+        NullBand.of(null_scores(data, expected, _cached_null_bases(model.order, rate, settings), settings))
+        if with_null
+        else None
+    )
+    other_skills = {
+        name: forecast(data, expected, _filtered_basis(m, rate, settings), settings)[0]
+        for name, m in (other_models or {}).items()
     }
-    found = joint_fit(data, times.times, basis)
-    offset = _offset(samples, rate, axle_times)
-    noise = float(np.std(filtered(quiet, through)[int(0.02 * rate) :])) if quiet.size > 0.1 * rate else float("nan")
-    within = np.sqrt(2.0 * (min(settings.band_high, rate / 2) - settings.band_low) / rate)  # of white noise in the band
-    noise = max(noise, least * within)
-    window = np.concatenate([data[int(t) : int(t + settings.score_window * rate)] for t in expected + late])
-    status, detail = _judged(scores, null, test, settings)
+    joint = joint_fit(data, times.times, basis)
+    start = _excerpt_start(samples, rate, axle_times)
+    noise = (
+        float(np.std(apply_filter(quiet, band_filter)[int(0.02 * rate) :])) if quiet.size > 0.1 * rate else float("nan")
+    )
+    band_ratio = np.sqrt(
+        2.0 * (min(settings.band_high, rate / 2) - settings.band_low) / rate
+    )  # of white noise in the band
+    noise = max(noise, min_noise * band_ratio)
+    window = np.concatenate([data[int(t) : int(t + settings.score_window * rate)] for t in expected + delay])
+    status, detail = _judge(scores, null, test, settings)
     return ChannelFit(
         status,
         detail,
-        times.times / rate + offset,
+        times.times / rate + start,
         times.standard_errors / rate,
         times.ambiguous,
-        found.amplitudes[:, 0],
-        found.standard_errors(noise / within)[:, 0] if np.isfinite(noise) else np.full(expected.size, np.nan),
+        joint.amplitudes[:, 0],
+        joint.standard_errors(noise / band_ratio)[:, 0] if np.isfinite(noise) else np.full(expected.size, np.nan),
         test,
         scores,
         null,
-        beside,
+        other_skills,
         100.0 * (1.0 - noise / max(float(np.std(window)), 1e-300)),
         float(np.max(np.abs(window))),
         scores.n_parameter / (scores.n_value / rate),
     )
 
 
-def _offset(samples, rate, axle_times) -> float:
+def _excerpt_start(samples, rate, axle_times) -> float:
     """Start of the excerpt that is analysed. [s]"""
-    return max(int((np.min(axle_times) - LEAD) * rate), 0) / rate
+    return max(int((np.min(axle_times) - LEAD_TIME) * rate), 0) / rate
 
 
-def _cut(samples, rate, axle_times, settings):
+def _cut_excerpt(samples, rate, axle_times, settings):
     """The excerpt of the record with the train in it, and the axle times in its samples."""
-    start = round(_offset(samples, rate, axle_times) * rate)
+    start = round(_excerpt_start(samples, rate, axle_times) * rate)
     stop = min(int((np.max(axle_times) + settings.score_window + 0.2) * rate), len(samples))
     expected = np.sort(np.asarray(axle_times, dtype=float)) * rate - start
-    room = (settings.time_search + settings.delay_search) * rate  # a wheel may appear that much earlier
-    inside = (expected > room + 2) & (expected < stop - start - settings.score_window * rate)
+    margin = (settings.time_search + settings.delay_search) * rate  # a wheel may appear that much earlier
+    inside = (expected > margin + 2) & (expected < stop - start - settings.score_window * rate)
     return samples[start:stop], expected[inside]
 
 
-def _quiet(samples, rate, axle_times, speed):
+def _quiet_samples(samples, rate, axle_times, speed):
     """Record at least 15 m and 0.5 s from any wheel: before or after the train, whichever is longer."""
     away = max(15.0 / speed, 0.5) * rate
     before = samples[: max(int(np.min(axle_times) * rate - away), 0)]
@@ -145,19 +156,21 @@ def _quiet(samples, rate, axle_times, speed):
     return before if before.size >= after.size else after
 
 
-def _impacts(part, expected, quiet, speed, model, rate, settings, least) -> tuple[ImpactTimes, DirectionTest]:
+def _impacts_and_test(
+    excerpt, expected, quiet, speed, model, rate, settings, min_noise
+) -> tuple[ImpactTimes, DirectionTest]:
     """Impact times and the test of the jump's direction, both on whitened data."""
-    taps, noise = whitener(quiet[: int(rate)] if quiet.size > 0.1 * rate else np.diff(part[: int(rate)]))
-    noise = max(noise, least)
+    taps, noise = whitener(quiet[: int(rate)] if quiet.size > 0.1 * rate else np.diff(excerpt[: int(rate)]))
+    noise = max(noise, min_noise)
     basis = wheel_basis(model, taps, rate)
-    white = filtered(part, taps)
+    white = apply_filter(excerpt, taps)
     spread = max(min(settings.place_error / speed, settings.time_search) * rate, 1.0)
-    half = settings.time_search * rate
-    times = impact_times(white, expected, basis, half, noise, spread, settings.ambiguity_odds)
+    search_range = settings.time_search * rate
+    times = impact_times(white, expected, basis, search_range, noise, spread, settings.ambiguity_odds)
     return times, direction_test(white, np.sort(times.times), basis, noise, settings.chi_squared_level)
 
 
-def _judged(scores, null, test, settings) -> tuple[str, str]:
+def _judge(scores, null, test, settings) -> tuple[str, str]:
     """Status and reason: first whether the null explains the scores, then whether the load was an impulse.
 
     The chi-squared test alone cannot show that. At 40 dB it fails for a model 5 % off in one resonance, whose fit is
@@ -173,21 +186,21 @@ def _judged(scores, null, test, settings) -> tuple[str, str]:
     return ACCEPTED, "without null band" if null is None else ""
 
 
-def _basis(model, rate, settings):
+def _filtered_basis(model, rate, settings):
     """``wheel_basis`` behind the band-pass. It is cached: the same few models are used for every passage."""
-    parts = tuple(np.ascontiguousarray(x, dtype=float).tobytes() for x in (model.a, model.b, model.c))
-    return _kept_basis(parts, len(np.atleast_1d(model.b)), model.rate, rate, settings)
+    matrices = tuple(np.ascontiguousarray(x, dtype=float).tobytes() for x in (model.a, model.b, model.c))
+    return _cached_basis(matrices, len(np.atleast_1d(model.b)), model.rate, rate, settings)
 
 
 @lru_cache(maxsize=64)
-def _kept_basis(parts, n, model_rate, rate, settings):
-    a, b, c = (np.frombuffer(x) for x in parts)
+def _cached_basis(matrices, n, model_rate, rate, settings):
+    a, b, c = (np.frombuffer(x) for x in matrices)
     model = ModalModel(a.reshape(n, n), b, c, model_rate, ())
-    through = band_pass(settings.band_low, settings.band_high, settings.filter_order, rate)
-    return wheel_basis(model, through, rate)
+    band_filter = band_pass(settings.band_low, settings.band_high, settings.filter_order, rate)
+    return wheel_basis(model, band_filter, rate)
 
 
 @lru_cache(maxsize=8)
-def _bases(order, rate, settings):
-    through = band_pass(settings.band_low, settings.band_high, settings.filter_order, rate)
-    return null_bases(order, through, rate, settings)
+def _cached_null_bases(order, rate, settings):
+    band_filter = band_pass(settings.band_low, settings.band_high, settings.filter_order, rate)
+    return null_bases(order, band_filter, rate, settings)

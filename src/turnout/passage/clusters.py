@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy import optimize, stats
 
-FLOOR = np.array([0.01, 0.02])  # least standard deviations of ln(speed) and ln(load)
+MIN_SD = np.array([0.01, 0.02])  # least standard deviations of ln(speed) and ln(load)
 
 
 @dataclass(frozen=True)
@@ -37,10 +37,10 @@ class Clusters:
     clusters: tuple[Cluster, ...]
     used: Mapping[str, int] = field(default_factory=dict)
 
-    def highest(self, train_type) -> int:
+    def highest_number(self, train_type) -> int:
         """The highest number used for a type, 0 where it had none."""
-        there = [_number(c.id) for c in self.clusters if c.type == train_type]
-        return max([self.used.get(train_type, 0), *there])
+        numbers = [_number(c.id) for c in self.clusters if c.type == train_type]
+        return max([self.used.get(train_type, 0), *numbers])
 
     def assign(self, train_type, speed_kmh, axle_load_t, level: float = 1e-4) -> str | None:
         """Id of the cluster that a passage most likely belongs to; None where it lies outside all clusters of its type.
@@ -49,21 +49,21 @@ class Clusters:
         """
         if train_type is None or speed_kmh is None:
             return None
-        best, found = -np.inf, None
+        highest_log, cluster_id = -np.inf, None
         for cluster in self.clusters:
             if cluster.type != train_type:
                 continue
             point = np.log([speed_kmh] if axle_load_t is None else [speed_kmh, axle_load_t])
-            d = min(len(point), len(cluster.mean))
-            away = point[:d] - cluster.mean[:d]
-            covariance = cluster.covariance[:d, :d]
-            square = float(away @ np.linalg.solve(covariance, away))
-            if stats.chi2.sf(square, d) < level:
+            n_dimension = min(len(point), len(cluster.mean))
+            deviation = point[:n_dimension] - cluster.mean[:n_dimension]
+            covariance = cluster.covariance[:n_dimension, :n_dimension]
+            distance_squared = float(deviation @ np.linalg.solve(covariance, deviation))
+            if stats.chi2.sf(distance_squared, n_dimension) < level:
                 continue
-            log = np.log(cluster.weight) - 0.5 * square - 0.5 * np.linalg.slogdet(covariance)[1]
-            if log > best:
-                best, found = log, cluster.id
-        return found
+            log_density = np.log(cluster.weight) - 0.5 * distance_squared - 0.5 * np.linalg.slogdet(covariance)[1]
+            if log_density > highest_log:
+                highest_log, cluster_id = log_density, cluster.id
+        return cluster_id
 
     def document(self) -> dict:
         """As plain values, for a JSON file."""
@@ -78,11 +78,11 @@ class Clusters:
     @classmethod
     def of(cls, document: Mapping) -> Clusters:
         """From ``document()``."""
-        made = [
+        clusters = [
             Cluster(**{**c, "mean": np.array(c["mean"]), "covariance": np.array(c["covariance"])})
             for c in document["clusters"]
         ]
-        return cls(int(document["version"]), tuple(made), dict(document.get("used", {})))
+        return cls(int(document["version"]), tuple(clusters), dict(document.get("used", {})))
 
 
 def fit_clusters(passages: Sequence[Mapping], settings, previous: Clusters | None = None) -> Clusters:
@@ -101,7 +101,7 @@ def fit_clusters(passages: Sequence[Mapping], settings, previous: Clusters | Non
     Clusters
         Version one above ``previous``.
     """
-    found, previous = [], previous or Clusters(0, ())
+    clusters, previous = [], previous or Clusters(0, ())
     groups: dict[str, list] = {}
     for p in passages:
         if p["train_type"] and p["train_type"] != "unknown" and p["speed_kmh"]:
@@ -110,12 +110,12 @@ def fit_clusters(passages: Sequence[Mapping], settings, previous: Clusters | Non
         rows = groups[type_]
         loaded = [r for r in rows if r[1] is not None]
         points = np.log([r for r in loaded]) if len(loaded) > 0.5 * len(rows) else np.log([[r[0]] for r in rows])
-        old = [c for c in previous.clusters if c.type == type_]
-        fresh = previous.highest(type_) + 1
-        found += _named(type_, _mixture(points, settings), len(points), old, fresh)
-    made = Clusters(previous.version + 1, tuple(found), previous.used)
-    types = sorted({c.type for c in (*previous.clusters, *found)} | set(previous.used))
-    return replace(made, used={t: max(previous.highest(t), made.highest(t)) for t in types})
+        previous_clusters = [c for c in previous.clusters if c.type == type_]
+        next_number = previous.highest_number(type_) + 1
+        clusters += _with_ids(type_, _mixture(points, settings), len(points), previous_clusters, next_number)
+    fitted = Clusters(previous.version + 1, tuple(clusters), previous.used)
+    types = sorted({c.type for c in (*previous.clusters, *clusters)} | set(previous.used))
+    return replace(fitted, used={t: max(previous.highest_number(t), fitted.highest_number(t)) for t in types})
 
 
 def _mixture(points, settings):
@@ -124,45 +124,48 @@ def _mixture(points, settings):
 
     order = np.lexsort(points.T)
     points = points[order]  # the result must not depend on the order of the passages
-    d = points.shape[1]
-    floor = FLOOR[:d]
-    scaled = points / floor
+    n_dimension = points.shape[1]
+    min_sd = MIN_SD[:n_dimension]
+    scaled = points / min_sd
     if len(points) == 1:  # one passage has no spread of its own
-        return [(1.0, points[0], np.diag(floor**2))]
-    best, lowest, worse = None, np.inf, 0
-    for k in range(1, min(settings.cluster_maximum, max(len(points) // (5 * d), 1)) + 1):
+        return [(1.0, points[0], np.diag(min_sd**2))]
+    chosen, lowest, n_worse = None, np.inf, 0
+    for k in range(1, min(settings.cluster_maximum, max(len(points) // (5 * n_dimension), 1)) + 1):
         mixture = GaussianMixture(k, n_init=3, random_state=settings.cluster_seed, reg_covar=1.0).fit(scaled)
         bic = mixture.bic(scaled)
         if bic < lowest:
-            best, lowest, worse = mixture, bic, 0
+            chosen, lowest, n_worse = mixture, bic, 0
         else:
-            worse += 1
-            if worse == 3:
+            n_worse += 1
+            if n_worse == 3:
                 break
-    parts = zip(best.weights_, best.means_ * floor, best.covariances_ * np.outer(floor, floor))
-    return sorted(parts, key=lambda p: (-p[0], tuple(p[1])))
+    components = zip(chosen.weights_, chosen.means_ * min_sd, chosen.covariances_ * np.outer(min_sd, min_sd))
+    return sorted(components, key=lambda p: (-p[0], tuple(p[1])))
 
 
-def _named(type_, parts, n, old, fresh):
+def _with_ids(type_, components, n, previous_clusters, next_number):
     """Clusters with ids: that of the nearest previous cluster where it is nearer than two of its standard deviations.
 
     The others get numbers from ``next_number`` on.
     """
     ids = {}
-    if old and len(old[0].mean) == len(parts[0][1]):
+    if previous_clusters and len(previous_clusters[0].mean) == len(components[0][1]):
         distance = np.array(
-            [[np.sqrt((m - c.mean) @ np.linalg.solve(c.covariance, m - c.mean)) for c in old] for _, m, _ in parts]
+            [
+                [np.sqrt((m - c.mean) @ np.linalg.solve(c.covariance, m - c.mean)) for c in previous_clusters]
+                for _, m, _ in components
+            ]
         )
         for i, j in zip(*optimize.linear_sum_assignment(np.minimum(distance, 1e6))):
             if distance[i, j] < 2.0:
-                ids[i] = old[j].id
-    made = []
-    for i, (weight, mean, covariance) in enumerate(parts):
+                ids[i] = previous_clusters[j].id
+    clusters = []
+    for i, (weight, mean, covariance) in enumerate(components):
         if i not in ids:
-            ids[i] = f"{type_}/{fresh}"
-            fresh += 1
-        made.append(Cluster(ids[i], type_, mean, covariance, float(weight), round(weight * n)))
-    return sorted(made, key=lambda c: _number(c.id))
+            ids[i] = f"{type_}/{next_number}"
+            next_number += 1
+        clusters.append(Cluster(ids[i], type_, mean, covariance, float(weight), round(weight * n)))
+    return sorted(clusters, key=lambda c: _number(c.id))
 
 
 def _number(id_):

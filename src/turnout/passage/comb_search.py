@@ -12,17 +12,17 @@ from itertools import product
 import numpy as np
 
 from turnout.passage.axle_patterns import Pattern, offsets
-from turnout.passage.comb import Comb, evidence, explained, profiles_at, teeth_of
+from turnout.passage.comb import Comb, evidence, explained_share, profiles_at, teeth_of
 from turnout.passage.kinematics import Motion
 from turnout.passage.vehicle_sequence import likeliest_row
 
-NEAR, FAR = 5.0, 27.0  # m beyond the last wheel, where wheels of a further vehicle would be
+BEYOND_START, BEYOND_END = 5.0, 27.0  # m beyond the last wheel, where wheels of a further vehicle would be
 # Share of the mean amplitude along the row above which a further vehicle runs there. In 68 simulated cases of one
 # sensor it is at most 0.21 without one; the bogies of a locomotive have at least 0.75 of the amplitude of coaches.
-AS_LOUD = 0.6
+MIN_BEYOND_AMPLITUDE = 0.6
 
 
-def goes_on(heard, motion, first: float, length: float) -> bool:
+def continues_beyond(envelopes, motion, first: float, length: float) -> bool:
     """Whether the sensors record more than ``MIN_BEYOND_AMPLITUDE`` times the row's own amplitude beyond either end.
 
     A row that is a part of the train fits that part as well as the train's own row does. It fits better where the
@@ -37,32 +37,36 @@ def goes_on(heard, motion, first: float, length: float) -> bool:
     length : float
         From the first axle to the last one. [m]
     """
-    stretches = np.array([[0.0, length], [-FAR, -NEAR], [length + NEAR, length + FAR]]) + first
-    own, before, behind = np.mean([_amplitudes(heard, i, motion, stretches) for i in range(len(heard.positions))], 0)
-    return bool(max(before, behind) > AS_LOUD * own)
+    stretches = (
+        np.array([[0.0, length], [-BEYOND_END, -BEYOND_START], [length + BEYOND_START, length + BEYOND_END]]) + first
+    )
+    along, before, behind = np.mean(
+        [_mean_amplitudes(envelopes, i, motion, stretches) for i in range(len(envelopes.positions))], 0
+    )
+    return bool(max(before, behind) > MIN_BEYOND_AMPLITUDE * along)
 
 
-def _amplitudes(heard, i, motion, stretches):
+def _mean_amplitudes(envelopes, i, motion, stretches):
     """(n_stretch,) mean amplitude of sensor ``i`` above its quiet level; 0 where nothing was recorded."""
-    amplitude, step = heard.levels.amplitude[i], heard.levels.step
+    amplitude, step = envelopes.levels.amplitude[i], envelopes.levels.step
     above = np.clip(amplitude - np.quantile(amplitude, 0.05), 0.0, None)
     total = np.concatenate([[0.0], np.cumsum(above)]) * step
-    times = motion.passing(stretches, heard.positions[i])
+    times = motion.passing(stretches, envelopes.positions[i])
     inside = np.interp(times, np.arange(total.size) * step, total)
     return np.diff(inside, axis=1)[:, 0] / np.maximum(np.diff(times, axis=1)[:, 0], step)
 
 
-KMH = 3.6
-FINE = 0.003  # relative step between the speeds that are tried
-LOOSE = 0.5  # m, error of the first search over the length of the row
-OUTSIDE = 75.0  # m, most that is audible before the first and behind the last axle together
-BEND = 0.15  # m, step of the middle against the ends between accelerations; also its limit in m/s²
-CLOSE = 2.0  # m by which a row may exceed the audible length
-KEPT = 3  # rows of a type that are refined
+KMH_PER_MS = 3.6
+SPEED_STEP = 0.003  # relative step between the speeds that are tried
+COARSE_ERROR = 0.5  # m, error of the first search over the length of the row
+MAX_ENVELOPE_MARGIN = 75.0  # m, most that is audible before the first and behind the last axle together
+BEND_STEP = 0.15  # m, step of the middle against the ends between accelerations; also its limit in m/s²
+MAX_EXCESS_LENGTH = 2.0  # m by which a row may exceed the audible length
+N_REFINED = 3  # rows of a type that are refined
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedRow:
     """A row of vehicles fitted to the sensor envelopes.
 
     ``share`` is explained, ``evidence`` [nat] its log Bayes factor. ``start`` [m] is the first axle behind the
@@ -80,116 +84,128 @@ class Fitted:
 
 
 @lru_cache(maxsize=4)
-def even_rows(patterns) -> tuple:
+def uniform_rows(patterns) -> tuple:
     """(pattern, vehicles, comb) of every row in which each group has vehicles of one type only."""
-    found = {}
+    rows = {}
     for pattern in patterns:
         groups = []
         for g in pattern.groups:
             counts = range(max(g.minimum, 1), g.maximum + 1)
             groups.append([()] * (g.minimum == 0) + [(v,) * n for n in counts for v in g.vehicles])
-        for parts in product(*groups):
-            row = tuple(v for part in parts for v in part)
+        for selection in product(*groups):
+            row = tuple(v for members in selection for v in members)
             if sum(len(v.axles) for v in row) >= 4:
-                found[pattern.type, tuple((v.length, v.axles) for v in row)] = (pattern, row)
-    return tuple((pattern, row, Comb.of(offsets(row))) for pattern, row in found.values())
+                rows[pattern.type, tuple((v.length, v.axles) for v in row)] = (pattern, row)
+    return tuple((pattern, row, Comb.of(offsets(row))) for pattern, row in rows.values())
 
 
-def at_all_speeds(begin: float, settings) -> list[Motion]:
+def motions_at_all_speeds(begin: float, settings) -> list[Motion]:
     """Motions at all speeds of trains, ``SPEED_STEP`` apart, with the first axle at 0 at the time ``begin`` [s]."""
-    slow, fast = settings.speed_minimum / KMH, settings.speed_maximum / KMH
-    return [Motion(float(v), begin) for v in np.geomspace(slow, fast, int(np.log(fast / slow) / FINE))]
+    slow, fast = settings.speed_minimum / KMH_PER_MS, settings.speed_maximum / KMH_PER_MS
+    return [Motion(float(v), begin) for v in np.geomspace(slow, fast, int(np.log(fast / slow) / SPEED_STEP))]
 
 
 def choices_of(pattern, row) -> float:
     """Logarithm of the largest number of rows with as many vehicles that the pattern allows."""
-    kinds = max(len(g.vehicles) for g in pattern.groups)
-    return float(np.log(kinds) * len(row)) if len({v.name for v in row}) > 2 else float(np.log(kinds))
+    n_choices = max(len(g.vehicles) for g in pattern.groups)
+    return float(np.log(n_choices) * len(row)) if len({v.name for v in row}) > 2 else float(np.log(n_choices))
 
 
-def likeliest(heard, motions, patterns) -> dict[str, Fitted]:
+def likeliest_rows(envelopes, motions, patterns) -> dict[str, FittedRow]:
     """Type -> its likeliest row of vehicles, out of ``motions`` in order of their speed, ``SPEED_STEP`` apart.
 
     A row is left out where the train continues beyond its ends.
     """
-    profiles = profiles_at(heard, motions)
-    n_sensor, first = len(heard.positions), {}
-    for pattern, row, comb in even_rows(patterns):
+    profiles = profiles_at(envelopes, motions)
+    n_sensor, coarse = len(envelopes.positions), {}
+    for pattern, row, comb in uniform_rows(patterns):
         span = comb.offsets[-1]
-        near = np.flatnonzero((profiles.length > span - CLOSE) & (profiles.length < span + OUTSIDE))
-        near = near[:: max(int(LOOSE / span / FINE), 1)]
-        if not near.size:
+        indices = np.flatnonzero(
+            (profiles.length > span - MAX_EXCESS_LENGTH) & (profiles.length < span + MAX_ENVELOPE_MARGIN)
+        )
+        indices = indices[:: max(int(COARSE_ERROR / span / SPEED_STEP), 1)]
+        if not indices.size:
             continue
-        share, starts = explained(profiles, comb, near, every=4)
-        worth = evidence(share.max(axis=1), profiles.length[near], n_sensor) - choices_of(pattern, row)
-        k = int(np.argmax(worth))
+        share, starts = explained_share(profiles, comb, indices, stride=4)
+        log_evidence = evidence(share.max(axis=1), profiles.length[indices], n_sensor) - choices_of(pattern, row)
+        k = int(np.argmax(log_evidence))
         start = float(starts[int(np.argmax(share[k]))])
-        found = Fitted(pattern, row, comb, profiles.motions[near[k]], start, float(share[k].max()), float(worth[k]))
-        first.setdefault(pattern.type, []).append(found)
-    best = {}
-    for type_, rows in first.items():
-        rows = sorted(rows, key=lambda f: -f.evidence)[:KEPT]
-        close = [f for f in (closely(heard, f) for f in rows) if not goes_on(heard, f.motion, *_ends(heard, f))]
-        if close:
-            best[type_] = max(close, key=lambda f: f.evidence)
-    return best
+        fitted = FittedRow(
+            pattern, row, comb, profiles.motions[indices[k]], start, float(share[k].max()), float(log_evidence[k])
+        )
+        coarse.setdefault(pattern.type, []).append(fitted)
+    likeliest_by_type = {}
+    for type_, rows in coarse.items():
+        rows = sorted(rows, key=lambda f: -f.evidence)[:N_REFINED]
+        refined = [
+            f
+            for f in (refine_row(envelopes, f) for f in rows)
+            if not continues_beyond(envelopes, f.motion, *_row_extent(envelopes, f))
+        ]
+        if refined:
+            likeliest_by_type[type_] = max(refined, key=lambda f: f.evidence)
+    return likeliest_by_type
 
 
-def closely(heard, fitted: Fitted, passes: int = 3) -> Fitted:
+def refine_row(envelopes, fitted: FittedRow, passes: int = 3) -> FittedRow:
     """The row with refined speed and, where the pattern allows a choice, refined vehicles, in turn."""
-    fitted = sharper(heard, fitted, 0.006)
+    fitted = refine_motion(envelopes, fitted, 0.006)
     for _ in range(passes):
-        better = _other_vehicles(heard, fitted)
-        better = sharper(heard, better, 0.004) if better is not fitted else fitted
+        better = _refine_vehicles(envelopes, fitted)
+        better = refine_motion(envelopes, better, 0.004) if better is not fitted else fitted
         if better.evidence <= fitted.evidence:
             break
         fitted = better
     return fitted
 
 
-def _ends(heard, fitted: Fitted) -> tuple[float, float]:
+def _row_extent(envelopes, fitted: FittedRow) -> tuple[float, float]:
     """The row's first axle in its motion's own coordinate, and its length. [m]"""
-    place = fitted.motion.direction * float(np.mean(heard.positions))
-    return float(fitted.motion.way(heard.begin)) - place + fitted.start, float(fitted.comb.offsets[-1])
+    centre = fitted.motion.direction * float(np.mean(envelopes.positions))
+    return float(fitted.motion.distance(envelopes.begin)) - centre + fitted.start, float(fitted.comb.offsets[-1])
 
 
-def about_middle(heard, fitted: Fitted) -> Motion:
+def motion_at_middle(envelopes, fitted: FittedRow) -> Motion:
     """The motion relative to the row's middle: ``start`` when it passes the middle of the sensors, ``speed`` then."""
-    motion, place = fitted.motion, fitted.motion.direction * float(np.mean(heard.positions))
-    first, length = _ends(heard, fitted)
-    middle = float(motion.time(first + 0.5 * length + place))
+    motion, centre = fitted.motion, fitted.motion.direction * float(np.mean(envelopes.positions))
+    first, length = _row_extent(envelopes, fitted)
+    middle = float(motion.time(first + 0.5 * length + centre))
     return replace(motion, speed=float(motion.speed_at(middle)), start=middle)
 
 
-def sharper(heard, fitted: Fitted, reach: float) -> Fitted:
+def refine_motion(envelopes, fitted: FittedRow, reach: float) -> FittedRow:
     """The same row at the best speed within ``reach`` (relative) and the best acceleration near its own."""
-    middle = about_middle(heard, fitted)
-    bend = 16.0 * BEND / (fitted.comb.offsets[-1] / middle.speed) ** 2
-    bends = middle.acceleration + min(bend, BEND) * np.arange(-2, 3)
+    middle = motion_at_middle(envelopes, fitted)
+    acceleration_step = 16.0 * BEND_STEP / (fitted.comb.offsets[-1] / middle.speed) ** 2
+    accelerations = middle.acceleration + min(acceleration_step, BEND_STEP) * np.arange(-2, 3)
     speeds = middle.speed * (1.0 + np.linspace(-reach, reach, 9))
-    motions = [replace(middle, speed=v, acceleration=a) for a in bends for v in speeds]
-    profiles = profiles_at(heard, motions)
-    share, starts = explained(profiles, fitted.comb, np.arange(len(motions)))
+    motions = [replace(middle, speed=v, acceleration=a) for a in accelerations for v in speeds]
+    profiles = profiles_at(envelopes, motions)
+    share, starts = explained_share(profiles, fitted.comb, np.arange(len(motions)))
     k, s = np.unravel_index(int(np.argmax(share)), share.shape)
-    worth = evidence(share[k, s], profiles.length[k], len(heard.positions))
-    worth -= choices_of(fitted.pattern, fitted.vehicles)
-    if worth <= fitted.evidence:
+    log_evidence = evidence(share[k, s], profiles.length[k], len(envelopes.positions))
+    log_evidence -= choices_of(fitted.pattern, fitted.vehicles)
+    if log_evidence <= fitted.evidence:
         return fitted
-    return replace(fitted, motion=motions[k], start=float(starts[s]), share=float(share[k, s]), evidence=float(worth))
+    return replace(
+        fitted, motion=motions[k], start=float(starts[s]), share=float(share[k, s]), evidence=float(log_evidence)
+    )
 
 
-def _other_vehicles(heard, fitted):
+def _refine_vehicles(envelopes, fitted):
     """The row that fits best with the tooth of this one; unchanged where the pattern allows no choice."""
-    if fitted.pattern.only_row() is not None:
+    if fitted.pattern.fixed_row() is not None:
         return fitted
-    profiles = profiles_at(heard, [fitted.motion])
+    profiles = profiles_at(envelopes, [fitted.motion])
     teeth, _ = teeth_of(profiles, fitted.comb, fitted.start)
-    found = likeliest_row(profiles, teeth, fitted.pattern, fitted.start)
-    if found is None or found[0] == fitted.vehicles or sum(len(v.axles) for v in found[0]) < 4:
+    better = likeliest_row(profiles, teeth, fitted.pattern, fitted.start)
+    if better is None or better[0] == fitted.vehicles or sum(len(v.axles) for v in better[0]) < 4:
         return fitted
-    comb = Comb.of(offsets(found[0]))
-    share, starts = explained(profiles, comb, np.arange(1))
+    comb = Comb.of(offsets(better[0]))
+    share, starts = explained_share(profiles, comb, np.arange(1))
     k = int(np.argmax(share[0]))
-    worth = evidence(share[0, k], profiles.length[0], len(heard.positions))
-    worth -= choices_of(fitted.pattern, found[0])
-    return Fitted(fitted.pattern, found[0], comb, fitted.motion, float(starts[k]), float(share[0, k]), float(worth))
+    log_evidence = evidence(share[0, k], profiles.length[0], len(envelopes.positions))
+    log_evidence -= choices_of(fitted.pattern, better[0])
+    return FittedRow(
+        fitted.pattern, better[0], comb, fitted.motion, float(starts[k]), float(share[0, k]), float(log_evidence)
+    )

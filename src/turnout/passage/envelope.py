@@ -25,7 +25,7 @@ class Levels:
     values: np.ndarray
     step: float
     scatter: np.ndarray
-    loud: np.ndarray
+    loud_power: np.ndarray
     amplitude: np.ndarray
 
     @property
@@ -51,16 +51,16 @@ def band_powers(samples, rate: float, step: float, bands=BANDS) -> np.ndarray:
     for i, row in enumerate(samples):
         spectrum = fft.rfft(row[: n_bin * per_bin], length * per_bin)[: frequency.size]
         for k, window in enumerate(windows):
-            passed = fft.irfft(spectrum * window, length * points).reshape(length, points)[:n_bin]
-            powers[i, k] = np.einsum("np,np->n", passed, passed) / points
+            band_signal = fft.irfft(spectrum * window, length * points).reshape(length, points)[:n_bin]
+            powers[i, k] = np.einsum("np,np->n", band_signal, band_signal) / points
     return powers
 
 
 def _edges(frequency, low, high, width=0.2):
     """Window that is 1 between ``low`` and ``high`` and falls to 0 over ``width`` of either edge."""
-    up = np.clip((frequency / low - 1 + width) / width, 0, 1)
-    down = np.clip((1 + width - frequency / high) / width, 0, 1)
-    return np.sin(0.5 * np.pi * up) ** 2 * np.sin(0.5 * np.pi * down) ** 2
+    rise = np.clip((frequency / low - 1 + width) / width, 0, 1)
+    fall = np.clip((1 + width - frequency / high) / width, 0, 1)
+    return np.sin(0.5 * np.pi * rise) ** 2 * np.sin(0.5 * np.pi * fall) ** 2
 
 
 def levels(samples, rate: float, step: float, bands=BANDS) -> Levels:
@@ -70,18 +70,18 @@ def levels(samples, rate: float, step: float, bands=BANDS) -> Levels:
     """
     step = max(round(step * rate), 1) / rate
     powers = band_powers(samples, rate, step, bands)
-    floor = quiet_level(powers, max(round(0.05 / step), 1))[..., None]
-    values = np.log1p(powers / floor).mean(axis=1)
+    quiet_power = quiet_level(powers, max(round(0.05 / step), 1))[..., None]
+    values = np.log1p(powers / quiet_power).mean(axis=1)
     quiet = values < np.quantile(values, 0.2, axis=1, keepdims=True)
     centre = np.array([np.median(v[q]) for v, q in zip(values, quiet)])
     scatter = np.array([1.4826 * np.median(np.abs(v[q] - c)) for v, q, c in zip(values, quiet, centre)])
     block = max(round(0.05 / step), 1)
     n = max(values.shape[1] // block, 1)
     blocks = powers[..., : n * block].reshape(*powers.shape[:2], n, -1).mean(axis=-1)
-    loud = np.exp(np.log(np.maximum(np.quantile(blocks, 0.9, axis=-1), 1e-300)).mean(axis=1))
-    usual = np.maximum(powers.mean(axis=-1, keepdims=True), np.finfo(float).tiny)
-    amplitude = np.sqrt(powers / usual).mean(axis=1)
-    return Levels(values - centre[:, None], step, np.maximum(scatter, 0.05), loud, amplitude)
+    loud_power = np.exp(np.log(np.maximum(np.quantile(blocks, 0.9, axis=-1), 1e-300)).mean(axis=1))
+    mean_power = np.maximum(powers.mean(axis=-1, keepdims=True), np.finfo(float).tiny)
+    amplitude = np.sqrt(powers / mean_power).mean(axis=1)
+    return Levels(values - centre[:, None], step, np.maximum(scatter, 0.05), loud_power, amplitude)
 
 
 def quiet_level(powers, block: int) -> np.ndarray:

@@ -32,7 +32,7 @@ def gather(data, first, length: int) -> np.ndarray:
     return np.where(inside, np.asarray(data)[np.clip(index, 0, len(data) - 1)], 0.0)
 
 
-def explained(own, basis: WheelBasis, allowed, seen=None) -> np.ndarray:
+def explained_power(windows, basis: WheelBasis, allowed, n_observed=None) -> np.ndarray:
     r"""(n_wheel, n_lag, n_fraction) reduction of the residual's sum of squares by one wheel at n - phi.
 
     .. math:: P_n(\varphi) = (b_n^T\theta(\varphi))^2 / \theta^T G \theta
@@ -43,14 +43,14 @@ def explained(own, basis: WheelBasis, allowed, seen=None) -> np.ndarray:
     period of a slow mode away fits equally well.
     """
     n_lag = allowed.shape[1]
-    inner = basis.correlated(own, n_lag)
-    if seen is None:
+    inner = basis.correlate(windows, n_lag)
+    if n_observed is None:
         signed = inner @ basis.unit_weights.T
     else:
-        signed = np.einsum("jlp,lqp->jlq", inner, basis.unit_weights_of(seen))
+        signed = np.einsum("jlp,lqp->jlq", inner, basis.truncated_unit_weights(n_observed))
     signed = np.where(allowed, signed, 0.0)
-    up, down = signed.max(axis=(1, 2), initial=0.0), signed.min(axis=(1, 2), initial=0.0)
-    sign = 1.0 if np.sum(up**2) >= np.sum(down**2) else -1.0
+    positive, negative = signed.max(axis=(1, 2), initial=0.0), signed.min(axis=(1, 2), initial=0.0)
+    sign = 1.0 if np.sum(positive**2) >= np.sum(negative**2) else -1.0
     signed *= sign
     # a wheel without any time of that sign keeps its time and explains nothing
     signed[signed <= 0.0] = -np.inf
@@ -58,30 +58,34 @@ def explained(own, basis: WheelBasis, allowed, seen=None) -> np.ndarray:
     return np.where(allowed & (np.isfinite(signed) | (power.max(axis=(1, 2), keepdims=True) == 0)), power, -np.inf)
 
 
-def best_times(own, first, expected, basis: WheelBasis, half: float, seen=None) -> np.ndarray:
+def best_times(windows, first, expected, basis: WheelBasis, search_range: float, n_observed=None) -> np.ndarray:
     """(n_wheel,) times within ``search_range`` of ``expected`` that explain most of ``windows`` from ``first`` on."""
-    n_lag = own.shape[1] - basis.n_sample + 1
-    power = explained(own, basis, _allowed(first, expected, half, n_lag), seen)
+    n_lag = windows.shape[1] - basis.n_sample + 1
+    power = explained_power(windows, basis, _allowed_times(first, expected, search_range, n_lag), n_observed)
     lag, fraction = np.unravel_index(power.reshape(len(first), -1).argmax(axis=1), power.shape[1:])
-    return _polished(power, lag, fraction, first)
+    return _refine_times(power, lag, fraction, first)
 
 
-def _allowed(first, expected, half, n_lag):
-    return np.abs(np.arange(n_lag)[:, None] - FRACTIONS - (expected - first)[:, None, None]) <= half + 0.5
+def _allowed_times(first, expected, search_range, n_lag):
+    return np.abs(np.arange(n_lag)[:, None] - FRACTIONS - (expected - first)[:, None, None]) <= search_range + 0.5
 
 
-def search_times(data, expected, basis: WheelBasis, half: float, length: int = 300, sweeps: int = 3) -> np.ndarray:
+def search_times(
+    data, expected, basis: WheelBasis, search_range: float, length: int = 300, sweeps: int = 3
+) -> np.ndarray:
     """(n_wheel,) impact times within ``search_range`` of ``expected`` that explain most. [samples]
 
     One amplitude along b per wheel. The neighbours' responses are subtracted as the joint fit of the previous sweep has
     them, unless no response reaches the next wheel. Only the first ``length`` samples of a response are compared.
     """
-    power, first = _power(data, expected, basis, half, length, sweeps)
+    power, first = _search_power(data, expected, basis, search_range, length, sweeps)
     lag, fraction = np.unravel_index(power.reshape(len(first), -1).argmax(axis=1), power.shape[1:])
-    return _polished(power, lag, fraction, first)
+    return _refine_times(power, lag, fraction, first)
 
 
-def impact_times(data, expected, basis: WheelBasis, half: float, noise: float, spread: float, odds: float = 100.0):
+def impact_times(
+    data, expected, basis: WheelBasis, search_range: float, noise: float, spread: float, odds: float = 100.0
+):
     r"""Impact times with their errors and a flag where the interval between samples is not certain.
 
     .. math:: p(n,\varphi) \propto \exp\{P_n(\varphi)/2\sigma^2 - (t-t_0)^2/2s^2\}, \qquad t = n - \varphi
@@ -108,37 +112,37 @@ def impact_times(data, expected, basis: WheelBasis, half: float, noise: float, s
     if not noise > 0 or not spread > 0:
         raise ValueError(f"noise and spread must be above 0, got {noise} and {spread}")
     expected = np.asarray(expected, dtype=float)
-    power, first = _power(data, expected, basis, half, basis.n_sample, 3)
+    power, first = _search_power(data, expected, basis, search_range, basis.n_sample, 3)
     grid = (first - expected)[:, None, None] + np.arange(power.shape[1])[:, None] - FRACTIONS
     level = power / (2 * noise**2) - 0.5 * (grid / spread) ** 2
     lag, fraction = np.unravel_index(level.reshape(len(first), -1).argmax(axis=1), level.shape[1:])
-    times = _polished(power, lag, fraction, first)
+    times = _refine_times(power, lag, fraction, first)
     weight = np.exp(level - level.max(axis=(1, 2), keepdims=True))
     weight /= weight.sum(axis=(1, 2), keepdims=True)
     share = weight[np.arange(len(lag)), lag].sum(axis=-1)
-    rest = np.maximum(1.0 - share, 1e-300)
-    away = (grid + expected[:, None, None] - times[:, None, None]) ** 2
-    between = np.sum(weight * away, axis=(1, 2))
+    other_share = np.maximum(1.0 - share, 1e-300)
+    distance_squared = (grid + expected[:, None, None] - times[:, None, None]) ** 2
+    between = np.sum(weight * distance_squared, axis=(1, 2))
     inside = _curvature_error(power, lag, fraction, noise)
-    error = np.sqrt(between * rest + inside**2)
-    return ImpactTimes(times, error, share / rest, share / rest < odds)
+    error = np.sqrt(between * other_share + inside**2)
+    return ImpactTimes(times, error, share / other_share, share / other_share < odds)
 
 
-def _power(data, expected, basis, half, length, sweeps):
+def _search_power(data, expected, basis, search_range, length, sweeps):
     """Explained power of every wheel and (n_wheel,) the sample of lag 0."""
     expected = np.asarray(expected, dtype=float)
-    short = basis.cut(min(length, basis.n_sample))
-    reach = int(np.ceil(half)) + 1
+    short = basis.truncate(min(length, basis.n_sample))
+    reach = int(np.ceil(search_range)) + 1
     first, n_lag = np.round(expected).astype(int) - reach, 2 * reach + 1
     span = n_lag - 1 + short.n_sample
-    allowed = _allowed(first, expected, half, n_lag)
-    own = gather(data, first, span)
-    power = explained(own, short, allowed)
-    overlap = np.diff(expected).min(initial=np.inf) < basis.ring
-    for _ in range(sweeps - 1 if overlap else 0):
+    allowed = _allowed_times(first, expected, search_range, n_lag)
+    windows = gather(data, first, span)
+    power = explained_power(windows, short, allowed)
+    has_overlap = np.diff(expected).min(initial=np.inf) < basis.ring_length
+    for _ in range(sweeps - 1 if has_overlap else 0):
         lag, fraction = np.unravel_index(power.reshape(len(first), -1).argmax(axis=1), power.shape[1:])
-        own = _without_neighbours(data, _polished(power, lag, fraction, first), basis, first, span)
-        power = explained(own, short, allowed)
+        windows = _without_neighbours(data, _refine_times(power, lag, fraction, first), basis, first, span)
+        power = explained_power(windows, short, allowed)
     return power, first
 
 
@@ -148,12 +152,12 @@ def _without_neighbours(data, times, basis, first, span):
     fit = joint_fit(data, times[order], basis)
     amplitude = np.empty(len(times))
     amplitude[order] = fit.amplitudes[:, 0]
-    own = gather(data - fit.prediction, first, span)
+    windows = gather(data - fit.prediction, first, span)
     onset, phi = onsets(times)
-    for row, start, weight in zip(own, onset - first, amplitude[:, None] * basis.coefficients(phi)):
+    for row, start, weight in zip(windows, onset - first, amplitude[:, None] * basis.coefficients(phi)):
         n = min(span - start, basis.n_sample)
         row[start : start + n] += weight @ basis.columns[:, :n]
-    return own
+    return windows
 
 
 def _neighbours(power, lag, fraction):
@@ -163,7 +167,7 @@ def _neighbours(power, lag, fraction):
     return inner, [power[wheel, lag, inner + step] for step in (-1, 0, 1)]
 
 
-def _polished(power, lag, fraction, first):
+def _refine_times(power, lag, fraction, first):
     """Times n - phi from a parabola through the best fraction and its neighbours in the same interval."""
     inner, (low, mid, high) = _neighbours(power, lag, fraction)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -83,8 +83,8 @@ def joint_fit(data, times, basis: WheelBasis, free: bool = False) -> WheelFit:
     data = np.asarray(data, dtype=float)
     first, phi = onsets(times)
     weights = _weights(basis, phi, free)
-    right, bands, reach = _normal_equations(data, first, weights, basis)
-    numbers, covariance = _solve_banded(bands, right, reach)
+    right_side, blocks, n_overlap = _normal_equations(data, first, weights, basis)
+    numbers, covariance = _solve_banded(blocks, right_side, n_overlap)
     amplitudes = numbers.reshape(len(first), -1)
     prediction = predict(len(data), first, np.einsum("jp,jpq->jq", amplitudes, weights), basis)
     return WheelFit(np.asarray(times, float), amplitudes, covariance, prediction)
@@ -110,12 +110,12 @@ def _weights(basis, phi, free):
 def _normal_equations(data, first, weights, basis):
     """Right side (n,), blocks {(i, j): (p, p)} of the normal matrix, and how many wheels overlap."""
     n_wheel, p, _ = weights.shape
-    right, blocks, reach, known = np.zeros(n_wheel * p), {}, 0, {}
+    right_side, blocks, n_overlap, grams = np.zeros(n_wheel * p), {}, 0, {}
     for i, start in enumerate(first):
         length = min(basis.n_sample, len(data) - start)
         if length <= 0 or start < 0:
             raise ValueError(f"wheel {i} at sample {start} lies outside the {len(data)} samples")
-        right[i * p : (i + 1) * p] = weights[i] @ (basis.columns[:, :length] @ data[start : start + length])
+        right_side[i * p : (i + 1) * p] = weights[i] @ (basis.columns[:, :length] @ data[start : start + length])
         for j in range(i, n_wheel):
             lag = first[j] - start
             if lag >= length:
@@ -123,17 +123,17 @@ def _normal_equations(data, first, weights, basis):
             if length < basis.n_sample:
                 gram = basis.columns[:, lag:length] @ basis.columns[:, : length - lag].T
             else:
-                gram = known[lag] if lag in known else known.setdefault(lag, basis.lagged_gram(lag))
+                gram = grams[lag] if lag in grams else grams.setdefault(lag, basis.lagged_gram(lag))
             blocks[i, j] = weights[i] @ gram @ weights[j].T
-            reach = max(reach, j - i)
-    return right, blocks, reach
+            n_overlap = max(n_overlap, j - i)
+    return right_side, blocks, n_overlap
 
 
-def _solve_banded(blocks, right, reach):
+def _solve_banded(blocks, right_side, n_overlap):
     """Solution and inverse of the banded normal matrix, with a tiny ridge for wheels that coincide."""
     p = next(iter(blocks.values())).shape[0]
-    width = (reach + 1) * p
-    bands = np.zeros((width, right.size))
+    width = (n_overlap + 1) * p
+    bands = np.zeros((width, right_side.size))
     for (i, j), block in blocks.items():
         for a in range(p):
             for b in range(p):
@@ -142,8 +142,8 @@ def _solve_banded(blocks, right, reach):
                     bands[width - 1 - (column - row), column] = block[a, b]
     bands[-1] += 1e-12 * max(bands[-1].max(), np.finfo(float).tiny)
     factor = linalg.cholesky_banded(bands)
-    inverse = linalg.cho_solve_banded((factor, False), np.eye(right.size))
-    return linalg.cho_solve_banded((factor, False), right), inverse
+    inverse = linalg.cho_solve_banded((factor, False), np.eye(right_side.size))
+    return linalg.cho_solve_banded((factor, False), right_side), inverse
 
 
 def whitener(quiet, order: int = 16) -> tuple[np.ndarray, float]:

@@ -21,21 +21,21 @@ class Motion:
     acceleration: float = 0.0
     direction: int = 1
 
-    def time(self, way) -> np.ndarray:
+    def time(self, distance) -> np.ndarray:
         """Time at which the first axle is ``distance`` [m] past the origin; negative ``distance`` before it. [s]
 
         >>> float(Motion(10.0, 1.0, 2.0).time(24.0))
         3.0
         """
-        way = np.asarray(way, dtype=float)
-        square = np.maximum(self.speed**2 + 2.0 * self.acceleration * way, 1e-6)
+        distance = np.asarray(distance, dtype=float)
+        speed_squared = np.maximum(self.speed**2 + 2.0 * self.acceleration * distance, 1e-6)
         # rationalised root: no cancellation as the acceleration goes to 0
-        return self.start + 2.0 * way / (self.speed + np.sqrt(square))
+        return self.start + 2.0 * distance / (self.speed + np.sqrt(speed_squared))
 
-    def way(self, time) -> np.ndarray:
+    def distance(self, time) -> np.ndarray:
         """Distance that the first axle has travelled from the origin at ``time``: the inverse of ``time()``. [m]"""
-        past = np.asarray(time, dtype=float) - self.start
-        return self.speed * past + 0.5 * self.acceleration * past**2
+        elapsed = np.asarray(time, dtype=float) - self.start
+        return self.speed * elapsed + 0.5 * self.acceleration * elapsed**2
 
     def passing(self, offsets, position: float) -> np.ndarray:
         """Times at which axles ``offsets`` [m] behind the first pass ``position`` [m]. [s]"""
@@ -45,7 +45,7 @@ class Motion:
         """Speed at ``time`` [s]. [m/s]"""
         return self.speed + self.acceleration * (np.asarray(time) - self.start)
 
-    def moved(self, way: float) -> Motion:
+    def relative_to_axle(self, distance: float) -> Motion:
         """The same motion relative to an axle ``distance`` metres behind the first."""
-        start = float(self.time(way))
+        start = float(self.time(distance))
         return replace(self, speed=float(self.speed_at(start)), start=start)

@@ -51,14 +51,14 @@ def direction_test(data, times, basis: WheelBasis, noise: float, level: float = 
     _, phi = onsets(times)
     covariance = np.stack([fit.covariance[i * p : (i + 1) * p, i * p : (i + 1) * p] for i in range(n_wheel)])
     covariance = covariance * noise**2
-    statistic, whole = np.empty(n_wheel), 0.0
+    statistic, total = np.empty(n_wheel), 0.0
     for j, along in enumerate(basis.coefficients(phi)):
         root = linalg.cholesky(covariance[j], lower=True)
         jump, axis = (linalg.solve_triangular(root, v, lower=True) for v in (fit.amplitudes[j], along))
         statistic[j] = jump @ jump - (axis @ jump) ** 2 / (axis @ axis)
-        whole += jump @ jump
+        total += jump @ jump
     p_value = stats.chi2.sf(statistic, p - 1)
-    along = 1.0 - float(statistic.sum() / whole) if whole > 0 else float("nan")
+    along = 1.0 - float(statistic.sum() / total) if total > 0 else float("nan")
     return DirectionTest(statistic, p - 1, p_value, float(np.mean(p_value < level)), fit.amplitudes, covariance, along)
 
 
@@ -103,10 +103,10 @@ def random_models(n: int, order: int, low: float, high: float, rate: float, seed
     return tuple(models)
 
 
-def null_bases(order: int, through, rate: float, settings) -> list:
+def null_bases(order: int, band_filter, rate: float, settings) -> list:
     """Bases of the random models behind the same filter. They are the same for every passage."""
     models = random_models(settings.null_models, order, settings.band_low, settings.band_high, rate, settings.null_seed)
-    return [wheel_basis(model, through, rate, longest=0.1) for model in models]
+    return [wheel_basis(model, band_filter, rate, longest=0.1) for model in models]
 
 
 def null_scores(data, expected, bases, settings) -> list[Scores]:

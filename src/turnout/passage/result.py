@@ -79,7 +79,7 @@ class Passage:
         return self.motion.time(self.offsets) if self.motion else np.zeros(0)
 
     @property
-    def heard(self) -> tuple[str, ...]:
+    def audible_sensors(self) -> tuple[str, ...]:
         return tuple(self.at_sensor)
 
     @property

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-NEEDED = ("train_type", "speed_kmh", "axle_load_t")
+REQUIRED_COLUMNS = ("train_type", "speed_kmh", "axle_load_t")
 
 
 @dataclass(frozen=True)
@@ -43,42 +43,42 @@ def effects(rows: Sequence[Mapping], score: str = "fit_pct") -> tuple[Effect, ..
     score : str
         Name of the score.
     """
-    used = [r for r in rows if all(r.get(k) is not None for k in (*NEEDED, score))]
-    if len(used) < 8:
+    complete = [r for r in rows if all(r.get(k) is not None for k in (*REQUIRED_COLUMNS, score))]
+    if len(complete) < 8:
         return ()
-    y = np.array([r[score] for r in used], dtype=float)
-    speed = np.array([r["speed_kmh"] for r in used], dtype=float)
-    load = np.array([r["axle_load_t"] for r in used], dtype=float)
-    types = sorted({r["train_type"] for r in used})
-    is_type = np.array([[r["train_type"] == t for t in types] for r in used], dtype=float)
+    y = np.array([r[score] for r in complete], dtype=float)
+    speed = np.array([r["speed_kmh"] for r in complete], dtype=float)
+    load = np.array([r["axle_load_t"] for r in complete], dtype=float)
+    types = sorted({r["train_type"] for r in complete})
+    is_type = np.array([[r["train_type"] == t for t in types] for r in complete], dtype=float)
     slopes = {("axle load", "tonne"): load - load.mean(), ("speed", "10 km/h"): (speed - speed.mean()) / 10}
-    found = []
+    results = []
     for (factor, per), x in slopes.items():
-        found += _effect(y, np.column_stack([np.ones(len(y)), x]), [1], factor, [per], False)
-    found += _types(y, is_type, types, np.zeros((len(y), 0)), False)
-    whole = np.column_stack([is_type, *slopes.values()])
+        results += _column_effects(y, np.column_stack([np.ones(len(y)), x]), [1], factor, [per], False)
+    results += _type_effects(y, is_type, types, np.zeros((len(y), 0)), False)
+    design = np.column_stack([is_type, *slopes.values()])
     n_type = len(types)
     for k, (factor, per) in enumerate(slopes):
-        found += _effect(y, whole, [n_type + k], factor, [per], True)
-    found += _types(y, is_type, types, np.column_stack(list(slopes.values())), True)
-    return tuple(found)
+        results += _column_effects(y, design, [n_type + k], factor, [per], True)
+    results += _type_effects(y, is_type, types, np.column_stack(list(slopes.values())), True)
+    return tuple(results)
 
 
-def _types(y, is_type, types, beside, adjusted):
+def _type_effects(y, is_type, types, covariates, adjusted):
     """Effects of each further type against the most frequent one."""
     reference = int(np.argmax(is_type.sum(axis=0)))
-    others = [k for k in range(len(types)) if k != reference]
-    design = np.column_stack([np.ones(len(y)), is_type[:, others], beside])
-    names = [f"{types[k]} instead of {types[reference]}" for k in others]
-    return _effect(y, design, list(range(1, 1 + len(others))), "train type", names, adjusted)
+    compared = [k for k in range(len(types)) if k != reference]
+    design = np.column_stack([np.ones(len(y)), is_type[:, compared], covariates])
+    names = [f"{types[k]} instead of {types[reference]}" for k in compared]
+    return _column_effects(y, design, list(range(1, 1 + len(compared))), "train type", names, adjusted)
 
 
-def _effect(y, design, columns, factor, names, adjusted):
+def _column_effects(y, design, columns, factor, names, adjusted):
     """Effects of some columns of a design; columns that the others determine to 99 % are left out."""
-    found = []
+    results = []
     n, p = design.shape
     if n <= p + 2:
-        return found
+        return results
     inverse = np.linalg.pinv(design.T @ design)
     solution = inverse @ design.T @ y
     leverage = np.clip(np.einsum("ij,jk,ik->i", design, inverse, design), 0, 0.999)
@@ -86,17 +86,17 @@ def _effect(y, design, columns, factor, names, adjusted):
     covariance = inverse @ (design * weight[:, None]).T @ design @ inverse
     t = stats.t.ppf(0.975, n - p)
     for column, name in zip(columns, names):
-        if _determined(design, column):
+        if _is_determined(design, column):
             continue
         change, se = float(solution[column]), float(np.sqrt(covariance[column, column]))
-        found.append(Effect(factor, name, change, se, change - t * se, change + t * se, n, adjusted))
-    return found
+        results.append(Effect(factor, name, change, se, change - t * se, change + t * se, n, adjusted))
+    return results
 
 
-def _determined(design, column) -> bool:
+def _is_determined(design, column) -> bool:
     """Whether the other columns explain this one to 99 % of its variance."""
-    others = np.delete(design, column, axis=1)
+    other_columns = np.delete(design, column, axis=1)
     x = design[:, column]
-    rest = x - others @ np.linalg.lstsq(others, x, rcond=None)[0]
+    residual = x - other_columns @ np.linalg.lstsq(other_columns, x, rcond=None)[0]
     spread = np.sum((x - x.mean()) ** 2)
-    return bool(spread == 0 or np.sum(rest**2) < 0.01 * spread)
+    return bool(spread == 0 or np.sum(residual**2) < 0.01 * spread)

@@ -75,22 +75,22 @@ def score(data, expected, basis: WheelBasis, settings) -> Scores:
     uses only data before the predicted samples.
     """
     rate, n = basis.rate, len(data)
-    half, expected = settings.time_search * rate, np.asarray(expected, dtype=float)
-    heard = delay_power(data, expected, basis, settings)
-    times = np.sort(search_times(data, expected + common_delay(heard), basis, half))
+    search_range, expected = settings.time_search * rate, np.asarray(expected, dtype=float)
+    delays = delay_power(data, expected, basis, settings)
+    times = np.sort(search_times(data, expected + common_delay(delays), basis, search_range))
     fitted = joint_fit(data, times, basis)
     first, length = wheel_windows(times, n, round(settings.score_window * rate), 2)
-    own = [slice(max(a, 0), a + k) for a, k in zip(first, length)]
-    scored = np.concatenate([np.arange(s.start, s.stop) for s in own])
-    parts = np.array([fit_percent(data[s], fitted.prediction[s]) for s in own])
-    ahead, ahead_parts = forecast(data, expected, basis, settings, heard)
-    left, left_parts = leave_one_out(data, times, basis, own)
+    windows = [slice(max(a, 0), a + k) for a, k in zip(first, length)]
+    scored_samples = np.concatenate([np.arange(s.start, s.stop) for s in windows])
+    fit_by_wheel = np.array([fit_percent(data[s], fitted.prediction[s]) for s in windows])
+    forecast_skill, forecast_by_wheel = forecast(data, expected, basis, settings, delays)
+    left_out_score, left_out_by_wheel = leave_one_out(data, times, basis, windows)
     return Scores(
-        fit_percent(data[scored], fitted.prediction[scored]),
-        ahead,
-        left,
-        np.column_stack([parts, ahead_parts, left_parts]),
-        len(scored),
+        fit_percent(data[scored_samples], fitted.prediction[scored_samples]),
+        forecast_skill,
+        left_out_score,
+        np.column_stack([fit_by_wheel, forecast_by_wheel, left_out_by_wheel]),
+        len(scored_samples),
         2 * len(times),
     )
 
@@ -115,27 +115,29 @@ def delay_power(data, expected, basis: WheelBasis, settings) -> DelayPower:
     """
     stride = max(int(basis.rate / (12.0 * settings.band_high)), 1)
     reach = round(settings.delay_search * basis.rate / stride) * stride
-    short = basis.cut(300)
+    short = basis.truncate(300)
     rows = gather(data, np.round(expected).astype(int) - reach, 2 * reach + short.n_sample)
-    inner = short.correlated(rows, 2 * reach + 1)[:, ::stride]
+    inner = short.correlate(rows, 2 * reach + 1)[:, ::stride]
     power = np.sum((inner @ np.linalg.inv(short.whitening)) ** 2, axis=2)
-    own = 2 * round(settings.time_search * basis.rate / stride) + 1
-    return DelayPower(ndimage.maximum_filter1d(power, own, axis=1), stride, reach)
+    search_width = 2 * round(settings.time_search * basis.rate / stride) + 1
+    return DelayPower(ndimage.maximum_filter1d(power, search_width, axis=1), stride, reach)
 
 
-def common_delay(heard: DelayPower, without_own: bool = False) -> np.ndarray:
+def common_delay(delays: DelayPower, leave_own_out: bool = False) -> np.ndarray:
     """(n_wheel,) delay of all wheels against the detected axles that explains most, the same for all. [samples]
 
     ``leave_own_out``: for every wheel the delay from the other wheels, so that its own future does not enter.
     """
-    each = heard.power
-    total = np.broadcast_to(each.sum(axis=0), each.shape) - (each if without_own and len(each) > 1 else 0.0)
+    power = delays.power
+    total = np.broadcast_to(power.sum(axis=0), power.shape) - (power if leave_own_out and len(power) > 1 else 0.0)
     # middle of the range in which every wheel has its best time within its search range
-    best = [np.median(np.flatnonzero(row >= row.max() * (1 - 1e-9))) for row in (total if without_own else total[:1])]
-    return np.broadcast_to(np.array(best), len(each)) * heard.stride - heard.reach
+    best_steps = [
+        np.median(np.flatnonzero(row >= row.max() * (1 - 1e-9))) for row in (total if leave_own_out else total[:1])
+    ]
+    return np.broadcast_to(np.array(best_steps), len(power)) * delays.stride - delays.reach
 
 
-def forecast(data, expected, basis: WheelBasis, settings, heard: DelayPower | None = None):
+def forecast(data, expected, basis: WheelBasis, settings, delays: DelayPower | None = None):
     """Forecast skill [%], pooled and (n_wheel,) per wheel: jumps from the first milliseconds predict the next ones.
 
     The forecast is causal, as is the filter: nothing after ``forecast_train`` behind a wheel's expected impact enters
@@ -145,71 +147,71 @@ def forecast(data, expected, basis: WheelBasis, settings, heard: DelayPower | No
     """
     rate, n = basis.rate, len(data)
     train, test = round(settings.forecast_train * rate), round(settings.forecast_test * rate)
-    half, expected = settings.time_search * rate, np.asarray(expected, dtype=float)
-    heard = heard or delay_power(data, expected, basis, settings)
-    expected = expected + common_delay(heard, without_own=True)
-    following = np.append(np.floor(expected[1:] - half).astype(int), n)
+    search_range, expected = settings.time_search * rate, np.asarray(expected, dtype=float)
+    delays = delays or delay_power(data, expected, basis, settings)
+    expected = expected + common_delay(delays, leave_own_out=True)
+    following = np.append(np.floor(expected[1:] - search_range).astype(int), n)
     end = np.round(expected).astype(int) + train
-    total = _from_training(data, expected, end, basis, half)
-    measured, predicted, parts = [], [], np.full(len(expected), np.nan)
+    prediction = _predict_from_training(data, expected, end, basis, search_range)
+    measured, predicted, skill_by_wheel = [], [], np.full(len(expected), np.nan)
     for j, first in enumerate(end):
-        judged = slice(first, min(first + test, following[j], n))
-        if judged.stop - judged.start >= test // 2:
-            measured.append(data[judged])
-            predicted.append(total[judged])
-            parts[j] = fit_percent(measured[-1], predicted[-1])
+        tested = slice(first, min(first + test, following[j], n))
+        if tested.stop - tested.start >= test // 2:
+            measured.append(data[tested])
+            predicted.append(prediction[tested])
+            skill_by_wheel[j] = fit_percent(measured[-1], predicted[-1])
     if not measured:
-        return float("nan"), parts
-    return fit_percent(np.concatenate(measured), np.concatenate(predicted)), parts
+        return float("nan"), skill_by_wheel
+    return fit_percent(np.concatenate(measured), np.concatenate(predicted)), skill_by_wheel
 
 
-def _from_training(data, expected, end, basis, half):
+def _predict_from_training(data, expected, end, basis, search_range):
     """Sum (n,) of the predicted responses, from the data of each wheel before its ``end``."""
-    reach = int(np.ceil(half)) + 1
+    reach = int(np.ceil(search_range)) + 1
     first = np.round(expected).astype(int) - reach
     n_lag, span = 2 * reach + 1, int(end[0] - first[0])
-    short = basis.cut(span)
-    seen = span - np.arange(n_lag)
-    own = np.pad(gather(data, first, span), ((0, 0), (0, n_lag - 1)))
-    rows, onset, weight, total = own, None, None, None
-    gap = np.diff(expected).min(initial=np.inf) - half
-    for sweep in range(3 if gap < basis.ring else 2 if gap < basis.n_sample else 1):
+    short = basis.truncate(span)
+    n_observed = span - np.arange(n_lag)
+    windows = np.pad(gather(data, first, span), ((0, 0), (0, n_lag - 1)))
+    rows, onset, weight, prediction = windows, None, None, None
+    gap = np.diff(expected).min(initial=np.inf) - search_range
+    for sweep in range(3 if gap < basis.ring_length else 2 if gap < basis.n_sample else 1):
         if sweep:
-            rows = own - np.pad(gather(total, first, span), ((0, 0), (0, n_lag - 1)))
+            rows = windows - np.pad(gather(prediction, first, span), ((0, 0), (0, n_lag - 1)))
             for row, shift, response in zip(rows, onset - first, weight @ short.columns):
                 row[shift:span] += response[: span - shift]
-        onset, phi = onsets(best_times(rows, first, expected, short, half, seen))
+        onset, phi = onsets(best_times(rows, first, expected, short, search_range, n_observed))
         theta = short.coefficients(phi)
         unit = theta @ short.columns
         unit[np.arange(span) >= (span - (onset - first))[:, None]] = 0.0
-        mine = rows[np.arange(len(rows))[:, None], (onset - first)[:, None] + np.arange(span)]
-        weight = theta * (np.sum(unit * mine, axis=1) / np.sum(unit**2, axis=1))[:, None]
-        total = predict(len(data), onset, weight, basis)
-    return total
+        aligned_rows = rows[np.arange(len(rows))[:, None], (onset - first)[:, None] + np.arange(span)]
+        weight = theta * (np.sum(unit * aligned_rows, axis=1) / np.sum(unit**2, axis=1))[:, None]
+        prediction = predict(len(data), onset, weight, basis)
+    return prediction
 
 
-def leave_one_out(data, times, basis: WheelBasis, own):
+def leave_one_out(data, times, basis: WheelBasis, windows):
     """Score [%] with the jump's direction from the other wheels and one amplitude for the held-out wheel."""
     if len(times) < 3:
         return float("nan"), np.full(len(times), np.nan)
     free = joint_fit(data, times, basis, free=True)
     onset, phi = onsets(times)
-    whitened = basis.turned(free.amplitudes, -phi) @ basis.whitening.T
+    whitened = basis.advance(free.amplitudes, -phi) @ basis.whitening.T
     moment = whitened.T @ whitened - whitened[:, :, None] * whitened[:, None, :]
     direction = np.linalg.solve(basis.whitening, np.linalg.eigh(moment)[1][:, :, -1].T).T
-    shapes = basis.turned(direction, phi) @ basis.columns
-    mine = free.amplitudes @ basis.columns
-    measured, predicted, parts = [], [], np.full(len(times), np.nan)
-    for j, window in enumerate(own):
+    shapes = basis.advance(direction, phi) @ basis.columns
+    own_responses = free.amplitudes @ basis.columns
+    measured, predicted, score_by_wheel = [], [], np.full(len(times), np.nan)
+    for j, window in enumerate(windows):
         n = min(window.stop - onset[j], basis.n_sample)
         if n < 8:
             continue
-        here = slice(onset[j], onset[j] + n)
-        others = free.prediction[here] - mine[j, :n]
-        scale = shapes[j, :n] @ (data[here] - others) / (shapes[j, :n] @ shapes[j, :n])
-        measured.append(data[here])
-        predicted.append(others + scale * shapes[j, :n])
-        parts[j] = fit_percent(measured[-1], predicted[-1])
+        samples = slice(onset[j], onset[j] + n)
+        other_responses = free.prediction[samples] - own_responses[j, :n]
+        scale = shapes[j, :n] @ (data[samples] - other_responses) / (shapes[j, :n] @ shapes[j, :n])
+        measured.append(data[samples])
+        predicted.append(other_responses + scale * shapes[j, :n])
+        score_by_wheel[j] = fit_percent(measured[-1], predicted[-1])
     if not measured:
-        return float("nan"), parts
-    return fit_percent(np.concatenate(measured), np.concatenate(predicted)), parts
+        return float("nan"), score_by_wheel
+    return fit_percent(np.concatenate(measured), np.concatenate(predicted)), score_by_wheel

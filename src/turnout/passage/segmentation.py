@@ -10,13 +10,13 @@ import numpy as np
 from scipy import signal
 
 BAND = (120.0, 400.0)  # Hz, in which wheels are loud on any rail
-BIN = 0.05  # s, length of a bin of the level
-LOUD = 6.0  # least ratio of a passage's power to the quiet power
-MEMORY = 120.0  # s of quiet time from which the quiet power is taken
+BIN_LENGTH = 0.05  # s, length of a bin of the level
+LOUD_FACTOR = 6.0  # least ratio of a passage's power to the quiet power
+MEMORY_TIME = 120.0  # s of quiet time from which the quiet power is taken
 
 
 @dataclass(frozen=True)
-class Piece:
+class Excerpt:
     """``samples`` (n_channel, n) from sample ``start`` of the record on.
 
     ``is_whole`` is False where a passage was longer than allowed and was cut.
@@ -24,10 +24,10 @@ class Piece:
 
     start: int
     samples: np.ndarray
-    whole: bool = True
+    is_whole: bool = True
 
 
-def cut_passages(blocks: Iterable[np.ndarray], rate: float, settings) -> Iterator[Piece]:
+def cut_passages(blocks: Iterable[np.ndarray], rate: float, settings) -> Iterator[Excerpt]:
     """Pieces of a continuous record, one per passage, each with ``settings.margin`` seconds on either side.
 
     A passage exceeds six times the quiet power, mean over the channels, without a gap of more than ``settings.gap``
@@ -41,10 +41,10 @@ def cut_passages(blocks: Iterable[np.ndarray], rate: float, settings) -> Iterato
     rate : float
         [Hz]
     """
-    state = _Cutter(rate, settings)
+    cutter = _PassageCutter(rate, settings)
     for block in equal_blocks(blocks, max(round(settings.chunk * rate), 1)):
-        yield from state.feed(block)
-    yield from state.end()
+        yield from cutter.feed(block)
+    yield from cutter.end()
 
 
 def equal_blocks(blocks, length: int) -> Iterator[np.ndarray]:
@@ -53,97 +53,97 @@ def equal_blocks(blocks, length: int) -> Iterator[np.ndarray]:
     >>> [b.tolist() for b in equal_blocks([np.array([[1, 2]]), np.array([[3, 4, 5]])], 3)]
     [[[1, 2, 3]], [[4, 5]]]
     """
-    parts, n = [], 0
+    chunks, n = [], 0
     for block in blocks:
         block = np.atleast_2d(block)
         while block.shape[1]:
-            take = min(length - n, block.shape[1])
-            parts.append(block[:, :take])
-            block, n = block[:, take:], n + take
+            n_taken = min(length - n, block.shape[1])
+            chunks.append(block[:, :n_taken])
+            block, n = block[:, n_taken:], n + n_taken
             if n == length:
-                yield np.concatenate(parts, axis=1)
-                parts, n = [], 0
-    if parts:
-        yield np.concatenate(parts, axis=1)
+                yield np.concatenate(chunks, axis=1)
+                chunks, n = [], 0
+    if chunks:
+        yield np.concatenate(chunks, axis=1)
 
 
 @dataclass
-class _Cutter:
+class _PassageCutter:
     """Cut passages from successive blocks; holds the state between them."""
 
     rate: float
     settings: object
-    sections: np.ndarray = None
-    memory: np.ndarray = None
-    kept: deque = field(default_factory=deque)
-    kept_from: int = 0
-    seen: int = 0
-    rest: np.ndarray = None
-    quiet: deque = field(default_factory=lambda: deque(maxlen=int(MEMORY / BIN)))
-    passing: list = field(default_factory=list)
+    filter_sections: np.ndarray = None
+    filter_state: np.ndarray = None
+    blocks: deque = field(default_factory=deque)
+    blocks_start: int = 0
+    n_fed: int = 0
+    remainder: np.ndarray = None
+    quiet_levels: deque = field(default_factory=lambda: deque(maxlen=int(MEMORY_TIME / BIN_LENGTH)))
+    passage_levels: list = field(default_factory=list)
     first: int | None = None
     last: int = 0
 
     def feed(self, block):
         """Excerpts that end in this block."""
-        if self.sections is None:
-            self.sections = signal.butter(2, BAND, btype="bandpass", fs=self.rate, output="sos")
+        if self.filter_sections is None:
+            self.filter_sections = signal.butter(2, BAND, btype="bandpass", fs=self.rate, output="sos")
             # as if the channels had always had their first value: an offset is no impact
-            rest = np.median(block, axis=1)[None, :, None]
-            self.memory = signal.sosfilt_zi(self.sections)[:, None, :] * rest
-            self.rest = np.zeros((block.shape[0], 0))
-        passed, self.memory = signal.sosfilt(self.sections, block, axis=1, zi=self.memory)
-        self.kept.append(block.astype(np.float32))
-        self.seen += block.shape[1]
-        per_bin = int(BIN * self.rate)
-        passed = np.concatenate([self.rest, passed], axis=1)
-        n = passed.shape[1] // per_bin
-        begin = self.seen - passed.shape[1]
-        self.rest = passed[:, n * per_bin :].copy()
-        powers = np.square(passed[:, : n * per_bin]).reshape(passed.shape[0], n, per_bin).mean(axis=2)
+            offset = np.median(block, axis=1)[None, :, None]
+            self.filter_state = signal.sosfilt_zi(self.filter_sections)[:, None, :] * offset
+            self.remainder = np.zeros((block.shape[0], 0))
+        filtered, self.filter_state = signal.sosfilt(self.filter_sections, block, axis=1, zi=self.filter_state)
+        self.blocks.append(block.astype(np.float32))
+        self.n_fed += block.shape[1]
+        per_bin = int(BIN_LENGTH * self.rate)
+        filtered = np.concatenate([self.remainder, filtered], axis=1)
+        n = filtered.shape[1] // per_bin
+        begin = self.n_fed - filtered.shape[1]
+        self.remainder = filtered[:, n * per_bin :].copy()
+        powers = np.square(filtered[:, : n * per_bin]).reshape(filtered.shape[0], n, per_bin).mean(axis=2)
         levels = np.log(np.maximum(powers, 1e-30)).mean(axis=0)
-        known = self.quiet if self.quiet else levels
-        loud = levels > np.quantile(known, 0.2) + np.log(LOUD) if n else ()
+        quiet_reference = self.quiet_levels if self.quiet_levels else levels
+        is_loud = levels > np.quantile(quiet_reference, 0.2) + np.log(LOUD_FACTOR) if n else ()
         for k in range(n):
-            self.passing.append(levels[k])
-            yield from self._step(begin + k * per_bin, per_bin, bool(loud[k]))
+            self.passage_levels.append(levels[k])
+            yield from self._step(begin + k * per_bin, per_bin, bool(is_loud[k]))
             if self.first is None:
-                self.quiet.extend(self.passing)
-                self.passing.clear()
-        self._forget()
+                self.quiet_levels.extend(self.passage_levels)
+                self.passage_levels.clear()
+        self._drop_blocks()
 
     def end(self):
         """The excerpt that the end of the record cuts off, if there is one."""
         if self.first is not None:
-            yield self._piece(self.first, self.seen, True)
+            yield self._excerpt(self.first, self.n_fed, True)
 
-    def _step(self, place, per_bin, loud):
+    def _step(self, sample, per_bin, is_loud):
         margin = int(self.settings.margin * self.rate)
-        if loud:
+        if is_loud:
             if self.first is None:
-                self.first = max(place - margin, 0)
-            self.last = place + per_bin
+                self.first = max(sample - margin, 0)
+            self.last = sample + per_bin
         if self.first is None:
             return
-        if loud and self.last - self.first > self.settings.longest * self.rate:
-            yield self._piece(self.first, self.last, False)
+        if is_loud and self.last - self.first > self.settings.longest * self.rate:
+            yield self._excerpt(self.first, self.last, False)
             self.first = None
-        elif not loud and place - self.last > self.settings.gap * self.rate:
-            yield self._piece(self.first, self.last + margin, True)
+        elif not is_loud and sample - self.last > self.settings.gap * self.rate:
+            yield self._excerpt(self.first, self.last + margin, True)
             self.first = None
-            self.passing.clear()  # a train as long as the memory would be taken as quiet
+            self.passage_levels.clear()  # a train as long as the memory would be taken as quiet
 
-    def _piece(self, start, stop, whole):
-        start, parts, place = max(start, self.kept_from), [], self.kept_from
-        for block in self.kept:
-            inside = slice(max(start - place, 0), max(min(stop - place, block.shape[1]), 0))
-            parts.append(block[:, inside])
-            place += block.shape[1]
-        return Piece(start, np.concatenate(parts, axis=1), whole)
+    def _excerpt(self, start, stop, is_whole):
+        start, blocks, sample = max(start, self.blocks_start), [], self.blocks_start
+        for block in self.blocks:
+            inside = slice(max(start - sample, 0), max(min(stop - sample, block.shape[1]), 0))
+            blocks.append(block[:, inside])
+            sample += block.shape[1]
+        return Excerpt(start, np.concatenate(blocks, axis=1), is_whole)
 
-    def _forget(self):
+    def _drop_blocks(self):
         """Remove blocks that no later excerpt can need."""
-        margin = int((self.settings.margin + BIN) * self.rate)
-        needed = self.first if self.first is not None else self.seen - margin - self.rest.shape[1]
-        while self.kept and self.kept_from + self.kept[0].shape[1] <= needed:
-            self.kept_from += self.kept.popleft().shape[1]
+        margin = int((self.settings.margin + BIN_LENGTH) * self.rate)
+        first_needed = self.first if self.first is not None else self.n_fed - margin - self.remainder.shape[1]
+        while self.blocks and self.blocks_start + self.blocks[0].shape[1] <= first_needed:
+            self.blocks_start += self.blocks.popleft().shape[1]

@@ -4,56 +4,61 @@ from __future__ import annotations
 
 import numpy as np
 
-from turnout.passage.axle_features import GRID, along_train
-from turnout.passage.slowness import coarser, pair_likeness, slowness_grid, stacked
+from turnout.passage.axle_features import GRID_STEP, along_train
+from turnout.passage.slowness import coarsen, pair_correlations, slowness_grid, stack_correlations
 from turnout.records import Rejection
 
-SEEN = 0.7  # m, largest shift between a wheel's position in a record and the sensor
-BLOW = 2.5  # m, the same in the crossing panel, where the impact at the nose may be louder than the wheel
-POOR, GOOD = 0.85, 0.95  # of the correlation with free shifts: below is inconsistent, above is consistent
-WIDTH = 0.02  # s, smoothing of the levels
+MAX_POSITION_SHIFT = 0.7  # m, largest shift between a wheel's position in a record and the sensor
+MAX_NOSE_SHIFT = 2.5  # m, the same in the crossing panel, where the impact at the nose may be louder than the wheel
+MIN_CONSISTENT_SHARE, MIN_REPAIRED_SHARE = (
+    0.85,
+    0.95,
+)  # of the correlation with free shifts: below is inconsistent, above is consistent
+SMOOTHING_TIME = 0.02  # s, smoothing of the levels
 
 
-def wrong_channels(heard, used, settings):
+def inconsistent_channels(envelopes, sensors, settings):
     """Findings and (n_sensor,) bool of the sensors to keep: channels that make all others disagree.
 
     They are sought only where no speed correlates the sensors' levels nearly as well as free shifts do. Then every
     exchange of two channels is tried, and every sensor is left out once. The one that helps decisively is reported.
     Fewer than four sensors cannot show which one is wrong.
     """
-    n = len(used)
+    n = len(sensors)
     keep = np.ones(n, dtype=bool)
     if n < 4:
         return [], keep
-    positions = heard.positions
-    values, step = coarser(heard.levels.values, heard.levels.step, 0.005)
-    pairs = pair_likeness(values, step, WIDTH)
+    positions = envelopes.positions
+    values, step = coarsen(envelopes.levels.values, envelopes.levels.step, 0.005)
+    correlations = pair_correlations(values, step, SMOOTHING_TIME)
     slowness = slowness_grid(settings)
-    free = np.mean([p.max() for p in pairs.values()])
-    best = stacked(pairs, step, positions, slowness).max()
-    if best >= POOR * free:
+    free_correlation = np.mean([p.max() for p in correlations.values()])
+    best_correlation = stack_correlations(correlations, step, positions, slowness).max()
+    if best_correlation >= MIN_CONSISTENT_SHARE * free_correlation:
         return [], keep
-    tried = []
-    for i, j in pairs:
+    trials = []
+    for i, j in correlations:
         changed = positions.astype(float).copy()
         changed[[i, j]] = changed[[j, i]]
-        tried.append((stacked(pairs, step, changed, slowness).max(), (i, j)))
+        trials.append((stack_correlations(correlations, step, changed, slowness).max(), (i, j)))
     for i in range(n):
         changed = positions.astype(float).copy()
         changed[i] = np.nan
-        tried.append((stacked(pairs, step, changed, slowness).max(), (i,)))
-    likeness, wrong = max(tried)
-    if likeness < GOOD * free:
+        trials.append((stack_correlations(correlations, step, changed, slowness).max(), (i,)))
+    correlation, suspects = max(trials)
+    if correlation < MIN_REPAIRED_SHARE * free_correlation:
         return [], keep
-    keep[list(wrong)] = False
-    if len(wrong) == 2:
-        text = f"{used[wrong[0]].name} and {used[wrong[1]].name}: each hears the train in the other's place"
-        return [Rejection("channels_swapped", float(best / free), POOR, text)], keep
-    text = f"{used[wrong[0]].name}: hears the train at another time than its place says"
-    return [Rejection("clock_drift", float(best / free), POOR, text)], keep
+    keep[list(suspects)] = False
+    if len(suspects) == 2:
+        text = f"{sensors[suspects[0]].name} and {sensors[suspects[1]].name}: each hears the train in the other's place"
+        return [
+            Rejection("channels_swapped", float(best_correlation / free_correlation), MIN_CONSISTENT_SHARE, text)
+        ], keep
+    text = f"{sensors[suspects[0]].name}: hears the train at another time than its place says"
+    return [Rejection("clock_drift", float(best_correlation / free_correlation), MIN_CONSISTENT_SHARE, text)], keep
 
 
-def wrong_places(heard, motion, used):
+def inconsistent_positions(envelopes, motion, sensors):
     """Findings and (n_sensor,) bool of the sensors to keep: small offsets, once the motion is known.
 
     Each sensor's level along the train is compared with the median of the others, in the first and in the second half.
@@ -61,46 +66,48 @@ def wrong_places(heard, motion, used):
     the crossing panel a constant shift below ``MAX_NOSE_SHIFT`` is no finding: it may be the distance to the nose.
     Fewer than four sensors cannot show which one is wrong.
     """
-    n = len(used)
+    n = len(sensors)
     keep = np.ones(n, dtype=bool)
     if n < 4:
         return [], keep
-    shifts = half_shifts(heard, motion)
+    shifts = half_shifts(envelopes, motion)
     shifts = shifts - np.median(shifts, axis=0)
-    whole = shifts.mean(axis=1)
-    limits = np.array([BLOW if s.panel == "CP" else SEEN for s in used])
-    drifts = np.abs(shifts[:, 1] - shifts[:, 0]) > SEEN
-    bad = np.flatnonzero((np.abs(whole) > limits) | drifts)
-    if bad.size == 0 or bad.size > n // 2:
+    mean_shift = shifts.mean(axis=1)
+    limits = np.array([MAX_NOSE_SHIFT if s.panel == "CP" else MAX_POSITION_SHIFT for s in sensors])
+    is_drifting = np.abs(shifts[:, 1] - shifts[:, 0]) > MAX_POSITION_SHIFT
+    suspects = np.flatnonzero((np.abs(mean_shift) > limits) | is_drifting)
+    if suspects.size == 0 or suspects.size > n // 2:
         return [], keep
     findings = []
-    for i in bad:
+    for i in suspects:
         first, last = shifts[i] / motion.speed * 1e3
-        if drifts[i]:
-            text = f"{used[i].name}: its clock drifts, from {first:.0f} to {last:.0f} ms against the others"
+        if is_drifting[i]:
+            text = f"{sensors[i].name}: its clock drifts, from {first:.0f} to {last:.0f} ms against the others"
         else:
-            text = f"{used[i].name}: its clock is off, {whole[i] / motion.speed * 1e3:.0f} ms against the others"
-        findings.append(Rejection("clock_drift", float(whole[i]), float(limits[i]), text))
+            text = (
+                f"{sensors[i].name}: its clock is off, {mean_shift[i] / motion.speed * 1e3:.0f} ms against the others"
+            )
+        findings.append(Rejection("clock_drift", float(mean_shift[i]), float(limits[i]), text))
         keep[i] = False
     return findings, keep
 
 
-def half_shifts(heard, motion, reach: float = 20.0) -> np.ndarray:
+def half_shifts(envelopes, motion, reach: float = 20.0) -> np.ndarray:
     """(n_sensor, 2) shift [m] of each sensor against the others, in the first and second half of the train."""
-    ways = motion.way(np.array([heard.begin, heard.end]))
-    middle = motion.direction * np.mean(heard.positions)
-    start, stop = ways[0] - middle - 30.0, ways[1] - middle + 30.0
-    values = along_train(heard.levels.values, heard.levels.step, heard.positions, motion, start, stop)
+    extent = motion.distance(np.array([envelopes.begin, envelopes.end]))
+    middle = motion.direction * np.mean(envelopes.positions)
+    start, stop = extent[0] - middle - 30.0, extent[1] - middle + 30.0
+    values = along_train(envelopes.levels.values, envelopes.levels.step, envelopes.positions, motion, start, stop)
     values = values - values.mean(axis=1, keepdims=True)
-    n, out = values.shape[1], np.zeros((len(values), 2))
-    lags = np.arange(-int(reach / GRID), int(reach / GRID) + 1)
-    for k, part in enumerate((slice(0, n // 2), slice(n // 2, n))):
-        rows = values[:, part]
+    n, shifts = values.shape[1], np.zeros((len(values), 2))
+    lags = np.arange(-int(reach / GRID_STEP), int(reach / GRID_STEP) + 1)
+    for k, half in enumerate((slice(0, n // 2), slice(n // 2, n))):
+        rows = values[:, half]
         size = 2 ** int(np.ceil(np.log2(2 * rows.shape[1])))
         spectra = np.fft.rfft(rows, size, axis=1)
         for i in range(len(rows)):
             # the median of the others: a second wrong sensor must not affect it
-            others = np.median(np.delete(rows, i, axis=0), axis=0)
-            likeness = np.fft.irfft(spectra[i] * np.fft.rfft(others, size).conj(), size)
-            out[i, k] = lags[np.argmax(likeness[lags])] * GRID
-    return out
+            median_of_others = np.median(np.delete(rows, i, axis=0), axis=0)
+            correlation = np.fft.irfft(spectra[i] * np.fft.rfft(median_of_others, size).conj(), size)
+            shifts[i, k] = lags[np.argmax(correlation[lags])] * GRID_STEP
+    return shifts

@@ -7,21 +7,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from turnout.passage.axle_features import (
-    GRID,
+    GRID_STEP,
     AxleFinding,
     along_train,
     axle_candidates,
     deflection_feature,
     level_feature,
-    scaled,
+    scale_profile,
 )
 from turnout.passage.envelope import Levels
 from turnout.passage.kinematics import Motion
-from turnout.passage.profile_decoding import decoded
+from turnout.passage.profile_decoding import decode_profile
 
 
 @dataclass(frozen=True)
-class Listening:
+class SensorEnvelopes:
     """Envelopes of all sensors on one time grid, in which axles are sought.
 
     ``levels`` (n_sensor, n_bin) with their ``step`` [s]; ``slow`` (n_sensor, n_bin) mean acceleration per bin, without
@@ -34,49 +34,51 @@ class Listening:
     begin: float
     end: float
 
-    def only(self, rows) -> Listening:
+    def select(self, rows) -> SensorEnvelopes:
         """The envelopes of some of the sensors."""
         rows = np.asarray(rows, dtype=int)
         levels = self.levels
-        part = Levels(levels.values[rows], levels.step, levels.scatter[rows], levels.loud[rows], levels.amplitude[rows])
-        return Listening(part, self.slow[rows], self.positions[rows], self.begin, self.end)
+        selected = Levels(
+            levels.values[rows], levels.step, levels.scatter[rows], levels.loud_power[rows], levels.amplitude[rows]
+        )
+        return SensorEnvelopes(selected, self.slow[rows], self.positions[rows], self.begin, self.end)
 
 
-def profiles(listening: Listening, motion: Motion) -> tuple[dict, float]:
+def feature_profiles(envelopes: SensorEnvelopes, motion: Motion) -> tuple[dict, float]:
     """Feature name -> (profile (n,), noise), and the offset [m] of their first point behind the motion's origin."""
-    start, stop = _stretch(listening, motion)
-    step, positions = listening.levels.step, listening.positions
-    level = level_feature(along_train(listening.levels.values, step, positions, motion, start, stop)).mean(axis=0)
-    slow = along_train(listening.slow, step, positions, motion, start, stop)
+    start, stop = _train_extent(envelopes, motion)
+    step, positions = envelopes.levels.step, envelopes.positions
+    level = level_feature(along_train(envelopes.levels.values, step, positions, motion, start, stop)).mean(axis=0)
+    slow = along_train(envelopes.slow, step, positions, motion, start, stop)
     gain = np.maximum(np.sqrt(np.mean(slow**2, axis=1, keepdims=True)), 1e-30)
     deflection = deflection_feature(slow / gain)
     inside = np.zeros(level.size, dtype=bool)
-    inside[int(8.0 / GRID) : -int(8.0 / GRID)] = True
-    level, level_noise = scaled(level, inside)
-    deflection, deflection_noise = scaled(deflection.mean(axis=0), inside)
+    inside[int(8.0 / GRID_STEP) : -int(8.0 / GRID_STEP)] = True
+    level, level_noise = scale_profile(level, inside)
+    deflection, deflection_noise = scale_profile(deflection.mean(axis=0), inside)
     weights = np.array([level_noise, deflection_noise]) ** -2.0
     weights /= weights.sum()
-    both = weights[0] * level + weights[1] * deflection
+    combined = weights[0] * level + weights[1] * deflection
     noise = float(np.hypot(weights[0] * level_noise, weights[1] * deflection_noise))
-    found = {"both": (both, noise), "deflection": (deflection, deflection_noise), "level": (level, level_noise)}
-    return found, start
+    features = {"both": (combined, noise), "deflection": (deflection, deflection_noise), "level": (level, level_noise)}
+    return features, start
 
 
-def aligned(listening: Listening, motion: Motion, reach: float = 2.0, passes: int = 3) -> Motion:
+def align_sensors(envelopes: SensorEnvelopes, motion: Motion, reach: float = 2.0, passes: int = 3) -> Motion:
     """The motion with its speed corrected until all sensors' features coincide along the train.
 
     Each sensor's shift against the mean of the others [m], up to ``reach``, is regressed on its position.
     """
-    along = motion.direction * listening.positions
-    along = along - along.mean()
-    if np.ptp(along) < 0.3:
+    travel = motion.direction * envelopes.positions
+    travel = travel - travel.mean()
+    if np.ptp(travel) < 0.3:
         return motion
     for _ in range(passes):
-        shifts = _own_shifts(listening, motion, reach)
+        shifts = _sensor_shifts(envelopes, motion, reach)
         # the slope is v/v' - 1: a train faster than assumed arrives early at later sensors
-        slope = np.sum(along * shifts) / np.sum(along**2)
+        slope = np.sum(travel * shifts) / np.sum(travel**2)
         slope = float(np.clip(slope, -0.2, 0.2))
-        middle = float(motion.time(motion.direction * listening.positions.mean()))
+        middle = float(motion.time(motion.direction * envelopes.positions.mean()))
         speed = motion.speed / (1.0 + slope)
         start = middle - (middle - motion.start) * motion.speed / speed
         motion = replace(motion, speed=speed, start=start)
@@ -86,53 +88,57 @@ def aligned(listening: Listening, motion: Motion, reach: float = 2.0, passes: in
     return motion
 
 
-def _own_shifts(listening, motion, reach):
+def _sensor_shifts(envelopes, motion, reach):
     """(n_sensor,) shift [m] of each sensor's features against the mean of the others."""
-    start, stop = _stretch(listening, motion)
-    step, positions = listening.levels.step, listening.positions
-    level = level_feature(along_train(listening.levels.values, step, positions, motion, start, stop))
-    deflection = deflection_feature(along_train(listening.slow, step, positions, motion, start, stop))
+    start, stop = _train_extent(envelopes, motion)
+    step, positions = envelopes.levels.step, envelopes.positions
+    level = level_feature(along_train(envelopes.levels.values, step, positions, motion, start, stop))
+    deflection = deflection_feature(along_train(envelopes.slow, step, positions, motion, start, stop))
     size = 2 ** int(np.ceil(np.log2(2 * level.shape[1])))
-    lags = np.arange(-int(reach / GRID), int(reach / GRID) + 1)
-    likeness = np.zeros((len(positions), lags.size))
+    lags = np.arange(-int(reach / GRID_STEP), int(reach / GRID_STEP) + 1)
+    correlation = np.zeros((len(positions), lags.size))
     for rows in (level, deflection):
         rows = rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-30)
         spectra = np.fft.rfft(rows, size, axis=1)
-        others = spectra.sum(axis=0) - spectra
-        found = np.fft.irfft(spectra * others.conj(), size, axis=1)[:, lags]
+        other_spectra = spectra.sum(axis=0) - spectra
+        candidate = np.fft.irfft(spectra * other_spectra.conj(), size, axis=1)[:, lags]
         # at low speed the deflection is below noise, on a quiet rail the level is: the better one counts
-        if found.max(axis=1).mean() > likeness.max(axis=1).mean():
-            likeness = found
+        if candidate.max(axis=1).mean() > correlation.max(axis=1).mean():
+            correlation = candidate
     # a wide prior at no shift keeps a train of equal bogies from a shift by one bogie
-    likeness = likeness * np.exp(-0.5 * (lags * GRID / max(reach, 1.0)) ** 2)
-    best = likeness.argmax(axis=1)
+    correlation = correlation * np.exp(-0.5 * (lags * GRID_STEP / max(reach, 1.0)) ** 2)
+    best_lag = correlation.argmax(axis=1)
     n = len(positions)
     # the others' mean moves too: with n sensors a common slope appears n / (n - 1) times too large
-    return lags[best] * GRID * (n - 1) / n
+    return lags[best_lag] * GRID_STEP * (n - 1) / n
 
 
-def _stretch(listening, motion):
+def _train_extent(envelopes, motion):
     """Range along the train, from before the first to behind the last axle. [m]"""
-    ways = [motion.way(t) - motion.direction * x for t in (listening.begin, listening.end) for x in listening.positions]
-    return min(ways) - 12.0, max(ways) + 12.0
+    extent = [
+        motion.distance(t) - motion.direction * x for t in (envelopes.begin, envelopes.end) for x in envelopes.positions
+    ]
+    return min(extent) - 12.0, max(extent) + 12.0
 
 
-def template_counts(listening: Listening, motion: Motion, patterns, n: int = 3) -> list[AxleFinding]:
+def template_counts(envelopes: SensorEnvelopes, motion: Motion, patterns, n: int = 3) -> list[AxleFinding]:
     """The axle counts of the rows of vehicles that collect most along the train, the best first."""
-    found, start = profiles(listening, motion)
-    around = min(motion.way(listening.end) - motion.way(listening.begin) - np.ptp(listening.positions), 2000.0)
-    offers = []
-    for feature, (profile, noise) in found.items():
+    features, start = feature_profiles(envelopes, motion)
+    audible_length = min(
+        motion.distance(envelopes.end) - motion.distance(envelopes.begin) - np.ptp(envelopes.positions), 2000.0
+    )
+    candidates = []
+    for feature, (profile, noise) in features.items():
         if noise < 0.5:
-            offers += [decoded(profile, start, p, around, feature) for p in patterns]
-    return sorted((o for o in offers if o is not None), key=lambda o: -o.contrast)[:n]
+            candidates += [decode_profile(profile, start, p, audible_length, feature) for p in patterns]
+    return sorted((o for o in candidates if o is not None), key=lambda o: -o.contrast)[:n]
 
 
-def counts(listening: Listening, motion: Motion, settings) -> list[AxleFinding]:
+def axle_counts(envelopes: SensorEnvelopes, motion: Motion, settings) -> list[AxleFinding]:
     """Candidate axle counts of all features, the one with the largest contrast first."""
-    found, start = profiles(listening, motion)
-    offers = []
-    for feature, (profile, noise) in found.items():
+    features, start = feature_profiles(envelopes, motion)
+    candidates = []
+    for feature, (profile, noise) in features.items():
         threshold = float(np.clip(settings.axle_level * noise, 0.12, 0.5))
-        offers += axle_candidates(profile, start, settings.axle_spacing_minimum, threshold, feature)
-    return sorted(offers, key=lambda c: -c.contrast)
+        candidates += axle_candidates(profile, start, settings.axle_spacing_minimum, threshold, feature)
+    return sorted(candidates, key=lambda c: -c.contrast)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import fft, ndimage
 
-KMH = 3.6  # km/h per m/s
+KMH_PER_MS = 3.6  # km/h per m/s
 
 
 @dataclass(frozen=True)
@@ -18,23 +18,23 @@ class Scan:
     """
 
     slowness: np.ndarray
-    likeness: np.ndarray
+    correlation: np.ndarray
 
-    def peaks(self, n: int = 3, apart: float = 0.04) -> list[tuple[float, float]]:
+    def peaks(self, n: int = 3, min_distance: float = 0.04) -> list[tuple[float, float]]:
         """The ``n`` best (slowness, correlation), at least ``min_distance`` (relative) from each other."""
-        found, left = [], self.likeness.copy()
+        peaks, remaining = [], self.correlation.copy()
         for _ in range(n):
-            k = int(np.argmax(left))
-            if not np.isfinite(left[k]):
+            k = int(np.argmax(remaining))
+            if not np.isfinite(remaining[k]):
                 break
-            found.append((self._refined(k), float(self.likeness[k])))
-            left[np.abs(self.slowness - self.slowness[k]) < apart * abs(self.slowness[k])] = -np.inf
-        return found
+            peaks.append((self._refined_peak(k), float(self.correlation[k])))
+            remaining[np.abs(self.slowness - self.slowness[k]) < min_distance * abs(self.slowness[k])] = -np.inf
+        return peaks
 
-    def _refined(self, k: int) -> float:
+    def _refined_peak(self, k: int) -> float:
         if not 0 < k < len(self.slowness) - 1:
             return float(self.slowness[k])
-        low, mid, high = self.likeness[k - 1 : k + 2]
+        low, mid, high = self.correlation[k - 1 : k + 2]
         curve = low - 2 * mid + high
         shift = 0.5 * (low - high) / curve if curve < 0 else 0.0
         step = 0.5 * (self.slowness[k + 1] - self.slowness[k - 1])
@@ -43,9 +43,9 @@ class Scan:
 
 def slowness_grid(settings, relative: float = 0.008) -> np.ndarray:
     """Signed slownesses between the slowest and the fastest train, with relative steps ``relative``. [s/m]"""
-    slow, fast = KMH / settings.speed_minimum, KMH / settings.speed_maximum
-    one = np.geomspace(fast, slow, int(np.log(slow / fast) / relative) + 2)
-    return np.concatenate([-one[::-1], one])
+    slow, fast = KMH_PER_MS / settings.speed_minimum, KMH_PER_MS / settings.speed_maximum
+    positive = np.geomspace(fast, slow, int(np.log(slow / fast) / relative) + 2)
+    return np.concatenate([-positive[::-1], positive])
 
 
 def scan_slowness(values, step: float, positions, settings) -> Scan:
@@ -54,60 +54,62 @@ def scan_slowness(values, step: float, positions, settings) -> Scan:
     Bogies are not resolved, so that there are no false maxima.
     """
     slowness = slowness_grid(settings)
-    return Scan(slowness, likeness_at(slowness, values, step, positions))
+    return Scan(slowness, correlation_at(slowness, values, step, positions))
 
 
-def likeness_at(slowness, values, step: float, positions) -> np.ndarray:
+def correlation_at(slowness, values, step: float, positions) -> np.ndarray:
     """(n,) correlation of all sensors at each slowness [s/m]; at 0 that of simultaneous records."""
     positions = np.asarray(positions, dtype=float)
     # as wide as the grid at the slow end, where a passage is long
-    width = np.clip(0.008 * np.ptp(positions) * KMH / 20.0, 0.02, 0.1)
-    values, step = coarser(values, step, 0.005)
-    return stacked(pair_likeness(values, step, width), step, positions, np.asarray(slowness, dtype=float))
+    width = np.clip(0.008 * np.ptp(positions) * KMH_PER_MS / 20.0, 0.02, 0.1)
+    values, step = coarsen(values, step, 0.005)
+    return stack_correlations(
+        pair_correlations(values, step, width), step, positions, np.asarray(slowness, dtype=float)
+    )
 
 
-def refine_slowness(pairs, step: float, positions, near: float, reach: float = 0.03) -> tuple[float, float]:
+def refine_slowness(correlations, step: float, positions, near: float, reach: float = 0.03) -> tuple[float, float]:
     """Best slowness within ``reach`` (relative) of ``near`` and its correlation, from fine ``pair_correlations``."""
     positions = np.asarray(positions, dtype=float)
     span = max(np.ptp(positions), 0.1)
     n = int(np.clip(2 * reach * abs(near) * span / (0.5 * step), 21, 601)) | 1
     slowness = near * np.linspace(1 - reach, 1 + reach, n)
-    return Scan(slowness, stacked(pairs, step, positions, slowness)).peaks(1)[0]
+    return Scan(slowness, stack_correlations(correlations, step, positions, slowness)).peaks(1)[0]
 
 
-def coarser(values, step: float, wanted: float):
+def coarsen(values, step: float, max_step: float):
     """(levels, step) averaged over as many bins as fit into ``max_step`` [s]."""
-    values, k = np.atleast_2d(values), max(int(wanted / step + 1e-9), 1)
+    values, k = np.atleast_2d(values), max(int(max_step / step + 1e-9), 1)
     n = values.shape[1] // k
     return values[:, : n * k].reshape(len(values), n, k).mean(axis=2), k * step
 
 
-def pair_likeness(values, step, width) -> dict:
+def pair_correlations(values, step, width) -> dict:
     """(i, j) -> (n_lag,) correlation coefficient of sensors i and j over the lag [bins], negative ones at the end."""
     smooth = ndimage.uniform_filter1d(np.atleast_2d(values), max(round(width / step), 1), axis=1)
     n = fft.next_fast_len(2 * smooth.shape[1], real=True)
     centred = smooth - smooth.mean(axis=1, keepdims=True)
     centred /= np.maximum(np.linalg.norm(centred, axis=1, keepdims=True), 1e-12)
     spectra = fft.rfft(centred, n, axis=1)
-    found = {}
+    correlations = {}
     for i in range(len(spectra) - 1):
         for j, row in enumerate(fft.irfft(spectra[i + 1 :] * spectra[i].conj(), n, axis=1), i + 1):
-            found[i, j] = row
-    return found
+            correlations[i, j] = row
+    return correlations
 
 
-def stacked(pairs, step, positions, slowness) -> np.ndarray:
+def stack_correlations(correlations, step, positions, slowness) -> np.ndarray:
     """(n,) mean correlation coefficient of the pairs after the shifts of each slowness, weighted by distance to 3 m."""
     total, weight = np.zeros(len(slowness)), 0.0
-    for (i, j), likeness in pairs.items():
+    for (i, j), correlation in correlations.items():
         distance = positions[j] - positions[i]
         if not abs(distance) >= 0.05:
             continue
-        n = likeness.size
+        n = correlation.size
         lag = slowness * distance / step
         whole = np.floor(lag).astype(int)
-        part = lag - whole
+        fraction = lag - whole
         w = min(abs(distance), 3.0)
-        total += w * ((1 - part) * likeness[whole % n] + part * likeness[(whole + 1) % n])
+        total += w * ((1 - fraction) * correlation[whole % n] + fraction * correlation[(whole + 1) % n])
         weight += w
     return total / weight if weight else np.full(len(slowness), -np.inf)

@@ -14,7 +14,7 @@ from turnout.passage.result import SpeedFinding
 from turnout.passage.sensor_consistency import half_shifts
 
 
-def slowness_from_sensors(times, positions, direction: int, place_error: float, limit: float):
+def slowness_from_sensors(times, positions, direction: int, position_error: float, limit: float):
     r"""Slowness at the mean time [s/m], its change [s/m per s], and their standard errors.
 
     .. math:: t_{ij} = \tau_j + \frac{2 d\,x_i}{v_j + \sqrt{v_j^2 + 2 a\,d\,x_i}} + b_i q, \qquad
@@ -33,41 +33,43 @@ def slowness_from_sensors(times, positions, direction: int, place_error: float, 
     limit : float
         Four standard deviations of the prior of the acceleration: two sensors alone leave it open. [m/s²]
     """
-    times, along = np.asarray(times, float), direction * np.asarray(positions, float)
-    along = along - along.mean()
+    times, travel = np.asarray(times, float), direction * np.asarray(positions, float)
+    travel = travel - travel.mean()
     centre = np.nanmean(times, axis=0)
-    late = centre - centre.mean()
+    elapsed = centre - centre.mean()
     sensor, axle = np.nonzero(np.isfinite(times))
     n_axle = times.shape[1]
     design = np.zeros((sensor.size, n_axle + 2))
     design[np.arange(sensor.size), axle] = 1.0
-    design[:, -2] = along[sensor]
-    design[:, -1] = along[sensor] * late[axle]
+    design[:, -2] = travel[sensor]
+    design[:, -1] = travel[sensor] * elapsed[axle]
     target = times[sensor, axle]
     weight = np.ones(sensor.size)
     level = times - centre
-    start = np.nansum(level * along[:, None]) / np.sum(np.isfinite(level) * along[:, None] ** 2)
-    floor = 0.3 * place_error * abs(start)
+    start = np.nansum(level * travel[:, None]) / np.sum(np.isfinite(level) * travel[:, None] ** 2)
+    min_scale = 0.3 * position_error * abs(start)
     prior = np.zeros((1, n_axle + 2))
-    scale, curved = floor, np.zeros(sensor.size)
+    scale, curvature = min_scale, np.zeros(sensor.size)
     for _ in range(10):
         prior[0, -1] = scale / (0.25 * limit * start**2)
         rows = np.vstack([design * weight[:, None], prior])
-        solution = np.linalg.lstsq(rows, np.append((target - curved) * weight, 0.0), rcond=None)[0]
-        residual = target - curved - design @ solution
-        scale = max(1.4826 * np.median(np.abs(residual)), floor)
+        solution = np.linalg.lstsq(rows, np.append((target - curvature) * weight, 0.0), rcond=None)[0]
+        residual = target - curvature - design @ solution
+        scale = max(1.4826 * np.median(np.abs(residual)), min_scale)
         weight = np.sqrt(1.0 / np.maximum(1.0, np.abs(residual) / (2.5 * scale)))
         q, change = solution[-2:]
         if not q > 0.0:
             break
-        curved = _by_motion(q, change, along[sensor], late[axle]) - along[sensor] * (q + change * late[axle])
-    variance = max(np.sum((weight * residual) ** 2) / max(sensor.size - n_axle - 1, 1), floor**2)
+        curvature = _travel_times(q, change, travel[sensor], elapsed[axle]) - travel[sensor] * (
+            q + change * elapsed[axle]
+        )
+    variance = max(np.sum((weight * residual) ** 2) / max(sensor.size - n_axle - 1, 1), min_scale**2)
     covariance = np.linalg.pinv(rows.T @ rows) * variance
-    place = np.array([np.mean(residual[sensor == i]) for i in np.unique(sensor)])
-    n_sensor = len(place)
-    spread = np.sqrt(np.sum(place**2) / (n_sensor - 2)) if n_sensor > 2 else 0.0
-    spread = max(spread, place_error * abs(q))
-    extent = np.sum((along[np.unique(sensor)] - along[np.unique(sensor)].mean()) ** 2)
+    sensor_residual = np.array([np.mean(residual[sensor == i]) for i in np.unique(sensor)])
+    n_sensor = len(sensor_residual)
+    spread = np.sqrt(np.sum(sensor_residual**2) / (n_sensor - 2)) if n_sensor > 2 else 0.0
+    spread = max(spread, position_error * abs(q))
+    extent = np.sum((travel[np.unique(sensor)] - travel[np.unique(sensor)].mean()) ** 2)
     return (
         q,
         change,
@@ -78,11 +80,11 @@ def slowness_from_sensors(times, positions, direction: int, place_error: float, 
     )
 
 
-def _by_motion(q, change, along, late):
+def _travel_times(q, change, travel, elapsed):
     """Travel times from the middle of the sensors to positions ``travel``, at a slowness ``q`` with a steady change."""
     acceleration = -change / q**2
-    speed = np.maximum(1.0 - change / q * late, 0.2) / q
-    return 2.0 * along / (speed + np.sqrt(np.maximum(speed**2 + 2.0 * acceleration * along, 0.0)))
+    speed = np.maximum(1.0 - change / q * elapsed, 0.2) / q
+    return 2.0 * travel / (speed + np.sqrt(np.maximum(speed**2 + 2.0 * acceleration * travel, 0.0)))
 
 
 def residual_by_sensor(times, residual, sensor, axle):
@@ -92,19 +94,19 @@ def residual_by_sensor(times, residual, sensor, axle):
     return table
 
 
-def combine(from_sensors, from_type, at: float) -> SpeedFinding:
+def combine_speeds(from_sensors, from_type, at: float) -> SpeedFinding:
     """Speed at the time ``at`` [s] from both sources, weighted by their variances.
 
     Each source is (speed, se, acceleration, acceleration se, time of its speed) or None.
     """
-    carried = []
+    at_time = []
     for source in (from_sensors, from_type):
         if source is None:
-            carried.append(None)
+            at_time.append(None)
             continue
         v, se, a, a_se, time = source
-        carried.append((v + a * (at - time), float(np.hypot(se, a_se * (at - time))), a, a_se))
-    sensors, spacing = carried
+        at_time.append((v + a * (at - time), float(np.hypot(se, a_se * (at - time))), a, a_se))
+    sensors, spacing = at_time
     if sensors is None or spacing is None:
         v, se, a, a_se = sensors or spacing
         return SpeedFinding(v, se, a, a_se, "sensors" if sensors else "axle spacing", None, at)
@@ -112,15 +114,15 @@ def combine(from_sensors, from_type, at: float) -> SpeedFinding:
     if abs(difference) > 3.0:
         # distances in a train are known better than the offset between sensor and wheel
         return SpeedFinding(*spacing, "axle spacing", float(difference), at)
-    v, se = weighted(sensors[:2], spacing[:2])
-    a, a_se = weighted(sensors[2:], spacing[2:])
+    v, se = weighted_mean(sensors[:2], spacing[:2])
+    a, a_se = weighted_mean(sensors[2:], spacing[2:])
     return SpeedFinding(v, se, a, a_se, "both", float(difference), at)
 
 
-def weighted(first, second) -> tuple[float, float]:
+def weighted_mean(first, second) -> tuple[float, float]:
     """Mean of two (value, standard error) by inverse variance.
 
-    >>> weighted((10.0, 1.0), (20.0, 1e9))
+    >>> weighted_mean((10.0, 1.0), (20.0, 1e9))
     (10.0, 1.0)
     """
     (a, sa), (b, sb) = first, second
@@ -133,11 +135,11 @@ def motion_of(finding: SpeedFinding, start: float, direction: int) -> Motion:
     return Motion(finding.at(start), start, finding.acceleration, direction)
 
 
-STEADY = 0.15  # m, largest mean difference between the halves of a steady train
-PASSES, SETTLED = 6, 2e-3  # largest number of passes; slope at which they have converged
+MAX_STEADY_SHIFT = 0.15  # m, largest mean difference between the halves of a steady train
+MAX_PASSES, SLOPE_TOLERANCE = 6, 2e-3  # largest number of passes; slope at which they have converged
 
 
-def with_change(heard, motion: Motion, limit: float) -> Motion:
+def with_acceleration(envelopes, motion: Motion, limit: float) -> Motion:
     r"""The motion with the acceleration that aligns all sensors in both halves of the train.
 
     If the train runs at v and is assumed to run at v', a sensor x metres on records it :math:`x (v'/v - 1)` metres too
@@ -153,40 +155,40 @@ def with_change(heard, motion: Motion, limit: float) -> Motion:
     limit : float
         Of accelerations. [m/s²]
     """
-    if len(heard.positions) < 3:
+    if len(envelopes.positions) < 3:
         return motion
-    shifts = half_shifts(heard, motion)
-    apart, found = _apart(shifts), motion
-    if apart < STEADY:
+    shifts = half_shifts(envelopes, motion)
+    spread, adjusted = _half_spread(shifts), motion
+    if spread < MAX_STEADY_SHIFT:
         return motion
-    for _ in range(PASSES):
-        slopes = [_slope(motion.direction * heard.positions, row) for row in shifts.T]
-        found = _bent(found, heard, np.clip(slopes, -0.3, 0.3))
-        if abs(found.acceleration) > limit:
+    for _ in range(MAX_PASSES):
+        slopes = [_slope(motion.direction * envelopes.positions, row) for row in shifts.T]
+        adjusted = _with_half_slopes(adjusted, envelopes, np.clip(slopes, -0.3, 0.3))
+        if abs(adjusted.acceleration) > limit:
             return motion
-        shifts = half_shifts(heard, found)
-        if np.max(np.abs(slopes)) < SETTLED:
+        shifts = half_shifts(envelopes, adjusted)
+        if np.max(np.abs(slopes)) < SLOPE_TOLERANCE:
             break
-    return found if _apart(shifts) < 0.5 * apart else motion
+    return adjusted if _half_spread(shifts) < 0.5 * spread else motion
 
 
-def _apart(shifts) -> float:
+def _half_spread(shifts) -> float:
     """Mean over the sensors of the difference between the halves, against the median sensor. [m]"""
     change = shifts[:, 1] - shifts[:, 0]
     return float(np.mean(np.abs(change - np.median(change))))
 
 
-def _slope(along, shift) -> float:
+def _slope(travel, shift) -> float:
     """Median slope over all pairs of sensors (Theil and Sen), except pairs at one position."""
-    pairs = [(i, j) for i, j in combinations(range(len(along)), 2) if abs(along[j] - along[i]) > 0.5]
-    return float(np.median([(shift[j] - shift[i]) / (along[j] - along[i]) for i, j in pairs])) if pairs else 0.0
+    pairs = [(i, j) for i, j in combinations(range(len(travel)), 2) if abs(travel[j] - travel[i]) > 0.5]
+    return float(np.median([(shift[j] - shift[i]) / (travel[j] - travel[i]) for i, j in pairs])) if pairs else 0.0
 
 
-def _bent(motion, heard, slopes) -> Motion:
+def _with_half_slopes(motion, envelopes, slopes) -> Motion:
     """The motion with the speeds in the middles of both halves corrected by ``slopes``, by which they are too high."""
-    begin, end = motion.way(heard.begin), motion.way(heard.end)
+    begin, end = motion.distance(envelopes.begin), motion.distance(envelopes.end)
     times = motion.time(begin + np.array([0.25, 0.75]) * (end - begin))
     speeds = motion.speed_at(times) / (1.0 + slopes)
     middle, change = float(times.mean()), float(np.diff(speeds)[0] / np.diff(times)[0])
-    told = Motion(float(speeds.mean()), middle, change, motion.direction)
-    return told.moved(-float(motion.way(middle)))
+    middle_motion = Motion(float(speeds.mean()), middle, change, motion.direction)
+    return middle_motion.relative_to_axle(-float(motion.distance(middle)))

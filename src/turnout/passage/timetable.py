@@ -8,7 +8,7 @@ from datetime import datetime
 
 
 @dataclass(frozen=True)
-class Listed:
+class ListedTrain:
     """One row of trains.csv; None for an empty field. ``speed`` [km/h], ``axle_load`` [t]."""
 
     passed_at: datetime
@@ -19,7 +19,7 @@ class Listed:
     n_axles: int | None = None
 
 
-def listed_trains(rows: Sequence[Mapping[str, str]]) -> tuple[tuple[Listed, ...], tuple[str, ...]]:
+def listed_trains(rows: Sequence[Mapping[str, str]]) -> tuple[tuple[ListedTrain, ...], tuple[str, ...]]:
     """Valid rows in order of time, and a sentence for each row that cannot be used.
 
     Columns: passed_at_utc (needed), train_type, speed_kmh, axle_load_t, track, n_axles.
@@ -29,16 +29,16 @@ def listed_trains(rows: Sequence[Mapping[str, str]]) -> tuple[tuple[Listed, ...]
     >>> found[0].speed, wrong
     (160.0, ("row 2: passed_at_utc 'noon' is not a time like 2024-05-13T10:00:00",))
     """
-    found, wrong = [], []
+    trains, errors = [], []
     for k, row in enumerate(rows, 1):
         try:
-            found.append(_listed(row))
+            trains.append(_listed_train(row))
         except ValueError as error:
-            wrong.append(f"row {k}: {error}")
-    return tuple(sorted(found, key=lambda t: (t.passed_at, t.train_type or ""))), tuple(wrong)
+            errors.append(f"row {k}: {error}")
+    return tuple(sorted(trains, key=lambda t: (t.passed_at, t.train_type or ""))), tuple(errors)
 
 
-def _listed(row) -> Listed:
+def _listed_train(row) -> ListedTrain:
     text = row.get("passed_at_utc") or ""
     try:
         moment = datetime.fromisoformat(text.removesuffix("Z"))
@@ -53,7 +53,7 @@ def _listed(row) -> Listed:
     track = row.get("track") or None
     if track not in (None, "main", "diverging"):
         raise ValueError(f"track {track!r} is neither main nor diverging")
-    return Listed(moment, row.get("train_type") or None, track=track, n_axles=n_axles and int(n_axles), **numbers)
+    return ListedTrain(moment, row.get("train_type") or None, track=track, n_axles=n_axles and int(n_axles), **numbers)
 
 
 def _number(text, column, low, high):
@@ -65,7 +65,7 @@ def _number(text, column, low, high):
     return value
 
 
-def listed_for(moment: datetime, n_axles: int, trains: Sequence[Listed], tolerance: float) -> Listed | None:
+def listed_for(moment: datetime, n_axles: int, trains: Sequence[ListedTrain], tolerance: float) -> ListedTrain | None:
     """The listed train nearest in time to ``moment``, within ``tolerance`` [s].
 
     None where it has another number of axles, or where a second one fits nearly as well.

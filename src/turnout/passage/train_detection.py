@@ -8,26 +8,26 @@ import numpy as np
 from scipy import ndimage
 
 from turnout.passage.envelope import levels
-from turnout.passage.sensor_stack import Listening
+from turnout.passage.sensor_stack import SensorEnvelopes
 
 QUIET_BLOCK = 0.05  # s over which a level is averaged
 
 
-def listen(samples, rate: float, positions, step: float) -> Listening | None:
+def sensor_envelopes(samples, rate: float, positions, step: float) -> SensorEnvelopes | None:
     """``SensorEnvelopes`` of the channels (n_sensor, n_sample), None where nothing is louder than the quiet parts."""
-    found = levels(samples, rate, step)
-    step, n = found.step, found.n_bin
+    band_levels = levels(samples, rate, step)
+    step, n = band_levels.step, band_levels.n_bin
     per_bin = round(step * rate)
     slow = samples[:, : n * per_bin].reshape(samples.shape[0], n, per_bin).mean(axis=2)
     slow = slow - np.median(slow, axis=1, keepdims=True)
-    active = heard_bins(found.values.mean(axis=0), step)
-    if not active.any():
+    is_audible = audible_bins(band_levels.values.mean(axis=0), step)
+    if not is_audible.any():
         return None
-    bins = np.flatnonzero(active)
-    return Listening(found, slow, np.asarray(positions, float), bins[0] * step, (bins[-1] + 1) * step)
+    bins = np.flatnonzero(is_audible)
+    return SensorEnvelopes(band_levels, slow, np.asarray(positions, float), bins[0] * step, (bins[-1] + 1) * step)
 
 
-def heard_bins(level, step: float, times: float = 8.0) -> np.ndarray:
+def audible_bins(level, step: float, min_ratio: float = 8.0) -> np.ndarray:
     """(n_bin,) bool: the level (n_bin,) over 50 ms is above a seventh of its range.
 
     All False where that range is below ``min_ratio`` times the scatter of neighbouring blocks, or below half a neper:
@@ -37,55 +37,55 @@ def heard_bins(level, step: float, times: float = 8.0) -> np.ndarray:
     smooth = ndimage.uniform_filter1d(level, width)
     blocks = smooth[width // 2 :: width]
     low, high = np.quantile(blocks, 0.05), blocks.max()
-    calm = np.sort(blocks)[: max(len(blocks) // 3, 2)]
-    scatter = np.median(np.abs(np.diff(blocks[np.isin(blocks, calm)]))) / 0.954 if len(calm) > 3 else 0.0
-    if high - low < max(times * scatter, 0.5):
+    quiet = np.sort(blocks)[: max(len(blocks) // 3, 2)]
+    scatter = np.median(np.abs(np.diff(blocks[np.isin(blocks, quiet)]))) / 0.954 if len(quiet) > 3 else 0.0
+    if high - low < max(min_ratio * scatter, 0.5):
         return np.zeros(len(level), dtype=bool)
     return smooth > low + (high - low) / 7.0
 
 
-def narrowed(listening: Listening, rows) -> Listening:
+def restrict_to(envelopes: SensorEnvelopes, rows) -> SensorEnvelopes:
     """Only the sensors ``rows``, with the begin and end of the train in their envelopes."""
-    part = listening.only(rows)
-    bins = np.flatnonzero(heard_bins(part.levels.values.mean(axis=0), part.levels.step))
+    selected = envelopes.select(rows)
+    bins = np.flatnonzero(audible_bins(selected.levels.values.mean(axis=0), selected.levels.step))
     if bins.size == 0:
-        return part
-    return replace(part, begin=bins[0] * part.levels.step, end=(bins[-1] + 1) * part.levels.step)
+        return selected
+    return replace(selected, begin=bins[0] * selected.levels.step, end=(bins[-1] + 1) * selected.levels.step)
 
 
-def loudness(listening: Listening) -> np.ndarray:
+def loudness(envelopes: SensorEnvelopes) -> np.ndarray:
     """(n_sensor,) level over 50 ms that a tenth of the passage exceeds; 0 where a sensor records only noise."""
-    step = listening.levels.step
+    step = envelopes.levels.step
     width = max(round(QUIET_BLOCK / step), 1)
-    part = slice(int(listening.begin / step), max(int(listening.end / step), 1))
-    smooth = ndimage.uniform_filter1d(listening.levels.values, width, axis=1)
-    loud = np.quantile(smooth[:, part], 0.9, axis=1) - np.quantile(smooth, 0.05, axis=1)
-    heard = np.array([heard_bins(row, step).any() for row in listening.levels.values])
-    return np.where(heard, loud, 0.0)
+    passage = slice(int(envelopes.begin / step), max(int(envelopes.end / step), 1))
+    smooth = ndimage.uniform_filter1d(envelopes.levels.values, width, axis=1)
+    loud = np.quantile(smooth[:, passage], 0.9, axis=1) - np.quantile(smooth, 0.05, axis=1)
+    is_audible = np.array([audible_bins(row, step).any() for row in envelopes.levels.values])
+    return np.where(is_audible, loud, 0.0)
 
 
-def hearing(listening: Listening) -> np.ndarray:
+def audible_sensors(envelopes: SensorEnvelopes) -> np.ndarray:
     """Rows of the sensors that record the train: more than noise, and not much fainter than most.
 
     A sensor with a tenth of the amplitude of the best third belongs to the neighbouring track; it is not a less
     sensitive sensor.
     """
-    loud = loudness(listening) > 0.1
-    if not loud.any():
-        return np.flatnonzero(loud)
-    power = listening.levels.loud
-    return np.flatnonzero(loud & (power >= 0.01 * np.quantile(power[loud], 0.7, method="higher")))
+    is_loud = loudness(envelopes) > 0.1
+    if not is_loud.any():
+        return np.flatnonzero(is_loud)
+    power = envelopes.levels.loud_power
+    return np.flatnonzero(is_loud & (power >= 0.01 * np.quantile(power[is_loud], 0.7, method="higher")))
 
 
-def track_taken(listening: Listening, tracks) -> tuple[str, float]:
+def train_track(envelopes: SensorEnvelopes, tracks) -> tuple[str, float]:
     """("main" | "diverging" | "unknown", difference): the track whose own sensors are the louder ones.
 
     ``difference`` is in nepers of power; at least twice the amplitude, 1.4 nepers, is required. With sensors of one
     track only, that track is taken if they are not much fainter than the sensors of both tracks. If they record
     nothing, the other track is taken.
     """
-    tracks, heard = np.asarray(tracks), loudness(listening) > 0.1
-    power = np.where(heard, np.log(np.maximum(listening.levels.loud, 1e-300)), -np.inf)
+    tracks, is_audible = np.asarray(tracks), loudness(envelopes) > 0.1
+    power = np.where(is_audible, np.log(np.maximum(envelopes.levels.loud_power, 1e-300)), -np.inf)
     mean = {name: power[tracks == name].max() for name in ("main", "diverging", "both") if np.any(tracks == name)}
     if "main" in mean and "diverging" in mean:
         difference = _difference(mean["main"], mean["diverging"])

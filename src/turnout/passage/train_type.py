@@ -8,11 +8,11 @@ import numpy as np
 from scipy import stats
 
 from turnout.passage.axle_patterns import Vehicle, offsets
-from turnout.passage.vehicle_sequence import best_row
+from turnout.passage.vehicle_sequence import closest_row
 
 UNKNOWN = "unknown"
 # m, axle spacings of a train without template: inside bogies 1.8 to 3.2 m, between them up to 22 m.
-BOGIE, BOGIE_SPREAD, LONG_FROM, LONGEST = 2.4, 0.4, 3.4, 22.0
+BOGIE_WHEELBASE, BOGIE_WHEELBASE_SD, MIN_LONG_SPACING, MAX_SPACING = 2.4, 0.4, 3.4, 22.0
 
 
 @dataclass(frozen=True)
@@ -36,8 +36,8 @@ class TypeFinding:
     speed_se: float | None = None
     acceleration: float | None = None
     acceleration_se: float | None = None
-    middle: float | None = None
-    middle_se: float | None = None
+    middle_speed: float | None = None
+    middle_speed_se: float | None = None
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class _Candidate:
     motion: tuple
 
 
-def axle_times_to_motion(times, places, sigma: float, limit: float):
+def axle_times_to_motion(times, positions, sigma: float, limit: float):
     r"""Speed and acceleration at the first axle from times and known distances, with their covariance.
 
     .. math:: d = u_0 + v t + \tfrac12 a t^2
@@ -62,7 +62,7 @@ def axle_times_to_motion(times, places, sigma: float, limit: float):
     """
     t = np.asarray(times, dtype=float) - times[0]
     design = np.column_stack([np.ones_like(t), t, 0.5 * t**2]) / sigma
-    target = np.asarray(places, dtype=float) / sigma
+    target = np.asarray(positions, dtype=float) / sigma
     fits = []
     for share, width in ((0.8, 0.02), (0.2, limit / 4)):
         normal = design.T @ design + np.diag([0.0, 0.0, width**-2])
@@ -74,11 +74,11 @@ def axle_times_to_motion(times, places, sigma: float, limit: float):
     weight = np.exp(np.array([f[0] for f in fits]) - max(f[0] for f in fits))
     weight /= weight.sum()
     mean = sum(w * f[1] for w, f in zip(weight, fits))
-    doubt = sum(w * (f[2] + np.outer(f[1] - mean, f[1] - mean)) for w, f in zip(weight, fits))
-    return mean, doubt
+    total_covariance = sum(w * (f[2] + np.outer(f[1] - mean, f[1] - mean)) for w, f in zip(weight, fits))
+    return mean, total_covariance
 
 
-def find_type(times, patterns, settings, speed=None, speed_se=None, place_se: float = 0.03) -> TypeFinding:
+def find_type(times, patterns, settings, speed=None, speed_se=None, position_se: float = 0.03) -> TypeFinding:
     """Template that the axle ``times`` (n_axle,) [s] fit, at any speed, or at ``speed`` ± ``speed_se`` [m/s].
 
     ``position_se`` [m] is the error of one axle's position along the rail. A type is named if its posterior probability
@@ -87,42 +87,44 @@ def find_type(times, patterns, settings, speed=None, speed_se=None, place_se: fl
     times = np.asarray(times, dtype=float)
     if len(times) < 3:
         return TypeFinding(UNKNOWN, 1.0, {UNKNOWN: 1.0})
-    sigma = float(np.sqrt(2 * place_se**2 + settings.type_tolerance**2))
-    found: dict[str, _Candidate] = {}
+    sigma = float(np.sqrt(2 * position_se**2 + settings.type_tolerance**2))
+    candidates: dict[str, _Candidate] = {}
     for pattern in patterns:
         candidate = _fit_pattern(times, pattern, settings, speed, speed_se, sigma)
-        if candidate and candidate.evidence > getattr(found.get(candidate.type), "evidence", -np.inf):
-            found[candidate.type] = candidate
-    return _decide(times, found, len({p.type for p in patterns}), settings, speed, sigma)
+        if candidate and candidate.evidence > getattr(candidates.get(candidate.type), "evidence", -np.inf):
+            candidates[candidate.type] = candidate
+    return _decide_type(times, candidates, len({p.type for p in patterns}), settings, speed, sigma)
 
 
-def _decide(times, found, n_type, settings, speed, sigma):
-    log = {name: c.evidence + np.log((1 - settings.unknown_prior) / max(n_type, 1)) for name, c in found.items()}
-    best = max(found.values(), key=lambda c: c.evidence, default=None)
-    v = speed or (best.motion[0][0] if best else BOGIE / np.min(np.diff(times)))
-    log[UNKNOWN] = np.log(settings.unknown_prior) + unknown_evidence(v * np.diff(times))
-    top = max(log.values())
-    weight = {name: float(np.exp(value - top)) for name, value in log.items()}
+def _decide_type(times, candidates, n_type, settings, speed, sigma):
+    log_posterior = {
+        name: c.evidence + np.log((1 - settings.unknown_prior) / max(n_type, 1)) for name, c in candidates.items()
+    }
+    likeliest = max(candidates.values(), key=lambda c: c.evidence, default=None)
+    v = speed or (likeliest.motion[0][0] if likeliest else BOGIE_WHEELBASE / np.min(np.diff(times)))
+    log_posterior[UNKNOWN] = np.log(settings.unknown_prior) + unknown_evidence(v * np.diff(times))
+    top = max(log_posterior.values())
+    weight = {name: float(np.exp(value - top)) for name, value in log_posterior.items()}
     total = sum(weight.values())
     posterior = {name: w / total for name, w in sorted(weight.items())}
-    if best is None:
+    if likeliest is None:
         return TypeFinding(UNKNOWN, posterior[UNKNOWN], posterior)
-    (v, a), covariance = best.motion
-    half = 0.5 * float(times[-1] - times[0])
-    to_middle = np.array([1.0, half])
-    accepted = posterior[best.type] >= settings.type_probability and best.p_value >= 1e-3
+    (v, a), covariance = likeliest.motion
+    half_duration = 0.5 * float(times[-1] - times[0])
+    to_middle = np.array([1.0, half_duration])
+    accepted = posterior[likeliest.type] >= settings.type_probability and likeliest.p_value >= 1e-3
     return TypeFinding(
-        best.type if accepted else UNKNOWN,
-        posterior[best.type] if accepted else max(posterior[UNKNOWN], 1.0 - posterior[best.type]),
+        likeliest.type if accepted else UNKNOWN,
+        posterior[likeliest.type] if accepted else max(posterior[UNKNOWN], 1.0 - posterior[likeliest.type]),
         posterior,
-        best.vehicles,
-        best.offsets,
-        best.residual,
+        likeliest.vehicles,
+        likeliest.offsets,
+        likeliest.residual,
         float(v),
         float(np.sqrt(covariance[0, 0])),
         float(a),
         float(np.sqrt(covariance[1, 1])),
-        float(v + a * half),
+        float(v + a * half_duration),
         float(np.sqrt(to_middle @ covariance @ to_middle)),
     )
 
@@ -133,14 +135,18 @@ def unknown_evidence(spacing) -> float:
     Short spacings (in a bogie) and long ones form a Markov chain: a short one is nearly always followed by a long one.
     This distinguishes bogies from axles where the speed is not known.
     """
-    short = np.asarray(spacing) < LONG_FROM
-    density = np.where(short, 0.95 * stats.norm.pdf(spacing, BOGIE, BOGIE_SPREAD) + 0.01, 1 / (LONGEST - LONG_FROM))
-    density = np.where(np.asarray(spacing) > 1.5 * LONGEST, 1e-4, density)
-    follows = np.where(short[:-1], np.where(short[1:], 0.05, 0.95), np.where(short[1:], 0.85, 0.15))
+    short = np.asarray(spacing) < MIN_LONG_SPACING
+    density = np.where(
+        short,
+        0.95 * stats.norm.pdf(spacing, BOGIE_WHEELBASE, BOGIE_WHEELBASE_SD) + 0.01,
+        1 / (MAX_SPACING - MIN_LONG_SPACING),
+    )
+    density = np.where(np.asarray(spacing) > 1.5 * MAX_SPACING, 1e-4, density)
+    transitions = np.where(short[:-1], np.where(short[1:], 0.05, 0.95), np.where(short[1:], 0.85, 0.15))
     # three short ones in a row are four axles at bogie distance, which no vehicle has
     runs = np.sum(short[:-2] & short[1:-1] & short[2:])
     first = np.log(0.9 if short[0] else 0.1) + runs * np.log(0.01)
-    return float(np.sum(np.log(density)) + np.sum(np.log(follows)) + first)
+    return float(np.sum(np.log(density)) + np.sum(np.log(transitions)) + first)
 
 
 def _fit_pattern(times, pattern, settings, speed, speed_se, sigma):
@@ -148,66 +154,66 @@ def _fit_pattern(times, pattern, settings, speed, speed_se, sigma):
     low, high = pattern.axle_counts()
     if not low <= len(times) <= high:
         return None
-    past = times - times[0]
-    row = pattern.only_row()
-    if speed is not None and not _plausible(times, pattern, row, settings, speed, speed_se or 0.0):
+    elapsed = times - times[0]
+    row = pattern.fixed_row()
+    if speed is not None and not _is_plausible(times, pattern, row, settings, speed, speed_se or 0.0):
         return None
     if row is None:
-        starts = _starts(times, pattern, settings, speed, speed_se)
-        rows = [best_row(np.diff(v * past + 0.5 * a * past**2), pattern, 5.0 * sigma) for v, a in starts]
+        starts = _start_values(times, pattern, settings, speed, speed_se)
+        rows = [closest_row(np.diff(v * elapsed + 0.5 * a * elapsed**2), pattern, 5.0 * sigma) for v, a in starts]
         row = min((r for r in rows if r), key=lambda r: r[0], default=None)
         for _ in range(3 if row else 0):
             (v, a), _ = axle_times_to_motion(times, offsets(row[1]), sigma, settings.acceleration_limit)
-            sharp = best_row(np.diff(v * past + 0.5 * a * past**2), pattern, 2.0 * sigma)
-            if sharp is None or sharp[1] == row[1]:
+            refined = closest_row(np.diff(v * elapsed + 0.5 * a * elapsed**2), pattern, 2.0 * sigma)
+            if refined is None or refined[1] == row[1]:
                 break
-            row = sharp
+            row = refined
     return _candidate(times, pattern.type, row, settings, speed, speed_se, sigma) if row else None
 
 
-def _plausible(times, pattern, row, settings, speed, speed_se):
+def _is_plausible(times, pattern, row, settings, speed, speed_se):
     """Whether the known speed allows the pattern, by a cheap test.
 
     It compares the length of a fixed row, or the first wheelbase of a free one.
     """
-    lasted = times[-1] - times[0]
-    slack = 4 * speed_se * lasted + 0.5 * settings.acceleration_limit * lasted**2 + 1.0
+    duration = times[-1] - times[0]
+    slack = 4 * speed_se * duration + 0.5 * settings.acceleration_limit * duration**2 + 1.0
     if row is not None:
-        return abs(offsets(row[1])[-1] - speed * lasted) < slack
-    leading = {v.axles[1] - v.axles[0] for g in pattern.groups for v in g.vehicles if len(v.axles) > 1}
+        return abs(offsets(row[1])[-1] - speed * duration) < slack
+    wheelbases = {v.axles[1] - v.axles[0] for g in pattern.groups for v in g.vehicles if len(v.axles) > 1}
     gap = times[1] - times[0]
-    return any(abs(speed * gap - base) < 4 * speed_se * gap + 0.1 * base + 0.2 for base in leading)
+    return any(abs(speed * gap - wheelbase) < 4 * speed_se * gap + 0.1 * wheelbase + 0.2 for wheelbase in wheelbases)
 
 
 def _candidate(times, type_, row, settings, speed, speed_se, sigma):
     """Motion, residual and evidence of one row of vehicles."""
     _, vehicles, choices = row
-    places = offsets(vehicles)
+    positions = offsets(vehicles)
     limit = settings.acceleration_limit
-    (v, a), covariance = axle_times_to_motion(times, places, sigma / np.sqrt(2), limit)
+    (v, a), covariance = axle_times_to_motion(times, positions, sigma / np.sqrt(2), limit)
     if not settings.speed_minimum / 3.6 <= v <= settings.speed_maximum / 3.6 or abs(a) > limit:
         return None
-    past = times - times[0]
-    residual = np.diff(v * past + 0.5 * a * past**2) - np.diff(places)
-    square = float(np.sum((residual / sigma) ** 2))
+    elapsed = times - times[0]
+    residual = np.diff(v * elapsed + 0.5 * a * elapsed**2) - np.diff(positions)
+    chi_squared = float(np.sum((residual / sigma) ** 2))
     freedom = max(len(residual) - 2, 1)
     if speed is not None and speed_se:
-        square += float((v - speed) ** 2 / (speed_se**2 + covariance[0, 0]))
+        chi_squared += float((v - speed) ** 2 / (speed_se**2 + covariance[0, 0]))
         freedom += 1
-    evidence = -0.5 * square - len(residual) * np.log(sigma * np.sqrt(2 * np.pi)) - choices
+    evidence = -0.5 * chi_squared - len(residual) * np.log(sigma * np.sqrt(2 * np.pi)) - choices
     rms = float(np.sqrt(np.mean(residual**2)))
     # the error of the motion follows the observed scatter, as far as a few axles determine it
     covariance = covariance * min(1.0, max((rms / sigma) ** 2 * len(times) / freedom, 0.1))
     # errors of neighbours are correlated, most in a heavy vehicle: fewer of them are independent
-    covariance = covariance * _alike(v * past + 0.5 * a * past**2 - places)
-    p_value = float(stats.chi2.sf(square, freedom))
-    return _Candidate(type_, evidence, p_value, vehicles, places, rms, ((v, a), covariance))
+    covariance = covariance * _variance_inflation(v * elapsed + 0.5 * a * elapsed**2 - positions)
+    p_value = float(stats.chi2.sf(chi_squared, freedom))
+    return _Candidate(type_, evidence, p_value, vehicles, positions, rms, ((v, a), covariance))
 
 
-def _alike(residual) -> float:
+def _variance_inflation(residual) -> float:
     r"""Factor on a variance for residuals (n,) with autocorrelation: :math:`(1 + \rho) / (1 - \rho)`.
 
-    >>> _alike(np.array([1.0, -1.0] * 4)), round(_alike(np.array([1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0])), 1)
+    >>> _variance_inflation(np.array([1.0, -1.0] * 4)), round(_variance_inflation(np.repeat([1.0, -1.0], 4)), 1)
     (1.0, 4.3)
     """
     centred = residual - residual.mean()
@@ -217,7 +223,7 @@ def _alike(residual) -> float:
     return (1.0 + rho) / (1.0 - rho)
 
 
-def _starts(times, pattern, settings, speed, speed_se):
+def _start_values(times, pattern, settings, speed, speed_se):
     """Start values of speed and acceleration, fine enough for the coarse tolerance over the whole train."""
     spacing = np.diff(times)
     if speed is not None:

@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from turnout.passage.axle_patterns import Pattern
-from turnout.passage.comb import LEAD, STEP, TAPS, Profiles
+from turnout.passage.comb import COMB_STEP, LEAD_LENGTH, N_TAPS, Profiles
 
-SLACK = 1  # grid steps that a vehicle may deviate: rounding of lengths, error of the speed
+LENGTH_SLACK = 1  # grid steps that a vehicle may deviate: rounding of lengths, error of the speed
 
 
 def likeliest_row(profiles: Profiles, teeth, pattern: Pattern, first: float, reach: float = 30.0):
@@ -24,97 +24,97 @@ def likeliest_row(profiles: Profiles, teeth, pattern: Pattern, first: float, rea
     beginning of the audible part. ``teeth`` (n_sensor, N_TAPS), ``profiles`` of one motion.
     """
     values = profiles.values[:, 0]
-    match = sum(np.correlate(np.pad(v, TAPS // 2), k, "valid") for v, k in zip(values, teeth))
-    self_match = sum(np.correlate(np.pad(k, TAPS - 1), k, "valid") for k in teeth)
-    n, inner = match.size, {}
-    couplings = _Couplings(self_match)
+    match = sum(np.correlate(np.pad(v, N_TAPS // 2), k, "valid") for v, k in zip(values, teeth))
+    self_match = sum(np.correlate(np.pad(k, N_TAPS - 1), k, "valid") for k in teeth)
+    n, gains = match.size, {}
+    overlaps = _ToothOverlaps(self_match)
     for group in pattern.groups:
         for v in group.vehicles:
-            inner[v.name] = _gain(match, v, couplings)
+            gains[v.name] = _vehicle_gain(match, v, overlaps)
     layers: dict[tuple, dict] = {}
-    for node in pattern.following(0, 0):
+    for node in pattern.next_vehicles(0, 0):
         for v in pattern.groups[node[0]].vehicles:
             gain = np.full(n, -np.inf)
-            at = round((first + LEAD - v.axles[0]) / STEP)
-            part = slice(max(at - int(reach / STEP), 0), max(at + int(reach / STEP) + 1, 0))
-            gain[part] = inner[v.name][part]
+            index = round((first + LEAD_LENGTH - v.axles[0]) / COMB_STEP)
+            inside = slice(max(index - int(reach / COMB_STEP), 0), max(index + int(reach / COMB_STEP) + 1, 0))
+            gain[inside] = gains[v.name][inside]
             layers.setdefault(node, {})[v.name] = (gain, ([None], np.zeros(n, int), np.zeros(n, int)), v)
-    best = (-np.inf, None)
+    best_end = (-np.inf, None)
     for node in [(g, c) for g, group in enumerate(pattern.groups) for c in range(1, group.maximum + 1)]:
         for name, (score, _, v) in layers.get(node, {}).items():
             if not np.isfinite(score).any():
                 continue
-            if pattern.may_end(*node) and score.max() > best[0]:
-                best = (float(score.max()), (node, name, int(score.argmax())))
-            for following in pattern.following(*node):
-                for w in pattern.groups[following[0]].vehicles:
-                    _extend(layers, node, following, v, w, score, inner[w.name], couplings)
-    return None if best[1] is None else _traced(layers, best[1])
+            if pattern.can_end(*node) and score.max() > best_end[0]:
+                best_end = (float(score.max()), (node, name, int(score.argmax())))
+            for successor in pattern.next_vehicles(*node):
+                for w in pattern.groups[successor[0]].vehicles:
+                    _extend_rows(layers, node, successor, v, w, score, gains[w.name], overlaps)
+    return None if best_end[1] is None else _trace_back(layers, best_end[1])
 
 
-class _Couplings:
+class _ToothOverlaps:
     """What overlapping teeth subtract: -a(distance) twice, between axles."""
 
     def __init__(self, self_match):
-        self.places = (np.arange(self_match.size) - TAPS + 1) * STEP
+        self.distances = (np.arange(self_match.size) - N_TAPS + 1) * COMB_STEP
         self.values = self_match
 
     def at(self, distance):
         """Autocorrelation a of the tooth at ``distance`` [m]."""
-        return np.interp(distance, self.places, self.values, left=0.0, right=0.0)
+        return np.interp(distance, self.distances, self.values, left=0.0, right=0.0)
 
     def between(self, v, w):
         """Sum over all axles of ``v`` with those of ``w`` behind it."""
-        apart = v.length + np.asarray(w.axles)[None] - np.asarray(v.axles)[:, None]
-        return 2.0 * float(np.sum(self.at(apart)))
+        distance = v.length + np.asarray(w.axles)[None] - np.asarray(v.axles)[:, None]
+        return 2.0 * float(np.sum(self.at(distance)))
 
 
-def _gain(match, v, couplings):
+def _vehicle_gain(match, v, overlaps):
     """(n,) gain of vehicle ``v`` with its front coupler at each point of the grid."""
-    place = np.arange(match.size)
+    grid = np.arange(match.size)
     total = np.zeros(match.size)
     for axle in v.axles:
-        total += 2.0 * np.interp(place + axle / STEP, place, match, right=0.0)
+        total += 2.0 * np.interp(grid + axle / COMB_STEP, grid, match, right=0.0)
     axles = np.asarray(v.axles)
-    return total - float(np.sum(couplings.at(axles[:, None] - axles[None])))
+    return total - float(np.sum(overlaps.at(axles[:, None] - axles[None])))
 
 
-def _extend(layers, node, following, v, w, score, gain, couplings):
+def _extend_rows(layers, node, successor, v, w, score, gain, overlaps):
     """Couple ``w`` behind every row that ends with ``v``; of rows with the same end the better one stays."""
-    n, length = score.size, round(v.length / STEP)
+    n, length = score.size, round(v.length / COMB_STEP)
     reached, step = np.full(n, -np.inf), np.zeros(n, dtype=int)
-    for shift in range(length - SLACK, length + SLACK + 1):
-        here = np.full(n, -np.inf)
-        here[min(shift, n) :] = score[: max(n - shift, 0)]
-        better = here > reached
-        reached, step = np.where(better, here, reached), np.where(better, shift, step)
-    reached = reached + gain - couplings.between(v, w)
-    known = layers.setdefault(following, {}).get(w.name)
-    sources = [] if known is None else known[1][0]
+    for shift in range(length - LENGTH_SLACK, length + LENGTH_SLACK + 1):
+        shifted = np.full(n, -np.inf)
+        shifted[min(shift, n) :] = score[: max(n - shift, 0)]
+        better = shifted > reached
+        reached, step = np.where(better, shifted, reached), np.where(better, shift, step)
+    reached = reached + gain - overlaps.between(v, w)
+    existing = layers.setdefault(successor, {}).get(w.name)
+    sources = [] if existing is None else existing[1][0]
     source = np.full(n, len(sources))
-    if known is not None:
-        better = reached > known[0]
-        reached = np.where(better, reached, known[0])
-        source, step = np.where(better, source, known[1][1]), np.where(better, step, known[1][2])
-    layers[following][w.name] = (reached, ([*sources, (node, v.name)], source, step), w)
+    if existing is not None:
+        better = reached > existing[0]
+        reached = np.where(better, reached, existing[0])
+        source, step = np.where(better, source, existing[1][1]), np.where(better, step, existing[1][2])
+    layers[successor][w.name] = (reached, ([*sources, (node, v.name)], source, step), w)
 
 
-def _traced(layers, end):
+def _trace_back(layers, end):
     """(row, start [m]) of the best row, traced from its end to its beginning."""
-    row, (node, name, place) = [], end
+    row, (node, name, index) = [], end
     while True:
         _, (sources, source, step), v = layers[node][name]
         row.append(v)
-        before = sources[source[place]]
-        if before is None:
-            return tuple(reversed(row)), place * STEP - LEAD + v.axles[0]
-        node, name, place = *before, place - int(step[place])
+        previous = sources[source[index]]
+        if previous is None:
+            return tuple(reversed(row)), index * COMB_STEP - LEAD_LENGTH + v.axles[0]
+        node, name, index = *previous, index - int(step[index])
 
 
 UNREACHED = (np.inf,)
 
 
-def best_row(spacing, pattern: Pattern, tolerance: float):
+def closest_row(spacing, pattern: Pattern, tolerance: float):
     """(cost [nat], row of vehicles, its choices): axle spacings closest to ``spacing`` (n_axle - 1,) [m].
 
     Cost is half the squared deviation in units of ``tolerance`` [m], summed over the spacings, plus the logarithm of
@@ -127,28 +127,28 @@ def best_row(spacing, pattern: Pattern, tolerance: float):
         return None
     limit = 20.0 + 4.0 * n_axle  # above it the chi-squared test fails anyway
     # plain floats for speed: there are several 1e5 pairs, most of them rejected at the first spacing
-    seen, weight, within = np.asarray(spacing).tolist(), 0.5 / tolerance**2, pattern.spacings
-    chance = pattern.log_choices
+    spacings, weight, own_spacings = np.asarray(spacing).tolist(), 0.5 / tolerance**2, pattern.spacings
+    log_choices = pattern.log_n_choices
     # state: axles used, group, vehicles used of the group, last vehicle -> (cost, row, choices)
     layers = [{} for _ in range(n_axle + 1)]
     layers[0][(0, 0, None)] = (0.0, (), 0.0)
-    for used in range(n_axle):
-        for (g, count, _), (cost, row, free) in layers[used].items():
-            for group, taken in pattern.following(g, count):
+    for n_axle_used in range(n_axle):
+        for (g, count, _), (cost, row, free) in layers[n_axle_used].items():
+            for group, n_used in pattern.next_vehicles(g, count):
                 choices = pattern.groups[group].vehicles
                 for vehicle in choices:
-                    stop = used + len(vehicle.axles)
+                    stop = n_axle_used + len(vehicle.axles)
                     if stop > n_axle:
                         continue
-                    total = cost + chance[group]
+                    total = cost + log_choices[group]
                     if row:
-                        total += weight * (seen[used - 1] - row[-1].rear - vehicle.axles[0]) ** 2
-                    for k, expected in enumerate(within[vehicle.name], used):
+                        total += weight * (spacings[n_axle_used - 1] - row[-1].rear - vehicle.axles[0]) ** 2
+                    for k, expected in enumerate(own_spacings[vehicle.name], n_axle_used):
                         if total >= limit:
                             break
-                        total += weight * (seen[k] - expected) ** 2
-                    key = (group, taken, vehicle.name)
+                        total += weight * (spacings[k] - expected) ** 2
+                    key = (group, n_used, vehicle.name)
                     if total < limit and total < layers[stop].get(key, UNREACHED)[0]:
-                        layers[stop][key] = (total, (*row, vehicle), free + chance[group])
-    ends = [v for (g, count, _), v in layers[n_axle].items() if pattern.may_end(g, count)]
+                        layers[stop][key] = (total, (*row, vehicle), free + log_choices[group])
+    ends = [v for (g, count, _), v in layers[n_axle].items() if pattern.can_end(g, count)]
     return min(ends, key=lambda v: v[0], default=None)

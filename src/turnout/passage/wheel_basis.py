@@ -34,8 +34,8 @@ class WheelBasis:
     """
 
     poles: np.ndarray
-    observed: np.ndarray
-    into_modes: np.ndarray
+    output: np.ndarray
+    to_modes: np.ndarray
     direction: np.ndarray
     columns: np.ndarray
     rate: float
@@ -51,29 +51,29 @@ class WheelBasis:
     def coefficients(self, phi, jump=None) -> np.ndarray:
         """(..., n_column) weights of the columns for a jump (n_state,), default b, ``phi`` samples early."""
         jump = self.direction if jump is None else jump
-        weight = self.observed * (self.into_modes @ jump)
+        weight = self.output * (self.to_modes @ jump)
         weight = weight * self.poles ** np.asarray(phi, dtype=float)[..., None]
         return self._real(weight)
 
     def slopes(self, phi) -> np.ndarray:
         """(..., n_column) derivative of ``coefficients`` by ``phi``. [1/sample]"""
-        weight = self.observed * (self.into_modes @ self.direction) * np.log(self.poles)
+        weight = self.output * (self.to_modes @ self.direction) * np.log(self.poles)
         return self._real(weight * self.poles ** np.asarray(phi, dtype=float)[..., None])
 
     def _real(self, weight) -> np.ndarray:
         oscillates = self.poles.imag > 0
-        parts = [np.where(oscillates, 2.0, 1.0) * weight.real, -2.0 * weight.imag]
-        stacked = np.stack(parts, axis=-1).reshape(*weight.shape[:-1], -1)
+        components = [np.where(oscillates, 2.0, 1.0) * weight.real, -2.0 * weight.imag]
+        stacked = np.stack(components, axis=-1).reshape(*weight.shape[:-1], -1)
         keep = np.stack([np.ones_like(oscillates), oscillates], axis=-1).ravel()
         return stacked[..., keep]
 
-    def turned(self, weights, phi) -> np.ndarray:
+    def advance(self, weights, phi) -> np.ndarray:
         """(n, n_column) column weights if the impacts are ``phi`` (n,) samples earlier."""
         oscillates = self.poles.imag > 0
-        place = np.concatenate([[0], np.cumsum(1 + oscillates)[:-1]])
+        index = np.concatenate([[0], np.cumsum(1 + oscillates)[:-1]])
         weights = np.asarray(weights, dtype=float)
-        real = weights[:, place]
-        imaginary = np.where(oscillates, -weights[:, np.minimum(place + 1, weights.shape[1] - 1)], 0.0)
+        real = weights[:, index]
+        imaginary = np.where(oscillates, -weights[:, np.minimum(index + 1, weights.shape[1] - 1)], 0.0)
         scale = np.where(oscillates, 2.0, 1.0)
         return self._real((real + 1j * imaginary) / scale * self.poles ** np.asarray(phi, float)[:, None])
 
@@ -92,7 +92,7 @@ class WheelBasis:
         theta = self.coefficients(FRACTIONS)
         return theta / np.sqrt(np.einsum("qp,pr,qr->q", theta, self.gram, theta))[:, None]
 
-    def correlated(self, rows, n_lag: int) -> np.ndarray:
+    def correlate(self, rows, n_lag: int) -> np.ndarray:
         """(n_row, n_lag, n_column) inner products of the columns with each row (n_row, n), shifted by every lag."""
         size = fft.next_fast_len(rows.shape[1], real=True)
         if size not in self._spectra:
@@ -104,23 +104,23 @@ class WheelBasis:
     def _spectra(self) -> dict:
         return {}
 
-    def unit_weights_of(self, seen) -> np.ndarray:
+    def truncated_unit_weights(self, n_observed) -> np.ndarray:
         """(n, n_fraction, n_column) ``unit_weights`` for the first ``n_observed`` (n,) samples of a response."""
-        key = tuple(int(k) for k in seen)
-        if key not in self._seen:
+        key = tuple(int(k) for k in n_observed)
+        if key not in self._truncated_weights:
             products = self.columns[:, None, :] * self.columns[None, :, :]
-            grams = np.cumsum(products, axis=2)[:, :, np.clip(np.asarray(seen) - 1, 0, self.n_sample - 1)]
+            grams = np.cumsum(products, axis=2)[:, :, np.clip(np.asarray(n_observed) - 1, 0, self.n_sample - 1)]
             theta = self.coefficients(FRACTIONS)
             square = np.einsum("qp,prn,qr->nq", theta, grams, theta)
-            self._seen[key] = theta / np.sqrt(np.maximum(square, 1e-300))[..., None]
-        return self._seen[key]
+            self._truncated_weights[key] = theta / np.sqrt(np.maximum(square, 1e-300))[..., None]
+        return self._truncated_weights[key]
 
     @cached_property
-    def _seen(self) -> dict:
+    def _truncated_weights(self) -> dict:
         return {}
 
     @cached_property
-    def ring(self) -> int:
+    def ring_length(self) -> int:
         """Samples after which the columns stay below 2 % of their peak."""
         level = np.abs(self.columns).max(axis=0)
         return int(np.flatnonzero(level > 0.02 * level.max())[-1]) + 1
@@ -137,18 +137,18 @@ class WheelBasis:
             return np.zeros((self.n_column, self.n_column))
         return self.columns[:, lag:] @ self.columns[:, : self.n_sample - lag].T
 
-    def cut(self, n: int) -> WheelBasis:
+    def truncate(self, n: int) -> WheelBasis:
         """The same basis with the first ``n`` samples of its columns."""
         if n >= self.n_sample:
             return self
-        if n not in self._cuts:
+        if n not in self._truncated:
             columns = self.columns[:, :n].copy()
-            parts = (self.poles, self.observed, self.into_modes, self.direction)
-            self._cuts[n] = WheelBasis(*parts, columns, self.rate)
-        return self._cuts[n]
+            modes = (self.poles, self.output, self.to_modes, self.direction)
+            self._truncated[n] = WheelBasis(*modes, columns, self.rate)
+        return self._truncated[n]
 
     @cached_property
-    def _cuts(self) -> dict:
+    def _truncated(self) -> dict:
         return {}
 
 
@@ -160,24 +160,24 @@ def band_pass(low: float, high: float, order: int, rate: float) -> np.ndarray:
     return signal.butter(order, [low, high], btype="bandpass", fs=rate, output="sos")
 
 
-def filtered(samples, through) -> np.ndarray:
+def apply_filter(samples, filter_) -> np.ndarray:
     """Samples (..., n) behind ``filter_``: second-order sections (n, 6), taps (n,) or None for no filter."""
-    if through is None:
+    if filter_ is None:
         return np.asarray(samples, dtype=float)
-    if np.ndim(through) == 2:
-        return signal.sosfilt(through, samples, axis=-1)
-    return signal.lfilter(through, [1.0], samples, axis=-1)
+    if np.ndim(filter_) == 2:
+        return signal.sosfilt(filter_, samples, axis=-1)
+    return signal.lfilter(filter_, [1.0], samples, axis=-1)
 
 
-def settling(poles, through, tolerance: float, longest: int) -> int:
+def settling_length(poles, filter_, tolerance: float, longest: int) -> int:
     """Samples after which the slowest pole of model and filter has decayed to ``tolerance``."""
-    inner = signal.sos2zpk(through)[1] if np.ndim(through) == 2 else np.zeros(0)
+    inner = signal.sos2zpk(filter_)[1] if np.ndim(filter_) == 2 else np.zeros(0)
     radii = np.concatenate([np.abs(poles), np.abs(inner), [0.0]])
     slowest = min(radii.max(), 1 - 1e-6)
     return int(min(longest, max(8, np.ceil(np.log(tolerance) / np.log(slowest)))))
 
 
-def wheel_basis(model: ModalModel, through, rate: float, tolerance=1e-4, longest=0.25) -> WheelBasis:
+def wheel_basis(model: ModalModel, filter_, rate: float, tolerance=1e-4, longest=0.25) -> WheelBasis:
     """Basis of ``model`` at the sampling ``rate`` of the passage [Hz], behind ``filter_`` (``apply_filter``).
 
     A model identified at another rate is converted by A^(ratio): its poles in 1/s stay the same. ``tolerance``
@@ -190,11 +190,11 @@ def wheel_basis(model: ModalModel, through, rate: float, tolerance=1e-4, longest
     poles, vectors = poles[order].astype(complex), vectors[:, order]
     inverse = np.linalg.inv(vectors)
     keep = poles.imag >= 0
-    poles, observed, inverse = poles[keep], (np.asarray(model.c) @ vectors)[keep], inverse[keep]
+    poles, output, inverse = poles[keep], (np.asarray(model.c) @ vectors)[keep], inverse[keep]
     poles = poles ** (model.rate / rate)
-    n = settling(poles, through, tolerance, int(longest * rate))
+    n = settling_length(poles, filter_, tolerance, int(longest * rate))
     powers = poles[:, None] ** np.arange(n)
-    parts = np.stack([powers.real, powers.imag], axis=1).reshape(-1, n)
-    used = np.stack([np.ones(len(poles), bool), poles.imag > 0], axis=-1).ravel()
-    columns = filtered(parts[used], through)
-    return WheelBasis(poles, observed.astype(complex), inverse, np.asarray(model.b, float), columns, rate)
+    components = np.stack([powers.real, powers.imag], axis=1).reshape(-1, n)
+    is_used = np.stack([np.ones(len(poles), bool), poles.imag > 0], axis=-1).ravel()
+    columns = apply_filter(components[is_used], filter_)
+    return WheelBasis(poles, output.astype(complex), inverse, np.asarray(model.b, float), columns, rate)

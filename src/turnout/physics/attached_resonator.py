@@ -22,7 +22,7 @@ class AttachedResonator(PhysicsTerm):
 
     name = "attached_resonator"
     left_out = "{mass:.1f} kg resonate at {frequency:.0f} Hz on the rail over sleeper {support}"
-    kind = "matrix"
+    effect_type = "matrix"
     frame = "frequency"
     parameters = (
         Parameter("mass", "kg", 0.0, (0.0, 150.0), "mass that swings on the rail", SOURCE),
@@ -40,11 +40,11 @@ class AttachedResonator(PhysicsTerm):
         self.check()
         if self.mass == 0.0:
             return []
-        omega, own = 2.0 * np.pi * self.frequency, ("resonator", self.support)
-        spring = ((("rail", self.support), 1.0), (own, -1.0))
+        omega, node = 2.0 * np.pi * self.frequency, ("resonator", self.support)
+        spring = ((("rail", self.support), 1.0), (node, -1.0))
         return [
             Link(spring, self.mass * omega**2, 2.0 * self.damping * omega * self.mass, tag="resonator"),
-            Link(((own, 1.0),), mass=self.mass, tag="resonator"),
+            Link(((node, 1.0),), mass=self.mass, tag="resonator"),
         ]
 
     def dynamic_stiffness(self, frequency):

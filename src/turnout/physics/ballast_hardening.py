@@ -7,8 +7,8 @@ import numpy as np
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.force_laws import Port, TableLaw
 
-UNIT = 1e-3  # m, deflection at which the parameter is the added share of stiffness
-WAY = np.linspace(-3e-3, 3e-3, 121)
+REFERENCE_DEFLECTION = 1e-3  # m, deflection at which the parameter is the added share of stiffness
+DEFLECTIONS = np.linspace(-3e-3, 3e-3, 121)
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class BallastHardening(PhysicsTerm):
 
     name = "ballast_hardening"
     left_out = "ballast under sleepers {first} to {last} stiffens by {hardening:.2f} at a deflection of 1 mm"
-    kind = "port"
+    effect_type = "port"
     frame = "amplitude"
     parameters = (
         Parameter("hardening", "-", 0.0, (-0.1, 20.0), "share of stiffness added at 1 mm",
@@ -44,6 +44,6 @@ class BallastHardening(PhysicsTerm):
         return tuple(self._port(track.ballast_link(j), j) for j in range(self.first, self.last + 1))
 
     def _port(self, ballast, j):
-        force = self.hardening * ballast.stiffness * (WAY * (WAY / UNIT) ** 2)
-        law = TableLaw(tuple(WAY), tuple(force), (0.0,) * WAY.size)
+        force = self.hardening * ballast.stiffness * (DEFLECTIONS * (DEFLECTIONS / REFERENCE_DEFLECTION) ** 2)
+        law = TableLaw(tuple(DEFLECTIONS), tuple(force), (0.0,) * DEFLECTIONS.size)
         return Port(ballast.ends, law, label=f"hardening under sleeper {j}")

@@ -21,7 +21,7 @@ class BallastInertia(PhysicsTerm):
 
     name = "ballast_inertia"
     left_out = "{mass:.0f} kg of ballast move with every half sleeper and {damping:.0f} N s/m radiate"
-    kind = "matrix"
+    effect_type = "matrix"
     frame = "condition"
     parameters = (
         Parameter("mass", "kg", 0.0, (0.0, 600.0), "ballast that moves with half a sleeper", SOURCE),
@@ -39,8 +39,8 @@ class BallastInertia(PhysicsTerm):
         if track.layers == 1 or (self.mass == 0.0 and self.damping == 0.0):
             return []
         lowest = "ballast" if track.layers == 3 else "sleeper"
-        there = track.subgrade_damping if track.layers == 3 else track.ballast_damping
+        base_damping = track.subgrade_damping if track.layers == 3 else track.ballast_damping
         return [
             Link((((lowest, j), 1.0),), damping=max(self.damping, -0.9 * c), mass=self.mass, tag="ballast_inertia")
-            for j, c in enumerate(there)
+            for j, c in enumerate(base_damping)
         ]

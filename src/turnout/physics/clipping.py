@@ -16,7 +16,7 @@ class Clipping(PhysicsTerm):
 
     name = "clipping"
     left_out = "channel {channel_name} clips at {limit:.3g} m/s²"
-    kind = "channel"
+    effect_type = "channel"
     frame = "sensor"
     parameters = (
         Parameter("limit", "m/s²", 1e5, (0.01, 1e5), "largest value that is shown",

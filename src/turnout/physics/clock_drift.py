@@ -22,7 +22,7 @@ class ClockDrift(PhysicsTerm):
 
     name = "clock_drift"
     left_out = "the clock of channel {channel_name} is off by a share of {drift:.2e}"
-    kind = "channel"
+    effect_type = "channel"
     frame = "clock"
     parameters = (
         Parameter("drift", "-", 0.0, (-5e-3, 5e-3), "relative error of the sampling rate",
@@ -34,7 +34,7 @@ class ClockDrift(PhysicsTerm):
         """A drift of one in a thousand."""
         return cls("A", 1e-3)
 
-    def under(self, conditions):
+    def under_conditions(self, conditions):
         """The term with the start time of the signal of this recording."""
         return replace(self, start=float(conditions.get("start", 0.0)))
 

@@ -14,7 +14,7 @@ class ContactStiffness(PhysicsTerm):
 
     name = "contact_stiffness"
     left_out = "the wheel-rail contact has {factor:.2f} times its stiffness"
-    kind = "vehicle"
+    effect_type = "vehicle"
     frame = "train"
     parameters = (
         Parameter("factor", "-", 1.0, (0.1, 5.0), "contact constant over that of nominal profiles",
@@ -29,5 +29,5 @@ class ContactStiffness(PhysicsTerm):
     def vehicle(self, vehicle):
         """The vehicle with another contact law."""
         self.check()
-        laws = [replace(law, stiffness=self.factor * law.stiffness) for law in vehicle.each("contact")]
+        laws = [replace(law, stiffness=self.factor * law.stiffness) for law in vehicle.wheel_values("contact")]
         return vehicle.with_(contact=one_or_all(laws))

@@ -7,7 +7,7 @@ import numpy as np
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.force_laws import FrictionLaw, Port
 
-SLIP = 2e-3  # m/s, slip rate over which the force changes sign
+SLIP_RATE = 2e-3  # m/s, slip rate over which the force changes sign
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class DryFriction(PhysicsTerm):
 
     name = "dry_friction"
     left_out = "dry friction of {limit:.0f} N between rail and sleeper {support}"
-    kind = "port"
+    effect_type = "port"
     frame = "amplitude"
     parameters = (
         Parameter("limit", "N", 0.0, (0.0, 2e4), "force at which the joint slips",
@@ -38,7 +38,7 @@ class DryFriction(PhysicsTerm):
         if self.limit == 0.0 or track.layers == 1:
             return ()
         ends = ((("rail", self.support), 1.0), (("sleeper", self.support), -1.0))
-        return (Port(ends, FrictionLaw(self.limit, SLIP), label=f"friction at support {self.support}"),)
+        return (Port(ends, FrictionLaw(self.limit, SLIP_RATE), label=f"friction at support {self.support}"),)
 
     def damping_at(self, velocity_amplitude):
         r"""Equivalent viscous damping of slip at an amplitude V well above v0, :math:`4 F_0 / (\pi V)` [N s/m]."""

@@ -27,7 +27,7 @@ class HangingSleeper(PhysicsTerm):
 
     name = "hanging_sleeper"
     left_out = "sleeper {sleeper} hangs {gap:.4f} m above its ballast"
-    kind = "port"
+    effect_type = "port"
     parameters = (
         Parameter(
             "gap",
@@ -53,7 +53,7 @@ class HangingSleeper(PhysicsTerm):
         return cls(20, 3e-4)
 
     @property
-    def withheld(self):
+    def withheld_share(self):
         """Share of the ballast that is missing within the gap."""
         return 1.0 - self.seated
 
@@ -63,9 +63,9 @@ class HangingSleeper(PhysicsTerm):
         if self.gap == 0.0:
             return ()
         ballast = track.ballast_link(self.sleeper)
-        k, c = self.withheld * ballast.stiffness, self.withheld * ballast.damping
+        k, c = self.withheld_share * ballast.stiffness, self.withheld_share * ballast.damping
         onset = min(ONSET, 0.5 * self.gap)
-        way: tuple[float, ...] = (
+        deflections: tuple[float, ...] = (
             -self.gap - onset,
             -self.gap,
             -self.gap + onset,
@@ -73,9 +73,12 @@ class HangingSleeper(PhysicsTerm):
             self.gap,
             self.gap + onset,
         )
-        withheld = tuple(-k * min(max(y, -self.gap), self.gap) for y in way)
+        withheld_force = tuple(-k * min(max(y, -self.gap), self.gap) for y in deflections)
         if onset == self.gap - onset:  # the two middle points are equal
-            way, withheld = (*way[:2], 0.0, *way[4:]), (*withheld[:2], 0.0, *withheld[4:])
-        viscous = (0.0, -0.5 * c, *(-c,) * (len(way) - 4), -0.5 * c, 0.0)
-        law = TableLaw(way, withheld, viscous)
+            deflections, withheld_force = (
+                (*deflections[:2], 0.0, *deflections[4:]),
+                (*withheld_force[:2], 0.0, *withheld_force[4:]),
+            )
+        viscous = (0.0, -0.5 * c, *(-c,) * (len(deflections) - 4), -0.5 * c, 0.0)
+        law = TableLaw(deflections, withheld_force, viscous)
         return (Port(ballast.ends, law, label=f"gap under sleeper {self.sleeper}"),)

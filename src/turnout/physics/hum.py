@@ -22,7 +22,7 @@ class Hum(PhysicsTerm):
 
     name = "hum"
     left_out = "channel {channel_name} hums at {frequency:.1f} Hz with an amplitude of {amplitude:.3g} m/s²"
-    kind = "channel"
+    effect_type = "channel"
     frame = "clock"
     parameters = (
         Parameter("sine", "m/s²", 0.0, (-50.0, 50.0), "part in phase with the record's start",
@@ -39,7 +39,7 @@ class Hum(PhysicsTerm):
         """Sentence that states what was left out."""
         return self.left_out.format(**vars(self), amplitude=float(np.hypot(self.sine, self.cosine)))
 
-    def under(self, conditions):
+    def under_conditions(self, conditions):
         """The term with the start time of the signal of this recording."""
         return replace(self, start=float(conditions.get("start", 0.0)))
 

@@ -25,7 +25,7 @@ class LiftingSleepers(PhysicsTerm):
 
     name = "lifting_sleepers"
     left_out = "ballast under sleepers {first} to {last} does not pull when they lift off against {dead_load:.0f} N"
-    kind = "port"
+    effect_type = "port"
     parameters = (
         Parameter(
             "share",
@@ -43,7 +43,7 @@ class LiftingSleepers(PhysicsTerm):
         return cls(15, 25, 1.0, dead_load=400.0)
 
     @property
-    def withheld(self):
+    def withheld_share(self):
         """Share of the ballast that is missing after lift-off."""
         return self.share
 

@@ -17,8 +17,8 @@ class LocalBallast(PhysicsTerm):
 
     name = "local_ballast"
     left_out = "the ballast under sleeper {sleeper} has {factor:.2f} times its stiffness"
-    kind = "matrix"
-    scales = True
+    effect_type = "matrix"
+    scales_track = True
     frame = "place"
     parameters = (
         Parameter("factor", "-", 1.0, (0.05, 8.0), "ballast stiffness over that of the base model",
@@ -34,9 +34,9 @@ class LocalBallast(PhysicsTerm):
     def links(self, track):
         """Links added to the spring and damper of the ballast."""
         self.check()
-        found = [link for link in track.support_links(self.sleeper) if link.tag == "ballast"]
+        springs = [link for link in track.support_links(self.sleeper) if link.tag == "ballast"]
         more = self.factor - 1.0
         slower = self.factor**0.5 - 1.0
         return [
-            replace(k, stiffness=more * k.stiffness, damping=slower * k.damping, tag="local_ballast") for k in found
+            replace(k, stiffness=more * k.stiffness, damping=slower * k.damping, tag="local_ballast") for k in springs
         ]

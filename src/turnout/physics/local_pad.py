@@ -17,8 +17,8 @@ class LocalPad(PhysicsTerm):
 
     name = "local_pad"
     left_out = "the pad on sleeper {sleeper} has {factor:.2f} times its stiffness"
-    kind = "matrix"
-    scales = True
+    effect_type = "matrix"
+    scales_track = True
     frame = "place"
     parameters = (
         Parameter("factor", "-", 1.0, (0.05, 8.0), "pad stiffness over that of the base model",
@@ -34,7 +34,7 @@ class LocalPad(PhysicsTerm):
     def links(self, track):
         """Links added to the spring and damper of the pad."""
         self.check()
-        found = [link for link in track.support_links(self.sleeper) if link.tag == "pad"]
+        springs = [link for link in track.support_links(self.sleeper) if link.tag == "pad"]
         more = self.factor - 1.0
         slower = self.factor**0.5 - 1.0
-        return [replace(k, stiffness=more * k.stiffness, damping=slower * k.damping, tag="local_pad") for k in found]
+        return [replace(k, stiffness=more * k.stiffness, damping=slower * k.damping, tag="local_pad") for k in springs]

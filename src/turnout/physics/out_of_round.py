@@ -27,7 +27,7 @@ class OutOfRound(PhysicsTerm):
 
     name = "out_of_round"
     left_out = "wheel {number} of {who} has {order} waves around it with an amplitude of {amplitude:.2e} m"
-    kind = "path"
+    effect_type = "path"
     frame = "wheel"
     parameters = (
         Parameter("cosine", "m", 0.0, (-1e-3, 1e-3), "amplitude in phase with the place", SOURCE),
@@ -46,12 +46,12 @@ class OutOfRound(PhysicsTerm):
         who = self.train or "every train"
         return self.left_out.format(number=self.wheel + 1, who=who, order=self.order, amplitude=amplitude)
 
-    def under(self, conditions):
+    def under_conditions(self, conditions):
         """The term with the phase of a recording; no effect in another train or if the phase is unknown."""
-        known, name = dict(self.phases), conditions.get("name")
-        if (self.train and conditions.get("train", self.train) != self.train) or (known and name not in known):
+        phases, name = dict(self.phases), conditions.get("name")
+        if (self.train and conditions.get("train", self.train) != self.train) or (phases and name not in phases):
             return replace(self, cosine=0.0, sine=0.0)
-        return replace(self, phases=((name, known[name]),)) if known else self
+        return replace(self, phases=((name, phases[name]),)) if phases else self
 
     def paths(self, track, vehicle):
         """Two waves a quarter wave apart."""

@@ -20,7 +20,7 @@ class PadPreload(PhysicsTerm):
 
     name = "pad_preload"
     left_out = "pads stiffen by {slope:.0f} N/m per newton of seat load"
-    kind = "matrix"
+    effect_type = "matrix"
     frame = "condition"
     parameters = (
         Parameter("slope", "N/m per N", 0.0, (-3e3, 2e4), "growth of pad stiffness with load",
@@ -32,7 +32,7 @@ class PadPreload(PhysicsTerm):
         """100 MN/m under 25 kN."""
         return cls(4e3)
 
-    def under(self, conditions):
+    def under_conditions(self, conditions):
         """The term at the load of a recording; without axle loads, as in a hammer test, the load is zero."""
         loads = conditions.get("axle_loads", ())
         mean = sum(loads) / len(loads) / 2.0 if len(loads) else 0.0

@@ -16,8 +16,8 @@ class PadTemperature(PhysicsTerm):
 
     name = "pad_temperature"
     left_out = "pads lose a share of {coefficient:.4f} of their stiffness per kelvin"
-    kind = "matrix"
-    scales = True
+    effect_type = "matrix"
+    scales_track = True
     frame = "condition"
     parameters = (
         Parameter("coefficient", "1/K", 0.0, (-0.01, 0.04), "relative loss of stiffness per kelvin",
@@ -29,7 +29,7 @@ class PadTemperature(PhysicsTerm):
         """1 % per kelvin at 30 °C."""
         return cls(0.01)
 
-    def under(self, conditions):
+    def under_conditions(self, conditions):
         """The term at the rail temperature of a recording; an unknown one is the reference temperature."""
         return replace(self, temperature=float(conditions.get("rail_temperature", REFERENCE)))
 

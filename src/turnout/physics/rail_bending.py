@@ -16,7 +16,7 @@ class RailBending(PhysicsTerm):
 
     name = "rail_bending"
     left_out = "the rail from {start:.1f} to {end:.1f} m has {factor:.2f} times its bending stiffness"
-    kind = "matrix"
+    effect_type = "matrix"
     frame = "place"
     parameters = (
         Parameter("factor", "-", 1.0, (0.3, 5.0), "bending stiffness over that of the base",
@@ -33,8 +33,8 @@ class RailBending(PhysicsTerm):
         self.check()
         if self.factor == 1.0:
             return track
-        base = track.rail_between(0.5 * (self.start + self.end))
+        base = track.rail_at(0.5 * (self.start + self.end))
         mass = self.factor**0.5
-        other = replace(base, bending_stiffness=self.factor * base.bending_stiffness, mass=mass * base.mass,
+        changed_rail = replace(base, bending_stiffness=self.factor * base.bending_stiffness, mass=mass * base.mass,
                         rotary_inertia=self.factor * base.rotary_inertia)  # fmt: skip
-        return replace(track, stretches=(*track.stretches, RailStretch(self.start, self.end, other)))
+        return replace(track, stretches=(*track.stretches, RailStretch(self.start, self.end, changed_rail)))

@@ -22,8 +22,8 @@ class Waves:
     def __call__(self, x, wheel=0):
         x = np.asarray(x, dtype=float)
         fade = np.clip(np.minimum(x - self.start, self.end - x) / self.wavelength, 0.0, 1.0)
-        way = 2.0 * np.pi * (x - self.start) / self.wavelength
-        return fade * fade * (3.0 - 2.0 * fade) * (self.sine * np.sin(way) + self.cosine * np.cos(way))
+        phase = 2.0 * np.pi * (x - self.start) / self.wavelength
+        return fade * fade * (3.0 - 2.0 * fade) * (self.sine * np.sin(phase) + self.cosine * np.cos(phase))
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class RailCorrugation(PhysicsTerm):
 
     name = "rail_corrugation"
     left_out = "corrugation of {wavelength:.3f} m and {amplitude:.2e} m from {start:.1f} to {end:.1f} m"
-    kind = "path"
+    effect_type = "path"
     frame = "wavelength"
     parameters = (
         Parameter("sine", "m", 0.0, (-3e-4, 3e-4), "amplitude in phase with the start", SOURCE, (0.0, 6e-5)),

@@ -17,7 +17,7 @@ class RailShear(PhysicsTerm):
 
     name = "rail_shear"
     left_out = "the rail yields in shear by {flexibility:.2f} per giganewton more"
-    kind = "matrix"
+    effect_type = "matrix"
     frame = "condition"
     parameters = (
         Parameter("flexibility", "-", 0.0, (-3.0, 20.0), "shear flexibility added, in 1/GN",
@@ -35,11 +35,13 @@ class RailShear(PhysicsTerm):
         self.check()
         if self.flexibility == 0.0:
             return track
-        stretches = tuple(replace(s, rail=self._sheared(s.rail, track.rail)) for s in track.stretches)
-        return replace(track, rail=self._sheared(track.rail, track.rail), stretches=stretches)
+        stretches = tuple(replace(s, rail=self._with_shear(s.rail, track.rail)) for s in track.stretches)
+        return replace(track, rail=self._with_shear(track.rail, track.rail), stretches=stretches)
 
-    def _sheared(self, rail, running):
-        own, usual = (0.0 if r.beam == "euler" else 1.0 / r.shear_stiffness for r in (rail, running))
-        share = own / usual if own and usual else running.mass / rail.mass
-        total = max(own + 1e-9 * self.flexibility * share, 1e-11)
+    def _with_shear(self, rail, running):
+        flexibility, running_flexibility = (
+            0.0 if r.beam == "euler" else 1.0 / r.shear_stiffness for r in (rail, running)
+        )
+        share = flexibility / running_flexibility if flexibility and running_flexibility else running.mass / rail.mass
+        total = max(flexibility + 1e-9 * self.flexibility * share, 1e-11)
         return replace(rail, shear_stiffness=1.0 / total, beam="timoshenko")

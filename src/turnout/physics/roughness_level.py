@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.roughness import roughness
 
-OWN = 1  # second element of its seed; the roughness of the base model uses the seed alone
+SEED_STREAM = 1  # second element of its seed; the roughness of the base model uses the seed alone
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class RoughnessLevel(PhysicsTerm):
 
     name = "roughness_level"
     left_out = "rail roughness has {amplitude:.2f} times the amplitude of the limit curve on top"
-    kind = "path"
+    effect_type = "path"
     frame = "place"
     parameters = (
         Parameter("amplitude", "-", 0.0, (0.0, 30.0), "amplitude over that of the limit curve",
@@ -49,4 +49,4 @@ class RoughnessLevel(PhysicsTerm):
         self.check()
         if self.amplitude == 0.0:
             return ()
-        return (Scaled(roughness(track.start - 5.0, track.end + 5.0, [self.seed, OWN]), self.amplitude),)
+        return (Scaled(roughness(track.start - 5.0, track.end + 5.0, [self.seed, SEED_STREAM]), self.amplitude),)

@@ -14,7 +14,7 @@ class SensorPosition(PhysicsTerm):
 
     name = "sensor_position"
     left_out = "channel {channel_name} sits {shift:+.2f} m from where its description says"
-    kind = "channel"
+    effect_type = "channel"
     frame = "sensor"
     parameters = (
         Parameter("shift", "m", 0.0, (-1.2, 1.2), "true place minus described place",

@@ -23,7 +23,7 @@ class SleeperMode(PhysicsTerm):
 
     name = "sleeper_mode"
     left_out = "sleepers bend at {frequency:.0f} Hz with a share of {share:.2f} of their mass"
-    kind = "matrix"
+    effect_type = "matrix"
     frame = "frequency"
     parameters = (
         Parameter("share", "-", 0.0, (0.0, 0.95), "modal mass over half the sleeper's mass", SOURCE),
@@ -40,11 +40,11 @@ class SleeperMode(PhysicsTerm):
         self.check()
         if self.share == 0.0 or track.layers == 1:
             return []
-        found, omega = [], 2.0 * np.pi * self.frequency
+        links, omega = [], 2.0 * np.pi * self.frequency
         for j in range(track.support.size):
-            mass, own = self.share * track.sleeper_mass[j], ("sleeper_mode", j)
-            spring = ((("sleeper", j), 1.0), (own, -1.0))
-            found.append(Link(spring, mass * omega**2, 2.0 * self.damping * omega * mass, tag="sleeper_mode"))
-            found.append(Link(((own, 1.0),), mass=mass, tag="sleeper_mode"))
-            found.append(Link(((("sleeper", j), 1.0),), mass=-mass, tag="sleeper_mode"))
-        return found
+            mass, node = self.share * track.sleeper_mass[j], ("sleeper_mode", j)
+            spring = ((("sleeper", j), 1.0), (node, -1.0))
+            links.append(Link(spring, mass * omega**2, 2.0 * self.damping * omega * mass, tag="sleeper_mode"))
+            links.append(Link(((node, 1.0),), mass=mass, tag="sleeper_mode"))
+            links.append(Link(((("sleeper", j), 1.0),), mass=-mass, tag="sleeper_mode"))
+        return links

@@ -23,7 +23,7 @@ class SurfaceDip(PhysicsTerm):
 
     name = "surface_dip"
     left_out = "the running surface dips by {depth:.5f} m over {length:.2f} m near {place:.2f} m"
-    kind = "path"
+    effect_type = "path"
     frame = "place"
     parameters = (
         Parameter("depth", "m", 0.0, (-3e-3, 6e-3), "depth of the dip, negative a bump", SOURCE, (0.0, 1e-3)),
@@ -38,18 +38,18 @@ class SurfaceDip(PhysicsTerm):
         return cls(12.0, 1e-3, 0.5)
 
     @property
-    def where(self):
+    def deepest_position(self):
         """Position of the lowest point [m]."""
         return self.place + self.shift
 
     def sentence(self):
         """Sentence that states what was left out."""
-        return self.left_out.format(**{**vars(self), "place": self.where})
+        return self.left_out.format(**{**vars(self), "place": self.deepest_position})
 
     def paths(self, track, vehicle):
         """A cosine and a kink of the same length."""
         self.check()
         if self.depth == 0.0:
             return ()
-        smooth = Cosine(self.where, (1.0 - self.sharpness) * self.depth, self.length)
-        return smooth, Kink(self.where, self.sharpness * self.depth, self.length)
+        smooth = Cosine(self.deepest_position, (1.0 - self.sharpness) * self.depth, self.length)
+        return smooth, Kink(self.deepest_position, self.sharpness * self.depth, self.length)

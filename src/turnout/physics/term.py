@@ -6,7 +6,7 @@ import numpy as np
 
 from turnout.errors import SimulationError
 
-KINDS = ("matrix", "port", "path", "channel", "vehicle")
+EFFECT_TYPES = ("matrix", "port", "path", "channel", "vehicle")
 
 
 @dataclass(frozen=True)
@@ -36,9 +36,9 @@ class PhysicsTerm:
 
     name = ""
     left_out = ""
-    kind = ""
+    effect_type = ""
     parameters: tuple[Parameter, ...] = ()
-    scales = False  # whether its links are a multiple of the track's springs; other terms then act on the result
+    scales_track = False  # whether its links are a multiple of the track's springs; other terms then act on the result
 
     @classmethod
     def example(cls):
@@ -54,7 +54,7 @@ class PhysicsTerm:
         return ()
 
     @property
-    def withheld(self):
+    def withheld_share(self):
         """Share of the ballast of a sleeper that the ports of this term remove."""
         return 0.0
 
@@ -73,7 +73,7 @@ class PhysicsTerm:
         """The sensor at its true position, if its description is wrong."""
         return sensor
 
-    def under(self, conditions):
+    def under_conditions(self, conditions):
         """The same term under the conditions of one recording (rail temperature, axle load, train)."""
         return self
 
@@ -92,8 +92,8 @@ class PhysicsTerm:
         """
         force = np.zeros(len(state.sleeper_position))
         for port in self.ports(state.track):
-            ((kind, j), weight), *others = port.ends
-            if kind != "sleeper" or others:
+            ((node_type, j), weight), *more_ends = port.ends
+            if node_type != "sleeper" or more_ends:
                 raise SimulationError(f"{self.name}: port {port.label!r} does not act on one sleeper alone.")
             d = weight * state.sleeper_position[j] - port.gap
             force[j] -= weight * float(port.law.force(d, weight * state.sleeper_velocity[j]))

@@ -10,7 +10,7 @@ class TransferTerm(PhysicsTerm):
     """A term of one channel, named by its field ``channel_name``, with ``transfer(frequency)`` complex (n,)."""
 
     channel_name: str
-    kind = "channel"
+    effect_type = "channel"
     frame = "sensor"
 
     def transfer(self, frequency):

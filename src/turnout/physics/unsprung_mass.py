@@ -14,7 +14,7 @@ class UnsprungMass(PhysicsTerm):
 
     name = "unsprung_mass"
     left_out = "wheelsets of {who} have {factor:.2f} times their mass"
-    kind = "vehicle"
+    effect_type = "vehicle"
     frame = "train"
     parameters = (
         Parameter("factor", "-", 1.0, (0.4, 2.5), "unsprung mass over that of the vehicle file",
@@ -31,10 +31,10 @@ class UnsprungMass(PhysicsTerm):
         """Sentence that states what was left out."""
         return self.left_out.format(factor=self.factor, who=self.train or "all trains")
 
-    def under(self, conditions):
+    def under_conditions(self, conditions):
         """The same term; no effect in another train."""
-        other = self.train and conditions.get("train", self.train) != self.train
-        return replace(self, factor=1.0) if other else self
+        other_train = self.train and conditions.get("train", self.train) != self.train
+        return replace(self, factor=1.0) if other_train else self
 
     def vehicle(self, vehicle):
         """The vehicle with changed wheel masses."""

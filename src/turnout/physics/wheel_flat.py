@@ -25,7 +25,7 @@ class WheelFlat(PhysicsTerm):
 
     name = "wheel_flat"
     left_out = "wheel {number} of {who} has a flat of {length:.3f} m"
-    kind = "path"
+    effect_type = "path"
     frame = "wheel"
     parameters = (
         Parameter("length", "m", 0.0, (0.0, 0.15), "length of the flat along the tread", SOURCE, (0.04, 0.04)),
@@ -40,12 +40,12 @@ class WheelFlat(PhysicsTerm):
         """Sentence that states what was left out."""
         return self.left_out.format(length=self.length, number=self.wheel + 1, who=self.train or "every train")
 
-    def under(self, conditions):
+    def under_conditions(self, conditions):
         """The term with the phase of a recording; no flat in another train or if the phase is unknown."""
-        known, name = dict(self.phases), conditions.get("name")
-        if (self.train and conditions.get("train", self.train) != self.train) or (known and name not in known):
+        phases, name = dict(self.phases), conditions.get("name")
+        if (self.train and conditions.get("train", self.train) != self.train) or (phases and name not in phases):
             return replace(self, length=0.0)
-        return replace(self, phase=known.get(name, self.phase))
+        return replace(self, phase=phases.get(name, self.phase))
 
     def paths(self, track, vehicle):
         """The path part of that wheel."""

@@ -24,7 +24,7 @@ class ZenerPad(PhysicsTerm):
 
     name = "zener_pad"
     left_out = "pads stiffen by {ratio:.2f} of their static stiffness above 1/(2 pi {relaxation_time:.2g} s)"
-    kind = "matrix"
+    effect_type = "matrix"
     frame = "frequency"
     parameters = (
         Parameter("ratio", "-", 0.0, (0.0, 10.0), "stiffness of the branch over the pad's static stiffness", SOURCE),

@@ -5,8 +5,8 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 from turnout.errors import TurnoutError
-from turnout.readers.formats import FORMATS, detect, refuse_spreadsheet
-from turnout.readers.interpret import describe
+from turnout.readers.formats import FORMATS, detect_format, reject_spreadsheet
+from turnout.readers.interpret import convert_records
 from turnout.readers.source import load
 from turnout.records import LongRecording, RawDescription, ReadResult, Recording
 
@@ -14,10 +14,16 @@ __all__ = ["FORMATS", "read"]
 
 LOG = logging.getLogger("turnout.readers")
 
-HELD = 32 * 2**20  # bytes: a file up to this size is read into memory as a whole, whatever its duration
+MAX_WHOLE_FILE_SIZE = 32 * 2**20  # bytes: a file up to this size is read into memory as a whole, whatever its duration
 
 
-def read(path, root, description: RawDescription, longest: float | None = None, held: int = HELD) -> ReadResult:
+def read(
+    path,
+    root,
+    description: RawDescription,
+    max_duration: float | None = None,
+    max_whole_file_size: int = MAX_WHOLE_FILE_SIZE,
+) -> ReadResult:
     """Recordings of one raw file, in SI units, with the order and signs of channels that the configuration states.
 
     Parameters
@@ -58,21 +64,21 @@ def read(path, root, description: RawDescription, longest: float | None = None, 
     array([   0. , 4347.8,    0. ])
     """
     source = load(path, root)
-    source = replace(source, stay=longest is not None and source.size > held)
+    source = replace(source, lazy=max_duration is not None and source.size > max_whole_file_size)
     before = source.state()
-    with _named(source):
-        raw = _format(source, description).read_raw(source)
+    with _as_read_error(source):
+        raw = _format_of(source, description).read_raw(source)
         digest = source.sha256()
-        recordings, errors = describe(raw, description, source, longest)
+        recordings, errors = convert_records(raw, description, source, max_duration)
     if source.state() != before:
         raise source.error("the file", "it changed while it was read", "Start again when its copying has ended")
-    held_back = tuple(r for r in recordings if isinstance(r, LongRecording))
-    whole = tuple(r for r in recordings if isinstance(r, Recording))
-    return ReadResult(recordings=whole, errors=errors, sha256=digest, long=held_back)
+    long_recordings = tuple(r for r in recordings if isinstance(r, LongRecording))
+    recordings_in_memory = tuple(r for r in recordings if isinstance(r, Recording))
+    return ReadResult(recordings=recordings_in_memory, errors=errors, sha256=digest, long_recordings=long_recordings)
 
 
 @contextmanager
-def _named(source):
+def _as_read_error(source):
     """Turn any unexpected exception of a reader into a ReadError of this file; the traceback goes to the log."""
     try:
         yield
@@ -80,15 +86,15 @@ def _named(source):
         raise
     except Exception as error:
         LOG.exception("%s: not foreseen by the reader", source.name)
-        found = f"it cannot be read ({type(error).__name__}: {' '.join(str(error).split())[:200]})"
-        raise source.error("the file", found) from error
+        problem = f"it cannot be read ({type(error).__name__}: {' '.join(str(error).split())[:200]})"
+        raise source.error("the file", problem) from error
 
 
-def _format(source, description):
-    refuse_spreadsheet(source)
+def _format_of(source, description):
+    reject_spreadsheet(source)
     if description.format == "auto":
-        return detect(source)
+        return detect_format(source)
     if description.format not in FORMATS:
-        known = ", ".join(FORMATS)
-        raise source.error("the layout", f"the format {description.format!r} is not known", f"Use one of {known}")
+        names = ", ".join(FORMATS)
+        raise source.error("the layout", f"the format {description.format!r} is not known", f"Use one of {names}")
     return FORMATS[description.format]

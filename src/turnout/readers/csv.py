@@ -24,31 +24,33 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import csv
 
-from turnout.readers.csv_header import MISSING, cells_named, head_of, seconds_per_number, time_column
-from turnout.readers.lazy import Column
-from turnout.readers.named_arrays import COUNT, SAMPLES, START, START_DATE, Facts
+from turnout.readers.csv_header import MISSING_VALUES, cell_errors, read_head, seconds_per_number, time_column
+from turnout.readers.lazy import LazyColumn
+from turnout.readers.named_arrays import RECORD_COUNT_NAMES, SAMPLE_COUNT_NAMES, START_DATE_NAMES, START_NAMES, Metadata
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord
-from turnout.readers.timing import PART, TEXT, moment
+from turnout.readers.timing import BLOCK_SIZE, TEXT_PRECISION, parse_time
 
 
 def read_raw(source) -> RawFile:
     """Records of a text file."""
-    wide = source.head[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
-    stay = source.stay and not wide
-    data = source.mapped if stay else _in_utf8(source) if wide else source.data
+    is_utf16 = source.head[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+    lazy = source.lazy and not is_utf16
+    data = source.mapped if lazy else _in_utf8(source) if is_utf16 else source.data
     if data[-1:] not in (b"\n", b"\r"):
-        found = "the last line has no line break: its last number may be cut"
+        problem = "the last line has no line break: its last number may be cut"
         line = data[:].count(b"\n") + 1
         raise source.error(
-            f"line {line}", found, f"{COPY_AGAIN}, or add the line break if it is whole", reason="truncated"
+            f"line {line}", problem, f"{COPY_AGAIN}, or add the line break if it is whole", reason="truncated"
         )
-    head, names, units, at, separator, unclear = head_of(data, source)
-    read = _staying if stay and "record" not in [name.strip().lower() for name in names] else _table
+    head, names, units, offset, separator, unclear = read_head(data, source)
+    read_columns = (
+        _lazy_columns if lazy and "record" not in [name.strip().lower() for name in names] else _columns_in_memory
+    )
     time = time_column(names, units)
-    columns = read(source, data, at, separator, names, time)
-    facts = Facts(head, source)
+    columns = read_columns(source, data, offset, separator, names, time)
+    facts = Metadata(head, source)
     records = tuple(_records(columns, names, units, time, facts, source, unclear))
-    return RawFile(records, facts.count(COUNT))
+    return RawFile(records, facts.count(RECORD_COUNT_NAMES))
 
 
 def _in_utf8(source):
@@ -57,77 +59,77 @@ def _in_utf8(source):
         return source.data.decode("utf-16").encode()
 
 
-def _table(source, data, at, separator, names, time):
+def _columns_in_memory(source, data, offset, separator, names, time):
     """All columns as arrays."""
-    options = _options(data, at, separator, len(names))
-    line = _line(data, at)
-    with source.parsed_by("pyarrow", f"the numbers after line {line}"), cells_named(source, line, names):
-        table = csv.read_csv(io.BytesIO(memoryview(data)[at:]), **options)
+    options = _options(data, offset, separator, len(names))
+    line = _line_number(data, offset)
+    with source.parsed_by("pyarrow", f"the numbers after line {line}"), cell_errors(source, line, names):
+        table = csv.read_csv(io.BytesIO(memoryview(data)[offset:]), **options)
     return [column.to_numpy(zero_copy_only=False) for column in table.columns]
 
 
-def _staying(source, data, at, separator, names, time):
+def _lazy_columns(source, data, offset, separator, names, time):
     """Columns that read their numbers when sliced; a time column is read at once."""
-    options = _options(data, at, separator, len(names))
-    rows = Rows(source.path, at, options)
-    line = _line(data, at)
-    with source.parsed_by("pyarrow", f"the numbers after line {line}"), cells_named(source, line, names):
-        read = rows.scan(time)
+    options = _options(data, offset, separator, len(names))
+    rows = RowReader(source.path, offset, options)
+    line = _line_number(data, offset)
+    with source.parsed_by("pyarrow", f"the numbers after line {line}"), cell_errors(source, line, names):
+        times = rows.scan(time)
     columns = [rows.column(i) for i in range(len(names))]
-    return columns if time is None else [*columns[:time], read, *columns[time + 1 :]]
+    return columns if time is None else [*columns[:time], times, *columns[time + 1 :]]
 
 
-def _line(data, at):
-    return data[:at].count(b"\n")
+def _line_number(data, offset):
+    return data[:offset].count(b"\n")
 
 
-class Rows:
+class RowReader:
     """Reads the rows of a text file in order; a request for earlier rows starts again at the beginning."""
 
-    def __init__(self, path, at, options):
-        self.path, self.at, self.options = path, at, options
-        self.n_row, self.begin, self.held, self.reader = 0, 0, [], None
+    def __init__(self, path, offset, options):
+        self.path, self.offset, self.options = path, offset, options
+        self.n_row, self.begin, self.batches, self.reader = 0, 0, [], None
 
     def scan(self, time):
         """Count the rows; return column number ``time``, (n_row,), or None if ``time`` is None."""
-        found = []
-        for batch in self._opened():
+        values = []
+        for batch in self._open():
             self.n_row += batch.num_rows
             if time is not None:
-                found.append(batch.column(time).to_numpy(zero_copy_only=False))
-        return None if time is None else np.concatenate(found)
+                values.append(batch.column(time).to_numpy(zero_copy_only=False))
+        return None if time is None else np.concatenate(values)
 
     def column(self, i):
         """Column number ``i``."""
-        return Column(lambda start, stop: self._stretch(i, start, stop), self.n_row, np.dtype(float))
+        return LazyColumn(lambda start, stop: self._read_rows(i, start, stop), self.n_row, np.dtype(float))
 
-    def _opened(self):
+    def _open(self):
         file = self.path.open("rb")
-        file.seek(self.at)
+        file.seek(self.offset)
         return csv.open_csv(file, **self.options)
 
-    def _stretch(self, i, start, stop):
+    def _read_rows(self, i, start, stop):
         if self.reader is None or start < self.begin:
-            self.reader, self.begin, self.held = self._opened(), 0, []
-        end = self.begin + sum(batch.num_rows for batch in self.held)
+            self.reader, self.begin, self.batches = self._open(), 0, []
+        end = self.begin + sum(batch.num_rows for batch in self.batches)
         while end < stop:
-            self.held.append(self.reader.read_next_batch())
-            end += self.held[-1].num_rows
-            while self.begin + self.held[0].num_rows <= start:
-                self.begin += self.held.pop(0).num_rows
-        table = pa.Table.from_batches(self.held).slice(start - self.begin, stop - start)
+            self.batches.append(self.reader.read_next_batch())
+            end += self.batches[-1].num_rows
+            while self.begin + self.batches[0].num_rows <= start:
+                self.begin += self.batches.pop(0).num_rows
+        table = pa.Table.from_batches(self.batches).slice(start - self.begin, stop - start)
         return table.column(i).to_numpy()
 
 
-def _options(data, at, separator, width):
+def _options(data, offset, separator, width):
     """Options of pyarrow for the numbers from byte ``offset`` on."""
-    dot = data.find(b".", at)
-    commas = separator != "," and data.find(b",", at, dot if dot >= 0 else len(data)) >= 0
-    point = "," if commas else "."
+    dot_offset = data.find(b".", offset)
+    has_decimal_comma = separator != "," and data.find(b",", offset, dot_offset if dot_offset >= 0 else len(data)) >= 0
+    decimal_mark = "," if has_decimal_comma else "."
     converting = csv.ConvertOptions(
         column_types={str(i): pa.float64() for i in range(width)},
-        decimal_point=point,
-        null_values=list(MISSING),
+        decimal_point=decimal_mark,
+        null_values=list(MISSING_VALUES),
         strings_can_be_null=True,
     )
     reading = csv.ReadOptions(use_threads=False, column_names=[str(i) for i in range(width)], block_size=1 << 24)
@@ -139,9 +141,9 @@ def _records(columns, names, units, time, facts, source, unclear):
     """The records: one of all rows, or one per number in the column ``record``."""
     lower = [name.strip().lower() for name in names]
     number = columns[lower.index("record")] if "record" in lower else None
-    kept = [i for i, name in enumerate(lower) if name != "record" and i != time]
-    if len(kept) > 1 and not names[kept[-1]] and _is_empty(columns[kept[-1]]):
-        kept.pop()
+    selected = [i for i, name in enumerate(lower) if name != "record" and i != time]
+    if len(selected) > 1 and not names[selected[-1]] and _is_empty(columns[selected[-1]]):
+        selected.pop()
     seconds = None if time is None else columns[time] * seconds_per_number(units[time], source)
     n_row = len(columns[0])
     edges = [0, n_row]
@@ -150,21 +152,24 @@ def _records(columns, names, units, time, facts, source, unclear):
             raise source.error("column 'record'", "it does not number every row", COPY_AGAIN)
         edges = [0, *(np.flatnonzero(np.diff(number)) + 1), n_row]
     n = len(edges) - 1
-    promised, rows = facts.count(("n_samples",)), facts.number(SAMPLES)
+    promised, rows = facts.count(("n_samples",)), facts.number(SAMPLE_COUNT_NAMES)
     if promised is None and rows is not None and rows > n_row:
         promised = int(rows)
     for k, (a, b) in enumerate(pairwise(edges)):
         if promised is not None and b - a != promised:
-            found = f"has {b - a} of the {promised} samples that its head promises"
-            yield source.error(f"record {k + 1} of {n}", found, COPY_AGAIN, reason="truncated")
+            problem = f"has {b - a} of the {promised} samples that its head promises"
+            yield source.error(f"record {k + 1} of {n}", problem, COPY_AGAIN, reason="truncated")
             continue
-        date, start = facts.one(START_DATE, k, n), facts.one((f"started_at_{k}", *START), k, n)
+        date, start = (
+            facts.record_value(START_DATE_NAMES, k, n),
+            facts.record_value((f"started_at_{k}", *START_NAMES), k, n),
+        )
         yield RawRecord(
-            names=tuple(names[i] for i in kept),
-            samples=[columns[i] if isinstance(columns[i], Column) else columns[i][a:b] for i in kept],
-            **facts.rated(TEXT),
-            units=tuple(units[i] for i in kept),
-            started_at=moment(date if start is None else start) or moment(f"{date} {start}"),
+            names=tuple(names[i] for i in selected),
+            samples=[columns[i] if isinstance(columns[i], LazyColumn) else columns[i][a:b] for i in selected],
+            **facts.rate_fields(TEXT_PRECISION),
+            units=tuple(units[i] for i in selected),
+            started_at=parse_time(date if start is None else start) or parse_time(f"{date} {start}"),
             conditions=facts.conditions(k, n),
             time=None if seconds is None else seconds[a:b],
             unclear=unclear,
@@ -172,4 +177,4 @@ def _records(columns, names, units, time, facts, source, unclear):
 
 
 def _is_empty(column):
-    return all(np.isnan(column[a : a + PART]).all() for a in range(0, len(column), PART))
+    return all(np.isnan(column[a : a + BLOCK_SIZE]).all() for a in range(0, len(column), BLOCK_SIZE))

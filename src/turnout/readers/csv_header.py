@@ -9,13 +9,21 @@ from contextlib import contextmanager
 
 import pyarrow as pa
 
-from turnout.readers.interpret import MEANINGLESS
-from turnout.readers.named_arrays import COUNT, RATE, SAMPLES, START, START_DATE, STEP, TIME
+from turnout.readers.interpret import MEANINGLESS_UNITS
+from turnout.readers.named_arrays import (
+    RATE_NAMES,
+    RECORD_COUNT_NAMES,
+    SAMPLE_COUNT_NAMES,
+    START_DATE_NAMES,
+    START_NAMES,
+    STEP_NAMES,
+    TIME_NAMES,
+)
 from turnout.readers.source import COPY_AGAIN
 from turnout.units import conversion
 
-WORDS = (*TIME, "zeit", "tid", "temps", "tempo", "tiempo", "tijd")
-SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "µs": 1e-6, "us": 1e-6}
+TIME_WORDS = (*TIME_NAMES, "zeit", "tid", "temps", "tempo", "tiempo", "tijd")
+SECONDS_PER_UNIT = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "µs": 1e-6, "us": 1e-6}
 
 
 def time_column(names, units):
@@ -30,20 +38,20 @@ def time_column(names, units):
     >>> time_column(["force", "rail"], ["N", ""])
     """
     for i, name in enumerate(names):
-        if name.strip().lower() in WORDS:
+        if name.strip().lower() in TIME_WORDS:
             return i
-    return next((i for i, unit in enumerate(units) if unit.strip() and _plain_time(unit) in SECONDS), None)
+    return next((i for i, unit in enumerate(units) if unit.strip() and _plain_unit(unit) in SECONDS_PER_UNIT), None)
 
 
 def seconds_per_number(unit, source):
     """Seconds per number in the time column; ReadError for an unknown unit of time."""
-    if _plain_time(unit) not in SECONDS:
-        remedy = f"Export the time in one of {', '.join(SECONDS)[2:]}"
+    if _plain_unit(unit) not in SECONDS_PER_UNIT:
+        remedy = f"Export the time in one of {', '.join(SECONDS_PER_UNIT)[2:]}"
         raise source.error("the time column", f"its unit {unit!r} is not known", remedy, reason="unit_unknown")
-    return SECONDS[_plain_time(unit)]
+    return SECONDS_PER_UNIT[_plain_unit(unit)]
 
 
-def _plain_time(unit):
+def _plain_unit(unit):
     return unit.strip().replace("\u03bc", "µ")
 
 
@@ -72,14 +80,14 @@ def names_among(lines):
 
 def _are_units(cells, share):
     """Whether at least this share of the filled cells are units."""
-    said = [cell for cell in cells if cell]
-    return sum(map(_is_unit, said)) >= share * len(said)
+    filled_cells = [cell for cell in cells if cell]
+    return sum(map(_is_unit, filled_cells)) >= share * len(filled_cells)
 
 
 def _is_unit(cell):
     """Whether a cell is a known unit, a meaningless one, or anything in brackets; "12 m" is a length."""
     bare = cell.strip("[]() ")
-    if cell[0] in "[(" or bare.casefold() in MEANINGLESS or bare.replace("\u03bc", "µ") in SECONDS:
+    if cell[0] in "[(" or bare.casefold() in MEANINGLESS_UNITS or bare.replace("\u03bc", "µ") in SECONDS_PER_UNIT:
         return True
     try:
         return not bare[0].isdigit() and bool(conversion(bare))
@@ -92,62 +100,64 @@ def _are_names(cells):
     if any(cell[:1].isdigit() for cell in cells):
         return False
     in_brackets = [match[2] for cell in cells if (match := NAME_WITH_UNIT.match(cell)) and match[1]]
-    return any(cell.lower() in WORDS for cell in cells) or any(unit and _is_unit(unit) for unit in in_brackets)
+    return any(cell.lower() in TIME_WORDS for cell in cells) or any(unit and _is_unit(unit) for unit in in_brackets)
 
 
 # What loggers and spreadsheets write for a missing value; these become nan.
-MISSING = (
+MISSING_VALUES = (
     "", "NaN", "nan", "NA", "-", "#NV", "#N/A", "#NA", "#VALUE!", "#WERT!", "#DIV/0!", "#NUM!", "#ZAHL!", "#REF!",
     "#BEZUG!",
 )  # fmt: skip
-MARK = r"[ .,'’\u00a0\u202f]"  # between groups of three digits
-THOUSANDS = re.compile(rf"[+-]?\d{{1,3}}(?:{MARK}\d{{3}})+(?:[.,]\d+)?")
-REFUSED = re.compile(
+THOUSANDS_MARK = r"[ .,'’\u00a0\u202f]"  # between groups of three digits
+THOUSANDS = re.compile(rf"[+-]?\d{{1,3}}(?:{THOUSANDS_MARK}\d{{3}})+(?:[.,]\d+)?")
+INVALID_VALUE = re.compile(
     r"CSV column #(\d+): (?:Row #(\d+): )?CSV conversion error to \w+: invalid value '(.*)'", re.DOTALL
 )
 
 
-def stands_for_a_number(cell):
+def is_unreadable_number(cell):
     """Whether a cell is a number with thousands marks or the mark of a missing one; an empty cell is neither.
 
-    >>> stands_for_a_number("-1.234,5"), stands_for_a_number("#NV"), stands_for_a_number("13.05.2024")
+    >>> is_unreadable_number("-1.234,5"), is_unreadable_number("#NV"), is_unreadable_number("13.05.2024")
     (True, True, False)
     """
-    return bool(THOUSANDS.fullmatch(cell)) or (cell.startswith("#") and cell in MISSING)
+    return bool(THOUSANDS.fullmatch(cell)) or (cell.startswith("#") and cell in MISSING_VALUES)
 
 
 @contextmanager
-def cells_named(source, line, names):
+def cell_errors(source, line, names):
     """Turn pyarrow's error about a cell in the rows below ``line`` into a ReadError with its line and column."""
     try:
         yield
     except pa.ArrowInvalid as error:
-        if not (match := REFUSED.search(str(error))):
+        if not (match := INVALID_VALUE.search(str(error))):
             raise
         column, row, cell = int(match[1]), match[2], match[3]
         where = f"line {line + int(row)}" if row else f"the numbers after line {line}"
         where += f", column {names[column] or str(column + 1)!r}"
         if THOUSANDS.fullmatch(cell):
-            found = f"{cell!r} has marks for thousands, or another decimal mark than other numbers"
+            problem = f"{cell!r} has marks for thousands, or another decimal mark than other numbers"
             remedy = "Export all numbers with one decimal mark and without marks for thousands"
         else:
-            found = f"{cell[:60]!r} is no number"
+            problem = f"{cell[:60]!r} is no number"
             remedy = f"{COPY_AGAIN}; if it stands in the logger's own file too, leave that record out"
-        raise source.error(where, found, remedy) from error
+        raise source.error(where, problem, remedy) from error
 
 
-NOTE = re.compile(r"^#?\s*([^\W\d][\w .'’-]*?)\s*([\[(][^\])]*[\])])?\s*[:=,;\t]\s*(.*)$")
-SCALES = {"kHz": 1e3, "khz": 1e3, "MHz": 1e6, "ms": 1e-3, "µs": 1e-6, "\u03bcs": 1e-6, "us": 1e-6}
+HEAD_LINE = re.compile(r"^#?\s*([^\W\d][\w .'’-]*?)\s*([\[(][^\])]*[\])])?\s*[:=,;\t]\s*(.*)$")
+UNIT_SCALES = {"kHz": 1e3, "khz": 1e3, "MHz": 1e6, "ms": 1e-3, "µs": 1e-6, "\u03bcs": 1e-6, "us": 1e-6}
 TEMPERATURES = {"rail_temperature", "air_temperature"}
-NOTES = {*RATE, *STEP, *START, *START_DATE, *COUNT, "n_samples"}
-NUMBERS = TEMPERATURES | {*SAMPLES}  # a head line only if a number follows, else the name of a column
-GROUPED = re.compile(rf"\d{{1,3}}(?:{MARK}\d{{3}})+(?!\d)")
+HEAD_NAMES = {*RATE_NAMES, *STEP_NAMES, *START_NAMES, *START_DATE_NAMES, *RECORD_COUNT_NAMES, "n_samples"}
+NUMERIC_HEAD_NAMES = TEMPERATURES | {
+    *SAMPLE_COUNT_NAMES
+}  # a head line only if a number follows, else the name of a column
+GROUPED_NUMBER = re.compile(rf"\d{{1,3}}(?:{THOUSANDS_MARK}\d{{3}})+(?!\d)")
 # A line with one frequency and nothing else: "Vzorkovani: 10000 Hz", "taktning [kHz];10".
-FREQUENCY = re.compile(r"^#?[^\d\[(]+[\[(]?([kM]?Hz)?[\])]?[\s:=,;]*([\d.,]+)\s*([kM]?Hz)?\W*$", re.IGNORECASE)
-NO_RATE = re.compile(r"filt|pass|paß|cut|grenz|band|coup|cort|tagli|græns|eigen|reson|netz|mains", re.IGNORECASE)
+FREQUENCY_LINE = re.compile(r"^#?[^\d\[(]+[\[(]?([kM]?Hz)?[\])]?[\s:=,;]*([\d.,]+)\s*([kM]?Hz)?\W*$", re.IGNORECASE)
+NO_RATE_WORDS = re.compile(r"filt|pass|paß|cut|grenz|band|coup|cort|tagli|græns|eigen|reson|netz|mains", re.IGNORECASE)
 
 
-def _line_of(data):
+def _decode_line(data):
     """One line as text: UTF-8, else Windows-1252 of older western loggers."""
     try:
         return data.decode("utf-8-sig").strip("\r\n")
@@ -155,40 +165,42 @@ def _line_of(data):
         return data.decode("cp1252", "replace").strip("\r\n")
 
 
-def head_of(data, source):
+def read_head(data, source):
     """(notes, names, units, offset of the first number, separator, lines with a frequency in unknown words)."""
     notes: dict[str, float | str] = {}
-    before: list[str] = []
+    text_lines: list[str] = []
     unclear: list[tuple[str, float]] = []
     position = 0
     while position < len(data):
         end = data.find(b"\n", position)
         end = len(data) if end < 0 else end
-        line = _line_of(data[position:end])
+        line = _decode_line(data[position:end])
         # a comma is the decimal mark where another separator stands
         separator = next((s for s in ("\t", ";") if s in line), ",")
         cells = _cells(line, separator)
-        if any(cells) and all(_is_number(cell) or stands_for_a_number(cell) or cell == "" for cell in cells):
-            names, units = _names([_cells(text, separator) for text in before], cells)
+        if any(cells) and all(_is_number(cell) or is_unreadable_number(cell) or cell == "" for cell in cells):
+            names, units = _names([_cells(text, separator) for text in text_lines], cells)
             return notes, names, units, position, separator, tuple(unclear)
-        match = NOTE.match(line.strip())
+        match = HEAD_LINE.match(line.strip())
         name = match[1].strip() if match else ""
-        plain = _plain(name)
-        if plain not in NOTES and (frequency := _frequency(line)) is not None:
+        plain_name = _plain(name)
+        if plain_name not in HEAD_NAMES and (frequency := _frequency(line)) is not None:
             unclear.append((line.strip(), frequency))
         value = match[3].strip(separator + " ") if match else ""
-        known = plain in NOTES or (plain in NUMBERS and _is_number(value.split()[0] if value else ""))
-        if plain in SAMPLES and (grouped := GROUPED.match(value)):
+        is_note = plain_name in HEAD_NAMES or (
+            plain_name in NUMERIC_HEAD_NAMES and _is_number(value.split()[0] if value else "")
+        )
+        if plain_name in SAMPLE_COUNT_NAMES and (grouped := GROUPED_NUMBER.match(value)):
             value = re.sub(r"\D", "", grouped[0])
-        if match and (line.startswith("#") or known):
-            notes[plain if known else name] = _value(f"{value} {match[2]}" if match[2] else value)
+        if match and (line.startswith("#") or is_note):
+            notes[plain_name if is_note else name] = _value(f"{value} {match[2]}" if match[2] else value)
         elif line.strip():
-            before.append(line)
+            text_lines.append(line)
         position = end + 1
-    if len(before) < 2:
+    if len(text_lines) < 2:
         raise source.error("line 1", "no line of numbers follows", COPY_AGAIN, reason="empty")
-    said = f"no line of numbers; the last line reads {before[-1][:60]!r}"
-    raise source.error("the file", said, "Export numbers between semicolons, tabs or commas, the time in seconds")
+    problem = f"no line of numbers; the last line reads {text_lines[-1][:60]!r}"
+    raise source.error("the file", problem, "Export numbers between semicolons, tabs or commas, the time in seconds")
 
 
 def _plain(name):
@@ -207,8 +219,8 @@ def _frequency(line):
     >>> _frequency("# Vzorkovací kmitočet: 10 kHz"), _frequency("Tiefpass: 4000 Hz"), _frequency("0.5-10000 Hz")
     (10000.0, None, None)
     """
-    match = FREQUENCY.match(line.strip())
-    if not match or NO_RATE.search(line) or not (match[1] or match[3]):
+    match = FREQUENCY_LINE.match(line.strip())
+    if not match or NO_RATE_WORDS.search(line) or not (match[1] or match[3]):
         return None
     value = _value(f"{match[2]} {match[3] or match[1]}")
     return value if isinstance(value, float) else None
@@ -228,11 +240,11 @@ def _is_number(cell):
 
 def _value(text):
     """A number in Hz or s if the text begins with one ("51200 Hz", "12,8 kHz"), else the text."""
-    first, *rest = text.split() or [""]
+    first, *words = text.split() or [""]
     dated = "-" in first[1:].lower().replace("e-", "")
     if not first or not _is_number(first) or dated:
         return text
-    return float(first.replace(",", ".")) * SCALES.get(rest[0].strip("[]()") if rest else "", 1.0)
+    return float(first.replace(",", ".")) * UNIT_SCALES.get(words[0].strip("[]()") if words else "", 1.0)
 
 
 def _names(lines, cells):
@@ -245,9 +257,9 @@ def _names(lines, cells):
     if not lines:
         names = [str(i) for i in range(count)]
         return [*names[:-1], ""] if open_end and count > 1 else names, [""] * count
-    at, below = names_among(lines)
-    names = lines[at]
-    units = [""] * count if below is None else [cell.strip("[]() ") for cell in lines[below]]
+    name_line, unit_line = names_among(lines)
+    names = lines[name_line]
+    units = [""] * count if unit_line is None else [cell.strip("[]() ") for cell in lines[unit_line]]
     for i, name in enumerate(names):
         if match := NAME_WITH_UNIT.match(name):
             names[i], units[i] = match[1], match[2]

@@ -48,7 +48,7 @@ FORMATS = {
 }
 
 
-def detect(source: Source) -> Format:
+def detect_format(source: Source) -> Format:
     """The format of a file, by its first bytes or else by its extension; ReadError if neither is known."""
     head = source.head
     extension = source.path.suffix.lower()
@@ -58,21 +58,27 @@ def detect(source: Source) -> Format:
     for entry in FORMATS.values():
         if extension in entry.extensions:
             return entry
-    known = ", ".join(FORMATS)
+    names = ", ".join(FORMATS)
     raise source.error(
         "byte 0",
         f"neither its first bytes ({head[:8]!r}) nor its extension {extension!r} tells a known format",
-        f"Set the format in the layout to one of {known}",
+        f"Set the format in the layout to one of {names}",
     )
 
 
 OLD_EXCEL = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
-FIRST_PARTS = (b"[Content_Types].xml", b"_rels/", b"docProps/", b"xl/", b"mimetypeapplication/vnd.oasis.opendocument")
+FIRST_ZIP_ENTRIES = (
+    b"[Content_Types].xml",
+    b"_rels/",
+    b"docProps/",
+    b"xl/",
+    b"mimetypeapplication/vnd.oasis.opendocument",
+)
 
 
-def refuse_spreadsheet(source):
+def reject_spreadsheet(source):
     """ReadError if the first bytes are those of Excel or OpenDocument, whatever the name of the file."""
-    zipped = source.head[:4] == b"PK\x03\x04" and source.head[30:].startswith(FIRST_PARTS)
+    zipped = source.head[:4] == b"PK\x03\x04" and source.head[30:].startswith(FIRST_ZIP_ENTRIES)
     if zipped or source.head.startswith(OLD_EXCEL):
         remedy = "Save it from the spreadsheet as CSV, text with separated columns"
         raise source.error("byte 0", "it is a spreadsheet's own file", remedy)

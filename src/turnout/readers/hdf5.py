@@ -9,17 +9,26 @@ import h5py
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.lazy import stays, stored
-from turnout.readers.named_arrays import RATE, STEP, TIME, Alphabetical, Facts, matrices, raw_file, vectors
+from turnout.readers.lazy import is_large, lazy_array
+from turnout.readers.named_arrays import (
+    RATE_NAMES,
+    STEP_NAMES,
+    TIME_NAMES,
+    Alphabetical,
+    Metadata,
+    matrices,
+    raw_file,
+    vectors,
+)
 from turnout.readers.source import RawFile
-from turnout.readers.timing import check_together
+from turnout.readers.timing import check_simultaneous
 
-UNIT = ("unit", "units", "Unit", "Units")
+UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units")
 
 
 def read_raw(source) -> RawFile:
     """Records of an HDF5 file."""
-    if source.stay:
+    if source.lazy:
         with source.parsed_by("HDF5"):
             # not closed here: a dataset keeps its file open as long as it exists
             variables = _variables(h5py.File(source.path, "r"), source)
@@ -31,10 +40,12 @@ def read_raw(source) -> RawFile:
 
 def _variables(group, source):
     """Members and attributes of a group in one dictionary; a ReadError for a dataset that cannot be read."""
-    made = group[group.name].id.get_create_plist()  # the id of a File does not have it
-    tracked = made.get_link_creation_order() & h5py.h5p.CRT_ORDER_TRACKED
-    kind = dict if tracked else Alphabetical  # members are in the order of creation only if it was tracked
-    variables = kind({name: _attribute(value) for name, value in group.attrs.items()})
+    creation = group[group.name].id.get_create_plist()  # the id of a File does not have it
+    is_order_tracked = creation.get_link_creation_order() & h5py.h5p.CRT_ORDER_TRACKED
+    mapping_type = (
+        dict if is_order_tracked else Alphabetical
+    )  # members are in the order of creation only if it was tracked
+    variables = mapping_type({name: _attribute(value) for name, value in group.attrs.items()})
     units: dict[str, str] = {}
     clocks: dict[str, dict] = {}
     for name, member in group.items():
@@ -43,33 +54,33 @@ def _variables(group, source):
             continue
         try:
             with source.parsed_by("HDF5", f"dataset {member.name!r}"):
-                large = source.stay and stays(member) and name.lower() not in TIME
-                variables[name] = stored(member) if large else _values(member)
+                large = source.lazy and is_large(member) and name.lower() not in TIME_NAMES
+                variables[name] = lazy_array(member) if large else _values(member)
         except ReadError as error:
             variables[name] = error
             continue
         for key, value in member.attrs.items():
-            if key in UNIT and isinstance(value := _attribute(value), str):
+            if key in UNIT_ATTRIBUTES and isinstance(value := _attribute(value), str):
                 units[name] = value
-            elif key.lower() in (*RATE, *STEP):
+            elif key.lower() in (*RATE_NAMES, *STEP_NAMES):
                 clocks.setdefault(name, {})[key] = _attribute(value)
             elif key.lower() in ("channels", "channel_names", "units"):
                 variables.setdefault(key, _attribute(value))
-    _settle(variables, clocks, source)
+    _apply_clocks(variables, clocks, source)
     if units and not any(key.lower() == "units" for key in variables):
         variables["units"] = units
     return variables
 
 
-def _settle(variables, clocks, source):
+def _apply_clocks(variables, clocks, source):
     """Use the rate or step that datasets state individually as the common one; a different one is an error."""
     for name in (*vectors(variables), *matrices(variables)):
         try:
-            common, own = (Facts(of, source).rate() for of in (variables, clocks.get(name, {})))
-            if common is None:
+            common_rate, dataset_rate = (Metadata(of, source).rate() for of in (variables, clocks.get(name, {})))
+            if common_rate is None:
                 variables |= clocks.get(name, {})
-            elif common and own:
-                check_together((), (1.0 / common, 1.0 / own), (0.0, 0.0), f"dataset {name!r}", source)
+            elif common_rate and dataset_rate:
+                check_simultaneous((), (1.0 / common_rate, 1.0 / dataset_rate), (0.0, 0.0), f"dataset {name!r}", source)
         except ReadError as error:
             variables[name] = error
 

@@ -10,18 +10,18 @@ from types import MappingProxyType
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.lazy import Soundness, Stretches, fault
+from turnout.readers.lazy import BlockReader, ChannelStatistics, channel_error
 from turnout.readers.source import COPY_AGAIN
-from turnout.readers.timing import check_order, check_time, settled_rate, starts_of
+from turnout.readers.timing import check_order, check_time, resolve_rate, start_times
 from turnout.records import Channel, LongRecording, RawChannel, RawDescription, Recording
 from turnout.units import IGNORED, conversion, to_si
 
 # Labels that loggers write for a unit that was not configured; in lower case.
-MEANINGLESS = ("", "-", "eu", "none", "n/a", "a.u.", "arb", "?", "unknown", "undefined", "unitless")
+MEANINGLESS_UNITS = ("", "-", "eu", "none", "n/a", "a.u.", "arb", "?", "unknown", "undefined", "unitless")
 
 
 @dataclass(frozen=True)
-class Mapping:
+class ChannelMapping:
     """Row ``index`` of the file becomes ``channel``: SI = ``scale`` * number + ``offset``, sign included."""
 
     index: int
@@ -30,13 +30,13 @@ class Mapping:
     offset: float
 
 
-def mappings(record, channels, where, source):
+def channel_mappings(record, channels, where, source):
     """One ChannelMapping per channel that is read, in the layout's order; ReadError if file and layout disagree.
 
     ``RawChannel.limit`` and ``resolution`` are in SI already. Channels with the quantity "ignored" are not read and
     may be absent.
     """
-    channels = [c for c in channels if c.quantity != IGNORED or _is_there(record, c.source, where, source)]
+    channels = [c for c in channels if c.quantity != IGNORED or _has_channel(record, c.source, where, source)]
     indices = [index_of(record, channel.source, where, source) for channel in channels]
     if len(set(indices)) < len(indices):
         twice = next(i for i in indices if indices.count(i) > 1)
@@ -50,7 +50,7 @@ def mappings(record, channels, where, source):
             reason="channel_unknown",
         )
     return tuple(
-        _mapping(i, record.units[i], channel, where, source)
+        _channel_mapping(i, record.units[i], channel, where, source)
         for i, channel in zip(indices, channels)
         if channel.quantity != IGNORED
     )
@@ -61,26 +61,32 @@ def index_of(record, wanted, where, source):
     if isinstance(wanted, int):
         if 0 <= wanted < len(record.names):
             return wanted
-        found = f"there is no channel {wanted}; the file has {len(record.names)}, counted from 0"
-        raise source.error(where, found, "Correct the channel map or copy the file again", reason="channel_missing")
+        problem = f"there is no channel {wanted}; the file has {len(record.names)}, counted from 0"
+        raise source.error(where, problem, "Correct the channel map or copy the file again", reason="channel_missing")
     for names in (record.names, [n.strip().casefold() for n in record.names]):
         key = wanted if names is record.names else wanted.strip().casefold()
         if names.count(key) == 1:
             return names.index(key)
-    hits = [i for i, others in enumerate(record.aliases) if wanted in others]
-    if len(hits) == 1:
-        return hits[0]
-    there = ", ".join(repr(name) for name in record.names)
-    near = get_close_matches(wanted, record.names, n=1)
-    hint = f"Did you mean {near[0]!r}? Correct the channel map" if near else "Correct the channel map or the wiring"
-    count = record.names.count(wanted) + len(hits)
-    found = (
-        f"{count} channels are called {wanted!r}" if count > 1 else f"there is no channel {wanted!r}; there are {there}"
+    matches = [i for i, aliases in enumerate(record.aliases) if wanted in aliases]
+    if len(matches) == 1:
+        return matches[0]
+    available = ", ".join(repr(name) for name in record.names)
+    similar_names = get_close_matches(wanted, record.names, n=1)
+    hint = (
+        f"Did you mean {similar_names[0]!r}? Correct the channel map"
+        if similar_names
+        else "Correct the channel map or the wiring"
     )
-    raise source.error(where, found, hint, reason="channel_missing")
+    count = record.names.count(wanted) + len(matches)
+    problem = (
+        f"{count} channels are called {wanted!r}"
+        if count > 1
+        else f"there is no channel {wanted!r}; there are {available}"
+    )
+    raise source.error(where, problem, hint, reason="channel_missing")
 
 
-def _is_there(record, wanted, where, source):
+def _has_channel(record, wanted, where, source):
     try:
         index_of(record, wanted, where, source)
     except ReadError:
@@ -88,9 +94,9 @@ def _is_there(record, wanted, where, source):
     return True
 
 
-def _mapping(index, file_unit, raw: RawChannel, where, source):
+def _channel_mapping(index, file_unit, raw: RawChannel, where, source):
     try:
-        convert = to_si(raw.quantity, settled_unit(file_unit, raw.unit), raw.sensitivity, raw.sensitivity_unit)
+        conversion_to_si = to_si(raw.quantity, resolve_unit(file_unit, raw.unit), raw.sensitivity, raw.sensitivity_unit)
     except ValueError as error:
         remedy = "Correct unit and sensitivity of this channel in the layout"
         place = f"{where}, channel {raw.name!r}"
@@ -105,10 +111,10 @@ def _mapping(index, file_unit, raw: RawChannel, where, source):
         limit=raw.limit,
         resolution=raw.resolution,
     )
-    return Mapping(index, channel, sign * convert.scale, sign * convert.offset)
+    return ChannelMapping(index, channel, sign * conversion_to_si.scale, sign * conversion_to_si.offset)
 
 
-def settled_unit(file_unit, layout_unit):
+def resolve_unit(file_unit, layout_unit):
     """Unit of the raw numbers. File and layout must agree if both state one; "V!" in a layout overrules the file.
 
     If the file states counts, the layout gives the value of one count: a voltage, or a unit with a factor. The layout
@@ -116,7 +122,7 @@ def settled_unit(file_unit, layout_unit):
 
     Examples
     --------
-    >>> settled_unit("Newtons", None), settled_unit("EU", "mV"), settled_unit("g", "V!"), settled_unit("count", "0.5 N")
+    >>> resolve_unit("Newtons", None), resolve_unit("EU", "mV"), resolve_unit("g", "V!"), resolve_unit("count", "0.5 N")
     ('Newtons', 'mV', 'V', '0.5 N')
     """
     if layout_unit is None:
@@ -126,32 +132,32 @@ def settled_unit(file_unit, layout_unit):
     if layout_unit.endswith("!"):
         return layout_unit[:-1]
     stated = conversion(layout_unit)
-    if _says_nothing(file_unit.strip().strip("[]").strip()):
+    if _is_meaningless(file_unit.strip().strip("[]").strip()):
         return layout_unit
     try:
         written = conversion(file_unit)
     except ValueError:
-        raise ValueError(_both_say(f"{file_unit!r}, which is not known", layout_unit)) from None
+        raise ValueError(_conflict_text(f"{file_unit!r}, which is not known", layout_unit)) from None
     of_a_count = stated.dimension == "voltage" or layout_unit.lstrip(" [+-.")[:1].isdigit()
     same = stated.dimension == written.dimension and abs(stated.scale - written.scale) <= 1e-9 * abs(stated.scale)
     if not same and not (written.dimension == "count" and of_a_count):
-        raise ValueError(_both_say(repr(file_unit), layout_unit))
+        raise ValueError(_conflict_text(repr(file_unit), layout_unit))
     return layout_unit
 
 
-def _says_nothing(unit):
+def _is_meaningless(unit):
     """Whether a label is no unit: a placeholder, or a number that some loggers write there."""
-    return unit.casefold() in MEANINGLESS or unit.replace(".", "", 1).isdigit()
+    return unit.casefold() in MEANINGLESS_UNITS or unit.replace(".", "", 1).isdigit()
 
 
-def _both_say(said, layout_unit):
-    return f"the file says {said}, the layout {layout_unit!r} ({layout_unit + '!'!r} would overrule the file)"
+def _conflict_text(statement, layout_unit):
+    return f"the file says {statement}, the layout {layout_unit!r} ({layout_unit + '!'!r} would overrule the file)"
 
 
-TOO_SHORT = 2  # fewest samples of a record: one sample has neither rate nor spread
+MIN_SAMPLES = 2  # fewest samples of a record: one sample has neither rate nor spread
 
 
-def describe(raw, description: RawDescription, source, longest=None):
+def convert_records(raw, description: RawDescription, source, max_duration=None):
     """(recordings, errors) of a raw file. A damaged record does not affect the other records.
 
     In a passage a dead or non-finite channel is left out of the recording and adds an error. A hammer test needs all
@@ -161,18 +167,18 @@ def describe(raw, description: RawDescription, source, longest=None):
         raise source.error("the file", "it holds no record", COPY_AGAIN, reason="empty")
     recordings, errors = [], []
     stamps = [(k, record.started_at) for k, record in enumerate(raw.records) if not isinstance(record, ReadError)]
-    starts = starts_of(stamps, description.time_zone)
-    backwards = check_order(starts, source)
+    starts = start_times(stamps, description.time_zone)
+    order_errors = check_order(starts, source)
     for k, record in enumerate(raw.records):
         try:
             if isinstance(record, ReadError):
                 raise record
-            if k in backwards:
-                raise backwards[k]
-            limit = longest if source.stay and description.kind == "passage" else None
-            recording, lost = _recording(record, k, len(raw.records), description, source, limit)
+            if k in order_errors:
+                raise order_errors[k]
+            limit = max_duration if source.lazy and description.kind == "passage" else None
+            recording, channel_errors = _recording(record, k, len(raw.records), description, source, limit)
             recordings.append(replace(recording, started_at=dict(starts)[k]))
-            errors.extend(lost)
+            errors.extend(channel_errors)
         except ReadError as error:
             errors.append(error)
     errors.extend(_count_errors(raw, description, source))
@@ -181,55 +187,63 @@ def describe(raw, description: RawDescription, source, longest=None):
 
 def _count_errors(raw, description, source):
     """Errors where the number of records differs from that stated by the layout or by the file itself."""
-    there = len(raw.records)
-    of_layout = _or_layout("records", description.n_records)
-    promises = (("the layout", description.n_records, of_layout), ("its own header", raw.expected, COPY_AGAIN))
-    for who, promised, remedy in promises:
-        if promised is not None and there < promised:
-            found = f"it holds {there} of the {promised} records that {who} promises"
-            yield source.error(f"record {there + 1} of {promised}", found, remedy, reason="truncated")
+    n_present = len(raw.records)
+    layout_remedy = _copy_or_correct("records", description.n_records)
+    promises = (("the layout", description.n_records, layout_remedy), ("its own header", raw.expected, COPY_AGAIN))
+    for promiser, promised, remedy in promises:
+        if promised is not None and n_present < promised:
+            problem = f"it holds {n_present} of the {promised} records that {promiser} promises"
+            yield source.error(f"record {n_present + 1} of {promised}", problem, remedy, reason="truncated")
             return
-    if description.n_records is not None and there > description.n_records:
-        found = f"it holds {there} records, {there - description.n_records} more than the layout promises"
+    if description.n_records is not None and n_present > description.n_records:
+        problem = f"it holds {n_present} records, {n_present - description.n_records} more than the layout promises"
         remedy = "Correct records in the layout, or find out whether two tests share one file"
-        yield source.error(f"record {description.n_records + 1}", found, remedy, reason="wrong_length")
+        yield source.error(f"record {description.n_records + 1}", problem, remedy, reason="wrong_length")
 
 
-def _or_layout(key, promised):
+def _copy_or_correct(key, promised):
     """Remedy if a file holds less than the layout's ``key`` states: either may be wrong."""
     return f"{COPY_AGAIN}; if it is whole, correct '{key}: {promised}' in the layout (null: any number)"
 
 
-def _recording(record, k, n_record, description, source, longest):
+def _recording(record, k, n_record, description, source, max_duration):
     """(recording, errors of channels left out) of raw record ``k``; ReadError if the record cannot be used."""
     where = f"record {k + 1} of {n_record}"
     n_sample = _sample_count(record, where, description.n_samples, source)
     if record.time is not None:
         check_time(record.time, where, source)
-    rate = settled_rate(record, description.rate, where, source)
-    mapped = mappings(record, description.channels, where, source)
-    if not mapped:
+    rate = resolve_rate(record, description.rate, where, source)
+    channel_maps = channel_mappings(record, description.channels, where, source)
+    if not channel_maps:
         raise source.error(where, "the layout wants none of its channels", "Name channels in the layout")
-    stretches = Stretches(record, mapped, where, source, source.state())
-    stays = longest is not None and n_sample / rate > longest
-    samples = np.empty((0, 0)) if stays else stretches(0, n_sample)
-    judged = Soundness.over(stretches, n_sample).by_channel() if stays else [_judged(row) for row in samples]
-    faults = {i: e for i, j in enumerate(judged) if (e := fault(n_sample, j, mapped[i].channel, where, source))}
-    if faults and (description.kind != "passage" or len(faults) == len(mapped)):
+    block_reader = BlockReader(record, channel_maps, where, source, source.state())
+    is_long = max_duration is not None and n_sample / rate > max_duration
+    samples = np.empty((0, 0)) if is_long else block_reader(0, n_sample)
+    statistics = (
+        ChannelStatistics.from_record(block_reader, n_sample).by_channel()
+        if is_long
+        else [_row_statistics(row) for row in samples]
+    )
+    faults = {
+        i: e
+        for i, channel_statistics in enumerate(statistics)
+        if (e := channel_error(n_sample, channel_statistics, channel_maps[i].channel, where, source))
+    }
+    if faults and (description.kind != "passage" or len(faults) == len(channel_maps)):
         raise next(iter(faults.values()))
-    kept = [i for i in range(len(mapped)) if i not in faults]
-    known = {
+    usable = [i for i in range(len(channel_maps)) if i not in faults]
+    fields = {
         "rate": rate,
-        "channels": tuple(mapped[i].channel for i in kept),
+        "channels": tuple(channel_maps[i].channel for i in usable),
         "kind": description.kind,
         "source": source.name,
         "record": k,
         "conditions": MappingProxyType(dict(record.conditions)),
     }
-    lost = list(faults.values())
-    if stays:
-        return LongRecording(stretches.of(kept), n_sample, **known), lost
-    return Recording(samples=samples if not faults else samples[kept], **known), lost
+    channel_errors = list(faults.values())
+    if is_long:
+        return LongRecording(block_reader.subset(usable), n_sample, **fields), channel_errors
+    return Recording(samples=samples if not faults else samples[usable], **fields), channel_errors
 
 
 def _sample_count(record, where, promised, source):
@@ -238,23 +252,23 @@ def _sample_count(record, where, promised, source):
     longest = max(lengths.values(), default=0)
     if shortest != longest:
         short = next(name for name, n in lengths.items() if n == shortest)
-        found = f"channel {short!r} ends after {shortest} samples, others after {longest}"
-        raise source.error(where, found, COPY_AGAIN, reason="truncated")
+        problem = f"channel {short!r} ends after {shortest} samples, others after {longest}"
+        raise source.error(where, problem, COPY_AGAIN, reason="truncated")
     if promised is not None and shortest < promised:
-        found = f"ends after {shortest} of the {promised} samples that the layout promises"
-        raise source.error(where, found, _or_layout("samples", promised), reason="truncated")
+        problem = f"ends after {shortest} of the {promised} samples that the layout promises"
+        raise source.error(where, problem, _copy_or_correct("samples", promised), reason="truncated")
     if promised is not None and shortest > promised:
-        found = f"it has {shortest} samples instead of {promised}"
+        problem = f"it has {shortest} samples instead of {promised}"
         remedy = "Correct samples in the layout, or find out why the logger was set differently"
-        raise source.error(where, found, remedy, reason="wrong_length")
-    if shortest < TOO_SHORT:
+        raise source.error(where, problem, remedy, reason="wrong_length")
+    if shortest < MIN_SAMPLES:
         raise source.error(
             where, f"it has {shortest} samples", COPY_AGAIN, reason="empty" if not shortest else "truncated"
         )
     return shortest
 
 
-def _judged(row):
+def _row_statistics(row):
     """(number of non-finite samples, index of the first, first value, whether all are equal) of a channel (n,)."""
     with np.errstate(over="ignore", invalid="ignore"):
         suspect = not np.isfinite(row.sum())

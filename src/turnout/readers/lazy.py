@@ -7,15 +7,15 @@ import numpy as np
 from turnout.errors import ReadError
 from turnout.readers.source import RawRecord, Source
 
-MANY = 2**16  # numbers: smaller datasets are read at once
+MIN_LAZY_SIZE = 2**16  # numbers: smaller datasets are read at once
 
 
-def stays(dataset) -> bool:
+def is_large(dataset) -> bool:
     """Whether a dataset may be the samples of a long record: many numbers in one or two dimensions."""
-    return dataset.dtype.kind in "fiu" and dataset.ndim in (1, 2) and dataset.size >= MANY
+    return dataset.dtype.kind in "fiu" and dataset.ndim in (1, 2) and dataset.size >= MIN_LAZY_SIZE
 
 
-class Stored:
+class LazyMatrix:
     """A matrix in a file with the ``shape``, ``ndim``, ``dtype``, ``T`` and rows of an array; rows are ``LazyColumn``.
 
     ``numbers`` has ``shape`` and ``dtype`` and is sliced like a two-dimensional array. The last block is cached, so
@@ -24,40 +24,40 @@ class Stored:
 
     ndim = 2
 
-    def __init__(self, numbers, turned: bool = False):
-        self.numbers, self.turned = numbers, turned
+    def __init__(self, numbers, transposed: bool = False):
+        self.numbers, self.transposed = numbers, transposed
         self.dtype = np.dtype(numbers.dtype)
-        self.shape = tuple(numbers.shape)[::-1] if turned else tuple(numbers.shape)
+        self.shape = tuple(numbers.shape)[::-1] if transposed else tuple(numbers.shape)
         self.size = self.shape[0] * self.shape[1]
         self.last: tuple[tuple[int, int] | None, np.ndarray] = (None, np.empty((0, 0)))
 
     @property
     def T(self):
         """The same matrix with its axes exchanged."""
-        return Stored(self.numbers, not self.turned)
+        return LazyMatrix(self.numbers, not self.transposed)
 
     def __len__(self):
         return self.shape[0]
 
     def __iter__(self):
-        return (Column(self.row_of(k), self.shape[1], self.dtype) for k in range(len(self)))
+        return (LazyColumn(self.row_of(k), self.shape[1], self.dtype) for k in range(len(self)))
 
     def row_of(self, k):
         """Function (start, stop) -> samples of row ``k``."""
-        return lambda start, stop: self.stretch(start, stop)[k]
+        return lambda start, stop: self.block(start, stop)[k]
 
-    def stretch(self, start, stop) -> np.ndarray:
+    def block(self, start, stop) -> np.ndarray:
         """All rows from ``start`` to ``stop``, (n_row, stop - start)."""
         if self.last[0] != (start, stop):
-            part = self.numbers[start:stop].T if self.turned else self.numbers[:, start:stop]
-            self.last = (start, stop), part
+            block = self.numbers[start:stop].T if self.transposed else self.numbers[:, start:stop]
+            self.last = (start, stop), block
         return self.last[1]
 
 
-class Column:
+class LazyColumn:
     """A row of samples in a file, (n,), which ``take(start, stop)`` reads when it is sliced.
 
-    >>> column = Column(lambda start, stop: np.arange(start, stop), 10, np.dtype(float))
+    >>> column = LazyColumn(lambda start, stop: np.arange(start, stop), 10, np.dtype(float))
     >>> len(column), column[7:99].tolist(), float(np.asarray(column).sum())
     (10, [7, 8, 9], 45.0)
     """
@@ -70,37 +70,37 @@ class Column:
     def __len__(self):
         return self.size
 
-    def __getitem__(self, part: slice):
-        start, stop, step = part.indices(self.size)
+    def __getitem__(self, selection: slice):
+        start, stop, step = selection.indices(self.size)
         return self.take(start, max(stop, start))[::step]
 
     def __array__(self, dtype=None, copy=None):
         return np.asarray(self[:], dtype=dtype)
 
 
-def stored(numbers):
+def lazy_array(numbers):
     """``LazyColumn`` or ``LazyMatrix`` of anything that is sliced like an array; axes of length 1 are dropped.
 
-    >>> stored(np.ones((1, 5))).shape, stored(np.ones((5, 1))).shape, stored(np.ones((2, 5))).shape
+    >>> lazy_array(np.ones((1, 5))).shape, lazy_array(np.ones((5, 1))).shape, lazy_array(np.ones((2, 5))).shape
     ((5,), (5,), (2, 5))
     """
     shape = tuple(numbers.shape)
     if len(shape) == 1:
-        return Column(lambda start, stop: numbers[start:stop], shape[0], numbers.dtype)
+        return LazyColumn(lambda start, stop: numbers[start:stop], shape[0], numbers.dtype)
     if 1 in shape:
-        (only,) = Stored(numbers, turned=shape[0] != 1)
+        (only,) = LazyMatrix(numbers, transposed=shape[0] != 1)
         return only
-    return Stored(numbers)
+    return LazyMatrix(numbers)
 
 
-ARRAYS = (np.ndarray, Stored, Column)
+ARRAYS = (np.ndarray, LazyMatrix, LazyColumn)
 
 
-PASS = 2**18  # samples of each channel that are read at a time
+BLOCK_SIZE = 2**18  # samples of each channel that are read at a time
 
 
 @dataclass(frozen=True)
-class Stretches:
+class BlockReader:
     """``reader(start, stop)`` -> (n_channel, stop - start) SI samples of the channels ``mapped`` of a raw record.
 
     ReadError if the file is damaged there, or has changed since this object was created.
@@ -114,23 +114,23 @@ class Stretches:
 
     def __call__(self, start: int, stop: int) -> np.ndarray:
         if self.source.state() != self.state:
-            found = f"it changed while it was read, at sample {start}"
-            raise self.source.error(self.where, found, "Start again when its copying has ended")
+            problem = f"it changed while it was read, at sample {start}"
+            raise self.source.error(self.where, problem, "Start again when its copying has ended")
         samples = np.empty((len(self.mapped), stop - start))
         with self.source.parsed_by("the format's library", f"{self.where}, samples {start} to {stop}"):
-            for row, m in zip(samples, self.mapped):
-                np.multiply(self.record.samples[m.index][start:stop], m.scale, out=row)
-                if m.offset:
-                    row += m.offset
+            for row, mapping in zip(samples, self.mapped):
+                np.multiply(self.record.samples[mapping.index][start:stop], mapping.scale, out=row)
+                if mapping.offset:
+                    row += mapping.offset
         return samples
 
-    def of(self, rows) -> "Stretches":
+    def subset(self, rows) -> "BlockReader":
         """The same reader for some of the channels."""
-        return Stretches(self.record, tuple(self.mapped[i] for i in rows), self.where, self.source, self.state)
+        return BlockReader(self.record, tuple(self.mapped[i] for i in rows), self.where, self.source, self.state)
 
 
 @dataclass
-class Soundness:
+class ChannelStatistics:
     """Statistics of each channel (n_channel,) over the blocks read so far.
 
     ``n_bad`` is the number of non-finite samples, ``first_bad`` the index of the first of them, ``value`` the first
@@ -143,13 +143,13 @@ class Soundness:
     constant: np.ndarray
 
     @classmethod
-    def over(cls, stretches: Stretches, n_sample: int):
+    def from_record(cls, block_reader: BlockReader, n_sample: int):
         """Statistics from one pass over a record of ``n_sample`` samples."""
-        n = len(stretches.mapped)
-        found = cls(np.zeros(n, int), np.full(n, -1), np.zeros(n), np.ones(n, bool))
-        for start in range(0, n_sample, PASS):
-            found._add(stretches(start, min(start + PASS, n_sample)), start)
-        return found
+        n = len(block_reader.mapped)
+        statistics = cls(np.zeros(n, int), np.full(n, -1), np.zeros(n), np.ones(n, bool))
+        for start in range(0, n_sample, BLOCK_SIZE):
+            statistics._add(block_reader(start, min(start + BLOCK_SIZE, n_sample)), start)
+        return statistics
 
     def by_channel(self) -> list[tuple]:
         """(n_bad, first_bad, value, constant) of each channel."""
@@ -168,15 +168,15 @@ class Soundness:
                 self.n_bad[i] += np.count_nonzero(~finite)
 
 
-def fault(n_sample, seen, channel, where, source) -> ReadError | None:
+def channel_error(n_sample, statistics, channel, where, source) -> ReadError | None:
     """ReadError of a channel that is not finite or constant; None for an intact one."""
     place = f"{where}, channel {channel.name!r}"
-    n_bad, first_bad, value, constant = seen
+    n_bad, first_bad, value, constant = statistics
     if n_bad:
-        found = f"{n_bad} of {n_sample} samples are missing or not finite, the first is sample {first_bad}"
+        problem = f"{n_bad} of {n_sample} samples are missing or not finite, the first is sample {first_bad}"
         remedy = "Export the record again from the logger; if it is so there too, check the channel's cable and range"
-        return source.error(place, found, remedy, reason="not_finite")
+        return source.error(place, problem, remedy, reason="not_finite")
     if constant and channel.quantity != "temperature":
-        found = f"all {n_sample} samples are {value:.6g}: the channel is dead"
-        return source.error(place, found, "Check sensor, cable and channel map", reason="dead_channel")
+        problem = f"all {n_sample} samples are {value:.6g}: the channel is dead"
+        return source.error(place, problem, "Check sensor, cable and channel map", reason="dead_channel")
     return None

@@ -9,9 +9,9 @@ import pyarrow as pa
 from pyarrow import csv
 
 from turnout.errors import ReadError
-from turnout.readers.named_arrays import Facts
+from turnout.readers.named_arrays import Metadata
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, number_or_text
-from turnout.readers.timing import TEXT, check_together, moment, seconds_behind, step_precision
+from turnout.readers.timing import TEXT_PRECISION, check_simultaneous, parse_time, start_offsets, step_precision
 
 END_OF_HEADER = b"***End_of_Header***"
 SEPARATORS = {"Tab": "\t", "Comma": ",", "Semicolon": ";"}
@@ -20,7 +20,7 @@ SEPARATORS = {"Tab": "\t", "Comma": ",", "Semicolon": ";"}
 def read_raw(source) -> RawFile:
     """Records of an LVM file; the head of the file may state their number (``Records``)."""
     lines = source.data[: source.data.find(END_OF_HEADER)].decode("latin-1").splitlines()
-    head = _pairs(lines, _separator(lines))
+    head = _fields(lines, _separator(lines))
     if END_OF_HEADER not in source.data:
         raise source.error("the header", "it has no end", COPY_AGAIN, reason="truncated")
     separator = _separator(lines)
@@ -34,7 +34,7 @@ def read_raw(source) -> RawFile:
             records.append(_record(source, start, edges[k + 1], head, separator, k, len(starts)))
         except ReadError as error:
             records.append(error)
-    return RawFile(tuple(records), Facts(head, source).count(("records",)))
+    return RawFile(tuple(records), Metadata(head, source).count(("records",)))
 
 
 def _separator(lines):
@@ -42,18 +42,18 @@ def _separator(lines):
     return SEPARATORS.get(named[10:].strip().strip(",;"), "\t")
 
 
-def _pairs(lines, separator):
+def _fields(lines, separator):
     pairs = (line.split(separator) for line in lines)
     return {cells[0].strip(): cells[1].strip() for cells in pairs if len(cells) > 1 and cells[0].strip()}
 
 
 def _segments(data):
     """Offsets of the lines "Channels ..." at which the segments begin."""
-    found, at = [], data.find(END_OF_HEADER)
-    while (at := data.find(b"\nChannels", at)) >= 0:
-        found.append(at + 1)
-        at += 1
-    return found
+    offsets, offset = [], data.find(END_OF_HEADER)
+    while (offset := data.find(b"\nChannels", offset)) >= 0:
+        offsets.append(offset + 1)
+        offset += 1
+    return offsets
 
 
 def _record(source, start, stop, head, separator, k, n):
@@ -65,80 +65,85 @@ def _record(source, start, stop, head, separator, k, n):
         raise source.error(where, "its header has no end", COPY_AGAIN, reason="truncated")
     text = source.data[start:end].decode("utf-8", "replace").splitlines()
     fields = {cells[0].strip(): [c.strip() for c in cells[1:]] for cells in (line.split(separator) for line in text)}
-    point = head.get("Decimal_Separator", ".")
+    decimal_mark = head.get("Decimal_Separator", ".")
     x_line = source.data[source.data.find(b"\nX_Value", end) + 1 : first].decode("utf-8", "replace")
     names = [name for name in x_line.rstrip("\r\n").split(separator)[1:] if name and name != "Comment"]
     with source.parsed_by("the header", where):
         count = int(fields["Channels"][0])
         samples = [int(s) for s in fields.get("Samples", [])[:count]]
-        steps = [float(s.replace(point, ".")) for s in fields.get("Delta_X", [])[:count] if s] or [0.0]
-        offsets = [float(x.replace(point, ".") or 0.0) for x in _each(fields, "X0", count)]
+        steps = [float(s.replace(decimal_mark, ".")) for s in fields.get("Delta_X", [])[:count] if s] or [0.0]
+        offsets = [float(x.replace(decimal_mark, ".") or 0.0) for x in _per_channel(fields, "X0", count)]
     if len(names) != count:
         raise source.error(where, f"it names {len(names)} of {count} channels", COPY_AGAIN, reason="truncated")
-    with_x = 0 if head.get("X_Columns") == "No" else 1 if head.get("X_Columns", "One") == "One" else count
-    columns = _columns(source, source.data[first:stop], separator, point, count, with_x, where)
+    n_x_columns = 0 if head.get("X_Columns") == "No" else 1 if head.get("X_Columns", "One") == "One" else count
+    columns = _columns(source, source.data[first:stop], separator, decimal_mark, count, n_x_columns, where)
     for name, promised, column in zip(names, samples, columns):
         if len(column) != promised:
             place = f"{where}, channel {name!r}"
-            found = f"ends after {len(column)} of {promised} samples"
-            raise source.error(place, found, COPY_AGAIN, reason="truncated")
+            problem = f"ends after {len(column)} of {promised} samples"
+            raise source.error(place, problem, COPY_AGAIN, reason="truncated")
     units = fields.get("Y_Unit_Label", [])
-    stamps = [_moment(*cells) for cells in zip(_each(fields, "Date", count), _each(fields, "Time", count))]
-    starts = [a + b for a, b in zip(seconds_behind(stamps), offsets)]
-    check_together(names, steps, starts, where, source)
+    stamps = [
+        _parse_date_and_time(*cells)
+        for cells in zip(_per_channel(fields, "Date", count), _per_channel(fields, "Time", count))
+    ]
+    starts = [a + b for a, b in zip(start_offsets(stamps), offsets)]
+    check_simultaneous(names, steps, starts, where, source)
     step = steps[0]
     return RawRecord(
         names=tuple(names),
         samples=columns,
         rate=1.0 / step if step > 0 else None,
-        rate_tolerance=max(step_precision(step), TEXT),
+        rate_tolerance=max(step_precision(step), TEXT_PRECISION),
         units=tuple(units[:count]) if len(units) >= count else ("",) * count,
-        started_at=_moment(*(_each(fields, name, 1)[0] or head.get(name, "") for name in ("Date", "Time"))),
+        started_at=_parse_date_and_time(
+            *(_per_channel(fields, name, 1)[0] or head.get(name, "") for name in ("Date", "Time"))
+        ),
         conditions={name: number_or_text(head[name]) for name in CONDITIONS if name in head},
     )
 
 
-def _each(fields, name, count):
+def _per_channel(fields, name, count):
     """The field ``name`` of each channel, "" if absent."""
     return [*fields.get(name, []), *[""] * count][:count]
 
 
-def _moment(date, clock):
-    return moment(f"{date.replace('/', '-')}T{clock.replace(',', '.')[:15]}")
+def _parse_date_and_time(date, clock):
+    return parse_time(f"{date.replace('/', '-')}T{clock.replace(',', '.')[:15]}")
 
 
-def _columns(source, body, separator, point, count, with_x, where):
+def _columns(source, body, separator, decimal_mark, count, n_x_columns, where):
     """One array per channel: the rows up to the blank line that ends a segment."""
     body = body.replace(b"\r", b"")
-    for blank in (b"\n\n", b"\n" + separator.encode() + b"\n"):
-        body = body.partition(blank)[0] + b"\n" if blank in body else body
+    for segment_end in (b"\n\n", b"\n" + separator.encode() + b"\n"):
+        body = body.partition(segment_end)[0] + b"\n" if segment_end in body else body
     if not body.strip():
         return [np.empty(0)] * count
     if not body.endswith(b"\n"):
-        found = "its last line has no line break: the last number may be cut"
-        raise source.error(where, found, COPY_AGAIN, reason="truncated")
-    wanted = [1 + 2 * i for i in range(count)] if with_x > 1 else [1 + i for i in range(count)]
-    width = wanted[-1] + 1
-    mark = separator.encode()
+        problem = "its last line has no line break: the last number may be cut"
+        raise source.error(where, problem, COPY_AGAIN, reason="truncated")
+    indices = [1 + 2 * i for i in range(count)] if n_x_columns > 1 else [1 + i for i in range(count)]
+    width = indices[-1] + 1
+    separator_bytes = separator.encode()
     with source.parsed_by("pyarrow", where):
         try:
-            table = _table(body, width, separator, point, wanted)
+            table = _table(body, width, separator, decimal_mark, indices)
         except pa.ArrowInvalid:  # a comment behind the channels: only some rows have one
-            rows = [line.split(mark)[:width] for line in body.splitlines()]
-            table = _table(b"\n".join(map(mark.join, rows)) + b"\n", width, separator, point, wanted)
+            rows = [line.split(separator_bytes)[:width] for line in body.splitlines()]
+            table = _table(b"\n".join(map(separator_bytes.join, rows)) + b"\n", width, separator, decimal_mark, indices)
     return [column.to_numpy(zero_copy_only=False) for column in table.columns]
 
 
-def _table(body, width, separator, point, wanted):
+def _table(body, width, separator, decimal_mark, indices):
     names = [str(i) for i in range(width)]
     return csv.read_csv(
         pa.py_buffer(body),
         read_options=csv.ReadOptions(use_threads=False, column_names=names, block_size=1 << 24),
         parse_options=csv.ParseOptions(delimiter=separator),
         convert_options=csv.ConvertOptions(
-            column_types={names[i]: pa.float64() for i in wanted},
-            decimal_point=point,
-            include_columns=[names[i] for i in wanted],
+            column_types={names[i]: pa.float64() for i in indices},
+            decimal_point=decimal_mark,
+            include_columns=[names[i] for i in indices],
             null_values=["", "NaN"],
         ),
     )

@@ -10,44 +10,46 @@ import h5py
 import numpy as np
 import pymatreader
 
-from turnout.readers.lazy import stays, stored
-from turnout.readers.named_arrays import TIME, Alphabetical, raw_file
+from turnout.readers.lazy import is_large, lazy_array
+from turnout.readers.named_arrays import TIME_NAMES, Alphabetical, raw_file
 from turnout.readers.source import RawFile
 
-LEAST = 128  # bytes of the header of version 5
-NEW = b"MATLAB 7.3"
+HEADER_SIZE = 128  # bytes of the header of version 5
+VERSION_73 = b"MATLAB 7.3"
 
 
 def read_raw(source) -> RawFile:
     """Records of a MATLAB file."""
-    if source.size < LEAST:
+    if source.size < HEADER_SIZE:
         raise source.error("the header", f"the file ends after {source.size} bytes", reason="truncated")
     with source.parsed_by("pymatreader"), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # objects and tables that it cannot read are no samples
-        large = _large(source) if source.stay and source.head.startswith(NEW) else {}
-        read = pymatreader.read_mat(source.path, ignore_fields=list(large)) | large
-    kind = Alphabetical if source.head.startswith(NEW) else dict
-    return raw_file(_plain({k: v for k, v in read.items() if not k.startswith("__")}, kind), source)
+        large = _lazy_arrays(source) if source.lazy and source.head.startswith(VERSION_73) else {}
+        variables = pymatreader.read_mat(source.path, ignore_fields=list(large)) | large
+    mapping_type = Alphabetical if source.head.startswith(VERSION_73) else dict
+    return raw_file(
+        _plain_variables({k: v for k, v in variables.items() if not k.startswith("__")}, mapping_type), source
+    )
 
 
-def _large(source):
+def _lazy_arrays(source):
     """Arrays of version 7.3 outside structures, which stay in the file. Version 5 cannot be read in parts."""
     file = h5py.File(source.path, "r")  # not closed here: a dataset keeps its file open
     return {
-        name: stored(member)
+        name: lazy_array(member)
         for name, member in file.items()
-        if isinstance(member, h5py.Dataset) and stays(member) and name.lower() not in TIME
+        if isinstance(member, h5py.Dataset) and is_large(member) and name.lower() not in TIME_NAMES
     }
 
 
-def _plain(value, kind):
+def _plain_variables(value, mapping_type):
     """The value with dictionaries of ``mapping_type`` and arrays; a structure array becomes numbered records."""
     if isinstance(value, dict):
-        members = {name: _plain(v, kind) for name, v in value.items()}
-        return kind({name: v for name, v in members.items() if v is not None})
+        members = {name: _plain_variables(v, mapping_type) for name, v in value.items()}
+        return mapping_type({name: v for name, v in members.items() if v is not None})
     if isinstance(value, list):
         if value and all(isinstance(v, dict) for v in value):
-            return {f"record_{i:03d}": _plain(v, kind) for i, v in enumerate(value)}
+            return {f"record_{i:03d}": _plain_variables(v, mapping_type) for i, v in enumerate(value)}
         if value and all(isinstance(v, np.ndarray) and v.ndim == 2 for v in value):
             return {f"record_{i:03d}": v for i, v in enumerate(value)}
         return value if all(isinstance(v, str) for v in value) else np.asarray(value, dtype=object)

@@ -27,9 +27,9 @@ import numpy as np
 from turnout.errors import ReadError
 from turnout.readers.lazy import ARRAYS
 from turnout.readers.source import CONDITIONS, RawFile, RawRecord
-from turnout.readers.timing import EXACT, SINGLE, moment, single_precision, step_precision
+from turnout.readers.timing import EXACT_PRECISION, SINGLE_PRECISION, is_single_precision, parse_time, step_precision
 
-NUMBERED = re.compile(r"^(?:record|rec|segment|impact|hit)[_ ]?(\d+)$", re.IGNORECASE)
+RECORD_NAME = re.compile(r"^(?:record|rec|segment|impact|hit)[_ ]?(\d+)$", re.IGNORECASE)
 
 
 def numbered_names(names):
@@ -38,10 +38,10 @@ def numbered_names(names):
     >>> numbered_names(["rate", "hit_02", "Record 10"])
     [(2, 'hit_02'), (10, 'Record 10')]
     """
-    return [(int(m[1]), name) for name in names if (m := NUMBERED.match(name))]
+    return [(int(m[1]), name) for name in names if (m := RECORD_NAME.match(name))]
 
 
-def by_number(numbered, variables, source):
+def records_in_order(numbered, variables, source):
     """Values of the records in the order of their numbers, None for a missing number.
 
     If the gaps outnumber the records, no record counts as missing: a clock or a counter numbered them.
@@ -50,39 +50,39 @@ def by_number(numbered, variables, source):
     for number, name in sorted(numbered):
         names.setdefault(number, []).append(name)
     first, last = min(names), max(names)
-    whole = last - first + 1 <= 2 * len(names)
-    for i, number in enumerate(range(first, last + 1) if whole else names):
-        same = names.get(number, [])
-        if len(same) > 1:
-            found = f"{' and '.join(map(repr, same))} are both number {number}"
-            yield source.error(f"record {i + 1}", found, "Number the records each by a number of its own")
+    is_dense = last - first + 1 <= 2 * len(names)
+    for i, number in enumerate(range(first, last + 1) if is_dense else names):
+        candidates = names.get(number, [])
+        if len(candidates) > 1:
+            problem = f"{' and '.join(map(repr, candidates))} are both number {number}"
+            yield source.error(f"record {i + 1}", problem, "Number the records each by a number of its own")
         else:
-            yield variables[same[0]] if same else None
+            yield variables[candidates[0]] if candidates else None
 
 
-def natural(name):
+def natural_sort_key(name):
     """Key that sorts "record_2" before "record_10"."""
-    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name)]
+    return [int(piece) if piece.isdigit() else piece for piece in re.split(r"(\d+)", name)]
 
 
 class Alphabetical(dict):
     """Variables of a file that sorts them alphabetically: their order carries no information."""
 
 
-def listed_units(names, units, labels, ordered):
+def match_units(names, units, labels, ordered):
     """Unit of each of ``names``: by the ``labels`` that belong to the units, else by order; "" if unknown.
 
     None if the units differ and the names are not ``ordered``: then the assignment is unknown.
 
-    >>> listed_units(["rail", "sleeper"], ["g", "m/s²"], ["Sleeper", "rail"], ordered=False)
+    >>> match_units(["rail", "sleeper"], ["g", "m/s²"], ["Sleeper", "rail"], ordered=False)
     ['m/s²', 'g']
-    >>> listed_units(["rail", "sleeper"], ["g", "m/s²"], [], ordered=True)
+    >>> match_units(["rail", "sleeper"], ["g", "m/s²"], [], ordered=True)
     ['g', 'm/s²']
-    >>> listed_units(["rail", "sleeper"], ["g", "m/s²"], [], ordered=False)
+    >>> match_units(["rail", "sleeper"], ["g", "m/s²"], [], ordered=False)
     """
-    wanted, labels = [name.casefold() for name in names], [label.casefold() for label in labels]
-    if len(labels) == len(set(labels)) == len(units) and set(wanted) <= set(labels):
-        return [units[labels.index(name)] for name in wanted]
+    plain_names, labels = [name.casefold() for name in names], [label.casefold() for label in labels]
+    if len(labels) == len(set(labels)) == len(units) and set(plain_names) <= set(labels):
+        return [units[labels.index(name)] for name in plain_names]
     if len(units) == 1:
         return units * len(names)
     if len(units) != len(names):
@@ -90,15 +90,15 @@ def listed_units(names, units, labels, ordered):
     return units if ordered or len(set(units)) == 1 else None
 
 
-START = (
+START_NAMES = (
     "started_at", "start_time", "starttime", "wf_start_time", "startzeit", "startzeitpunkt", "messbeginn", "messstart",
     "beginn_der_messung", "heure_de_debut", "debut_de_mesure", "debut_de_la_mesure", "starttijd", "begintijd",
     "begin_meting", "zacatek_mereni", "cas_zacatku", "starttid", "starttidspunkt",
 )  # fmt: skip
 # The day of a start whose time of day is in a line of its own.
-START_DATE = ("start_date", "startdatum", "date_de_debut", "begindatum", "datum_zacatku", "startdato")
+START_DATE_NAMES = ("start_date", "startdatum", "date_de_debut", "begindatum", "datum_zacatku", "startdato")
 # Unlike n_samples, which counts per record, these may count the rows of the whole file.
-SAMPLES = (
+SAMPLE_COUNT_NAMES = (
     "number_of_samples", "anzahl_messwerte", "anzahl_der_messwerte", "anzahl_werte", "anzahl_abtastwerte",
     "anzahl_samples", "anzahl_datenpunkte", "nombre_d_echantillons", "nombre_de_points", "aantal_samples",
     "aantal_meetwaarden", "aantal_meetpunten", "pocet_vzorku", "antal_samples", "antal_malepunkter",
@@ -106,26 +106,26 @@ SAMPLES = (
 )  # fmt: skip
 
 
-RATE = (
+RATE_NAMES = (
     "rate", "fs", "f_s", "rate_hz", "fs_hz", "sample_rate", "samplerate", "samplingrate", "sampling_rate",
     "sample_frequency", "sampling_frequency", "abtastrate", "abtastfrequenz", "samplingsfrekvens", "samplingfrekvens",
     "samplingsrate", "frequence_d_echantillonnage", "taux_d_echantillonnage", "cadence_d_echantillonnage",
     "frecuencia_de_muestreo", "tasa_de_muestreo", "velocidad_de_muestreo", "frequenza_di_campionamento",
     "velocita_di_campionamento",
 )  # fmt: skip
-STEP = ("dt", "delta_t", "sample_interval", "wf_increment")
-TIME = ("time", "t", "time_s")
-NAMES = ("channels", "channel_names", "names", "labels")
-UNITS = ("units", "unit", "channel_units")
-COUNT = ("n_records", "n_record")
+STEP_NAMES = ("dt", "delta_t", "sample_interval", "wf_increment")
+TIME_NAMES = ("time", "t", "time_s")
+CHANNEL_NAMES = ("channels", "channel_names", "names", "labels")
+UNIT_NAMES = ("units", "unit", "channel_units")
+RECORD_COUNT_NAMES = ("n_records", "n_record")
 
 
-class Facts:
+class Metadata:
     """Metadata of the samples of a group of variables; missing entries are taken from the ``parent`` group."""
 
-    def __init__(self, variables: Mapping, source, around: "Facts | None" = None):
+    def __init__(self, variables: Mapping, source, parent: "Metadata | None" = None):
         self.lower = {(k if k == "t" else k.lower()): v for k, v in variables.items() if k != "T"}
-        self.around, self.source = around, source
+        self.parent, self.source = parent, source
 
     def get(self, names):
         """The first variable of ``names``, here or in a parent group; ReadError if it is damaged."""
@@ -134,9 +134,9 @@ class Facts:
                 if isinstance(value, ReadError):
                     raise value
                 return value
-        return self.around.get(names) if self.around else None
+        return self.parent.get(names) if self.parent else None
 
-    def one(self, names, k, n):
+    def record_value(self, names, k, n):
         """As ``get``, but entry ``k`` if there is one entry per record."""
         value = self.get(names)
         if isinstance(value, (list, tuple)) or (isinstance(value, np.ndarray) and value.ndim):
@@ -146,7 +146,7 @@ class Facts:
 
     def number(self, names, k=0, n=1):
         """As ``record_value``, but a float; ReadError if it is no number."""
-        value = self.one(names, k, n)
+        value = self.record_value(names, k, n)
         try:
             return None if value is None else float(value)
         except (TypeError, ValueError) as error:
@@ -161,26 +161,26 @@ class Facts:
 
     def rate(self):
         """Sampling rate [Hz], None if not stated."""
-        rate = self.number(RATE)
-        if rate is None and (step := self.number(STEP)):
+        rate = self.number(RATE_NAMES)
+        if rate is None and (step := self.number(STEP_NAMES)):
             return 1.0 / step
         return rate
 
-    def rated(self, least: float = EXACT) -> dict:
+    def rate_fields(self, min_tolerance: float = EXACT_PRECISION) -> dict:
         """``rate`` [Hz] and ``rate_tolerance`` of a RawRecord; ``min_tolerance`` is the precision of the format."""
-        rate, step = self.number(RATE), self.number(STEP)
+        rate, step = self.number(RATE_NAMES), self.number(STEP_NAMES)
         if rate is None and step:
-            return {"rate": 1.0 / step, "rate_tolerance": max(step_precision(step), least)}
-        stated = SINGLE if rate is not None and single_precision(rate) else EXACT
-        return {"rate": rate, "rate_tolerance": max(stated, least)}
+            return {"rate": 1.0 / step, "rate_tolerance": max(step_precision(step), min_tolerance)}
+        tolerance = SINGLE_PRECISION if rate is not None and is_single_precision(rate) else EXACT_PRECISION
+        return {"rate": rate, "rate_tolerance": max(tolerance, min_tolerance)}
 
     def conditions(self, k, n):
         """Conditions that are stored with the samples."""
-        noted = {name: self.one((name,), k, n) for name in CONDITIONS}
-        return {name: value for name, value in noted.items() if value is not None}
+        values = {name: self.record_value((name,), k, n) for name in CONDITIONS}
+        return {name: value for name, value in values.items() if value is not None}
 
 
-def texts(value) -> list[str]:
+def list_of_texts(value) -> list[str]:
     """A list of texts from the form in which a library returns it."""
     if value is None:
         return []
@@ -191,37 +191,39 @@ def texts(value) -> list[str]:
     ]
 
 
-def raw_file(variables: Mapping, source, around: Facts | None = None) -> RawFile:
+def raw_file(variables: Mapping, source, parent: Metadata | None = None) -> RawFile:
     """All records in ``variables``; a damaged value is a ReadError."""
-    facts = Facts(variables, source, around)
-    expected = facts.count(COUNT)
+    facts = Metadata(variables, source, parent)
+    expected = facts.count(RECORD_COUNT_NAMES)
     numbered = numbered_names(variables)
-    inner = [name for name, value in variables.items() if isinstance(value, Mapping)]
+    groups = [name for name, value in variables.items() if isinstance(value, Mapping)]
     if numbered:
-        parts = [(value, f"record {i + 1}") for i, value in enumerate(by_number(numbered, variables, source))]
-    elif inner and not vectors(variables) and not matrices(variables):
-        if len(inner) == 1:
-            return raw_file(variables[inner[0]], source, facts)
-        parts = [(variables[name], f"group {name!r}") for name in sorted(inner, key=natural)]
+        entries = [(value, f"record {i + 1}") for i, value in enumerate(records_in_order(numbered, variables, source))]
+    elif groups and not vectors(variables) and not matrices(variables):
+        if len(groups) == 1:
+            return raw_file(variables[groups[0]], source, facts)
+        entries = [(variables[name], f"group {name!r}") for name in sorted(groups, key=natural_sort_key)]
     else:
-        return RawFile(tuple(_whole(variables, facts, source)), expected)
-    records = [_part(value, k, len(parts), where, facts, source) for k, (value, where) in enumerate(parts)]
+        return RawFile(tuple(_group_records(variables, facts, source)), expected)
+    records = [
+        _numbered_record(value, k, len(entries), where, facts, source) for k, (value, where) in enumerate(entries)
+    ]
     return RawFile(tuple(records), expected)
 
 
-def _part(value, k, n, where, facts, source):
+def _numbered_record(value, k, n, where, facts, source):
     """One numbered record, or its error."""
     try:
         if value is None:
-            found = "this record is missing between its neighbours"
-            raise source.error(where, found, reason="truncated")
+            problem = "this record is missing between its neighbours"
+            raise source.error(where, problem, reason="truncated")
         if isinstance(value, ReadError):
             raise value
         if not isinstance(value, Mapping):
             return _record(value, facts, k, n, where, source)
         if damaged := [v for v in value.values() if isinstance(v, ReadError)]:
             raise damaged[0]
-        (record,) = _whole(value, Facts(value, source, facts), source, k, n)
+        (record,) = _group_records(value, Metadata(value, source, facts), source, k, n)
         return record
     except ReadError as error:
         return error
@@ -229,7 +231,7 @@ def _part(value, k, n, where, facts, source):
         return source.error(where, f"it is no single record ({error})", "Check how the file was exported")
 
 
-def _whole(variables, facts, source, k=0, n=1):
+def _group_records(variables, facts, source, k=0, n=1):
     """The records of a group whose variables are samples."""
     if damaged := [v for v in variables.values() if isinstance(v, ReadError)]:
         raise damaged[0]
@@ -241,7 +243,7 @@ def _whole(variables, facts, source, k=0, n=1):
         )
     for name, array in blocks_by_name.items():
         blocks = array if array.ndim == 3 else [array]
-        if array.ndim == 3 and len(names := texts(facts.get(NAMES))) and array.shape[1] != len(names):
+        if array.ndim == 3 and len(names := list_of_texts(facts.get(CHANNEL_NAMES))) and array.shape[1] != len(names):
             raise source.error(f"variable {name!r}", f"{array.shape} samples do not match {len(names)} channels")
         if array.ndim == 3 and array.shape[0] > array.shape[2]:  # MATLAB: (sample, channel, record)
             blocks = array.transpose(2, 1, 0)
@@ -251,19 +253,19 @@ def _whole(variables, facts, source, k=0, n=1):
     if not channels:
         return []
     units = _units_of(channels, facts, not isinstance(variables, Alphabetical), f"record {k + 1}", source)
-    return [_settled(tuple(channels), list(channels.values()), units, facts, k, n)]
+    return [_raw_record(tuple(channels), list(channels.values()), units, facts, k, n)]
 
 
 def _units_of(channels, facts, ordered, where, source):
     """The unit of each variable that is a channel, "" if the file does not state it."""
-    noted = facts.get(UNITS)
-    if isinstance(noted, Mapping):
-        return [noted.get(name, "") for name in channels]
-    units = listed_units(list(channels), texts(noted), texts(facts.get(NAMES)), ordered)
+    entry = facts.get(UNIT_NAMES)
+    if isinstance(entry, Mapping):
+        return [entry.get(name, "") for name in channels]
+    units = match_units(list(channels), list_of_texts(entry), list_of_texts(facts.get(CHANNEL_NAMES)), ordered)
     if units is None:
-        found = f"nothing says which of the units {', '.join(map(repr, texts(noted)))} are whose"
+        problem = f"nothing says which of the units {', '.join(map(repr, list_of_texts(entry)))} are whose"
         remedy = "Write each dataset's unit beside it, or a list 'channels' of their names beside that of the units"
-        raise source.error(where, found, remedy, reason="unit_unknown")
+        raise source.error(where, problem, remedy, reason="unit_unknown")
     return units
 
 
@@ -275,21 +277,30 @@ def matrices(variables):
 
 def vectors(variables):
     """Vectors that can be channels; those much shorter than the longest are metadata, not samples."""
-    known = {*RATE, *STEP, *TIME, *NAMES, *UNITS, *START, *COUNT, *CONDITIONS}
-    found = {
+    reserved_names = {
+        *RATE_NAMES,
+        *STEP_NAMES,
+        *TIME_NAMES,
+        *CHANNEL_NAMES,
+        *UNIT_NAMES,
+        *START_NAMES,
+        *RECORD_COUNT_NAMES,
+        *CONDITIONS,
+    }
+    candidates = {
         name: v
         for name, v in variables.items()
         if isinstance(v, ARRAYS) and v.ndim == 1 and v.dtype.kind in "fiu" and v.size > 1
-        if name.lower() not in known
+        if name.lower() not in reserved_names
     }
-    longest = max((v.size for v in found.values()), default=0)
-    return {name: v for name, v in found.items() if 2 * v.size > longest}
+    longest = max((v.size for v in candidates.values()), default=0)
+    return {name: v for name, v in candidates.items() if 2 * v.size > longest}
 
 
 def _record(block, facts, k, n, where, source):
     """The record of a matrix (channel, sample) or (sample, channel)."""
     block = np.atleast_2d(block) if isinstance(block, np.ndarray) else block
-    names, units = texts(facts.get(NAMES)), texts(facts.get(UNITS))
+    names, units = list_of_texts(facts.get(CHANNEL_NAMES)), list_of_texts(facts.get(UNIT_NAMES))
     if block.ndim != 2 or block.dtype.kind not in "fiu":
         raise source.error(where, f"{block.dtype} of shape {block.shape} is no matrix of samples")
     rows = len(names) or min(block.shape)
@@ -298,18 +309,18 @@ def _record(block, facts, k, n, where, source):
     block = block if block.shape[0] == rows else block.T
     names = names or [str(i) for i in range(rows)]
     units = units if len(units) == rows else [units[0] if len(units) == 1 else ""] * rows
-    return _settled(names, list(block), units, facts, k, n)
+    return _raw_record(names, list(block), units, facts, k, n)
 
 
-def _settled(names, samples, units, facts, k, n):
-    time = facts.get(TIME)
+def _raw_record(names, samples, units, facts, k, n):
+    time = facts.get(TIME_NAMES)
     time = np.asarray(time, dtype=float) if isinstance(time, np.ndarray) and time.size == len(samples[0]) else None
     return RawRecord(
         names=tuple(names),
         samples=samples,
-        **facts.rated(),
+        **facts.rate_fields(),
         units=tuple(units),
-        started_at=moment(facts.one(START, k, n)),
+        started_at=parse_time(facts.record_value(START_NAMES, k, n)),
         conditions=facts.conditions(k, n),
         time=time,
     )

@@ -10,10 +10,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from turnout.readers.lazy import Column
-from turnout.readers.named_arrays import COUNT, START, TIME, Facts
+from turnout.readers.lazy import LazyColumn
+from turnout.readers.named_arrays import RECORD_COUNT_NAMES, START_NAMES, TIME_NAMES, Metadata
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord
-from turnout.readers.timing import TEXT, moment
+from turnout.readers.timing import TEXT_PRECISION, parse_time
 
 
 def read_raw(source) -> RawFile:
@@ -21,37 +21,37 @@ def read_raw(source) -> RawFile:
     with source.parsed_by("pyarrow"):
         file = pq.ParquetFile(source.path, page_checksum_verification=True)
         schema, n_row = file.schema_arrow, file.metadata.num_rows
-        rows = RowGroups(file) if source.stay and "record" not in schema.names else None
+        rows = RowGroupReader(file) if source.lazy and "record" not in schema.names else None
         columns = _columns(file, rows)
-    facts = Facts(_notes(schema), source)
+    facts = Metadata(_notes(schema), source)
     units = {field.name: _unit(field) for field in schema}
     numbers = columns.pop("record", None)
     edges = [0, n_row]
     if numbers is not None:
         edges = [0, *(np.flatnonzero(np.diff(numbers)) + 1), n_row]
-    time = next((name for name in columns if name.lower() in TIME), None)
+    time = next((name for name in columns if name.lower() in TIME_NAMES), None)
     names = [name for name, x in columns.items() if name != time and x.dtype.kind in "fiu"]
     n = len(edges) - 1
     records = []
     for k in range(n):
-        part = slice(edges[k], edges[k + 1])
+        span = slice(edges[k], edges[k + 1])
         promised = facts.count(("n_samples",), k, n)
-        if promised is not None and part.stop - part.start != promised:
-            found = f"has {part.stop - part.start} of the {promised} samples that its metadata promise"
-            records.append(source.error(f"record {k + 1} of {n}", found, COPY_AGAIN, reason="truncated"))
+        if promised is not None and span.stop - span.start != promised:
+            problem = f"has {span.stop - span.start} of the {promised} samples that its metadata promise"
+            records.append(source.error(f"record {k + 1} of {n}", problem, COPY_AGAIN, reason="truncated"))
             continue
         records.append(
             RawRecord(
                 names=tuple(names),
-                samples=[columns[name] if rows else columns[name][part] for name in names],
-                **facts.rated(TEXT),
+                samples=[columns[name] if rows else columns[name][span] for name in names],
+                **facts.rate_fields(TEXT_PRECISION),
                 units=tuple(units[name] for name in names),
-                started_at=moment(facts.one(START, k, n)),
+                started_at=parse_time(facts.record_value(START_NAMES, k, n)),
                 conditions=facts.conditions(k, n),
-                time=None if time is None else _seconds(columns[time][part]),
+                time=None if time is None else _seconds(columns[time][span]),
             )
         )
-    return RawFile(tuple(records) if n_row else (), facts.count(COUNT))
+    return RawFile(tuple(records) if n_row else (), facts.count(RECORD_COUNT_NAMES))
 
 
 def _columns(file, rows):
@@ -60,40 +60,40 @@ def _columns(file, rows):
     if rows is None:
         table = file.read(use_threads=False)
         return {name: table.column(name).to_numpy() for name in names}
-    stay = [f.name for f in file.schema_arrow if (pa.types.is_floating(f.type) or pa.types.is_integer(f.type))]
-    stay = [name for name in stay if name.lower() not in TIME]
-    table = file.read([name for name in names if name not in stay], use_threads=False)
-    read = {name: table.column(name).to_numpy() for name in table.column_names}
-    kept = {name: rows.column(name) for name in stay}
-    return {name: read.get(name, kept.get(name)) for name in names}
+    lazy_names = [f.name for f in file.schema_arrow if (pa.types.is_floating(f.type) or pa.types.is_integer(f.type))]
+    lazy_names = [name for name in lazy_names if name.lower() not in TIME_NAMES]
+    table = file.read([name for name in names if name not in lazy_names], use_threads=False)
+    columns_in_memory = {name: table.column(name).to_numpy() for name in table.column_names}
+    lazy_columns = {name: rows.column(name) for name in lazy_names}
+    return {name: columns_in_memory.get(name, lazy_columns.get(name)) for name in names}
 
 
-class RowGroups:
+class RowGroupReader:
     """Reads row groups of a file; two adjacent ones are cached, because a block may lie across their border."""
 
     def __init__(self, file):
-        self.file, self.held = file, {}
+        self.file, self.groups = file, {}
         sizes = [file.metadata.row_group(k).num_rows for k in range(file.num_row_groups)]
         self.edges = np.concatenate([[0], np.cumsum(sizes)]).astype(int)
 
     def column(self, name):
         """One column, read lazily."""
         dtype = self.file.schema_arrow.field(name).type.to_pandas_dtype()
-        return Column(lambda start, stop: self._stretch(name, start, stop), int(self.edges[-1]), dtype)
+        return LazyColumn(lambda start, stop: self._read_rows(name, start, stop), int(self.edges[-1]), dtype)
 
-    def _stretch(self, name, start, stop):
+    def _read_rows(self, name, start, stop):
         first, last = np.searchsorted(self.edges, [start, max(stop - 1, start)], side="right") - 1
-        parts = []
+        pieces = []
         for k in range(first, last + 1):
             low, high = max(start - self.edges[k], 0), stop - self.edges[k]
-            parts.append(self._group(k).column(name).to_numpy()[low:high])
-        return np.concatenate(parts)
+            pieces.append(self._group(k).column(name).to_numpy()[low:high])
+        return np.concatenate(pieces)
 
     def _group(self, k):
-        if k not in self.held:
-            self.held = {i: group for i, group in self.held.items() if abs(i - k) == 1}
-            self.held[k] = self.file.read_row_group(k, use_threads=False)
-        return self.held[k]
+        if k not in self.groups:
+            self.groups = {i: group for i, group in self.groups.items() if abs(i - k) == 1}
+            self.groups[k] = self.file.read_row_group(k, use_threads=False)
+        return self.groups[k]
 
 
 def _notes(schema):

@@ -14,24 +14,24 @@ import h5py
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.lazy import stays, stored
-from turnout.readers.named_arrays import Facts
+from turnout.readers.lazy import is_large, lazy_array
+from turnout.readers.named_arrays import Metadata
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord
 
-FREQUENCY = ("CommonTriggerFrequency", "CommonTriggerFreq", "CommonTriggerFrequence", "TriggerValue")
-NOTED = {*CONDITIONS, "RecordCount"}
+FREQUENCY_ATTRIBUTES = ("CommonTriggerFrequency", "CommonTriggerFreq", "CommonTriggerFrequence", "TriggerValue")
+METADATA_ATTRIBUTES = {*CONDITIONS, "RecordCount"}
 SINGLE_PRECISION = 2.0**-23  # the frequency is a 32 bit float
 
 
 def read_raw(source) -> RawFile:
     """Records of an RCM-DX file, in the order of its sessions."""
-    with source.parsed_by("HDF5"), _opened(source) as file:
+    with source.parsed_by("HDF5"), _open(source) as file:
         if "RCMDX" not in file:
             raise source.error("the root", "there is no group RCMDX", "Set the format in the layout to hdf5")
-        found: list[tuple[h5py.Group, dict]] = []
-        _data_sources(file["RCMDX"], {}, found)
+        data_sources: list[tuple[h5py.Group, dict]] = []
+        _data_sources(file["RCMDX"], {}, data_sources)
         records = []
-        for group, notes in found:
+        for group, notes in data_sources:
             try:
                 with source.parsed_by("HDF5", f"data source {group.name!r}"):
                     record = _record(group, notes, source)
@@ -39,29 +39,29 @@ def read_raw(source) -> RawFile:
                 record = error
             if record is not None:
                 records.append((group.name, record))
-    records.sort(key=lambda named: named[0])  # sessions are named by their date
-    notes = found[0][1] if found else {}
-    return RawFile(tuple(record for _, record in records), Facts(notes, source).count(("recordcount",)))
+    records.sort(key=lambda entry: entry[0])  # sessions are named by their date
+    notes = data_sources[0][1] if data_sources else {}
+    return RawFile(tuple(record for _, record in records), Metadata(notes, source).count(("recordcount",)))
 
 
-def _opened(source):
+def _open(source):
     """The file; with a lazy source the datasets keep it open."""
     file = h5py.File(source.path, "r")
-    return nullcontext(file) if source.stay else file
+    return nullcontext(file) if source.lazy else file
 
 
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
-def _data_sources(group, notes, found):
+def _data_sources(group, notes, data_sources):
     """Append every group that holds time stamps and channels, with the metadata of its parent groups."""
-    notes = {**notes, **{k: group.attrs[k] for k in NOTED.intersection(group.attrs)}}
+    notes = {**notes, **{k: group.attrs[k] for k in METADATA_ATTRIBUTES.intersection(group.attrs)}}
     if isinstance(group.get("timestamp"), h5py.Dataset) and any(_is_channel(m) for m in group.values()):
-        found.append((group, notes))
+        data_sources.append((group, notes))
         return
     for member in group.values():
         if isinstance(member, h5py.Group):
-            _data_sources(member, notes, found)
+            _data_sources(member, notes, data_sources)
 
 
 def _is_channel(member):
@@ -81,14 +81,16 @@ def _record(group, notes, source):
     where = f"data source {group.name!r}"
     stamps = group["timestamp"][()]
     data = [c["data"] for c in channels.values()]
-    samples = [stored(d) if source.stay and stays(d) else d[()] for d in data]
+    samples = [lazy_array(d) if source.lazy and is_large(d) else d[()] for d in data]
     for name, x in zip(channels, samples):
         if len(x) != len(stamps):
-            found = f"{len(x)} samples and {len(stamps)} time stamps"
-            raise source.error(f"{where}, channel {name!r}", found, COPY_AGAIN, reason="truncated")
+            problem = f"{len(x)} samples and {len(stamps)} time stamps"
+            raise source.error(f"{where}, channel {name!r}", problem, COPY_AGAIN, reason="truncated")
     if len(stamps) < 2:
         raise source.error(where, f"it has {len(stamps)} samples", COPY_AGAIN, reason="empty")
-    rates = {float(c.attrs[k]) for c in channels.values() for k in set(FREQUENCY).intersection(c.attrs)} - {0.0}
+    rates = {float(c.attrs[k]) for c in channels.values() for k in set(FREQUENCY_ATTRIBUTES).intersection(c.attrs)} - {
+        0.0
+    }
     if len(rates) > 1:
         raise source.error(where, f"its channels name different frequencies: {sorted(rates)} Hz", reason="wrong_rate")
     time = (stamps - stamps[0]) * 1e-9

@@ -15,12 +15,12 @@ from pathlib import Path
 import numpy as np
 
 from turnout.content import sha256_of
-from turnout.errors import ReadError, TurnoutError, of_the_machine
-from turnout.records import NOTHING
+from turnout.errors import ReadError, TurnoutError, is_infrastructure
+from turnout.records import EMPTY_MAPPING
 
 COPY_AGAIN = "Copy the file again from the logger"
 SYSTEM_ERROR = re.compile(r"errno = (\d{1,9})\b")
-MOST = 1032  # largest ratio of unpacked to packed bytes: the bound of deflate
+MAX_COMPRESSION_RATIO = 1032  # largest ratio of unpacked to packed bytes: the bound of deflate
 # Metadata that any format may store with the samples; they become Recording.conditions.
 CONDITIONS = (
     "rail_temperature",
@@ -60,7 +60,7 @@ class Source:
     name: str
     size: int
     head: bytes
-    stay: bool = False
+    lazy: bool = False
 
     @cached_property
     def data(self) -> bytes:
@@ -87,9 +87,9 @@ class Source:
             return hashlib.sha256(self.data).hexdigest()
         return sha256_of(self.path)
 
-    def error(self, where, found, remedy=COPY_AGAIN, reason="unreadable") -> ReadError:
+    def error(self, where, problem, remedy=COPY_AGAIN, reason="unreadable") -> ReadError:
         """The ReadError of this file at ``where``."""
-        return ReadError(self.name, where, found, remedy, reason=reason)
+        return ReadError(self.name, where, problem, remedy, reason=reason)
 
     @contextmanager
     def parsed_by(self, library, where="the file", reason="unreadable"):
@@ -102,25 +102,29 @@ class Source:
         except TurnoutError:
             raise
         except Exception as error:
-            said = " ".join(str(error).split())[:200] or type(error).__name__
-            fault = None if _asks_for_more_than(MOST * self.size, error) else _fault_of_the_machine(error)
+            message = " ".join(str(error).split())[:200] or type(error).__name__
+            fault = (
+                None
+                if _requests_more_memory_than(MAX_COMPRESSION_RATIO * self.size, error)
+                else _infrastructure_error(error)
+            )
             if fault is error:
                 raise
             if fault:
                 raise fault from error
-            raise self.error(where, f"{library} cannot read it ({said})", reason=reason) from error
+            raise self.error(where, f"{library} cannot read it ({message})", reason=reason) from error
 
 
-def _fault_of_the_machine(error):
+def _infrastructure_error(error):
     """``error`` if it is a fault of the machine, an OSError if the text of an HDF5 error states one, else None."""
-    if of_the_machine(error):
+    if is_infrastructure(error):
         return error
-    told = SYSTEM_ERROR.search(str(error))
-    fault = OSError(int(told[1]), str(error)) if told else None
-    return fault if fault and of_the_machine(fault) else None
+    match = SYSTEM_ERROR.search(str(error))
+    fault = OSError(int(match[1]), str(error)) if match else None
+    return fault if fault and is_infrastructure(fault) else None
 
 
-def _asks_for_more_than(n_byte, error):
+def _requests_more_memory_than(n_byte, error):
     """Whether numpy failed to allocate an array of more bytes: such a length comes from damaged bytes."""
     shape, dtype = getattr(error, "shape", None), getattr(error, "dtype", None)
     return shape is not None and dtype is not None and math.prod(shape) * dtype.itemsize > n_byte
@@ -142,7 +146,7 @@ class RawRecord:
     units: tuple[str, ...] = ()
     rate_tolerance: float = 1e-9
     started_at: datetime | None = None
-    conditions: Mapping = field(default_factory=lambda: NOTHING)
+    conditions: Mapping = field(default_factory=lambda: EMPTY_MAPPING)
     time: np.ndarray | None = None
     aliases: tuple[tuple[str, ...], ...] = ()
     unclear: tuple[tuple[str, float], ...] = ()
@@ -164,7 +168,7 @@ class RawFile:
     expected: int | None = None
 
 
-HEAD = 4096  # bytes, enough for every signature
+HEAD_SIZE = 4096  # bytes, enough for every signature
 
 
 def load(path, root) -> Source:
@@ -173,26 +177,28 @@ def load(path, root) -> Source:
     A symbolic link that leads out of the raw root is an error.
     """
     root = Path(root)
-    inside = "Put the file under the raw root or correct the turnout's pattern"
+    remedy = "Put the file under the raw root or correct the turnout's pattern"
     try:
         base = root.resolve()
         resolved = (base / Path(path)).resolve()
     except (OSError, RuntimeError, ValueError) as error:
-        raise ReadError(path, "the path", f"it cannot be followed ({error})", inside, reason="outside_root") from error
+        raise ReadError(path, "the path", f"it cannot be followed ({error})", remedy, reason="outside_root") from error
     name = _name(path, root, base)
     if not resolved.is_relative_to(base):
-        raise ReadError(name, "the path", "it leads outside the raw root", inside, reason="outside_root")
+        raise ReadError(name, "the path", "it leads outside the raw root", remedy, reason="outside_root")
     try:
         with resolved.open("rb") as file:
-            head, size = file.read(HEAD), os.fstat(file.fileno()).st_size
+            head, size = file.read(HEAD_SIZE), os.fstat(file.fileno()).st_size
     except (FileNotFoundError, NotADirectoryError) as error:
-        again = "Correct the path; if it was there before, start again when it is back, or plan anew without it"
-        raise ReadError(name, "the path", "there is no such file", again, reason="vanished") from error
+        vanished_remedy = (
+            "Correct the path; if it was there before, start again when it is back, or plan anew without it"
+        )
+        raise ReadError(name, "the path", "there is no such file", vanished_remedy, reason="vanished") from error
     except OSError as error:
-        if of_the_machine(error) and not isinstance(error, PermissionError):
+        if is_infrastructure(error) and not isinstance(error, PermissionError):
             raise
-        found = f"the file cannot be opened ({error.strerror})"
-        raise ReadError(name, "the path", found, "Correct its permissions or copy it again") from error
+        problem = f"the file cannot be opened ({error.strerror})"
+        raise ReadError(name, "the path", problem, "Correct its permissions or copy it again") from error
     if not size:
         raise ReadError(name, "byte 0", "the file has no bytes", "Copy the file again from the logger", reason="empty")
     return Source(resolved, name, size, head)

@@ -10,51 +10,53 @@ from contextlib import nullcontext
 import nptdms
 
 from turnout.errors import ReadError
-from turnout.readers.lazy import Column
-from turnout.readers.named_arrays import COUNT, START, Facts, natural
+from turnout.readers.lazy import LazyColumn
+from turnout.readers.named_arrays import RECORD_COUNT_NAMES, START_NAMES, Metadata, natural_sort_key
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord
-from turnout.readers.timing import check_together, moment, seconds_behind, step_precision
+from turnout.readers.timing import check_simultaneous, parse_time, start_offsets, step_precision
 
 nptdms.log.log_manager.set_level("ERROR")  # find_truncation turns what it would warn of into an error
 LEAD_IN = 28  # bytes: tag, mask, version, offset of the next segment, offset of the raw data
-UNFINISHED = 0xFFFFFFFFFFFFFFFF
+UNFINISHED_SEGMENT = 0xFFFFFFFFFFFFFFFF
 
 
 def read_raw(source) -> RawFile:
     """Records of a TDMS file, in the natural order of the groups' names."""
     file = source.path.open("rb")  # not the path: npTDMS would use an index file in the same folder
-    with nullcontext() if source.stay else file:
-        cut = cut_off(file, source.size)
-        with source.parsed_by("npTDMS", reason="truncated" if cut else "unreadable"):
+    with nullcontext() if source.lazy else file:
+        truncation = find_truncation(file, source.size)
+        with source.parsed_by("npTDMS", reason="truncated" if truncation else "unreadable"):
             file.seek(0)
-            tdms = nptdms.TdmsFile.open(file) if source.stay else nptdms.TdmsFile.read(file)
-    groups = sorted((g for g in tdms.groups() if any(len(c) for c in g.channels())), key=lambda g: natural(g.name))
+            tdms = nptdms.TdmsFile.open(file) if source.lazy else nptdms.TdmsFile.read(file)
+    groups = sorted(
+        (g for g in tdms.groups() if any(len(c) for c in g.channels())), key=lambda g: natural_sort_key(g.name)
+    )
     names = {channel.name for group in groups for channel in group.channels()}
-    damaged = _damaged(tdms) if cut else set()
+    damaged = _damaged_paths(tdms) if truncation else set()
     records = [_record(g, k, len(groups), names, damaged, tdms.properties, source) for k, g in enumerate(groups)]
-    if cut and not any(isinstance(r, ReadError) for r in records):
-        records.append(source.error(f"record {len(records) + 1}", cut, COPY_AGAIN, reason="truncated"))
-    return RawFile(tuple(records), Facts(tdms.properties, source).count(COUNT))
+    if truncation and not any(isinstance(r, ReadError) for r in records):
+        records.append(source.error(f"record {len(records) + 1}", truncation, COPY_AGAIN, reason="truncated"))
+    return RawFile(tuple(records), Metadata(tdms.properties, source).count(RECORD_COUNT_NAMES))
 
 
-def cut_off(file, size: int) -> str:
+def find_truncation(file, size: int) -> str:
     """Text that says where a file of ``size`` bytes is truncated; "" for a complete one."""
-    at = 0
-    while at < size:
-        file.seek(at)
+    position = 0
+    while position < size:
+        file.seek(position)
         lead_in = file.read(LEAD_IN)
         if len(lead_in) < LEAD_IN:
             return f"it ends within the lead-in of a segment, at byte {size}"
-        ahead = struct.unpack_from("<Q", lead_in, 12)[0]
+        segment_size = struct.unpack_from("<Q", lead_in, 12)[0]
         if lead_in[:4] != b"TDSm":
-            return f"there is no segment at byte {at}"
-        if ahead == UNFINISHED:
-            return f"the segment at byte {at} was never finished by the logger"
-        at += LEAD_IN + ahead
-    return "" if at == size else f"it ends at byte {size} of {at}"
+            return f"there is no segment at byte {position}"
+        if segment_size == UNFINISHED_SEGMENT:
+            return f"the segment at byte {position} was never finished by the logger"
+        position += LEAD_IN + segment_size
+    return "" if position == size else f"it ends at byte {size} of {position}"
 
 
-def _damaged(tdms):
+def _damaged_paths(tdms):
     """Paths of the channels of the last, incomplete segment."""
     statuses = tdms.file_status.channel_statuses or {}
     return {path for path, status in statuses.items() if status.read_length < status.expected_length}
@@ -63,35 +65,35 @@ def _damaged(tdms):
 def _record(group, *context):
     """One group as a record, or its error."""
     try:
-        return _sound_record(group, *context)
+        return _complete_record(group, *context)
     except ReadError as error:
         return error
 
 
-def _sound_record(group, k, n, names, damaged, properties, source):
+def _complete_record(group, k, n, names, damaged, properties, source):
     where = f"record {k + 1} of {n} (group {group.name!r})"
     channels = group.channels()
     if missing := names - {c.name for c in channels}:
-        found = f"it lacks the channel {min(missing)!r} that other groups have"
-        raise source.error(where, found, COPY_AGAIN, reason="truncated")
+        problem = f"it lacks the channel {min(missing)!r} that other groups have"
+        raise source.error(where, problem, COPY_AGAIN, reason="truncated")
     for channel in channels:
-        promised = Facts(channel.properties, source).number(("wf_samples",))
+        promised = Metadata(channel.properties, source).number(("wf_samples",))
         # for a channel written in several segments it counts the samples of the last one
         if channel.path in damaged or (promised and len(channel) < promised):
-            found = f"ends after {len(channel)}{f' of {promised:g}' if promised else ''} samples"
+            problem = f"ends after {len(channel)}{f' of {promised:g}' if promised else ''} samples"
             place = f"{where}, channel {channel.name!r}"
-            raise source.error(place, found, COPY_AGAIN, reason="truncated")
+            raise source.error(place, problem, COPY_AGAIN, reason="truncated")
     step = _common_step(channels, where, source)
-    stated = {"rate": 1.0 / step, "rate_tolerance": step_precision(step)} if step else None
+    rate_fields = {"rate": 1.0 / step, "rate_tolerance": step_precision(step)} if step else None
     with source.parsed_by("npTDMS", where):
-        samples = [_numbers(c, source.stay) for c in channels]
-    facts = Facts({**properties, **group.properties, **channels[0].properties}, source)
+        samples = [_numbers(c, source.lazy) for c in channels]
+    facts = Metadata({**properties, **group.properties, **channels[0].properties}, source)
     return RawRecord(
         names=tuple(c.name for c in channels),
         samples=samples,
-        **(stated or facts.rated()),
+        **(rate_fields or facts.rate_fields()),
         units=tuple(str(c.properties.get("unit_string", "") or "") for c in channels),
-        started_at=moment(facts.one(("wf_start_time", *START), 0, 1)),
+        started_at=parse_time(facts.record_value(("wf_start_time", *START_NAMES), 0, 1)),
         conditions=facts.conditions(0, 1),
         aliases=tuple((f"{group.name}/{c.name}",) for c in channels),
     )
@@ -99,16 +101,16 @@ def _sound_record(group, k, n, names, damaged, properties, source):
 
 def _common_step(channels, where, source):
     """Step [s] of all channels, 0 if not stated; a channel begins at its time stamp plus ``wf_start_offset``."""
-    facts = [Facts(c.properties, source) for c in channels]
+    facts = [Metadata(c.properties, source) for c in channels]
     steps = [f.number(("wf_increment",)) or 0.0 for f in facts]
-    stamps = seconds_behind([moment(f.one(("wf_start_time",), 0, 1)) for f in facts])
+    stamps = start_offsets([parse_time(f.record_value(("wf_start_time",), 0, 1)) for f in facts])
     starts = [stamp + (f.number(("wf_start_offset",)) or 0.0) for stamp, f in zip(stamps, facts)]
-    check_together([c.name for c in channels], steps, starts, where, source)
+    check_simultaneous([c.name for c in channels], steps, starts, where, source)
     return steps[0]
 
 
-def _numbers(channel, stay):
+def _numbers(channel, lazy):
     """All numbers of a channel, or a lazy column: npTDMS can skip what is not requested."""
-    if not stay or channel.dtype.kind not in "fiu":
+    if not lazy or channel.dtype.kind not in "fiu":
         return channel[:]
-    return Column(lambda start, stop: channel.read_data(start, stop - start), len(channel), channel.dtype)
+    return LazyColumn(lambda start, stop: channel.read_data(start, stop - start), len(channel), channel.dtype)

@@ -14,10 +14,10 @@ import numpy as np
 
 from turnout.errors import ReadError
 
-PART = 2**18  # samples of a time column that are checked at a time
-USUAL = 2**21  # samples whose median step is the usual step
-DRIFT = 1e-4  # relative: two clocks of one logger with separate crystals may differ by this much
-PER_SECOND = (1.0, 1e3, 1e6)  # a time column without unit may be in s, ms or µs
+BLOCK_SIZE = 2**18  # samples of a time column that are checked at a time
+STEP_SAMPLES = 2**21  # samples whose median step is the usual step
+MAX_CLOCK_DRIFT = 1e-4  # relative: two clocks of one logger with separate crystals may differ by this much
+TIME_UNITS_PER_SECOND = (1.0, 1e3, 1e6)  # a time column without unit may be in s, ms or µs
 
 
 def rate_of_time(time):
@@ -47,37 +47,37 @@ def rate_of_time(time):
     """
     time = np.asarray(time, dtype=float)
     span = time[-1] - time[0]
-    step = float(np.median(np.diff(time[:USUAL])))
-    for start, part in _parts(time):
-        jumps = np.abs(np.diff(part) - step) > 0.5 * step
+    step = float(np.median(np.diff(time[:STEP_SAMPLES])))
+    for start, block in _blocks(time):
+        jumps = np.abs(np.diff(block) - step) > 0.5 * step
         if jumps.any():
             return 1.0 / step, 1e-9, start + int(np.argmax(jumps))
     rate = (time.size - 1) / span
     deviation = max(
-        np.abs(part - time[0] - np.arange(start, start + part.size) / rate).max() for start, part in _parts(time)
+        np.abs(block - time[0] - np.arange(start, start + block.size) / rate).max() for start, block in _blocks(time)
     )
     return float(rate), float(max(2 * deviation / span, 1e-9)), None
 
 
-def _parts(time):
+def _blocks(time):
     """(first index, samples) of consecutive blocks that share one sample; so hours need little memory."""
-    for start in range(0, max(time.size - 1, 1), PART):
-        yield start, time[start : start + PART + 1]
+    for start in range(0, max(time.size - 1, 1), BLOCK_SIZE):
+        yield start, time[start : start + BLOCK_SIZE + 1]
 
 
 def check_time(time, where, source):
     """ReadError if a time column runs backwards, is not finite, jumps over missing samples, or is not even."""
-    for start, part in _parts(time):
-        if not np.isfinite(part).all():
-            found = f"the time of sample {start + int(np.argmin(np.isfinite(part)))} is not a number"
-            raise source.error(where, found, reason="not_finite")
-    backwards = (start + int(np.argmax(b)) for start, part in _parts(time) if (b := np.diff(part) <= 0).any())
+    for start, block in _blocks(time):
+        if not np.isfinite(block).all():
+            problem = f"the time of sample {start + int(np.argmin(np.isfinite(block)))} is not a number"
+            raise source.error(where, problem, reason="not_finite")
+    backwards = (start + int(np.argmax(b)) for start, block in _blocks(time) if (b := np.diff(block) <= 0).any())
     if (k := next(backwards, None)) is not None:
-        found = (
+        problem = (
             f"the clock runs backwards or stands still: sample {k} at {time[k]:.9g} s, the next at {time[k + 1]:.9g} s"
         )
         remedy = "Check the logger's clock and export the record again"
-        raise source.error(where, found, remedy, reason="clock_backwards")
+        raise source.error(where, problem, remedy, reason="clock_backwards")
     rate, _, gap = rate_of_time(time)
     if gap is not None:
         raise source.error(
@@ -95,31 +95,31 @@ def _check_even(time, rate, where, source):
     Rounding to printed digits stays within one step, or time would stand still. Each block has its own line, because
     over hours the temperature shifts a crystal by many steps.
     """
-    for start, part in _parts(time):
-        steps = np.arange(part.size)
-        off = np.abs((part - part[0]) * rate - steps)
-        if (odd := off > 1.0 + DRIFT * steps).any():
-            k = int(np.argmax(odd))
-            found = (
-                f"its time column is not even: sample {start + k}, at {part[k]:.9g} s, is {off[k]:.3g} steps from "
+    for start, block in _blocks(time):
+        steps = np.arange(block.size)
+        offsets = np.abs((block - block[0]) * rate - steps)
+        if (is_uneven := offsets > 1.0 + MAX_CLOCK_DRIFT * steps).any():
+            k = int(np.argmax(is_uneven))
+            problem = (
+                f"its time column is not even: sample {start + k}, at {block[k]:.9g} s, is {offsets[k]:.3g} steps from "
                 f"where {rate:.6g} Hz put it"
             )
             remedy = "Check the logger's clock, or export the record at an even rate"
-            raise source.error(where, found, remedy, reason="wrong_rate")
+            raise source.error(where, problem, remedy, reason="wrong_rate")
 
 
-def _refuse_another(unclear, promised, source):
+def _check_unclear_lines(unclear, promised, source):
     """ReadError if a file states frequencies in unknown words and none of them is the rate of the layout."""
     if unclear and all(abs(frequency - promised) > 1e-3 * promised for _, frequency in unclear):
         line = unclear[0][0][:60]
-        found = f"{line!r} may be a sampling rate, and the layout's is {promised:.9g} Hz"
+        problem = f"{line!r} may be a sampling rate, and the layout's is {promised:.9g} Hz"
         remedy = (
             f"Correct the rate in the layout; if that line means something else, write 'rate: {promised:.9g}' above it"
         )
-        raise source.error("the head", found, remedy, reason="wrong_rate")
+        raise source.error("the head", problem, remedy, reason="wrong_rate")
 
 
-def settled_rate(record, promised, where, source):
+def resolve_rate(record, promised, where, source):
     """The rate of the layout if that of the file agrees with it to the file's precision; without one, that of the file.
 
     A rate printed with few digits (UFF58: 1/51200 s as 1.95312E-05) becomes the whole number of Hz with the same
@@ -132,18 +132,18 @@ def settled_rate(record, promised, where, source):
             raise source.error(
                 where, "neither the file nor the layout says the sampling rate", remedy, reason="wrong_rate"
             )
-        _refuse_another(record.unclear, promised, source)
+        _check_unclear_lines(record.unclear, promised, source)
         return float(promised)
     if promised is not None:
-        drift = DRIFT if record.rate is None else 0.0  # a time column has a clock of its own
+        drift = MAX_CLOCK_DRIFT if record.rate is None else 0.0  # a time column has a clock of its own
         if abs(rate - promised) > (tolerance + drift) * promised:
             remedy = "Correct the rate in the layout, or find out why the logger was set differently"
-            found = f"sampled at {rate:.9g} Hz instead of {promised:.9g} Hz"
-            raise source.error(where, found, remedy, reason="wrong_rate")
+            problem = f"sampled at {rate:.9g} Hz instead of {promised:.9g} Hz"
+            raise source.error(where, problem, remedy, reason="wrong_rate")
         return float(promised)
     whole = round(rate)
-    unique = rate * tolerance < 0.5
-    return float(whole) if unique and abs(rate - whole) <= rate * tolerance else float(rate)
+    is_unique = rate * tolerance < 0.5
+    return float(whole) if is_unique and abs(rate - whole) <= rate * tolerance else float(rate)
 
 
 def _stated_rate(record, where, source):
@@ -156,106 +156,106 @@ def _stated_rate(record, where, source):
     measured, precision, _ = rate_of_time(record.time)
     if rate is None:
         return measured, precision
-    if all(abs(measured * n - rate) > (tolerance + precision + DRIFT) * rate for n in PER_SECOND):
-        found = f"its time column has {measured:.9g} samples a second, its rate says {rate:.9g} Hz"
+    if all(abs(measured * n - rate) > (tolerance + precision + MAX_CLOCK_DRIFT) * rate for n in TIME_UNITS_PER_SECOND):
+        problem = f"its time column has {measured:.9g} samples a second, its rate says {rate:.9g} Hz"
         remedy = "Find out which of them is right and export the record again with that one alone"
-        raise source.error(where, found, remedy, reason="wrong_rate")
+        raise source.error(where, problem, remedy, reason="wrong_rate")
     return rate, tolerance
 
 
-STAMP = "%Y-%m-%d %H:%M:%S.%f"
+TIME_FORMAT = "%Y-%m-%d %H:%M:%S.%f"
 
 
-def started_at(moment, time_zone):
+def to_utc(stamp, time_zone):
     """Naive UTC of a file's start time; a time stamp without a zone is in ``time_zone`` (IANA name).
 
     >>> from datetime import datetime
-    >>> started_at(datetime(2024, 5, 13, 12, 0), "Europe/Zurich")
+    >>> to_utc(datetime(2024, 5, 13, 12, 0), "Europe/Zurich")
     datetime.datetime(2024, 5, 13, 10, 0)
     """
-    if moment is None:
+    if stamp is None:
         return None
-    if moment.tzinfo is None:
-        moment = moment.replace(tzinfo=ZoneInfo(time_zone))
+    if stamp.tzinfo is None:
+        stamp = stamp.replace(tzinfo=ZoneInfo(time_zone))
     try:
-        return moment.astimezone(UTC).replace(tzinfo=None)
+        return stamp.astimezone(UTC).replace(tzinfo=None)
     except OverflowError:  # a damaged stamp in the year 1 or 9999
         return None
 
 
-def starts_of(moments, time_zone):
+def start_times(stamps, time_zone):
     """[(record, naive UTC)] of [(record, time stamp)] of one file, in its order.
 
     In the hour that comes twice in autumn a stamp means the first one, unless the record would precede its predecessor.
 
     >>> from datetime import datetime
     >>> stamps = enumerate([datetime(2024, 10, 27, 2, 55), datetime(2024, 10, 27, 2, 5)])
-    >>> [f"{start:%H:%M}" for _, start in starts_of(stamps, "Europe/Copenhagen")]
+    >>> [f"{start:%H:%M}" for _, start in start_times(stamps, "Europe/Copenhagen")]
     ['00:55', '01:05']
     """
-    found, latest = [], None
-    for record, moment in moments:
-        start = started_at(moment, time_zone)
-        if start is not None and latest is not None and start < latest and moment.tzinfo is None:
-            second = started_at(moment.replace(fold=1), time_zone)
+    starts, latest = [], None
+    for record, stamp in stamps:
+        start = to_utc(stamp, time_zone)
+        if start is not None and latest is not None and start < latest and stamp.tzinfo is None:
+            second = to_utc(stamp.replace(fold=1), time_zone)
             start = second if second is not None and second >= latest else start
-        found.append((record, start))
+        starts.append((record, start))
         latest = start if latest is None or (start is not None and start > latest) else latest
-    return found
+    return starts
 
 
 def check_order(starts, source):
     """{record: ReadError} for the fewest records without which all others are in order of time."""
     errors: dict[int, ReadError] = {}
-    known = [(record, start) for record, start in starts if start is not None]
-    kept = _in_order([start for _, start in known])
-    for i, (record, start) in enumerate(known):
-        n = bisect_left(kept, i)
-        if n < len(kept) and kept[n] == i:
+    timed = [(record, start) for record, start in starts if start is not None]
+    ordered = _longest_ordered([start for _, start in timed])
+    for i, (record, start) in enumerate(timed):
+        n = bisect_left(ordered, i)
+        if n < len(ordered) and ordered[n] == i:
             continue
-        if n and start < (front := known[kept[n - 1]][1]):
-            where = f"before the record in front of it ({front:{STAMP}})"
+        if n and start < (previous := timed[ordered[n - 1]][1]):
+            where = f"before the record in front of it ({previous:{TIME_FORMAT}})"
         else:
-            where = f"after a record behind it ({known[kept[n]][1]:{STAMP}})"
-        found = f"it began at {start:{STAMP}}, {where}"
+            where = f"after a record behind it ({timed[ordered[n]][1]:{TIME_FORMAT}})"
+        problem = f"it began at {start:{TIME_FORMAT}}, {where}"
         remedy = "Check the logger's clock and the time zone in the layout"
-        errors[record] = source.error(f"record {record + 1}", found, remedy, reason="clock_backwards")
+        errors[record] = source.error(f"record {record + 1}", problem, remedy, reason="clock_backwards")
     return errors
 
 
-def _in_order(starts):
+def _longest_ordered(starts):
     """Indices of the longest non-decreasing subsequence of ``starts``; of several, the earliest.
 
-    >>> _in_order([2099, 2001, 2002, 1970, 2002])
+    >>> _longest_ordered([2099, 2001, 2002, 1970, 2002])
     [1, 2, 4]
     """
     rank = {start: -k for k, start in enumerate(sorted(set(starts)))}
     ends: list[int] = []  # ends[n]: rank of the latest first start of all subsequences of n + 1 starts
-    ahead = [0] * len(starts)  # length of the longest subsequence from here on, this start included
+    n_following = [0] * len(starts)  # length of the longest subsequence from here on, this start included
     for i in reversed(range(len(starts))):
         k = bisect_right(ends, rank[starts[i]])
         ends[k : k + 1] = [rank[starts[i]]]
-        ahead[i] = k + 1
-    kept: list[int] = []
+        n_following[i] = k + 1
+    ordered: list[int] = []
     for i, start in enumerate(starts):
-        if ahead[i] == len(ends) - len(kept) and (not kept or start >= starts[kept[-1]]):
-            kept.append(i)
-    return kept
+        if n_following[i] == len(ends) - len(ordered) and (not ordered or start >= starts[ordered[-1]]):
+            ordered.append(i)
+    return ordered
 
 
 MATLAB_EPOCH = 719529  # datenum of 1970-01-01
-DOTTED = re.compile(r"(\d{1,2})\.\s?(\d{1,2})\.\s?(\d{4})[\sT,;]+(\d{1,2}):(\d{2}(?::\d{2}(?:[.,]\d{1,9})?)?)")
+DOTTED_DATE = re.compile(r"(\d{1,2})\.\s?(\d{1,2})\.\s?(\d{4})[\sT,;]+(\d{1,2}):(\d{2}(?::\d{2}(?:[.,]\d{1,9})?)?)")
 MONTHS = {m: i for i, m in enumerate("jan feb mar apr may jun jul aug sep oct nov dec".split(), start=1)}
 
 
-def moment(value):
+def parse_time(value):
     """datetime of ISO 8601 text, numpy datetime64 (UTC), seconds since 1970 (UTC) or a MATLAB datenum; else None.
 
     With dots the day comes first, "13.05.2024 10:00"; dates with slashes are ambiguous and not read.
 
     Examples
     --------
-    >>> moment("2024-05-13T10:00:00"), moment(719529.5)
+    >>> parse_time("2024-05-13T10:00:00"), parse_time(719529.5)
     (datetime.datetime(2024, 5, 13, 10, 0), datetime.datetime(1970, 1, 1, 12, 0))
     """
     if isinstance(value, datetime):
@@ -266,7 +266,7 @@ def moment(value):
     if isinstance(value, bytes):
         value = value.decode("utf-8", "replace")
     if isinstance(value, str):
-        if match := DOTTED.fullmatch(value.strip()):
+        if match := DOTTED_DATE.fullmatch(value.strip()):
             value = f"{match[3]}-{match[2]:0>2}-{match[1]:0>2}T{match[4]:0>2}:{match[5]}"
         try:
             return datetime.fromisoformat(value.strip())
@@ -280,12 +280,12 @@ def moment(value):
     return None
 
 
-def uff_moment(text):
+def parse_uff_time(text):
     """datetime of UFF's ID line 3, DD-MMM-YY HH:MM:SS; None for any other text.
 
     Two-digit years from 70 on are 1970 to 1999.
 
-    >>> uff_moment("18-Apr-16 13:49:58")
+    >>> parse_uff_time("18-Apr-16 13:49:58")
     datetime.datetime(2016, 4, 18, 13, 49, 58)
     """
     try:
@@ -299,16 +299,16 @@ def uff_moment(text):
         return None
 
 
-EXACT = 1e-9
-SINGLE = 2.0**-23  # one unit in the last place of a 32 bit float
-TEXT = 1e-6
-FEWEST_DIGITS = 4
+EXACT_PRECISION = 1e-9
+SINGLE_PRECISION = 2.0**-23  # one unit in the last place of a 32 bit float
+TEXT_PRECISION = 1e-6
+MIN_DIGITS = 4
 
 
-def single_precision(value: float) -> bool:
+def is_single_precision(value: float) -> bool:
     """Whether a number may have been stored as a 32 bit float.
 
-    >>> single_precision(float(np.float32(1 / 44100))), single_precision(1 / 44100)
+    >>> is_single_precision(float(np.float32(1 / 44100))), is_single_precision(1 / 44100)
     (True, False)
     """
     with np.errstate(over="ignore"):
@@ -325,35 +325,35 @@ def step_precision(step: float) -> float:
     4.4e-07 1.0e-09 1.0e-09
     """
     digits = repr(float(step)).partition("e")[0].replace(".", "").strip("0")
-    printed = 1.0 / int(digits) if digits.isdigit() and len(digits) >= FEWEST_DIGITS else 0.0
-    return max(EXACT, printed, SINGLE if single_precision(step) else 0.0)
+    printed = 1.0 / int(digits) if digits.isdigit() and len(digits) >= MIN_DIGITS else 0.0
+    return max(EXACT_PRECISION, printed, SINGLE_PRECISION if is_single_precision(step) else 0.0)
 
 
-def seconds_behind(moments):
+def start_offsets(stamps):
     """Start of each channel relative to the first one [s]; all 0 if not all time stamps are comparable.
 
     >>> from datetime import datetime
-    >>> seconds_behind([datetime(2024, 5, 13, 10, 0, 1), datetime(2024, 5, 13, 10, 0, 0, 500_000)])
+    >>> start_offsets([datetime(2024, 5, 13, 10, 0, 1), datetime(2024, 5, 13, 10, 0, 0, 500_000)])
     [0.0, -0.5]
     """
-    if None in moments or len({moment.tzinfo is None for moment in moments}) > 1:
-        return [0.0] * len(moments)
-    return [(moment - moments[0]).total_seconds() for moment in moments]
+    if None in stamps or len({stamp.tzinfo is None for stamp in stamps}) > 1:
+        return [0.0] * len(stamps)
+    return [(stamp - stamps[0]).total_seconds() for stamp in stamps]
 
 
-def check_together(names, steps, starts, where, source):
+def check_simultaneous(names, steps, starts, where, source):
     """ReadError if channels state different steps [s] (0: not stated), or starts [s] more than half a step apart.
 
     Multiplexed converters cause smaller differences of the starts.
     """
     step = steps[0]
-    if any(abs(other - step) > TEXT * abs(step) for other in steps):
-        found = f"its channels have different steps: {sorted(set(steps))} s"
+    if any(abs(channel_step - step) > TEXT_PRECISION * abs(step) for channel_step in steps):
+        problem = f"its channels have different steps: {sorted(set(steps))} s"
         remedy = "Record all channels at one rate, or export those of one rate to one file"
-        raise source.error(where, found, remedy, reason="wrong_rate")
-    early, late = min(starts), max(starts)
-    if step and late - early > 0.5 * abs(step):
-        first, last = names[starts.index(early)], names[starts.index(late)]
-        found = f"channel {last!r} begins {late - early:.6g} s after channel {first!r}"
+        raise source.error(where, problem, remedy, reason="wrong_rate")
+    earliest, latest = min(starts), max(starts)
+    if step and latest - earliest > 0.5 * abs(step):
+        first, last = names[starts.index(earliest)], names[starts.index(latest)]
+        problem = f"channel {last!r} begins {latest - earliest:.6g} s after channel {first!r}"
         remedy = "Start all channels by one trigger, or export them cut to the stretch that they share"
-        raise source.error(where, found, remedy, reason="clock_drift")
+        raise source.error(where, problem, remedy, reason="clock_drift")

@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.lazy import Column
+from turnout.readers.lazy import LazyColumn
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, load, number_or_text
-from turnout.readers.timing import check_together, uff_moment
-from turnout.readers.uff_datasets import UffSet, says_si, sets_of
+from turnout.readers.timing import check_simultaneous, parse_uff_time
+from turnout.readers.uff_datasets import UffDataset, declares_si, read_datasets
 
-PROMISED = re.compile(r"record \d+ of (\d+)$")
+PROMISED_RECORDS = re.compile(r"record \d+ of (\d+)$")
 TIME_RESPONSE, FREQUENCY_RESPONSE, TIME_AXIS = 1, 4, 17
 # Unit of a specific data type (records 9 and 10) without a label, if dataset 164 declares SI.
 SI_OF_TYPE = {8: "m", 9: "N", 11: "m/s", 12: "m/s²", 13: "N", 15: "Pa"}
@@ -44,60 +44,64 @@ def read_raw(source) -> RawFile:
     it is the same in all sets, the order of the channels defines the records. "record k of n" in ID line 5, as this
     program writes it, states n records.
     """
-    data = source.mapped if source.stay else source.data
-    everything = sets_of(data)
-    if source.stay:
-        everything = tuple(replace(s, data=_in_file(s.data, data, source.path)) for s in everything)
-    sets = [s for s in everything if s.kind in ("", "58", "58b")]
-    wanted = [s for s in sets if s.damage or _is_time(s)]
-    if not wanted or not any(s.kind for s in wanted):
-        found = wanted[0].damage if wanted else f"it holds {len(sets)} functions and no time response"
-        raise source.error(f"byte {wanted[0].offset if wanted else 0}", found, COPY_AGAIN)
-    return RawFile(tuple(_records(wanted, says_si(data, everything), source)), _promised(wanted))
+    data = source.mapped if source.lazy else source.data
+    all_sets = read_datasets(data)
+    if source.lazy:
+        all_sets = tuple(replace(s, data=_lazy_column(s.data, data, source.path)) for s in all_sets)
+    sets = [s for s in all_sets if s.dataset_type in ("", "58", "58b")]
+    wanted = [s for s in sets if s.damage or _is_time_response(s)]
+    if not wanted or not any(s.dataset_type for s in wanted):
+        problem = wanted[0].damage if wanted else f"it holds {len(sets)} functions and no time response"
+        raise source.error(f"byte {wanted[0].offset if wanted else 0}", problem, COPY_AGAIN)
+    return RawFile(tuple(_records(wanted, declares_si(data, all_sets), source)), _promised_count(wanted))
 
 
-def _promised(sets):
+def _promised_count(sets):
     """Number of records that the sets state for the file, or None."""
-    said = [m for s in sets if s.ids and (m := PROMISED.match(s.ids[4]))]
-    return max((int(m[1]) for m in said), default=None)
+    matches = [m for s in sets if s.ids and (m := PROMISED_RECORDS.match(s.ids[4]))]
+    return max((int(m[1]) for m in matches), default=None)
 
 
-def _in_file(numbers, mapped, path):
+def _lazy_column(numbers, mapped, path):
     """A lazy column of the bytes of the file that ``numbers`` is a view of; ``numbers`` itself if it is none."""
     base = np.frombuffer(mapped, np.uint8).__array_interface__["data"][0]
     offset = numbers.__array_interface__["data"][0] - base
     if not 0 <= offset <= len(mapped) - numbers.nbytes or not numbers.flags.c_contiguous or not numbers.size:
         return numbers
     dtype = numbers.dtype
-    return Column(
+    return LazyColumn(
         lambda start, stop: np.fromfile(path, dtype, stop - start, offset=offset + start * dtype.itemsize),
         numbers.size,
         dtype,
     )
 
 
-def _is_time(one: UffSet):
-    return one.func_type == TIME_RESPONSE or (one.func_type == 0 and one.labels and one.labels[0][0] == TIME_AXIS)
+def _is_time_response(dataset: UffDataset):
+    return dataset.func_type == TIME_RESPONSE or (
+        dataset.func_type == 0 and dataset.labels and dataset.labels[0][0] == TIME_AXIS
+    )
 
 
-def _records(sets, si, source):
+def _records(sets, is_si, source):
     """RawRecord or ReadError per record, in order."""
     nameless = [s for s in sets if not s.labels]
     named = [s for s in sets if s.labels]
-    keys = [_names_of(s) for s in named]
+    keys = [_channel_key(s) for s in named]
     per_key = Counter(keys)
     channels = list(dict.fromkeys(keys))
     numbers = [s.sequence for s in named]
     if len(set(zip(keys, numbers))) == len(named) and len(set(numbers)) > 1:
         span = range(min(numbers), max(numbers) + 1)
-        whole = len(span) <= len(set(numbers)) + len(nameless)  # else the logger's own numbering has gaps
-        groups: dict[int, dict] = {n: {} for n in (span if whole else sorted(set(numbers)))}
-        for key, number, one in zip(keys, numbers, named):
-            groups[number][key] = one
+        is_dense = len(span) <= len(set(numbers)) + len(nameless)  # else the logger's own numbering has gaps
+        groups: dict[int, dict] = {n: {} for n in (span if is_dense else sorted(set(numbers)))}
+        for key, number, dataset in zip(keys, numbers, named):
+            groups[number][key] = dataset
         ordered = list(groups.values())
     elif nameless and len(named) > len(channels) and nameless[0].offset < named[-1].offset:
-        found = "a set without readable header stands between others, and no sequence numbers say which belong together"
-        raise source.error(f"byte {nameless[0].offset}", f"{nameless[0].damage}; {found}")
+        problem = (
+            "a set without readable header stands between others, and no sequence numbers say which belong together"
+        )
+        raise source.error(f"byte {nameless[0].offset}", f"{nameless[0].damage}; {problem}")
     else:
         interleaved = all(key == channels[i % len(channels)] for i, key in enumerate(keys))
         if (
@@ -106,39 +110,44 @@ def _records(sets, si, source):
             and sum(keys[i] != keys[i - 1] for i in range(1, len(keys))) > len(channels)
         ):
             raise source.error("the sets", "channels come in no regular order and carry no sequence numbers")
-        seen: Counter[tuple] = Counter()
+        n_taken: Counter[tuple] = Counter()
         ordered = [{} for _ in range(max(per_key.values(), default=0))]
-        for key, one in zip(keys, named):
-            ordered[seen[key]][key] = one
-            seen[key] += 1
+        for key, dataset in zip(keys, named):
+            ordered[n_taken[key]][key] = dataset
+            n_taken[key] += 1
     n = len(ordered)
     for k, group in enumerate(ordered):
-        yield _record(group, channels, k, n, si, source)
-    for one in nameless:
-        yield source.error(f"record {n + 1}, byte {one.offset}", one.damage, COPY_AGAIN, reason="truncated")
+        yield _record(group, channels, k, n, is_si, source)
+    for dataset in nameless:
+        yield source.error(f"record {n + 1}, byte {dataset.offset}", dataset.damage, COPY_AGAIN, reason="truncated")
 
 
-def _names_of(one: UffSet):
+def _channel_key(dataset: UffDataset):
     """Key of a set's channel: all its names."""
-    return (one.ids[0] if one.ids[0] not in ("", "NONE") else "", *one.response, one.labels[1][1], one.labels[1][2])
+    return (
+        dataset.ids[0] if dataset.ids[0] not in ("", "NONE") else "",
+        *dataset.response,
+        dataset.labels[1][1],
+        dataset.labels[1][2],
+    )
 
 
-def _record(group, channels, k, n, si, source):
+def _record(group, channels, k, n, is_si, source):
     """One record from the sets of its channels, or its error."""
     for key in channels:
-        one = group.get(key)
-        if one is None:
-            found = f"channel {_call(key)!r} is missing from this record"
-            return source.error(f"record {k + 1} of {n}", found, COPY_AGAIN, reason="truncated")
-        if one.damage:
-            place = f"record {k + 1} of {n}, channel {_call(key)!r}, byte {one.offset}"
-            return source.error(place, one.damage, COPY_AGAIN, reason="truncated")
+        dataset = group.get(key)
+        if dataset is None:
+            problem = f"channel {_channel_name(key)!r} is missing from this record"
+            return source.error(f"record {k + 1} of {n}", problem, COPY_AGAIN, reason="truncated")
+        if dataset.damage:
+            place = f"record {k + 1} of {n}, channel {_channel_name(key)!r}, byte {dataset.offset}"
+            return source.error(place, dataset.damage, COPY_AGAIN, reason="truncated")
     sets = [group[key] for key in channels]
     first = sets[0]
-    names, aliases = _distinct(channels)
+    names, aliases = _distinct_names(channels)
     starts, steps = zip(*map(_axis, sets))
     try:
-        check_together(names, steps, starts, f"record {k + 1} of {n}", source)
+        check_simultaneous(names, steps, starts, f"record {k + 1} of {n}", source)
     except ReadError as error:
         return error
     return RawRecord(
@@ -146,44 +155,44 @@ def _record(group, channels, k, n, si, source):
         samples=[s.data for s in sets],
         rate=1.0 / first.step if first.x is None and first.step > 0 else None,
         rate_tolerance=_precision(first.step_text),
-        units=tuple(_unit(s.labels[1], si) for s in sets),
-        started_at=uff_moment(first.ids[2]),
+        units=tuple(_unit(s.labels[1], is_si) for s in sets),
+        started_at=parse_uff_time(first.ids[2]),
         conditions=_conditions(first.ids[3]),
         time=first.x,
         aliases=aliases,
     )
 
 
-def _axis(one):
+def _axis(dataset):
     """(start, mean step) of a set's abscissa [s]."""
-    if one.x is None or len(one.x) < 2:
-        return one.start, one.step
-    return float(one.x[0]), float(one.x[-1] - one.x[0]) / (len(one.x) - 1)
+    if dataset.x is None or len(dataset.x) < 2:
+        return dataset.start, dataset.step
+    return float(dataset.x[0]), float(dataset.x[-1] - dataset.x[0]) / (len(dataset.x) - 1)
 
 
-def _call(key):
+def _channel_name(key):
     """The name of a channel: ID line 1, or the first of its other names that is not empty."""
     return next(
-        (part for part in (key[0], key[1], key[4]) if part and part != "NONE"),
+        (name for name in (key[0], key[1], key[4]) if name and name != "NONE"),
         f"{key[2]} {DIRECTIONS.get(key[3], key[3])}",
     )
 
 
-def _distinct(channels):
+def _distinct_names(channels):
     """(names, aliases): the names are of the first type that differs for all channels."""
-    dofs = [_dof(("", *key[2:4])) for key in channels]
-    kinds = [[key[i] for key in channels] for i in (0, 1, 4)] + [dofs]
-    clear = [names for names in kinds if len(set(names)) == len(names) and not {"", "NONE"} & set(names)]
-    names = clear[0] if clear else [_call(key) for key in channels]
+    dofs = [_dof_name(("", *key[2:4])) for key in channels]
+    name_lists = [[key[i] for key in channels] for i in (0, 1, 4)] + [dofs]
+    distinct_lists = [names for names in name_lists if len(set(names)) == len(names) and not {"", "NONE"} & set(names)]
+    names = distinct_lists[0] if distinct_lists else [_channel_name(key) for key in channels]
     aliases = tuple(tuple(a for a in (key[0], key[1], key[4], dof) if a) for key, dof in zip(channels, dofs))
     return tuple(names), aliases
 
 
-def _unit(axis, si):
+def _unit(axis, is_si):
     """Unit of an ordinate: its label, else the unit of its data type if the file declares SI."""
-    kind, _, label = axis
+    data_type, _, label = axis
     blank = label.upper() in ("", "NONE", "UNKNOWN")
-    return (SI_OF_TYPE.get(kind, "") if si else "") if blank else label
+    return (SI_OF_TYPE.get(data_type, "") if is_si else "") if blank else label
 
 
 def _precision(text):
@@ -198,7 +207,7 @@ def _precision(text):
 
 def _conditions(text):
     """Conditions in ID line 4, as in "rail_temperature=12.3; track=main"; other text is ignored."""
-    pairs = dict(part.strip().split("=", 1) for part in text.split(";") if part.count("=") == 1)
+    pairs = dict(item.strip().split("=", 1) for item in text.split(";") if item.count("=") == 1)
     return {name: number_or_text(value) for name, value in pairs.items() if name in CONDITIONS}
 
 
@@ -214,13 +223,13 @@ def read_frf(path, root=".") -> FrequencyResponses:
     if data[:2] == b"\x1f\x8b":
         with source.parsed_by("gzip"):
             data = gzip.decompress(data)
-    everything = sets_of(data)
-    si = says_si(data, everything)
-    functions = [s for s in everything if s.kind in ("58", "58b")]
+    all_sets = read_datasets(data)
+    is_si = declares_si(data, all_sets)
+    functions = [s for s in all_sets if s.dataset_type in ("58", "58b")]
     sets = [s for s in functions if s.damage or s.func_type == FREQUENCY_RESPONSE]
-    for one in sets:
-        if one.damage:
-            raise source.error(f"byte {one.offset}", one.damage, COPY_AGAIN, reason="truncated")
+    for dataset in sets:
+        if dataset.damage:
+            raise source.error(f"byte {dataset.offset}", dataset.damage, COPY_AGAIN, reason="truncated")
     if not sets:
         raise source.error("the file", "it holds no frequency response (function type 4)", "Export frequency responses")
     axes = [s.x if s.x is not None else s.start + s.step * np.arange(len(s.data)) for s in sets]
@@ -231,19 +240,19 @@ def read_frf(path, root=".") -> FrequencyResponses:
     return FrequencyResponses(
         frequency=axes[0],
         frf=np.vstack([s.data for s in sets]),
-        units=tuple(_frf_unit(s, si) for s in sets),
-        responses=tuple(_dof(s.response) for s in sets),
-        references=tuple(_dof(s.reference) for s in sets),
+        units=tuple(_frf_unit(s, is_si) for s in sets),
+        responses=tuple(_dof_name(s.response) for s in sets),
+        references=tuple(_dof_name(s.reference) for s in sets),
         names=tuple(s.ids[0] for s in sets),
     )
 
 
-def _frf_unit(one, si):
-    top, bottom = (_unit(axis, si) for axis in one.labels[1:3])
-    return top if not bottom or "/N" in top else f"({top})/({bottom})"
+def _frf_unit(dataset, is_si):
+    numerator, denominator = (_unit(axis, is_si) for axis in dataset.labels[1:3])
+    return numerator if not denominator or "/N" in numerator else f"({numerator})/({denominator})"
 
 
-def _dof(dof):
+def _dof_name(dof):
     name, node, direction = dof
     name = "" if name == "NONE" else name
     return f"{name} {node} {DIRECTIONS.get(direction, direction)}".strip()

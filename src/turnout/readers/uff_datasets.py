@@ -25,18 +25,18 @@ class Delimiter:
     end: int
 
 
-def delimiter(data: bytes | mmap, position: int) -> Delimiter | None:
+def find_delimiter(data: bytes | mmap, position: int) -> Delimiter | None:
     """The first delimiter from ``position`` on; plain search, because a regular expression is slow on large files."""
-    at = position
-    while (at := data.find(b"    -1", at)) >= 0:
-        rest = REST_OF_LINE.match(data, at + 6)
-        if rest and (at == 0 or data[at - 1] in b"\r\n"):
-            return Delimiter(at, rest.end())
-        at += 1
+    start = position
+    while (start := data.find(b"    -1", start)) >= 0:
+        line_end = REST_OF_LINE.match(data, start + 6)
+        if line_end and (start == 0 or data[start - 1] in b"\r\n"):
+            return Delimiter(start, line_end.end())
+        start += 1
     return None
 
 
-def _per_value(header):
+def _numbers_per_value(header):
     """Numbers stored for each value."""
     return (2 if header["complex"] else 1) + (0 if header["even"] else 1)
 
@@ -48,33 +48,33 @@ def binary_numbers(data, at, header):
     declare single precision and write double.
     """
     if header["float_format"] not in (0, 2):
-        end = delimiter(data, at)
-        position = end.end if end else len(data)
+        closing_delimiter = find_delimiter(data, at)
+        position = closing_delimiter.end if closing_delimiter else len(data)
         return np.empty(0), position, f"floating-point format {header['float_format']} is not IEEE 754 (2)"
-    count = header["set"]["promised"] * _per_value(header)
+    count = header["set"]["promised"] * _numbers_per_value(header)
     sizes = {"d" if header["double"] else "f": count * (8 if header["double"] else 4), "d": count * 8}
     for letter, size in sizes.items():
-        if (closed := END_58B.match(data, at + size)) is not None:
-            return np.frombuffer(data, header["byte_order"] + letter, count, at), closed.end(), ""
+        if (closing_match := END_58B.match(data, at + size)) is not None:
+            return np.frombuffer(data, header["byte_order"] + letter, count, at), closing_match.end(), ""
     item = 8 if header["double"] else 4
-    late = END_58B.search(data, at)
-    stop = late.start() if late else len(data)
-    there = (stop - at) // item
-    kept = min(there, count)
-    values = np.frombuffer(data, f"{header['byte_order']}f{item}", kept, at)
-    per = _per_value(header)
-    damage = f"ends after {kept // per} of {header['set']['promised']} samples"
-    if there >= count:
+    closing = END_58B.search(data, at)
+    stop = closing.start() if closing else len(data)
+    n_stored = (stop - at) // item
+    n_read = min(n_stored, count)
+    values = np.frombuffer(data, f"{header['byte_order']}f{item}", n_read, at)
+    per_value = _numbers_per_value(header)
+    damage = f"ends after {n_read // per_value} of {header['set']['promised']} samples"
+    if n_stored >= count:
         damage = f"its {count * item} bytes are not followed by the closing -1"
-    return values, late.end() if late else len(data), damage
+    return values, closing.end() if closing else len(data), damage
 
 
 def ascii_numbers(data, at, header):
     """(numbers, position after the set, damage) of a 58 set: fixed columns, not always separated by blanks."""
-    end = delimiter(data, at)
-    damage = "" if end else "the set is not closed by -1"
-    body = data[at : end.start if end else len(data)]
-    position = end.end if end else len(data)
+    closing_delimiter = find_delimiter(data, at)
+    damage = "" if closing_delimiter else "the set is not closed by -1"
+    body = data[at : closing_delimiter.start if closing_delimiter else len(data)]
+    position = closing_delimiter.end if closing_delimiter else len(data)
     if header["even"]:
         widths = [20] * 4 if header["double"] else [13] * 6
     elif header["double"]:
@@ -103,25 +103,25 @@ def _numbers(body, widths):
         table = np.frombuffer(block, "S1").reshape(-1, width)
         columns = [np.ascontiguousarray(table[:, a:b]).view(f"S{b - a}") for a, b in _edges(widths)]
         values = np.hstack([c.astype(float) for c in columns]).ravel()
-    rest = [float(last[a:b].replace(b"D", b"E")) for a, b in _edges(widths) if last[a:b].strip()]
-    return np.concatenate([values, rest])
+    last_values = [float(last[a:b].replace(b"D", b"E")) for a, b in _edges(widths) if last[a:b].strip()]
+    return np.concatenate([values, last_values])
 
 
 def _edges(widths):
     return list(pairwise(np.cumsum([0, *widths])))
 
 
-def columns(values, header):
+def split_columns(values, header):
     """(ordinates, abscissae or None, damage) from the numbers of a set."""
-    per = _per_value(header)
+    per_value = _numbers_per_value(header)
     promised = header["set"]["promised"]
-    n = min(len(values) // per, promised)
+    n = min(len(values) // per_value, promised)
     damage = ""
-    if len(values) < promised * per:
-        damage = f"ends after {len(values) // per} of {promised} samples"
-    elif len(values) > promised * per:
-        damage = f"has {len(values) // per} samples where its header says {promised}"
-    table = np.asarray(values[: n * per]).reshape(n, per)
+    if len(values) < promised * per_value:
+        damage = f"ends after {len(values) // per_value} of {promised} samples"
+    elif len(values) > promised * per_value:
+        damage = f"has {len(values) // per_value} samples where its header says {promised}"
+    table = np.asarray(values[: n * per_value]).reshape(n, per_value)
     x = None if header["even"] else np.ascontiguousarray(table[:, 0], dtype=float)
     if header["complex"]:
         return table[:, -2] + 1j * table[:, -1], x, damage
@@ -132,7 +132,7 @@ HEADER_LINES = 12  # from the set's number to record 11
 
 
 @dataclass(frozen=True)
-class UffSet:
+class UffDataset:
     """One function at nodal degree of freedom. ``damage`` is empty for an intact set.
 
     ``func_type`` 1 is a time response, 4 a frequency response; ``data`` are the ordinates (float or complex),
@@ -141,7 +141,7 @@ class UffSet:
     """
 
     offset: int
-    kind: str
+    dataset_type: str
     ids: tuple[str, ...] = ()
     func_type: int = 0
     sequence: int = 0
@@ -157,31 +157,31 @@ class UffSet:
     damage: str = ""
 
 
-def sets_of(data: bytes | mmap) -> tuple[UffSet, ...]:
+def read_datasets(data: bytes | mmap) -> tuple[UffDataset, ...]:
     """All data sets of a file in their order; sets of other types have only ``dataset_type`` and ``offset``."""
-    found = []
+    datasets = []
     position = 0
-    while (begin := delimiter(data, position)) is not None:
+    while (begin := find_delimiter(data, position)) is not None:
         if len(data) - begin.end < 200 and not data[begin.end :].strip():
-            found.append(UffSet(begin.start, "", damage="a delimiter opens a set that never comes"))
+            datasets.append(UffDataset(begin.start, "", damage="a delimiter opens a set that never comes"))
             break
         # the opening delimiter of this set was used as the end of an unclosed set before it
         if data[begin.end : begin.end + 6] == b"    -1":
-            found.append(UffSet(begin.start, "", damage="a delimiter closes a set that was never opened"))
+            datasets.append(UffDataset(begin.start, "", damage="a delimiter closes a set that was never opened"))
             position = begin.end
             continue
-        one, position = _one_set(data, begin)
-        found.append(one)
-    if not found:
-        return (UffSet(0, "", damage="there is no delimiter (-1 in columns 5 and 6)"),)
-    return tuple(found)
+        dataset, position = _read_dataset(data, begin)
+        datasets.append(dataset)
+    if not datasets:
+        return (UffDataset(0, "", damage="there is no delimiter (-1 in columns 5 and 6)"),)
+    return tuple(datasets)
 
 
-def says_si(data: bytes, sets) -> bool:
+def declares_si(data: bytes, sets) -> bool:
     """Whether dataset 164 declares SI: unit code 1, or factors of 1 from the file's units to SI."""
-    for one in sets:
-        if one.kind == "164":
-            lines, _ = _lines(data, data.find(b"\n", one.offset) + 1, 3)
+    for dataset in sets:
+        if dataset.dataset_type == "164":
+            lines, _ = _lines(data, data.find(b"\n", dataset.offset) + 1, 3)
             factors = _fields(lines[2].replace("D", "E"), [25, 25]) if len(lines) == 3 else ["nan"]
             try:
                 return int(lines[1][:10]) == 1 or all(float(f) == 1.0 for f in factors)
@@ -190,29 +190,35 @@ def says_si(data: bytes, sets) -> bool:
     return False
 
 
-def _one_set(data, begin):
+def _read_dataset(data, begin):
     """(set, position after its closing delimiter)."""
     start = begin.end
     lines, at = _lines(data, start, HEADER_LINES)
-    kind = lines[0][:7].strip().lower() if lines else ""
-    if kind not in ("58", "58b"):
-        end = delimiter(data, start)
-        damage = "" if end else "the set is not closed by -1"
-        if not kind.removesuffix("b").isdigit():
-            kind, damage = "", f"{kind!r} is no number of a data set"
-        return UffSet(begin.start, kind, damage=damage), end.end if end else len(data)
+    dataset_type = lines[0][:7].strip().lower() if lines else ""
+    if dataset_type not in ("58", "58b"):
+        closing_delimiter = find_delimiter(data, start)
+        damage = "" if closing_delimiter else "the set is not closed by -1"
+        if not dataset_type.removesuffix("b").isdigit():
+            dataset_type, damage = "", f"{dataset_type!r} is no number of a data set"
+        return UffDataset(
+            begin.start, dataset_type, damage=damage
+        ), closing_delimiter.end if closing_delimiter else len(data)
     try:
         if len(lines) < HEADER_LINES:
             raise ValueError(f"its header ends after {len(lines)} of {HEADER_LINES} lines")
         header = _header(lines)
     except ValueError as error:
-        end = delimiter(data, start)
-        return UffSet(begin.start, kind, damage=f"the header cannot be read ({error})"), end.end if end else len(data)
-    read = binary_numbers if kind == "58b" else ascii_numbers
-    values, position, damage = read(data, at, header)
-    ordinates, x, short = columns(values, header)
-    one = UffSet(begin.start, kind, data=ordinates, x=x, damage=damage or short, **header["set"])
-    return one, position
+        closing_delimiter = find_delimiter(data, start)
+        return UffDataset(
+            begin.start, dataset_type, damage=f"the header cannot be read ({error})"
+        ), closing_delimiter.end if closing_delimiter else len(data)
+    read_numbers = binary_numbers if dataset_type == "58b" else ascii_numbers
+    values, position, damage = read_numbers(data, at, header)
+    ordinates, x, length_damage = split_columns(values, header)
+    dataset = UffDataset(
+        begin.start, dataset_type, data=ordinates, x=x, damage=damage or length_damage, **header["set"]
+    )
+    return dataset, position
 
 
 def _lines(data, position, count):
@@ -223,12 +229,12 @@ def _lines(data, position, count):
         if end < 0:
             break
         raw = data[position:end].rstrip(b"\r")
-        lines.append(_text(raw))
+        lines.append(_decode_text(raw))
         position = end + 1
     return lines, position
 
 
-def _text(raw):
+def _decode_text(raw):
     """Header text: UTF-8 if valid, else Latin-1 (older exporters' "m/s²")."""
     try:
         return raw.decode("utf-8")
@@ -243,7 +249,7 @@ def _fields(line, widths):
     return [line[a:b].strip() for a, b in pairwise(edges)]
 
 
-def _whole(text):
+def _integer(text):
     return int(text) if text else 0
 
 
@@ -262,18 +268,18 @@ def _header(lines):
         "set": {
             "ids": tuple(line.strip() for line in lines[1:6]),
             "func_type": int(dof[0]),
-            "sequence": _whole(dof[2]),
-            "response": (dof[4], _whole(dof[5]), _whole(dof[6])),
-            "reference": (dof[7], _whole(dof[8]), _whole(dof[9])),
+            "sequence": _integer(dof[2]),
+            "response": (dof[4], _integer(dof[5]), _integer(dof[6])),
+            "reference": (dof[7], _integer(dof[8]), _integer(dof[9])),
             "promised": promised,
             "start": float(form[3] or 0),
             "step": float(form[4] or 0),
             "step_text": form[4],
-            "labels": tuple((_whole(a[0]), a[4], a[5]) for a in axes),
+            "labels": tuple((_integer(a[0]), a[4], a[5]) for a in axes),
         },
         "double": ordinate_type in (4, 6),
         "complex": ordinate_type in (5, 6),
         "even": even == 1,
         "byte_order": ">" if first[2] == "2" else "<",
-        "float_format": _whole(first[3]),
+        "float_format": _integer(first[3]),
     }

@@ -13,36 +13,38 @@ from pathlib import Path
 import numpy as np
 import soundfile
 
-from turnout.readers.lazy import Stored
-from turnout.readers.named_arrays import NAMES, START, UNITS, Facts, texts
+from turnout.readers.lazy import LazyMatrix
+from turnout.readers.named_arrays import CHANNEL_NAMES, START_NAMES, UNIT_NAMES, Metadata, list_of_texts
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord
-from turnout.readers.timing import moment
+from turnout.readers.timing import parse_time
 
-OPEN_END = 0xFFFFFFFF
+UNKNOWN_LENGTH = 0xFFFFFFFF
 
 
 def read_raw(source) -> RawFile:
     """The record of an audio file."""
     with source.path.open("rb", buffering=0) as raw:  # libsndfile shares its position
-        if cut := cut_off(raw, source.size):
-            raise source.error("the header", cut, COPY_AGAIN, reason="truncated")
+        if truncation := find_truncation(raw, source.size):
+            raise source.error("the header", truncation, COPY_AGAIN, reason="truncated")
         raw.seek(0)
         with source.parsed_by("libsndfile"), soundfile.SoundFile(raw.fileno(), closefd=False) as file:
             rate, comment = file.samplerate, file.comment
             frames = Frames(source.path, file.frames, file.channels)
-            samples = Stored(frames, turned=True) if source.stay else file.read(dtype="float64", always_2d=True).T
+            samples = (
+                LazyMatrix(frames, transposed=True) if source.lazy else file.read(dtype="float64", always_2d=True).T
+            )
     if samples.shape[1] != frames.shape[0]:
-        found = f"ends after {samples.shape[1]} of {frames.shape[0]} samples"
-        raise source.error("record 1 of 1", found, COPY_AGAIN, reason="truncated")
-    facts = Facts(_notes(comment), source)
+        problem = f"ends after {samples.shape[1]} of {frames.shape[0]} samples"
+        raise source.error("record 1 of 1", problem, COPY_AGAIN, reason="truncated")
+    facts = Metadata(_notes(comment), source)
     n = len(samples)
-    names, units = texts(facts.get(NAMES)), texts(facts.get(UNITS))
+    names, units = list_of_texts(facts.get(CHANNEL_NAMES)), list_of_texts(facts.get(UNIT_NAMES))
     record = RawRecord(
         names=tuple(names) if len(names) == n else tuple(str(i) for i in range(n)),
         samples=list(samples),
         rate=facts.rate() or float(rate),
         units=tuple(units) if len(units) == n else ("",) * n,
-        started_at=moment(facts.one(START, 0, 1)),
+        started_at=parse_time(facts.record_value(START_NAMES, 0, 1)),
         conditions=facts.conditions(0, 1),
         aliases=tuple((str(i),) for i in range(n)),
     )
@@ -63,14 +65,14 @@ class Frames:
         """Number of frames and of channels."""
         return self.n_frame, self.n_channel
 
-    def __getitem__(self, part: slice) -> np.ndarray:
-        start, stop, _ = part.indices(self.n_frame)
+    def __getitem__(self, selection: slice) -> np.ndarray:
+        start, stop, _ = selection.indices(self.n_frame)
         with soundfile.SoundFile(self.path) as file:
             file.seek(start)
             return file.read(stop - start, dtype="float64", always_2d=True)
 
 
-def cut_off(file, size: int) -> str:
+def find_truncation(file, size: int) -> str:
     """Text that says where a RIFF file of ``size`` bytes is truncated; "" if complete or of another format."""
     head = file.read(36)
     if head[:4] not in (b"RIFF", b"RF64"):
@@ -78,21 +80,21 @@ def cut_off(file, size: int) -> str:
     if len(head) < 12:
         return f"the file ends after {size} bytes, before its samples"
     long_sizes = _long_sizes(head)
-    position, samples_seen = 12, False
+    position, has_samples = 12, False
     while position + 8 <= size:
         file.seek(position)
         tag, length = struct.unpack("<4sI", file.read(8))
-        length = long_sizes.get(tag, length) if length == OPEN_END else length
-        if tag == b"data" and length in (0, OPEN_END):
+        length = long_sizes.get(tag, length) if length == UNKNOWN_LENGTH else length
+        if tag == b"data" and length in (0, UNKNOWN_LENGTH):
             return "the chunk of samples was never finished by the logger"
         if position + 8 + length > size:
             return f"its chunk {tag.decode('latin-1')!r} ends after {size - position - 8} of {length} bytes"
-        samples_seen = samples_seen or tag == b"data"
+        has_samples = has_samples or tag == b"data"
         position += 8 + length + length % 2
-    if not samples_seen:
+    if not has_samples:
         return f"the file ends after {size} bytes, before its samples"
-    whole = 8 + long_sizes.get(b"RIFF", struct.unpack_from("<I", head, 4)[0])
-    return f"it ends after {size} of {whole} bytes" if whole > size + 1 else ""
+    expected_size = 8 + long_sizes.get(b"RIFF", struct.unpack_from("<I", head, 4)[0])
+    return f"it ends after {size} of {expected_size} bytes" if expected_size > size + 1 else ""
 
 
 def _long_sizes(head):

@@ -7,9 +7,9 @@ from turnout.receptance.segmentation import MAD_TO_SD
 from turnout.records import Rejection
 
 # Least number of impacts from which the spread of a test is estimated.
-FEWEST_BLOWS = 5
+MIN_IMPACTS = 5
 # Share of the largest peak above which an impact may be clipped: sampling can miss a fifth of a short pulse's peak.
-AT_THE_TOP = 0.8
+MIN_CLIPPED_PEAK = 0.8
 
 
 def pairwise_coherence(force: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
@@ -40,9 +40,11 @@ def pairwise_coherence(force: np.ndarray, acceleration: np.ndarray) -> np.ndarra
     n = force.shape[0]
     result = np.ones((n, n))
     for i in range(n - 1):
-        above = np.abs(cross[i] + cross[i + 1 :]) ** 2
-        below = (ff[i] + ff[i + 1 :]) * (aa[i] + aa[i + 1 :])
-        result[i, i + 1 :] = result[i + 1 :, i] = np.median(above / np.where(below > 0.0, below, np.inf), axis=1)
+        numerator = np.abs(cross[i] + cross[i + 1 :]) ** 2
+        denominator = (ff[i] + ff[i + 1 :]) * (aa[i] + aa[i + 1 :])
+        result[i, i + 1 :] = result[i + 1 :, i] = np.median(
+            numerator / np.where(denominator > 0.0, denominator, np.inf), axis=1
+        )
     return result
 
 
@@ -74,10 +76,10 @@ def response_gain(force: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
     """
     ff, aa = np.abs(force) ** 2, np.abs(acceleration) ** 2
     total = np.sum(ff, axis=0)
-    below = ff @ (np.sum(aa, axis=0) / np.where(total > 0.0, total, np.inf))
-    gain = np.sqrt(np.sum(aa, axis=1) / np.where(below > 0.0, below, np.inf))
-    middle = np.median(gain)
-    return gain / middle if middle > 0.0 else np.ones_like(gain)
+    predicted = ff @ (np.sum(aa, axis=0) / np.where(total > 0.0, total, np.inf))
+    gain = np.sqrt(np.sum(aa, axis=1) / np.where(predicted > 0.0, predicted, np.inf))
+    median_gain = np.median(gain)
+    return gain / median_gain if median_gain > 0.0 else np.ones_like(gain)
 
 
 def judge_agreement(cuts, settings):
@@ -87,8 +89,8 @@ def judge_agreement(cuts, settings):
         return
     force, acceleration = _spectra(cuts, settings)
     _judge_coherence(cuts, force, acceleration, settings)
-    left = [k for k, c in enumerate(cuts) if not c.rejections]
-    _judge_gain([cuts[k] for k in left], force[left], acceleration[left], settings)
+    agreeing = [k for k, c in enumerate(cuts) if not c.rejections]
+    _judge_gain([cuts[k] for k in agreeing], force[agreeing], acceleration[agreeing], settings)
 
 
 def _judge_coherence(cuts, force, acceleration, settings):
@@ -99,26 +101,26 @@ def _judge_coherence(cuts, force, acceleration, settings):
     with and without it. Of two impacts that disagree none can be called an outlier.
     """
     pairs = pairwise_coherence(force, acceleration)
-    left = list(range(len(cuts)))
-    while len(left) >= 3:
-        inside = pairs[np.ix_(left, left)]
-        np.fill_diagonal(inside, np.nan)
-        own = np.nanmedian(inside, axis=1)
-        worst = int(np.argmin(own))
-        others = float(np.median(np.delete(own, worst)))
-        limit = min(others - settings.agreement_gap, 1.0 - settings.agreement_factor * (1.0 - others))
-        if own[worst] >= limit:
+    remaining = list(range(len(cuts)))
+    while len(remaining) >= 3:
+        remaining_pairs = pairs[np.ix_(remaining, remaining)]
+        np.fill_diagonal(remaining_pairs, np.nan)
+        medians = np.nanmedian(remaining_pairs, axis=1)
+        worst = int(np.argmin(medians))
+        other_median = float(np.median(np.delete(medians, worst)))
+        limit = min(other_median - settings.agreement_gap, 1.0 - settings.agreement_factor * (1.0 - other_median))
+        if medians[worst] >= limit:
             return
-        odd = left.pop(worst)
+        outlier = remaining.pop(worst)
         detail = (
-            f"coherence with each other blow {own[worst]:.3f}, among those {others:.3f}; of the whole test "
-            f"{_test_coherence(force, acceleration, [*left, odd]):.3f} with it, "
-            f"{_test_coherence(force, acceleration, left):.3f} without"
+            f"coherence with each other blow {medians[worst]:.3f}, among those {other_median:.3f}; of the whole test "
+            f"{_test_coherence(force, acceleration, [*remaining, outlier]):.3f} with it, "
+            f"{_test_coherence(force, acceleration, remaining):.3f} without"
         )
-        common = np.sum(force[left].conj() * acceleration[left], axis=0)
-        if np.sum((force[odd].conj() * acceleration[odd] * common.conj()).real) < 0.0:
+        common = np.sum(force[remaining].conj() * acceleration[remaining], axis=0)
+        if np.sum((force[outlier].conj() * acceleration[outlier] * common.conj()).real) < 0.0:
             detail += "; its response has the opposite sign"
-        cuts[odd].rejections.append(Rejection("odd_one_out", float(own[worst]), float(limit), detail))
+        cuts[outlier].rejections.append(Rejection("odd_one_out", float(medians[worst]), float(limit), detail))
 
 
 def _judge_gain(cuts, force, acceleration, settings):
@@ -128,7 +130,7 @@ def _judge_gain(cuts, force, acceleration, settings):
     pulse of a few samples clipping shows in no other way. Any other gain is only noted, as it does not affect poles.
     """
     n = len(cuts)
-    if n < FEWEST_BLOWS:
+    if n < MIN_IMPACTS:
         return
     gain = response_gain(force, acceleration)
     # The median deviation of a few impacts is itself uncertain by about 1/sqrt(n).
@@ -137,7 +139,7 @@ def _judge_gain(cuts, force, acceleration, settings):
     peak = np.array([abs(c.contact.peak) for c in cuts])
     for k, cut in enumerate(cuts):
         if abs(gain[k] - 1.0) > limit:
-            clipped = gain[k] > 1.0 and peak[k] > AT_THE_TOP * np.max(np.delete(peak, k))
+            clipped = gain[k] > 1.0 and peak[k] > MIN_CLIPPED_PEAK * np.max(np.delete(peak, k))
             detail = f"the response is {gain[k]:.3f} of what the other blows predict from the force"
             bound = 1.0 + (limit if gain[k] > 1.0 else -limit)
             finding = Rejection("overload" if clipped else "odd_one_out", float(gain[k]), float(bound), detail)
@@ -158,8 +160,8 @@ def _spectra(cuts, settings):
     return spectra[0], spectra[1]
 
 
-def _test_coherence(force, acceleration, blows):
-    f, a = force[blows], acceleration[blows]
+def _test_coherence(force, acceleration, impacts):
+    f, a = force[impacts], acceleration[impacts]
     cross = np.abs(np.sum(f.conj() * a, axis=0)) ** 2
     power = np.sum(np.abs(f) ** 2, axis=0) * np.sum(np.abs(a) ** 2, axis=0)
     return float(np.median(cross / np.where(power > 0.0, power, np.inf)))

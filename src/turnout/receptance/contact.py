@@ -44,17 +44,17 @@ def measure_contact(cut, level):
     top = int(np.argmax(force))
     peak = float(force[top])
     onset, end = run_around(force, top, level * peak)
-    left, right = crossing(force, top, 0.5 * peak, -1), crossing(force, top, 0.5 * peak, 1)
-    quiet = max(0, min(cut.first, onset) - max(2, round(0.2 * (end - onset + 1))))
-    if quiet >= 8:
-        noise_force = float(np.std(cut.force[:quiet]))
-        ahead = cut.acceleration[:quiet]
+    rise, fall = crossing(force, top, 0.5 * peak, -1), crossing(force, top, 0.5 * peak, 1)
+    n_quiet = max(0, min(cut.first, onset) - max(2, round(0.2 * (end - onset + 1))))
+    if n_quiet >= 8:
+        noise_force = float(np.std(cut.force[:n_quiet]))
+        quiet_acceleration = cut.acceleration[:n_quiet]
     else:
         noise_force = cut.force_noise
-        ahead = cut.acceleration[-max(8, cut.acceleration.size // 10) :]
+        quiet_acceleration = cut.acceleration[-max(8, cut.acceleration.size // 10) :]
     return Contact(
-        onset, end, top, cut.polarity * peak, right - left, float(np.sum(cut.force[onset : end + 1])) / cut.rate,
-        noise_force, float(np.std(ahead)), float(np.mean(ahead)) if quiet >= 8 else 0.0,
+        onset, end, top, cut.polarity * peak, fall - rise, float(np.sum(cut.force[onset : end + 1])) / cut.rate,
+        noise_force, float(np.std(quiet_acceleration)), float(np.mean(quiet_acceleration)) if n_quiet >= 8 else 0.0,
     )  # fmt: skip
 
 
@@ -86,13 +86,13 @@ def crossing(x, top, level, step):
 # s. Within this time of the main contact, ringing of a filter or of the hammer resembles a small second contact, and a
 # large one after a pulse of a few samples; no hammer rebounds so soon. Then a contact needs this prominence (share of
 # the peak), and a main pulse of at least so many samples at half height.
-CLOSE = 1e-3
-CLOSE_PROMINENCE = 0.1
-CLOSE_SAMPLES = 6.0
+MIN_CONTACT_INTERVAL = 1e-3
+MIN_CLOSE_PROMINENCE = 0.1
+MIN_CLOSE_SAMPLES = 6.0
 # Least height of a further contact, in standard deviations of the noise.
 NOISE_FACTOR = 6.0
 # A further contact lasts as long as it exceeds this share of its own height.
-OWN_LEVEL = 0.1
+FURTHER_CONTACT_LEVEL = 0.1
 
 
 def smoothed_force(force, half_width):
@@ -125,22 +125,22 @@ def further_contacts(cut, contact, settings):
     outside the main contact, so that hum or a drifting zero raise the limit instead of causing findings.
     """
     force = smoothed_force(cut.polarity * cut.force, contact.half_width)
-    near = max(2, round(CLOSE * cut.rate))
-    top = max(0, contact.top - near) + int(np.argmax(force[max(0, contact.top - near) : contact.top + near + 1]))
+    margin = max(2, round(MIN_CONTACT_INTERVAL * cut.rate))
+    top = max(0, contact.top - margin) + int(np.argmax(force[max(0, contact.top - margin) : contact.top + margin + 1]))
     force /= force[top]
-    lower, upper = max(0, contact.onset - near), min(force.size, contact.end + near + 1)
+    lower, upper = max(0, contact.onset - margin), min(force.size, contact.end + margin + 1)
     outside = np.concatenate([force[:lower], force[upper:]])
     noise = NOISE_FACTOR * MAD_TO_SD * float(np.median(np.abs(outside))) if outside.size else 0.0
     level = max(settings.double_hit_level, noise)
     tops, shape = find_peaks(force, height=level, prominence=max(settings.double_hit_prominence, noise))
-    found = []
+    contacts = []
     for k, prominence in zip(tops, shape["prominences"]):
-        close = lower <= k < upper
-        stands_out = prominence >= max(CLOSE_PROMINENCE, noise) and contact.half_width >= CLOSE_SAMPLES
-        if k != top and (not close or stands_out):
-            onset, end = run_around(force, k, max(OWN_LEVEL * force[k], noise / 2))
-            found.append(FurtherContact(onset, end, int(k), float(force[k])))
-    return found, level
+        is_close = lower <= k < upper
+        stands_out = prominence >= max(MIN_CLOSE_PROMINENCE, noise) and contact.half_width >= MIN_CLOSE_SAMPLES
+        if k != top and (not is_close or stands_out):
+            onset, end = run_around(force, k, max(FURTHER_CONTACT_LEVEL * force[k], noise / 2))
+            contacts.append(FurtherContact(onset, end, int(k), float(force[k])))
+    return contacts, level
 
 
 def band_edges(pulses: list[np.ndarray], rate: float, fall: float = 20.0, resolution: float = 5.0) -> np.ndarray:

@@ -39,8 +39,12 @@ def dynamic_stiffness(frequency, h1, coherence, passed, n: int, at: float) -> tu
     if n < 2 or not frequency.size or not frequency[0] <= at <= frequency[-1]:
         return None
     k = int(np.argmin(np.abs(frequency - at)))
-    size, seen = float(np.abs(h1[k])), float(coherence[k])
-    if not (passed[k] and size > 0.0 and seen > 0.0):
+    magnitude, gamma_squared = float(np.abs(h1[k])), float(coherence[k])
+    if not (passed[k] and magnitude > 0.0 and gamma_squared > 0.0):
         return None
-    radius = float(np.sqrt(fisher.ppf(0.95, 2, 2 * n - 2) / (n - 1) * max(0.0, 1.0 - seen) / seen))
-    return 1.0 / size, 1.0 / (size * (1.0 + radius)), 1.0 / (size * (1.0 - radius)) if radius < 1.0 else float("inf")
+    radius = float(np.sqrt(fisher.ppf(0.95, 2, 2 * n - 2) / (n - 1) * max(0.0, 1.0 - gamma_squared) / gamma_squared))
+    return (
+        1.0 / magnitude,
+        1.0 / (magnitude * (1.0 + radius)),
+        1.0 / (magnitude * (1.0 - radius)) if radius < 1.0 else float("inf"),
+    )

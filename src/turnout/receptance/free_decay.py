@@ -6,9 +6,9 @@ from turnout.receptance.contact import further_contacts
 from turnout.records import Rejection
 
 # s, end of a record over which its remaining amplitude is taken: a period of the slowest mode.
-TAIL = 0.01
+TAIL_TIME = 0.01
 # Several further contacts, one with this share of the main peak and this late [ms], may be quick impacts of a machine.
-AS_HARD, AS_LATE = 0.7, 60.0
+MIN_REPEATED_SHARE, MIN_REPEATED_DELAY = 0.7, 60.0
 
 
 def judge_second_contact(cut, settings):
@@ -26,24 +26,22 @@ def judge_second_contact(cut, settings):
         return
     largest = max(further, key=lambda c: c.share)
     delay = 1e3 * (largest.top - cut.contact.top) / cut.rate
-    words = (
-        f"further contacts: {len(further)}, the largest {largest.share:.3f} of the first and {delay:+.1f} ms from it"
-    )
-    if len(further) > 1 and largest.share > AS_HARD and abs(delay) > AS_LATE:
-        words += "; where each is a blow of its own, set receptance.separation below the time between them"
+    text = f"further contacts: {len(further)}, the largest {largest.share:.3f} of the first and {delay:+.1f} ms from it"
+    if len(further) > 1 and largest.share > MIN_REPEATED_SHARE and abs(delay) > MIN_REPEATED_DELAY:
+        text += "; where each is a blow of its own, set receptance.separation below the time between them"
     last = max(cut.contact.end, *(c.end for c in further))
-    remaining = _remaining(cut, last + 1 + round(settings.decay_gap * cut.rate), settings)
+    remaining = _decay_ratio(cut, last + 1 + round(settings.decay_gap * cut.rate), settings)
     end = min(c.onset for c in further) - round(settings.decay_gap * cut.rate)
-    if settings.double_hit == "move" and _died_away(cut, end, settings):
+    if settings.double_hit == "move" and _has_died_away(cut, end, settings):
         cut.force, cut.acceleration = cut.force[:end], cut.acceleration[:end]
-        cut.notes.append(Rejection("double_hit", largest.share, level, f"{words}; the record is cut before it"))
+        cut.notes.append(Rejection("double_hit", largest.share, level, f"{text}; the record is cut before it"))
         return
     cut.contact_end = last
-    words = f"{words}, {remaining:.2f} of the decay is left"
+    text = f"{text}, {remaining:.2f} of the decay is left"
     if settings.double_hit == "move" and remaining >= settings.double_hit_remaining:
-        cut.notes.append(Rejection("double_hit", largest.share, level, f"{words}; it starts after the last contact"))
+        cut.notes.append(Rejection("double_hit", largest.share, level, f"{text}; it starts after the last contact"))
     else:
-        cut.rejections.append(Rejection("double_hit", largest.share, level, words))
+        cut.rejections.append(Rejection("double_hit", largest.share, level, text))
 
 
 def judge_decay(cut, settings):
@@ -52,20 +50,20 @@ def judge_decay(cut, settings):
     An exponential window counts as decay: it prevents the leakage that the check is for.
     """
     cut.decay_start = cut.contact_end + 1 + round(settings.decay_gap * cut.rate)
-    left = max(0.0, (cut.force.size - cut.decay_start) / cut.rate)
-    if left < settings.minimum_decay:
-        detail = f"{1e3 * left:.1f} ms of decay are left, {1e3 * settings.minimum_decay:.1f} ms are needed"
-        cut.rejections.append(Rejection("late", left, settings.minimum_decay, detail))
+    duration = max(0.0, (cut.force.size - cut.decay_start) / cut.rate)
+    if duration < settings.minimum_decay:
+        detail = f"{1e3 * duration:.1f} ms of decay are left, {1e3 * settings.minimum_decay:.1f} ms are needed"
+        cut.rejections.append(Rejection("late", duration, settings.minimum_decay, detail))
         return
-    share, limit = _left_at(cut, cut.force.size, settings)
+    share, limit = _remaining_amplitude(cut, cut.force.size, settings)
     if share > limit:
         detail = f"the record ends while the vibration still has {share:.3f} of its peak"
         cut.rejections.append(Rejection("cut_off", share, limit, detail))
 
 
-def _left_at(cut, end, settings):
+def _remaining_amplitude(cut, end, settings):
     """Amplitude just before sample ``end`` over the peak, and its limit."""
-    tail = cut.acceleration[max(0, end - max(round(TAIL * cut.rate), end // 20)) : end]
+    tail = cut.acceleration[max(0, end - max(round(TAIL_TIME * cut.rate), end // 20)) : end]
     window = np.exp(-settings.exponential_window * (end - cut.contact.onset) / cut.rate)
     top = np.max(np.abs(cut.acceleration))
     noise = 3.0 * np.sqrt(2.0) * cut.contact.noise_acceleration
@@ -74,19 +72,19 @@ def _left_at(cut, end, settings):
     return float(window * np.sqrt(2.0) * np.std(tail) / top), float(max(settings.cut_off, window * noise / top))
 
 
-def _died_away(cut, end, settings):
+def _has_died_away(cut, end, settings):
     """Whether the vibration has decayed by sample ``end``, at least two shortest decays behind the main contact."""
     if end < cut.contact.end + 1 + 2 * round(settings.minimum_decay * cut.rate):
         return False
-    share, limit = _left_at(cut, end, settings)
+    share, limit = _remaining_amplitude(cut, end, settings)
     return share <= limit
 
 
-def _remaining(cut, start, settings):
+def _decay_ratio(cut, start, settings):
     """Amplitude of the decay from ``start`` on over that after the main contact; 0 if too short."""
     n = round(settings.minimum_decay * cut.rate)
-    clean = cut.contact.end + 1 + round(settings.decay_gap * cut.rate)
+    decay_start = cut.contact.end + 1 + round(settings.decay_gap * cut.rate)
     if cut.force.size - start < n:
         return 0.0
-    full = np.max(np.abs(cut.acceleration[clean : clean + n]), initial=0.0)
+    full = np.max(np.abs(cut.acceleration[decay_start : decay_start + n]), initial=0.0)
     return float(np.max(np.abs(cut.acceleration[start : start + n])) / full) if full > 0.0 else 0.0

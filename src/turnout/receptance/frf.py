@@ -124,9 +124,9 @@ def coherence(g_ff: np.ndarray, g_aa: np.ndarray, g_fa: np.ndarray) -> np.ndarra
     return np.minimum(_quotient(np.abs(g_fa) ** 2, g_ff * g_aa), 1.0)
 
 
-def _quotient(above, below):
+def _quotient(numerator, denominator):
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(below == 0.0, np.nan, above / np.where(below == 0.0, 1.0, below))
+        return np.where(denominator == 0.0, np.nan, numerator / np.where(denominator == 0.0, 1.0, denominator))
 
 
 def receptance_of(impacts: Sequence[Impact], settings: ReceptanceSettings | None = None) -> Receptance:
@@ -169,19 +169,19 @@ def receptance_of(impacts: Sequence[Impact], settings: ReceptanceSettings | None
     [-0.25 -0.25 -0.25] 3
     """
     settings = settings or ReceptanceSettings()
-    used = [i for i in impacts if i.accepted]
-    if not used:
-        return _nothing(settings)
-    rate = used[0].rate
-    if any(i.rate != rate for i in used):
-        raise ValueError(f"impacts of one section need one sampling rate, got {sorted({i.rate for i in used})} Hz")
-    force, acceleration = _records(used, settings)
+    accepted = [i for i in impacts if i.accepted]
+    if not accepted:
+        return _empty_receptance(settings)
+    rate = accepted[0].rate
+    if any(i.rate != rate for i in accepted):
+        raise ValueError(f"impacts of one section need one sampling rate, got {sorted({i.rate for i in accepted})} Hz")
+    force, acceleration = _records(accepted, settings)
     n_fft = next_fast_len(force.shape[1], real=True)
     frequency, g_ff, g_aa, g_fa = cross_spectra(force, acceleration, rate, n_fft)
     keep = (frequency > 0.0) & (frequency <= min(settings.highest_frequency, rate / 2))
     frequency, g_ff, g_aa, g_fa = frequency[keep], g_ff[keep], g_aa[keep], g_fa[keep]
     to_displacement = 1.0 / (2j * np.pi * frequency + settings.exponential_window) ** 2
-    n = len(used)
+    n = len(accepted)
     estimate = coherence(g_ff, g_aa, g_fa)
     low, high = coherence_limits(estimate, n)
     level = lower_coherence_limit(estimate, n)
@@ -190,14 +190,14 @@ def receptance_of(impacts: Sequence[Impact], settings: ReceptanceSettings | None
         frequency=frequency,
         h1=to_displacement * h1(g_ff, g_fa),
         h2=to_displacement * h2(g_aa, g_fa),
-        hv=to_displacement * hv(g_ff, g_aa, g_fa, _noise_ratio(used)),
+        hv=to_displacement * hv(g_ff, g_aa, g_fa, _noise_ratio(accepted)),
         coherence=estimate,
         coherence_low=low,
         coherence_high=high,
         gate_level=level,
         passed=(compared >= settings.gate_level) & (n >= settings.minimum_impacts),
         n=n,
-        valid_to=float(np.median([i.band_edge for i in used])),
+        valid_to=float(np.median([i.band_edge for i in accepted])),
         gate=settings.gate,
         decay=settings.exponential_window,
     )
@@ -226,8 +226,19 @@ def _noise_ratio(impacts):
     return acceleration / force if force > 0.0 else np.inf
 
 
-def _nothing(settings):
-    real, cplx = np.empty(0), np.empty(0, dtype=complex)
+def _empty_receptance(settings):
+    no_values, no_complex = np.empty(0), np.empty(0, dtype=complex)
     return Receptance(
-        real, cplx, cplx, cplx, real, real, real, real, np.empty(0, dtype=bool), 0, float("nan"), settings.gate
+        no_values,
+        no_complex,
+        no_complex,
+        no_complex,
+        no_values,
+        no_values,
+        no_values,
+        no_values,
+        np.empty(0, dtype=bool),
+        0,
+        float("nan"),
+        settings.gate,
     )

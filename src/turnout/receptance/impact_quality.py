@@ -13,15 +13,15 @@ from turnout.receptance.segmentation import MAD_TO_SD
 from turnout.records import Rejection
 
 # Steps: a parabola one step deep over m equal samples falls by 9 steps within as many samples again, and 1 by rounding.
-NATURAL_FALL = 12.0
+MAX_NATURAL_FALL = 12.0
 # Probability below which repeated codes are no chance event.
-CHANCE = 1e-3
+MAX_CHANCE = 1e-3
 
 
-def range_exceeded(x, limit):
+def value_out_of_range(x, limit):
     """Largest absolute sample if it reaches a known range, else None.
 
-    >>> range_exceeded(np.array([0.0, -5.0, 3.0]), 5.0), range_exceeded(np.array([1.0]), None)
+    >>> value_out_of_range(np.array([0.0, -5.0, 3.0]), 5.0), value_out_of_range(np.array([1.0]), None)
     (5.0, None)
     """
     size = float(np.max(np.abs(x)))
@@ -58,20 +58,20 @@ def rail_code(x, resolution=None, noise=0.0):
     """
     for y, sign in ((x, 1.0), (-x, -1.0)):
         code = float(y.max())
-        equal = np.flatnonzero(y == code)
-        if equal.size < 3 or code <= 0.0:
+        at_code = np.flatnonzero(y == code)
+        if at_code.size < 3 or code <= 0.0:
             continue
-        runs = [(first, last) for first, last in _runs(equal) if last - first >= 2]
+        runs = [(first, last) for first, last in _runs(at_code) if last - first >= 2]
         step = (resolution or _smallest_step(y)) if runs else 0.0
         noisy = noise > step / 4.0
         for first, last in runs:
             m = last - first + 1
             reach = (m + 1) // 2
             chance = (step / (2.0 * np.sqrt(np.pi) * noise)) ** (m - 1) if noisy else 1.0
-            if first < reach or last + reach >= y.size or (noisy and m == 3 and chance > CHANCE / 10.0):
+            if first < reach or last + reach >= y.size or (noisy and m == 3 and chance > MAX_CHANCE / 10.0):
                 continue
-            depth = step if chance < CHANCE else step + 3.0 * noise
-            if code - max(y[first - reach], y[last + reach]) > NATURAL_FALL * depth:
+            depth = step if chance < MAX_CHANCE else step + 3.0 * noise
+            if code - max(y[first - reach], y[last + reach]) > MAX_NATURAL_FALL * depth:
                 return int(sum(b - a + 1 for a, b in runs)), sign * code
     return None
 
@@ -81,9 +81,9 @@ def overload(cut, contact):
 
     The range applies to the recorded samples, before the zero line is subtracted.
     """
-    both = (cut.force, contact.noise_force), (cut.acceleration, contact.noise_acceleration)
-    for (x, noise), zero, channel in zip(both, cut.zeros, cut.channels):
-        if (size := range_exceeded(x + zero, channel.limit)) is not None:
+    signals = (cut.force, contact.noise_force), (cut.acceleration, contact.noise_acceleration)
+    for (x, noise), zero, channel in zip(signals, cut.zeros, cut.channels):
+        if (size := value_out_of_range(x + zero, channel.limit)) is not None:
             detail = f"{channel.name} reaches {size:.4g}, its range ends at {channel.limit:.4g}"
             return Rejection("overload", size, channel.limit, detail)
         if (rail := rail_code(x, channel.resolution, noise)) is not None:
@@ -93,8 +93,8 @@ def overload(cut, contact):
 
 
 def _runs(indices):
-    parts = np.split(indices, np.flatnonzero(np.diff(indices) > 1) + 1)
-    return [(int(p[0]), int(p[-1])) for p in parts if p.size]
+    groups = np.split(indices, np.flatnonzero(np.diff(indices) > 1) + 1)
+    return [(int(p[0]), int(p[-1])) for p in groups if p.size]
 
 
 def _smallest_step(y):
@@ -104,18 +104,18 @@ def _smallest_step(y):
 
 
 # A concave pulse is at most as flat as a parabola, sqrt(0.05 / 0.5) = 0.316 of its half width; half-sine 0.303.
-FLATTEST_TOP = 0.335
+MAX_NATURAL_TOP = 0.335
 # Top share that is flat with certainty, whatever the test's other impacts look like.
-CERTAINLY_FLAT = 0.42
+MIN_CERTAIN_TOP = 0.42
 # Samples above half the peak: least number for a top share, and for a comparison with natural pulses.
-FEWEST_SAMPLES, ENOUGH_SAMPLES = 3.0, 8.0
+MIN_TOP_SAMPLES, MIN_NATURAL_SAMPLES = 3.0, 8.0
 # An impact's top share may exceed the median of its test by this much, more for few samples and for noise of some
 # percent; saturation by tanh(1) gives 0.05 to 0.06.
-FLATTER = 0.03
+MIN_TOP_EXCESS = 0.03
 # Least number of impacts for a comparison within a test.
-FEWEST_BLOWS = 5
+MIN_IMPACTS = 5
 # Largest force noise over the peak for which a top share is used.
-NOISIEST = 0.02
+MAX_TOP_NOISE = 0.02
 
 
 def top_share(force, contact, polarity=1):
@@ -135,11 +135,11 @@ def top_share(force, contact, polarity=1):
     >>> print(f"{top_share(x, about):.2f} {top_share(np.minimum(x, 0.9), about):.2f}")
     0.30 0.49
     """
-    if contact.half_width < FEWEST_SAMPLES:
+    if contact.half_width < MIN_TOP_SAMPLES:
         return None
     first = max(0, contact.onset - 2)
-    part = polarity * force[first : contact.end + 3]
-    fine = CubicSpline(np.arange(part.size), part)(np.arange(8 * (part.size - 1) + 1) / 8.0)
+    pulse = polarity * force[first : contact.end + 3]
+    fine = CubicSpline(np.arange(pulse.size), pulse)(np.arange(8 * (pulse.size - 1) + 1) / 8.0)
     top = int(np.argmax(fine))
     width = [
         crossing(fine, top, share * fine[top], 1) - crossing(fine, top, share * fine[top], -1) for share in (0.95, 0.5)
@@ -149,7 +149,7 @@ def top_share(force, contact, polarity=1):
 
 def natural_top(contact):
     """Largest natural ``top_share``: noise shifts the 5 % line, with dw/w = d(level) / (2 * 0.05), at three sigma."""
-    return FLATTEST_TOP * float(np.sqrt(1.0 + 60.0 * contact.noise_force / abs(contact.peak)))
+    return MAX_NATURAL_TOP * float(np.sqrt(1.0 + 60.0 * contact.noise_force / abs(contact.peak)))
 
 
 def judge_tops(cuts, deviation):
@@ -159,31 +159,33 @@ def judge_tops(cuts, deviation):
     this tip. In a test of ``MIN_IMPACTS`` or more, one hammer with one tip makes one shape, and an outlier is rejected
     too. A soft saturation may leave a pointed pulse no flatter than a natural half-sine.
     """
-    known = [(c, share) for c in cuts if (share := _share_if_quiet(c)) is not None]
-    shares = np.array([share for _, share in known])
-    enough = len(known) >= FEWEST_BLOWS
-    middle = float(np.median(shares)) if enough else 0.0
-    spread = deviation * MAD_TO_SD * float(np.median(np.abs(shares - middle))) if enough else np.inf
-    for cut, share in known:
+    measured = [(c, share) for c in cuts if (share := _share_if_quiet(c)) is not None]
+    shares = np.array([share for _, share in measured])
+    is_comparable = len(measured) >= MIN_IMPACTS
+    median_share = float(np.median(shares)) if is_comparable else 0.0
+    spread = deviation * MAD_TO_SD * float(np.median(np.abs(shares - median_share))) if is_comparable else np.inf
+    for cut, share in measured:
         c = cut.contact
-        natural = natural_top(c) if c.half_width >= ENOUGH_SAMPLES else np.inf
-        natural = min(max(natural, middle + FLATTER / 2.0), max(natural, CERTAINLY_FLAT))
-        usual = middle + max(spread, FLATTER * (1.0 + 4.0 / c.half_width + 100.0 * c.noise_force / abs(c.peak)))
+        natural = natural_top(c) if c.half_width >= MIN_NATURAL_SAMPLES else np.inf
+        natural = min(max(natural, median_share + MIN_TOP_EXCESS / 2.0), max(natural, MIN_CERTAIN_TOP))
+        usual = median_share + max(
+            spread, MIN_TOP_EXCESS * (1.0 + 4.0 / c.half_width + 100.0 * c.noise_force / abs(c.peak))
+        )
         limit = min(natural, usual)
         if share > limit:
-            words = f"the others' {middle:.2f} allow" if usual < natural else "is natural"
-            detail = f"the top of the force is flat: {share:.2f} of its half width, at most {limit:.2f} {words}"
+            comparison = f"the others' {median_share:.2f} allow" if usual < natural else "is natural"
+            detail = f"the top of the force is flat: {share:.2f} of its half width, at most {limit:.2f} {comparison}"
             cut.rejections.append(Rejection("overload", float(share), float(limit), detail))
 
 
 def _share_if_quiet(cut):
-    if cut.rejections or cut.contact.noise_force > NOISIEST * abs(cut.contact.peak):
+    if cut.rejections or cut.contact.noise_force > MAX_TOP_NOISE * abs(cut.contact.peak):
         return None
     return top_share(cut.force, cut.contact, cut.polarity)
 
 
 # Largest difference of repeated records over their largest value: rounding to 16 bits. Two impacts differ far more.
-ALIKE = 1e-4
+MAX_REPEAT_DIFFERENCE = 1e-4
 
 
 def judge_repeats(cuts):
@@ -194,42 +196,45 @@ def judge_repeats(cuts):
     """
     peaks = np.array([np.max(np.abs(c.force)) for c in cuts])
     order = np.argsort(peaks, kind="stable")
-    for place, k in enumerate(order):
-        for other in order[place + 1 :]:
-            if peaks[other] - peaks[k] > 2.0 * ALIKE * peaks[other]:
+    for rank, k in enumerate(order):
+        for later in order[rank + 1 :]:
+            if peaks[later] - peaks[k] > 2.0 * MAX_REPEAT_DIFFERENCE * peaks[later]:
                 break
-            first, second = sorted((int(k), int(other)))
-            if not repeated(cuts[second]) and (apart := difference(cuts[first], cuts[second])) <= ALIKE:
+            first, second = sorted((int(k), int(later)))
+            if (
+                not is_repeated(cuts[second])
+                and (distance := difference(cuts[first], cuts[second])) <= MAX_REPEAT_DIFFERENCE
+            ):
                 earlier = cuts[first]
                 detail = f"the same samples as record {earlier.record + 1} of {earlier.recording.source or 'the test'}"
-                cuts[second].rejections.append(Rejection("duplicate", apart, ALIKE, detail))
+                cuts[second].rejections.append(Rejection("duplicate", distance, MAX_REPEAT_DIFFERENCE, detail))
 
 
-def difference(one, other) -> float:
+def difference(first, second) -> float:
     """Largest difference of force or acceleration over the largest value of either; inf for different rates."""
-    if one.rate != other.rate:
+    if first.rate != second.rate:
         return np.inf
-    tops = [int(np.argmax(np.abs(c.force))) for c in (one, other)]
-    ahead = min(tops)
-    n = ahead + min(one.force.size - tops[0], other.force.size - tops[1])
-    pairs = ((one.force, other.force), (one.acceleration, other.acceleration))
-    found = 0.0
+    tops = [int(np.argmax(np.abs(c.force))) for c in (first, second)]
+    lead = min(tops)
+    n = lead + min(first.force.size - tops[0], second.force.size - tops[1])
+    pairs = ((first.force, second.force), (first.acceleration, second.acceleration))
+    largest = 0.0
     for a, b in pairs:
-        a, b = a[tops[0] - ahead :][:n], b[tops[1] - ahead :][:n]
+        a, b = a[tops[0] - lead :][:n], b[tops[1] - lead :][:n]
         top = max(np.max(np.abs(a)), np.max(np.abs(b)))
-        found = max(found, float(np.max(np.abs(a - b)) / top) if top > 0.0 else 0.0)
-    return found
+        largest = max(largest, float(np.max(np.abs(a - b)) / top) if top > 0.0 else 0.0)
+    return largest
 
 
-def repeated(cut) -> bool:
+def is_repeated(cut) -> bool:
     """Whether ``judge_repeats`` found the impact to repeat an earlier one."""
     return any(r.reason == "duplicate" for r in cut.rejections)
 
 
 # Noise over the peak acceleration that is never rejected by comparison with the test's median.
-NOISE_FLOOR = 0.02
+MIN_NOISE_LIMIT = 0.02
 # Least peak response over its noise; a channel below it is dead.
-DEAD = 5.0
+MIN_SIGNAL_TO_NOISE = 5.0
 
 
 def judge_against_median(cuts, settings):
@@ -242,36 +247,36 @@ def judge_against_median(cuts, settings):
         return
     peak = np.array([abs(c.contact.peak) for c in cuts])
     largest = np.array([_largest_response(c) for c in cuts])
-    before = np.array([c.contact.noise_acceleration for c in cuts])
-    noise = before / np.where(largest > 0.0, largest, np.inf)
+    noise_before = np.array([c.contact.noise_acceleration for c in cuts])
+    noise = noise_before / np.where(largest > 0.0, largest, np.inf)
     for k, cut in enumerate(cuts):
-        if largest[k] <= DEAD * before[k]:
-            _reject(cut, "dead_channel", largest[k], DEAD * before[k], (
+        if largest[k] <= MIN_SIGNAL_TO_NOISE * noise_before[k]:
+            _reject(cut, "dead_channel", largest[k], MIN_SIGNAL_TO_NOISE * noise_before[k], (
                 f"{cut.channels[1].name} answers with {largest[k]:.3g}, no more than its noise"))  # fmt: skip
         elif noise[k] > settings.noise:
             _reject(cut, "noisy", noise[k], settings.noise, "rms before the blow is {0:.3f} of the peak acceleration")
     if len(cuts) < 3:
         return
-    middle = float(np.median(peak))
+    median_peak = float(np.median(peak))
     # Peaks scatter by ratios: half and double the typical force are equally unusual.
-    spread = MAD_TO_SD * float(np.median(np.abs(np.log(peak / middle))))
-    usual = float(np.median(noise))
+    spread = MAD_TO_SD * float(np.median(np.abs(np.log(peak / median_peak))))
+    median_noise = float(np.median(noise))
     for k, cut in enumerate(cuts):
-        low = middle * min(settings.weak, np.exp(-settings.deviation * spread))
-        high = middle * max(settings.out_of_range, np.exp(settings.deviation * spread))
+        low = median_peak * min(settings.weak, np.exp(-settings.deviation * spread))
+        high = median_peak * max(settings.out_of_range, np.exp(settings.deviation * spread))
         if peak[k] < low:
-            _reject(cut, "weak", peak[k], low, f"{{0:.4g}} N, the test's median is {middle:.4g} N")
+            _reject(cut, "weak", peak[k], low, f"{{0:.4g}} N, the test's median is {median_peak:.4g} N")
         elif peak[k] > high:
-            _reject(cut, "overload", peak[k], high, f"{{0:.4g}} N, the test's median is {middle:.4g} N")
-        limit = max(NOISE_FLOOR, settings.noise_over_median * usual)
+            _reject(cut, "overload", peak[k], high, f"{{0:.4g}} N, the test's median is {median_peak:.4g} N")
+        limit = max(MIN_NOISE_LIMIT, settings.noise_over_median * median_noise)
         if noise[k] > limit and not cut.rejections:
             _reject(cut, "noisy", noise[k], limit, f"rms before the blow is {{0:.3f}} of the peak acceleration, "
-                    f"{usual:.3f} in the median blow")  # fmt: skip
+                    f"{median_noise:.3f} in the median blow")  # fmt: skip
 
 
 def _largest_response(cut):
     return float(np.max(np.abs(cut.acceleration[cut.contact.onset :] - cut.contact.zero_acceleration)))
 
 
-def _reject(cut, reason, value, limit, words):
-    cut.rejections.append(Rejection(reason, float(value), float(limit), words.format(float(value))))
+def _reject(cut, reason, value, limit, template):
+    cut.rejections.append(Rejection(reason, float(value), float(limit), template.format(float(value))))

@@ -8,12 +8,12 @@ from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.receptance.agreement import judge_agreement
 from turnout.receptance.contact import band_edges, measure_contact
 from turnout.receptance.free_decay import judge_decay, judge_second_contact
-from turnout.receptance.impact_quality import judge_against_median, judge_repeats, judge_tops, overload, repeated
-from turnout.receptance.segmentation import cut_blows
+from turnout.receptance.impact_quality import is_repeated, judge_against_median, judge_repeats, judge_tops, overload
+from turnout.receptance.segmentation import cut_impacts
 from turnout.records import Impact, Recording, Rejection
 
 # N, largest peak force: far above any hammer, and below newtons that were read as kilonewtons.
-HARDEST = 1e6
+MAX_FORCE = 1e6
 
 
 def find_impacts(
@@ -51,24 +51,24 @@ def find_impacts(
     500 N for 1.9 ms, 0.64 N s True
     """
     settings = settings or ReceptanceSettings()
-    cuts = cut_blows(recordings, force, response, settings)
-    sound = [c for c in cuts if not c.rejections]
-    judge_repeats(sound)
-    for cut in sound:
+    cuts = cut_impacts(recordings, force, response, settings)
+    candidates = [c for c in cuts if not c.rejections]
+    judge_repeats(candidates)
+    for cut in candidates:
         _measure(cut, settings)
-    _judge_scale(sound, settings.softest_blow)
-    pulses = [c.force[c.contact.onset : c.contact.end + 1] for c in sound]
-    for cut, edge in zip(sound, _edges(sound, pulses)):
+    _judge_scale(candidates, settings.softest_blow)
+    pulses = [c.force[c.contact.onset : c.contact.end + 1] for c in candidates]
+    for cut, edge in zip(candidates, _band_edges(candidates, pulses)):
         cut.band_edge = edge
-    sound = [c for c in sound if not repeated(c)]
-    judge_against_median(sound, settings)
-    judge_tops(sound, settings.deviation)
-    for rate in sorted({c.rate for c in sound}):
-        judge_agreement([c for c in sound if c.rate == rate], settings)
+    candidates = [c for c in candidates if not is_repeated(c)]
+    judge_against_median(candidates, settings)
+    judge_tops(candidates, settings.deviation)
+    for rate in sorted({c.rate for c in candidates}):
+        judge_agreement([c for c in candidates if c.rate == rate], settings)
     return tuple(_impact(c) for c in cuts)
 
 
-def _edges(cuts, pulses):
+def _band_edges(cuts, pulses):
     edges = np.empty(len(cuts))
     for rate in {c.rate for c in cuts}:
         rows = [k for k, c in enumerate(cuts) if c.rate == rate]
@@ -90,26 +90,26 @@ def _measure(cut, settings):
             "its sign is reversed, or it is another channel")))  # fmt: skip
     cut.contact, cut.contact_end = contact, contact.end
     _judge_start(cut, settings)
-    if abs(contact.peak) > HARDEST:
-        cut.rejections.append(Rejection("out_of_scale", contact.peak, HARDEST, (
+    if abs(contact.peak) > MAX_FORCE:
+        cut.rejections.append(Rejection("out_of_scale", contact.peak, MAX_FORCE, (
             f"{contact.peak:.4g} N: no hammer strikes so hard, its unit or scale is wrong")))  # fmt: skip
-    if (found := overload(cut, contact)) is not None:
-        cut.rejections.append(found)
+    if (rejection := overload(cut, contact)) is not None:
+        cut.rejections.append(rejection)
     judge_second_contact(cut, settings)
     judge_decay(cut, settings)
 
 
-def _judge_scale(cuts, softest):
+def _judge_scale(cuts, min_median_peak):
     """Reject a test whose median peak is too small for any hammer on a track.
 
     A single small impact is weak, not out of scale.
     """
     peaks = [abs(c.contact.peak) for c in cuts]
     median = float(np.median(peaks)) if cuts else np.inf
-    if median >= softest:
+    if median >= min_median_peak:
         return
     for cut, peak in zip(cuts, peaks):
-        cut.rejections.insert(0, Rejection("out_of_scale", peak, softest, (
+        cut.rejections.insert(0, Rejection("out_of_scale", peak, min_median_peak, (
             f"{peak:.4g} N, the test's median is {median:.4g} N: no hammer is so soft on a track, its unit or scale "
             "is wrong (kN read as N?); for a small hammer set receptance.softest_blow")))  # fmt: skip
 
@@ -117,16 +117,16 @@ def _judge_scale(cuts, softest):
 def _judge_start(cut, settings):
     """Reject an impact that began before its record: the response to the missing force is in the record."""
     contact, at_start = cut.contact, cut.polarity * float(cut.force[0])
-    least = max(settings.contact_level * abs(contact.peak), 5.0 * contact.noise_force)
-    if contact.onset == 0 and at_start > least:
+    limit = max(settings.contact_level * abs(contact.peak), 5.0 * contact.noise_force)
+    if contact.onset == 0 and at_start > limit:
         detail = f"the record starts with {at_start:.4g} N: the blow had begun before it"
-        cut.rejections.append(Rejection("late", at_start, least, detail))
+        cut.rejections.append(Rejection("late", at_start, limit, detail))
 
 
 def _significant_zero(cut, contact):
     """Mean before the impact if it is statistically significant, else 0: a correct zero line must not be changed."""
-    ahead = max(1, min(cut.first, contact.onset))
-    significant = abs(contact.zero_acceleration) > 4.0 * contact.noise_acceleration / np.sqrt(ahead)
+    n_quiet = max(1, min(cut.first, contact.onset))
+    significant = abs(contact.zero_acceleration) > 4.0 * contact.noise_acceleration / np.sqrt(n_quiet)
     return contact.zero_acceleration if significant else 0.0
 
 

@@ -34,68 +34,70 @@ class Cut:
     contact: object = None
 
 
-def cut_blows(recordings, force, response, settings):
+def cut_impacts(recordings, force, response, settings):
     """Every impact of a test, in order; a recording without one gives one cut with that rejection.
 
     The number ``record`` is the recording's own where each record of its file holds one impact, else the impact's
     number within the file.
     """
-    per_recording = [_cut_one(r, force, response, settings) for r in recordings]
-    crowded = {r.source for r, cuts in zip(recordings, per_recording) if len(cuts) > 1}
+    per_recording = [_cut_recording(r, force, response, settings) for r in recordings]
+    sources_with_many = {r.source for r, cuts in zip(recordings, per_recording) if len(cuts) > 1}
     count: dict[str, int] = {}
     for recording, cuts in zip(recordings, per_recording):
         for cut in cuts:
             number = count.get(recording.source, 0)
             count[recording.source] = number + 1
-            cut.record = number if recording.source in crowded else recording.record
+            cut.record = number if recording.source in sources_with_many else recording.record
     return [cut for cuts in per_recording for cut in cuts]
 
 
-def _cut_one(recording, force, response, settings):
-    pulled, answered = recording.index(force), recording.index(response)
-    channels = recording.channels[pulled], recording.channels[answered]
-    f, a = recording.samples[pulled], recording.samples[answered]
+def _cut_recording(recording, force, response, settings):
+    force_index, response_index = recording.index(force), recording.index(response)
+    channels = recording.channels[force_index], recording.channels[response_index]
+    f, a = recording.samples[force_index], recording.samples[response_index]
     finite = np.isfinite(f) & np.isfinite(a)
     if not finite.all():
         f, a = np.where(np.isfinite(f), f, 0.0), np.where(np.isfinite(a), a, 0.0)
-    whole = Cut(f, a, recording.rate, 0, 0, 1, 0.0, recording, channels)
+    record = Cut(f, a, recording.rate, 0, 0, 1, 0.0, recording, channels)
     if f.size == 0 or np.ptp(f) == 0.0:
-        whole.rejections.append(_nothing(finite, Rejection("dead_channel", 0.0, None, f"{force} is constant")))
-        return [whole]
+        record.rejections.append(_not_finite(finite, Rejection("dead_channel", 0.0, None, f"{force} is constant")))
+        return [record]
     zero = float(np.median(f[finite]))
     f = f - zero
     noise = MAD_TO_SD * float(np.median(np.abs(f[finite])))
-    blows, level = _find(f, noise, recording.rate, settings)
-    if not blows:
-        whole.rejections.append(_nothing(finite, Rejection("no_impact", float(np.max(np.abs(f))), level, (
+    impacts, level = _find_triggers(f, noise, recording.rate, settings)
+    if not impacts:
+        record.rejections.append(_not_finite(finite, Rejection("no_impact", float(np.max(np.abs(f))), level, (
             f"the force reaches {np.max(np.abs(f)):.3g} N, a blow would exceed {level:.3g} N"))))  # fmt: skip
-        return [whole]
+        return [record]
     before = int(settings.pre_trigger * recording.rate)
     after = int(settings.window * recording.rate)
-    starts = [max(0, first - before) for first, _ in blows]
+    starts = [max(0, first - before) for first, _ in impacts]
     cuts = []
-    for k, (first, last) in enumerate(blows):
-        start = starts[k] if k == 0 else max(starts[k], blows[k - 1][1] + 1)
-        end = min(f.size, first + after, starts[k + 1] if k + 1 < len(blows) else f.size)
+    for k, (first, last) in enumerate(impacts):
+        start = starts[k] if k == 0 else max(starts[k], impacts[k - 1][1] + 1)
+        end = min(f.size, first + after, starts[k + 1] if k + 1 < len(impacts) else f.size)
         end = max(end, min(last + 1, f.size))
-        part = slice(start, end)
+        window = slice(start, end)
         polarity = 1 if f[first : last + 1].max() >= -f[first : last + 1].min() else -1
-        here = first - start, last - start
-        cut = Cut(f[part], a[part], recording.rate, *here, polarity, noise, recording, channels, (zero, 0.0))
-        if not finite[part].all():
-            cut.rejections.append(_nothing(finite[part], None, start))
+        trigger_span = first - start, last - start
+        cut = Cut(
+            f[window], a[window], recording.rate, *trigger_span, polarity, noise, recording, channels, (zero, 0.0)
+        )
+        if not finite[window].all():
+            cut.rejections.append(_not_finite(finite[window], None, start))
         cuts.append(cut)
     return cuts
 
 
-def _nothing(finite, otherwise, start=0):
+def _not_finite(finite, otherwise, start=0):
     bad = np.flatnonzero(~finite)
     if bad.size == 0:
         return otherwise
     return Rejection("not_finite", float(bad.size), 0.0, f"{bad.size} samples from {start + bad[0]} on are no numbers")
 
 
-def _find(f, noise, rate, settings):
+def _find_triggers(f, noise, rate, settings):
     """(first, last) sample above the trigger for each impact, and the trigger [N].
 
     The typical peak is the upper quartile of all candidates, so that neither handling noise nor one overflow shifts
@@ -109,5 +111,5 @@ def _find(f, noise, rate, settings):
     breaks = np.flatnonzero(np.diff(above) > settings.separation * rate) + 1
     groups = np.split(above, breaks)
     peaks = np.array([size[g].max() for g in groups])
-    usual = np.quantile(peaks, 0.75)
-    return [(int(g[0]), int(g[-1])) for g, p in zip(groups, peaks) if p >= settings.weakest_blow * usual], level
+    typical_peak = np.quantile(peaks, 0.75)
+    return [(int(g[0]), int(g[-1])) for g, p in zip(groups, peaks) if p >= settings.weakest_blow * typical_peak], level

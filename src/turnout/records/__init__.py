@@ -2,11 +2,11 @@
 
 from turnout.records.modal import Impact, ModalModel, Mode, Receptance
 from turnout.records.raw import RawChannel, RawDescription
-from turnout.records.recording import NOTHING, Channel, LongRecording, ReadResult, Recording
+from turnout.records.recording import EMPTY_MAPPING, Channel, LongRecording, ReadResult, Recording
 from turnout.records.unit import Rejection, Unit
 
 __all__ = [
-    "NOTHING",
+    "EMPTY_MAPPING",
     "Channel",
     "Impact",
     "LongRecording",

@@ -55,7 +55,7 @@ class Samples(Protocol):
         """(start, stop) -> (n_channel, stop - start)."""
 
 
-class Sampled:
+class SampledSignals:
     """Duration, rows and blocks of ``Samples``."""
 
     @property
@@ -67,7 +67,7 @@ class Sampled:
         """Rows of all channels that measure ``quantity``."""
         return tuple(i for i, c in enumerate(self.channels) if c.quantity == quantity)
 
-    def stretches(self: Samples, length: float) -> Iterator[np.ndarray]:
+    def blocks(self: Samples, length: float) -> Iterator[np.ndarray]:
         """The whole recording in consecutive blocks of ``length`` seconds, (n_channel, n) each."""
         step = max(round(length * self.rate), 1)
         for start in range(0, self.n_sample, step):
@@ -75,7 +75,7 @@ class Sampled:
 
 
 @dataclass(frozen=True)
-class LongRecording(Sampled):
+class LongRecording(SampledSignals):
     """Recording of a continuous logger, whose samples stay in the file.
 
     ``read(start, stop)`` returns (n_channel, stop - start) of its ``n_sample`` samples, in the SI unit of each channel.
@@ -93,11 +93,11 @@ class LongRecording(Sampled):
     conditions: Mapping = field(default_factory=dict)
 
 
-NOTHING: Mapping = MappingProxyType({})
+EMPTY_MAPPING: Mapping = MappingProxyType({})
 
 
 @dataclass(frozen=True)
-class Recording(Sampled):
+class Recording(SampledSignals):
     """Simultaneously sampled channels over one period of time, measured or simulated.
 
     Parameters
@@ -169,4 +169,4 @@ class ReadResult:
     recordings: tuple[Recording, ...]
     errors: tuple[Exception, ...] = ()
     sha256: str = ""
-    long: tuple[LongRecording, ...] = ()
+    long_recordings: tuple[LongRecording, ...] = ()

@@ -2,7 +2,7 @@
 
 from datetime import UTC, datetime, timedelta
 
-CHARTS = """
+CHART_COUNTS_SQL = """
     select count(*), count(*) filter (state = 'suppressed'), count(*) filter (state = 'not measured'), newest_charted()
     from chart_states_on({})"""
 
@@ -25,10 +25,10 @@ def whole_list(day: str) -> str:
 
 def counts_of(connection, day: str) -> tuple:
     """(number of charts, suppressed ones, those not measured for too long, newest campaign or None) on ``day``, SQL."""
-    return connection.execute(CHARTS.format(day)).fetchall()[0]
+    return connection.execute(CHART_COUNTS_SQL.format(day)).fetchall()[0]
 
 
-def of_then(newest: datetime, option: str, what: str) -> str:
+def past_day_hint(newest: datetime, option: str, what: str) -> str:
     """Sentence for a list of today with charts not measured lately: how to get the list of the last data."""
     then = (newest + timedelta(days=1)).date()  # the day after, because a day begins at midnight
     today = f"As of {datetime.now(UTC):%Y-%m-%d}; the last data are of {newest:%Y-%m-%d}"

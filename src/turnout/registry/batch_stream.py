@@ -11,7 +11,7 @@ import pyarrow as pa
 from turnout.registry.ids import content_id
 from turnout.registry.intake import Arrival
 
-CHUNK = 1024  # units per chunk that is in memory at once
+CHUNK_SIZE = 1024  # units per chunk that is in memory at once
 
 
 def token(path) -> str:
@@ -20,44 +20,44 @@ def token(path) -> str:
     return f"{path.name}:{path.stat().st_size}"
 
 
-def present(paths: Sequence[PathLike], faults: dict[str, str]) -> tuple[list[PathLike], list[str]]:
+def existing_batches(paths: Sequence[PathLike], faults: dict[str, str]) -> tuple[list[PathLike], list[str]]:
     """(paths, tokens) of the batches that exist; the others are entered in ``faults`` under their path."""
-    there, tokens = [], []
+    existing, tokens = [], []
     for path in paths:
         try:
             tokens.append(token(path))
-            there.append(path)
+            existing.append(path)
         except OSError as error:
-            faults[fspath(path)] = _said(error)
-    return there, tokens
+            faults[fspath(path)] = _describe(error)
+    return existing, tokens
 
 
-def fresh(tokens: Sequence[str], consumed: Sequence[str]) -> list[int]:
+def unread_positions(tokens: Sequence[str], consumed: Sequence[str]) -> list[int]:
     """Positions of the batches to read: those that are new, or that come later in the list than before.
 
     Batches are in the order of writing, and the last result of a unit counts. A configuration that is changed back
     gives an old batch again, at the end of the list.
 
-    >>> fresh(["a", "b", "c"], ["a", "c"]), fresh(["b", "a"], ["a", "b"])
+    >>> unread_positions(["a", "b", "c"], ["a", "c"]), unread_positions(["b", "a"], ["a", "b"])
     ([1], [1])
     """
-    places = {name: i for i, name in enumerate(consumed)}
+    positions = {name: i for i, name in enumerate(consumed)}
     last, new = -1, []
     for i, name in enumerate(tokens):
-        if places.get(name, -1) > last:
-            last = places[name]
+        if positions.get(name, -1) > last:
+            last = positions[name]
         else:
             new.append(i)
     return new
 
 
-def merged(paths: Sequence[PathLike], read: Callable, faults: dict[str, str]) -> Iterator[Arrival]:
+def merge_units(paths: Sequence[PathLike], read: Callable, faults: dict[str, str]) -> Iterator[Arrival]:
     """Units of all batches sorted by name; of a unit in several batches the result in the last one.
 
     ``read(path)`` yields objects with unit, turnout, kind, key, algo and tables, sorted by unit. A batch that cannot be
     read is entered in ``faults`` under its path, and the others are read.
     """
-    streams = [_guarded(path, read, -i, faults) for i, path in enumerate(paths)]
+    streams = [_read_guarded(path, read, -i, faults) for i, path in enumerate(paths)]
     in_order = heapq.merge(*streams, key=lambda entry: entry[:2])
     for index, (_, group) in enumerate(groupby(in_order, key=lambda entry: entry[0])):
         _, _, result = next(group)
@@ -67,7 +67,7 @@ def merged(paths: Sequence[PathLike], read: Callable, faults: dict[str, str]) ->
         )  # fmt: skip
 
 
-def of_tables(tables: Mapping[str, list[dict]], first_index: int) -> list[Arrival]:
+def table_arrivals(tables: Mapping[str, list[dict]], first_index: int) -> list[Arrival]:
     """Rows that come from no recording, one unit per table: configuration, alarms, findings."""
     return [
         Arrival(
@@ -78,7 +78,7 @@ def of_tables(tables: Mapping[str, list[dict]], first_index: int) -> list[Arriva
     ]  # fmt: skip
 
 
-def chunks(arrivals: Iterable[Arrival], size: int = CHUNK) -> Iterator[list[Arrival]]:
+def chunks(arrivals: Iterable[Arrival], size: int = CHUNK_SIZE) -> Iterator[list[Arrival]]:
     """Lists of at most ``size`` units, which limits the memory."""
     chunk: list[Arrival] = []
     for arrival in arrivals:
@@ -90,15 +90,15 @@ def chunks(arrivals: Iterable[Arrival], size: int = CHUNK) -> Iterator[list[Arri
         yield chunk
 
 
-def _guarded(path, read, rank, faults):
+def _read_guarded(path, read, rank, faults):
     try:
         for result in read(path):
             yield result.unit, rank, result
     except (OSError, pa.ArrowException, ValueError, KeyError, TypeError) as error:
-        faults[fspath(path)] = _said(error)
+        faults[fspath(path)] = _describe(error)
 
 
-def _said(error: Exception) -> str:
+def _describe(error: Exception) -> str:
     return f"{type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
 
 

@@ -15,11 +15,11 @@ from turnout.registry.generation import (
     load,
     schema_of,
 )
-from turnout.registry.lock import locked
+from turnout.registry.lock import registry_lock
 from turnout.registry.parquet import folder_of, read_list, read_live, write_sorted
 from turnout.registry.schema import WHOLE_TABLES, file_literal, tables
 from turnout.registry.staging import connect
-from turnout.registry.supersede import LARGE, halves, last_word, with_dead
+from turnout.registry.supersede import LARGE_TABLES, count_superseded, latest_supersession, split_superseded
 
 
 def compact(registry_dir: PathLike, at_least: int = 2, patience: float = 600.0) -> dict[str, tuple[int, int]]:
@@ -29,9 +29,9 @@ def compact(registry_dir: PathLike, at_least: int = 2, patience: float = 600.0) 
     then nothing is changed.
     """
     root = Path(registry_dir)
-    with locked(root, patience):
+    with registry_lock(root, patience):
         before = load(root)
-        groups = {g: files for g, files in _groups(before).items() if _pays(files, max(2, at_least))}
+        groups = {g: files for g, files in _groups(before).items() if _is_worth_merging(files, max(2, at_least))}
         return _rewrite(root, before, groups, lambda table, files: read_list(root, table, [f.path for f in files]))
 
 
@@ -41,11 +41,11 @@ def rebuild(registry_dir: PathLike, patience: float = 600.0) -> dict[str, tuple[
     RegistryError when a value cannot be cast; then nothing is changed.
     """
     root = Path(registry_dir)
-    with locked(root, patience):
+    with registry_lock(root, patience):
         before = load(root)
         groups = {g: files for g, files in _groups(before).items() if g[0] in tables()}
-        done = _rewrite(root, before, groups, lambda table, files: _cast(root, before, table, files))
-        return done
+        merged = _rewrite(root, before, groups, lambda table, files: _cast(root, before, table, files))
+        return merged
 
 
 def _groups(generation: Generation) -> dict[tuple[str, int | None], list[DataFile]]:
@@ -55,7 +55,7 @@ def _groups(generation: Generation) -> dict[tuple[str, int | None], list[DataFil
     return groups
 
 
-def _pays(files: list[DataFile], at_least: int) -> bool:
+def _is_worth_merging(files: list[DataFile], at_least: int) -> bool:
     """Whether merging is useful: enough files with valid rows, or one with valid and superseded rows."""
     return sum(f.dead < f.rows for f in files) >= at_least or any(0 < f.dead < f.rows for f in files)
 
@@ -67,32 +67,32 @@ def _rewrite(root, before, groups, select) -> dict[str, tuple[int, int]]:
         return {}
     number, con = before.number + 1, connect(temp_directory=str(root / ".spill"))
     con.execute(f"create view said as {read_live(con, root, 'supersedes', before.of('supersedes'))}")
-    con.execute(f"create table superseded as {last_word('said')}")
-    files, retired, done = list(before.files), list(before.retired), {}
+    con.execute(f"create table superseded as {latest_supersession('said')}")
+    files, retired, summary = list(before.files), list(before.retired), {}
     for (table, year), merged in groups.items():
         written = _write(con, root, table, year, merged, select(table, merged))
-        kept = {w.path for w in written}
-        gone = {f.path for f in merged} - kept
-        retired += [(path, number) for path in sorted(gone)]
-        files = [f for f in files if f.path not in gone | kept] + written
-        done[folder_of(table, year)] = (len(merged), sum(w.rows for w in written))
-    files = sorted(with_dead(con, root, files), key=lambda f: f.path)
+        written_paths = {w.path for w in written}
+        removed_paths = {f.path for f in merged} - written_paths
+        retired += [(path, number) for path in sorted(removed_paths)]
+        files = [f for f in files if f.path not in removed_paths | written_paths] + written
+        summary[folder_of(table, year)] = (len(merged), sum(w.rows for w in written))
+    files = sorted(count_superseded(con, root, files), key=lambda f: f.path)
     schemas = {f.schema: before.schemas.get(f.schema) or schema_of(f.table) for f in files}
     now = replace(before, number=number, files=files, retired=retired, schemas=schemas)
     due = due_for_deletion(now)
     commit(root, now)
     build_database(root, now)
     delete_files(root, due)
-    return done
+    return summary
 
 
 def _write(con, root, table, year, merged: list[DataFile], sql: str) -> list[DataFile]:
     """Write the rows of ``sql`` as one file, or as two if some are superseded; RegistryError if a row was lost."""
     prefix = "all" if table in WHOLE_TABLES else "compact"
-    parts = [(prefix, sql)]
-    if table in LARGE and any(f.dead for f in merged):
-        parts = list(zip((prefix, "superseded"), halves(table, sql)))
-    written = [w for name, part in parts if (w := write_sorted(con, root, table, year, part, name))]
+    selects = [(prefix, sql)]
+    if table in LARGE_TABLES and any(f.dead for f in merged):
+        selects = list(zip((prefix, "superseded"), split_superseded(table, sql)))
+    written = [w for name, select in selects if (w := write_sorted(con, root, table, year, select, name))]
     expected, got = sum(f.rows for f in merged), sum(w.rows for w in written)
     if got != expected:
         raise RegistryError(f"{table} {year}: {expected} rows expected, {got} written. Nothing was changed.")
@@ -101,13 +101,13 @@ def _write(con, root, table, year, merged: list[DataFile], sql: str) -> list[Dat
 
 def _cast(root: Path, before: Generation, table: str, files: list[DataFile]) -> str:
     """SQL over files of several schemas, every value cast to the present type of its column."""
-    parts = []
+    selects = []
     for schema in sorted({f.schema for f in files}):
-        held = before.schemas[schema]
+        old_columns = before.schemas[schema]
         columns = ", ".join(
-            f'"{c.name}"::{c.type} as "{c.name}"' if c.name in held else f'null::{c.type} as "{c.name}"'
+            f'"{c.name}"::{c.type} as "{c.name}"' if c.name in old_columns else f'null::{c.type} as "{c.name}"'
             for c in tables()[table]
         )
         paths = ", ".join(file_literal(root / f.path) for f in files if f.schema == schema)
-        parts.append(f"select {columns} from read_parquet([{paths}])")
-    return " union all ".join(parts)
+        selects.append(f"select {columns} from read_parquet([{paths}])")
+    return " union all ".join(selects)

@@ -15,13 +15,13 @@ from pathlib import Path
 import duckdb
 
 from turnout.errors import REASONS, RegistryError
-from turnout.files import beside
+from turnout.files import temporary_path
 from turnout.registry.generation import Generation, load, sync_folder
 from turnout.registry.ids import content_id
-from turnout.registry.parquet import MEASURED, read_live
+from turnout.registry.parquet import MEASUREMENT_IDS, read_live
 from turnout.registry.schema import file_literal, literal, tables, time_column
 from turnout.registry.staging import connect
-from turnout.registry.supersede import LARGE, create_parts, last_word
+from turnout.registry.supersede import LARGE_TABLES, create_split_views, latest_supersession
 
 _NEEDS = re.compile(r"^--\s*needs:\s*(.+)$", re.MULTILINE)
 
@@ -36,13 +36,13 @@ def view_files() -> dict[str, str]:
     """
     folder = files("turnout.registry") / "views"
     texts = {p.name[:-4]: p.read_text(encoding="utf-8") for p in folder.iterdir() if p.name.endswith(".sql")}
-    return in_order(texts)
+    return sort_by_needs(texts)
 
 
-def in_order(texts: dict[str, str]) -> dict[str, str]:
+def sort_by_needs(texts: dict[str, str]) -> dict[str, str]:
     """Files sorted by dependency: each follows those in its line ``-- needs: a, b``.
 
-    >>> list(in_order({"a": "-- needs: c", "b": "", "c": ""}))
+    >>> list(sort_by_needs({"a": "-- needs: c", "b": "", "c": ""}))
     ['b', 'c', 'a']
     """
     sorter: TopologicalSorter = TopologicalSorter()
@@ -69,20 +69,20 @@ def reasons_sql() -> str:
     return f"create or replace view reasons as select * from (values {values}) as r(reason_code, meaning)"
 
 
-def newest_that_counts(con: duckdb.DuckDBPyConnection, root: Path, generation: Generation) -> str | None:
+def newest_valid(con: duckdb.DuckDBPyConnection, root: Path, generation: Generation) -> str | None:
     """ISO time of the newest measurement that is not superseded, None without any.
 
     Files are read in the order of their newest time, until no other can hold a later time.
     """
-    con.execute(f"create or replace temp table no_longer as {last_word('supersedes')}")
+    con.execute(f"create or replace temp table no_longer as {latest_supersession('supersedes')}")
     newest = None
     for file in sorted((f for f in generation.files if f.newest), key=lambda f: str(f.newest), reverse=True):
         if newest is not None and str(file.newest) <= newest:
             break
         source = f"read_parquet({file_literal(root / file.path)})"
-        counts = f"{MEASURED[file.table]} not in (select old_id from no_longer)"
-        found = con.execute(f"select max({time_column(file.table)})::varchar from {source} where {counts}").fetchall()
-        newest = max(filter(None, (newest, found[0][0])), default=None)
+        counts = f"{MEASUREMENT_IDS[file.table]} not in (select old_id from no_longer)"
+        rows = con.execute(f"select max({time_column(file.table)})::varchar from {source} where {counts}").fetchall()
+        newest = max(filter(None, (newest, rows[0][0])), default=None)
     con.execute("drop table no_longer")
     return newest
 
@@ -90,7 +90,7 @@ def newest_that_counts(con: duckdb.DuckDBPyConnection, root: Path, generation: G
 DATABASE = "registry.duckdb"
 # Every DuckDB since 1.2 opens it; tools with an older DuckDB could not read the newest format.
 STORAGE_VERSION = "v1.2.0"
-OFFLINE: dict[str, str | bool | int | float | list[str]] = {
+OFFLINE_CONFIG: dict[str, str | bool | int | float | list[str]] = {
     "autoinstall_known_extensions": False,
     "autoload_known_extensions": False,
 }
@@ -98,7 +98,7 @@ OFFLINE: dict[str, str | bool | int | float | list[str]] = {
 # No measurement can be later than the last run and the last campaign, so a logger clock that is ahead is ignored. The
 # date of a campaign is entered by people. One after the last run counts only if most turnouts have one: then the clock
 # of this machine is late.
-LAST_POSSIBLE = """
+LAST_POSSIBLE_SQL = """
     with clock as (select max(ended_at_utc) as at_utc from runs),
     last as (select turnout_id, max(started_at_utc) as at_utc from campaigns group by turnout_id),
     judged as (
@@ -125,7 +125,7 @@ def open_registry(path, read_only: bool = True) -> duckdb.DuckDBPyConnection:
             f"{file}: there is no registry here. Run the pipeline, or give the folder that holds {DATABASE}."
         )
     try:
-        connection = duckdb.connect(str(file), read_only=read_only, config=OFFLINE)
+        connection = duckdb.connect(str(file), read_only=read_only, config=OFFLINE_CONFIG)
         connection.execute("set enable_progress_bar = false")
         ((folder,),) = connection.execute("select folder from registry_info").fetchall()
     except duckdb.Error as error:
@@ -143,7 +143,7 @@ def build_database(registry_dir: Path, generation: Generation) -> None:
     The views hold absolute paths, so that it can be opened from any folder.
     """
     root = Path(registry_dir).resolve()
-    unfinished = beside(root / "registry")
+    unfinished = temporary_path(root / "registry")
     con = connect()
     try:
         con.execute(f"attach {literal(str(unfinished))} as registry (storage_version '{STORAGE_VERSION}')")
@@ -170,7 +170,7 @@ def is_behind(registry_dir: Path, generation: Generation) -> bool:
     if not file.exists():
         return True
     try:
-        with duckdb.connect(str(file), read_only=True, config=OFFLINE) as con:
+        with duckdb.connect(str(file), read_only=True, config=OFFLINE_CONFIG) as con:
             row = con.execute("select generation, folder, views_version from registry_info").fetchall()[0]
     except duckdb.Error:
         return True
@@ -194,10 +194,10 @@ def rebuild_database(registry_dir: Path) -> Generation:
 def _create_views(con, root: Path, generation: Generation) -> None:
     for table in tables():
         con.execute(f'create view "{table}" as {read_live(con, root, table, generation.of(table))}')
-    for table in LARGE:
-        create_parts(con, root, table, generation.of(table))
-    until = con.execute(LAST_POSSIBLE).fetchall()[0][0]
-    counted = newest_that_counts(con, root, generation)
+    for table in LARGE_TABLES:
+        create_split_views(con, root, table, generation.of(table))
+    until = con.execute(LAST_POSSIBLE_SQL).fetchall()[0][0]
+    counted = newest_valid(con, root, generation)
     last = counted and min(counted, until or counted)
     newest = f"timestamp {literal(last)}" if last else "null::timestamp"
     con.execute(f"create macro newest_measurement() as {newest}")

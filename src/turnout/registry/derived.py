@@ -19,12 +19,12 @@ from turnout.registry.generation import (
     load,
     schema_of,
 )
-from turnout.registry.lock import locked
+from turnout.registry.lock import registry_lock
 from turnout.registry.parquet import write_sorted
 from turnout.registry.schema import WHOLE_TABLES, key, tables, time_column
 from turnout.registry.staging import connect
 
-BY_YEAR = ("charts",)
+TABLES_BY_YEAR = ("charts",)
 
 
 def publish(
@@ -54,23 +54,23 @@ def publish(
         the registry is locked or the disk is full. Then nothing was changed.
     """
     root = Path(registry_dir)
-    with locked(root, patience):
+    with registry_lock(root, patience):
         before, con = load(root), connect(temp_directory=str(root / ".spill"))
         number = before.number + 1
         files = list(before.files)
         for table in sorted(frames):
-            _enter(con, table, frames[table])
-            kept = (keep or {}).get(table, ())
-            files = [f for f in files if f.table != table or f.year in kept] + _written(con, root, table)
+            _create_view(con, table, frames[table])
+            unchanged_years = (keep or {}).get(table, ())
+            files = [f for f in files if f.table != table or f.year in unchanged_years] + _write_table(con, root, table)
         live = {f.path for f in files}
-        gone = [(f.path, number) for f in before.files if f.path not in live]
+        removed = [(f.path, number) for f in before.files if f.path not in live]
         files.sort(key=lambda f: f.path)
         if files == before.files:
             if is_behind(root, before):
                 build_database(root, before)
             return before
         schemas = before.schemas | {f.schema: schema_of(f.table) for f in files if f.table in frames}
-        now = Generation(number, files, [*before.retired, *gone], schemas, before.consumed)
+        now = Generation(number, files, [*before.retired, *removed], schemas, before.consumed)
         due = due_for_deletion(now)
         commit(root, now)
         build_database(root, now)
@@ -78,7 +78,7 @@ def publish(
         return now
 
 
-def _enter(con: duckdb.DuckDBPyConnection, table: str, frame) -> None:
+def _create_view(con: duckdb.DuckDBPyConnection, table: str, frame) -> None:
     """Create view ``new_<table>`` of the rows, typed and rounded; RegistryError at the first bad row."""
     if table not in WHOLE_TABLES:
         raise RegistryError(f"{table} is not a table that is replaced whole; those are {', '.join(WHOLE_TABLES)}.")
@@ -86,18 +86,18 @@ def _enter(con: duckdb.DuckDBPyConnection, table: str, frame) -> None:
     if unknown := sorted(set(present) - {c.name for c in tables()[table]}):
         raise RegistryError(f"{table}, column {unknown[0]}: columns.csv does not know it.")
     con.register(f"came_{table}", frame)
-    parts = []
+    expressions = []
     for c in tables()[table]:
         value = f'"{c.name}"::{c.type}' if c.name in present else f"null::{c.type}"
         if c.type in ("double", "float"):
             value = f"nullif({value}, 'nan'::{c.type})"
             value = value if c.decimals is None else f"round({value}, {c.decimals})"
-        parts.append(f'{value} as "{c.name}"')
-    con.execute(f"create view new_{table} as select {', '.join(parts)} from came_{table}")
-    _refuse_bad(con, table)
+        expressions.append(f'{value} as "{c.name}"')
+    con.execute(f"create view new_{table} as select {', '.join(expressions)} from came_{table}")
+    _reject_bad_rows(con, table)
 
 
-def _refuse_bad(con, table) -> None:
+def _reject_bad_rows(con, table) -> None:
     rules = [(c, f'"{c.name}" is not null') for c in tables()[table] if c.required or c.key]
     rules += [(c, f"coalesce({c.check}, true)") for c in tables()[table] if c.check]
     counted = ", ".join(f"count(*) filter (not ({rule}))" for _, rule in rules)
@@ -110,15 +110,15 @@ def _refuse_bad(con, table) -> None:
             keys = ", ".join(f'"{k}"' for k in key(table))
             row = con.execute(f'select {keys}, "{column.name}" from new_{table} where not ({rule}) limit 1').fetchall()
             *where, value = row[0]
-            asked = "given" if value is None else column.rule
+            requirement = "given" if value is None else column.rule
             raise RegistryError(
-                f"{table}, row {' '.join(map(str, where))}, column {column.name}: {value}, must be {asked} "
+                f"{table}, row {' '.join(map(str, where))}, column {column.name}: {value}, must be {requirement} "
                 f"({count} rows). Nothing was changed."
             )
 
 
-def _written(con, root: Path, table: str) -> list[DataFile]:
-    if table not in BY_YEAR:
+def _write_table(con, root: Path, table: str) -> list[DataFile]:
+    if table not in TABLES_BY_YEAR:
         written = write_sorted(con, root, table, None, f"select * from new_{table}", "all", True)
         return [written] if written else []
     year = f"year({time_column(table)})"

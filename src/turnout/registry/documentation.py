@@ -21,18 +21,18 @@ def views() -> dict[str, tuple[str, tuple[dict[str, str], ...]]]:
     >>> views()["section_trend(section, resonance)"][1][1]["column"]
     'frequency_hz'
     """
-    found: dict[str, list[dict[str, str]]] = {}
+    columns_by_call: dict[str, list[dict[str, str]]] = {}
     for row in view_columns():
-        found.setdefault(row["view"] + row["parameters"], []).append(row)
-    return {call: (row_of(rows[0]["view"]), tuple(rows)) for call, rows in found.items()}
+        columns_by_call.setdefault(row["view"] + row["parameters"], []).append(row)
+    return {call: (row_meaning(rows[0]["view"]), tuple(rows)) for call, rows in columns_by_call.items()}
 
 
-def row_of(name: str) -> str:
+def row_meaning(name: str) -> str:
     """Meaning of a row of the view: the SQL comment above the statement that creates it."""
     for sql in view_files().values():
         for keyword in ("view", "macro"):
-            head, found, _ = sql.partition(f"create or replace {keyword} {name}")
-            if found and not (sql[len(head) + len(found)].isalnum() or sql[len(head) + len(found)] == "_"):
+            head, statement, _ = sql.partition(f"create or replace {keyword} {name}")
+            if statement and not (sql[len(head) + len(statement)].isalnum() or sql[len(head) + len(statement)] == "_"):
                 comment = head.rstrip().rpartition("\n\n")[2].splitlines()
                 lines = [c[2:].strip() for c in comment if c.startswith("--") and "needs:" not in c]
                 return " ".join(lines)
@@ -67,7 +67,7 @@ def describe(name: str | None = None) -> str:
     return "\n\n".join(blocks)
 
 
-_PART = "<!-- {name}: generated, do not edit -->\n{body}\n<!-- end of {name} -->"
+_SECTION = "<!-- {name}: generated, do not edit -->\n{body}\n<!-- end of {name} -->"
 
 
 def table_tables() -> str:
@@ -110,36 +110,36 @@ def reasons_page() -> str:
     return "\n".join(lines) + "\n"
 
 
-def with_parts(page: str, parts: dict[str, str]) -> str:
+def with_sections(page: str, sections: dict[str, str]) -> str:
     """``page`` with every generated section replaced; KeyError where the page lacks one."""
-    for name, body in parts.items():
-        found = re.compile(rf"<!-- {name}: generated, do not edit -->\n.*?\n?<!-- end of {name} -->", re.DOTALL)
-        if not found.search(page):
+    for name, body in sections.items():
+        pattern = re.compile(rf"<!-- {name}: generated, do not edit -->\n.*?\n?<!-- end of {name} -->", re.DOTALL)
+        if not pattern.search(page):
             raise KeyError(f"no place for {name}")
-        page = found.sub(_PART.format(name=name, body=body).replace("\\", r"\\"), page)
+        page = pattern.sub(_SECTION.format(name=name, body=body).replace("\\", r"\\"), page)
     return page
 
 
 def write(folder: Path) -> None:
     """Write the generated sections into the pages of ``folder``."""
     page = folder / "registry.md"
-    parts = {"tables": table_tables(), "views": view_tables()}
-    page.write_text(with_parts(page.read_text(encoding="utf-8"), parts), encoding="utf-8")
+    sections = {"tables": table_tables(), "views": view_tables()}
+    page.write_text(with_sections(page.read_text(encoding="utf-8"), sections), encoding="utf-8")
     (folder / "reasons.md").write_text(reasons_page(), encoding="utf-8")
 
 
 def _values(column: Column) -> str:
     """Rules of a value in words: required or not, its range or choices, its resolution."""
-    parts = ["required"] if column.required and not column.key else []
+    words = ["required"] if column.required and not column.key else []
     if column.allowed:
-        parts.append(", ".join(column.allowed))
+        words.append(", ".join(column.allowed))
     elif column.minimum is not None and column.maximum is not None and abs(column.maximum) < 1e300:
-        parts.append(f"{column.minimum:g} to {column.maximum:g}")
+        words.append(f"{column.minimum:g} to {column.maximum:g}")
     elif column.minimum is not None and column.minimum > -1e300:
-        parts.append(f"at least {column.minimum:g}")
+        words.append(f"at least {column.minimum:g}")
     if column.decimals is not None:
-        parts.append(f"kept to {10.0**-column.decimals:g}")
-    return "; ".join(parts)
+        words.append(f"kept to {10.0**-column.decimals:g}")
+    return "; ".join(words)
 
 
 if __name__ == "__main__":

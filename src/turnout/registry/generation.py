@@ -10,10 +10,10 @@ from turnout.errors import RegistryError
 from turnout.files import write_atomic
 from turnout.registry.schema import tables
 
-FILE = "_generation.json"
-FORMAT = 1
-KEPT_GENERATIONS = 2  # for which retired files stay, for readers of an older state
-NO_DATABASE = {"?", "\\"}  # in a path: DuckDB reads options after the first and takes the second for a slash
+GENERATION_FILE = "_generation.json"
+FORMAT_VERSION = 1
+N_KEPT_GENERATIONS = 2  # for which retired files stay, for readers of an older state
+FORBIDDEN_CHARACTERS = {"?", "\\"}  # in a path: DuckDB reads options after the first and takes the second for a slash
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Generation:
 
     def to_json(self) -> str:
         """Text of the generation file; equal generations give equal bytes."""
-        return json.dumps({"format": FORMAT} | asdict(self), indent=1, sort_keys=True) + "\n"
+        return json.dumps({"format": FORMAT_VERSION} | asdict(self), indent=1, sort_keys=True) + "\n"
 
 
 def load(registry_dir: Path) -> Generation:
@@ -64,8 +64,8 @@ def load(registry_dir: Path) -> Generation:
     RegistryError when it is not readable, which means that something else changed it, for it is written in one step.
     RegistryError also for a folder in which DuckDB can make no database.
     """
-    path = Path(registry_dir) / FILE
-    if forbidden := NO_DATABASE.intersection(path.resolve().as_posix()):
+    path = Path(registry_dir) / GENERATION_FILE
+    if forbidden := FORBIDDEN_CHARACTERS.intersection(path.resolve().as_posix()):
         raise RegistryError(
             f"{registry_dir}: DuckDB can make no database where a folder has {min(forbidden)} in its name. "
             "Nothing was changed. Rename that folder, or put the registry elsewhere."
@@ -77,13 +77,13 @@ def load(registry_dir: Path) -> Generation:
     except (json.JSONDecodeError, UnicodeDecodeError) as error:
         raise RegistryError(f"{path}: not a generation file ({error}). Put it back from a backup.") from None
     try:
-        if raw.pop("format", None) != FORMAT:
+        if raw.pop("format", None) != FORMAT_VERSION:
             raise RegistryError(f"{path}: written by another version of the program. Install that version.")
         files = [DataFile(**f) for f in raw.pop("files")]
         return Generation(files=files, retired=[(p, n) for p, n in raw.pop("retired")], **raw)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        said = f"{type(error).__name__}: {error}"
-        raise RegistryError(f"{path}: not a generation file ({said}). Put it back from a backup.") from None
+        message = f"{type(error).__name__}: {error}"
+        raise RegistryError(f"{path}: not a generation file ({message}). Put it back from a backup.") from None
 
 
 def schema_hash(table: str) -> str:
@@ -102,20 +102,20 @@ def check_schemas(generation: Generation) -> None:
 
     DuckDB would silently convert both to text. A new column is allowed: it is NULL in old rows.
     """
-    for name, held in sorted(generation.schemas.items()):
+    for name, column_types in sorted(generation.schemas.items()):
         table, _, _ = name.partition(":")
         now = schema_of(table) if table in tables() else {}
-        for column, kind in held.items():
-            if column in now and now[column] != kind:
+        for column, old_type in column_types.items():
+            if column in now and now[column] != old_type:
                 raise RegistryError(
-                    f"{table}, column {column}: files hold {kind}, columns.csv says {now[column]}. "
+                    f"{table}, column {column}: files hold {old_type}, columns.csv says {now[column]}. "
                     "Rename the new column, or rebuild the registry from the work batches."
                 )
 
 
 def commit(registry_dir: Path, generation: Generation) -> None:
     """Publish the generation by replacing one file; from then on the new files count and the retired ones do not."""
-    write_durably(Path(registry_dir) / FILE, generation.to_json().encode())
+    write_durably(Path(registry_dir) / GENERATION_FILE, generation.to_json().encode())
 
 
 def write_durably(path: Path, content: bytes) -> None:
@@ -139,7 +139,7 @@ def due_for_deletion(generation: Generation) -> list[str]:
     # a small table that was changed back has its old path again, which may be live or retired a second time
     dropped = dict(sorted(generation.retired, key=lambda entry: entry[1]))
     waiting = {path: n for path, n in dropped.items() if path not in live}
-    last = generation.number - KEPT_GENERATIONS
+    last = generation.number - N_KEPT_GENERATIONS
     generation.retired = sorted((path, n) for path, n in waiting.items() if n > last)
     return sorted(path for path, n in waiting.items() if n <= last)
 

@@ -4,7 +4,7 @@ import hashlib
 import json
 
 
-def content_id(*parts) -> str:
+def content_id(*values) -> str:
     """First 128 bits of the sha256 of the values, as 32 hexadecimal digits.
 
     Each value is text, bytes, a number, None, or a list or dictionary of these; ("ab", "c") and ("a", "bc")
@@ -21,18 +21,18 @@ def content_id(*parts) -> str:
     >>> content_id("ab", "c") == content_id("a", "bc")
     False
     """
-    if len(parts) == 1 and isinstance(parts[0], bytes):
-        return hashlib.sha256(parts[0]).hexdigest()[:32]
-    text = json.dumps(parts, sort_keys=True, separators=(",", ":"), ensure_ascii=True, default=_plain)
+    if len(values) == 1 and isinstance(values[0], bytes):
+        return hashlib.sha256(values[0]).hexdigest()[:32]
+    text = json.dumps(values, sort_keys=True, separators=(",", ":"), ensure_ascii=True, default=_plain)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
-def _plain(part):
+def _plain(value):
     """Convert types unknown to JSON: bytes to their hash, times to ISO text, numpy scalars and arrays to numbers."""
-    if isinstance(part, bytes):
-        return {"sha256": hashlib.sha256(part).hexdigest()}
-    if hasattr(part, "isoformat"):
-        return part.isoformat()
-    if hasattr(part, "tolist"):
-        return part.tolist()
-    raise TypeError(f"no content id from {type(part).__name__} {part!r}")
+    if isinstance(value, bytes):
+        return {"sha256": hashlib.sha256(value).hexdigest()}
+    if hasattr(value, "isoformat"):
+        return value.isoformat()
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    raise TypeError(f"no content id from {type(value).__name__} {value!r}")

@@ -27,11 +27,11 @@ class Refusal:
     row: int
     column: str
     value: str
-    asked: str
+    requirement: str
     number: float | None = None
 
     def __str__(self):
-        return f"{self.table}, row {self.row + 1}, column {self.column}: {self.value}, must be {self.asked}"
+        return f"{self.table}, row {self.row + 1}, column {self.column}: {self.value}, must be {self.requirement}"
 
 
 @dataclass
@@ -64,8 +64,8 @@ def unit_year(unit: str, rows: Mapping[str, list[dict]]) -> int:
     >>> unit_year("t1/hammer/A7/2024-05-13", {}), unit_year("t1/passage/20260105T101112Z", {}), unit_year("t1/x/y", {})
     (2024, 2026, 0)
     """
-    if found := _DATE.search(unit.split("/", 1)[-1]):
-        return int(found[1])
+    if date := _DATE.search(unit.split("/", 1)[-1]):
+        return int(date[1])
     times = (str(v) for table in sorted(rows) for row in rows[table] for k, v in row.items() if k.endswith("_at_utc"))
     return next((int(t[:4]) for t in times if t[:4].isdigit()), UNDATED)
 
@@ -76,58 +76,58 @@ def gather(table: str, arrivals: Iterable[Arrival]) -> tuple[pa.Table, list[Refu
     Returns the table of all rows whose values fit their types, and a refusal for every other row: one with a column
     that is not in ``columns.csv``, or with a value of another type.
     """
-    known = frozenset(names(table))
-    units, places, years, rows, refusals = [], [], [], [], []
+    column_names = frozenset(names(table))
+    units, row_numbers, years, rows, refusals = [], [], [], [], []
     for arrival in arrivals:
-        for place, row in enumerate(arrival.tables.get(table, ())):
-            if not isinstance(row, dict) or not known.issuperset(row):
-                refusals.append(_misshapen(arrival, table, place, row, known))
+        for row_number, row in enumerate(arrival.tables.get(table, ())):
+            if not isinstance(row, dict) or not column_names.issuperset(row):
+                refusals.append(_rejected_row(arrival, table, row_number, row, column_names))
                 continue
             units.append(arrival.index)
-            places.append(place)
+            row_numbers.append(row_number)
             years.append(arrival.year)
             rows.append(row)
     columns = [c for c in tables()[table] if c.name not in FILLED_BY_REGISTER]
     arrays: dict[str, pa.Array] = {}
     bad: dict[int, Refusal] = {}
     for column, values in zip(columns, _by_column(rows, [c.name for c in columns])):
-        arrays[column.name], wrong = typed(column, values)
+        arrays[column.name], wrong = to_arrow(column, values)
         for i in wrong:
             value = repr(values[i])[:200]
-            bad.setdefault(i, Refusal(units[i], table, places[i], column.name, value, f"of type {column.type}"))
-    marks = {"_unit": pa.array(units, pa.int32()), "_row": pa.array(places, pa.int32())}
+            bad.setdefault(i, Refusal(units[i], table, row_numbers[i], column.name, value, f"of type {column.type}"))
+    marks = {"_unit": pa.array(units, pa.int32()), "_row": pa.array(row_numbers, pa.int32())}
     gathered = pa.table(arrays | marks | {"_year": pa.array(years, pa.int32())})
     if bad:
         gathered = gathered.filter(pa.array([i not in bad for i in range(len(rows))]))
     return gathered, refusals + [bad[i] for i in sorted(bad)]
 
 
-def _misshapen(arrival, table, place, row, known) -> Refusal:
+def _rejected_row(arrival, table, row_number, row, column_names) -> Refusal:
     if not isinstance(row, dict):
-        return Refusal(arrival.index, table, place, "all", repr(row)[:200], "a row")
-    name = min(map(str, row.keys() - known))
-    return Refusal(arrival.index, table, place, name, repr(row.get(name))[:200], "a column of columns.csv")
+        return Refusal(arrival.index, table, row_number, "all", repr(row)[:200], "a row")
+    name = min(map(str, row.keys() - column_names))
+    return Refusal(arrival.index, table, row_number, name, repr(row.get(name))[:200], "a column of columns.csv")
 
 
 def _by_column(rows: list[dict], wanted: list[str]) -> list[Sequence]:
     """Values of each column. Rows usually have the same keys, and using that halves the time."""
     if not rows:
         return [()] * len(wanted)
-    alike = [name for name in wanted if name in rows[0]]
+    shared_names = [name for name in wanted if name in rows[0]]
     try:
-        together = zip(*map(itemgetter(*alike, alike[0]), rows)) if alike else ()
-        fetched: dict[str, Sequence] = dict(zip(alike, together))
+        transposed = zip(*map(itemgetter(*shared_names, shared_names[0]), rows)) if shared_names else ()
+        fetched: dict[str, Sequence] = dict(zip(shared_names, transposed))
     except KeyError:
         return [[row.get(name) for row in rows] for name in wanted]
     fetched |= {name: [row.get(name) for row in rows] for name in wanted if name not in fetched}
     return [fetched[name] for name in wanted]
 
 
-def typed(column: Column, values: Sequence) -> tuple[pa.Array, list[int]]:
+def to_arrow(column: Column, values: Sequence) -> tuple[pa.Array, list[int]]:
     """Arrow array of ``values``, None where one does not fit the type, and the indices of those.
 
     >>> from turnout.registry.schema import column
-    >>> typed(column("modes", "n_impacts"), [30, None, "many"])[1]
+    >>> to_arrow(column("modes", "n_impacts"), [30, None, "many"])[1]
     [2]
     """
     try:
@@ -148,8 +148,8 @@ def _convert(column: Column, values: Sequence) -> pa.Array:
     if column.is_list:
         return _lists(column, values)
     if column.type == "timestamp":
-        known = {v: _time(v) for v in set(values)}
-        return pa.array([known[v] for v in values], pa.timestamp("us"))
+        parsed = {v: _time(v) for v in set(values)}
+        return pa.array([parsed[v] for v in values], pa.timestamp("us"))
     if pa.types.is_floating(column.arrow) or pa.types.is_integer(column.arrow):
         kinds = set(map(type, values))
         if not kinds.isdisjoint((bool, str, np.bool_)):
@@ -173,14 +173,16 @@ def _lists(column: Column, values: Sequence) -> pa.Array:
     """List array from lists or numpy arrays, through one flat array."""
     if any(isinstance(v, (str, bytes, Mapping)) for v in values):
         raise TypeError("not a list")
-    kind = column.arrow.value_type
+    element_type = column.arrow.value_type
     if any(v is not None and not isinstance(v, np.ndarray) for v in values):
         return pa.array([v.tolist() if isinstance(v, np.ndarray) else v for v in values], column.arrow)
-    held = [np.ravel(v) for v in values if v is not None]
-    flat = np.concatenate(held) if held else np.zeros(0)
+    arrays = [np.ravel(v) for v in values if v is not None]
+    flat = np.concatenate(arrays) if arrays else np.zeros(0)
     lengths = np.array([0 if v is None else np.size(v) for v in values], dtype=np.int64)
     offsets = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int32)
     missing = pa.array(np.array([v is None for v in values], dtype=bool), pa.bool_())
     return pa.ListArray.from_arrays(
-        pa.array(offsets), pa.array(flat.astype(kind.to_pandas_dtype()), kind), mask=missing if len(values) else None
+        pa.array(offsets),
+        pa.array(flat.astype(element_type.to_pandas_dtype()), element_type),
+        mask=missing if len(values) else None,
     )

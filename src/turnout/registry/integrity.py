@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 from turnout.content import sha256_of
 from turnout.registry.database import DATABASE, is_behind
 from turnout.registry.generation import DataFile, Generation, load
-from turnout.registry.lock import locked
+from turnout.registry.lock import registry_lock
 from turnout.registry.schema import tables
 
 _SCHEMA = re.compile(r"_schema-[0-9a-f]{12}\.parquet")
@@ -37,7 +37,7 @@ def check(registry_dir: PathLike, hashes: bool = True) -> list[str]:
 def vacuum(registry_dir: PathLike, patience: float = 600.0) -> list[str]:
     """Delete files on no list, which killed runs leave. Returns their paths."""
     root = Path(registry_dir)
-    with locked(root, patience):
+    with registry_lock(root, patience):
         lost = orphans(root, load(root))
         for path in lost:
             (root / path).unlink(missing_ok=True)
@@ -46,11 +46,11 @@ def vacuum(registry_dir: PathLike, patience: float = 600.0) -> list[str]:
 
 def orphans(root: Path, generation: Generation) -> list[str]:
     """Files below the tables' folders, and temporary ones, that are neither live nor retired."""
-    kept = {f.path for f in generation.files} | {path for path, _ in generation.retired}
-    found = [p for table in tables() for p in (root / table).rglob("*") if p.is_file()]
-    found += list(root.glob(".*.tmp"))
-    paths = (p.relative_to(root).as_posix() for p in found if not _SCHEMA.fullmatch(p.name))
-    return sorted(set(paths) - kept)
+    listed = {f.path for f in generation.files} | {path for path, _ in generation.retired}
+    candidates = [p for table in tables() for p in (root / table).rglob("*") if p.is_file()]
+    candidates += list(root.glob(".*.tmp"))
+    paths = (p.relative_to(root).as_posix() for p in candidates if not _SCHEMA.fullmatch(p.name))
+    return sorted(set(paths) - listed)
 
 
 def _check_file(root: Path, file: DataFile, hashes: bool) -> list[str]:
@@ -66,16 +66,18 @@ def _check_file(root: Path, file: DataFile, hashes: bool) -> list[str]:
     problems = []
     if parquet.metadata.num_rows != file.rows:
         problems.append(f"{file.path}: {parquet.metadata.num_rows} rows, the list says {file.rows}.")
-    held = {f.name: f.type for f in parquet.schema_arrow}
+    file_types = {f.name: f.type for f in parquet.schema_arrow}
     for column in tables().get(file.table, ()):
-        if column.name in held and not _same(held[column.name], column.arrow):
-            problems.append(f"{file.path}, column {column.name}: {held[column.name]}, columns.csv says {column.type}.")
+        if column.name in file_types and not _is_same_type(file_types[column.name], column.arrow):
+            problems.append(
+                f"{file.path}, column {column.name}: {file_types[column.name]}, columns.csv says {column.type}."
+            )
     if hashes and sha256_of(path) != file.sha256:
         problems.append(f"{file.path}: its hash differs from the list. Put it back from a backup.")
     return problems
 
 
-def _same(held: pa.DataType, wanted: pa.DataType) -> bool:
-    if pa.types.is_list(held) and pa.types.is_list(wanted):
-        return held.value_type == wanted.value_type
-    return held == wanted
+def _is_same_type(actual: pa.DataType, wanted: pa.DataType) -> bool:
+    if pa.types.is_list(actual) and pa.types.is_list(wanted):
+        return actual.value_type == wanted.value_type
+    return actual == wanted

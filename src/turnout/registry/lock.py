@@ -9,7 +9,7 @@ from turnout.errors import RegistryError
 
 
 @contextmanager
-def locked(registry_dir: Path, patience: float = 600.0):
+def registry_lock(registry_dir: Path, patience: float = 600.0):
     """Hold the registry for writing; RegistryError after ``patience`` seconds, or without permission to write."""
     path = Path(registry_dir) / ".lock"
     try:

@@ -7,7 +7,7 @@ import duckdb
 
 from turnout.content import sha256_of
 from turnout.errors import RegistryError
-from turnout.files import beside
+from turnout.files import temporary_path
 from turnout.registry.generation import DataFile, schema_hash, sync_folder
 from turnout.registry.schema import file_literal, literal, names, sort_order, tables, time_column
 
@@ -16,7 +16,7 @@ from turnout.registry.schema import file_literal, literal, names, sort_order, ta
 SMALL_GROUP, LARGE_GROUP, SMALL_FILE = 16_384, 122_880, 250_000
 
 # Tables of measurements, and the id by which their rows are superseded.
-MEASURED = {"models": "model_id", "modes": "model_id", "passages": "passage_id", "passage_fits": "passage_id"}
+MEASUREMENT_IDS = {"models": "model_id", "modes": "model_id", "passages": "passage_id", "passage_fits": "passage_id"}
 
 
 def folder_of(table: str, year: int | None) -> str:
@@ -37,7 +37,7 @@ def write_sorted(
     year: int | None,
     select: str,
     prefix: str,
-    always_alike: bool = False,
+    same_source: bool = False,
 ) -> DataFile | None:
     """Write the rows of ``select`` (all columns of ``table``) as one sorted file; None where there are none.
 
@@ -46,10 +46,10 @@ def write_sorted(
     the rows always come from the same type of source. RegistryError when the disk is full; then nothing is changed.
     """
     folder = Path(registry_dir) / folder_of(table, year)
-    unfinished = beside(folder / prefix)
+    unfinished = temporary_path(folder / prefix)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        rows = _copy(con, table, select, unfinished, prefix.startswith("batch"), always_alike)
+        rows = _copy(con, table, select, unfinished, prefix.startswith("batch"), same_source)
         if rows == 0:
             return None
         digest = _sync_and_hash(unfinished)
@@ -69,11 +69,11 @@ def write_sorted(
     return DataFile(path, table, year, rows, size, digest, f"{table}:{schema_hash(table)}", _newest(con, table, final))
 
 
-def _copy(con, table: str, select: str, path: Path, small: bool, always_alike: bool) -> int:
+def _copy(con, table: str, select: str, path: Path, small: bool, same_source: bool) -> int:
     """Copy the rows, sorted, and return their number. ``small`` row groups are used in small files only."""
     columns = ", ".join(f'"{n}"' for n in names(table))
     source = f"({select})"
-    if not always_alike:
+    if not same_source:
         con.execute(f"create or replace temp table to_write as select {columns} from {source}")
         source = "to_write"
         small = small and con.execute("select count(*) from to_write").fetchall()[0][0] <= SMALL_FILE
@@ -88,7 +88,7 @@ def write_empty(con: duckdb.DuckDBPyConnection, registry_dir: Path, table: str) 
     path = Path(registry_dir) / table / f"_schema-{schema_hash(table)}.parquet"
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
-        unfinished = beside(path)
+        unfinished = temporary_path(path)
         typed = ", ".join(f'null::{c.type} as "{c.name}"' for c in tables()[table])
         try:
             con.execute(f"copy (select {typed} limit 0) to {literal(str(unfinished))} (format parquet)")
@@ -100,14 +100,14 @@ def write_empty(con: duckdb.DuckDBPyConnection, registry_dir: Path, table: str) 
     return f"{table}/{path.name}"
 
 
-def read_list(registry_dir: Path, table: str, paths: list[str], alike: bool = False) -> str:
+def read_list(registry_dir: Path, table: str, paths: list[str], same_schema: bool = False) -> str:
     """SQL that reads the files of one table, its columns by name; a column that a file lacks is NULL.
 
     With ``same_schema`` all files have the present columns, and DuckDB opens only the first to get them.
     """
     listed = ", ".join(file_literal(Path(registry_dir) / p) for p in paths)
     columns = ", ".join(f'"{n}"' for n in names(table))
-    by_name = "" if alike else ", union_by_name = true"
+    by_name = "" if same_schema else ", union_by_name = true"
     return f"select {columns} from read_parquet([{listed}]{by_name}, hive_partitioning = false)"
 
 
@@ -118,9 +118,9 @@ def read_live(con: duckdb.DuckDBPyConnection, registry_dir: Path, table: str, fi
     it estimates from the first file.
     """
     present = f"{table}:{schema_hash(table)}"
-    alike = all(f.schema == present for f in files)
-    empty = [] if files and alike else [write_empty(con, registry_dir, table)]
-    return read_list(registry_dir, table, [f.path for f in files] + empty, alike)
+    same_schema = all(f.schema == present for f in files)
+    empty = [] if files and same_schema else [write_empty(con, registry_dir, table)]
+    return read_list(registry_dir, table, [f.path for f in files] + empty, same_schema)
 
 
 def _sync_and_hash(path: Path) -> str:
@@ -132,7 +132,7 @@ def _sync_and_hash(path: Path) -> str:
 def _newest(con, table, path) -> str | None:
     """Time of the newest measurement in the file; None for tables without measurements."""
     time = time_column(table)
-    if time is None or table not in MEASURED:
+    if time is None or table not in MEASUREMENT_IDS:
         return None
-    found = con.execute(f"select max({time})::varchar from read_parquet({file_literal(path)})").fetchall()
-    return found[0][0]
+    rows = con.execute(f"select max({time})::varchar from read_parquet({file_literal(path)})").fetchall()
+    return rows[0][0]

@@ -7,10 +7,10 @@ from datetime import UTC, datetime
 from os import PathLike, fspath
 from pathlib import Path
 
-from turnout.registry.batch_stream import chunks, fresh, merged, of_tables, present
+from turnout.registry.batch_stream import chunks, existing_batches, merge_units, table_arrivals, unread_positions
 from turnout.registry.generation import check_schemas, load
-from turnout.registry.lock import locked
-from turnout.registry.registration import Registered, Registration
+from turnout.registry.lock import registry_lock
+from turnout.registry.registration import Registration, RegistrationResult
 
 
 def register(
@@ -23,7 +23,7 @@ def register(
     code_version: str = "",
     started_at: datetime | None = None,
     patience: float = 600.0,
-) -> Registered:
+) -> RegistrationResult:
     """Register the results of work batches and rows from the configuration.
 
     The same results give byte-identical files, however they are divided into batches and however often a run was killed
@@ -50,23 +50,23 @@ def register(
     RegistryError
         Locked, disk full, no permission, or made by another version. Then nothing was changed.
     """
-    root, began = Path(registry_dir), started_at or datetime.now(UTC).replace(tzinfo=None)
-    with locked(root, patience):
+    root, started = Path(registry_dir), started_at or datetime.now(UTC).replace(tzinfo=None)
+    with registry_lock(root, patience):
         before = load(root)
         check_schemas(before)
         faults: dict[str, str] = {}
-        there, tokens = present(batches, faults)
-        unread, count = [there[i] for i in fresh(tokens, before.consumed)], 0
+        existing, tokens = existing_batches(batches, faults)
+        unread, count = [existing[i] for i in unread_positions(tokens, before.consumed)], 0
         registration = Registration(root, before)
         with _without_collection():
-            for chunk in chunks(merged(unread, read, faults)):
+            for chunk in chunks(merge_units(unread, read, faults)):
                 count = chunk[-1].index + 1
                 registration.take(chunk)
         registration.replace_whole(tables or {})
-        registration.take(of_tables(tables or {}, count))
-        consumed = [t for t, p in zip(tokens, there) if fspath(p) not in faults]
-        about = {"code_version": code_version, "config_hash": config_hash, "started_at_utc": began}
-        return registration.finish(consumed, faults, about)
+        registration.take(table_arrivals(tables or {}, count))
+        consumed = [t for t, p in zip(tokens, existing) if fspath(p) not in faults]
+        run_info = {"code_version": code_version, "config_hash": config_hash, "started_at_utc": started}
+        return registration.finish(consumed, faults, run_info)
 
 
 @contextmanager

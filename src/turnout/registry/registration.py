@@ -9,7 +9,7 @@ from pathlib import Path
 import pyarrow as pa
 
 from turnout.registry.database import build_database, is_behind
-from turnout.registry.generation import FILE, Generation, commit, delete_files, due_for_deletion, schema_of
+from turnout.registry.generation import GENERATION_FILE, Generation, commit, delete_files, due_for_deletion, schema_of
 from turnout.registry.ids import content_id
 from turnout.registry.intake import Arrival, Refusal, gather
 from turnout.registry.parquet import read_live, write_sorted
@@ -18,19 +18,25 @@ from turnout.registry.staging import (
     admit,
     connect,
     create_staging,
-    identified,
     note_arrivals,
     quarantine_of,
-    refuse_orphans,
+    reject_orphans,
+    with_quarantine_id,
 )
-from turnout.registry.supersede import last_word, leave_out_known, note_dead, supersede, with_dead
+from turnout.registry.supersede import (
+    count_superseded,
+    latest_supersession,
+    note_superseded,
+    remove_known_rows,
+    supersede,
+)
 
-ONE_FILE = (*WHOLE_TABLES, "runs", "supersedes")
-MADE_HERE = ("quarantine", "results", "runs", "supersedes")
+ONE_FILE_TABLES = (*WHOLE_TABLES, "runs", "supersedes")
+INTERNAL_TABLES = ("quarantine", "results", "runs", "supersedes")
 PENDING = "pending"
 # A section with measurements stays in the table if the configuration drops it or never named it, because charts and
 # events refer to it. ``left_layout`` marks a section that was in the configuration before.
-SECTIONS = """
+SECTIONS_SQL = """
 with given as (select * exclude (_unit, _row, _year) replace (false as left_layout) from new_sections),
 left_over as (
     select * replace (left_layout or (panel is not null and exists (from given)) as left_layout)
@@ -45,7 +51,7 @@ select section_id, turnout_id, split_part(section_id, '/', -1) as label from mea
 
 
 @dataclass(frozen=True)
-class Registered:
+class RegistrationResult:
     """Result of ``register``. ``rows`` are the numbers of new rows by table, ``faults`` the unreadable batches."""
 
     run_id: str | None
@@ -70,11 +76,11 @@ class Registration:
         create_staging(self.con)
         for table in tables():
             self.con.execute(f"create view old_{table} as {read_live(self.con, root, table, before.of(table))}")
-        note_dead(self.con)
+        note_superseded(self.con)
 
     def take(self, arrivals: list[Arrival]) -> None:
         """Admit those units of a chunk whose result is not live already."""
-        arrivals = self._changed(arrivals)
+        arrivals = self._select_changed(arrivals)
         # a whole table without a change is not in the staging tables and stays as it is
         self.replaced |= self.whole & {table for a in arrivals for table in a.tables}
         if not arrivals:
@@ -82,12 +88,14 @@ class Registration:
         note_arrivals(self.con, arrivals)
         by_index = {a.index: a for a in arrivals}
         quarantine = {a.index: [r for r in a.tables.get("quarantine", ())] for a in arrivals}
-        refusals = [_unknown(a, t) for a in arrivals for t in sorted(a.tables.keys() - tables().keys()) if a.tables[t]]
+        refusals = [
+            _unknown_table(a, t) for a in arrivals for t in sorted(a.tables.keys() - tables().keys()) if a.tables[t]
+        ]
         for table in tables():
-            if table not in MADE_HERE and any(table in a.tables for a in arrivals):
+            if table not in INTERNAL_TABLES and any(table in a.tables for a in arrivals):
                 gathered, untyped = gather(table, arrivals)
                 refusals += untyped + admit(self.con, table, gathered, PENDING)
-        refuse_orphans(self.con, refusals, by_index)
+        reject_orphans(self.con, refusals, by_index)
         for refusal in refusals:
             quarantine[refusal.unit].append(quarantine_of(refusal, by_index[refusal.unit]))
         self._admit_quarantine(arrivals, quarantine)
@@ -102,39 +110,39 @@ class Registration:
         """Name the small tables of which all rows are replaced."""
         self.whole |= set(names) & set(WHOLE_TABLES)
 
-    def finish(self, consumed: list[str], faults: dict[str, str], about: dict) -> Registered:
+    def finish(self, consumed: list[str], faults: dict[str, str], run_info: dict) -> RegistrationResult:
         """Write the files and publish them; without new results, only complete what a killed run left unfinished."""
         before = self.before
         if not self.result_ids:
-            if consumed != before.consumed or not (self.root / FILE).exists():
+            if consumed != before.consumed or not (self.root / GENERATION_FILE).exists():
                 commit(self.root, replace(before, consumed=consumed))
             if is_behind(self.root, before):
                 build_database(self.root, before)
-            return Registered(None, before.number, faults=faults)
+            return RegistrationResult(None, before.number, faults=faults)
         number = before.number + 1
         run_id = self._run_id(number)
         n_superseded = supersede(self.con, number, run_id)
-        leave_out_known(self.con)
-        self._note_run(run_id, about)
+        remove_known_rows(self.con)
+        self._note_run(run_id, run_info)
         now, rows = self._write(run_id, number)
         if n_superseded:
-            now.files = self._with_dead(now.files)
+            now.files = self._count_superseded(now.files)
         now.consumed = consumed
         due = due_for_deletion(now)
         commit(self.root, now)
         build_database(self.root, now)
         delete_files(self.root, due)
-        return Registered(run_id, number, len(self.result_ids), rows, self.n_refused, n_superseded, faults)
+        return RegistrationResult(run_id, number, len(self.result_ids), rows, self.n_refused, n_superseded, faults)
 
-    def _changed(self, arrivals: list[Arrival]) -> list[Arrival]:
-        asked = pa.table({"result_id": pa.array([a.result_id for a in arrivals], pa.string())})
-        self.con.register("_asked", asked)
+    def _select_changed(self, arrivals: list[Arrival]) -> list[Arrival]:
+        offered_ids = pa.table({"result_id": pa.array([a.result_id for a in arrivals], pa.string())})
+        self.con.register("_asked", offered_ids)
         live = self.con.execute(
             "select result_id from old_results semi join _asked using (result_id) anti join dead on result_id = old_id"
         ).fetchall()
         self.con.unregister("_asked")
-        known = {r for (r,) in live}
-        return [a for a in arrivals if a.result_id not in known]
+        live_ids = {r for (r,) in live}
+        return [a for a in arrivals if a.result_id not in live_ids]
 
     def _admit_quarantine(self, arrivals, quarantine) -> None:
         """Admit quarantine rows with their ids; a rejected one is replaced by a row about its rejection."""
@@ -143,13 +151,13 @@ class Registration:
             arrival.tables["quarantine"] = _by_id(quarantine[arrival.index], arrival.unit)
         gathered, refusals = gather("quarantine", arrivals)
         refusals += admit(self.con, "quarantine", gathered, PENDING)
-        again: dict[int, list[dict]] = {}
+        replacements: dict[int, list[dict]] = {}
         for refusal in refusals:
-            again.setdefault(refusal.unit, []).append(quarantine_of(refusal, by_index[refusal.unit]))
-        wrong = [by_index[i] for i in sorted(again)]
-        for arrival in wrong:
-            arrival.tables["quarantine"] = _by_id(again[arrival.index], arrival.unit)
-        admit(self.con, "quarantine", gather("quarantine", wrong)[0], PENDING)
+            replacements.setdefault(refusal.unit, []).append(quarantine_of(refusal, by_index[refusal.unit]))
+        wrong_arrivals = [by_index[i] for i in sorted(replacements)]
+        for arrival in wrong_arrivals:
+            arrival.tables["quarantine"] = _by_id(replacements[arrival.index], arrival.unit)
+        admit(self.con, "quarantine", gather("quarantine", wrong_arrivals)[0], PENDING)
         self.n_refused += len(refusals)
 
     def _run_id(self, number: int) -> str:
@@ -158,9 +166,9 @@ class Registration:
             return content_id(run_id, number)
         return run_id
 
-    def _note_run(self, run_id, about) -> None:
+    def _note_run(self, run_id, run_info) -> None:
         """Enter the run in ``runs``, the only table with the time of day."""
-        row = about | {
+        row = run_info | {
             "run_id": run_id, "ended_at_utc": datetime.now(UTC).replace(tzinfo=None), "host": platform.node(),
             "n_ok": len(self.result_ids) - self.n_bad, "n_quarantined": self.n_bad,
         }  # fmt: skip
@@ -176,7 +184,7 @@ class Registration:
         for table in tables():
             for year, select in self._selects(table):
                 prefix = "all" if table in WHOLE_TABLES else f"batch-{run_id[:12]}"
-                written = write_sorted(self.con, self.root, table, year, _stamped(table, select, run_id), prefix)
+                written = write_sorted(self.con, self.root, table, year, _with_run_id(table, select, run_id), prefix)
                 if table in WHOLE_TABLES:
                     keep = written.path if written else None
                     retired += [(f.path, number) for f in files if f.table == table and f.path != keep]
@@ -188,40 +196,40 @@ class Registration:
         files.sort(key=lambda f: f.path)
         return Generation(number, files, retired, schemas), rows
 
-    def _with_dead(self, files):
-        self.con.execute(f"create temp table superseded as {last_word('old_supersedes', 'new_supersedes')}")
-        return with_dead(self.con, self.root, files)
+    def _count_superseded(self, files):
+        self.con.execute(f"create temp table superseded as {latest_supersession('old_supersedes', 'new_supersedes')}")
+        return count_superseded(self.con, self.root, files)
 
     def _selects(self, table):
         """(year, SELECT) of every file to be written for a table."""
         if table == "sections":
-            return [(None, SECTIONS)]
+            return [(None, SECTIONS_SQL)]
         if table in WHOLE_TABLES:
-            came = self.con.execute(f"select count(*) from new_{table}").fetchall()[0][0]
+            n_new = self.con.execute(f"select count(*) from new_{table}").fetchall()[0][0]
             if table in self.replaced:
                 return [(None, f"select * exclude (_unit, _row, _year) from new_{table}")]
             keys = ", ".join(key(table))
-            kept = f"select * from old_{table} anti join new_{table} using ({keys})"
+            unchanged = f"select * from old_{table} anti join new_{table} using ({keys})"
             new = f"select * exclude (_unit, _row, _year) from new_{table}"
-            return [(None, f"{kept} union all by name {new}")] if came else []
+            return [(None, f"{unchanged} union all by name {new}")] if n_new else []
         years = self.con.execute(f"select distinct _year from new_{table} order by 1").fetchall()
-        if table in ONE_FILE:
+        if table in ONE_FILE_TABLES:
             return [(None, f"select * from new_{table}")] if years else []
         return [(year, f"select * from new_{table} where _year = {year}") for (year,) in years]
 
 
-def _stamped(table, select, run_id):
+def _with_run_id(table, select, run_id):
     if not any(c.name == "run_id" for c in tables()[table]):
         return select
     return f"select * replace ({literal(run_id)} as run_id) from ({select})"
 
 
 def _by_id(rows: list[dict], unit: str) -> list[dict]:
-    known = {row["quarantine_id"]: row for row in (identified(row, unit) for row in rows)}
-    return [known[i] for i in sorted(known)]
+    rows_by_id = {row["quarantine_id"]: row for row in (with_quarantine_id(row, unit) for row in rows)}
+    return [rows_by_id[i] for i in sorted(rows_by_id)]
 
 
-def _unknown(arrival: Arrival, table: str) -> Refusal:
+def _unknown_table(arrival: Arrival, table: str) -> Refusal:
     return Refusal(arrival.index, table, 0, "any", f"a table {table!r}", "a table of columns.csv")
 
 

@@ -9,7 +9,7 @@ from os import PathLike, fspath
 
 import pyarrow as pa
 
-ARROW = {
+ARROW_TYPES = {
     "varchar": pa.string(),
     "double": pa.float64(),
     "float": pa.float32(),
@@ -52,8 +52,8 @@ class Column:
     @property
     def arrow(self) -> pa.DataType:
         """The same type in Arrow."""
-        kind = ARROW[self.type.removesuffix("[]")]
-        return pa.list_(kind) if self.is_list else kind
+        arrow_type = ARROW_TYPES[self.type.removesuffix("[]")]
+        return pa.list_(arrow_type) if self.is_list else arrow_type
 
     @property
     def check(self) -> str | None:
@@ -97,12 +97,12 @@ class Column:
     @property
     def ddl(self) -> str:
         """Column definition of CREATE TABLE: name, type and constraints."""
-        parts = [f'"{self.name}" {self.type}']
+        words = [f'"{self.name}" {self.type}']
         if self.required or self.key:
-            parts.append("not null")
+            words.append("not null")
         if self.check:
-            parts.append(f"check ({self.check})")
-        return " ".join(parts)
+            words.append(f"check ({self.check})")
+        return " ".join(words)
 
 
 def literal(text: str) -> str:
@@ -126,11 +126,11 @@ def file_literal(path: PathLike | str) -> str:
 @cache
 def tables() -> dict[str, tuple[Column, ...]]:
     """Every table of the registry with its columns, in the order of ``columns.csv``."""
-    found: dict[str, list[Column]] = {}
+    columns_by_table: dict[str, list[Column]] = {}
     text = (files("turnout.registry") / "columns.csv").read_text(encoding="utf-8")
     for row in csv.DictReader(text.splitlines()):
         number = {k: float(row[k]) if row[k] else None for k in ("minimum", "maximum", "decimals")}
-        found.setdefault(row["table"], []).append(
+        columns_by_table.setdefault(row["table"], []).append(
             Column(
                 table=row["table"],
                 name=row["column"],
@@ -145,7 +145,7 @@ def tables() -> dict[str, tuple[Column, ...]]:
                 meaning=row["meaning"],
             )
         )
-    return {table: tuple(columns) for table, columns in found.items()}
+    return {table: tuple(columns) for table, columns in columns_by_table.items()}
 
 
 def column(table: str, name: str) -> Column:

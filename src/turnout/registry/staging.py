@@ -15,7 +15,7 @@ from turnout.registry.intake import Arrival, Refusal
 from turnout.registry.schema import create_table, key, names, tables
 
 UNIQUE = "unique, and another row has it already"
-MARKS = ", _unit integer, _row integer, _year integer"
+MARK_COLUMNS = ", _unit integer, _row integer, _year integer"
 # Parent table: its id, and the tables whose rows have no meaning without their parent row.
 CHILDREN = {
     "models": ("model_id", ("modes", "impact_modes", "receptances")),
@@ -36,14 +36,14 @@ def create_staging(con: duckdb.DuckDBPyConnection) -> None:
     """Create the table ``came`` of incoming units, and an empty staging table for each table of the registry."""
     con.execute("create table came (_unit integer, unit_id varchar, result_id varchar, algo varchar)")
     for table in tables():
-        con.execute(create_table(table, f"new_{table}", MARKS))
+        con.execute(create_table(table, f"new_{table}", MARK_COLUMNS))
 
 
 def note_arrivals(con: duckdb.DuckDBPyConnection, arrivals: list[Arrival]) -> None:
     """Enter the units of a chunk in ``came``, before their rows."""
     columns = {"_unit": "index", "unit_id": "unit", "result_id": "result_id", "algo": "algo"}
-    came = pa.table({name: pa.array([getattr(a, of) for a in arrivals]) for name, of in columns.items()})
-    con.register("_arrivals", came)
+    unit_rows = pa.table({name: pa.array([getattr(a, of) for a in arrivals]) for name, of in columns.items()})
+    con.register("_arrivals", unit_rows)
     con.execute("insert into came select * from _arrivals")
     con.unregister("_arrivals")
 
@@ -61,7 +61,7 @@ def admit(con: duckdb.DuckDBPyConnection, table: str, gathered: pa.Table, run_id
         con.execute(f"insert into new_{table} {_select(table, run_id)}")
     except duckdb.ConstraintException:
         con.execute(f"create or replace temp table arriving as {_select(table, run_id)}")
-        refusals = _bad_values(con, table) + _second_of_a_key(con, table)
+        refusals = _bad_values(con, table) + _duplicate_keys(con, table)
         con.execute(f"insert into new_{table} select * from arriving")
         con.execute("drop table arriving")
     finally:
@@ -69,9 +69,9 @@ def admit(con: duckdb.DuckDBPyConnection, table: str, gathered: pa.Table, run_id
     return refusals
 
 
-def refuse_orphans(con: duckdb.DuckDBPyConnection, refusals: list[Refusal], arrivals: Mapping[int, Arrival]) -> int:
+def reject_orphans(con: duckdb.DuckDBPyConnection, refusals: list[Refusal], arrivals: Mapping[int, Arrival]) -> int:
     """Remove the rows that belong to a rejected model or passage, and their refusals; returns the number of rows."""
-    taken = 0
+    n_removed = 0
     for refusal in list(refusals):
         if refusal.table not in CHILDREN:
             continue
@@ -79,23 +79,23 @@ def refuse_orphans(con: duckdb.DuckDBPyConnection, refusals: list[Refusal], arri
         parent = arrivals[refusal.unit].tables[refusal.table][refusal.row].get(id_column)
         for child in children:
             where = f"from new_{child} where _unit = ? and {id_column} is not distinct from ?"
-            taken += con.execute(f"select count(*) {where}", [refusal.unit, parent]).fetchall()[0][0]
+            n_removed += con.execute(f"select count(*) {where}", [refusal.unit, parent]).fetchall()[0][0]
             con.execute(f"delete {where}", [refusal.unit, parent])
-            given = arrivals[refusal.unit].tables.get(child, ())
+            child_rows = arrivals[refusal.unit].tables.get(child, ())
             refusals[:] = [
                 r
                 for r in refusals
-                if (r.unit, r.table) != (refusal.unit, child) or given[r.row].get(id_column) != parent
+                if (r.unit, r.table) != (refusal.unit, child) or child_rows[r.row].get(id_column) != parent
             ]
-    return taken
+    return n_removed
 
 
 def _select(table: str, run_id: str) -> str:
     """SELECT of rounded values in the order of the table, with the columns that the registration fills in."""
     filled = {"run_id": f"'{run_id}'", "result_id": "_result_id"}
-    parts = [f'{filled.get(c.name, c.rounded)} as "{c.name}"' for c in tables()[table]]
+    expressions = [f'{filled.get(c.name, c.rounded)} as "{c.name}"' for c in tables()[table]]
     came = "(select _unit, result_id as _result_id from came)"
-    return f"select {', '.join(parts)}, _unit, _row, _year from _gathered join {came} using (_unit)"
+    return f"select {', '.join(expressions)}, _unit, _row, _year from _gathered join {came} using (_unit)"
 
 
 def _bad_values(con, table) -> list[Refusal]:
@@ -109,47 +109,47 @@ def _bad_values(con, table) -> list[Refusal]:
             continue
         where = f"coalesce({' or '.join(rules)}, false)"
         number = f'"{column.name}"::double' if column.type in ("double", "float", "integer", "bigint") else "null"
-        found = con.execute(
+        rows = con.execute(
             f'select _unit, _row, "{column.name}"::varchar, {number} from arriving where {where} order by all'
         ).fetchall()
-        for unit, row, value, figure in found:
-            asked = "given" if value is None else column.rule
+        for unit, row, value, figure in rows:
+            requirement = "given" if value is None else column.rule
             refusals.append(
-                Refusal(unit, table, row, column.name, "missing" if value is None else value[:200], asked, figure)
+                Refusal(unit, table, row, column.name, "missing" if value is None else value[:200], requirement, figure)
             )
-        if found:
+        if rows:
             con.execute(f"delete from arriving where {where}")
     return refusals
 
 
-def _second_of_a_key(con, table) -> list[Refusal]:
+def _duplicate_keys(con, table) -> list[Refusal]:
     """Refusals of all rows but the first of each key, in the order of the units, including earlier chunks."""
     keys = key(table)
     quoted = ", ".join(f'"{k}"' for k in keys)
     numbered = f"select _unit, _row, {quoted}, row_number() over (partition by {quoted} order by _unit, _row) as nth"
     later = f"select * exclude nth from ({numbered} from arriving) where nth > 1"
-    there = f"select _unit, _row, {quoted} from arriving semi join new_{table} using ({quoted})"
-    found = con.execute(f"from ({later} union {there}) order by all").fetchall()
-    for unit, row, *_ in found:
+    existing = f"select _unit, _row, {quoted} from arriving semi join new_{table} using ({quoted})"
+    rows = con.execute(f"from ({later} union {existing}) order by all").fetchall()
+    for unit, row, *_ in rows:
         con.execute("delete from arriving where _unit = ? and _row = ?", [unit, row])
     return [
-        Refusal(unit, table, row, "+".join(keys), " ".join(map(str, values)), UNIQUE) for unit, row, *values in found
+        Refusal(unit, table, row, "+".join(keys), " ".join(map(str, values)), UNIQUE) for unit, row, *values in rows
     ]
 
 
 REMEDY = "This is a fault of the stage that made the row, not of the measurement: report it with this"
-_LONGEST = 2000  # characters of the column ``found``
+_MAX_LENGTH = 2000  # characters of the column ``found``
 
 
 def quarantine_of(refusal: Refusal, arrival: Arrival) -> dict:
     """Quarantine row that names table, row, column and value, with the whole row in ``found``."""
-    given = arrival.tables[refusal.table][refusal.row]
-    row = given if isinstance(given, dict) else {}
+    source_row = arrival.tables[refusal.table][refusal.row]
+    row = source_row if isinstance(source_row, dict) else {}
     recordings = [r for r in arrival.tables.get("recordings", ()) if isinstance(r, dict)] or [{}]
     path = row.get("path") or recordings[0].get("path") or arrival.unit
     record = row.get("record")
     number = refusal.number
-    whole = json.dumps(given, default=str, sort_keys=True)
+    whole = json.dumps(source_row, default=str, sort_keys=True)
     return {
         "turnout_id": arrival.turnout,
         "section_id": _text(row.get("section_id") or recordings[0].get("section_id")),
@@ -160,16 +160,16 @@ def quarantine_of(refusal: Refusal, arrival: Arrival) -> dict:
         "stage": "register",
         "reason_code": "internal_error",
         "place": f"{refusal.table}, row {refusal.row + 1}, column {refusal.column}",
-        "found": f"{refusal.value}, must be {refusal.asked}; row: {whole}"[:_LONGEST],
+        "found": f"{refusal.value}, must be {refusal.requirement}; row: {whole}"[:_MAX_LENGTH],
         "remedy": REMEDY,
         "measured_value": number if number is not None and math.isfinite(number) else None,
     }
 
 
-def identified(row: dict, unit: str) -> dict:
+def with_quarantine_id(row: dict, unit: str) -> dict:
     """The quarantine row with its id, the hash of the unit and of its content."""
-    said = {k: row.get(k) for k in names("quarantine") if k not in ("quarantine_id", "run_id", "result_id")}
-    return row | {"quarantine_id": content_id("quarantine", unit, said)}
+    content = {k: row.get(k) for k in names("quarantine") if k not in ("quarantine_id", "run_id", "result_id")}
+    return row | {"quarantine_id": content_id("quarantine", unit, content)}
 
 
 def _text(value):

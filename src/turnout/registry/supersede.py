@@ -24,15 +24,15 @@ KINDS = {
 }
 
 
-def note_dead(con: duckdb.DuckDBPyConnection) -> None:
+def note_superseded(con: duckdb.DuckDBPyConnection) -> None:
     """Create table ``dead``: ids of the registry that are superseded."""
-    con.execute(f"create temp table dead as {last_word('old_supersedes')}")
+    con.execute(f"create temp table dead as {latest_supersession('old_supersedes')}")
 
 
-def last_word(*relations: str) -> str:
+def latest_supersession(*relations: str) -> str:
     """SELECT of the superseded ids, by the last statement about each in the ``relations``."""
-    said = " union all ".join(f"select old_id, generation, reason from {r}" for r in relations)
-    return f"select old_id from ({said}) group by old_id having arg_max(reason, generation) <> 'reinstated'"
+    statements = " union all ".join(f"select old_id, generation, reason from {r}" for r in relations)
+    return f"select old_id from ({statements}) group by old_id having arg_max(reason, generation) <> 'reinstated'"
 
 
 def supersede(con: duckdb.DuckDBPyConnection, generation: int, run_id: str) -> int:
@@ -59,7 +59,7 @@ def supersede(con: duckdb.DuckDBPyConnection, generation: int, run_id: str) -> i
     return con.execute("select count(*) from new_supersedes").fetchall()[0][0]
 
 
-def leave_out_known(con: duckdb.DuckDBPyConnection) -> None:
+def remove_known_rows(con: duckdb.DuckDBPyConnection) -> None:
     """Delete from the staging tables the rows that the registry already has: same id, same content."""
     con.execute(
         "create or replace temp table known_results as "
@@ -74,11 +74,11 @@ def leave_out_known(con: duckdb.DuckDBPyConnection) -> None:
             f"semi join old_{table} using ({id_column})"
         )
         for child in CHILDREN.get(table, ("", ()))[1]:
-            con.execute(f"delete from new_{child} where {_known_child(child, id_column)}")
+            con.execute(f"delete from new_{child} where {_known_child_condition(child, id_column)}")
         con.execute(f"delete from new_{table} where {id_column} in (from known)")
 
 
-def _known_child(child: str, id_column: str) -> str:
+def _known_child_condition(child: str, id_column: str) -> str:
     """SQL condition: the child row is known, with its parent; a fit only if it has the same model, too."""
     if child != "passage_fits":
         return f"{id_column} in (from known)"
@@ -88,12 +88,12 @@ def _known_child(child: str, id_column: str) -> str:
 
 def _note_new_ids(con) -> None:
     """Create table ``new_ids``: ids of all incoming rows, before known rows are deleted."""
-    parts = [
-        f"select '{kind}' as kind, t.{id_column} as id, c.unit_id, {place} as place "
+    selects = [
+        f"select '{row_type}' as kind, t.{id_column} as id, c.unit_id, {counterpart} as place "
         f"from new_{table} t join (select _unit, unit_id from came) c using (_unit)"
-        for kind, (table, id_column, place) in KINDS.items()
+        for row_type, (table, id_column, counterpart) in KINDS.items()
     ]
-    con.execute(f"create temp table new_ids as {' union all '.join(parts)}")
+    con.execute(f"create temp table new_ids as {' union all '.join(selects)}")
 
 
 def _note_prior(con) -> None:
@@ -102,13 +102,13 @@ def _note_prior(con) -> None:
         "create temp table prior_results as select result_id, unit_id, code_version from old_results "
         "semi join came using (unit_id)"
     )
-    parts = [
-        f"select '{kind}' as kind, t.{id_column} as id, p.unit_id, {place} as place, "
+    selects = [
+        f"select '{row_type}' as kind, t.{id_column} as id, p.unit_id, {counterpart} as place, "
         f"t.{id_column} in (select old_id from dead) as is_dead "
         f"from old_{table} t join (select result_id, unit_id from prior_results) p using (result_id)"
-        for kind, (table, id_column, place) in KINDS.items()
+        for row_type, (table, id_column, counterpart) in KINDS.items()
     ]
-    con.execute(f"create temp table prior as {' union all '.join(parts)}")
+    con.execute(f"create temp table prior as {' union all '.join(selects)}")
 
 
 def _note_causes(con: duckdb.DuckDBPyConnection) -> None:
@@ -128,39 +128,41 @@ def _note_causes(con: duckdb.DuckDBPyConnection) -> None:
 
 
 # The large tables, and the ids by which their rows are superseded.
-LARGE = {"modes": ("model_id",), "impact_modes": ("model_id",), "passage_fits": ("passage_id", "model_id")}
+LARGE_TABLES = {"modes": ("model_id",), "impact_modes": ("model_id",), "passage_fits": ("passage_id", "model_id")}
 
 
-def dead_rows(table: str, alias: str = "t") -> str:
+def superseded_condition(table: str, alias: str = "t") -> str:
     """SQL condition: the row is superseded, by the ids in the table or view ``superseded``."""
-    return " or ".join(f"{alias}.{i} in (select old_id from superseded)" for i in LARGE[table])
+    return " or ".join(f"{alias}.{i} in (select old_id from superseded)" for i in LARGE_TABLES[table])
 
 
-def with_dead(con: duckdb.DuckDBPyConnection, root: Path, files: list[DataFile]) -> list[DataFile]:
+def count_superseded(con: duckdb.DuckDBPyConnection, root: Path, files: list[DataFile]) -> list[DataFile]:
     """The files with their number of superseded rows, from the table ``superseded`` of ``con``."""
     counted: dict[str, int] = {}
-    for table in LARGE:
+    for table in LARGE_TABLES:
         paths = {str(root / f.path): f.path for f in files if f.table == table}
         if paths:
             listed = ", ".join(map(file_literal, paths))
-            ids = ", ".join(LARGE[table])
+            ids = ", ".join(LARGE_TABLES[table])
             sql = f"select {ids}, filename from read_parquet([{listed}], filename = true, union_by_name = true)"
             rows = con.execute(
-                f"select filename, count(*) from ({sql}) t where {dead_rows(table)} group by 1"
+                f"select filename, count(*) from ({sql}) t where {superseded_condition(table)} group by 1"
             ).fetchall()
             counted |= {paths[name]: count for name, count in rows}
-    return [replace(f, dead=counted.get(f.path, 0)) if f.table in LARGE else f for f in files]
+    return [replace(f, dead=counted.get(f.path, 0)) if f.table in LARGE_TABLES else f for f in files]
 
 
-def create_parts(con: duckdb.DuckDBPyConnection, root: Path, table: str, files: list[DataFile]) -> None:
+def create_split_views(con: duckdb.DuckDBPyConnection, root: Path, table: str, files: list[DataFile]) -> None:
     """Create view ``<table>_settled`` of files without superseded rows, ``<table>_touched`` of files with some."""
     settled = [f for f in files if f.dead == 0]
     touched = [f for f in files if 0 < f.dead < f.rows]
-    for part, chosen in (("settled", settled), ("touched", touched)):
-        con.execute(f"create view {table}_{part} as {read_live(con, root, table, chosen)}")
+    for suffix, chosen in (("settled", settled), ("touched", touched)):
+        con.execute(f"create view {table}_{suffix} as {read_live(con, root, table, chosen)}")
 
 
-def halves(table: str, select: str) -> tuple[str, str]:
+def split_superseded(table: str, select: str) -> tuple[str, str]:
     """SELECTs of the valid and of the superseded rows."""
     columns = ", ".join(f't."{n}"' for n in names(table))
-    return tuple(f"select {columns} from ({select}) t where {sign} ({dead_rows(table)})" for sign in ("not", ""))  # type: ignore[return-value]
+    return tuple(
+        f"select {columns} from ({select}) t where {sign} ({superseded_condition(table)})" for sign in ("not", "")
+    )  # type: ignore[return-value]

@@ -31,16 +31,16 @@ def write_beams(beams, folder):
         The page.
     """
     template = page_environment().get_template("beams.html")
-    shown = [
-        {"name": b.name, "origin": b.origin, "drawing": beam_panel(b), "rows": [_words(*row) for row in b.rows]}
+    entries = [
+        {"name": b.name, "origin": b.origin, "drawing": beam_panel(b), "rows": [_table_row(*row) for row in b.rows]}
         for b in beams
     ]
     page = Path(folder) / f"{NAME}.html"
-    replace_page(page, template.render(beams=shown, **shared_by_pages()))
+    replace_page(page, template.render(beams=entries, **shared_by_pages()))
     table = io.StringIO()
     writer = csv.writer(table, lineterminator="\n")
     writer.writerow(COLUMNS)
-    writer.writerows([b.name, *_numbers(*row)] for b in beams for row in b.rows)
+    writer.writerows([b.name, *_csv_row(*row)] for b in beams for row in b.rows)
     replace_page(page.with_suffix(".csv"), table.getvalue())
     return page
 
@@ -49,8 +49,8 @@ def beam_panel(beam):
     """SVG of the magnitude of every response, published modes as vertical lines, identified modes as dots."""
     inside = (beam.frequency > 0.0) & (beam.frequency <= beam.highest)
     frequency, size = beam.frequency[inside], np.abs(beam.responses[:, inside])
-    known = size[np.isfinite(size) & (size > 0.0)]
-    low, high = np.quantile(known, 0.002) / 2.0, known.max() * 3.0
+    valid = size[np.isfinite(size) & (size > 0.0)]
+    low, high = np.quantile(valid, 0.002) / 2.0, valid.max() * 3.0
     chart = Chart(
         Axis(0.0, beam.highest, "frequency [Hz]"),
         Axis(low, high, "|response|, unit of the file", "log"),
@@ -69,7 +69,7 @@ def beam_panel(beam):
     return chart.svg()
 
 
-def _numbers(published, damping, mode):
+def _csv_row(published, damping, mode):
     row = [published, None if damping is None else f"{damping / 100:.4f}"]
     if mode is None:
         return [*row, *[None] * 7]
@@ -77,17 +77,17 @@ def _numbers(published, damping, mode):
     return [*row, *(f"{v:.3f}" for v in (f.mean, f.low, f.high)), *(f"{v:.6f}" for v in (d.mean, d.low, d.high)), f.n]
 
 
-def _words(published, damping, mode):
+def _table_row(published, damping, mode):
     """One row of the page's table in words; ± is the half width of the 95 % interval."""
-    said = {
+    words = {
         "published": "not published" if published is None else f"{published:.1f}",
         "damping": "–" if damping is None else f"{damping:.2f}",
     }
     if mode is None:
-        return said | {"found": "not found", "off": "–", "found_damping": "–", "n": 0}
+        return words | {"found": "not found", "off": "–", "found_damping": "–", "n": 0}
     f, d = mode.frequency, mode.damping
     off = "–" if published is None else f"{100 * (f.mean / published - 1):+.3f}"
-    return said | {
+    return words | {
         "found": f"{f.mean:.3f} ± {(f.high - f.low) / 2:.3f}",
         "off": off,
         "found_damping": f"{100 * d.mean:.3f} ± {50 * (d.high - d.low):.3f}",

@@ -10,32 +10,36 @@ from turnout.config import load_configuration
 from turnout.report.pages.finding import finding_page
 from turnout.report.write import replace_page
 
-NEWEST = """
+NEWEST_SQL = """
     select f.* from findings_current f
     where visit = (select max(visit) from findings_current n where n.turnout_id = f.turnout_id) order by turnout_id
 """
-CURVES = "select c.* from mismatch_curves c where finding_id in (select finding_id from findings_current)"
-PARAMETERS = "select p.* from mismatch_parameters p where finding_id in (select finding_id from findings_current)"
-SILENT = "select * from quarantine_open where stage = 'mismatch' order by place"
+CURVES_SQL = "select c.* from mismatch_curves c where finding_id in (select finding_id from findings_current)"
+PARAMETERS_SQL = "select p.* from mismatch_parameters p where finding_id in (select finding_id from findings_current)"
+QUARANTINE_SQL = "select * from quarantine_open where stage = 'mismatch' order by place"
 
 
 def write_finding_pages(connection, folder, generation="", turnouts=None) -> int:
     """Write ``folder``/findings/<id>.html for every turnout that was diagnosed; returns their number."""
-    kinds = {"mismatch_findings": NEWEST, "quarantine": SILENT}
-    rows = {kind: _by_turnout(_fetch(connection, sql)) for kind, sql in kinds.items()}
+    queries = {"mismatch_findings": NEWEST_SQL, "quarantine": QUARANTINE_SQL}
+    rows = {table: _by_turnout(_fetch(connection, sql)) for table, sql in queries.items()}
     diagnosed = sorted(set(rows["mismatch_findings"]) | set(rows["quarantine"]))
     chosen = [t for t in diagnosed if turnouts is None or t in turnouts]
     for name in chosen:
-        own = {kind: rows[kind].get(name, []) for kind in kinds}
-        own["mismatch_curves"] = _fetch(connection, f"{CURVES} and turnout_id = ? order by curve_no", [name])
-        own["mismatch_parameters"] = _fetch(connection, f"{PARAMETERS} and turnout_id = ?", [name])
-        own["sections"] = _fetch(connection, "select * from sections where turnout_id = ? order by position_m", [name])
+        turnout_rows = {table: rows[table].get(name, []) for table in queries}
+        turnout_rows["mismatch_curves"] = _fetch(
+            connection, f"{CURVES_SQL} and turnout_id = ? order by curve_no", [name]
+        )
+        turnout_rows["mismatch_parameters"] = _fetch(connection, f"{PARAMETERS_SQL} and turnout_id = ?", [name])
+        turnout_rows["sections"] = _fetch(
+            connection, "select * from sections where turnout_id = ? order by position_m", [name]
+        )
         about = _fetch(connection, "select * from turnouts where turnout_id = ?", [name])
-        _write(folder, (about or [{"turnout_id": name}])[0], own, generation)
+        _write(folder, (about or [{"turnout_id": name}])[0], turnout_rows, generation)
     return len(chosen)
 
 
-def write_own_page(tables, config, turnout_id, folder) -> Path:
+def write_diagnosis_page(tables, config, turnout_id, folder) -> Path:
     """Write the page of one turnout from the rows of its diagnosis, without a registry."""
     turnout = load_configuration(config).turnout(turnout_id)
     about = {"turnout_id": turnout.id, "name": turnout.name, "layout": turnout.layout}
@@ -48,8 +52,8 @@ def write_own_page(tables, config, turnout_id, folder) -> Path:
 def _write(folder, about, rows, generation) -> Path:
     environment = Environment(loader=PackageLoader("turnout.report"), trim_blocks=True, autoescape=True)
     templates = files("turnout.report") / "templates"
-    css, own = ((templates / name).read_text() for name in ("page.css", "finding.css"))
-    shared = {"css": css, "finding_css": own, "version": __version__, "generation": generation}
+    css, finding_css = ((templates / name).read_text() for name in ("page.css", "finding.css"))
+    shared = {"css": css, "finding_css": finding_css, "version": __version__, "generation": generation}
     path = Path(folder) / "findings" / f"{about['turnout_id']}.html"
     path.parent.mkdir(parents=True, exist_ok=True)
     replace_page(path, finding_page(about, rows, environment.get_template("finding.html"), shared))
@@ -63,7 +67,7 @@ def _fetch(connection, sql, parameters=()):
 
 
 def _by_turnout(rows):
-    found: dict[str, list] = {}
+    grouped: dict[str, list] = {}
     for row in rows:
-        found.setdefault(row["turnout_id"], []).append(row)
-    return found
+        grouped.setdefault(row["turnout_id"], []).append(row)
+    return grouped

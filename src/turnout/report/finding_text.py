@@ -4,7 +4,7 @@ import json
 
 from turnout.stages.mismatch_text import Z95, interval, number_in_words, parameter_in_words, title
 
-__all__ = ["answer", "check", "facts", "filed", "parameters", "rivals", "title"]
+__all__ = ["accepted_parameters", "answer", "check", "facts", "parameters", "rivals", "title"]
 ANSWERS = {
     "none": "nothing is missing",
     "named": "named",
@@ -16,23 +16,23 @@ ANSWERS = {
 
 def parameters(finding) -> list[dict]:
     """Name, value with its 95 % interval, and unit of every fitted parameter."""
-    found = []
+    rows = []
     for term in json.loads(finding["term_json"] or "[]"):
         for name, p in term["parameters"].items():
             low, high = interval(term["term"], name, p["value"], p["se"])
-            found.append(_parameter(term["term"], None, name, p["value"], low, high, p["unit"]))
-    return found
+            rows.append(_parameter(term["term"], None, name, p["value"], low, high, p["unit"]))
+    return rows
 
 
-def filed(rows) -> list[dict]:
+def accepted_parameters(rows) -> list[dict]:
     """The same for effects accepted in the track file and estimated again; ``rows`` of ``mismatch_parameters``."""
     names = ("term", "position_m", "parameter", "value", "value_low", "value_high", "unit")
     return [_parameter(*(row[name] for name in names)) for row in rows if row["accepted"]]
 
 
-def _parameter(term, place, name, value, low, high, unit):
+def _parameter(term, position, name, value, low, high, unit):
     digits = 4 if unit == "m" and abs(value) >= 10.0 else 3  # position along the turnout, to a centimetre
-    effect = term.replace("_", " ") + (f" at {place:.1f} m" if place is not None else "")
+    effect = term.replace("_", " ") + (f" at {position:.1f} m" if position is not None else "")
     ends = [number_in_words(end, unit, digits) for end in (low, high) if end is not None]
     return {
         "effect": effect,
@@ -45,18 +45,18 @@ def _parameter(term, place, name, value, low, high, unit):
 def facts(finding) -> list[tuple[str, str]]:
     """(question, answer) pairs: position, frame that it is fixed to, band, time, amount of data, certainty."""
     evidence = json.loads(finding["evidence_json"] or "{}")
-    found = [("Where", _where(finding)), ("It is fixed to", _locked(finding, evidence))]
+    pairs = [("Where", _where(finding)), ("It is fixed to", _frame_words(finding, evidence))]
     if finding["band_low_hz"] is not None and finding["verdict"] not in ("none", "numerics"):
-        found.append(("Band", f"{finding['band_low_hz']:.0f} to {finding['band_high_hz']:.0f} Hz"))
+        pairs.append(("Band", f"{finding['band_low_hz']:.0f} to {finding['band_high_hz']:.0f} Hz"))
     if finding["wheel_within_m"] is not None and finding["verdict"] not in ("none", "numerics"):
-        found.append(
+        pairs.append(
             ("When", f"four fifths of it while a wheel is within {finding['wheel_within_m']:.1f} m of the sensor")
         )
     if words := _conditions(evidence):
-        found.append(("Shows most in", words))
-    found.append(("From", _amount(finding)))
-    found.append(("How sure", _sure(finding, evidence)))
-    return [(question, answer) for question, answer in found if answer]
+        pairs.append(("Shows most in", words))
+    pairs.append(("From", _amount(finding)))
+    pairs.append(("How sure", _certainty(finding, evidence)))
+    return [(question, answer) for question, answer in pairs if answer]
 
 
 def _where(finding):
@@ -71,7 +71,7 @@ def _where(finding):
     return f"somewhere in {low:.1f} to {high:.1f} m" if high - low > 0.1 else f"about {low:.1f} m"
 
 
-def _locked(finding, evidence):
+def _frame_words(finding, evidence):
     """What the residual is fixed to: the significant frames, strongest first."""
     if finding["train"]:
         return f"the train: {finding['train']}"
@@ -81,11 +81,11 @@ def _locked(finding, evidence):
     ]
     if finding["verdict"] in ("named", "a_or_b", "unknown") and finding["locked_to"]:
         most = f"; before, most was left at {'; '.join(words)}" if words else ""
-        return f"{_of_what(finding)}{most}"
+        return f"{_owner(finding)}{most}"
     return "; ".join(words) or "nothing in particular"
 
 
-def _of_what(finding):
+def _owner(finding):
     """What a named effect belongs to, in words."""
     if finding["locked_to"] in ("sensor", "clock") and finding["channel"]:
         return f"sensor {finding['channel']}"
@@ -100,15 +100,15 @@ def _conditions(evidence):
 
 
 def _amount(finding):
-    parts = [
+    counts = [
         (finding["n_hammer_tests"], "hammer test"),
         (finding["n_passages"], "passage"),
         (finding["n_sensors"], "installed sensor"),
     ]
-    return ", ".join(f"{n} {what}{'s' if n != 1 else ''}" for n, what in parts)
+    return ", ".join(f"{n} {what}{'s' if n != 1 else ''}" for n, what in counts)
 
 
-def _sure(finding, evidence):
+def _certainty(finding, evidence):
     words = f"probability {finding['probability']:.2f}" if finding["probability"] is not None else ""
     if finding["grade"] == "A":
         words += "; with it the recordings are predicted as well as a sound turnout's"
@@ -117,20 +117,20 @@ def _sure(finding, evidence):
     if evidence.get("reason"):
         words += f"; {evidence['reason']}"
     stated = [evidence, *evidence["beside"]] if evidence.get("beside") else []
-    each = ", ".join(_by_itself(s, s is not evidence) for s in stated if s["term"])
+    each = ", ".join(_single_effect(s, s is not evidence) for s in stated if s["term"])
     return f"{words}; each by itself: {each}" if each else words
 
 
-def _by_itself(said, further):
+def _single_effect(effect, further):
     """Name and probability of one of several effects; for a ``further`` one also its reason, given only here."""
-    why = f" ({said['reason']})" if further and said.get("reason") else ""
-    return f"{said['term'].replace('_', ' ')} {said['probability']:.2f}{why}"
+    why = f" ({effect['reason']})" if further and effect.get("reason") else ""
+    return f"{effect['term'].replace('_', ' ')} {effect['probability']:.2f}{why}"
 
 
 def answer(finding) -> str:
     """The verdict in a few words."""
-    said = ANSWERS[finding["verdict"]]
-    return f"{said}, grade {finding['grade']}" if finding["grade"] else said
+    words = ANSWERS[finding["verdict"]]
+    return f"{words}, grade {finding['grade']}" if finding["grade"] else words
 
 
 def check(finding) -> str:
@@ -139,8 +139,8 @@ def check(finding) -> str:
         return "Nothing to check."
     if finding["verdict"] == "numerics":
         return "Nothing on site: refine mesh and step of the simulation."
-    said = finding["next_measurement"] or "Look at the place; repeat the measurement"
-    return said.rstrip(".") + "."
+    action = finding["next_measurement"] or "Look at the place; repeat the measurement"
+    return action.rstrip(".") + "."
 
 
 def rivals(finding) -> list[dict]:

@@ -8,8 +8,8 @@ from turnout.errors import REASONS
 from turnout.report.hammer_text import heading, resonances, verdict
 from turnout.report.panels.hammer import coherence_panel, decay_panel, impacts_panel, receptance_panel
 
-WIDTH, HEAD, GAP = 462, 52, 12  # px: width of a panel, height of the header, space between panels
-HEIGHT = re.compile(r' height="(\d+)"')
+WIDTH, HEADER_HEIGHT, GAP = 462, 52, 12  # px: width of a panel, height of the header, space between panels
+HEIGHT_PATTERN = re.compile(r' height="(\d+)"')
 
 
 def hammer_figure(rows, unit, turnout) -> str:
@@ -17,14 +17,14 @@ def hammer_figure(rows, unit, turnout) -> str:
 
     ``rows`` by table are those of ``hammer_unit``; "" without an impact.
     """
-    drawn = _panels(rows)
-    if not drawn:
+    panels = _panels(rows)
+    if not panels:
         return ""
-    parts, y = [], HEAD
-    for row in (drawn[:2], drawn[2:]):
-        parts += [f'<g transform="translate({k * (WIDTH + GAP)} {y})">{panel}</g>' for k, panel in enumerate(row)]
-        y += max((int(HEIGHT.findall(panel)[0]) for panel in row), default=0)
-    words = heading(unit, turnout), ": ".join([verdict(rows), *_told(rows)])
+    cells, y = [], HEADER_HEIGHT
+    for row in (panels[:2], panels[2:]):
+        cells += [f'<g transform="translate({k * (WIDTH + GAP)} {y})">{panel}</g>' for k, panel in enumerate(row)]
+        y += max((int(HEIGHT_PATTERN.findall(panel)[0]) for panel in row), default=0)
+    words = heading(unit, turnout), ": ".join([verdict(rows), *_resonance_words(rows)])
     lines = "".join(
         f'<text class="{style}" x="8" y="{18 + 20 * k}">{escape(line)}</text>'
         for k, (style, line) in enumerate(zip(("title", "label"), words))
@@ -32,11 +32,11 @@ def hammer_figure(rows, unit, turnout) -> str:
     width = 2 * WIDTH + GAP
     frame = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {y}" width="{width}" height="{y}">'
     return (
-        f'{frame}<style>{_style()}</style><rect width="{width}" height="{y}" fill="#fff"/>{lines}{"".join(parts)}</svg>'
+        f'{frame}<style>{_style()}</style><rect width="{width}" height="{y}" fill="#fff"/>{lines}{"".join(cells)}</svg>'
     )
 
 
-def _told(rows) -> list[str]:
+def _resonance_words(rows) -> list[str]:
     """The resonances and the reason why the model was rejected."""
     reasons = [REASONS[model["reason"]] for model in rows.get("models", ()) if model["reason"]]
     return ["; ".join([*resonances(rows), *reasons])] if rows.get("models") else []
@@ -55,4 +55,4 @@ def _style() -> str:
     css = (files("turnout.report") / "templates" / "page.css").read_text(encoding="utf-8")
     colours = dict(re.findall(r"(--\w+):([^;}]+)", css))
     inside = css[css.index("svg text{") : css.index("@media print")]
-    return re.sub(r"var\((--\w+)\)", lambda found: colours[found[1]], inside)
+    return re.sub(r"var\((--\w+)\)", lambda match: colours[match[1]], inside)

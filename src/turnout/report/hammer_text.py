@@ -34,10 +34,10 @@ def is_usable(rows) -> bool:
 
 def heading(unit, turnout) -> str:
     """Turnout, section with its position, and campaign."""
-    place = turnout.section(unit.section)
-    track = "both tracks" if place.track == "both" else f"{place.track} track" if place.track else ""
-    parts = [PANELS.get(place.panel), track, f"{place.position:g} m"]
-    return f"{turnout.id}, section {place.label} ({', '.join(p for p in parts if p)}), campaign {unit.campaign}"
+    section = turnout.section(unit.section)
+    track = "both tracks" if section.track == "both" else f"{section.track} track" if section.track else ""
+    details = [PANELS.get(section.panel), track, f"{section.position:g} m"]
+    return f"{turnout.id}, section {section.label} ({', '.join(p for p in details if p)}), campaign {unit.campaign}"
 
 
 def hammer_words(rows, unit, turnout, remarks=()) -> list[str]:
@@ -50,12 +50,12 @@ def hammer_words(rows, unit, turnout, remarks=()) -> list[str]:
     lines += [_line("read", _file(row, names[row["recording_id"]])) for row in rows.get("recordings", ())]
     if rows.get("recordings"):
         lines.append(_line("channels", _channels(turnout.hammer, unit.section)))
-    lines += _quarantined(rows.get("quarantine", ()))
+    lines += _quarantine_lines(rows.get("quarantine", ()))
     if rows.get("models"):
-        lines += _blows(rows, turnout.settings["receptance"])
-        lines += _gate(rows, turnout.settings)
-        lines += [line for band in _bands(rows) for line in _resonance(band, rows)]
-        lines += _why(rows["models"][0])
+        lines += _impact_lines(rows, turnout.settings["receptance"])
+        lines += _gate_lines(rows, turnout.settings)
+        lines += [line for band in _bands(rows) for line in _resonance_lines(band, rows)]
+        lines += _reason_lines(rows["models"][0])
         lines.append(_line("rail", _temperature(rows, unit, turnout)))
     return lines + [_line("note", remark) for remark in remarks]
 
@@ -86,42 +86,44 @@ def _file(row, name) -> str:
 
 
 def _channels(hammer, section) -> str:
-    known = {channel.name: channel for channel in hammer.descriptions[section].channels}
-    parts = []
+    channels = {channel.name: channel for channel in hammer.descriptions[section].channels}
+    descriptions = []
     for what, name in (("force", hammer.force[section]), ("response", hammer.response[section])):
-        channel = known[name]
+        channel = channels[name]
         unit = f" [{channel.unit}]" if channel.unit else ""
-        parts.append(f"{what} from {channel.source!r}{unit}{f', {channel.mounting}' if channel.mounting else ''}")
-    return "; ".join(parts)
+        descriptions.append(
+            f"{what} from {channel.source!r}{unit}{f', {channel.mounting}' if channel.mounting else ''}"
+        )
+    return "; ".join(descriptions)
 
 
-def _quarantined(rows) -> list[str]:
+def _quarantine_lines(rows) -> list[str]:
     """A line for each file or record that is not used; records of a file with the same problem share one.
 
     A file with another time in its name than inside is used, and has a line, too.
     """
-    alike: dict[tuple, list] = {}
+    groups: dict[tuple, list] = {}
     for row in rows:
-        alike.setdefault((row["path"], row["reason_code"], row["found"], row["remedy"]), []).append(row["place"])
+        groups.setdefault((row["path"], row["reason_code"], row["found"], row["remedy"]), []).append(row["place"])
     lines = []
-    for (path, reason, found, remedy), places in alike.items():
-        more = f" ({len(places)} such places, the last: {places[-1]})" if len(places) > 1 else ""
+    for (path, reason, finding, remedy), positions in groups.items():
+        more = f" ({len(positions)} such places, the last: {positions[-1]})" if len(positions) > 1 else ""
         what = "note" if reason == "wrong_time" else "not used"
-        lines.append(_line(what, f"{path}, {places[0]}: {found}{more}. {remedy}."))
+        lines.append(_line(what, f"{path}, {positions[0]}: {finding}{more}. {remedy}."))
     return lines
 
 
-def _blows(rows, settings) -> list[str]:
+def _impact_lines(rows, settings) -> list[str]:
     """A line for each impact with its verdict; they are counted from 1."""
     names = _names(rows["recordings"])
-    blows = rows["impacts"]
-    used = sum(blow["status"] == "accepted" for blow in blows)
-    lines = [_line("blows", f"{used} of {len(blows)} accepted, {settings.minimum_impacts} are needed")]
+    impacts = rows["impacts"]
+    used = sum(impact["status"] == "accepted" for impact in impacts)
+    lines = [_line("blows", f"{used} of {len(impacts)} accepted, {settings.minimum_impacts} are needed")]
     width = max(map(len, names.values()))
-    for blow in blows:
-        force, contact = (_number(blow[c], d) for c, d in (("peak_n", 1e3), ("contact_ms", 1.0)))
-        name = f"{names[blow['recording_id']]:<{width}} {blow['record'] + 1:>3}"
-        lines.append(_line("", f"{name}  {force:>6} kN  {contact:>5} ms  {_judged(blow)}"))
+    for impact in impacts:
+        force, contact = (_number(impact[c], d) for c, d in (("peak_n", 1e3), ("contact_ms", 1.0)))
+        name = f"{names[impact['recording_id']]:<{width}} {impact['record'] + 1:>3}"
+        lines.append(_line("", f"{name}  {force:>6} kN  {contact:>5} ms  {_impact_verdict(impact)}"))
     return lines
 
 
@@ -132,25 +134,27 @@ def _number(value, divisor) -> str:
     return f"{size:.2f}" if abs(size) >= 0.1 else f"{size:.2g}"
 
 
-def _judged(blow) -> str:
-    if blow["status"] == "accepted":
-        return "accepted" + (f", {blow['detail']}" if blow["detail"] else "")
-    return f"refused, {blow['reason']}: {blow['detail']}"
+def _impact_verdict(impact) -> str:
+    if impact["status"] == "accepted":
+        return "accepted" + (f", {impact['detail']}" if impact["detail"] else "")
+    return f"refused, {impact['reason']}: {impact['detail']}"
 
 
-def _gate(rows, settings) -> list[str]:
+def _gate_lines(rows, settings) -> list[str]:
     """Lines about the coherence and the share of lines that pass the gate; none without a receptance."""
     if not rows.get("receptances"):
         return []
-    row, asked = rows["receptances"][0], settings["receptance"]
+    row, receptance_settings = rows["receptances"][0], settings["receptance"]
     lowest = rows["models"][0]["coherence_minimum"]
-    said = (
+    limit_words = (
         ""
         if lowest is None
         else f"its lower 95 % limit is {floor(1e3 * lowest) / 1e3:.3f} or more around the resonances; "
     )
     compared = "that limit" if row["gate"] == "limit" else "the coherence itself"
-    lines = [_line("coherence", f"{said}the gate wants {compared} at {asked.gate_level:g} or more")]
+    lines = [
+        _line("coherence", f"{limit_words}the gate wants {compared} at {receptance_settings.gate_level:g} or more")
+    ]
     frequency, passed = np.asarray(row["frequency_hz"]), np.asarray(row["passed"], dtype=bool)
     shares = []
     for _, low, high in settings["identify"].bands():
@@ -165,11 +169,11 @@ def _bands(rows) -> list[str]:
     return [*BANDS, *(mode["band"] for mode in rows.get("modes", ()) if mode["band"] not in BANDS)]
 
 
-def _resonance(band, rows) -> list[str]:
+def _resonance_lines(band, rows) -> list[str]:
     mode = next((mode for mode in rows.get("modes", ()) if mode["band"] == band), None)
     if mode is None:
         return [_line(band, "none")]
-    return [_line(band, _mode(mode)), *_stiffness(mode, rows)]
+    return [_line(band, _mode(mode)), *_stiffness_lines(mode, rows)]
 
 
 def _mode(mode) -> str:
@@ -178,24 +182,24 @@ def _mode(mode) -> str:
     return f"{frequency} Hz, damping {with_interval(mode['damping_ratio'], mode['damping_se'], n, 4)}, n = {n}"
 
 
-def _stiffness(mode, rows) -> list[str]:
+def _stiffness_lines(mode, rows) -> list[str]:
     """Dynamic stiffness at the line nearest to the resonance; not with an exponential window, which changes it."""
     row = rows["receptances"][0]
     if row["window_decay_per_s"]:
         return []
     frequency = np.asarray(row["frequency_hz"], dtype=float)
     h1 = np.asarray(row["h1_real_m_n"], dtype=float) + 1j * np.asarray(row["h1_imag_m_n"], dtype=float)
-    found = dynamic_stiffness(
+    stiffness = dynamic_stiffness(
         frequency, h1, row["coherence"], row["passed"], row["n_impacts"], float(mode["frequency_hz"])
     )
-    if found is None:
+    if stiffness is None:
         return []
-    at = frequency[np.argmin(np.abs(frequency - mode["frequency_hz"]))]
-    value, low, high = (f"{v / 1e6:#.4g}" for v in found)
-    return [_line("", f"dynamic stiffness at {at:.0f} Hz {value} MN/m ({low} to {high}, 95 %)")]
+    nearest = frequency[np.argmin(np.abs(frequency - mode["frequency_hz"]))]
+    value, low, high = (f"{v / 1e6:#.4g}" for v in stiffness)
+    return [_line("", f"dynamic stiffness at {nearest:.0f} Hz {value} MN/m ({low} to {high}, 95 %)")]
 
 
-def _why(model) -> list[str]:
+def _reason_lines(model) -> list[str]:
     """Why the model was rejected or has one resonance only, or else its detail."""
     if not model["reason"]:
         return [_line("detail", model["detail"])] if model["detail"] else []
@@ -203,12 +207,12 @@ def _why(model) -> list[str]:
 
 
 def _temperature(rows, unit, turnout) -> str:
-    noted = turnout.campaigns[unit.campaign].rail_temperature
-    told = next((mode["rail_temperature_c"] for mode in rows.get("modes", ())), None)
-    if noted is not None:
-        return f"{noted:g} °C, noted in campaigns.csv"
-    if told is not None:
-        return f"{told:g} °C, noted in the file"
+    from_notes = turnout.campaigns[unit.campaign].rail_temperature
+    from_file = next((mode["rail_temperature_c"] for mode in rows.get("modes", ())), None)
+    if from_notes is not None:
+        return f"{from_notes:g} °C, noted in campaigns.csv"
+    if from_file is not None:
+        return f"{from_file:g} °C, noted in the file"
     return "temperature not noted in campaigns.csv" + (
         " nor in the file: no chart judges a campaign without one, note it there" if rows.get("modes") else ""
     )

@@ -15,20 +15,20 @@ def report_job(registry, pages, turnouts=None, log=None, threads=1, day=None) ->
     They show the state on ``day`` (YYYY-MM-DD), by default today.
     """
     with open_registry(registry) as connection:
-        _check_known(connection, turnouts)
-        generation, known = connection.execute(
+        _check_turnouts(connection, turnouts)
+        generation, n_turnouts = connection.execute(
             "select (select generation from registry_info), (select count(*) from turnouts)"
         ).fetchall()[0]
 
-        def elsewhere(content):
+        def write_parallel(content):
             _in_processes(registry, pages, content, generation, threads, day)
 
-        many = elsewhere if threads > 1 and known > AT_ONCE else None
-        n = write_pages(connection, pages, generation, turnouts or None, log is None, many, day)
+        writer = write_parallel if threads > 1 and n_turnouts > AT_ONCE else None
+        n = write_pages(connection, pages, generation, turnouts or None, log is None, writer, day)
         write_finding_pages(connection, pages, generation, turnouts or None)
     if log is not None:
         with open(log, "w") as file:
-            file.write(f"{n} pages of generation {generation} written, {known + 1 - n} had not changed\n")
+            file.write(f"{n} pages of generation {generation} written, {n_turnouts + 1 - n} had not changed\n")
     return n
 
 
@@ -40,8 +40,8 @@ def _in_processes(registry, pages, content, generation, threads, day):
     names = list(content)
     with ProcessPoolExecutor(threads, multiprocessing.get_context("spawn")) as pool:
         shares = [{t: content[t] for t in names[k : k + AT_ONCE]} for k in range(0, len(names), AT_ONCE)]
-        for done in [pool.submit(_write_share, registry, pages, share, generation, day) for share in shares]:
-            done.result()
+        for future in [pool.submit(_write_share, registry, pages, share, generation, day) for share in shares]:
+            future.result()
 
 
 def _write_share(registry, pages, content, generation, day):
@@ -50,7 +50,9 @@ def _write_share(registry, pages, content, generation, day):
         write_turnouts(connection, pages, content, generation, day=day)
 
 
-def _check_known(connection, turnouts):
-    known = {row[0] for row in connection.execute("select turnout_id from turnouts").fetchall()}
-    if unknown := sorted(set(turnouts or ()) - known):
-        raise RegistryError(f"no turnout {', '.join(unknown)} in the registry; it has {', '.join(sorted(known)[:20])}.")
+def _check_turnouts(connection, turnouts):
+    turnout_ids = {row[0] for row in connection.execute("select turnout_id from turnouts").fetchall()}
+    if unknown := sorted(set(turnouts or ()) - turnout_ids):
+        raise RegistryError(
+            f"no turnout {', '.join(unknown)} in the registry; it has {', '.join(sorted(turnout_ids)[:20])}."
+        )

@@ -6,7 +6,7 @@ import numpy as np
 
 SPEED = 160.0 / 3.6
 SENSORS = (("A1", 0.6), ("A4", 9.0), ("A7", 24.6), ("nose", 26.7), ("A11", 36.0))
-LOW, HIGH = (0.0, 40.0), (40.0, 1000.0)
+LOW_BAND, HIGH_BAND = (0.0, 40.0), (40.0, 1000.0)
 
 
 def draw_all(folder):
@@ -35,7 +35,7 @@ def _save(figure, path):
 def _passage():
     from turnout.simulate import Sensor, load_track, load_vehicle, simulate_passage
 
-    sensors = [Sensor(name, place, "rail web", noise=0.05) for name, place in SENSORS]
+    sensors = [Sensor(name, position, "rail web", noise=0.05) for name, position in SENSORS]
     return simulate_passage(load_track("tommerup"), load_vehicle("ic3", 0.5), SPEED, sensors, seed=1, truth=True)
 
 
@@ -47,20 +47,24 @@ def _receptances():
     from turnout.receptance import find_impacts, receptance_of
     from turnout.simulate import load_track, simulate_hammer
     from turnout.simulate.frequency_response import receptance
-    from turnout.simulate.hammer import located
+    from turnout.simulate.hammer import resolve_location
     from turnout.simulate.matrices import assemble
 
     turnout, settings = load_track("tommerup"), ReceptanceSettings()
     printed = {"OT": (154.6, 611.6), "CLP": (105.9, 407.6), "A7": (99.6, 616.4), "ASD": (131.3, 692.6)}
     figure, axes = plt.subplots(2, 2, figsize=(8.5, 6.0), sharex=True, layout="constrained")
     for axis, (name, modes) in zip(axes.flat, printed.items()):
-        place, track = located(turnout, name)
-        blows = simulate_hammer(turnout, name, n_blows=10, duration=0.3)
-        found = receptance_of([i for i in find_impacts(blows, "hammer", "acc_1", settings) if i.accepted], settings)
-        inside = (found.frequency > 30.0) & (found.frequency < 900.0)
-        exact = receptance(assemble(track), found.frequency[inside], place, place)
-        axis.semilogy(found.frequency[inside], np.abs(exact), lw=2.5, color="0.75", label="track, frequency domain")
-        axis.semilogy(found.frequency[inside], np.abs(found.h1[inside]), lw=0.9, color="C0", label="H1 of ten blows")
+        position, track = resolve_location(turnout, name)
+        recordings = simulate_hammer(turnout, name, n_blows=10, duration=0.3)
+        measured = receptance_of(
+            [i for i in find_impacts(recordings, "hammer", "acc_1", settings) if i.accepted], settings
+        )
+        inside = (measured.frequency > 30.0) & (measured.frequency < 900.0)
+        exact = receptance(assemble(track), measured.frequency[inside], position, position)
+        axis.semilogy(measured.frequency[inside], np.abs(exact), lw=2.5, color="0.75", label="track, frequency domain")
+        axis.semilogy(
+            measured.frequency[inside], np.abs(measured.h1[inside]), lw=0.9, color="C0", label="H1 of ten blows"
+        )
         for mode in modes:
             axis.axvline(mode, color="C3", lw=0.8, ls="--", label="paper, table 3" if mode == modes[0] else None)
         axis.set_title(name)
@@ -81,8 +85,10 @@ def _passage_forces(recording, truth):
     top.plot(time, recording.signal("nose"), lw=0.5)
     top.set(xlabel="time [s]", ylabel="acceleration [m/s²]", title="IC3 at 160 km/h, rail at the crossing nose")
     for wheel in range(truth.force.shape[0]):
-        near = np.abs(truth.wheel_place[wheel] - 26.7) < 1.6
-        bottom.plot(truth.wheel_place[wheel, near], truth.force[wheel, near] / 1e3, lw=0.8, label=f"wheel {wheel + 1}")
+        is_near = np.abs(truth.wheel_position[wheel] - 26.7) < 1.6
+        bottom.plot(
+            truth.wheel_position[wheel, is_near], truth.force[wheel, is_near] / 1e3, lw=0.8, label=f"wheel {wheel + 1}"
+        )
     bottom.set(xlabel="place [m]", ylabel="contact force [kN]", title="every wheel at the crossing (nose at 26.7 m)")
     bottom.set_ylim(0.0, 1.3 * bottom.get_ylim()[1])  # room for the legend
     bottom.legend(ncol=4, loc="upper center")
@@ -98,16 +104,16 @@ def _two_sensors(recording):
     time = np.arange(recording.n_sample) / recording.rate
     for row, name in enumerate(("A1", "A4")):
         signal = recording.signal(name)
-        for column, (low, high) in enumerate((LOW, HIGH)):
-            edges, kind = (high, "low") if low == 0.0 else ((low, high), "band")
-            part = sosfiltfilt(butter(4, edges, kind, fs=recording.rate, output="sos"), signal)
-            frequency, density = welch(part, recording.rate, nperseg=16384)
+        for column, (low, high) in enumerate((LOW_BAND, HIGH_BAND)):
+            edges, filter_type = (high, "low") if low == 0.0 else ((low, high), "band")
+            filtered = sosfiltfilt(butter(4, edges, filter_type, fs=recording.rate, output="sos"), signal)
+            frequency, density = welch(filtered, recording.rate, nperseg=16384)
             inside = (frequency >= max(low, 1.0)) & (frequency <= high)
-            left, right = axes[row, 2 * column], axes[row, 2 * column + 1]
-            left.plot(time, part, lw=0.4)
-            left.set(title=f"{name}, {low:.0f}-{high:.0f} Hz", xlabel="time [s]", ylabel="acceleration [m/s²]")
-            right.semilogy(frequency[inside], density[inside], lw=0.8)
-            right.set(xlabel="frequency [Hz]", ylabel="power density [(m/s²)²/Hz]")
+            time_axis, density_axis = axes[row, 2 * column], axes[row, 2 * column + 1]
+            time_axis.plot(time, filtered, lw=0.4)
+            time_axis.set(title=f"{name}, {low:.0f}-{high:.0f} Hz", xlabel="time [s]", ylabel="acceleration [m/s²]")
+            density_axis.semilogy(frequency[inside], density[inside], lw=0.8)
+            density_axis.set(xlabel="frequency [Hz]", ylabel="power density [(m/s²)²/Hz]")
     return figure
 
 
@@ -121,17 +127,17 @@ def _closed_form():
     from turnout.simulate.matrices import assemble
 
     track, frequency = uniform_track(96.0), np.arange(20.0, 1301.0, 5.0)
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9.5, 3.8), layout="constrained")
+    figure, (receptance_axis, wave_axis) = plt.subplots(1, 2, figsize=(9.5, 3.8), layout="constrained")
     for offset, name in ((0.0, "over a sleeper"), (0.3, "mid-span")):
         exact = np.abs(floquet_receptance(frequency, track, offset))
         meshed = np.abs(receptance(assemble(track), frequency, 48.0 + offset, 48.0 + offset))
-        left.semilogy(frequency, exact, lw=2.5, color="0.75")
-        left.semilogy(frequency, meshed, lw=0.9, label=f"{name}, 4 elements per bay")
-    left.set(xlabel="frequency [Hz]", ylabel="|receptance| [m/N]", title="grey: infinite track, Floquet")
-    left.legend()
+        receptance_axis.semilogy(frequency, exact, lw=2.5, color="0.75")
+        receptance_axis.semilogy(frequency, meshed, lw=0.9, label=f"{name}, 4 elements per bay")
+    receptance_axis.set(xlabel="frequency [Hz]", ylabel="|receptance| [m/N]", title="grey: infinite track, Floquet")
+    receptance_axis.legend()
     kappa = propagation(frequency, track)
-    right.plot(frequency, np.abs(kappa[:, 0].real), label="wavenumber [rad/m]")
-    right.plot(frequency, -8.686 * kappa[:, 0].imag, label="decay [dB/m]")
-    right.set(xlabel="frequency [Hz]", ylabel="see key", title="less damped wave", ylim=(0.0, 25.0))
-    right.legend()
+    wave_axis.plot(frequency, np.abs(kappa[:, 0].real), label="wavenumber [rad/m]")
+    wave_axis.plot(frequency, -8.686 * kappa[:, 0].imag, label="decay [dB/m]")
+    wave_axis.set(xlabel="frequency [Hz]", ylabel="see key", title="less damped wave", ylim=(0.0, 25.0))
+    wave_axis.legend()
     return figure

@@ -6,54 +6,54 @@ from turnout.registry.as_of import list_day, whole_list
 from turnout.report.trains import train_rows
 
 # One row per section: that of the newest model, accepted or not.
-NEWEST = "qualify row_number() over (partition by section_id order by measured_at_utc desc, model_id) = 1"
-OF_SOME = "turnout_id in (select unnest($turnouts))"
-ALIKE = 20  # quarantine rows of one reason that a page shows
+NEWEST_MODEL = "qualify row_number() over (partition by section_id order by measured_at_utc desc, model_id) = 1"
+ID_GIVEN = "turnout_id in (select unnest($turnouts))"
+MAX_QUARANTINE_ROWS = 20  # quarantine rows of one reason that a page shows
 ROWS = {
-    "turnouts": f"select * from turnouts where {OF_SOME}",
-    "sections": f"select * from sections where {OF_SOME} order by position_m, label",
-    "events": f"select * from events where {OF_SOME} order by event_at_utc, event_id",
+    "turnouts": f"select * from turnouts where {ID_GIVEN}",
+    "sections": f"select * from sections where {ID_GIVEN} order by position_m, label",
+    "events": f"select * from events where {ID_GIVEN} order by event_at_utc, event_id",
     "modes": f"""
         select turnout_id, section_id, model_id, band, measured_at_utc, frequency_hz, frequency_se_hz,
             damping_ratio, damping_se, n_impacts, rail_temperature_c
-        from modes_current where band in ('ballast', 'railpad') and source = 'hammer' and {OF_SOME}
+        from modes_current where band in ('ballast', 'railpad') and source = 'hammer' and {ID_GIVEN}
         order by section_id, band, measured_at_utc""",
-    "models": f"select * from models_current where {OF_SOME} {NEWEST}",
+    "models": f"select * from models_current where {ID_GIVEN} {NEWEST_MODEL}",
     "unused": f"""
         select turnout_id, section_id, measured_at_utc, reason, detail
         from (
             select *, max(measured_at_utc) over (partition by section_id) as newest_utc
-            from models_current where {OF_SOME}
+            from models_current where {ID_GIVEN}
         )
         where status = 'rejected' and coalesce(method, 'joint') <> 'paper' and measured_at_utc < newest_utc
         order by section_id, measured_at_utc desc, model_id""",
-    "receptances": f"select * from receptances_current where {OF_SOME} {NEWEST}",
+    "receptances": f"select * from receptances_current where {ID_GIVEN} {NEWEST_MODEL}",
     "impacts": f"""
         select i.turnout_id, i.section_id, i.test, i.record, i.status, i.reason, i.detail, i.peak_n
         from impacts_current i
         join (
-            select section_id, max(campaign_id) as campaign_id from impacts_current where {OF_SOME} group by section_id
+            select section_id, max(campaign_id) as campaign_id from impacts_current where {ID_GIVEN} group by section_id
         ) newest using (section_id, campaign_id)
         order by i.section_id, i.test, i.record""",
     # of each reason the newest by name, because a sensor may be dead for years
     "quarantine": f"""
         select *, count(*) over (partition by turnout_id, kind, reason_code) as n_alike
-        from quarantine_open where {OF_SOME}
+        from quarantine_open where {ID_GIVEN}
         qualify row_number() over (
             partition by turnout_id, kind, reason_code order by path desc, record desc
-        ) <= {ALIKE}
+        ) <= {MAX_QUARANTINE_ROWS}
         order by path, record""",
     "charts": f"""
         select turnout_id, section_id, band, measured_at_utc, expected_low_hz, expected_high_hz, state
-        from charts where source = 'hammer' and {OF_SOME} order by section_id, band, measured_at_utc""",
-    "chart_states": f"select * from chart_states_on(:today) where {OF_SOME}",
-    "mismatches": f"select * from findings_newest where {OF_SOME} and verdict <> 'none' order by level_before desc",
-    "worklist": f"select * from {whole_list(':today')} where {OF_SOME} order by rank",
+        from charts where source = 'hammer' and {ID_GIVEN} order by section_id, band, measured_at_utc""",
+    "chart_states": f"select * from chart_states_on(:today) where {ID_GIVEN}",
+    "mismatches": f"select * from findings_newest where {ID_GIVEN} and verdict <> 'none' order by level_before desc",
+    "worklist": f"select * from {whole_list(':today')} where {ID_GIVEN} order by rank",
 }
 TURNOUTS = f"""
     with models as (
         select turnout_id, max(measured_at_utc) as latest, count(*) filter (where status <> 'rejected') as n_models
-        from (select * from models_current {NEWEST}) group by turnout_id
+        from (select * from models_current {NEWEST_MODEL}) group by turnout_id
     ),
     sections as (select turnout_id, count(*) as n_sections from sections group by turnout_id),
     rejected as (
@@ -84,8 +84,8 @@ class FleetSource:
 
     def __init__(self, connection, day=None):
         self.connection, self.day = connection, list_day(connection, day)
-        found = connection.execute("select view_name from duckdb_views() where database_name = current_database()")
-        self.there = {row[0] for row in found.fetchall()}
+        rows = connection.execute("select view_name from duckdb_views() where database_name = current_database()")
+        self.views = {row[0] for row in rows.fetchall()}
 
     def turnouts(self):
         """One row per turnout with its counts."""
@@ -109,15 +109,15 @@ class FleetSource:
         sql = f"select state, count(*) as n from {whole_list(':today')} group by state"
         return {row["state"]: row["n"] for row in self._fetch(sql)} if self.has("worklist") else {}
 
-    def has(self, kind):
+    def has(self, table):
         """Whether the registry has ``table``; those of the trend exist after its first run."""
-        return kind not in TREND_VIEWS or kind in self.there
+        return table not in TREND_VIEWS or table in self.views
 
-    def of_some(self, turnout_ids):
+    def rows_of(self, turnout_ids):
         """Rows of the given turnouts from all queries: {table: {turnout_id: [row, ...]}}."""
         chosen = {"turnouts": list(turnout_ids)}
-        kinds = [kind for kind in ROWS if self.has(kind)]
-        rows = {kind: _by_turnout(self._fetch(ROWS[kind], chosen)) for kind in kinds if kind != "receptances"}
+        tables = [table for table in ROWS if self.has(table)]
+        rows = {table: _by_turnout(self._fetch(ROWS[table], chosen)) for table in tables if table != "receptances"}
         rows |= train_rows(self._fetch, turnout_ids)
         return rows | {"receptances": _by_turnout(self._arrays(ROWS["receptances"], chosen))}
 

@@ -7,7 +7,7 @@ from turnout.registry.as_of import whole_list
 
 # Rows that a page shows. The id of a result represents its models, modes, impacts, receptances and passages: it is a
 # hash of the raw files, the configuration and the code that they were computed from.
-SHOWN = {
+PAGE_CONTENT = {
     "turnouts": "turnouts",
     "sections": "sections",
     "events": "events",
@@ -19,12 +19,12 @@ SHOWN = {
     "chart_states": "chart_states_on(:today)",
     "worklist": f"(select * exclude (rank, n_in_all) from {whole_list(':today')})",
 }
-MARK = '<meta name="turnout-content" content="{}">'
-MARKED = re.compile(re.escape(MARK).replace(r"\{\}", "([0-9a-f]+)"))
-HEAD = 2000  # characters of a page that contain its hash
+HASH_MARK = '<meta name="turnout-content" content="{}">'
+HASH_PATTERN = re.compile(re.escape(HASH_MARK).replace(r"\{\}", "([0-9a-f]+)"))
+HEAD_LENGTH = 2000  # characters of a page that contain its hash
 
 
-def contents(source):
+def page_hashes(source):
     """Hash of what the page of each turnout shows, including the code that draws it.
 
     Parameters
@@ -37,25 +37,25 @@ def contents(source):
     dict of str
         32 hexadecimal digits by turnout. The order of rows does not matter, their number does.
     """
-    parts = [
-        f"select turnout_id, '{kind}' as kind, count(*) as n, sum(hash(r)::hugeint) as total "
+    selects = [
+        f"select turnout_id, '{table}' as kind, count(*) as n, sum(hash(r)::hugeint) as total "
         f"from {rows} r group by turnout_id"
-        for kind, rows in SHOWN.items()
-        if source.has(kind)
+        for table, rows in PAGE_CONTENT.items()
+        if source.has(table)
     ]
     sql = f"""
         select turnout_id, md5($code || string_agg(kind || ' ' || n || ' ' || total, ',' order by kind)) as content
-        from ({" union all ".join(parts)}) semi join turnouts using (turnout_id) group by turnout_id"""
+        from ({" union all ".join(selects)}) semi join turnouts using (turnout_id) group by turnout_id"""
     sql = sql.replace(":today", source.day)
     rows = source.connection.execute(sql, {"code": fingerprint("turnout.report.job")}).fetchall()
     return dict(rows)
 
 
-def content_of(path):
+def page_hash(path):
     """Hash stored in the page ``path``; None if there is no page, or it is not from this program."""
     try:
         with open(path, encoding="utf-8", errors="replace") as file:
-            found = MARKED.search(file.read(HEAD))
+            match = HASH_PATTERN.search(file.read(HEAD_LENGTH))
     except FileNotFoundError:
         return None
-    return found.group(1) if found else None
+    return match.group(1) if match else None

@@ -13,7 +13,7 @@ import numpy as np
 SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
-def linear_ticks(low, high, about=5):
+def linear_ticks(low, high, n_target=5):
     """Round numbers between ``low`` and ``high``, steps of 1, 2 or 5 times a power of ten.
 
     >>> linear_ticks(0.0, 1.0)
@@ -23,7 +23,7 @@ def linear_ticks(low, high, about=5):
     """
     if not high > low:
         return [low]
-    raw = (high - low) / about
+    raw = (high - low) / n_target
     magnitude = 10.0 ** math.floor(math.log10(raw))
     step = min((s * magnitude for s in (1, 2, 5, 10)), key=lambda s: abs(s - raw))
     first = math.ceil(low / step - 1e-9)
@@ -45,16 +45,16 @@ def log_ticks(low, high):
     return [m * 10.0**k for k in exponents for m in (1, 2, 5) if low <= m * 10.0**k <= high]
 
 
-def time_ticks(low, high, about=6):
+def time_ticks(low, high, n_target=6):
     """Starts of months or years between two POSIX times [s], about ``n_target`` of them.
 
     >>> from datetime import UTC
     >>> start = datetime(2024, 1, 10, tzinfo=UTC).timestamp()
-    >>> [say_day(t) for t in time_ticks(start, start + 3 * 365.25 * 86400)]
+    >>> [format_day(t) for t in time_ticks(start, start + 3 * 365.25 * 86400)]
     ['Jul 2024', 'Jan 2025', 'Jul 2025', 'Jan 2026', 'Jul 2026', 'Jan 2027']
     """
     months = (high - low) / (30.44 * 86400)
-    step = next((s for s in (1, 2, 3, 6, 12, 24, 60, 120) if months / s <= about + 1), 120)
+    step = next((s for s in (1, 2, 3, 6, 12, 24, 60, 120) if months / s <= n_target + 1), 120)
     epoch = datetime(1970, 1, 1)
     day = (epoch + timedelta(seconds=low)).replace(day=1, hour=0, minute=0, second=0, microsecond=0)
     ticks = []
@@ -65,26 +65,26 @@ def time_ticks(low, high, about=6):
     return ticks
 
 
-def say_number(value, step=None):
+def format_number(value, step=None):
     """Short text of a tick's number, with enough digits to differ from the next tick, ``step`` away.
 
-    >>> say_number(0.2), say_number(1500.0), say_number(1e-9), say_number(0.0)
+    >>> format_number(0.2), format_number(1500.0), format_number(1e-9), format_number(0.0)
     ('0.2', '1500', '10⁻⁹', '0')
-    >>> say_number(530.00002, step=1e-5)
+    >>> format_number(530.00002, step=1e-5)
     '530.00002'
     """
     if value == 0:
         return "0"
     exponent = math.floor(math.log10(abs(value)) + 1e-12)
-    needed = exponent - math.floor(math.log10(step) + 1e-12) + 1 if step else 0
+    n_digits = exponent - math.floor(math.log10(step) + 1e-12) + 1 if step else 0
     if -4 <= exponent <= 4:
-        return f"{value:.{max(6, needed)}g}"
+        return f"{value:.{max(6, n_digits)}g}"
     mantissa = value / 10.0**exponent
     power = "10" + str(exponent).translate(SUPERSCRIPTS)
-    return power if abs(mantissa - 1) < 1e-9 and needed <= 3 else f"{mantissa:.{max(3, needed)}g}·{power}"
+    return power if abs(mantissa - 1) < 1e-9 and n_digits <= 3 else f"{mantissa:.{max(3, n_digits)}g}·{power}"
 
 
-def say_day(seconds):
+def format_day(seconds):
     """Month and year of a POSIX time."""
     return (datetime(1970, 1, 1) + timedelta(seconds=seconds)).strftime("%b %Y")
 
@@ -99,7 +99,7 @@ def runs(good):
     return [slice(first, last) for first, last in zip(edges[::2].tolist(), edges[1::2].tolist())]
 
 
-def drawn(px, py):
+def reduce_points(px, py):
     """Fewer points that draw the same curve: the first, last, lowest and highest of every pixel column.
 
     Parameters
@@ -116,7 +116,7 @@ def drawn(px, py):
     --------
     Two hundred points of a comb within two pixels; four draw it, as first and last of a pixel are its extremes:
 
-    >>> px, py = drawn(np.linspace(0.0, 1.99, 200), np.arange(200) % 2.0)
+    >>> px, py = reduce_points(np.linspace(0.0, 1.99, 200), np.arange(200) % 2.0)
     >>> len(px), sorted(set(py.tolist()))
     (4, [0.0, 1.0])
     """
@@ -127,8 +127,8 @@ def drawn(px, py):
         return px, py
     ends = np.append(starts[1:], len(px)) - 1
     order = np.lexsort((py, column))
-    kept = np.unique(np.concatenate([starts, ends, order[starts], order[ends]]))
-    return px[kept], py[kept]
+    indices = np.unique(np.concatenate([starts, ends, order[starts], order[ends]]))
+    return px[indices], py[indices]
 
 
 LEFT, RIGHT, TOP, BOTTOM = 62, 14, 26, 40  # px, margins around the plot area
@@ -162,12 +162,12 @@ class Axis:
         if self.scale == "names":
             return [(k, escape(name)) for k, name in enumerate(self.names, start=1)]
         if self.scale == "time":
-            return [(t, say_day(t)) for t in time_ticks(self.low, self.high)]
+            return [(t, format_day(t)) for t in time_ticks(self.low, self.high)]
         if self.scale == "log":
-            return [(v, say_number(v)) for v in log_ticks(self.low, self.high)]
+            return [(v, format_number(v)) for v in log_ticks(self.low, self.high)]
         values = linear_ticks(self.low, self.high)
         step = values[1] - values[0] if len(values) > 1 else None
-        return [(v, say_number(v, step)) for v in values]
+        return [(v, format_number(v, step)) for v in values]
 
 
 @dataclass
@@ -179,7 +179,7 @@ class Chart:
     title: str = ""
     width: int = 462
     height: int = 240
-    parts: list = field(default_factory=list)
+    elements: list = field(default_factory=list)
 
     def px(self, values):
         """Horizontal pixels of data values."""
@@ -192,50 +192,50 @@ class Chart:
     def line(self, x, y, style, label=""):
         """Draw a polyline with gaps at missing values."""
         px, py = self.px(x), self.py(y)
-        pieces = (drawn(px[piece], py[piece]) for piece in runs(np.isfinite(px) & np.isfinite(py)))
-        path = "".join("M" + _joined(*piece) for piece in pieces)
-        self.parts.append(f'<path class="{style}" d="{path}">{_title(label)}</path>')
+        pieces = (reduce_points(px[piece], py[piece]) for piece in runs(np.isfinite(px) & np.isfinite(py)))
+        path = "".join("M" + _path_points(*piece) for piece in pieces)
+        self.elements.append(f'<path class="{style}" d="{path}">{_title(label)}</path>')
 
     def band(self, x, low, high, style, label=""):
         """Draw the area between two lines, with gaps at missing values."""
         px, low, high = self.px(x), self.py(low), self.py(high)
         for piece in runs(np.isfinite(px) & np.isfinite(low) & np.isfinite(high)):
-            there, (x_back, y_back) = drawn(px[piece], high[piece]), drawn(px[piece], low[piece])
-            path = f"M{_joined(*there)}L{_joined(x_back[::-1], y_back[::-1])}Z"
-            self.parts.append(f'<path class="{style}" d="{path}">{_title(label)}</path>')
+            forward, (x_back, y_back) = reduce_points(px[piece], high[piece]), reduce_points(px[piece], low[piece])
+            path = f"M{_path_points(*forward)}L{_path_points(x_back[::-1], y_back[::-1])}Z"
+            self.elements.append(f'<path class="{style}" d="{path}">{_title(label)}</path>')
 
     def points(self, x, y, style, radius=3.0, low=None, high=None, labels=None):
         """Draw dots, with bars from ``low`` to ``high`` if given, and ``labels`` as text on hovering."""
         px, py = np.atleast_1d(self.px(x)), np.atleast_1d(self.py(y))
-        shown = np.isfinite(px) & np.isfinite(py)
+        is_finite = np.isfinite(px) & np.isfinite(py)
         if low is not None and high is not None:
             bottom, top = self.py(low), self.py(high)
-            barred = np.flatnonzero(shown & np.isfinite(bottom) & np.isfinite(top))
+            barred = np.flatnonzero(is_finite & np.isfinite(bottom) & np.isfinite(top))
             numbers = np.column_stack([px[barred], bottom[barred], top[barred]]).ravel()
             if barred.size:
                 path = "M%.1f %.1fV%.1f" * barred.size % tuple(numbers.tolist())
-                self.parts.append(f'<path class="{style} bar" d="{path}"/>')
+                self.elements.append(f'<path class="{style} bar" d="{path}"/>')
         texts = [""] * len(px) if labels is None else [_title(label) for label in labels]
         dot = f'<circle class="{style}" r="{radius:g}" cx="%.1f" cy="%.1f">%s</circle>'
-        self.parts += [dot % (px[i], py[i], texts[i]) for i in np.flatnonzero(shown).tolist()]
+        self.elements += [dot % (px[i], py[i], texts[i]) for i in np.flatnonzero(is_finite).tolist()]
 
     def vertical(self, x, style, label="", row=0):
         """Draw a vertical line at ``x`` with a label at its top."""
         px = float(self.px(x))
         if LEFT - 1 <= px <= self.width - RIGHT + 1:
-            self.parts.append(f'<path class="{style}" d="M{px:.1f} {TOP}V{self.height - BOTTOM}"/>')
+            self.elements.append(f'<path class="{style}" d="M{px:.1f} {TOP}V{self.height - BOTTOM}"/>')
             if label:
                 room = self.width - RIGHT - px > 6.2 * len(label)
-                place = f'x="{px + (3 if room else -3):.1f}" y="{TOP + 9 + 11 * row}"'
+                position = f'x="{px + (3 if room else -3):.1f}" y="{TOP + 9 + 11 * row}"'
                 anchor = "start" if room else "end"
-                self.parts.append(f'<text class="{style}" {place} text-anchor="{anchor}">{escape(label)}</text>')
+                self.elements.append(f'<text class="{style}" {position} text-anchor="{anchor}">{escape(label)}</text>')
 
     def span(self, x_low, x_high, style, label=""):
         """Shade an interval of the horizontal axis."""
-        left, right = (float(np.clip(self.px(v), LEFT, self.width - RIGHT)) for v in (x_low, x_high))
-        if right > left:
-            self.parts.append(
-                f'<rect class="{style}" x="{left:.1f}" y="{TOP}" width="{right - left:.1f}" '
+        x_left, x_right = (float(np.clip(self.px(v), LEFT, self.width - RIGHT)) for v in (x_low, x_high))
+        if x_right > x_left:
+            self.elements.append(
+                f'<rect class="{style}" x="{x_left:.1f}" y="{TOP}" width="{x_right - x_left:.1f}" '
                 f'height="{self.height - TOP - BOTTOM}">{_title(label)}</rect>'
             )
 
@@ -243,7 +243,7 @@ class Chart:
         """Draw words at a position given in shares of the width and height of the panel."""
         px = LEFT + x_share * (self.width - LEFT - RIGHT)
         py = TOP + y_share * (self.height - TOP - BOTTOM)
-        self.parts.append(
+        self.elements.append(
             f'<text class="{style}" x="{px:.1f}" y="{py:.1f}" text-anchor="{anchor}">{escape(words)}</text>'
         )
 
@@ -256,7 +256,7 @@ class Chart:
         title = f'<text class="title" x="{LEFT}" y="16">{escape(self.title)}</text>'
         width, height = self.width - LEFT - RIGHT, self.height - TOP - BOTTOM
         window = f'x="{LEFT}" y="{TOP}" width="{width}" height="{height}" viewBox="{LEFT} {TOP} {width} {height}"'
-        body = f"<svg {window}>" + "".join(self.parts) + "</svg>"
+        body = f"<svg {window}>" + "".join(self.elements) + "</svg>"
         return frame + title + self._axes() + body + "</svg>"
 
     def _axes(self):
@@ -264,7 +264,7 @@ class Chart:
         x_ticks, y_ticks = self.x.ticks(), self.y.ticks()
         px, py = self.px([v for v, _ in x_ticks]).tolist(), self.py([v for v, _ in y_ticks]).tolist()
         grid = [f"M{x:.1f} {TOP}V{bottom}" for x in px] + [f"M{LEFT} {y:.1f}H{right}" for y in py]
-        parts = [
+        elements = [
             f'<path class="frame" d="M{LEFT} {TOP}V{bottom}H{right}"/><path class="grid" d="{"".join(grid)}"/>',
             '<g class="tick" text-anchor="middle">',
             *[f'<text x="{x:.1f}" y="{bottom + 14}">{text}</text>' for x, (_, text) in zip(px, x_ticks)],
@@ -273,16 +273,16 @@ class Chart:
             "</g>",
         ]
         middle_x, middle_y = (LEFT + right) / 2, (TOP + bottom) / 2
-        parts.append(
+        elements.append(
             f'<text class="label" x="{middle_x:.0f}" y="{self.height - 6}" text-anchor="middle">'
             f"{escape(self.x.label)}</text>"
             f'<text class="label" transform="translate(13 {middle_y:.0f}) rotate(-90)" text-anchor="middle">'
             f"{escape(self.y.label)}</text>"
         )
-        return "".join(parts)
+        return "".join(elements)
 
 
-def _joined(px, py):
+def _path_points(px, py):
     """Path data of the points: ``x y`` of each, with the letter L of a straight line between them."""
     numbers = np.column_stack([px, py]).ravel().tolist()
     return ("%.1f %.1fL" * len(px) % tuple(numbers))[:-1]

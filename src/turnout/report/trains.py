@@ -26,13 +26,13 @@ SCORES = ("fit", "forecast")
 
 def train_rows(fetch, turnout_ids):
     """Rows that ``trains_part`` needs, {table: {turnout_id: [row, ...]}}; ``fetch`` runs SQL and returns dicts."""
-    own, found = ", ".join(literal(t) for t in turnout_ids), {}
-    for kind, sql in ROWS.items():
+    ids, rows_by_table = ", ".join(literal(t) for t in turnout_ids), {}
+    for table, sql in ROWS.items():
         grouped = defaultdict(list)
-        for row in fetch(sql.format(own=own)) if own else ():
+        for row in fetch(sql.format(own=ids)) if ids else ():
             grouped[row["turnout_id"]].append(row)
-        found[kind] = grouped
-    return found
+        rows_by_table[table] = grouped
+    return rows_by_table
 
 
 def trains_part(rows, sections):
@@ -60,31 +60,35 @@ def score_words(scores):
     if not scores:
         return ""
     n = sum(s["n"] for s in scores)
-    of = {status: sum(s["n"] for s in scores if s["status"] == status) for status in {s["status"] for s in scores}}
-    said = [
+    count = {status: sum(s["n"] for s in scores if s["status"] == status) for status in {s["status"] for s in scores}}
+    sentences = [
         f"{n} records of single sensors were compared with the model of their section: "
-        f"in {of.get('accepted', 0)} it foretells more than random models do and the wheels act as blows on it, "
-        f"in {of.get('not_an_impulse', 0)} it foretells more although they do not, "
-        f"in {of.get('null_explains', 0)} random models reach as much."
+        f"in {count.get('accepted', 0)} it foretells more than random models do and the wheels act as blows on it, "
+        f"in {count.get('not_an_impulse', 0)} it foretells more although they do not, "
+        f"in {count.get('null_explains', 0)} random models reach as much."
     ]
     rolling = sum(s["n_no_impulse"] for s in scores)
     if rolling:
-        said.append(f"In {rolling} the wheels did not act as single blows: they press and shake the rail all the time.")
-    compared, best = (sum(s[k] for s in scores) for k in ("n_compared", "n_best"))
-    if compared:
-        said.append(f"The own section's model foretells more than that of any other section in {best} of {compared}.")
-    said.append("A score inside its null tells nothing about the track, neither good nor bad.")
-    return " ".join(said)
+        sentences.append(
+            f"In {rolling} the wheels did not act as single blows: they press and shake the rail all the time."
+        )
+    n_compared, n_best = (sum(s[k] for s in scores) for k in ("n_compared", "n_best"))
+    if n_compared:
+        sentences.append(
+            f"The own section's model foretells more than that of any other section in {n_best} of {n_compared}."
+        )
+    sentences.append("A score inside its null tells nothing about the track, neither good nor bad.")
+    return " ".join(sentences)
 
 
 def _passage(passage):
     """One passage in words."""
     load, load_error = passage["axle_load_t"], passage["axle_load_se_t"]
-    said = {"speed": passage["speed_listed_kmh"], "type": passage["train_type_listed"]}
+    timetable = {"speed": passage["speed_listed_kmh"], "type": passage["train_type_listed"]}
     return {
         "when": f"{passage['passed_at_utc']:%Y-%m-%d %H:%M}",
         "type": passage["train_type"] or "unknown",
-        "listed": ", ".join(f"{v:g} km/h" if k == "speed" else v for k, v in said.items() if v) or "–",
+        "listed": ", ".join(f"{v:g} km/h" if k == "speed" else v for k, v in timetable.items() if v) or "–",
         "axles": passage["n_axles"] or "–",
         "speed": "–" if passage["speed_kmh"] is None else _with_error(passage["speed_kmh"], passage["speed_se_kmh"]),
         "load": "not available" if load is None else _with_error(load, load_error),

@@ -8,16 +8,16 @@ from jinja2 import Environment, PackageLoader
 from tqdm import tqdm
 
 from turnout import __version__
-from turnout.files import beside
+from turnout.files import temporary_path
 from turnout.report.pages.fleet import fleet_page
 from turnout.report.pages.turnout import turnout_page
 from turnout.report.source import ROWS, FleetSource
-from turnout.report.stale_pages import MARK, content_of, contents
+from turnout.report.stale_pages import HASH_MARK, page_hash, page_hashes
 
 AT_ONCE = 100  # turnouts whose rows are read by one set of queries
 
 
-def write_pages(connection, folder, generation="", turnouts=None, progress=True, elsewhere=None, day=None):
+def write_pages(connection, folder, generation="", turnouts=None, progress=True, writer=None, day=None):
     """Write ``folder``/index.html, and ``folder``/turnouts/<id>.html where its content has changed.
 
     Pages of turnouts that are no longer in the registry are removed.
@@ -47,12 +47,12 @@ def write_pages(connection, folder, generation="", turnouts=None, progress=True,
     environment, shared = page_environment(), shared_by_pages(generation)
     source = FleetSource(connection, day)
     replace_page(folder / "index.html", fleet_page(source, environment.get_template("fleet.html"), shared))
-    content = contents(source)
+    content = page_hashes(source)
     if turnouts is None:
-        _remove_others(folder / "turnouts", content)
+        _remove_stale(folder / "turnouts", content)
     wanted = sorted(content if turnouts is None else set(turnouts) & set(content))
-    stale = {t: content[t] for t in wanted if content_of(folder / "turnouts" / f"{t}.html") != content[t]}
-    write = elsewhere or (lambda some: write_turnouts(connection, folder, some, generation, progress, day))
+    stale = {t: content[t] for t in wanted if page_hash(folder / "turnouts" / f"{t}.html") != content[t]}
+    write = writer or (lambda some: write_turnouts(connection, folder, some, generation, progress, day))
     if stale:
         write(stale)
     return 1 + len(stale)
@@ -66,11 +66,11 @@ def write_turnouts(connection, folder, content, generation="", progress=False, d
     with tqdm(total=len(names), desc="pages", disable=not progress, leave=False) as bar:
         for start in range(0, len(names), AT_ONCE):
             some = names[start : start + AT_ONCE]
-            rows = source.of_some(some)
+            rows = source.rows_of(some)
             for name in some:
-                own = {kind: rows[kind].get(name, []) if kind in rows else [] for kind in {*ROWS, *rows}}
-                mark = {"mark": MARK.format(content[name])}
-                text = turnout_page(own, own["turnouts"][0], template, shared | mark)
+                turnout_rows = {table: rows[table].get(name, []) if table in rows else [] for table in {*ROWS, *rows}}
+                mark = {"mark": HASH_MARK.format(content[name])}
+                text = turnout_page(turnout_rows, turnout_rows["turnouts"][0], template, shared | mark)
                 replace_page(Path(folder) / "turnouts" / f"{name}.html", text)
                 bar.update()
 
@@ -86,16 +86,16 @@ def shared_by_pages(generation=""):
     return {"css": css, "version": __version__, "generation": generation}
 
 
-def _remove_others(folder, known):
+def _remove_stale(folder, turnout_ids):
     """Remove pages of this program for turnouts that are not in ``turnout_ids``; other files stay."""
     for path in folder.glob("*.html"):
-        if path.stem not in known and content_of(path):
+        if path.stem not in turnout_ids and page_hash(path):
             path.unlink()
 
 
 def replace_page(path, text):
     """Write a page in one step, so that no reader sees an incomplete one."""
-    temporary = beside(path)
+    temporary = temporary_path(path)
     try:
         temporary.write_text(text, encoding="utf-8")
         os.replace(temporary, path)

@@ -54,10 +54,10 @@ def _distribution_of_complements(b, a, n):
 
 def _sum_of_logs(b, a, n):
     """Sum of the series; all terms are positive, and logarithms and ratios avoid overflow at large n."""
-    rest = a + b - a * b
+    denominator = a + b - a * b
     x = (1.0 - a) * (1.0 - b)
-    log_step = np.log(b) - np.log(rest)
-    log_term = np.log1p(-b) + n * (np.log(a) - np.log(rest))
+    log_step = np.log(b) - np.log(denominator)
+    log_term = np.log1p(-b) + n * (np.log(a) - np.log(denominator))
     total = np.exp(log_term)
     ratio = np.ones_like(x)
     for k in range(n - 2):

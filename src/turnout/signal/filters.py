@@ -43,8 +43,8 @@ def butterworth_sections(low: float | None, high: float | None, rate: float, ord
     edges = [edge for edge in (low, high) if edge is not None]
     if not edges or any(not 0.0 < edge < rate / 2 for edge in edges) or sorted(set(edges)) != edges:
         raise ValueError(f"cannot pass {low} ... {high} Hz at a rate of {rate} Hz")
-    kind = "bandpass" if len(edges) == 2 else ("highpass" if high is None else "lowpass")
-    sections = signal.butter(order, edges if len(edges) == 2 else edges[0], kind, fs=rate, output="sos")
+    band_type = "bandpass" if len(edges) == 2 else ("highpass" if high is None else "lowpass")
+    sections = signal.butter(order, edges if len(edges) == 2 else edges[0], band_type, fs=rate, output="sos")
     sections.flags.writeable = False
     return sections
 
@@ -63,8 +63,8 @@ def band_pass(
     0.000
     """
     sections = np.array(butterworth_sections(low, high, float(rate), order))
-    run = signal.sosfiltfilt if zero_phase else signal.sosfilt
-    return run(sections, np.asarray(x, dtype=float), axis=-1)
+    apply_sections = signal.sosfiltfilt if zero_phase else signal.sosfilt
+    return apply_sections(sections, np.asarray(x, dtype=float), axis=-1)
 
 
 def reduce_rate(x: np.ndarray, factor: int) -> np.ndarray:
@@ -80,7 +80,7 @@ def reduce_rate(x: np.ndarray, factor: int) -> np.ndarray:
 
 
 # Skewed pulse x^p e^(p (1-x)): it rises fast and decays slowly; above 2 % of its peak until x = SKEW_END.
-SKEW = 3.0
+SKEW_EXPONENT = 3.0
 SKEW_END = 3.5791
 
 
@@ -104,13 +104,13 @@ def hertzian(x):
     return np.abs(np.sin(np.pi * x)) ** 1.5
 
 
-def skewed(x):
+def skewed_pulse(x):
     r""":math:`(u e^{1-u})^3` with u = 3.58 x: a soft tip that yields quickly and recovers slowly."""
     u = SKEW_END * np.asarray(x, dtype=float)
-    return (u * np.exp(1.0 - u)) ** SKEW
+    return (u * np.exp(1.0 - u)) ** SKEW_EXPONENT
 
 
-FAMILIES = {"half-sine": half_sine, "haversine": haversine, "Hertzian": hertzian, "skewed": skewed}
+FAMILIES = {"half-sine": half_sine, "haversine": haversine, "Hertzian": hertzian, "skewed": skewed_pulse}
 
 
 def force_pulse(family: str, time: np.ndarray, contact: float) -> np.ndarray:
@@ -139,5 +139,5 @@ def force_pulse(family: str, time: np.ndarray, contact: float) -> np.ndarray:
     [0.637, 0.5]
     """
     time = np.asarray(time, dtype=float)
-    touching = (time > 0.0) & ((time < contact) | (family == "skewed"))
-    return np.where(touching, FAMILIES[family](np.where(touching, time / contact, 0.0)), 0.0)
+    in_contact = (time > 0.0) & ((time < contact) | (family == "skewed"))
+    return np.where(in_contact, FAMILIES[family](np.where(in_contact, time / contact, 0.0)), 0.0)

@@ -70,13 +70,13 @@ def upper_rows(lower_rows, n, half, width):
 def solve(lower_rows, upper, inverse_pivot, x, start, n):
     """Solve in place for ``x[start:start+n]``; unrolled for four or six diagonals."""
     width = lower_rows.shape[1]
-    part = x[start : start + n]
+    segment = x[start : start + n]
     if width == 4:
-        _solve4(lower_rows, upper, inverse_pivot, part, n)
+        _solve4(lower_rows, upper, inverse_pivot, segment, n)
     elif width == 6:
-        _solve6(lower_rows, upper, inverse_pivot, part, n)
+        _solve6(lower_rows, upper, inverse_pivot, segment, n)
     else:
-        _solve_any(lower_rows, upper, inverse_pivot, part, n)
+        _solve_any(lower_rows, upper, inverse_pivot, segment, n)
 
 
 @kernel
@@ -148,7 +148,7 @@ def multiply(diagonals, x, start, out, n):
 
 
 @kernel
-def momentum_less_force(mass, stiffness, v, u, by_v, by_u, start, out, n):
+def momentum_minus_force(mass, stiffness, v, u, by_v, by_u, start, out, n):
     """``out[start:start+n]`` = by_v M v - by_u K u, with all 9 diagonals in one pass."""
     near_v, near_u, inner = v[start - 4 : start + n + 4], u[start - 4 : start + n + 4], out[start : start + n]
     for i in range(n):
@@ -168,27 +168,27 @@ def solve_from_both_ends(low, up, pivot, low_back, up_back, pivot_back, middle, 
     Two independent recurrences run in parallel, so that neither waits for the last product of the other.
     ``low_back`` ... are the factors of the reversed matrix, ``middle`` (4, 4) is the middle block of the inverse.
     """
-    part = x[start : start + n]
+    segment = x[start : start + n]
     top = (n - 4) // 2
     bottom = n - 4 - top
     last = n - 1
-    zero = 0.0 * part[0]
+    zero = 0.0 * segment[0]
     a, b, c, d, e, f, g, h = zero, zero, zero, zero, zero, zero, zero, zero
     for i in range(top):
-        s = part[i] - low[i, 3] * d - low[i, 2] * c - low[i, 1] * b - low[i, 0] * a
-        t = part[last - i] - low_back[i, 3] * h - low_back[i, 2] * g - low_back[i, 1] * f - low_back[i, 0] * e
+        s = segment[i] - low[i, 3] * d - low[i, 2] * c - low[i, 1] * b - low[i, 0] * a
+        t = segment[last - i] - low_back[i, 3] * h - low_back[i, 2] * g - low_back[i, 1] * f - low_back[i, 0] * e
         d, c, b, a = c, b, a, s
         h, g, f, e = g, f, e, t
-        part[i] = s
-        part[last - i] = t
+        segment[i] = s
+        segment[last - i] = t
     for i in range(top, bottom):
-        t = part[last - i] - low_back[i, 3] * h - low_back[i, 2] * g - low_back[i, 1] * f - low_back[i, 0] * e
+        t = segment[last - i] - low_back[i, 3] * h - low_back[i, 2] * g - low_back[i, 1] * f - low_back[i, 0] * e
         h, g, f, e = g, f, e, t
-        part[last - i] = t
-    r0 = part[top] - low[top, 0] * a - low[top, 1] * b - low[top, 2] * c - low[top, 3] * d
-    r1 = part[top + 1] - low[top + 1, 1] * a - low[top + 1, 2] * b - low[top + 1, 3] * c
-    r2 = part[top + 2] - low[top + 2, 2] * a - low[top + 2, 3] * b
-    r3 = part[top + 3] - low[top + 3, 3] * a
+        segment[last - i] = t
+    r0 = segment[top] - low[top, 0] * a - low[top, 1] * b - low[top, 2] * c - low[top, 3] * d
+    r1 = segment[top + 1] - low[top + 1, 1] * a - low[top + 1, 2] * b - low[top + 1, 3] * c
+    r2 = segment[top + 2] - low[top + 2, 2] * a - low[top + 2, 3] * b
+    r3 = segment[top + 3] - low[top + 3, 3] * a
     r3 = r3 - low_back[bottom, 0] * e - low_back[bottom, 1] * f - low_back[bottom, 2] * g - low_back[bottom, 3] * h
     r2 = r2 - low_back[bottom + 1, 1] * e - low_back[bottom + 1, 2] * f - low_back[bottom + 1, 3] * g
     r1 = r1 - low_back[bottom + 2, 2] * e - low_back[bottom + 2, 3] * f
@@ -197,21 +197,21 @@ def solve_from_both_ends(low, up, pivot, low_back, up_back, pivot_back, middle, 
     b = middle[1, 0] * r0 + middle[1, 1] * r1 + middle[1, 2] * r2 + middle[1, 3] * r3
     c = middle[2, 0] * r0 + middle[2, 1] * r1 + middle[2, 2] * r2 + middle[2, 3] * r3
     d = middle[3, 0] * r0 + middle[3, 1] * r1 + middle[3, 2] * r2 + middle[3, 3] * r3
-    part[top], part[top + 1], part[top + 2], part[top + 3] = a, b, c, d
+    segment[top], segment[top + 1], segment[top + 2], segment[top + 3] = a, b, c, d
     e, f, g, h = d, c, b, a
     for i in range(bottom - 1, top - 1, -1):
-        t = part[last - i] * pivot_back[i] - up_back[i, 3] * h - up_back[i, 2] * g
+        t = segment[last - i] * pivot_back[i] - up_back[i, 3] * h - up_back[i, 2] * g
         t = t - up_back[i, 1] * f - up_back[i, 0] * e
         h, g, f, e = g, f, e, t
-        part[last - i] = t
+        segment[last - i] = t
     for i in range(top - 1, -1, -1):
-        s = part[i] * pivot[i] - up[i, 3] * d - up[i, 2] * c - up[i, 1] * b - up[i, 0] * a
-        t = part[last - i] * pivot_back[i] - up_back[i, 3] * h - up_back[i, 2] * g
+        s = segment[i] * pivot[i] - up[i, 3] * d - up[i, 2] * c - up[i, 1] * b - up[i, 0] * a
+        t = segment[last - i] * pivot_back[i] - up_back[i, 3] * h - up_back[i, 2] * g
         t = t - up_back[i, 1] * f - up_back[i, 0] * e
         d, c, b, a = c, b, a, s
         h, g, f, e = g, f, e, t
-        part[i] = s
-        part[last - i] = t
+        segment[i] = s
+        segment[last - i] = t
 
 
 def all_diagonals(upper, half):

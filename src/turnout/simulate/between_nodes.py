@@ -12,7 +12,7 @@ import numpy as np
 from turnout.simulate.kernels import ramp_at
 from turnout.simulate.rail import local_compliance
 
-ON_NODE = 1e-9  # m from a node within which a position is on it; positions are rounded to this
+NODE_TOLERANCE = 1e-9  # m from a node within which a position is on it; positions are rounded to this
 
 
 @dataclass(frozen=True)
@@ -23,13 +23,13 @@ class RailLoads:
     moves before time 0. ``ramp`` has the positions where the modelled track fades in and out, None without.
     """
 
-    place: np.ndarray
+    position: np.ndarray
     force: np.ndarray
     from_rest: bool
     ramp: np.ndarray | None = None
 
 
-def rail_loads(place, speed, force, dt, from_rest, ramp=None):
+def rail_loads(position, speed, force, dt, from_rest, ramp=None):
     """``RailLoads`` of forces (n_load, n_step) [N] that roll from ``position`` (n_load,) [m] with ``speed`` [m/s].
 
     The forces are extrapolated linearly by one step after the end.
@@ -37,27 +37,30 @@ def rail_loads(place, speed, force, dt, from_rest, ramp=None):
     force = np.column_stack([force[:, :1], force])
     force = np.column_stack([force, 2.0 * force[:, -1] - force[:, -2]])
     time = (np.arange(force.shape[1]) - 0.5) * dt
-    return RailLoads(place[:, None] + speed * time, force, from_rest, ramp)
+    return RailLoads(position[:, None] + speed * time, force, from_rest, ramp)
 
 
-def lies_between_nodes(matrices, place):
+def is_between_nodes(matrices, point):
     """Whether a point is on the rail between two nodes; it is a position [m] or the name of a degree of freedom."""
-    return not isinstance(place, tuple) and float(np.min(np.abs(matrices.node - place))) > ON_NODE
+    return not isinstance(point, tuple) and float(np.min(np.abs(matrices.node - point))) > NODE_TOLERANCE
 
 
-def bending(matrices, x, loads):
+def element_deflection(matrices, x, loads):
     """(n_step + 2,) deflection [m] at ``x`` [m] of its element with both ends clamped, under the loads on it."""
     e = matrices.element_at(x)
     first, last = matrices.node[e : e + 2]
-    inside = np.flatnonzero((loads.place > first) & (loads.place < last))
-    at, h, n = loads.place.ravel()[inside], last - first, loads.force.shape[1]
-    bent = local_compliance((x - first) / h, (at - first) / h, h, matrices.rails[e]) * loads.force.ravel()[inside]
+    inside = np.flatnonzero((loads.position > first) & (loads.position < last))
+    load_position, h, n = loads.position.ravel()[inside], last - first, loads.force.shape[1]
+    deflection = (
+        local_compliance((x - first) / h, (load_position - first) / h, h, matrices.rails[e])
+        * loads.force.ravel()[inside]
+    )
     if loads.ramp is not None and not loads.ramp[1] <= first < last <= loads.ramp[2]:
-        bent = bent * np.array([ramp_at(loads.ramp, True, place)[0] for place in at])
-    return np.bincount(inside % n, bent, n)
+        deflection = deflection * np.array([ramp_at(loads.ramp, True, position)[0] for position in load_position])
+    return np.bincount(inside % n, deflection, n)
 
 
-def recorded(deflection, order, dt, from_rest):
+def step_mean(deflection, order, dt, from_rest):
     """(n_step,) means over each step of a deflection (n_step + 2,) [m]; ``order`` 1: its rate, 2: its acceleration."""
     if order == 0:
         return deflection[1:-1]

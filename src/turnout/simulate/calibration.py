@@ -7,7 +7,7 @@ from scipy.optimize import least_squares
 
 from turnout.errors import SimulationError
 from turnout.simulate.frequency_response import receptance_gradient
-from turnout.simulate.hammer import located
+from turnout.simulate.hammer import resolve_location
 from turnout.simulate.matrices import assemble
 from turnout.simulate.modal_calibration import with_section
 from turnout.simulate.turnout_track import stretch_of_track
@@ -21,13 +21,13 @@ PARAMETERS = {
     "sleeper_mass": ("sleeper", "mass", 0.15),
 }
 BANDS = ((40.0, 100.0), (100.0, 200.0), (200.0, 400.0), (400.0, 600.0), (600.0, 800.0))
-INFORMED = 0.5  # posterior sd over prior sd below which the data determine a parameter
-CORRELATED = 0.95  # posterior correlation above which two parameters are determined only together
-SMOOTH = 1.0  # octaves over which the model error is the same
+MAX_SD_RATIO = 0.5  # posterior sd over prior sd below which the data determine a parameter
+MIN_CORRELATION = 0.95  # posterior correlation above which two parameters are determined only together
+ERROR_BANDWIDTH = 1.0  # octaves over which the model error is the same
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredReceptance:
     """A measured receptance: ``value`` (n,) complex [m/N] at ``frequency`` [Hz].
 
     It is from an impact at ``excited`` [m] to an accelerometer at ``measured`` [m]. ``sd`` (n,) is the standard
@@ -41,7 +41,7 @@ class Measured:
     measured: float
 
 
-MET = 4.0  # chi-squared per degree of freedom: the residual is at most twice the errors of test and model
+MAX_CHI_SQUARED = 4.0  # chi-squared per degree of freedom: the residual is at most twice the errors of test and model
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Calibration:
     sd: dict
     covariance: np.ndarray
     informed: dict
-    tied: tuple
+    correlated: tuple
     misfit: dict
     misfit_before: dict
     reduced: float
@@ -66,25 +66,27 @@ class Calibration:
     turnout: object
 
     @property
-    def met(self) -> bool:
+    def is_adequate(self) -> bool:
         """Whether the model with these values fits the tests."""
-        return self.reduced <= MET
+        return self.reduced <= MAX_CHI_SQUARED
 
-    def tells(self, name) -> bool:
+    def is_determined(self, name) -> bool:
         """Whether the tests determine a parameter, alone or together with another one."""
-        return self.informed[name] or any(name in pair for pair in self.tied)
+        return self.informed[name] or any(name in pair for pair in self.correlated)
 
     def __str__(self):
-        bar = f"about 1: met within the errors; above {MET:.0f}: not met"
-        lines = [f"{self.section}: {self.n} numbers, chi-squared per degree of freedom {self.reduced:.2f} ({bar})"]
+        criterion = f"about 1: met within the errors; above {MAX_CHI_SQUARED:.0f}: not met"
+        lines = [
+            f"{self.section}: {self.n} numbers, chi-squared per degree of freedom {self.reduced:.2f} ({criterion})"
+        ]
         for name, value in self.values.items():
-            told = "" if self.informed[name] else "   hardly told by these tests: about what the track file says"
-            lines.append(f"  {name:<18} {value:12.5g} ± {100 * self.sd[name]:.1f} %{told}")
-        lines += [f"  {a} and {b} are told only together" for a, b in self.tied]
-        for (low, high), left in self.misfit.items():
+            remark = "" if self.informed[name] else "   hardly told by these tests: about what the track file says"
+            lines.append(f"  {name:<18} {value:12.5g} ± {100 * self.sd[name]:.1f} %{remark}")
+        lines += [f"  {a} and {b} are told only together" for a, b in self.correlated]
+        for (low, high), after in self.misfit.items():
             before = self.misfit_before[low, high]
-            lines.append(f"  {low:.0f}-{high:.0f} Hz: misfit {100 * before:.1f} % before, {100 * left:.1f} % after")
-        if not self.met:
+            lines.append(f"  {low:.0f}-{high:.0f} Hz: misfit {100 * before:.1f} % before, {100 * after:.1f} % after")
+        if not self.is_adequate:
             lines.append("  The track's model does not meet this test: neither values nor ± mean anything.")
         return "\n".join(lines)
 
@@ -124,31 +126,33 @@ def calibrate(turnout, section, measured, location=None, parameters=tuple(PARAME
         raise SimulationError(f"calibration of {section!r}: no receptance given.")
     if unknown := [name for name in parameters if name not in PARAMETERS]:
         raise SimulationError(f"calibration cannot fit {unknown[0]!r}; it can fit {', '.join(PARAMETERS)}.")
-    place, track = located(turnout, location if location is not None else section)
-    j = track.nearest_support(place)
+    position, track = resolve_location(turnout, location if location is not None else section)
+    j = track.nearest_support(position)
     centre = np.log([max(getattr(track, name)[j], 1.0) for name in parameters])
     spread = np.array([PARAMETERS[name][2] for name in parameters])
 
     def model(logs):
         changed = with_section(turnout, section, **dict(zip(parameters, np.exp(logs))))
-        _, base = located(changed, location if location is not None else section)
-        return _model(stretch_of_track(base, place, half_length), section, parameters, measured)
+        _, base = resolve_location(changed, location if location is not None else section)
+        return _model_receptances(stretch_of_track(base, position, half_length), section, parameters, measured)
 
     residual = _residual(model, measured, model_sd, centre, spread)
-    best = least_squares(lambda q: residual(q)[0], centre, jac=lambda q: residual(q)[1], method="trf", x_scale=spread)
-    before, after = ([h for h, _ in model(q)] for q in (centre, best.x))
+    solution = least_squares(
+        lambda q: residual(q)[0], centre, jac=lambda q: residual(q)[1], method="trf", x_scale=spread
+    )
+    before, after = ([h for h, _ in model(q)] for q in (centre, solution.x))
     n = sum(2 * m.value.size for m in measured)
-    reduced = _left(measured, after, model_sd) / max(1, n - len(parameters))
-    covariance = np.linalg.inv(best.jac.T @ best.jac) * max(1.0, reduced)
+    reduced = _chi_squared(measured, after, model_sd) / max(1, n - len(parameters))
+    covariance = np.linalg.inv(solution.jac.T @ solution.jac) * max(1.0, reduced)
     sd = np.sqrt(np.diag(covariance))
-    values = dict(zip(parameters, (float(v) for v in np.exp(best.x))))
+    values = dict(zip(parameters, (float(v) for v in np.exp(solution.x))))
     return Calibration(
         section,
         values,
         dict(zip(parameters, (float(s) for s in sd))),
         covariance,
-        {name: bool(s < INFORMED * p) for name, s, p in zip(parameters, sd, spread)},
-        _tied(parameters, covariance / np.outer(sd, sd)),
+        {name: bool(s < MAX_SD_RATIO * p) for name, s, p in zip(parameters, sd, spread)},
+        _correlated_pairs(parameters, covariance / np.outer(sd, sd)),
         _misfit(measured, after),
         _misfit(measured, before),
         reduced,
@@ -159,72 +163,74 @@ def calibrate(turnout, section, measured, location=None, parameters=tuple(PARAME
 
 def _residual(model, measured, model_sd, centre, spread):
     """Function of the logarithms: residuals in standard errors, those of the prior last, and the Jacobian."""
-    weights = [1.0 / np.sqrt(m.sd**2 + _lines_alike(m.frequency) * (model_sd * np.abs(m.value)) ** 2) for m in measured]
-    newest: dict[bytes, tuple] = {}
+    weights = [
+        1.0 / np.sqrt(m.sd**2 + _n_correlated_lines(m.frequency) * (model_sd * np.abs(m.value)) ** 2) for m in measured
+    ]
+    cache: dict[bytes, tuple] = {}
 
     def residual(logs):
         key = logs.tobytes()
-        if key not in newest:
-            newest.clear()
-            found = model(logs)
-            miss = [w * (h - m.value) for w, (h, _), m in zip(weights, found, measured)]
-            slope = [w[:, None] * g for w, (_, g) in zip(weights, found)]
-            r = np.concatenate([_split(m) for m in miss])
-            jacobian = np.concatenate([_split(s) for s in slope])
-            newest[key] = (
+        if key not in cache:
+            cache.clear()
+            modelled = model(logs)
+            misfit = [w * (h - m.value) for w, (h, _), m in zip(weights, modelled, measured)]
+            slope = [w[:, None] * g for w, (_, g) in zip(weights, modelled)]
+            r = np.concatenate([_stack_real_imag(m) for m in misfit])
+            jacobian = np.concatenate([_stack_real_imag(s) for s in slope])
+            cache[key] = (
                 np.concatenate([r, (logs - centre) / spread]),
                 np.concatenate([jacobian, np.diag(1.0 / spread)]),
             )
-        return newest[key]
+        return cache[key]
 
     return residual
 
 
-def _left(measured, found, model_sd):
+def _chi_squared(measured, modelled, model_sd):
     """Sum of squared residuals in standard errors of each line alone."""
     return float(
         sum(
             np.sum(np.abs(h - m.value) ** 2 / (m.sd**2 + (model_sd * np.abs(m.value)) ** 2))
-            for m, h in zip(measured, found)
+            for m, h in zip(measured, modelled)
         )
     )
 
 
-def _lines_alike(frequency):
+def _n_correlated_lines(frequency):
     """(n,) number of lines that share the model error with each line, including itself."""
     octaves = np.log2(frequency)
-    return np.sum(np.abs(octaves[:, None] - octaves) <= SMOOTH / 2.0, axis=1)
+    return np.sum(np.abs(octaves[:, None] - octaves) <= ERROR_BANDWIDTH / 2.0, axis=1)
 
 
-def _tied(parameters, correlation):
+def _correlated_pairs(parameters, correlation):
     """Pairs of parameters that the data do not separate."""
     return tuple(
         (parameters[a], parameters[b])
         for a in range(len(parameters))
         for b in range(a)
-        if abs(correlation[a, b]) > CORRELATED
+        if abs(correlation[a, b]) > MIN_CORRELATION
     )
 
 
-def _split(value):
+def _stack_real_imag(value):
     return np.concatenate([value.real, value.imag])
 
 
-def _model(track, section, parameters, measured):
+def _model_receptances(track, section, parameters, measured):
     """Modelled receptance and its derivatives by the logarithm of each parameter, for each measured receptance."""
     matrices = assemble(track)
     inside = {j for j, name in enumerate(track.section) if name == section}
     groups, values = [], []
     for name in parameters:
-        tag, kind, _ = PARAMETERS[name]
+        tag, quantity, _ = PARAMETERS[name]
         links = [link for link in matrices.links if link.tag == tag and _support_of(link) in inside]
-        groups.append((kind, links))
-        values.append(getattr(links[0], kind) if links else 0.0)
-    found = []
+        groups.append((quantity, links))
+        values.append(getattr(links[0], quantity) if links else 0.0)
+    modelled = []
     for m in measured:
         h, gradient = receptance_gradient(matrices, m.frequency, m.excited, m.measured, groups)
-        found.append((h, gradient * np.array(values)))
-    return found
+        modelled.append((h, gradient * np.array(values)))
+    return modelled
 
 
 def _support_of(link):
@@ -235,11 +241,11 @@ def _misfit(measured, modelled):
     """Relative rms misfit in each band that has lines."""
     table = {}
     for low, high in BANDS:
-        miss = size = 0.0
+        error = size = 0.0
         for m, h in zip(measured, modelled):
             inside = (m.frequency >= low) & (m.frequency < high)
-            miss += np.sum(np.abs(h - m.value)[inside] ** 2)
+            error += np.sum(np.abs(h - m.value)[inside] ** 2)
             size += np.sum(np.abs(m.value[inside]) ** 2)
         if size:
-            table[low, high] = float(np.sqrt(miss / size))
+            table[low, high] = float(np.sqrt(error / size))
     return table

@@ -11,10 +11,10 @@ from numba import config, njit
 
 from turnout.fingerprint import fingerprint
 
-FAST = {"contract", "reassoc", "nsz", "arcp"}
+FASTMATH_FLAGS = {"contract", "reassoc", "nsz", "arcp"}
 # numba only checks whether the file of the function itself has changed. But a kernel contains the code of the kernels
 # it calls and the constants they import. So the cache folder has the fingerprint of all modules of the march.
-OUTERMOST = "turnout.simulate.march"
+FINGERPRINTED_MODULE = "turnout.simulate.march"
 
 
 def kernel(function):
@@ -22,32 +22,32 @@ def kernel(function):
 
     If no folder can be written, every process compiles it again: some 20 s for all kernels.
     """
-    return _compiled(function)
+    return _compile(function)
 
 
-def inlined(function):
+def inline_kernel(function):
     """Decorator: a kernel inlined into its callers. No tuple of arrays is copied for a call: a quarter faster."""
-    return _compiled(function, forceinline=True)
+    return _compile(function, forceinline=True)
 
 
-def _compiled(function, **options):
+def _compile(function, **options):
     folder = cache_folder()
     if folder is not None:
         try:
-            with _numba_keeps_in(folder):
-                return njit(cache=True, fastmath=FAST, **options)(function)
+            with _numba_cache(folder):
+                return njit(cache=True, fastmath=FASTMATH_FLAGS, **options)(function)
         except RuntimeError:  # "no locator available": the folder was removed after it was tested
             pass
-    return njit(fastmath=FAST, **options)(function)
+    return njit(fastmath=FASTMATH_FLAGS, **options)(function)
 
 
 @cache
 def cache_folder():
     """First writable cache folder, or None: that of numba's setting, beside the source, in the user's cache."""
-    name = f"kernels-{fingerprint(OUTERMOST)}"
+    name = f"kernels-{fingerprint(FINGERPRINTED_MODULE)}"
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    beside = Path(__file__).resolve().parent / "__pycache__"
-    for base in (config.CACHE_DIR, beside, Path(home) / "turnout"):  # type: ignore[attr-defined]
+    source_cache = Path(__file__).resolve().parent / "__pycache__"
+    for base in (config.CACHE_DIR, source_cache, Path(home) / "turnout"):  # type: ignore[attr-defined]
         if not base or str(base).startswith("~"):  # a user without a home
             continue
         folder = Path(base) / name
@@ -56,20 +56,20 @@ def cache_folder():
             tempfile.TemporaryFile(dir=folder).close()
         except OSError:
             continue
-        if base == beside:
-            _forget_older(folder)
+        if base == source_cache:
+            _remove_older_caches(folder)
         return folder
     return None
 
 
-def _forget_older(folder):
-    for other in folder.parent.glob("kernels-*"):
-        if other != folder:
-            shutil.rmtree(other, ignore_errors=True)
+def _remove_older_caches(folder):
+    for older in folder.parent.glob("kernels-*"):
+        if older != folder:
+            shutil.rmtree(older, ignore_errors=True)
 
 
 @contextmanager
-def _numba_keeps_in(folder):
+def _numba_cache(folder):
     before, config.CACHE_DIR = config.CACHE_DIR, str(folder)  # type: ignore[attr-defined]
     try:
         yield

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from turnout.simulate.links import moved
+from turnout.simulate.links import shift_supports
 from turnout.simulate.passage import simulate_passage
 from turnout.simulate.track import PER_SUPPORT
 from turnout.simulate.turnout_track import TurnoutTrack
@@ -64,29 +64,32 @@ def numerical_error(case, bands=BANDS):
 
     Each run prepares its track again. The finer runs have the same sampling rate: two steps are averaged per sample.
     """
-    options = _unprepared(case.options)
+    options = _without_prepared(case.options)
     rate, substeps = options.get("rate", 20e3), options.pop("substeps", 1)
     options["rate"] = rate
-    bare = _bare(case.sensors)
+    sensors = _without_instruments(case.sensors)
 
     def samples(track, substeps):
-        return simulate_passage(track, case.vehicle, case.speed, bare, **options, substeps=substeps).samples
+        return simulate_passage(track, case.vehicle, case.speed, sensors, **options, substeps=substeps).samples
 
     base, finer_step = samples(case.track, substeps), samples(case.track, 2 * substeps)
-    elements = 2 * _base(case.track).elements_per_bay
+    elements = 2 * _base_track(case.track).elements_per_bay
     finer_mesh = samples(_with_elements(case.track, elements), substeps)
-    step, level_step = compare(base, finer_step, rate, bands)
-    mesh, level_mesh = compare(base, finer_mesh, rate, bands)
-    step, mesh = _whole(step, STEP_ORDER[options.get("scheme", "radau")]), _whole(mesh, MESH_ORDER)
-    return NumericalError(tuple(bands), tuple(s.name for s in bare), step, mesh, level_step, level_mesh)
+    step, level_step = compare_recordings(base, finer_step, rate, bands)
+    mesh, level_mesh = compare_recordings(base, finer_mesh, rate, bands)
+    step, mesh = (
+        _extrapolate_error(step, STEP_ORDER[options.get("scheme", "radau")]),
+        _extrapolate_error(mesh, MESH_ORDER),
+    )
+    return NumericalError(tuple(bands), tuple(s.name for s in sensors), step, mesh, level_step, level_mesh)
 
 
-def _whole(difference, order):
+def _extrapolate_error(difference, order):
     """Error of the coarser of two runs from their difference; the finer one has half the step."""
     return difference * 2.0**order / (2.0**order - 1.0)
 
 
-def compare(coarse, fine, rate, bands=BANDS):
+def compare_recordings(coarse, fine, rate, bands=BANDS):
     """Relative waveform difference and level difference [dB] of two (n_sensor, n) recordings in each band."""
     n = min(coarse.shape[1], fine.shape[1])
     window = np.hanning(n)
@@ -104,29 +107,29 @@ def compare(coarse, fine, rate, bands=BANDS):
 def end_error(case, extra=30.0, bands=BANDS):
     """Relative waveform difference to the same track, longer by ``extra`` [m] of its last supports at both ends."""
     smooth = replace(case.track, roughness_level=None) if isinstance(case.track, TurnoutTrack) else case.track
-    options = {name: value for name, value in _unprepared(case.options).items() if name != "roughness"}
+    options = {name: value for name, value in _without_prepared(case.options).items() if name != "roughness"}
     rate = options.get("rate", 20e3)
-    bare = _bare(case.sensors)
-    count = _count(_base(smooth), extra)
-    elsewhere = options | {"terms": tuple(moved(term, count) for term in options.get("terms", ()))}
-    here = simulate_passage(smooth, case.vehicle, case.speed, bare, **options)
-    longer = simulate_passage(_lengthened(smooth, extra), case.vehicle, case.speed, bare, **elsewhere)
-    return compare(here.samples, longer.samples, rate, bands)[0]
+    sensors = _without_instruments(case.sensors)
+    count = _n_supports_in(_base_track(smooth), extra)
+    shifted_options = options | {"terms": tuple(shift_supports(term, count) for term in options.get("terms", ()))}
+    base = simulate_passage(smooth, case.vehicle, case.speed, sensors, **options)
+    longer = simulate_passage(_lengthen(smooth, extra), case.vehicle, case.speed, sensors, **shifted_options)
+    return compare_recordings(base.samples, longer.samples, rate, bands)[0]
 
 
-def _unprepared(options):
+def _without_prepared(options):
     """The options for another track or step: those of the prepared track become terms and scheme."""
-    rest = {name: value for name, value in options.items() if name != "prepared"}
+    remaining = {name: value for name, value in options.items() if name != "prepared"}
     prepared = options.get("prepared")
-    return rest if prepared is None else rest | {"terms": prepared.terms, "scheme": prepared.scheme_name}
+    return remaining if prepared is None else remaining | {"terms": prepared.terms, "scheme": prepared.scheme_name}
 
 
-def _bare(sensors):
+def _without_instruments(sensors):
     """The sensors without noise, clipping, resolution and filter: only the track is compared."""
     return tuple(replace(s, noise=0.0, limit=None, resolution=None, cutoff=None) for s in sensors)
 
 
-def _base(track):
+def _base_track(track):
     return track.track if isinstance(track, TurnoutTrack) else track
 
 
@@ -136,17 +139,17 @@ def _with_elements(track, elements):
     return replace(track, elements_per_bay=elements)
 
 
-def _lengthened(track, extra):
+def _lengthen(track, extra):
     if isinstance(track, TurnoutTrack):
-        tracks = {name: _lengthened(one, extra) for name, one in track.tracks.items()}
-        return replace(track, track=_lengthened(track.track, extra), tracks=tracks)
-    spacing, count = track.support[1] - track.support[0], _count(track, extra)
-    more = spacing * np.arange(1, count + 1)
-    support = np.concatenate([track.start - more[::-1], track.support, track.end + more])
+        tracks = {name: _lengthen(route_track, extra) for name, route_track in track.tracks.items()}
+        return replace(track, track=_lengthen(track.track, extra), tracks=tracks)
+    spacing, count = track.support[1] - track.support[0], _n_supports_in(track, extra)
+    added_distance = spacing * np.arange(1, count + 1)
+    support = np.concatenate([track.start - added_distance[::-1], track.support, track.end + added_distance])
     values = {name: np.pad(getattr(track, name), count, mode="edge") for name in PER_SUPPORT}
     return replace(track, support=support, section=(), **values)
 
 
-def _count(track, extra):
+def _n_supports_in(track, extra):
     """Number of supports of ``extra`` [m] of track."""
     return round(extra / float(track.support[1] - track.support[0]))

@@ -23,7 +23,7 @@ class PowerLaw:
     stiffness: float
     exponent: float = 1.5
     damping: float = 0.0
-    kind = POWER
+    law_code = POWER
 
     def __post_init__(self):
         if not (self.stiffness > 0.0 and self.exponent >= 1.0 and self.damping >= 0.0):
@@ -58,7 +58,7 @@ class GapLaw:
     stiffness: float
     damping: float = 0.0
     onset: float = 1e-5
-    kind = GAP
+    law_code = GAP
 
     @property
     def numbers(self):
@@ -83,7 +83,7 @@ class TableLaw:
     deformation: tuple
     elastic: tuple
     viscous: tuple
-    kind = TABLE
+    law_code = TABLE
     numbers = (0.0, 0.0, 0.0)
 
     def __post_init__(self):
@@ -108,7 +108,7 @@ class LinearLaw:
     stiffness: float
     damping: float = 0.0
     preload: float = 0.0
-    kind = LINEAR
+    law_code = LINEAR
 
     @property
     def numbers(self):
@@ -126,7 +126,7 @@ class FrictionLaw:
 
     limit: float
     slip_rate: float = 1e-3
-    kind = FRICTION
+    law_code = FRICTION
 
     @property
     def numbers(self):
@@ -148,7 +148,7 @@ class LiftLaw:
     stiffness: float
     damping: float
     load: float
-    kind = LIFT
+    law_code = LIFT
 
     @property
     def numbers(self):

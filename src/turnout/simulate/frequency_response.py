@@ -11,7 +11,7 @@ GROWTH_LIMIT = 1e6  # largest factor without pivoting: above it six digits are l
 
 
 @kernel
-def _solve_lines(mass, damping, stiffness, hysteresis, omega, right, keep, width, out):
+def _solve_lines(mass, damping, stiffness, hysteresis, omega, right, selected, width, out):
     """Rows ``selected`` for all lines and right-hand sides in ``out[line, k]``; returns the largest factor."""
     half, n = mass.shape[0] - 1, mass.shape[1]
     system = np.zeros((width + 1, n + 4), dtype=np.complex128)
@@ -34,8 +34,8 @@ def _solve_lines(mass, damping, stiffness, hysteresis, omega, right, keep, width
             for i in range(n):
                 x[i] = right[r, i]
             solve(lower[:n], upper, pivot, x, 0, n)
-            for i in range(keep.size):
-                out[line, r, i] = x[keep[i]]
+            for i in range(selected.size):
+                out[line, r, i] = x[selected[i]]
     return worst
 
 
@@ -54,7 +54,7 @@ def _solve_pivoted(matrices, omega, right):
     return out
 
 
-def responses(matrices, frequency, places, rows=None, pivoted=False):
+def responses(matrices, frequency, points, rows=None, pivoted=False):
     r"""(n_line, n_point, n) complex displacement of all degrees of freedom, or of ``rows``, under unit forces.
 
     ``points`` are positions (rail at x [m]) or names of degrees of freedom. ``frequency`` [Hz] may be 0. A complex one,
@@ -64,18 +64,18 @@ def responses(matrices, frequency, places, rows=None, pivoted=False):
     omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequency, dtype=complex))
     if not (np.all(np.isfinite(omega)) and np.all(omega.real >= 0.0)):
         raise SimulationError(f"frequencies must not be negative, got {frequency!r}.")
-    right = np.zeros((len(places), matrices.n))
-    for k, place in enumerate(places):
-        np.add.at(right[k], *matrices.weights(place))
-    keep = np.arange(matrices.n) if rows is None else np.asarray(rows, dtype=np.int64)
+    right = np.zeros((len(points), matrices.n))
+    for k, point in enumerate(points):
+        np.add.at(right[k], *matrices.weights(point))
+    selected = np.arange(matrices.n) if rows is None else np.asarray(rows, dtype=np.int64)
     if not pivoted:
-        out = np.zeros((omega.size, len(places), keep.size), dtype=complex)
+        out = np.zeros((omega.size, len(points), selected.size), dtype=complex)
         width = 4 if matrices.half <= 4 else 6 if matrices.half <= 6 else matrices.half
         arrays = matrices.mass, matrices.damping, matrices.stiffness, matrices.hysteresis
-        growth = _solve_lines(*arrays, omega, right, keep, width, out)
+        growth = _solve_lines(*arrays, omega, right, selected, width, out)
         if growth < GROWTH_LIMIT:
             return out
-    return _solve_pivoted(matrices, omega, right)[:, :, keep]
+    return _solve_pivoted(matrices, omega, right)[:, :, selected]
 
 
 def receptance(matrices, frequency, excited, measured):
@@ -104,10 +104,10 @@ def receptance(matrices, frequency, excited, measured):
     """
     rows, weights = matrices.weights(measured)
     h = responses(matrices, frequency, [excited], rows)[:, 0] @ weights
-    return h + _within_element(matrices, excited, measured)
+    return h + _element_compliance(matrices, excited, measured)
 
 
-def _within_element(matrices, excited, measured):
+def _element_compliance(matrices, excited, measured):
     """Compliance between two positions in one rail element, which the motion of the nodes does not include [m/N]."""
     if isinstance(excited, tuple) or isinstance(measured, tuple):
         return 0.0
@@ -137,17 +137,17 @@ def receptance_gradient(matrices, frequency, excited, measured, parameters):
         Receptance [m/N] and its derivatives [m/N per unit of the parameter].
     """
     omega = 2.0 * np.pi * np.asarray(frequency, dtype=float)
-    both = responses(matrices, frequency, [excited, measured])
+    point_responses = responses(matrices, frequency, [excited, measured])
     rows, weights = matrices.weights(measured)
-    h = both[:, 0][:, rows] @ weights + _within_element(matrices, excited, measured)
+    h = point_responses[:, 0][:, rows] @ weights + _element_compliance(matrices, excited, measured)
     gradient = np.zeros((omega.size, len(parameters)), dtype=complex)
-    for k, (kind, links) in enumerate(parameters):
-        factor = {"stiffness": -1.0 + 0.0 * omega, "damping": -1j * omega, "mass": omega**2}.get(kind)
+    for k, (quantity, links) in enumerate(parameters):
+        factor = {"stiffness": -1.0 + 0.0 * omega, "damping": -1j * omega, "mass": omega**2}.get(quantity)
         for link in links:
-            found, weight = link_vector(link, matrices.index)
-            product = (both[:, 0][:, found] @ weight) * (both[:, 1][:, found] @ weight)
-            by = -1j * link.stiffness if kind == "loss_factor" else factor
-            if kind == "stiffness" and link.loss_factor:
-                by = factor * (1.0 + 1j * link.loss_factor)
-            gradient[:, k] += by * product
+            link_rows, weight = link_vector(link, matrices.index)
+            product = (point_responses[:, 0][:, link_rows] @ weight) * (point_responses[:, 1][:, link_rows] @ weight)
+            derivative = -1j * link.stiffness if quantity == "loss_factor" else factor
+            if quantity == "stiffness" and link.loss_factor:
+                derivative = factor * (1.0 + 1j * link.loss_factor)
+            gradient[:, k] += derivative * product
     return h, gradient

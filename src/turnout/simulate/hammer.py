@@ -8,11 +8,11 @@ import numpy as np
 from turnout.errors import SimulationError
 from turnout.records import Recording
 from turnout.simulate.force_laws import PowerLaw
-from turnout.simulate.links import on_stretch
+from turnout.simulate.links import terms_on_stretch
 from turnout.simulate.prepare import prepare
 from turnout.simulate.run import Drive, run
-from turnout.simulate.sensor import Sensor, mean_of, measured, seated
-from turnout.simulate.turnout_track import TurnoutTrack, stretch_of_track, within
+from turnout.simulate.sensor import Sensor, actual_sensor, mean_of, record_signal
+from turnout.simulate.turnout_track import TurnoutTrack, stretch_of_track, supports_within
 from turnout.simulate.vehicle import lone_wheels
 
 # Stiffness of the plastic tip: it gives a contact of 1.2 to 1.5 ms on ballasted track, as the paper's band of 800 Hz
@@ -36,13 +36,13 @@ class Hammer:
     mass: float = 5.5
     velocity: float = 1.2
     velocity_spread: float = 0.12
-    place_spread: float = 0.01
+    position_spread: float = 0.01
     tip: PowerLaw = PLASTIC_TIP
     force: Sensor = LOAD_CELL
     name: str = "086D50"
 
 
-class Struck(NamedTuple):
+class ImpactTruth(NamedTuple):
     """True values of one impact: its ``place`` [m], the hammer's ``speed`` [m/s], the ``peak_force`` [N]."""
 
     place: float
@@ -121,62 +121,72 @@ def simulate_hammer(
     >>> bool(1.0 < blow.signal("hammer").sum() / blow.rate / (5.5 * 1.2) < 2.0)
     True
     """
-    hammer, blows = hammer or Hammer(), []
-    place, _ = located(track, location)
-    sensors = hammer_sensors(place) if sensors is None else tuple(sensors)
+    hammer, impacts = hammer or Hammer(), []
+    position, _ = resolve_location(track, location)
+    sensors = hammer_sensors(position) if sensors is None else tuple(sensors)
     prepared = prepared or prepare_hammer(track, location, terms, rate, substeps, half_length, scheme)
     prepared.check_step(rate, substeps)
     rng = np.random.default_rng(seed)
-    probes = [seated(sensor, prepared.terms).probe(prepared.track) for sensor in sensors]
-    channels = (replace(hammer.force, place=place), *sensors)
-    channel_terms = [term for term in prepared.terms if term.kind == "channel"]
+    probes = [actual_sensor(sensor, prepared.terms).probe(prepared.track) for sensor in sensors]
+    channels = (replace(hammer.force, place=position), *sensors)
+    channel_terms = [term for term in prepared.terms if term.effect_type == "channel"]
     recordings = []
     for record in range(n_blows):
         velocity = hammer.velocity * np.exp(hammer.velocity_spread * rng.normal())
-        hit = place + hammer.place_spread * float(np.clip(rng.normal(), -2.0, 2.0))
-        clean = _blow(prepared, hammer, velocity, hit, probes, duration - pretrigger, pulse)
-        blows.append(Struck(hit, float(velocity), float(mean_of(clean[0], substeps).max())))
-        before = np.zeros((len(channels), round(pretrigger * rate) * substeps))
-        clean = np.concatenate([before, clean], axis=1)
+        impact_position = position + hammer.position_spread * float(np.clip(rng.normal(), -2.0, 2.0))
+        clean = _simulate_impact(prepared, hammer, velocity, impact_position, probes, duration - pretrigger, pulse)
+        impacts.append(ImpactTruth(impact_position, float(velocity), float(mean_of(clean[0], substeps).max())))
+        pretrigger_zeros = np.zeros((len(channels), round(pretrigger * rate) * substeps))
+        clean = np.concatenate([pretrigger_zeros, clean], axis=1)
         samples = [
-            measured(c, row, rate, rng, channel_terms if c.quantity != "force" else (), substeps)
+            record_signal(c, row, rate, rng, channel_terms if c.quantity != "force" else (), substeps)
             for c, row in zip(channels, clean)
         ]
-        noted = {"hammer_id": hammer.name, "tip": "plastic", "location": place, **(conditions or {})}
+        metadata = {"hammer_id": hammer.name, "tip": "plastic", "location": position, **(conditions or {})}
         recordings.append(
             Recording(
-                np.array(samples), rate, tuple(c.channel() for c in channels), "hammer", "", record, started_at, noted
+                np.array(samples),
+                rate,
+                tuple(c.channel() for c in channels),
+                "hammer",
+                "",
+                record,
+                started_at,
+                metadata,
             )
         )
-    return (tuple(recordings), tuple(blows)) if truth else tuple(recordings)
+    return (tuple(recordings), tuple(impacts)) if truth else tuple(recordings)
 
 
 def prepare_hammer(track, location, terms=(), rate=20e3, substeps=1, half_length=30.0, scheme="radau"):
     """Factorisation for hammer tests near ``location``, a position [m] or a name."""
-    place, base = located(track, location)
-    stretch, terms = stretch_of_track(base, place, half_length), on_stretch(terms, within(base, place, half_length))
+    position, base = resolve_location(track, location)
+    stretch, terms = (
+        stretch_of_track(base, position, half_length),
+        terms_on_stretch(terms, supports_within(base, position, half_length)),
+    )
     return prepare(stretch, 1.0 / (rate * substeps), scheme, terms)
 
 
-def located(track, location):
+def resolve_location(track, location):
     """Position [m] and track of a named location, or of a position on the first route."""
     base = track.track if isinstance(track, TurnoutTrack) else track
     if not isinstance(location, str):
         return float(location), base
-    known = getattr(track, "locations", {})
-    if location not in known:
-        raise SimulationError(f"no location {location!r}; there are {', '.join(known) or 'none'}.")
-    place, route = known[location]
-    return float(place), track.track_of(route)
+    locations = getattr(track, "locations", {})
+    if location not in locations:
+        raise SimulationError(f"no location {location!r}; there are {', '.join(locations) or 'none'}.")
+    position, route = locations[location]
+    return float(position), track.track_of(route)
 
 
-def _blow(prepared, hammer, velocity, hit, probes, duration, pulse):
+def _simulate_impact(prepared, hammer, velocity, position, probes, duration, pulse):
     """(1 + n_probe, n_step) force on the rail and true signals of one impact."""
     if pulse is not None:
-        outcome = run(prepared, duration, probes, pulses=[(hit, pulse)])
+        outcome = run(prepared, duration, probes, pulses=[(position, pulse)])
         stages = (np.arange(outcome.time.size)[:, None] + prepared.scheme.node) * prepared.dt
         return np.vstack([pulse(stages) @ prepared.scheme.quadrature, outcome.signals])
     body = lone_wheels(hammer.mass, contact=hammer.tip, gravity=0.0)
-    drive = Drive(hit, 0.0, entry=0.0, thrown=(0.0, velocity))
+    drive = Drive(position, 0.0, entry=0.0, free_fall=(0.0, velocity))
     outcome = run(prepared, duration, probes, body, drive)
     return np.vstack([outcome.force, outcome.signals])

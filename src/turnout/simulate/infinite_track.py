@@ -65,7 +65,7 @@ def _beam_matrix(omega, rail):
     return np.array([[0, 1, 0, shear], [0, 0, 1 / rail.bending_stiffness, 0], [0, spin, 0, -1], [push, 0, 0, 0]])
 
 
-def _bay(omega, rail, spacing, support):
+def _bay_transfer(omega, rail, spacing, support):
     """Multipliers and vectors of the transfer from one support to the next, the decaying ones first."""
     across = expm(_beam_matrix(omega, rail) * spacing)
     jump = np.eye(4, dtype=complex)
@@ -97,15 +97,15 @@ def floquet_receptance(frequency, track, offset=0.0, distance=0):
     if not 0.0 <= offset < spacing:
         raise SimulationError(f"offset {offset!r} m is not within a bay of {spacing:.3f} m.")
     stiffness = support_stiffness(frequency, track)
-    found = np.empty(len(frequency), dtype=complex)
+    receptance = np.empty(len(frequency), dtype=complex)
     for line, f in enumerate(np.asarray(frequency, dtype=float)):
         omega = 2.0 * np.pi * f
-        multiplier, vector = _bay(omega, track.rail, spacing, stiffness[line])
+        multiplier, vector = _bay_transfer(omega, track.rail, spacing, stiffness[line])
         to_force = expm(_beam_matrix(omega, track.rail) * offset)
-        right, left = to_force @ vector[:, :2], to_force @ vector[:, 2:]
-        amount = np.linalg.solve(np.column_stack([right, -left]), [0.0, 0.0, 0.0, -1.0])
-        found[line] = right[0] @ (amount[:2] * multiplier[:2] ** distance)
-    return found
+        right_waves, left_waves = to_force @ vector[:, :2], to_force @ vector[:, 2:]
+        amount = np.linalg.solve(np.column_stack([right_waves, -left_waves]), [0.0, 0.0, 0.0, -1.0])
+        receptance[line] = right_waves[0] @ (amount[:2] * multiplier[:2] ** distance)
+    return receptance
 
 
 def propagation(frequency, track):
@@ -116,11 +116,11 @@ def propagation(frequency, track):
     """
     spacing = float(track.support[1] - track.support[0])
     stiffness = support_stiffness(frequency, track)
-    found = np.empty((len(frequency), 2), dtype=complex)
+    wavenumber = np.empty((len(frequency), 2), dtype=complex)
     for line, f in enumerate(np.asarray(frequency, dtype=float)):
-        multiplier, _ = _bay(2.0 * np.pi * f, track.rail, spacing, stiffness[line])
-        found[line] = 1j * np.log(multiplier[[1, 0]]) / spacing
-    return found
+        multiplier, _ = _bay_transfer(2.0 * np.pi * f, track.rail, spacing, stiffness[line])
+        wavenumber[line] = 1j * np.log(multiplier[[1, 0]]) / spacing
+    return wavenumber
 
 
 def pinned_pinned_frequency(rail, spacing):

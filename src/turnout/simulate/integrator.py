@@ -40,7 +40,7 @@ class Scheme:
     scale: float
 
 
-def _real(value) -> complex:
+def _to_real(value) -> complex:
     return float(np.real(value))
 
 
@@ -57,14 +57,14 @@ def scheme(name):
         raise SimulationError(f"scheme {name!r} is none of {', '.join(TABLEAUX)}.")
     a, b, c = (np.array(v) for v in TABLEAUX[name])
     inverse = np.linalg.inv(a)
-    rates, right = np.linalg.eig(inverse)
+    rates, right_vectors = np.linalg.eig(inverse)
     k = int(np.argmax(rates.imag))
-    right = right / right[-1]
-    left = np.linalg.inv(right)
-    t, tau = right[:, k], left[k]
+    right_vectors = right_vectors / right_vectors[-1]
+    left_vectors = np.linalg.inv(right_vectors)
+    t, tau = right_vectors[:, k], left_vectors[k]
     real = len(b) == 1
     cast = np.real if real else np.asarray
-    number = _real if real else complex
+    number = _to_real if real else complex
     carry = 0.0 if name == "radau" else float(1.0 - b @ inverse @ np.ones(len(b)))
     return Scheme(
         name,

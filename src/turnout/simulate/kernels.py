@@ -7,9 +7,9 @@ from turnout.simulate.force_laws import FRICTION, GAP, LIFT, LINEAR, POWER
 
 
 @kernel
-def law_force(kind, numbers, i, table, first, last, d, rate):
+def law_force(law_code, numbers, i, table, first, last, d, rate):
     """Force of a law with its numbers in row ``i``, and its derivatives by deformation and by rate."""
-    if kind == POWER:
+    if law_code == POWER:
         if d <= 0.0:
             return 0.0, 0.0, 0.0
         k, p, chi = numbers[i, 0], numbers[i, 1], numbers[i, 2]
@@ -18,7 +18,7 @@ def law_force(kind, numbers, i, table, first, last, d, rate):
         if factor <= 0.0:
             return 0.0, 0.0, 0.0
         return k * power * d * factor, p * k * power * factor, k * power * d * chi
-    if kind == GAP:
+    if law_code == GAP:
         if d <= 0.0:
             return 0.0, 0.0, 0.0
         k, c, onset = numbers[i, 0], numbers[i, 1], numbers[i, 2]
@@ -27,12 +27,12 @@ def law_force(kind, numbers, i, table, first, last, d, rate):
         if force <= 0.0:
             return 0.0, 0.0, 0.0
         return force, k + (c * rate / onset if d < onset else 0.0), c * share
-    if kind == LINEAR:
+    if law_code == LINEAR:
         return numbers[i, 2] + numbers[i, 0] * d + numbers[i, 1] * rate, numbers[i, 0], numbers[i, 1]
-    if kind == FRICTION:
+    if law_code == FRICTION:
         value = np.tanh(rate / numbers[i, 1])
         return numbers[i, 0] * value, 0.0, numbers[i, 0] * (1.0 - value * value) / numbers[i, 1]
-    if kind == LIFT:
+    if law_code == LIFT:
         pull = -(numbers[i, 2] + numbers[i, 0] * d + numbers[i, 1] * rate)
         return (pull, -numbers[i, 0], -numbers[i, 1]) if pull > 0.0 else (0.0, 0.0, 0.0)
     k = first
@@ -40,19 +40,21 @@ def law_force(kind, numbers, i, table, first, last, d, rate):
         k += 1
     width = table[0, k + 1] - table[0, k]
     slope = (table[1, k + 1] - table[1, k]) / width
-    part = (d - table[0, k]) / width
-    bend = (table[2, k + 1] - table[2, k]) / width if 0.0 < part < 1.0 else 0.0
-    viscous = table[2, k] + (table[2, k + 1] - table[2, k]) * min(1.0, max(0.0, part))
+    fraction = (d - table[0, k]) / width
+    bend = (table[2, k + 1] - table[2, k]) / width if 0.0 < fraction < 1.0 else 0.0
+    viscous = table[2, k] + (table[2, k + 1] - table[2, k]) * min(1.0, max(0.0, fraction))
     return table[1, k] + slope * (d - table[0, k]) + viscous * rate, slope + bend * rate, viscous
 
 
 @kernel
-def path_at(path, which, start, step, x):
+def path_at(path, path_index, start, step, x):
     """Dip of path ``path_index`` at ``x``; constant beyond the ends of its grid."""
-    place = (x - start) / step
-    k = min(max(int(np.floor(place)), 0), path.shape[1] - 1)
-    r = min(max(place - k, 0.0), 1.0)
-    return ((path[which, k, 0] * r + path[which, k, 1]) * r + path[which, k, 2]) * r + path[which, k, 3]
+    grid_position = (x - start) / step
+    k = min(max(int(np.floor(grid_position)), 0), path.shape[1] - 1)
+    r = min(max(grid_position - k, 0.0), 1.0)
+    return ((path[path_index, k, 0] * r + path[path_index, k, 1]) * r + path[path_index, k, 2]) * r + path[
+        path_index, k, 3
+    ]
 
 
 @kernel
@@ -60,14 +62,14 @@ def ramp_at(ramp, stand_in, x):
     """Share (r, q) of the modelled track and of the stand-in, r² + q² = 1."""
     if not stand_in:
         return 1.0, 0.0
-    left = (x - ramp[0]) / (ramp[1] - ramp[0])
-    right = (ramp[3] - x) / (ramp[3] - ramp[2])
-    e = min(left, right)
-    if e >= 1.0:
+    entry_ramp = (x - ramp[0]) / (ramp[1] - ramp[0])
+    exit_ramp = (ramp[3] - x) / (ramp[3] - ramp[2])
+    ramp_share = min(entry_ramp, exit_ramp)
+    if ramp_share >= 1.0:
         return 1.0, 0.0
-    if e <= 0.0:
+    if ramp_share <= 0.0:
         return 0.0, 1.0
-    angle = 0.5 * np.pi * e * e * e * (10.0 + e * (6.0 * e - 15.0))
+    angle = 0.5 * np.pi * ramp_share * ramp_share * ramp_share * (10.0 + ramp_share * (6.0 * ramp_share - 15.0))
     return np.sin(angle), np.cos(angle)
 
 
@@ -105,14 +107,14 @@ def window_product(window, pad, rows, weights, a, b):
 def solve_dense(a, b, n):
     """Solve in place by elimination with partial pivoting; the matrices have at most a few dozen rows."""
     for i in range(n):
-        best = i
+        pivot_row = i
         for k in range(i + 1, n):
-            if abs(a[k, i]) > abs(a[best, i]):
-                best = k
-        if best != i:
+            if abs(a[k, i]) > abs(a[pivot_row, i]):
+                pivot_row = k
+        if pivot_row != i:
             for j in range(n):
-                a[i, j], a[best, j] = a[best, j], a[i, j]
-            b[i], b[best] = b[best], b[i]
+                a[i, j], a[pivot_row, j] = a[pivot_row, j], a[i, j]
+            b[i], b[pivot_row] = b[pivot_row], b[i]
         inverse = 1.0 / a[i, i]
         for k in range(i + 1, n):
             f = a[k, i] * inverse

@@ -36,20 +36,20 @@ class Link:
                 raise SimulationError(f"link {self.tag!r} at {self.ends}: {value!r} is not a finite number.")
 
 
-OWN = {
+SPRING_FIELDS = {
     "pad": ("pad_stiffness", "pad_damping"),
     "ballast": ("ballast_stiffness", "ballast_damping"),
     "subgrade": ("subgrade_stiffness", "subgrade_damping"),
 }
-ROUNDING = 1e-9  # rounding error of shares that add up to 1
+SHARE_TOLERANCE = 1e-9  # rounding error of shares that add up to 1
 
 
 def links_of(terms, track):
     """Links that ``terms`` add to ``track``; terms that scale its springs come first, the others act on the result."""
-    found: list = []
-    for term in sorted(terms, key=lambda term: not term.scales):
-        found += term.links(left(track, found) if term.kind == "matrix" else track)
-    return found
+    links: list = []
+    for term in sorted(terms, key=lambda term: not term.scales_track):
+        links += term.links(with_links(track, links) if term.effect_type == "matrix" else track)
+    return links
 
 
 def ports_of(terms, track):
@@ -57,58 +57,58 @@ def ports_of(terms, track):
 
     SimulationError if terms withhold more than the whole ballast of one sleeper: it would act in the wrong direction.
     """
-    found: list = []
-    taken: dict[tuple, list] = {}
+    ports: list = []
+    withheld: dict[tuple, list] = {}
     for k, term in enumerate(terms):
-        others = links_of([*terms[:k], *terms[k + 1 :]], track) if term.kind == "port" else []
-        for port in term.ports(left(track, others)):
-            found.append(port)
-            taken.setdefault(port.ends, []).append((term.withheld, f"{term.name} ({port.label})"))
-    for shares in taken.values():
-        if sum(share for share, _ in shares) > 1.0 + ROUNDING:
-            both = " and ".join(name for share, name in shares if share)
-            raise SimulationError(f"{track.name}: {both} withhold more than there is; keep one of them.")
-    return found
+        other_links = links_of([*terms[:k], *terms[k + 1 :]], track) if term.effect_type == "port" else []
+        for port in term.ports(with_links(track, other_links)):
+            ports.append(port)
+            withheld.setdefault(port.ends, []).append((term.withheld_share, f"{term.name} ({port.label})"))
+    for shares in withheld.values():
+        if sum(share for share, _ in shares) > 1.0 + SHARE_TOLERANCE:
+            names = " and ".join(name for share, name in shares if share)
+            raise SimulationError(f"{track.name}: {names} withhold more than there is; keep one of them.")
+    return ports
 
 
-def left(track, links):
+def with_links(track, links):
     """``track`` with the ``links`` that act on its pads, ballast and subgrade added to the values of these."""
     values: dict = {}
     for link in links:
         j = link.ends[0][0][1]
-        own = (k.tag for k in track.support_links(j) if k.ends == link.ends and k.tag in OWN)
-        for name, more in zip(OWN.get(next(own, ""), ()), (link.stiffness, link.damping)):
-            values.setdefault(name, getattr(track, name).copy())[j] += more
+        tags = (k.tag for k in track.support_links(j) if k.ends == link.ends and k.tag in SPRING_FIELDS)
+        for name, addition in zip(SPRING_FIELDS.get(next(tags, ""), ()), (link.stiffness, link.damping)):
+            values.setdefault(name, getattr(track, name).copy())[j] += addition
     return track.with_(**values) if values else track
 
 
-COUNTED = ("sleeper", "support", "first", "last")  # fields of terms that are support numbers
+SUPPORT_FIELDS = ("sleeper", "support", "first", "last")  # fields of terms that are support numbers
 
 
-def moved(term, count):
+def shift_supports(term, count):
     """The term at the same positions of a track that has ``count`` more supports at its start."""
-    return replace(term, **{name: getattr(term, name) + count for name in _counted(term)})
+    return replace(term, **{name: getattr(term, name) + count for name in _support_fields(term)})
 
 
-def on_stretch(terms, keep):
+def terms_on_stretch(terms, inside):
     """The terms with the support numbers of a stretch, which has the supports ``inside`` (n_support,) of the track.
 
     Terms outside it are dropped. A range of supports that is partly outside is cut to the part inside.
     """
-    first, last = int(keep.argmax()), len(keep) - 1 - int(keep[::-1].argmax())
-    found = []
+    first, last = int(inside.argmax()), len(inside) - 1 - int(inside[::-1].argmax())
+    terms_inside = []
     for term in terms:
-        names = _counted(term)
-        run = {"first", "last"} <= names
-        start, end = (term.first, term.last) if run else (first, last)
-        own = [getattr(term, name) for name in names - {"first", "last"}]
-        if start > last or end < first or not all(first <= value <= last for value in own):
+        names = _support_fields(term)
+        is_range = {"first", "last"} <= names
+        start, end = (term.first, term.last) if is_range else (first, last)
+        support_numbers = [getattr(term, name) for name in names - {"first", "last"}]
+        if start > last or end < first or not all(first <= value <= last for value in support_numbers):
             continue
-        if run:
+        if is_range:
             term = replace(term, first=max(start, first), last=min(end, last))
-        found.append(moved(term, -first))
-    return tuple(found)
+        terms_inside.append(shift_supports(term, -first))
+    return tuple(terms_inside)
 
 
-def _counted(term):
-    return {f.name for f in fields(term) if f.name in COUNTED}
+def _support_fields(term):
+    return {f.name for f in fields(term) if f.name in SUPPORT_FIELDS}

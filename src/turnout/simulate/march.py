@@ -5,34 +5,34 @@ Each step: free motion, the small system of all ports, their response, sensor re
 
 import numpy as np
 
-from turnout.simulate.banded import momentum_less_force, multiply, solve, solve_from_both_ends
-from turnout.simulate.compiled import inlined, kernel
-from turnout.simulate.port_system import evaluate, flexibility, newton_update, place_ports
+from turnout.simulate.banded import momentum_minus_force, multiply, solve, solve_from_both_ends
+from turnout.simulate.compiled import inline_kernel, kernel
+from turnout.simulate.port_system import evaluate, flexibility, locate_ports, newton_update
 
-ITERATIONS = 60  # Newton iterations of a step
-PLAIN = 12  # iterations before the residual is checked for progress
-ROUNDED = 1000.0  # tolerances; stuck friction is so steep that rounded velocities do not determine it better
+MAX_ITERATIONS = 60  # Newton iterations of a step
+UNCHECKED_ITERATIONS = 12  # iterations before the residual is checked for progress
+ROUNDING_TOLERANCE = 1000.0  # tolerances; stuck friction is so steep that rounded velocities do not determine it better
 CONVERGED, NEWTON, LEFT_TRACK = range(3)
 
 
-@inlined
+@inline_kernel
 def free_motion(track, scheme, bodies, run, motion, step, d, e, e_stand_in, mass_v, stiff_u):
     """Right-hand sides and solution of the step with all ports free."""
     pad, n = track.pad, track.n
     by_v, by_u = scheme.weight * scheme.s, scheme.weight
     if track.mass.shape[0] == 9:
-        momentum_less_force(track.mass, track.stiffness, motion.v, motion.u, by_v, by_u, pad, d, n)
+        momentum_minus_force(track.mass, track.stiffness, motion.v, motion.u, by_v, by_u, pad, d, n)
     else:
         multiply(track.mass, motion.v, pad, mass_v, n)
         multiply(track.stiffness, motion.u, pad, stiff_u, n)
         inner = d[pad : pad + n]
         for i in range(n):
             inner[i] = by_v * mass_v[i] - by_u * stiff_u[i]
-    for k in range(run.known_rows.shape[0]):
+    for k in range(run.pulse_rows.shape[0]):
         for a in range(scheme.node.size):
-            f = scheme.tau[a] * run.known_force[k, step, a]
+            f = scheme.tau[a] * run.pulse_force[k, step, a]
             for i in range(4):
-                d[pad + run.known_rows[k, i]] += f * run.known_weights[k, i]
+                d[pad + run.pulse_rows[k, i]] += f * run.pulse_weights[k, i]
     if track.middle.shape[0] == 4:
         back = track.lower_back, track.upper_back, track.pivot_back
         solve_from_both_ends(track.lower, track.upper, track.inverse_pivot, *back, track.middle, d, pad, n)
@@ -48,11 +48,11 @@ def free_motion(track, scheme, bodies, run, motion, step, d, e, e_stand_in, mass
             e[i] = value
     for i in range(motion.y.size):
         momentum = scheme.s * bodies.stand_in_mass[i] * motion.x[i]
-        rest = momentum - bodies.stand_in_stiffness[i] * motion.y[i]
-        e_stand_in[i] = bodies.stand_in_answer[i] * scheme.weight * rest
+        free_force = momentum - bodies.stand_in_stiffness[i] * motion.y[i]
+        e_stand_in[i] = bodies.stand_in_response[i] * scheme.weight * free_force
 
 
-@inlined
+@inline_kernel
 def free_deformation(track, scheme, ports, motion, d, e, e_stand_in, rows, weights, share, dip, d0):
     """Deformation of every port stage without any port force."""
     stages, pad, t = scheme.node.size, track.pad, scheme.t
@@ -72,11 +72,11 @@ def free_deformation(track, scheme, ports, motion, d, e, e_stand_in, rows, weigh
             d0[k] = value
 
 
-@inlined
+@inline_kernel
 def add_port_forces(track, scheme, bodies, ports, force, rows, weights, share, d, e, e_stand_in):
     """Add the response to the port forces to the free motion, through windows of the inverse."""
     stages, tau, window, width = scheme.node.size, scheme.tau, track.window, 2 * track.pad + 1
-    body_of, wheel_of, answer, stand_in_answer = ports.body, ports.wheel, bodies.answer, bodies.stand_in_answer
+    body_of, wheel_of, response, stand_in_response = ports.body, ports.wheel, bodies.response, bodies.stand_in_response
     block_of, block_start = bodies.block_of, bodies.block_start
     for i in range(body_of.size):
         total, first = 0.0 * tau[0], i * stages
@@ -86,7 +86,7 @@ def add_port_forces(track, scheme, bodies, ports, force, rows, weights, share, d
             amount = tau[a] * force[k]
             total += amount
             if share[k] != 0.0:
-                e_stand_in[wheel_of[i]] += amount * share[k] * stand_in_answer[wheel_of[i]]
+                e_stand_in[wheel_of[i]] += amount * share[k] * stand_in_response[wheel_of[i]]
             if same and a == 0:
                 continue
             for j in range(4):
@@ -100,10 +100,10 @@ def add_port_forces(track, scheme, bodies, ports, force, rows, weights, share, d
             block = block_of[body]
             start = block_start[block]
             for j in range(start, block_start[block + 1]):
-                e[j] -= total * answer[block, j - start, body - start]
+                e[j] -= total * response[block, j - start, body - start]
 
 
-@inlined
+@inline_kernel
 def add_window(d, window, r, width, c):
     """``d[r:r+width]`` += c times row ``r`` of the windows."""
     near, row = d[r : r + width], window[r]
@@ -111,7 +111,7 @@ def add_window(d, window, r, width, c):
         near[m] += c * row[m]
 
 
-@inlined
+@inline_kernel
 def record(track, scheme, run, motion, d, step, out):
     """Sensor signals of the current step: mean acceleration, mean velocity or mid-step displacement."""
     for m in range(out.shape[0]):
@@ -129,7 +129,7 @@ def record(track, scheme, run, motion, d, step, out):
         out[m, step] = value
 
 
-@inlined
+@inline_kernel
 def advance(scheme, motion, d, e, e_stand_in):
     """End of the step: u + scale Re(δ D) and R v + scale Re(δ s D) for track, bodies and stand-ins."""
     by_d, by_s = scheme.delta, scheme.delta * scheme.s
@@ -161,9 +161,9 @@ def march(track, scheme, bodies, ports, run, motion, n_step, out, out_force):
     iterations = 0
     for step in range(n_step):
         free_motion(track, scheme, bodies, run, motion, step, d, e, e_stand_in, mass_v, stiff_u)
-        lost = place_ports(track, scheme, ports, run, step, element, x, rows, weights, local, share, dip)
-        if lost >= 0:
-            return LEFT_TRACK, step, lost, x[lost * stages], iterations
+        lost_port = locate_ports(track, scheme, ports, run, step, element, x, rows, weights, local, share, dip)
+        if lost_port >= 0:
+            return LEFT_TRACK, step, lost_port, x[lost_port * stages], iterations
         free_deformation(track, scheme, ports, motion, d, e, e_stand_in, rows, weights, share, dip, d0)
         flexibility(track, scheme, bodies, ports, rows, weights, local, share, g)
         for k in range(1, n_port):
@@ -172,28 +172,30 @@ def march(track, scheme, bodies, ports, run, motion, n_step, out, out_force):
                 order[m] = order[m - 1]
                 m -= 1
             order[m] = o
-        converged, before = n == 0, np.inf
-        for trial in range(ITERATIONS):
+        converged, previous = n == 0, np.inf
+        for trial in range(MAX_ITERATIONS):
             if n == 0:
                 break
-            worst, where = evaluate(
+            worst, worst_port = evaluate(
                 scheme, ports, n, g, d0, motion.force, motion.deformation, deformed, f, by_d, by_rate
             )
-            if worst < run.tolerance or (trial > PLAIN and worst < ROUNDED * run.tolerance):
+            if worst < run.tolerance or (trial > UNCHECKED_ITERATIONS and worst < ROUNDING_TOLERANCE * run.tolerance):
                 converged = True
                 break
             iterations += 1
-            if trial > PLAIN and worst > 0.99 * before:  # oscillation about a kink: halve the last change
+            if (
+                trial > UNCHECKED_ITERATIONS and worst > 0.99 * previous
+            ):  # oscillation about a kink: halve the last change
                 for i in range(n):
                     change[i] *= 0.5
                     motion.force[i] -= change[i]
                 continue
-            before = worst
+            previous = worst
             newton_update(
                 scheme, ports, order, x, run.cut, g, motion.force, f, by_d, by_rate, change, matrix, right, active
             )
         if not converged:
-            return NEWTON, step, where, worst, iterations
+            return NEWTON, step, worst_port, worst, iterations
         for i in range(n_port):
             value = scheme.carry * motion.deformation[i]
             for a in range(stages):

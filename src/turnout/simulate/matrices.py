@@ -10,7 +10,7 @@ from turnout.errors import SimulationError
 from turnout.simulate.links import links_of
 from turnout.simulate.rail import element_mass, element_stiffness, local_compliance, shape_functions
 
-ORDER = {"sleeper": 0, "ballast": 1}
+ROW_ORDER = {"sleeper": 0, "ballast": 1}
 
 
 @dataclass(frozen=True)
@@ -60,27 +60,27 @@ class TrackMatrices:
         i, j = self.node_index[e], self.node_index[e + 1]
         return np.array([i, i + 1, j, j + 1]), shape_functions((x - self.node[e]) / h, h, p)
 
-    def compliance(self, x, other=None):
+    def compliance(self, x, x_load=None):
         """Local compliance of the element between ``x`` and ``x_load`` [m/N], by default ``x`` itself.
 
         It is 0 if ``x_load`` is in another element.
         """
-        e, other = self.element_at(x), x if other is None else other
+        e, x_load = self.element_at(x), x if x_load is None else x_load
         h = self.node[e + 1] - self.node[e]
-        shares = (x - self.node[e]) / h, (other - self.node[e]) / h
+        shares = (x - self.node[e]) / h, (x_load - self.node[e]) / h
         return float(local_compliance(*shares, h, self.rails[e])) if 0.0 <= shares[1] <= 1.0 else 0.0
 
     def element_at(self, x):
         """Index of the element at ``x`` [m]; on a node the one after it."""
         return min(int(np.searchsorted(self.node, x, side="right")) - 1, self.node.size - 2)
 
-    def weights(self, place):
+    def weights(self, point):
         """Rows and weights of a point: a number is the rail at x [m], a tuple names a degree of freedom."""
-        if isinstance(place, tuple):
-            if place not in self.index:
-                raise SimulationError(f"the track has no degree of freedom {place!r}.")
-            return np.array([self.index[place]]), np.array([1.0])
-        return self.rail_weights(float(place))
+        if isinstance(point, tuple):
+            if point not in self.index:
+                raise SimulationError(f"the track has no degree of freedom {point!r}.")
+            return np.array([self.index[point]]), np.array([1.0])
+        return self.rail_weights(float(point))
 
 
 def link_vector(link, index):
@@ -95,12 +95,12 @@ def assemble(track, terms=()):
     """Matrices of ``track`` with the rails that ``terms`` change and the links that they add."""
     for term in terms:
         track = term.rail(track)
-    return railed(linked(track, [*track.links(), *links_of(terms, track)]), track)
+    return add_rails(link_matrices(track, [*track.links(), *links_of(terms, track)]), track)
 
 
-def linked(track, links):
+def link_matrices(track, links):
     """Matrices of links alone, with the numbering of ``track`` and without its rail."""
-    node, node_index, index = _number(track, links)
+    node, node_index, index = _number_rows(track, links)
     vectors = [link_vector(link, index) for link in links]
     half = max([1 + int(np.max(np.diff(node_index))), *(int(np.ptp(rows)) for rows, _ in vectors)])
     n = max(max(index.values()) + 1, int(node_index[-1]) + 2)
@@ -116,15 +116,15 @@ def linked(track, links):
     return TrackMatrices(mass, damping, stiffness, hysteresis, node, node_index, index, (), tuple(links))
 
 
-def railed(matrices, track):
+def add_rails(matrices, track):
     """The matrices with the rails of ``track`` added."""
-    rails = tuple(track.rail_over(a, b) for a, b in pairwise(matrices.node.tolist()))
+    rails = tuple(track.element_rail(a, b) for a, b in pairwise(matrices.node.tolist()))
     mass, damping, stiffness = (x.copy() for x in (matrices.mass, matrices.damping, matrices.stiffness))
     _add_rail(track, rails, matrices.node, matrices.node_index, mass, damping, stiffness)
     return replace(matrices, mass=mass, damping=damping, stiffness=stiffness, rails=rails)
 
 
-def _number(track, links):
+def _number_rows(track, links):
     """Nodes, their rows and the row of every named degree of freedom; those of a support follow its node."""
     per_bay = track.elements_per_bay
     bays = [np.linspace(a, b, per_bay + 1)[:-1] for a, b in zip(track.support[:-1], track.support[1:])]
@@ -140,35 +140,35 @@ def _number(track, links):
     node_index, row = np.empty(node.size, dtype=np.int64), 0
     for k in range(node.size):
         node_index[k], row = row, row + 2
-        j, rest = divmod(k, per_bay)
-        index[("rail", j, rest)] = node_index[k]
-        if rest:
+        j, node_in_bay = divmod(k, per_bay)
+        index[("rail", j, node_in_bay)] = node_index[k]
+        if node_in_bay:
             if j + 1 < track.support.size:
-                index[("rail", j + 1, rest - per_bay)] = node_index[k]
+                index[("rail", j + 1, node_in_bay - per_bay)] = node_index[k]
             continue
         index[("rail", j)] = node_index[k]
-        for name in sorted(extra[j], key=lambda n: (ORDER.get(n[0], 2), n[0], n[2:])):
+        for name in sorted(extra[j], key=lambda n: (ROW_ORDER.get(n[0], 2), n[0], n[2:])):
             index[name], row = row, row + 1
     return node, node_index, index
 
 
 def _add_rail(track, rails, node, node_index, mass, damping, stiffness):
-    known, length = {}, np.diff(node)
+    element_cache, length = {}, np.diff(node)
     keys = [(rail, round(h, 12)) for rail, h in zip(rails, length)]
     for key, h in zip(keys, length):
-        if key not in known:
-            known[key] = element_mass(key[0], h), element_stiffness(key[0], h)
-    m, k = (np.array(parts) for parts in zip(*(known[key] for key in keys)))
+        if key not in element_cache:
+            element_cache[key] = element_mass(key[0], h), element_stiffness(key[0], h)
+    m, k = (np.array(element_matrices) for element_matrices in zip(*(element_cache[key] for key in keys)))
     middle = 0.5 * (node[:-1] + node[1:])
     rate = np.array([rail.damping / rail.mass + _end_rate(track, x) for rail, x in zip(rails, middle)])
     first, last = node_index[:-1], node_index[1:]
     rows = first, first + 1, last, last + 1
     for a in range(4):
         for b in range(a, 4):
-            where = rows[b] - rows[a], rows[a]
-            np.add.at(mass, where, m[:, a, b])
-            np.add.at(stiffness, where, k[:, a, b])
-            np.add.at(damping, where, rate * m[:, a, b])
+            entries = rows[b] - rows[a], rows[a]
+            np.add.at(mass, entries, m[:, a, b])
+            np.add.at(stiffness, entries, k[:, a, b])
+            np.add.at(damping, entries, rate * m[:, a, b])
 
 
 def _end_rate(track, x):

@@ -6,9 +6,9 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from turnout.errors import SimulationError
-from turnout.simulate.hammer import Hammer, located, prepare_hammer, simulate_hammer
+from turnout.simulate.hammer import Hammer, prepare_hammer, resolve_location, simulate_hammer
 
-FREE = ("pad_stiffness", "pad_damping", "ballast_stiffness", "ballast_damping")
+FREE_PARAMETERS = ("pad_stiffness", "pad_damping", "ballast_stiffness", "ballast_damping")
 # Relative accuracy of the fit, far better than the printed uncertainties, and the weak prior on the logarithms.
 FREQUENCY_SD, DAMPING_SD, PRIOR_SD = 0.002, 0.02, 3.0
 BOUNDS = {
@@ -17,7 +17,7 @@ BOUNDS = {
     "ballast_stiffness": (5e6, 1e9),
     "ballast_damping": (1e3, 600e3),
 }
-QUIET = Hammer(velocity_spread=0.05, place_spread=0.0)
+REPEATABLE_HAMMER = Hammer(velocity_spread=0.05, position_spread=0.0)
 
 
 @dataclass(frozen=True)
@@ -26,35 +26,37 @@ class ModeFit:
 
     section: str
     values: dict
-    wanted: dict
-    found: dict
+    targets: dict
+    fitted: dict
     evaluations: int
 
 
 def with_section(turnout, label, **values):
     """The turnout with parameters of the supports of section ``label`` replaced, on every route that has it."""
 
-    def changed(track):
+    def replace_values(track):
         inside = np.array([name == label for name in track.section])
         if not inside.any():
             return track
         return replace(track, **{k: np.where(inside, v, getattr(track, k)) for k, v in values.items()})
 
     if not any(label in track.section for track in (turnout.track, *turnout.tracks.values())):
-        known = sorted({*turnout.track.section} - {""})
-        raise SimulationError(f"{turnout.name}: no section {label!r}; there are {', '.join(known) or 'none'}.")
-    tracks = {name: changed(track) for name, track in turnout.tracks.items()}
-    return replace(turnout, track=changed(turnout.track), tracks=tracks)
+        sections = sorted({*turnout.track.section} - {""})
+        raise SimulationError(f"{turnout.name}: no section {label!r}; there are {', '.join(sections) or 'none'}.")
+    tracks = {name: replace_values(track) for name, track in turnout.tracks.items()}
+    return replace(turnout, track=replace_values(turnout.track), tracks=tracks)
 
 
-def section_modes(turnout, location, modes_of, blows=2, half_length=20.0):
+def section_modes(turnout, location, modes_of, n_impacts=2, half_length=20.0):
     """Modes of a simulated test at ``location`` by ``modes_of``: band -> (frequency [Hz], damping)."""
     prepared = prepare_hammer(turnout, location, half_length=half_length)
-    recordings = simulate_hammer(turnout, location, QUIET, n_blows=blows, duration=0.15, prepared=prepared)
+    recordings = simulate_hammer(
+        turnout, location, REPEATABLE_HAMMER, n_blows=n_impacts, duration=0.15, prepared=prepared
+    )
     return modes_of(recordings)
 
 
-def fit_modes(turnout, location, wanted, modes_of, section=None, evaluations=14):
+def fit_modes(turnout, location, targets, modes_of, section=None, evaluations=14):
     """``ModeFit`` of one section; the rest of the turnout does not change.
 
     Parameters
@@ -71,21 +73,23 @@ def fit_modes(turnout, location, wanted, modes_of, section=None, evaluations=14)
         Section whose supports are changed, by default the one with the name of the location.
     """
     section = section or location
-    place, track = located(turnout, location)
-    j = track.nearest_support(place)
-    start = np.log([getattr(track, name)[j] for name in FREE])
-    low, high = (np.log([BOUNDS[name][k] for name in FREE]) for k in (0, 1))
+    position, track = resolve_location(turnout, location)
+    j = track.nearest_support(position)
+    start = np.log([getattr(track, name)[j] for name in FREE_PARAMETERS])
+    low, high = (np.log([BOUNDS[name][k] for name in FREE_PARAMETERS]) for k in (0, 1))
 
     def residual(logs):
-        found = section_modes(with_section(turnout, section, **dict(zip(FREE, np.exp(logs)))), location, modes_of)
-        miss = []
-        for band, (frequency, damping) in wanted.items():
-            f, zeta = found.get(band, (3.0 * frequency, 3.0 * damping))
-            miss += [np.log(f / frequency) / FREQUENCY_SD, np.log(zeta / damping) / DAMPING_SD]
-        return np.concatenate([miss, (logs - start) / PRIOR_SD])
+        modes = section_modes(
+            with_section(turnout, section, **dict(zip(FREE_PARAMETERS, np.exp(logs)))), location, modes_of
+        )
+        misfit = []
+        for band, (frequency, damping) in targets.items():
+            f, zeta = modes.get(band, (3.0 * frequency, 3.0 * damping))
+            misfit += [np.log(f / frequency) / FREQUENCY_SD, np.log(zeta / damping) / DAMPING_SD]
+        return np.concatenate([misfit, (logs - start) / PRIOR_SD])
 
     inside = np.clip(start, low + 1e-3, high - 1e-3)
-    best = least_squares(residual, inside, diff_step=0.01, bounds=(low, high), max_nfev=evaluations)
-    values = dict(zip(FREE, (float(v) for v in np.exp(best.x))))
-    found = section_modes(with_section(turnout, section, **values), location, modes_of)
-    return ModeFit(section, values, wanted, found, int(best.nfev))
+    solution = least_squares(residual, inside, diff_step=0.01, bounds=(low, high), max_nfev=evaluations)
+    values = dict(zip(FREE_PARAMETERS, (float(v) for v in np.exp(solution.x))))
+    modes = section_modes(with_section(turnout, section, **values), location, modes_of)
+    return ModeFit(section, values, targets, modes, int(solution.nfev))

@@ -8,11 +8,11 @@ from turnout.errors import SimulationError
 from turnout.records import Recording
 from turnout.simulate.prepare import prepare
 from turnout.simulate.run import Drive, run
-from turnout.simulate.sensor import mean_of, measured, seated
+from turnout.simulate.sensor import actual_sensor, mean_of, record_signal
 from turnout.simulate.turnout_track import TurnoutTrack
 from turnout.simulate.wheel_path import check_path
 
-CLOSE = 1e-6  # m; positions are rounded to this
+POSITION_TOLERANCE = 1e-6  # m; positions are rounded to this
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class PassageTruth:
     time: np.ndarray
     force: np.ndarray
     surface_force: np.ndarray
-    wheel_place: np.ndarray
+    wheel_position: np.ndarray
     port_force: np.ndarray
     clean: np.ndarray
     iterations: float
@@ -126,20 +126,23 @@ def simulate_passage(
     sensors, sign = tuple(sensors), 1 if direction == "facing" else -1
     if not sensors:
         raise SimulationError("a passage without sensors records nothing.")
-    seats = [seated(sensor, prepared.terms) for sensor in sensors]
+    seats = [actual_sensor(sensor, prepared.terms) for sensor in sensors]
     probes = [seat.probe(prepared.track) for seat in seats]
     drive, duration = _drive(
         turnout, vehicle, speed, sensors, sign, route, roughness, seed if rail_seed is None else rail_seed, lead, tail,
         irregularities, entry,
     )  # fmt: skip
-    _check_carried(seats, prepared.track, drive)
+    _check_sensor_positions(seats, prepared.track, drive)
     outcome = run(prepared, duration, probes, vehicle, drive, forces=truth)
     rng = np.random.default_rng([seed, 1])
-    channel_terms = [term for term in prepared.terms if term.kind == "channel"]
+    channel_terms = [term for term in prepared.terms if term.effect_type == "channel"]
     samples = np.array(
-        [measured(sensor, row, rate, rng, channel_terms, substeps) for sensor, row in zip(sensors, outcome.signals)]
+        [
+            record_signal(sensor, row, rate, rng, channel_terms, substeps)
+            for sensor, row in zip(sensors, outcome.signals)
+        ]
     )
-    noted = {
+    metadata = {
         "train_type": vehicle.name,
         "speed": float(speed),
         "axle_loads": tuple(float(2.0 * load) for load in vehicle.static_loads),
@@ -149,7 +152,7 @@ def simulate_passage(
         **(conditions or {}),
     }
     channels = tuple(sensor.channel() for sensor in sensors)
-    recording = Recording(samples, rate, channels, "passage", "", 0, started_at, noted)
+    recording = Recording(samples, rate, channels, "passage", "", 0, started_at, metadata)
     if not truth:
         return recording
     return recording, _truth(outcome, drive, vehicle, rate, substeps)
@@ -162,25 +165,25 @@ def prepare_passage(track, terms=(), rate=20e3, substeps=1, scheme="radau", rout
 
 
 def _drive(turnout, vehicle, speed, sensors, sign, route, level, seed, lead, tail, irregularities, entry):
-    places = sign * np.array([sensor.place for sensor in sensors])
-    length = float(vehicle.wheel_places[-1])
-    start = sign * (places.min() - speed * lead)
-    way = np.ptp(places) + length + speed * (lead + tail)
+    positions = sign * np.array([sensor.place for sensor in sensors])
+    length = float(vehicle.wheel_positions[-1])
+    start = sign * (positions.min() - speed * lead)
+    distance = np.ptp(positions) + length + speed * (lead + tail)
     track = turnout.track
-    for parts in turnout.surfaces(route):
-        check_path((*parts, *irregularities), track.start, track.end)
-    rough = turnout.rolling(track.start - 5.0, track.end + 5.0, seed, level)
-    surfaces = tuple((*parts, *rough, *irregularities) for parts in turnout.surfaces(route))
-    return Drive(start, speed, sign, surfaces, entry), way / speed
+    for surface_parts in turnout.surfaces(route):
+        check_path((*surface_parts, *irregularities), track.start, track.end)
+    roughness_parts = turnout.roughness_parts(track.start - 5.0, track.end + 5.0, seed, level)
+    surfaces = tuple((*surface_parts, *roughness_parts, *irregularities) for surface_parts in turnout.surfaces(route))
+    return Drive(start, speed, sign, surfaces, entry), distance / speed
 
 
-def _check_carried(seats, track, drive):
+def _check_sensor_positions(seats, track, drive):
     """Reject sensors where wheels are partly on the stand-in track: they would record reduced loads."""
     if drive.entry == 0.0:
         return
     first, last = track.start + drive.margin + drive.entry, track.end - drive.margin - drive.entry
     for seat in seats:
-        if not first - CLOSE <= seat.place <= last + CLOSE:
+        if not first - POSITION_TOLERANCE <= seat.place <= last + POSITION_TOLERANCE:
             raise SimulationError(
                 f"sensor {seat.name!r} at {seat.place:.3f} m: wheels are wholly on the modelled track, which goes from "
                 f"{track.start:.3f} m to {track.end:.3f} m, only between {first:.3f} m and {last:.3f} m. Lengthen the "
@@ -191,12 +194,12 @@ def _check_carried(seats, track, drive):
 def _truth(outcome, drive, vehicle, rate, substeps):
     clean = mean_of(outcome.signals, substeps)
     time = (np.arange(clean.shape[1]) + 0.5) / rate
-    place = drive.start + drive.direction * (drive.speed * time - vehicle.wheel_places[:, None])
+    position = drive.start + drive.direction * (drive.speed * time - vehicle.wheel_positions[:, None])
     return PassageTruth(
         time,
         mean_of(outcome.force, substeps),
         mean_of(outcome.surface_force, substeps),
-        place,
+        position,
         mean_of(outcome.port_force, substeps),
         clean,
         outcome.iterations,

@@ -2,20 +2,20 @@
 
 import numpy as np
 
-from turnout.simulate.compiled import inlined
+from turnout.simulate.compiled import inline_kernel
 from turnout.simulate.kernels import law_force, path_at, rail_weights, ramp_at, solve_dense, window_product
 
 
-@inlined
-def place_ports(track, scheme, ports, run, step, element, x, rows, weights, local, share, dip):
+@inline_kernel
+def locate_ports(track, scheme, ports, run, step, element, x, rows, weights, local, share, dip):
     """Rows, weights, local compliance, stand-in share and dip of every port and stage; -1 or a port off the track."""
     stages, n_port = scheme.node.size, ports.body.size
     # Local names here and below: taking an array out of a tuple counts a reference, which is slow inside a loop.
     body, start, fixed_rows, fixed_weights, gap = ports.body, ports.place, ports.rows, ports.weights, ports.gap
     node, node_row, shear_ratio = track.node, track.node_row, track.shear_ratio
     flexible, shear_flexible = track.flexibility, track.shear_flexibility
-    time, path, which, ramp, last = scheme.node, run.path, ports.path, run.ramp, track.node.size - 2
-    first_place, last_place = node[0], node[last + 1]
+    time, path, path_index, ramp, last = scheme.node, run.path, ports.path, run.ramp, track.node.size - 2
+    first_position, last_position = node[0], node[last + 1]
     for i in range(n_port):
         for a in range(stages):
             k = i * stages + a
@@ -24,85 +24,87 @@ def place_ports(track, scheme, ports, run, step, element, x, rows, weights, loca
                 for j in range(4):
                     rows[k, j], weights[k, j] = fixed_rows[i, j], fixed_weights[i, j]
                 continue
-            at = start[i] + run.speed * (step + time[a]) * scheme.dt
-            x[k] = at
-            dip[k] = path_at(path, which[i], run.path_start, run.path_step, at)
-            r, share[k] = ramp_at(ramp, run.stand_in, at)
+            position = start[i] + run.speed * (step + time[a]) * scheme.dt
+            x[k] = position
+            dip[k] = path_at(path, path_index[i], run.path_start, run.path_step, position)
+            r, share[k] = ramp_at(ramp, run.stand_in, position)
             local[k] = 0.0
             for j in range(4):
                 weights[k, j] = 0.0
             if r == 0.0:
                 continue
-            if at < first_place or at > last_place:
+            if position < first_position or position > last_position:
                 return i
             e = element[i]
-            while e > 0 and at < node[e]:
+            while e > 0 and position < node[e]:
                 e -= 1
-            while e < last and at >= node[e + 1]:
+            while e < last and position >= node[e + 1]:
                 e += 1
             element[i] = e
-            local[k] = rail_weights(node, node_row, shear_ratio, flexible, shear_flexible, e, at, r, k, rows, weights)
+            local[k] = rail_weights(
+                node, node_row, shear_ratio, flexible, shear_flexible, e, position, r, k, rows, weights
+            )
     return -1
 
 
-@inlined
+@inline_kernel
 def flexibility(track, scheme, bodies, ports, rows, weights, local, share, g):
     """Fill ``g``: by how much a unit force at port stage b reduces the deformation of port stage a."""
     stages, n_port, pad = scheme.node.size, ports.body.size, track.pad
     body, wheel, window, t, tau = ports.body, ports.wheel, track.window, scheme.t, scheme.tau
-    block_of, block_start, answer = bodies.block_of, bodies.block_start, bodies.answer
-    stand_in_answer = bodies.stand_in_answer
+    block_of, block_start, response = bodies.block_of, bodies.block_start, bodies.response
+    stand_in_response = bodies.stand_in_response
     for i in range(n_port):
         for j in range(i, n_port):
-            coupled = 0.0 * tau[0]
+            body_response = 0.0 * tau[0]
             if body[i] >= 0 and body[j] >= 0 and block_of[body[i]] == block_of[body[j]]:
                 block = block_of[body[i]]
-                coupled += answer[block, body[i] - block_start[block], body[j] - block_start[block]]
-            together = wheel[i] >= 0 and wheel[i] == wheel[j]
+                body_response += response[block, body[i] - block_start[block], body[j] - block_start[block]]
+            same_wheel = wheel[i] >= 0 and wheel[i] == wheel[j]
             for a in range(stages):
                 for b in range(stages):
                     p, q = i * stages + a, j * stages + b
-                    value = coupled
+                    value = body_response
                     if abs(rows[p, 0] - rows[q, 0]) <= pad + 8:
                         value += window_product(window, pad, rows, weights, p, q)
-                    if together:
-                        value += share[p] * share[q] * stand_in_answer[wheel[i]]
+                    if same_wheel:
+                        value += share[p] * share[q] * stand_in_response[wheel[i]]
                     g[p, q] = scheme.scale * (t[a] * tau[b] * value).real
                     g[q, p] = scheme.scale * (t[b] * tau[a] * value).real
                     if a == b and i == j:
                         g[p, q] += local[p]
-                    elif a == b and together:
-                        both = np.sqrt(local[p] * local[q])
-                        g[p, q] += both
-                        g[q, p] += both
+                    elif a == b and same_wheel:
+                        shared = np.sqrt(local[p] * local[q])
+                        g[p, q] += shared
+                        g[q, p] += shared
 
 
-@inlined
-def evaluate(scheme, ports, n, g, d0, force, before, d, f, by_d, by_rate):
+@inline_kernel
+def evaluate(scheme, ports, n, g, d0, force, previous, d, f, by_d, by_rate):
     """Deformations and law forces of all port stages; returns the largest residual and its port."""
     stages, inverse = scheme.node.size, scheme.inverse
-    kind, numbers, table, table_start = ports.kind, ports.numbers, ports.table, ports.table_start
+    law_code, numbers, table, table_start = ports.law_code, ports.numbers, ports.table, ports.table_start
     for k in range(n):
         value = d0[k]
         for m in range(n):
             value -= g[k, m] * force[m]
         d[k] = value
-    worst, where = 0.0, 0
+    worst, worst_port = 0.0, 0
     for i in range(n // stages):
         first, last = table_start[i], table_start[i + 1]
         for a in range(stages):
             rate = 0.0
             for b in range(stages):
-                rate += inverse[a, b] * (d[i * stages + b] - before[i]) / scheme.dt
+                rate += inverse[a, b] * (d[i * stages + b] - previous[i]) / scheme.dt
             k = i * stages + a
-            f[k], by_d[k], by_rate[k] = law_force(kind[i], numbers, i, table, first, last, d[k], rate)
+            f[k], by_d[k], by_rate[k] = law_force(law_code[i], numbers, i, table, first, last, d[k], rate)
             residual = abs(force[k] - f[k])
             if not residual <= worst:
-                worst, where = residual, i
-    return worst, where
+                worst, worst_port = residual, i
+    return worst, worst_port
 
 
-@inlined
+@inline_kernel
 def newton_update(scheme, ports, order, x, cut, g, force, f, by_d, by_rate, change, matrix, right, active):
     """One Newton step for each cluster of neighbouring ports; the iteration resolves the coupling of distant ports."""
     stages, inverse = scheme.node.size, scheme.inverse

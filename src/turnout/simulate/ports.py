@@ -10,11 +10,11 @@ from turnout.simulate.state import PortArrays
 
 def contact_ports(vehicle, surfaces, start, direction):
     """(position, body row, wheel, surface, law) of each contact: every wheel on every surface of the route."""
-    rows, found = vehicle.wheel_rows, []
-    for wheel, (behind, law) in enumerate(zip(vehicle.wheel_places, vehicle.each("contact"))):
+    rows, contacts = vehicle.wheel_rows, []
+    for wheel, (offset, law) in enumerate(zip(vehicle.wheel_positions, vehicle.wheel_values("contact"))):
         for surface in range(len(surfaces)):
-            found.append((start - direction * behind, int(rows[wheel]), wheel, surface, law))
-    return found
+            contacts.append((start - direction * offset, int(rows[wheel]), wheel, surface, law))
+    return contacts
 
 
 def fixed_ports(prepared):
@@ -28,14 +28,16 @@ def port_arrays(prepared, contacts, fixed, path_of):
     ``path_of`` (wheel, surface) -> index of the path.
     """
     entries = []
-    for place, row, wheel, surface, law in contacts:
-        entries.append((place, row, wheel, path_of[wheel, surface], np.zeros(4, dtype=np.int64), np.zeros(4), 0.0, law))
+    for position, row, wheel, surface, law in contacts:
+        entries.append(
+            (position, row, wheel, path_of[wheel, surface], np.zeros(4, dtype=np.int64), np.zeros(4), 0.0, law)
+        )
     for port in fixed:
-        rows, weights, place = _fixed_entry(prepared, port)
-        entries.append((place, -1, -1, -1, rows, -weights, port.gap, port.law))
+        rows, weights, position = _fixed_entry(prepared, port)
+        entries.append((position, -1, -1, -1, rows, -weights, port.gap, port.law))
     order = sorted(range(len(entries)), key=lambda k: entries[k][0])
     entries = [entries[k] for k in order]
-    tables = [_table(e[7]) for e in entries]
+    tables = [_law_table(e[7]) for e in entries]
     column = [np.array([e[k] for e in entries]) for k in (0, 1, 2, 3, 6)]
     arrays = PortArrays(
         column[1].astype(np.int64),
@@ -45,7 +47,7 @@ def port_arrays(prepared, contacts, fixed, path_of):
         np.array([e[4] for e in entries], dtype=np.int64).reshape(-1, 4),
         np.array([e[5] for e in entries]).reshape(-1, 4),
         column[4].astype(float),
-        np.array([e[7].kind for e in entries], dtype=np.int64),
+        np.array([e[7].law_code for e in entries], dtype=np.int64),
         np.array([e[7].numbers for e in entries]).reshape(-1, 3).astype(float),
         np.concatenate([[0], np.cumsum([t.shape[1] for t in tables])]).astype(np.int64),
         np.ascontiguousarray(np.concatenate([*tables, np.zeros((3, 2))], axis=1)),
@@ -65,7 +67,7 @@ def _fixed_entry(prepared, port):
     return rows, weights, float(prepared.track.support[port.ends[0][0][1]])
 
 
-def _table(law):
-    if law.kind != TABLE:
+def _law_table(law):
+    if law.law_code != TABLE:
         return np.zeros((3, 0))
     return np.array([law.deformation, law.elastic, law.viscous], dtype=float)

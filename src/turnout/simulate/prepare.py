@@ -11,7 +11,7 @@ from turnout.simulate.matrices import TrackMatrices, assemble
 from turnout.simulate.state import SchemeArrays, TrackArrays
 from turnout.simulate.track import Track
 
-LOOSE = 1e-11  # pivot over its diagonal element below which the pivot is a rounded 0
+MIN_PIVOT_RATIO = 1e-11  # pivot over its diagonal element below which the pivot is a rounded 0
 WINDOW_DECAY = 30.0  # exp(-30) = 1e-13: windows of the inverse are exact to rounding
 
 
@@ -63,20 +63,20 @@ def prepare(track, dt=5e-5, scheme="radau", terms=(), decay=WINDOW_DECAY, matric
         raise SimulationError(f"time step must be above 0 s, got {dt!r}.")
     terms = tuple(terms)
     matrices = assemble(track, terms) if matrices is None else matrices
-    chosen = scheme_called(scheme)
-    s = chosen.rate / dt
+    integration_scheme = scheme_called(scheme)
+    s = integration_scheme.rate / dt
     system = s * s * matrices.mass + s * matrices.damping + matrices.stiffness
     lower, upper, inverse_pivot = _factors(system)
     static = _factors(matrices.stiffness)
-    loose = (static[2] <= 0.0) | (1.0 / static[2] < LOOSE * matrices.stiffness[0])
-    if np.any(loose):
-        k = int(np.argmax(loose))
+    is_loose = (static[2] <= 0.0) | (1.0 / static[2] < MIN_PIVOT_RATIO * matrices.stiffness[0])
+    if np.any(is_loose):
+        k = int(np.argmax(is_loose))
         raise SimulationError(
             f"{track.name}: the track carries no load, its stiffness has pivot {1 / static[2][k]:.3g} in row {k}."
         )
     reach = _reach(track, matrices, s, decay)
     window = inverse_windows(lower, upper, inverse_pivot, reach)
-    lower_back, upper_back, pivot_back, middle = _from_both_ends(system, window, reach)
+    lower_back, upper_back, pivot_back, middle = _two_sided_factors(system, window, reach)
     _, p, ei, kga = matrices.elements
     arrays = TrackArrays(
         matrices.n,
@@ -97,7 +97,7 @@ def prepare(track, dt=5e-5, scheme="radau", terms=(), decay=WINDOW_DECAY, matric
         1.0 / ei,
         1.0 / kga,
     )
-    return Prepared(track, terms, dt, scheme, matrices, arrays, _scheme_arrays(chosen, dt), static)
+    return Prepared(track, terms, dt, scheme, matrices, arrays, _scheme_arrays(integration_scheme, dt), static)
 
 
 def _factors(system):
@@ -108,18 +108,18 @@ def _factors(system):
     return lower, upper_rows(lower, n, half, width), inverse_pivot
 
 
-def _from_both_ends(system, window, reach):
+def _two_sided_factors(system, window, reach):
     """Factors of the reversed matrix and the middle block of the inverse, for half bandwidth 4 at most."""
     half, n = system.shape[0] - 1, system.shape[1]
     if half > 4 or n < 16 or reach < 4:
-        nothing = np.zeros((0, 4), dtype=system.dtype)
-        return nothing, nothing, np.zeros(0, dtype=system.dtype), np.zeros((0, 0), dtype=system.dtype)
-    turned = np.zeros_like(system)
+        empty = np.zeros((0, 4), dtype=system.dtype)
+        return empty, empty, np.zeros(0, dtype=system.dtype), np.zeros((0, 0), dtype=system.dtype)
+    reversed_system = np.zeros_like(system)
     for k in range(half + 1):
-        turned[k, : n - k] = system[k, : n - k][::-1]
+        reversed_system[k, : n - k] = system[k, : n - k][::-1]
     top = (n - 4) // 2
     middle = np.array([[window[top + i, reach + j - i] for j in range(4)] for i in range(4)])
-    return *_factors(turned), np.ascontiguousarray(middle)
+    return *_factors(reversed_system), np.ascontiguousarray(middle)
 
 
 def _reach(track, matrices, s, exponent):
@@ -135,18 +135,18 @@ def _reach(track, matrices, s, exponent):
     return int(min(max(rows) + matrices.half + 2, matrices.n - 1))
 
 
-def _scheme_arrays(chosen, dt):
+def _scheme_arrays(integration_scheme, dt):
     return SchemeArrays(
         float(dt),
-        chosen.rate / dt,
-        chosen.t,
-        chosen.tau,
-        chosen.weight,
-        chosen.delta,
-        float(chosen.carry),
-        chosen.node,
-        chosen.quadrature,
-        chosen.inverse,
-        float(chosen.scale),
-        chosen.quadrature @ chosen.inverse,
+        integration_scheme.rate / dt,
+        integration_scheme.t,
+        integration_scheme.tau,
+        integration_scheme.weight,
+        integration_scheme.delta,
+        float(integration_scheme.carry),
+        integration_scheme.node,
+        integration_scheme.quadrature,
+        integration_scheme.inverse,
+        float(integration_scheme.scale),
+        integration_scheme.quadrature @ integration_scheme.inverse,
     )

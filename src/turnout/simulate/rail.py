@@ -60,14 +60,14 @@ def in_series(rails, shares):
     def mean(name):
         return sum(p * getattr(r, name) for r, p in zip(rails, shares))
 
-    sheared = sum(p / r.shear_stiffness for r, p in zip(rails, shares) if r.beam != "euler")
+    shear_compliance = sum(p / r.shear_stiffness for r, p in zip(rails, shares) if r.beam != "euler")
     return Rail(
         bending_stiffness=1.0 / sum(p / r.bending_stiffness for r, p in zip(rails, shares)),
         mass=mean("mass"),
-        shear_stiffness=1.0 / sheared if sheared else mean("shear_stiffness"),
+        shear_stiffness=1.0 / shear_compliance if shear_compliance else mean("shear_stiffness"),
         rotary_inertia=mean("rotary_inertia"),
         damping=mean("damping"),
-        beam="timoshenko" if sheared else "euler",
+        beam="timoshenko" if shear_compliance else "euler",
     )
 
 

@@ -7,9 +7,28 @@ from turnout.simulate.wheel_path import Sampled
 # Limit curve of ISO 3095:2013 in one-third octave bands from 2 m down to 3.15 mm [dB re 1 µm], the class "well
 # maintained and very smooth" of Directive (EU) 2015/996; between the bands the level is linear in the logarithm.
 WAVELENGTH = 2.0 * 10.0 ** (-0.1 * np.arange(29))
-LONG = (17.1, 17.1, 17.1, 17.1, 17.1, 17.1, 17.1, 17.1, 15.0, 13.0, 11.0, 9.0, 7.0, 4.9, 2.9, 0.9, -1.1, -3.2)
-SHORT = (-5.0, -5.6, -6.2, -6.8, -7.4, -8.0, -8.6, -9.2, -9.8, -10.4, -11.0)
-LIMIT = np.array([*LONG, *SHORT])
+LONG_WAVE_LEVELS = (
+    17.1,
+    17.1,
+    17.1,
+    17.1,
+    17.1,
+    17.1,
+    17.1,
+    17.1,
+    15.0,
+    13.0,
+    11.0,
+    9.0,
+    7.0,
+    4.9,
+    2.9,
+    0.9,
+    -1.1,
+    -3.2,
+)
+SHORT_WAVE_LEVELS = (-5.0, -5.6, -6.2, -6.8, -7.4, -8.0, -8.6, -9.2, -9.8, -10.4, -11.0)
+LIMIT_LEVELS = np.array([*LONG_WAVE_LEVELS, *SHORT_WAVE_LEVELS])
 
 
 def level(wavelength, offset=0.0):
@@ -20,7 +39,7 @@ def level(wavelength, offset=0.0):
     >>> [round(float(level(w)), 1) for w in (1.0, 0.4, 0.1, 0.01)], round(float(level(0.1, offset=6.0)), 1)
     ([17.1, 17.1, 4.9, -8.0], 10.9)
     """
-    return np.interp(np.log(wavelength), np.log(WAVELENGTH[::-1]), LIMIT[::-1]) + offset
+    return np.interp(np.log(wavelength), np.log(WAVELENGTH[::-1]), LIMIT_LEVELS[::-1]) + offset
 
 
 def roughness(start, end, seed, offset=0.0, shortest=0.02, longest=3.0, step=0.005, fade=3.0):
@@ -59,6 +78,6 @@ def roughness(start, end, seed, offset=0.0, shortest=0.02, longest=3.0, step=0.0
     noise = rng.normal(size=frequency.size) + 1j * rng.normal(size=frequency.size)
     spectrum = noise * np.sqrt(density * n / (4.0 * step))
     dip = np.fft.irfft(spectrum, n)
-    way = step * np.arange(n)
-    edge = np.clip(np.minimum(way, way[-1] - way) / fade, 0.0, 1.0)
+    distance = step * np.arange(n)
+    edge = np.clip(np.minimum(distance, distance[-1] - distance) / fade, 0.0, 1.0)
     return Sampled(start, step, dip * edge * edge * (3.0 - 2.0 * edge))

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.simulate.between_nodes import bending, lies_between_nodes, rail_loads, recorded
+from turnout.simulate.between_nodes import element_deflection, is_between_nodes, rail_loads, step_mean
 from turnout.simulate.march import CONVERGED, LEFT_TRACK, march
-from turnout.simulate.port_system import place_ports
+from turnout.simulate.port_system import locate_ports
 from turnout.simulate.ports import contact_ports, fixed_ports, port_arrays
 from turnout.simulate.state import PortArrays, RunArrays, stand_in_of, vehicle_arrays
-from turnout.simulate.statics import equilibrium, resting
+from turnout.simulate.statics import equilibrium, motion_at_rest
 from turnout.simulate.wheel_path import spline_pieces
 
 CLUSTER_CUT = 0.9  # ports closer than this [m] share one Newton system, the others couple by iteration
@@ -61,7 +61,7 @@ class Drive:
     entry: float = 6.0
     margin: float = 3.0
     path_step: float = 0.005
-    thrown: tuple | None = None
+    free_fall: tuple | None = None
 
 
 def run(prepared, duration, probes=(), vehicle=None, drive=None, pulses=(), forces=True, tolerance=1e-6, marcher=march):
@@ -91,81 +91,87 @@ def run(prepared, duration, probes=(), vehicle=None, drive=None, pulses=(), forc
         raise SimulationError(f"a duration of {duration!r} s is not one step of {prepared.dt!r} s.")
     contacts = contact_ports(vehicle, drive.surfaces, drive.start, drive.direction) if vehicle else []
     fixed = fixed_ports(prepared)
-    paths, path_of, path_start = _paths(prepared, vehicle, drive, n_step) if vehicle else (np.zeros((1, 1, 4)), {}, 0.0)
+    paths, path_of, path_start = (
+        _wheel_paths(prepared, vehicle, drive, n_step) if vehicle else (np.zeros((1, 1, 4)), {}, 0.0)
+    )
     ports, order = port_arrays(prepared, contacts, fixed, path_of)
     use_stand_in = bool(vehicle) and drive.entry > 0.0
     stand_in = _stand_in(prepared, drive) if use_stand_in else (1.0, 0.0, 1.0)
-    bodies = vehicle_arrays(vehicle or _nobody(), prepared.scheme, stand_in)
+    bodies = vehicle_arrays(vehicle or _dummy_vehicle(), prepared.scheme, stand_in)
     arrays = _run_arrays(prepared, drive, use_stand_in, paths, path_start, probes, pulses, n_step, tolerance)
-    motion = _initial(prepared, vehicle, drive, ports, arrays, stand_in)
+    motion = _initial_motion(prepared, vehicle, drive, ports, arrays, stand_in)
     signals = np.zeros((len(probes), n_step))
-    between = [k for k, probe in enumerate(probes) if lies_between_nodes(prepared.matrices, probe.place)]
-    kept = np.zeros((len(order), n_step if forces or between else 0))
+    between_nodes = [k for k, probe in enumerate(probes) if is_between_nodes(prepared.matrices, probe.place)]
+    port_forces = np.zeros((len(order), n_step if forces or between_nodes else 0))
     status, step, port, value, iterations = marcher(
-        prepared.arrays, prepared.scheme, bodies, ports, arrays, motion, n_step, signals, kept
+        prepared.arrays, prepared.scheme, bodies, ports, arrays, motion, n_step, signals, port_forces
     )
     if status != CONVERGED:
-        _fail(status, prepared, step, port, value, ports)
-    by_port = np.zeros((len(order), kept.shape[1]))
-    by_port[order] = kept
+        _raise_failure(status, prepared, step, port, value, ports)
+    by_port = np.zeros((len(order), port_forces.shape[1]))
+    by_port[order] = port_forces
     time = (np.arange(n_step) + 0.5) * prepared.dt
     shape = (len(vehicle.wheels), len(drive.surfaces)) if vehicle else (0, 1)
-    surface = by_port[: len(contacts)].reshape(*shape, kept.shape[1])
+    surface = by_port[: len(contacts)].reshape(*shape, port_forces.shape[1])
     force = surface.sum(axis=1)
-    for loads in _loads(prepared, vehicle, drive, pulses, arrays, force) if between else ():
-        for k in between:
-            bent = bending(prepared.matrices, probes[k].place, loads)
-            signals[k] += recorded(bent, probes[k].order, prepared.dt, loads.from_rest)
+    for loads in _applied_loads(prepared, vehicle, drive, pulses, arrays, force) if between_nodes else ():
+        for k in between_nodes:
+            deflection = element_deflection(prepared.matrices, probes[k].place, loads)
+            signals[k] += step_mean(deflection, probes[k].order, prepared.dt, loads.from_rest)
     return Outcome(time, signals, force, surface, by_port[len(contacts) :], iterations / n_step, motion)
 
 
-def _nobody():
+def _dummy_vehicle():
     from turnout.simulate.vehicle import lone_wheels
 
     return lone_wheels(1.0)
 
 
-def _fail(status, prepared, step, port, value, ports):
-    time, what = step * prepared.dt, f"wheel {ports.wheel[port]}" if ports.wheel[port] >= 0 else f"port {port}"
+def _raise_failure(status, prepared, step, port, value, ports):
+    time, subject = step * prepared.dt, f"wheel {ports.wheel[port]}" if ports.wheel[port] >= 0 else f"port {port}"
     if status == LEFT_TRACK:
         a, b = prepared.matrices.node[[0, -1]]
         raise SimulationError(
-            f"{what} leaves the track at {time:.4f} s: it is at {value:.3f} m, "
+            f"{subject} leaves the track at {time:.4f} s: it is at {value:.3f} m, "
             f"the track goes from {a:.3f} m to {b:.3f} m."
         )
     raise SimulationError(
-        f"Newton's iteration did not converge at {time:.6f} s: residual {value:.3g} N at {what}, "
+        f"Newton's iteration did not converge at {time:.6f} s: residual {value:.3g} N at {subject}, "
         f"which started at {ports.place[port]:.3f} m."
     )
 
 
 def _stand_in(prepared, drive):
-    place, known = float(prepared.matrices.node[0]) + drive.margin + drive.entry, prepared.stand_ins
-    if place not in known:
-        known[place] = stand_in_of(prepared, place)
-    return known[place]
+    position, cache = float(prepared.matrices.node[0]) + drive.margin + drive.entry, prepared.stand_ins
+    if position not in cache:
+        cache[position] = stand_in_of(prepared, position)
+    return cache[position]
 
 
-def _paths(prepared, vehicle, drive, n_step):
+def _wheel_paths(prepared, vehicle, drive, n_step):
     """Cubic pieces of every distinct path, and the path of each wheel on each surface."""
-    way = drive.speed * n_step * prepared.dt
-    length = float(vehicle.wheel_places[-1])
-    ends = (drive.start - drive.direction * length, drive.start + drive.direction * way)
+    distance = drive.speed * n_step * prepared.dt
+    length = float(vehicle.wheel_positions[-1])
+    ends = (drive.start - drive.direction * length, drive.start + drive.direction * distance)
     low, high = min(ends) - 0.1, max(ends) + 0.1
-    rolls = drive.thrown is None  # the paths of wheels do not apply to a hammer
-    term_parts = [part for term in prepared.terms for part in term.paths(prepared.track, vehicle)] if rolls else []
+    rolls = drive.free_fall is None  # the paths of wheels do not apply to a hammer
+    term_parts = (
+        [path_part for term in prepared.terms for path_part in term.paths(prepared.track, vehicle)] if rolls else []
+    )
     pieces: list[np.ndarray] = []
-    known: dict[tuple, int] = {}
+    piece_index: dict[tuple, int] = {}
     path_of: dict[tuple, int] = {}
     for wheel in range(len(vehicle.wheels)):
-        for surface, parts in enumerate(drive.surfaces):
-            mine = [p for p in (*parts, *term_parts) if getattr(p, "wheel", None) in (None, wheel)]
-            own = any(getattr(p, "wheel", None) is not None or getattr(p, "per_wheel", False) for p in mine)
-            key = (surface, wheel if own else None)
-            if key not in known:
-                known[key] = len(pieces)
-                pieces.append(spline_pieces(mine, wheel, low, high, drive.path_step))
-            path_of[wheel, surface] = known[key]
+        for surface, surface_parts in enumerate(drive.surfaces):
+            wheel_parts = [p for p in (*surface_parts, *term_parts) if getattr(p, "wheel", None) in (None, wheel)]
+            wheel_specific = any(
+                getattr(p, "wheel", None) is not None or getattr(p, "per_wheel", False) for p in wheel_parts
+            )
+            key = (surface, wheel if wheel_specific else None)
+            if key not in piece_index:
+                piece_index[key] = len(pieces)
+                pieces.append(spline_pieces(wheel_parts, wheel, low, high, drive.path_step))
+            path_of[wheel, surface] = piece_index[key]
     return np.array(pieces), path_of, low
 
 
@@ -175,12 +181,12 @@ def _run_arrays(prepared, drive, use_stand_in, paths, path_start, probes, pulses
     for k, probe in enumerate(probes):
         r, w = matrices.weights(probe.place)
         rows[k, : r.size], weights[k, : r.size] = r, w
-    known_rows, known_weights = np.zeros((len(pulses), 4), dtype=np.int64), np.zeros((len(pulses), 4))
-    known = np.zeros((len(pulses), n_step if len(pulses) else 1, scheme.node.size))
-    for k, (place, pulse) in enumerate(pulses):
-        r, w = matrices.weights(place)
-        known_rows[k, : r.size], known_weights[k, : r.size] = r, w
-        known[k] = pulse((np.arange(n_step)[:, None] + scheme.node) * prepared.dt)
+    pulse_rows, pulse_weights = np.zeros((len(pulses), 4), dtype=np.int64), np.zeros((len(pulses), 4))
+    pulse_force = np.zeros((len(pulses), n_step if len(pulses) else 1, scheme.node.size))
+    for k, (point, pulse) in enumerate(pulses):
+        r, w = matrices.weights(point)
+        pulse_rows[k, : r.size], pulse_weights[k, : r.size] = r, w
+        pulse_force[k] = pulse((np.arange(n_step)[:, None] + scheme.node) * prepared.dt)
     ramp = np.zeros(4)
     if use_stand_in:
         first, last = matrices.node[0] + drive.margin, matrices.node[-1] - drive.margin
@@ -192,9 +198,9 @@ def _run_arrays(prepared, drive, use_stand_in, paths, path_start, probes, pulses
         float(path_start),
         float(drive.path_step) if drive else 1.0,
         paths,
-        known_rows,
-        known_weights,
-        known,
+        pulse_rows,
+        pulse_weights,
+        pulse_force,
         rows,
         weights,
         np.array([probe.order for probe in probes], dtype=np.int64),
@@ -203,42 +209,42 @@ def _run_arrays(prepared, drive, use_stand_in, paths, path_start, probes, pulses
     )
 
 
-def _loads(prepared, vehicle, drive, pulses, arrays, force):
+def _applied_loads(prepared, vehicle, drive, pulses, arrays, force):
     """Loads on the rail itself: wheels, and pulses that do not act on a named degree of freedom."""
-    found = []
+    loads = []
     if vehicle is not None:
-        place = drive.start - drive.direction * np.asarray(vehicle.wheel_places)
+        position = drive.start - drive.direction * np.asarray(vehicle.wheel_positions)
         ramp = arrays.ramp if arrays.stand_in else None
-        found.append(rail_loads(place, arrays.speed, force, prepared.dt, drive.thrown is not None, ramp))
-    on_rail = [k for k, (place, _) in enumerate(pulses) if not isinstance(place, tuple)]
+        loads.append(rail_loads(position, arrays.speed, force, prepared.dt, drive.free_fall is not None, ramp))
+    on_rail = [k for k, (position, _) in enumerate(pulses) if not isinstance(position, tuple)]
     if on_rail:
-        place = np.array([float(pulses[k][0]) for k in on_rail])
-        known = arrays.known_force[on_rail] @ prepared.scheme.quadrature
-        found.append(rail_loads(place, 0.0, known, prepared.dt, True))
-    return found
+        position = np.array([float(pulses[k][0]) for k in on_rail])
+        pulse_force = arrays.pulse_force[on_rail] @ prepared.scheme.quadrature
+        loads.append(rail_loads(position, 0.0, pulse_force, prepared.dt, True))
+    return loads
 
 
-def _initial(prepared, vehicle, drive, ports, arrays, stand_in):
+def _initial_motion(prepared, vehicle, drive, ports, arrays, stand_in):
     if vehicle is None:
-        return resting(prepared, ports)
-    if drive.thrown is not None:
-        motion = resting(prepared, ports, vehicle)
-        clearance, velocity = drive.thrown
+        return motion_at_rest(prepared, ports)
+    if drive.free_fall is not None:
+        motion = motion_at_rest(prepared, ports, vehicle)
+        clearance, velocity = drive.free_fall
         motion.z[:], motion.w[:] = -clearance, velocity
         motion.deformation[ports.wheel >= 0] = -clearance
         return motion
-    return equilibrium(prepared, vehicle, ports, _placed(prepared, ports, arrays), stand_in[2])
+    return equilibrium(prepared, vehicle, ports, _initial_ports(prepared, ports, arrays), stand_in[2])
 
 
-def _placed(prepared, ports: PortArrays, arrays):
+def _initial_ports(prepared, ports: PortArrays, arrays):
     """Rows, weights, local compliance, stand-in share and dip of every port at time 0."""
     n = ports.body.size
     x, local, share, dip = (np.zeros(n) for _ in range(4))
     rows, weights = np.zeros((n, 4), dtype=np.int64), np.zeros((n, 4))
     start = prepared.scheme._replace(node=np.zeros(1))
-    lost = place_ports(
+    lost_port = locate_ports(
         prepared.arrays, start, ports, arrays, 0, np.zeros(n, dtype=np.int64), x, rows, weights, local, share, dip
     )
-    if lost >= 0:
-        _fail(LEFT_TRACK, prepared, 0, lost, x[lost], ports)
+    if lost_port >= 0:
+        _raise_failure(LEFT_TRACK, prepared, 0, lost_port, x[lost_port], ports)
     return rows, weights, local, share, dip

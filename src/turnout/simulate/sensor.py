@@ -8,7 +8,7 @@ from turnout.errors import SimulationError
 from turnout.records import Channel
 from turnout.simulate.run import Probe
 
-ORDERS = {"acceleration": 2, "velocity": 1, "displacement": 0}
+DERIVATIVE_ORDERS = {"acceleration": 2, "velocity": 1, "displacement": 0}
 ALIAS_TAPS = 63
 
 
@@ -44,7 +44,7 @@ class Sensor:
 
     def probe(self, track):
         """Signal that the simulation must record."""
-        if self.quantity not in ORDERS:
+        if self.quantity not in DERIVATIVE_ORDERS:
             raise SimulationError(f"sensor {self.name!r}: cannot record {self.quantity!r} on the track.")
         if not track.start <= self.place <= track.end:
             raise SimulationError(
@@ -52,11 +52,11 @@ class Sensor:
                 f"which goes from {track.start:.3f} m to {track.end:.3f} m."
             )
         if self.mounting.startswith("sleeper"):
-            return Probe(("sleeper", track.nearest_support(self.place)), ORDERS[self.quantity])
-        return Probe(self.place, ORDERS[self.quantity])
+            return Probe(("sleeper", track.nearest_support(self.place)), DERIVATIVE_ORDERS[self.quantity])
+        return Probe(self.place, DERIVATIVE_ORDERS[self.quantity])
 
 
-def seated(sensor, terms):
+def actual_sensor(sensor, terms):
     """The sensor at its true position according to ``terms``."""
     for term in terms:
         sensor = term.sensor(sensor)
@@ -69,7 +69,7 @@ def mean_of(signals, substeps):
     return signals[..., : n * substeps].reshape(*signals.shape[:-1], n, substeps).mean(axis=-1)
 
 
-def measured(sensor, signal, rate, rng, terms=(), substeps=1):
+def record_signal(sensor, signal, rate, rng, terms=(), substeps=1):
     r"""Samples (n,) at ``rate`` [Hz] that a ``sensor`` records of the true ``signal`` (n * substeps,).
 
     The signal is filtered before it is sampled, to prevent aliasing.
@@ -78,7 +78,7 @@ def measured(sensor, signal, rate, rng, terms=(), substeps=1):
     """
     for term in terms:
         signal = term.channel(signal, rate * substeps, sensor)
-    signal = mean_of(_filtered(sensor, np.asarray(signal, dtype=float), rate, substeps), substeps)
+    signal = mean_of(_apply_filters(sensor, np.asarray(signal, dtype=float), rate, substeps), substeps)
     signal = sensor.gain * signal + sensor.offset
     if sensor.noise:
         signal = signal + sensor.noise * rng.normal(size=signal.size)
@@ -89,7 +89,7 @@ def measured(sensor, signal, rate, rng, terms=(), substeps=1):
     return signal
 
 
-def _filtered(sensor, signal, rate, substeps):
+def _apply_filters(sensor, signal, rate, substeps):
     """Mounting, delay and anti-alias filter in one transform, padded so that the signal does not wrap around."""
     if not (sensor.mount_frequency or sensor.delay or sensor.cutoff):
         return signal
@@ -120,9 +120,9 @@ def _anti_alias(cutoff, frequency, substeps):
 
 def _fast_length(n):
     """Smallest 2^a 3^b 5^c that is at least ``n``."""
-    best = 1 << (n - 1).bit_length()
+    length = 1 << (n - 1).bit_length()
     for three in (1, 3, 9, 27):
         for five in (1, 5, 25):
             factor = three * five
-            best = min(best, factor << max(0, (-(-n // factor) - 1).bit_length()))
-    return best
+            length = min(length, factor << max(0, (-(-n // factor) - 1).bit_length()))
+    return length

@@ -58,13 +58,13 @@ class VehicleArrays(NamedTuple):
 
     block_start: np.ndarray
     block_of: np.ndarray
-    answer: np.ndarray
+    response: np.ndarray
     from_velocity: np.ndarray
     from_position: np.ndarray
     from_weight: np.ndarray
     stand_in_mass: np.ndarray
     stand_in_stiffness: np.ndarray
-    stand_in_answer: np.ndarray
+    stand_in_response: np.ndarray
 
 
 class PortArrays(NamedTuple):
@@ -81,7 +81,7 @@ class PortArrays(NamedTuple):
     rows: np.ndarray
     weights: np.ndarray
     gap: np.ndarray
-    kind: np.ndarray
+    law_code: np.ndarray
     numbers: np.ndarray
     table_start: np.ndarray
     table: np.ndarray
@@ -101,9 +101,9 @@ class RunArrays(NamedTuple):
     path_start: float
     path_step: float
     path: np.ndarray
-    known_rows: np.ndarray
-    known_weights: np.ndarray
-    known_force: np.ndarray
+    pulse_rows: np.ndarray
+    pulse_weights: np.ndarray
+    pulse_force: np.ndarray
     sensor_rows: np.ndarray
     sensor_weights: np.ndarray
     sensor_order: np.ndarray
@@ -129,38 +129,38 @@ def vehicle_arrays(vehicle, scheme, stand_in):
     mass, damping, stiffness, weight = vehicle.matrices
     starts = vehicle.blocks
     size, count = int(np.max(np.diff(starts))), starts.size - 1
-    kind = scheme.tau.dtype
-    answer, by_v, by_z = (np.zeros((count, size, size), dtype=kind) for _ in range(3))
-    by_weight = np.zeros(vehicle.n, dtype=kind)
+    dtype = scheme.tau.dtype
+    response, by_v, by_z = (np.zeros((count, size, size), dtype=dtype) for _ in range(3))
+    by_weight = np.zeros(vehicle.n, dtype=dtype)
     block_of = np.zeros(vehicle.n, dtype=np.int64)
     for b, (i, j) in enumerate(pairwise(starts)):
-        part = np.s_[i:j, i:j]
-        inverse = np.linalg.inv(scheme.s**2 * mass[part] + scheme.s * damping[part] + stiffness[part])
+        block = np.s_[i:j, i:j]
+        inverse = np.linalg.inv(scheme.s**2 * mass[block] + scheme.s * damping[block] + stiffness[block])
         n = j - i
-        answer[b, :n, :n] = inverse
-        by_v[b, :n, :n] = scheme.weight * scheme.s * inverse @ mass[part]
-        by_z[b, :n, :n] = scheme.weight * inverse @ stiffness[part]
+        response[b, :n, :n] = inverse
+        by_v[b, :n, :n] = scheme.weight * scheme.s * inverse @ mass[block]
+        by_z[b, :n, :n] = scheme.weight * inverse @ stiffness[block]
         by_weight[i:j] = scheme.weight * inverse @ weight[i:j]
         block_of[i:j] = b
     m, c, k = stand_in
     n_wheel = len(vehicle.wheels)
-    scalar = np.full(n_wheel, 1.0 / (scheme.s**2 * m + scheme.s * c + k), dtype=kind)
+    scalar = np.full(n_wheel, 1.0 / (scheme.s**2 * m + scheme.s * c + k), dtype=dtype)
     return VehicleArrays(
-        starts, block_of, answer, by_v, by_z, by_weight, np.full(n_wheel, m), np.full(n_wheel, k), scalar
+        starts, block_of, response, by_v, by_z, by_weight, np.full(n_wheel, m), np.full(n_wheel, k), scalar
     )
 
 
-def stand_in_of(prepared, place):
+def stand_in_of(prepared, position):
     """Mass, damping and stiffness of one oscillator that responds like the track at ``position``, 5-200 Hz.
 
     The stiffness is the static one, so that a wheel rolls onto the modelled track without a step. Mass and damping are
     fitted to the dynamic stiffness by least squares.
     """
-    rows, weights = prepared.matrices.rail_weights(place)
-    compliance = weights @ prepared.static_response(rows, weights)[rows] + prepared.matrices.compliance(place)
+    rows, weights = prepared.matrices.rail_weights(position)
+    compliance = weights @ prepared.static_response(rows, weights)[rows] + prepared.matrices.compliance(position)
     frequency = np.linspace(5.0, 200.0, 40)
     omega = 2.0 * np.pi * frequency
-    dynamic = 1.0 / receptance(prepared.matrices, frequency, place, place)
+    dynamic = 1.0 / receptance(prepared.matrices, frequency, position, position)
     mass = float(np.sum(omega**2 * (1.0 / compliance - dynamic.real)) / np.sum(omega**4))
     damping = float(np.sum(omega * dynamic.imag) / np.sum(omega**2))
     return max(mass, 20.0), max(damping, 0.0), 1.0 / compliance

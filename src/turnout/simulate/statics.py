@@ -8,7 +8,7 @@ from turnout.simulate.kernels import law_force
 from turnout.simulate.state import Motion
 
 
-def resting(prepared, ports, vehicle=None):
+def motion_at_rest(prepared, ports, vehicle=None):
     """Motion of a track at rest without any force; ``vehicle`` is at its zero position without contact."""
     t, n_port = prepared.arrays, ports.body.size
     wide = t.n + 2 * t.pad
@@ -26,29 +26,31 @@ def resting(prepared, ports, vehicle=None):
     )
 
 
-def equilibrium(prepared, vehicle, ports, placed, stand_in_stiffness, tolerance=1e-7):
+def equilibrium(prepared, vehicle, ports, initial_ports, stand_in_stiffness, tolerance=1e-7):
     """Motion in static equilibrium under the weight of ``vehicle``, all velocities 0.
 
     ``initial_ports`` is (rows, weights, local compliance, stand-in share, dip) of every port at time 0. Newton's method
     on all port forces and wheel positions; SimulationError if the residual is not below 1e-7 N after 50 steps.
     """
-    rows, weights, local, share, dip = placed
+    rows, weights, local, share, dip = initial_ports
     n_port = ports.body.size
     columns = np.zeros((n_port, prepared.arrays.n))
     for k in np.flatnonzero(np.any(weights != 0.0, axis=1)):
         columns[k] = prepared.static_response(rows[k], weights[k])
     flexibility = np.array([[weights[i] @ columns[j][rows[i]] for j in range(n_port)] for i in range(n_port)])
     flexibility = flexibility.reshape(n_port, n_port)
-    same = (ports.wheel[:, None] == ports.wheel[None, :]) & (ports.wheel[:, None] >= 0)
-    flexibility += np.where(same, np.outer(share, share) / stand_in_stiffness + np.sqrt(np.outer(local, local)), 0.0)
+    same_wheel = (ports.wheel[:, None] == ports.wheel[None, :]) & (ports.wheel[:, None] >= 0)
+    flexibility += np.where(
+        same_wheel, np.outer(share, share) / stand_in_stiffness + np.sqrt(np.outer(local, local)), 0.0
+    )
     on_level_rail = vehicle.static_loads
-    stiff, load, touches = _condensed(vehicle, ports)
+    stiff, load, touches = _wheel_stiffness(vehicle, ports)
     force = touches.T @ on_level_rail / np.maximum(touches.sum(0), 1.0)
     wheel_z = _first_guess(ports, touches, flexibility, force, dip)
     n = n_port + wheel_z.size
     for _ in range(50):
         d = touches.T @ wheel_z - flexibility @ force - dip
-        f, slope = _laws(ports, d)
+        f, slope = _law_forces(ports, d)
         residual = np.concatenate([force - f, stiff @ wheel_z - load + touches @ force])
         if np.max(np.abs(residual)) < tolerance * max(1.0, np.max(np.abs(load), initial=0.0) / 1e5):
             return _motion(prepared, vehicle, ports, force, wheel_z, columns, share, stand_in_stiffness, d)
@@ -66,7 +68,7 @@ def equilibrium(prepared, vehicle, ports, placed, stand_in_stiffness, tolerance=
     )
 
 
-def _condensed(vehicle, ports):
+def _wheel_stiffness(vehicle, ports):
     """Stiffness and load of the wheels with the sprung rows eliminated; matrix of the ports of each wheel."""
     _, _, stiffness, weight = vehicle.matrices
     wheels = vehicle.wheel_rows
@@ -85,7 +87,7 @@ def _first_guess(ports, touches, flexibility, force, dip):
     approach = np.zeros_like(force)
     for k in np.flatnonzero(ports.wheel >= 0):
         stiffness, exponent, preload = ports.numbers[k]
-        if ports.kind[k] == POWER:
+        if ports.law_code[k] == POWER:
             approach[k] = (abs(force[k]) / stiffness) ** (1.0 / exponent)
         elif stiffness > 0.0:
             approach[k] = (force[k] - preload) / stiffness
@@ -93,16 +95,16 @@ def _first_guess(ports, touches, flexibility, force, dip):
         return np.array([np.min((below + approach)[row > 0.0]) for row in touches])
 
 
-def _laws(ports, d):
+def _law_forces(ports, d):
     f, slope = np.zeros(d.size), np.zeros(d.size)
     for k in range(d.size):
         first, last = ports.table_start[k], ports.table_start[k + 1]
-        f[k], slope[k], _ = law_force(ports.kind[k], ports.numbers, k, ports.table, first, last, d[k], 0.0)
+        f[k], slope[k], _ = law_force(ports.law_code[k], ports.numbers, k, ports.table, first, last, d[k], 0.0)
     return f, slope
 
 
 def _motion(prepared, vehicle, ports, force, wheel_z, columns, share, stand_in_stiffness, d):
-    motion = resting(prepared, ports, vehicle)
+    motion = motion_at_rest(prepared, ports, vehicle)
     pad, n = prepared.arrays.pad, prepared.arrays.n
     motion.u[pad : pad + n] = force @ columns
     _, _, stiffness, weight = vehicle.matrices

@@ -34,9 +34,9 @@ class RailStretch:
     rail: Rail
 
 
-SAME = 1e-6  # m from a node within which an end is on it
+NODE_TOLERANCE = 1e-6  # m from a node within which an end is on it
 # One number is the value of all supports; it becomes an array when the track is created.
-NOTHING: Any = 0.0
+ZERO: Any = 0.0
 
 
 @dataclass(frozen=True)
@@ -57,16 +57,16 @@ class Track:
     support: np.ndarray
     pad_stiffness: np.ndarray
     pad_damping: np.ndarray
-    sleeper_mass: np.ndarray = NOTHING
-    ballast_stiffness: np.ndarray = NOTHING
-    ballast_damping: np.ndarray = NOTHING
-    ballast_mass: np.ndarray = NOTHING
-    subgrade_stiffness: np.ndarray = NOTHING
-    subgrade_damping: np.ndarray = NOTHING
-    bay_shear_stiffness: np.ndarray = NOTHING
-    bay_shear_damping: np.ndarray = NOTHING
-    pad_loss_factor: np.ndarray = NOTHING
-    ballast_loss_factor: np.ndarray = NOTHING
+    sleeper_mass: np.ndarray = ZERO
+    ballast_stiffness: np.ndarray = ZERO
+    ballast_damping: np.ndarray = ZERO
+    ballast_mass: np.ndarray = ZERO
+    subgrade_stiffness: np.ndarray = ZERO
+    subgrade_damping: np.ndarray = ZERO
+    bay_shear_stiffness: np.ndarray = ZERO
+    bay_shear_damping: np.ndarray = ZERO
+    pad_loss_factor: np.ndarray = ZERO
+    ballast_loss_factor: np.ndarray = ZERO
     layers: int = 2
     pad_width: float = 0.0
     elements_per_bay: int = 4
@@ -82,16 +82,16 @@ class Track:
             raise SimulationError(f"{self.name}: support needs at least 3 rising places, got {support!r}.")
         object.__setattr__(self, "support", support)
         for name in PER_SUPPORT:
-            object.__setattr__(self, name, self._pattern(name))
+            object.__setattr__(self, name, self._support_values(name))
         for name in NOT_NEGATIVE:
-            if np.any(bad := getattr(self, name) < 0.0):
-                j = int(np.argmax(bad))
-                value, where = getattr(self, name)[j], support[j]
-                raise SimulationError(f"{self.name}: {name} of support {j} at {where:.3f} m is negative: {value!r}.")
+            if np.any(negative := getattr(self, name) < 0.0):
+                j = int(np.argmax(negative))
+                value, position = getattr(self, name)[j], support[j]
+                raise SimulationError(f"{self.name}: {name} of support {j} at {position:.3f} m is negative: {value!r}.")
         if self.layers not in (1, 2, 3) or self.elements_per_bay < 1:
             raise SimulationError(f"{self.name}: {self.layers} layers, {self.elements_per_bay} elements per bay.")
-        needed = {1: (), 2: ("sleeper_mass",), 3: ("sleeper_mass", "ballast_mass")}[self.layers]
-        for name in needed:
+        required = {1: (), 2: ("sleeper_mass",), 3: ("sleeper_mass", "ballast_mass")}[self.layers]
+        for name in required:
             if np.any(getattr(self, name) <= 0.0):
                 raise SimulationError(f"{self.name}: {self.layers} layers need {name} above 0 at every support.")
 
@@ -106,7 +106,7 @@ class Track:
                 f"three nodes hold that are {element:.3f} m apart; fewer elements per bay hold more."
             )
 
-    def _pattern(self, name):
+    def _support_values(self, name):
         value = np.asarray(getattr(self, name), dtype=float)
         n = self.support.size
         if value.ndim and value.shape != (n,):
@@ -129,40 +129,42 @@ class Track:
         """The same track with some fields changed."""
         return replace(self, **changes)
 
-    def nearest_support(self, place):
+    def nearest_support(self, position):
         """Index of the support nearest to ``position`` [m]."""
-        return int(np.argmin(np.abs(self.support - place)))
+        return int(np.argmin(np.abs(self.support - position)))
 
-    def rail_between(self, x):
+    def rail_at(self, x):
         """Rail profile at ``x`` [m]; if stretches overlap that of the last one."""
-        found = [stretch.rail for stretch in self.stretches if stretch.start <= x < stretch.end]
-        return found[-1] if found else self.rail
+        rails = [stretch.rail for stretch in self.stretches if stretch.start <= x < stretch.end]
+        return rails[-1] if rails else self.rail
 
-    def rail_over(self, start, end):
+    def element_rail(self, start, end):
         """Rail profile of an element from ``start`` to ``end`` [m]; several profiles are combined in series."""
-        inside = {x for s in self.stretches for x in (s.start, s.end) if start + SAME < x < end - SAME}
+        inside = {
+            x for s in self.stretches for x in (s.start, s.end) if start + NODE_TOLERANCE < x < end - NODE_TOLERANCE
+        }
         cuts = [start, *sorted(inside), end]
-        rails = [self.rail_between(0.5 * (a + b)) for a, b in pairwise(cuts)]
+        rails = [self.rail_at(0.5 * (a + b)) for a, b in pairwise(cuts)]
         return in_series(rails, np.diff(cuts) / (end - start)) if inside else rails[0]
 
     def links(self):
         """All springs, dampers and masses of the supports as links."""
-        found = []
+        links = []
         for j in range(self.support.size):
-            found.extend(self.support_links(j))
-        return found
+            links.extend(self.support_links(j))
+        return links
 
     def pad_link(self, j):
         """The pad of support ``j``."""
         ends: tuple = ((("rail", j), 1.0),)
         if self.pad_width and 0 < j < self.support.size - 1:
-            before, behind = self._beside(j)
+            before, behind = self._pad_shares(j)
             ends = ((("rail", j, -1), before), (("rail", j), 1.0 - before - behind), (("rail", j, 1), behind))
         if self.layers > 1:
             ends = (*ends, (("sleeper", j), -1.0))
         return Link(ends, self.pad_stiffness[j], self.pad_damping[j], 0.0, self.pad_loss_factor[j], "pad")
 
-    def _beside(self, j):
+    def _pad_shares(self, j):
         """Shares of the nodes before and after support ``j`` in its pad.
 
         Two points of a uniform pressure over the width b are b/3 apart on average. So are shares a, 1 - 2a, a at
@@ -170,8 +172,8 @@ class Track:
         A rail that only bends needs the second moment, a = b²/24h², which has half of the effect on a rail with shear.
         """
         nearness = self.elements_per_bay / np.diff(self.support[j - 1 : j + 2])
-        both = nearness.sum()
-        return (nearness * (1.0 - np.sqrt(1.0 - both * self.pad_width / 6.0)) / both).tolist()
+        total = nearness.sum()
+        return (nearness * (1.0 - np.sqrt(1.0 - total * self.pad_width / 6.0)) / total).tolist()
 
     def ballast_link(self, j):
         """The ballast under sleeper ``j``: to the ground, or to the ballast mass with 3 layers."""

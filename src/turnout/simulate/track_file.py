@@ -19,7 +19,7 @@ SUPPORT_UNITS = {
     "bay_shear_stiffness": "N/m",
     "bay_shear_damping": "N s/m",
 }
-NEEDED = ("pad_stiffness", "pad_damping")
+REQUIRED_VALUES = ("pad_stiffness", "pad_damping")
 RAIL_UNITS = {
     "youngs_modulus": "Pa",
     "second_moment": "m⁴",
@@ -58,65 +58,69 @@ def turnout_track(parameters, seed=0):
 
     Errors: ConfigError with file and entry where a key is unknown or missing, or a value cannot be used.
     """
-    p = parameters.only(*TRACK_KEYS)
+    p = parameters.allow_only(*TRACK_KEYS)
     routes = _routes(p)
     tracks = {name: _track(p, name, tuple(routes), seed) for name in routes}
     first = next(iter(routes))
-    terms = tuple(p.parts("terms"))
+    terms = tuple(p.mappings_at("terms"))
     for entry in terms:
         _route_of(entry, routes)
-    rough = p.maybe("roughness").only("level")
+    rough = p.optional_mapping_at("roughness").allow_only("level")
     level = rough.number("level", "dB") if rough else None
-    places, numbers, spreads = _locations(p, routes), tuple(p.numbers()), dict(_spreads(p.maybe("routes")))
-    return TurnoutTrack(tracks[first], routes, level, places, numbers, tracks, terms, spreads)
+    locations, numbers, spreads = (
+        _locations(p, routes),
+        tuple(p.numbers()),
+        dict(_spreads(p.optional_mapping_at("routes"))),
+    )
+    return TurnoutTrack(tracks[first], routes, level, locations, numbers, tracks, terms, spreads)
 
 
 def _routes(p):
-    routes = p.maybe("routes")
+    routes = p.optional_mapping_at("routes")
     return {name: _surfaces(routes, name) for name in routes} or {"main": ((),)}
 
 
 def _surfaces(routes, name):
     """Surfaces of a route: its ``common`` parts on each of its ``surfaces``, or one surface."""
     if isinstance(routes[name], list):
-        return (tuple(_path(part) for part in routes.parts(name)),)
-    route = routes.part(name).only("common", "surfaces")
-    common = tuple(_path(part) for part in route.parts("common"))
-    surfaces = route.listed("surfaces")
+        return (tuple(_path_part(entry) for entry in routes.mappings_at(name)),)
+    route = routes.mapping_at(name).allow_only("common", "surfaces")
+    common = tuple(_path_part(entry) for entry in route.mappings_at("common"))
+    surfaces = route.list_at("surfaces")
     if not surfaces:
         raise route.error(None, "a route without a surface", "List its surfaces, or the parts of its only one")
-    return tuple((*common, *(_path(part) for part in surfaces.parts(k))) for k in surfaces)
+    return tuple((*common, *(_path_part(entry) for entry in surfaces.mappings_at(k))) for k in surfaces)
 
 
 def _spreads(routes):
     """(part, field -> relative standard deviation) of every part that has a prior; for a list its largest."""
     for entry in entries_of_routes(routes):
         spread: dict[str, float] = {}
-        for place, number in entry.numbers():
-            name = place.removeprefix(f"{entry.place}.").split("[")[0]
+        for key, number in entry.numbers():
+            name = key.removeprefix(f"{entry.place}.").split("[")[0]
             if number.prior:
                 spread[name] = max(number.prior, spread.get(name, 0.0))
         if spread:
-            yield _path(entry), spread
+            yield _path_part(entry), spread
 
 
 def entries_of_routes(routes):
     """The entry of every part of every route."""
     for name in routes:
         if isinstance(routes[name], list):
-            yield from routes.parts(name)
+            yield from routes.mappings_at(name)
             continue
-        route = routes.part(name)
-        surfaces = route.listed("surfaces")
-        yield from route.parts("common")
+        route = routes.mapping_at(name)
+        surfaces = route.list_at("surfaces")
+        yield from route.mappings_at("common")
         for k in surfaces:
-            yield from surfaces.parts(k)
+            yield from surfaces.mappings_at(k)
 
 
 def _locations(p, routes):
     """Name -> (position [m], route); the first route where none is named."""
-    found = p.maybe("locations")
-    entries = {name: found.part(name).only("place", "route") for name in found}
+    section = p.optional_mapping_at("locations")
+    entries = {name: section.mapping_at(name).allow_only("place", "route") for name in section}
     return {name: (e.number("place", "m"), _route_of(e, routes)) for name, e in entries.items()}
 
 
@@ -134,10 +138,10 @@ def _track(p, route, routes, seed):
     values, section = _support_values(p, support, route, routes)
     _draw_scatter(p, values, seed)
     elements = p.count("elements_per_bay", 4)
-    end = p.maybe("absorbing_end").only("length", "rate")
-    return p.make(
+    end = p.optional_mapping_at("absorbing_end").allow_only("length", "rate")
+    return p.build(
         Track,
-        _rail(p.part("rail")),
+        _rail(p.mapping_at("rail")),
         support,
         **values,
         layers=p.count("layers", 2),
@@ -152,11 +156,11 @@ def _track(p, route, routes, seed):
 
 
 def _supports(p):
-    start, end = _ends(p.part("extent").only("from", "to"))
+    start, end = _ends(p.mapping_at("extent").allow_only("from", "to"))
     spacing = p.number("spacing", "m")
     if not 0.0 < spacing <= 0.5 * (end - start):
-        found = f"{spacing:g} m does not divide a track of {end - start:g} m into bays"
-        raise p.error("spacing", found, "Write the distance of two supports")
+        problem = f"{spacing:g} m does not divide a track of {end - start:g} m into bays"
+        raise p.error("spacing", problem, "Write the distance of two supports")
     return start + spacing * np.arange(round((end - start) / spacing) + 1)
 
 
@@ -171,7 +175,7 @@ def _ends(entry):
 
 
 def _draw_scatter(p, values, seed):
-    scatter = p.maybe("scatter").only(*SUPPORT_UNITS)
+    scatter = p.optional_mapping_at("scatter").allow_only(*SUPPORT_UNITS)
     rng = np.random.default_rng(seed)
     for name in scatter:
         if name not in values:
@@ -184,33 +188,33 @@ def _stretches(p, support, elements, route, routes):
     """Stretches of other rail on ``route``; one without the middle of an element has no effect and is rejected."""
     nodes = np.interp(np.arange(elements * (support.size - 1) + 1) / elements, np.arange(support.size), support)
     middle = 0.5 * (nodes[:-1] + nodes[1:])
-    for entry in p.parts("stretches"):
-        start, end = _ends(entry.only("from", "to", "rail", "route"))
+    for entry in p.mappings_at("stretches"):
+        start, end = _ends(entry.allow_only("from", "to", "rail", "route"))
         if start < support[-1] and end > support[0] and not np.any((middle >= start) & (middle < end)):
-            found = f"from {start:g} m to {end:g} m lies the middle of no element"
-            raise entry.error(None, found, f"Make it as long as an element, {nodes[1] - nodes[0]:g} m")
+            problem = f"from {start:g} m to {end:g} m lies the middle of no element"
+            raise entry.error(None, problem, f"Make it as long as an element, {nodes[1] - nodes[0]:g} m")
         if _route_of(entry, routes, route) == route:
-            yield RailStretch(start, end, _rail(entry.part("rail")))
+            yield RailStretch(start, end, _rail(entry.mapping_at("rail")))
 
 
 def _rail(p):
-    p.only(*RAIL_UNITS, "damping", "beam", "name")
+    p.allow_only(*RAIL_UNITS, "damping", "beam", "name")
     values = {name: p.number(name, unit) for name, unit in RAIL_UNITS.items()}
     bending = values["youngs_modulus"] * values["second_moment"]
     shear = values["shear_coefficient"] * values["shear_modulus"] * values["area"]
     rotary = values["density"] * values["second_moment"]
     damping = p.number("damping", "N s/m²", default=0.0)
-    return p.make(Rail, bending, values["mass"], shear, rotary, damping, p.get("beam", "timoshenko"))
+    return p.build(Rail, bending, values["mass"], shear, rotary, damping, p.get("beam", "timoshenko"))
 
 
 def _support_values(p, support, route, routes):
     """Values of every support on ``route`` by name, (n,) each, and the label of its section."""
-    base = p.part("support").only(*SUPPORT_UNITS)
-    given = [name for name in SUPPORT_UNITS if name in base or name in NEEDED]
-    values = {name: np.full(support.size, base.number(name, SUPPORT_UNITS[name])) for name in given}
+    base = p.mapping_at("support").allow_only(*SUPPORT_UNITS)
+    names = [name for name in SUPPORT_UNITS if name in base or name in REQUIRED_VALUES]
+    values = {name: np.full(support.size, base.number(name, SUPPORT_UNITS[name])) for name in names}
     section = ["" for _ in support]
-    for entry in p.parts("sections"):
-        start, end = _ends(entry.only("label", "panel", "from", "to", "route", *SUPPORT_UNITS))
+    for entry in p.mappings_at("sections"):
+        start, end = _ends(entry.allow_only("label", "panel", "from", "to", "route", *SUPPORT_UNITS))
         if _route_of(entry, routes, route) != route:
             continue
         inside = (support >= start) & (support < end)
@@ -228,19 +232,20 @@ PATHS = {
     "kink": (Kink, {"place": "m", "depth": "m", "length": "m", "share": "-", "power": "-"}),
     "corrugation": (Corrugation, {"start": "m", "end": "m", "amplitude": "m", "wavelength": "m"}),
 }
-OPTIONAL = ("share", "power")
+OPTIONAL_KEYS = ("share", "power")
 
 
-def _path(p):
+def _path_part(p):
     """One part of the path of a wheel."""
-    kind = p["kind"]
-    if kind == "sections":
-        listed = [p.only("kind", "places", "dips").listed(name) for name in ("places", "dips")]
-        return p.make(Sections, *(tuple(values.number(k, "m") for k in values) for values in listed))
-    if kind not in list(PATHS):
-        raise p.error("kind", f"no path of kind {kind!r}", f"Write one of sections, {', '.join(PATHS)}")
-    made, units = PATHS[kind]
-    p.only("kind", *units)
-    return p.make(
-        made, **{name: p.number(name, unit) for name, unit in units.items() if name in p or name not in OPTIONAL}
+    part_type = p["kind"]
+    if part_type == "sections":
+        listed = [p.allow_only("kind", "places", "dips").list_at(name) for name in ("places", "dips")]
+        return p.build(Sections, *(tuple(values.number(k, "m") for k in values) for values in listed))
+    if part_type not in list(PATHS):
+        raise p.error("kind", f"no path of kind {part_type!r}", f"Write one of sections, {', '.join(PATHS)}")
+    part_class, units = PATHS[part_type]
+    p.allow_only("kind", *units)
+    return p.build(
+        part_class,
+        **{name: p.number(name, unit) for name, unit in units.items() if name in p or name not in OPTIONAL_KEYS},
     )

@@ -6,7 +6,7 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.simulate.force_laws import PowerLaw
-from turnout.simulate.vehicle import EACH, Body, Suspension, Vehicle, one_or_all
+from turnout.simulate.vehicle import WHEEL_FIELDS, Body, Suspension, Vehicle, one_or_all
 
 CAR_UNITS = {"mass": "kg", "payload": "kg", "inertia": "kg m²"}
 BOGIE_UNITS = {
@@ -20,7 +20,7 @@ BOGIE_UNITS = {
     "secondary_damping": "N s/m",
 }
 AXLE_UNITS = {"wheelset_mass": "kg", "suspension_stiffness": "N/m", "suspension_damping": "N s/m"}
-KEYS = ("name", "title", "car_types", "bogie_types", "axle_types", "cars", "bogies", "axles", "wheel", "length")
+TRAIN_KEYS = ("name", "title", "car_types", "bogie_types", "axle_types", "cars", "bogies", "axles", "wheel", "length")
 
 
 def train(parameters, load=0.5, units=1):
@@ -30,7 +30,7 @@ def train(parameters, load=0.5, units=1):
     and centre. Centres are from the unit's front end. A bogie of two cars is shared (Jacobs): each car rests on half of
     its secondary springs. ``load`` is the share of the payload, ``units`` the number of coupled units.
     """
-    p = parameters.only(*KEYS)
+    p = parameters.allow_only(*TRAIN_KEYS)
     if not 0.0 <= load <= 1.5:
         raise SimulationError(f"{p['name']}: load {load!r} is not between 0 (empty) and 1.5 (overloaded).")
     if units < 1:
@@ -43,12 +43,12 @@ def train(parameters, load=0.5, units=1):
         _add_unit(p, load, unit * length, bodies, suspensions, wheels)
     if not wheels:
         raise p.error(None, "a train without wheels", "List 'cars' and the 'bogies' or 'axles' below them")
-    front = min(bodies[w].place for w in wheels)
-    bodies = [Body(b.name, b.mass, b.inertia, b.place - front) for b in bodies]
-    wheel = p.part("wheel").only("radius", "contact")
-    contact = wheel.make(PowerLaw, wheel.number("contact", "N/m^1.5"))
-    noted = {"load_share": float(load), "units": int(units)}
-    return p.make(
+    front = min(bodies[w].position for w in wheels)
+    bodies = [Body(b.name, b.mass, b.inertia, b.position - front) for b in bodies]
+    wheel = p.mapping_at("wheel").allow_only("radius", "contact")
+    contact = wheel.build(PowerLaw, wheel.number("contact", "N/m^1.5"))
+    conditions = {"load_share": float(load), "units": int(units)}
+    return p.build(
         Vehicle,
         str(p["name"]),
         tuple(bodies),
@@ -58,83 +58,83 @@ def train(parameters, load=0.5, units=1):
         radius=wheel.number("radius", "m"),
         length=units * length,
         overhang=float(front),
-        conditions=noted,
+        conditions=conditions,
     )
 
 
 def _add_unit(p, load, offset, bodies, suspensions, wheels):
-    bogies, axles, cars = (p.parts(name) for name in ("bogies", "axles", "cars"))
+    bogies, axles, cars = (p.mappings_at(name) for name in ("bogies", "axles", "cars"))
     carriers = [("bogie", b) for b in bogies] + [("axle", a) for a in axles]
-    names = {str(entry.only("label", "type", "centre")["label"]): k for k, (_, entry) in enumerate(carriers)}
-    users = {label: sum(label in _rests_on(car) for car in cars) for label in names}
+    names = {str(entry.allow_only("label", "type", "centre")["label"]): k for k, (_, entry) in enumerate(carriers)}
+    users = {label: sum(label in _carrier_labels(car) for car in cars) for label in names}
     # Bodies in order of position keep the rows of a car together, so that uncoupled cars are separate blocks.
     order = sorted(range(len(carriers)), key=lambda k: carriers[k][1].number("centre", "m"))
-    placed, at = {}, {}
+    carrier_bodies, carrier_positions = {}, {}
     pending = sorted(cars, key=lambda c: c.number("centre", "m"))
     for entry in pending:
-        kind = _kind(p, "car_types", entry, CAR_UNITS)
-        empty = kind.number("mass", "kg")
+        car_type = _type_values(p, "car_types", entry, CAR_UNITS)
+        empty = car_type.number("mass", "kg")
         if not empty > 0.0:
-            raise kind.error("mass", f"{empty:g} kg is no mass of a car", "Write what it weighs empty")
-        mass = 0.5 * (empty + load * kind.number("payload", "kg", default=0.0))
+            raise car_type.error("mass", f"{empty:g} kg is no mass of a car", "Write what it weighs empty")
+        mass = 0.5 * (empty + load * car_type.number("payload", "kg", default=0.0))
         share = mass / (0.5 * empty)
         car_index = len(bodies)
         centre = offset + entry.number("centre", "m")
-        bodies.append(Body(str(entry["type"]), mass, 0.5 * share * kind.number("inertia", "kg m²"), centre))
-        for label in _rests_on(entry):
+        bodies.append(Body(str(entry["type"]), mass, 0.5 * share * car_type.number("inertia", "kg m²"), centre))
+        for label in _carrier_labels(entry):
             if label not in names:
                 raise SimulationError(f"{p['name']}: a car rests on {label!r}; there are {', '.join(names)}.")
             k = names[label]
-            if k not in placed:
-                placed[k] = _add_carrier(p, *carriers[k], offset, bodies, suspensions, wheels)
-                at[k] = offset + carriers[k][1].number("centre", "m")
-            index, stiffness, damping = placed[k]
+            if k not in carrier_bodies:
+                carrier_bodies[k] = _add_carrier(p, *carriers[k], offset, bodies, suspensions, wheels)
+                carrier_positions[k] = offset + carriers[k][1].number("centre", "m")
+            index, stiffness, damping = carrier_bodies[k]
             n = users[label]
-            suspensions.append(Suspension(car_index, index, at[k] - centre, stiffness / n, damping / n))
-    if len(placed) < len(order):
+            suspensions.append(Suspension(car_index, index, carrier_positions[k] - centre, stiffness / n, damping / n))
+    if len(carrier_bodies) < len(order):
         raise SimulationError(f"{p['name']}: a bogie or axle carries no car.")
-    wheels.sort(key=lambda w: bodies[w].place)
+    wheels.sort(key=lambda w: bodies[w].position)
 
 
-def _rests_on(car):
+def _carrier_labels(car):
     """Labels of the bogies and axles below a car."""
-    return [str(label) for label in car.only("type", "rests_on", "centre").listed("rests_on").values()]
+    return [str(label) for label in car.allow_only("type", "rests_on", "centre").list_at("rests_on").values()]
 
 
-def _kind(p, table, entry, keys):
+def _type_values(p, table, entry, keys):
     """The type of a car, bogie or axle: its values in ``table``."""
-    return p.part(table).part(str(entry["type"])).only(*keys)
+    return p.mapping_at(table).mapping_at(str(entry["type"])).allow_only(*keys)
 
 
-def _add_carrier(p, kind, entry, offset, bodies, suspensions, wheels):
+def _add_carrier(p, carrier_type, entry, offset, bodies, suspensions, wheels):
     """Add a bogie or axle; returns its body and half of the springs above it."""
-    place = offset + entry.number("centre", "m")
-    if kind == "axle":
-        table = _kind(p, "axle_types", entry, AXLE_UNITS)
+    position = offset + entry.number("centre", "m")
+    if carrier_type == "axle":
+        table = _type_values(p, "axle_types", entry, AXLE_UNITS)
         values = {name: table.number(name, unit) for name, unit in AXLE_UNITS.items()}
         wheels.append(len(bodies))
-        bodies.append(Body("wheel", 0.5 * values["wheelset_mass"], None, place))
+        bodies.append(Body("wheel", 0.5 * values["wheelset_mass"], None, position))
         return len(bodies) - 1, 0.5 * values["suspension_stiffness"], 0.5 * values["suspension_damping"]
-    table = _kind(p, "bogie_types", entry, (*BOGIE_UNITS, "axles"))
+    table = _type_values(p, "bogie_types", entry, (*BOGIE_UNITS, "axles"))
     values = {name: table.number(name, unit) for name, unit in BOGIE_UNITS.items()}
     bogie = len(bodies)
-    bodies.append(Body("bogie", 0.5 * values["mass"], 0.5 * values["inertia"], place))
+    bodies.append(Body("bogie", 0.5 * values["mass"], 0.5 * values["inertia"], position))
     for side in np.linspace(-0.5, 0.5, table.count("axles", 2)):
         lever = side * values["base"]
         suspensions.append(
             Suspension(bogie, len(bodies), lever, 0.5 * values["primary_stiffness"], 0.5 * values["primary_damping"])
         )
         wheels.append(len(bodies))
-        bodies.append(Body("wheel", 0.5 * values["wheelset_mass"], None, place + lever))
+        bodies.append(Body("wheel", 0.5 * values["wheelset_mass"], None, position + lever))
     return bogie, 0.5 * values["secondary_stiffness"], 0.5 * values["secondary_damping"]
 
 
-def coupled(name, vehicles):
+def couple(name, vehicles):
     """One train of ``vehicles`` in a row; every wheel has the contact, radius and pressing force of its vehicle.
 
     >>> from turnout.simulate.vehicle import car
-    >>> two = coupled("two cars", [car(length=26.0, overhang=1.9)] * 2)
-    >>> [float(p) for p in two.wheel_places[:5]]
+    >>> two = couple("two cars", [car(length=26.0, overhang=1.9)] * 2)
+    >>> [float(p) for p in two.wheel_positions[:5]]
     [0.0, 2.5, 17.7, 20.2, 26.0]
     """
     bodies: list[Body] = []
@@ -145,10 +145,10 @@ def coupled(name, vehicles):
     for vehicle in vehicles:
         shift, first = end + vehicle.overhang, len(bodies)
         row = int(sum(1 if b.inertia is None else 2 for b in bodies))
-        bodies += [replace(b, place=b.place + shift) for b in vehicle.bodies]
+        bodies += [replace(b, position=b.position + shift) for b in vehicle.bodies]
         suspensions += [replace(s, upper=s.upper + first, lower=s.lower + first) for s in vehicle.suspensions]
         wheels += [w + first for w in vehicle.wheels]
-        links += [(tuple((r + row, f) for r, f in ends), *rest) for ends, *rest in vehicle.extra_links]
+        links += [(tuple((r + row, f) for r, f in ends), *coefficients) for ends, *coefficients in vehicle.extra_links]
         end += vehicle.length
     lead = vehicles[0]
     return Vehicle(
@@ -156,7 +156,10 @@ def coupled(name, vehicles):
         tuple(bodies),
         tuple(suspensions),
         tuple(wheels),
-        **{what: one_or_all([value for v in vehicles for value in v.each(what)]) for what in EACH},
+        **{
+            quantity: one_or_all([value for v in vehicles for value in v.wheel_values(quantity)])
+            for quantity in WHEEL_FIELDS
+        },
         extra_links=tuple(links),
         length=end + lead.overhang,
         overhang=lead.overhang,

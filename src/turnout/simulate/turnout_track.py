@@ -38,9 +38,9 @@ class TurnoutTrack:
         """The track under ``route``."""
         return self.tracks.get(route, self.track)
 
-    def parts_at(self, place):
+    def is_divided_at(self, position):
         """Whether the routes have separate supports at ``position`` [m], as behind a crossing."""
-        return len({track.section[track.nearest_support(place)] for track in self.tracks.values()}) > 1
+        return len({track.section[track.nearest_support(position)] for track in self.tracks.values()}) > 1
 
     def surfaces(self, route):
         """Surfaces of ``route``; an unknown one is a SimulationError."""
@@ -48,7 +48,7 @@ class TurnoutTrack:
             raise SimulationError(f"{self.name}: no route {route!r}; there are {', '.join(self.routes)}.")
         return self.routes[route]
 
-    def rolling(self, start, end, seed, level=None):
+    def roughness_parts(self, start, end, seed, level=None):
         """The roughness between two positions as path parts, () for a smooth rail."""
         level = self.roughness_level if level is None else level
         return () if level is None else (roughness(start, end, seed, level),)
@@ -59,16 +59,16 @@ class TurnoutTrack:
         return replace(self, track=replace(self.track, **changes), tracks=tracks)
 
 
-def within(track, place, half_length):
+def supports_within(track, position, half_length):
     """(n_support,) whether each support is in the ``stretch_of_track``."""
-    return np.abs(track.support - place) <= half_length
+    return np.abs(track.support - position) <= half_length
 
 
-def stretch_of_track(track, place, half_length=30.0):
+def stretch_of_track(track, position, half_length=30.0):
     """The track within ``half_length`` [m] of ``position``, which is enough for a hammer test."""
-    keep = within(track, place, half_length)
-    if keep.sum() < 3:
-        raise SimulationError(f"{track.name}: no three supports within {half_length} m of {place} m.")
-    values = {name: getattr(track, name)[keep] for name in PER_SUPPORT}
-    section = tuple(s for s, k in zip(track.section, keep) if k)
-    return replace(track, support=track.support[keep], section=section, **values)
+    inside = supports_within(track, position, half_length)
+    if inside.sum() < 3:
+        raise SimulationError(f"{track.name}: no three supports within {half_length} m of {position} m.")
+    values = {name: getattr(track, name)[inside] for name in PER_SUPPORT}
+    section = tuple(s for s, k in zip(track.section, inside) if k)
+    return replace(track, support=track.support[inside], section=section, **values)

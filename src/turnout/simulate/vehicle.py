@@ -10,7 +10,7 @@ from turnout.simulate.force_laws import PowerLaw
 
 GRAVITY = 9.81
 HERTZ = PowerLaw(93e9)
-EACH = ("contact", "radius", "pressing")  # fields that may differ between the wheels of a train
+WHEEL_FIELDS = ("contact", "radius", "pressing")  # fields that may differ between the wheels of a train
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Body:
     name: str
     mass: float
     inertia: float | None
-    place: float
+    position: float
 
 
 @dataclass(frozen=True)
@@ -72,13 +72,15 @@ class Vehicle:
                 raise SimulationError(
                     f"{self.name}: suspension of {name!r} has {s.stiffness!r} N/m, {s.damping!r} N s/m."
                 )
-        places = self.wheel_places
-        if not len(places) or np.any(np.diff(places) <= 0.0):
-            raise SimulationError(f"{self.name}: wheels must follow each other, their places are {places!r}.")
-        for what in EACH:
-            value = getattr(self, what)
-            if isinstance(value, tuple) and len(value) != len(places):
-                raise SimulationError(f"{self.name}: {what} of {len(value)} wheels, the train has {len(places)}.")
+        positions = self.wheel_positions
+        if not len(positions) or np.any(np.diff(positions) <= 0.0):
+            raise SimulationError(f"{self.name}: wheels must follow each other, their places are {positions!r}.")
+        for quantity in WHEEL_FIELDS:
+            value = getattr(self, quantity)
+            if isinstance(value, tuple) and len(value) != len(positions):
+                raise SimulationError(
+                    f"{self.name}: {quantity} of {len(value)} wheels, the train has {len(positions)}."
+                )
 
     @cached_property
     def row(self):
@@ -97,13 +99,13 @@ class Vehicle:
         return self.row[list(self.wheels)]
 
     @property
-    def wheel_places(self):
+    def wheel_positions(self):
         """Distance of each wheel behind the front one [m], (n_wheel,)."""
-        return np.array([self.bodies[i].place for i in self.wheels])
+        return np.array([self.bodies[i].position for i in self.wheels])
 
-    def each(self, what):
+    def wheel_values(self, quantity):
         """``contact``, ``radius`` or ``pressing`` of every wheel, a tuple of n_wheel."""
-        value = getattr(self, what)
+        value = getattr(self, quantity)
         return value if isinstance(value, tuple) else (value,) * len(self.wheels)
 
     @cached_property
@@ -115,7 +117,7 @@ class Vehicle:
             mass[row, row], weight[row] = body.mass, self.gravity * body.mass
             if body.inertia is not None:
                 mass[row + 1, row + 1] = body.inertia
-        weight[self.wheel_rows] += self.each("pressing")
+        weight[self.wheel_rows] += self.wheel_values("pressing")
         for s in self.suspensions:
             ends = self._ends(s.upper, s.lever, 1.0) + self._ends(s.lower, s.lower_lever, -1.0)
             _add(stiffness, ends, s.stiffness)
@@ -150,28 +152,30 @@ class Vehicle:
         """First row of each group of coupled rows, with the end; rows of a group follow each other."""
         _, damping, stiffness, _ = self.matrices
         mass = self.matrices[0]
-        linked = (stiffness != 0.0) | (damping != 0.0) | (mass != 0.0)
+        coupled = (stiffness != 0.0) | (damping != 0.0) | (mass != 0.0)
         starts, reach = [0], 0
         for i in range(self.n):
             if i > reach:
                 starts.append(i)
-            reach = max(reach, i, int(np.flatnonzero(linked[i]).max(initial=i)))
+            reach = max(reach, i, int(np.flatnonzero(coupled[i]).max(initial=i)))
         return np.array([*starts, self.n], dtype=np.int64)
 
     def with_(self, **changes):
         """The same vehicle with some fields changed."""
         return replace(self, **changes)
 
-    def turned(self):
+    def reverse(self):
         """The same vehicle in the opposite direction, its last wheel first."""
-        last = float(self.wheel_places[-1])
+        last = float(self.wheel_positions[-1])
         pitch = {int(r) + 1 for r, b in zip(self.row, self.bodies) if b.inertia is not None}
-        links = tuple((tuple((r, -w if r in pitch else w) for r, w in ends), *rest) for ends, *rest in self.extra_links)
+        links = tuple(
+            (tuple((r, -w if r in pitch else w) for r, w in ends), *values) for ends, *values in self.extra_links
+        )
         return self.with_(
-            bodies=tuple(replace(b, place=last - b.place) for b in self.bodies),
+            bodies=tuple(replace(b, position=last - b.position) for b in self.bodies),
             suspensions=tuple(replace(s, lever=-s.lever, lower_lever=-s.lower_lever) for s in self.suspensions),
             wheels=self.wheels[::-1], extra_links=links,
-            **{what: self.each(what)[::-1] for what in EACH if isinstance(getattr(self, what), tuple)},
+            **{name: self.wheel_values(name)[::-1] for name in WHEEL_FIELDS if isinstance(getattr(self, name), tuple)},
             overhang=self.length - last - self.overhang if self.length else self.overhang,
         )  # fmt: skip
 
@@ -210,16 +214,16 @@ def car(
     suspensions = []
     for side in (-1.0, 1.0):
         bogie = len(bodies)
-        place = centre + side * half_pivot
-        bodies.append(Body(f"bogie {bogie}", bogie_mass, bogie_inertia, place))
+        position = centre + side * half_pivot
+        bodies.append(Body(f"bogie {bogie}", bogie_mass, bogie_inertia, position))
         suspensions.append(Suspension(0, bogie, side * half_pivot, *secondary))
         for axle in (-1.0, 1.0):
             suspensions.append(Suspension(bogie, len(bodies), axle * half_base, *primary))
-            bodies.append(Body(f"wheel {len(bodies)}", wheel_mass, None, place + axle * half_base))
+            bodies.append(Body(f"wheel {len(bodies)}", wheel_mass, None, position + axle * half_base))
     return Vehicle(name, tuple(bodies), tuple(suspensions), (2, 3, 5, 6), **more)
 
 
-def lone_wheels(mass, places=(0.0,), **more):
+def lone_wheels(mass, positions=(0.0,), **more):
     """Wheels of ``mass`` [kg] without suspension at ``positions`` [m]; ``more`` is passed to ``Vehicle``."""
-    bodies = tuple(Body(f"wheel {k}", mass, None, place) for k, place in enumerate(places))
+    bodies = tuple(Body(f"wheel {k}", mass, None, position) for k, position in enumerate(positions))
     return Vehicle("wheels", bodies, (), tuple(range(len(bodies))), **more)

@@ -42,12 +42,12 @@ def uniform_pieces(value):
 def uniform_spline(value, start, step, x):
     """Natural cubic spline through ``value`` at ``start`` + k ``step``, at ``x``; 0 outside the grid."""
     pieces = uniform_pieces(value)
-    place = (np.asarray(x, dtype=float) - start) / step
-    k = np.clip(np.floor(place).astype(np.int64), 0, len(pieces) - 1)
-    r = place - k
+    grid_position = (np.asarray(x, dtype=float) - start) / step
+    k = np.clip(np.floor(grid_position).astype(np.int64), 0, len(pieces) - 1)
+    r = grid_position - k
     c = pieces[k]
-    found = ((c[..., 0] * r + c[..., 1]) * r + c[..., 2]) * r + c[..., 3]
-    return np.where((place >= 0.0) & (place <= len(pieces)), found, 0.0)
+    dip = ((c[..., 0] * r + c[..., 1]) * r + c[..., 2]) * r + c[..., 3]
+    return np.where((grid_position >= 0.0) & (grid_position <= len(pieces)), dip, 0.0)
 
 
 @dataclass(frozen=True)
@@ -81,8 +81,8 @@ class Cosine:
         _check_length("cosine", self.place, self.length)
 
     def __call__(self, x, wheel=0):
-        part = np.clip((np.asarray(x) - self.place) / self.length, -0.5, 0.5)
-        return 0.5 * self.depth * (1.0 + np.cos(2.0 * np.pi * part))
+        phase = np.clip((np.asarray(x) - self.place) / self.length, -0.5, 0.5)
+        return 0.5 * self.depth * (1.0 + np.cos(2.0 * np.pi * phase))
 
 
 @dataclass(frozen=True)
@@ -116,9 +116,12 @@ class Kink:
         return self.power * self.depth * (1.0 / (self.share * self.length) + 1.0 / ((1.0 - self.share) * self.length))
 
     def __call__(self, x, wheel=0):
-        way = np.asarray(x) - self.place
+        distance = np.asarray(x) - self.place
         before, after = self.share * self.length, (1.0 - self.share) * self.length
-        return self.depth * np.clip(1.0 - np.where(way < 0.0, -way / before, way / after), 0.0, None) ** self.power
+        return (
+            self.depth
+            * np.clip(1.0 - np.where(distance < 0.0, -distance / before, distance / after), 0.0, None) ** self.power
+        )
 
 
 @dataclass(frozen=True)
@@ -191,11 +194,11 @@ class WheelFlat:
         if wheel != self.wheel:
             return np.zeros_like(x)
         turn = 2.0 * np.pi * self.radius
-        way = np.remainder(x - self.phase + 0.5 * turn, turn) - 0.5 * turn
+        distance = np.remainder(x - self.phase + 0.5 * turn, turn) - 0.5 * turn
         return (
             0.5
             * self.depth
-            * np.where(np.abs(way) < 0.5 * self.length, 1.0 + np.cos(2.0 * np.pi * way / self.length), 0.0)
+            * np.where(np.abs(distance) < 0.5 * self.length, 1.0 + np.cos(2.0 * np.pi * distance / self.length), 0.0)
         )
 
 
@@ -226,32 +229,32 @@ class Sampled:
         return uniform_spline(self.dip, self.start, self.step, x)
 
 
-def _check_length(kind, place, length):
+def _check_length(path_name, position, length):
     if not length > 0.0:
-        raise SimulationError(f"{kind} at {place:.3f} m: a length of {length!r} m is none.")
+        raise SimulationError(f"{path_name} at {position:.3f} m: a length of {length!r} m is none.")
 
 
-def check_path(parts, start, end, step=0.005, limit=1e-3):
+def check_path(path_parts, start, end, step=0.005, limit=1e-3):
     """Reject a path with a jump of more than ``limit`` [m] that remains on a grid 2000 times finer."""
     x = np.arange(start, end + step, step)
-    for part in parts:
-        p = part(x, 0)
+    for path_part in path_parts:
+        p = path_part(x, 0)
         jumps = np.abs(np.diff(p))
         if not np.all(np.isfinite(p)):
-            raise SimulationError(f"path {part!r}: not a number at {x[~np.isfinite(p)][0]:.3f} m.")
+            raise SimulationError(f"path {path_part!r}: not a number at {x[~np.isfinite(p)][0]:.3f} m.")
         for k in np.flatnonzero(jumps > limit)[:50]:
             fine = np.linspace(x[k], x[k + 1], 2001)
-            step_found = np.max(np.abs(np.diff(part(fine, 0))))
-            if step_found > 0.5 * jumps[k]:
-                raise SimulationError(f"path {part!r} jumps by {step_found * 1e3:.2f} mm at {x[k]:.3f} m.")
+            jump = np.max(np.abs(np.diff(path_part(fine, 0))))
+            if jump > 0.5 * jumps[k]:
+                raise SimulationError(f"path {path_part!r} jumps by {jump * 1e3:.2f} mm at {x[k]:.3f} m.")
 
 
-def spline_pieces(parts, wheel, start, end, step):
+def spline_pieces(path_parts, wheel, start, end, step):
     """Cubic coefficients (n, 4) in steps of ``step`` of the sum of ``path_parts`` for one wheel, C2 spline."""
     x = np.arange(start, end + 1.5 * step, step)
     dip = np.zeros_like(x)
-    for part in parts:
-        dip += part(x, wheel)
+    for path_part in path_parts:
+        dip += path_part(x, wheel)
     if not np.all(np.isfinite(dip)):
         raise SimulationError(f"the path of wheel {wheel} is not a number at {x[~np.isfinite(dip)][0]:.3f} m.")
     return uniform_pieces(dip)

@@ -10,18 +10,18 @@ from turnout.config import load_configuration
 from turnout.errors import SimulationError
 from turnout.files import write_text
 from turnout.simulate import load_track
-from turnout.stages.accepted_effects import KINDS, OF_A_WHEELSET, SUPPORTS, accepted_of
+from turnout.stages.accepted_effects import SUPPORT_KEYS, TERM_CLASSES, WHEELSET_EFFECTS, accepted_of
 from turnout.stages.mismatch_inputs import track_file
 
 # Units for values below 0.1 in SI units: SI unit -> (unit, its size in the SI unit)
-SMALLER = {"m": ("mm", 1e-3), "s": ("ms", 1e-3)}
-PLACES = ("place", "start", "end")
-PLACED = {*SUPPORTS, *PLACES}
-HEAD = """# What recordings of this turnout showed to be missing from the track of its layout. Written by
+DISPLAY_UNITS = {"m": ("mm", 1e-3), "s": ("ms", 1e-3)}
+POSITION_FIELDS = ("place", "start", "end")
+FIELDS_IN_METRES = {*SUPPORT_KEYS, *POSITION_FIELDS}
+FILE_HEADER = """# What recordings of this turnout showed to be missing from the track of its layout. Written by
 # `turnout diagnose --accept`; take an entry out again when the cause is repaired.
 extends: {layout}
 """
-ENTRY = re.compile(r"^ *- term:", re.MULTILINE)
+ENTRY_START = re.compile(r"^ *- term:", re.MULTILINE)
 
 
 def accept(finding, config, turnout_id, track=None, anyway=False) -> tuple[Path, str]:
@@ -37,39 +37,39 @@ def accept(finding, config, turnout_id, track=None, anyway=False) -> tuple[Path,
         belongs to a wheelset. The file is then unchanged.
     """
     turnout = load_configuration(config).turnout(turnout_id)
-    _refuse(finding, turnout_id, anyway)
+    _check_acceptable(finding, turnout_id, anyway)
     terms = json.loads(finding["term_json"])
     path = track_file(turnout, track)
     if path.stem != turnout_id and track is None:
-        text, path = HEAD.format(layout=path.stem), path.with_name(f"{turnout_id}.yaml")
+        text, path = FILE_HEADER.format(layout=path.stem), path.with_name(f"{turnout_id}.yaml")
     else:
         text = path.read_text(encoding="utf-8")
-    known = load_track(str(track_file(turnout, track)), folder=path.parent)
+    current_track = load_track(str(track_file(turnout, track)), folder=path.parent)
     for term in terms:
-        text = with_entry(text, entry_text(term, finding, known))
+        text = with_entry(text, entry_text(term, finding, current_track))
     _write(path, text)
-    return path, "; ".join(f"{t['term']} ({_values(t)})" for t in terms) + " accepted"
+    return path, "; ".join(f"{t['term']} ({_values_text(t)})" for t in terms) + " accepted"
 
 
-def _refuse(finding, turnout_id, anyway):
-    said = f"{turnout_id}, {finding['sections']}: the verdict is {finding['verdict'].replace('_', ' ')}"
+def _check_acceptable(finding, turnout_id, anyway):
+    prefix = f"{turnout_id}, {finding['sections']}: the verdict is {finding['verdict'].replace('_', ' ')}"
     if not finding["term_json"]:
-        raise SimulationError(f"{said}; it carries no term that could be accepted.")
-    families = {t["term"] for t in json.loads(finding["term_json"])}
-    if found := families & set(OF_A_WHEELSET):
-        raise SimulationError(f"{said}; {min(found)} belongs to a wheelset, which no track file describes.")
-    if not anyway and not any(_material(t) for t in json.loads(finding["term_json"])):
-        raise SimulationError(f"{said}, but no parameter differs from having no effect; --anyway accepts it.")
+        raise SimulationError(f"{prefix}; it carries no term that could be accepted.")
+    effects = {t["term"] for t in json.loads(finding["term_json"])}
+    if on_wheelset := effects & set(WHEELSET_EFFECTS):
+        raise SimulationError(f"{prefix}; {min(on_wheelset)} belongs to a wheelset, which no track file describes.")
+    if not anyway and not any(_is_significant(t) for t in json.loads(finding["term_json"])):
+        raise SimulationError(f"{prefix}, but no parameter differs from having no effect; --anyway accepts it.")
     if (finding["verdict"] != "named" or finding["grade"] not in ("A", "B")) and not anyway:
-        raise SimulationError(f"{said}, not named with grade A or B; --anyway accepts it all the same.")
-    either = next((t for t in json.loads(finding["term_json"]) if t.get("or")), None)
-    if either and not anyway:
-        raise SimulationError(f"{said}; {either['term']} may as well be {either['or']}; --anyway accepts it.")
+        raise SimulationError(f"{prefix}, not named with grade A or B; --anyway accepts it all the same.")
+    ambiguous = next((t for t in json.loads(finding["term_json"]) if t.get("or")), None)
+    if ambiguous and not anyway:
+        raise SimulationError(f"{prefix}; {ambiguous['term']} may as well be {ambiguous['or']}; --anyway accepts it.")
 
 
-def _material(term):
+def _is_significant(term):
     """Whether a parameter differs from its neutral value by more than half its 95 % interval."""
-    neutral = {p.name: p.neutral for p in KINDS[term["term"]].parameters}
+    neutral = {p.name: p.neutral for p in TERM_CLASSES[term["term"]].parameters}
     return any(abs(p["value"] - neutral[name]) > 1.96 * p["se"] for name, p in term["parameters"].items())
 
 
@@ -100,13 +100,15 @@ def entry_text(term, finding, track) -> str:
     day = f"{_time(finding['found_at_utc']):%Y-%m-%d}"
     source = f"turnout diagnose, recordings up to {day}, finding {finding['finding_id'][:12]}"
     lines = [f"  - term: {term['term']}"]
-    places = [value for name, value in term["fixed"].items() if name in PLACED and isinstance(value, (int, float))]
-    if any(track.parts_at(place) for place in places):
+    positions = [
+        value for name, value in term["fixed"].items() if name in FIELDS_IN_METRES and isinstance(value, (int, float))
+    ]
+    if any(track.is_divided_at(position) for position in positions):
         lines.append(f"    route: {finding['route']}")
     for name, value in term["fixed"].items():
-        lines.append(f"    {name}: {_fixed(name, value, source)}")
+        lines.append(f"    {name}: {_fixed_text(name, value, source)}")
     for name, p in term["parameters"].items():
-        lines.append(f"    {name}: {_number(p, source, finding)}")
+        lines.append(f"    {name}: {_parameter_text(p, source, finding)}")
     lines.append(f"    accepted: {datetime.now(UTC):%Y-%m-%d}")
     lines.append(f"    finding: {finding['finding_id']}")
     return "\n".join(lines) + "\n"
@@ -116,21 +118,21 @@ def _time(value) -> datetime:
     return value if isinstance(value, datetime) else datetime.fromisoformat(str(value))
 
 
-def _fixed(name, value, source):
-    if name in PLACED and isinstance(value, (int, float)):
+def _fixed_text(name, value, source):
+    if name in FIELDS_IN_METRES and isinstance(value, (int, float)):
         return f'{{value: {value:g}, unit: m, source: "{source}"}}'
     return json.dumps(value, ensure_ascii=False)
 
 
-def _number(p, source, finding):
-    unit, size = SMALLER.get(p["unit"], ("", 1.0)) if abs(p["value"]) < 0.1 else ("", 1.0)
+def _parameter_text(p, source, finding):
+    unit, size = DISPLAY_UNITS.get(p["unit"], ("", 1.0)) if abs(p["value"]) < 0.1 else ("", 1.0)
     unit, value, se = unit or p["unit"], p["value"] / size, p["se"] / size
-    shown = f'{{value: {value:.4g}, unit: "{unit}", source: "{source}"'
+    text = f'{{value: {value:.4g}, unit: "{unit}", source: "{source}"'
     if value and se:
-        shown += f", prior: {se / abs(value):.2g}"
+        text += f", prior: {se / abs(value):.2g}"
     low, high = value - 1.96 * se, value + 1.96 * se
     grade = f", grade {finding['grade']}" if finding["grade"] else ""
-    return f'{shown}, note: "95 %: {low:.3g} to {high:.3g} {unit}, {finding["verdict"].replace("_", " ")}{grade}"}}'
+    return f'{text}, note: "95 %: {low:.3g} to {high:.3g} {unit}, {finding["verdict"].replace("_", " ")}{grade}"}}'
 
 
 def with_entry(text: str, entry: str) -> str:
@@ -146,33 +148,35 @@ def with_entry(text: str, entry: str) -> str:
     <BLANKLINE>
     """
     text = text.rstrip("\n") + "\n"
-    found = re.search(r"^terms:[^\n]*\n((?:[ #][^\n]*\n|\n)*)", text, re.MULTILINE)
-    if not found:
+    section = re.search(r"^terms:[^\n]*\n((?:[ #][^\n]*\n|\n)*)", text, re.MULTILINE)
+    if not section:
         return text + "terms:\n" + entry
-    starts = [m.start() for m in ENTRY.finditer(found[1])] + [len(found[1])]
-    head, old = found[1][: starts[0]], [found[1][a:b] for a, b in pairwise(starts)]
-    kept = [e for e in old if not _same(_identity(e), _identity(entry))]
-    block = head + "".join(e if e.endswith("\n") else e + "\n" for e in kept) + entry
-    return text[: found.start(1)] + block + text[found.end(1) :]
+    starts = [m.start() for m in ENTRY_START.finditer(section[1])] + [len(section[1])]
+    head, entries = section[1][: starts[0]], [section[1][a:b] for a, b in pairwise(starts)]
+    remaining = [old_entry for old_entry in entries if not _is_same_effect(_identity(old_entry), _identity(entry))]
+    block = (
+        head + "".join(old_entry if old_entry.endswith("\n") else old_entry + "\n" for old_entry in remaining) + entry
+    )
+    return text[: section.start(1)] + block + text[section.end(1) :]
 
 
-def _same(one, other) -> bool:
+def _is_same_effect(first, second) -> bool:
     """Whether two identities are the same effect; an identity without route applies to all routes."""
-    return one[1:] == other[1:] and (one[0] == other[0] or not (one[0] and other[0]))
+    return first[1:] == second[1:] and (first[0] == second[0] or not (first[0] and second[0]))
 
 
 def _identity(entry: str) -> tuple[str, ...]:
     """Identity of an entry: route, effect, and position, sensor or train."""
-    names = ("route", "term", *SUPPORTS, *PLACES, "channel_name", "train")
-    found = []
+    names = ("route", "term", *SUPPORT_KEYS, *POSITION_FIELDS, "channel_name", "train")
+    values = []
     for name in names:
         match = re.search(rf"^[ -]*{name}: *(?:{{ *value: *([^,}}]+)|([^\n#]+))", entry, re.MULTILINE)
         value = (match[1] or match[2]).strip().strip('"') if match else ""
-        found.append(f"{float(value):.1f}" if re.fullmatch(r"-?\d+(\.\d*)?", value) else value)
-    return tuple(found)
+        values.append(f"{float(value):.1f}" if re.fullmatch(r"-?\d+(\.\d*)?", value) else value)
+    return tuple(values)
 
 
-def _values(term):
+def _values_text(term):
     return ", ".join(
         f"{name} {p['value']:.4g} ± {1.96 * p['se']:.2g} {p['unit']}" for name, p in term["parameters"].items()
     )

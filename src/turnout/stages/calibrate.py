@@ -14,15 +14,15 @@ from turnout.readers import read
 from turnout.receptance import find_impacts, receptance_of
 from turnout.records import RawChannel, RawDescription, Recording
 from turnout.simulate import load_track
-from turnout.simulate.calibration import Measured, calibrate
-from turnout.simulate.hammer import located
+from turnout.simulate.calibration import MeasuredReceptance, calibrate
+from turnout.simulate.hammer import resolve_location
 from turnout.simulate.modal_calibration import fit_modes
 from turnout.simulate.parameters import track_path
 from turnout.stages.mismatch_inputs import track_file
 
 LOG = logging.getLogger("turnout.simulate")
-BAND = (60.0, 800.0)  # Hz: receptance lines used
-UNDESCRIBED = RawDescription(
+CALIBRATION_BAND = (60.0, 800.0)  # Hz: receptance lines used
+DEFAULT_CHANNELS = RawDescription(
     (
         RawChannel("hammer", "hammer", "force"),
         RawChannel("acc_1", "acc_1", "acceleration"),
@@ -31,7 +31,7 @@ UNDESCRIBED = RawDescription(
 )
 
 
-def track_asked(track, turnout_id=None, config="config"):
+def resolve_track(track, turnout_id=None, config="config"):
     """Track file: of ``track`` if given, else the turnout's own, else Tommerup's; SimulationError if there is none."""
     if turnout_id is not None:
         return track_file(load_configuration(config).turnout(turnout_id), track)
@@ -45,39 +45,39 @@ def calibrate_to_files(track_name, section, files, turnout_id=None, config="conf
     :math:`\\sigma = |H| \\sqrt{(1-\\gamma^2) / 2n\\gamma^2}` (Bendat and Piersol, eq. 9.90), lines 60-800 Hz.
     """
     track = load_track(str(track_name), seed=seed)
-    place, _ = located(track, section)
+    position, _ = resolve_location(track, section)
     description, force, responses, settings = _channels(section, turnout_id, config)
-    recordings, refused = _recordings(files, description)
+    recordings, rejected = _recordings(files, description)
     if not recordings:
-        raise SimulationError(f"calibration of {section}: no record can be used. {' '.join(refused)}")
-    if refused:
-        LOG.warning("not used: %s", " ".join(refused))
+        raise SimulationError(f"calibration of {section}: no record can be used. {' '.join(rejected)}")
+    if rejected:
+        LOG.warning("not used: %s", " ".join(rejected))
     measured = []
     for name in responses:
         channel = recordings[0].channels[recordings[0].index(name)]
-        at = channel.position
-        if at is None:
-            at = place + (0.3 if "mid-span" in channel.mounting else 0.0)
+        response_position = channel.position
+        if response_position is None:
+            response_position = position + (0.3 if "mid-span" in channel.mounting else 0.0)
         impacts = [i for i in find_impacts(recordings, force, name, settings) if i.accepted]
         if len(impacts) < settings.minimum_impacts:
             raise SimulationError(f"calibration of {section}: {len(impacts)} sound impacts in channel {name!r}.")
-        measured.append(_measured(receptance_of(impacts, settings), place, at))
+        measured.append(_receptance_data(receptance_of(impacts, settings), position, response_position))
     return calibrate(track, section, measured)
 
 
 def _recordings(files, description):
     """(recordings of all files, errors of those that cannot be read)."""
     recordings: list[Recording] = []
-    refused: list[str] = []
+    rejected: list[str] = []
     for file in (Path(f).resolve() for f in files):  # a link may lead anywhere
         try:
             result = read(file.name, file.parent, description)
         except ReadError as error:
-            refused.append(str(error))
+            rejected.append(str(error))
             continue
         recordings += result.recordings
-        refused += map(str, result.errors)
-    return recordings, refused
+        rejected += map(str, result.errors)
+    return recordings, rejected
 
 
 def calibrate_to_modes(track_name, section, wanted, seed=0, evaluations=14):
@@ -96,7 +96,7 @@ def identified_modes(recordings, force="hammer", response="acc_1"):
 
 def _channels(section, turnout_id, config):
     if turnout_id is None:
-        return UNDESCRIBED, "hammer", ("acc_1", "acc_2"), ReceptanceSettings()
+        return DEFAULT_CHANNELS, "hammer", ("acc_1", "acc_2"), ReceptanceSettings()
     turnout = load_configuration(config).turnout(turnout_id)
     hammer = turnout.hammer
     if hammer is None:
@@ -105,8 +105,8 @@ def _channels(section, turnout_id, config):
     return hammer.descriptions[section], hammer.force[section], names, turnout.settings["receptance"]
 
 
-def _measured(receptance, excited, at):
-    inside = (receptance.frequency >= BAND[0]) & (receptance.frequency <= BAND[1])
+def _receptance_data(receptance, impact_position, response_position):
+    inside = (receptance.frequency >= CALIBRATION_BAND[0]) & (receptance.frequency <= CALIBRATION_BAND[1])
     h, coherence = receptance.h1[inside], np.clip(receptance.coherence[inside], 1e-3, 1.0 - 1e-6)
     sd = np.abs(h) * np.sqrt((1.0 - coherence) / (2.0 * receptance.n * coherence))
-    return Measured(receptance.frequency[inside], h, sd, excited, at)
+    return MeasuredReceptance(receptance.frequency[inside], h, sd, impact_position, response_position)

@@ -14,21 +14,21 @@ class Checkpoint(MutableMapping):
     def __init__(self, folder, name, version=()):
         digest = hashlib.sha256(repr(tuple(version)).encode()).hexdigest()[:12]
         self.folder = folder / f"{name}-{digest}"
-        self.seen = {}
+        self.cache = {}
 
     def _path(self, key):
         return self.folder / (hashlib.sha256(key.encode()).hexdigest()[:24] + ".fit")
 
     def __getitem__(self, key):
-        if key not in self.seen:
+        if key not in self.cache:
             try:
-                self.seen[key] = pickle.loads(self._path(key).read_bytes())
+                self.cache[key] = pickle.loads(self._path(key).read_bytes())
             except (FileNotFoundError, EOFError, pickle.UnpicklingError):
                 raise KeyError(key) from None
-        return self.seen[key]
+        return self.cache[key]
 
     def __setitem__(self, key, value):
-        self.seen[key] = value
+        self.cache[key] = value
         self.folder.mkdir(parents=True, exist_ok=True)
         path = self._path(key)
         unfinished = path.with_suffix(".tmp")
@@ -36,22 +36,22 @@ class Checkpoint(MutableMapping):
         unfinished.replace(path)
 
     def __delitem__(self, key):
-        del self.seen[key]
+        del self.cache[key]
         self._path(key).unlink(missing_ok=True)
 
     def __iter__(self):
-        return iter(self.seen)
+        return iter(self.cache)
 
     def __len__(self):
-        return len(self.seen)
+        return len(self.cache)
 
-    def done(self):
+    def discard(self):
         """Delete all values and the folder."""
         if self.folder.is_dir():
             for path in self.folder.iterdir():
                 path.unlink()
             self.folder.rmdir()
-        self.seen.clear()
+        self.cache.clear()
 
 
 class Replay(Checkpoint):
@@ -61,8 +61,8 @@ class Replay(Checkpoint):
         try:
             return super().__getitem__(key)
         finally:
-            self.seen.clear()
+            self.cache.clear()
 
     def __setitem__(self, key, value):
         super().__setitem__(key, value)
-        self.seen.clear()
+        self.cache.clear()

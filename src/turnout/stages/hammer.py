@@ -8,21 +8,29 @@ from typing import Any
 
 import numpy as np
 
-from turnout.config.filename_pattern import compiled
+from turnout.config.filename_pattern import compile_pattern
 from turnout.config.turnout import TurnoutConfig
 from turnout.errors import ReadError
 from turnout.modal import identify
 from turnout.receptance import find_impacts, receptance_of
 from turnout.records import ModalModel, Rejection, Unit
 from turnout.registry.ids import content_id
-from turnout.stages.common import contradiction, quarantine_row, rail_temperature, read_or_quarantine, recording_row
+from turnout.stages.common import (
+    quarantine_row,
+    rail_temperature,
+    read_or_quarantine,
+    recording_row,
+    time_contradiction,
+)
 from turnout.stages.hammer_rows import impact_mode_row, impact_row, mode_row, model_row, receptance_row
 
 # Largest time between a recording and its campaign: it may last into the night, and a clock may show local time.
-OTHER_CAMPAIGN = timedelta(days=2)
+MAX_CAMPAIGN_OFFSET = timedelta(days=2)
 # Largest value of the registry's column `test`.
-LARGEST_TEST = 2**31 - 1
-REFILE = "It is used. Move it to its day's campaign if it is another's; a logger's clock that was wrong does no harm"
+MAX_TEST_NUMBER = 2**31 - 1
+MISFILED_REMEDY = (
+    "It is used. Move it to its day's campaign if it is another's; a logger's clock that was wrong does no harm"
+)
 
 
 def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root, algo: str = "") -> dict[str, list[dict]]:
@@ -60,17 +68,19 @@ def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root, algo: str = "") ->
         result = read_or_quarantine(path, raw_root, description, base, rows["quarantine"], "hammer", ids)
         if result is not None:
             ids[path] = result.sha256[:32]
-            wrong = contradiction(path, result.recordings, campaign.started_at, OTHER_CAMPAIGN, REFILE)
+            wrong = time_contradiction(
+                path, result.recordings, campaign.started_at, MAX_CAMPAIGN_OFFSET, MISFILED_REMEDY
+            )
             if wrong is not None:
                 rows["quarantine"].append(quarantine_row(wrong, base, "hammer", "hammer", None, ids[path]))
             rows["recordings"].append(recording_row(result, path, size, description, base, "hammer"))
             recordings += result.recordings
     if not rows["recordings"]:
         return rows
-    recordings = _of_one_rate(recordings, base, rows["quarantine"], ids)
+    recordings = _with_common_rate(recordings, base, rows["quarantine"], ids)
     # all impacts of the campaign at once: a fault of a whole file shows in comparison with the others
     impacts = find_impacts(recordings, force, response, turnout.settings["receptance"])
-    impacts, receptance, model = _identified(impacts, turnout)
+    impacts, receptance, model = _identify_accepted(impacts, turnout)
     tests = {path: _test_number(turnout, unit, path) for path in ids}
     rows["impacts"] = [impact_row(i, base, tests[i.source], ids[i.source]) for i in impacts]
     temperature = campaign.rail_temperature
@@ -92,70 +102,73 @@ def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root, algo: str = "") ->
     if receptance is None:
         return rows | {"models": [model_row(model, base, identity, counts, None)], "modes": []}
     return rows | {
-        "models": [model_row(model, base, identity, counts, _lowest(receptance, model))],
+        "models": [model_row(model, base, identity, counts, _lowest_gate_level(receptance, model))],
         "modes": [mode_row(mode, base, identity, temperature) for mode in model.modes],
         "impact_modes": [impact_mode_row(e, base, identity, names[e["impact"]]) for e in model.per_impact],
         "receptances": [receptance_row(receptance, required, model, used[0].decay, base, identity)],
     }
 
 
-def _of_one_rate(recordings, base, quarantine, ids):
+def _with_common_rate(recordings, base, quarantine, ids):
     """Recordings of the most common sampling rate; a quarantine row for each file of another rate."""
-    rates = Counter(_rounded(r.rate) for r in recordings)
-    most = max(rates, key=lambda rate: (rates[rate], rate))
-    for path in sorted({r.source for r in recordings if _rounded(r.rate) != most}):
-        rate = next(r.rate for r in recordings if r.source == path and _rounded(r.rate) != most)
-        found, remedy = f"{rate:g} Hz, the others {most:g} Hz", "Record all tests of a campaign at one rate"
-        error = ReadError(path, "the file", found, remedy, "wrong_rate")
+    rates = Counter(_round_rate(r.rate) for r in recordings)
+    common_rate = max(rates, key=lambda rate: (rates[rate], rate))
+    for path in sorted({r.source for r in recordings if _round_rate(r.rate) != common_rate}):
+        rate = next(r.rate for r in recordings if r.source == path and _round_rate(r.rate) != common_rate)
+        observation, remedy = (
+            f"{rate:g} Hz, the others {common_rate:g} Hz",
+            "Record all tests of a campaign at one rate",
+        )
+        error = ReadError(path, "the file", observation, remedy, "wrong_rate")
         quarantine.append(quarantine_row(error, base, "hammer", "hammer", None, ids[path]))
-    same = [r for r in recordings if _rounded(r.rate) == most]
-    rate = float(np.median([r.rate for r in same]))
-    return [r if r.rate == rate else replace(r, rate=rate) for r in same]
+    selected = [r for r in recordings if _round_rate(r.rate) == common_rate]
+    rate = float(np.median([r.rate for r in selected]))
+    return [r if r.rate == rate else replace(r, rate=rate) for r in selected]
 
 
-def _rounded(rate):
+def _round_rate(rate):
     """Sampling rate rounded to six digits: times printed in a file are no more exact."""
     return float(f"{rate:.6g}")
 
 
-def _identified(impacts, turnout):
+def _identify_accepted(impacts, turnout):
     """(impacts, receptance, model); impacts that the model does not describe are rejected, and the rest fitted again.
 
     With too few impacts there is no receptance, and the model is rejected.
     """
-    needed = turnout.settings["receptance"].minimum_impacts
+    n_required = turnout.settings["receptance"].minimum_impacts
     settings = turnout.settings["identify"]
     while True:
         used = [i for i in impacts if i.accepted]
-        if len(used) < needed:
-            return impacts, None, _too_few(len(used), needed, impacts)
+        if len(used) < n_required:
+            return impacts, None, _rejected_model(len(used), n_required, impacts)
         receptance = receptance_of(used, turnout.settings["receptance"])
-        leads: dict[str, Any] = {}
+        lead_arguments: dict[str, Any] = {}
         if settings.method == "paper":
-            leads = {"leads": [i.acceleration[: i.decay_start] for i in used]}
-        model = identify([i.decay for i in used], used[0].rate, settings, receptance, **leads)
-        dropped = {id(used[k]): rejection for k, rejection in model.diagnostics.get("dropped_impacts", ())}
-        if not dropped:
+            lead_arguments = {"leads": [i.acceleration[: i.decay_start] for i in used]}
+        model = identify([i.decay for i in used], used[0].rate, settings, receptance, **lead_arguments)
+        rejected = {id(used[k]): rejection for k, rejection in model.diagnostics.get("dropped_impacts", ())}
+        if not rejected:
             return impacts, receptance, model
-        impacts = [replace(i, rejections=(dropped[id(i)],)) if id(i) in dropped else i for i in impacts]
+        impacts = [replace(i, rejections=(rejected[id(i)],)) if id(i) in rejected else i for i in impacts]
 
 
 def _test_number(turnout, unit, path):
     """Number of the test from the file's name; 0 if the name has no number there."""
     inside = str(PurePosixPath(path).relative_to(turnout.raw))
     labels = tuple(s.label for s in turnout.sections)
-    match = compiled(turnout.hammer.files, "hammer", labels).fullmatch(inside)
+    match = compile_pattern(turnout.hammer.files, "hammer", labels).fullmatch(inside)
     number = (match.groupdict().get("test") or "0") if match else "0"
-    return int(number) if number.isdigit() and int(number) <= LARGEST_TEST else 0
+    return int(number) if number.isdigit() and int(number) <= MAX_TEST_NUMBER else 0
 
 
-def _too_few(n, needed, impacts):
+def _rejected_model(n, n_required, impacts):
     """A rejected model without modes, with the number of accepted impacts and the reasons of the others."""
     reasons = sorted({r.reason for i in impacts for r in i.rejections})
-    words = f"{n} of {len(impacts)} impacts accepted, {needed} needed"
+    detail = f"{n} of {len(impacts)} impacts accepted, {n_required} needed"
     if reasons:
-        words += f"; rejected for {', '.join(reasons)}"
-    rejection = Rejection("too_few_impacts", float(n), float(needed), words)
+        detail += f"; rejected for {', '.join(reasons)}"
+    rejection = Rejection("too_few_impacts", float(n), float(n_required), detail)
     empty = np.zeros(0)
     return ModalModel(
         np.zeros((0, 0)), empty, empty, impacts[0].rate if impacts else 1.0, (), status="rejected",
@@ -163,12 +176,12 @@ def _too_few(n, needed, impacts):
     )  # fmt: skip
 
 
-def _lowest(receptance, model):
+def _lowest_gate_level(receptance, model):
     """Lowest gate level within the half-power bandwidths of the modes, None without modes."""
     lowest = []
     for mode in model.modes:
-        half = max(mode.damping, 0.02) * mode.frequency
-        near = np.abs(receptance.frequency - mode.frequency) <= half
-        if near.any():
-            lowest.append(float(np.nanmin(receptance.gate_level[near])))
+        half_bandwidth = max(mode.damping, 0.02) * mode.frequency
+        in_band = np.abs(receptance.frequency - mode.frequency) <= half_bandwidth
+        if in_band.any():
+            lowest.append(float(np.nanmin(receptance.gate_level[in_band])))
     return min(lowest) if lowest else None

@@ -10,24 +10,24 @@ from datetime import datetime
 from pathlib import Path
 
 from turnout.config import TurnoutConfig
-from turnout.config.filename_pattern import compiled
+from turnout.config.filename_pattern import compile_pattern
 from turnout.config.load import read_notes
 from turnout.config.schema import suggestion
 from turnout.errors import ConfigError, ReadError
 from turnout.readers import read
-from turnout.records import NOTHING, Unit
+from turnout.records import EMPTY_MAPPING, Unit
 from turnout.stages.hammer import hammer_unit
-from turnout.workflow.guard import guarded
+from turnout.workflow.guard import compute_guarded
 from turnout.workflow.scan import scan
 
 
-def check_asked(turnout, section, campaign):
+def check_request(turnout, section, campaign):
     """ConfigError for a turnout without hammer tests, an unknown section, or an invalid day."""
     if turnout.hammer is None:
         raise ConfigError(turnout.layout, "hammer", "nothing about hammer tests", "Add them to the layout")
-    if section is not None and section not in (known := turnout.hammer.descriptions):
+    if section is not None and section not in (labels := turnout.hammer.descriptions):
         raise ConfigError(
-            "turnout hammer", "--section", f"{section!r} is no section of {turnout.id}", suggestion(section, known)
+            "turnout hammer", "--section", f"{section!r} is no section of {turnout.id}", suggestion(section, labels)
         )
     if campaign is not None and not _is_day(campaign):
         remedy = "Write the day of the campaign as YYYY-MM-DD"
@@ -41,16 +41,16 @@ def _is_day(text) -> bool:
         return False
 
 
-def agree(path, named, day, section, campaign):
+def check_agreement(path, section_in_name, day_in_name, section, campaign):
     """ConfigError if an option contradicts the section or day in the file's name."""
-    pairs = (("--section", section, named, "section"), ("--campaign", campaign, day, "campaign"))
-    for option, asked, told, what in pairs:
-        if asked is not None and told is not None and asked != told:
-            remedy = f"Leave out {option}, or rename the file after the {what} at which it was recorded"
-            raise ConfigError(path, option, f"is {asked!r}, and the file's name says {told!r}", remedy)
+    pairs = (("--section", section, section_in_name, "section"), ("--campaign", campaign, day_in_name, "campaign"))
+    for option, option_value, name_value, quantity in pairs:
+        if option_value is not None and name_value is not None and option_value != name_value:
+            remedy = f"Leave out {option}, or rename the file after the {quantity} at which it was recorded"
+            raise ConfigError(path, option, f"is {option_value!r}, and the file's name says {name_value!r}", remedy)
 
 
-def _named(path, turnout) -> tuple[str | None, str | None]:
+def _section_and_day(path, turnout) -> tuple[str | None, str | None]:
     """(section, day) from the end of a path that matches the layout's pattern, None where not given."""
     labels, pattern = tuple(s.label for s in turnout.sections), turnout.hammer.files.split("/")
     for n in range(min(len(pattern), len(path.parts) - 1), 0, -1):
@@ -58,7 +58,7 @@ def _named(path, turnout) -> tuple[str | None, str | None]:
         if "{section}" not in tail:
             break
         dated = "{campaign}" in tail
-        match = compiled(tail if dated else "{campaign}/" + tail, "hammer", labels).fullmatch(
+        match = compile_pattern(tail if dated else "{campaign}/" + tail, "hammer", labels).fullmatch(
             name if dated else "2000-01-01/" + name
         )
         if match:
@@ -68,22 +68,22 @@ def _named(path, turnout) -> tuple[str | None, str | None]:
 
 def section_of(path, turnout, section, campaign) -> str:
     """Label of a file's section, from the option or its name; ConfigError if unknown or contradictory."""
-    named, day = _named(path, turnout)
-    agree(path, named, day, section, campaign)
-    label = section or named
+    section_in_name, day_in_name = _section_and_day(path, turnout)
+    check_agreement(path, section_in_name, day_in_name, section, campaign)
+    label = section or section_in_name
     if label is None:
         remedy = f"Write --section with one of {', '.join(turnout.hammer.descriptions)}"
-        found = f"its name does not say at which section of {turnout.id} it was recorded"
-        raise ConfigError(path, "--section", found, remedy)
+        observation = f"its name does not say at which section of {turnout.id} it was recorded"
+        raise ConfigError(path, "--section", observation, remedy)
     return label
 
 
-def by_day(paths, turnout, label, campaign) -> dict[str, list[Path]]:
+def files_by_day(paths, turnout, label, campaign) -> dict[str, list[Path]]:
     """Files of one section by the day of their campaign: from the option, their names, or the first time noted."""
     days: dict[str, list[Path]] = {}
     unknown = []
     for path in paths:
-        day = campaign or _named(path, turnout)[1]
+        day = campaign or _section_and_day(path, turnout)[1]
         days.setdefault(day, []).append(path) if day else unknown.append(path)
     if unknown:
         days.setdefault(_noted_day(unknown, turnout.hammer.descriptions[label]), []).extend(unknown)
@@ -93,32 +93,32 @@ def by_day(paths, turnout, label, campaign) -> dict[str, list[Path]]:
 def _noted_day(paths, description) -> str:
     """Day of the first time noted in files; ReadError if none of them holds a usable record."""
     faults: list[ReadError] = []
-    times, n_sound = [], 0
+    times, n_usable = [], 0
     for path in paths:
-        real = os.path.realpath(path)
+        real_path = os.path.realpath(path)
         try:
-            result = read(os.path.basename(real), os.path.dirname(real), description)
+            result = read(os.path.basename(real_path), os.path.dirname(real_path), description)
         except ReadError as error:
-            faults.append(_called(path, error))
+            faults.append(_with_path(path, error))
             continue
-        faults += [_called(path, error) for error in result.errors if isinstance(error, ReadError)]
+        faults += [_with_path(path, error) for error in result.errors if isinstance(error, ReadError)]
         times += [recording.started_at for recording in result.recordings if recording.started_at is not None]
-        n_sound += len(result.recordings)
+        n_usable += len(result.recordings)
     if times:
         return min(times).date().isoformat()
-    if faults and not n_sound:
+    if faults and not n_usable:
         raise faults[0]
-    found = "neither its name nor the file says on which day it was recorded"
-    raise ConfigError(paths[0], "--campaign", found, "Write --campaign YYYY-MM-DD")
+    observation = "neither its name nor the file says on which day it was recorded"
+    raise ConfigError(paths[0], "--campaign", observation, "Write --campaign YYYY-MM-DD")
 
 
-def _called(path, error: ReadError) -> ReadError:
+def _with_path(path, error: ReadError) -> ReadError:
     """The same error, with the path as the user gave it."""
-    return ReadError(path, error.where, error.found, error.remedy, error.reason)
+    return ReadError(path, error.where, error.problem, error.remedy, error.reason)
 
 
 @dataclass(frozen=True)
-class AskedFor:
+class RequestedUnit:
     """A ``unit`` to compute as the nightly run would, with its ``turnout`` and the ``root`` of its paths.
 
     ``remarks`` say how the nightly run will differ: further files, or none of these.
@@ -131,17 +131,17 @@ class AskedFor:
 
     def rows(self) -> dict[str, list[dict]]:
         """Rows by table, as in the nightly run; a file that cannot be used is a quarantine row."""
-        return guarded(hammer_unit, self.unit, self.turnout, self.root, "", "", strict=False).tables
+        return compute_guarded(hammer_unit, self.unit, self.turnout, self.root, "", "", strict=False).tables
 
 
-def asked_for(
+def requested_units(
     files,
     turnout: TurnoutConfig,
     raw_root: Path,
     section: str | None = None,
     campaign: str | None = None,
-    folders: Mapping[str, str] = NOTHING,
-) -> list[AskedFor]:
+    folders: Mapping[str, str] = EMPTY_MAPPING,
+) -> list[RequestedUnit]:
     """The units that ``files`` belong to, one for each section and campaign.
 
     Parameters
@@ -166,80 +166,82 @@ def asked_for(
         A path that is no file, or an unreadable file whose day is needed.
     """
     raw_root = Path(raw_root)
-    check_asked(turnout, section, campaign)
-    turnout, wrong = read_notes(turnout, raw_root)
-    night = _Night(turnout, raw_root, [error for error in wrong if error.path.endswith("campaigns.csv")])
-    filed: dict[str, tuple[Unit, set]] = {}
+    check_request(turnout, section, campaign)
+    turnout, note_errors = read_notes(turnout, raw_root)
+    scan_result = _NightlyScan(
+        turnout, raw_root, [error for error in note_errors if error.path.endswith("campaigns.csv")]
+    )
+    in_raw_folder: dict[str, tuple[Unit, set]] = {}
     elsewhere: dict[str, list[Path]] = {}
     for path in dict.fromkeys(Path(os.path.abspath(file)) for file in files):
-        real = _file(path)
-        if real in night.units:
-            unit, name = night.units[real]
-            agree(path, unit.section, unit.campaign, section, campaign)
-            filed.setdefault(unit.label, (unit, set()))[1].add(name)
+        real_path = _real_path(path)
+        if real_path in scan_result.units:
+            unit, name = scan_result.units[real_path]
+            check_agreement(path, unit.section, unit.campaign, section, campaign)
+            in_raw_folder.setdefault(unit.label, (unit, set()))[1].add(name)
         else:
-            night.refuse_others(path, folders)
+            scan_result.check_turnout(path, folders)
             elsewhere.setdefault(section_of(path, turnout, section, campaign), []).append(path)
-    found = [night.part(unit, names) for unit, names in filed.values()]
+    requests = [scan_result.select(unit, names) for unit, names in in_raw_folder.values()]
     for label, paths in elsewhere.items():
-        for day, some in by_day(paths, turnout, label, campaign).items():
-            found.append(_brought(some, turnout, label, day, night))
-    return found
+        for day, day_paths in files_by_day(paths, turnout, label, campaign).items():
+            requests.append(_unit_elsewhere(day_paths, turnout, label, day, scan_result))
+    return requests
 
 
-class _Night:
+class _NightlyScan:
     """Scan of the turnout's raw folder, as in the nightly run: (unit, path) and problems by real path."""
 
-    def __init__(self, turnout, raw_root, wrong):
-        self.turnout, self.raw_root, self.wrong = turnout, raw_root, wrong
+    def __init__(self, turnout, raw_root, note_errors):
+        self.turnout, self.raw_root, self.note_errors = turnout, raw_root, note_errors
         self.folder = os.path.realpath(raw_root / turnout.raw)
-        seen = scan(turnout, raw_root)
+        scanned = scan(turnout, raw_root)
         self.units = {
-            os.path.realpath(raw_root / file[0]): (unit, file[0]) for unit in seen.units for file in unit.files
+            os.path.realpath(raw_root / file[0]): (unit, file[0]) for unit in scanned.units for file in unit.files
         }
-        self.problems = {os.path.realpath(raw_root / p.path): p for p in seen.problems}
+        self.problems = {os.path.realpath(raw_root / p.path): p for p in scanned.problems}
 
-    def refuse_others(self, path, folders):
+    def check_turnout(self, path, folders):
         """ConfigError for a file in the raw folder of another turnout."""
         for turnout, raw in folders.items():
             if raw != self.turnout.raw and _within(path, self.raw_root / raw) and not _within(path, self.folder):
-                found = f"is {self.turnout.id}, and the file lies in the raw folder of {turnout}"
-                raise ConfigError(path, "--turnout", found, f"Write --turnout {turnout}")
+                observation = f"is {self.turnout.id}, and the file lies in the raw folder of {turnout}"
+                raise ConfigError(path, "--turnout", observation, f"Write --turnout {turnout}")
 
     def notes(self, day) -> tuple[str, ...]:
         """Errors of campaigns.csv, if none of its valid rows is of this day."""
-        return () if self.turnout.campaigns[day].noted else tuple(str(error) for error in self.wrong)
+        return () if self.turnout.campaigns[day].listed else tuple(str(error) for error in self.note_errors)
 
-    def part(self, unit, names) -> AskedFor:
+    def select(self, unit, names) -> RequestedUnit:
         """The requested files of a unit, with a remark on the others that the nightly run includes."""
         if unit.kind != "hammer":
             command = f"Use turnout passage {names.pop()} --turnout {unit.turnout}"
             raise ConfigError(unit.files[0][0], "file name", "is that of a passage, not of a hammer test", command)
-        others = [path.rsplit("/", 1)[-1] for path, *_ in unit.files if path not in names]
-        some = replace(unit, files=tuple(file for file in unit.files if file[0] in names))
-        told = f"the nightly run takes {', '.join(others)} with it; name all of them to hear what it will say"
-        remarks = self.notes(unit.campaign) + ((told,) if others else ())
-        return AskedFor(some, self.turnout, self.raw_root, remarks)
+        further = [path.rsplit("/", 1)[-1] for path, *_ in unit.files if path not in names]
+        selection = replace(unit, files=tuple(file for file in unit.files if file[0] in names))
+        remark = f"the nightly run takes {', '.join(further)} with it; name all of them to hear what it will say"
+        remarks = self.notes(unit.campaign) + ((remark,) if further else ())
+        return RequestedUnit(selection, self.turnout, self.raw_root, remarks)
 
-    def misses(self, paths, label, day) -> tuple[str, ...]:
+    def explain_missing(self, paths, label, day) -> tuple[str, ...]:
         """Why the nightly run does not use these files, and what to change."""
-        said, strange = [], []
+        remarks, unseen = [], []
         for path in paths:
             problem = self.problems.get(os.path.realpath(path))
             if problem:
-                said.append(f"the nightly run leaves {path.name} out: {problem.found}. {problem.remedy}.")
+                remarks.append(f"the nightly run leaves {path.name} out: {problem.problem}. {problem.remedy}.")
             elif _within(path, self.folder):
-                said.append(f"the nightly run leaves {path.name} out: its name is that of a file not yet complete")
+                remarks.append(f"the nightly run leaves {path.name} out: its name is that of a file not yet complete")
             else:
-                strange.append(path)
-        if strange:
-            place = self.raw_root / self.turnout.raw / _filled(self.turnout.hammer.files, strange, label, day)
-            names = ", ".join(path.name for path in strange)
-            said.append(f"the nightly run does not see {names} there: it looks for {place}")
-        return tuple(said)
+                unseen.append(path)
+        if unseen:
+            expected = self.raw_root / self.turnout.raw / _fill_pattern(self.turnout.hammer.files, unseen, label, day)
+            names = ", ".join(path.name for path in unseen)
+            remarks.append(f"the nightly run does not see {names} there: it looks for {expected}")
+        return tuple(remarks)
 
 
-def _filled(pattern, paths, label, day) -> str:
+def _fill_pattern(pattern, paths, label, day) -> str:
     """The layout's file pattern with day, section and file extension filled in."""
     endings = {path.suffix.lstrip(".") for path in paths}
     ending = endings.pop() if len(endings) == 1 else ""
@@ -252,7 +254,7 @@ def _within(path, folder) -> bool:
     return os.path.realpath(path).startswith(os.path.realpath(folder) + os.sep)
 
 
-def _file(path) -> str:
+def _real_path(path) -> str:
     """Real path of a file, links resolved; ReadError if it is none."""
     if os.path.isdir(path):
         remedy = f"Name the files in it, such as {path.name}/*"
@@ -262,12 +264,12 @@ def _file(path) -> str:
     return os.path.realpath(path)
 
 
-def _brought(paths, turnout, label, day, night) -> AskedFor:
+def _unit_elsewhere(paths, turnout, label, day, scan_result) -> RequestedUnit:
     """Unit of files that the nightly run does not see; its root is their common folder."""
-    real = [os.path.realpath(path) for path in paths]
-    root = os.path.commonpath([os.path.dirname(path) for path in real])
-    sizes = sorted((os.path.relpath(path, root), os.stat(path)) for path in dict.fromkeys(real))
+    real_paths = [os.path.realpath(path) for path in paths]
+    root = os.path.commonpath([os.path.dirname(path) for path in real_paths])
+    sizes = sorted((os.path.relpath(path, root), os.stat(path)) for path in dict.fromkeys(real_paths))
     entries = tuple((name, status.st_size, status.st_mtime_ns) for name, status in sizes)
     unit = Unit(turnout.id, "hammer", f"{label}/{day}", entries, turnout.hashes["hammer"], label, day)
-    remarks = night.notes(day) + night.misses(paths, label, day)
-    return AskedFor(unit, replace(turnout, raw="."), Path(root), remarks)
+    remarks = scan_result.notes(day) + scan_result.explain_missing(paths, label, day)
+    return RequestedUnit(unit, replace(turnout, raw="."), Path(root), remarks)

@@ -6,17 +6,17 @@ import numpy as np
 
 from turnout.records import Impact, ModalModel, Mode, Receptance
 
-SHOWN = (20.0, 1600.0)  # Hz: band of the receptances in the registry
-SHOWN_LINES = 240  # lines of a receptance in the registry
-SHOWN_DECAY = 0.04  # s of a decay in the registry
+PLOT_BAND = (20.0, 1600.0)  # Hz: band of the receptances in the registry
+MAX_PLOT_LINES = 240  # lines of a receptance in the registry
+PLOT_DECAY_TIME = 0.04  # s of a decay in the registry
 # Hz: rejected poles in this band are reported. Others vary with the noise, far from the track's two resonances.
-WORTH_SAYING = (30.0, 1000.0)
+REPORTED_POLE_BAND = (30.0, 1000.0)
 
 
 def impact_row(impact: Impact, base: dict, test: int, recording_id: str) -> dict:
     """Row of ``impacts``; ``base`` holds turnout_id, section_id, campaign_id."""
     first = impact.rejections[0] if impact.rejections else None
-    words = "; ".join(r.detail or r.reason for r in (*impact.rejections, *impact.notes))
+    detail = "; ".join(r.detail or r.reason for r in (*impact.rejections, *impact.notes))
     return {
         **base,
         "impact_id": f"{recording_id}:{impact.record}",
@@ -27,7 +27,7 @@ def impact_row(impact: Impact, base: dict, test: int, recording_id: str) -> dict
         "reason": first.reason if first else None,
         "measured_value": first.value if first else None,
         "limit_value": first.limit if first else None,
-        "detail": words or None,
+        "detail": detail or None,
         "peak_n": impact.peak,
         "contact_ms": 1e3 * impact.contact,
         "impulse_ns": impact.impulse,
@@ -50,7 +50,7 @@ def model_row(model: ModalModel, base: dict, identity: dict, counts: tuple[int, 
         "reason": first.reason if first else None,
         "measured_value": first.value if first else None,
         "limit_value": first.limit if first else None,
-        "detail": _model_words(model),
+        "detail": _model_detail(model),
         "model_order": model.order,
         "sampling_rate_hz": model.rate,
         "a_matrix": np.ravel(model.a),
@@ -105,8 +105,8 @@ def receptance_row(
 
     ``required`` is the level that the gate requires.
     """
-    lines = shown_lines(receptance.frequency)
-    measured, predicted = shown_decay(model, decay)
+    lines = plot_lines(receptance.frequency)
+    measured, predicted = plot_decay(model, decay)
     return {
         **base,
         "model_id": identity["model_id"],
@@ -128,28 +128,28 @@ def receptance_row(
         "decay_rate_hz": model.rate,
         "decay_ms2": measured,
         "decay_model_ms2": predicted,
-        "stabilisation_json": json.dumps([_pole(p) for p in model.stabilisation]),
+        "stabilisation_json": json.dumps([_pole_row(p) for p in model.stabilisation]),
     }
 
 
-def shown_lines(frequency):
+def plot_lines(frequency):
     """Indices of at most ``MAX_PLOT_LINES`` lines, evenly spaced over the logarithm of ``PLOT_BAND``.
 
     >>> frequency = np.arange(1.0, 4000.0)
-    >>> lines = shown_lines(frequency)
-    >>> frequency[lines[0]], frequency[lines[-1]], len(lines) <= SHOWN_LINES
+    >>> lines = plot_lines(frequency)
+    >>> frequency[lines[0]], frequency[lines[-1]], len(lines) <= MAX_PLOT_LINES
     (np.float64(20.0), np.float64(1600.0), True)
     """
-    wanted = np.geomspace(*SHOWN, SHOWN_LINES)
+    wanted = np.geomspace(*PLOT_BAND, MAX_PLOT_LINES)
     nearest = np.searchsorted(0.5 * (frequency[1:] + frequency[:-1]), wanted)
     return np.unique(nearest)
 
 
-def shown_decay(model: ModalModel, decay):
+def plot_decay(model: ModalModel, decay):
     """The first part of a decay and the model's decay fitted to it by its initial state (float32 arrays)."""
     if decay is None or not model.order:
         return None, None
-    n = min(len(decay), int(SHOWN_DECAY * model.rate))
+    n = min(len(decay), int(PLOT_DECAY_TIME * model.rate))
     basis = np.empty((n, model.order))
     row = np.array(model.c, dtype=float)
     for k in range(n):
@@ -159,7 +159,7 @@ def shown_decay(model: ModalModel, decay):
     return decay[:n].astype(np.float32), (basis @ state).astype(np.float32)
 
 
-def _pole(pole):
+def _pole_row(pole):
     return {
         "order": int(pole["order"]),
         "frequency": round(float(pole["frequency"]), 2),
@@ -168,9 +168,9 @@ def _pole(pole):
     }
 
 
-def _model_words(model):
-    near = [m for m in model.rejected_modes if WORTH_SAYING[0] <= m["frequency"] <= WORTH_SAYING[1]]
-    dropped = [f"{m['frequency']:.0f} Hz not used: {m['reason']}" for m in near]
+def _model_detail(model):
+    in_band = [m for m in model.rejected_modes if REPORTED_POLE_BAND[0] <= m["frequency"] <= REPORTED_POLE_BAND[1]]
+    rejected = [f"{m['frequency']:.0f} Hz not used: {m['reason']}" for m in in_band]
     reasons = [r.detail or r.reason for r in model.rejections]
     bias = model.diagnostics.get("bias_words")
-    return "; ".join([*reasons, *dropped, *([bias] if bias else [])]) or None
+    return "; ".join([*reasons, *rejected, *([bias] if bias else [])]) or None

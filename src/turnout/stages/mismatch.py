@@ -14,18 +14,18 @@ from turnout.errors import ReadError, SimulationError, TurnoutError
 from turnout.mismatch.engine.diagnose import diagnose
 from turnout.mismatch.turnout import TrackCase
 from turnout.records import Unit
-from turnout.stages.accepted_effects_case import BudgetSpentError, GuidedCase, Watch
+from turnout.stages.accepted_effects_case import AcceptedEffectsCase, BudgetSpentError, Watch
 from turnout.stages.checkpoint import Checkpoint, Replay
 from turnout.stages.common import quarantine_row
 from turnout.stages.mismatch_groups import Group, groups, members_of
-from turnout.stages.mismatch_inputs import digest_of_model, gather, track_of
+from turnout.stages.mismatch_inputs import digest_of_model, gather_inputs, track_of
 from turnout.stages.mismatch_rows import finding_tables
 from turnout.workflow.scan import scan
 
-FITS = "work/mismatch-fits"
+FITS_FOLDER = "work/mismatch-fits"
 TABLES = ("mismatch_findings", "mismatch_parameters", "mismatch_curves", "quarantine")
-UNFINISHED = "the time given was up with {} of {} groups done; the same command goes on from there"
-GRAVITY = ("named", "a_or_b", "unknown", "numerics", "none")
+BUDGET_SPENT = "the time given was up with {} of {} groups done; the same command goes on from there"
+SEVERITY_ORDER = ("named", "a_or_b", "unknown", "numerics", "none")
 
 
 @dataclass
@@ -37,7 +37,7 @@ class Options:
 
     track: str | None = None
     sections: Sequence[str] = ()
-    fits: str = FITS
+    fits: str = FITS_FOLDER
     watch: Watch = field(default_factory=Watch)
     progress: Callable | None = None
 
@@ -53,10 +53,12 @@ def mismatch_unit(unit: Unit, turnout: TurnoutConfig, raw_root, context=None, al
     except ReadError:
         raise
     except TurnoutError as error:  # no track, or a wrong vehicle or configuration: a fault of this turnout only
-        return {**{name: [] for name in TABLES}, "quarantine": [_nothing(unit, turnout, str(error)[:1000])]}
+        return {**{name: [] for name in TABLES}, "quarantine": [_undiagnosed_row(unit, turnout, str(error)[:1000])]}
 
 
-def diagnose_visit(unit, turnout, raw_root, told, algo="", options: Options | None = None) -> dict[str, list[dict]]:
+def diagnose_visit(
+    unit, turnout, raw_root, passage_tables, algo="", options: Options | None = None
+) -> dict[str, list[dict]]:
     """Rows by table of one visit.
 
     ``passage_tables`` are the tables of the passage stage by unit; passages without one are analysed here.
@@ -66,65 +68,69 @@ def diagnose_visit(unit, turnout, raw_root, told, algo="", options: Options | No
     options = options or Options()
     track, accepted = track_of(turnout, options.track)
     units = members_of(unit, scan(turnout, Path(raw_root)).units)
-    found = gather(units, turnout, raw_root, track, told)
-    contents = [[path, _content(Path(raw_root) / path)] for path, *_ in unit.files]
-    identity = digest([unit.config_hash, contents, found.said(), digest_of_model(turnout, options.track), algo])
-    about = {"turnout": turnout, "visit": unit.label, "identity": identity, "notes": found.notes}
+    inputs = gather_inputs(units, turnout, raw_root, track, passage_tables)
+    contents = [[path, _content_hash(Path(raw_root) / path)] for path, *_ in unit.files]
+    identity = digest(
+        [unit.config_hash, contents, inputs.digest_content(), digest_of_model(turnout, options.track), algo]
+    )
+    about = {"turnout": turnout, "visit": unit.label, "identity": identity, "notes": inputs.notes}
     rows: dict[str, list[dict]] = {name: [] for name in TABLES}
-    members = list(groups(turnout, track, found, options.sections))
+    members = list(groups(turnout, track, inputs, options.sections))
     for k, group in enumerate(members):
         try:
-            own = _one(group, turnout, accepted, about, options, (k, len(members)))
+            group_tables = _diagnose_group(group, turnout, accepted, about, options, (k, len(members)))
         except BudgetSpentError:
-            left = [_nothing(unit, turnout, UNFINISHED.format(k, len(members)), g) for g in members[k:]]
+            unfinished = [_undiagnosed_row(unit, turnout, BUDGET_SPENT.format(k, len(members)), g) for g in members[k:]]
             raise BudgetSpentError(
-                k, len(members), _graver_first(rows | {"quarantine": rows["quarantine"] + left})
+                k, len(members), _sort_by_severity(rows | {"quarantine": rows["quarantine"] + unfinished})
             ) from None
-        for table, more in own.items():
-            rows[table] += more
+        for table, group_rows in group_tables.items():
+            rows[table] += group_rows
     if not members:
-        said = "; ".join(found.notes) or "neither a hammer test nor a passage"
-        rows["quarantine"].append(_nothing(unit, turnout, f"no section can be diagnosed: {said}"[:1000]))
-    return _graver_first(rows)
+        reasons = "; ".join(inputs.notes) or "neither a hammer test nor a passage"
+        rows["quarantine"].append(_undiagnosed_row(unit, turnout, f"no section can be diagnosed: {reasons}"[:1000]))
+    return _sort_by_severity(rows)
 
 
-def _graver_first(rows):
-    rows["mismatch_findings"].sort(key=lambda r: (GRAVITY.index(r["verdict"]), -(r["probability"] or 0.0)))
+def _sort_by_severity(rows):
+    rows["mismatch_findings"].sort(key=lambda r: (SEVERITY_ORDER.index(r["verdict"]), -(r["probability"] or 0.0)))
     return rows
 
 
-def _content(path):
+def _content_hash(path):
     try:
         return sha256_of(path)
     except OSError:  # deleted since it was planned: the notes say so
         return ""
 
 
-def _one(group: Group, turnout, accepted, about, options, number) -> dict[str, list[dict]]:
+def _diagnose_group(group: Group, turnout, accepted, about, options, number) -> dict[str, list[dict]]:
     """Rows of one group, read from the store if an earlier run computed them."""
     name = f"{turnout.id}-{about['visit']}-{'+'.join(group.labels)}"
     store = Checkpoint(Path(options.fits), name, (about["identity"],))
     if "rows" in store:
         return store["rows"]
     replay = Replay(Path(options.fits), f"{name}-predictions", (about["identity"],))
-    tell = options.progress(group, *number) if options.progress else None
+    report_progress = options.progress(group, *number) if options.progress else None
     try:
         track_case = TrackCase(group.campaign, turnout.settings["mismatch"])
         accepted = tuple(a for a in accepted if a.is_on(group.route))
-        case = GuidedCase(track_case, accepted, options.watch, replay if options.watch.deadline is not None else None)
-        rows = finding_tables(diagnose(case, turnout.settings["mismatch"], tell, store), case, group, about)
+        case = AcceptedEffectsCase(
+            track_case, accepted, options.watch, replay if options.watch.deadline is not None else None
+        )
+        rows = finding_tables(diagnose(case, turnout.settings["mismatch"], report_progress, store), case, group, about)
     except (SimulationError, np.linalg.LinAlgError) as error:
-        said = f"sections {', '.join(group.labels)}: {error}"
-        return {"quarantine": [_nothing(None, turnout, "; ".join([said, *about["notes"]])[:1000], group)]}
-    replay.done()
-    store.done()
+        reason = f"sections {', '.join(group.labels)}: {error}"
+        return {"quarantine": [_undiagnosed_row(None, turnout, "; ".join([reason, *about["notes"]])[:1000], group)]}
+    replay.discard()
+    store.discard()
     store["rows"] = rows
     return rows
 
 
-def _nothing(unit, turnout, said, group=None) -> dict[str, Any]:
+def _undiagnosed_row(unit, turnout, reason, group=None) -> dict[str, Any]:
     """Quarantine row with the reason why sections cannot be diagnosed."""
-    place = f"sections {', '.join(group.labels)}" if group else "all sections"
+    sections = f"sections {', '.join(group.labels)}" if group else "all sections"
     remedy = "See docs/mismatch.md: what a diagnosis needs"
-    error = ReadError(turnout.raw, place, said, remedy, "simulation_failed")
+    error = ReadError(turnout.raw, sections, reason, remedy, "simulation_failed")
     return quarantine_row(error, {"turnout_id": turnout.id}, "mismatch", "mismatch")

@@ -16,17 +16,17 @@ from re import search
 from turnout.config import Configuration
 from turnout.config.merge import digest
 from turnout.config.turnout import TurnoutConfig
-from turnout.mismatch.turnout import Campaign
+from turnout.mismatch.turnout import CampaignInput
 from turnout.records import Unit
 from turnout.simulate import Sensor, TurnoutTrack
-from turnout.stages.mismatch_inputs import Gathered, digest_of_model
-from turnout.workflow.plan import Planned, read_plan
+from turnout.stages.mismatch_inputs import VisitInputs, digest_of_model
+from turnout.workflow.plan import PlannedUnit, read_plan
 
-GAP = 6.0  # m: sections further apart do not respond to the same sleeper
-MOST_PASSAGES = 8  # of a case: each is simulated hundreds of times, and more alike add little
-MOST_AXLES = 96  # of all passages of a case: the simulation time is proportional to them
+MAX_SECTION_GAP = 6.0  # m: sections further apart do not respond to the same sleeper
+MAX_PASSAGES = 8  # of a case: each is simulated hundreds of times, and more alike add little
+MAX_AXLES = 96  # of all passages of a case: the simulation time is proportional to them
 RESERVED_EVERY = 5  # one of so many recordings is held out from all fits
-FEWEST_TO_RESERVE = 4  # recordings; with fewer none is held out
+MIN_TO_RESERVE = 4  # recordings; with fewer none is held out
 
 
 @dataclass(frozen=True)
@@ -35,106 +35,110 @@ class Group:
 
     labels: tuple[str, ...]
     route: str
-    campaign: Campaign
+    campaign: CampaignInput
 
 
-def groups(turnout: TurnoutConfig, track: TurnoutTrack, found: Gathered, only: Sequence[str] = ()) -> Iterator[Group]:
+def groups(
+    turnout: TurnoutConfig, track: TurnoutTrack, inputs: VisitInputs, only: Sequence[str] = ()
+) -> Iterator[Group]:
     """Groups of a visit in order of position; sections without a recording are left out."""
-    for route, labels in _neighbours(turnout, only):
-        campaign = _campaign(turnout, track, found, route, labels)
+    for route, labels in _neighbouring_sections(turnout, only):
+        campaign = _campaign(turnout, track, inputs, route, labels)
         if campaign is not None and route not in ("main", *track.routes):
-            found.notes.append(f"sections {', '.join(labels)}: the track's file has no route {route}; not used")
+            inputs.notes.append(f"sections {', '.join(labels)}: the track's file has no route {route}; not used")
         elif campaign is not None:
-            yield Group(_measured(turnout, found, campaign, labels), route, campaign)
+            yield Group(_measured_labels(turnout, inputs, campaign, labels), route, campaign)
 
 
-def _neighbours(turnout, only):
+def _neighbouring_sections(turnout, only):
     """(route, labels) of sections with gaps up to ``MAX_SECTION_GAP``, or of all sections in ``only``."""
     for route in ("main", "diverging"):
-        mine = [s for s in turnout.sections if _route(s) == route and (not only or s.label in only)]
-        mine.sort(key=lambda s: s.position)
-        part: list = []
-        for section in mine:
-            if part and not only and section.position - part[-1].position > GAP:
-                yield route, tuple(s.label for s in part)
-                part = []
-            part.append(section)
-        if part:
-            yield route, tuple(s.label for s in part)
+        sections = [s for s in turnout.sections if _route(s) == route and (not only or s.label in only)]
+        sections.sort(key=lambda s: s.position)
+        members: list = []
+        for section in sections:
+            if members and not only and section.position - members[-1].position > MAX_SECTION_GAP:
+                yield route, tuple(s.label for s in members)
+                members = []
+            members.append(section)
+        if members:
+            yield route, tuple(s.label for s in members)
 
 
-def _measured(turnout, found, campaign, labels):
+def _measured_labels(turnout, inputs, campaign, labels):
     """Labels of sections with a recording in the campaign."""
-    struck = {found.sections[t.name] for t in campaign.hammer}
-    watched = {turnout.passages.sections[s.name] for s in campaign.sensors} if turnout.passages else set()
-    return tuple(label for label in labels if label in struck | watched)
+    tested = {inputs.sections[t.name] for t in campaign.hammer}
+    monitored = {turnout.passages.sections[s.name] for s in campaign.sensors} if turnout.passages else set()
+    return tuple(label for label in labels if label in tested | monitored)
 
 
 def _route(section):
     return "diverging" if section.track == "diverging" else "main"
 
 
-def _campaign(turnout, track, found, route, labels):
-    tests = tuple(t for t in found.tests if found.sections[t.name] in labels)
+def _campaign(turnout, track, inputs, route, labels):
+    tests = tuple(t for t in inputs.tests if inputs.sections[t.name] in labels)
     sensors = _sensors(turnout, labels)
     names = {s.name for s in sensors}
     shared = all(turnout.section(label).track == "both" for label in labels)
     passages = [
-        p for p in found.passages if (shared or p.route == route) and names & {c.name for c in p.recording.channels}
+        p for p in inputs.passages if (shared or p.route == route) and names & {c.name for c in p.recording.channels}
     ]
-    passages = telling(formations(passages))
-    heard = {c.name for p in passages for c in p.recording.channels} & names
-    sensors = tuple(s for s in sensors if s.name in heard)
+    passages = select_passages(split_by_length(passages))
+    recorded = {c.name for p in passages for c in p.recording.channels} & names
+    sensors = tuple(s for s in sensors if s.name in recorded)
     if not tests and not passages:
         return None
     if route != "main" and route in track.routes:
-        track, passages = _as_main(track, route, passages)
-    return Campaign(track, sensors, tests, tuple(passages), reserved(passages, tests))
+        track, passages = _with_main_route(track, route, passages)
+    return CampaignInput(track, sensors, tests, tuple(passages), reserved_names(passages, tests))
 
 
 def _sensors(turnout, labels):
     if turnout.passages is None:
         return ()
-    found = []
+    sensors = []
     for channel in turnout.passages.description.channels:
         label = turnout.passages.sections.get(channel.name)
         if label in labels and channel.quantity == "acceleration":
             position = channel.position if channel.position is not None else turnout.section(label).position
-            found.append(Sensor(channel.name, float(position), channel.mounting or "rail head"))
-    return tuple(found)
+            sensors.append(Sensor(channel.name, float(position), channel.mounting or "rail head"))
+    return tuple(sensors)
 
 
-def _as_main(track, route, passages):
+def _with_main_route(track, route, passages):
     """(track, passages) with the track of ``route`` as the main one."""
-    own = track.track_of(route)
-    seen = replace(track, track=own, tracks={"main": own}, routes={"main": track.routes[route]})
-    return seen, [replace(p, route="main") for p in passages]
+    route_track = track.track_of(route)
+    turnout_track = replace(
+        track, track=route_track, tracks={"main": route_track}, routes={"main": track.routes[route]}
+    )
+    return turnout_track, [replace(p, route="main") for p in passages]
 
 
-def formations(passages):
+def split_by_length(passages):
     """Passages with a separate train name for each number of axles of one type."""
     axles = {id(p): len(p.vehicle.wheels) for p in passages}
     lengths: dict[str, set] = {}
     for p in passages:
         lengths.setdefault(p.train, set()).add(axles[id(p)])
-    several = {train for train, found in lengths.items() if train and len(found) > 1}
+    several = {train for train, counts in lengths.items() if train and len(counts) > 1}
     return [replace(p, train=f"{p.train}, {axles[id(p)]} axles") if p.train in several else p for p in passages]
 
 
-def telling(passages, most=MOST_PASSAGES, axles=MOST_AXLES):
+def select_passages(passages, max_passages=MAX_PASSAGES, max_axles=MAX_AXLES):
     """At most ``max_passages`` passages with ``max_axles`` axles in all.
 
     One train of each type in turn, short trains first, and in each type the extremes of speed first.
     """
-    kinds: dict[str, list] = {}
+    by_train: dict[str, list] = {}
     for p in sorted(passages, key=lambda p: (len(p.vehicle.wheels), p.train, p.speed)):
-        kinds.setdefault(p.train, []).append(p)
-    queues = [_extremes_first(members) for members in kinds.values()]
+        by_train.setdefault(p.train, []).append(p)
+    queues = [_extremes_first(members) for members in by_train.values()]
     order = [p for turn in zip_longest(*queues) for p in turn if p is not None]
     chosen: list = []
     for p in order:
         total = sum(len(c.vehicle.wheels) for c in chosen) + len(p.vehicle.wheels)
-        if len(chosen) < most and (total <= axles or not chosen):
+        if len(chosen) < max_passages and (total <= max_axles or not chosen):
             chosen.append(p)
     return [p for p in passages if any(p is c for c in chosen)]
 
@@ -145,19 +149,19 @@ def _extremes_first(members):
     return [members[k // 2 if k % 2 == 0 else n - 1 - k // 2] for k in range(n)]
 
 
-def reserved(passages, tests) -> tuple[str, ...]:
+def reserved_names(passages, tests) -> tuple[str, ...]:
     """Names of the held out recordings: every fifth passage in order of speed, else every fifth test.
 
     The only passage of a train is not held out if another passage, the nearest in speed, can be.
     """
     items = sorted(passages, key=lambda p: p.speed) or sorted(tests, key=lambda t: t.place)
-    if len(items) < FEWEST_TO_RESERVE:
+    if len(items) < MIN_TO_RESERVE:
         return ()
-    left, chosen = Counter(_train(item) for item in items), []
+    remaining, chosen = Counter(_train(item) for item in items), []
     for wanted in range(RESERVED_EVERY // 2, len(items), RESERVED_EVERY):
-        near = sorted((k for k in range(len(items)) if k not in chosen), key=lambda k: abs(k - wanted))
-        chosen.append(next((k for k in near if left[_train(items[k])] > 1), near[0]))
-        left[_train(items[chosen[-1]])] -= 1
+        nearest = sorted((k for k in range(len(items)) if k not in chosen), key=lambda k: abs(k - wanted))
+        chosen.append(next((k for k in nearest if remaining[_train(items[k])] > 1), nearest[0]))
+        remaining[_train(items[chosen[-1]])] -= 1
     return tuple(items[k].name for k in sorted(chosen))
 
 
@@ -166,8 +170,8 @@ def _train(item):
     return getattr(item, "train", "")
 
 
-NEAR_DAYS = 31  # a passage further from every campaign belongs to the visit of its month
-NEWEST = 1  # visits per turnout in the workflow: older ones were diagnosed before
+MAX_DAYS_TO_CAMPAIGN = 31  # a passage further from every campaign belongs to the visit of its month
+N_NEWEST_VISITS = 1  # visits per turnout in the workflow: older ones were diagnosed before
 
 
 def visits(units: Iterable[Unit]) -> dict[str, list[Unit]]:
@@ -182,12 +186,12 @@ def visits(units: Iterable[Unit]) -> dict[str, list[Unit]]:
     """
     units = list(units)
     days = sorted({date.fromisoformat(u.campaign) for u in units if u.campaign})
-    found: dict[str, list[Unit]] = {}
+    by_visit: dict[str, list[Unit]] = {}
     for unit in units:
         label = unit.campaign or _visit_of(unit.label, days)
         if label:
-            found.setdefault(label, []).append(unit)
-    return dict(sorted(found.items()))
+            by_visit.setdefault(label, []).append(unit)
+    return dict(sorted(by_visit.items()))
 
 
 def _visit_of(label: str, days: Sequence[date]) -> str:
@@ -195,31 +199,31 @@ def _visit_of(label: str, days: Sequence[date]) -> str:
     if not stamp:
         return ""
     day = date(*map(int, stamp.groups()))
-    near = min(days, key=lambda d: abs((d - day).days), default=None)
-    if near is not None and abs((near - day).days) <= NEAR_DAYS:
-        return near.isoformat()
+    nearest = min(days, key=lambda d: abs((d - day).days), default=None)
+    if nearest is not None and abs((nearest - day).days) <= MAX_DAYS_TO_CAMPAIGN:
+        return nearest.isoformat()
     return f"{day:%Y-%m}"
 
 
-def enabled_visit(plan: Path, configuration: Configuration) -> Iterator[Planned]:
+def enabled_visit(plan: Path, configuration: Configuration) -> Iterator[PlannedUnit]:
     """Newest visits, as units, of the turnouts with the setting ``mismatch: enabled: true``."""
     for planned in every_visit(plan, configuration):
         if configuration.turnout(planned.unit.turnout).settings["mismatch"].enabled:
             yield planned
 
 
-def every_visit(plan: Path, configuration: Configuration) -> Iterator[Planned]:
+def every_visit(plan: Path, configuration: Configuration) -> Iterator[PlannedUnit]:
     """Newest visits of all turnouts of a plan; their note changes with notes, track and vehicle files."""
-    by_turnout: dict[str, list[Planned]] = {}
+    by_turnout: dict[str, list[PlannedUnit]] = {}
     for planned in read_plan(plan):
         by_turnout.setdefault(planned.unit.turnout, []).append(planned)
     hashes = {e["turnout"]: e["hashes"] for e in json.loads(Path(plan).read_text(encoding="utf-8"))["turnouts"]}
     for turnout, members in by_turnout.items():
         notes = {id(p.unit): p.note for p in members}
         model = digest_of_model(configuration.turnout(turnout))
-        for label, units in list(visits(p.unit for p in members).items())[-NEWEST:]:
+        for label, units in list(visits(p.unit for p in members).items())[-N_NEWEST_VISITS:]:
             note = digest([model, *(notes[id(u)] for u in units)])[:16]
-            yield Planned(unit_of(turnout, label, units, hashes[turnout].get("mismatch", "")), note)
+            yield PlannedUnit(unit_of(turnout, label, units, hashes[turnout].get("mismatch", "")), note)
 
 
 def unit_of(turnout: str, label: str, units: Sequence[Unit], config_hash: str) -> Unit:
@@ -231,9 +235,9 @@ def unit_of(turnout: str, label: str, units: Sequence[Unit], config_hash: str) -
 def members_of(unit: Unit, scanned: Iterable[Unit]) -> list[Unit]:
     """Scanned hammer tests and passages whose files belong to the unit of a visit."""
     wanted = {f[0] for f in unit.files}
-    found = []
+    members = []
     for u in scanned:
         files = tuple(f for f in u.files if f[0] in wanted)
         if files:
-            found.append(replace(u, files=files))
-    return found
+            members.append(replace(u, files=files))
+    return members

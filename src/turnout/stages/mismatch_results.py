@@ -15,7 +15,7 @@ from turnout.stages.mismatch_inputs import mismatch_context
 from turnout.workflow.batches import decode, encode
 from turnout.workflow.scan import scan
 
-ALL = "all"  # every visit in one case: effects of temperature or time need several
+ALL_VISITS = "all"  # every visit in one case: effects of temperature or time need several
 
 
 def diagnose_turnout(
@@ -40,22 +40,22 @@ def diagnose_turnout(
         raise SimulationError(f"{turnout_id} has no section {', '.join(unknown)}.")
     label, units = _visit(turnout_id, visits(scan(turnout, Path(raw_root)).units), visit, raw_root)
     unit = unit_of(turnout_id, label, units, turnout.hashes["mismatch"])
-    _, told = mismatch_context(turnout_id, work=work)
+    _, passage_tables = mismatch_context(turnout_id, work=work)
     watch = Watch(None if budget is None else time.monotonic() + budget, bar.simulations if bar else None)
     options = Options(track, tuple(sections), str(Path(work) / "mismatch-fits"), watch, bar.group if bar else None)
-    return diagnose_visit(unit, turnout, raw_root, told, fingerprint("turnout.stages.mismatch"), options)
+    return diagnose_visit(unit, turnout, raw_root, passage_tables, fingerprint("turnout.stages.mismatch"), options)
 
 
-def _visit(turnout_id, found, wanted, raw_root):
-    if not found:
+def _visit(turnout_id, by_visit, requested, raw_root):
+    if not by_visit:
         raise SimulationError(f"{turnout_id}: no hammer test and no passage below {raw_root}; nothing can be said.")
-    if wanted is None:
-        return list(found.items())[-1]
-    if wanted == ALL:
-        return list(found)[-1], [unit for members in found.values() for unit in members]
-    if wanted not in found:
-        raise SimulationError(f"{turnout_id} has no visit {wanted!r}; there are {', '.join(list(found)[-12:])}.")
-    return wanted, found[wanted]
+    if requested is None:
+        return list(by_visit.items())[-1]
+    if requested == ALL_VISITS:
+        return list(by_visit)[-1], [unit for members in by_visit.values() for unit in members]
+    if requested not in by_visit:
+        raise SimulationError(f"{turnout_id} has no visit {requested!r}; there are {', '.join(list(by_visit)[-12:])}.")
+    return requested, by_visit[requested]
 
 
 class Results:
@@ -65,7 +65,7 @@ class Results:
         self.turnout_id, self.registry = turnout_id, registry
         self.path = Path(work) / "mismatch-fits" / f"{turnout_id}.json"
 
-    def keep(self, tables):
+    def save(self, tables):
         """Write the result below ``work``."""
         write_text(self.path, encode(tables))
 
@@ -78,27 +78,27 @@ class Results:
             chosen = [r for r in rows if r["term_json"]]
         if len(chosen) == 1:
             return chosen[0]
-        there = "; ".join(
+        overview = "; ".join(
             f"{r['finding_id'][:12]} {r['sections']}: {r['verdict']} {r['term'] or ''}".strip() for r in rows
         )
-        wrong = "several findings carry a term" if chosen else "no such finding carries a term"
-        raise SimulationError(f"{self.turnout_id}: {wrong}; say which with --finding. There are {there or 'none'}.")
+        reason = "several findings carry a term" if chosen else "no such finding carries a term"
+        raise SimulationError(f"{self.turnout_id}: {reason}; say which with --finding. There are {overview or 'none'}.")
 
     def _rows(self):
         """Rows saved below ``work`` or those of the registry, whichever are of newer recordings."""
-        kept, registered = self._kept(), self._registered()
-        if not kept and not registered:
-            said = f"{self.turnout_id} has no result below {self.path.parent}, nor in the registry"
-            raise SimulationError(f"{said}: run turnout diagnose --turnout {self.turnout_id} first.")
-        return registered if _newest(registered) > _newest(kept) else kept
+        saved, registered = self._saved_rows(), self._registry_rows()
+        if not saved and not registered:
+            message = f"{self.turnout_id} has no result below {self.path.parent}, nor in the registry"
+            raise SimulationError(f"{message}: run turnout diagnose --turnout {self.turnout_id} first.")
+        return registered if _newest(registered) > _newest(saved) else saved
 
-    def _kept(self):
+    def _saved_rows(self):
         try:
             return decode(self.path.read_text(encoding="utf-8"))["mismatch_findings"]
         except FileNotFoundError:
             return []
 
-    def _registered(self):
+    def _registry_rows(self):
         """Newest findings of the turnout in the registry, [] without a registry."""
         if self.registry is None or not (Path(self.registry) / "registry.duckdb").exists():
             return []

@@ -6,14 +6,21 @@ from datetime import datetime
 import numpy as np
 
 from turnout.registry.ids import content_id
-from turnout.stages.accepted_effects import described
-from turnout.stages.accepted_effects_case import visit_of
-from turnout.stages.mismatch_curves import band_of, band_of_blows, best_shown, curve_rows, passages_shown, reach_of
-from turnout.stages.mismatch_text import headline, interval, otherwise
+from turnout.stages.accepted_effects import describe_term
+from turnout.stages.accepted_effects_case import accepted_estimates
+from turnout.stages.mismatch_curves import (
+    band_of,
+    band_of_impacts,
+    best_comparison,
+    channel_comparisons,
+    curve_rows,
+    reach_of,
+)
+from turnout.stages.mismatch_text import headline, interval, surface_sentence
 
-HALF_BAY = 0.3  # m: a cell of the residual closer than this is at the finding
-FALSE_DISCOVERY = 0.05  # expected share of false ones among the frames reported
-CHECKS = {
+MAX_CELL_DISTANCE = 0.3  # m: a cell of the residual closer than this is at the finding
+FALSE_DISCOVERY_RATE = 0.05  # expected share of false ones among the frames reported
+SITE_CHECKS = {
     "hanging_sleeper": "Look under this sleeper while a train passes; tamp it",
     "local_ballast": "Compare the ballast of this sleeper with its neighbours'; tamp or drain",
     "local_pad": "Take out the pad of this sleeper",
@@ -42,7 +49,7 @@ CHECKS = {
     "sleeper_mode": "Check the kind of sleepers in the track's file",
     "contact_stiffness": "Measure the profiles of rail and wheels",
 }
-SEPARATES = {
+SEPARATING_TESTS = {
     "pad_temperature": "a hammer test at another rail temperature, 15 K away",
     "pad_preload": "a hammer test beside a standing train, or passages of another axle load",
     "zener_pad": "a hammer test with a hard tip up to 1.2 kHz",
@@ -56,8 +63,8 @@ SEPARATES = {
     "sensor_position": "passages at another speed",
     "attached_resonator": "a hammer test above and beside this place",
 }
-BAY = 0.6  # m between supports
-ELSE = "hammer tests at the points between, and a train of another load and speed"
+SUPPORT_SPACING = 0.6  # m between supports
+GENERAL_TEST = "hammer tests at the points between, and a train of another load and speed"
 
 
 def sentence(diagnosis):
@@ -68,40 +75,42 @@ def sentence(diagnosis):
     if verdict.answer == "numerics":
         return f"The simulation is not fine enough to be compared: {verdict.reason}."
     if verdict.answer == "unknown":
-        return f"Something is missing {place_in_words(diagnosis)}: {verdict.reason}."
-    words = []
-    for term, own in zip(diagnosis.fit.terms, diagnosis.verdicts):
-        words.append(f"What the model left out: {term.sentence()}.")
-        if own.answer == "a_or_b":
-            words.append(f"Or {own.names[1].replace('_', ' ')}: these recordings cannot tell them apart.")
-    return " ".join([*words, f"But {verdict.reason}."] if verdict.answer == "named" and verdict.reason else words)
+        return f"Something is missing {location_text(diagnosis)}: {verdict.reason}."
+    sentences = []
+    for term, term_verdict in zip(diagnosis.fit.terms, diagnosis.verdicts):
+        sentences.append(f"What the model left out: {term.sentence()}.")
+        if term_verdict.answer == "a_or_b":
+            sentences.append(f"Or {term_verdict.names[1].replace('_', ' ')}: these recordings cannot tell them apart.")
+    return " ".join(
+        [*sentences, f"But {verdict.reason}."] if verdict.answer == "named" and verdict.reason else sentences
+    )
 
 
-def place_in_words(diagnosis):
+def location_text(diagnosis):
     """Location of the missing effect in words, else the frames in which the residual is concentrated."""
     if diagnosis.where is not None:
         return str(diagnosis.where)
-    found = [f for f in diagnosis.frames if f.q < FALSE_DISCOVERY]
-    if not found:
+    frames = [f for f in diagnosis.frames if f.q < FALSE_DISCOVERY_RATE]
+    if not frames:
         return "at no place, sensor or train in particular"
-    return ", ".join(f"at {f.frame} {f.level} ({f.effect:+.1f} dB, q = {f.q:.3f})" for f in found[:2])
+    return ", ".join(f"at {f.frame} {f.level} ({f.effect:+.1f} dB, q = {f.q:.3f})" for f in frames[:2])
 
 
 def recommendation(diagnosis):
     """What to check on site, or which measurement would decide."""
     verdict = diagnosis.verdict
     if verdict.answer == "named":
-        return CHECKS.get(verdict.names[0], "Look at the place; repeat the measurement after the work")
+        return SITE_CHECKS.get(verdict.names[0], "Look at the place; repeat the measurement after the work")
     if verdict.answer == "a_or_b":
-        return f"Measure {SEPARATES.get(verdict.names[0], SEPARATES.get(verdict.names[1], ELSE))}"
-    return f"Measure {ELSE}" if verdict.answer == "unknown" else ""
+        return f"Measure {SEPARATING_TESTS.get(verdict.names[0], SEPARATING_TESTS.get(verdict.names[1], GENERAL_TEST))}"
+    return f"Measure {GENERAL_TEST}" if verdict.answer == "unknown" else ""
 
 
 def finding_row(diagnosis, identity):
     """Row of ``mismatch_findings``; ``identity`` holds finding_id, turnout_id, section_id, found_at_utc, result_id."""
     verdict, check = diagnosis.verdict, diagnosis.verification
     term = next(iter(diagnosis.fit.candidates), None) if verdict.answer in ("named", "a_or_b") else None
-    where = term.where if term else acts(diagnosis.where)
+    where = term.where if term else location_fields(diagnosis.where)
     locked = term.frame if term else where.get("frame")
     return {
         **identity,
@@ -115,38 +124,38 @@ def finding_row(diagnosis, identity):
         "band_low_hz": None,
         "band_high_hz": None,
         "probability": round(diagnosis.probability, 4),
-        "p_value": next((f.q for f in diagnosis.frames if f.frame == locked and _is_there(f.level, where)), None),
+        "p_value": next((f.q for f in diagnosis.frames if f.frame == locked and _is_at_finding(f.level, where)), None),
         "fit_before_pct": _finite(check.before),
         "fit_after_pct": _finite(check.after),
         "fit_rival_pct": _finite(check.rival),
         "fit_decoy_pct": _finite(check.decoy),
         "fit_gain_se_pct": _finite(check.error),
         "n_held_out": check.n,
-        "parameters_json": json.dumps(parameters(diagnosis), sort_keys=True) if term else None,
-        "train": in_train(where),
+        "parameters_json": json.dumps(fitted_parameters(diagnosis), sort_keys=True) if term else None,
+        "train": train_text(where),
         "sentence": sentence(diagnosis),
         "next_measurement": recommendation(diagnosis) or None,
     }
 
 
-def in_train(where):
+def train_text(where):
     """Train and axle of a location in words, None without a train."""
     if not where.get("train"):
         return None
     return f"{where['train']}, axle {where['axle']}" if where.get("axle") else where["train"]
 
 
-def acts(found):
+def location_fields(location):
     """Frame, position with standard error, sensor, train and axle of the location of a residual, {} of None."""
-    if found is None:
+    if location is None:
         return {}
-    said = {"frame": found.frame, "sensor": found.sensor, "train": found.train, "axle": found.axle}
-    if found.place is not None:  # an interval of 95 %, not below half a bay
-        said |= {"place": found.place, "place_se": max(found.high - found.low, BAY) / 4.0}
-    return said
+    columns = {"frame": location.frame, "sensor": location.sensor, "train": location.train, "axle": location.axle}
+    if location.place is not None:  # an interval of 95 %, not below half a bay
+        columns |= {"place": location.place, "place_se": max(location.high - location.low, SUPPORT_SPACING) / 4.0}
+    return columns
 
 
-def parameters(diagnosis):
+def fitted_parameters(diagnosis):
     """Name, value, standard error and unit of each fitted parameter."""
     fitted = [(c, p) for c in diagnosis.fit.candidates for p in c.parameters]
     values = zip(fitted, diagnosis.fit.psi, diagnosis.fit.psi_se)
@@ -158,63 +167,69 @@ def parameters(diagnosis):
 
 def _position(diagnosis, term, where):
     """Position [m] and its standard error; a fitted ``shift`` from the scanned position is added."""
-    place, se = where.get("place"), where.get("place_se")
+    position, se = where.get("place"), where.get("place_se")
     names = [p.name for p in term.parameters] if term else []
-    if place is not None and "shift" in names:
+    if position is not None and "shift" in names:
         k = diagnosis.fit.part(term).start + names.index("shift")
-        place, se = round(float(place + diagnosis.fit.psi[k]), 3), float(f"{diagnosis.fit.psi_se[k]:.3g}")
-    return {"position_m": place, "position_se_m": se}
+        position, se = round(float(position + diagnosis.fit.psi[k]), 3), float(f"{diagnosis.fit.psi_se[k]:.3g}")
+    return {"position_m": position, "position_se_m": se}
 
 
-def _is_there(level, where):
+def _is_at_finding(level, where):
     """Whether the level of a frame is at the finding; True for a finding without position, sensor and train.
 
-    >>> _is_there("12.0", {"place": 12.2}), _is_there("12.0", {"place": 18.0}), _is_there("A1", {"sensor": "A2"})
-    (True, False, False)
+    >>> [_is_at_finding("12.0", {"place": position}) for position in (12.2, 18.0)]
+    [True, False]
+    >>> _is_at_finding("A1", {"sensor": "A2"})
+    False
     """
     if where.get("place") is not None:
         try:
-            return abs(float(level) - where["place"]) <= HALF_BAY
+            return abs(float(level) - where["place"]) <= MAX_CELL_DISTANCE
         except ValueError:
             return False
-    own = (where.get("sensor"), where.get("train"), in_train(where))
-    return str(level) in own or not any(own)
+    names = (where.get("sensor"), where.get("train"), train_text(where))
+    return str(level) in names or not any(names)
 
 
 def _finite(value):
     return None if value is None or value != value else round(float(value), 2)
 
 
-NOTES_KEPT = 12
+MAX_NOTES = 12
 
 
-def finding_tables(found, case, group, about) -> dict[str, list[dict]]:
+def finding_tables(diagnosis, case, group, about) -> dict[str, list[dict]]:
     """Rows by table of one group's diagnosis; ``about`` holds turnout, visit, identity (content id), notes."""
     identity = _identity(group, about, case)
-    shown = best_shown(passages_shown(case, found), case, found) if case.rollings else None
-    changed = found.fit is not found.base
-    row = finding_row(found, {**identity, "result_id": ""})
+    comparison = (
+        best_comparison(channel_comparisons(case, diagnosis), case, diagnosis) if case.aligned_passages else None
+    )
+    changed = diagnosis.fit is not diagnosis.base
+    row = finding_row(diagnosis, {**identity, "result_id": ""})
     row.pop("result_id")
-    band, reach = band_of_blows(case, found) or band_of(shown, changed), reach_of(shown, changed)
+    band, reach = band_of_impacts(case, diagnosis) or band_of(comparison, changed), reach_of(comparison, changed)
     low, high = band or (row["band_low_hz"], row["band_high_hz"])
     row |= {"band_low_hz": low, "band_high_hz": high, "wheel_within_m": reach}
-    row |= _numbers(found, case, group, about)
-    row["sentence"] = " ".join(filter(None, [headline(row), *map(otherwise, surface_told(case, found.fit))]))
+    row |= _summary_columns(diagnosis, case, group, about)
+    row["sentence"] = " ".join(
+        filter(None, [headline(row), *map(surface_sentence, surface_estimates(case, diagnosis.fit))])
+    )
     key = {"finding_id": row["finding_id"], "turnout_id": row["turnout_id"]}
     return {
         "mismatch_findings": [row],
-        "mismatch_parameters": parameter_rows(found, case, row),
-        "mismatch_curves": curve_rows(case, found, shown, key),
+        "mismatch_parameters": parameter_rows(diagnosis, case, row),
+        "mismatch_curves": curve_rows(case, diagnosis, comparison, key),
     }
 
 
 def _identity(group, about, case):
     turnout = about["turnout"]
-    one = turnout.section_id(group.labels[0]) if len(group.labels) == 1 else None
+    section_id = turnout.section_id(group.labels[0]) if len(group.labels) == 1 else None
     return {
         "finding_id": content_id("finding", turnout.id, about["visit"], *group.labels, about["identity"]),
         "turnout_id": turnout.id,
-        "section_id": one,
+        "section_id": section_id,
         "found_at_utc": _newest(group.campaign, about),
     }
 
@@ -229,43 +244,45 @@ def _newest(campaign, about) -> datetime:
     return datetime.fromisoformat(visit if len(visit) > 7 else f"{visit}-01")
 
 
-def _numbers(found, case, group, about) -> dict:
-    campaign, fit = group.campaign, found.fit
-    places = [s.place for s in campaign.sensors] + [t.place for t in campaign.hammer]
+def _summary_columns(diagnosis, case, group, about) -> dict:
+    campaign, fit = group.campaign, diagnosis.fit
+    positions = [s.place for s in campaign.sensors] + [t.place for t in campaign.hammer]
     terms = [
-        described(t, c, se, case.track()) | _said_of(v)
-        for t, c, se, v in zip(fit.terms, fit.candidates, _errors(fit), found.verdicts)
+        describe_term(t, c, se, case.track()) | _term_evidence(v)
+        for t, c, se, v in zip(fit.terms, fit.candidates, _errors_by_candidate(fit), diagnosis.verdicts)
     ]  # fmt: skip
     return {
         "visit": about["visit"],
         "sections": ", ".join(group.labels),
         "route": group.route,
-        "place_low_m": min(places),
-        "place_high_m": max(places),
+        "place_low_m": min(positions),
+        "place_high_m": max(positions),
         "n_hammer_tests": len(campaign.hammer),
-        "n_passages": sum(o.kind == "passage" for o in (*case.observations, *case.reserved)),
+        "n_passages": sum(o.data_type == "passage" for o in (*case.observations, *case.reserved)),
         "n_sensors": len(campaign.sensors),
-        "level_before": float(max(found.base.level.values())),
+        "level_before": float(max(diagnosis.base.level.values())),
         "level_after": float(max(fit.level.values())),
         "term_json": json.dumps(terms, sort_keys=True) if terms else None,
-        "evidence_json": json.dumps(_evidence(found), sort_keys=True),
-        "notes": "\n".join(_kept([*dict.fromkeys([*case.notes, *_of_visit(about, campaign)])])) or None,
+        "evidence_json": json.dumps(_evidence(diagnosis), sort_keys=True),
+        "notes": "\n".join(_first_notes([*dict.fromkeys([*case.notes, *_visit_notes(about, campaign)])])) or None,
     }
 
 
-def _kept(notes):
+def _first_notes(notes):
     """The first ``MAX_NOTES`` notes and the number of others."""
-    more = len(notes) - NOTES_KEPT
-    return [*notes[:NOTES_KEPT], *([f"and {more} more"] if more > 0 else [])]
+    more = len(notes) - MAX_NOTES
+    return [*notes[:MAX_NOTES], *([f"and {more} more"] if more > 0 else [])]
 
 
-def _of_visit(about, campaign):
+def _visit_notes(about, campaign):
     """Notes of the visit, those on passages of other groups last."""
-    mine = tuple(f"passage {p.name}: " for p in campaign.passages)
-    return sorted(about["notes"], key=lambda note: not note.startswith(mine) if note.startswith("passage ") else False)
+    prefixes = tuple(f"passage {p.name}: " for p in campaign.passages)
+    return sorted(
+        about["notes"], key=lambda note: not note.startswith(prefixes) if note.startswith("passage ") else False
+    )
 
 
-def _errors(fit):
+def _errors_by_candidate(fit):
     """Standard errors of each candidate's parameters."""
     first, se = 0, fit.psi_se
     for candidate in fit.candidates:
@@ -273,32 +290,32 @@ def _errors(fit):
         first += len(candidate.parameters)
 
 
-def _said_of(verdict) -> dict:
+def _term_evidence(verdict) -> dict:
     """Probability of a term, and the other effect of an "a_or_b" verdict."""
-    other = {"or": verdict.names[1]} if len(verdict.names) > 1 else {}
-    return {"probability": _plain(verdict.probability), **other}
+    alternative = {"or": verdict.names[1]} if len(verdict.names) > 1 else {}
+    return {"probability": _plain(verdict.probability), **alternative}
 
 
-def _evidence(found) -> dict:
+def _evidence(diagnosis) -> dict:
     """Frames, and the evidence of each verdict: of the first effect, and of further ones under ``beside``."""
     frames = [
         {"frame": f.frame, "level": str(f.level), "effect_db": _plain(f.effect), "q": _plain(f.q), "n": f.n}
-        for f in found.frames[:6]
+        for f in diagnosis.frames[:6]
     ]
-    first, *others = (_rests_on(v) for v in found.verdicts)
-    return {"frames": frames, **first, "beside": others}
+    first, *further = (_verdict_evidence(v) for v in diagnosis.verdicts)
+    return {"frames": frames, **first, "beside": further}
 
 
-def _rests_on(verdict) -> dict:
+def _verdict_evidence(verdict) -> dict:
     """Probabilities, ranking of rivals, and evidence [nats] by condition."""
-    best = verdict.scores[:4]
+    top_scores = verdict.scores[:4]
     return {
         "term": verdict.names[0] if verdict.names else None,
         "probability": _plain(verdict.probability),
         "reason": verdict.reason,
         "posterior": {k: _plain(v) for k, v in _largest(verdict.posterior)},
-        "ranking": [{"family": s.family, "nats": _plain(s.gain), "explained": _plain(s.explained)} for s in best],
-        "by_condition": {k: _plain(v) for k, v in best[0].by_condition.items()} if best else {},
+        "ranking": [{"family": s.family, "nats": _plain(s.gain), "explained": _plain(s.explained)} for s in top_scores],
+        "by_condition": {k: _plain(v) for k, v in top_scores[0].by_condition.items()} if top_scores else {},
     }
 
 
@@ -310,7 +327,7 @@ def _plain(value):
     return float(f"{value:.5g}") if np.isfinite(value) else None
 
 
-def parameter_rows(found, case, row) -> list[dict]:
+def parameter_rows(diagnosis, case, row) -> list[dict]:
     """Rows of ``mismatch_parameters``.
 
     They hold the new terms, and the present estimates of the track file: accepted effects and uncertain numbers of the
@@ -319,40 +336,40 @@ def parameter_rows(found, case, row) -> list[dict]:
     base = {k: row[k] for k in ("finding_id", "turnout_id", "found_at_utc")}
     rows = []
     for term in json.loads(row["term_json"] or "[]"):
-        place = _place(term["fixed"])
+        position = _mean_position(term["fixed"])
         for name, p in term["parameters"].items():
             channel = term["fixed"].get("channel_name")
-            rows.append(_parameter(term["term"], place, channel, name, p["value"], p["se"], p["unit"], False))
-    for v in visit_of(case, found.fit):
+            rows.append(_parameter_row(term["term"], position, channel, name, p["value"], p["se"], p["unit"], False))
+    for v in accepted_estimates(case, diagnosis.fit):
         a = v["accepted"]
         channel = a.fixed.get("channel_name")
-        rows.append(_parameter(a.family, a.place, channel, v["name"], v["value"], v["se"], v["unit"], True))
-    for s in surface_told(case, found.fit):
-        rows.append(_parameter(s["term"], s["place"], None, s["name"], s["value"], s["se"], s["unit"], True))
+        rows.append(_parameter_row(a.family, a.place, channel, v["name"], v["value"], v["se"], v["unit"], True))
+    for s in surface_estimates(case, diagnosis.fit):
+        rows.append(_parameter_row(s["term"], s["place"], None, s["name"], s["value"], s["se"], s["unit"], True))
     return [{**base, "parameter_no": k, **r} for k, r in enumerate(rows)]
 
 
-def surface_told(case, fit) -> list[dict]:
+def surface_estimates(case, fit) -> list[dict]:
     """Estimates of uncertain numbers of the running surface in the track's file."""
     surface = getattr(case, "surface", None)
-    return list(surface.told(case, fit)) if surface else []
+    return list(surface.estimate(case, fit)) if surface else []
 
 
-def _place(fixed):
-    places = [fixed[k] for k in ("sleeper", "support", "first", "last", "place") if k in fixed]
-    return float(np.mean(places)) if places else None
+def _mean_position(fixed):
+    positions = [fixed[k] for k in ("sleeper", "support", "first", "last", "place") if k in fixed]
+    return float(np.mean(positions)) if positions else None
 
 
-def _parameter(term, place, channel, name, value, se, unit, accepted):
-    known = se is not None and np.isfinite(se)
-    low, high = interval(term, name, float(value), se) if known else (None, None)
+def _parameter_row(term, position, channel, name, value, se, unit, accepted):
+    has_error = se is not None and np.isfinite(se)
+    low, high = interval(term, name, float(value), se) if has_error else (None, None)
     return {
         "term": term,
-        "position_m": place,
+        "position_m": position,
         "channel": channel,
         "parameter": name,
         "value": float(value),
-        "value_se": float(se) if known else None,
+        "value_se": float(se) if has_error else None,
         "value_low": low,
         "value_high": high,
         "unit": unit,

@@ -4,8 +4,8 @@ import json
 
 import numpy as np
 
-from turnout.mismatch.engine.score import NO_UPPER_END
-from turnout.stages.accepted_effects import KINDS
+from turnout.mismatch.engine.score import MAX_BOUNDED_ERROR
+from turnout.stages.accepted_effects import TERM_CLASSES
 
 # One sentence per effect. Fields: {place}, {channel}, {train}, {wheel}, every parameter with its unit, and its
 # absolute value as {<parameter>_size}.
@@ -41,16 +41,18 @@ SENTENCES = {
     "low_pass": "Channel {channel} loses what is fast",
 }
 # effect -> (parameter, sentence if its standard error is too large for an upper limit)
-OPEN = {"hanging_sleeper": ("gap", "The sleeper at {place} hangs above its ballast, and no train here closes the gap")}
+OPEN_SENTENCES = {
+    "hanging_sleeper": ("gap", "The sleeper at {place} hangs above its ballast, and no train here closes the gap")
+}
 # effect -> (parameter, sentence if it is negative)
-REVERSED = {
+NEGATIVE_SENTENCES = {
     "sensor_gain": ("gain", "Sensor {channel} has the wrong polarity: it reads {gain} times what it should"),
     "time_offset": ("delay", "Channel {channel} is early by {delay_size}"),
 }
-OTHERWISE = 2.0  # prior standard deviations from the track file's value that are worth a sentence
+MIN_SURFACE_DEVIATION = 2.0  # prior standard deviations from the track file's value that are worth a sentence
 Z95 = 1.959964  # half width of a 95 % interval in standard errors
-MILLI = {"m": "mm", "s": "ms"}
-PERCENT = {"1/K": "% per kelvin"}
+MILLI_UNITS = {"m": "mm", "s": "ms"}
+PERCENT_UNITS = {"1/K": "% per kelvin"}
 
 
 def number_in_words(value, unit, digits=2):
@@ -59,12 +61,12 @@ def number_in_words(value, unit, digits=2):
     >>> number_in_words(0.00112, "m"), number_in_words(1.31, "-"), number_in_words(0.012, "1/K")
     ('1.1 mm', '1.3', '1.2 % per kelvin')
     """
-    if unit in PERCENT:
-        return f"{100.0 * value:.{digits}g} {PERCENT[unit]}"
-    if unit in MILLI and abs(value) < 0.1:
-        return f"{1e3 * value:.{digits}g} {MILLI[unit]}"
-    shown = f"{value:.{digits}g}" if abs(value) < 100 else f"{value:.0f}"
-    return shown if unit in ("-", "") else f"{shown} {unit}"
+    if unit in PERCENT_UNITS:
+        return f"{100.0 * value:.{digits}g} {PERCENT_UNITS[unit]}"
+    if unit in MILLI_UNITS and abs(value) < 0.1:
+        return f"{1e3 * value:.{digits}g} {MILLI_UNITS[unit]}"
+    text = f"{value:.{digits}g}" if abs(value) < 100 else f"{value:.0f}"
+    return text if unit in ("-", "") else f"{text} {unit}"
 
 
 def interval(term, name, value, se) -> tuple[float, float]:
@@ -73,9 +75,9 @@ def interval(term, name, value, se) -> tuple[float, float]:
     >>> [round(interval(*what, 0.1, 0.1)[0], 3) for what in (("hanging_sleeper", "seated"), ("kink", "depth"))]
     [0.0, -0.096]
     """
-    listed = KINDS[term].parameters if term in KINDS else ()
-    least = 0.0 if any(p.name == name and p.bounds[0] >= 0.0 for p in listed) else -np.inf
-    return float(max(value - Z95 * se, min(least, value))), float(value + Z95 * se)
+    parameters = TERM_CLASSES[term].parameters if term in TERM_CLASSES else ()
+    lower_limit = 0.0 if any(p.name == name and p.bounds[0] >= 0.0 for p in parameters) else -np.inf
+    return float(max(value - Z95 * se, min(lower_limit, value))), float(value + Z95 * se)
 
 
 def parameter_in_words(term, name) -> str:
@@ -84,19 +86,19 @@ def parameter_in_words(term, name) -> str:
     >>> parameter_in_words("hanging_sleeper", "gap"), parameter_in_words("kink", "depth")
     ('gap: clearance when unloaded', 'depth')
     """
-    listed = KINDS[term].parameters if term in KINDS else ()
-    return ": ".join([name, *(p.meaning for p in listed if p.name == name)])
+    parameters = TERM_CLASSES[term].parameters if term in TERM_CLASSES else ()
+    return ": ".join([name, *(p.meaning for p in parameters if p.name == name)])
 
 
-NAMES = {"power": "power of the flanks (1 straight, 2 parabolas)", "share": "share before the deepest point"}
+PARAMETER_NAMES = {"power": "power of the flanks (1 straight, 2 parabolas)", "share": "share before the deepest point"}
 
 
 def headline(finding) -> str:
     """The ``title``, followed by the reason of a named verdict."""
-    said, reason = title(finding), json.loads(finding["evidence_json"] or "{}").get("reason")
+    text, reason = title(finding), json.loads(finding["evidence_json"] or "{}").get("reason")
     if finding["verdict"] != "named" or not reason or not json.loads(finding["term_json"] or "[]"):
-        return said
-    return f"{said} {reason[:1].upper()}{reason[1:]}."
+        return text
+    return f"{text} {reason[:1].upper()}{reason[1:]}."
 
 
 def title(finding) -> str:
@@ -104,38 +106,43 @@ def title(finding) -> str:
     terms = json.loads(finding["term_json"] or "[]")
     if finding["verdict"] in ("named", "a_or_b") and terms:
         rivals = [finding["rival_term"] if finding["verdict"] == "a_or_b" else None, *(None for _ in terms[1:])]
-        return "; ".join(_sentence(t, finding) + _or(t.get("or", rival)) for t, rival in zip(terms, rivals)) + "."
+        return (
+            "; ".join(_sentence(t, finding) + _rival_text(t.get("or", rival)) for t, rival in zip(terms, rivals)) + "."
+        )
     low, high = finding["place_low_m"], finding["place_high_m"]
     if finding["verdict"] == "unknown":
-        return f"Something is missing {_somewhere(finding, low, high)}, and no known effect explains it."
+        return f"Something is missing {_location_text(finding, low, high)}, and no known effect explains it."
     return finding["sentence"] or ""
 
 
-def otherwise(told) -> str:
+def surface_sentence(estimate) -> str:
     """A sentence on a number of the running surface that differs from the track's file, "" if it agrees.
 
     >>> depth = {"term": "running_surface_kink", "place": 26.7, "name": "depth", "unit": "m", "filed": 1e-3}
-    >>> otherwise({**depth, "value": 4e-3, "se": 1e-4, "off": 2.8})
+    >>> surface_sentence({**depth, "value": 4e-3, "se": 1e-4, "off": 2.8})
     'The depth of the kink at 26.7 m is 4 mm (3.8 to 4.2 mm), the track file has 1 mm.'
-    >>> otherwise({**depth, "value": 1.3e-3, "se": 1e-4, "off": 0.5})
+    >>> surface_sentence({**depth, "value": 1.3e-3, "se": 1e-4, "off": 0.5})
     ''
     """
-    if told["off"] < OTHERWISE:
+    if estimate["off"] < MIN_SURFACE_DEVIATION:
         return ""
-    half = Z95 * told["se"]
-    values = told["value"], told["value"] - half, told["value"] + half, told["filed"]
-    now, low, high, filed = (number_in_words(v, told["unit"], 3) for v in values)
-    name, part = NAMES.get(told["name"], told["name"]), told["term"].removeprefix("running_surface_")
-    what = f"{name} of the {part} at {told['place']:.1f} m"
-    return f"The {what} is {now} ({low.removesuffix(' mm')} to {high}), the track file has {filed}."
+    half = Z95 * estimate["se"]
+    values = estimate["value"], estimate["value"] - half, estimate["value"] + half, estimate["filed"]
+    value, low, high, filed = (number_in_words(v, estimate["unit"], 3) for v in values)
+    name, feature = (
+        PARAMETER_NAMES.get(estimate["name"], estimate["name"]),
+        estimate["term"].removeprefix("running_surface_"),
+    )
+    subject = f"{name} of the {feature} at {estimate['place']:.1f} m"
+    return f"The {subject} is {value} ({low.removesuffix(' mm')} to {high}), the track file has {filed}."
 
 
-def _or(other) -> str:
-    name = (other or "").replace("_", " ")
-    return f", or what was left out is “{name}”: these recordings cannot tell the two apart" if other else ""
+def _rival_text(rival) -> str:
+    name = (rival or "").replace("_", " ")
+    return f", or what was left out is “{name}”: these recordings cannot tell the two apart" if rival else ""
 
 
-def _somewhere(finding, low, high):
+def _location_text(finding, low, high):
     """Location of the effect in words, else the range of the measurements."""
     if finding["position_m"] is not None:
         return f"at {finding['position_m']:.1f} m"
@@ -148,38 +155,42 @@ def _somewhere(finding, low, high):
     return f"{between} that comes and goes without a wheel" if finding["locked_to"] == "clock" else between
 
 
-def _wheel(said):
+def _wheel_text(train_and_axle):
     """Axle of a train in words, from the text "train, axle n".
 
-    >>> _wheel("IC 2000, axle 3"), _wheel("a train")
+    >>> _wheel_text("IC 2000, axle 3"), _wheel_text("a train")
     ('axle 3 of IC 2000', 'an axle of a train')
     """
-    train, _, axle = said.partition(", axle ")
+    train, _, axle = train_and_axle.partition(", axle ")
     return f"axle {axle} of {train}" if axle else f"an axle of {train}"
 
 
 def _sentence(term, finding) -> str:
     fixed = term["fixed"]
-    places = [fixed[k] for k in ("sleeper", "support", "first", "last", "place") if k in fixed]
-    beyond = term["parameters"].get("shift", {"value": 0.0})["value"] if "place" in fixed else 0.0
+    positions = [fixed[k] for k in ("sleeper", "support", "first", "last", "place") if k in fixed]
+    shift = term["parameters"].get("shift", {"value": 0.0})["value"] if "place" in fixed else 0.0
     words = {name: number_in_words(p["value"], p["unit"]) for name, p in term["parameters"].items()}
     words |= {f"{name}_size": number_in_words(abs(p["value"]), p["unit"]) for name, p in term["parameters"].items()}
     words |= {
-        "place": f"{sum(places) / len(places) + beyond:.1f} m" if places else "an unknown place",
+        "place": f"{sum(positions) / len(positions) + shift:.1f} m" if positions else "an unknown place",
         "channel": fixed.get("channel_name") or finding["channel"] or "?",
         "train": finding["train"] or fixed.get("train") or "a train",
-        "wheel": _wheel(finding["train"] or fixed.get("train") or "a train"),
+        "wheel": _wheel_text(finding["train"] or fixed.get("train") or "a train"),
     }
     try:
-        return _said(term).format(**words)
+        return _sentence_template(term).format(**words)
     except KeyError:  # a new effect without a sentence of its own yet
         return f"{term['term'].replace('_', ' ').capitalize()} at {words['place']}"
 
 
-def _said(term) -> str:
-    name, turned = REVERSED.get(term["term"], ("", ""))
+def _sentence_template(term) -> str:
+    name, template = NEGATIVE_SENTENCES.get(term["term"], ("", ""))
     if name and term["parameters"][name]["value"] < 0.0:
-        return turned
-    name, vague = OPEN.get(term["term"], ("", ""))
-    known = term["parameters"].get(name)
-    return vague if known and known["se"] > NO_UPPER_END * abs(known["value"]) else SENTENCES[term["term"]]
+        return template
+    name, open_template = OPEN_SENTENCES.get(term["term"], ("", ""))
+    estimate = term["parameters"].get(name)
+    return (
+        open_template
+        if estimate and estimate["se"] > MAX_BOUNDED_ERROR * abs(estimate["value"])
+        else SENTENCES[term["term"]]
+    )

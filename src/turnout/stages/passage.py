@@ -16,12 +16,12 @@ from turnout.passage.segmentation import cut_passages
 from turnout.passage.timetable import listed_for, listed_trains
 from turnout.records import ModalModel, Recording, Unit
 from turnout.registry.ids import content_id
-from turnout.stages.common import contradiction, quarantine_row, read_or_quarantine, recording_row
+from turnout.stages.common import quarantine_row, read_or_quarantine, recording_row, time_contradiction
 from turnout.stages.passage_rows import finding_rows, fit_row, passage_row
 
 # Largest time between the file's name and its content; names in local time differ by less.
-OTHER_TIME = timedelta(days=1)
-RENAME = "Nobody can tell which is right. Rename it, or export it anew with the right time"
+MAX_NAME_OFFSET = timedelta(days=1)
+TIME_REMEDY = "Nobody can tell which is right. Rename it, or export it anew with the right time"
 
 
 @dataclass(frozen=True)
@@ -77,20 +77,20 @@ def passage_unit(
     faults: list[tuple] = []
     base = {"turnout_id": unit.turnout}
     rows: dict[str, list[dict]] = {"recordings": [], "passages": [], "passage_fits": [], "quarantine": []}
-    description = _described(turnout).description
+    description = _passage_config(turnout).description
     for path, size, _ in unit.files:
         longest = turnout.settings["passage"].longest
         result = read_or_quarantine(path, raw_root, description, base, rows["quarantine"], "passage", longest=longest)
         if result is None:
             continue
         recording_id = result.sha256[:32]
-        everything = sorted((*result.recordings, *result.long), key=lambda r: r.record)
-        wrong = contradiction(path, everything, _time_in(unit.label), OTHER_TIME, RENAME)
-        if wrong is not None:
-            rows["quarantine"].append(quarantine_row(wrong, base, "passage", "passage", None, recording_id))
+        records = sorted((*result.recordings, *result.long_recordings), key=lambda r: r.record)
+        contradiction = time_contradiction(path, records, _time_of_label(unit.label), MAX_NAME_OFFSET, TIME_REMEDY)
+        if contradiction is not None:
+            rows["quarantine"].append(quarantine_row(contradiction, base, "passage", "passage", None, recording_id))
             continue
-        for recording in everything:
-            started_at = recording.started_at or _time_in(unit.label)
+        for recording in records:
+            started_at = recording.started_at or _time_of_label(unit.label)
             if started_at is None:
                 remedy = "Put the time in its name as YYYYMMDDTHHMMSSZ, or record it in the file"
                 error = ReadError(path, f"record {recording.record + 1}", "has no time", remedy, "wrong_time")
@@ -99,9 +99,9 @@ def passage_unit(
                 )
                 continue
             try:
-                for part, late, name in trains_in(recording, turnout.settings["passage"]):
-                    moment = started_at + timedelta(seconds=late)
-                    _one_train(part, moment, recording_id, path, turnout, context, rows, name)
+                for train_recording, offset, name in trains_in(recording, turnout.settings["passage"]):
+                    moment = started_at + timedelta(seconds=offset)
+                    _add_train(train_recording, moment, recording_id, path, turnout, context, rows, name)
             except ReadError as error:  # a long record is read in pieces: its file may be damaged or change meanwhile
                 rows["quarantine"].append(
                     quarantine_row(error, base, "passage", "passage", recording.record, recording_id)
@@ -119,13 +119,13 @@ def passage_unit(
 
 def sensors_of(turnout: TurnoutConfig) -> tuple[PassageSensor, ...]:
     """The acceleration sensors of a turnout's passages."""
-    found, passages = [], _described(turnout)
+    sensors, passages = [], _passage_config(turnout)
     for channel in passages.description.channels:
         if channel.quantity == "acceleration":
             section = turnout.section(passages.sections[channel.name])
             position = channel.position if channel.position is not None else section.position
-            found.append(PassageSensor(channel.name, section.label, float(position), section.track, section.panel))
-    return tuple(found)
+            sensors.append(PassageSensor(channel.name, section.label, float(position), section.track, section.panel))
+    return tuple(sensors)
 
 
 def model_at(models, moment: datetime) -> SectionModel | None:
@@ -134,7 +134,7 @@ def model_at(models, moment: datetime) -> SectionModel | None:
     return before[-1] if before else models[0] if models else None
 
 
-def _described(turnout: TurnoutConfig) -> PassageConfig:
+def _passage_config(turnout: TurnoutConfig) -> PassageConfig:
     """The passage configuration of a turnout; ValueError if it has none."""
     if turnout.passages is None:
         raise ValueError(f"{turnout.id} has no passages in its configuration")
@@ -151,17 +151,17 @@ def trains_in(recording, settings):
         yield recording, 0.0, ()
         return
     rows = list(recording.of_quantity("acceleration"))
-    known = {
+    attributes = {
         name: getattr(recording, name) for name in ("rate", "kind", "source", "record", "started_at", "conditions")
     }
     channels = tuple(recording.channels[i] for i in rows)
-    blocks = (block[rows] for block in recording.stretches(settings.chunk))
+    blocks = (block[rows] for block in recording.blocks(settings.chunk))
     for piece in cut_passages(blocks, recording.rate, settings):
-        part = Recording(samples=piece.samples.astype(float), channels=channels, **known)
-        yield part, piece.start / recording.rate, (str(piece.start),)
+        train_recording = Recording(samples=piece.samples.astype(float), channels=channels, **attributes)
+        yield train_recording, piece.start / recording.rate, (str(piece.start),)
 
 
-def _one_train(recording, started_at, recording_id, path, turnout, context, rows, name=()):
+def _add_train(recording, started_at, recording_id, path, turnout, context, rows, name=()):
     """Add the rows of one train; ``name`` distinguishes it from others in the same record."""
     settings = turnout.settings["passage"]
     sensors = sensors_of(turnout)
@@ -174,13 +174,15 @@ def _one_train(recording, started_at, recording_id, path, turnout, context, rows
     passed_at = started_at + timedelta(seconds=round(first, 3))
     rows["quarantine"] += finding_rows(passage, base, path, recording.record, recording_id)
     listed, _ = listed_trains(turnout.trains)
-    match = listed_for(passed_at, passage.n_axle, listed, settings.train_data_tolerance) if passage.n_axle else None
+    listed_train = (
+        listed_for(passed_at, passage.n_axle, listed, settings.train_data_tolerance) if passage.n_axle else None
+    )
     load = axle_load(recording, passage, context.loads, settings) if passage.n_axle else None
     identity = {**base, "recording_id": recording_id, "passed_at_utc": passed_at}
-    row = passage_row(passage, identity, match, load, recording.conditions)
+    row = passage_row(passage, identity, listed_train, load, recording.conditions)
     if context.clusters is not None and passage.n_axle:
-        known = (row.get(name) for name in ("train_type", "speed_kmh", "axle_load_t"))
-        row["cluster_id"] = context.clusters.assign(*known)
+        features = (row.get(name) for name in ("train_type", "speed_kmh", "axle_load_t"))
+        row["cluster_id"] = context.clusters.assign(*features)
     fits = _fit_rows(recording, passage, sensors, turnout, context, identity, settings) if passage.n_axle else []
     # The id depends on the whole row: train data, models, clusters and loads change it as well as the file does.
     # It depends on the path too, so that the row of a copy stays when that of its original is withdrawn.
@@ -191,30 +193,32 @@ def _one_train(recording, started_at, recording_id, path, turnout, context, rows
 
 def _fit_rows(recording, passage, sensors, turnout, context, identity, settings):
     """One row per sensor that recorded the train and whose section has a model."""
-    unsound = {r.detail.split(":")[0] for r in passage.findings if r.reason in ("clipped", "sensor_lost")}
-    found = []
+    unusable = {r.detail.split(":")[0] for r in passage.findings if r.reason in ("clipped", "sensor_lost")}
+    rows = []
     latest = {label: model_at(models, identity["passed_at_utc"]) for label, models in context.models.items()}
     for sensor in sensors:
         section_model = latest.get(sensor.section)
         if sensor.name not in passage.at_sensor or section_model is None:
             continue
         times = passage.at_sensor[sensor.name]
-        until = next((r.value for r in passage.findings if r.reason == "sensor_lost" and sensor.name in r.detail), None)
-        if until is not None:
-            times = times[times + settings.score_window < until]
-        clipped = sensor.name in unsound and until is None
+        lost_at = next(
+            (r.value for r in passage.findings if r.reason == "sensor_lost" and sensor.name in r.detail), None
+        )
+        if lost_at is not None:
+            times = times[times + settings.score_window < lost_at]
+        clipped = sensor.name in unusable and lost_at is None
         fit = None
         if not clipped and len(times) >= 2:
             samples = recording.signal(sensor.name)
-            others = {label: m.model for label, m in latest.items() if m is not None and label != sensor.section}
+            other_models = {label: m.model for label, m in latest.items() if m is not None and label != sensor.section}
             fit = fit_channel(
-                samples, recording.rate, times, passage.motion.speed, section_model.model, settings, others
+                samples, recording.rate, times, passage.motion.speed, section_model.model, settings, other_models
             )
-        found.append(fit_row(fit, sensor, section_model.model_id, turnout, identity))
-    return found
+        rows.append(fit_row(fit, sensor, section_model.model_id, turnout, identity))
+    return rows
 
 
-def _time_in(label: str) -> datetime | None:
+def _time_of_label(label: str) -> datetime | None:
     """Time of a unit from its file name, YYYYMMDDTHHMMSSZ."""
     stem = label.rsplit("/", 1)[-1].split(".")[0]
     try:

@@ -13,7 +13,7 @@ import numpy as np
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError
 
-from turnout.config.document import legible
+from turnout.config.document import as_config_errors
 from turnout.config.merge import digest
 from turnout.config.settings.passage import PassageSettings
 from turnout.content import sha256_of
@@ -24,7 +24,7 @@ from turnout.passage.clusters import Clusters
 from turnout.records import ModalModel, Unit
 from turnout.stages.passage import PassageContext, SectionModel
 from turnout.workflow.current_results import current_results
-from turnout.workflow.notes import LONGEST, start_of
+from turnout.workflow.notes import MAX_FILE_DURATION, start_of
 
 
 def passage_context(
@@ -36,19 +36,22 @@ def passage_context(
     Models are read from the results of the hammer stage in ``work``. A passage is fitted with the latest model before
     it, so a new campaign changes the scores of later passages only.
     """
-    own = settings["passage"] if settings else PassageSettings()
-    models, clusters_file = section_models(turnout, work), Path(own.assets) / "clusters.json"
-    clusters, loads = read_clusters(clusters_file), read_loads(Path(own.assets) / "loads.json").get(turnout, {})
-    parts = [_digest(own.axle_patterns), _digest(clusters_file), repr(sorted(loads.items()))]
+    passage_settings = settings["passage"] if settings else PassageSettings()
+    models, clusters_file = section_models(turnout, work), Path(passage_settings.assets) / "clusters.json"
+    clusters, loads = (
+        read_clusters(clusters_file),
+        read_loads(Path(passage_settings.assets) / "loads.json").get(turnout, {}),
+    )
+    digests = [_digest(passage_settings.axle_patterns), _digest(clusters_file), repr(sorted(loads.items()))]
 
     def token(unit: Unit) -> str:
-        used = [[m.model_id for m in near(found, unit.label)] for _, found in sorted(models.items())]
-        return digest([parts, used])[:16]
+        used = [[m.model_id for m in applicable_models(section, unit.label)] for _, section in sorted(models.items())]
+        return digest([digests, used])[:16]
 
-    return token, PassageContext(models, known_patterns(own.axle_patterns), clusters, loads)
+    return token, PassageContext(models, known_patterns(passage_settings.axle_patterns), clusters, loads)
 
 
-def near(models: tuple[SectionModel, ...], label: str) -> tuple[SectionModel, ...]:
+def applicable_models(models: tuple[SectionModel, ...], label: str) -> tuple[SectionModel, ...]:
     """Those of ``models``, in order of time, that may be fitted to a file's passages, by the time in its name.
 
     All models if the name has no time.
@@ -56,19 +59,19 @@ def near(models: tuple[SectionModel, ...], label: str) -> tuple[SectionModel, ..
     start = start_of(label)
     if start is None:
         return models
-    now, end = (bisect_right(models, time, key=lambda m: m.measured_at) for time in (start, start + LONGEST))
+    now, end = (bisect_right(models, time, key=lambda m: m.measured_at) for time in (start, start + MAX_FILE_DURATION))
     return (*(models[now - 1 : now] if now else models[:1]), *models[now:end])
 
 
 def section_models(turnout: str, work="work") -> dict[str, tuple[SectionModel, ...]]:
     """Accepted models of each section, by label, in order of time."""
-    found: dict[str, list[SectionModel]] = {}
+    by_section: dict[str, list[SectionModel]] = {}
     for result in current_results(work, "hammer", turnout):
         for row in result.tables.get("models", []):
             if row["status"] in ("accepted", "second_order_only"):
                 label = row["section_id"].removeprefix(f"{turnout}/")
-                found.setdefault(label, []).append(_section_model(row))
-    return {label: tuple(sorted(ms, key=lambda m: (m.measured_at, m.model_id))) for label, ms in found.items()}
+                by_section.setdefault(label, []).append(_section_model(row))
+    return {label: tuple(sorted(ms, key=lambda m: (m.measured_at, m.model_id))) for label, ms in by_section.items()}
 
 
 def _section_model(row) -> SectionModel:
@@ -87,21 +90,21 @@ def known_patterns(path: str):
     ConfigError if the file cannot be used, or if another file named in the settings does not exist.
     """
     if Path(path).is_file():
-        return _patterns(path, sha256_of(path))
+        return _read_patterns(path, sha256_of(path))
     if path != PassageSettings().axle_patterns:
         raise ConfigError(path, "passage.axle_patterns", "there is no such file", "Name one, or leave the setting out")
     return ()
 
 
 @lru_cache(maxsize=4)
-def _patterns(path: str, content: str):
+def _read_patterns(path: str, content: str):
     """Axle patterns of a file; ``content`` is its hash, since the same name may be another file."""
     try:
-        with legible(path, "the file"):
+        with as_config_errors(path, "the file"):
             return read_patterns(YAML(typ="safe").load(Path(path)))
     except (KeyError, ValueError, TypeError, AttributeError, MarkedYAMLError) as error:
-        said = " ".join(str(error).split()).strip("'\"")
-        raise ConfigError(path, "vehicles and trains", said, "See docs/passages.md") from None
+        message = " ".join(str(error).split()).strip("'\"")
+        raise ConfigError(path, "vehicles and trains", message, "See docs/passages.md") from None
 
 
 def read_clusters(path: Path) -> Clusters | None:

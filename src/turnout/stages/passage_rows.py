@@ -28,10 +28,10 @@ def finding_rows(passage, base, path, record, recording_id) -> list[dict]:
     """Rows of ``quarantine`` for unused data: the whole record, or single channels."""
     rows: list[dict] = []
     for finding in passage.findings:
-        whole = finding.reason in ("no_train", "two_trains", "train_cut_off")
-        if whole and passage.status != "rejected":
+        is_whole_record = finding.reason in ("no_train", "two_trains", "train_cut_off")
+        if is_whole_record and passage.status != "rejected":
             continue
-        place = f"record {record + 1}" if whole else f"record {record + 1}, {finding.detail.split(':')[0]}"
+        place = f"record {record + 1}" if is_whole_record else f"record {record + 1}, {finding.detail.split(':')[0]}"
         remedy = REMEDIES.get(finding.reason, "Look at the recording")
         error = ReadError(path, place, finding.detail or finding.reason, remedy, finding.reason)
         row = quarantine_row(error, base, "passage", "passage", record, recording_id)
@@ -54,10 +54,10 @@ def passage_row(passage, identity, listed, load, conditions) -> dict:
         "rail_temperature_c": temperature(conditions),
         "axle_load_source": "unavailable",
     }
-    words = [f.detail or f.reason for f in passage.findings]
-    noted = number(conditions, "rail_temperature")
-    if noted is not None and temperature(conditions) is None:
-        words.append(f"rail temperature {noted:g} °C noted, not used")
+    remarks = [f.detail or f.reason for f in passage.findings]
+    noted_temperature = number(conditions, "rail_temperature")
+    if noted_temperature is not None and temperature(conditions) is None:
+        remarks.append(f"rail temperature {noted_temperature:g} °C noted, not used")
     if speed is not None:
         row |= {
             "speed_kmh": KMH * float(speed.speed),
@@ -72,19 +72,19 @@ def passage_row(passage, identity, listed, load, conditions) -> dict:
     if load is not None:
         row |= {"axle_load_t": load.mean, "axle_load_se_t": load.se, "axle_load_source": "recording"}
     if listed is not None and speed is not None:
-        words += _listed(row, listed)
-    row["detail"] = "; ".join(words) or None
+        remarks += _enter_listed(row, listed)
+    row["detail"] = "; ".join(remarks) or None
     return row
 
 
-def _listed(row, listed) -> list[str]:
+def _enter_listed(row, listed) -> list[str]:
     """Enter the values of the train data, and return their differences from the recording in words."""
-    words = []
+    remarks = []
     if listed.speed is not None:
         row |= {"speed_listed_kmh": listed.speed, "speed_source": "both"}
-        off = abs(listed.speed - row["speed_kmh"])
-        if off > max(3.0 * row["speed_se_kmh"], 0.02 * listed.speed):
-            words.append(f"speed {row['speed_kmh']:.1f} km/h here, {listed.speed:g} in the train data")
+        difference = abs(listed.speed - row["speed_kmh"])
+        if difference > max(3.0 * row["speed_se_kmh"], 0.02 * listed.speed):
+            remarks.append(f"speed {row['speed_kmh']:.1f} km/h here, {listed.speed:g} in the train data")
     if listed.train_type is not None:
         row["train_type_listed"] = listed.train_type
         if row["train_type"] == UNKNOWN:
@@ -92,7 +92,7 @@ def _listed(row, listed) -> list[str]:
         else:
             row["train_type_source"] = "both"
             if row["train_type"] != listed.train_type:
-                words.append(f"type {row['train_type']} here, {listed.train_type} in the train data")
+                remarks.append(f"type {row['train_type']} here, {listed.train_type} in the train data")
     if listed.axle_load is not None:
         row["axle_load_listed_t"] = listed.axle_load
         if row["axle_load_source"] == "unavailable":
@@ -100,13 +100,13 @@ def _listed(row, listed) -> list[str]:
         else:
             row["axle_load_source"] = "both"
             if abs(row["axle_load_t"] - listed.axle_load) > 3.0 * row["axle_load_se_t"]:
-                words.append(f"axle load {row['axle_load_t']:.1f} t here, {listed.axle_load:g} in the train data")
+                remarks.append(f"axle load {row['axle_load_t']:.1f} t here, {listed.axle_load:g} in the train data")
     if listed.track is not None:
         if row["track"] == "unknown":
             row["track"] = listed.track
         elif row["track"] != listed.track:
-            words.append(f"track {row['track']} here, {listed.track} in the train data")
-    return words
+            remarks.append(f"track {row['track']} here, {listed.track} in the train data")
+    return remarks
 
 
 def fit_row(fit, sensor, model_id, turnout, identity) -> dict:
@@ -132,7 +132,7 @@ def fit_row(fit, sensor, model_id, turnout, identity) -> dict:
         "along_b_share": _plain(fit.test.along_share),
         "peak_ms2": _plain(fit.peak),
     }
-    skills = [skill for skill in fit.others.values() if np.isfinite(skill)]
+    skills = [skill for skill in fit.other_skills.values() if np.isfinite(skill)]
     row["forecast_others_pct"] = float(max(skills)) if skills else None
     if null is not None:
         row |= {

@@ -11,17 +11,17 @@ from turnout.config.turnout import TurnoutConfig
 from turnout.errors import ReadError
 from turnout.files import write_if_changed
 from turnout.passage.analysis import analyse
-from turnout.passage.axle_load import LoadCalibration, calibrate, quasi_static, train_amplitude, with_shared
+from turnout.passage.axle_load import LoadCalibration, calibrate, quasi_static, train_amplitude, with_error_correlation
 from turnout.passage.clusters import Clusters, fit_clusters
 from turnout.passage.timetable import listed_for, listed_trains
 from turnout.readers import read
 from turnout.records import LongRecording, Recording
-from turnout.stages.passage import _time_in, sensors_of, trains_in
+from turnout.stages.passage import _time_of_label, sensors_of, trains_in
 from turnout.stages.passage_context import read_clusters, read_loads
 from turnout.workflow.scan import scan
 
-MOST_PASSAGES = 20_000  # for the clusters: more do not change them, and a mixture fit takes time
-RECENT = """
+MAX_PASSAGES = 20_000  # for the clusters: more do not change them, and a mixture fit takes time
+RECENT_QUERY = """
     select train_type, speed_kmh, axle_load_t from passages_current
     where status <> 'rejected' and train_type is not null and speed_kmh is not null
     order by passed_at_utc desc, passage_id limit ?
@@ -39,14 +39,14 @@ def learn_clusters(connection, settings) -> Clusters:
         Folder of the clusters, and their largest number.
     """
     path = Path(settings.assets) / "clusters.json"
-    cursor = connection.execute(RECENT, [MOST_PASSAGES])
+    cursor = connection.execute(RECENT_QUERY, [MAX_PASSAGES])
     names = [d[0] for d in cursor.description]
-    found = fit_clusters([dict(zip(names, row)) for row in cursor.fetchall()], settings, read_clusters(path))
-    write_if_changed(path, json.dumps(found.document(), indent=1) + "\n")
-    return found
+    clusters = fit_clusters([dict(zip(names, row)) for row in cursor.fetchall()], settings, read_clusters(path))
+    write_if_changed(path, json.dumps(clusters.document(), indent=1) + "\n")
+    return clusters
 
 
-def weighed_trains(turnout: TurnoutConfig, raw_root, patterns, settings, most: int = 60) -> list[dict]:
+def weighed_trains(turnout: TurnoutConfig, raw_root, patterns, settings, max_trains: int = 60) -> list[dict]:
     """The latest ``max_trains`` trains of known axle load in a turnout's raw folder, with each sensor's amplitude.
 
     Each is {"file", "load" [t], "speed" [m/s], "amplitudes": {channel: (mean, standard error) [m/s²]}}. A train counts
@@ -54,34 +54,34 @@ def weighed_trains(turnout: TurnoutConfig, raw_root, patterns, settings, most: i
     accepted.
     """
     listed, _ = listed_trains([row for row in turnout.trains if row.get("axle_load_t")])
-    found: list[dict] = []
-    passages = [u for u in scan(turnout, Path(raw_root)).units if u.kind == "passage"] if listed else []
-    for unit in sorted(passages, key=lambda u: u.label, reverse=True):
-        started = _time_in(unit.label)
+    trains: list[dict] = []
+    passage_units = [u for u in scan(turnout, Path(raw_root)).units if u.kind == "passage"] if listed else []
+    for unit in sorted(passage_units, key=lambda u: u.label, reverse=True):
+        started = _time_of_label(unit.label)
         if started is not None and not any(abs((t.passed_at - started).total_seconds()) < 900 for t in listed):
             continue
-        found += _weighed(unit, turnout, raw_root, patterns, settings, listed)
-        if len(found) >= most:
+        trains += _weighed_in_unit(unit, turnout, raw_root, patterns, settings, listed)
+        if len(trains) >= max_trains:
             break
-    return found
+    return trains
 
 
-def _weighed(unit, turnout, raw_root, patterns, settings, listed):
-    found = []
+def _weighed_in_unit(unit, turnout, raw_root, patterns, settings, listed):
+    trains = []
     for path, *_ in unit.files:
         try:
             result = read(path, raw_root, turnout.passages.description, settings.longest)
-            everything: list[Recording | LongRecording] = [*result.recordings, *result.long]
-            for recording in everything:
-                started = recording.started_at or _time_in(unit.label)
+            records: list[Recording | LongRecording] = [*result.recordings, *result.long_recordings]
+            for recording in records:
+                started = recording.started_at or _time_of_label(unit.label)
                 if started is None:
                     continue
-                for part, late, _ in trains_in(recording, settings):
-                    moment = started + timedelta(seconds=late)
-                    found += _weighed_train(part, moment, path, turnout, patterns, settings, listed)
+                for train_recording, offset, _ in trains_in(recording, settings):
+                    moment = started + timedelta(seconds=offset)
+                    trains += _weighed_train(train_recording, moment, path, turnout, patterns, settings, listed)
         except ReadError:
             continue  # the passage stage puts it into quarantine
-    return found
+    return trains
 
 
 def _weighed_train(recording, started, path, turnout, patterns, settings, listed):
@@ -91,10 +91,10 @@ def _weighed_train(recording, started, path, turnout, patterns, settings, listed
         return []
     moment = started + timedelta(seconds=round(float(passage.times[0]), 6))
     train = listed_for(moment, passage.n_axle, listed, settings.train_data_tolerance)
-    return [] if train is None else [_what_sensors_say(path, recording, passage, sensors_of(turnout), train)]
+    return [] if train is None else [_sensor_amplitudes(path, recording, passage, sensors_of(turnout), train)]
 
 
-def _what_sensors_say(path, recording, passage, sensors, train):
+def _sensor_amplitudes(path, recording, passage, sensors, train):
     amplitudes = {
         s.name: train_amplitude(quasi_static(recording.signal(s.name), recording.rate, passage, s.position))
         for s in sensors
@@ -105,25 +105,25 @@ def _what_sensors_say(path, recording, passage, sensors, train):
 
 def learn_loads(turnout: TurnoutConfig, trains, settings) -> dict[str, LoadCalibration]:
     """Calibration of every sensor that recorded enough of ``trains``, written to the file of all turnouts."""
-    made = {}
+    calibrations = {}
     for name in sorted({name for t in trains for name in t["amplitudes"]}):
-        heard = [t for t in trains if name in t["amplitudes"]]
-        amplitudes, errors = zip(*(t["amplitudes"][name] for t in heard))
-        loads, speeds = [t["load"] for t in heard], [t["speed"] for t in heard]
-        found = calibrate(amplitudes, loads, speeds, settings.load_trains_minimum, errors)
-        if found is not None:
-            made[name] = found
-    made = with_shared(made, trains)
+        recorded = [t for t in trains if name in t["amplitudes"]]
+        amplitudes, errors = zip(*(t["amplitudes"][name] for t in recorded))
+        loads, speeds = [t["load"] for t in recorded], [t["speed"] for t in recorded]
+        calibration = calibrate(amplitudes, loads, speeds, settings.load_trains_minimum, errors)
+        if calibration is not None:
+            calibrations[name] = calibration
+    calibrations = with_error_correlation(calibrations, trains)
     path = Path(settings.assets) / "loads.json"
-    known = read_loads(path)
-    if made:
-        known[turnout.id] = made
-        write_if_changed(path, json.dumps(_document(known), indent=1) + "\n")
-    return made
+    by_turnout = read_loads(path)
+    if calibrations:
+        by_turnout[turnout.id] = calibrations
+        write_if_changed(path, json.dumps(_document(by_turnout), indent=1) + "\n")
+    return calibrations
 
 
-def _document(known):
+def _document(by_turnout):
     return {
         turnout: {name: asdict(c) | {"covariance": c.covariance.tolist()} for name, c in sorted(channels.items())}
-        for turnout, channels in sorted(known.items())
+        for turnout, channels in sorted(by_turnout.items())
     }

@@ -11,19 +11,19 @@ from pathlib import Path
 
 import numpy as np
 
-from turnout.config.events import wrong_time
+from turnout.config.events import time_problem
 from turnout.config.load import load_configuration
 from turnout.config.schema import suggestion
 from turnout.config.settings.simulate import SimulateSettings
 from turnout.errors import ConfigError, SimulationError
 from turnout.readers.writing import WRITERS, write
 from turnout.simulate import Hammer, Sensor, load_track, load_vehicle, simulate_hammer, simulate_passage
-from turnout.simulate.hammer import hammer_sensors, located
+from turnout.simulate.hammer import hammer_sensors, resolve_location
 from turnout.stages.accepted_effects import accepted_of, terms_on
 from turnout.stages.mismatch_inputs import track_file
 
 ENDINGS = {"uff58": "uff", "uff58b": "uff", "hdf5": "h5", "mat73": "mat", "rcmdx": "rcmdx"}
-WHOLE = {"tests": 1, "blows": 1, "units": 1, "seed": 0}
+MIN_COUNTS = {"tests": 1, "blows": 1, "units": 1, "seed": 0}
 
 
 def check_request(request) -> None:
@@ -33,15 +33,15 @@ def check_request(request) -> None:
     Traceback (most recent call last):
     turnout.errors.ConfigError: simulate, --out: one file for 2 tests. Write --tests 1, or leave out --out.
     """
-    for option, least in WHOLE.items():
-        if option in request and request[option] < least:
-            raise _wrong(option, repr(request[option]), f"Write a whole number of at least {least}")
+    for option, minimum in MIN_COUNTS.items():
+        if option in request and request[option] < minimum:
+            raise _option_error(option, repr(request[option]), f"Write a whole number of at least {minimum}")
     if request["format"] not in WRITERS:
-        raise _wrong("format", repr(request["format"]), suggestion(request["format"], WRITERS))
+        raise _option_error("format", repr(request["format"]), suggestion(request["format"], WRITERS))
     if request.get("out") and request.get("tests", 1) > 1:
-        raise _wrong("out", f"one file for {request['tests']} tests", "Write --tests 1, or leave out --out")
-    if wrong := wrong_time(request["at"]):
-        raise _wrong("at", f"{request['at']!r} is not a time in UTC{wrong[0]}", wrong[1])
+        raise _option_error("out", f"one file for {request['tests']} tests", "Write --tests 1, or leave out --out")
+    if fault := time_problem(request["at"]):
+        raise _option_error("at", f"{request['at']!r} is not a time in UTC{fault[0]}", fault[1])
 
 
 def with_format(request) -> dict:
@@ -53,11 +53,11 @@ def with_format(request) -> dict:
     if request["format"] or not request.get("out"):
         return {**request, "format": request["format"] or "hdf5"}
     ending = Path(request["out"]).suffix.lstrip(".").lower()
-    known = {ending_of(name): name for name in reversed(WRITERS)} | {"hdf5": "hdf5", "hdf": "hdf5"}
-    if ending not in known:
-        remedy = f"Write one of .{', .'.join(sorted(known))}, or say --format"
-        raise _wrong("out", f"{request['out']!r}, whose ending is no format", remedy)
-    return {**request, "format": known[ending]}
+    formats = {ending_of(name): name for name in reversed(WRITERS)} | {"hdf5": "hdf5", "hdf": "hdf5"}
+    if ending not in formats:
+        remedy = f"Write one of .{', .'.join(sorted(formats))}, or say --format"
+        raise _option_error("out", f"{request['out']!r}, whose ending is no format", remedy)
+    return {**request, "format": formats[ending]}
 
 
 def ending_of(format_name: str) -> str:
@@ -77,17 +77,17 @@ def time_of(request) -> datetime:
 def section_channels(turnout, section: float | str):
     """Description of a section's hammer files; ConfigError if the turnout has no tests of ``section``."""
     if turnout.hammer is None:
-        raise _wrong("turnout", f"{turnout.id} has no hammer tests in its layout", "Name another one, or none")
-    known = turnout.hammer.descriptions
-    if section not in known:
-        found = f"{section!r} is no section of {turnout.id}, whose raw files are sought by section"
-        remedy = f"Write one of {', '.join(known)}; places in metres go without --turnout"
-        raise _wrong("section", found, remedy)
-    return known[section]
+        raise _option_error("turnout", f"{turnout.id} has no hammer tests in its layout", "Name another one, or none")
+    descriptions = turnout.hammer.descriptions
+    if section not in descriptions:
+        observation = f"{section!r} is no section of {turnout.id}, whose raw files are sought by section"
+        remedy = f"Write one of {', '.join(descriptions)}; places in metres go without --turnout"
+        raise _option_error("section", observation, remedy)
+    return descriptions[section]
 
 
-def _wrong(option: str, found: str, remedy: str) -> ConfigError:
-    return ConfigError("simulate", f"--{option}", found, remedy)
+def _option_error(option: str, observation: str, remedy: str) -> ConfigError:
+    return ConfigError("simulate", f"--{option}", observation, remedy)
 
 
 NOISE = {"acceleration": 0.05, "force": 2.0, "velocity": 1e-6, "displacement": 1e-9}
@@ -103,20 +103,20 @@ def write_hammer(request):
     check_request(request)
     turnout, settings = _turnout(request)
     track = _track(request, turnout)
-    section = _place(request["section"])
-    place, base = located(track, section)
-    _, route = track.locations.get(section, (place, "main"))
+    section = _label_or_position(request["section"])
+    position, base = resolve_location(track, section)
+    _, route = track.locations.get(section, (position, "main"))
     description = None if turnout is None else section_channels(turnout, section)
-    hammer, sensors = _hammer_channels(description, place)
+    hammer, sensors = _hammer_channels(description, position)
     rate = description.rate if description and description.rate else settings.rate
     for test in range(1, request["tests"] + 1):
-        recordings, blows = simulate_hammer(
+        recordings, impacts = simulate_hammer(
             track,
             section,
             hammer,
             sensors,
             request["blows"],
-            terms_on(track, base, _noted(request), route),
+            terms_on(track, base, _noted_conditions(request), route),
             seed=1000 * request["seed"] + test,
             rate=rate,
             substeps=settings.substeps,
@@ -125,15 +125,17 @@ def write_hammer(request):
             half_length=settings.hammer_half_length,
             scheme=settings.scheme,
             started_at=time_of(request),
-            conditions=_noted(request),
+            conditions=_noted_conditions(request),
             truth=True,
         )
         day = time_of(request).date().isoformat()
         name = f"hammer/{day}/{section}_{test}.{ending_of(request['format'])}"
         path = _write(request, turnout, name, recordings, description)
-        _write_truth(request, path, track, route, recordings[0], {"blows": [_struck(b) for b in blows]})
+        _write_truth(
+            request, path, track, route, recordings[0], {"blows": [_impact_truth(impact) for impact in impacts]}
+        )
         peak = max(float(r.samples[0].max()) for r in recordings)
-        yield path, f"{len(recordings)} blows at {place:.2f} m, highest force {peak / 1e3:.1f} kN"
+        yield path, f"{len(recordings)} blows at {position:.2f} m, highest force {peak / 1e3:.1f} kN"
 
 
 def write_passage(request):
@@ -153,7 +155,7 @@ def write_passage(request):
         sensors,
         request["direction"],
         request["route"],
-        terms=terms_on(track, track.track_of(request["route"]), _said(vehicle, request), request["route"]),
+        terms=terms_on(track, track.track_of(request["route"]), _term_conditions(vehicle, request), request["route"]),
         seed=request["seed"],
         rate=rate,
         substeps=settings.substeps,
@@ -162,7 +164,7 @@ def write_passage(request):
         entry=settings.entry,
         scheme=settings.scheme,
         started_at=time_of(request),
-        conditions=_noted(request),
+        conditions=_noted_conditions(request),
         truth=True,
     )
     name = f"passages/{time_of(request):%Y%m%dT%H%M%SZ}.{ending_of(request['format'])}"
@@ -176,18 +178,35 @@ def write_passage(request):
     yield path, f"{len(vehicle.wheels)} axles, {recording.duration:.2f} s, highest wheel force {peak / 1e3:.0f} kN"
 
 
-COMMON = {"turnout": None, "config": "config", "raw": "raw", "format": "hdf5", "truth": None, "temperature": None}
+REQUEST_DEFAULTS = {
+    "turnout": None,
+    "config": "config",
+    "raw": "raw",
+    "format": "hdf5",
+    "truth": None,
+    "temperature": None,
+}
 
 
 def hammer_request(track, out, wildcards):
     """The request of rule simulate_hammer."""
-    request = COMMON | {"track": track, "out": out, "section": wildcards.location, "seed": int(wildcards.seed)}
+    request = REQUEST_DEFAULTS | {
+        "track": track,
+        "out": out,
+        "section": wildcards.location,
+        "seed": int(wildcards.seed),
+    }
     return request | {"tests": 1, "blows": 10, "at": "2024-05-13T09:00:00"}
 
 
 def passage_request(files, out, wildcards):
     """The request of rule simulate_passage."""
-    request = COMMON | {"track": files.track, "vehicle": files.vehicle, "out": out.recording, "truth_file": out.truth}
+    request = REQUEST_DEFAULTS | {
+        "track": files.track,
+        "vehicle": files.vehicle,
+        "out": out.recording,
+        "truth_file": out.truth,
+    }
     request |= {"speed": float(wildcards.speed), "route": wildcards.route, "direction": wildcards.direction}
     return request | {"load": 0.5, "units": 1, "seed": int(wildcards.seed), "at": "2024-05-13T09:00:00"}
 
@@ -207,30 +226,30 @@ def _track(request, turnout):
     return load_track(request["track"] or "tommerup", request["seed"])
 
 
-def _place(section):
+def _label_or_position(section):
     try:
-        place = float(section)
+        position = float(section)
     except ValueError:
         return section
-    return place if math.isfinite(place) else section
+    return position if math.isfinite(position) else section
 
 
-def _noted(request):
+def _noted_conditions(request):
     temperature = request.get("temperature")
     return {} if temperature is None else {"rail_temperature": temperature}
 
 
-def _said(vehicle, request):
+def _term_conditions(vehicle, request):
     """Conditions that accepted terms depend on: temperature, axle loads, train."""
     loads = tuple(2.0 * float(load) for load in vehicle.static_loads)
-    return {"axle_loads": loads, "train": vehicle.name.lower(), **_noted(request)}
+    return {"axle_loads": loads, "train": vehicle.name.lower(), **_noted_conditions(request)}
 
 
-def _sensor(channel, place):
+def _sensor(channel, position):
     """Sensor of a configured channel, at ``position`` if the configuration gives none."""
     return Sensor(
         channel.name,
-        place if channel.position is None else channel.position,
+        position if channel.position is None else channel.position,
         channel.mounting or "rail head",
         channel.quantity,
         noise=NOISE.get(channel.quantity, 0.0),
@@ -240,24 +259,24 @@ def _sensor(channel, place):
     )
 
 
-def _hammer_channels(description, place):
+def _hammer_channels(description, position):
     if description is None:
-        return Hammer(), hammer_sensors(place)
+        return Hammer(), hammer_sensors(position)
     force = next((c for c in description.channels if c.quantity == "force"), None)
     if force is None:
         raise SimulationError("the turnout's hammer channels have none of quantity 'force'.")
-    others = [c for c in description.channels if c.quantity in ("acceleration", "velocity", "displacement")]
+    responses = [c for c in description.channels if c.quantity in ("acceleration", "velocity", "displacement")]
     sensors = []
-    for channel in others:
-        sensor = _sensor(channel, place + (0.3 if "mid-span" in channel.mounting else 0.0))
+    for channel in responses:
+        sensor = _sensor(channel, position + (0.3 if "mid-span" in channel.mounting else 0.0))
         sensors.append(sensor)
-    return Hammer(force=_sensor(force, place)), tuple(sensors)
+    return Hammer(force=_sensor(force, position)), tuple(sensors)
 
 
 def _passage_sensors(description, track):
     if description is None:
-        places = sorted({(place, name) for name, (place, _) in track.locations.items()})
-        return tuple(Sensor(name, place, "rail web", noise=0.05, limit=5000.0) for place, name in places)
+        positions = sorted({(position, name) for name, (position, _) in track.locations.items()})
+        return tuple(Sensor(name, position, "rail web", noise=0.05, limit=5000.0) for position, name in positions)
     return tuple(_sensor(c, c.position) for c in description.channels if c.quantity != "temperature")
 
 
@@ -274,25 +293,25 @@ def _write(request, turnout, name, recordings, description):
         raise SimulationError(f"{path} cannot be written as {request['format']}: {error}.") from None
 
 
-def _struck(blow):
+def _impact_truth(impact):
     return {
-        "place_m": round(blow.place, 4),
-        "speed_m_s": round(blow.speed, 4),
-        "peak_force_n": round(blow.peak_force, 1),
+        "place_m": round(impact.place, 4),
+        "speed_m_s": round(impact.speed, 4),
+        "peak_force_n": round(impact.peak_force, 1),
     }
 
 
-def _write_truth(request, path, track, route, recording, more):
+def _write_truth(request, path, track, route, recording, extra):
     """Write the truth of the file at ``path`` to the targets of the request, if any."""
-    wanted = [Path(request["truth"]) / Path(path).with_suffix(".json").name] if request.get("truth") else []
-    wanted += [Path(request["truth_file"])] if request.get("truth_file") else []
+    targets = [Path(request["truth"]) / Path(path).with_suffix(".json").name] if request.get("truth") else []
+    targets += [Path(request["truth_file"])] if request.get("truth_file") else []
     content = {
         "track": track.name,
-        "effects": [a.told for a in accepted_of(track.terms) if a.is_on(route)],
+        "effects": [a.as_dict for a in accepted_of(track.terms) if a.is_on(route)],
         "conditions": dict(recording.conditions),
-        **more,
+        **extra,
         "channels": [asdict(c) for c in recording.channels],
     }
-    for place in wanted:
-        place.parent.mkdir(parents=True, exist_ok=True)
-        place.write_text(json.dumps(content, indent=1, default=str) + "\n", encoding="utf-8")
+    for target in targets:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_text(json.dumps(content, indent=1, default=str) + "\n", encoding="utf-8")

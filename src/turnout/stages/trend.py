@@ -29,19 +29,21 @@ def trend_job(generation, state, worklist, configuration, day=None) -> dict:
         Day of the list, YYYY-MM-DD; by default today.
     """
     registry, state = Path(generation).parent, Path(state)
-    before = read_json(state, {})
-    read = load_configuration(configuration)
-    warnings = [str(warning) for warning in read.warnings]
+    old_state = read_json(state, {})
+    loaded = load_configuration(configuration)
+    warnings = [str(warning) for warning in loaded.warnings]
     for warning in warnings:
         logging.getLogger("turnout.trend").warning("%s", warning)
-    said = [dict(row) for row in read.acknowledgements]
-    done = update(registry, read.settings["trend"], before.get("digests"), acknowledgements=said, day=day)
+    acknowledgements = [dict(row) for row in loaded.acknowledgements]
+    result = update(
+        registry, loaded.settings["trend"], old_state.get("digests"), acknowledgements=acknowledgements, day=day
+    )
     with open_registry(registry) as con:
         asof = list_day(con, day)
         rows = con.execute(f"select *, {asof} as asof_utc from worklist({asof}) order by rank").df()
     write_text(worklist, rows.to_csv(index=False, lineterminator="\n"))
-    newest = done.newest.isoformat() if done.newest else None
-    now = {"rows": done.rows, "generation": done.generation, "newest": newest, "digests": done.digests}
-    now |= {"warnings": warnings} if warnings else {}
-    write_text(state, json.dumps(now, indent=1, sort_keys=True) + "\n")
-    return now
+    newest = result.newest.isoformat() if result.newest else None
+    new_state = {"rows": result.rows, "generation": result.generation, "newest": newest, "digests": result.digests}
+    new_state |= {"warnings": warnings} if warnings else {}
+    write_text(state, json.dumps(new_state, indent=1, sort_keys=True) + "\n")
+    return new_state

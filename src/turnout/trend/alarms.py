@@ -11,9 +11,9 @@ import numpy as np
 import pandas as pd
 
 from turnout.trend.change_point import find_change
-from turnout.trend.drift import discoveries
-from turnout.trend.forecast import RECENT, forecast
-from turnout.trend.panel import WHOLE, timestamps
+from turnout.trend.drift import adjusted_p_values
+from turnout.trend.forecast import N_RECENT, forecast
+from turnout.trend.panel import WHOLE_TURNOUT, timestamps
 from turnout.trend.residuals import first_epoch
 
 COLUMNS = {
@@ -46,49 +46,49 @@ class Flag:
 
     time: np.ndarray
     values: np.ndarray
-    memory: float
+    autocorrelation: float
     temperature: np.ndarray | None
-    known: float
+    slope_weight: float
     ratio: dict
-    opened: dict
+    opening_campaign: dict
 
 
 def candidates(charts, status, settings) -> dict[int, Flag]:
     """Charts that may be flagged, by row of ``status``: an open alarm, or a drift with p below the rate."""
     p = charts.prepared
-    whole = status["section_id"].to_numpy() == WHOLE
+    whole = status["section_id"].to_numpy() == WHOLE_TURNOUT
     drifting = p.baseline.complete & ~whole & (status["drift_p"].to_numpy() <= settings.false_discovery)
-    found = {}
+    flags = {}
     for i in np.flatnonzero((status["state"].to_numpy() == "alarm") | drifting):
         column = np.flatnonzero(np.isfinite(charts.residual[i]) & (p.epoch[i] == p.epoch[i, -1]))
         ratio = {d: getattr(charts, d)[i, -1] / getattr(charts, f"threshold_{d}")[i] for d in ("down", "up")}
         alarms = {d: getattr(charts, f"{d}_open")[i] for d in ("down", "up")}
-        opened = {d: _raised(alarm) for d, alarm in alarms.items() if alarm[-1]}
-        if len(opened) == 2:  # describe the later alarm, relative to the level after the earlier one
-            column = column[column >= min(opened.values())]
-        temperature, known = _heat(charts, i, column)
-        found[int(i)] = Flag(
+        opening_campaign = {d: _opening_campaign(alarm) for d, alarm in alarms.items() if alarm[-1]}
+        if len(opening_campaign) == 2:  # describe the later alarm, relative to the level after the earlier one
+            column = column[column >= min(opening_campaign.values())]
+        temperature, slope_weight = _temperatures(charts, i, column)
+        flags[int(i)] = Flag(
             p.time[i, column],
             charts.residual[i, column],
-            float(charts.memory[i]),
+            float(charts.autocorrelation[i]),
             temperature,
-            known,
+            slope_weight,
             ratio,
-            opened,
+            opening_campaign,
         )
-    return found
+    return flags
 
 
-def _raised(alarm) -> int:
+def _opening_campaign(alarm) -> int:
     """Campaign that raised an alarm that is open at the newest.
 
-    >>> _raised(np.array([True, False, True, True]))
+    >>> _opening_campaign(np.array([True, False, True, True]))
     2
     """
     return int(np.max(np.flatnonzero(~alarm), initial=-1)) + 1
 
 
-def _heat(charts, i, column):
+def _temperatures(charts, i, column):
     """Temperatures of a section's values [°C], and the weight of the slope that other values give (0: none do)."""
     p = charts.prepared
     if i >= len(p.panel.charts):
@@ -105,53 +105,53 @@ def describe_flagged(status, flags, settings) -> pd.DataFrame:
     adjusted p value of the drift is at most ``settings.false_discovery``. The costly steps run on them alone.
     """
     status = status.copy()
-    judged = status["complete"].to_numpy() & (status["section_id"].to_numpy() != WHOLE)
-    status["drift_q"] = discoveries(np.where(judged, status["drift_p"].to_numpy(), np.nan))
+    is_tested = status["complete"].to_numpy() & (status["section_id"].to_numpy() != WHOLE_TURNOUT)
+    status["drift_q"] = adjusted_p_values(np.where(is_tested, status["drift_p"].to_numpy(), np.nan))
     flagged = ((status["state"] == "alarm") | (status["drift_q"] <= settings.false_discovery)).to_numpy()
-    stories = {i: _story(flag, settings) for i, flag in flags.items() if flagged[i]}
-    for name, kind in COLUMNS.items():
-        column = np.full(len(status), None if kind is object else np.nan, dtype=object if kind is object else float)
-        if "datetime" in str(kind):
+    descriptions = {i: _describe_chart(flag, settings) for i, flag in flags.items() if flagged[i]}
+    for name, dtype in COLUMNS.items():
+        column = np.full(len(status), None if dtype is object else np.nan, dtype=object if dtype is object else float)
+        if "datetime" in str(dtype):
             column = np.full(len(status), np.datetime64("NaT"), dtype="datetime64[us]")
-        for i, story in stories.items():
-            column[i] = story[name]
+        for i, description in descriptions.items():
+            column[i] = description[name]
         status[name] = column
     return status
 
 
-def _story(flag, settings):
+def _describe_chart(flag, settings):
     """Columns that describe one flagged chart. The change point is sought in its present epoch only."""
     time, values = flag.time, flag.values
-    found = find_change(time, values, flag.memory, flag.temperature, flag.known)
-    at = int(np.searchsorted(time, found.since)) if np.isfinite(found.since) else 0
-    if flag.opened:
-        direction = max(flag.opened, key=flag.opened.get)
+    change = find_change(time, values, flag.autocorrelation, flag.temperature, flag.slope_weight)
+    at = int(np.searchsorted(time, change.since)) if np.isfinite(change.since) else 0
+    if flag.opening_campaign:
+        direction = max(flag.opening_campaign, key=flag.opening_campaign.get)
     else:
-        direction = "down" if values[-RECENT:].mean() < values.mean() else "up"
-    seen = forecast(time[at:], values[at:], flag.memory, settings)
+        direction = "down" if values[-N_RECENT:].mean() < values.mean() else "up"
+    outlook = forecast(time[at:], values[at:], flag.autocorrelation, settings)
     now = time[-1] if len(time) else np.nan
     return dict(
         direction=direction,
         statistic_ratio=flag.ratio[direction],
-        change_kind=found.kind,
-        since_at_utc=timestamps([found.since])[0],
-        since_earliest_utc=timestamps([found.earliest])[0],
-        since_latest_utc=timestamps([found.latest])[0],
-        change_pct=found.size,
-        change_low_pct=found.low,
-        change_high_pct=found.high,
+        change_kind=change.shape,
+        since_at_utc=timestamps([change.since])[0],
+        since_earliest_utc=timestamps([change.earliest])[0],
+        since_latest_utc=timestamps([change.latest])[0],
+        change_pct=change.size,
+        change_low_pct=change.low,
+        change_high_pct=change.high,
         n_after=float(len(values) - at),
-        forecast=seen.verdict,
-        forecast_slope_pct_per_year=seen.slope,
-        forecast_slope_se_pct_per_year=seen.slope_error,
-        not_before_utc=timestamps([now + 365.25 * seen.not_before])[0],
-        not_after_utc=timestamps([now + 365.25 * seen.not_after])[0],
+        forecast=outlook.verdict,
+        forecast_slope_pct_per_year=outlook.slope,
+        forecast_slope_se_pct_per_year=outlook.slope_error,
+        not_before_utc=timestamps([now + 365.25 * outlook.not_before])[0],
+        not_after_utc=timestamps([now + 365.25 * outlook.not_after])[0],
     )
 
 
-CHART = ["turnout_id", "section_id", "band", "source", "direction"]
+ALARM_KEYS = ["turnout_id", "section_id", "band", "source", "direction"]
 # Published alarms that the next update must raise again or close: open ones, and those closed as recomputed.
-ACCOUNTED = "select * from alarms where closed_at_utc is null or closed_by = 'recomputed' order by alarm_id"
+PREVIOUS_ALARMS = "select * from alarms where closed_at_utc is null or closed_by = 'recomputed' order by alarm_id"
 
 
 def with_withdrawn(alarms, before, newest) -> pd.DataFrame:
@@ -173,19 +173,20 @@ def with_withdrawn(alarms, before, newest) -> pd.DataFrame:
     if before.empty:
         return alarms
     times = ["raised_at_utc", "closed_at_utc"]
-    now = alarms if len(alarms) else pd.DataFrame(columns=[*CHART, *times])
-    both = before.reset_index().merge(now[[*CHART, *times]], on=CHART, suffixes=("", "_now"))
-    until, then = pd.to_datetime(both["closed_at_utc_now"]), pd.to_datetime(both["closed_at_utc"])
-    again = until.isna() | (until >= both["raised_at_utc"])
-    again &= then.isna() | (pd.to_datetime(both["raised_at_utc_now"]) <= then)
-    found = both.loc[again.to_numpy(dtype=bool), "index"]
-    gone = before[~before.index.isin(found)]
-    fresh = gone["closed_at_utc"].isna()
-    for row in gone[fresh].itertuples():
-        said = "the alarm %s is not raised again by what is known now: closed as recomputed"
-        logging.getLogger("turnout.trend").warning(said, row.alarm_id)
-    closed = np.fmax(timestamps(np.full(len(gone), newest)), gone["raised_at_utc"].to_numpy("datetime64[us]"))
-    gone = gone.assign(
-        closed_at_utc=np.where(fresh, closed, gone["closed_at_utc"].to_numpy("datetime64[us]")), closed_by="recomputed"
+    now = alarms if len(alarms) else pd.DataFrame(columns=[*ALARM_KEYS, *times])
+    pairs = before.reset_index().merge(now[[*ALARM_KEYS, *times]], on=ALARM_KEYS, suffixes=("", "_now"))
+    until, then = pd.to_datetime(pairs["closed_at_utc_now"]), pd.to_datetime(pairs["closed_at_utc"])
+    is_counterpart = until.isna() | (until >= pairs["raised_at_utc"])
+    is_counterpart &= then.isna() | (pd.to_datetime(pairs["raised_at_utc_now"]) <= then)
+    matched = pairs.loc[is_counterpart.to_numpy(dtype=bool), "index"]
+    withdrawn = before[~before.index.isin(matched)]
+    is_open = withdrawn["closed_at_utc"].isna()
+    for row in withdrawn[is_open].itertuples():
+        message = "the alarm %s is not raised again by what is known now: closed as recomputed"
+        logging.getLogger("turnout.trend").warning(message, row.alarm_id)
+    closed = np.fmax(timestamps(np.full(len(withdrawn), newest)), withdrawn["raised_at_utc"].to_numpy("datetime64[us]"))
+    withdrawn = withdrawn.assign(
+        closed_at_utc=np.where(is_open, closed, withdrawn["closed_at_utc"].to_numpy("datetime64[us]")),
+        closed_by="recomputed",
     )
-    return gone.reset_index(drop=True) if alarms.empty else pd.concat([alarms, gone], ignore_index=True)
+    return withdrawn.reset_index(drop=True) if alarms.empty else pd.concat([alarms, withdrawn], ignore_index=True)

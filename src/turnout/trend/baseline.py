@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from turnout.trend.epochs import by_epoch, spread_out
+from turnout.trend.epochs import by_epoch, expand_epochs
 
 # Prior standard deviation of the temperature slope about 0. [%/°C] Resonances fall by 0.15 to 0.4 %/°C
 # (docs/measuring.md), so all slopes lie within one sd. A choice; a year of temperatures outweighs it.
-USUAL_SLOPE = 0.5
+SLOPE_PRIOR_SD = 0.5
 
 
 @dataclass(frozen=True)
@@ -44,9 +44,9 @@ def baseline_window(usable, time, least_days, least_campaigns) -> tuple[np.ndarr
     """
     rank = np.cumsum(usable, axis=1)
     first = np.min(np.where(usable, time, np.inf), axis=1, keepdims=True, initial=np.inf)
-    done = usable & (rank >= least_campaigns) & (time - first >= least_days)
-    before = np.cumsum(done, axis=1) - done == 0
-    return usable & before, done.any(axis=1)
+    is_complete = usable & (rank >= least_campaigns) & (time - first >= least_days)
+    before = np.cumsum(is_complete, axis=1) - is_complete == 0
+    return usable & before, is_complete.any(axis=1)
 
 
 def fit_baseline(frequency, temperature, time, epoch, settings) -> tuple[Baseline, np.ndarray]:
@@ -69,14 +69,14 @@ def fit_baseline(frequency, temperature, time, epoch, settings) -> tuple[Baselin
     f0 = np.take_along_axis(level_f, first, axis=1)
     t0 = np.take_along_axis(level_t, first, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
-        dt = np.where(inside, temperature - spread_out(level_t, epoch), 0.0)
-        dp = np.where(inside, 100.0 * (frequency - spread_out(level_f, epoch)) / f0, 0.0)
+        dt = np.where(inside, temperature - expand_epochs(level_t, epoch), 0.0)
+        dp = np.where(inside, 100.0 * (frequency - expand_epochs(level_f, epoch)) / f0, 0.0)
         stt, stp = np.sum(dt * dt, axis=1), np.sum(dt * dp, axis=1)
         n_base = count.sum(axis=1)
         freedom = n_base - (count > 0).sum(axis=1) - (stt > 0.0)
         rss = np.sum(dp * dp, axis=1) - np.where(stt > 0.0, stp**2 / stt, 0.0)
         scatter = np.where(freedom > 0, np.maximum(rss, 0.0) / np.maximum(freedom, 1), 0.0)
-        weight = stt + scatter / USUAL_SLOPE**2
+        weight = stt + scatter / SLOPE_PRIOR_SD**2
         slope = np.where(weight > 0.0, stp / weight, 0.0)
         slope_se = np.where((freedom > 0) & (weight > 0.0), np.sqrt(scatter / weight), np.nan)
         corrected = 100.0 * (frequency / f0 - 1.0) - slope[:, None] * (temperature - t0)
@@ -87,7 +87,7 @@ def fit_baseline(frequency, temperature, time, epoch, settings) -> tuple[Baselin
     return fitted, corrected
 
 
-def spread_and_memory(residual, inside, epoch, freedom, time) -> tuple[np.ndarray, np.ndarray]:
+def spread_and_autocorrelation(residual, inside, epoch, freedom, time) -> tuple[np.ndarray, np.ndarray]:
     r"""Spread s and lag-one autocorrelation of a residual over the baseline, about the mean of each epoch.
 
     .. math:: s^2 = \sum_B r_i^2 / \nu, \qquad
@@ -108,7 +108,7 @@ def spread_and_memory(residual, inside, epoch, freedom, time) -> tuple[np.ndarra
     inside = inside & np.isfinite(residual)
     n_epoch = int(epoch.max(initial=0)) + 1
     mean, count = by_epoch(np.where(inside, residual, 0.0), inside, epoch, n_epoch)
-    centred = np.where(inside, residual - spread_out(mean, epoch), 0.0)
+    centred = np.where(inside, residual - expand_epochs(mean, epoch), 0.0)
     power = np.sum(centred**2, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         spread = np.sqrt(np.where(freedom > 0, power / np.maximum(freedom, 1), np.nan))
@@ -152,17 +152,17 @@ def usual_interval(time, inside) -> np.ndarray:
     return np.where(count > 0, step[np.arange(len(step)), np.maximum(count - 1, 0) // 2], np.nan)
 
 
-def pooled_memory(memory, classes) -> np.ndarray:
+def pooled_autocorrelation(autocorrelation, classes) -> np.ndarray:
     """Autocorrelation of each chart: the mean over the charts of its class; 0 where none is known.
 
     The estimate of one chart from 52 campaigns scatters by 0.13, which would cause false alarms. The mean scatters
     far less.
 
-    >>> pooled_memory(np.array([0.2, 0.4, np.nan, 0.1]), np.array([0, 0, 0, 1]))
+    >>> pooled_autocorrelation(np.array([0.2, 0.4, np.nan, 0.1]), np.array([0, 0, 0, 1]))
     array([0.3, 0.3, 0.3, 0.1])
     """
-    known = np.isfinite(memory)
+    is_valid = np.isfinite(autocorrelation)
     n = int(classes.max(initial=-1)) + 1
-    total = np.bincount(classes[known], weights=memory[known], minlength=n)
-    count = np.bincount(classes[known], minlength=n)
+    total = np.bincount(classes[is_valid], weights=autocorrelation[is_valid], minlength=n)
+    count = np.bincount(classes[is_valid], minlength=n)
     return (total / np.maximum(count, 1))[classes]

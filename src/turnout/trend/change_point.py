@@ -6,9 +6,9 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import stdtr
 
-from turnout.trend.forecast import YEAR, memory_of_steps
+from turnout.trend.forecast import DAYS_PER_YEAR, step_autocorrelation
 
-FEWEST = 4  # values, fewer give no change point: level, size, onset and scatter are estimated
+MIN_VALUES = 4  # values, fewer give no change point: level, size, onset and scatter are estimated
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Change:
     probability, so a wrong choice of the shape does not narrow them.
     """
 
-    kind: str
+    shape: str
     since: float
     earliest: float
     latest: float
@@ -46,7 +46,7 @@ class Fits:
     rss: np.ndarray
 
 
-def fits(time, values, memory, pieces=4, temperature=None, known=0.0) -> dict[str, Fits]:
+def fit_onsets(time, values, autocorrelation, pieces=4, temperature=None, slope_weight=0.0) -> dict[str, Fits]:
     r"""Fit a level and a change for every onset, by generalised least squares with AR(1) errors.
 
     .. math:: y_i = l + b\,T_i + c\, x_i,\quad x_i = [t_i \ge \tau]\ \text{(step)},\quad
@@ -72,62 +72,70 @@ def fits(time, values, memory, pieces=4, temperature=None, known=0.0) -> dict[st
     Examples
     --------
     >>> t, y = np.arange(6.0), np.array([0.0, 0.0, 0.0, -2.0, -2.0, -2.0])
-    >>> step = fits(t, y, 0.0, pieces=1)["step"]
+    >>> step = fit_onsets(t, y, 0.0, pieces=1)["step"]
     >>> best = np.argmin(step.rss)
     >>> print(f"{YEAR * step.onset[best]:.1f} {step.size[best]:.1f} {abs(step.rss[best]):.1f}")
     -2.5 -2.0 0.0
     """
-    t = (time - time[-1]) / YEAR
-    diagonal, beside = _precision(time, memory)
+    t = (time - time[-1]) / DAYS_PER_YEAR
+    diagonal, off_diagonal = _precision(time, autocorrelation)
 
-    def weighted(v):
-        found = diagonal * v + beside * np.append(v[1:], 0.0)
-        found[1:] += beside[:-1] * v[:-1]
-        return found
+    def times_precision(v):
+        product = diagonal * v + off_diagonal * np.append(v[1:], 0.0)
+        product[1:] += off_diagonal[:-1] * v[:-1]
+        return product
 
-    one, y = weighted(np.ones(t.size)), weighted(values)
+    one, y = times_precision(np.ones(t.size)), times_precision(values)
     after = np.append(t[1:], 0.0)
-    terms = (one, t * one, y, t * y, diagonal + 2 * beside, t * diagonal + beside * (t + after))
-    sums = [np.cumsum(v[::-1])[::-1] for v in (*terms, t * t * diagonal + 2 * beside * t * after)]
+    terms = (one, t * one, y, t * y, diagonal + 2 * off_diagonal, t * diagonal + off_diagonal * (t + after))
+    sums = [np.cumsum(v[::-1])[::-1] for v in (*terms, t * t * diagonal + 2 * off_diagonal * t * after)]
     i = np.repeat(np.arange(2, t.size), pieces)
     width = (t[i] - t[i - 1]) / pieces
     onset = t[i - 1] + (np.tile(np.arange(pieces), t.size - 2) + 0.5) * width
     one_0, one_1, y_0, y_1, self_0, self_1, self_2 = (s[i] for s in sums)
     total, total_y = one.sum(), y.sum()
-    left = max(float(values @ y) - total_y**2 / total, 0.0)
-    warm = np.zeros(t.size) if temperature is None else temperature - (temperature @ one) / total
-    heat = weighted(warm)
-    heat_square, heat_y = float(warm @ heat) + known, float(heat @ values)
-    per_degree = 1.0 / heat_square if float(warm @ heat) > 0.0 else 0.0
-    heat_0, heat_1 = (np.cumsum(v[::-1])[::-1][i] for v in (heat, t * heat))
-    left = max(left - heat_y**2 * per_degree, 0.0)
+    rss_total = max(float(values @ y) - total_y**2 / total, 0.0)
+    temperature_centred = np.zeros(t.size) if temperature is None else temperature - (temperature @ one) / total
+    temperature_weighted = times_precision(temperature_centred)
+    temperature_square, temperature_y = (
+        float(temperature_centred @ temperature_weighted) + slope_weight,
+        float(temperature_weighted @ values),
+    )
+    per_degree = 1.0 / temperature_square if float(temperature_centred @ temperature_weighted) > 0.0 else 0.0
+    temperature_0, temperature_1 = (
+        np.cumsum(v[::-1])[::-1][i] for v in (temperature_weighted, t * temperature_weighted)
+    )
+    rss_total = max(rss_total - temperature_y**2 * per_degree, 0.0)
 
-    def solved(square, level, product, hot):
-        weight = np.maximum(square - level**2 / total - hot**2 * per_degree, 1e-300)
-        moment = product - level * total_y / total - hot * heat_y * per_degree
-        rss = np.maximum(left - moment**2 / weight, 1e-12 * max(left, 1e-300))
+    def solve(square, level, product, temperature_sum):
+        weight = np.maximum(square - level**2 / total - temperature_sum**2 * per_degree, 1e-300)
+        moment = product - level * total_y / total - temperature_sum * temperature_y * per_degree
+        rss = np.maximum(rss_total - moment**2 / weight, 1e-12 * max(rss_total, 1e-300))
         return Fits(onset, width, moment / weight, weight, rss)
 
     square = self_2 - 2.0 * onset * self_1 + onset**2 * self_0
     return {
-        "step": solved(self_0, one_0, y_0, heat_0),
-        "drift": solved(
+        "step": solve(self_0, one_0, y_0, temperature_0),
+        "drift": solve(
             square / onset**2,
-            *((v_1 - onset * v_0) / -onset for v_0, v_1 in ((one_0, one_1), (y_0, y_1), (heat_0, heat_1))),
+            *(
+                (v_1 - onset * v_0) / -onset
+                for v_0, v_1 in ((one_0, one_1), (y_0, y_1), (temperature_0, temperature_1))
+            ),
         ),
     }
 
 
-def _precision(time, memory):
+def _precision(time, autocorrelation):
     """Diagonal and off-diagonal of the precision matrix of an AR(1) process: (n,) arrays, the last off-diagonal 0."""
-    phi = memory_of_steps(time, memory)
+    phi = step_autocorrelation(time, autocorrelation)
     share = 1.0 / (1.0 - phi**2)
-    diagonal, beside = np.append(1.0, share), np.append(-phi * share, 0.0)
+    diagonal, off_diagonal = np.append(1.0, share), np.append(-phi * share, 0.0)
     diagonal[:-1] += phi**2 * share
-    return diagonal, beside
+    return diagonal, off_diagonal
 
 
-def find_change(time, values, memory, temperature=None, known=0.0, level=0.95) -> Change:
+def find_change(time, values, autocorrelation, temperature=None, slope_weight=0.0, level=0.95) -> Change:
     r"""Onset and size of one change, averaged over its shape and its onset.
 
     The prior is uniform over step and drift, over the onset and over the size; the scatter is unknown. Then an onset
@@ -148,28 +156,30 @@ def find_change(time, values, memory, temperature=None, known=0.0, level=0.95) -
     --------
     >>> t = np.arange(40.0) * 7.0
     >>> found = find_change(t, -0.2 * np.maximum(t / 7.0 - 25.0, 0.0) + 0.01 * np.cos(9.0 * t), 0.0)
-    >>> print(found.kind, f"{found.since / 7.0:.1f} {found.size:.1f}")
+    >>> print(found.shape, f"{found.since / 7.0:.1f} {found.size:.1f}")
     drift 25.0 -2.8
     """
     time, values = np.asarray(time, dtype=float), np.asarray(values, dtype=float)
     n = values.size
-    if n < FEWEST or np.ptp(values) == 0.0:
+    if n < MIN_VALUES or np.ptp(values) == 0.0:
         return Change("step", *(float("nan"),) * 6, 0.5)
-    slope = temperature is not None and n > FEWEST and np.ptp(temperature) > 0.0
-    both = fits(time, values, memory, 4 if n < 150 else 2, temperature if slope else None, known)
-    freedom = n - 2 - (slope and known == 0.0)
-    log_p = [np.log(f.width) - 0.5 * np.log(f.weight) - 0.5 * freedom * np.log(f.rss) for f in both.values()]
+    slope = temperature is not None and n > MIN_VALUES and np.ptp(temperature) > 0.0
+    fits_by_shape = fit_onsets(
+        time, values, autocorrelation, 4 if n < 150 else 2, temperature if slope else None, slope_weight
+    )
+    freedom = n - 2 - (slope and slope_weight == 0.0)
+    log_p = [np.log(f.width) - 0.5 * np.log(f.weight) - 0.5 * freedom * np.log(f.rss) for f in fits_by_shape.values()]
     p = np.exp(np.concatenate(log_p) - max(v.max() for v in log_p))
     p = np.split(p / p.sum(), 2)
-    step, drift = both["step"], both["drift"]
-    kind = "drift" if p[1].sum() > 0.5 else "step"
+    step, drift = fits_by_shape["step"], fits_by_shape["drift"]
+    shape = "drift" if p[1].sum() > 0.5 else "step"
     tail = 0.5 * (1.0 - level)
     first, last = _quantiles(step, p[0] + p[1], (tail, 1.0 - tail))
-    since = _quantiles(both[kind], p[kind == "drift"], (0.5,))[0]
+    since = _quantiles(fits_by_shape[shape], p[shape == "drift"], (0.5,))[0]
     joined = Fits(*(np.concatenate(pair) for pair in zip(vars(step).values(), vars(drift).values())))
     low, middle, high = _sizes(joined, np.concatenate(p), freedom - 1, (tail, 0.5, 1.0 - tail))
-    since, first, last = (float(time[-1] + YEAR * x) for x in (min(max(since, first), last), first, last))
-    return Change(kind, since, first, last, middle, low, high, float(p[1].sum()))
+    since, first, last = (float(time[-1] + DAYS_PER_YEAR * x) for x in (min(max(since, first), last), first, last))
+    return Change(shape, since, first, last, middle, low, high, float(p[1].sum()))
 
 
 def _quantiles(fit, weight, levels):
@@ -184,12 +194,14 @@ def _sizes(fit, p, freedom, levels):
     use = p > 1e-6 * p.max()
     p, size = p[use] / p[use].sum(), fit.size[use]
     scale = np.sqrt(fit.rss[use] / freedom / fit.weight[use])
-    reach = 1e3 * scale.max() + np.ptp(size)
+    half_range = 1e3 * scale.max() + np.ptp(size)
 
     def quantile(q):
-        def short(x):
+        def shortfall(x):
             return float(np.sum(p * stdtr(freedom, (x - size) / scale))) - q
 
-        return float(brentq(short, size.min() - reach, size.max() + reach, xtol=1e-9 * reach, maxiter=200))
+        return float(
+            brentq(shortfall, size.min() - half_range, size.max() + half_range, xtol=1e-9 * half_range, maxiter=200)
+        )
 
     return [quantile(q) for q in levels]

@@ -7,8 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from turnout.trend.epochs import by_epoch, spread_out
-from turnout.trend.residuals import Prepared, first_epoch, learning, of_sections, of_turnouts, stacked
+from turnout.trend.epochs import by_epoch, expand_epochs
+from turnout.trend.residuals import (
+    Prepared,
+    first_epoch,
+    learning_campaigns,
+    section_residuals,
+    stack_padded,
+    turnout_residuals,
+)
 from turnout.trend.threshold import run_lengths, threshold_for
 
 
@@ -54,7 +61,7 @@ def cusum(z, allowance, threshold, active, fresh) -> tuple[np.ndarray, np.ndarra
     counts = np.isfinite(z).T.copy()
     fresh = fresh.T.copy()
     statistic = np.zeros((n_campaign, n_chart))
-    opened = np.zeros((n_campaign, n_chart), dtype=bool)
+    alarm_open = np.zeros((n_campaign, n_chart), dtype=bool)
     began = np.full((n_campaign, n_chart), -1, dtype=np.int32)
     total, alarm, since = np.zeros(n_chart), np.zeros(n_chart, dtype=bool), np.full(n_chart, -1, dtype=np.int32)
     for i in range(n_campaign):
@@ -62,11 +69,11 @@ def cusum(z, allowance, threshold, active, fresh) -> tuple[np.ndarray, np.ndarra
         resting = total == 0.0
         since = np.where(resting & (counts[i] | fresh[i]), i, since)
         alarm = (alarm & ~resting & ~fresh[i]) | (total > threshold)
-        statistic[i], opened[i], began[i] = total, alarm, since
-    return np.ascontiguousarray(statistic.T), np.ascontiguousarray(opened.T), np.ascontiguousarray(began.T)
+        statistic[i], alarm_open[i], began[i] = total, alarm, since
+    return np.ascontiguousarray(statistic.T), np.ascontiguousarray(alarm_open.T), np.ascontiguousarray(began.T)
 
 
-SIBLING_ROUNDS = 3  # iterations of section residuals and alarms, each of which decides which sections are siblings
+MAX_SIBLING_ROUNDS = 3  # iterations of section residuals and alarms, each of which decides which sections are siblings
 
 
 @dataclass
@@ -83,19 +90,19 @@ class Charts:
 
     prepared: Prepared
     allowance: np.ndarray
-    learn: np.ndarray
+    n_learning: np.ndarray
     guard: np.ndarray
-    memory: np.ndarray
+    autocorrelation: np.ndarray
     widening: np.ndarray
     level: np.ndarray
     shift: np.ndarray
-    learned: np.ndarray
+    n_learned: np.ndarray
     residual: np.ndarray
     sigma: np.ndarray
     z: np.ndarray
     fitted: np.ndarray
     learning: np.ndarray
-    serving: np.ndarray
+    is_sibling: np.ndarray
     extra: np.ndarray
     threshold_down: np.ndarray
     threshold_up: np.ndarray
@@ -118,45 +125,45 @@ def guard_factor(count, small, settings) -> np.ndarray:
     return 1.0 + excess * (52.0 / np.maximum(count, 1)) ** np.where(small, 1.0, 1.2)
 
 
-def finish(p: Prepared, memory, settings) -> Charts:
+def finish(p: Prepared, phi, settings) -> Charts:
     """Residuals, CUSUM and alarms of prepared charts; ``phi`` is the pooled autocorrelation of each chart."""
     n = len(p.panel.charts)
-    widening = np.sqrt((1.0 + memory) / (1.0 - memory))
+    widening = np.sqrt((1.0 + phi) / (1.0 - phi))
     with np.errstate(invalid="ignore"):
         visible = settings.target_percent >= settings.allowance_switch * p.spread * widening * settings.guard_large
     allowance = np.where(visible, settings.allowance_large, settings.allowance_small)
     guard = guard_factor(p.baseline.count, ~visible, settings)
-    learn = np.where(visible, settings.learning_large, settings.learning_small)
-    window, settled = learning(p, learn, n, settings.siblings_minimum + 1)
-    summing = _Summing(p, allowance, window, guard * widening, settings)
-    sections, first, serving = _siblings_without_alarm(p, window, settled, summing, settings)
+    n_learning = np.where(visible, settings.learning_large, settings.learning_small)
+    window, settled = learning_campaigns(p, n_learning, n, settings.siblings_minimum + 1)
+    chart_sums = _ChartSums(p, allowance, window, guard * widening, settings)
+    sections, first, is_sibling = _siblings_without_alarm(p, window, settled, chart_sums, settings)
     alarmed = first["down_open"] | first["up_open"]
-    turnouts = of_turnouts(p, sections, window, settled, alarmed, settings)
-    second = summing(slice(n, None), turnouts)
+    turnouts = turnout_residuals(p, sections, window, settled, alarmed, settings)
+    second = chart_sums(slice(n, None), turnouts)
     sums = {name: np.concatenate([first[name], second[name]]) for name in first}
-    both = {k: np.vstack([getattr(sections, k), getattr(turnouts, k)]) for k in ("values", "residual", "sigma")}
-    level, shift = (stacked(getattr(sections, k), getattr(turnouts, k)) for k in ("level", "shift"))
-    learned = by_epoch(both["values"], window & np.isfinite(both["values"]), p.epoch, level.shape[1])[1]
+    joint = {k: np.vstack([getattr(sections, k), getattr(turnouts, k)]) for k in ("values", "residual", "sigma")}
+    level, shift = (stack_padded(getattr(sections, k), getattr(turnouts, k)) for k in ("level", "shift"))
+    n_learned = by_epoch(joint["values"], window & np.isfinite(joint["values"]), p.epoch, level.shape[1])[1]
     return Charts(
-        p, allowance, learn, guard, memory, widening, level, shift, learned, both["residual"], both["sigma"],
-        fitted=both["values"] - both["residual"], learning=window, serving=serving, **sums,
+        p, allowance, n_learning, guard, phi, widening, level, shift, n_learned, joint["residual"], joint["sigma"],
+        fitted=joint["values"] - joint["residual"], learning=window, is_sibling=is_sibling, **sums,
     )  # fmt: skip
 
 
-def _siblings_without_alarm(p, window, settled, summing, settings):
+def _siblings_without_alarm(p, window, settled, chart_sums, settings):
     """Residuals and sums of the sections, and which of their campaigns serve as siblings: none that is in alarm.
 
     Sections with a large change may first raise a false alarm in an unchanged one. Without them its alarm closes, and
     it is a sibling again.
     """
     n = len(p.panel.charts)
-    serving = settled[:n]
-    for _ in range(SIBLING_ROUNDS):
+    is_sibling = settled[:n]
+    for _ in range(MAX_SIBLING_ROUNDS):
         sections = sums = None  # free the arrays of the last round before the next: they set the peak of memory
-        sections = of_sections(p, window, settled, serving, settings)
-        sums = summing(slice(0, n), sections)
-        before, serving = serving, settled[:n] & ~(sums["down_open"] | sums["up_open"])
-        if np.array_equal(before, serving):
+        sections = section_residuals(p, window, settled, is_sibling, settings)
+        sums = chart_sums(slice(0, n), sections)
+        before, is_sibling = is_sibling, settled[:n] & ~(sums["down_open"] | sums["up_open"])
+        if np.array_equal(before, is_sibling):
             break
     return sections, sums, before
 
@@ -167,26 +174,26 @@ def _thresholds(length, allowance):
     return np.array([threshold_for(float(n), float(k)) for n, k in pairs] or [0.0])[where.ravel()]
 
 
-class _Summing:
+class _ChartSums:
     """Standardise residuals and sum them, for the sections first and then for the turnouts."""
 
     def __init__(self, p, allowance, window, factor, settings):
         self.p, self.allowance, self.window, self.factor, self.settings = p, allowance, window, factor, settings
 
-    def __call__(self, part, found):
-        p, settings, window = self.p, self.settings, self.window[part]
-        epoch = p.epoch[part]
-        usable = window & np.isfinite(found.values)
-        _, learned = by_epoch(found.values, usable, epoch, int(epoch.max(initial=0)) + 1)
-        later = epoch > first_epoch(p)[part, None]
-        extra = np.where(later, 1.0 / np.sqrt(np.maximum(spread_out(learned, epoch), 1)), 0.0)
+    def __call__(self, rows, residuals):
+        p, settings, window = self.p, self.settings, self.window[rows]
+        epoch = p.epoch[rows]
+        usable = window & np.isfinite(residuals.values)
+        _, n_learned = by_epoch(residuals.values, usable, epoch, int(epoch.max(initial=0)) + 1)
+        later = epoch > first_epoch(p)[rows, None]
+        extra = np.where(later, 1.0 / np.sqrt(np.maximum(expand_epochs(n_learned, epoch), 1)), 0.0)
         with np.errstate(invalid="ignore", divide="ignore"):
-            z = found.residual / (found.sigma * self.factor[part, None])
-        active = np.isfinite(z) & ~window & p.baseline.complete[part, None]
+            z = residuals.residual / (residuals.sigma * self.factor[rows, None])
+        active = np.isfinite(z) & ~window & p.baseline.complete[rows, None]
         fresh = np.diff(epoch, axis=1, prepend=0) > 0
         sums = {"z": z, "extra": extra}
-        k = self.allowance[part]
-        bands = p.charts["band"].to_numpy()[part]
+        k = self.allowance[rows]
+        bands = p.charts["band"].to_numpy()[rows]
         for name, sign in (("down", 1.0), ("up", -1.0)):
             h = _thresholds(run_lengths(bands, name, settings), k)
             limit = settings.single_share * h[:, None] + k[:, None] + extra

@@ -4,7 +4,7 @@ import numpy as np
 from scipy import stats
 
 
-def slopes(residual, time, mask, memory):
+def slopes(residual, time, mask, autocorrelation):
     r"""Least-squares slope of each chart against time, its standard error widened for AR(1) errors.
 
     .. math:: s_b^2 = \frac{\sum r^2}{\nu \sum (t - \bar t)^2}, \quad \nu = n \frac{1 - \phi}{1 + \phi} - 2
@@ -40,15 +40,15 @@ def slopes(residual, time, mask, memory):
     y = np.where(mask, residual, 0.0)
     y = np.where(mask, y - (y.sum(axis=1) / n)[:, None], 0.0)
     sxx = np.sum(x * x, axis=1)
-    shrink = (1.0 - memory) / (1.0 + memory)
+    shrink = (1.0 - autocorrelation) / (1.0 + autocorrelation)
     freedom = count * shrink - 2.0
     with np.errstate(invalid="ignore", divide="ignore"):
         slope = np.sum(x * y, axis=1) / sxx
         rss = np.sum((y - slope[:, None] * x) ** 2, axis=1)
         error = np.sqrt(rss / (count * shrink - 2.0) / sxx)
-        known = (freedom >= 3.0) & (sxx > 0.0)
+        is_valid = (freedom >= 3.0) & (sxx > 0.0)
         p_value = 2.0 * stats.t.sf(np.abs(slope / error), np.maximum(freedom, 1.0))
-    return tuple(np.where(known, value, np.nan) for value in (slope, error, p_value))
+    return tuple(np.where(is_valid, value, np.nan) for value in (slope, error, p_value))
 
 
 def span(time, mask) -> np.ndarray:
@@ -58,14 +58,14 @@ def span(time, mask) -> np.ndarray:
     return np.where(mask.any(axis=1), last - first, 0.0)
 
 
-def discoveries(p_value) -> np.ndarray:
+def adjusted_p_values(p_value) -> np.ndarray:
     """Benjamini and Hochberg's adjusted p values over the charts that have one, nan elsewhere.
 
-    >>> discoveries(np.array([0.01, np.nan, 0.04])).round(3)
+    >>> adjusted_p_values(np.array([0.01, np.nan, 0.04])).round(3)
     array([0.02,  nan, 0.04])
     """
     adjusted = np.full(p_value.shape, np.nan)
-    known = np.isfinite(p_value)
-    if known.any():
-        adjusted[known] = stats.false_discovery_control(p_value[known])
+    is_valid = np.isfinite(p_value)
+    if is_valid.any():
+        adjusted[is_valid] = stats.false_discovery_control(p_value[is_valid])
     return adjusted

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from turnout.trend.panel import days, truth
+from turnout.trend.panel import days, is_true
 
 
 def epochs_of(charts, time, events) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -53,20 +53,20 @@ def _mark(reset, charts, time, events):
     section = charts["section_id"].to_numpy()
     chosen = {flag: (band == flag) | ~np.isin(band, ["ballast", "railpad"]) for flag in ("ballast", "railpad")}
     for event, at in zip(events.itertuples(index=False), days(events["event_at_utc"])):
-        hit = members.get(event.turnout_id)
-        if hit is None or np.isnan(at):
+        rows = members.get(event.turnout_id)
+        if rows is None or np.isnan(at):
             continue
-        touched = np.zeros(hit.size, dtype=bool)
+        affected = np.zeros(rows.size, dtype=bool)
         for flag in ("ballast", "railpad"):
-            if truth(getattr(event, f"resets_{flag}")):
-                touched |= chosen[flag][hit]
+            if is_true(getattr(event, f"resets_{flag}")):
+                affected |= chosen[flag][rows]
         if isinstance(event.section_id, str) and event.section_id:
-            touched &= section[hit] == event.section_id
-        hit = hit[touched]
-        last = np.sum(np.isfinite(filled[hit]), axis=1)
-        column = np.sum(filled[hit] < at, axis=1)
+            affected &= section[rows] == event.section_id
+        rows = rows[affected]
+        last = np.sum(np.isfinite(filled[rows]), axis=1)
+        column = np.sum(filled[rows] < at, axis=1)
         column = np.where(column >= last, reset.shape[1] - 1, column)
-        reset[hit, column] = np.maximum(reset[hit, column], at)
+        reset[rows, column] = np.maximum(reset[rows, column], at)
 
 
 def by_epoch(values, mask, epoch, n_epoch) -> tuple[np.ndarray, np.ndarray]:
@@ -86,6 +86,6 @@ def by_epoch(values, mask, epoch, n_epoch) -> tuple[np.ndarray, np.ndarray]:
         return np.where(count > 0, total / np.maximum(count, 1), np.nan), count
 
 
-def spread_out(per_epoch, epoch) -> np.ndarray:
+def expand_epochs(per_epoch, epoch) -> np.ndarray:
     """Expand (n_chart, n_epoch) values to the campaigns of each epoch, (n_chart, n_campaign)."""
     return np.take_along_axis(per_epoch, epoch.astype(np.intp), axis=1)

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from turnout.trend.baseline import pooled_memory
+from turnout.trend.baseline import pooled_autocorrelation
 from turnout.trend.cusum import finish
-from turnout.trend.panel import WHOLE, panel_of
+from turnout.trend.panel import WHOLE_TURNOUT, panel_of
 from turnout.trend.residuals import prepare
 
 
-def memory_classes(prepared) -> list[np.ndarray]:
+def autocorrelation_classes(prepared) -> list[np.ndarray]:
     """Class number of every chart; charts of a class share one autocorrelation.
 
     A class has the same band and source, section or whole turnout, and similar spacing. Spacing is classed in octaves
@@ -18,7 +18,7 @@ def memory_classes(prepared) -> list[np.ndarray]:
     classes = []
     for p in prepared:
         octave = np.nan_to_num(np.round(np.log2(np.maximum(p.interval, 1.0) / 7.0)), nan=-99.0).astype(int)
-        keys = zip(p.charts["band"], p.charts["source"], p.charts["section_id"] == WHOLE, octave)
+        keys = zip(p.charts["band"], p.charts["source"], p.charts["section_id"] == WHOLE_TURNOUT, octave)
         classes.append(np.array([names.setdefault(key, len(names)) for key in keys], dtype=np.int64))
     return classes
 
@@ -26,11 +26,11 @@ def memory_classes(prepared) -> list[np.ndarray]:
 def evaluate_panels(panels, events, settings):
     """Yield the finished ``Charts`` of each panel; the panels are parts of one fleet and share its autocorrelation."""
     prepared = [prepare(panel, events, settings) for panel in panels]
-    for p, own in zip(prepared, shared_memory(prepared)):
-        yield finish(p, own, settings)
+    for p, autocorrelation in zip(prepared, shared_autocorrelation(prepared)):
+        yield finish(p, autocorrelation, settings)
 
 
-def shared_memory(prepared) -> list[np.ndarray]:
+def shared_autocorrelation(prepared) -> list[np.ndarray]:
     """Autocorrelation of every chart of each panel: the mean over its class in the whole fleet.
 
     Only charts with a complete baseline count, unless their class has none. So the value changes when a baseline is
@@ -38,13 +38,13 @@ def shared_memory(prepared) -> list[np.ndarray]:
     """
     if not prepared:
         return []
-    classes = np.concatenate(memory_classes(prepared))
-    memory = np.concatenate([p.memory for p in prepared])
+    classes = np.concatenate(autocorrelation_classes(prepared))
+    autocorrelation = np.concatenate([p.autocorrelation for p in prepared])
     complete = np.concatenate([p.baseline.complete for p in prepared])
-    settled = pooled_memory(np.where(complete, memory, np.nan), classes)
-    known = np.zeros(int(classes.max(initial=-1)) + 1, dtype=bool)
-    known[classes[complete & np.isfinite(memory)]] = True
-    shared = np.where(known[classes], settled, pooled_memory(memory, classes))
+    from_complete = pooled_autocorrelation(np.where(complete, autocorrelation, np.nan), classes)
+    has_complete = np.zeros(int(classes.max(initial=-1)) + 1, dtype=bool)
+    has_complete[classes[complete & np.isfinite(autocorrelation)]] = True
+    shared = np.where(has_complete[classes], from_complete, pooled_autocorrelation(autocorrelation, classes))
     return np.split(shared, np.cumsum([len(p.charts) for p in prepared])[:-1])
 
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-YEAR = 365.25
-RECENT = 8  # newest values, whose mean is the present level of a chart
+DAYS_PER_YEAR = 365.25
+N_RECENT = 8  # newest values, whose mean is the present level of a chart
 SETTLING_YEARS = np.geomspace(0.05, 10.0, 40)  # time constants of the settling curve that are tried [a]
 
 
@@ -42,19 +42,19 @@ class Forecast:
         return f"not before {self.not_before:.1f} years, no latest date"
 
 
-def memory_of_steps(time, memory) -> np.ndarray:
+def step_autocorrelation(time, autocorrelation) -> np.ndarray:
     """AR(1) coefficient from each value to the next; ``autocorrelation`` is that at the median spacing.
 
-    >>> memory_of_steps(np.array([0.0, 1.0, 2.0, 4.0]), 0.5)
+    >>> step_autocorrelation(np.array([0.0, 1.0, 2.0, 4.0]), 0.5)
     array([0.5 , 0.5 , 0.25])
     """
     step = np.diff(time)
     usual = np.median(step)
-    phi = memory ** (step / usual) if usual > 0.0 else np.full(step.size, memory)
+    phi = autocorrelation ** (step / usual) if usual > 0.0 else np.full(step.size, autocorrelation)
     return np.where(step <= 0.0, 0.0, phi)
 
 
-def whitened(design, values, time, memory):
+def whiten(design, values, time, autocorrelation):
     r"""Whiten a regression with AR(1) errors and unequal spacing.
 
     .. math:: y_i' = \frac{y_i - \phi_i y_{i-1}}{\sqrt{1 - \phi_i^2}}, \quad
@@ -62,23 +62,23 @@ def whitened(design, values, time, memory):
 
     with the median spacing :math:`\tilde{\Delta t}`; the first value stays as it is (Prais and Winsten 1954).
     """
-    phi = memory_of_steps(time, memory)
+    phi = step_autocorrelation(time, autocorrelation)
     scale = 1.0 / np.sqrt(1.0 - phi**2)
     rows = np.vstack([design[:1], (design[1:] - phi[:, None] * design[:-1]) * scale[:, None]])
     return rows, np.append(values[:1], (values[1:] - phi * values[:-1]) * scale)
 
 
-def line(time, values, memory):
+def fit_line(time, values, autocorrelation):
     """Fit a line by generalised least squares.
 
     Returns (level at the last value, slope [1/a]), their covariance, residual sum of squares and degrees of freedom.
 
-    >>> fit = line(np.arange(5.0) * 365.25, np.array([1.0, 0.0, -1.0, -2.0, -3.0]), 0.3)
+    >>> fit = fit_line(np.arange(5.0) * 365.25, np.array([1.0, 0.0, -1.0, -2.0, -3.0]), 0.3)
     >>> fit[0].round(6)
     array([-3., -1.])
     """
-    years = (time - time[-1]) / YEAR
-    design, y = whitened(np.column_stack([np.ones(years.size), years]), values, time, memory)
+    years = (time - time[-1]) / DAYS_PER_YEAR
+    design, y = whiten(np.column_stack([np.ones(years.size), years]), values, time, autocorrelation)
     coefficient, _, _, _ = np.linalg.lstsq(design, y, rcond=None)
     rss = float(np.sum((y - design @ coefficient) ** 2))
     freedom = years.size - 2
@@ -86,18 +86,18 @@ def line(time, values, memory):
     return coefficient, covariance, rss, freedom
 
 
-def settling_rss(time, values, memory) -> float:
+def settling_rss(time, values, autocorrelation) -> float:
     """Smallest residual sum of squares of a settling curve, a + c exp(-t / tau), over a grid of tau."""
-    years = (time - time[0]) / YEAR
-    best = np.inf
+    years = (time - time[0]) / DAYS_PER_YEAR
+    lowest = np.inf
     for tau in SETTLING_YEARS:
-        design, y = whitened(np.column_stack([np.ones(years.size), np.exp(-years / tau)]), values, time, memory)
+        design, y = whiten(np.column_stack([np.ones(years.size), np.exp(-years / tau)]), values, time, autocorrelation)
         coefficient, _, _, _ = np.linalg.lstsq(design, y, rcond=None)
-        best = min(best, float(np.sum((y - design @ coefficient) ** 2)))
-    return best
+        lowest = min(lowest, float(np.sum((y - design @ coefficient) ** 2)))
+    return lowest
 
 
-def crossing(coefficient, covariance, freedom, limit, level) -> tuple[float, float]:
+def crossing_interval(coefficient, covariance, freedom, limit, level) -> tuple[float, float]:
     r"""Interval of the time at which a line reaches ``limit`` (Fieller).
 
     All t >= 0 with :math:`|a + b t - L| \le q\, \mathrm{se}(a + b t)`, with q a quantile of Student's t. Returns
@@ -111,7 +111,7 @@ def crossing(coefficient, covariance, freedom, limit, level) -> tuple[float, flo
     --------
     A line known almost exactly, 1 %/a from 0 to -5.
 
-    >>> print(*(f"{t:.2f}" for t in crossing(np.array([0.0, -1.0]), np.eye(2) * 1e-12, 50, -5.0, 0.8)))
+    >>> print(*(f"{t:.2f}" for t in crossing_interval(np.array([0.0, -1.0]), np.eye(2) * 1e-12, 50, -5.0, 0.8)))
     5.00 5.00
     """
     q = stats.t.isf((1.0 - level) / 2.0, freedom)
@@ -129,7 +129,7 @@ def crossing(coefficient, covariance, freedom, limit, level) -> tuple[float, flo
     return (first, float((root - half) / square)) if square > 0.0 else (first, never[1])
 
 
-def forecast(time, values, memory, settings) -> Forecast:
+def forecast(time, values, autocorrelation, settings) -> Forecast:
     """When the values reach ``settings.limit_percent``, with the interval of ``settings.interval_level``.
 
     If the mean of the last ``N_RECENT`` values is beyond the limit, it is reached. Otherwise a line is compared with a
@@ -144,16 +144,16 @@ def forecast(time, values, memory, settings) -> Forecast:
         AR(1) coefficient at the usual spacing.
     """
     nan = float("nan")
-    if time.size and values[-RECENT:].mean() <= settings.limit_percent:
+    if time.size and values[-N_RECENT:].mean() <= settings.limit_percent:
         return Forecast("reached", nan, nan, 0.0, nan, nan)
     if time.size < 12 or time[-1] - time[0] < settings.drift_days:
         return Forecast("too_short", nan, nan, nan, nan, nan)
-    coefficient, covariance, rss, freedom = line(time, values, memory)
+    coefficient, covariance, rss, freedom = fit_line(time, values, autocorrelation)
     slope, error = float(coefficient[1]), float(np.sqrt(covariance[1, 1]))
-    other = settling_rss(time, values, memory)
+    rss_settling = settling_rss(time, values, autocorrelation)
     n = time.size
-    preference = n * np.log(max(rss, 1e-300) / max(other, 1e-300)) - 2.0
-    low, high = crossing(coefficient, covariance, freedom, settings.limit_percent, settings.interval_level)
+    preference = n * np.log(max(rss, 1e-300) / max(rss_settling, 1e-300)) - 2.0
+    low, high = crossing_interval(coefficient, covariance, freedom, settings.limit_percent, settings.interval_level)
     if preference > 0.0:
         return Forecast("settling", slope, error, nan, nan, preference)
     if not np.isfinite(low) or low > settings.horizon_years:

@@ -8,20 +8,20 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-DAY = 86400.0  # s
+SECONDS_PER_DAY = 86400.0  # s
 # [d] A first campaign isolated by more than this from the next is left out: a mistyped year or a clock that was reset.
 # A true one, such as an acceptance test, must not start the baseline either.
-LONG_BEFORE = 5 * 365.25
+ISOLATED_FIRST_GAP = 5 * 365.25
 
 
-def truth(flag) -> bool:
+def is_true(flag) -> bool:
     """Whether a flag from a CSV or from the registry is true; missing or unknown texts are false."""
     return flag is True or str(flag).strip().lower() in ("true", "1", "yes")
 
 
 def keys_of(visits, time):
     """Row of visits and time [d] combined in one sortable integer."""
-    return visits * 2**40 + np.round((time + 2e6) * DAY).astype(np.int64)
+    return visits * 2**40 + np.round((time + 2e6) * SECONDS_PER_DAY).astype(np.int64)
 
 
 def unique_of(key):
@@ -33,7 +33,7 @@ def unique_of(key):
     return np.asarray(unique)[order], rank[code]
 
 
-def campaigns_of(visits, time, gap, n_visits, works):
+def campaigns_of(visits, time, gap, n_visits, resets):
     """Number of the campaign of each row within its turnout, and (n_visits, n_campaign) start times.
 
     A campaign lasts ``gap`` [d] from its first value on, and ends at an event that resets charts. ``resets`` are the
@@ -42,10 +42,10 @@ def campaigns_of(visits, time, gap, n_visits, works):
     if not time.size:  # one empty column, so that later steps need no special case
         return np.zeros(0, dtype=np.int64), np.full((n_visits, 1), np.nan)
     stamp, row = unique_of(keys_of(visits, time))
-    visit, moment = stamp >> 40, (stamp & (2**40 - 1)) / DAY - 2e6
+    visit, moment = stamp >> 40, (stamp & (2**40 - 1)) / SECONDS_PER_DAY - 2e6
     new_turnout = np.diff(visit, prepend=-1) != 0
-    worked = np.diff(np.searchsorted(works, stamp, side="right"), prepend=0) > 0
-    new = split(new_turnout | worked | (np.diff(moment, prepend=0.0) > gap), moment, gap)
+    after_reset = np.diff(np.searchsorted(resets, stamp, side="right"), prepend=0) > 0
+    new = split(new_turnout | after_reset | (np.diff(moment, prepend=0.0) > gap), moment, gap)
     running = np.cumsum(new) - 1
     first = np.zeros(n_visits, dtype=np.int64)
     first[visit[new_turnout]] = running[new_turnout]
@@ -55,12 +55,12 @@ def campaigns_of(visits, time, gap, n_visits, works):
     return number[row], starts
 
 
-def long_before(visits, time, gap, n_visits) -> np.ndarray:
+def is_isolated_first(visits, time, gap, n_visits) -> np.ndarray:
     """Which rows belong to a first campaign more than ``ISOLATED_FIRST_GAP`` before the next, if at least two follow.
 
     A baseline that begins with it would last a year without a value in summer.
 
-    >>> long_before(np.zeros(4, int), np.array([0.0, 9000.0, 1.0, 9007.0]), 1.5, 1)
+    >>> is_isolated_first(np.zeros(4, int), np.array([0.0, 9000.0, 1.0, 9007.0]), 1.5, 1)
     array([ True, False,  True, False])
     """
     first, second = np.full((2, n_visits), np.inf)
@@ -69,7 +69,7 @@ def long_before(visits, time, gap, n_visits) -> np.ndarray:
     early = time <= first[visits] + gap
     np.minimum.at(second, visits[~early], time[~early])
     np.maximum.at(last, visits, time)
-    lone = (second > first + LONG_BEFORE) & (last > second + gap)
+    lone = (second > first + ISOLATED_FIRST_GAP) & (last > second + gap)
     return early & lone[visits]
 
 
@@ -91,8 +91,8 @@ def split(new, moment, gap):
     return new
 
 
-CHART = ["turnout_id", "band", "source", "section_id"]
-WHOLE = "*"
+CHART_KEYS = ["turnout_id", "band", "source", "section_id"]
+WHOLE_TURNOUT = "*"
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ def days(times) -> np.ndarray:
     array([1.5])
     """
     stamps = pd.to_datetime(pd.Series(times)).to_numpy().astype("datetime64[us]")
-    return np.where(np.isnat(stamps), np.nan, stamps.astype("int64") / (DAY * 1e6))
+    return np.where(np.isnat(stamps), np.nan, stamps.astype("int64") / (SECONDS_PER_DAY * 1e6))
 
 
 def timestamps(day) -> np.ndarray:
@@ -145,26 +145,26 @@ def timestamps(day) -> np.ndarray:
     '1970-01-02T12:00:00.000000'
     """
     day = np.asarray(day, dtype=float)
-    micro = np.round(np.nan_to_num(day) * DAY).astype("int64") * 1_000_000
+    micro = np.round(np.nan_to_num(day) * SECONDS_PER_DAY).astype("int64") * 1_000_000
     return np.where(np.isfinite(day), micro.view("datetime64[us]"), np.datetime64("NaT"))
 
 
-def believable(time, settings, until=np.inf) -> tuple[np.ndarray, float]:
+def believable_times(time, settings, until=np.inf) -> tuple[np.ndarray, float]:
     """Which times of a fleet are plausible, and the newest of them. [d]
 
     A time before ``earliest_year`` or after ``until`` [d] is implausible. So is a single last day of measurement more
     than ``clock_gap_days`` after all others of the fleet.
 
     >>> from turnout.config.settings.trend import TrendSettings
-    >>> believable(np.array([-3.0, 15000.0, 15007.0, 26000.0]), TrendSettings())
+    >>> believable_times(np.array([-3.0, 15000.0, 15007.0, 26000.0]), TrendSettings())
     (array([False,  True,  True, False]), 15007.0)
     """
     earliest = days([pd.Timestamp(settings.earliest_year, 1, 1)])[0]
-    good = np.isfinite(time) & (time >= earliest) & (time <= until)
-    dates = np.unique(np.floor(time[good]))
+    is_believable = np.isfinite(time) & (time >= earliest) & (time <= until)
+    dates = np.unique(np.floor(time[is_believable]))
     if dates.size >= 3 and dates[-1] - dates[-2] > settings.clock_gap_days:
-        good &= time < dates[-1]
-    return good, float(np.max(time, where=good, initial=-np.inf))
+        is_believable &= time < dates[-1]
+    return is_believable, float(np.max(time, where=is_believable, initial=-np.inf))
 
 
 def panel_of(modes, settings, as_of=None, events=None) -> Panel:
@@ -178,7 +178,7 @@ def panel_of(modes, settings, as_of=None, events=None) -> Panel:
     rows = modes if "source" in modes else modes.assign(source="hammer")
     time = days(rows["measured_at_utc"])
     if as_of is None:
-        _, newest = believable(time, settings)
+        _, newest = believable_times(time, settings)
     else:
         newest = days([as_of])[0]
     charts, chart = _charts(rows)
@@ -198,48 +198,48 @@ def lay_out(charts, chart, time, frequency, error, temperature, newest, settings
     those of an isolated first campaign (``is_isolated_first``).
     """
     earliest = days([pd.Timestamp(settings.earliest_year, 1, 1)])[0]
-    good = (time >= earliest) & (time <= newest)
-    sound = np.isfinite(frequency) & (frequency > 0.0)
+    is_believable = (time >= earliest) & (time <= newest)
+    has_value = np.isfinite(frequency) & (frequency > 0.0)
     charts = charts.assign(
-        group=charts.groupby(CHART[:3], sort=True, observed=True).ngroup().to_numpy(),
+        group=charts.groupby(CHART_KEYS[:3], sort=True, observed=True).ngroup().to_numpy(),
         visits=charts.groupby(["turnout_id", "source"], sort=True, observed=True).ngroup().to_numpy(),
     )
     visits, gap = charts["visits"].to_numpy(), settings.campaign_gap_hours / 24.0
     n_visits = int(visits.max()) + 1 if len(visits) else 0
-    use = good & sound
-    good[use] = ~long_before(visits[chart[use]], time[use], gap, n_visits)
-    use &= good
-    out = ~use
-    left_out = charts[CHART].iloc[chart[out]].reset_index(drop=True)
-    left_out["measured_at_utc"] = timestamps(time[out])
-    left_out["reason"] = np.where(good[out], "no_value", "wrong_time")
+    use = is_believable & has_value
+    is_believable[use] = ~is_isolated_first(visits[chart[use]], time[use], gap, n_visits)
+    use &= is_believable
+    is_left_out = ~use
+    left_out = charts[CHART_KEYS].iloc[chart[is_left_out]].reset_index(drop=True)
+    left_out["measured_at_utc"] = timestamps(time[is_left_out])
+    left_out["reason"] = np.where(is_believable[is_left_out], "no_value", "wrong_time")
     if not use.all():
         chart, time = chart[use], time[use]
         frequency, error, temperature = frequency[use], error[use], temperature[use]
-    works = _works(charts, events)
-    column, starts = campaigns_of(visits[chart], time, gap, n_visits, works)
-    order = _later_last(chart, column, starts.shape[1], time)
+    resets = _reset_keys(charts, events)
+    column, starts = campaigns_of(visits[chart], time, gap, n_visits, resets)
+    order = _write_order(chart, column, starts.shape[1], time)
     cell = (chart[order], column[order])
 
-    def laid_out(values):
+    def to_matrix(values):
         matrix = np.full((len(charts), starts.shape[1]), np.nan)
         matrix[cell] = values[order]
         return matrix
 
-    return Panel(charts, starts, laid_out(frequency), laid_out(error), laid_out(temperature), left_out, newest)
+    return Panel(charts, starts, to_matrix(frequency), to_matrix(error), to_matrix(temperature), left_out, newest)
 
 
-def _later_last(chart, column, n_column, time):
+def _write_order(chart, column, n_column, time):
     """Order in which rows are written into cells: by time if two rows share a cell, so that the later one stays."""
-    taken = np.zeros((int(chart.max(initial=-1)) + 1, n_column), dtype=bool)
-    taken[chart, column] = True
-    return slice(None) if np.count_nonzero(taken) == time.size else np.argsort(time, kind="stable")
+    is_occupied = np.zeros((int(chart.max(initial=-1)) + 1, n_column), dtype=bool)
+    is_occupied[chart, column] = True
+    return slice(None) if np.count_nonzero(is_occupied) == time.size else np.argsort(time, kind="stable")
 
 
 def _charts(rows):
     """Charts in sorted order, and the chart number of each row; categories are not expanded to text per row."""
     codes, names = [], []
-    for name in CHART:
+    for name in CHART_KEYS:
         column = rows[name]
         if isinstance(column.dtype, pd.CategoricalDtype):
             categories = np.asarray(column.cat.categories, dtype=object)
@@ -253,17 +253,17 @@ def _charts(rows):
     sizes = [max(len(n), 1) for n in names]
     key = np.ravel_multi_index([np.asarray(c, dtype=np.int64) for c in codes], sizes) if len(rows) else np.zeros(0, int)
     unique, chart = unique_of(key)
-    parts = np.unravel_index(unique, sizes)
-    return pd.DataFrame({n: v[p] for n, v, p in zip(CHART, names, parts)}, columns=CHART), chart
+    indices = np.unravel_index(unique, sizes)
+    return pd.DataFrame({n: v[p] for n, v, p in zip(CHART_KEYS, names, indices)}, columns=CHART_KEYS), chart
 
 
-def _works(charts, events):
+def _reset_keys(charts, events):
     """Sorted ``keys_of`` the events that reset charts, for every row of visits."""
     if events is None or not len(events):
         return np.zeros(0, dtype=np.int64)
     flags = zip(events["resets_ballast"], events["resets_railpad"])
-    resetting = np.array([truth(ballast) or truth(railpad) for ballast, railpad in flags])
+    resetting = np.array([is_true(ballast) or is_true(railpad) for ballast, railpad in flags])
     resets = events[resetting & events["event_at_utc"].notna().to_numpy()]
     rows = charts[["turnout_id", "visits"]].drop_duplicates().astype({"turnout_id": object})
-    both = rows.merge(resets[["turnout_id", "event_at_utc"]].astype({"turnout_id": object}), on="turnout_id")
-    return np.sort(keys_of(both["visits"].to_numpy(dtype=np.int64), days(both["event_at_utc"])))
+    pairs = rows.merge(resets[["turnout_id", "event_at_utc"]].astype({"turnout_id": object}), on="turnout_id")
+    return np.sort(keys_of(pairs["visits"].to_numpy(dtype=np.int64), days(pairs["event_at_utc"])))

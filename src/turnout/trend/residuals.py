@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from turnout.trend.baseline import Baseline, fit_baseline, spread_and_memory, usual_interval
-from turnout.trend.epochs import by_epoch, epochs_of, spread_out
-from turnout.trend.panel import WHOLE, Panel
-from turnout.trend.siblings import median_of_group, median_of_others
+from turnout.trend.baseline import Baseline, fit_baseline, spread_and_autocorrelation, usual_interval
+from turnout.trend.epochs import by_epoch, epochs_of, expand_epochs
+from turnout.trend.panel import WHOLE_TURNOUT, Panel
+from turnout.trend.siblings import median_of_group, median_of_siblings
 
 
 @dataclass
@@ -35,7 +35,7 @@ class Prepared:
     interval: np.ndarray
     spread: np.ndarray
     spread_alone: np.ndarray
-    memory: np.ndarray
+    autocorrelation: np.ndarray
     with_siblings: np.ndarray
 
 
@@ -44,66 +44,70 @@ def prepare(panel: Panel, events, settings) -> Prepared:
     time = panel.chart_time
     epoch, pending, started = epochs_of(panel.charts, time, events)
     base, values = fit_baseline(panel.frequency, panel.temperature, time, epoch, settings)
-    stretch = slice(0, int(np.max(np.flatnonzero(base.inside.any(axis=0)), initial=-1)) + 1)
-    inside, part = base.inside[:, stretch], epoch[:, stretch]
-    level, _ = by_epoch(np.where(inside, values[:, stretch], 0.0), inside, part, int(part.max(initial=0)) + 1)
-    centred = np.where(inside, values[:, stretch] - spread_out(level, part), np.nan)
+    baseline_span = slice(0, int(np.max(np.flatnonzero(base.inside.any(axis=0)), initial=-1)) + 1)
+    inside, epoch_base = base.inside[:, baseline_span], epoch[:, baseline_span]
+    level, _ = by_epoch(
+        np.where(inside, values[:, baseline_span], 0.0), inside, epoch_base, int(epoch_base.max(initial=0)) + 1
+    )
+    centred = np.where(inside, values[:, baseline_span] - expand_epochs(level, epoch_base), np.nan)
     group = panel.charts["group"].to_numpy()
-    median, others = median_of_others(centred, inside, group)
-    enough = inside & (others >= settings.siblings_minimum)
+    median, n_siblings = median_of_siblings(centred, inside, group)
+    enough = inside & (n_siblings >= settings.siblings_minimum)
     with_siblings = enough.sum(axis=1) >= settings.siblings_share * np.maximum(inside.sum(axis=1), 1)
     residual = np.where(with_siblings[:, None] & enough, centred - median, np.nan)
-    alone, memory_alone = spread_and_memory(centred, inside, part, base.freedom, time[:, stretch])
-    fewer = base.freedom - np.sum(inside & ~enough, axis=1)
-    beside, memory = spread_and_memory(residual, enough, part, fewer, time[:, stretch])
-    with_siblings &= _siblings_pay(beside, alone, group)
+    sd_alone, phi_alone = spread_and_autocorrelation(centred, inside, epoch_base, base.freedom, time[:, baseline_span])
+    freedom_siblings = base.freedom - np.sum(inside & ~enough, axis=1)
+    sd_sibling, phi = spread_and_autocorrelation(residual, enough, epoch_base, freedom_siblings, time[:, baseline_span])
+    with_siblings &= _has_sibling_gain(sd_sibling, sd_alone, group)
     section = Prepared(
         panel, panel.charts, time, base, values, epoch, started, pending, usual_interval(time, base.inside),
-        np.where(with_siblings, beside, alone), alone, np.where(with_siblings, memory, memory_alone), with_siblings,
+        np.where(with_siblings, sd_sibling, sd_alone), sd_alone, np.where(with_siblings, phi, phi_alone), with_siblings,
     )  # fmt: skip
-    return _with_whole(section, centred, inside, stretch, events, settings)
+    return _with_turnout_charts(section, centred, inside, baseline_span, events, settings)
 
 
-def _siblings_pay(beside, alone, group):
+def _has_sibling_gain(spread_siblings, spread_alone, group):
     """Whether a turnout's sections scatter less about their median than alone; one answer for all of them."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        gain = np.log(alone / beside)
-    known = np.isfinite(gain)
-    total = np.bincount(group, weights=np.where(known, gain, 0.0))
+        gain = np.log(spread_alone / spread_siblings)
+    is_valid = np.isfinite(gain)
+    total = np.bincount(group, weights=np.where(is_valid, gain, 0.0))
     return (total > 0.0)[group]
 
 
-def _with_whole(p: Prepared, centred, inside, stretch, events, settings) -> Prepared:
+def _with_turnout_charts(p: Prepared, centred, inside, baseline_span, events, settings) -> Prepared:
     """Append one chart per turnout, band and source: the median of its sections, to detect a change common to all."""
     group = p.charts["group"].to_numpy()
     median, count = median_of_group(centred, inside, group)
     first = np.flatnonzero(np.diff(group, prepend=-1))
-    charts = p.charts.iloc[first].assign(section_id=WHOLE)
+    charts = p.charts.iloc[first].assign(section_id=WHOLE_TURNOUT)
     time = p.time[first]
     epoch, pending, started = epochs_of(charts, time, events)
     window = count >= settings.siblings_minimum + 1
     members = np.add.reduceat(p.baseline.complete.astype(int), first) if len(first) else np.zeros(0, int)
     complete = members >= settings.siblings_minimum + 1
-    whole = np.zeros((len(first), p.time.shape[1]), dtype=bool)
-    whole[:, stretch] = window
+    inside_turnout = np.zeros((len(first), p.time.shape[1]), dtype=bool)
+    inside_turnout[:, baseline_span] = window
     n_base = window.sum(axis=1)
     freedom = n_base - 2
-    spread, memory = spread_and_memory(
-        np.where(window, median, np.nan), window, epoch[:, stretch], freedom, time[:, stretch]
+    spread, autocorrelation = spread_and_autocorrelation(
+        np.where(window, median, np.nan), window, epoch[:, baseline_span], freedom, time[:, baseline_span]
     )
     nothing = np.full(len(first), np.nan)
-    base = Baseline(nothing, nothing, nothing, nothing, n_base, freedom, complete, np.zeros(len(first), int), whole)
+    base = Baseline(
+        nothing, nothing, nothing, nothing, n_base, freedom, complete, np.zeros(len(first), int), inside_turnout
+    )
     joined = Baseline(*(np.concatenate([a, b]) for a, b in zip(vars(p.baseline).values(), vars(base).values())))
     return Prepared(
         p.panel, pd.concat([p.charts, charts], ignore_index=True), np.vstack([p.time, time]), joined, p.values,
-        np.vstack([p.epoch, epoch]), stacked(p.started, started), np.append(p.pending, pending),
-        np.append(p.interval, usual_interval(time, whole)), np.append(p.spread, spread),
-        np.append(p.spread_alone, spread), np.append(p.memory, memory),
+        np.vstack([p.epoch, epoch]), stack_padded(p.started, started), np.append(p.pending, pending),
+        np.append(p.interval, usual_interval(time, inside_turnout)), np.append(p.spread, spread),
+        np.append(p.spread_alone, spread), np.append(p.autocorrelation, autocorrelation),
         np.append(p.with_siblings, np.zeros(len(first), bool)),
     )  # fmt: skip
 
 
-def stacked(a, b):
+def stack_padded(a, b):
     """Stack two arrays vertically; the narrower one is filled with nan on the right."""
     width = max(a.shape[1], b.shape[1])
     return np.vstack([np.pad(x, ((0, 0), (0, width - x.shape[1])), constant_values=np.nan) for x in (a, b)])
@@ -115,7 +119,7 @@ def first_epoch(p):
     return p.epoch[np.arange(len(p.epoch)), column]
 
 
-RESOLUTION = 0.001  # Hz, of frequencies in the registry; values that differ by less are equal
+FREQUENCY_RESOLUTION = 0.001  # Hz, of frequencies in the registry; values that differ by less are equal
 
 
 @dataclass
@@ -139,7 +143,7 @@ def _usable(p, n_section):
     return np.vstack([usable, np.zeros((len(p.epoch) - n_section, usable.shape[1]), dtype=bool)])
 
 
-def learning(p, learn, n_section, need):
+def learning_campaigns(p, n_learning, n_section, need):
     """Masks of campaigns from which a level is learned, and of settled campaigns.
 
     A level is learned from the baseline and from the first ``n_learning`` campaigns of every later epoch. A settled
@@ -155,12 +159,12 @@ def learning(p, learn, n_section, need):
     fresh = np.diff(p.epoch, axis=1, prepend=0) > 0
     before = np.maximum.accumulate(np.where(fresh, running - usable, 0), axis=1)
     rank = running - before
-    window = usable & (p.baseline.inside | (later & (rank <= learn[:, None])))
+    window = usable & (p.baseline.inside | (later & (rank <= n_learning[:, None])))
     settled = usable & p.baseline.complete[:, None] & ~(window & later)
     return window, settled
 
 
-def of_sections(p: Prepared, window, settled, serving, settings) -> Residuals:
+def section_residuals(p: Prepared, window, settled, is_sibling, settings) -> Residuals:
     """Residuals of the sections. ``window`` and ``settled`` are those of ``learning_campaigns``.
 
     (n_chart, n_campaign) ``is_sibling`` marks the settled campaigns that serve as siblings of others. Those in alarm do
@@ -168,34 +172,34 @@ def of_sections(p: Prepared, window, settled, serving, settings) -> Residuals:
     """
     n = len(p.panel.charts)
     group, epoch = p.panel.charts["group"].to_numpy(), p.epoch[:n]
-    level, e = _centred(p.values, window[:n], epoch)
-    median, others = median_of_others(e, serving, group)
-    enough = np.isfinite(e) & (others >= settings.siblings_minimum)
-    young = np.isfinite(e) & ~settled[:n] & ~enough
-    if young.any():
-        rest, rest_others = median_of_others(e, np.isfinite(e), group)
-        use = young & (rest_others >= settings.siblings_minimum)
-        median, enough = np.where(use, rest, median), enough | use
+    level, e = _centre(p.values, window[:n], epoch)
+    median, n_siblings = median_of_siblings(e, is_sibling, group)
+    enough = np.isfinite(e) & (n_siblings >= settings.siblings_minimum)
+    is_unsettled = np.isfinite(e) & ~settled[:n] & ~enough
+    if is_unsettled.any():
+        median_any, n_any = median_of_siblings(e, np.isfinite(e), group)
+        use = is_unsettled & (n_any >= settings.siblings_minimum)
+        median, enough = np.where(use, median_any, median), enough | use
     enough &= p.with_siblings[:n, None]
-    enough &= _compared(window[:n], enough, epoch, first_epoch(p)[:n], settings.siblings_share)
-    shift, beside = _centred(np.where(enough, e - median, np.nan), window[:n] & enough, epoch)
+    enough &= _has_sibling_level(window[:n], enough, epoch, first_epoch(p)[:n], settings.siblings_share)
+    shift, residual_siblings = _centre(np.where(enough, e - median, np.nan), window[:n] & enough, epoch)
     sigma = _sigma(p, enough, slope_variance(p, window[:n]))
-    return Residuals(p.values, np.where(enough, beside, e), sigma, level, shift, e)
+    return Residuals(p.values, np.where(enough, residual_siblings, e), sigma, level, shift, e)
 
 
-def _compared(window, beside, epoch, first, share) -> np.ndarray:
+def _has_sibling_level(window, with_siblings, epoch, first, share) -> np.ndarray:
     """Campaigns of epochs in which the usual difference to the siblings is known, (n_chart, n_campaign).
 
     In a later epoch it is known if a ``share`` of the campaigns that learned the level were ``with_siblings``. A
     section measured alone gives its level, but not its difference to the others.
     """
     n_epoch = int(epoch.max(initial=0)) + 1
-    learned, together = (by_epoch(epoch, mask, epoch, n_epoch)[1] for mask in (window, window & beside))
+    n_learned, n_with_siblings = (by_epoch(epoch, mask, epoch, n_epoch)[1] for mask in (window, window & with_siblings))
     later = np.arange(n_epoch) > first[:, None]
-    return spread_out((together > 0) & (together >= share * learned * later), epoch)
+    return expand_epochs((n_with_siblings > 0) & (n_with_siblings >= share * n_learned * later), epoch)
 
 
-def of_turnouts(p: Prepared, sections: Residuals, window, settled, alarmed, settings) -> Residuals:
+def turnout_residuals(p: Prepared, sections: Residuals, window, settled, alarmed, settings) -> Residuals:
     """Residuals of the medians of the turnouts, which show a change common to all sections.
 
     Sections in ``alarmed``, whose own alarm is open, do not count: a large change of one section would shift the median
@@ -206,17 +210,17 @@ def of_turnouts(p: Prepared, sections: Residuals, window, settled, alarmed, sett
     median, count = median_of_group(sections.centred, settled[:n] & ~alarmed, group)
     young, young_count = median_of_group(sections.centred, np.isfinite(sections.centred), group)
     whole = np.where(count >= need, median, np.where((young_count >= need) & window[n:], young, np.nan))
-    level, residual = _centred(whole, window[n:] & np.isfinite(whole), epoch)
+    level, residual = _centre(whole, window[n:] & np.isfinite(whole), epoch)
     common, _ = median_of_group(slope_variance(p, window[:n]), settled[:n] & ~alarmed, group)
     sigma = np.sqrt(p.spread[n:, None] ** 2 + np.nan_to_num(common))
     return Residuals(whole, residual, np.where(sigma > 0.0, sigma, np.nan), level, np.zeros_like(level), residual)
 
 
-def _centred(values, window, epoch):
+def _centre(values, window, epoch):
     """Level of each epoch, learned from the campaigns of ``window``, and the values less that level."""
     n_epoch = int(epoch.max(initial=0)) + 1
     level, _ = by_epoch(np.where(window, values, 0.0), window, epoch, n_epoch)
-    return level, values - spread_out(level, epoch)
+    return level, values - expand_epochs(level, epoch)
 
 
 def slope_variance(p, window):
@@ -226,14 +230,14 @@ def slope_variance(p, window):
     It matters, for instance, in the first summer after a baseline with nearly constant temperature.
     """
     n, base = len(window), p.baseline
-    _, away = _centred(p.panel.temperature, window & np.isfinite(p.panel.temperature), p.epoch[:n])
+    _, deviation = _centre(p.panel.temperature, window & np.isfinite(p.panel.temperature), p.epoch[:n])
     inside = base.inside[:n]
-    known = np.max(np.where(inside, away, 0.0) ** 2, axis=1, initial=0.0)
-    beyond = np.maximum(np.nan_to_num(away) ** 2 - known[:, None], 0.0)
-    return np.nan_to_num(base.slope_se[:n, None]) ** 2 * beyond
+    baseline_deviation = np.max(np.where(inside, deviation, 0.0) ** 2, axis=1, initial=0.0)
+    excess = np.maximum(np.nan_to_num(deviation) ** 2 - baseline_deviation[:, None], 0.0)
+    return np.nan_to_num(base.slope_se[:n, None]) ** 2 * excess
 
 
-def _sigma(p, enough, beyond):
+def _sigma(p, enough, slope_variance_excess):
     """Spread of each value [%]: that of the baseline, with or without siblings, and more where its own error is larger.
 
     ``slope_variance_excess`` is the (n_section, n_campaign) variance from ``slope_variance``. [%²]
@@ -243,5 +247,5 @@ def _sigma(p, enough, beyond):
     f0, inside = p.baseline.frequency[:n, None], p.baseline.inside[:n]
     error = np.nan_to_num(100.0 * p.panel.error / f0)
     usual = np.sum(np.where(inside, error**2, 0.0), axis=1) / np.maximum(inside.sum(axis=1), 1)
-    sigma = np.sqrt(sigma**2 + np.maximum(error**2 - usual[:, None], 0.0) + beyond)
-    return np.where(sigma > 100.0 * RESOLUTION / f0, sigma, np.nan)
+    sigma = np.sqrt(sigma**2 + np.maximum(error**2 - usual[:, None], 0.0) + slope_variance_excess)
+    return np.where(sigma > 100.0 * FREQUENCY_RESOLUTION / f0, sigma, np.nan)

@@ -14,7 +14,7 @@ def blocks(group):
         yield start[size == n][:, None] + np.arange(n)
 
 
-def median_of_others(values, mask, group) -> tuple[np.ndarray, np.ndarray]:
+def median_of_siblings(values, mask, group) -> tuple[np.ndarray, np.ndarray]:
     """Median over the siblings of each chart, that is the other charts of its group, and their number.
 
     Parameters
@@ -33,29 +33,29 @@ def median_of_others(values, mask, group) -> tuple[np.ndarray, np.ndarray]:
 
     Examples
     --------
-    >>> median_of_others(np.array([[1.0], [2.0], [4.0], [9.0]]), np.ones((4, 1), bool), np.zeros(4, int))[0].ravel()
+    >>> median_of_siblings(np.array([[1.0], [2.0], [4.0], [9.0]]), np.ones((4, 1), bool), np.zeros(4, int))[0].ravel()
     array([4., 4., 2., 2.])
     """
     median = np.full(values.shape, np.nan)
-    others = np.zeros(values.shape, dtype=np.int16)
+    n_siblings = np.zeros(values.shape, dtype=np.int16)
     for block in blocks(group):
         if block.shape[1] == 1:
             continue
         inside = mask[block]
         ordered = np.where(inside, values[block], np.inf)
-        place = np.argsort(ordered, axis=1, kind="stable")
-        ordered = np.take_along_axis(ordered, place, axis=1)
-        rank = np.empty_like(place)
-        np.put_along_axis(rank, place, np.arange(block.shape[1])[None, :, None], axis=1)
-        left = inside.sum(axis=1, keepdims=True) - inside
-        lower, upper = (left - 1) // 2, left // 2
-        out = np.where(inside, rank, block.shape[1])
-        low = np.take_along_axis(ordered, np.clip(lower + (lower >= out), 0, block.shape[1] - 1), axis=1)
-        high = np.take_along_axis(ordered, np.clip(upper + (upper >= out), 0, block.shape[1] - 1), axis=1)
+        order = np.argsort(ordered, axis=1, kind="stable")
+        ordered = np.take_along_axis(ordered, order, axis=1)
+        rank = np.empty_like(order)
+        np.put_along_axis(rank, order, np.arange(block.shape[1])[None, :, None], axis=1)
+        n_block = inside.sum(axis=1, keepdims=True) - inside
+        lower, upper = (n_block - 1) // 2, n_block // 2
+        own_rank = np.where(inside, rank, block.shape[1])
+        low = np.take_along_axis(ordered, np.clip(lower + (lower >= own_rank), 0, block.shape[1] - 1), axis=1)
+        high = np.take_along_axis(ordered, np.clip(upper + (upper >= own_rank), 0, block.shape[1] - 1), axis=1)
         with np.errstate(invalid="ignore"):
-            median[block] = np.where(left > 0, 0.5 * (low + high), np.nan)
-        others[block] = left
-    return median, others
+            median[block] = np.where(n_block > 0, 0.5 * (low + high), np.nan)
+        n_siblings[block] = n_block
+    return median, n_siblings
 
 
 def median_of_group(values, mask, group) -> tuple[np.ndarray, np.ndarray]:

@@ -30,7 +30,7 @@ class Block:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class SplitVerdict:
     """Change of one section: ``split`` is its first campaign after the step in the likeliest model, None for no step.
 
     ``probability`` is that of no change and of each split; ``p_value`` is that of any change, by permutation. Use a
@@ -80,8 +80,8 @@ def design(splits, temperature, common="temperature") -> np.ndarray:
 def _projector(matrix):
     """Projector on the residual space, I - H, of a regression, from an orthonormal basis of its columns."""
     basis = np.linalg.svd(matrix, full_matrices=False)
-    kept = basis.U[:, basis.S > 1e-10 * basis.S[0]]
-    return np.eye(len(matrix)) - kept @ kept.T
+    columns = basis.U[:, basis.S > 1e-10 * basis.S[0]]
+    return np.eye(len(matrix)) - columns @ columns.T
 
 
 def deviance(blocks, splits, common="temperature") -> float:
@@ -103,11 +103,11 @@ def deviance(blocks, splits, common="temperature") -> float:
     total = 2.0 * len(changed) * np.log(n_campaign - 1.0)
     for block in blocks:
         cells = block.values.reshape(len(block.values), -1)
-        found = []
-        for shown in product((False, True), repeat=len(changed)):
-            part = [k if s in changed and shown[changed.index(s)] else 0 for s, k in enumerate(splits)]
-            found.append(_log_factor(cells, design(part, block.temperature, common), n_section))
-        total -= 2.0 * float(np.sum(logsumexp(found, axis=0) - len(changed) * np.log(2.0)))
+        log_factors = []
+        for is_shown in product((False, True), repeat=len(changed)):
+            splits_shown = [k if s in changed and is_shown[changed.index(s)] else 0 for s, k in enumerate(splits)]
+            log_factors.append(_log_factor(cells, design(splits_shown, block.temperature, common), n_section))
+        total -= 2.0 * float(np.sum(logsumexp(log_factors, axis=0) - len(changed) * np.log(2.0)))
     return total
 
 
@@ -126,20 +126,20 @@ def find_splits(blocks) -> tuple[int, ...]:
     most sections share.
     """
     n_section, n_campaign = blocks[0].shape
-    best, lowest = (0,) * n_section, np.inf
+    best_splits, lowest = (0,) * n_section, np.inf
     for start in range(n_campaign):
         splits, score = [start] * n_section, deviance(blocks, [start] * n_section)
-        moved = True
-        while moved:
-            moved = False
+        is_improved = True
+        while is_improved:
+            is_improved = False
             for s in range(n_section):
                 for k in range(n_campaign):
-                    tried = [*splits[:s], k, *splits[s + 1 :]]
-                    if k != splits[s] and (found := deviance(blocks, tried)) < score - 1e-9:
-                        splits, score, moved = tried, found, True
+                    trial = [*splits[:s], k, *splits[s + 1 :]]
+                    if k != splits[s] and (trial_score := deviance(blocks, trial)) < score - 1e-9:
+                        splits, score, is_improved = trial, trial_score, True
         if score < lowest:
-            best, lowest = tuple(splits), score
-    return best
+            best_splits, lowest = tuple(splits), score
+    return best_splits
 
 
 def independent_quantities(blocks, splits) -> float:
@@ -147,17 +147,17 @@ def independent_quantities(blocks, splits) -> float:
 
     Errors of neighbouring frequency bands are correlated; to count each band fully would overstate the evidence.
     """
-    parts = []
+    residuals = []
     for block in blocks:
         cells = block.values.reshape(len(block.values), -1)
-        parts.append(cells @ _projector(design(splits, block.temperature)))
-    residual = np.vstack(parts)
+        residuals.append(cells @ _projector(design(splits, block.temperature)))
+    residual = np.vstack(residuals)
     residual = residual / np.sqrt(np.sum(residual**2, axis=1, keepdims=True))
     correlation = residual @ residual.T
     return float(np.trace(correlation) ** 2 / np.sum(correlation**2))
 
 
-def verdicts(blocks, n_permutation=2000, seed=0) -> list[Verdict]:
+def verdicts(blocks, n_permutation=2000, seed=0) -> list[SplitVerdict]:
     """For every section: when it changed, with what probability, and the p value of a change.
 
     The probability follows from the deviances of the section's splits, with the other sections at their best splits and
@@ -165,39 +165,39 @@ def verdicts(blocks, n_permutation=2000, seed=0) -> list[Verdict]:
     Econ. Stat. 1, 1983): residuals of the model without the section's step are permuted among cells, all quantities of
     a cell together, and the largest gain over all splits is compared.
     """
-    best = find_splits(blocks)
-    shares = [independent_quantities([b], best) / len(b.values) for b in blocks]
+    best_splits = find_splits(blocks)
+    shares = [independent_quantities([b], best_splits) / len(b.values) for b in blocks]
     n_section, n_campaign = blocks[0].shape
     rng = np.random.default_rng(seed)
-    found = []
+    results = []
     for s in range(n_section):
-        options = [(*best[:s], k, *best[s + 1 :]) for k in range(n_campaign)]
+        options = [(*best_splits[:s], k, *best_splits[s + 1 :]) for k in range(n_campaign)]
         score = np.array([sum(w * deviance([b], o) for w, b in zip(shares, blocks)) for o in options])
         weight = np.exp(-0.5 * (score - score.min()))
-        p_value = _permuted(blocks, options, n_permutation, rng)
-        found.append(Verdict(best[s] or None, weight / weight.sum(), p_value))
-    return found
+        p_value = _permutation_p_value(blocks, options, n_permutation, rng)
+        results.append(SplitVerdict(best_splits[s] or None, weight / weight.sum(), p_value))
+    return results
 
 
-def _permuted(blocks, options, n_permutation, rng) -> float:
+def _permutation_p_value(blocks, options, n_permutation, rng) -> float:
     prepared = []
     for block in blocks:
         cells = block.values.reshape(len(block.values), -1)
-        inner = _projector(design(options[0], block.temperature))
-        others = [_projector(design(o, block.temperature)) for o in options[1:]]
-        prepared.append((cells @ inner, cells - cells @ inner, inner, others))
+        null_projector = _projector(design(options[0], block.temperature))
+        projectors = [_projector(design(o, block.temperature)) for o in options[1:]]
+        prepared.append((cells @ null_projector, cells - cells @ null_projector, null_projector, projectors))
 
     def gain(order):
         gains = np.zeros(len(options) - 1)
-        for residual, fitted, inner, others in prepared:
+        for residual, fitted, null_projector, projectors in prepared:
             cells = fitted + residual[:, order]
-            base = np.log(np.sum((cells @ inner) ** 2, axis=1))
-            gains += [np.sum(base - np.log(np.sum((cells @ other) ** 2, axis=1))) for other in others]
+            base = np.log(np.sum((cells @ null_projector) ** 2, axis=1))
+            gains += [np.sum(base - np.log(np.sum((cells @ projector) ** 2, axis=1))) for projector in projectors]
         return gains.max()
 
     n_cell = blocks[0].temperature.size
-    seen = gain(np.arange(n_cell))
-    larger = sum(gain(rng.permutation(n_cell)) >= seen - 1e-12 for _ in range(n_permutation))
+    observed_gain = gain(np.arange(n_cell))
+    larger = sum(gain(rng.permutation(n_cell)) >= observed_gain - 1e-12 for _ in range(n_permutation))
     return (1 + larger) / (1 + n_permutation)
 
 
@@ -237,10 +237,10 @@ def left_out_error(block, splits, common="temperature") -> np.ndarray:
     campaign = np.tile(np.arange(block.shape[1]), block.shape[0])
     squares, count = np.zeros(len(cells)), 0
     for c in range(block.shape[1]):
-        rest, out = matrix[campaign != c], matrix[campaign == c]
-        coefficient = cells[:, campaign != c] @ np.linalg.pinv(rest).T
-        null = np.eye(matrix.shape[1]) - np.linalg.pinv(rest) @ rest
-        known = np.linalg.norm(out @ null, axis=1) < 1e-8
-        squares += np.sum((cells[:, campaign == c] - coefficient @ out.T)[:, known] ** 2, axis=1)
-        count += int(known.sum())
+        training, left_out = matrix[campaign != c], matrix[campaign == c]
+        coefficient = cells[:, campaign != c] @ np.linalg.pinv(training).T
+        null = np.eye(matrix.shape[1]) - np.linalg.pinv(training) @ training
+        is_predictable = np.linalg.norm(left_out @ null, axis=1) < 1e-8
+        squares += np.sum((cells[:, campaign == c] - coefficient @ left_out.T)[:, is_predictable] ** 2, axis=1)
+        count += int(is_predictable.sum())
     return np.sqrt(squares / count)

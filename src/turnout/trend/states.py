@@ -5,11 +5,11 @@ import pandas as pd
 
 from turnout.trend.drift import slopes, span
 from turnout.trend.epochs import by_epoch
-from turnout.trend.panel import WHOLE, timestamps
-from turnout.trend.residuals import RESOLUTION, first_epoch, slope_variance
+from turnout.trend.panel import WHOLE_TURNOUT, timestamps
+from turnout.trend.residuals import FREQUENCY_RESOLUTION, first_epoch, slope_variance
 from turnout.trend.threshold import detectable_shift, run_lengths
 
-YEAR = 365.25
+DAYS_PER_YEAR = 365.25
 
 
 def detectable_change(charts, settings) -> tuple[np.ndarray, np.ndarray]:
@@ -21,39 +21,41 @@ def detectable_change(charts, settings) -> tuple[np.ndarray, np.ndarray]:
     campaigns = campaigns_a_year(charts.prepared)
     extra = charts.extra[:, -1] if charts.extra.shape[1] else np.zeros(len(charts.allowance))
     epoch = charts.prepared.epoch[:, -1] if charts.extra.shape[1] else np.zeros(len(extra), dtype=int)
-    return change_seen(charts, np.arange(len(extra)), epoch, charts.allowance + extra, campaigns, settings), campaigns
+    return detectable_in_epoch(
+        charts, np.arange(len(extra)), epoch, charts.allowance + extra, campaigns, settings
+    ), campaigns
 
 
 def campaigns_a_year(p) -> np.ndarray:
     """Usual number of campaigns a year of each chart."""
     with np.errstate(invalid="ignore"):
-        return np.clip(np.nan_to_num(np.round(YEAR / p.interval)), 0, 366).astype(int)
+        return np.clip(np.nan_to_num(np.round(DAYS_PER_YEAR / p.interval)), 0, 366).astype(int)
 
 
 def spread_in(charts, chart, epoch) -> np.ndarray:
     """Spread [%] of the charts numbered ``chart`` in an ``epoch``: that without siblings where none was known."""
-    alone = (charts.learned[chart, epoch] > 0) & ~np.isfinite(charts.shift[chart, epoch])
+    alone = (charts.n_learned[chart, epoch] > 0) & ~np.isfinite(charts.shift[chart, epoch])
     return np.where(alone, charts.prepared.spread_alone[chart], charts.prepared.spread[chart])
 
 
-def change_seen(charts, chart, epoch, allowance, campaigns, settings) -> np.ndarray:
+def detectable_in_epoch(charts, chart, epoch, allowance, campaigns, settings) -> np.ndarray:
     """Detectable change [%] of charts in an ``epoch`` with their ``allowance`` and ``campaigns`` a year."""
     harmful = np.minimum(charts.threshold_down, charts.threshold_up)[chart]
     keys = np.column_stack([harmful, np.round(allowance, 2), campaigns])
     unique, where = np.unique(keys, axis=0, return_inverse=True)
     shift = [detectable_shift(float(h), float(k), int(n), settings.detectable_probability) for h, k, n in unique]
-    spread = np.hypot(spread_in(charts, chart, epoch), of_unknown_temperatures(charts)[chart, epoch])
+    spread = np.hypot(spread_in(charts, chart, epoch), temperature_spread(charts)[chart, epoch])
     return np.array(shift)[where.ravel()] * spread * (charts.guard * charts.widening)[chart]
 
 
-def of_unknown_temperatures(charts) -> np.ndarray:
+def temperature_spread(charts) -> np.ndarray:
     """Spread that the unknown temperature slope adds in each epoch, (n_chart, n_epoch). [%]
 
     It is the root mean square over the campaigns of the epoch. Only campaigns where this part exceeds the spread add to
     it.
     """
     p = charts.prepared
-    variance, n_epoch = _of_slopes(charts), int(p.epoch.max(initial=0)) + 1
+    variance, n_epoch = _slope_variances(charts), int(p.epoch.max(initial=0)) + 1
     unknown = variance > p.spread[:, None] ** 2
     rows = np.flatnonzero(unknown.any(axis=1))  # few charts, or none
     added = np.where(unknown[rows], variance[rows], 0.0)
@@ -76,50 +78,50 @@ def chart_status(charts, settings) -> pd.DataFrame:
     last = np.max(np.where(measured, p.time, -np.inf), axis=1, initial=-np.inf)
     detectable, campaigns = detectable_change(charts, settings)
     present = p.epoch == (p.epoch[:, -1:] if p.epoch.shape[1] else 0)
-    mask = present & np.isfinite(charts.residual) & at_known_temperatures(charts)
-    slope, error, p_value = slopes(charts.residual, p.time, mask, charts.memory)
-    short = span(p.time, mask) < settings.drift_days
+    mask = present & np.isfinite(charts.residual) & is_temperature_known(charts)
+    slope, error, p_value = slopes(charts.residual, p.time, mask, charts.autocorrelation)
+    is_too_short = span(p.time, mask) < settings.drift_days
     status = p.charts.drop(columns=["group", "visits"]).copy()
     status["last_measured_at_utc"] = timestamps(np.where(np.isfinite(last), last, np.nan))
     status["n_campaigns"] = measured.sum(axis=1)
     status["campaigns_per_year"] = campaigns
     status["n_baseline"] = p.baseline.count
     status["baseline_until_utc"] = timestamps(baseline_until(p, settings))
-    status["n_learned"] = mask_count(charts, present)
-    status["n_needed"] = charts.learn
+    status["n_learned"] = count_learned(charts, present)
+    status["n_needed"] = charts.n_learning
     status["complete"] = p.baseline.complete
-    for way in ("down", "up"):
-        status[f"run_length_{way}"] = run_lengths(p.charts["band"], way, settings)
+    for direction in ("down", "up"):
+        status[f"run_length_{direction}"] = run_lengths(p.charts["band"], direction, settings)
     status["without_temperature"] = p.baseline.without_temperature
     status["detectable_pct"] = detectable
     status["stale_after_days"] = stale_after(p, settings)
     status["target_pct"] = settings.target_percent
     status["worklist_rows"] = settings.worklist_rows
-    status["drift_pct_per_year"] = np.where(short, np.nan, slope)
-    status["drift_se_pct_per_year"] = np.where(short, np.nan, error)
-    status["drift_p"] = np.where(short, np.nan, p_value)
+    status["drift_pct_per_year"] = np.where(is_too_short, np.nan, slope)
+    status["drift_se_pct_per_year"] = np.where(is_too_short, np.nan, error)
+    status["drift_p"] = np.where(is_too_short, np.nan, p_value)
     status["state"], status["reason"] = _states(charts, settings, status, last, present)
     return status
 
 
-def at_known_temperatures(charts) -> np.ndarray:
+def is_temperature_known(charts) -> np.ndarray:
     """Campaigns at which the error of the temperature slope is less than the spread, (n_chart, n_campaign).
 
     A drift of the other campaigns may be seasonal.
     """
-    return _of_slopes(charts) <= charts.prepared.spread[:, None] ** 2
+    return _slope_variances(charts) <= charts.prepared.spread[:, None] ** 2
 
 
-def _of_slopes(charts) -> np.ndarray:
+def _slope_variances(charts) -> np.ndarray:
     """Variance that the error of the temperature slope adds to each value, (n_chart, n_campaign). [%²]"""
     p, n = charts.prepared, len(charts.prepared.panel.charts)
     return np.vstack([slope_variance(p, charts.learning[:n]), charts.sigma[n:] ** 2 - p.spread[n:, None] ** 2])
 
 
-def mask_count(charts, present) -> np.ndarray:
+def count_learned(charts, present) -> np.ndarray:
     """Number of campaigns from which the level of the present epoch is learned."""
-    learned = np.sum(charts.learning & present & np.isfinite(charts.residual), axis=1)
-    return np.where(charts.prepared.pending, 0, learned)
+    n_learned = np.sum(charts.learning & present & np.isfinite(charts.residual), axis=1)
+    return np.where(charts.prepared.pending, 0, n_learned)
 
 
 def baseline_until(p, settings) -> np.ndarray:
@@ -159,32 +161,32 @@ def _states(charts, settings, status, last, present):
     p = charts.prepared
     as_of = np.nan_to_num(p.panel.as_of, neginf=0.0)  # without any usable campaign in the fleet no chart is old
     stale = stale_after(p, settings)
-    old = as_of - last > stale
-    whole = status["section_id"].to_numpy() == WHOLE
+    is_old = as_of - last > stale
+    whole = status["section_id"].to_numpy() == WHOLE_TURNOUT
     # sections are measured, but too few of them are without an alarm for a median
-    unjudged = whole & old & (as_of - _newest_of_sections(p, last) <= stale)
+    too_few = whole & is_old & (as_of - _newest_of_sections(p, last) <= stale)
     open_now = _last(charts.down_open) | _last(charts.up_open)
-    stuck = ~np.isfinite(charts.sigma).any(axis=1) | ~(p.spread > 0.0)
-    stuck[: len(p.panel.charts)] |= never_changes(p.panel.frequency)
-    judged = np.max(np.where(np.isfinite(charts.z), p.time, -np.inf), axis=1, initial=-np.inf)
-    unheard = p.baseline.complete & ~whole & (as_of - judged > stale)
-    cold = p.baseline.without_temperature > 0.5 * status["n_campaigns"].to_numpy()
-    learned = status["n_learned"].to_numpy()
-    relearn = p.baseline.complete & (p.pending | ((p.epoch[:, -1] > first_epoch(p)) & (learned < charts.learn)))
-    blind = ~(status["detectable_pct"].to_numpy() <= settings.target_percent)
+    constant = ~np.isfinite(charts.sigma).any(axis=1) | ~(p.spread > 0.0)
+    constant[: len(p.panel.charts)] |= is_constant(p.panel.frequency)
+    last_judged = np.max(np.where(np.isfinite(charts.z), p.time, -np.inf), axis=1, initial=-np.inf)
+    no_temperature = p.baseline.complete & ~whole & (as_of - last_judged > stale)
+    mostly_no_temperature = p.baseline.without_temperature > 0.5 * status["n_campaigns"].to_numpy()
+    n_learned = status["n_learned"].to_numpy()
+    relearn = p.baseline.complete & (p.pending | ((p.epoch[:, -1] > first_epoch(p)) & (n_learned < charts.n_learning)))
+    too_noisy = ~(status["detectable_pct"].to_numpy() <= settings.target_percent)
     rules = [
         (~np.isfinite(last) & whole, "cannot_tell", "too_few_sections"),
         (~np.isfinite(last), "not_measured", "never"),
-        (open_now & ~p.pending & ~(p.baseline.complete & stuck & ~whole), "alarm", "threshold_crossed"),
-        (unjudged, "cannot_tell", "too_few_sections"),
-        (old, "not_measured", "too_long_ago"),
-        (p.baseline.complete & stuck & ~whole, "cannot_tell", "constant"),
-        (unheard, "cannot_tell", "no_temperature"),
-        (~p.baseline.complete & cold, "cannot_tell", "no_temperature"),
+        (open_now & ~p.pending & ~(p.baseline.complete & constant & ~whole), "alarm", "threshold_crossed"),
+        (too_few, "cannot_tell", "too_few_sections"),
+        (is_old, "not_measured", "too_long_ago"),
+        (p.baseline.complete & constant & ~whole, "cannot_tell", "constant"),
+        (no_temperature, "cannot_tell", "no_temperature"),
+        (~p.baseline.complete & mostly_no_temperature, "cannot_tell", "no_temperature"),
         (~p.baseline.complete & whole & (p.baseline.count == 0), "cannot_tell", "too_few_sections"),
         (~p.baseline.complete, "learning", "baseline"),
         (relearn, "learning", "after_event"),
-        (blind, "cannot_tell", "too_noisy"),
+        (too_noisy, "cannot_tell", "too_noisy"),
     ]
     conditions = [rule[0] for rule in rules]
     state = np.select(conditions, [np.full(len(last), rule[1], object) for rule in rules], "ok")
@@ -192,18 +194,18 @@ def _states(charts, settings, status, last, present):
     return state, reason
 
 
-def never_changes(frequency, least=8) -> np.ndarray:
+def is_constant(frequency, least=8) -> np.ndarray:
     """Whether the last ``least`` values of a chart are all equal; False with fewer values.
 
-    >>> never_changes(np.array([[1.0] * 8 + [np.nan], [1.0] * 8 + [2.0]]))
+    >>> is_constant(np.array([[1.0] * 8 + [np.nan], [1.0] * 8 + [2.0]]))
     array([ True, False])
     """
-    known = np.isfinite(frequency)
-    behind = np.cumsum(known[:, ::-1], axis=1)[:, ::-1]
-    last = known & (behind <= least)
+    is_valid = np.isfinite(frequency)
+    behind = np.cumsum(is_valid[:, ::-1], axis=1)[:, ::-1]
+    last = is_valid & (behind <= least)
     high = np.max(np.where(last, frequency, -np.inf), axis=1, initial=-np.inf)
     low = np.min(np.where(last, frequency, np.inf), axis=1, initial=np.inf)
-    return (last.sum(axis=1) >= least) & (high - low < RESOLUTION)
+    return (last.sum(axis=1) >= least) & (high - low < FREQUENCY_RESOLUTION)
 
 
 def _last(values):

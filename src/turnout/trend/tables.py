@@ -12,32 +12,32 @@ from turnout.registry.schema import arrow_schema, tables
 from turnout.trend.epochs import by_epoch
 from turnout.trend.panel import timestamps
 from turnout.trend.residuals import first_epoch
-from turnout.trend.states import campaigns_a_year, change_seen, spread_in
+from turnout.trend.states import campaigns_a_year, detectable_in_epoch, spread_in
 from turnout.trend.threshold import run_lengths
 
-KEYS = ["turnout_id", "section_id", "band", "source"]
-STATES = np.array(
+TABLE_KEYS = ["turnout_id", "section_id", "band", "source"]
+CELL_STATES = np.array(
     ["ok", "baseline", "learning", "alarm_down", "alarm_up", "no_temperature", "not_judged", "wrong_time"]
 )
-BAND = float(stats.norm.isf(0.025))
+NORMAL_QUANTILE = float(stats.norm.isf(0.025))
 
 
 def cell_states(charts) -> np.ndarray:
     """(n_chart, n_campaign) index in ``CELL_STATES`` of every campaign of every chart."""
     p = charts.prepared
     n_section = len(p.panel.charts)
-    cold = np.zeros(charts.z.shape, dtype=bool)
-    cold[:n_section] = np.isfinite(p.panel.frequency) & ~np.isfinite(p.values)
+    no_temperature = np.zeros(charts.z.shape, dtype=bool)
+    no_temperature[:n_section] = np.isfinite(p.panel.frequency) & ~np.isfinite(p.values)
     first = p.epoch <= first_epoch(p)[:, None]
     started = p.baseline.complete[:, None] & ~(charts.learning & first)
     return np.select(
-        [cold, ~started, charts.learning, ~np.isfinite(charts.z), charts.down_open, charts.up_open],
+        [no_temperature, ~started, charts.learning, ~np.isfinite(charts.z), charts.down_open, charts.up_open],
         [5, 1, 2, 6, 3, 4],
         0,
     ).astype(np.int8)
 
 
-def measured(charts) -> np.ndarray:
+def is_measured(charts) -> np.ndarray:
     """Cells with a row: a frequency was measured, or the median of the turnout exists."""
     n_section = len(charts.prepared.panel.charts)
     return np.isfinite(np.vstack([charts.prepared.panel.frequency, charts.residual[n_section:]]))
@@ -51,27 +51,27 @@ def chart_rows(charts) -> pd.DataFrame:
     p = charts.prepared
     n_section = len(p.panel.charts)
     order = p.charts.sort_values(["turnout_id", "section_id", "band", "source"]).index.to_numpy()
-    place, campaign = np.nonzero(measured(charts)[order])
-    chart = order[place]
+    row, campaign = np.nonzero(is_measured(charts)[order])
+    chart = order[row]
     cell = chart * p.time.shape[1] + campaign
     section = chart < n_section
     f0 = reference_frequency(p)[chart]
 
-    def of_section(values):
+    def section_values(values):
         """Values of the sections' cells; nan for the whole turnout, whose charts come last."""
-        found = np.take(values.ravel(), np.where(section, cell, 0))
-        return np.where(section, found, np.nan)
+        cell_values = np.take(values.ravel(), np.where(section, cell, 0))
+        return np.where(section, cell_values, np.nan)
 
     residual = np.take(charts.residual.ravel(), cell)
-    expected = of_section(p.panel.frequency) - f0 * residual / 100.0
-    half = BAND * charts.guard[chart] * np.take(charts.sigma.ravel(), cell) * f0 / 100.0
-    keys = {k: pd.Categorical.from_codes(*_codes(p.charts[k], chart)) for k in KEYS}
+    expected = section_values(p.panel.frequency) - f0 * residual / 100.0
+    half = NORMAL_QUANTILE * charts.guard[chart] * np.take(charts.sigma.ravel(), cell) * f0 / 100.0
+    keys = {k: pd.Categorical.from_codes(*_codes(p.charts[k], chart)) for k in TABLE_KEYS}
     rows = pd.DataFrame(
         keys
         | {
             "measured_at_utc": timestamps(np.take(p.time.ravel(), cell)),
             "epoch": np.take(p.epoch.ravel(), cell).astype(np.int32),
-            "rail_temperature_c": of_section(p.panel.temperature),
+            "rail_temperature_c": section_values(p.panel.temperature),
             "expected_hz": expected,
             "expected_low_hz": expected - half,
             "expected_high_hz": expected + half,
@@ -79,8 +79,8 @@ def chart_rows(charts) -> pd.DataFrame:
             "z": np.take(charts.z.ravel(), cell),
             "cusum_down": np.take(charts.down.ravel(), cell),
             "cusum_up": np.take(charts.up.ravel(), cell),
-            "is_sibling": section & np.take(charts.serving.ravel(), np.where(section, cell, 0)),
-            "state": pd.Categorical.from_codes(np.take(cell_states(charts).ravel(), cell), STATES),
+            "is_sibling": section & np.take(charts.is_sibling.ravel(), np.where(section, cell, 0)),
+            "state": pd.Categorical.from_codes(np.take(cell_states(charts).ravel(), cell), CELL_STATES),
         }
     )
     return _with_wrong_times(rows, p.panel.left_out)
@@ -97,19 +97,19 @@ def _with_wrong_times(rows, left_out):
     if wrong.empty:
         return rows
     wrong = (
-        wrong[[*KEYS, "measured_at_utc"]]
+        wrong[[*TABLE_KEYS, "measured_at_utc"]]
         .drop_duplicates()
         .assign(epoch=np.int32(0), is_sibling=False, state="wrong_time")
     )
-    for name in (*KEYS, "state"):
-        known = rows[name].cat.categories
-        known = known.append(pd.Index(wrong[name].unique()).difference(known, sort=True))
-        rows[name] = rows[name].cat.set_categories(known)
-        wrong[name] = pd.Categorical(wrong[name], categories=known)
-    both = pd.concat([rows, wrong], ignore_index=True)
-    texts = {name: both[name].astype(object) for name in KEYS[:3]}
-    order = pd.DataFrame(texts).sort_values(KEYS[:3], kind="stable").index
-    return both.loc[order].reset_index(drop=True)
+    for name in (*TABLE_KEYS, "state"):
+        categories = rows[name].cat.categories
+        categories = categories.append(pd.Index(wrong[name].unique()).difference(categories, sort=True))
+        rows[name] = rows[name].cat.set_categories(categories)
+        wrong[name] = pd.Categorical(wrong[name], categories=categories)
+    combined = pd.concat([rows, wrong], ignore_index=True)
+    texts = {name: combined[name].astype(object) for name in TABLE_KEYS[:3]}
+    order = pd.DataFrame(texts).sort_values(TABLE_KEYS[:3], kind="stable").index
+    return combined.loc[order].reset_index(drop=True)
 
 
 def _codes(column, chart):
@@ -120,13 +120,13 @@ def _codes(column, chart):
 def baseline_rows(charts, settings) -> pd.DataFrame:
     """Table ``baselines``: one row per chart and epoch that has a campaign."""
     p = charts.prepared
-    _, count = by_epoch(np.zeros(p.time.shape), measured(charts), p.epoch, charts.level.shape[1])
+    _, count = by_epoch(np.zeros(p.time.shape), is_measured(charts), p.epoch, charts.level.shape[1])
     chart, epoch = np.nonzero(count)
     base = p.baseline
-    rows = p.charts.iloc[chart][KEYS].reset_index(drop=True)
-    learned = charts.learned[chart, epoch]
+    rows = p.charts.iloc[chart][TABLE_KEYS].reset_index(drop=True)
+    n_learned = charts.n_learned[chart, epoch]
     later = epoch > first_epoch(p)[chart]
-    allowance = charts.allowance[chart] + np.where(later, 1.0 / np.sqrt(np.maximum(learned, 1)), 0.0)
+    allowance = charts.allowance[chart] + np.where(later, 1.0 / np.sqrt(np.maximum(n_learned, 1)), 0.0)
     return rows.assign(
         epoch=epoch.astype(np.int32),
         epoch_start_utc=timestamps(p.started[chart, epoch]),
@@ -138,16 +138,16 @@ def baseline_rows(charts, settings) -> pd.DataFrame:
         sibling_shift_pct=charts.shift[chart, epoch],
         sd_pct=spread_in(charts, chart, epoch),
         sd_alone_pct=p.spread_alone[chart],
-        phi=charts.memory[chart],
+        phi=charts.autocorrelation[chart],
         guard=charts.guard[chart],
         allowance=allowance,
         threshold_down=charts.threshold_down[chart],
         threshold_up=charts.threshold_up[chart],
         n_baseline=base.count[chart],
-        n_learned=learned,
+        n_learned=n_learned,
         complete=base.complete[chart],
         with_siblings=p.with_siblings[chart],
-        detectable_pct=change_seen(charts, chart, epoch, allowance, campaigns_a_year(p)[chart], settings),
+        detectable_pct=detectable_in_epoch(charts, chart, epoch, allowance, campaigns_a_year(p)[chart], settings),
     )
 
 
@@ -157,24 +157,27 @@ def alarm_rows(charts, settings) -> pd.DataFrame:
     ``began_at_utc`` is the last campaign at which the sum was 0: the change came after it. An alarm closes when its sum
     is back at 0 or an event starts a new epoch.
     """
-    parts = [_alarms(charts, way, run_lengths(charts.prepared.charts["band"], way, settings)) for way in ("down", "up")]
-    rows = pd.concat(parts, ignore_index=True)
-    return rows.sort_values(["raised_at_utc", *KEYS, "direction"], kind="stable", ignore_index=True)
+    frames = [
+        _alarms(charts, direction, run_lengths(charts.prepared.charts["band"], direction, settings))
+        for direction in ("down", "up")
+    ]
+    rows = pd.concat(frames, ignore_index=True)
+    return rows.sort_values(["raised_at_utc", *TABLE_KEYS, "direction"], kind="stable", ignore_index=True)
 
 
 def _alarms(charts, direction, run_length):
     p = charts.prepared
-    opened = getattr(charts, f"{direction}_open")
-    edge = np.diff(opened.astype(np.int8), axis=1, prepend=0)
+    is_open = getattr(charts, f"{direction}_open")
+    edge = np.diff(is_open.astype(np.int8), axis=1, prepend=0)
     chart, campaign = np.nonzero(edge > 0)
-    closing = np.where(edge < 0, np.arange(opened.shape[1]), opened.shape[1])
+    closing = np.where(edge < 0, np.arange(is_open.shape[1]), is_open.shape[1])
     next_close = np.minimum.accumulate(closing[:, ::-1], axis=1)[:, ::-1] if closing.size else closing
     close = next_close[chart, campaign]
-    gone = close < opened.shape[1]
-    held = np.where(gone, close, 0)
-    by_event = gone & (p.epoch[chart, held] > p.epoch[chart, campaign])
+    is_closed = close < is_open.shape[1]
+    closing_campaign = np.where(is_closed, close, 0)
+    by_event = is_closed & (p.epoch[chart, closing_campaign] > p.epoch[chart, campaign])
     began = getattr(charts, f"{direction}_began")[chart, campaign]
-    rows = p.charts.iloc[chart][KEYS].reset_index(drop=True)
+    rows = p.charts.iloc[chart][TABLE_KEYS].reset_index(drop=True)
     raised = timestamps(p.time[chart, campaign])
     names = rows["section_id"].where(rows["section_id"] != "*", rows["turnout_id"] + "/*")
     stamp = np.datetime_as_string(raised, unit="s")
@@ -186,8 +189,8 @@ def _alarms(charts, direction, run_length):
         statistic=getattr(charts, direction)[chart, campaign],
         threshold=getattr(charts, f"threshold_{direction}")[chart],
         run_length=run_length[chart],
-        closed_at_utc=timestamps(np.where(gone, p.time[chart, held], np.nan)),
-        closed_by=np.where(gone, np.where(by_event, "event", "recovered"), np.array(None, dtype=object)),
+        closed_at_utc=timestamps(np.where(is_closed, p.time[chart, closing_campaign], np.nan)),
+        closed_by=np.where(is_closed, np.where(by_event, "event", "recovered"), np.array(None, dtype=object)),
     )
 
 
@@ -202,21 +205,21 @@ def arrow_rows(table, frame, rounded=True, single=False) -> pa.Table:
     return pa.table(arrays, names=[c.name for c in columns])
 
 
-def _array(frame, column, kind, rounded, single):
+def _array(frame, column, arrow_type, rounded, single):
     if column.name not in frame:
-        return pa.nulls(len(frame), kind)
+        return pa.nulls(len(frame), arrow_type)
     values = frame[column.name]
-    if pa.types.is_floating(kind) or pa.types.is_integer(kind):
+    if pa.types.is_floating(arrow_type) or pa.types.is_integer(arrow_type):
         numbers = values.to_numpy(dtype=float, na_value=np.nan) if values.dtype.kind not in "iub" else values.to_numpy()
         if rounded and column.decimals is not None:
             numbers = np.round(numbers, column.decimals) + 0.0
         if single and column.decimals is not None:
-            numbers, kind = numbers.astype(np.float32), pa.float32()
+            numbers, arrow_type = numbers.astype(np.float32), pa.float32()
         if numbers.dtype.kind == "f":
-            return pa.array(numbers, mask=~np.isfinite(numbers)).cast(kind)
-        return pa.array(numbers).cast(kind)
+            return pa.array(numbers, mask=~np.isfinite(numbers)).cast(arrow_type)
+        return pa.array(numbers).cast(arrow_type)
     if str(values.dtype) == "category":
         return pa.DictionaryArray.from_arrays(
             pa.array(values.cat.codes.to_numpy(), mask=values.cat.codes.to_numpy() < 0), values.cat.categories.tolist()
         )
-    return pa.array(values, type=kind, from_pandas=True)
+    return pa.array(values, type=arrow_type, from_pandas=True)

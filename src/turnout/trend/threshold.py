@@ -7,7 +7,7 @@ from scipy.optimize import brentq
 from scipy.special import ndtr
 
 OVERSHOOT = 1.166  # sd; twice Siegmund's correction of 0.583 for the excess over the threshold
-STATES = 80  # cells of the Markov chain that approximates the statistic
+N_CELLS = 80  # cells of the Markov chain that approximates the statistic
 
 
 def run_length(threshold, allowance, shift=0.0):
@@ -67,12 +67,12 @@ def alarm_probability(shift, threshold, allowance, campaigns) -> float:
     >>> print(f"{alarm_probability(0.0, 1.0, 0.5, 1):.4f}")
     0.0668
     """
-    width = 2.0 * threshold / (2 * STATES - 1)
-    cell = np.arange(STATES)
+    width = 2.0 * threshold / (2 * N_CELLS - 1)
+    cell = np.arange(N_CELLS)
     upper = (cell[None, :] - cell[:, None] + 0.5) * width + allowance - shift
     reach = ndtr(upper)
     stay = np.diff(reach, axis=1, prepend=0.0)
-    inside = np.zeros(STATES)
+    inside = np.zeros(N_CELLS)
     inside[0] = 1.0
     for _ in range(int(campaigns)):
         inside = inside @ stay
@@ -89,10 +89,10 @@ def detectable_shift(threshold, allowance, campaigns, probability=0.9) -> float:
     if campaigns < 1:
         return float("inf")
 
-    def miss(shift):
+    def shortfall(shift):
         return alarm_probability(shift, threshold, allowance, campaigns) - probability
 
-    return float(brentq(miss, 0.0, 2.0 * (threshold + allowance) + 4.0, xtol=1e-4))
+    return float(brentq(shortfall, 0.0, 2.0 * (threshold + allowance) + 4.0, xtol=1e-4))
 
 
 def run_lengths(bands, direction, settings) -> np.ndarray:

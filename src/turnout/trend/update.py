@@ -19,10 +19,10 @@ from turnout.registry.database import open_registry
 from turnout.registry.derived import publish
 from turnout.registry.generation import load
 from turnout.registry.schema import names
-from turnout.trend.alarms import ACCOUNTED, Flag, candidates, describe_flagged, with_withdrawn
+from turnout.trend.alarms import PREVIOUS_ALARMS, Flag, candidates, describe_flagged, with_withdrawn
 from turnout.trend.cusum import finish
-from turnout.trend.evaluation import shared_memory
-from turnout.trend.panel import CHART, DAY, believable, days, lay_out, timestamps
+from turnout.trend.evaluation import shared_autocorrelation
+from turnout.trend.panel import CHART_KEYS, SECONDS_PER_DAY, believable_times, days, lay_out, timestamps
 from turnout.trend.residuals import prepare
 from turnout.trend.states import chart_status
 from turnout.trend.tables import alarm_rows, arrow_rows, baseline_rows, chart_rows
@@ -39,21 +39,21 @@ def split_by_year(rows: pa.Table) -> dict[int, pa.Table]:
     return {int(y.as_py()): rows.filter(pc.equal(year, y)) for y in sorted(pc.unique(year), key=lambda y: y.as_py())}
 
 
-def digest(parts, *about) -> str:
+def digest(tables, *settings) -> str:
     """Hash of the content of concatenated Arrow tables, however they are split, and of the ``settings``.
 
     >>> whole, other = pa.table({"z": [1.0, 2.0]}), pa.table({"z": [1.0, 3.0]})
     >>> digest([whole]) == digest([whole.slice(0, 1), whole.slice(1)]), digest([whole]) == digest([other])
     (True, False)
     """
-    columns = [hashlib.blake2b(digest_size=16) for _ in (parts[0].columns if parts else ())]
-    for part in parts:
-        for found, column in zip(columns, part.columns):
+    columns = [hashlib.blake2b(digest_size=16) for _ in (tables[0].columns if tables else ())]
+    for table in tables:
+        for column_hash, column in zip(columns, table.columns):
             for chunk in column.chunks:
-                found.update(_plain(chunk))
-    whole = hashlib.blake2b(repr(about).encode(), digest_size=16)
-    for found in columns:
-        whole.update(found.digest())
+                column_hash.update(_plain(chunk))
+    whole = hashlib.blake2b(repr(settings).encode(), digest_size=16)
+    for column_hash in columns:
+        whole.update(column_hash.digest())
     return whole.hexdigest()
 
 
@@ -71,14 +71,14 @@ def _plain(chunk) -> memoryview:
 
 
 CELLS_PER_PART = 1_500_000  # values per group of turnouts that is evaluated at once; limits the memory
-HAMMER = (
+HAMMER_MODES_SQL = (
     "select turnout_id, section_id, band, source, measured_at_utc, frequency_hz, frequency_se_hz, rail_temperature_c "
     "from modes_current where source = 'hammer' and coalesce(method, 'joint') = 'joint'"
 )
 
 
 @dataclass(frozen=True)
-class Updated:
+class TrendUpdate:
     """Result of an update: rows by table, years of ``charts`` written, registry ``generation``.
 
     ``newest`` is the time of the newest plausible campaign; ``digests`` are hash of the rows and file, by year.
@@ -91,7 +91,7 @@ class Updated:
     digests: dict[str, str]
 
 
-def update(registry_dir, settings, digests=None, as_of=None, acknowledgements=None, day=None) -> Updated:
+def update(registry_dir, settings, digests=None, as_of=None, acknowledgements=None, day=None) -> TrendUpdate:
     """Compute every chart of a registry and replace the tables of charts, baselines, alarms and states.
 
     Parameters
@@ -109,21 +109,25 @@ def update(registry_dir, settings, digests=None, as_of=None, acknowledgements=No
         The present day, by default that of this machine in UTC. Events planned for later do not reset charts yet, and
         later campaigns are implausible.
     """
-    end = np.floor(days([datetime.now(UTC).replace(tzinfo=None) if day is None else day])[0]) + 1.0
+    day_end = np.floor(days([datetime.now(UTC).replace(tzinfo=None) if day is None else day])[0]) + 1.0
     with open_registry(registry_dir) as con:
         events = con.execute("select * from events order by event_at_utc, event_id").df()
-        parts, newest = _parts(con, settings, as_of, end)
+        groups, newest = _chart_groups(con, settings, as_of, day_end)
         at = days(events["event_at_utc"])
-        events = events[(at <= newest) | ((as_of is None) & (at < end))]
-        before = con.execute(ACCOUNTED if as_of is None else f"from ({ACCOUNTED}) limit 0").df()
-        prepared = [prepare(_panel(con, part, newest, events, settings), events, settings) for part in parts]
-    years, tables = _tables(prepared, settings, lambda alarms: with_withdrawn(alarms, before, newest))
+        events = events[(at <= newest) | ((as_of is None) & (at < day_end))]
+        previous_alarms = con.execute(PREVIOUS_ALARMS if as_of is None else f"from ({PREVIOUS_ALARMS}) limit 0").df()
+        prepared = [prepare(_panel(con, block, newest, events, settings), events, settings) for block in groups]
+    years, tables = _tables(prepared, settings, lambda alarms: with_withdrawn(alarms, previous_alarms, newest))
     rows = {name: table.num_rows for name, table in tables.items()}
-    rows["charts"] = sum(part.num_rows for found in years.values() for part in found)
-    now = {str(year): digest(found, names("charts")) for year, found in years.items()}
-    live = _files(load(Path(registry_dir)))  # after a restored backup these differ from those of the last update
-    same = {year for year in now if year in live and (digests or {}).get(year) == f"{now[year]} {live[year]}"}
-    changed = [part for year, found in sorted(years.items()) if str(year) not in same for part in found]
+    rows["charts"] = sum(block.num_rows for year_tables in years.values() for block in year_tables)
+    digests_now = {str(year): digest(year_tables, names("charts")) for year, year_tables in years.items()}
+    live = _chart_files(load(Path(registry_dir)))  # after a restored backup these differ from those of the last update
+    same = {
+        year
+        for year in digests_now
+        if year in live and (digests or {}).get(year) == f"{digests_now[year]} {live[year]}"
+    }
+    changed = [block for year, year_tables in sorted(years.items()) if str(year) not in same for block in year_tables]
     tables["charts"] = (
         pa.concat_tables(changed, promote_options="permissive") if changed else arrow_rows("charts", pd.DataFrame())
     )
@@ -134,13 +138,15 @@ def update(registry_dir, settings, digests=None, as_of=None, acknowledgements=No
     changed.clear()
     published = publish(registry_dir, tables, keep={"charts": {int(year) for year in same}})
     stamp = None if not np.isfinite(newest) else timestamps([newest])[0].item()
-    now = {year: f"{said} {_files(published)[year]}" for year, said in now.items()}
-    done = Updated(rows, written, published.number, stamp, now)
+    digests_now = {
+        year: f"{content_hash} {_chart_files(published)[year]}" for year, content_hash in digests_now.items()
+    }
+    result = TrendUpdate(rows, written, published.number, stamp, digests_now)
     logging.getLogger("turnout.trend").info("%s, years of charts written: %s, newest %s", rows, written, stamp)
-    return done
+    return result
 
 
-def _files(generation) -> dict[str, str]:
+def _chart_files(generation) -> dict[str, str]:
     """Path of the file of each year of ``charts``; it ends with the hash of the content."""
     return {str(f.year): f.path for f in generation.of("charts")}
 
@@ -153,39 +159,47 @@ def _tables(prepared, settings, account):
     frames: dict[str, list[pd.DataFrame]] = {name: [] for name in ("chart_status", "baselines", "alarms")}
     years: dict[int, list[pa.Table]] = {}
     flags: dict[int, Flag] = {}
-    seen = 0
-    memory = shared_memory(prepared)
+    n_charts = 0
+    memory = shared_autocorrelation(prepared)
     while prepared:
-        done = finish(prepared.pop(0), memory.pop(0), settings)
-        status = chart_status(done, settings)
-        flags |= {seen + i: flag for i, flag in candidates(done, status, settings).items()}
-        seen += len(status)
+        charts = finish(prepared.pop(0), memory.pop(0), settings)
+        status = chart_status(charts, settings)
+        flags |= {n_charts + i: flag for i, flag in candidates(charts, status, settings).items()}
+        n_charts += len(status)
         frames["chart_status"].append(status)
-        frames["baselines"].append(baseline_rows(done, settings))
-        frames["alarms"].append(alarm_rows(done, settings))
-        for year, part in split_by_year(arrow_rows("charts", chart_rows(done), single=True)).items():
-            years.setdefault(year, []).append(part)
-    joined = {name: pd.concat(found, ignore_index=True) if found else pd.DataFrame() for name, found in frames.items()}
+        frames["baselines"].append(baseline_rows(charts, settings))
+        frames["alarms"].append(alarm_rows(charts, settings))
+        for year, year_rows in split_by_year(arrow_rows("charts", chart_rows(charts), single=True)).items():
+            years.setdefault(year, []).append(year_rows)
+    joined = {
+        name: pd.concat(pieces, ignore_index=True) if pieces else pd.DataFrame() for name, pieces in frames.items()
+    }
     joined["alarms"] = account(joined["alarms"])
-    if seen:
+    if n_charts:
         joined["chart_status"] = describe_flagged(joined["chart_status"], flags, settings)
     return years, {name: arrow_rows(name, frame) for name, frame in joined.items()}
 
 
-def _parts(con, settings, as_of, end):
+def _chart_groups(con, settings, as_of, end):
     """Charts in groups of whole turnouts, and the newest time that counts; ``end`` is that of the present day. [d]"""
     # values from passages are aggregated once; values from hammer tests are read group by group
     con.execute("create temp table by_trains as select * from passage_values")
     later = "" if as_of is None else f" where measured_at_utc <= timestamp '{timestamps(days([as_of]))[0]}'"
-    con.execute(f"create temp view charted as select * from ({HAMMER} union all select * from by_trains){later}")
-    charts = con.execute(f"select {', '.join(CHART)}, max(measured_at_utc) as newest from charted group by all").df()
-    for name in CHART:
+    con.execute(
+        f"create temp view charted as select * from ({HAMMER_MODES_SQL} union all select * from by_trains){later}"
+    )
+    charts = con.execute(
+        f"select {', '.join(CHART_KEYS)}, max(measured_at_utc) as newest from charted group by all"
+    ).df()
+    for name in CHART_KEYS:
         charts[name] = charts[name].astype(object)
-    charts = charts.sort_values(CHART, ignore_index=True)
+    charts = charts.sort_values(CHART_KEYS, ignore_index=True)
     last = days(charts.pop("newest"))
     if as_of is None:
-        found = con.execute("select distinct measured_at_utc from charted").df()
-        _, newest = believable(days(found["measured_at_utc"]), settings, _until(charts, last, end + 1.0))
+        times = con.execute("select distinct measured_at_utc from charted").df()
+        _, newest = believable_times(
+            days(times["measured_at_utc"]), settings, _last_believable(charts, last, end + 1.0)
+        )
     else:
         newest = days([as_of])[0]
     if charts.empty:
@@ -193,10 +207,10 @@ def _parts(con, settings, as_of, end):
     rows = con.execute("select turnout_id, count(*) as n from charted group by all order by all").df()
     share = dict(zip(rows["turnout_id"], rows["n"].cumsum() // CELLS_PER_PART))
     number = charts["turnout_id"].map(share)
-    return [part.reset_index(drop=True) for _, part in charts.groupby(number, sort=True)], newest
+    return [group.reset_index(drop=True) for _, group in charts.groupby(number, sort=True)], newest
 
 
-def _until(charts, last, until):
+def _last_believable(charts, last, until):
     """Time [d] after which campaigns are implausible: ``until``, or infinity if most charts have a later campaign.
 
     Then the clock of this machine is late, or the fleet is simulated. ``last`` are the newest campaigns of the charts.
@@ -206,11 +220,11 @@ def _until(charts, last, until):
     if 2 * ahead.sum() > len(ahead):
         return np.inf
     if ahead.any():
-        said = (
+        message = (
             "campaigns after %s, which has not come, are shown and not used. Correct the dates of %d charts, first %s"
         )
         where = " ".join(charts.loc[ahead, ["section_id", "band"]].iloc[0])
-        logging.getLogger("turnout.trend").warning(said, timestamps([until])[0].item(), ahead.sum(), where)
+        logging.getLogger("turnout.trend").warning(message, timestamps([until])[0].item(), ahead.sum(), where)
     return until
 
 
@@ -227,6 +241,6 @@ def _panel(con, charts, newest, events, settings):
         [charts["turnout_id"].iloc[0], charts["turnout_id"].iloc[-1]],
     ).fetchnumpy()
     con.unregister("_part")
-    time = np.asarray(rows["us"], dtype=float) / (DAY * 1e6)
+    time = np.asarray(rows["us"], dtype=float) / (SECONDS_PER_DAY * 1e6)
     frequency, error, temperature = (np.asarray(rows[n], dtype=float) for n in names)
     return lay_out(charts, np.asarray(rows["chart"]), time, frequency, error, temperature, newest, settings, events)

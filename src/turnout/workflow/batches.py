@@ -56,7 +56,7 @@ def write_batch(folder: Path, results: Iterable[UnitResult]) -> Path:
     rows = [[*_header(r), encode(r.tables)] for r in sorted(results, key=lambda r: r.unit)]
     digest = hashlib.sha256(json.dumps(rows).encode()).hexdigest()[:24]
     path = Path(folder) / f"batch-{digest}.parquet"
-    table = pa.Table.from_arrays([_strings(values) for values in zip(*rows)], names=list(COLUMNS))
+    table = pa.Table.from_arrays([_string_array(values) for values in zip(*rows)], names=list(COLUMNS))
     # small groups, because a stage that uses results of another one reads the few units of one turnout
     write_atomic(path, lambda stream: pq.write_table(table, stream, compression="zstd", row_group_size=8))
     return path
@@ -97,7 +97,7 @@ def read_batch(path: os.PathLike) -> Iterator[tuple[str, str, list[dict]]]:
                 yield result.unit, table, rows
 
 
-def is_sound(path: os.PathLike) -> bool:
+def is_readable(path: os.PathLike) -> bool:
     """Whether a batch exists and its Parquet footer can be read; the columns are not checked."""
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -135,7 +135,7 @@ def decode(text: str) -> dict[str, list[dict]]:
     return json.loads(text, object_hook=_unpack)
 
 
-def _strings(values: Iterable[str]):
+def _string_array(values: Iterable[str]):
     """Arrow strings without ``pa.array``, which imports pandas and doubles the time of a small job."""
     import pyarrow as pa
 

@@ -23,7 +23,7 @@ def configuration_rows(configuration: Configuration, raw_root: Path, plans: Iter
         "sections": [_section(t, s) for t in turnouts for s in t.sections],
         "events": list({row["event_id"]: row for row in map(_event, configuration.events)}.values()),
         "campaigns": [r for t in turnouts for r in _campaigns(with_raw(t, raw_root), measured.get(t.id, set()))],
-        "quarantine": [row for plan in plans for row in _left_out(plan)],
+        "quarantine": [row for plan in plans for row in _excluded_files(plan)],
     }
 
 
@@ -88,7 +88,7 @@ def _campaigns(turnout: TurnoutConfig, measured: set[str]) -> list[dict]:
     return rows
 
 
-def _left_out(plan: Path) -> list[dict]:
+def _excluded_files(plan: Path) -> list[dict]:
     rows = []
     for turnout, problem in read_problems(plan):
         rows.append(

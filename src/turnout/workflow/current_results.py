@@ -17,13 +17,13 @@ class DamagedBatch(TurnoutError):
         self.batch = batch
 
 
-def current_results(work, kind: str, turnout: str) -> Iterator[UnitResult]:
+def current_results(work, stage: str, turnout: str) -> Iterator[UnitResult]:
     """Current results of ``stage`` below ``work``: of each unit the one in the batch that the state names.
 
     Results in earlier batches are out of date. If the number of shards was changed, several states may contain the
     turnout; the one written last counts.
     """
-    states = sorted((Path(work) / kind).glob("*.json"), key=lambda p: (p.stat().st_mtime_ns, p.name), reverse=True)
+    states = sorted((Path(work) / stage).glob("*.json"), key=lambda p: (p.stat().st_mtime_ns, p.name), reverse=True)
     for state in states:
         batches = _batches(state, state.stat().st_mtime_ns).get(turnout)
         if not batches:
@@ -45,7 +45,7 @@ def _read(batch: Path, units: frozenset[str]) -> Iterator[UnitResult]:
 @lru_cache(maxsize=256)
 def _batches(state: Path, written: int) -> dict[str, dict[str, frozenset[str]]]:
     """Turnout -> batch -> its current units."""
-    found: dict[str, dict[str, set[str]]] = {}
-    for unit, known in load_state(state).units.items():
-        found.setdefault(unit.split("/", 1)[0], {}).setdefault(known.batch, set()).add(unit)
-    return {t: {b: frozenset(units) for b, units in of.items()} for t, of in found.items()}
+    by_turnout: dict[str, dict[str, set[str]]] = {}
+    for unit, entry in load_state(state).units.items():
+        by_turnout.setdefault(unit.split("/", 1)[0], {}).setdefault(entry.batch, set()).add(unit)
+    return {t: {b: frozenset(units) for b, units in of.items()} for t, of in by_turnout.items()}

@@ -14,12 +14,12 @@ from turnout.records import Unit
 from turnout.workflow.batches import UnitResult
 from turnout.workflow.guard import quarantine_row, status_of
 from turnout.workflow.ledger import Ledger
-from turnout.workflow.plan import Planned, read_plan
-from turnout.workflow.retries import ask_again
+from turnout.workflow.plan import PlannedUnit, read_plan
+from turnout.workflow.retries import request_rerun
 from turnout.workflow.scan import unit_id
-from turnout.workflow.state import VANISHED, WITH_ROWS, Known, load_state, locked
+from turnout.workflow.state import VANISHED, WITH_ROWS, UnitState, load_state, state_lock
 
-KEY = "copy of "
+COPY_PREFIX = "copy of "
 
 
 @dataclass(frozen=True)
@@ -30,62 +30,67 @@ class Original:
     path: str
 
 
-def originals_of(known: Known) -> list[str]:
+def originals_of(entry: UnitState) -> list[str]:
     """Units whose files a unit holds as copies."""
-    return [line.removeprefix(KEY) for line in known.key.split("\n") if line.startswith(KEY)]
+    return [line.removeprefix(COPY_PREFIX) for line in entry.key.split("\n") if line.startswith(COPY_PREFIX)]
 
 
-def copies(units: Mapping[str, Known]) -> dict[str, dict[str, str]]:
+def copies(units: Mapping[str, UnitState]) -> dict[str, dict[str, str]]:
     """Copy -> {content: unit in which it counts}, of units with rows, within one turnout and kind.
 
     A unit is a copy as a whole if another one has all of its files. Of units that share some files, and of two with the
     same files, the first by name keeps them. Files that were already excluded from a unit remain excluded.
 
-    >>> units = {name: Known("", "", "", "ok", "", held) for name, held in
+    >>> units = {name: UnitState("", "", "", "ok", "", held) for name, held in
     ...          {"t/passage/b": "1", "t/passage/a": "1 3", "t/passage/c": "2 3", "u/passage/a": "1"}.items()}
     >>> copies(units)
     {'t/passage/b': {'1': 't/passage/a'}, 't/passage/c': {'3': 't/passage/a'}}
     """
-    held = {name: frozenset(k.counted) for name, k in units.items() if k.status in WITH_ROWS}
+    contents_by_unit = {name: frozenset(k.own_contents) for name, k in units.items() if k.status in WITH_ROWS}
     holders: dict[tuple[str, str], set[str]] = {}
-    for name, contents in held.items():
+    for name, contents in contents_by_unit.items():
         for content in contents:
             holders.setdefault((_folder(name), content), set()).add(name)
-    found = _whole_copies(held, holders)
-    whole = set(found)
+    originals_by_copy = _whole_copies(contents_by_unit, holders)
+    whole = set(originals_by_copy)
     for (_, content), names in sorted(holders.items()):
         first, *later = sorted(names - whole)
         for name in later:
-            found.setdefault(name, {})[content] = first
-    for name, counts_in in found.items():
-        for content in units[name].elsewhere:
-            if there := holders.get((_folder(name), content), set()) - whole:
-                counts_in[content] = min(there)
-    return found
+            originals_by_copy.setdefault(name, {})[content] = first
+    for name, counts_in in originals_by_copy.items():
+        for content in units[name].contents_elsewhere:
+            if holding_units := holders.get((_folder(name), content), set()) - whole:
+                counts_in[content] = min(holding_units)
+    return originals_by_copy
 
 
-def _whole_copies(held: Mapping[str, frozenset[str]], holders: Mapping) -> dict[str, dict[str, str]]:
-    found = {}
-    for name in sorted(name for name in held if held[name]):
-        others = set.intersection(*(holders[_folder(name), content] for content in held[name]))
-        originals = [o for o in sorted(others) if held[name] < held[o] or (held[name] == held[o] and o < name)]
+def _whole_copies(contents_by_unit: Mapping[str, frozenset[str]], holders: Mapping) -> dict[str, dict[str, str]]:
+    originals_by_copy = {}
+    for name in sorted(name for name in contents_by_unit if contents_by_unit[name]):
+        containers = set.intersection(*(holders[_folder(name), content] for content in contents_by_unit[name]))
+        originals = [
+            o
+            for o in sorted(containers)
+            if contents_by_unit[name] < contents_by_unit[o]
+            or (contents_by_unit[name] == contents_by_unit[o] and o < name)
+        ]
         if originals:
-            found[name] = dict.fromkeys(sorted(held[name]), originals[0])
-    return found
+            originals_by_copy[name] = dict.fromkeys(sorted(contents_by_unit[name]), originals[0])
+    return originals_by_copy
 
 
 def originals(
-    name: str, counts_in: Mapping[str, str], units: Mapping[str, Known], wanted: Mapping[str, Planned]
+    name: str, counts_in: Mapping[str, str], units: Mapping[str, UnitState], wanted: Mapping[str, PlannedUnit]
 ) -> dict[str, Original]:
     """Path -> original, of the files of a unit whose content counts in another one, ``counts_in``."""
     return {
-        path: Original(other, _path_of(content, wanted[other].unit, units[other]))
-        for (path, *_), content in zip(wanted[name].unit.files, units[name].held)
-        if (other := counts_in.get(content))
+        path: Original(original_unit, _path_in_unit(content, wanted[original_unit].unit, units[original_unit]))
+        for (path, *_), content in zip(wanted[name].unit.files, units[name].all_contents)
+        if (original_unit := counts_in.get(content))
     }
 
 
-def without(unit: Unit, copied: Mapping[str, Original]) -> Unit:
+def without_copies(unit: Unit, copied: Mapping[str, Original]) -> Unit:
     """The unit without the files that count in other units."""
     return replace(unit, files=tuple(file for file in unit.files if file[0] not in copied))
 
@@ -94,11 +99,11 @@ def key_without(key: str, copied: Mapping[str, Original]) -> str:
     """The ``key`` of a unit that is computed without its copied files; it names the units of the originals."""
     if not copied:
         return key
-    named = "".join(f"\n{KEY}{unit}" for unit in sorted({o.unit for o in copied.values()}))
+    named = "".join(f"\n{COPY_PREFIX}{unit}" for unit in sorted({o.unit for o in copied.values()}))
     return digest([key, [[path, o.path] for path, o in sorted(copied.items())]]) + named
 
 
-def with_copies_said(result: UnitResult, unit: Unit, copied: Mapping[str, Original]) -> UnitResult:
+def with_copy_rows(result: UnitResult, unit: Unit, copied: Mapping[str, Original]) -> UnitResult:
     """The ``result`` of the remaining files of ``unit``, with quarantine rows that name the copies."""
     if not copied:
         return result
@@ -115,10 +120,10 @@ def _row(unit: Unit, path: str, what: str, originals: str) -> dict:
     return quarantine_row(unit, path, "duplicate", what, f"same bytes as {originals}", "Delete one of them")
 
 
-def _path_of(content: str, unit: Unit, known: Known) -> str:
+def _path_in_unit(content: str, unit: Unit, entry: UnitState) -> str:
     """Path of a content in ``unit``; that of its first file if its files have changed since it was computed."""
-    held = (path for (path, *_), held in zip(unit.files, known.held) if held == content)
-    return next(held, unit.files[0][0])
+    match = (path for (path, *_), match in zip(unit.files, entry.all_contents) if match == content)
+    return next(match, unit.files[0][0])
 
 
 def _folder(name: str) -> str:
@@ -130,19 +135,23 @@ def _folder(name: str) -> str:
     return "/".join(name.split("/", 2)[:2])
 
 
-Units = Mapping[str, Known]
+Units = Mapping[str, UnitState]
 
 
-def moved(units: Units, wanted: Collection[str]) -> list[str]:
+def moved_units(units: Units, wanted: Collection[str]) -> list[str]:
     """Missing units of which all files have rows in other units of the same state."""
-    held = _holders({content for name in _gone(units, wanted) for content in units[name].counted}, [(units, wanted)])
-    return [name for name in _gone(units, wanted) if all(held[content] for content in units[name].counted)]
+    holders = _holders(
+        {content for name in _missing_units(units, wanted) for content in units[name].own_contents}, [(units, wanted)]
+    )
+    return [
+        name for name in _missing_units(units, wanted) if all(holders[content] for content in units[name].own_contents)
+    ]
 
 
-def withdrawn(name: str, known: Known) -> UnitResult:
+def withdrawal(name: str, entry: UnitState) -> UnitResult:
     """The empty result that supersedes the rows of a unit."""
     turnout, kind, _ = name.split("/", 2)
-    return UnitResult(name, turnout, kind, VANISHED, known.algo, VANISHED, {})
+    return UnitResult(name, turnout, kind, VANISHED, entry.algo, VANISHED, {})
 
 
 def withdraw_moved(work: Path, stages: Iterable[str], shards: Iterable[str], limits: FleetSettings) -> int:
@@ -156,42 +165,42 @@ def withdraw_moved(work: Path, stages: Iterable[str], shards: Iterable[str], lim
     kinds = {_kind(name) for names in wanted.values() for name in names}
     states = [work / stage / f"{shard}.json" for stage in stages for shard in wanted]
     units = {state: load_state(state).units for state in states}
-    gone = {state: _gone(units[state], wanted[state.stem]) for state in states}
-    asked = {content for state in states for name in gone[state] for content in units[state][name].counted}
-    holders = _holders(asked, [(units[state], wanted[state.stem]) for state in states])
+    missing = {state: _missing_units(units[state], wanted[state.stem]) for state in states}
+    contents = {content for state in states for name in missing[state] for content in units[state][name].own_contents}
+    holders = _holders(contents, [(units[state], wanted[state.stem]) for state in states])
 
-    def has_moved(name: str, known: Known) -> bool:
-        by = [holders[content] for content in known.counted]
+    def has_moved(name: str, entry: UnitState) -> bool:
+        by = [holders[content] for content in entry.own_contents]
         return all(by) and (_kind(name) in kinds or _turnout(name) not in set().union(*by))
 
-    left = {s: {n: units[s][n] for n in gone[s] if has_moved(n, units[s][n])} for s in states}
+    moved = {s: {n: units[s][n] for n in missing[s] if has_moved(n, units[s][n])} for s in states}
     for state in states:
-        _withdraw(state, left[state], limits)
-    return sum(map(len, left.values()))
+        _withdraw(state, moved[state], limits)
+    return sum(map(len, moved.values()))
 
 
-def _withdraw(state: Path, left: Units, limits: FleetSettings) -> None:
-    if not left:
+def _withdraw(state: Path, moved: Units, limits: FleetSettings) -> None:
+    if not moved:
         return
-    ask_again(state)  # first: a job killed in between then causes one rerun too many, not one too few
-    with locked(state):
+    request_rerun(state)  # first: a job killed in between then causes one rerun too many, not one too few
+    with state_lock(state):
         ledger = Ledger(state, limits)
-        for name, known in left.items():
-            ledger.keep(withdrawn(name, known), "")
+        for name, entry in moved.items():
+            ledger.keep(withdrawal(name, entry), "")
         ledger.checkpoint()
 
 
-def _gone(units: Units, wanted: Collection[str]) -> list[str]:
-    return [n for n, known in units.items() if n not in wanted and known.status != VANISHED and known.counted]
+def _missing_units(units: Units, wanted: Collection[str]) -> list[str]:
+    return [n for n, entry in units.items() if n not in wanted and entry.status != VANISHED and entry.own_contents]
 
 
-def _holders(asked: Collection[str], places: Iterable[tuple[Units, Collection[str]]]) -> dict[str, set[str]]:
+def _holders(contents: Collection[str], states: Iterable[tuple[Units, Collection[str]]]) -> dict[str, set[str]]:
     """Content -> turnouts with a planned unit that has rows from it."""
-    holders: dict[str, set[str]] = {content: set() for content in asked}
-    for units, wanted in places:
-        for name in wanted if asked else ():
-            known = units.get(name)
-            for content in known.counted if known and known.status in WITH_ROWS else ():
+    holders: dict[str, set[str]] = {content: set() for content in contents}
+    for units, wanted in states:
+        for name in wanted if contents else ():
+            entry = units.get(name)
+            for content in entry.own_contents if entry and entry.status in WITH_ROWS else ():
                 if content in holders:
                     holders[content].add(_turnout(name))
     return holders

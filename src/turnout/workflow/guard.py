@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from turnout.config import TurnoutConfig
-from turnout.errors import PartlyComputed, ReadError, of_the_machine
+from turnout.errors import PartlyComputed, ReadError, is_infrastructure
 from turnout.records import Unit
 from turnout.registry.ids import content_id
 from turnout.workflow.batches import UnitResult, encode
@@ -15,8 +15,8 @@ from turnout.workflow.scan import unit_id
 LOG = logging.getLogger("turnout.workflow")
 
 
-def guarded(
-    compute: Callable, unit: Unit, turnout: TurnoutConfig, raw_root: Path, key: str, algo: str, strict: bool, **more
+def compute_guarded(
+    compute: Callable, unit: Unit, turnout: TurnoutConfig, raw_root: Path, key: str, algo: str, strict: bool, **extra
 ) -> UnitResult:
     """Result of ``compute(unit, turnout, raw_root, algo=algo)``.
 
@@ -25,41 +25,41 @@ def guarded(
     ``strict`` it is raised. Faults of the machine (bad sector, disk full, out of memory) are always raised.
     """
     try:
-        tables, faults = _computed(compute, unit, turnout, raw_root, algo=algo, **more)
+        tables, faults = _compute(compute, unit, turnout, raw_root, algo=algo, **extra)
         if strict and faults:
             raise faults[0][2]
-        rows = [_fault(unit, error, path, record) for path, record, error in faults]
+        rows = [_fault_row(unit, error, path, record) for path, record, error in faults]
         tables = {**tables, "quarantine": [*tables.get("quarantine", ()), *rows]} if rows else tables
         encode(tables)
     except ReadError as error:
         tables = {
-            "quarantine": [quarantine_row(unit, error.path, error.reason, error.where, error.found, error.remedy)]
+            "quarantine": [quarantine_row(unit, error.path, error.reason, error.where, error.problem, error.remedy)]
         }
     except Exception as error:
-        if strict or of_the_machine(error):
+        if strict or is_infrastructure(error):
             raise
-        tables = {"quarantine": [_fault(unit, error)]}
+        tables = {"quarantine": [_fault_row(unit, error)]}
     return UnitResult(unit_id(unit), unit.turnout, unit.kind, key, algo, status_of(tables), tables)
 
 
-def died_of(unit: Unit, *_, **__) -> dict[str, list[dict]]:
+def death_rows(unit: Unit, *_, **__) -> dict[str, list[dict]]:
     """Rows of a unit whose process dies each time it is computed."""
-    found = "the process died that computed it, and again where it was computed alone"
+    finding = "the process died that computed it, and again where it was computed alone"
     remedy = (
         "Look in the machine's log whether its memory ended, and whether its files are whole; "
         "the unit is tried again when one of its files is touched, or the program changes"
     )
     return {
-        "quarantine": [quarantine_row(unit, _first_of(unit), "internal_error", "a process of its own", found, remedy)]
+        "quarantine": [quarantine_row(unit, _first_of(unit), "internal_error", "a process of its own", finding, remedy)]
     }
 
 
-def _computed(compute, *args, **more):
+def _compute(compute, *args, **extra):
     """(tables, faults); the faults of single records do not affect the rows of the others."""
     try:
-        return compute(*args, **more), ()
-    except PartlyComputed as part:
-        return part.tables, part.faults
+        return compute(*args, **extra), ()
+    except PartlyComputed as partial:
+        return partial.tables, partial.faults
 
 
 def status_of(tables: dict[str, list[dict]]) -> str:
@@ -76,10 +76,10 @@ def status_of(tables: dict[str, list[dict]]) -> str:
     return "partly" if any(rows for table, rows in tables.items() if table != "quarantine") else "quarantined"
 
 
-def quarantine_row(unit: Unit, path: str, reason: str, where: str, found: str, remedy: str, record=None) -> dict:
+def quarantine_row(unit: Unit, path: str, reason: str, where: str, finding: str, remedy: str, record=None) -> dict:
     """Row of ``quarantine`` for a unit as a whole, or for one record of it."""
     row = {
-        "quarantine_id": content_id("quarantine", path, str(record), unit.kind, reason, found),
+        "quarantine_id": content_id("quarantine", path, str(record), unit.kind, reason, finding),
         "turnout_id": unit.turnout,
         "section_id": f"{unit.turnout}/{unit.section}" if unit.section else None,
         "kind": unit.kind,
@@ -87,20 +87,20 @@ def quarantine_row(unit: Unit, path: str, reason: str, where: str, found: str, r
         "stage": unit.kind,
         "reason_code": reason,
         "place": where,
-        "found": found,
+        "found": finding,
         "remedy": remedy,
     }
     return row if record is None else row | {"record": record}
 
 
-def _fault(unit: Unit, error: Exception, path: str | None = None, record: int | None = None) -> dict:
+def _fault_row(unit: Unit, error: Exception, path: str | None = None, record: int | None = None) -> dict:
     """Quarantine row of a fault of the program; its trace has no machine paths, so it is the same everywhere."""
     LOG.error("%s: internal error\n%s", unit_id(unit), "".join(traceback.format_exception(error)))
     frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename != __file__]
     trace = " < ".join(f"{Path(f.filename).name}:{f.lineno} {f.name}" for f in reversed(frames[-6:]))
-    found = f"{type(error).__name__}: {error}"[:500]
+    finding = f"{type(error).__name__}: {error}"[:500]
     remedy = "Report it with the log of the run; the unit is tried again when its files or the program change"
-    return quarantine_row(unit, path or _first_of(unit), "internal_error", trace, found, remedy, record)
+    return quarantine_row(unit, path or _first_of(unit), "internal_error", trace, finding, remedy, record)
 
 
 def _first_of(unit: Unit) -> str:

@@ -13,9 +13,9 @@ from turnout.workflow.batches import read_results
 from turnout.workflow.configuration_rows import configuration_rows
 from turnout.workflow.current_results import DamagedBatch
 from turnout.workflow.duplicate_files import withdraw_moved
-from turnout.workflow.launch import launched_at
-from turnout.workflow.quality_gate import Verdict, verdict
-from turnout.workflow.retries import ask_again, attempt
+from turnout.workflow.launch import launch_time
+from turnout.workflow.quality_gate import QualityGate, check_quality
+from turnout.workflow.retries import attempt, request_rerun
 from turnout.workflow.shard import Summary, run_shard
 from turnout.workflow.state import batch_paths, state_of, state_of_mark
 from turnout.workflow.tasks import Stage
@@ -33,28 +33,28 @@ def stage_job(plan, mark, log, params, threads: int) -> Summary:
     try:
         summary = run_shard(
             Path(plan), state_of_mark(mark), stage, configuration, Path(job["raw"]),
-            threads=threads, only=job["only"] or None, strict=job["strict"], launched=launched_at(),
+            threads=threads, only=job["only"] or None, strict=job["strict"], launched=launch_time(),
         )  # fmt: skip
     except DamagedBatch as error:
-        ask_again(state_of(error.batch))
+        request_rerun(state_of(error.batch))
         raise
-    _say(summary)
+    _report(summary)
     write_text(mark, f"{summary}\n")
     return summary
 
 
-def verdict_job(marks, output, log, params) -> Verdict:
+def verdict_job(marks, output, log, params) -> QualityGate:
     """Check the quality of the run; SystemExit with 1 where it fails."""
     _log_to(log)
     states = [state_of_mark(mark) for mark in marks]
     try:
         with attempt("verdict", params.again):
-            found = verdict(states, load_configuration(params.job["configuration"]), Path(output))
+            gate = check_quality(states, load_configuration(params.job["configuration"]), Path(output))
     except TurnoutError as error:
-        _say(error)
+        _report(error)
         raise SystemExit(1) from None
-    _say(found)
-    return found
+    _report(gate)
+    return gate
 
 
 def register_job(register, generation, log, params) -> None:
@@ -69,14 +69,14 @@ def register_job(register, generation, log, params) -> None:
     tables = configuration_rows(configuration, Path(params.job["raw"]), plans)
     with attempt("register", params.again):
         withdraw_moved(Path("work"), params.stages, params.shards, configuration.settings["fleet"])
-        done = register(
+        result = register(
             batch_paths(states), Path(generation).parent, read=read_results, tables=tables,
-            config_hash=params.configuration, code_version=__version__, started_at=launched_at(),
+            config_hash=params.configuration, code_version=__version__, started_at=launch_time(),
         )  # fmt: skip
     os.utime(generation)
-    for batch, fault in done.faults.items():
+    for batch, fault in result.faults.items():
         logging.getLogger("turnout.workflow").warning("%s: %s", batch, fault)
-    _say(f"register: {done.n_units} units, {sum(done.rows.values())} rows, {done.n_refused} refused")
+    _report(f"register: {result.n_units} units, {sum(result.rows.values())} rows, {result.n_refused} refused")
 
 
 def _log_to(log) -> None:
@@ -91,6 +91,6 @@ def _log_to(log) -> None:
     logging.getLogger("turnout").setLevel(logging.INFO)
 
 
-def _say(what) -> None:
+def _report(what) -> None:
     logging.getLogger("turnout.workflow").info("%s", what)
     print(what, file=sys.stderr, flush=True)

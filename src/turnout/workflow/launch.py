@@ -11,7 +11,7 @@ from turnout.errors import ConfigError
 from turnout.files import write_text
 from turnout.workflow.configuration_rows import fleet_hash
 from turnout.workflow.plan import shard_names, write_plans
-from turnout.workflow.retries import ask_again
+from turnout.workflow.retries import request_rerun
 from turnout.workflow.state import is_cut_state, states_below
 
 OPTIONS = {
@@ -25,9 +25,9 @@ OPTIONS = {
     "day": "YYYY-MM-DD: the day of list and pages, instead of today",
     "chains": "for each stage module:function, instead of the program's own",
 }
-PLANS = "work/plan"
+PLAN_FOLDER = "work/plan"
 # Start time of the newest run that reached its jobs, UTC. It is no input of a rule, so it causes no rerun.
-LAUNCHED = "work/launched"
+LAUNCH_FILE = "work/launched"
 
 
 @dataclass(frozen=True)
@@ -73,80 +73,84 @@ def launch(options: Mapping, scan: bool, formats=None, to_si=None) -> Launch:
         "strict": _flag(options, "strict"),
     }
     if scan:
-        began = datetime.now(UTC).replace(tzinfo=None)
+        started = datetime.now(UTC).replace(tzinfo=None)
         raw, accept = Path(job["raw"]), _flag(options, "accept_vanished")
-        write_plans(configuration, raw, Path(PLANS), shards, turnouts, accept)
-        for state in states_below(Path(PLANS).parent):
+        write_plans(configuration, raw, Path(PLAN_FOLDER), shards, turnouts, accept)
+        for state in states_below(Path(PLAN_FOLDER).parent):
             if state.stem in shard_names(shards) and is_cut_state(state):
-                ask_again(state)
-        write_text(Path(LAUNCHED), began.isoformat(timespec="seconds"))
+                request_rerun(state)
+        write_text(Path(LAUNCH_FILE), started.isoformat(timespec="seconds"))
     day = _day(options.get("day"))
     names = shard_names(shards, turnouts)
     chains = dict(options.get("chains") or {})
-    whose = _diagnosed(options, configuration)
-    learned = _learned(configuration)
-    return Launch(names, shard_names(shards), turnouts, fleet_hash(configuration), job, whose, chains, learned, day)
+    diagnosis = _diagnosis_scope(options, configuration)
+    learned = _learned_files(configuration)
+    return Launch(names, shard_names(shards), turnouts, fleet_hash(configuration), job, diagnosis, chains, learned, day)
 
 
-def _learned(configuration: Configuration) -> tuple[str, ...]:
+def _learned_files(configuration: Configuration) -> tuple[str, ...]:
     """Existing files of learned parameters that the settings of any turnout name, each once."""
     files: dict[Path, None] = {}
-    for settings in _different(configuration):
-        own = settings["passage"]
-        named = Path(own.assets) / "clusters.json", Path(own.assets) / "loads.json", Path(own.axle_patterns)
+    for settings in _distinct_settings(configuration):
+        passage_settings = settings["passage"]
+        named = (
+            Path(passage_settings.assets) / "clusters.json",
+            Path(passage_settings.assets) / "loads.json",
+            Path(passage_settings.axle_patterns),
+        )
         files |= dict.fromkeys(named)
     return tuple(str(path) for path in files if path.is_file())
 
 
-def launched_at() -> datetime | None:
+def launch_time() -> datetime | None:
     """Start time of the run that this job belongs to; None outside a run."""
     try:
-        return datetime.fromisoformat(Path(LAUNCHED).read_text(encoding="utf-8"))
+        return datetime.fromisoformat(Path(LAUNCH_FILE).read_text(encoding="utf-8"))
     except (FileNotFoundError, ValueError):
         return None
 
 
-def _day(said) -> str:
+def _day(value) -> str:
     """The given day, else the day on which the run began, which is the same for all of its jobs."""
-    if not said:
-        return (launched_at() or datetime.now(UTC)).date().isoformat()
+    if not value:
+        return (launch_time() or datetime.now(UTC)).date().isoformat()
     try:
-        return date.fromisoformat(str(said)).isoformat()
+        return date.fromisoformat(str(value)).isoformat()
     except ValueError:
-        raise ConfigError("--config", "day", repr(said), "Write YYYY-MM-DD") from None
+        raise ConfigError("--config", "day", repr(value), "Write YYYY-MM-DD") from None
 
 
-def _diagnosed(options: Mapping, configuration: Configuration) -> str:
+def _diagnosis_scope(options: Mapping, configuration: Configuration) -> str:
     """Which turnouts are diagnosed: by the option, else by ``mismatch: enabled`` of any turnout."""
     if "diagnose" in options:
         return "every" if _flag(options, "diagnose") else ""
-    return "enabled" if any(settings["mismatch"].enabled for settings in _different(configuration)) else ""
+    return "enabled" if any(settings["mismatch"].enabled for settings in _distinct_settings(configuration)) else ""
 
 
-def _different(configuration: Configuration) -> list[Mapping]:
+def _distinct_settings(configuration: Configuration) -> list[Mapping]:
     """The different settings of all turnouts, each by its parts."""
     variants = {id(v): v for v in configuration.variants.values()}.values()
-    return [variant.parts["settings"] for variant in variants]
+    return [variant.turnout_fields["settings"] for variant in variants]
 
 
-def _turnouts(said, configuration: Configuration) -> tuple[str, ...] | None:
-    if said is None or said == "":
+def _turnouts(value, configuration: Configuration) -> tuple[str, ...] | None:
+    if value is None or value == "":
         return None
-    ids = [str(t).strip() for t in (said if isinstance(said, list) else str(said).split(","))]
+    ids = [str(t).strip() for t in (value if isinstance(value, list) else str(value).split(","))]
     for turnout in ids:
         configuration.turnout(turnout)
     return tuple(sorted(set(ids)))
 
 
-def _number(said) -> int:
-    if not isinstance(said, int) or not 1 <= said <= 4096:
-        raise ConfigError("--config", "shards", repr(said), "Write a whole number from 1 to 4096")
-    return said
+def _number(value) -> int:
+    if not isinstance(value, int) or not 1 <= value <= 4096:
+        raise ConfigError("--config", "shards", repr(value), "Write a whole number from 1 to 4096")
+    return value
 
 
 def _flag(options: Mapping, name: str) -> bool:
     """An option that is true or false; Snakemake passes some spellings on as text."""
-    said = str(options.get(name, False)).lower()
-    if said not in ("true", "false"):
+    value = str(options.get(name, False)).lower()
+    if value not in ("true", "false"):
         raise ConfigError("--config", name, repr(options[name]), "Write true or false")
-    return said == "true"
+    return value == "true"

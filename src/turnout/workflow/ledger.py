@@ -5,8 +5,8 @@ import time
 from pathlib import Path
 
 from turnout.config.settings.fleet import FleetSettings
-from turnout.workflow.batches import UnitResult, is_sound, write_batch
-from turnout.workflow.state import Known, batch_folder, load_state, remove_orphans
+from turnout.workflow.batches import UnitResult, is_readable, write_batch
+from turnout.workflow.state import UnitState, batch_folder, load_state, remove_orphans
 
 LOG = logging.getLogger("turnout.workflow")
 
@@ -26,9 +26,9 @@ class Ledger:
         remove_orphans(self.state, self.folder)
 
     def _drop_damaged(self) -> None:
-        damaged = {name for name in self.state.batches if not is_sound(self.folder / name)}
+        damaged = {name for name in self.state.batches if not is_readable(self.folder / name)}
         if damaged:
-            n_unit = self.state.forget(damaged)
+            n_unit = self.state.drop_batches(damaged)
             names = ", ".join(str(self.folder / name) for name in sorted(damaged))
             LOG.warning("%s cannot be read: %d units are computed again where their files are there", names, n_unit)
 
@@ -45,8 +45,8 @@ class Ledger:
             batch = write_batch(self.folder, [result for result, *_ in self._waiting]).name
             self.state.batches = [b for b in self.state.batches if b != batch] + [batch]
             for result, stamp, contents in self._waiting:
-                known = Known(stamp, result.key, result.algo, result.status, batch, contents)
-                self.state.units[result.unit] = known
+                entry = UnitState(stamp, result.key, result.algo, result.status, batch, contents)
+                self.state.units[result.unit] = entry
             self._waiting.clear()
         self.state.save(self.path)
         self._saved_at = time.monotonic()

@@ -16,21 +16,21 @@ from filelock import FileLock, Timeout
 
 from turnout.errors import TurnoutError
 from turnout.workflow.plan import is_cut_plan, read_plan
-from turnout.workflow.run_report import rejected, unused_turnouts, why
+from turnout.workflow.run_report import failure_reason, rejected_units, unused_turnouts
 from turnout.workflow.scan import unit_id
 from turnout.workflow.state import load_state, states_below
 
 JOB_NAMES = "turnouts"
-TOO_LATE = 124  # exit code of a run ended by the time limit, as of timeout(1)
-TO_PUBLISH = 1 / 6  # share of the time limit reserved for publishing
-WORST = 3  # turnouts named in the report
-LOOK = 'turnout query "from quarantine_open" and "from rejected"'
+EXIT_TIME_LIMIT = 124  # exit code of a run ended by the time limit, as of timeout(1)
+PUBLISHING_SHARE = 1 / 6  # share of the time limit reserved for publishing
+MAX_TURNOUTS_SHOWN = 3  # turnouts named in the report
+QUERY_HINT = 'turnout query "from quarantine_open" and "from rejected"'
 GENERATION = Path("results/registry/_generation.json")
-PUBLISHING = ("all", "register", "verdict", "trend", "report")
+PUBLISHING_RULES = ("all", "register", "verdict", "trend", "report")
 
 
 @dataclass(frozen=True)
-class Night:
+class NightReport:
     """Report of a run; ``code`` is 0 only if all went well, else ``reason`` says why not.
 
     ``vanished`` is the number of units gone since the last run. ``worst`` are the turnouts with most unused units, and
@@ -47,58 +47,62 @@ class Night:
     rejected: int = 0
     worst: tuple[tuple[str, int], ...] = ()
     unused: tuple[str, ...] = ()
-    useless: bool = False
+    nothing_usable: bool = False
     reason: str = ""
 
     def __str__(self):
-        well = "every job ran, but nothing could be used" if self.useless else "sound"
-        said = {0: well, TOO_LATE: "stopped at the time limit"}.get(self.code, f"failed with exit code {self.code}")
+        well = "every job ran, but nothing could be used" if self.nothing_usable else "sound"
+        outcome = {0: well, EXIT_TIME_LIMIT: "stopped at the time limit"}.get(
+            self.code, f"failed with exit code {self.code}"
+        )
         return (
-            f"{said}: {self.units} units known, {self.processed} processed, "
+            f"{outcome}: {self.units} units known, {self.processed} processed, "
             f"{self.quarantined} of these with rows in quarantine, "
             + (f"{self.rejected} hammer test{'s' * (self.rejected > 1)} rejected, " if self.rejected else "")
             + f"{self.vanished} vanished"
             + (f"; nothing could be used yet of {self._unused()}" if self.unused else "")
             + (f"; worst: {', '.join(f'{t} ({n})' for t, n in self.worst)}" if self.worst else "")
-            + (f", see {LOOK}" if self.worst or self.unused else "")
+            + (f", see {QUERY_HINT}" if self.worst or self.unused else "")
             + ("" if self.published else "; the registry was not published")
             + (f"; why: {self.reason}" if self.reason else "")
         )
 
     def _unused(self) -> str:
-        more = len(self.unused) - WORST
-        return ", ".join(self.unused[:WORST]) + (f" and {more} more" if more > 0 else "")
+        more = len(self.unused) - MAX_TURNOUTS_SHOWN
+        return ", ".join(self.unused[:MAX_TURNOUTS_SHOWN]) + (f" and {more} more" if more > 0 else "")
 
 
-def nightly(options: Sequence[str], profile: str, limit: float | None = None, work: Path = Path("work")) -> Night:
+def nightly(options: Sequence[str], profile: str, limit: float | None = None, work: Path = Path("work")) -> NightReport:
     """Run the workflow once, with ``options`` passed to Snakemake.
 
     ``profile`` is a folder of profiles/; ``limit`` [s] ends a run that hangs or takes longer than the night. If jobs
     die or are ended, the finished results are published without the rest. A signal that ends this process ends
     Snakemake first. TurnoutError where there is no such profile, or another run is active.
     """
-    _refuse_no_profile(Path(profile))
+    _require_profile(Path(profile))
     work.mkdir(exist_ok=True)
     lock = FileLock(work / ".nightly.lock")
     try:
         with lock.acquire(timeout=0), _signals_raise():
-            _refuse_beside_another()
+            _require_no_other_run()
             _clear(options, Path(profile).name)
-            before, planned, began = _batches(work), _planned(work), time.time_ns()
+            before, planned, started = _batches(work), _planned(work), time.time_ns()
             code = _run([*options, "--workflow-profile", profile, "--rerun-incomplete"], limit, work)
-            return _night(code, before, planned, why(began) if code not in (0, TOO_LATE) else "", work)
+            return _report(
+                code, before, planned, failure_reason(started) if code not in (0, EXIT_TIME_LIMIT) else "", work
+            )
     except Timeout:
-        found = f"{work / '.nightly.lock'} is held: another nightly run is going on"
-        raise TurnoutError(f"{found}. Wait for it, or end it.") from None
+        message = f"{work / '.nightly.lock'} is held: another nightly run is going on"
+        raise TurnoutError(f"{message}. Wait for it, or end it.") from None
 
 
-def _refuse_no_profile(profile: Path) -> None:
+def _require_profile(profile: Path) -> None:
     """TurnoutError without the profile; Snakemake's own message would only be about cores."""
     if not any(profile.glob("config*.yaml")):
-        there = sorted(str(p.parent) for p in profile.parent.glob("*/config*.yaml"))
-        found = "holds no config.yaml" if profile.is_dir() else "there is no such folder"
-        remedy = f"Give one of {', '.join(there)}" if there else "Run it in the folder of the Snakefile"
-        raise TurnoutError(f"{profile}, the profile: {found}. {remedy}.")
+        profiles = sorted(str(p.parent) for p in profile.parent.glob("*/config*.yaml"))
+        problem = "holds no config.yaml" if profile.is_dir() else "there is no such folder"
+        remedy = f"Give one of {', '.join(profiles)}" if profiles else "Run it in the folder of the Snakefile"
+        raise TurnoutError(f"{profile}, the profile: {problem}. {remedy}.")
 
 
 @contextmanager
@@ -117,7 +121,7 @@ def _signals_raise():
             signal.signal(number, handler)
 
 
-def _refuse_beside_another() -> None:
+def _require_no_other_run() -> None:
     """TurnoutError if another Snakemake works in this folder, for then its lock is not that of a killed run."""
     here = os.getcwd()
     for process in Path("/proc").glob("[0-9]*"):
@@ -131,7 +135,7 @@ def _refuse_beside_another() -> None:
             raise TurnoutError(f"process {process.name} is a Snakemake run in this folder. Wait for it, or end it.")
 
 
-def _release() -> None:
+def _unlock() -> None:
     """Remove the lock and the backups of a killed Snakemake."""
     shutil.rmtree(Path(".snakemake") / "backups", ignore_errors=True)
     shutil.rmtree(Path(".snakemake") / "locks", ignore_errors=True)
@@ -139,25 +143,25 @@ def _release() -> None:
 
 def _clear(options: Sequence[str], profile: str) -> None:
     """Remove Snakemake's lock and backups, and cancel jobs that a killed run left in the queue."""
-    _release()
+    _unlock()
     if profile == "slurm" and shutil.which("scancel"):
-        asked = ["squeue", "--me", "-h", "-o", "%i %j %Z"]  # number, name, folder
-        queue = subprocess.run(asked, capture_output=True, text=True, check=False)
+        command = ["squeue", "--me", "-h", "-o", "%i %j %Z"]  # number, name, folder
+        queue = subprocess.run(command, capture_output=True, text=True, check=False)
         jobs = [line.split(maxsplit=2) for line in queue.stdout.splitlines()]
-        left = [job[0] for job in jobs if job[1].startswith(JOB_NAMES) and job[2:] == [os.getcwd()]]
-        if left:
-            subprocess.run(["scancel", *left], check=False)
+        job_ids = [job[0] for job in jobs if job[1].startswith(JOB_NAMES) and job[2:] == [os.getcwd()]]
+        if job_ids:
+            subprocess.run(["scancel", *job_ids], check=False)
 
 
 def _run(options: Sequence[str], limit: float | None, work: Path) -> int:
     """Exit code of Snakemake; if jobs died or were ended before the registry was published, publish it afterwards."""
-    began, launched, generation = time.monotonic(), _changed_at(work / "launched"), _changed_at(GENERATION)
-    code = _snakemake(options, None if limit is None else (1.0 - TO_PUBLISH) * limit)
+    started, launched, generation = time.monotonic(), _changed_at(work / "launched"), _changed_at(GENERATION)
+    code = _snakemake(options, None if limit is None else (1.0 - PUBLISHING_SHARE) * limit)
     had_jobs, registered = _changed_at(work / "launched") != launched, _changed_at(GENERATION) != generation
     if code != 0 and had_jobs and not registered:
-        left = None if limit is None else max(0.0, began + limit - time.monotonic())
-        _release()
-        _snakemake([*options, "--allowed-rules", *PUBLISHING], left)
+        remaining = None if limit is None else max(0.0, started + limit - time.monotonic())
+        _unlock()
+        _snakemake([*options, "--allowed-rules", *PUBLISHING_RULES], remaining)
     return code
 
 
@@ -173,7 +177,7 @@ def _snakemake(options: Sequence[str], limit: float | None) -> int:
         return process.wait(limit)
     except subprocess.TimeoutExpired:
         _end(process)
-        return TOO_LATE
+        return EXIT_TIME_LIMIT
     except BaseException:
         _end(process)
         raise
@@ -202,21 +206,21 @@ def _planned(work: Path) -> set[str]:
     return {unit_id(p.unit) for plan in plans for p in read_plan(plan)}
 
 
-def _night(code: int, before: set, planned_before: set[str], reason: str, work: Path) -> Night:
-    gone = planned_before - _planned(work)
+def _report(code: int, before: set, planned_before: set[str], reason: str, work: Path) -> NightReport:
+    missing = planned_before - _planned(work)
     units: set[str] = set()  # states of an earlier number of shards may remain
     processed, quarantined = [], []
     for path in states_below(work):
-        for name, known in load_state(path).units.items():
+        for name, entry in load_state(path).units.items():
             units.add(name)
-            if (path, known.batch) not in before:
+            if (path, entry.batch) not in before:
                 processed.append(name)
-                quarantined += [name] if known.status not in ("ok", "vanished") else []
+                quarantined += [name] if entry.status not in ("ok", "vanished") else []
     newest = max(map(_changed_at, states_below(work)), default=0)
     published = code == 0 or 0 < newest <= _changed_at(GENERATION)
-    tests = rejected(processed, GENERATION.parent)
-    unused, useless = unused_turnouts(GENERATION.parent)
+    tests = rejected_units(processed, GENERATION.parent)
+    unused, nothing_usable = unused_turnouts(GENERATION.parent)
     by_turnout = Counter(name.partition("/")[0] for name in {*quarantined, *tests})
-    worst = sorted(by_turnout.items(), key=lambda item: (-item[1], item[0]))[:WORST]
-    counts = len(units), len(processed), len(quarantined), len(gone & units)
-    return Night(code, *counts, published, len(tests), tuple(worst), tuple(unused), useless, reason)
+    worst = sorted(by_turnout.items(), key=lambda item: (-item[1], item[0]))[:MAX_TURNOUTS_SHOWN]
+    counts = len(units), len(processed), len(quarantined), len(missing & units)
+    return NightReport(code, *counts, published, len(tests), tuple(worst), tuple(unused), nothing_usable, reason)

@@ -9,8 +9,8 @@ from turnout.config import TurnoutConfig
 from turnout.config.merge import digest
 from turnout.records import Unit
 
-AROUND = timedelta(hours=1)  # maximum difference between the clocks of a logger and of the train data
-LONGEST = timedelta(days=2)  # maximum duration of one file of a continuous logger
+MAX_CLOCK_DIFFERENCE = timedelta(hours=1)  # maximum difference between the clocks of a logger and of the train data
+MAX_FILE_DURATION = timedelta(days=2)  # maximum duration of one file of a continuous logger
 
 
 def notes_of(turnout: TurnoutConfig, units: Sequence[Unit]) -> list[str]:
@@ -19,7 +19,7 @@ def notes_of(turnout: TurnoutConfig, units: Sequence[Unit]) -> list[str]:
     A file lasts until the next one begins; one of a continuous logger contains the trains of a day.
     """
     campaigns: dict[str, str] = {}
-    trains = sorted(_timed(turnout.trains), key=lambda entry: entry[0])
+    trains = sorted(_trains_with_time(turnout.trains), key=lambda entry: entry[0])
     starts = sorted({time for u in units if not u.campaign and (time := start_of(u.label))})
     notes = []
     for unit in units:
@@ -28,21 +28,21 @@ def notes_of(turnout: TurnoutConfig, units: Sequence[Unit]) -> list[str]:
                 campaigns[unit.campaign] = digest(repr(turnout.campaigns[unit.campaign]))[:16]
             notes.append(campaigns[unit.campaign])
         else:
-            notes.append(_within(start_of(unit.label), starts, trains))
+            notes.append(_trains_digest(start_of(unit.label), starts, trains))
     return notes
 
 
-def _timed(rows: Sequence[Mapping]) -> list[tuple[datetime, list]]:
+def _trains_with_time(rows: Sequence[Mapping]) -> list[tuple[datetime, list]]:
     """(time, row) of the rows of trains.csv with a valid time in their first time column."""
-    found = []
+    entries = []
     for row in rows:
-        said = next((value for name, value in row.items() if name.endswith("_at_utc")), "")
+        stamp = next((value for name, value in row.items() if name.endswith("_at_utc")), "")
         try:
-            time = datetime.fromisoformat(str(said).removesuffix("Z")).replace(tzinfo=None)
+            time = datetime.fromisoformat(str(stamp).removesuffix("Z")).replace(tzinfo=None)
         except ValueError:
             continue
-        found.append((time, sorted((k, str(v)) for k, v in row.items())))
-    return found
+        entries.append((time, sorted((k, str(v)) for k, v in row.items())))
+    return entries
 
 
 def start_of(label: str) -> datetime | None:
@@ -54,12 +54,12 @@ def start_of(label: str) -> datetime | None:
         return None
 
 
-def _within(start: datetime | None, starts: list[datetime], trains: list[tuple[datetime, list]]) -> str:
+def _trains_digest(start: datetime | None, starts: list[datetime], trains: list[tuple[datetime, list]]) -> str:
     """Digest of the trains during a file that begins at ``start``, "" without any."""
     if start is None or not trains:
         return ""
     after = bisect_right(starts, start)
-    end = min(starts[after] if after < len(starts) else start + LONGEST, start + LONGEST)
-    first = bisect_left(trains, start - AROUND, key=lambda entry: entry[0])
-    last = bisect_right(trains, end + AROUND, key=lambda entry: entry[0])
+    end = min(starts[after] if after < len(starts) else start + MAX_FILE_DURATION, start + MAX_FILE_DURATION)
+    first = bisect_left(trains, start - MAX_CLOCK_DIFFERENCE, key=lambda entry: entry[0])
+    last = bisect_right(trains, end + MAX_CLOCK_DIFFERENCE, key=lambda entry: entry[0])
     return digest([row for _, row in trains[first:last]])[:16] if last > first else ""

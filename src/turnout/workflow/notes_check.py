@@ -8,16 +8,16 @@ from pathlib import Path
 
 from turnout.config import TurnoutConfig
 from turnout.config.campaign_notes import COLUMNS
-from turnout.config.csv_table import TableFault, read_csv
+from turnout.config.csv_table import TableError, read_csv
 from turnout.errors import ReadError
 from turnout.records import Unit
 from turnout.workflow.notes import start_of
 
-SHIFTS = sorted((h for h in range(-14, 15) if h), key=abs)  # h, offsets of local times from UTC
-FEWEST = 3  # passages that a shift must match to trains: fewer may match by chance
+CLOCK_SHIFTS = sorted((h for h in range(-14, 15) if h), key=abs)  # h, offsets of local times from UTC
+MIN_SHIFTED_PASSAGES = 3  # passages that a shift must match to trains: fewer may match by chance
 
 
-def contradicted_notes(turnout: TurnoutConfig, raw_root: Path, units: Iterable[Unit]) -> Iterator[ReadError]:
+def note_contradictions(turnout: TurnoutConfig, raw_root: Path, units: Iterable[Unit]) -> Iterator[ReadError]:
     """An error for each row without files, and for files without a row; ``turnout`` includes its notes.
 
     Without campaigns.csv no row is required. Invalid rows are reported by ``read_notes``.
@@ -32,25 +32,25 @@ def contradicted_notes(turnout: TurnoutConfig, raw_root: Path, units: Iterable[U
 def _campaigns(path: Path, name: str, units) -> Iterator[ReadError]:
     try:
         table = read_csv(path, name, COLUMNS, 2)
-    except (OSError, TableFault):
+    except (OSError, TableError):
         return
-    there = Counter(unit.campaign for unit in units if unit.kind == "hammer" for _ in unit.files)
-    noted = set()
+    n_files = Counter(unit.campaign for unit in units if unit.kind == "hammer" for _ in unit.files)
+    days_in_notes = set()
     for line, cells in table.rows:
         day = _day(cells["campaign"])
-        noted.add(day)
-        if day is not None and day not in there:
+        days_in_notes.add(day)
+        if day is not None and day not in n_files:
             remedy = "Correct its day, put its files there, or remove the row"
             where = str(cells.place(name, line, "campaign"))
             yield ReadError(name, where, f"no hammer file is of campaign {day}", remedy)
-    for day in sorted(there.keys() - noted):
-        files = f"{there[day]} file{'s' * (there[day] > 1)}"
-        found = (
+    for day in sorted(n_files.keys() - days_in_notes):
+        files = f"{n_files[day]} file{'s' * (n_files[day] > 1)}"
+        finding = (
             f"no row for campaign {day}, of which there are {files}: it counts as measured at noon, without a rail "
             "temperature"
         )
         remedy = f"Add a line '{day},<start in UTC>,<rail temperature in °C>'"
-        yield ReadError(name, "line 1", found, remedy)
+        yield ReadError(name, "line 1", finding, remedy)
 
 
 def _day(text: str) -> str | None:
@@ -65,21 +65,21 @@ def _trains(rows, name: str, units, tolerance: timedelta) -> Iterator[ReadError]
     passages = [start for unit in units if unit.kind == "passage" and (start := start_of(unit.label))]
     trains = sorted(datetime.fromisoformat(row["passed_at_utc"].removesuffix("Z")) for row in rows)
 
-    def fitting(hours: int) -> int:
-        return sum(_near(p + timedelta(hours=hours), trains, tolerance) for p in passages)
+    def count_fitting(hours: int) -> int:
+        return sum(_has_train_near(p + timedelta(hours=hours), trains, tolerance) for p in passages)
 
-    if not passages or not trains or fitting(0):
+    if not passages or not trains or count_fitting(0):
         return
-    count, hours = max(((fitting(h), h) for h in SHIFTS), key=lambda found: found[0])
-    if count < max(FEWEST, min(len(passages), len(trains)) / 2):
+    count, hours = max(((count_fitting(h), h) for h in CLOCK_SHIFTS), key=lambda finding: finding[0])
+    if count < max(MIN_SHIFTED_PASSAGES, min(len(passages), len(trains)) / 2):
         return
     shift = f"{abs(hours)} h {'after' if hours > 0 else 'before'}"
     seconds = f"{tolerance.total_seconds():.0f} s"
-    found = f"of {len(passages)} passages none has a train within {seconds}, and {count} have one {shift}"
+    finding = f"of {len(passages)} passages none has a train within {seconds}, and {count} have one {shift}"
     remedy = "Write passed_at_utc in UTC, not in local time"
-    yield ReadError(name, "column passed_at_utc", found, remedy)
+    yield ReadError(name, "column passed_at_utc", finding, remedy)
 
 
-def _near(moment: datetime, trains: list[datetime], tolerance: timedelta) -> bool:
+def _has_train_near(moment: datetime, trains: list[datetime], tolerance: timedelta) -> bool:
     at = bisect_left(trains, moment - tolerance)
     return at < len(trains) and trains[at] <= moment + tolerance

@@ -14,12 +14,12 @@ from turnout.config import Configuration, TurnoutConfig
 from turnout.config.load import read_notes
 from turnout.config.settings.fleet import FleetSettings
 from turnout.errors import ConfigError, ReadError
-from turnout.files import is_cut, write_if_changed
+from turnout.files import is_truncated, write_if_changed
 from turnout.records import Unit
 from turnout.workflow.notes import notes_of
 from turnout.workflow.scan import scan
 
-NAME = r"\d{2,4}of\d{2,4}"
+SHARD_NAME = r"\d{2,4}of\d{2,4}"
 
 
 def shard_of(turnout: str, shards: int) -> str:
@@ -45,19 +45,19 @@ def shard_names(shards: int, turnouts=None) -> list[str]:
     return sorted({shard_of(t, shards) for t in turnouts})
 
 
-def parse(name: str) -> tuple[int, int]:
+def parse_shard_name(name: str) -> tuple[int, int]:
     """Number of a shard and number of shards from its name."""
-    if not re.fullmatch(NAME, name):
+    if not re.fullmatch(SHARD_NAME, name):
         raise ConfigError("shard", "name", repr(name), "Write a name like 00of64")
     number, count = name.split("of")
     return int(number), int(count)
 
 
-END = "\n]}\n"
+PLAN_END = "\n]}\n"
 
 
 @dataclass(frozen=True)
-class Planned:
+class PlannedUnit:
     """A unit and the digest of the notes about it (campaign, trains)."""
 
     unit: Unit
@@ -78,8 +78,8 @@ def write_plans(
     and no absolute path, so it changes only with its content. Plans of another number of shards are deleted, because
     they would not be updated. ConfigError if so many known files are missing that a disk is probably not mounted.
     """
-    texts, gone = _looked(configuration, raw_root, folder, shards, turnouts)
-    if not accept_vanished and (error := gone.error(configuration.settings["fleet"], raw_root)):
+    texts, missing = _scan_turnouts(configuration, raw_root, folder, shards, turnouts)
+    if not accept_vanished and (error := missing.error(configuration.settings["fleet"], raw_root)):
         raise error
     for path, text in texts.items():
         write_if_changed(path, text)
@@ -91,15 +91,15 @@ def write_plans(
 
 
 @dataclass(frozen=True)
-class Gone:
+class MissingFiles:
     """Sorted ``files`` in the plans that the scan does not find, of configured turnouts; ``n_known`` are in plans."""
 
     files: list[str]
-    known: int
+    n_known: int
 
     def error(self, settings: FleetSettings, raw_root: Path) -> ConfigError | None:
         """Error that stops a run if so many files are missing that a disk is probably not mounted, else None."""
-        if len(self.files) <= max(settings.vanished_files, settings.vanished_share * self.known):
+        if len(self.files) <= max(settings.vanished_files, settings.vanished_share * self.n_known):
             return None
         remedy = (
             "Nothing was changed. Mount the disk again, or allow reading it; if they are meant to be gone, run once: "
@@ -111,23 +111,23 @@ class Gone:
         return f"{len(self.files)} known file{'s are' if len(self.files) != 1 else ' is'} gone"
 
 
-def gone_files(
+def missing_files(
     configuration: Configuration, raw_root: Path, folder: Path, shards: int, turnouts: Iterable[str] | None = None
-) -> Gone:
+) -> MissingFiles:
     """Files that the next run will find missing, compared with the plans in ``folder``; nothing is written."""
-    return _looked(configuration, raw_root, folder, shards, turnouts)[1]
+    return _scan_turnouts(configuration, raw_root, folder, shards, turnouts)[1]
 
 
-def _looked(configuration, raw_root, folder, shards, turnouts) -> tuple[dict[Path, str], Gone]:
+def _scan_turnouts(configuration, raw_root, folder, shards, turnouts) -> tuple[dict[Path, str], MissingFiles]:
     """New text of each plan, and the files of the existing plans that are missing now."""
     for turnout in turnouts or ():
         configuration.turnout(turnout)
-    asked = set(shard_names(shards, turnouts))
-    names = [n for n in shard_names(shards) if n in asked or is_cut_plan(Path(folder) / f"{n}.json")]
+    requested = set(shard_names(shards, turnouts))
+    names = [n for n in shard_names(shards) if n in requested or is_cut_plan(Path(folder) / f"{n}.json")]
     members: dict[str, list[str]] = {name: [] for name in names}
     for turnout in sorted(configuration.ids):
         members.get(shard_of(turnout, shards), []).append(turnout)
-    texts, gone, known = {}, [], 0
+    texts, missing, n_known = {}, [], 0
     for name in names:
         path = Path(folder) / f"{name}.json"
         entries = [_entry(configuration.turnout(t), Path(raw_root)) for t in members[name]]
@@ -136,25 +136,25 @@ def _looked(configuration, raw_root, folder, shards, turnouts) -> tuple[dict[Pat
         if before and before != texts[path]:
             # files of a turnout that was removed or renamed in the configuration do not count as missing
             files = _paths(e for e in json.loads(before)["turnouts"] if e["turnout"] in configuration.rows)
-            gone += sorted(files - _paths(entries))
-            known += len(files)
+            missing += sorted(files - _paths(entries))
+            n_known += len(files)
         elif before:
-            known += sum(len(u[5]) for e in entries for u in e["units"])
-    return texts, Gone(gone, known)
+            n_known += sum(len(u[5]) for e in entries for u in e["units"])
+    return texts, MissingFiles(missing, n_known)
 
 
 def is_cut_plan(path: Path) -> bool:
     """Whether a plan file exists and is truncated."""
-    return is_cut(path, END)
+    return is_truncated(path, PLAN_END)
 
 
-def read_plan(path: Path) -> Iterator[Planned]:
+def read_plan(path: Path) -> Iterator[PlannedUnit]:
     """Units of a plan file."""
     for entry in json.loads(Path(path).read_text(encoding="utf-8"))["turnouts"]:
         for kind, label, section, campaign, note, files in entry["units"]:
             files = tuple((f"{entry['raw']}/{name}", size, time) for name, size, time in files)
             unit = Unit(entry["turnout"], kind, label, files, entry["hashes"][kind], section, campaign)
-            yield Planned(unit, note)
+            yield PlannedUnit(unit, note)
 
 
 def read_problems(path: Path) -> Iterator[tuple[str, dict]]:
@@ -182,13 +182,13 @@ def _entry(turnout: TurnoutConfig, raw_root: Path) -> dict:
 
 
 def _problem(error: ReadError) -> list[str]:
-    return [error.path, error.where, error.found, error.remedy, error.reason]
+    return [error.path, error.where, error.problem, error.remedy, error.reason]
 
 
 def _text(shard: str, entries: list[dict]) -> str:
     """One line per turnout, so that two plans can be compared by eye."""
     lines = ",\n".join(json.dumps(e, ensure_ascii=False, separators=(",", ":")) for e in entries)
-    return f'{{"shard":"{shard}","turnouts":[\n{lines}{END}'
+    return f'{{"shard":"{shard}","turnouts":[\n{lines}{PLAN_END}'
 
 
 def _paths(entries: Iterable[dict]) -> set[str]:

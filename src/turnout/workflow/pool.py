@@ -17,21 +17,21 @@ _CALL: Callable | None = None
 
 
 @dataclass(frozen=True)
-class Died:
+class LostTask:
     """A ``task`` without a result because a process of the pool died; it may have caused that or not."""
 
-    thing: Any
+    task: Any
 
 
-def in_order(call: Callable, things: Sequence, threads: int) -> Iterator:
+def map_in_order(function: Callable, tasks: Sequence, threads: int) -> Iterator:
     """``function(task)`` for each of ``tasks``, in their order; in this process if one is enough."""
-    if threads <= 1 or len(things) <= 1:
-        yield from map(call, things)
+    if threads <= 1 or len(tasks) <= 1:
+        yield from map(function, tasks)
     else:
-        yield from in_processes(call, things, threads)
+        yield from map_in_processes(function, tasks, threads)
 
 
-def in_processes(call: Callable, things: Sequence, threads: int) -> Iterator:
+def map_in_processes(function: Callable, tasks: Sequence, threads: int) -> Iterator:
     """``function(task)`` for each of ``tasks``, in their order, in child processes.
 
     If one of them dies, ``LostTask`` takes the place of the results in progress, and new processes continue with the
@@ -39,31 +39,31 @@ def in_processes(call: Callable, things: Sequence, threads: int) -> Iterator:
     have started threads by then.
     """
     global _CALL
-    _CALL, left = call, list(things)
+    _CALL, remaining = function, list(tasks)
     try:
-        while left:
+        while remaining:
             lost: list = []
-            yield from _until_one_dies(left, threads, lost)
+            yield from _run_until_death(remaining, threads, lost)
             # tasks are started in their order: the first lost ones were in progress
-            yield from map(Died, lost[:threads])
-            left = lost[threads:]
+            yield from map(LostTask, lost[:threads])
+            remaining = lost[threads:]
     finally:
         _CALL = None
 
 
-def _until_one_dies(things: Sequence, threads: int, lost: list) -> Iterator:
+def _run_until_death(tasks: Sequence, threads: int, lost: list) -> Iterator:
     """Results of the processes of one pool until one dies; tasks without a result are appended to ``lost``."""
-    n = min(threads, len(things))
+    n = min(threads, len(tasks))
     with ProcessPoolExecutor(n, multiprocessing.get_context("fork"), _end_with_parent) as pool:
-        futures = deque(_asked(pool, thing) for thing in things)
+        futures = deque(_submit(pool, task) for task in tasks)
         try:
-            for thing in things:
+            for task in tasks:
                 try:
-                    found = futures.popleft().result()
+                    result = futures.popleft().result()
                 except BrokenProcessPool:
-                    lost.append(thing)
+                    lost.append(task)
                     continue
-                yield found
+                yield result
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
 
@@ -81,16 +81,16 @@ def _end_with_parent() -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
-def _asked(pool: ProcessPoolExecutor, thing) -> Future:
+def _submit(pool: ProcessPoolExecutor, task) -> Future:
     """Future of a task; it holds an exception if the pool is broken already."""
     try:
-        return pool.submit(_call, thing)
+        return pool.submit(_call_task, task)
     except BrokenProcessPool as error:
         future: Future = Future()
         future.set_exception(error)
         return future
 
 
-def _call(thing):
+def _call_task(task):
     assert _CALL is not None, "in_processes has set it before the processes were forked"
-    return _CALL(thing)
+    return _CALL(task)

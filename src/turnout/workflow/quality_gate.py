@@ -11,15 +11,15 @@ from turnout.config.settings.fleet import FleetSettings
 from turnout.errors import TurnoutError
 from turnout.files import read_json, write_text
 from turnout.workflow.batches import read_column
-from turnout.workflow.retries import LEFT, ask_again, begun, read_postponed
+from turnout.workflow.retries import JOB_ENDED, read_postponed, request_rerun, started_units
 from turnout.workflow.state import batch_paths, state_of
 
-SAID_BEFORE = "said before; it ends when they are mended, or when enough newer units are sound by themselves"
+REPEATED_COMPLAINT = "said before; it ends when they are mended, or when enough newer units are sound by themselves"
 IN_QUARANTINE, FAULTS = ("partly", "quarantined"), ("internal_error",)
 
 
 @dataclass(frozen=True)
-class Verdict:
+class QualityGate:
     """Result of the check of all units that are new since the last one.
 
     ``complaints`` is empty if the run passes; ``unsound`` is True if one of them is about units. ``batches`` are all
@@ -35,12 +35,12 @@ class Verdict:
     damaged: tuple[Path, ...] = ()
 
     def __str__(self):
-        said = f"{self.units} units computed, {self.quarantined} with rows in quarantine"
+        summary = f"{self.units} units computed, {self.quarantined} with rows in quarantine"
         faults = f", {self.internal_errors} internal errors" if self.internal_errors else ""
-        return said + faults + "".join(f"\n{c}" for c in self.complaints)
+        return summary + faults + "".join(f"\n{c}" for c in self.complaints)
 
 
-def judge(states: Iterable[Path], configuration: Configuration, judged: Iterable[str] = ()) -> Verdict:
+def judge(states: Iterable[Path], configuration: Configuration, judged: Iterable[str] = ()) -> QualityGate:
     """Judge all batches that ``states`` name, except those already ``judged``.
 
     Complaints: a batch that cannot be read; an internal error; a unit without a result because of a fault of the
@@ -53,35 +53,35 @@ def judge(states: Iterable[Path], configuration: Configuration, judged: Iterable
     for path in batch_paths(states):
         name = f"{path.parent.parent.name}/{path.parent.name}/{path.name}"
         names.append(name)
-        for unit, turnout, found in _read(path, damaged) if name not in before else ():
-            status[unit] = found
+        for unit, turnout, unit_status in _read(path, damaged) if name not in before else ():
+            status[unit] = unit_status
             row = configuration.rows.get(turnout)
             lines[unit] = str(row.values.get("line", "")) if row else ""
     again = "the next run computes its units again"
     complaints = [f"{path} cannot be read ({why}): {again}" for path, why in damaged.items()]
     of_units = [*_faults(status), *_shares(status, lines, configuration.settings["fleet"])]
     complaints += [*_waiting(states), *of_units]
-    n_bad, n_fault = (sum(found in of for found in status.values()) for of in (IN_QUARANTINE, FAULTS))
-    return Verdict(len(status), n_bad, n_fault, tuple(complaints), tuple(names), bool(of_units), tuple(damaged))
+    n_bad, n_fault = (sum(unit_status in group for unit_status in status.values()) for group in (IN_QUARANTINE, FAULTS))
+    return QualityGate(len(status), n_bad, n_fault, tuple(complaints), tuple(names), bool(of_units), tuple(damaged))
 
 
 def _faults(status: Mapping[str, str]) -> Iterator[str]:
-    if faults := sorted(unit for unit, found in status.items() if found in FAULTS):
+    if faults := sorted(unit for unit, unit_status in status.items() if unit_status in FAULTS):
         first = f"{len(faults)} internal errors, first in {faults[0]}"
         yield f"{first}: query the quarantine table for reason_code 'internal_error', report it with the log"
 
 
 def _waiting(states: Iterable[Path]) -> Iterator[str]:
-    left: dict[str, str] = {}
+    waiting: dict[str, str] = {}
     for state in states:
-        left |= dict.fromkeys(sorted(begun(state)), LEFT) | read_postponed(state)[1]
-    if left:
-        first = f"{len(left)} units wait for the next run, first {': '.join(next(iter(left.items())))}"
+        waiting |= dict.fromkeys(sorted(started_units(state)), JOB_ENDED) | read_postponed(state)[1]
+    if waiting:
+        first = f"{len(waiting)} units wait for the next run, first {': '.join(next(iter(waiting.items())))}"
         yield f"{first}: look after the disk or the network they lie on, and the memory they take"
 
 
 def _shares(status: Mapping[str, str], lines: Mapping[str, str], limits: FleetSettings) -> Iterator[str]:
-    bad = [unit for unit, found in status.items() if found in IN_QUARANTINE]
+    bad = [unit for unit, unit_status in status.items() if unit_status in IN_QUARANTINE]
     total, wrong = Counter(lines.values()), Counter(lines[unit] for unit in bad)
     groups = [("the fleet", len(status), len(bad))]
     groups += [(f"line {line!r}", total[line], wrong[line]) for line in sorted(total) if line and len(total) > 1]
@@ -102,34 +102,36 @@ def _read(path: Path, damaged: dict[Path, str]) -> list[tuple]:
         return []
 
 
-def verdict(states: Iterable[Path], configuration: Configuration, output: Path) -> Verdict:
+def check_quality(states: Iterable[Path], configuration: Configuration, output: Path) -> QualityGate:
     """Judge the batches that ``output`` does not name yet, and write it; TurnoutError, ``output`` unchanged, if bad.
 
     Nights with too few units to be judged are added up. Bad units are judged again together with later ones, until
     there are enough newer units to be judged by themselves. Otherwise a small fleet would fail for months, until its
     bad units are a small share of all. A run over some turnouts keeps the state of the others.
     """
-    output, states, enough = Path(output), list(states), configuration.settings["fleet"].quarantine_units
+    output, states, min_units = Path(output), list(states), configuration.settings["fleet"].quarantine_units
     doubts = output.with_name("doubts.json")  # not in the output, which Snakemake restores after a failed job
-    judged, said = read_json(output, {"judged": []})["judged"], read_json(doubts, {"told": [], "doubted": []})
-    told, doubted = said["told"], said["doubted"]
-    found = newer = judge(states, configuration, [*judged, *told, *doubted])
-    if newer.units >= enough:
-        told, doubted = [*told, *doubted], []
+    judged, open_doubts = read_json(output, {"judged": []})["judged"], read_json(doubts, {"told": [], "doubted": []})
+    reported, doubted = open_doubts["told"], open_doubts["doubted"]
+    gate = newer = judge(states, configuration, [*judged, *reported, *doubted])
+    if newer.units >= min_units:
+        reported, doubted = [*reported, *doubted], []
     else:
-        found = judge(states, configuration, [*judged, *told])
-    for batch in found.damaged:
-        ask_again(state_of(batch))
-    if found.complaints:
-        again = f"\n{SAID_BEFORE}: so far there are {newer.units} of {enough}" if doubted and found.unsound else ""
-        if found.unsound:
-            doubted = doubted or [name for name in found.batches if name not in {*judged, *told}]
-            write_text(doubts, json.dumps({"told": told, "doubted": doubted}, indent=1) + "\n")
-        raise TurnoutError(f"the registry is up to date, but {found}{again}")
-    here = set(found.batches)
-    kept = [name for name in [*judged, *told] if name in here or (output.parent / name).exists()]
-    named = list(dict.fromkeys([*kept, *(found.batches if found.units >= enough else ())]))
-    content = {"units": found.units, "quarantined": found.quarantined, "judged": named}
+        gate = judge(states, configuration, [*judged, *reported])
+    for batch in gate.damaged:
+        request_rerun(state_of(batch))
+    if gate.complaints:
+        again = (
+            f"\n{REPEATED_COMPLAINT}: so far there are {newer.units} of {min_units}" if doubted and gate.unsound else ""
+        )
+        if gate.unsound:
+            doubted = doubted or [name for name in gate.batches if name not in {*judged, *reported}]
+            write_text(doubts, json.dumps({"told": reported, "doubted": doubted}, indent=1) + "\n")
+        raise TurnoutError(f"the registry is up to date, but {gate}{again}")
+    here = set(gate.batches)
+    still_present = [name for name in [*judged, *reported] if name in here or (output.parent / name).exists()]
+    named = list(dict.fromkeys([*still_present, *(gate.batches if gate.units >= min_units else ())]))
+    content = {"units": gate.units, "quarantined": gate.quarantined, "judged": named}
     write_text(output, json.dumps(content, indent=1) + "\n")
     doubts.unlink(missing_ok=True)
-    return found
+    return gate

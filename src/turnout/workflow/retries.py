@@ -24,65 +24,65 @@ from pathlib import Path
 from turnout.files import read_json, write_text
 from turnout.workflow.state import batch_folder
 
-PREFIX = "begun-"
+MARK_PREFIX = "begun-"
 # Complaint about a unit whose job ended while it was computed.
-LEFT = "its job ended while it was computed"
+JOB_ENDED = "its job ended while it was computed"
 
 
-def begun(state: Path) -> dict[str, str]:
+def started_units(state: Path) -> dict[str, str]:
     """Units that were started and have not ended, and the run that first started each; ``state`` is the state file.
 
     The unit started last comes last, for it is the most probable cause; so the others are not delayed by it.
     """
-    found = {}
-    for note in sorted(batch_folder(state).glob(f"{PREFIX}*"), key=_changed_at):
-        run, unit = _said(note)
-        if note == _note(state, unit):  # else it is truncated: the unit was not started
-            found[unit] = run
-    return found
+    units = {}
+    for mark in sorted(batch_folder(state).glob(f"{MARK_PREFIX}*"), key=_changed_at):
+        run, unit = _read_mark(mark)
+        if mark == _mark_path(state, unit):  # else it is truncated: the unit was not started
+            units[unit] = run
+    return units
 
 
 @contextmanager
-def noted(state: Path, unit: str, run: str) -> Iterator[None]:
+def mark_started(state: Path, unit: str, run: str) -> Iterator[None]:
     """Mark a unit as started until the block ends, also by an exception; an existing complete mark keeps its run.
 
     The mark is not flushed to the disk: it is for a process that dies, not for a machine that does.
     """
-    note = _note(state, unit)
-    if _said(note)[1] != unit:
-        note.parent.mkdir(parents=True, exist_ok=True)
-        note.write_text(f"{run}\n{unit}", encoding="utf-8")
+    mark = _mark_path(state, unit)
+    if _read_mark(mark)[1] != unit:
+        mark.parent.mkdir(parents=True, exist_ok=True)
+        mark.write_text(f"{run}\n{unit}", encoding="utf-8")
     else:
-        os.utime(note)
+        os.utime(mark)
     try:
         yield
     finally:
-        forget(state, unit)
+        clear_mark(state, unit)
 
 
-def forget(state: Path, unit: str) -> None:
+def clear_mark(state: Path, unit: str) -> None:
     """Remove the mark of a unit if there is one."""
-    _note(state, unit).unlink(missing_ok=True)
+    _mark_path(state, unit).unlink(missing_ok=True)
 
 
-def _said(note: Path) -> tuple[str, str]:
+def _read_mark(mark: Path) -> tuple[str, str]:
     """(run, unit) of a mark; empty texts as far as it is missing or truncated."""
     try:
-        run, _, unit = note.read_bytes().decode(errors="replace").partition("\n")
+        run, _, unit = mark.read_bytes().decode(errors="replace").partition("\n")
     except FileNotFoundError:  # its unit has ended meanwhile
         return "", ""
     return run, unit
 
 
-def _changed_at(note: Path) -> int:
+def _changed_at(mark: Path) -> int:
     try:
-        return note.stat().st_mtime_ns
+        return mark.stat().st_mtime_ns
     except FileNotFoundError:
         return 0
 
 
-def _note(state: Path, unit: str) -> Path:
-    return batch_folder(state) / f"{PREFIX}{hashlib.sha256(unit.encode()).hexdigest()[:16]}"
+def _mark_path(state: Path, unit: str) -> Path:
+    return batch_folder(state) / f"{MARK_PREFIX}{hashlib.sha256(unit.encode()).hexdigest()[:16]}"
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class Postponed:
     """A unit without a result, and the ``fault`` of the machine that caused it."""
 
     unit: str
-    met: str
+    fault: str
 
 
 def read_postponed(state: Path) -> tuple[int, dict[str, str]]:
@@ -98,7 +98,7 @@ def read_postponed(state: Path) -> tuple[int, dict[str, str]]:
 
     The number is a parameter of the job: a higher one makes it run again without a change of the plan.
     """
-    content = read_json(_path(state), {"jobs": 0, "units": {}})
+    content = read_json(_postponed_path(state), {"jobs": 0, "units": {}})
     return content["jobs"], content["units"]
 
 
@@ -109,27 +109,27 @@ def note_postponed(state: Path, units: Mapping[str, str]) -> None:
         _write(state, jobs + bool(units), units)
 
 
-def ask_again(state: Path) -> None:
+def request_rerun(state: Path) -> None:
     """Make the job of a shard run again without postponed units, for instance because a batch is damaged."""
     jobs, units = read_postponed(state)
     _write(state, jobs + 1, units)
 
 
 def _write(state: Path, jobs: int, units: Mapping[str, str]) -> None:
-    write_text(_path(state), json.dumps({"jobs": jobs, "units": dict(units)}, indent=1) + "\n")
+    write_text(_postponed_path(state), json.dumps({"jobs": jobs, "units": dict(units)}, indent=1) + "\n")
 
 
-def _path(state: Path) -> Path:
+def _postponed_path(state: Path) -> Path:
     return batch_folder(state) / "postponed.json"
 
 
-FOLDER = Path("work/attempts")
+ATTEMPTS_FOLDER = Path("work/attempts")
 
 
 def attempts(job: str) -> int:
     """Number of unfinished attempts of ``job``; -1, a new value, where the file is truncated."""
     try:
-        return int((FOLDER / job).read_text(encoding="utf-8"))
+        return int((ATTEMPTS_FOLDER / job).read_text(encoding="utf-8"))
     except FileNotFoundError:
         return 0
     except ValueError:
@@ -139,6 +139,6 @@ def attempts(job: str) -> int:
 @contextmanager
 def attempt(job: str, before: int) -> Iterator[None]:
     """Count one more attempt than ``before`` until the block ends without an exception."""
-    write_text(FOLDER / job, str(before + 1))
+    write_text(ATTEMPTS_FOLDER / job, str(before + 1))
     yield
-    write_text(FOLDER / job, str(before))
+    write_text(ATTEMPTS_FOLDER / job, str(before))

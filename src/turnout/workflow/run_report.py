@@ -8,19 +8,19 @@ import duckdb
 
 from turnout.errors import RegistryError
 from turnout.registry.database import open_registry
-from turnout.registry.generation import FILE
+from turnout.registry.generation import GENERATION_FILE
 
 LOGS = Path(".snakemake/log")
 VERDICT = Path("logs/verdict.log")
-FAILED = re.compile(
+FAILED_RULE = re.compile(
     r"^Error in rule (\w+):\n(?:    (?!jobid).*\n)*    jobid: (\d+)\n(?:    (?!log:).*\n)*(?:    log: (\S+))?", re.M
 )
-FINISHED = re.compile(r"^Finished jobid: (\d+) ", re.M)
-STOPPED = re.compile(r"^\w+(?:Errors?|Exception)(?: in (?:file|rule) .*)?:\n(.+)$", re.M)
-LONGEST = 300  # characters of a message in the report
+FINISHED_JOB = re.compile(r"^Finished jobid: (\d+) ", re.M)
+STOP_MESSAGE = re.compile(r"^\w+(?:Errors?|Exception)(?: in (?:file|rule) .*)?:\n(.+)$", re.M)
+MAX_REASON_LENGTH = 300  # characters of a message in the report
 
 
-def why(since: int = 0) -> str:
+def failure_reason(since: int = 0) -> str:
     """Reason of a failed run in a few words; "" if unknown. ``since`` is its start [ns since 1970].
 
     It is the first failed rule with its log. If only the rule verdict failed, it is the first complaint of the quality
@@ -28,37 +28,37 @@ def why(since: int = 0) -> str:
     """
     written = sorted((path.stat().st_mtime_ns, path) for path in LOGS.glob("*.snakemake.log"))
     texts = [path.read_text(encoding="utf-8", errors="replace") for time, path in written if time >= since]
-    failed = [found for text in texts for found in _failed(text)]
+    failed = [match for text in texts for match in _failed_jobs(text)]
     jobs = [(rule, log) for rule, log in failed if rule != "verdict"]
     if jobs:
         rule, log = jobs[0]
-        said = f"rule {rule} failed" + (f", see {log}" if log else "")
-        return said + (f" (and {len(failed) - 1} more)" if len(failed) > 1 else "")
+        words = f"rule {rule} failed" + (f", see {log}" if log else "")
+        return words + (f" (and {len(failed) - 1} more)" if len(failed) > 1 else "")
     if failed:
-        return _complaint()
-    stopped = [found for text in texts if (found := STOPPED.search(text))]
-    return stopped[0][1].strip()[:LONGEST] if stopped else ""
+        return _first_complaint()
+    stopped = [match for text in texts if (match := STOP_MESSAGE.search(text))]
+    return stopped[0][1].strip()[:MAX_REASON_LENGTH] if stopped else ""
 
 
-def _failed(text: str) -> list[tuple[str, str]]:
+def _failed_jobs(text: str) -> list[tuple[str, str]]:
     """(rule, log) of each job that failed and did not succeed in a later attempt, each job once."""
-    ended = set(FINISHED.findall(text))
-    return list({job: (rule, log) for rule, job, log in FAILED.findall(text) if job not in ended}.values())
+    ended = set(FINISHED_JOB.findall(text))
+    return list({job: (rule, log) for rule, job, log in FAILED_RULE.findall(text) if job not in ended}.values())
 
 
-def _complaint() -> str:
+def _first_complaint() -> str:
     """First complaint of the quality gate; in its log it follows the line of counts."""
     lines = VERDICT.read_text(encoding="utf-8").splitlines() if VERDICT.exists() else []
     if len(lines) < 2:
         return f"rule verdict failed, see {VERDICT}"
     more = f" (and {len(lines) - 2} more, see {VERDICT})" if len(lines) > 2 else ""
-    return lines[1][:LONGEST] + more
+    return lines[1][:MAX_REASON_LENGTH] + more
 
 
-REJECTED = """
+REJECTED_SQL = """
 select turnout_id || '/hammer/' || split_part(section_id, '/', -1) || '/' || split_part(campaign_id, '/', -1) as unit
 from models_current where status = 'rejected' and unit in (select unnest(?))"""
-UNUSED = """
+UNUSED_SQL = """
 with used as (
     select turnout_id from models_current where status <> 'rejected'
     union all select turnout_id from passages_current where status <> 'rejected'
@@ -68,19 +68,19 @@ from unusable() where used_at_utc is null and turnout_id not in (select turnout_
 group by turnout_id order by turnout_id"""
 
 
-def rejected(units: Collection[str], registry: Path) -> list[str]:
+def rejected_units(units: Collection[str], registry: Path) -> list[str]:
     """Those of the ``units`` whose hammer test was rejected."""
-    return [unit for (unit,) in _asked(registry, REJECTED, [list(units)])] if units else []
+    return [unit for (unit,) in _query(registry, REJECTED_SQL, [list(units)])] if units else []
 
 
 def unused_turnouts(registry: Path) -> tuple[list[str], bool]:
     """Turnouts with files but without any accepted test or passage; and whether that holds for all."""
-    rows = _asked(registry, UNUSED, [])
+    rows = _query(registry, UNUSED_SQL, [])
     return [turnout for turnout, _ in rows], any(nothing for _, nothing in rows)
 
 
-def _asked(registry: Path, sql: str, values: list) -> list[tuple]:
-    if not (registry / FILE).exists():
+def _query(registry: Path, sql: str, values: list) -> list[tuple]:
+    if not (registry / GENERATION_FILE).exists():
         return []
     try:
         with open_registry(registry) as connection:

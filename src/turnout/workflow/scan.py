@@ -9,14 +9,14 @@ from operator import attrgetter
 from pathlib import Path
 
 from turnout.config import TurnoutConfig
-from turnout.config.filename_pattern import compiled
+from turnout.config.filename_pattern import compile_pattern
 from turnout.errors import ReadError
 from turnout.records import Unit
 
-NOTES = ("campaigns.csv", "trains.csv")
+NOTE_FILES = ("campaigns.csv", "trains.csv")
 # Suffixes that upload programs give to unfinished files, and names of files for people; both are ignored.
-UNFINISHED = (".tmp", ".part", ".partial", ".crdownload", ".filepart")
-FOR_PEOPLE = ("README", "README.txt", "README.md", "Thumbs.db", "desktop.ini")
+UNFINISHED_SUFFIXES = (".tmp", ".part", ".partial", ".crdownload", ".filepart")
+IGNORED_NAMES = ("README", "README.txt", "README.md", "Thumbs.db", "desktop.ini")
 
 _name = attrgetter("name")
 
@@ -43,7 +43,7 @@ class RawFolder:
                 self._leave_out(inside, "link", "leads to nothing", "Put the file itself there, or remove the link")
             return None
         except OSError as error:
-            self._cannot(inside, "file", error)
+            self._note_unreadable(inside, "file", error)
             return None
         # allowing to read it changes neither size nor time, so until then the file is not part of a unit
         if status.st_mode & 0o444 != 0o444 and not os.access(entry.path, os.R_OK):
@@ -51,7 +51,7 @@ class RawFolder:
             return None
         return f"{self.raw}/{inside}", status.st_size, status.st_mtime_ns
 
-    def _collect(self, folder: str, inside: str, way: tuple[str, ...]) -> None:
+    def _collect(self, folder: str, inside: str, ancestors: tuple[str, ...]) -> None:
         """Collect the files of a folder and below; ``ancestors`` are the real paths of the folders that lead here."""
         try:
             with os.scandir(folder) as listing:
@@ -59,40 +59,44 @@ class RawFolder:
         except FileNotFoundError:
             return
         except OSError as error:
-            self._cannot(inside, "folder", error)
+            self._note_unreadable(inside, "folder", error)
             return
         for entry in entries:
             name = entry.name
-            if name.startswith(".") or name.endswith(UNFINISHED) or (not inside and name in (*NOTES, *FOR_PEOPLE)):
+            if (
+                name.startswith(".")
+                or name.endswith(UNFINISHED_SUFFIXES)
+                or (not inside and name in (*NOTE_FILES, *IGNORED_NAMES))
+            ):
                 continue
             try:
-                self._take(entry, inside + name, way)
+                self._take(entry, inside + name, ancestors)
             except OSError as error:
-                self._cannot(inside + name, "entry", error)
+                self._note_unreadable(inside + name, "entry", error)
 
-    def _take(self, entry: os.DirEntry, inside: str, way: tuple[str, ...]) -> None:
+    def _take(self, entry: os.DirEntry, inside: str, ancestors: tuple[str, ...]) -> None:
         if not _is_text(entry.name):
             self._leave_out(inside, "name", "is not UTF-8", "Rename it", "name_unknown")
             return
         target = os.path.realpath(entry.path) if entry.is_symlink() else ""
         if target and not _within(target, self.root):
-            said = "leads out of the raw root", "Put the file itself below the raw root", "outside_root"
-            self._leave_out(inside, "link", *said)
+            problem = "leads out of the raw root", "Put the file itself below the raw root", "outside_root"
+            self._leave_out(inside, "link", *problem)
         elif not entry.is_dir():
             self.files.append((inside, entry))
-        elif target and any(_within(passed, target) for passed in way):
+        elif target and any(_within(ancestor, target) for ancestor in ancestors):
             self._leave_out(inside, "link", "leads back to a folder that it lies in", "Remove it")
         else:
-            self._collect(entry.path, f"{inside}/", (*way, target or os.path.join(way[-1], entry.name)))
+            self._collect(entry.path, f"{inside}/", (*ancestors, target or os.path.join(ancestors[-1], entry.name)))
 
-    def _cannot(self, inside: str, where: str, error: OSError) -> None:
+    def _note_unreadable(self, inside: str, where: str, error: OSError) -> None:
         self._leave_out(
             inside, where, str(error.strerror or error), "Allow reading it, or put right what the name stands for"
         )
 
-    def _leave_out(self, inside: str, where: str, found: str, remedy: str, reason: str = "unreadable") -> None:
+    def _leave_out(self, inside: str, where: str, finding: str, remedy: str, reason: str = "unreadable") -> None:
         path = os.fsencode(f"{self.raw}/{inside}".rstrip("/")).decode(errors="backslashreplace")
-        self.problems.append(ReadError(path, where, found, remedy, reason))
+        self.problems.append(ReadError(path, where, finding, remedy, reason))
 
 
 def _is_text(name: str) -> bool:
@@ -118,7 +122,7 @@ class Scan:
 
 def scan(turnout: TurnoutConfig, raw_root: Path) -> Scan:
     """Units of one turnout from the file names in its raw folder; no file is opened."""
-    found, names = Scan(), _names(turnout)
+    result, names = Scan(), _names(turnout)
     by_unit: dict[tuple, list] = {}
     matched, unmatched = set(), []
     folder = RawFolder(raw_root, turnout.raw)
@@ -126,8 +130,8 @@ def scan(turnout: TurnoutConfig, raw_root: Path) -> Scan:
         for kind, expression in names:
             if match := expression.fullmatch(inside):
                 matched.add(kind)
-                if wrong := _no_time(match):
-                    found.problems.append(ReadError(f"{turnout.raw}/{inside}", "file name", *wrong, "name_unknown"))
+                if wrong := _time_problem(match):
+                    result.problems.append(ReadError(f"{turnout.raw}/{inside}", "file name", *wrong, "name_unknown"))
                     break
                 by_unit.setdefault(_label(kind, match, inside, turnout), []).append((inside, entry))
                 break
@@ -136,9 +140,9 @@ def scan(turnout: TurnoutConfig, raw_root: Path) -> Scan:
     for (kind, label, section, campaign), files in sorted(by_unit.items(), key=lambda item: item[0][:2]):
         entries = tuple(sorted(e for e in [folder.stat(*file) for file in files] if e))
         if entries:
-            found.units.append(Unit(turnout.id, kind, label, entries, turnout.hashes[kind], section, campaign))
-    found.problems += [*folder.problems, *_strangers(turnout, unmatched, matched, names)]
-    return found
+            result.units.append(Unit(turnout.id, kind, label, entries, turnout.hashes[kind], section, campaign))
+    result.problems += [*folder.problems, *_unmatched_files(turnout, unmatched, matched, names)]
+    return result
 
 
 def unit_id(unit: Unit) -> str:
@@ -153,9 +157,11 @@ def unit_id(unit: Unit) -> str:
 def _names(turnout: TurnoutConfig) -> list[tuple]:
     names = []
     if turnout.hammer:
-        names.append(("hammer", compiled(turnout.hammer.files, "hammer", tuple(s.label for s in turnout.sections))))
+        names.append(
+            ("hammer", compile_pattern(turnout.hammer.files, "hammer", tuple(s.label for s in turnout.sections)))
+        )
     if turnout.passages:
-        names.append(("passage", compiled(turnout.passages.files, "passages")))
+        names.append(("passage", compile_pattern(turnout.passages.files, "passages")))
     return names
 
 
@@ -168,22 +174,25 @@ def _label(kind, match, inside, turnout) -> tuple:
     return kind, inside.removeprefix(fixed), None, None
 
 
-def _no_time(match) -> tuple[str, str] | None:
+def _time_problem(match) -> tuple[str, str] | None:
     """Problem of the day or time in a file name, and its remedy; None if it is a valid date.
 
     >>> import re
-    >>> _no_time(re.fullmatch("(?P<campaign>.*)", "2024-13-45"))[0]
+    >>> _time_problem(re.fullmatch("(?P<campaign>.*)", "2024-13-45"))[0]
     "'2024-13-45' is no day of the calendar"
     """
-    for group, form, said in (("campaign", "%Y-%m-%d", "day"), ("time", "%Y%m%dT%H%M%SZ", "time")):
+    for group, form, quantity in (("campaign", "%Y-%m-%d", "day"), ("time", "%Y%m%dT%H%M%SZ", "time")):
         text = match[group] if group in match.re.groupindex else None
-        if text is not None and not _in_the_calendar(text, form):
-            return f"{text!r} is no {said} of the calendar", "Rename it after the day on which it was measured, in UTC"
+        if text is not None and not _is_calendar_time(text, form):
+            return (
+                f"{text!r} is no {quantity} of the calendar",
+                "Rename it after the day on which it was measured, in UTC",
+            )
     return None
 
 
 @lru_cache(maxsize=10_000)
-def _in_the_calendar(text: str, form: str) -> bool:
+def _is_calendar_time(text: str, form: str) -> bool:
     """Whether a text is a valid time. Cached: a network has 140,000 files, but a few hundred days."""
     try:
         datetime.strptime(text, form)
@@ -192,13 +201,15 @@ def _in_the_calendar(text: str, form: str) -> bool:
     return True
 
 
-def _strangers(turnout, unmatched: list[str], matched: set, names: Iterable) -> Iterator[ReadError]:
+def _unmatched_files(turnout, unmatched: list[str], matched: set, names: Iterable) -> Iterator[ReadError]:
     patterns = {"hammer": turnout.hammer, "passage": turnout.passages}
-    said = " or ".join(repr(patterns[kind].files) for kind, _ in names)
+    pattern_words = " or ".join(repr(patterns[kind].files) for kind, _ in names)
     for inside in unmatched:
-        remedy = f"Rename it after {said}, or add its section to the layout {turnout.layout!r}"
-        found = "its name follows no pattern of the layout"
-        yield ReadError(f"{turnout.raw}/{inside}", "file name", found, remedy, "name_unknown")
+        remedy = f"Rename it after {pattern_words}, or add its section to the layout {turnout.layout!r}"
+        finding = "its name follows no pattern of the layout"
+        yield ReadError(f"{turnout.raw}/{inside}", "file name", finding, remedy, "name_unknown")
     if not matched:
-        remedy = f"Put files named like {said} there, or correct 'raw' in turnouts.tsv or 'files' in the layout"
+        remedy = (
+            f"Put files named like {pattern_words} there, or correct 'raw' in turnouts.tsv or 'files' in the layout"
+        )
         yield ReadError(turnout.raw, "folder", "no file matches a pattern of the layout", remedy, "nothing_found")

@@ -11,29 +11,37 @@ from datetime import datetime
 from pathlib import Path
 
 from turnout.config import Configuration
-from turnout.errors import passing
+from turnout.errors import is_transient
 from turnout.workflow.batches import UnitResult
-from turnout.workflow.duplicate_files import copies, key_without, moved, originals, with_copies_said, withdrawn, without
-from turnout.workflow.guard import died_of, guarded
+from turnout.workflow.duplicate_files import (
+    copies,
+    key_without,
+    moved_units,
+    originals,
+    with_copy_rows,
+    withdrawal,
+    without_copies,
+)
+from turnout.workflow.guard import compute_guarded, death_rows
 from turnout.workflow.ledger import Ledger
-from turnout.workflow.plan import Planned, read_plan
-from turnout.workflow.pool import Died, in_order, in_processes
-from turnout.workflow.retries import Postponed, begun, forget, note_postponed, noted, read_postponed
+from turnout.workflow.plan import PlannedUnit, read_plan
+from turnout.workflow.pool import LostTask, map_in_order, map_in_processes
+from turnout.workflow.retries import Postponed, clear_mark, mark_started, note_postponed, read_postponed, started_units
 from turnout.workflow.scan import unit_id
-from turnout.workflow.state import locked
-from turnout.workflow.tasks import Stage, Task, Tasks, contents_of, key_of, named, short
+from turnout.workflow.state import state_lock
+from turnout.workflow.tasks import Stage, Task, Tasks, contents_of, key_of, load_function, short_contents
 
 # Seconds between two lines of progress in a log.
-PAUSE = 30.0
+LOG_INTERVAL = 30.0
 
 
 class Progress:
     """Shows how many units are done: a bar on a terminal, else a line every ``LOG_INTERVAL`` seconds."""
 
     def __init__(self, name: str, total: int, stream=None):
-        self.name, self.total, self.done, self.quarantined = name, total, 0, 0
+        self.name, self.total, self.n_done, self.quarantined = name, total, 0, 0
         self.stream = stream or sys.stderr
-        self.next_line = time.monotonic() + PAUSE
+        self.next_line = time.monotonic() + LOG_INTERVAL
         self.bar = None
         if total and self.stream.isatty():
             from tqdm import tqdm
@@ -42,14 +50,14 @@ class Progress:
 
     def step(self, quarantined: bool) -> None:
         """One more unit is done."""
-        self.done += 1
+        self.n_done += 1
         self.quarantined += quarantined
         if self.bar:
             self.bar.update()
             self.bar.set_postfix(quarantined=self.quarantined)
         elif time.monotonic() >= self.next_line:
-            self.next_line = time.monotonic() + PAUSE
-            print(f"{self.name}: {self.done} of {self.total} units", file=self.stream, flush=True)
+            self.next_line = time.monotonic() + LOG_INTERVAL
+            print(f"{self.name}: {self.n_done} of {self.total} units", file=self.stream, flush=True)
 
     def close(self) -> None:
         """Close the bar if there is one."""
@@ -58,7 +66,7 @@ class Progress:
 
 
 LOG = logging.getLogger("turnout.workflow")
-DIED = "the process died that computed it"
+PROCESS_DIED = "the process died that computed it"
 # A result, and the stamp and the contents that it was computed from.
 Computed = tuple[UnitResult, str, str]
 
@@ -72,7 +80,7 @@ class Summary:
     """
 
     shard: str
-    known: int = 0
+    n_known: int = 0
     processed: int = 0
     quarantined: int = 0
     internal_errors: int = 0
@@ -81,12 +89,12 @@ class Summary:
     postponed: int = 0
 
     def __str__(self):
-        said = f"{self.shard}: {self.known} known, {self.processed} processed, {self.quarantined} quarantined"
+        words = f"{self.shard}: {self.n_known} known, {self.processed} processed, {self.quarantined} quarantined"
         more = {
             "internal errors": self.internal_errors, "postponed": self.postponed,
             "vanished": self.vanished, "waiting for a plan": self.stale,
         }  # fmt: skip
-        return said + "".join(f", {n} {what}" for what, n in more.items() if n)
+        return words + "".join(f", {n} {what}" for what, n in more.items() if n)
 
 
 def run_shard(
@@ -120,9 +128,9 @@ def run_shard(
     launched : datetime, optional
         Start of the run that this job belongs to; a further attempt in the same run counts as the first one.
     """
-    with locked(state):
+    with state_lock(state):
         run = _Run(Path(state), stage, configuration, Path(raw_root), threads, strict, launched)
-        planned = named(stage.gather)(plan, configuration) if stage.gather else read_plan(plan)
+        planned = load_function(stage.gather)(plan, configuration) if stage.gather else read_plan(plan)
         return run.bring_up(list(planned), only)
 
 
@@ -139,9 +147,9 @@ class _Run:
         self.state = self.ledger.state
         self.tasks = Tasks(self.state, stage, configuration, raw_root)
         self.postponed: dict[str, str] = {}
-        self.suspects = begun(path)
+        self.suspects = started_units(path)
 
-    def bring_up(self, planned: list[Planned], only: Sequence[str] | None) -> Summary:
+    def bring_up(self, planned: list[PlannedUnit], only: Sequence[str] | None) -> Summary:
         """Compute missing units, write batches and state."""
         wanted = {unit_id(p.unit): p for p in planned if p.unit.kind == self.stage.kind}
         due, stale = self.tasks.due(wanted, only)
@@ -151,35 +159,37 @@ class _Run:
         vanished = self._withdraw_vanished(wanted)
         n_postponed = self._note_postponed(wanted, {_name(task) for task in due})
         self.ledger.checkpoint()
-        done, faults = statuses.total(), statuses["internal_error"]
+        n_done, faults = statuses.total(), statuses["internal_error"]
         return Summary(
-            self.name, len(wanted), done, done - statuses["ok"], faults, vanished, stale, n_postponed,
+            self.name, len(wanted), n_done, n_done - statuses["ok"], faults, vanished, stale, n_postponed,
         )  # fmt: skip
 
     def _clear_notes(self, due: list[Task], only: Sequence[str] | None) -> None:
         """Clear the marks of started units that need no computation any more."""
-        asked = {name for name in self.suspects if only is None or name.split("/", 1)[0] in only}
-        for name in asked - {_name(task) for task in due}:
-            forget(self.path, name)
+        requested = {name for name in self.suspects if only is None or name.split("/", 1)[0] in only}
+        for name in requested - {_name(task) for task in due}:
+            clear_mark(self.path, name)
             del self.suspects[name]
 
     def _compute_all(self, tasks: list[Task]) -> Counter[str]:
         """Compute the tasks and store every result; returns the number of units by status."""
         if tasks:
             # import it before processes are forked, or each of them would import it again
-            self.compute = named(self.stage.compute)
+            self.compute = load_function(self.stage.compute)
         self.progress, self.statuses = Progress(self.name, len(tasks)), Counter[str]()
-        asked = {_name(task): task for task in tasks}
-        alone = [asked[name] for name in self.suspects if name in asked]
-        each = in_processes if alone else in_order  # a process that has computed may have threads, no fork then
+        tasks_by_name = {_name(task): task for task in tasks}
+        tasks_alone = [tasks_by_name[name] for name in self.suspects if name in tasks_by_name]
+        map_tasks = (
+            map_in_processes if tasks_alone else map_in_order
+        )  # a process that has computed may have threads, no fork then
         try:
-            for found in each(self._compute, [t for t in tasks if _name(t) not in self.suspects], self.threads):
-                if isinstance(found, Died):
-                    alone.append(found.thing)
+            for computed in map_tasks(self._compute, [t for t in tasks if _name(t) not in self.suspects], self.threads):
+                if isinstance(computed, LostTask):
+                    tasks_alone.append(computed.task)
                 else:
-                    self._keep(found)
+                    self._keep(computed)
             self.ledger.checkpoint()
-            for task in alone:
+            for task in tasks_alone:
                 self._compute_alone(task)
                 self.ledger.checkpoint()
         finally:
@@ -194,68 +204,70 @@ class _Run:
         """
         name = _name(task)
         LOG.warning("%s: a process or a job died while it was computed: it is computed by itself", name)
-        (found,) = in_processes(self._compute, [task], 1)
-        if not isinstance(found, Died):
-            self._keep(found)
+        (computed,) = map_in_processes(self._compute, [task], 1)
+        if not isinstance(computed, LostTask):
+            self._keep(computed)
         elif self.strict:
-            raise RuntimeError(f"{name}: {DIED}")
+            raise RuntimeError(f"{name}: {PROCESS_DIED}")
         elif name not in self.suspects or (self.launched and self.suspects[name] == self.launched):
-            self._keep(Postponed(name, DIED))
+            self._keep(Postponed(name, PROCESS_DIED))
         else:
-            self._keep(found := _for_now(self._guarded(task, died_of)))
+            self._keep(computed := _provisional(self._guarded(task, death_rows)))
             self.ledger.checkpoint()  # before its mark is cleared
-            if not isinstance(found, Postponed):
-                forget(self.path, name)
+            if not isinstance(computed, Postponed):
+                clear_mark(self.path, name)
 
-    def _keep(self, found: Computed | Postponed) -> None:
-        if isinstance(found, Postponed):
-            self.postponed[found.unit] = found.met
+    def _keep(self, computed: Computed | Postponed) -> None:
+        if isinstance(computed, Postponed):
+            self.postponed[computed.unit] = computed.fault
             self.progress.step(False)
             return
-        result, stamp, contents = found
+        result, stamp, contents = computed
         self.statuses[result.status] += 1
         self.progress.step(result.status != "ok")
         self.ledger.keep(result, stamp, contents)
 
     def _compute(self, task: Task) -> Computed | Postponed:
-        with noted(self.path, _name(task), self.launched):
+        with mark_started(self.path, _name(task), self.launched):
             return self._guarded(task, self.compute)
 
     def _guarded(self, task: Task, compute: Callable) -> Computed | Postponed:
         planned, unit = task.planned, task.planned.unit
-        more = {"context": task.context} if self.stage.context else {}
+        extra = {"context": task.context} if self.stage.context else {}
         try:
             contents = contents_of(planned, self.raw_root)
             key = key_without(key_of(planned, contents), task.copied)
-            rest = without(unit, task.copied)
-            compute = compute if rest.files else _no_rows
-            result = guarded(compute, rest, task.turnout, self.raw_root, key, self.stage.algo, self.strict, **more)
+            own_unit = without_copies(unit, task.copied)
+            compute = compute if own_unit.files else _no_rows
+            result = compute_guarded(
+                compute, own_unit, task.turnout, self.raw_root, key, self.stage.algo, self.strict, **extra
+            )
         except (OSError, MemoryError) as error:
-            if self.strict or not passing(error):
+            if self.strict or not is_transient(error):
                 raise
             LOG.warning("%s: left for the next run\n%s", unit_id(unit), traceback.format_exc())
             return Postponed(unit_id(unit), f"{type(error).__name__}: {error}")
         elsewhere = {k for k, (path, *_) in enumerate(unit.files) if path in task.copied}
-        return with_copies_said(result, unit, task.copied), task.stamp, short(contents, elsewhere)
+        return with_copy_rows(result, unit, task.copied), task.stamp, short_contents(contents, elsewhere)
 
     def _note_postponed(self, wanted: Container[str], tried: Container[str]) -> int:
         """Write the postponed units and return their number; those of turnouts that did not take part stay."""
         before = read_postponed(self.path)[1]
-        left = {unit: met for unit, met in before.items() if unit in wanted and unit not in tried}
-        note_postponed(self.path, left | self.postponed)
+        postponed = {unit: fault for unit, fault in before.items() if unit in wanted and unit not in tried}
+        note_postponed(self.path, postponed | self.postponed)
         return len(self.postponed)
 
-    def _set_copies_aside(self, wanted: dict[str, Planned], only: Sequence[str] | None) -> None:
+    def _set_copies_aside(self, wanted: dict[str, PlannedUnit], only: Sequence[str] | None) -> None:
         """Compute units again that contain copies of files of other units of their turnout, without these files."""
         if self.stage.gather:
             return
-        asked = {name for name, p in wanted.items() if only is None or p.unit.turnout in only}
-        units = {name: known for name, known in self.state.units.items() if name in asked}
-        again = []
+        requested = {name for name, p in wanted.items() if only is None or p.unit.turnout in only}
+        units = {name: entry for name, entry in self.state.units.items() if name in requested}
+        tasks = []
         for name, counts_in in copies(units).items():
             if self.tasks.is_known(name, wanted) and (task := self.tasks.task(wanted[name])):
-                again.append(replace(task, copied=originals(name, counts_in, units, wanted)))
-        self._compute_all(again)
+                tasks.append(replace(task, copied=originals(name, counts_in, units, wanted)))
+        self._compute_all(tasks)
 
     def _withdraw_vanished(self, wanted: Collection[str]) -> int:
         """Number of units whose files are all gone; their rows stay.
@@ -265,20 +277,20 @@ class _Run:
         gathers its own units plans only some of them, so none of its units counts as vanished.
         """
         units = self.state.units
-        gone = [name for name in units if name not in wanted]
-        left = {name for name in gone if units[name].status == "quarantined"}
-        if gone and not self.stage.gather:
-            left.update(moved(units, wanted))
-        for name in sorted(left):
-            self.ledger.keep(withdrawn(name, units[name]), "")
-        return 0 if self.stage.gather else len(gone)
+        missing = [name for name in units if name not in wanted]
+        to_withdraw = {name for name in missing if units[name].status == "quarantined"}
+        if missing and not self.stage.gather:
+            to_withdraw.update(moved_units(units, wanted))
+        for name in sorted(to_withdraw):
+            self.ledger.keep(withdrawal(name, units[name]), "")
+        return 0 if self.stage.gather else len(missing)
 
 
-def _for_now(found: Computed | Postponed) -> Computed | Postponed:
+def _provisional(computed: Computed | Postponed) -> Computed | Postponed:
     """A result whose key matches no content, so that touching a file repeats it, perhaps on another machine."""
-    if isinstance(found, Postponed):
-        return found
-    return replace(found[0], key=f"{DIED} {found[0].key}"), *found[1:]
+    if isinstance(computed, Postponed):
+        return computed
+    return replace(computed[0], key=f"{PROCESS_DIED} {computed[0].key}"), *computed[1:]
 
 
 def _name(task: Task) -> str:

@@ -10,19 +10,19 @@ from pathlib import Path
 from filelock import FileLock
 
 from turnout.errors import TurnoutError
-from turnout.files import is_cut, write_text
-from turnout.workflow.batches import is_sound, read_column
+from turnout.files import is_truncated, write_text
+from turnout.workflow.batches import is_readable, read_column
 
 LOG = logging.getLogger("turnout.workflow")
 
 # Status of units whose rows count, and of a unit whose files are gone and which has no rows.
 WITH_ROWS, VANISHED = ("ok", "partly"), "vanished"
-ELSEWHERE = "-"  # before the content of a file that counts in another unit
-END = "\n}}\n"
+ELSEWHERE_MARK = "-"  # before the content of a file that counts in another unit
+STATE_END = "\n}}\n"
 
 
 @dataclass(frozen=True)
-class Known:
+class UnitState:
     """State of one unit.
 
     ``stamp`` is the digest of configuration, notes, and names, sizes and times of its files; ``key`` the same with
@@ -38,32 +38,32 @@ class Known:
     contents: str = ""
 
     @property
-    def held(self) -> list[str]:
+    def all_contents(self) -> list[str]:
         """Content hashes of all its files, in their order."""
-        return [content.removeprefix(ELSEWHERE) for content in self.contents.split()]
+        return [content.removeprefix(ELSEWHERE_MARK) for content in self.contents.split()]
 
     @property
-    def elsewhere(self) -> list[str]:
+    def contents_elsewhere(self) -> list[str]:
         """Content hashes of the files that count in other units."""
-        return [c.removeprefix(ELSEWHERE) for c in self.contents.split() if c.startswith(ELSEWHERE)]
+        return [c.removeprefix(ELSEWHERE_MARK) for c in self.contents.split() if c.startswith(ELSEWHERE_MARK)]
 
     @property
-    def counted(self) -> list[str]:
+    def own_contents(self) -> list[str]:
         """Content hashes of the files that its rows come from."""
-        return [content for content in self.contents.split() if not content.startswith(ELSEWHERE)]
+        return [content for content in self.contents.split() if not content.startswith(ELSEWHERE_MARK)]
 
 
 @dataclass
 class State:
     """State of one shard: its units by name, and its ``batches`` in the order of writing."""
 
-    units: dict[str, Known] = field(default_factory=dict)
+    units: dict[str, UnitState] = field(default_factory=dict)
     batches: list[str] = field(default_factory=list)
 
-    def forget(self, batches: Collection[str]) -> int:
+    def drop_batches(self, batches: Collection[str]) -> int:
         """Remove ``batches`` and their units, which then count as new; returns the number of units."""
         before = len(self.units)
-        self.units = {unit: known for unit, known in self.units.items() if known.batch not in batches}
+        self.units = {unit: entry for unit, entry in self.units.items() if entry.batch not in batches}
         self.batches = [b for b in self.batches if b not in batches]
         return before - len(self.units)
 
@@ -71,7 +71,7 @@ class State:
         """Write the state in one step; from then on the results of its batches count."""
         units = {u: [k.stamp, k.key, k.algo, k.status, k.batch, k.contents] for u, k in sorted(self.units.items())}
         lines = ",\n".join(f"{json.dumps(u, ensure_ascii=False)}:{json.dumps(v)}" for u, v in units.items())
-        write_text(path, f'{{"batches":{json.dumps(self.batches)},"units":{{\n{lines}{END}')
+        write_text(path, f'{{"batches":{json.dumps(self.batches)},"units":{{\n{lines}{STATE_END}')
 
 
 def load_state(path: Path) -> State:
@@ -84,7 +84,7 @@ def load_state(path: Path) -> State:
         return _from_batches(batch_folder(path))
     try:
         content = json.loads(Path(path).read_text(encoding="utf-8"))
-        units = {unit: Known(*values) for unit, values in content["units"].items()}
+        units = {unit: UnitState(*values) for unit, values in content["units"].items()}
         return State(units, list(content["batches"]))
     except FileNotFoundError:
         return State()
@@ -95,7 +95,7 @@ def load_state(path: Path) -> State:
 
 def is_cut_state(path: Path) -> bool:
     """Whether a state file exists and is truncated."""
-    return is_cut(path, END)
+    return is_truncated(path, STATE_END)
 
 
 def _from_batches(folder: Path) -> State:
@@ -106,13 +106,13 @@ def _from_batches(folder: Path) -> State:
     """
     written = sorted(folder.glob("batch-*.parquet"), key=lambda path: (path.stat().st_mtime_ns, path.name))
     state = State(batches=[path.name for path in written])
-    for path in filter(is_sound, written):
+    for path in filter(is_readable, written):
         rows = read_column(path, "unit", "key", "algo", "status")
-        state.units |= {unit: Known("", key, algo, status, path.name) for unit, key, algo, status in rows}
+        state.units |= {unit: UnitState("", key, algo, status, path.name) for unit, key, algo, status in rows}
     return state
 
 
-def locked(state: Path) -> FileLock:
+def state_lock(state: Path) -> FileLock:
     """Lock for writing a state."""
     state.parent.mkdir(parents=True, exist_ok=True)
     return FileLock(state.parent / f".{state.stem}.lock")

@@ -17,38 +17,38 @@ from turnout.content import sha256_of
 from turnout.errors import ConfigError
 from turnout.records import Unit
 from turnout.workflow.duplicate_files import Original, originals_of
-from turnout.workflow.plan import Planned
+from turnout.workflow.plan import PlannedUnit
 from turnout.workflow.scan import unit_id
-from turnout.workflow.state import ELSEWHERE, State
+from turnout.workflow.state import ELSEWHERE_MARK, State
 
 
-def stamp_of(planned: Planned) -> str:
+def stamp_of(planned: PlannedUnit) -> str:
     """Digest of configuration, notes, and name, size and time of each file; no file is opened."""
     unit = planned.unit
     return digest([unit.config_hash, planned.note, unit.files])
 
 
-def contents_of(planned: Planned, raw_root: Path) -> list[str | None]:
+def contents_of(planned: PlannedUnit, raw_root: Path) -> list[str | None]:
     """sha256 of each file of a unit, None for a missing one; OSError where one cannot be read."""
     return [_content(os.path.join(raw_root, path)) for path, *_ in planned.unit.files]
 
 
-def key_of(planned: Planned, contents: Sequence[str | None]) -> str:
+def key_of(planned: PlannedUnit, contents: Sequence[str | None]) -> str:
     """Digest of configuration, notes, and name and content of each file."""
     unit = planned.unit
     files = [[path, content] for (path, *_), content in zip(unit.files, contents, strict=True)]
     return digest([unit.config_hash, planned.note, files])
 
 
-def short(contents: Sequence[str | None], elsewhere: Container[int] = ()) -> str:
+def short_contents(contents: Sequence[str | None], elsewhere: Container[int] = ()) -> str:
     """Text of the contents for a state: the first 16 digits of each hash; "" if a file was missing.
 
     ``elsewhere`` are the indices of files that count in other units.
 
-    >>> short(["e3b0c44298fc1c149afbf4c8996fb924", "0123456789abcdef0123456789abcdef"], {1})
+    >>> short_contents(["e3b0c44298fc1c149afbf4c8996fb924", "0123456789abcdef0123456789abcdef"], {1})
     'e3b0c44298fc1c14 -0123456789abcdef'
     """
-    marks = [ELSEWHERE if k in elsewhere else "" for k in range(len(contents))]
+    marks = [ELSEWHERE_MARK if k in elsewhere else "" for k in range(len(contents))]
     return " ".join(mark + c[:16] for mark, c in zip(marks, contents) if c) if all(contents) else ""
 
 
@@ -77,10 +77,10 @@ class Stage:
     compute: Callable | str
     algo: str
     context: Callable[[str, Mapping], tuple[Token, object]] | str | None = None
-    gather: Callable[[Path, Configuration], Iterable[Planned]] | str | None = None
+    gather: Callable[[Path, Configuration], Iterable[PlannedUnit]] | str | None = None
 
 
-def named(function: Callable | str) -> Callable:
+def load_function(function: Callable | str) -> Callable:
     """Function from its name "package.module:name"; a user's own module must be in the folder of the run."""
     if callable(function):
         return function
@@ -90,7 +90,7 @@ def named(function: Callable | str) -> Callable:
     return getattr(import_module(module), name)
 
 
-def with_token(planned: Planned, token: Token) -> Planned:
+def with_token(planned: PlannedUnit, token: Token) -> PlannedUnit:
     """The planned unit, with the token of the stage's context appended to its note."""
     return replace(planned, note=planned.note + (token if isinstance(token, str) else token(planned.unit)))
 
@@ -99,7 +99,7 @@ def with_token(planned: Planned, token: Token) -> Planned:
 class Task:
     """A unit to compute with its inputs; files in ``copied`` are excluded, because they count in other units."""
 
-    planned: Planned
+    planned: PlannedUnit
     turnout: TurnoutConfig
     stamp: str
     context: object = None
@@ -114,22 +114,22 @@ class Tasks:
         self._contexts: dict[str, tuple[Token, object]] = {}
         self._turnouts: dict[str, TurnoutConfig | None] = {}
 
-    def due(self, wanted: Mapping[str, Planned], only: Sequence[str] | None) -> tuple[list[Task], int]:
+    def due(self, wanted: Mapping[str, PlannedUnit], only: Sequence[str] | None) -> tuple[list[Task], int]:
         """Tasks of all units to compute, sorted, and the number of units that wait for a new plan."""
         due, stale = [], 0
         for name in sorted(wanted):
             if only is not None and wanted[name].unit.turnout not in only:
                 continue
-            if self.is_known(name, wanted) and self._still_a_copy(name, wanted):
+            if self.is_known(name, wanted) and self._has_same_originals(name, wanted):
                 continue
             task = self.task(wanted[name])
             if task is None:
                 stale += 1
-            elif not self._same_content(task):
+            elif not self._has_same_content(task):
                 due.append(task)
         return due, stale
 
-    def task(self, planned: Planned) -> Task | None:
+    def task(self, planned: PlannedUnit) -> Task | None:
         """The task of one unit; None if the configuration has changed since the plan."""
         unit = planned.unit
         turnout = self._turnout(unit.turnout)
@@ -139,31 +139,31 @@ class Tasks:
         planned = with_token(planned, token)
         return Task(planned, turnout, stamp_of(planned), value)
 
-    def is_known(self, name: str, wanted: Mapping[str, Planned]) -> bool:
+    def is_known(self, name: str, wanted: Mapping[str, PlannedUnit]) -> bool:
         """Whether the state has the result of the unit as it is planned now."""
-        known = self.state.units.get(name)
-        return known is not None and (known.stamp, known.algo) == (self._stamp(wanted[name]), self.stage.algo)
+        entry = self.state.units.get(name)
+        return entry is not None and (entry.stamp, entry.algo) == (self._stamp(wanted[name]), self.stage.algo)
 
-    def _stamp(self, planned: Planned) -> str:
+    def _stamp(self, planned: PlannedUnit) -> str:
         return stamp_of(with_token(planned, self._context(planned.unit.turnout)[0]))
 
-    def _still_a_copy(self, name: str, wanted: Mapping[str, Planned]) -> bool:
+    def _has_same_originals(self, name: str, wanted: Mapping[str, PlannedUnit]) -> bool:
         """True for a unit without copies, and for one whose originals have not changed."""
         return all(o in wanted and self.is_known(o, wanted) for o in originals_of(self.state.units[name]))
 
     def _context(self, turnout: str) -> tuple[Token, object]:
         if turnout not in self._contexts:
-            self._contexts[turnout] = self._asked(turnout)
+            self._contexts[turnout] = self._compute_context(turnout)
         return self._contexts[turnout]
 
-    def _asked(self, turnout: str) -> tuple[Token, object]:
+    def _compute_context(self, turnout: str) -> tuple[Token, object]:
         if not self.stage.context:
             return "", None
         try:
             settings = self.configuration.turnout(turnout).settings
         except ConfigError:  # its units wait for a plan
             return "", None
-        return named(self.stage.context)(turnout, settings)
+        return load_function(self.stage.context)(turnout, settings)
 
     def _turnout(self, turnout: str) -> TurnoutConfig | None:
         """Configuration with the notes of the raw folder; None for a turnout that is no longer configured."""
@@ -174,16 +174,16 @@ class Tasks:
                 self._turnouts[turnout] = None
         return self._turnouts[turnout]
 
-    def _same_content(self, task: Task) -> bool:
+    def _has_same_content(self, task: Task) -> bool:
         """Whether only file times changed; the state then gets the new stamp."""
         name = unit_id(task.planned.unit)
-        known = self.state.units.get(name)
-        if known is None or known.algo != self.stage.algo:
+        entry = self.state.units.get(name)
+        if entry is None or entry.algo != self.stage.algo:
             return False
         try:
             contents = contents_of(task.planned, self.raw_root)
         except OSError:  # reported when the unit is computed
             return False
-        if same := known.key == key_of(task.planned, contents):
-            self.state.units[name] = replace(known, stamp=task.stamp, contents=short(contents))
+        if same := entry.key == key_of(task.planned, contents):
+            self.state.units[name] = replace(entry, stamp=task.stamp, contents=short_contents(contents))
         return same

@@ -11,7 +11,7 @@ from turnout.config import load_configuration
 from turnout.config.acknowledgements import read_acknowledgements
 from turnout.config.campaign_notes import read_campaigns, read_trains
 from turnout.config.events import read_events
-from turnout.config.turnouts_table import append_csv, append_tsv, taken_back
+from turnout.config.turnouts_table import append_csv, append_tsv, restore_on_error
 
 HEADER = "turnout,section,date,kind,resets,note\n"
 
@@ -195,7 +195,7 @@ def test_a_table_is_as_it_was_where_there_is_no_room_for_one_more_row(tmp_path, 
     path.write_text("\n".join(rows) + "\n")
     before = path.read_bytes()
     assert len(before) > 8192
-    with pytest.raises(OSError, match="too large"), full_disk(), taken_back(path):
+    with pytest.raises(OSError, match="too large"), full_disk(), restore_on_error(path):
         append(path, {"turnout": "t1", "layout": "main"}, columns)
     assert path.read_bytes() == before
     assert [p.name for p in tmp_path.iterdir()] == [name]
@@ -208,7 +208,7 @@ def test_a_row_that_is_taken_back_leaves_mode_link_and_bytes(tmp_path):
     path.chmod(0o640)
     link.symlink_to(path)
     before = path.read_bytes()
-    with pytest.raises(KeyError), taken_back(link):
+    with pytest.raises(KeyError), restore_on_error(link):
         append_csv(link, {"turnout": "t2"}, ("turnout", "section"))
         assert path.read_bytes() == before + b"\r\nt2,\r\n"
         raise KeyError
@@ -217,7 +217,7 @@ def test_a_row_that_is_taken_back_leaves_mode_link_and_bytes(tmp_path):
 
 
 def test_a_new_table_that_is_taken_back_is_gone(tmp_path):
-    with pytest.raises(KeyError), taken_back(tmp_path / "events.csv"):
+    with pytest.raises(KeyError), restore_on_error(tmp_path / "events.csv"):
         append_csv(tmp_path / "events.csv", {"turnout": "t2"}, ("turnout", "section"))
         assert (tmp_path / "events.csv").read_text() == "turnout,section\nt2,\n"
         raise KeyError

@@ -8,14 +8,14 @@ from ruamel.yaml import YAML
 
 from turnout.cli.main import main
 from turnout.config import load_configuration
-from turnout.config.generate import generated
+from turnout.config.generate import generate_files
 from turnout.config.settings import parts
 from turnout.readers.formats import FORMATS
 from turnout.units import to_si
 
 
 def test_generated_files_are_up_to_date(repository):
-    for path, text in generated(repository / "config", repository / "docs", defaults=True).items():
+    for path, text in generate_files(repository / "config", repository / "docs", defaults=True).items():
         assert path.read_text(encoding="utf-8") == text, f"{path}: run `turnout config generate --defaults`"
 
 
@@ -51,9 +51,9 @@ def test_the_schemas_refuse_what_the_program_refuses(repository, change):
 
 def test_a_changed_value_is_kept(tmp_path, repository):
     (tmp_path / "config.yaml").write_text("fleet: {shards: 64}\n")
-    text = generated(tmp_path, tmp_path)[tmp_path / "config.yaml"]
+    text = generate_files(tmp_path, tmp_path)[tmp_path / "config.yaml"]
     assert "\n  shards: 64\n" in text and "# default 1; 1 to 4096:" in text
-    assert "\n  shards: 1\n" in generated(tmp_path, tmp_path, defaults=True)[tmp_path / "config.yaml"]
+    assert "\n  shards: 1\n" in generate_files(tmp_path, tmp_path, defaults=True)[tmp_path / "config.yaml"]
 
 
 @pytest.fixture

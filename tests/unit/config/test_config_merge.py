@@ -5,7 +5,7 @@ import pickle
 import pytest
 
 from turnout.config import load_configuration, with_raw
-from turnout.config.document import load, merge_branches, plain
+from turnout.config.document import load, merge_branches, plain_values
 from turnout.config.load import sources
 from turnout.errors import ConfigError
 
@@ -119,7 +119,9 @@ def test_a_written_default_is_the_default(folder):
 def test_a_list_is_replaced_whole(tmp_path):
     (tmp_path / "a.yaml").write_text("a: {x: [1, 2, 3], y: 1}")
     (tmp_path / "b.yaml").write_text("a: {x: [9]}")
-    assert plain(merge_branches(load(tmp_path / "a.yaml"), load(tmp_path / "b.yaml"))) == {"a": {"x": (9,), "y": 1}}
+    assert plain_values(merge_branches(load(tmp_path / "a.yaml"), load(tmp_path / "b.yaml"))) == {
+        "a": {"x": (9,), "y": 1}
+    }
 
 
 def test_it_travels_between_processes(folder):
@@ -153,7 +155,7 @@ def test_unsound_campaigns_are_said_and_the_others_used(folder, tmp_path):
     assert [e.where.split(",")[0] for e in errors] == ["line 4", "line 5", "line 6", "line 7"]
     assert "rail_temperature_c is 'warm'. Write a number" in str(errors[0])
     assert "is not on the campaign's day" in str(errors[1]) and "second time" in str(errors[2])
-    assert not turnout.campaigns["2031-01-01"].noted
+    assert not turnout.campaigns["2031-01-01"].listed
 
 
 def test_no_notes_are_no_error(folder, tmp_path):

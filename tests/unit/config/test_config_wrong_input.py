@@ -226,7 +226,7 @@ WRONG = {
 def test_every_error_of_an_event_is_said_at_its_cell(tmp_path):
     with pytest.raises(ConfigErrors) as caught:
         configuration(tmp_path, events='turnout,section,date,kind,resets\n"t1",B1,1.1.2025,taming,ballst\n')
-    places = [(e.place, e.found.split(" is ")[0]) for e in caught.value.errors]
+    places = [(e.place, e.problem.split(" is ")[0]) for e in caught.value.errors]
     assert places == [
         ("line 2, column 9", "date"), ("line 2, column 18", "kind"), ("line 2, column 25", "resets"),
     ]  # fmt: skip

@@ -7,7 +7,7 @@ import pytest
 
 from turnout.demo.hammer import RATE, hammer_test, simulated_response
 from turnout.simulate.frequency_response import receptance
-from turnout.simulate.hammer import located
+from turnout.simulate.hammer import resolve_location
 from turnout.simulate.matrices import assemble
 from turnout.simulate.parameters import load_track
 from turnout.simulate.turnout_track import stretch_of_track
@@ -25,7 +25,7 @@ def test_receptance_of_the_recordings_is_that_of_the_track(section):
     force, rail = np.fft.rfft(np.array(sound), axis=2).transpose(1, 0, 2)[:, :, lines]
     recorded = -np.sum(rail * force.conj(), axis=0) / np.sum(np.abs(force) ** 2, axis=0)
     recorded /= (2 * np.pi * frequency[lines]) ** 2
-    place, track = located(load_track("tommerup"), section)
+    place, track = resolve_location(load_track("tommerup"), section)
     stretch = stretch_of_track(track, place, 18.0)
     place = float(stretch.support[stretch.nearest_support(place)])
     expected = receptance(assemble(stretch), frequency[lines], place, place)

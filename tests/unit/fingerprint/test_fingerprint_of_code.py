@@ -45,9 +45,9 @@ def package(tmp_path, monkeypatch):
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         (root / name).write_text(text)
     monkeypatch.setattr(fp, "ROOT", root)
-    fp.forget()
+    fp.clear_caches()
     yield root
-    fp.forget()
+    fp.clear_caches()
 
 
 def moved(package, module, name, old, new):
@@ -55,7 +55,7 @@ def moved(package, module, name, old, new):
     text = (package / name).read_text()
     assert old in text
     (package / name).write_text(text.replace(old, new))
-    fp.forget()
+    fp.clear_caches()
     return fp.fingerprint(module) != before
 
 
@@ -99,12 +99,12 @@ def test_it_is_the_same_wherever_the_package_lies(package, tmp_path, monkeypatch
     before = fp.fingerprint("turnout.core")
     shutil.move(package, tmp_path / "elsewhere")
     monkeypatch.setattr(fp, "ROOT", tmp_path / "elsewhere")
-    fp.forget()
+    fp.clear_caches()
     assert fp.fingerprint("turnout.core") == before
 
 
 def test_the_hammer_chain_stands_on_its_parts():
-    fp.forget()
+    fp.clear_caches()
     found = fp.closure("turnout.stages.hammer")
     assert {"turnout.receptance", "turnout.modal", "turnout.readers.uff", "turnout.signal.spectra"} <= found
     assert not {

@@ -4,7 +4,7 @@ import numpy as np
 from scipy import stats
 
 from turnout.mismatch.engine.candidate import Candidate
-from turnout.mismatch.engine.candidate_search import absorbed, gain_when_opened
+from turnout.mismatch.engine.candidate_search import gain_with_wide_prior, masked_candidates
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.physics.term import Parameter
@@ -15,7 +15,7 @@ TAU, NOISE, WIDE = 0.1, 0.06, 0.7
 def test_opening_a_prior_gains_the_ratio_of_two_marginal_densities():
     y = -0.69
     s = (TAU**-2 + NOISE**-2) ** -0.5
-    gain, size = gain_when_opened(y * s**2 / NOISE**2, s, TAU, WIDE)
+    gain, size = gain_with_wide_prior(y * s**2 / NOISE**2, s, TAU, WIDE)
     opened, closed = (stats.norm(0.0, np.hypot(NOISE, sd)).logpdf(y) for sd in (WIDE, TAU))
     assert np.isclose(gain, opened - closed, atol=0.0, rtol=1e-12)
     assert np.isclose(size, y * WIDE**2 / (WIDE**2 + NOISE**2), atol=0.0, rtol=1e-12)
@@ -24,7 +24,7 @@ def test_opening_a_prior_gains_the_ratio_of_two_marginal_densities():
 class Springs(Case):
     """Two springs in series of which both logarithms are hidden; the second is soft."""
 
-    frozen_jacobian = True
+    expensive = True
 
     def __init__(self):
         self.nuisances = tuple(Nuisance(f"spring_{k}", "-", 0.0, TAU) for k in range(2))
@@ -32,8 +32,8 @@ class Springs(Case):
                              np.full(60, 0.1), 0.3))  # fmt: skip
         factor = Parameter("factor", "-", 1.0, (0.05, 8.0), "", "")
         self.candidates = tuple(
-            Candidate("soft", (factor,), lambda p, k=k: (k, p["factor"]), ((0.5,),), {"place": k}, scanned=2,
-                      twin=f"spring_{k}") for k in range(2)
+            Candidate("soft", (factor,), lambda p, k=k: (k, p["factor"]), ((0.5,),), {"place": k}, n_scanned=2,
+                      masking_parameter=f"spring_{k}") for k in range(2)
         )  # fmt: skip
 
     def predict(self, values, terms, observations):
@@ -46,7 +46,7 @@ class Springs(Case):
 
 def test_the_spring_that_took_an_effect_in_gives_it_back_at_its_size():
     case = Springs()
-    entries = absorbed(case, fit_jointly(case, iterations=12))
+    entries = masked_candidates(case, fit_jointly(case, iterations=12))
     gain, candidate, start, values = max(entries, key=lambda e: e[0])
     assert candidate.where["place"] == 1 and gain > 10.0
     # wide prior: least squares but for noise over prior, (0.3 / sqrt(60) / 0.7)² = 0.3 %, and 0.15 of it of the other's

@@ -9,7 +9,7 @@ from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case, Observation
-from turnout.mismatch.engine.cross_validation import hangs_on, plainness, told_apart
+from turnout.mismatch.engine.cross_validation import effect_energy, gain_where_unmasked, single_witness
 from turnout.mismatch.engine.decision import judge
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.score import Score
@@ -43,7 +43,7 @@ def fitted(loud):
 def test_plainness_is_the_energy_of_the_change():
     case, fit = fitted((1.0, 2.0, 3.0))
     size = float(fit.psi[0])
-    for name, energy in plainness(case, fit, case.candidates[0]).items():
+    for name, energy in effect_energy(case, fit, case.candidates[0]).items():
         share = 0.5 if name == "b" else 1.0
         by_hand = share * np.sum((case.loud[name] * size * BUMP / 0.1) ** 2)
         assert energy == pytest.approx(by_hand, rel=1e-9)
@@ -63,9 +63,9 @@ def test_plainness_is_the_energy_of_the_change():
 )
 def test_what_one_recording_says_and_its_like_do_not(loud, gains, alone):
     case, fit = fitted(loud)
-    assert hangs_on(case, fit, case.candidates[0], 25.0, gains, MismatchSettings()) == alone
+    assert single_witness(case, fit, case.candidates[0], 25.0, gains, MismatchSettings()) == alone
     of_a_train = replace(case.candidates[0], where={"train": "ic3"})
-    assert hangs_on(case, fit, of_a_train, 25.0, gains, MismatchSettings()) == ""
+    assert single_witness(case, fit, of_a_train, 25.0, gains, MismatchSettings()) == ""
 
 
 @pytest.mark.parametrize(
@@ -80,8 +80,8 @@ def test_what_one_recording_says_and_its_like_do_not(loud, gains, alone):
 def test_recordings_without_the_first_effect_tell_of_the_second(loud, nats):
     case, fit = fitted(loud)
     gains = {"a": 7.0, "b": 2.0, "c": 30.0}
-    assert told_apart(case, fit, gains) == nats
-    assert told_apart(case, replace(fit, candidates=()), gains) == 0.0  # a first effect has none before it
+    assert gain_where_unmasked(case, fit, gains) == nats
+    assert gain_where_unmasked(case, replace(fit, candidates=()), gains) == 0.0  # a first effect has none before it
 
 
 @pytest.mark.parametrize(
@@ -90,8 +90,8 @@ def test_recordings_without_the_first_effect_tell_of_the_second(loud, nats):
 def test_what_others_tell_need_not_explain_what_the_first_left(apart, places, answer):
     """A tenth of an excess of twice the level of controls, which may be the shape of the effect named before; of 20
     places each costs the evidence 3 nats."""
-    candidate = Candidate("bump", (), lambda p: None, (), scanned=places)
-    said = judge([Score(candidate, 40.0, 0.0, 0.1, None, apart=apart)], 2.0, MismatchSettings())
+    candidate = Candidate("bump", (), lambda p: None, (), n_scanned=places)
+    said = judge([Score(candidate, 40.0, 0.0, 0.1, None, unmasked_gain=apart)], 2.0, MismatchSettings())
     assert said.answer == answer
     assert "explains 10%" in said.reason
     assert ("does not show" in said.reason) == (answer == "named")
@@ -104,7 +104,7 @@ class Struck(Days):
         super().__init__((1.0, 1.0, 1.0))
         self.spots = spots
 
-    def struck(self):
+    def hammer_positions(self):
         return {f"{spot} {year}": spot for spot in self.spots for year in (2025, 2026)}
 
 
@@ -130,20 +130,22 @@ def test_blows_at_one_spot_are_one_witness(gains, gain, alone):
     conditions = [f"{spot} {year}" for spot in (2.1, 4.2, 9.0) for year in (2025, 2026)]
     by_condition = dict(zip([*conditions, "railcar"], gains))
     case = Struck(2.1, 4.2, 9.0)
-    assert hangs_on(case, None, Days((1.0, 1.0, 1.0)).candidates[0], gain, by_condition, MismatchSettings()) == alone
+    assert (
+        single_witness(case, None, Days((1.0, 1.0, 1.0)).candidates[0], gain, by_condition, MismatchSettings()) == alone
+    )
 
 
 def test_of_two_spots_neither_is_the_odd_one():
     case, fit = fitted((1.0, 1.0, 1.0))
     of_two = Struck(2.1, 4.2)
     gains = {"2.1 2025": 0.5, "2.1 2026": -1.0, "4.2 2025": 7.0, "4.2 2026": 6.0, "railcar": 1.0}
-    assert hangs_on(of_two, fit, case.candidates[0], 15.0, gains, MismatchSettings()) == ""
+    assert single_witness(of_two, fit, case.candidates[0], 15.0, gains, MismatchSettings()) == ""
 
 
 @pytest.mark.parametrize("gain, answer", [(20.0, "none"), (60.0, "unknown")])
 def test_it_gets_no_name(gain, answer):
     candidate = Candidate("bump", (), lambda p: None, ())
-    score = Score(candidate, gain, 0.0, 1.0, None, {"a": gain}, alone="a")
+    score = Score(candidate, gain, 0.0, 1.0, None, {"a": gain}, single_witness="a")
     said = judge([score], 0.8, MismatchSettings())
     assert said.answer == answer and not said.names
     assert "bump" in said.reason

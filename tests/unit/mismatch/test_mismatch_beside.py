@@ -8,7 +8,7 @@ from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case, Observation
 from turnout.mismatch.engine.evidence import score_of
 from turnout.mismatch.engine.map_fit import fit_jointly
-from turnout.mismatch.engine.refit import beside
+from turnout.mismatch.engine.refit import correct_for_leader
 from turnout.physics import Parameter
 
 AMOUNT = (Parameter("amount", "-", 0.0, (-3.0, 3.0), "share of a shape", "made up 2026"),)
@@ -19,7 +19,7 @@ SHAPES = {"wave": np.sin(9.0 * X), "near": np.sin(9.4 * X), "ramp": X - 0.5}
 class Shapes(Case):
     """Sums of shapes under noise of 0.1; a wave counts from 10 on, the others always."""
 
-    frozen_jacobian = True
+    expensive = True
 
     def __init__(self, **true):
         noise = 0.1 * np.random.default_rng(6).normal(size=X.size)
@@ -28,21 +28,28 @@ class Shapes(Case):
         data = sum(a * SHAPES[n] for n, a in true.items()) + noise
         self.observations = (Observation("all", "all", data, np.full(X.size, 0.1)),)
         self.candidates = tuple(
-            Candidate(n, AMOUNT, lambda p, n=n: (n, p["amount"]), ((0.5,),), {"shape": n}, least=10.0 * (n == "wave"))
+            Candidate(
+                n,
+                AMOUNT,
+                lambda p, n=n: (n, p["amount"]),
+                ((0.5,),),
+                {"shape": n},
+                smallest_reportable=10.0 * (n == "wave"),
+            )
             for n in SHAPES
         )
 
     def predict(self, values, terms, observations):
         return [sum((a * SHAPES[n] for n, a in terms), np.zeros(X.size))]
 
-    def cheap(self, observation):
+    def is_cheap(self, observation):
         return True
 
     def ranked(self, settings):
         base = fit_jointly(self)
         fits = [(c, fit_jointly(self, (c,), c.starts[0])) for c in self.candidates]
         scores = [score_of(self, base, f, c, settings) for c, f in fits]
-        return beside(self, base, sorted(scores, key=lambda s: -s.gain), settings)
+        return correct_for_leader(self, base, sorted(scores, key=lambda s: -s.gain), settings)
 
 
 @pytest.mark.parametrize("true, kept", [({"wave": 1.0}, False), ({"wave": 1.0, "ramp": 0.8}, True)])
@@ -50,7 +57,7 @@ def test_a_name_that_lives_on_what_leads_is_dropped_and_another_effect_is_not(tr
     """A wave of nearly the right length gains hundreds of nats of the wave alone, and next to nothing beside it."""
     settings = MismatchSettings()
     ranked = Shapes(**true).ranked(settings)
-    best = next(s for s in ranked if s.material)
+    best = next(s for s in ranked if s.is_reportable)
     assert (best.gain > settings.threshold) == kept
 
 
@@ -60,5 +67,5 @@ def test_a_name_as_good_as_what_leads_is_kept():
     case = Shapes(**{n: size / np.linalg.norm(SHAPES[n]) for n, size in (("wave", 6.05), ("near", 6.0))})
     ranked = case.ranked(settings)
     near, wave = (next(s for s in ranked if s.family == n) for n in ("near", "wave"))
-    assert near.material and not wave.material
+    assert near.is_reportable and not wave.is_reportable
     assert 0.0 < wave.gain - near.gain < settings.margin and near.gain > 10.0 * settings.threshold

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import fftconvolve
 
-from turnout.mismatch.turnout.campaign import HammerTest
-from turnout.mismatch.turnout.saturation import FLOOR, blow_ceiling, ceilings, held
+from turnout.mismatch.turnout.campaign import HammerInput
+from turnout.mismatch.turnout.saturation import SCATTER_FLOOR, common_limit, limit_under_impacts, saturated_channels
 from turnout.records import Channel, Recording
 from turnout.signal.filters import force_pulse
 from turnout.simulate.sensor import Sensor
@@ -28,7 +28,7 @@ def blows(place, saturated=lambda x: x, share=1.0, limit=None):
         shown = saturated(share * fftconvolve(force, mode)[: t.size])
         noise = rng.normal(size=(2, t.size)) * np.array([[1e-4 * peak], [0.01]])
         made.append(Recording(np.array([force, shown]) + noise, RATE, channels, source="t.uff", record=k))
-    return HammerTest(f"blows at {place}", place, tuple(made), "force")
+    return HammerInput(f"blows at {place}", place, tuple(made), "force")
 
 
 def at(place, name="A", mounting="rail web"):
@@ -42,16 +42,16 @@ def uneven(x, limit=30.0):
 
 def test_peaks_that_hold_gain_the_logarithm_of_the_growth_they_lack():
     x = np.log(FORCES)
-    limit, gain = held([(x, np.full(6, np.log(50.0)))])
+    limit, gain = common_limit([(x, np.full(6, np.log(50.0)))])
     assert limit == pytest.approx(50.0)
-    assert gain == pytest.approx(3.0 * np.log(1.0 + np.var(x) / FLOOR**2) - 0.5 * np.log(6.0))
+    assert gain == pytest.approx(3.0 * np.log(1.0 + np.var(x) / SCATTER_FLOOR**2) - 0.5 * np.log(6.0))
 
 
 @pytest.mark.parametrize("slope", [1.0, 1.4])
 def test_peaks_that_grow_with_the_force_or_faster_gain_nothing(slope):
     scatter = 0.01 * np.array([1.0, -1.0, 0.5, -0.5, 1.0, -1.0])
     x = np.log(FORCES)
-    assert held([(x, slope * x - 5.0 + scatter), (x, slope * x - 6.0 - scatter)])[1] < 0.0
+    assert common_limit([(x, slope * x - 5.0 + scatter), (x, slope * x - 6.0 - scatter)])[1] < 0.0
 
 
 def test_one_limit_holds_in_all_tests_that_reach_it():
@@ -59,19 +59,19 @@ def test_one_limit_holds_in_all_tests_that_reach_it():
     x, top = np.log(FORCES), np.log(50.0)
     near, far = (x, np.minimum(top, x - 4.9)), (x, 1.3 * x - 9.5)
     assert far[1].max() < top
-    both, one = held([near, (x + 0.01, near[1]), far])[1], held([near, far])[1]
+    both, one = common_limit([near, (x + 0.01, near[1]), far])[1], common_limit([near, far])[1]
     assert both > 1.6 * one > 12.0
 
 
 def test_each_side_of_an_amplifier_holds_for_itself():
     """Limits of 36 and 24 m/s² are one of 30; a twentieth of that is within the scatter that is allowed for."""
-    limit, gain = blow_ceiling([blows(3.0, uneven), blows(6.0, uneven, share=0.2)], at(3.0))
+    limit, gain = limit_under_impacts([blows(3.0, uneven), blows(6.0, uneven, share=0.2)], at(3.0))
     assert gain > 12.0
     assert limit == pytest.approx(30.0, rel=0.05)
 
 
 def test_a_linear_channel_has_no_ceiling():
-    limit, gain = blow_ceiling([blows(3.0), blows(6.0, share=0.2)], at(3.0))
+    limit, gain = limit_under_impacts([blows(3.0), blows(6.0, share=0.2)], at(3.0))
     assert np.isnan(limit)
     assert gain == 0.0
 
@@ -83,30 +83,30 @@ def test_beside_the_blow_one_side_alone_proves_nothing():
         return np.minimum(x, 24.0)
 
     tests = [blows(3.0, one_side), blows(9.0, one_side)]
-    assert blow_ceiling(tests, at(3.0))[1] > 12.0
-    assert blow_ceiling(tests, at(6.0))[1] == 0.0
-    assert blow_ceiling([blows(3.0, uneven), blows(9.0, uneven)], at(6.0))[1] > 12.0
+    assert limit_under_impacts(tests, at(3.0))[1] > 12.0
+    assert limit_under_impacts(tests, at(6.0))[1] == 0.0
+    assert limit_under_impacts([blows(3.0, uneven), blows(9.0, uneven)], at(6.0))[1] > 12.0
 
 
 def test_a_sensor_on_the_sleeper_is_not_where_the_rail_is_struck():
     tests = [blows(3.0, lambda x: np.minimum(x, 24.0))]
-    assert blow_ceiling(tests, at(3.0))[1] > 12.0
-    assert blow_ceiling(tests, at(3.0, mounting="sleeper end"))[1] == 0.0
+    assert limit_under_impacts(tests, at(3.0))[1] > 12.0
+    assert limit_under_impacts(tests, at(3.0, mounting="sleeper end"))[1] == 0.0
 
 
 @pytest.mark.parametrize("share", [0.0, 1e-4])
 def test_noise_that_no_blow_exceeds_stays_and_is_no_limit(share):
-    assert blow_ceiling([blows(3.0, share=share), blows(9.0, share=share)], at(3.0))[1] == 0.0
+    assert limit_under_impacts([blows(3.0, share=share), blows(9.0, share=share)], at(3.0))[1] == 0.0
 
 
 def test_a_range_that_the_file_states_is_no_fault():
     """No blow below it is left."""
-    assert blow_ceiling([blows(3.0, lambda x: np.clip(x, -24.0, 24.0), limit=24.0)], at(3.0))[1] == 0.0
+    assert limit_under_impacts([blows(3.0, lambda x: np.clip(x, -24.0, 24.0), limit=24.0)], at(3.0))[1] == 0.0
 
 
 def test_a_channel_that_was_not_there_has_none():
-    assert blow_ceiling([blows(3.0, uneven)], at(3.0, "B"))[1] == 0.0
-    assert blow_ceiling([], at(3.0))[1] == 0.0
+    assert limit_under_impacts([blows(3.0, uneven)], at(3.0, "B"))[1] == 0.0
+    assert limit_under_impacts([], at(3.0))[1] == 0.0
 
 
 def two_tests():
@@ -126,7 +126,7 @@ def campaign(names="ABC", hammer=(), peaks=()):
 
 @pytest.mark.parametrize("names, found", [("ABC", ["A"]), ("AB", ["A"]), ("A", [])])
 def test_blows_alone_tell_a_ceiling_but_not_of_the_only_channel(names, found):
-    known = ceilings(campaign(names, two_tests()), 12.0)
+    known = saturated_channels(campaign(names, two_tests()), 12.0)
     assert list(known) == found
     assert all(c.limit == pytest.approx(30.0, rel=0.05) for c in known.values())
 
@@ -134,7 +134,7 @@ def test_blows_alone_tell_a_ceiling_but_not_of_the_only_channel(names, found):
 @pytest.mark.parametrize("shown, found", [(40.0, ["A"]), (45.0, [])])
 def test_no_limit_lies_far_below_what_trains_have_shown(shown, found):
     """Of 30 a square wave rings up to 38 m/s² in the recorder's filter, of the louder side by a tenth more."""
-    assert list(ceilings(campaign(hammer=two_tests(), peaks=[(shown, 200.0)]), 12.0)) == found
+    assert list(saturated_channels(campaign(hammer=two_tests(), peaks=[(shown, 200.0)]), 12.0)) == found
 
 
 @pytest.mark.parametrize("limit, share", [(30.0, 1.0), (10.0, 0.0)])
@@ -142,9 +142,10 @@ def test_two_that_speak_for_one_limit_speak_together(limit, share):
     """Trains of 60 to 300 m/s² of which A shows no more than ``limit``, blows of which it shows 30."""
     peaks = [(min(limit, 0.3 * loud), loud) for loud in (60.0, 90.0, 130.0, 180.0, 240.0, 300.0)]
     rolled, struck = (
-        ceilings(campaign(hammer=hammer, peaks=rolls), 3.0)["A"] for hammer, rolls in (((), peaks), (two_tests(), ()))
+        saturated_channels(campaign(hammer=hammer, peaks=rolls), 3.0)["A"]
+        for hammer, rolls in (((), peaks), (two_tests(), ()))
     )
-    both = ceilings(campaign(hammer=two_tests(), peaks=peaks), 3.0)["A"]
+    both = saturated_channels(campaign(hammer=two_tests(), peaks=peaks), 3.0)["A"]
     plainer, lesser = sorted((rolled, struck), key=lambda c: -c.gain)
     assert both.limit == plainer.limit
     assert both.gain == pytest.approx(plainer.gain + share * (lesser.gain + np.log(3.0)))

@@ -11,11 +11,11 @@ from turnout import physics
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
 from turnout.mismatch import diagnose
-from turnout.mismatch.turnout import Campaign, TrackCase, receptance_observation, sensitivity
-from turnout.mismatch.turnout.campaign import HammerTest
+from turnout.mismatch.turnout import CampaignInput, TrackCase, receptance_observation, sensitivity
+from turnout.mismatch.turnout.campaign import HammerInput
 from turnout.mismatch.turnout.observations import hammer_observations
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
-from turnout.mismatch.turnout.receptance_model import BlowModel
+from turnout.mismatch.turnout.receptance_model import ReceptanceModel
 from turnout.simulate import uniform_track
 from turnout.simulate.frequency_response import receptance
 from turnout.simulate.hammer import Hammer, simulate_hammer
@@ -29,9 +29,9 @@ IDENTITY = {"finding_id": "f", "turnout_id": "t", "section_id": None, "found_at_
 
 @pytest.fixture(scope="module")
 def plan():
-    small = small_plan((5.0, 25.0), passages=False, blows=(21.6, 24.0))
+    small = small_plan((5.0, 25.0), passages=False, hammer_positions=(21.6, 24.0))
     turnout = TurnoutTrack(uniform_track(36.0, start=6.0), {"main": ((),)})
-    return replace(small, turnout=turnout, n_blows=3, sensors=small.sensors[:3])
+    return replace(small, turnout=turnout, n_impacts=3, sensors=small.sensors[:3])
 
 
 def found_in(plan, *terms, seed=3):
@@ -71,11 +71,11 @@ def test_a_sensor_wired_the_other_way_round_is_named(plan):
 
 def test_nothing_to_diagnose_is_said():
     with pytest.raises(SimulationError, match="neither a hammer test nor a passage"):
-        Campaign(TurnoutTrack(uniform_track(12.0)), ())
+        CampaignInput(TurnoutTrack(uniform_track(12.0)), ())
 
 
 def test_a_reserved_recording_that_is_not_there_is_named(plan):
-    campaign = measured_campaign(replace(plan, blows=plan.blows[:1]), seed=1)
+    campaign = measured_campaign(replace(plan, hammer_points=plan.hammer_points[:1]), seed=1)
     with pytest.raises(SimulationError, match="light 9"):
         replace(campaign, reserved=("light 9",))
     with pytest.raises(SimulationError, match="stands for two recordings"):
@@ -86,7 +86,7 @@ def test_a_reserved_recording_that_is_not_there_is_named(plan):
 
 def test_fits_start_from_tests_that_are_not_kept_back(plan):
     """What a reserved test shows does not matter, be it three times as much."""
-    campaign, starts = measured_campaign(replace(plan, blows=plan.blows[:2]), seed=1), []
+    campaign, starts = measured_campaign(replace(plan, hammer_points=plan.hammer_points[:2]), seed=1), []
     kept = campaign.hammer[1]
     for factor in (1.0, 3.0):
         size = [[1.0 if c.name == kept.force else factor] for c in kept.recordings[0].channels]
@@ -97,7 +97,7 @@ def test_fits_start_from_tests_that_are_not_kept_back(plan):
 
 
 def test_channels_without_blows_are_left_out_and_said(plan):
-    campaign = measured_campaign(replace(plan, blows=plan.blows[:2]), seed=1)
+    campaign = measured_campaign(replace(plan, hammer_points=plan.hammer_points[:2]), seed=1)
     silent = replace(campaign.hammer[0], recordings=campaign.hammer[0].recordings[:1])
     case = TrackCase(replace(campaign, hammer=(silent, campaign.hammer[1])))
     assert any("blows 1" in note and "sound blows" in note for note in case.notes)
@@ -118,7 +118,7 @@ def test_a_rail_soft_in_shear_is_sized_against_the_rail_of_its_file(plan):
 
 def test_a_shear_law_is_tried_in_the_rail_that_blows_bent():
     """What a term says of the rail is said of its file; the rest stays as blows found it, for passages as well."""
-    case = TrackCase(measured_campaign(small_plan((15.0,), blows=(24.0,), passages=False), (), 3))
+    case = TrackCase(measured_campaign(small_plan((15.0,), hammer_positions=(24.0,), passages=False), (), 3))
     case.recentre({"rail_bending": 0.03, "rail_shear": -0.2})
     file, bent = case.nominal.turnout.track.rail, case.track().rail
     assert bent.shear_stiffness == pytest.approx(np.exp(-0.2) * file.shear_stiffness)
@@ -133,25 +133,25 @@ def test_a_shear_law_is_tried_in_the_rail_that_blows_bent():
 def test_a_receptance_follows_the_rail_however_far_it_goes(plan):
     """A rail whose shear stiffness is exp(-0.41) of its file's: the receptance is that of such a rail, to 1e-3."""
     case = TrackCase(measured_campaign(plan, (), 3))
-    (name, pair), *_ = case.pairs.items()
+    (name, pair), *_ = case.frf_pairs.items()
     values = {n.name: n.mean for n in case.nuisances} | {"rail_shear": -0.41}
     (found,) = case.predict(values, (), [o for o in case.observations if o.name == name])
     track = case.nominal.turnout.track
     softer = replace(track.rail, shear_stiffness=track.rail.shear_stiffness * np.exp(-0.41))
-    model = BlowModel(track.with_(rail=softer), ())
-    exact = receptance_observation.split(
-        receptance_observation.scaled(pair, model.receptance(pair.test.place, model.place_of(pair.sensor)))
+    model = ReceptanceModel(track.with_(rail=softer), ())
+    exact = receptance_observation.split_complex(
+        receptance_observation.scale_lines(pair, model.receptance(pair.test.place, model.position_of(pair.sensor)))
     )
     assert np.linalg.norm(found - exact) < 1e-3 * np.linalg.norm(exact)
 
 
 def test_a_blow_is_not_asked_of_sensors_far_from_it():
     """At 8 m the tolerance of a model has 1 + (8 / 1.5)^2 = 29 times its variance at the blow."""
-    plan = small_plan((15.0,), blows=(20.4, 30.0), passages=False)
+    plan = small_plan((15.0,), hammer_positions=(20.4, 30.0), passages=False)
     case = SimpleNamespace(
-        campaign=measured_campaign(plan), ceilings={}, settings=MismatchSettings(), notes=[], pairs={}
+        campaign=measured_campaign(plan), saturated={}, settings=MismatchSettings(), notes=[], frf_pairs={}
     )
-    heard = {(p.test.place, p.channel) for p in case.pairs.values()} if list(hammer_observations(case)) else set()
+    heard = {(p.test.place, p.channel) for p in case.frf_pairs.values()} if list(hammer_observations(case)) else set()
     assert heard == {(20.4, s.name) for s in plan.sensors} | {(30.0, "S2"), (30.0, "S3"), (30.0, "S4")}
 
 
@@ -177,7 +177,7 @@ def test_a_derivative_goes_to_the_side_where_the_simulation_can():
             raise SimulationError("too heavy")
         return np.array([values["load"] ** 2])
 
-    case = SimpleNamespace(passage_of=simulated)
+    case = SimpleNamespace(predict_passage=simulated)
     found = sensitivity._difference(case, {"load": 3.0}, (), None, np.array([9.0]), "load", 0.1)
     assert found == pytest.approx([5.9])
 
@@ -188,13 +188,13 @@ def test_a_track_that_still_rings_when_the_record_ends_shows_the_receptance_of_i
     motion is missing, which at 36 Hz is a quarter of a plain quotient of transforms."""
     values = {"ballast_stiffness": 238e6, "ballast_damping": 7.9e3, "sleeper_mass": 170.0}
     track, sensor = uniform_track(60.0, **values), Sensor("S1", 30.0)
-    recordings = simulate_hammer(track, 30.0, Hammer(place_spread=0.0), (sensor,), 4, seed=5, duration=0.15)
+    recordings = simulate_hammer(track, 30.0, Hammer(position_spread=0.0), (sensor,), 4, seed=5, duration=0.15)
     assert recordings[0].duration == pytest.approx(0.15)
-    test = HammerTest("blows", 30.0, recordings, "hammer", "", {})
-    ((pair, seen),) = receptance_observation.pairs_of(test, (sensor,), 0.03)
+    test = HammerInput("blows", 30.0, recordings, "hammer", "", {})
+    ((pair, seen),) = receptance_observation.pairs_of_test(test, (sensor,), 0.03)
     n = pair.lines.size
     measured = (seen.data[:n] + 1j * seen.data[n:]) * pair.size
-    model = receptance(assemble(track), receptance_observation.SHIFTED[pair.lines], 30.0, 30.0)
+    model = receptance(assemble(track), receptance_observation.SHIFTED_LINES[pair.lines], 30.0, 30.0)
     low = pair.frequency < 300.0
     assert low.sum() > 20 and pair.frequency[0] < 40.0
     # 0.1 s after the blow exp(-(21 + 20) 0.1 s) = 1.7 % are left, and an amplifier of 0.4 Hz turns 36 Hz by 1.1 %

@@ -10,9 +10,9 @@ from turnout.mismatch import diagnose
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
 from turnout.mismatch.engine.map_fit import fit_jointly
-from turnout.mismatch.turnout import Campaign, TrackCase
-from turnout.mismatch.turnout.campaign import Passage
-from turnout.mismatch.turnout.candidates.out_of_roundness import louder, short_polygons
+from turnout.mismatch.turnout import CampaignInput, TrackCase
+from turnout.mismatch.turnout.campaign import PassageInput
+from turnout.mismatch.turnout.candidates.out_of_roundness import short_polygon_candidates, wheel_excess
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.physics import Parameter
 
@@ -76,30 +76,30 @@ def test_a_dear_fit_keeps_its_updated_derivatives_where_no_new_ones_can_be_made(
 
 def test_a_train_of_two_lengths_is_refused():
     """Wheels are counted from the front: the ninth of eight is no wheel."""
-    long, short = (Passage(f"p{n}", None, SimpleNamespace(wheels=range(n)), 20.0, "freight") for n in (12, 8))
+    long, short = (PassageInput(f"p{n}", None, SimpleNamespace(wheels=range(n)), 20.0, "freight") for n in (12, 8))
     with pytest.raises(SimulationError, match="'freight' has 12 and 8 wheels"):
-        Campaign(None, (), passages=(long, short))
+        CampaignInput(None, (), passages=(long, short))
 
 
 def test_a_passage_that_cannot_be_simulated_is_noted_and_the_others_are_used():
-    campaign = measured_campaign(small_plan((15.0,), blows=(24.0,)), (), 3)
+    campaign = measured_campaign(small_plan((15.0,), hammer_positions=(24.0,)), (), 3)
     (first, *_), names = campaign.passages, {p.name for p in campaign.passages}
 
     class Picky(TrackCase):
-        def roll(self, values, terms, passage):
+        def passage_simulator(self, values, terms, passage):
             if passage.name == first.name:
                 raise SimulationError("wheel 3 leaves the track")
-            return super().roll(values, terms, passage)
+            return super().passage_simulator(values, terms, passage)
 
     case = Picky(campaign)
     assert any(first.name in note and "wheel 3 leaves" in note for note in case.notes)
-    assert names - {first.name} >= set(case.rollings) and len(case.rollings) > 2
+    assert names - {first.name} >= set(case.aligned_passages) and len(case.aligned_passages) > 2
 
 
 def test_wheels_that_were_never_heard_are_not_called_polygonal():
     """No slot of theirs was recorded; a recording too slow for short waves has no bin for them either."""
     nothing = SimpleNamespace(level=np.full((2, 4, 60), np.nan))
-    z, apart = louder([nothing], np.arange(20, 40), np.exp(-0.04 * np.arange(60)))
+    z, apart = wheel_excess([nothing], np.arange(20, 40), np.exp(-0.04 * np.arange(60)))
     assert apart == 0 and np.all(np.isneginf(z)) and z.shape == (4, 20)
     slow = SimpleNamespace(speed=30.0, passage=SimpleNamespace(recording=SimpleNamespace(rate=100.0)))
-    assert short_polygons(SimpleNamespace(fitted=lambda: [slow]), None) == ()
+    assert short_polygon_candidates(SimpleNamespace(fitted_passages=lambda: [slow]), None) == ()

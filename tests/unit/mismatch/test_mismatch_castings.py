@@ -7,17 +7,17 @@ import pytest
 
 from turnout.mismatch.turnout.planned_case import small_plan
 from turnout.mismatch.turnout.track_parameters import (
-    CAST,
-    RAIL,
-    cast_elements,
-    rail_spreads,
+    CASTING_SDS,
+    RAIL_SDS,
+    casting_elements,
+    rail_sds,
     track_nuisances,
     with_rail,
     zone_of,
 )
 from turnout.simulate.track import RailStretch
 
-PLAN = small_plan((15.0,), blows=(24.0,))
+PLAN = small_plan((15.0,), hammer_positions=(24.0,))
 TRACK = PLAN.turnout.track
 HEAVY = replace(TRACK.rail, bending_stiffness=1.7 * TRACK.rail.bending_stiffness, mass=2.2 * TRACK.rail.mass)
 NOSE, FAR = RailStretch(23.0, 26.4, HEAVY), RailStretch(2.0, 4.0, HEAVY)
@@ -42,24 +42,24 @@ def test_pieces_cover_the_casting_and_half_a_bay_beyond_its_ends(zone):
 
 
 def test_each_piece_has_its_own_bending_stiffness_and_mass_and_ends_are_less_sure(zone):
-    spreads, known = rail_spreads(zone), {n.name: n.sd for n in track_nuisances(zone, ())}
-    assert list(spreads)[:2] == [name for name, _ in RAIL] and len(spreads) == 2 + 2 * 7
+    spreads, known = rail_sds(zone), {n.name: n.sd for n in track_nuisances(zone, ())}
+    assert list(spreads)[:2] == [name for name, _ in RAIL_SDS] and len(spreads) == 2 + 2 * 7
     assert {name: known[name] for name in spreads} == spreads
-    assert spreads["cast_mass_0"] == dict((n, e) for n, _, e in CAST)["cast_mass"] > spreads["cast_mass_3"]
+    assert spreads["cast_mass_0"] == dict((n, e) for n, _, e in CASTING_SDS)["cast_mass"] > spreads["cast_mass_3"]
 
 
 def test_a_piece_changes_its_own_rail_and_no_other(zone):
     """Half as heavy again and a fifth stiffer in the fourth piece, all rails a tenth stiffer: there, beside it, on the
     other route, and nothing of what lies far away but what all rails share."""
-    values = dict.fromkeys(rail_spreads(zone), 0.0)
+    values = dict.fromkeys(rail_sds(zone), 0.0)
     values |= {"cast_mass_3": np.log(1.5), "cast_bending_3": np.log(1.2), "rail_bending": np.log(1.1)}
     changed = with_rail(zone, values).turnout
-    there, beside = (changed.track.rail_between(x) for x in (24.7, 24.0))
+    there, beside = (changed.track.rail_at(x) for x in (24.7, 24.0))
     assert there.mass == pytest.approx(1.5 * HEAVY.mass) and beside.mass == HEAVY.mass
     assert there.bending_stiffness == pytest.approx(1.1 * 1.2 * HEAVY.bending_stiffness)
     assert beside.bending_stiffness == pytest.approx(1.1 * HEAVY.bending_stiffness)
     for x, rail in ((24.7, TRACK.rail), (3.0, HEAVY)):
-        other = changed.tracks["diverging"].rail_between(x)
+        other = changed.tracks["diverging"].rail_at(x)
         assert (other.mass, other.bending_stiffness) == pytest.approx((rail.mass, 1.1 * rail.bending_stiffness))
 
 
@@ -73,12 +73,12 @@ def test_without_any_change_the_track_is_that_of_the_file(ends):
     rails = [replace(HEAVY, mass=HEAVY.mass * (1.0 + 0.1 * k)) for k in range(len(ends))]
     track = TRACK.with_(stretches=tuple(RailStretch(a, b, r) for (a, b), r in zip(ends, rails)))
     zone = zone_of(replace(PLAN.turnout, track=track, tracks={"main": track}), [21.0, 27.3])
-    same = with_rail(zone, dict.fromkeys(rail_spreads(zone), 0.0)).turnout.track
+    same = with_rail(zone, dict.fromkeys(rail_sds(zone), 0.0)).turnout.track
     x = np.arange(20.0, 29.0, 0.025) + 0.0125
-    assert zone.castings and [same.rail_between(v) for v in x] == [track.rail_between(v) for v in x]
+    assert zone.castings and [same.rail_at(v) for v in x] == [track.rail_at(v) for v in x]
     node = np.arange(16.0, 32.0, 0.15)
     covered = np.zeros(node.size - 1)
-    for element, share in cast_elements(zone, node):
+    for element, share in casting_elements(zone, node):
         covered[element] += share
     assert covered.max() < 1.0 + 1e-9
     assert covered @ np.diff(node) == pytest.approx(sum(c.piece.end - c.piece.start for c in zone.castings))
@@ -93,4 +93,4 @@ def test_castings_are_those_of_the_track_that_blows_are_modelled_on():
 
 def test_plain_track_has_nothing_more():
     plain = zone_of(PLAN.turnout, [21.0, 27.3])
-    assert plain.castings == () and rail_spreads(plain) == dict(RAIL)
+    assert plain.castings == () and rail_sds(plain) == dict(RAIL_SDS)

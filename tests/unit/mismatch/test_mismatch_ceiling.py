@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from turnout.mismatch.turnout.saturation import FLOOR, ceilings, saturation
+from turnout.mismatch.turnout.saturation import SCATTER_FLOOR, saturated_channels, saturation_gain
 from turnout.records import Channel, Recording
 
 LOUD = np.log([40.0, 55.0, 70.0, 100.0, 140.0, 200.0])
@@ -13,19 +13,21 @@ SCATTER = 0.1 * np.array([1.0, -1.0, 0.5, -0.5, 1.0, -1.0])
 
 
 def test_peaks_that_stay_gain_the_logarithm_of_the_scatter_they_lack():
-    gain = saturation(np.full(6, np.log(8.0)), LOUD)
-    assert np.isclose(gain, 3.0 * np.log(1.0 + np.var(LOUD) / FLOOR**2) - 0.5 * np.log(6.0), atol=0.0, rtol=1e-12)
+    gain = saturation_gain(np.full(6, np.log(8.0)), LOUD)
+    assert np.isclose(
+        gain, 3.0 * np.log(1.0 + np.var(LOUD) / SCATTER_FLOOR**2) - 0.5 * np.log(6.0), atol=0.0, rtol=1e-12
+    )
 
 
 def test_peaks_that_follow_the_trains_gain_nothing():
-    assert saturation(LOUD - 0.7 + SCATTER, LOUD) < 2.0
+    assert saturation_gain(LOUD - 0.7 + SCATTER, LOUD) < 2.0
 
 
 def test_only_the_loud_passages_may_reach_the_ceiling():
     peaks = np.minimum(np.log(90.0), LOUD + 0.01 * SCATTER)
-    assert saturation(peaks, LOUD) > 12.0
+    assert saturation_gain(peaks, LOUD) > 12.0
     # the quiet ones alone are at no ceiling; whatever is flat gains something over what follows
-    assert saturation(peaks[::-1], LOUD) < 0.5 * saturation(peaks, LOUD)
+    assert saturation_gain(peaks[::-1], LOUD) < 0.5 * saturation_gain(peaks, LOUD)
 
 
 @pytest.mark.parametrize("limit, found", [(None, ["A1"]), (1000.0, ["A1"]), (90.0, [])])
@@ -41,14 +43,14 @@ def test_a_channel_at_the_range_that_its_file_states_is_no_faulty_one(limit, fou
 
     sensors = [SimpleNamespace(name=n, place=x) for n, x in (("A1", 1.0), ("A2", 3.0), ("A3", 5.0))]
     campaign = SimpleNamespace(sensors=sensors, hammer=(), passages=[passage(np.exp(loud)) for loud in LOUD])
-    assert list(ceilings(campaign, 12.0)) == found
+    assert list(saturated_channels(campaign, 12.0)) == found
 
 
 def test_bangs_of_a_flat_that_one_channel_hears_less_are_no_ceiling():
     """Three passages bang once, alike for A1, which shows five times as much there as where it spends its time."""
     quiet, others = np.array([66.0, 64.0, 70.0, 68.0, 73.0]), np.array([46.0, 45.0, 49.0, 48.0, 51.0])
     bangs, heard = np.array([302.0, 312.0, 320.0]), np.array([400.0, 460.0, 480.0])
-    assert saturation(np.log([*quiet, *bangs]), np.log([*others, *heard])) > 12.0 + np.log(3.0)
+    assert saturation_gain(np.log([*quiet, *bangs]), np.log([*others, *heard])) > 12.0 + np.log(3.0)
 
     def passage(mine, theirs, rolled):
         samples = np.outer([rolled[0], rolled[1], rolled[1]], np.sin(np.linspace(0.0, 50.0, 1001)))
@@ -59,4 +61,4 @@ def test_bangs_of_a_flat_that_one_channel_hears_less_are_no_ceiling():
     sensors = [SimpleNamespace(name=n, place=x) for n, x in (("A1", 1.0), ("A2", 3.0), ("A3", 5.0))]
     rolling = [passage(a, b, (a, b)) for a, b in zip(quiet, others, strict=True)]
     banging = [passage(a, b, (66.0, 46.0)) for a, b in zip(bangs, heard, strict=True)]
-    assert ceilings(SimpleNamespace(sensors=sensors, hammer=(), passages=[*rolling, *banging]), 12.0) == {}
+    assert saturated_channels(SimpleNamespace(sensors=sensors, hammer=(), passages=[*rolling, *banging]), 12.0) == {}

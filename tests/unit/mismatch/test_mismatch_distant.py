@@ -10,7 +10,7 @@ from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.candidate_search import shortlist
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
 from turnout.mismatch.engine.map_fit import fit_jointly
-from turnout.mismatch.turnout.candidates.catalogue import MASSES, distant_wheels, left_by
+from turnout.mismatch.turnout.candidates.catalogue import MASS_STARTS, distant_mass_starts, residual_of_train
 from turnout.physics import Parameter
 
 FACTOR = (Parameter("factor", "-", 1.0, (0.4, 2.5), "times the pitch", "made up 2026", (1.0, 0.3)),)
@@ -20,14 +20,16 @@ T = np.linspace(0.0, 1.0, 300)
 class Pitch(Case):
     """A tone of twelve turns times a factor, known to 6 %, under noise of 0.1; columns are straight lines."""
 
-    frozen_jacobian = True
+    expensive = True
     nuisances = (Nuisance("tune", "-", 0.0, 0.06),)
 
     def __init__(self, true, afar=()):
         rng = np.random.default_rng(3)
         data = [self.tone(true) + 0.1 * rng.normal(size=T.size) for _ in range(2)]
         self.observations = tuple(Observation(f"o{k}", f"day {k}", d, np.full(T.size, 0.1)) for k, d in enumerate(data))
-        self.candidates = (Candidate("pitch", FACTOR, lambda p: p["factor"], ((1.2,),), twin="tune", twin_sd=0.3),)
+        self.candidates = (
+            Candidate("pitch", FACTOR, lambda p: p["factor"], ((1.2,),), masking_parameter="tune", masking_sd=0.3),
+        )
         self.afar = afar
 
     def tone(self, factor):
@@ -40,7 +42,7 @@ class Pitch(Case):
         near = self.predict({"tune": fit.values["tune"] + 1e-4}, (), self.observations)
         return {("pitch", 0): [np.log(1.2) * (a - b) / 1e-4 for a, b in zip(near, fit.predictions)]}
 
-    def distant(self, fit):
+    def distant_starts(self, fit):
         return [(self.candidates[0], (m,)) for m in self.afar]
 
 
@@ -50,13 +52,13 @@ def test_what_lies_behind_a_hump_is_found_from_afar(true):
     settings = MismatchSettings()
     blind = Pitch(true)
     assert shortlist(blind, fit_jointly(blind), settings) == []
-    case = Pitch(true, MASSES)
+    case = Pitch(true, MASS_STARTS)
     (found,) = shortlist(case, fit_jointly(case), settings)
     assert found.start == pytest.approx([true]) and found.values == {"tune": 0.0}
 
 
 def test_a_start_from_afar_that_gains_nothing_is_not_refitted():
-    case = Pitch(1.0, MASSES)
+    case = Pitch(1.0, MASS_STARTS)
     assert shortlist(case, fit_jointly(case), MismatchSettings()) == []
 
 
@@ -66,12 +68,14 @@ def test_only_trains_that_leave_more_than_sound_ones_are_simulated():
     rms = {"loud 1": 1.0, "loud 2": np.sqrt(3.0), "quiet": np.sqrt(0.5), "blows": 9.0}
     seen = [Observation(n, n, np.zeros(40), np.ones(40), effective=0.5) for n in names]
     case = SimpleNamespace(
-        observations=seen, control_level={"passage": 0.7}, said=lambda made: {"train": made},
-        rollings={n: train for n, train in names.items() if train},
+        observations=seen, control_level={"passage": 0.7}, conditions_of=lambda made: {"train": made},
+        aligned_passages={n: train for n, train in names.items() if train},
         candidates=[Candidate("unsprung_mass", FACTOR, float, ((1.4,),), {"train": t}) for t in "ab"],
     )  # fmt: skip
     fit = SimpleNamespace(white=[np.full(40, rms[o.name]) for o in seen])
-    assert left_by(case, fit, "a") == pytest.approx(2.0) and left_by(case, fit, "b") == pytest.approx(0.5)
-    assert left_by(case, fit, "c") == 0.0
-    found = distant_wheels(case, fit)
-    assert [(c.where["train"], start) for c, start in found] == [("a", (m,)) for m in MASSES]
+    assert residual_of_train(case, fit, "a") == pytest.approx(2.0) and residual_of_train(
+        case, fit, "b"
+    ) == pytest.approx(0.5)
+    assert residual_of_train(case, fit, "c") == 0.0
+    found = distant_mass_starts(case, fit)
+    assert [(c.where["train"], start) for c, start in found] == [("a", (m,)) for m in MASS_STARTS]

@@ -22,14 +22,14 @@ def one_warm_day():
 def test_at_one_temperature_soft_pads_may_be_warm_pads(one_warm_day):
     """3 nats at one temperature, thousands at two: at one, the common pad stiffness takes it all."""
     two = of(small_plan((5.0, 30.0), passages=False))
-    assert one_warm_day.seen[one_warm_day.names.index("pad_temperature")] < 5.0
-    assert "none" in one_warm_day.confused("pad_temperature")
-    assert two.seen[two.names.index("pad_temperature")] > 1000.0 and two.confused("pad_temperature") == []
+    assert one_warm_day.detectability[one_warm_day.names.index("pad_temperature")] < 5.0
+    assert "none" in one_warm_day.confused_with("pad_temperature")
+    assert two.detectability[two.names.index("pad_temperature")] > 1000.0 and two.confused_with("pad_temperature") == []
 
 
 def test_an_effect_explains_itself_and_no_explanation_beats_it(one_warm_day):
-    assert np.all(np.diag(one_warm_day.lost) == 0.0)
-    assert np.all(one_warm_day.lost <= one_warm_day.seen[:, None] + 1e-6 * one_warm_day.seen.max())
+    assert np.all(np.diag(one_warm_day.loss) == 0.0)
+    assert np.all(one_warm_day.loss <= one_warm_day.detectability[:, None] + 1e-6 * one_warm_day.detectability.max())
 
 
 @pytest.mark.slow
@@ -37,12 +37,12 @@ def test_passages_below_160_hz_are_blind_to_frequency_dependent_pads_and_blows_a
     from dataclasses import replace
 
     plan = small_plan((15.0,), speeds=(40.0,))
-    rolling = of(replace(plan, blows=()), (*FAMILIES, "surface_dip"))
-    assert "none" in rolling.confused("zener_pad")
+    rolling = of(replace(plan, hammer_points=()), (*FAMILIES, "surface_dip"))
+    assert "none" in rolling.confused_with("zener_pad")
     # twenty times what a name needs: the model's own smooth errors, integrated out, take part of it
-    assert one_warm_day.seen[one_warm_day.names.index("zener_pad")] > 100.0
-    ratio = {n: s for n, s in zip(rolling.names, rolling.seen)}
-    blows = {n: s for n, s in zip(one_warm_day.names, one_warm_day.seen)}
+    assert one_warm_day.detectability[one_warm_day.names.index("zener_pad")] > 100.0
+    ratio = {n: s for n, s in zip(rolling.names, rolling.detectability)}
+    blows = {n: s for n, s in zip(one_warm_day.names, one_warm_day.detectability)}
     # 5 nats of expected evidence are what a name needs
     assert ratio["mount_resonance"] < 5.0 < blows["mount_resonance"]
     # the rail's own waves, and each wheel's, take part of what a dip does; a hammer does not roll over it

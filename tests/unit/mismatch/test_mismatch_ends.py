@@ -7,10 +7,10 @@ import pytest
 
 from turnout import physics
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
-from turnout.mismatch.engine.levenberg_marquardt import Steps
-from turnout.mismatch.engine.map_fit import CHEAP_STEPS, Joint, fit_jointly
+from turnout.mismatch.engine.levenberg_marquardt import DampedSteps
+from turnout.mismatch.engine.map_fit import MAX_CHEAP_STEPS, JointProblem, fit_jointly
 from turnout.mismatch.turnout import TrackCase
-from turnout.mismatch.turnout.hammer_case import Blows
+from turnout.mismatch.turnout.hammer_case import HammerCase
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.simulate import uniform_track
 from turnout.simulate.turnout_track import TurnoutTrack
@@ -21,18 +21,18 @@ def test_whatever_the_start_the_end_is_the_same(seed):
     """Pads a third softer and ballast half as stiff again, each support with a scatter four times that of the priors:
     a common factor trades against thirty own ones, and some end at their bounds."""
     rng = np.random.default_rng(seed)
-    small = small_plan((5.0, 25.0), passages=False, blows=(21.6, 24.0))
+    small = small_plan((5.0, 25.0), passages=False, hammer_positions=(21.6, 24.0))
     turnout = TurnoutTrack(uniform_track(36.0, start=6.0), {"main": ((),)})
-    plan = replace(small, turnout=turnout, n_blows=3, sensors=small.sensors[:3])
+    plan = replace(small, turnout=turnout, n_impacts=3, sensors=small.sensors[:3])
     supports = range(turnout.track.support.size)
     terms = [physics.LocalPad(j, float(np.exp(-0.4 + 0.4 * rng.normal()))) for j in supports]
     terms += [physics.LocalBallast(j, float(np.exp(0.4 + 0.4 * rng.normal()))) for j in supports]
-    case = Blows(TrackCase(measured_campaign(plan, terms, seed)))
+    case = HammerCase(TrackCase(measured_campaign(plan, terms, seed)))
     ends = []
     for k in range(4):
         far = 0.7 * np.random.default_rng(k).normal(size=len(case.nuisances)) if k else np.zeros(len(case.nuisances))
         start = {n.name: n.mean + f * n.sd for n, f in zip(case.nuisances, far)}
-        ends.append(float(fit_jointly(case, values=start, iterations=CHEAP_STEPS).cost))
+        ends.append(float(fit_jointly(case, values=start, iterations=MAX_CHEAP_STEPS).cost))
     assert np.ptp(ends) < 1.0  # half a nat; a fit ends where ten steps in a row would gain no more
 
 
@@ -55,11 +55,11 @@ def test_what_is_at_its_bound_stays_and_the_others_take_their_best():
     found = fit_jointly(case, iterations=20)
     assert found.values["slope"] == 0.5 and found.values["rest"] == 0.5
     x, y = case.x, case.observations[0].data
-    held = Joint(case)
+    held = JointProblem(case)
     theta = np.array([0.5, 0.1])
     predictions = held.predict(theta)
     residuals = held.residuals(predictions)
-    step = Steps(held, theta, residuals, held.jacobian(theta, predictions)).damped(0.0)
+    step = DampedSteps(held, theta, residuals, held.jacobian(theta, predictions)).damped_step(0.0)
     best = np.sum((y - 0.5 * x) * x**2) / np.sum(x**4)
     assert step[0] == pytest.approx(0.0, abs=1e-9)
     assert theta[1] + step[1] == pytest.approx(best, rel=1e-3)  # the prior of 10 takes (0.1 / 10)² / sum x⁴ off

@@ -182,10 +182,10 @@ def test_whitening_gives_unit_variance_to_what_it_was_told_of():
     modes = rng.normal(size=(40, 5))
     o = Observation("a", "a", np.zeros(40), 0.3, modes=modes)
     drawn = np.array([modes @ rng.normal(size=5) + 0.3 * rng.normal(size=40) for _ in range(400)])
-    white = o.whitened(drawn.T)
+    white = o.whiten(drawn.T)
     # 16000 numbers of variance 1: the mean square scatters by sqrt(2 / 16000) = 1.1 %
     assert np.mean(white**2) == pytest.approx(1.0, abs=0.045)
-    assert o.whitened(drawn[0]) == pytest.approx(white[:, 0])
+    assert o.whiten(drawn[0]) == pytest.approx(white[:, 0])
 
 
 class Offset(Line):
@@ -209,7 +209,7 @@ def test_a_nuisance_that_is_missing_comes_back_as_physics_and_is_none_where_it_i
     """Finding: an offset forgotten in the model is a bent law; with the offset free nothing is missing."""
     forgotten = [diagnose(Offset(seed, known=False)) for seed in range(6)]
     known = [diagnose(Offset(seed, known=True)).verdict.answer for seed in range(6)]
-    best = [max(d.scored, key=lambda s: s.gain) for d in forgotten]
+    best = [max(d.scores, key=lambda s: s.gain) for d in forgotten]
     assert all(b.gain > MismatchSettings().threshold for b in best)  # each looks like a discovery
     assert known == ["none"] * 6
 
@@ -231,7 +231,7 @@ def test_two_laws_that_agree_on_one_condition_are_told_apart_by_another():
         case.predict = lambda v, terms, obs: [
             v["level"] + v["slope"] * case.x[o.name] + sum(a * law[p](case.x[o.name]) for p, a in terms) for o in obs
         ]
-        gain = {s.family: s.gain for s in diagnose(case).scored}
+        gain = {s.family: s.gain for s in diagnose(case).scores}
         return gain["power_3"] - gain["signed_square"]
 
     asked = MismatchSettings().margin
@@ -245,7 +245,7 @@ def test_a_size_errs_by_the_share_its_law_is_loose_as_well():
     case = Line(lambda x: x + 0.4 * x**2)
     strict = case.candidates[0]
     fit = fit_jointly(case, (strict,), np.array([0.3]))
-    loose = fit.with_candidates((replace(strict, loose=0.15),))
+    loose = fit.with_candidates((replace(strict, model_error_share=0.15),))
     assert np.allclose(loose.psi_se**2, fit.psi_se**2 + (0.15 * fit.psi) ** 2, atol=0.0, rtol=1e-12)
 
 
@@ -256,5 +256,5 @@ def test_modes_in_single_precision_whiten_as_in_double():
     exact = np.linalg.solve(np.diag(sigma**2) + modes @ modes.T, x)  # x' C^-1 x is the square of what is whitened
     for kind, close in ((np.float64, 1e-9), (np.float32, 1e-3)):  # a mode of 400 sigma leaves 1e-6 of 400, 200 times
         o = Observation("a", "a", np.zeros(200), sigma, modes=modes.astype(kind))
-        white = o.whitened(x)
+        white = o.whiten(x)
         assert white.T @ white == pytest.approx(x.T @ exact, rel=close, abs=200 * close)

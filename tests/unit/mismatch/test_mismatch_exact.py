@@ -8,9 +8,9 @@ import pytest
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch import diagnose
 from turnout.mismatch.engine.candidate import Candidate
-from turnout.mismatch.engine.candidate_search import _same_place
+from turnout.mismatch.engine.candidate_search import _is_same_site
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
-from turnout.mismatch.engine.cross_validation import shared, told_alone
+from turnout.mismatch.engine.cross_validation import signature_overlap, single_type_estimate
 from turnout.mismatch.engine.evidence import score_of
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.turnout import TrackCase
@@ -47,7 +47,7 @@ class Spread(Shapes):
     """Wave and ramp of four times the energy, for four times the samples, each spread evenly over the ``cells``
     (recording, sensor) in which it shows."""
 
-    frozen_jacobian = True
+    expensive = True
 
     def __init__(self, **cells):
         super().__init__(False)
@@ -95,26 +95,28 @@ def test_what_shows_elsewhere_is_not_the_shape_of_the_first(wave, ramp, alike, n
     case = Spread(wave=wave, ramp=ramp)
     assert len(diagnose(case).names) == names
     fit = fit_jointly(case, case.candidates, [100.0, 0.3])
-    assert shared(case, fit, *case.candidates) == pytest.approx(alike, abs=1e-3)
+    assert signature_overlap(case, fit, *case.candidates) == pytest.approx(alike, abs=1e-3)
 
 
 def test_a_gain_is_sought_beside_a_lag_of_the_same_channel_and_a_mounting_is_not():
-    case = TrackCase(measured_campaign(small_plan((15.0,), blows=(24.0,), passages=False), (), 7))
+    case = TrackCase(measured_campaign(small_plan((15.0,), hammer_positions=(24.0,), passages=False), (), 7))
     of = {c.family: c for c in case.candidates if c.where.get("sensor") == "S2"}
-    assert not _same_place(of["sensor_gain"], of["time_offset"])
-    assert _same_place(of["mount_resonance"], of["time_offset"]) and _same_place(of["sensor_gain"], of["sensor_gain"])
+    assert not _is_same_site(of["sensor_gain"], of["time_offset"])
+    assert _is_same_site(of["mount_resonance"], of["time_offset"]) and _is_same_site(
+        of["sensor_gain"], of["sensor_gain"]
+    )
 
 
 def with_whites(case, base, candidate, size, share):
     """Fit 90 nats better, with a candidate of this size and the residuals times the ``share`` of their name or kind."""
-    white = [share.get(o.name, share[o.kind]) * np.asarray(w) for o, w in zip(case.observations, base.white)]
+    white = [share.get(o.name, share[o.data_type]) * np.asarray(w) for o, w in zip(case.observations, base.white)]
     found = replace(base, candidates=(candidate,), psi=np.array([size]), white=white, evidence=base.evidence + 90.0)
     return replace(found, covariance=np.eye(len(base.values) + 1))
 
 
 @pytest.fixture(scope="module")
 def rolled_and_struck():
-    case = TrackCase(measured_campaign(small_plan((15.0,), blows=(24.0,)), (), 7))
+    case = TrackCase(measured_campaign(small_plan((15.0,), hammer_positions=(24.0,)), (), 7))
     return case, fit_jointly(case, iterations=0)
 
 
@@ -122,10 +124,10 @@ def rolled_and_struck():
 def test_friction_is_told_by_trains(rolled_and_struck, kind, material):
     """To blows it is a damper: a fit in which passages gain nothing gives it no name, whatever blows gain."""
     case, base = rolled_and_struck
-    assert {c.told_by for c in case.candidates if c.family == "dry_friction"} == {"passage"}
+    assert {c.required_data_type for c in case.candidates if c.family == "dry_friction"} == {"passage"}
     friction = next(c for c in case.candidates if c.family == "dry_friction")
     better = with_whites(case, base, friction, 3000.0, {"hammer": 1.0, "passage": 1.0, kind: 0.5})
-    assert bool(score_of(case, base, better, friction, MismatchSettings()).material) == material
+    assert bool(score_of(case, base, better, friction, MismatchSettings()).is_reportable) == material
 
 
 class Heard(Case):
@@ -136,16 +138,28 @@ class Heard(Case):
         rng = np.random.default_rng(9)
         loud = [("hammer", blows)] * 4 + [("passage", trains)] * 4
         self.observations = tuple(
-            Observation(f"{kind} {k}", f"day {k}", g * self.shape(k) + 0.1 * rng.normal(size=X.size), 0.1, kind=kind)
+            Observation(
+                f"{kind} {k}", f"day {k}", g * self.shape(k) + 0.1 * rng.normal(size=X.size), 0.1, data_type=kind
+            )
             for k, (kind, g) in enumerate(loud)
         )
         self.nuisances = (Nuisance("gain_A", "-", 0.0, 0.02), Nuisance("support", "-", 0.0, 0.1))
-        struck = tuple(o.name for o in self.observations if o.kind == "hammer")
+        struck = tuple(o.name for o in self.observations if o.data_type == "hammer")
         gain = (Parameter("gain", "-", 1.0, (-3.0, 3.0), "shown over true", "made up 2026", (1.0, 0.3)),)
         self.candidates = (
-            Candidate("sensor_gain", gain, lambda p: p["gain"], ((0.8,), (1.25,)), {"sensor": "A"}, unopposed=struck,
-                      least=0.04, twin="gain_A", twin_sd=0.3, from_twin=lambda g: 1.0 + g),
-        )  # fmt: skip
+            Candidate(
+                "sensor_gain",
+                gain,
+                lambda p: p["gain"],
+                ((0.8,), (1.25,)),
+                {"sensor": "A"},
+                must_not_oppose=struck,
+                smallest_reportable=0.04,
+                masking_parameter="gain_A",
+                masking_sd=0.3,
+                from_masking=lambda g: 1.0 + g,
+            ),
+        )
 
     def shape(self, k):
         return np.sin((9.0 + 2.0 * k) * X)
@@ -153,7 +167,7 @@ class Heard(Case):
     def predict(self, values, terms, observations):
         """Gain times shape and ramp."""
         whole = (1.0 + values["gain_A"]) * np.prod([1.0, *terms])
-        ramps = [values["support"] * (o.kind == "hammer") * SHAPES["ramp"] for o in observations]
+        ramps = [values["support"] * (o.data_type == "hammer") * SHAPES["ramp"] for o in observations]
         return [whole * (self.shape(int(o.name.split()[1])) + ramp) for o, ramp in zip(observations, ramps)]
 
 
@@ -164,8 +178,10 @@ def test_what_blows_alone_say_of_a_gain(gain):
     case = Heard(gain, 1.0)
     fit = fit_jointly(case, iterations=30)
     error = 0.1 / np.sqrt(4 * X.size * 0.5)
-    assert told_alone(case, fit, "hammer", "gain_A", 0.3) == pytest.approx(gain - 1.0, abs=4.0 * error, rel=0.03)
-    assert told_alone(case, fit, "passage", "gain_A", 0.3) == pytest.approx(0.0, abs=4.0 * error)
+    assert single_type_estimate(case, fit, "hammer", "gain_A", 0.3) == pytest.approx(
+        gain - 1.0, abs=4.0 * error, rel=0.03
+    )
+    assert single_type_estimate(case, fit, "passage", "gain_A", 0.3) == pytest.approx(0.0, abs=4.0 * error)
 
 
 @pytest.mark.parametrize(("blows", "trains", "material"), [(0.76, 0.76, True), (-1.0, -1.0, True), (1.0, 0.76, False)])
@@ -175,11 +191,11 @@ def test_a_gain_that_blows_speak_against_is_none(blows, trains, material):
     case = Heard(blows, trains)
     (gain,), base = case.candidates, fit_jointly(case)
     refit = fit_jointly(case, (gain,), [trains])
-    assert bool(score_of(case, base, refit, gain, MismatchSettings()).material) == material
+    assert bool(score_of(case, base, refit, gain, MismatchSettings()).is_reportable) == material
 
 
 def test_it_is_the_blows_that_a_sensor_read_that_may_speak_against_its_gain(rolled_and_struck):
     case, _ = rolled_and_struck
     gains = [c for c in case.candidates if c.family == "sensor_gain"]
-    assert any(c.unopposed for c in gains)
-    assert all(case.pairs[name].channel == c.where["sensor"] for c in gains for name in c.unopposed)
+    assert any(c.must_not_oppose for c in gains)
+    assert all(case.frf_pairs[name].channel == c.where["sensor"] for c in gains for name in c.must_not_oppose)

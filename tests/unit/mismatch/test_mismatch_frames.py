@@ -9,7 +9,7 @@ from scipy.stats import binom
 from turnout import physics
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.diagnose import Verification
-from turnout.mismatch.engine.residual_attribution import Frame, attribute
+from turnout.mismatch.engine.residual_attribution import Attribution, attribute
 from turnout.report.finding_text import facts
 from turnout.stages.mismatch_rows import finding_row
 
@@ -96,8 +96,8 @@ def test_a_row_has_no_place_from_a_frame_of_the_residual():
     law = physics.PadTemperature
     warm = Candidate("pad_temperature", law.parameters, lambda p: law(**p), (), {}, "condition")
     frames = [
-        Frame("sensor", "A2", 1.9, 0.1, 1e-3, 4e-3, 1253),
-        Frame("condition", "73 km/h", 1.0, 0.1, 0.2, 0.3, 1253),
+        Attribution("sensor", "A2", 1.9, 0.1, 1e-3, 4e-3, 1253),
+        Attribution("condition", "73 km/h", 1.0, 0.1, 0.2, 0.3, 1253),
     ]
     named = diagnosed("named", (warm,), frames)
     named.fit.terms = (warm.term(named.fit.psi),)

@@ -8,9 +8,15 @@ import pytest
 from turnout import physics
 from turnout.mismatch.engine.case import Case, Observation
 from turnout.mismatch.engine.map_fit import fit_jointly
-from turnout.mismatch.turnout.candidates.out_of_roundness import AMPLITUDES, _evidence
+from turnout.mismatch.turnout.candidates.out_of_roundness import AMPLITUDES, _passage_evidence
 from turnout.mismatch.turnout.candidates.rail_defects import RailScan
-from turnout.mismatch.turnout.candidates.wheel_flats import ODD, WIDE, heard, likelihood, of_wheel
+from turnout.mismatch.turnout.candidates.wheel_flats import (
+    OUTLIER_DENSITY,
+    OUTLIER_SHARE,
+    band_excess,
+    best_flat_on_wheel,
+    log_likelihood_ratio,
+)
 from turnout.mismatch.turnout.rail_roughness import Waves
 from turnout.simulate.vehicle import lone_wheels
 
@@ -44,8 +50,8 @@ def passage(phase, wheel, name, radius=0.46, strength=30.0, seed=0):
 
 
 def scanned(mades):
-    loud = [heard(m) for m in mades]
-    return [of_wheel(mades, loud, w) for w in range(len(WHEELS))]
+    loud = [band_excess(m) for m in mades]
+    return [best_flat_on_wheel(mades, loud, w) for w in range(len(WHEELS))]
 
 
 def test_a_row_of_blows_names_the_wheel_that_makes_them_its_radius_and_where_it_strikes():
@@ -71,7 +77,7 @@ def with_nose(made, place, loud, seed):
     """The same passage, every wheel banging at ``place`` as loud as ``loud`` says; axles a turn apart in a bogie."""
     rng = np.random.default_rng(seed)
     made.passage.vehicle = wagon([0.0, TURN, 10.7, 10.7 + TURN])
-    for behind, strength in zip(made.passage.vehicle.wheel_places, loud):
+    for behind, strength in zip(made.passage.vehicle.wheel_positions, loud):
         moment = made.reference + (place - PLACES[0] + behind) / SPEED
         inside = (made.time >= moment) & (made.time < moment + 0.004)
         for row, x in zip(made.passage.recording.samples, PLACES):
@@ -96,24 +102,27 @@ def test_a_flat_of_one_of_two_wheels_is_no_bang_of_the_rail():
     for wheels in ([0.0, 4.9], [0.0]):
         made = passage(1.1, 0, "a", seed=6)
         made.passage.vehicle = wagon(wheels)
-        assert of_wheel([made], [heard(made)], 0)[0] > 15.0  # the louder of two would leave it nothing
+        assert best_flat_on_wheel([made], [band_excess(made)], 0)[0] > 15.0  # the louder of two would leave it nothing
 
 
 def test_no_single_bang_says_more_than_its_bound():
     """ln of ((1-e) / sqrt(2 pi) + e U) / (e U), the density of noise at its middle over that of the odd."""
-    bound = np.log(((1.0 - ODD) / np.sqrt(2.0 * np.pi) + ODD * WIDE) / (ODD * WIDE))
+    bound = np.log(
+        ((1.0 - OUTLIER_SHARE) / np.sqrt(2.0 * np.pi) + OUTLIER_SHARE * OUTLIER_DENSITY)
+        / (OUTLIER_SHARE * OUTLIER_DENSITY)
+    )
     z, m = np.meshgrid(np.linspace(-5.0, 100.0, 200), np.linspace(0.0, 30.0, 50))
-    assert np.all(np.abs(likelihood(z, m)) <= bound)
-    assert likelihood(-1e3, 0.0) == 0.0 == likelihood(0.7, 0.0)
-    bell = (1.0 - ODD) * np.exp(-0.5 * (30.0 / 8.5) ** 2) / (np.sqrt(2.0 * np.pi) * 8.5)  # spread 1 + 30 / 4
-    assert likelihood(0.0, 30.0) == pytest.approx(np.log1p(bell / (ODD * WIDE)) - bound)
+    assert np.all(np.abs(log_likelihood_ratio(z, m)) <= bound)
+    assert log_likelihood_ratio(-1e3, 0.0) == 0.0 == log_likelihood_ratio(0.7, 0.0)
+    bell = (1.0 - OUTLIER_SHARE) * np.exp(-0.5 * (30.0 / 8.5) ** 2) / (np.sqrt(2.0 * np.pi) * 8.5)  # spread 1 + 30 / 4
+    assert log_likelihood_ratio(0.0, 30.0) == pytest.approx(np.log1p(bell / (OUTLIER_SHARE * OUTLIER_DENSITY)) - bound)
 
 
 def test_the_evidence_of_a_wave_is_that_of_two_normal_amplitudes_integrated_out():
     """By quadrature: the mean over amplitudes N(0, a^2) of exp(s.c - c.M.c / 2)."""
     m = np.array([[3e10, 4e9], [4e9, 2e10]])
     s = np.array([6e5, -3e5])
-    (row,) = _evidence(s[None], m[None])[2:3]
+    (row,) = _passage_evidence(s[None], m[None])[2:3]
     a = AMPLITUDES[2]
     grid = np.linspace(-8.0, 8.0, 1601) * a
     x, y = np.meshgrid(grid, grid, indexing="ij")
@@ -124,14 +133,14 @@ def test_the_evidence_of_a_wave_is_that_of_two_normal_amplitudes_integrated_out(
 
 def test_a_wheel_is_round_where_its_angle_is_not_known():
     term = physics.OutOfRound(2, 1e-4, 0.0, order=5, radius=0.45, train="loaded", phases=(("a", 0.3),))
-    assert term.under({"train": "railcar", "name": "a"}).paths(None, None) == ()
-    assert term.under({"train": "loaded", "name": "b"}).paths(None, None) == ()
+    assert term.under_conditions({"train": "railcar", "name": "a"}).paths(None, None) == ()
+    assert term.under_conditions({"train": "loaded", "name": "b"}).paths(None, None) == ()
     x = np.linspace(0.0, 3.0, 50)
-    parts = term.under({"train": "loaded", "name": "a"}).paths(None, None)
+    parts = term.under_conditions({"train": "loaded", "name": "a"}).paths(None, None)
     assert sum(p(x, 2) for p in parts) == pytest.approx(1e-4 * np.cos(5.0 * (x - 0.3) / 0.45))
     flat = physics.WheelFlat(2, 0.05, 0.45, train="loaded", phases=(("a", 0.3),))
-    assert flat.under({"train": "loaded", "name": "b"}).paths(None, None) == ()
-    assert flat.under({"train": "loaded", "name": "a"}).phase == 0.3
+    assert flat.under_conditions({"train": "loaded", "name": "b"}).paths(None, None) == ()
+    assert flat.under_conditions({"train": "loaded", "name": "a"}).phase == 0.3
 
 
 class OnlyWaves(Case):
@@ -141,7 +150,7 @@ class OnlyWaves(Case):
         rng = np.random.default_rng(11)
         self.waves = Waves(PLACES, 0.0)
         self.nuisances = tuple(self.waves.nuisances())
-        self.observations = (Observation("a", "a", rng.normal(size=400), 1.0, kind="passage"),)
+        self.observations = (Observation("a", "a", rng.normal(size=400), 1.0, data_type="passage"),)
         self.columns = rng.normal(size=(400, len(self.nuisances))) / self.waves.sd
 
     def predict(self, values, terms, observations):
@@ -156,7 +165,7 @@ def test_the_gain_of_a_shape_is_that_of_a_least_squares_fit_with_its_column_besi
     fit = fit_jointly(case, iterations=3)
     scan = RailScan(case, fit)
     shape = np.where(np.abs(scan.x - 5.0) < 0.4, 1e-3 * np.cos(np.pi * (scan.x - 5.0) / 0.8) ** 2, 0.0)
-    slope, size = scan.scored(shape[None])
+    slope, size = scan.score(shape[None])
 
     column = case.columns @ (shape @ scan.basis * case.waves.sd)  # what the shape's waves show
     prior = np.diag(1.0 / case.waves.sd)
@@ -167,5 +176,5 @@ def test_the_gain_of_a_shape_is_that_of_a_least_squares_fit_with_its_column_besi
 
     theta = np.linalg.lstsq(wider, right, rcond=None)[0]  # the waves that are left are those of that fit
     height = slope[0] / size[0, 0]
-    left = scan.released(height * shape)
+    left = scan.waves_without(height * shape)
     assert [left[n] for n in case.waves.names] == pytest.approx(theta[:-1], rel=1e-5, abs=1e-6 * case.waves.sd.max())

@@ -10,8 +10,8 @@ import pytest
 from turnout import physics
 from turnout.mismatch.turnout import TrackCase, receptance_observation
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
-from turnout.mismatch.turnout.receptance_model import AddedLinks, nudged
-from turnout.mismatch.turnout.screening import CHANNELS, _pair_channels
+from turnout.mismatch.turnout.receptance_model import AddedLinks, changed_links
+from turnout.mismatch.turnout.screening import CHANNEL_EFFECTS, _pair_channel_changes
 from turnout.simulate import uniform_track
 from turnout.simulate.turnout_track import TurnoutTrack
 
@@ -21,9 +21,9 @@ J = 27
 @pytest.fixture(scope="module")
 def somewhere():
     """(case, nuisances off their means, unlike at every support; the rail where models are made)."""
-    small = small_plan((25.0,), passages=False, blows=(21.6, 24.0))
+    small = small_plan((25.0,), passages=False, hammer_positions=(21.6, 24.0))
     turnout = TurnoutTrack(uniform_track(36.0, start=6.0), {"main": ((),)})
-    plan = replace(small, turnout=turnout, n_blows=3, sensors=small.sensors[:3])
+    plan = replace(small, turnout=turnout, n_impacts=3, sensors=small.sensors[:3])
     case, rng = TrackCase(measured_campaign(plan, (), 3)), np.random.default_rng(0)
     values = {n.name: n.mean + 0.3 * n.sd * rng.standard_normal() for n in case.nuisances}
     return case, values | {"rail_bending": 0.0, "rail_shear": 0.0}
@@ -32,7 +32,7 @@ def somewhere():
 def off(case, values, old, new):
     """How far the step from ``old`` is from the one predicted, over its size."""
     before = case.predict(values, (old,), case.observations)
-    short = np.concatenate(case.moved(values, (old,), (new,), case.observations, before))
+    short = np.concatenate(case.predict_near(values, (old,), (new,), case.observations, before))
     exact, before = np.concatenate(case.predict(values, (new,), case.observations)), np.concatenate(before)
     return np.linalg.norm(short - exact) / np.linalg.norm(exact - before)
 
@@ -73,10 +73,10 @@ def test_what_is_no_change_of_links_is_predicted(somewhere, old, new):
 
 def test_links_that_are_others_are_no_small_step(somewhere):
     case, values = somewhere
-    model = case.blow_model(values, (physics.LocalBallast(J, 0.5),), next(iter(case.pairs.values()))).model
-    assert nudged(model, (physics.LocalBallast(J + 1, 0.5),)) is None
-    assert nudged(model, (physics.LocalPad(J, 0.5),)) is None
-    ends, impedance = nudged(model, (physics.LocalBallast(J, 0.5),))
+    model = case.pair_sensitivity(values, (physics.LocalBallast(J, 0.5),), next(iter(case.frf_pairs.values()))).model
+    assert changed_links(model, (physics.LocalBallast(J + 1, 0.5),)) is None
+    assert changed_links(model, (physics.LocalPad(J, 0.5),)) is None
+    ends, impedance = changed_links(model, (physics.LocalBallast(J, 0.5),))
     assert ends.shape[0] == 0 and impedance.shape == (0, receptance_observation.LINES.size)
 
 
@@ -87,7 +87,7 @@ def test_an_added_link_changes_a_receptance_as_a_track_that_has_it(somewhere):
     added = AddedLinks(case, SimpleNamespace(values=values, terms=()), chosen)
     for o in case.observations[:3]:
         (before,) = case.predict(values, (), [o])
-        for (c, k), found in zip(chosen, added.changes(case.pairs[o.name]).values()):
+        for (c, k), found in zip(chosen, added.changes(case.frf_pairs[o.name]).values()):
             (after,) = case.predict(values, (c.term(c.starts[k]),), [o])
             assert np.linalg.norm(found - (after - before)) < 1e-9 * np.linalg.norm(after - before)
 
@@ -99,7 +99,7 @@ def test_what_a_channel_does_to_a_receptance_is_what_the_case_predicts(somewhere
     values = values | {"rail_shear": 0.02}
     predicted = case.predict(values, (), case.observations)
     fit, told = SimpleNamespace(values=values, terms=(), predictions=predicted), set()
-    chosen = [(c, 0) for c in case.candidates if c.family in CHANNELS]
+    chosen = [(c, 0) for c in case.candidates if c.family in CHANNEL_EFFECTS]
     for o, old in zip(case.observations, predicted):
         for c, found in zip(*_heard(case, fit, o, old, chosen)):
             (after,) = case.predict(values, (c.term(c.starts[0]),), [o])
@@ -111,7 +111,7 @@ def test_what_a_channel_does_to_a_receptance_is_what_the_case_predicts(somewhere
 
 def _heard(case, fit, observation, old, chosen):
     """Candidates on the channel of an observation, and the columns that they are given."""
-    found = _pair_channels(case, fit, observation, old, chosen)
+    found = _pair_channel_changes(case, fit, observation, old, chosen)
     return [c for c, k in chosen if (c.key, k) in found], found.values()
 
 
@@ -119,9 +119,9 @@ def test_a_sensor_moved_from_the_rail_to_a_sleeper_is_another_seat(somewhere):
     """The same channel at the same place, mounted otherwise in the second test: each pair is predicted as if alone."""
     case, values = somewhere
     (first, second), found = [o for o in case.observations if ":S1" in o.name][:2], copy(case)
-    sleeper = replace(case.pairs[second.name].sensor, mounting="sleeper")
-    found.pairs = {**case.pairs, second.name: replace(case.pairs[second.name], sensor=sleeper)}
-    found._forget()
+    sleeper = replace(case.frf_pairs[second.name].sensor, mounting="sleeper")
+    found.frf_pairs = {**case.frf_pairs, second.name: replace(case.frf_pairs[second.name], sensor=sleeper)}
+    found._clear_caches()
     (alone,), (beside,) = case.predict(values, (), [first]), found.predict(values, (), [first])
     assert np.allclose(alone, beside, atol=0.0, rtol=1e-9)
     (there,), (moved,) = case.predict(values, (), [second]), found.predict(values, (), [second])

@@ -7,10 +7,10 @@ import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine.candidate import Candidate
-from turnout.mismatch.engine.candidate_search import _fitted_already, _kin
+from turnout.mismatch.engine.candidate_search import _component_rivals, _with_fitted_start
 from turnout.mismatch.engine.case import Nuisance
 from turnout.mismatch.engine.decision import judge
-from turnout.mismatch.engine.evidence import ODD, _usual
+from turnout.mismatch.engine.evidence import MAX_ORDINARY_SPREADS, _is_ordinary
 from turnout.mismatch.engine.score import Score
 from turnout.physics import Parameter
 
@@ -38,21 +38,24 @@ def answer(*scores):
 
 @pytest.mark.parametrize("factor, said", [(0.05, "a_or_b"), (0.12, "a_or_b"), (0.40, "named")])
 def test_ballast_that_carries_nothing_may_be_a_gap_that_no_train_closes(factor, said):
-    ballast = score(candidate("local_ballast", limit="hanging_sleeper"), 600.0, factor, 0.1)
+    ballast = score(candidate("local_ballast", limit_form="hanging_sleeper"), 600.0, factor, 0.1)
     verdict = answer(ballast, score(candidate("hanging_sleeper"), 500.0, 2e-3, 2e-4))
     assert verdict.answer == said
     assert verdict.names[0] == "local_ballast"
 
 
 def test_a_gap_elsewhere_or_one_that_explains_nothing_is_no_limit():
-    ballast = score(candidate("local_ballast", limit="hanging_sleeper"), 600.0, 0.05, 0.1)
+    ballast = score(candidate("local_ballast", limit_form="hanging_sleeper"), 600.0, 0.05, 0.1)
     elsewhere = score(candidate("hanging_sleeper", {"sleeper": 9, "place": 5.4}), 500.0, 2e-3, 2e-4)
     useless = score(candidate("hanging_sleeper"), 500.0, 2e-3, 2e-4, explained=0.1)
     assert answer(ballast, elsewhere).answer == "named"
     assert answer(ballast, useless).answer == "named"
 
 
-@pytest.mark.parametrize("times, usual", [(0.9 * ODD, True), (1.1 * ODD, False), (-1.1 * ODD, False)])
+@pytest.mark.parametrize(
+    "times, usual",
+    [(0.9 * MAX_ORDINARY_SPREADS, True), (1.1 * MAX_ORDINARY_SPREADS, False), (-1.1 * MAX_ORDINARY_SPREADS, False)],
+)
 def test_a_support_is_odd_against_the_spread_of_its_like(times, usual):
     """Seven other pads have logarithms of mean 0.3 and variance 4e-2, each known to a variance of 9e-2; pad 0 is its
     own candidate; ballast is not its like, nor is what all pads have in common."""
@@ -66,19 +69,19 @@ def test_a_support_is_odd_against_the_spread_of_its_like(times, usual):
         psi=np.array([np.exp(times * spread)]),
         part=first,
     )
-    assert _usual(case, refit, candidate("local_pad", twin="pad_0")) == usual
-    assert not _usual(case, refit, candidate("local_pad"))
+    assert _is_ordinary(case, refit, candidate("local_pad", masking_parameter="pad_0")) == usual
+    assert not _is_ordinary(case, refit, candidate("local_pad"))
 
 
 def test_laws_of_the_leading_parts_are_refitted_from_their_best_starts():
     there = {"sleeper": 9, "place": 5.4}
-    leader, gap = candidate("local_ballast", kin="ballast"), candidate("hanging_sleeper", kin="ballast")
-    other, far = candidate("sensor_gain", {"sensor": "S1"}), candidate("hanging_sleeper", there, kin="ballast")
+    leader, gap = candidate("local_ballast", component="ballast"), candidate("hanging_sleeper", component="ballast")
+    other, far = candidate("sensor_gain", {"sensor": "S1"}), candidate("hanging_sleeper", there, component="ballast")
     chosen = [(40.0, leader, np.array([0.4]), {}), (30.0, other, np.array([0.9]), {})]
     weak, strong = (-9.0, gap, np.array([1.0]), {}), (-2.0, gap, np.array([2.0]), {})
     scored = {"local_ballast": chosen[:1], "hanging_sleeper": [strong, (5.0, far, np.array([3.0]), {}), weak]}
-    assert _kin(chosen, scored) == [strong]
-    assert _kin(chosen[1:], scored) == []
+    assert _component_rivals(chosen, scored) == [strong]
+    assert _component_rivals(chosen[1:], scored) == []
 
 
 @pytest.mark.parametrize("behind, said", [(0.9, "a_or_b"), (1.1, "named")])
@@ -139,14 +142,16 @@ def test_a_name_with_evidence_of_its_own_need_not_explain_what_the_fit_leaves(
     that the fit has become worse: by more than a margin of 6, which its numbers cost, that speaks against it; the
     loudest channel alone, which it may leave louder, does not."""
     where = {"train": "railcar", "axle": 1}
-    flat = candidate("wheel_flat", where, aside=aside, scanned=scanned, sounding=sounding)
+    flat = candidate("wheel_flat", where, external_evidence=aside, n_scanned=scanned, evidence_suffices=sounding)
     verdict = answer(score(flat, gain, 0.08, 0.01, explained=explained))
     assert verdict.answer == said and f"{explained:.0%}" in verdict.reason
 
 
 def test_what_explains_too_little_leaves_the_lead_to_what_other_data_tell():
     """A gain in a sensor that a flat keeps louder than sound turnouts: both are said, and asked together."""
-    flat = candidate("wheel_flat", {"train": "railcar", "axle": 1}, aside=43.6, scanned=20, sounding=True)
+    flat = candidate(
+        "wheel_flat", {"train": "railcar", "axle": 1}, external_evidence=43.6, n_scanned=20, evidence_suffices=True
+    )
     gain = candidate("sensor_gain", {"sensor": "A1"})
     found = [score(gain, 150.0, 0.7, 0.01, explained=0.02), score(flat, 37.6, 0.08, 0.01, explained=0.01)]
     assert answer(*found).names == ("wheel_flat", "sensor_gain")
@@ -160,5 +165,5 @@ def test_a_fit_that_was_made_is_a_better_start_than_a_column():
     column = (90.0, here, np.array([0.85]), {})
     made, elsewhere = (60.0, here, np.array([0.66]), {"gain_A1": 0.0}), (70.0, there, np.array([0.9]), {"gain_A2": 0.1})
     scored = {"sensor_gain": [column, made, elsewhere]}
-    assert _fitted_already(column, scored) is made
-    assert _fitted_already(column, {"sensor_gain": [column, elsewhere]}) is column
+    assert _with_fitted_start(column, scored) is made
+    assert _with_fitted_start(column, {"sensor_gain": [column, elsewhere]}) is column

@@ -11,19 +11,19 @@ from turnout import physics
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
 from turnout.mismatch import diagnose
-from turnout.mismatch.engine.evidence import judged
-from turnout.mismatch.engine.localization import whereabouts
+from turnout.mismatch.engine.evidence import assess
+from turnout.mismatch.engine.localization import locate
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.turnout import TrackCase, passage_observation
-from turnout.mismatch.turnout.candidates.wheel_flats import Strikes, flats
-from turnout.mismatch.turnout.passage_alignment import ALIKE, align, slow
+from turnout.mismatch.turnout.candidates.wheel_flats import FlatEvidence, flat_candidates
+from turnout.mismatch.turnout.passage_alignment import MIN_CORRELATION, align, low_pass
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 
 
 @pytest.fixture(scope="module")
 def plan():
-    return small_plan((15.0,), blows=(24.0,))
+    return small_plan((15.0,), hammer_positions=(24.0,))
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +61,7 @@ def test_derivatives_of_passages_are_those_beside_the_term(sound, term):
     case, values = sound
     (seen,) = (o for o in case.observations if o.name == "heavy 2")
     wave = case.waves.names[2 * int(np.argmin(np.abs(case.waves.lengths - 0.7)))]
-    row = [s.name for s in case.rollings["heavy 2"].sensors].index("S3")
+    row = [s.name for s in case.aligned_passages["heavy 2"].sensors].index("S3")
     before = case.predict(values, (term,), [seen])[0]
     jacobian = case.nuisance_jacobian(values, (term,), [seen], [before])[0]
     for name, size in ((wave, 3e-5), ("pad_40", 0.05)):
@@ -89,7 +89,7 @@ def test_a_wave_is_as_loud_as_simulated_where_supports_differ(sound, hangs):
         wave = case.waves.names[2 * int(np.argmin(np.abs(case.waves.lengths - wavelength)))]
         index = [n.name for n in case.nuisances].index(wave)
         change = case.predict({**values, wave: values[wave] + case.nuisances[index].sd}, term, [seen])[0] - before
-        column, change = seen.whitened(jacobian[:, index]), seen.whitened(change) / case.nuisances[index].sd
+        column, change = seen.whiten(jacobian[:, index]), seen.whiten(change) / case.nuisances[index].sd
         assert column @ change / np.sqrt((column @ column) * (change @ change)) > 0.9
         assert np.linalg.norm(column) == pytest.approx(np.linalg.norm(change), rel=0.15)
 
@@ -107,8 +107,8 @@ def test_what_supports_have_in_common_is_pressed_at_those_of_the_zone(sound, nam
     (seen,) = (o for o in case.observations if o.name == "heavy 2")
     before = case.predict(values, (), [seen])[0]
     jacobian = case.nuisance_jacobian(values, (), [seen], [before])[0]
-    column = seen.whitened(jacobian[:, [n.name for n in case.nuisances].index(name)])
-    change = seen.whitened(case.predict({**values, name: values[name] + 0.04}, (), [seen])[0] - before) / 0.04
+    column = seen.whiten(jacobian[:, [n.name for n in case.nuisances].index(name)])
+    change = seen.whiten(case.predict({**values, name: values[name] + 0.04}, (), [seen])[0] - before) / 0.04
     assert column @ change / np.sqrt((column @ column) * (change @ change)) > cosine
     assert np.linalg.norm(column) == pytest.approx(np.linalg.norm(change), rel=0.05 if "stiffness" in name else 0.4)
 
@@ -117,7 +117,7 @@ def test_what_supports_have_in_common_is_pressed_at_those_of_the_zone(sound, nam
 def test_a_flat_is_found_on_its_wheel_with_the_place_where_it_strikes(plan):
     flat = physics.WheelFlat(2, 0.07, 0.43, 1.1, "heavy")
     case = TrackCase(measured_campaign(plan, (flat,), 7))
-    found = flats(case, fit_jointly(case, iterations=12))
+    found = flat_candidates(case, fit_jointly(case, iterations=12))
     assert found and found[0].where == {"train": "heavy", "axle": 3}
     turn = 2.0 * np.pi * 0.43
     for _, phase in found[0].term([0.07]).phases:
@@ -129,7 +129,7 @@ def test_a_flat_is_found_on_its_wheel_with_the_place_where_it_strikes(plan):
 @pytest.mark.slow
 def test_no_wheel_is_blamed_where_none_has_a_flat(plan, sound):
     case, _ = sound
-    assert flats(case, fit_jointly(case, iterations=12)) == ()
+    assert flat_candidates(case, fit_jointly(case, iterations=12)) == ()
 
 
 @pytest.mark.slow
@@ -142,7 +142,7 @@ def test_too_coarse_a_step_is_answered_numerics_and_carries_no_name(plan):
 
 def test_the_derivative_by_a_sensors_place_is_where_the_simulation_goes_when_it_is_moved(sound):
     case, values = sound
-    observation = next(o for o in case.observations if o.name in case.rollings)
+    observation = next(o for o in case.observations if o.name in case.aligned_passages)
     names = [n.name for n in case.nuisances]
     predicted = case.predict(values, (), [observation])
     column = case.nuisance_jacobian(values, (), [observation], predicted)[0]
@@ -160,23 +160,25 @@ def test_one_sensor_that_disagrees_does_not_cost_the_passage_but_a_wrong_train_d
     wrong train, stay below what is asked for."""
     case, values = sound
     passage = next(p for p in case.campaign.passages if p.name == "heavy 2")
-    sensors = case.rollings["heavy 2"].sensors
-    signals = case.roll(values, (), passage)(passage, passage.vehicle, passage.speed, sensors)
-    reference, speed, _ = align(passage, slow(passage.recording, sensors), signals, case.solver.rate)
+    sensors = case.aligned_passages["heavy 2"].sensors
+    signals = case.passage_simulator(values, (), passage)(passage, passage.vehicle, passage.speed, sensors)
+    reference, speed, _ = align(passage, low_pass(passage.recording, sensors), signals, case.solver.rate)
     rows = [passage.recording.index(s.name) for s in sensors]
 
     def reversed_(*which):
         samples = passage.recording.samples.copy()
         samples[[rows[k] for k in which]] *= -1.0
         turned = replace(passage, recording=replace(passage.recording, samples=samples))
-        return align(turned, slow(turned.recording, sensors), signals, case.solver.rate)
+        return align(turned, low_pass(turned.recording, sensors), signals, case.solver.rate)
 
     found = reversed_(wrong)
-    assert found[2] > ALIKE and found[0] == pytest.approx(reference, abs=2.6e-3)  # two steps of the search
+    assert found[2] > MIN_CORRELATION and found[0] == pytest.approx(reference, abs=2.6e-3)  # two steps of the search
     assert found[1] == pytest.approx(speed, rel=0.003)
-    assert reversed_(wrong, wrong + 2)[2] < ALIKE
-    light = case.roll(values, (), passage)(passage, case.rollings["light 2"].passage.vehicle, passage.speed, sensors)
-    assert align(passage, slow(passage.recording, sensors), light, case.solver.rate)[2] < ALIKE
+    assert reversed_(wrong, wrong + 2)[2] < MIN_CORRELATION
+    light = case.passage_simulator(values, (), passage)(
+        passage, case.aligned_passages["light 2"].passage.vehicle, passage.speed, sensors
+    )
+    assert align(passage, low_pass(passage.recording, sensors), light, case.solver.rate)[2] < MIN_CORRELATION
 
 
 def test_blows_many_times_as_strong_as_any_axle_do_not_hide_which_train_it_is(sound):
@@ -184,24 +186,26 @@ def test_blows_many_times_as_strong_as_any_axle_do_not_hide_which_train_it_is(so
     itself with them, and of a wrong train they make none."""
     case, values = sound
     passage = next(p for p in case.campaign.passages if p.name == "heavy 2")
-    sensors = case.rollings["heavy 2"].sensors
-    signals = case.roll(values, (), passage)(passage, passage.vehicle, passage.speed, sensors)
-    quiet = slow(passage.recording, sensors)
+    sensors = case.aligned_passages["heavy 2"].sensors
+    signals = case.passage_simulator(values, (), passage)(passage, passage.vehicle, passage.speed, sensors)
+    quiet = low_pass(passage.recording, sensors)
     reference = align(passage, quiet, signals, case.solver.rate)[0]
     time = np.arange(quiet.shape[1]) / 800.0
     struck = sum(np.exp(-(((time - reference - 0.02 - 0.16 * k) / 0.01) ** 2)) for k in range(3))
     loud = quiet + 8.0 * np.max(np.abs(quiet), axis=1, keepdims=True) * struck
     alike = np.sum(quiet * loud, axis=1) / np.linalg.norm(quiet, axis=1) / np.linalg.norm(loud, axis=1)
-    assert np.max(np.abs(alike)) < 0.7 * ALIKE
-    assert align(passage, loud, signals, case.solver.rate)[2] > ALIKE
-    light = case.roll(values, (), passage)(passage, case.rollings["light 2"].passage.vehicle, passage.speed, sensors)
-    assert align(passage, loud, light, case.solver.rate)[2] < ALIKE
+    assert np.max(np.abs(alike)) < 0.7 * MIN_CORRELATION
+    assert align(passage, loud, signals, case.solver.rate)[2] > MIN_CORRELATION
+    light = case.passage_simulator(values, (), passage)(
+        passage, case.aligned_passages["light 2"].passage.vehicle, passage.speed, sensors
+    )
+    assert align(passage, loud, light, case.solver.rate)[2] < MIN_CORRELATION
 
 
 def power(case, train):
     """Variance of a train's modes over the band below 60 Hz, by the passage first recorded."""
-    o = next(o for o in case.observations if o.name in case.rollings and o.name.startswith(train))
-    made = case.rollings[o.name]
+    o = next(o for o in case.observations if o.name in case.aligned_passages and o.name.startswith(train))
+    made = case.aligned_passages[o.name]
     rows = np.asarray(o.modes, dtype=float).reshape(len(made.sensors), made.time.size, -1)
     spectrum = np.abs(np.fft.rfft(rows, axis=1)) ** 2
     inside = np.fft.rfftfreq(made.time.size, 1.0 / made.clock) < 60.0
@@ -214,16 +218,16 @@ def test_errors_of_a_passage_are_those_of_wheels_as_heavy_as_the_fit_has_them(so
     a spring, and what roughness does below 60 Hz grows; the other train's errors stay what they were."""
     case, values = sound
     fit = fit_jointly(case, values=values, iterations=1)
-    assert case.renewed(fit) is case
+    assert case.with_updated_errors(fit) is case
     heavy = replace(fit, values={**fit.values, "wheels_heavy": np.log(2.0)}, covariance=1e-4 * np.eye(len(fit.values)))
-    new = case.renewed(heavy)
-    assert new is not case and new.renewed(heavy) is new
+    new = case.with_updated_errors(heavy)
+    assert new is not case and new.with_updated_errors(heavy) is new
     assert power(new, "heavy") > 1.3 * power(case, "heavy")
     assert power(new, "light") == power(case, "light")
-    assert case.heavier == {} and set(new.heavier) == {"heavy"}
+    assert case.log_mass_ratios == {} and set(new.log_mass_ratios) == {"heavy"}
     term = next(c for c in case.candidates if c.family == "unsprung_mass" and c.where["train"] == "heavy")
     named = replace(fit, candidates=(term,), psi=np.array([2.0]))
-    assert case.renewed(named).heavier["heavy"] == pytest.approx(np.log(2.0), abs=0.1)
+    assert case.with_updated_errors(named).log_mass_ratios["heavy"] == pytest.approx(np.log(2.0), abs=0.1)
 
 
 @pytest.mark.slow
@@ -233,18 +237,18 @@ def test_passages_roll_on_the_rail_that_the_fit_has(sound):
     case, values = sound
     fit = fit_jointly(case, values=values, iterations=1)
     bent = {name: at - 0.1 * (name == "rail_shear") for name, at in case.rail.items()}
-    assert case.renewed(replace(fit, values={**fit.values, **bent})) is case
+    assert case.with_updated_errors(replace(fit, values={**fit.values, **bent})) is case
     bent["rail_shear"] -= 0.3
     softer = replace(fit, values={**fit.values, **bent})
-    new, made = case.renewed(softer), copy(case)
+    new, made = case.with_updated_errors(softer), copy(case)
     made.recentre(bent)
-    assert new.rail == bent and new.renewed(softer) is new and case.rail != bent
+    assert new.rail == bent and new.with_updated_errors(softer) is new and case.rail != bent
     seen = next(o for o in case.observations if o.name == "heavy 2")
     (before,), (found,), (exact,) = (c.predict(softer.values, (), [seen]) for c in (case, new, made))
     assert np.array_equal(found, exact) and np.linalg.norm(found - before) > 0.01 * np.linalg.norm(before)
     assert power(new, "light") != power(case, "light") and power(new, "heavy") != power(case, "heavy")
     for old, anew in zip(case.observations, new.observations):
-        assert (anew is old) is (old.name in case.pairs)
+        assert (anew is old) is (old.name in case.frf_pairs)
 
 
 def test_a_train_that_looks_like_no_such_train_is_said_and_located(plan):
@@ -253,48 +257,50 @@ def test_a_train_that_looks_like_no_such_train_is_said_and_located(plan):
     other = {p.train: p.vehicle for p in campaign.passages}
     swapped = [replace(p, vehicle=other["light"]) if p.train == "heavy" else p for p in campaign.passages]
     case = TrackCase(replace(campaign, passages=tuple(swapped)))
-    assert case.foreign == ("heavy",) and len([n for n in case.notes if "likeness" in n]) == 2
-    verdict, _ = judged(case, SimpleNamespace(level={"passage": 0.1}, white=[]), (), MismatchSettings())
+    assert case.mismatched_trains == ("heavy",) and len([n for n in case.notes if "likeness" in n]) == 2
+    verdict, _ = assess(case, SimpleNamespace(level={"passage": 0.1}, white=[]), (), MismatchSettings())
     assert verdict.answer == "unknown" and "heavy" in verdict.reason
-    where = whereabouts(case, None, cause=verdict.cause)
+    where = locate(case, None, cause=verdict.cause)
     assert where.frame == "train" and where.train == "heavy"
     one = [p for p in campaign.passages if p.train == "light"] + [p for p in swapped if p.train == "heavy"][:1]
-    assert TrackCase(replace(campaign, passages=tuple(one))).foreign == ()  # one passage may be another train
+    assert TrackCase(replace(campaign, passages=tuple(one))).mismatched_trains == ()  # one passage may be another train
     sound = [replace(p, name=f"{p.name} again") for p in campaign.passages if p.train == "heavy"][:1]
     most = TrackCase(replace(campaign, passages=(*swapped, *sound)))
-    assert most.foreign == ("heavy",)  # a polygon that lifts its wheels is heard at some speeds and not at others
+    assert most.mismatched_trains == (
+        "heavy",
+    )  # a polygon that lifts its wheels is heard at some speeds and not at others
 
 
 def test_a_train_that_could_not_be_looked_at_is_no_train_of_another_file(sound, monkeypatch):
     """Recordings that end too early, or have too few samples, are no word on the wheels that came: no alarm."""
-    plain = passage_observation.rolling_of
+    plain = passage_observation.observe_passage
 
     def cut_short(passage, *more):
         if passage.train == "heavy":
             raise SimulationError("the train lies outside the recording")
         return plain(passage, *more)
 
-    monkeypatch.setattr(passage_observation, "rolling_of", cut_short)
+    monkeypatch.setattr(passage_observation, "observe_passage", cut_short)
     case = TrackCase(sound[0].campaign, families=())
     assert len([n for n in case.notes if "outside the recording" in n]) == 2
-    assert case.rollings and case.foreign == ()
+    assert case.aligned_passages and case.mismatched_trains == ()
 
 
 @pytest.mark.parametrize(("behind", "offered"), [(2.9, [3, 1]), (3.1, [3])])
 def test_a_wheel_whose_blows_are_nearly_as_loud_is_sized_as_well(plan, monkeypatch, behind, offered):
     """What blows cannot tell apart the band may: a wheel of three rough ones came before the one with the flat."""
     case = TrackCase(measured_campaign(plan, (), 7))
-    (made, *_), radius = case.rollings.values(), 0.46
-    train, phases = case.said(made)["train"], ((made.name, 0.5),)
+    (made, *_), radius = case.aligned_passages.values(), 0.46
+    train, phases = case.conditions_of(made)["train"], ((made.name, 0.5),)
     nats = {2: 20.0, 0: 20.0 - behind, 5: 20.0 - behind}
-    heard = [Strikes(n, train, wheel, radius, phases) for wheel, n in nats.items()]
-    monkeypatch.setattr("turnout.mismatch.turnout.candidates.wheel_flats.strikes", lambda case: heard)
+    heard = [FlatEvidence(n, train, wheel, radius, phases) for wheel, n in nats.items()]
+    monkeypatch.setattr("turnout.mismatch.turnout.candidates.wheel_flats.flat_evidence", lambda case: heard)
     monkeypatch.setattr(
-        "turnout.mismatch.turnout.candidates.wheel_flats._sized", lambda case, fit, struck: (0.03, phases, 5.0)
+        "turnout.mismatch.turnout.candidates.wheel_flats._fit_flat", lambda case, fit, struck: (0.03, phases, 5.0)
     )
-    found = flats(case, SimpleNamespace(candidates=()))
+    found = flat_candidates(case, SimpleNamespace(candidates=()))
     assert [c.where["axle"] for c in found] == offered
     heavy, flat = (SimpleNamespace(where={"train": train, **more}) for more in ({}, {"axle": 3}))
-    beside = flats(case, SimpleNamespace(candidates=(heavy,)))
+    beside = flat_candidates(case, SimpleNamespace(candidates=(heavy,)))
     assert [c.where["axle"] for c in beside] == offered  # all wheels heavy is no reason against a flat on one
-    assert flats(case, SimpleNamespace(candidates=(flat,))) == ()
+    assert flat_candidates(case, SimpleNamespace(candidates=(flat,))) == ()

@@ -9,18 +9,18 @@ from turnout import physics
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.observations import with_errors
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
-from turnout.mismatch.turnout.track_parameters import ASKED
+from turnout.mismatch.turnout.track_parameters import EFFECT_REACH
 from turnout.simulate.roughness import level
 
 
 @pytest.fixture(scope="module")
 def lightly_damped():
     """A case, values of a track that carries far, and a heavy train at 144 km/h with the errors that it has there."""
-    case = TrackCase(measured_campaign(small_plan((15.0,), blows=(24.0,)), (), 7))
+    case = TrackCase(measured_campaign(small_plan((15.0,), hammer_positions=(24.0,)), (), 7))
     values = {n.name: case.start_values.get(n.name, n.mean) for n in case.nuisances}
     values |= {"ballast_damping": -1.6, "pad_damping": -0.7}
     (seen,) = (o for o in case.observations if o.name == "heavy 2")
-    return case, values, with_errors(case, values, case.rollings[seen.name], seen)
+    return case, values, with_errors(case, values, case.aligned_passages[seen.name], seen)
 
 
 @pytest.mark.slow
@@ -34,7 +34,7 @@ def test_rough_rail_beyond_the_free_waves_is_an_error_that_the_passage_knows(lig
     a, b = (case.waves.end + 0.5, case.waves.end + 4.5) if behind else (case.waves.start - 4.5, case.waves.start - 0.5)
     rough = physics.RailCorrugation(a, b, allowed, 0.0, wavelength)
     plain, with_it = (case.predict(values, terms, [seen])[0] for terms in ((), (rough,)))
-    squares = [o.whitened(with_it - plain) ** 2 for o in (replace(seen, modes=None), seen)]
+    squares = [o.whiten(with_it - plain) ** 2 for o in (replace(seen, modes=None), seen)]
     assert np.mean(squares[0]) > 0.5 and np.max(squares[0]) > 9.0
     assert np.max(squares[1]) < 4.0
 
@@ -42,9 +42,9 @@ def test_rough_rail_beyond_the_free_waves_is_an_error_that_the_passage_knows(lig
 def test_no_law_is_asked_more_than_a_bay_beyond_what_was_measured(lightly_damped):
     """What lies farther out cannot be told from all that lies beyond it; it has values of its own, no names."""
     case, _, _ = lightly_damped
-    measured = case.campaign.places()
+    measured = case.campaign.positions()
     asked = [c.where["place"] for c in case.candidates if "sleeper" in c.where]
     free = case.track().support[list(case.zone.supports)]
-    assert min(asked) >= min(measured) - ASKED and max(asked) <= max(measured) + ASKED
+    assert min(asked) >= min(measured) - EFFECT_REACH and max(asked) <= max(measured) + EFFECT_REACH
     assert free.min() < min(asked) and free.max() > max(asked)
     assert {"local_pad", "local_ballast", "hanging_sleeper"} <= {c.family for c in case.candidates}

@@ -13,16 +13,16 @@ from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.turnout import TrackCase, passage_alignment
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.mismatch.turnout.rail_roughness import Waves
-from turnout.mismatch.turnout.running_surface import MODEL, SHAPE, RunningSurface
+from turnout.mismatch.turnout.running_surface import MODEL_ERROR, SHAPE_SD, RunningSurface
 from turnout.simulate.track_file import turnout_track
 from turnout.simulate.wheel_path import Dip, Kink, Sections
-from turnout.stages.accepted_effects import Accepted
-from turnout.stages.accepted_effects_case import GuidedCase
-from turnout.stages.mismatch_rows import surface_told
-from turnout.stages.mismatch_text import otherwise
+from turnout.stages.accepted_effects import AcceptedEffect
+from turnout.stages.accepted_effects_case import AcceptedEffectsCase
+from turnout.stages.mismatch_rows import surface_estimates
+from turnout.stages.mismatch_text import surface_sentence
 
 TOMMERUP = Path(__file__).parents[3] / "config" / "tracks" / "tommerup.yaml"
-PLAN = small_plan((15.0,), blows=(24.0,))
+PLAN = small_plan((15.0,), hammer_positions=(24.0,))
 NOSE, JOINT, FAR = Kink(25.2, 0.8e-3, 1.0, 0.55), Dip(14.5, 3e-4, 0.15), Dip(45.0, 3e-4, 0.15)
 SPREADS = {NOSE: {"place": 0.02, "depth": 0.5, "length": 0.3, "share": 0.2}, JOINT: {"depth": 0.5}, FAR: {"depth": 0.5}}
 FILED = replace(PLAN.turnout, routes={"main": ((NOSE, JOINT, FAR),)}, spreads=SPREADS)
@@ -43,15 +43,19 @@ def test_numbers_with_a_prior_may_be_off_where_they_can_be_heard():
     known = {n.name: n for n in surface.nuisances()}
     assert known["surface_0_place"].sd == pytest.approx(0.02 * 25.2) and known["surface_0_place"].unit == "m"
     assert known["surface_0_depth"].sd == 0.5 and known["surface_0_depth"].unit == "-"
-    assert known["surface_0_place"].trust * known["surface_0_place"].sd < 0.5 * NOSE.length
+    assert known["surface_0_place"].max_step_sd * known["surface_0_place"].sd < 0.5 * NOSE.length
     assert 0.55 * np.exp(known["surface_0_share"].bounds[1]) < 1.0
     assert 1.0 < 2.0 * np.exp(known["surface_0_power"].bounds[0]) < 1.02  # a V, and nothing that overhangs
 
 
 def test_the_shape_of_a_nose_is_unsure_where_its_depth_is():
-    for spread, more in (({"depth": 0.5}, {"power": SHAPE}), ({"place": 0.02}, {}), ({"depth": 0.5, "power": 0.1}, {})):
+    for spread, more in (
+        ({"depth": 0.5}, {"power": SHAPE_SD}),
+        ({"place": 0.02}, {}),
+        ({"depth": 0.5, "power": 0.1}, {}),
+    ):
         surface = RunningSurface(replace(FILED, spreads={NOSE: spread}), WAVES, ("main",))
-        assert {u.field: u.spread for u in surface.unsure} == spread | more
+        assert {u.field: u.spread for u in surface.parameters} == spread | more
 
 
 def test_a_surface_has_the_numbers_that_it_is_given():
@@ -87,7 +91,7 @@ def test_a_number_is_told_where_it_is_known_better_than_from_the_file_or_is_not_
     surface = RunningSurface(replace(FILED, spreads={NOSE: {"share": prior}}), WAVES, ("main",))
     case = SimpleNamespace(nuisances=surface.nuisances())
     fit = SimpleNamespace(values={surface.names[0]: by}, covariance=np.array([[0.03**2]]), jacobian=[])
-    assert bool(list(surface.told(case, fit))) is said
+    assert bool(list(surface.estimate(case, fit))) is said
 
 
 def test_what_is_told_of_a_number_is_not_drawn_to_the_file():
@@ -96,18 +100,20 @@ def test_what_is_told_of_a_number_is_not_drawn_to_the_file():
     weights = np.array([0.2, 0.5]) ** -2.0
     values = {surface.names[0]: 0.3 * weights[0] / weights.sum()}
     fit = SimpleNamespace(values=values, covariance=np.array([[1.0 / weights.sum()]]), jacobian=[])
-    (told,) = surface.told(SimpleNamespace(nuisances=surface.nuisances()), fit)
+    (told,) = surface.estimate(SimpleNamespace(nuisances=surface.nuisances()), fit)
     assert told["value"] == pytest.approx(NOSE.length * np.exp(0.3))
-    assert told["se"] == pytest.approx(told["value"] * np.hypot(0.2, MODEL))
+    assert told["se"] == pytest.approx(told["value"] * np.hypot(0.2, MODEL_ERROR))
 
 
 def test_the_search_for_the_nose_hears_no_recording_that_is_kept_back(monkeypatch):
     heard = []
-    monkeypatch.setattr(passage_alignment, "_likeness", lambda case, values, passage: heard.append(passage.name) or 0.5)
+    monkeypatch.setattr(
+        passage_alignment, "_correlation", lambda case, values, passage: heard.append(passage.name) or 0.5
+    )
     passages = [SimpleNamespace(name=name, vehicle=SimpleNamespace(wheels=range(4))) for name in "abc"]
     campaign = SimpleNamespace(passages=passages, reserved=("a",), sensors_of=lambda p: ("A1",))
     surface = RunningSurface(FILED, WAVES, ("main",))
-    passage_alignment.seated(SimpleNamespace(campaign=campaign, surface=surface), {})
+    passage_alignment.fit_surface(SimpleNamespace(campaign=campaign, surface=surface), {})
     assert set(heard) == {"b", "c"}
 
 
@@ -141,14 +147,16 @@ def test_a_rough_search_finds_the_nose_from_where_no_straight_step_does(campaign
     """0.4 m further, 10 ms at 40 m/s: more than a period at 112 Hz. The search is to come within a tenth of the
     shortest wave of 30 Hz of the truth, and all trains look like themselves then."""
     case = TrackCase(campaign)
-    found = {u.name: u.moved(case.start_values[u.name]) for u in case.surface.unsure}
+    found = {u.name: u.value_at(case.start_values[u.name]) for u in case.surface.parameters}
     assert abs(found["surface_0_place"] - TRUE.place) < 0.1
     assert found["surface_0_depth"] == pytest.approx(TRUE.depth, rel=0.3)
-    assert len(case.rollings) == len(PLAN.trains) and not case.unlike
+    assert len(case.aligned_passages) == len(PLAN.trains) and not case.unmatched
     certain = TrackCase(replace(campaign, turnout=replace(FILED, spreads={})))
     assert not set(found) & set(certain.start_values)
-    standing = Accepted("local_pad", {"sleeper": 24.0}, {"factor": (0.7, 0.05)})  # what blows tell of it is no nose
-    beside = GuidedCase(case, (standing,)).start_values
+    standing = AcceptedEffect(
+        "local_pad", {"sleeper": 24.0}, {"factor": (0.7, 0.05)}
+    )  # what blows tell of it is no nose
+    beside = AcceptedEffectsCase(case, (standing,)).start_values
     assert {n: beside[n] for n in found} == {n: case.start_values[n] for n in found} and beside != case.start_values
 
 
@@ -158,7 +166,7 @@ def test_a_nose_within_its_prior_is_found_as_it_is_and_leaves_what_a_sound_track
     the same recordings are left with five times as much, and the answer was a dip."""
     case = TrackCase(campaign)
     fit = fit_jointly(case, iterations=15)
-    told = {(t["term"], t["name"]): t for t in surface_told(case, fit)}
+    told = {(t["term"], t["name"]): t for t in surface_estimates(case, fit)}
     for field in ("place", "depth", "length"):
         t = told["running_surface_kink", field]
         assert abs(t["value"] - getattr(TRUE, field)) < 2.0 * t["se"]
@@ -173,6 +181,6 @@ def test_a_nose_within_its_prior_is_found_as_it_is_and_leaves_what_a_sound_track
 
 def test_a_number_far_from_the_file_is_said():
     surface = RunningSurface(FILED, WAVES, ("main",))
-    depth = next(u for u in surface.unsure if u.field == "depth")
-    assert otherwise(depth.told(0.9, 0.05)) == ""
-    assert otherwise(depth.told(np.log(4.0), 0.02)).startswith("The depth of the kink at 25.2 m is 3.2 mm")
+    depth = next(u for u in surface.parameters if u.field == "depth")
+    assert surface_sentence(depth.estimate(0.9, 0.05)) == ""
+    assert surface_sentence(depth.estimate(np.log(4.0), 0.02)).startswith("The depth of the kink at 25.2 m is 3.2 mm")

@@ -11,19 +11,19 @@ from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
 from turnout.mismatch.engine.diagnose import Verification
-from turnout.mismatch.engine.evidence import explained_of, heard, judged, score_of
+from turnout.mismatch.engine.evidence import assess, explained_share, score_of, worst_excess
 from turnout.mismatch.engine.map_fit import fit_jointly
-from turnout.mismatch.engine.reserved_data import decoy, fit_percent
+from turnout.mismatch.engine.reserved_data import fit_percent, predict_with_decoy
 from turnout.mismatch.engine.score import Score
-from turnout.mismatch.engine.two_effects import reconsidered
+from turnout.mismatch.engine.two_effects import retest_with_second
 from turnout.mismatch.turnout import TrackCase
-from turnout.mismatch.turnout.candidates.catalogue import _sensors
-from turnout.mismatch.turnout.passage_observation import Rolling, rolling_of
+from turnout.mismatch.turnout.candidates.catalogue import _sensor_candidates
+from turnout.mismatch.turnout.passage_observation import AlignedPassage, observe_passage
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
-from turnout.mismatch.turnout.prediction import Predicting
-from turnout.mismatch.turnout.receptance_model import BlowModel
-from turnout.mismatch.turnout.residual_spaces import _forces, missing_sources
-from turnout.mismatch.turnout.saturation import highest
+from turnout.mismatch.turnout.prediction import TrackPredictor
+from turnout.mismatch.turnout.receptance_model import ReceptanceModel
+from turnout.mismatch.turnout.residual_spaces import _force_space, source_spaces
+from turnout.mismatch.turnout.saturation import raw_peak
 from turnout.physics import Parameter
 from turnout.simulate.track import uniform_track
 from turnout.stages.mismatch_rows import finding_row
@@ -43,7 +43,14 @@ class Alike(Case):
         self.control_level = {"response": 0.5}
         size = (Parameter("size", "-", 0.0, (-5.0, 5.0), "", "made up 2026", (0.0, 1.0)),)
         self.candidates = tuple(
-            Candidate(name, size, lambda p, name=name: (name, p["size"]), ((0.5,),), {"place": float(k)}, least=0.02)
+            Candidate(
+                name,
+                size,
+                lambda p, name=name: (name, p["size"]),
+                ((0.5,),),
+                {"place": float(k)},
+                smallest_reportable=0.02,
+            )
             for k, name in enumerate(("like it", "there"))
         )
 
@@ -57,11 +64,11 @@ def test_a_first_effect_is_not_credited_with_what_the_second_explains():
     like, there = case.candidates
     base = fit_jointly(case)
     first = fit_jointly(case, (like,), [0.5])
-    refused, _ = judged(case, base, [score_of(case, base, first, like, settings)], settings)
+    refused, _ = assess(case, base, [score_of(case, base, first, like, settings)], settings)
     pair = fit_jointly(case, (like, there), [*first.psi, 0.5], first.values)
-    second, _ = judged(case, first, [score_of(case, first, pair, there, settings)], settings)
+    second, _ = assess(case, first, [score_of(case, first, pair, there, settings)], settings)
     assert (refused.answer, second.answer) == ("unknown", "named")
-    verdicts, fit = reconsidered(case, base, pair, [refused, second], settings)
+    verdicts, fit = retest_with_second(case, base, pair, [refused, second], settings)
     assert [v.answer for v in verdicts] == ["unknown"] and fit is base
 
 
@@ -71,7 +78,7 @@ class OneLoud(Case):
     def __init__(self):
         labels = {"sensor": np.array(["S1"], dtype=object)}
         self.observations = (
-            Observation("p", "p", np.zeros(100), 1.0, kind="passage", cells=np.zeros(100, int), labels=labels),
+            Observation("p", "p", np.zeros(100), 1.0, data_type="passage", cells=np.zeros(100, int), labels=labels),
         )
         self.control_level, self.cell_level = {"passage": 0.7, "hammer": 0.9}, {"passage": 2.0}
 
@@ -90,33 +97,33 @@ def test_a_channel_that_raises_the_alarm_is_asked_for_again(after, answer, grade
     factor = Parameter("factor", "-", 1.0, (0.05, 20.0), "", "made up 2026")
     pad = Candidate("local_pad", (factor,), lambda p: p, ((0.4,),), {"place": 3.0})
     base, refit = with_squares(4.0, 0.5), with_squares(after, 0.45)
-    share = explained_of(case, base, refit, settings)
+    share = explained_share(case, base, refit, settings)
     assert share == pytest.approx(min(1.0, (4.0 - after) / 2.0))
-    verdict, _ = judged(case, base, [Score(pad, 13.0, 0.0, share, refit)], settings)
+    verdict, _ = assess(case, base, [Score(pad, 13.0, 0.0, share, refit)], settings)
     assert verdict.answer == answer
-    assert ("A" if heard(case, refit, settings) <= 1.0 else "B") == (grade or "B")
-    assert judged(case, base, [], settings)[0].answer == "unknown"
+    assert ("A" if worst_excess(case, refit, settings) <= 1.0 else "B") == (grade or "B")
+    assert assess(case, base, [], settings)[0].answer == "unknown"
 
 
 def test_what_a_name_leaves_in_a_channel_is_not_asked_of_a_second_effect():
     """A mounting not quite of its shape leaves its channel loud; a flat beside it has nothing to do with that."""
     first, both = (SimpleNamespace(**{**vars(with_squares(4.0, 0.5)), "candidates": c}) for c in ("m", "mf"))
-    assert explained_of(OneLoud(), first, both, MismatchSettings()) == 1.0
+    assert explained_share(OneLoud(), first, both, MismatchSettings()) == 1.0
 
 
 @pytest.mark.parametrize("place", [12.0, 12.07, 12.2])
 def test_the_receptance_under_the_hammer_is_no_other_a_micrometre_beside_it(place):
     """The rail between two nodes gives under its own blow, wherever the sensor sits between them."""
-    model = BlowModel(uniform_track(24.0), ())
+    model = ReceptanceModel(uniform_track(24.0), ())
     here, beside = (model.receptance(place, place + way) for way in (0.0, 1e-6))
     assert np.max(np.abs(beside / here - 1.0)) < 1e-5
 
 
 def test_the_seat_of_a_sensor_beside_the_blow_has_the_derivative_of_its_receptance():
-    model, way = BlowModel(uniform_track(24.0), ()), 1e-3
+    model, way = ReceptanceModel(uniform_track(24.0), ()), 1e-3
     difference = (model.receptance(12.2, 12.26 + way) - model.receptance(12.2, 12.26 - way)) / (2.0 * way)
     assert np.allclose(model.seat_gradient(12.2, 12.26, 1e-3), difference, atol=0.0, rtol=1e-9)
-    nodes_alone = (model.moved(12.2, 12.26 + way) - model.moved(12.2, 12.26 - way)) / (2.0 * way)
+    nodes_alone = (model.nodal_motion(12.2, 12.26 + way) - model.nodal_motion(12.2, 12.26 - way)) / (2.0 * way)
     assert np.max(np.abs(nodes_alone / difference - 1.0)) > 0.05  # what would be left out
 
 
@@ -124,10 +131,10 @@ def shown(reference, term):
     """What a channel with ``term`` shows of a train that comes ``reference`` seconds after its recorder starts."""
     time = np.arange(reference - 0.08, reference + 1.0, 1.0 / 360.0)
     sensor = SimpleNamespace(name="A", place=20.0)
-    made = Rolling("p", SimpleNamespace(), (sensor,), time, reference, 30.0)
+    made = AlignedPassage("p", SimpleNamespace(), (sensor,), time, reference, 30.0)
     case = SimpleNamespace(solver=SimpleNamespace(rate=1800.0))
     row = np.cos(2.0 * np.pi * 20.0 * np.arange(14400) / 7200.0)
-    return time, Predicting.shown(case, {"time@p": 0.0, "gain_A": 0.0}, (term,), made, sensor, row), row
+    return time, TrackPredictor.channel_output(case, {"time@p": 0.0, "gain_A": 0.0}, (term,), made, sensor, row), row
 
 
 @pytest.mark.parametrize("reference", [0.45, 0.457, 1.237])
@@ -176,10 +183,10 @@ def _library_of(sensor, peak, whole=None):
     )  # fmt: skip
     campaign = SimpleNamespace(sensors=(sensor,), passages=(SimpleNamespace(recording=recording),))
     made = SimpleNamespace(
-        campaign=campaign, pairs={}, rollings={"p": None}, ceilings={},
-        settings=MismatchSettings(), peak=lambda name: peak, highest=lambda name: highest(campaign, name),
+        campaign=campaign, frf_pairs={}, aligned_passages={"p": None}, saturated={},
+        settings=MismatchSettings(), band_peak=lambda name: peak, raw_peak=lambda name: raw_peak(campaign, name),
     )  # fmt: skip
-    return _sensors(made)
+    return _sensor_candidates(made)
 
 
 def test_a_limit_is_found_from_any_start_of_the_library():
@@ -217,10 +224,10 @@ def test_the_decoy_learns_from_recordings_like_those_it_has_to_predict():
 
     passages, (reserved, simulated) = [late(k) for k in range(3)], late(9)
     for seen in (passages, passages + [blow(k) for k in range(32)]):
-        made = decoy([o for o, _ in seen], [p for _, p in seen], [reserved], [simulated], 4)
+        made = predict_with_decoy([o for o, _ in seen], [p for _, p in seen], [reserved], [simulated], 4)
         assert fit_percent([reserved], made) > 85.0 > 20.0 > fit_percent([reserved], [simulated])
     alone = [blow(1)]
-    assert decoy([o for o, _ in alone], [p for _, p in alone], [reserved], [simulated], 4) == [simulated]
+    assert predict_with_decoy([o for o, _ in alone], [p for _, p in alone], [reserved], [simulated], 4) == [simulated]
 
 
 def dip(place, shift):
@@ -262,13 +269,13 @@ def test_the_error_of_a_sensors_place_is_none_of_a_sleepers():
 
 @pytest.fixture(scope="module")
 def rolled():
-    return TrackCase(measured_campaign(small_plan((15.0,), blows=(24.0,)), (), 7))
+    return TrackCase(measured_campaign(small_plan((15.0,), hammer_positions=(24.0,)), (), 7))
 
 
 def test_noise_is_not_measured_while_the_train_comes(rolled):
     """The same passage with its start cut off, to a twentieth of a second before the first wheel: what the sensors
     show then is the train, and a channel is no noisier for it."""
-    made = next(iter(rolled.rollings.values()))
+    made = next(iter(rolled.aligned_passages.values()))
     passage, sigma = made.passage, []
     for cut in (0.0, made.reference - 0.05):
         first = round(cut * passage.recording.rate)
@@ -278,24 +285,24 @@ def test_noise_is_not_measured_while_the_train_comes(rolled):
         recording.index = passage.recording.index
         shorter = SimpleNamespace(**vars(passage))
         shorter.recording = recording
-        _, seen = rolling_of(shorter, made.sensors, made.reference - cut, made.speed, 0.05)
+        _, seen = observe_passage(shorter, made.sensors, made.reference - cut, made.speed, 0.05)
         sigma.append(np.median(seen.sigma.reshape(len(made.sensors), -1), axis=1))
     assert np.all(sigma[1] < 1.3 * sigma[0])
 
 
 def test_one_sensor_cannot_tell_a_place_from_its_own_channel(rolled):
     fit = fit_jointly(rolled, iterations=0)
-    passages = [s for s in missing_sources(rolled, fit) if any(kind == "sensor" for kind, _ in s.parts)]
-    assert any(kind == "place" for s in passages for kind, _ in s.parts)
-    name, made = next(iter(rolled.rollings.items()))
-    one = Rolling(name, made.passage, made.sensors[:1], made.time, made.reference, made.speed)
-    kinds = {kind for kind, _ in _forces(rolled, fit, one).parts}
+    passages = [s for s in source_spaces(rolled, fit) if any(kind == "sensor" for kind, _ in s.combinations)]
+    assert any(kind == "place" for s in passages for kind, _ in s.combinations)
+    name, made = next(iter(rolled.aligned_passages.items()))
+    one = AlignedPassage(name, made.passage, made.sensors[:1], made.time, made.reference, made.speed)
+    kinds = {kind for kind, _ in _force_space(rolled, fit, one).combinations}
     assert kinds == {"clock", "sensor"}
 
 
 def test_passages_that_are_all_reserved_suggest_nothing_and_stop_nothing():
     """Waves of the rail that no fitted recording depends on have no size."""
-    campaign = measured_campaign(small_plan((15.0,), blows=(24.0,)), (), 7)
+    campaign = measured_campaign(small_plan((15.0,), hammer_positions=(24.0,)), (), 7)
     case = TrackCase(replace(campaign, reserved=tuple(p.name for p in campaign.passages)))
-    assert case.rollings and not any(o.name in case.rollings for o in case.observations)
-    assert case.further(fit_jointly(case, iterations=0)) == ()
+    assert case.aligned_passages and not any(o.name in case.aligned_passages for o in case.observations)
+    assert case.residual_candidates(fit_jointly(case, iterations=0)) == ()

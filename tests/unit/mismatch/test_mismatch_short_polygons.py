@@ -8,14 +8,20 @@ import pytest
 
 from turnout import physics
 from turnout.mismatch.turnout import TrackCase
-from turnout.mismatch.turnout.candidates.out_of_roundness import LOUD, ONE, SPREAD, evidence, short_polygons
+from turnout.mismatch.turnout.candidates.out_of_roundness import (
+    POLYGON_SD,
+    SENSOR_SD,
+    WHEEL_SD,
+    polygon_evidence,
+    short_polygon_candidates,
+)
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 
 
 def found_in(*terms, seed=7, changed=lambda campaign: campaign):
-    case = TrackCase(changed(measured_campaign(small_plan((15.0,), blows=()), terms, seed)))
+    case = TrackCase(changed(measured_campaign(small_plan((15.0,), hammer_positions=()), terms, seed)))
     values = {n.name: n.mean for n in case.nuisances}
-    return short_polygons(case, SimpleNamespace(candidates=(), values=values, terms=()))
+    return short_polygon_candidates(case, SimpleNamespace(candidates=(), values=values, terms=()))
 
 
 def turned(wheel, size, order):
@@ -48,7 +54,9 @@ def test_sound_wheels_corrugation_and_hum_are_no_polygons():
 
 def test_what_one_half_of_the_passages_does_not_show_is_no_finding():
     """The wheel is polygonal in one passage and round in the other; whether that one is kept back says nothing."""
-    sound, worn = (measured_campaign(small_plan((15.0,), blows=()), terms, 7) for terms in ((), (turned(1, 6e-5, 13),)))
+    sound, worn = (
+        measured_campaign(small_plan((15.0,), hammer_positions=()), terms, 7) for terms in ((), (turned(1, 6e-5, 13),))
+    )
     other = next(p.name for p in worn.passages if p.train == "heavy")
     passages = tuple(s if w.name == other else w for s, w in zip(sound.passages, worn.passages))
     assert found_in(changed=lambda _: replace(worn, passages=passages)) == ()
@@ -57,7 +65,7 @@ def test_what_one_half_of_the_passages_does_not_show_is_no_finding():
 
 def test_the_evidence_is_that_of_a_loudness_integrated_out():
     """By quadrature over what a polygon adds, N(0, LOUD²)."""
-    sd, added = np.sqrt(SPREAD**2 + ONE**2 / 8), np.linspace(-40.0, 40.0, 200001)
-    prior = np.exp(-0.5 * (added / LOUD) ** 2) / (LOUD * np.sqrt(2.0 * np.pi))
+    sd, added = np.sqrt(WHEEL_SD**2 + SENSOR_SD**2 / 8), np.linspace(-40.0, 40.0, 200001)
+    prior = np.exp(-0.5 * (added / POLYGON_SD) ** 2) / (POLYGON_SD * np.sqrt(2.0 * np.pi))
     ratio = np.exp(-0.5 * ((2.3 - added) / sd) ** 2 + 0.5 * (2.3 / sd) ** 2)
-    assert evidence(2.3, 8) == pytest.approx(np.log(np.trapezoid(prior * ratio, added)), abs=1e-6)
+    assert polygon_evidence(2.3, 8) == pytest.approx(np.log(np.trapezoid(prior * ratio, added)), abs=1e-6)

@@ -9,9 +9,9 @@ import pytest
 from turnout import physics
 from turnout.mismatch.turnout import matrix_cache
 from turnout.mismatch.turnout.matrix_cache import matrices_of
-from turnout.mismatch.turnout.receptance_model import BlowModel
-from turnout.mismatch.turnout.receptance_sensitivity import Heard
-from turnout.mismatch.turnout.track_parameters import COMMON, OWN, castings_of
+from turnout.mismatch.turnout.receptance_model import ReceptanceModel
+from turnout.mismatch.turnout.receptance_sensitivity import ReceptanceSensitivity
+from turnout.mismatch.turnout.track_parameters import COMMON_PARAMETERS, SUPPORT_PARAMETERS, castings_of
 from turnout.simulate import uniform_track
 from turnout.simulate.matrices import assemble
 from turnout.simulate.track import RailStretch
@@ -49,7 +49,7 @@ def test_a_skeleton_does_not_know_which_track_came_first():
     one, other = (track.with_(pad_stiffness=track.pad_stiffness * np.exp(0.3 * rng.normal(size=n))) for _ in range(2))
     found = []
     for first in (one, other):
-        matrix_cache._known.clear()
+        matrix_cache._templates.clear()
         matrices_of(first)
         found.append(matrices_of(one).stiffness)
     assert np.array_equal(*found)
@@ -63,7 +63,7 @@ def heard(model, seat):
     first, second = ("S", 8.0), ("S", 11.0)
     pairs = (9.1, first), (10.7, first), (10.7, second)
     zone = SimpleNamespace(first=18, last=19, castings=castings_of(model.track, 9.95, 11.4))
-    return Heard(model, pairs, {first: 8.8, second: seat}, zone)
+    return ReceptanceSensitivity(model, pairs, {first: 8.8, second: seat}, zone)
 
 
 FOLLOWING = [
@@ -73,7 +73,7 @@ FOLLOWING = [
     physics.HangingSleeper(19, 5e-4, 0.4),
     physics.ZenerPad(0.8),
     physics.SleeperMode(0.3, 250.0),
-    physics.PadTemperature(0.012).under({"rail_temperature": 35.0}),
+    physics.PadTemperature(0.012).under_conditions({"rail_temperature": 35.0}),
 ]
 
 
@@ -81,17 +81,19 @@ FOLLOWING = [
 def test_derivatives_by_supports_know_what_follows_them_in_a_term(term):
     """Against differences of the receptance: a free sleeper's ballast, a share of soft ballast, a pad's branch."""
     rng, track = np.random.default_rng(2), uniform_track(24.0)
-    own = {o.field: np.exp(0.2 * rng.normal(size=track.support.size)) for o in OWN}
+    own = {o.field: np.exp(0.2 * rng.normal(size=track.support.size)) for o in SUPPORT_PARAMETERS}
     track = track.with_(**{field: getattr(track, field) * by for field, by in own.items()})
-    found = heard(BlowModel(track, (term,)), 11.6).gradient(PAIR)
+    found = heard(ReceptanceModel(track, (term,)), 11.6).gradient(PAIR)
     size = np.abs(found).max(axis=0).max()
 
     def changed(field, where, step):
         by = np.ones(track.support.size)
         by[where] = np.exp(step)
-        return BlowModel(track.with_(**{field: getattr(track, field) * by}), (term,)).receptance(10.7, 11.6)
+        return ReceptanceModel(track.with_(**{field: getattr(track, field) * by}), (term,)).receptance(10.7, 11.6)
 
-    columns = [(name, slice(None)) for name, *_ in COMMON] + [(o.field, j) for o in OWN for j in (18, 19)]
+    columns = [(name, slice(None)) for name, *_ in COMMON_PARAMETERS] + [
+        (o.field, j) for o in SUPPORT_PARAMETERS for j in (18, 19)
+    ]
     for k, at in enumerate(columns):
         difference = (changed(*at, 1e-4) - changed(*at, -1e-4)) / 2e-4
         assert found[:, k] == pytest.approx(difference, rel=3e-3, abs=1e-5 * size), at  # the first order of SHARE
@@ -106,9 +108,9 @@ def test_the_rails_derivative_is_that_of_a_slightly_stiffer_rail(name):
 
     def receptance(more):
         rail = replace(track.rail, **{name: getattr(track.rail, name) * np.exp(more)})
-        return BlowModel(track.with_(rail=rail), ()).receptance(10.7, 12.3)
+        return ReceptanceModel(track.with_(rail=rail), ()).receptance(10.7, 12.3)
 
-    found = heard(BlowModel(track, ()), 12.3).rail_gradient(PAIR)[
+    found = heard(ReceptanceModel(track, ()), 12.3).rail_gradient(PAIR)[
         :, ("bending_stiffness", "shear_stiffness").index(name)
     ]
     exact = (receptance(1e-3) - receptance(-1e-3)) / 2e-3
@@ -124,7 +126,7 @@ def test_the_derivative_of_a_casting_is_that_of_a_slightly_other_one(name):
     track = track.with_(pad_stiffness=track.pad_stiffness * np.exp(0.2 * rng.normal(size=track.support.size)))
     cast = replace(track.rail, bending_stiffness=1.8 * track.rail.bending_stiffness, mass=2.5 * track.rail.mass)
     track = track.with_(stretches=(RailStretch(2.0, 4.0, cast), RailStretch(10.27, 13.17, cast)))
-    found = heard(BlowModel(track, ()), 12.3).rail_gradient(PAIR)
+    found = heard(ReceptanceModel(track, ()), 12.3).rail_gradient(PAIR)
     pieces = castings_of(track, 9.98, 11.4)
     assert [c.inner for c in pieces] == [False, False, True, True]  # of seven, those that reach into the zone
     for k, c in enumerate(pieces):
@@ -132,12 +134,12 @@ def test_the_derivative_of_a_casting_is_that_of_a_slightly_other_one(name):
         def receptance(more, c=c):
             mine = replace(c.piece.rail, **{name: getattr(c.piece.rail, name) * np.exp(more)})
             other = track.with_(stretches=(*track.stretches, replace(c.piece, rail=mine)))
-            return BlowModel(other, ()).receptance(10.7, 12.3)
+            return ReceptanceModel(other, ()).receptance(10.7, 12.3)
 
         exact = (receptance(1e-3) - receptance(-1e-3)) / 2e-3
         column = found[:, 2 + 2 * k + ("bending_stiffness", "mass").index(name)]
         assert np.linalg.norm(column - exact) < 0.005 * np.linalg.norm(exact)
-    over = BlowModel(track, (physics.RailBending(9.5, 12.5, 1.3),))
+    over = ReceptanceModel(track, (physics.RailBending(9.5, 12.5, 1.3),))
     assert np.all(heard(over, 12.3).rail_gradient(PAIR)[:, 2:][:, 2:] == 0.0)
 
 
@@ -155,8 +157,8 @@ def test_the_shear_of_the_file_is_a_share_of_a_rail_that_a_term_softens(cast):
             return replace(rail, shear_stiffness=rail.shear_stiffness * np.exp(more))
 
         stretches = tuple(replace(s, rail=stiffer(s.rail)) for s in track.stretches)
-        return BlowModel(track.with_(rail=stiffer(rail), stretches=stretches), term).receptance(10.7, 12.3)
+        return ReceptanceModel(track.with_(rail=stiffer(rail), stretches=stretches), term).receptance(10.7, 12.3)
 
-    found = heard(BlowModel(track, term), 12.3).rail_gradient(PAIR)[:, 1]
+    found = heard(ReceptanceModel(track, term), 12.3).rail_gradient(PAIR)[:, 1]
     exact = (receptance(1e-3) - receptance(-1e-3)) / 2e-3
     assert np.linalg.norm(found - exact) < 0.015 * np.linalg.norm(exact)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from turnout.mismatch.engine.map_fit import fit_jointly
-from turnout.mismatch.turnout import Campaign, TrackCase
-from turnout.mismatch.turnout.campaign import HammerTest, Passage
+from turnout.mismatch.turnout import CampaignInput, TrackCase
+from turnout.mismatch.turnout.campaign import HammerInput, PassageInput
 from turnout.simulate import Sensor, load_track, load_vehicle, simulate_hammer, simulate_passage
 from turnout.simulate.hammer import Hammer
 
@@ -17,15 +17,15 @@ def measured(places, seed):
     """Blows at the first place and two trains over one rail; the owner's file is the very track."""
     turnout = load_track("tommerup")
     sensors = tuple(Sensor(f"S{x:g}", x, noise=0.05) for x in places)
-    blows = simulate_hammer(turnout, places[0], Hammer(place_spread=0.004), sensors, 5, seed=seed, duration=RECORD)
+    blows = simulate_hammer(turnout, places[0], Hammer(position_spread=0.004), sensors, 5, seed=seed, duration=RECORD)
     passages = []
     for k, speed in enumerate(SPEEDS):
         train = load_vehicle("ic3", 0.5)
         recording = simulate_passage(
             turnout, train, speed, sensors, seed=seed + k, rail_seed=seed, rate=5e3, lead=0.6, tail=0.4
         )
-        passages.append(Passage(f"ic3 {k}", recording, train, speed, "ic3"))
-    return Campaign(turnout, sensors, (HammerTest("blows", places[0], blows),), tuple(passages))
+        passages.append(PassageInput(f"ic3 {k}", recording, train, speed, "ic3"))
+    return CampaignInput(turnout, sensors, (HammerInput("blows", places[0], blows),), tuple(passages))
 
 
 @pytest.mark.slow
@@ -33,7 +33,7 @@ def measured(places, seed):
 def test_what_the_base_model_leaves_of_sound_panels_is_what_it_leaves_of_controls(places, seed):
     """Switch, closure and crossing panel; by the settings' levels, which come from another generator's plain track."""
     case = TrackCase(measured(places, seed))
-    assert len(case.rollings) == len(SPEEDS)
+    assert len(case.aligned_passages) == len(SPEEDS)
     base = fit_jointly(case, iterations=case.settings.base_iterations)
     assert base.level["hammer"] < case.settings.hammer_control
     assert base.level["passage"] < case.settings.passage_control

@@ -9,14 +9,19 @@ import pytest
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch import diagnose
 from turnout.mismatch.engine.candidate import Candidate
-from turnout.mismatch.engine.candidate_search import Projector, _asked, _same_place
+from turnout.mismatch.engine.candidate_search import Projector, _is_same_site, _required_promise
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
-from turnout.mismatch.engine.decision import Verdict, judge, opened
-from turnout.mismatch.engine.diagnose import _as_it_ends
-from turnout.mismatch.engine.hammer_prescreen import _seen
+from turnout.mismatch.engine.decision import Verdict, judge, with_open_size
+from turnout.mismatch.engine.diagnose import _final_verdict
+from turnout.mismatch.engine.hammer_prescreen import _informed_values
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.score import Score
-from turnout.mismatch.engine.two_effects import borne_out, finished, needed, parted
+from turnout.mismatch.engine.two_effects import (
+    drop_redundant_first,
+    drop_unpredictive_second,
+    reject_if_residual_left,
+    split_rivals,
+)
 from turnout.physics import Parameter
 from turnout.stages.mismatch_rows import _evidence
 
@@ -28,12 +33,13 @@ SHAPES = {"wave": np.sin(9.0 * X), "ramp": X - 0.5, "ripple": np.sin(40.0 * X), 
 class Shapes(Case):
     """Sums of shapes of the ``known`` kinds in three conditions, under noise of 0.1."""
 
-    def __init__(self, known, kin="", **true):
+    def __init__(self, known, component="", **true):
         rng = np.random.default_rng(11)
         data = [sum(a * SHAPES[n] for n, a in true.items()) + 0.1 * rng.normal(size=X.size) for _ in range(3)]
         self.observations = tuple(Observation(f"o{k}", f"day {k}", d, np.full(X.size, 0.1)) for k, d in enumerate(data))
         self.candidates = tuple(
-            Candidate(n, AMOUNT, lambda p, n=n: (n, p["amount"]), ((0.5,),), {"shape": n}, kin=kin) for n in known
+            Candidate(n, AMOUNT, lambda p, n=n: (n, p["amount"]), ((0.5,),), {"shape": n}, component=component)
+            for n in known
         )
 
     def predict(self, values, terms, observations):
@@ -51,7 +57,7 @@ def test_two_effects_of_which_either_leaves_too_much_are_both_named():
 
 def test_two_laws_of_one_part_do_not_vouch_for_one_another():
     """The same, of laws that act on one part: two of them mend nearly any shape, so what is missing stays unknown."""
-    found = diagnose(Shapes(("wave", "ramp", "bowl"), kin="spring", wave=1.2, ramp=2.5))
+    found = diagnose(Shapes(("wave", "ramp", "bowl"), component="spring", wave=1.2, ramp=2.5))
     assert found.verdict.answer == "unknown" and not found.names
 
 
@@ -100,7 +106,7 @@ def test_an_effect_beside_two_forms_of_another_is_found(monkeypatch, wave, ramp)
     """Nothing tells a wave from the same wave 0.01 further along, two laws of one spring. The ramp is no law of it, and
     has its name whether it is found after or before that choice."""
     monkeypatch.setitem(SHAPES, "twin", np.sin(9.0 * X + 0.01))
-    case = Shapes(("wave", "twin"), kin="spring", wave=wave, ramp=ramp)
+    case = Shapes(("wave", "twin"), component="spring", wave=wave, ramp=ramp)
     case.candidates += Shapes(("ramp",)).candidates
     found = diagnose(case)
     said = {v.answer: set(v.names) for v in found.verdicts}
@@ -164,7 +170,7 @@ def test_a_gap_and_softer_ballast_that_are_as_likely_are_a_choice(seated, nats, 
     """A third of the bed bears, and no train closes the gap: that is ballast of a third; nothing tells more."""
     here = {"sleeper": 7, "place": 4.2}
     ballast = Candidate("local_ballast", FACTOR, lambda p: p, ((0.4,),), here)
-    gap = Candidate("hanging_sleeper", GAP, lambda p: p, ((1e-3, 0.0),), here, plain=("local_ballast", 1))
+    gap = Candidate("hanging_sleeper", GAP, lambda p: p, ((1e-3, 0.0),), here, simpler_form=("local_ballast", 1))
     scores = [own(gap, [3e-3, seated], [1e-3, 0.03], nats), own(ballast, [0.35], [0.04])]
     verdict = judge(scores, 2.0, MismatchSettings())
     assert verdict.names == said
@@ -174,17 +180,27 @@ def test_a_gap_and_softer_ballast_that_are_as_likely_are_a_choice(seated, nats, 
 def test_the_size_of_what_has_two_amplitudes_is_that_of_both():
     """0.3 and 0.4 are half a metre per second squared."""
     pair = (AMOUNT[0], Parameter("cosine", "-", 0.0, (-9.0, 9.0), "the other part", "made up 2026"))
-    hum = Candidate("hum", pair, lambda p: p, ((1.0, 0.0),), {"sensor": "A"}, least=0.49, sized=2)
-    assert own(hum, [0.3, 0.4], [0.01, 0.01]).material
-    assert not own(hum, [0.3, 0.38], [0.01, 0.01]).material
+    hum = Candidate(
+        "hum", pair, lambda p: p, ((1.0, 0.0),), {"sensor": "A"}, smallest_reportable=0.49, n_size_parameters=2
+    )
+    assert own(hum, [0.3, 0.4], [0.01, 0.01]).is_reportable
+    assert not own(hum, [0.3, 0.38], [0.01, 0.01]).is_reportable
 
 
 @pytest.mark.parametrize("error, told", [(1.0, True), (4.0, False)])
 def test_a_mass_that_may_as_well_be_nothing_is_not_named(error, told):
     """8 kg, of which 5 matter: sure by three standard errors, or open."""
     mass = (Parameter("mass", "kg", 0.0, (0.0, 200.0), "what hangs there", "made up 2026"),)
-    hung = Candidate("attached_resonator", mass, lambda p: p, ((15.0,),), {"place": 7.2}, least=5.0, sure=1.0)
-    assert own(hung, [8.0], [error]).material == told
+    hung = Candidate(
+        "attached_resonator",
+        mass,
+        lambda p: p,
+        ((15.0,),),
+        {"place": 7.2},
+        smallest_reportable=5.0,
+        min_significance=1.0,
+    )
+    assert own(hung, [8.0], [error]).is_reportable == told
 
 
 @pytest.mark.parametrize("whole, share", [(False, 1.0 / 3.0), (True, 1.0)])
@@ -192,7 +208,7 @@ def test_a_start_that_turns_promises_what_it_is(whole, share):
     """The data want a third of the start; half the cost falls by 2 s q - s² q with q its size and s the share."""
     case = Shapes(("wave",), wave=1.0)
     projector = Projector(case, fit_jointly(case))
-    candidate = Candidate("wave", AMOUNT, lambda p: p, ((3.0,),), whole=whole)
+    candidate = Candidate("wave", AMOUNT, lambda p: p, ((3.0,),), nonlinear_in_size=whole)
     gain, found = projector.score([3.0 * SHAPES["wave"]] * 3, candidate, 0)
     assert found == pytest.approx(share, rel=0.02)
     assert (gain < 0.0) == whole
@@ -203,16 +219,16 @@ def test_a_twin_goes_back_with_its_effect_even_where_nothing_is_learnt_of_it():
     case = SimpleNamespace(nuisances=[Nuisance(n, "-", 0.0, 0.1) for n in ("seat_A1", "gain_A1", "seat_A2")])
     values = {"seat_A1": 0.0, "gain_A1": 0.03, "seat_A2": 0.0}
     fit = SimpleNamespace(covariance=np.diag([1e-2, 1e-4, 1e-2]), values=values)
-    moved = SimpleNamespace(twin="seat_A1")
-    assert _seen(case, fit, moved) == {"seat_A1": 0.0, "gain_A1": 0.03}
+    moved = SimpleNamespace(masking_parameter="seat_A1")
+    assert _informed_values(case, fit, moved) == {"seat_A1": 0.0, "gain_A1": 0.03}
 
 
 @pytest.mark.parametrize("error, names", [(3e-3, ("hanging_sleeper", "local_ballast")), (1e-4, ("hanging_sleeper",))])
 def test_a_gap_that_no_train_closes_may_be_no_ballast_at_all(error, names):
     """2.5 ± 3 mm has no upper end: what lies beneath was never touched, and nobody can say whether it is there."""
     here, settings = {"sleeper": 7, "place": 4.2}, MismatchSettings()
-    gap = Candidate("hanging_sleeper", GAP, lambda p: p, ((1e-3, 0.0),), here, open_as="local_ballast")
-    verdict = opened(judge([own(gap, [2.5e-3, 0.04], [error, 0.01])], 2.0, settings), settings)
+    gap = Candidate("hanging_sleeper", GAP, lambda p: p, ((1e-3, 0.0),), here, unbounded_form="local_ballast")
+    verdict = with_open_size(judge([own(gap, [2.5e-3, 0.04], [error, 0.01])], 2.0, settings), settings)
     assert verdict.names == names and verdict.answer == ("named" if len(names) == 1 else "a_or_b")
     assert bool(verdict.grade) == (len(names) == 1) and verdict.probability > 0.9
 
@@ -221,14 +237,14 @@ def test_a_gap_that_no_train_closes_may_be_no_ballast_at_all(error, names):
 def test_a_second_gap_that_no_train_closes_may_be_no_ballast_either(error, answer):
     """Sure of its size when it was named, not in the fit with both."""
     settings = MismatchSettings()
-    gap = Candidate("hanging_sleeper", GAP, lambda p: p, ((1e-3, 0.0),), {"place": 4.2}, open_as="local_ballast")
+    gap = Candidate("hanging_sleeper", GAP, lambda p: p, ((1e-3, 0.0),), {"place": 4.2}, unbounded_form="local_ballast")
     second = judge([own(gap, [2.5e-3, 0.04], [1e-4, 0.01])], 2.0, settings)
     both = SimpleNamespace(
         psi=np.array([0.3, 2.5e-3, 0.04]), psi_se=np.array([0.02, error, 0.01]), part=lambda _: slice(1, 3),
         level={"passage": 0.8}, white=[],
     )  # fmt: skip
     case = SimpleNamespace(control_level={"passage": 0.7}, cell_level={}, observations=())
-    stated = _as_it_ends(second, case, both, settings)
+    stated = _final_verdict(second, case, both, settings)
     assert (stated.answer, stated.grade) == (answer, "B" if answer == "named" else "")
 
 
@@ -237,8 +253,8 @@ def test_a_second_of_a_kind_two_bays_on_is_the_shape_of_the_first():
         return Candidate(family, FACTOR, lambda p: p, ((0.4,),), {"place": place})
 
     first = at("local_ballast", 4.2)
-    assert _same_place(at("local_ballast", 5.4), first) and not _same_place(at("local_pad", 5.4), first)
-    assert not _same_place(at("local_ballast", 6.0), first) and _same_place(at("local_pad", 4.8), first)
+    assert _is_same_site(at("local_ballast", 5.4), first) and not _is_same_site(at("local_pad", 5.4), first)
+    assert not _is_same_site(at("local_ballast", 6.0), first) and _is_same_site(at("local_pad", 4.8), first)
 
 
 @pytest.mark.parametrize("known, offered, same", [
@@ -250,11 +266,13 @@ def test_a_wheel_known_by_its_blows_is_no_shape_of_heavy_wheels(known, offered, 
     own, and may be what heavy wheels leave."""
 
     def of(where, sounding):
-        return Candidate("flat" if "axle" in where else "mass", AMOUNT, tuple, ((0.5,),), where, sounding=sounding)
+        return Candidate(
+            "flat" if "axle" in where else "mass", AMOUNT, tuple, ((0.5,),), where, evidence_suffices=sounding
+        )
 
     first, second = of(known, "axle" in known), of(offered, True)
-    assert _same_place(second, first) == _same_place(first, second) == same
-    assert _same_place(of(offered, False), first) and _same_place(first, of(offered, False))
+    assert _is_same_site(second, first) == _is_same_site(first, second) == same
+    assert _is_same_site(of(offered, False), first) and _is_same_site(first, of(offered, False))
 
 
 @pytest.mark.parametrize("left, answer", [(50.0, "named"), (5.0, "a_or_b")])
@@ -268,7 +286,7 @@ def test_a_rival_that_keeps_its_gain_on_top_of_the_leader_is_none(left, answer):
     assert torn.names == ("wave", "ripple")
     on_top = tuple(Score(c, g, 0.0, 1.0, f) for c, g, f in zip(case.candidates[1:], (59.0, left), fits[1:]))
     second = Verdict("named", ("ripple",), "A", 0.97, {}, on_top)
-    found = parted(case, fit_jointly(case), torn, second, MismatchSettings())
+    found = split_rivals(case, fit_jointly(case), torn, second, MismatchSettings())
     assert found.answer == answer and found.names[0] == "wave"
 
 
@@ -278,8 +296,8 @@ def test_a_second_effect_that_blows_alone_promise_half_of_is_refitted(promised, 
     all recordings together, and has to be a name; a first effect is asked from 2 nats on."""
     settings, candidate = MismatchSettings(), Candidate("soft_rail", AMOUNT, tuple, ((0.5,),))
     entry, beside = (promised, candidate, np.array([0.5]), {}), SimpleNamespace(candidates=("pad",))
-    assert _asked(entry, beside, {candidate.key: scouted}, settings) == asked
-    assert _asked(entry, SimpleNamespace(candidates=()), {candidate.key: scouted}, settings) == 2.0
+    assert _required_promise(entry, beside, {candidate.key: scouted}, settings) == asked
+    assert _required_promise(entry, SimpleNamespace(candidates=()), {candidate.key: scouted}, settings) == 2.0
 
 
 def test_the_evidence_of_a_row_has_an_entry_for_each_verdict():
@@ -299,7 +317,7 @@ def test_a_first_name_that_the_second_leaves_nothing_to_is_dropped():
         pair = case.candidates[::-1]
         fit = fit_jointly(case, pair, [0.1, 0.1], iterations=20)
         verdicts = [Verdict("named", (c.family,), "A", 0.97, {}, (Score(c, 50.0, 0.0, 1.0, fit),)) for c in pair]
-        found, last = needed(case, fit_jointly(case), fit, verdicts, settings)
+        found, last = drop_redundant_first(case, fit_jointly(case), fit, verdicts, settings)
         assert tuple(v.names[0] for v in found) == left == tuple(c.family for c in last.candidates)
     assert last.psi == pytest.approx([2.5, 2.5], abs=0.15)
 
@@ -311,10 +329,10 @@ def test_a_second_name_that_is_left_alone_has_to_explain_what_is_there(ripple, s
     pair = case.candidates[::-1]
     fit = fit_jointly(case, pair, [0.1, 0.1], iterations=20)
     verdicts = [
-        Verdict("named", (c.family,), "A", 0.97, {}, (Score(c, 50.0, 0.0, 0.1, fit, apart=40.0),)) for c in pair
+        Verdict("named", (c.family,), "A", 0.97, {}, (Score(c, 50.0, 0.0, 0.1, fit, unmasked_gain=40.0),)) for c in pair
     ]
     verdicts = [replace(v, posterior={v.names[0]: 0.9, "unknown": 0.1}) for v in verdicts]
-    found, last = needed(case, fit_jointly(case), fit, verdicts, settings)
+    found, last = drop_redundant_first(case, fit_jointly(case), fit, verdicts, settings)
     assert [v.answer for v in found] == [said]
     assert len(last.candidates) == (said == "named")
 
@@ -330,7 +348,7 @@ def test_a_second_name_that_recordings_never_used_deny_is_dropped(reserved, left
     fit = fit_jointly(case, case.candidates, [0.1, 0.1], iterations=20)
     scores = [Score(c, 50.0, 0.0, 1.0, f) for c, f in zip(case.candidates, (alone, fit))]
     verdicts = [Verdict("named", (s.family,), "A", 0.97, {}, (s,)) for s in scores]
-    found, last = borne_out(case, fit, verdicts, settings)
+    found, last = drop_unpredictive_second(case, fit, verdicts, settings)
     assert tuple(v.names[0] for v in found) == left == tuple(c.family for c in last.candidates)
     assert ("bowl" in found[0].reason) is (len(left) == 1)
 
@@ -338,12 +356,12 @@ def test_a_second_name_that_recordings_never_used_deny_is_dropped(reserved, left
 @pytest.mark.parametrize("last, grade, said", [("ramp", "A", 2), ("ramp", "B", 1), ("", "B", 2)])
 def test_what_would_leave_nothing_is_no_name_where_something_is_left(last, grade, said):
     """A drifting clock bends what its channel shows into much else: first or second, it has to explain all."""
-    pair = [replace(c, leaves_nothing=c.family == last) for c in Shapes(("bowl", "ramp")).candidates]
+    pair = [replace(c, must_reach_control_level=c.family == last) for c in Shapes(("bowl", "ramp")).candidates]
     posterior = {"bowl": 0.9, "ramp": 0.05, "unknown": 0.05}
     verdicts = [
         Verdict("named", (c.family,), grade, 0.97, dict(posterior), (Score(c, 50.0, 0.0, 1.0, None),)) for c in pair
     ]
-    found, fit = finished("base", "fit", verdicts, MismatchSettings())
+    found, fit = reject_if_residual_left("base", "fit", verdicts, MismatchSettings())
     assert (len(found), fit) == ((2, "fit") if said == 2 else (1, "base"))
     assert said == 2 or (found[0].answer == "unknown" and "ramp would leave nothing" in found[0].reason)
 
@@ -352,7 +370,7 @@ def test_what_would_leave_nothing_is_no_name_where_something_is_left(last, grade
 def test_a_diagnosis_withdraws_what_would_leave_nothing(ripple, answer):
     """The ramp is there; with a ripple that no candidate has it is of grade B, which a drifting clock may not be."""
     case = Shapes(("wave", "ramp"), ramp=2.5, ripple=ripple)
-    case.candidates = tuple(replace(c, leaves_nothing=True) for c in case.candidates)
+    case.candidates = tuple(replace(c, must_reach_control_level=True) for c in case.candidates)
     found = diagnose(case)
     assert found.verdict.answer == answer
     assert bool(found.fit.candidates) == (answer == "named")

@@ -7,8 +7,8 @@ from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
 from turnout.mismatch.engine.decision import Verdict
 from turnout.mismatch.engine.diagnose import Verification, diagnose
-from turnout.mismatch.engine.evidence import over_reserved
-from turnout.mismatch.engine.two_effects import unconfirmed, unforetold
+from turnout.mismatch.engine.evidence import reserved_excess_ratio
+from turnout.mismatch.engine.two_effects import reject_if_reserved_unexplained, reject_unconfirmed
 from turnout.stages.mismatch_rows import sentence
 
 POSTERIOR = {"pad_preload": 0.8, "none": 0.15, "unknown": 0.05}
@@ -19,17 +19,17 @@ POSTERIOR = {"pad_preload": 0.8, "none": 0.15, "unknown": 0.05}
     [(26.0, 0.9, True), (26.0, 1.7, False), (28.0, 0.1, False), (26.0, None, False)],
 )
 def test_a_fall_is_one_beyond_its_standard_error(after, error, fell):
-    assert Verification(1, 27.6, after, error=error).fell is fell
+    assert Verification(1, 27.6, after, error=error).is_worse is fell
 
 
 def test_a_model_that_foretells_nothing_is_left_to_the_rules_before():
     """Without a prediction there is no error either: such a name was refused when it was judged."""
-    assert not Verification(1, 27.6).fell
+    assert not Verification(1, 27.6).is_worse
 
 
 def test_a_name_of_grade_b_becomes_unknown_with_the_probability_of_that():
     settings = MismatchSettings()
-    found = unconfirmed(Verdict("named", ("pad_preload",), "B", 0.97, dict(POSTERIOR)), settings)
+    found = reject_unconfirmed(Verdict("named", ("pad_preload",), "B", 0.97, dict(POSTERIOR)), settings)
     assert (found.answer, found.names, found.grade) == ("unknown", (), "")
     assert "pad_preload" in found.reason and "worse" in found.reason
     assert sum(found.posterior.values()) == pytest.approx(1.0)
@@ -38,16 +38,18 @@ def test_a_name_of_grade_b_becomes_unknown_with_the_probability_of_that():
 
 @pytest.mark.parametrize("verdict", [Verdict("named", ("dip",), "A", 0.97), Verdict("none"), Verdict("a_or_b")])
 def test_other_answers_stay(verdict):
-    assert unconfirmed(verdict, MismatchSettings()) is verdict
+    assert reject_unconfirmed(verdict, MismatchSettings()) is verdict
 
 
 def test_nothing_is_missing_no_longer_where_what_was_never_used_is_not_foretold():
     settings = MismatchSettings()
-    found = unforetold(Verdict("none", probability=0.9, posterior={"none": 0.9, "unknown": 0.1}), settings)
+    found = reject_if_reserved_unexplained(
+        Verdict("none", probability=0.9, posterior={"none": 0.9, "unknown": 0.1}), settings
+    )
     assert found.answer == "unknown" and "never used" in found.reason
     assert found.posterior["unknown"] == pytest.approx(found.probability)
     named = Verdict("named", ("dip",), "A", 0.97)
-    assert unforetold(named, settings) is named
+    assert reject_if_reserved_unexplained(named, settings) is named
 
 
 def test_what_is_left_of_reserved_recordings_is_held_against_the_level_of_controls():
@@ -55,8 +57,8 @@ def test_what_is_left_of_reserved_recordings_is_held_against_the_level_of_contro
     rows = [Observation(f"o{k}", "c", np.zeros(40), 0.1, 0.5, kind) for k, kind in enumerate("aab")]
     case = with_reserved(rows, {"a": 0.5, "b": 1.0})
     predictions = [np.full(40, 0.3), np.full(40, -0.1), np.full(40, 0.1)]
-    assert over_reserved(case, predictions, MismatchSettings()) == pytest.approx(5.0 / 0.5)
-    assert over_reserved(with_reserved((), {}), [], MismatchSettings()) == 0.0
+    assert reserved_excess_ratio(case, predictions, MismatchSettings()) == pytest.approx(5.0 / 0.5)
+    assert reserved_excess_ratio(with_reserved((), {}), [], MismatchSettings()) == 0.0
 
 
 def with_reserved(rows, level):

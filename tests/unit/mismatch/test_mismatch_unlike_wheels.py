@@ -9,12 +9,20 @@ import pytest
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
-from turnout.mismatch.turnout.wave_response import Carrier
-from turnout.mismatch.turnout.wheel_roughness import BEYOND, DEPTH, LENGTH, PLACE, _otherwise, _parts, profile_modes
+from turnout.mismatch.turnout.wave_response import WaveTransfer
+from turnout.mismatch.turnout.wheel_roughness import (
+    DEPTH_SD,
+    LENGTH_SD,
+    POSITION_SD,
+    ROUGHNESS_MARGIN,
+    _components,
+    _deviations,
+    profile_modes,
+)
 from turnout.physics.term import PhysicsTerm
 from turnout.simulate.wheel_path import Corrugation, Kink, Sections
 
-PLAN = small_plan((15.0,), blows=(24.0,))
+PLAN = small_plan((15.0,), hammer_positions=(24.0,))
 NOSE = Kink(25.2, 0.3e-3, 0.9, 0.55)
 FILED = replace(PLAN.turnout, routes={"main": ((NOSE,),)}, spreads={NOSE: {"depth": 0.5}})
 
@@ -23,13 +31,13 @@ def test_ways_of_wheels_are_those_of_noses_that_differ_by_a_standard_deviation()
     """A tenth of each, by difference, to the curvature's share; the sharper one is gone at both ends and where the nose
     is deepest."""
     way = np.linspace(24.0, 26.5, 25001)
-    deeper, further, longer, sharper = _otherwise(NOSE, way)
+    deeper, further, longer, sharper = _deviations(NOSE, way)
     others = (
-        (deeper, replace(NOSE, depth=NOSE.depth * (1.0 + 0.1 * DEPTH)), 0.1),
-        (further, replace(NOSE, place=NOSE.place - 0.1 * PLACE), 0.1),
-        (longer, replace(NOSE, length=NOSE.length * (1.0 - 0.1 * LENGTH)), 0.1),
+        (deeper, replace(NOSE, depth=NOSE.depth * (1.0 + 0.1 * DEPTH_SD)), 0.1),
+        (further, replace(NOSE, place=NOSE.place - 0.1 * POSITION_SD), 0.1),
+        (longer, replace(NOSE, length=NOSE.length * (1.0 - 0.1 * LENGTH_SD)), 0.1),
     )
-    smooth = np.abs(way - NOSE.place) > 0.1 * PLACE + 1e-3  # the kink itself moves
+    smooth = np.abs(way - NOSE.place) > 0.1 * POSITION_SD + 1e-3  # the kink itself moves
     for found, nose, share in others:
         change = (nose(way) - NOSE(way)) / share
         assert found[smooth] == pytest.approx(change[smooth], abs=0.03 * np.abs(found).max())
@@ -38,7 +46,7 @@ def test_ways_of_wheels_are_those_of_noses_that_differ_by_a_standard_deviation()
 
 
 def test_a_level_rail_is_met_alike_by_all():
-    assert _otherwise(replace(NOSE, depth=1e-8), np.linspace(24.0, 26.5, 500)) == []
+    assert _deviations(replace(NOSE, depth=1e-8), np.linspace(24.0, 26.5, 500)) == []
 
 
 def test_a_measured_surface_that_ends_lower_makes_no_step_and_a_corrugation_is_alike_to_all():
@@ -46,15 +54,15 @@ def test_a_measured_surface_that_ends_lower_makes_no_step_and_a_corrugation_is_a
     fifth part of what lies below the line between the ends. Waves of the rail are no nose."""
     profile = Sections((24.6, 25.2, 25.8), (0.0, 2.0e-3, 1.6e-3))
     way = np.linspace(22.0, 28.0, 6001)
-    deeper, further, longer, sharper = _otherwise(profile, way)
+    deeper, further, longer, sharper = _deviations(profile, way)
     outside = (way < 24.59) | (way > 25.81)
     assert all(np.all(w[outside] == 0.0) for w in (deeper, sharper))
     assert all(np.abs(w[outside]).max() < 1e-12 for w in (further, longer))
-    assert deeper[np.argmin(np.abs(way - 25.2))] == pytest.approx(DEPTH * (2.0e-3 - 0.8e-3))
+    assert deeper[np.argmin(np.abs(way - 25.2))] == pytest.approx(DEPTH_SD * (2.0e-3 - 0.8e-3))
     assert max(np.abs(w).max() for w in (deeper, further, longer, sharper)) < 0.5e-3
     waves = Corrugation(20.0, 28.0, 5e-5, 0.35)
     case = SimpleNamespace(surface=SimpleNamespace(surfaces=lambda route, values: ((waves, NOSE),)))
-    assert _parts(case, {}, SimpleNamespace(passage=SimpleNamespace(route="main"))) == [NOSE]
+    assert _components(case, {}, SimpleNamespace(passage=SimpleNamespace(route="main"))) == [NOSE]
 
 
 @dataclass(frozen=True)
@@ -64,7 +72,7 @@ class OneWheel(PhysicsTerm):
     name, kind = "one_wheel", "path"
 
     def paths(self, track, vehicle):
-        part = lambda x, wheel=0: DEPTH * NOSE(x)  # noqa: E731
+        part = lambda x, wheel=0: DEPTH_SD * NOSE(x)  # noqa: E731
         deeper = type("Deeper", (), {"wheel": 1, "__call__": lambda self, x, wheel=0: part(x)})()
         return (deeper,)
 
@@ -75,10 +83,10 @@ def test_the_signal_of_a_wheel_that_falls_deeper_is_that_of_a_simulation():
     free track: 0.99 and 5 % are met, 15 cm between the places looked at would make it half as loud again."""
     case = TrackCase(replace(measured_campaign(replace(PLAN, turnout=FILED), (), 7), turnout=FILED))
     fit = fit_jointly(case, iterations=6)
-    o, before = next((o, p) for o, p in zip(case.observations, fit.predictions) if o.name in case.rollings)
-    made = case.rollings[o.name]
+    o, before = next((o, p) for o, p in zip(case.observations, fit.predictions) if o.name in case.aligned_passages)
+    made = case.aligned_passages[o.name]
     filed = fit.values | dict.fromkeys(case.surface.names, 0.0)
-    modes = profile_modes(case, filed, made, Carrier(case, fit.values, made, beyond=BEYOND))
+    modes = profile_modes(case, filed, made, WaveTransfer(case, fit.values, made, beyond=ROUGHNESS_MARGIN))
     assert modes.shape == (o.data.size, 4 * len(made.passage.vehicle.wheels))
     change = case.predict(fit.values, (OneWheel(),), [o])[0] - before
     found = modes[:, 4]

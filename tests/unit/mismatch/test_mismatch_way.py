@@ -8,9 +8,9 @@ import pytest
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine import refit
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
-from turnout.mismatch.engine.map_fit import FINE, STALL, fit_jointly
+from turnout.mismatch.engine.map_fit import FINE_STALL, STALL, fit_jointly
 from turnout.mismatch.engine.score import Score
-from turnout.mismatch.turnout.passage_observation import BLURRED, Rolling, _topped, observed
+from turnout.mismatch.turnout.passage_observation import CLIPPING_BLUR, AlignedPassage, _clipped_samples, observation_of
 from turnout.records import Channel, Recording
 
 
@@ -20,7 +20,7 @@ class Bent(Case):
     def __init__(self, frozen):
         rng = np.random.default_rng(4)
         self.along, self.across = rng.normal(size=(60, 12)), rng.normal(size=(60, 12))
-        self.frozen_jacobian = frozen
+        self.expensive = frozen
         self.nuisances = tuple(Nuisance(f"x{k}", "-", 0.0, 3.0) for k in range(12))
         data = self._shown(rng.normal(size=12)) + 0.1 * rng.normal(size=60)
         self.observations = (Observation("all", "all", data, np.full(60, 0.1)),)
@@ -37,53 +37,53 @@ def test_a_dear_jacobian_is_made_anew_on_a_long_way():
     one that only updates its first derivatives does not."""
     full, renewed = fit_jointly(Bent(False), iterations=40), fit_jointly(Bent(True), iterations=25)
     first = fit_jointly(Bent(True), iterations=1).jacobian
-    updated = fit_jointly(Bent(True), keep=first, iterations=25)
+    updated = fit_jointly(Bent(True), reused_jacobian=first, iterations=25)
     assert renewed.cost == pytest.approx(full.cost, abs=0.2)
     assert updated.cost > full.cost + 1.0
 
 
 def test_a_dear_fit_on_which_the_verdict_rests_goes_on_for_less(monkeypatch):
     """Twenty of the cost per sample are 1,200 in all, which ends it early; leaders go on for a fifth of others'."""
-    early, late = (fit_jointly(Bent(True), iterations=25, stall=s) for s in (20.0, FINE))
+    early, late = (fit_jointly(Bent(True), iterations=25, stall=s) for s in (20.0, FINE_STALL))
     assert early.cost > late.cost + 1.0
     assert fit_jointly(Bent(False), iterations=25, stall=20.0).cost == pytest.approx(late.cost, abs=0.2)  # cheap: none
     asked = []
     monkeypatch.setattr(refit, "fit_jointly", lambda *a, stall=STALL, **k: asked.append(stall) or late)
-    refit.ended(Bent(True), early, MismatchSettings())
-    refit.to_the_end(Bent(True), early, MismatchSettings())
-    assert set(asked[:-1]) == {FINE} and asked[-1] == STALL > FINE
+    refit.converge(Bent(True), early, MismatchSettings())
+    refit.continue_fit(Bent(True), early, MismatchSettings())
+    assert set(asked[:-1]) == {FINE_STALL} and asked[-1] == STALL > FINE_STALL
 
 
 @pytest.mark.parametrize(("gain", "ended"), [(5.0, 0), (8.0, 1), (20.0, 1)])
 def test_what_comes_near_a_name_is_fitted_to_its_end_as_leaders_are(monkeypatch, gain, ended):
     """A name needs 12 nats; from half of them on the fit goes on to its end."""
-    score, asked = SimpleNamespace(gain=gain, material=True, family="a"), []
+    score, asked = SimpleNamespace(gain=gain, is_reportable=True, family="a"), []
     monkeypatch.setattr(
         refit, "shortlist", lambda *a: [SimpleNamespace(rival=False, candidate=SimpleNamespace(key="a"))]
     )
-    monkeypatch.setattr(refit, "_tried", lambda *a: score)
-    monkeypatch.setattr(refit, "_polished", lambda *a: asked.append(a) or score)
-    monkeypatch.setattr(refit, "begun_anew", lambda case, fit, s, *a: s)
-    monkeypatch.setattr(refit, "_checked", lambda case, fit, s, settings: s)
-    monkeypatch.setattr(refit, "_owed", lambda *a: None)
+    monkeypatch.setattr(refit, "_score_task", lambda *a: score)
+    monkeypatch.setattr(refit, "_polish", lambda *a: asked.append(a) or score)
+    monkeypatch.setattr(refit, "restart_leader", lambda case, fit, s, *a: s)
+    monkeypatch.setattr(refit, "_with_condition_gains", lambda case, fit, s, settings: s)
+    monkeypatch.setattr(refit, "_base_from_leader", lambda *a: None)
     plain = SimpleNamespace(candidates=())
-    refit.scored(Bent(True), plain, MismatchSettings(), lambda *a: None, {}, 0, None)
+    refit.score_candidates(Bent(True), plain, MismatchSettings(), lambda *a: None, {}, 0, None)
     assert len(asked) == ended
 
 
 @pytest.mark.parametrize(("beside", "begun"), [((), ["a"]), (("a name",), [])])
 def test_only_the_first_leader_of_a_first_effect_is_begun_anew(monkeypatch, beside, begun):
     """Of two leaders; beside a name what is left is that one's shape as well."""
-    scores = {f: SimpleNamespace(gain=g, material=True, family=f, fit=None) for f, g in (("a", 20.0), ("b", 19.0))}
+    scores = {f: SimpleNamespace(gain=g, is_reportable=True, family=f, fit=None) for f, g in (("a", 20.0), ("b", 19.0))}
     entries = [SimpleNamespace(rival=False, candidate=SimpleNamespace(key=f)) for f in "ba"]
     asked = []
     monkeypatch.setattr(refit, "shortlist", lambda *a: entries)
-    monkeypatch.setattr(refit, "_tried", lambda case, fit, entry, *a: scores[entry.candidate.key])
-    monkeypatch.setattr(refit, "_same_law_beside", lambda case, fit, ranked, *a: ranked)
-    monkeypatch.setattr(refit, "_polished", lambda case, fit, s, *a: s)
-    monkeypatch.setattr(refit, "begun_anew", lambda case, fit, s, *a: asked.append(s.family) or s)
+    monkeypatch.setattr(refit, "_score_task", lambda case, fit, entry, *a: scores[entry.candidate.key])
+    monkeypatch.setattr(refit, "_refit_equivalent_forms", lambda case, fit, ranked, *a: ranked)
+    monkeypatch.setattr(refit, "_polish", lambda case, fit, s, *a: s)
+    monkeypatch.setattr(refit, "restart_leader", lambda case, fit, s, *a: asked.append(s.family) or s)
     plain = SimpleNamespace(candidates=beside)
-    refit._ranked(Bent(True), plain, MismatchSettings(), lambda *a: None, {}, 0, None)
+    refit._rank_families(Bent(True), plain, MismatchSettings(), lambda *a: None, {}, 0, None)
     assert asked == begun
 
 
@@ -92,7 +92,7 @@ def test_what_the_fit_without_an_effect_had_not_come_to_is_no_evidence_for_the_e
     """A leader with 20 nats of its own, fitted to its end, on top of a fit that had stopped before: from the leader's
     nuisances that one comes to its end as well. What it owed goes off, and where that is more than a name needs, all
     are asked again on top of the better fit."""
-    early, late = (fit_jointly(Bent(True), iterations=25, stall=s) for s in (stall, FINE))
+    early, late = (fit_jointly(Bent(True), iterations=25, stall=s) for s in (stall, FINE_STALL))
     owed = late.evidence - early.evidence
     assert (owed > MismatchSettings().threshold) == again
     asked = []
@@ -102,10 +102,10 @@ def test_what_the_fit_without_an_effect_had_not_come_to_is_no_evidence_for_the_e
         debt = late.evidence - fit.evidence
         return [Score(SimpleNamespace(key=k), debt + g, 0.0, 1.0, late) for k, g in (("a", 20.0), ("b", 3.0))]
 
-    monkeypatch.setattr(refit, "_ranked", ranked)
-    monkeypatch.setattr(refit, "beside", lambda case, fit, found, settings: found)
-    monkeypatch.setattr(refit, "_checked", lambda case, fit, s, settings: s)
-    found, fit = refit.scored(Bent(True), early, MismatchSettings(), lambda *a: None, {}, 0, None)
+    monkeypatch.setattr(refit, "_rank_families", ranked)
+    monkeypatch.setattr(refit, "correct_for_leader", lambda case, fit, found, settings: found)
+    monkeypatch.setattr(refit, "_with_condition_gains", lambda case, fit, s, settings: s)
+    found, fit = refit.score_candidates(Bent(True), early, MismatchSettings(), lambda *a: None, {}, 0, None)
     assert [s.gain for s in found] == pytest.approx([20.0, 3.0], abs=0.5)
     assert len(asked) == 1 + again and fit.evidence == pytest.approx(asked[-1])
     assert fit.evidence == pytest.approx(late.evidence, abs=0.5 if again else MismatchSettings().threshold)
@@ -122,13 +122,13 @@ def test_a_law_of_the_whole_track_that_gains_too_little_is_begun_again_farther_o
     prior; what gains most counts. What has a name or a place is left alone."""
     candidate = SimpleNamespace(
         key="a",
-        scanned=scanned,
+        n_scanned=scanned,
         start_from_base=True,
         frame="place",
         parameters=(SimpleNamespace(neutral=0.0, bounds=(-9.0, 9.0)),),
     )
     case = Bent(True)
-    shared, wave = Nuisance("pads", "-", 0.2, 0.1), Nuisance("wave", "m", 0.0, 1.0, bends=False)
+    shared, wave = Nuisance("pads", "-", 0.2, 0.1), Nuisance("wave", "m", 0.0, 1.0, can_mask=False)
     case.nuisances = (shared, wave, Nuisance("time@p", "s", 0.0, 1.0, "p"))
     fit = SimpleNamespace(candidates=(), psi=np.zeros(0), values={"pads": 0.7, "wave": 0.5, "time@p": 0.1}, jacobian=[])
     starts, gains = [], iter((15.0, 18.0))
@@ -136,22 +136,22 @@ def test_a_law_of_the_whole_track_that_gains_too_little_is_begun_again_farther_o
     def fitted(case, candidates, psi, values, *_, **__):
         starts.append((float(psi[-1]), *values.values()))
         made = SimpleNamespace(gain=next(gains), with_candidates=lambda c: made)
-        return SimpleNamespace(light=lambda: made)
+        return SimpleNamespace(without_jacobian=lambda: made)
 
     first = SimpleNamespace(gain=gain, with_candidates=lambda c: first)
     monkeypatch.setattr(refit, "fit_jointly", fitted)
     monkeypatch.setattr(refit, "_refit", lambda *a: first)
     monkeypatch.setattr(refit, "score_of", lambda case, fit, refit, *a: SimpleNamespace(gain=refit.gain))
-    entry = SimpleNamespace(candidate=candidate, start=(promised,), values={}, promised=0.0)
-    score = refit._tried(case, fit, entry, MismatchSettings(), {}, 0)
+    entry = SimpleNamespace(candidate=candidate, start=(promised,), values={}, cheap_gain=0.0)
+    score = refit._score_task(case, fit, entry, MismatchSettings(), {}, 0)
     assert starts == ([] if begun is None else [(begun, 0.7, 0.5, 0.1), (begun, 0.2, 0.5, 0.1)])
     assert score.gain == (gain if begun is None else 18.0)
 
 
 def test_a_fit_is_not_made_again_where_nobody_would_be_named():
-    late = fit_jointly(Bent(True), iterations=25, stall=FINE)
+    late = fit_jointly(Bent(True), iterations=25, stall=FINE_STALL)
     silent = [Score(SimpleNamespace(key="a"), 11.0, 0.0, 1.0, late)]
-    assert refit._owed(Bent(True), late, silent, MismatchSettings(), {}, 0) is None
+    assert refit._base_from_leader(Bent(True), late, silent, MismatchSettings(), {}, 0) is None
 
 
 def test_where_a_channel_was_at_its_range_the_passage_says_no_more_than_its_size():
@@ -162,16 +162,16 @@ def test_where_a_channel_was_at_its_range_the_passage_says_no_more_than_its_size
     recording = Recording(samples, rate, channels)
     sensors = [SimpleNamespace(name=name, place=x) for name, x in (("A1", 0.0), ("A2", 2.0))]
     time = np.arange(0.1, 0.9, 0.005) + 0.0013
-    topped = _topped(recording, sensors, time)
-    assert np.array_equal(topped[0], np.abs(time - 0.5) < BLURRED)
+    topped = _clipped_samples(recording, sensors, time)
+    assert np.array_equal(topped[0], np.abs(time - 0.5) < CLIPPING_BLUR)
     assert not topped[1].any()
-    vehicle = SimpleNamespace(wheel_places=np.array([0.0]), static_loads=np.array([5e4]))
+    vehicle = SimpleNamespace(wheel_positions=np.array([0.0]), static_loads=np.array([5e4]))
     passage = SimpleNamespace(
         recording=recording, train="ic3", speed=20.0, direction="facing", conditions={}, vehicle=vehicle
     )
-    rolling = Rolling("p", passage, tuple(sensors), time, 0.2, 20.0)
+    rolling = AlignedPassage("p", passage, tuple(sensors), time, 0.2, 20.0)
     data = np.array([np.interp(time, np.arange(n) / rate, row) for row in samples])
-    sigma = observed(rolling, data, np.full(2, 0.01), 0.06, topped).sigma.reshape(2, -1)
-    plain = observed(rolling, data, np.full(2, 0.01), 0.06).sigma.reshape(2, -1)
+    sigma = observation_of(rolling, data, np.full(2, 0.01), 0.06, topped).sigma.reshape(2, -1)
+    plain = observation_of(rolling, data, np.full(2, 0.01), 0.06).sigma.reshape(2, -1)
     assert np.all(sigma[topped] >= np.abs(data[0]).max())
     assert np.array_equal(sigma[~topped], plain[~topped])

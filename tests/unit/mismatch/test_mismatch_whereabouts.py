@@ -9,9 +9,17 @@ from scipy.stats import f
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine.case import Case, Observation
 from turnout.mismatch.engine.decision import calibrate, judge
-from turnout.mismatch.engine.localization import AMPLITUDES, NOISE, Space, Whereabouts, evidence, weigh, whereabouts
+from turnout.mismatch.engine.localization import (
+    AMPLITUDES,
+    NOISE_FACTORS,
+    Location,
+    ResidualSpace,
+    locate,
+    subspace_evidence,
+    weigh_spaces,
+)
 from turnout.mismatch.engine.map_fit import fit_jointly
-from turnout.mismatch.engine.reserved_data import falls
+from turnout.mismatch.engine.reserved_data import is_significantly_worse
 from turnout.mismatch.turnout import disturbances
 
 N, K = 60, 6
@@ -25,21 +33,21 @@ def orthonormal(n, k, seed=3):
 def test_evidence_of_a_subspace_is_the_closed_form(i, j):
     """Residual with mean square f outside and f + a² inside a subspace of k of n dimensions:
     (n/2) ln(mean over f) - (k/2) ln(1 + a²/f), here with both maxima on the grid."""
-    floor = K / N * AMPLITUDES[i] / (NOISE[j] - 1.0)
+    floor = K / N * AMPLITUDES[i] / (NOISE_FACTORS[j] - 1.0)
     inside = np.sqrt(floor + AMPLITUDES[i])
     basis = orthonormal(N, N)
     r = basis @ np.concatenate([np.full(K, inside), np.full(N - K, np.sqrt(floor))])
     b = 7.0 * basis[:, :K]  # the scale of the columns must not matter
-    expected = 0.5 * N * np.log(NOISE[j]) - 0.5 * K * np.log1p(AMPLITUDES[i] / floor)
-    assert evidence(b.T @ b, b.T @ r, r @ r, N, floor) == pytest.approx(expected, rel=1e-9)
+    expected = 0.5 * N * np.log(NOISE_FACTORS[j]) - 0.5 * K * np.log1p(AMPLITUDES[i] / floor)
+    assert subspace_evidence(b.T @ b, b.T @ r, r @ r, N, floor) == pytest.approx(expected, rel=1e-9)
 
 
 def test_what_sound_recordings_leave_is_no_evidence():
     basis = orthonormal(N, N)
     r = basis @ np.full(N, np.sqrt(0.5))
     b = basis[:, :K]
-    assert evidence(b.T @ b, b.T @ r, r @ r, N, 0.5) == 0.0
-    assert evidence(b.T @ b, b.T @ r, r @ r, N, 2.0) == 0.0
+    assert subspace_evidence(b.T @ b, b.T @ r, r @ r, N, 0.5) == 0.0
+    assert subspace_evidence(b.T @ b, b.T @ r, r @ r, N, 2.0) == 0.0
 
 
 class Places(Case):
@@ -48,17 +56,17 @@ class Places(Case):
     seen = np.array([[1.0, 0.5, 0.2], [0.5, 1.0, 0.5], [0.2, 0.5, 1.0]])
 
     def __init__(self, rows):
-        self.observations = (Observation("a", "a", rows.ravel(), 1.0, kind="passage"),)
+        self.observations = (Observation("a", "a", rows.ravel(), 1.0, data_type="passage"),)
         self.n = rows.shape[1]
 
     def predict(self, values, terms, observations):
         return [np.zeros(o.data.size) for o in observations]
 
-    def spaces(self, fit):
+    def residual_spaces(self, fit):
         free, eye = np.eye(self.n), np.eye(3)
         parts = {("place", float(x)): np.kron(self.seen[:, x : x + 1], free) for x in range(3)}
         parts |= {("sensor", f"S{s}"): np.kron(eye[:, s : s + 1], free) for s in range(3)}
-        yield Space(("a",), np.eye(3 * self.n), parts)
+        yield ResidualSpace(("a",), np.eye(3 * self.n), parts)
 
 
 @pytest.mark.parametrize(
@@ -69,26 +77,26 @@ def test_a_force_is_told_from_a_channel(mix, frame, level):
     rows = 0.5 * rng.normal(size=(3, 40)) + 4.0 * np.outer(mix, rng.normal(size=40))
     case = Places(rows)
     fit = fit_jointly(case)
-    best = weigh(case, fit, {"passage": 1.0})[0]
+    best = weigh_spaces(case, fit, {"passage": 1.0})[0]
     assert (best.frame, best.level) == (frame, level)
-    found = whereabouts(case, fit)
+    found = locate(case, fit)
     assert (found.frame, found.place) == (frame, level if frame == "place" else None)
     assert found.sensor == (level if frame == "sensor" else None)
 
 
 def test_nothing_is_located_in_noise():
     case = Places(0.5 * np.random.default_rng(2).normal(size=(3, 40)))
-    assert whereabouts(case, fit_jointly(case)) is None
+    assert locate(case, fit_jointly(case)) is None
 
 
 def test_the_refused_candidate_is_heard_where_it_explains_more():
     case = Places(0.5 * np.random.default_rng(2).normal(size=(3, 40)))
     candidate = SimpleNamespace(frame="wheel", where={"train": "freight", "axle": 3}, key="k")
     refused = SimpleNamespace(candidate=candidate, gain=30.0, explained=0.4)
-    found = whereabouts(case, fit_jointly(case), refused)
+    found = locate(case, fit_jointly(case), refused)
     assert (found.frame, found.train, found.axle) == ("wheel", "freight", 3)
     refused.explained = 0.1
-    assert whereabouts(case, fit_jointly(case), refused) is None
+    assert locate(case, fit_jointly(case), refused) is None
 
 
 def levels_of(rng, n_sensor=4, n=2500, rate=5000.0, scale=1.0):
@@ -106,7 +114,7 @@ def test_degrees_of_freedom_of_a_quiet_segment():
 
 def test_quiet_segments_of_noise_have_uniform_chances():
     rng = np.random.default_rng(5)
-    chances = np.array([disturbances.louder_than(levels_of(rng), [levels_of(rng)])[1] for _ in range(600)])
+    chances = np.array([disturbances.excess_over(levels_of(rng), [levels_of(rng)])[1] for _ in range(600)])
     for q in (0.1, 0.5):
         assert abs(np.mean(chances < q) - q) < 4.0 * np.sqrt(q * (1.0 - q) / chances.size)
 
@@ -114,25 +122,25 @@ def test_quiet_segments_of_noise_have_uniform_chances():
 def test_another_train_shakes_all_sensors_and_a_noisy_channel_is_alone():
     rng = np.random.default_rng(6)
     others = [levels_of(rng) for _ in range(5)]
-    louder, p = disturbances.louder_than(levels_of(rng, scale=2.0), others)  # twice the amplitude: 6 dB
+    louder, p = disturbances.excess_over(levels_of(rng, scale=2.0), others)  # twice the amplitude: 6 dB
     assert louder == pytest.approx(6.0, abs=1.0)
-    assert p < disturbances.DISTURBED
+    assert p < disturbances.MAX_CHANCE
     power, freedom = levels_of(rng)
-    louder, p = disturbances.louder_than((power * np.array([100.0, 1.0, 1.0, 1.0]), freedom), others)
-    assert louder < disturbances.LOUDER
-    assert p > disturbances.DISTURBED
+    louder, p = disturbances.excess_over((power * np.array([100.0, 1.0, 1.0, 1.0]), freedom), others)
+    assert louder < disturbances.MIN_EXCESS
+    assert p > disturbances.MAX_CHANCE
 
 
 def test_a_fall_of_the_held_out_fit_counts_beyond_two_standard_errors():
     rng = np.random.default_rng(7)
     y, e = rng.normal(size=2500) * 10.0, rng.normal(size=2500)
     held = [Observation("a", "a", y, 1.0)]
-    assert falls(held, [y - e], [y - 2.0 * e], 0.5)  # every stretch is worse
-    assert not falls(held, [y - 2.0 * e], [y - e], 0.5)
-    assert not falls(held, [y - e], [y - e], 0.0)
+    assert is_significantly_worse(held, [y - e], [y - 2.0 * e], 0.5)  # every stretch is worse
+    assert not is_significantly_worse(held, [y - 2.0 * e], [y - e], 0.5)
+    assert not is_significantly_worse(held, [y - e], [y - e], 0.0)
     mixed = np.where(np.arange(2500) < 1250, 0.0, np.sqrt(2.05)) * e  # half gains what the other half loses, nearly
-    assert not falls(held, [y - e], [y - mixed], 0.0)
-    assert not falls(held, [y - e], [y - 1.001 * e], 0.5)  # worse everywhere, but not by half a point
+    assert not is_significantly_worse(held, [y - e], [y - mixed], 0.0)
+    assert not is_significantly_worse(held, [y - e], [y - 1.001 * e], 0.5)  # worse everywhere, but not by half a point
 
 
 def test_the_stated_probability_is_between_what_was_seen_and_what_the_softmax_says():
@@ -161,16 +169,19 @@ def test_recordings_that_were_not_fitted_say_where_only_if_they_are_the_reason()
     the sensors in another one, and whoever came in a third."""
     rng, settings = np.random.default_rng(8), MismatchSettings()
     case = Places(0.5 * rng.normal(size=(3, 40)) + 4.0 * np.outer([0.2, 0.5, 1.0], rng.normal(size=40)))
-    case.disturbed, case.foreign = (disturbances.Disturbance("p7", "before", 16.0, 1e-9),), ("freight",)
+    case.disturbed_recordings, case.mismatched_trains = (
+        (disturbances.Disturbance("p7", "before", 16.0, 1e-9),),
+        ("freight",),
+    )
     fit = fit_jointly(case)
     for disturbed, foreign in ((True, ()), (False, ("freight",))):
-        verdict = judge([], 5.0, settings, disturbed=disturbed, foreign=foreign)
+        verdict = judge([], 5.0, settings, disturbed=disturbed, mismatched_trains=foreign)
         assert (verdict.answer, verdict.cause) == ("unknown", "")
         assert verdict.probability == judge([], 5.0, settings).probability
-        assert whereabouts(case, fit, None, verdict.cause).place == 2.0
-    assert judge([], 0.5, settings, foreign=("freight",)).cause == "train"
-    assert whereabouts(case, fit, None, "clock").frame == "clock"
-    assert whereabouts(case, fit, None, "train").train == "freight"
+        assert locate(case, fit, None, verdict.cause).place == 2.0
+    assert judge([], 0.5, settings, mismatched_trains=("freight",)).cause == "train"
+    assert locate(case, fit, None, "clock").frame == "clock"
+    assert locate(case, fit, None, "train").train == "freight"
 
 
 def test_passages_with_different_sensors_are_compared_by_those_they_share():
@@ -179,10 +190,10 @@ def test_passages_with_different_sensors_are_compared_by_those_they_share():
         "b": ({"S1": 1.0, "S2": 2.0}, 50.0),
         "c": ({"S1": 1.0}, 50.0),
     }
-    louder, p = disturbances.louder_than(*disturbances._comparable(levels, "a"))
+    louder, p = disturbances.excess_over(*disturbances._shared_levels(levels, "a"))
     assert louder == pytest.approx(10.0 * np.log10(4.0))  # S3, which no other passage has, says nothing
     assert p == pytest.approx(f.sf(4.0, 50.0, 50.0) ** 2)  # both sensors
-    assert disturbances.louder_than(*disturbances._comparable(levels, "c")) == (0.0, 1.0)
+    assert disturbances.excess_over(*disturbances._shared_levels(levels, "c")) == (0.0, 1.0)
 
 
 @pytest.mark.parametrize(
@@ -194,5 +205,5 @@ def test_passages_with_different_sensors_are_compared_by_those_they_share():
     ],
 )
 def test_a_place_beyond_what_was_measured_is_not_said_to_a_metre(place, said):
-    found = Whereabouts("place", place, 40.0, place, place - 0.6, place + 0.6, measured=(2.4, 8.1))
+    found = Location("place", place, 40.0, place, place - 0.6, place + 0.6, measured_range=(2.4, 8.1))
     assert str(found) == said

@@ -44,10 +44,10 @@ def test_a_detectable_shift_is_detected_at_its_power():
 def test_a_moved_ballast_mode_is_found_and_the_railpad_mode_is_not():
     first, second = model_of(1, spread=0.01), model_of(2, spread=0.01, shift=(0.95, 1.0))
     ballast, railpad = (compare_tests(first, second, band) for band in ("ballast", "railpad"))
-    assert ballast.found
+    assert ballast.detected
     assert ballast.low < 0.05 * -99.4 < ballast.high
     assert "moved" in str(ballast)
-    assert not railpad.found
+    assert not railpad.detected
     assert f"a shift of {railpad.detectable:.3g} Hz would be found in 80 % of tests" in str(railpad)
 
 

@@ -116,7 +116,7 @@ def test_a_weak_blow_weighs_less_in_the_mean():
 
 
 def test_the_error_of_a_choice_widens_the_interval_and_leaves_the_mean():
-    plain, chosen = (summarise([3.0, 5.0, 4.0, 8.0], [0.3] * 4, choice=c) for c in (0.0, 2.0))
+    plain, chosen = (summarise([3.0, 5.0, 4.0, 8.0], [0.3] * 4, shared_se=c) for c in (0.0, 2.0))
     assert (chosen.mean, chosen.spread) == (plain.mean, plain.spread)
     assert chosen.se == pytest.approx(np.hypot(plain.se, 2.0))
     assert (chosen.high - chosen.mean) / (plain.high - plain.mean) == pytest.approx(chosen.se / plain.se)

@@ -6,7 +6,7 @@ from benchmarks.published import LOCATIONS, hammer_test
 
 from turnout.config.settings.identify import IdentifySettings
 from turnout.modal import identify
-from turnout.modal.paper import band_modes, split
+from turnout.modal.paper import band_modes, split_bands
 
 SETTINGS = IdentifySettings(null_draws=10, paper_bias_tests=8)
 
@@ -85,7 +85,7 @@ def test_at_a_low_rate_the_upper_band_ends_below_half_of_it(rate, bands):
     assert found[:bands, 0] == pytest.approx([f for f, _ in wanted], rel=0.05)
     assert np.isnan(found[bands:]).all()
     # 0.45 of the rate is left to the upper band, and nothing above the split where that is no more
-    assert len(split([records], rate, SETTINGS)) == bands
+    assert len(split_bands([records], rate, SETTINGS)) == bands
 
 
 def test_one_blow_has_no_standard_error():

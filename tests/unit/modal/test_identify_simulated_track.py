@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from turnout.config.settings.identify import IdentifySettings
-from turnout.demo.hammer import N_SAMPLE, RATE, pulse, response_to, simulated_response
+from turnout.demo.hammer import N_SAMPLES, RATE, pulse, response_to, simulated_response
 from turnout.modal import identify
 
 SETTINGS = IdentifySettings(null_draws=10)
@@ -20,7 +20,7 @@ def test_of_ten_blows(section, seed, ballast=1.0, railpad=1.0):
         contact = 1.5e-3 * rng.normal(1.0, 0.08)
         force = pulse(8e3 * rng.normal(1.0, 0.1), contact, (START + rng.uniform()) / RATE)
         acceleration = response_to(force, response(rng))
-        acceleration += 0.01 * np.abs(acceleration).max() * rng.standard_normal(N_SAMPLE)
+        acceleration += 0.01 * np.abs(acceleration).max() * rng.standard_normal(N_SAMPLES)
         first = START + int(np.ceil(contact * RATE)) + 5
         decays.append(acceleration[first : first + 600])
     return decays
@@ -32,8 +32,8 @@ test_of_ten_blows.__test__ = False
 def highest_peak(section, low, high):
     """Frequency [Hz] of the highest accelerance in a band, from an impulse response of many samples."""
     response = simulated_response(section, 1.0, 1.0)(_Still())
-    accelerance = np.abs(np.fft.rfft(response, 8 * N_SAMPLE))
-    frequency = np.fft.rfftfreq(8 * N_SAMPLE, 1.0 / RATE)
+    accelerance = np.abs(np.fft.rfft(response, 8 * N_SAMPLES))
+    frequency = np.fft.rfftfreq(8 * N_SAMPLES, 1.0 / RATE)
     inside = (frequency > low) & (frequency < high)
     return frequency[inside][np.argmax(accelerance[inside])]
 

@@ -32,7 +32,7 @@ def test_a_sensor_of_the_crossing_panel_may_hear_the_nose_instead_of_the_wheel_a
     sensors = sensors_for(recording)
     sensors[3] = replace(sensors[3], position=15.0, panel="CP")
     passage = analyse(recording, sensors, PATTERNS, settings)
-    assert passage.status == "accepted" and len(passage.heard) == 5
+    assert passage.status == "accepted" and len(passage.audible_sensors) == 5
     assert passage.speed.speed == pytest.approx(40.0, rel=3e-3)
     sensors[3] = replace(sensors[3], panel="OT")
     passage = analyse(recording, sensors, PATTERNS, settings)
@@ -57,7 +57,7 @@ def test_a_clock_that_runs_too_fast_is_named_with_its_channel(settings):
     passage = analyse(replace(recording, samples=samples), sensors_for(recording), PATTERNS, settings)
     assert passage.n_axle == 8 and passage.speed.speed == pytest.approx(25.0, rel=3e-3)
     named = findings(passage, "clock_drift")
-    assert len(named) == 1 and named[0].detail.startswith("c1: ") and "c1" not in passage.heard
+    assert len(named) == 1 and named[0].detail.startswith("c1: ") and "c1" not in passage.audible_sensors
 
 
 @pytest.mark.parametrize("after", ["constant", "noise"])

@@ -8,9 +8,9 @@ from benchmarks.passage_truth import KNOWN, RATE, recording_of, rolling, sensors
 
 from turnout.passage.analysis import analyse
 from turnout.passage.axle_patterns import offsets, read_patterns
-from turnout.passage.comb_search import goes_on
+from turnout.passage.comb_search import continues_beyond
 from turnout.passage.kinematics import Motion
-from turnout.passage.train_detection import hearing, listen
+from turnout.passage.train_detection import audible_sensors, sensor_envelopes
 
 SPEED, COACHES = 33.0, {"units": [{"any": ["coach"], "count": [2, 12]}]}
 
@@ -47,7 +47,7 @@ def test_coaches_behind_a_locomotive_that_sounds_otherwise_are_not_named_alone(s
 def test_what_is_heard_beyond_a_row_is_compared_with_the_row(speed, direction):
     """Amplitude 2 along 60 m and 1.1, 1.3 or 1.45 over 40 m beyond it, quiet level 0.3: shares 0.47, 0.59 and 0.68."""
     step, motion, place = 0.01, Motion(speed, 4.0, 0.0, direction), 17.0
-    way = motion.way((np.arange(3000) + 0.5) * step) - direction * place
+    way = motion.distance((np.arange(3000) + 0.5) * step) - direction * place
     for beyond, told in ((1.1, False), (1.3, False), (1.45, True)):
         for first, last in ((60.0, 100.0), (-40.0, 0.0)):
             amplitude = np.full((1, way.size), 0.3)
@@ -55,7 +55,7 @@ def test_what_is_heard_beyond_a_row_is_compared_with_the_row(speed, direction):
             amplitude[0, (way > first) & (way < last)] = beyond
             levels = SimpleNamespace(amplitude=amplitude, step=step)
             heard = SimpleNamespace(levels=levels, positions=np.array([place]))
-            assert goes_on(heard, motion, 0.0, 60.0) is told
+            assert continues_beyond(heard, motion, 0.0, 60.0) is told
 
 
 def test_the_neighbouring_track_is_not_heard_beside_one_sensor_of_its_own():
@@ -63,4 +63,4 @@ def test_the_neighbouring_track_is_not_heard_beside_one_sensor_of_its_own():
     rng = np.random.default_rng(3)
     samples = rolling(rng, positions=(2.0, 9.0, 14.0)).samples * np.array([[1.0], [0.08], [0.08]])
     samples += 1e-3 * rng.standard_normal(samples.shape)
-    assert hearing(listen(samples, RATE, (2.0, 9.0, 14.0), 0.001)).tolist() == [0]
+    assert audible_sensors(sensor_envelopes(samples, RATE, (2.0, 9.0, 14.0), 0.001)).tolist() == [0]

@@ -13,7 +13,7 @@ from turnout.passage.clusters import Cluster, Clusters
 from turnout.readers.writing import write
 from turnout.records import Channel
 from turnout.stages.passage import PassageContext, SectionModel, passage_unit
-from turnout.stages.passage_context import near
+from turnout.stages.passage_context import applicable_models
 from turnout.workflow.scan import scan
 
 PLACES = {"OT": -12.0, "SP": 3.6, "CLP": 13.8, "A7": 24.6, "A8": 26.4, "A9": 28.2, "ASM": 36.0, "ASD": 36.0}
@@ -237,8 +237,10 @@ def test_only_models_that_a_file_may_be_fitted_with_make_it_stale():
     models = tuple(SectionModel(f"m{month}", datetime(2024, month, 1), None) for month in (3, 5, 7))
     at = {"20240513T100000Z.h5": ["m5"], "20240101T000000Z.h5": ["m3"], "20240630T120000Z.h5": ["m5", "m7"]}
     for label, names in at.items():
-        assert [m.model_id for m in near(models, label)] == names
+        assert [m.model_id for m in applicable_models(models, label)] == names
     counted = tuple(Counted(datetime(2020, 1, 1) + timedelta(weeks=k)) for k in range(200))
-    assert near(counted, "20230101T000000Z.h5") == counted[156:157] and Counted.looks < 40  # not one after the other
+    assert (
+        applicable_models(counted, "20230101T000000Z.h5") == counted[156:157] and Counted.looks < 40
+    )  # not one after the other
     for label in ("run 17.h5", "20241399T250000Z.h5"):  # its time is inside; digits that are no time
-        assert near(models, label) == models
+        assert applicable_models(models, label) == models

@@ -13,7 +13,7 @@ from turnout.passage.segmentation import cut_passages
 from turnout.readers.writing import write
 from turnout.records import Channel
 from turnout.stages.passage import PassageContext, SectionModel, passage_unit
-from turnout.workflow.guard import guarded
+from turnout.workflow.guard import compute_guarded
 from turnout.workflow.scan import scan
 
 PLACES = {"OT": -12.0, "SP": 3.6, "CLP": 13.8, "A7": 24.6, "A8": 26.4, "A9": 28.2, "ASM": 36.0, "ASD": 36.0}
@@ -149,10 +149,10 @@ def test_a_fault_of_the_program_costs_one_record(tmp_path, monkeypatch):
     assert [p["status"] for p in caught.value.tables["passages"]] == ["accepted", "accepted"]
     turnout = with_raw(load_configuration("config").turnout("tommerup_s1"), tmp_path)
     unit = scan(turnout, tmp_path).units[0]
-    result = guarded(passage_unit, unit, turnout, tmp_path, "key", "1", False)
+    result = compute_guarded(passage_unit, unit, turnout, tmp_path, "key", "1", False)
     assert result.status == "internal_error" and len(result.tables["passages"]) == 2
     (row,) = result.tables["quarantine"]
     assert (row["reason_code"], row["record"], row["path"]) == ("internal_error", 1, unit.files[0][0])
     assert row["found"] == "ZeroDivisionError: in the toy" and "passage.py" in row["place"]
     with pytest.raises(ZeroDivisionError):
-        guarded(passage_unit, unit, turnout, tmp_path, "key", "1", True)
+        compute_guarded(passage_unit, unit, turnout, tmp_path, "key", "1", True)

@@ -30,7 +30,7 @@ def test_a_train_that_changes_its_speed_is_counted_named_and_finds_no_fault_in_c
 ):
     passage, middle = passed(settings, IC3, speed, acceleration, direction)
     assert not {f.reason for f in passage.findings} & {"clock_drift", "channels_swapped", "axles_uncertain"}
-    assert (passage.n_axle, passage.type.type, len(passage.heard)) == (8, "IC3", 6)
+    assert (passage.n_axle, passage.type.type, len(passage.audible_sensors)) == (8, "IC3", 6)
     assert passage.speed.speed == pytest.approx(middle, abs=5.0 * passage.speed.se)
     assert passage.speed.speed == pytest.approx(middle, rel=3e-3)
     assert passage.speed.acceleration == pytest.approx(acceleration, abs=0.05)
@@ -41,7 +41,7 @@ def test_a_freight_train_without_template_too(speed, acceleration, settings):
     """300 m of wagons: it is two fifths slower, or a third faster, when it has passed."""
     passage, middle = passed(settings, FREIGHT, speed, acceleration, 1)
     assert not {f.reason for f in passage.findings} & {"clock_drift", "two_trains", "axles_uncertain"}
-    assert (passage.n_axle, passage.type.type, len(passage.heard)) == (60, "unknown", 6)
+    assert (passage.n_axle, passage.type.type, len(passage.audible_sensors)) == (60, "unknown", 6)
     assert passage.speed.speed == pytest.approx(middle, abs=3.0 * passage.speed.se)
     assert passage.speed.acceleration == pytest.approx(acceleration, abs=0.01)
 

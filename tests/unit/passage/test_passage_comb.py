@@ -8,9 +8,9 @@ from benchmarks.passage_truth import IC3, PATTERNS, RATE, passing, recording_of,
 
 from turnout.passage.analysis import analyse
 from turnout.passage.axle_patterns import Group, Pattern, Vehicle, offsets
-from turnout.passage.comb import STEP, Comb, Profiles, evidence, explained, profiles_at, reshaped, teeth_of
+from turnout.passage.comb import COMB_STEP, Comb, Profiles, evidence, explained_share, fit_shape, profiles_at, teeth_of
 from turnout.passage.kinematics import Motion
-from turnout.passage.train_detection import listen
+from turnout.passage.train_detection import sensor_envelopes
 from turnout.passage.vehicle_sequence import likeliest_row
 
 # No symmetry: a tooth with two peaks of different height, off its middle.
@@ -23,13 +23,13 @@ def laid(places, noise=0.0, n=900, seed=0):
     """Profiles of one sensor and one motion: the tooth at ``places`` [m] behind where hearing begins."""
     row = np.zeros(n)
     for place in places:
-        at = (place + 12.0) / STEP
+        at = (place + 12.0) / COMB_STEP
         whole, part = int(np.floor(at)), at - np.floor(at)
         for k, weight in ((whole, 1.0 - part), (whole + 1, part)):
             row[k - 12 : k + 13] += weight * TOOTH
     row += noise * np.random.default_rng(seed).standard_normal(n)
     spectra = np.fft.rfft(row[None, None], 1024, axis=2)
-    length = np.array([STEP * n - 36.0])
+    length = np.array([COMB_STEP * n - 36.0])
     return Profiles((Motion(1.0),), row[None, None], spectra, np.array([np.sum(row**2)]), length, np.zeros(1))
 
 
@@ -45,7 +45,7 @@ def test_a_motion_that_would_turn_back_within_the_recording_hears_nothing():
 def test_the_true_comb_explains_all_and_gives_its_tooth_back():
     places = offsets((LONG, SHORT, LONG, LONG))
     profiles, comb = laid(places + 6.0), Comb.of(places)
-    share, starts = explained(profiles, comb, np.arange(1))
+    share, starts = explained_share(profiles, comb, np.arange(1))
     k = int(np.argmax(share[0]))
     # the ridge takes 3 % off the tooth's amplitude
     assert share[0, k] > 0.93 and starts[k] == pytest.approx(6.0, abs=1e-9)
@@ -59,7 +59,7 @@ def test_a_comb_in_noise_explains_no_more_than_its_free_numbers_do():
     share = []
     for seed in range(40):
         profiles = laid([], 1.0, seed=seed)
-        share.append(explained(profiles, Comb.of(offsets((LONG,) * 8)), np.arange(1))[0][0, 40])
+        share.append(explained_share(profiles, Comb.of(offsets((LONG,) * 8)), np.arange(1))[0][0, 40])
     assert np.mean(share) == pytest.approx(25 / 900, rel=0.25)
     assert evidence(np.max(share), 144.0, 1) < 0
 
@@ -72,7 +72,7 @@ def test_the_row_of_mixed_vehicles_is_found_with_its_start(seed):
     profiles = laid(offsets(row) + 5.0, 0.5, seed=seed)
     found, start = likeliest_row(profiles, TOOTH[None], pattern, 5.4)
     assert [v.name for v in found] == [v.name for v in row]
-    assert start == pytest.approx(5.0, abs=2 * STEP)
+    assert start == pytest.approx(5.0, abs=2 * COMB_STEP)
 
 
 def test_a_group_that_may_be_missing_is_left_out_where_it_is():
@@ -87,7 +87,7 @@ def test_other_wheelbases_are_found_and_the_same_ones_left_alone():
     row, true = (LONG,) * 5, offsets((wide,) * 5)
     for places, moved in ((offsets(row), 0.0), (true, 0.2)):
         profiles = laid(places + 6.0, 0.3)
-        found, before, after = reshaped(profiles, row, offsets(row), 6.0)
+        found, before, after = fit_shape(profiles, row, offsets(row), 6.0)
         base = np.diff(found)[::2]
         assert base == pytest.approx(1.8 + 2 * moved, abs=0.06)
         # what four free numbers gain by chance, by Schwarz, parts the two
@@ -123,4 +123,4 @@ def test_the_stated_error_of_the_speed_covers_it(positions, settings):
 
 def test_levels_of_a_silent_channel_have_an_amplitude():
     recording = recording_of(np.zeros((1, int(RATE))), (0.0,))
-    assert listen(recording.samples, RATE, (0.0,), 0.001) is None
+    assert sensor_envelopes(recording.samples, RATE, (0.0,), 0.001) is None

@@ -33,7 +33,7 @@ def test_every_train_is_in_one_piece_with_its_margins_whatever_the_blocks(block,
     n = int(block * RATE)
     blocks = (samples[:, k : k + n] for k in range(0, samples.shape[1], n))
     pieces = list(cut_passages(blocks, RATE, settings))
-    assert len(pieces) == 3 and all(p.whole for p in pieces)
+    assert len(pieces) == 3 and all(p.is_whole for p in pieces)
     for piece, start, speed in zip(pieces, (12.0, 31.0, 60.0), (40.0, 20.0, 33.0)):
         assert piece.start / RATE == pytest.approx(start - settings.margin, abs=0.15)
         stop = (piece.start + piece.samples.shape[1]) / RATE
@@ -60,7 +60,7 @@ def test_what_is_longer_than_may_be_kept_is_cut_and_says_so(settings):
     samples = 0.02 * rng.standard_normal((1, int(60 * RATE)))
     samples[:, int(20 * RATE) : int(45 * RATE)] += rng.standard_normal((1, int(25 * RATE)))
     pieces = list(cut_passages(np.array_split(samples, 30, axis=1), RATE, short))
-    assert [p.whole for p in pieces] == [False, False, True]
+    assert [p.is_whole for p in pieces] == [False, False, True]
     assert all(p.samples.shape[1] <= (short.longest + 2.2) * RATE for p in pieces)
 
 
@@ -82,7 +82,7 @@ def test_noise_that_came_to_stay_becomes_what_is_quiet(settings):
     samples = 0.1 * rng.standard_normal((1, int(600.0 * rate)))
     samples[:, int(60.0 * rate) :] *= 4.0
     pieces = list(cut_passages([samples], rate, settings))
-    assert not pieces[0].whole
+    assert not pieces[0].is_whole
     assert sum(p.samples.shape[1] for p in pieces) < (settings.longest + settings.chunk + 10.0) * rate
 
 
@@ -118,7 +118,7 @@ def test_passages_of_a_file_read_in_stretches_are_those_of_the_file_read_whole(f
     name = logged(tmp_path, format)
     short = replace(settings, longest=20.0, chunk=10.0)
     (whole,) = read(name, tmp_path, DESCRIBED).recordings
-    (long,) = read(name, tmp_path, DESCRIBED, short.longest, held=0).long
+    (long,) = read(name, tmp_path, DESCRIBED, short.longest, max_whole_file_size=0).long_recordings
     of_whole, of_long = list(trains_in(whole, short)), list(trains_in(long, short))
     assert [late for _, late, _ in of_whole] == pytest.approx([11.0, 27.6, 54.0], abs=0.15)
     assert of_whole[1][1] < 30.0 < of_whole[1][1] + of_whole[1][0].duration
@@ -138,7 +138,7 @@ def test_a_file_is_cut_in_memory_that_does_not_grow_with_it(settings, tmp_path):
         folder.mkdir()
         name = logged(folder, "hdf5", (12.0,), length)
         tracemalloc.start()
-        (long,) = read(name, folder, DESCRIBED, short.longest, held=0).long
+        (long,) = read(name, folder, DESCRIBED, short.longest, max_whole_file_size=0).long_recordings
         assert len(list(trains_in(long, short))) == 1
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()

@@ -14,7 +14,7 @@ from turnout.cli.main import main
 from turnout.config import load_configuration, with_raw
 from turnout.config.settings.passage import PassageSettings
 from turnout.passage.analysis import analyse
-from turnout.passage.axle_load import axle_load, calibrate, train_amplitude, with_shared
+from turnout.passage.axle_load import axle_load, calibrate, train_amplitude, with_error_correlation
 from turnout.readers.writing import write
 from turnout.records import Channel
 from turnout.stages.passage_context import read_clusters, read_loads
@@ -84,7 +84,7 @@ def test_trains_of_known_weight_calibrate_the_sensors_and_weigh_the_next_train(t
 
 def test_too_few_trains_of_known_weight_calibrate_nothing(turnout):
     config, raw, settings = turnout
-    trains = weighed_trains(config, raw, PATTERNS, settings, most=4)
+    trains = weighed_trains(config, raw, PATTERNS, settings, max_trains=4)
     assert len(trains) == 4
     assert learn_loads(config, trains, replace(settings, assets=str(raw / "none"))) == {}
     assert not (raw / "none").exists()
@@ -127,7 +127,7 @@ def test_an_error_that_all_sensors_share_is_not_averaged_away(common, own, monke
         recording = SimpleNamespace(channels=[SimpleNamespace(name=n, position=0.0) for n in names],
                                     signal=heard.get, rate=1.0)  # fmt: skip
         passage = SimpleNamespace(at_sensor=dict.fromkeys(names), motion=SimpleNamespace(speed=33.0))
-        found = axle_load(recording, passage, with_shared(made, trains), settings)
+        found = axle_load(recording, passage, with_error_correlation(made, trains), settings)
         off.append((found.mean - 15.0) / found.se)
     assert 0.7 < np.sqrt(np.mean(np.square(off))) < 1.25
 

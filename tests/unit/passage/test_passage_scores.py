@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from turnout.passage.channel_fit import fit_channel
 from turnout.passage.model_tests import NullBand, null_bases, null_scores
 from turnout.passage.scores import fit_percent, forecast, score
-from turnout.passage.wheel_basis import band_pass, filtered, wheel_basis
+from turnout.passage.wheel_basis import apply_filter, band_pass, wheel_basis
 
 THROUGH = band_pass(80, 800, 4, RATE)
 
@@ -42,7 +42,7 @@ def test_the_true_model_reaches_what_the_noise_allows(location, settings):
     passage = struck(np.random.default_rng(11), location, start=1.7)
     fit = fit_channel(passage.samples, RATE, passage.times / RATE + 0.004, 44.4, paper_model(location), settings)
     assert fit.status == "accepted"
-    assert fit.ceiling - 1.2 < fit.scores.fit < fit.ceiling + 0.4
+    assert fit.max_fit - 1.2 < fit.scores.fit < fit.max_fit + 0.4
     assert fit.scores.fit > 95 and fit.scores.forecast > 90
     assert fit.scores.fit > fit.null.fit + 30 and fit.scores.forecast > fit.null.forecast + 50
     assert fit.parameters_per_second == pytest.approx(16 / (8 * settings.score_window), rel=0.01)
@@ -50,7 +50,7 @@ def test_the_true_model_reaches_what_the_noise_allows(location, settings):
 
 def test_a_wrong_place_scores_less_and_the_forecast_says_it_loudest(settings):
     passage = struck(np.random.default_rng(12), "CP A7")
-    data = filtered(passage.samples, THROUGH)
+    data = apply_filter(passage.samples, THROUGH)
     true, wrong = (
         score(data, passage.times, wheel_basis(paper_model(x), THROUGH, RATE), settings) for x in ("CP A7", "OT")
     )
@@ -61,7 +61,7 @@ def test_the_forecast_does_not_see_its_future(settings):
     """Data behind the training part of the last wheel doubled: what is foretold there stays, so half is missing."""
     rng = np.random.default_rng(13)
     passage = struck(rng, "CP A7", offsets=IC3[:4])
-    data = filtered(passage.samples, THROUGH)
+    data = apply_filter(passage.samples, THROUGH)
     basis = wheel_basis(paper_model("CP A7"), THROUGH, RATE)
     _, parts = forecast(data, passage.times, basis, settings)
     changed = data.copy()
@@ -80,7 +80,7 @@ def test_noise_without_a_train_scores_inside_its_null(settings):
     own, left, best, null_left = [], [], [], []
     for k in range(40):
         times = (0.3 + IC3 / 44.4) * RATE
-        data = filtered(rng.standard_normal(int(times[-1] + 5000)), THROUGH)
+        data = apply_filter(rng.standard_normal(int(times[-1] + 5000)), THROUGH)
         found = score(data, times, basis, settings)
         own.append(found.forecast)
         left.append(found.leave_one_out)
@@ -156,7 +156,7 @@ def test_amplitudes_scatter_as_their_standard_errors_say(settings):
     found, said = [], []
     for _ in range(60):
         noisy = passage.clean + level * rng.standard_normal(passage.clean.size)
-        fit = fit_channel(noisy, RATE, passage.times / RATE, 44.4, paper_model("CP A7"), settings, nulls=False)
+        fit = fit_channel(noisy, RATE, passage.times / RATE, 44.4, paper_model("CP A7"), settings, with_null=False)
         found.append(fit.amplitudes)
         said.append(fit.amplitudes_se)
     ratio = np.sqrt(np.mean(np.var(found, axis=0, ddof=1)) / np.mean(np.square(said)))

@@ -8,7 +8,7 @@ from benchmarks.passage_truth import IC3, PATTERNS, RATE, rolling, sensors_for, 
 
 from turnout.passage.analysis import analyse
 from turnout.passage.kinematics import Motion
-from turnout.passage.sensor_consistency import wrong_places
+from turnout.passage.sensor_consistency import inconsistent_positions
 from turnout.passage.slowness import scan_slowness
 from turnout.passage.speed import slowness_from_sensors
 from turnout.stages.passage_context import known_patterns
@@ -106,7 +106,7 @@ def test_the_track_is_that_of_the_sensors_that_hear_it(settings):
     recording = replace(recording, samples=samples)
     tracks = ["both", "diverging", "main", "diverging"]
     passage = analyse(recording, sensors_for(recording, tracks), PATTERNS, settings)
-    assert passage.track == "main" and set(passage.heard) == {"c0", "c2"}
+    assert passage.track == "main" and set(passage.audible_sensors) == {"c0", "c2"}
     swapped = ["both", "main", "diverging", "main"]
     assert analyse(recording, sensors_for(recording, swapped), PATTERNS, settings).track == "diverging"
 
@@ -167,7 +167,7 @@ def test_swapped_channels_are_named_and_left_out(settings):
     swapped = [f for f in passage.findings if f.reason == "channels_swapped"]
     assert len(swapped) == 1 and "c1 and c3" in swapped[0].detail
     assert passage.n_axle == 8 and passage.speed.speed == pytest.approx(40.0, rel=3e-3)
-    assert not {"c1", "c3"} & set(passage.heard)
+    assert not {"c1", "c3"} & set(passage.audible_sensors)
 
 
 def test_a_clock_off_by_a_tenth_of_a_second_is_named(settings):
@@ -183,7 +183,7 @@ def test_a_clock_off_by_a_tenth_of_a_second_is_named(settings):
 
 def test_fewer_than_four_sensors_cannot_say_which_one_is_wrong(settings):
     recording = rolling(np.random.default_rng(18), IC3, 40.0, (0.0, 4.0, 9.0))
-    findings, keep = wrong_places(recording, Motion(40.0), sensors_for(recording))
+    findings, keep = inconsistent_positions(recording, Motion(40.0), sensors_for(recording))
     assert findings == [] and keep.all()
 
 
@@ -214,8 +214,8 @@ def test_motion_and_its_inverse_agree_with_the_law_of_motion():
     way = np.array([-30.0, 0.0, 55.0])
     time = motion.time(way)
     assert 20.0 * (time - 1.5) - 0.15 * (time - 1.5) ** 2 == pytest.approx(way)
-    assert motion.way(time) == pytest.approx(way)
-    later = motion.moved(40.0)
+    assert motion.distance(time) == pytest.approx(way)
+    later = motion.relative_to_axle(40.0)
     assert later.time(0.0) == pytest.approx(motion.time(40.0))
     assert later.speed == pytest.approx(np.sqrt(20.0**2 - 2 * 0.3 * 40.0))
 

@@ -8,7 +8,7 @@ from scipy import stats
 from turnout.passage.impact_timing import impact_times, search_times
 from turnout.passage.impulse_fit import joint_fit, onsets, predict, whitener
 from turnout.passage.model_tests import direction_test
-from turnout.passage.wheel_basis import band_pass, filtered, wheel_basis
+from turnout.passage.wheel_basis import apply_filter, band_pass, wheel_basis
 from turnout.records import ModalModel
 
 
@@ -165,15 +165,15 @@ def test_the_jump_test_keeps_its_level_and_finds_another_direction():
 
 def test_whitened_noise_is_white_and_the_basis_passes_the_same_filter():
     rng = np.random.default_rng(10)
-    coloured = filtered(rng.standard_normal(60000), np.array([1.0, 0.8, 0.3]))
+    coloured = apply_filter(rng.standard_normal(60000), np.array([1.0, 0.8, 0.3]))
     taps, noise = whitener(coloured)
-    white = filtered(coloured, taps)[100:]
+    white = apply_filter(coloured, taps)[100:]
     lags = [np.mean(white[k:] * white[:-k]) / np.var(white) for k in range(1, 6)]
     assert np.abs(lags).max() < 4 / np.sqrt(60000)
     assert noise == pytest.approx(1.0, rel=0.02)
     model = paper_model("OT")
     plain = wheel_basis(model, None, RATE).response(0.4)
-    assert np.allclose(filtered(plain, taps), wheel_basis(model, taps, RATE).response(0.4)[: plain.size], atol=1e-9)
+    assert np.allclose(apply_filter(plain, taps), wheel_basis(model, taps, RATE).response(0.4)[: plain.size], atol=1e-9)
 
 
 def test_a_wheel_outside_the_recording_is_named():

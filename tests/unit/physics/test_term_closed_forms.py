@@ -64,23 +64,23 @@ def test_a_zener_pad_on_every_support_is_the_track_with_that_complex_stiffness()
 
 
 def test_pads_lose_one_per_cent_a_kelvin():
-    term = physics.PadTemperature(0.01).under({"rail_temperature": 35.0})
+    term = physics.PadTemperature(0.01).under_conditions({"rail_temperature": 35.0})
     assert np.allclose(
         with_term(term),
         receptance(assemble(TRACK.with_(pad_stiffness=0.8 * 300e6)), F, 12.0, 12.0),
         atol=0.0,
         rtol=1e-9,
     )
-    assert physics.PadTemperature(0.01).under({}).links(TRACK) == []
+    assert physics.PadTemperature(0.01).under_conditions({}).links(TRACK) == []
 
 
 def test_pads_under_a_train_gain_slope_times_seat_load_and_none_under_a_hammer():
-    loaded = physics.PadPreload(4e3).under({"axle_loads": (100e3, 120e3)})
+    loaded = physics.PadPreload(4e3).under_conditions({"axle_loads": (100e3, 120e3)})
     stiff = 300e6 + 4e3 * 0.45 * 55e3
     assert np.allclose(
         with_term(loaded), receptance(assemble(TRACK.with_(pad_stiffness=stiff)), F, 12.0, 12.0), atol=0.0, rtol=1e-9
     )
-    assert physics.PadPreload(4e3).under({}).links(TRACK) == []
+    assert physics.PadPreload(4e3).under_conditions({}).links(TRACK) == []
 
 
 def test_ballast_inertia_is_a_heavier_and_more_damped_sleeper():
@@ -268,7 +268,7 @@ def test_a_kink_of_5_mrad_is_that_of_jenkins_joint():
 def test_a_flat_of_50_mm_drops_the_wheel_by_newton_and_clarks_number():
     (path,) = physics.WheelFlat(2, 0.05, 0.43).paths(TRACK, car())
     assert path.depth == pytest.approx(0.36e-3, abs=0.5e-5) and path.wheel == 2
-    assert physics.WheelFlat(2, 0.05, train="ICE").under({"train": "freight"}).paths(TRACK, car()) == ()
+    assert physics.WheelFlat(2, 0.05, train="ICE").under_conditions({"train": "freight"}).paths(TRACK, car()) == ()
 
 
 def test_three_waves_around_a_wheel_repeat_every_third_of_a_turn():
@@ -300,7 +300,7 @@ def test_roughness_on_top_of_a_rough_rail_adds_its_power():
     """Of the same seed, as both have where nothing is said: 1 times the curve twice over is 3 dB, not 6."""
     rail = TurnoutTrack(TRACK, {"main": ((),)}, roughness_level=0.0)
     x = np.arange(0.0, 24.0, 0.005)
-    base = rail.rolling(TRACK.start - 5.0, TRACK.end + 5.0, 0)[0](x)
+    base = rail.roughness_parts(TRACK.start - 5.0, TRACK.end + 5.0, 0)[0](x)
     more = physics.RoughnessLevel(1.0).paths(TRACK, car())[0](x)
     assert np.std(more) == pytest.approx(np.std(base), rel=0.3)  # waves up to 3 m in 24 m
     assert abs(np.corrcoef(base, more)[0, 1]) < 0.5  # some sixteen independent waves carry most of it

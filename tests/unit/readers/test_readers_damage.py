@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from turnout.errors import REASONS, ReadError, of_the_machine
+from turnout.errors import REASONS, ReadError, is_infrastructure
 from turnout.readers import read
 from turnout.readers.writing import WRITERS, write
 
@@ -188,7 +188,7 @@ def test_a_fault_of_the_machine_is_no_damage_of_the_file(fault, written, in_si, 
     monkeypatch.setattr("turnout.readers.npz.np.load", failing)
     with pytest.raises((OSError, MemoryError)) as caught:
         read(path.name, path.parent, in_si)
-    assert of_the_machine(caught.value)
+    assert is_infrastructure(caught.value)
     monkeypatch.undo()
     assert_sound(read(path.name, path.parent, in_si).recordings, whole)
 
@@ -202,7 +202,7 @@ def test_a_bad_sector_at_the_begin_of_a_file_is_no_damage_of_it_either(written, 
     with monkeypatch.context() as patched, pytest.raises(OSError) as caught:
         patched.setattr("turnout.readers.source.os.fstat", failing)
         read(path.name, path.parent, in_si)
-    assert of_the_machine(caught.value)
+    assert is_infrastructure(caught.value)
 
 
 def test_an_array_that_no_file_of_this_size_can_hold_is_damage_and_no_want_of_memory(in_si, tmp_path):
@@ -211,7 +211,7 @@ def test_an_array_that_no_file_of_this_size_can_hold_is_damage_and_no_want_of_me
     with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
         archive.writestr("record_000.npy", b"\x93NUMPY\x01\x00v\x00" + header + bytes(800))
     (error,) = read("a.npz", tmp_path, in_si).errors
-    assert error.reason == "unreadable" and "numpy cannot read it (Unable to allocate" in error.found
+    assert error.reason == "unreadable" and "numpy cannot read it (Unable to allocate" in error.problem
 
 
 @pytest.mark.parametrize("text", ["errno = 22, error message = 'Invalid argument'", "errno = 2 of the wheel", "errno"])

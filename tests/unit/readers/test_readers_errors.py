@@ -187,7 +187,7 @@ def test_a_frequency_of_rcm_dx_that_its_time_stamps_contradict_costs_that_record
         file.visititems(change)
     result = read(path.name, tmp_path, in_si)
     assert {e.reason for e in result.errors} == {"wrong_rate"} and len(result.errors) == 2
-    assert "samples a second, its rate says 25600 Hz" in result.errors[0].found
+    assert "samples a second, its rate says 25600 Hz" in result.errors[0].problem
 
 
 @pytest.mark.parametrize("per_second", [1.0, 1e3, 1e6])
@@ -386,7 +386,7 @@ def test_time_that_is_not_even_is_no_rate_of_whatever_was_promised(kind, tmp_pat
     name = archive(tmp_path, time=time, force=saw(300), rail=saw(300), units=["N", "m/s²"])
     error = only_error(name, tmp_path, in_si, 0)
     assert error.reason == "wrong_rate"
-    assert "its time column is not even: sample " in error.found and " steps from where " in error.found
+    assert "its time column is not even: sample " in error.problem and " steps from where " in error.problem
     assert error.remedy == "Check the logger's clock, or export the record at an even rate"
 
 

@@ -142,7 +142,7 @@ def test_a_list_of_units_goes_by_the_list_of_names_beside_it(names, by_three_nam
 def test_a_list_of_units_in_no_order_is_not_dealt_out_by_the_alphabet(lists, by_three_names, tmp_path):
     result = read(named_by_a_list(tmp_path, units=["g", "N", "m/s²"], **lists), tmp_path, by_three_names)
     assert [e.reason for e in result.errors] == ["unit_unknown"] * 2
-    assert result.errors[1].found == "nothing says which of the units 'g', 'N', 'm/s²' are whose"
+    assert result.errors[1].problem == "nothing says which of the units 'g', 'N', 'm/s²' are whose"
     assert result.errors[1].where == "record 2"
     remedy = "Write each dataset's unit beside it, or a list 'channels' of their names beside that of the units"
     assert result.errors[1].remedy == remedy
@@ -166,7 +166,7 @@ def test_a_list_of_units_goes_by_the_order_of_variables_where_the_file_keeps_it(
     with (tmp_path / "a.mat").open("r+b") as file:
         file.write(mat73.HEADER.ljust(116) + bytes(8) + b"\x00\x02IM")
     (error,) = _raised("a.mat", tmp_path, by_name)
-    assert error.reason == "unit_unknown" and "which of the units 'N', 'm/s²' are whose" in error.found
+    assert error.reason == "unit_unknown" and "which of the units 'N', 'm/s²' are whose" in error.problem
 
 
 def test_tdms_of_one_group_with_scaled_integers(by_name, tmp_path):
@@ -267,7 +267,7 @@ def test_channels_of_one_record_that_state_different_rates_are_not_put_side_by_s
     if format != "hdf5":
         both(read(name, tmp_path, by_name).recordings[0])
         assert error.where == "record 2 of 2" + " (group 'blow 1')" * (format == "tdms")
-    assert error.reason == "wrong_rate" and ("20000 Hz" in error.found or "5e-05" in error.found)
+    assert error.reason == "wrong_rate" and ("20000 Hz" in error.problem or "5e-05" in error.problem)
 
 
 @pytest.mark.parametrize("format", ["tdms", "lvm", "uff"])
@@ -282,7 +282,7 @@ def test_channels_of_one_record_that_begin_at_different_moments_are_not_put_side
     both(result.recordings[0])
     assert error.reason == "clock_drift" and "record 2 of 2" in error.where
     late, early = ("Acc", "Force") if start > 0 else ("Force", "Acc")
-    assert error.found == f"channel {late!r} begins {abs(start):.6g} s after channel {early!r}"
+    assert error.problem == f"channel {late!r} begins {abs(start):.6g} s after channel {early!r}"
     name = LEFT[format](tmp_path, (1 / RATE, 1 / RATE), (1e-3, 1e-3 + 8e-6))
     assert read(name, tmp_path, by_name).errors == ()
 

@@ -62,12 +62,12 @@ def in_another_order():
 def test_stretches_are_what_whole_reading_gives(format, logged, in_another_order, tmp_path):
     path = leave(logged, tmp_path, format)
     (whole,) = read(path.name, tmp_path, in_another_order).recordings
-    result = read(path.name, tmp_path, in_another_order, longest=10.0, held=0)
+    result = read(path.name, tmp_path, in_another_order, max_duration=10.0, max_whole_file_size=0)
     assert result.recordings == () and result.errors == ()
-    (long,) = result.long
+    (long,) = result.long_recordings
     assert (long.n_sample, long.rate, long.channels) == (N, whole.rate, whole.channels)
     assert (long.started_at, long.source, long.record) == (whole.started_at, whole.source, whole.record)
-    assert np.array_equal(np.concatenate(list(long.stretches(1.7)), axis=1), whole.samples)
+    assert np.array_equal(np.concatenate(list(long.blocks(1.7)), axis=1), whole.samples)
     # forwards, back, across any border of a block of the format
     for start, stop in ((70_000, 70_011), (3, 9), (65_000, 67_000), (N - 5, N)):
         assert np.array_equal(long.read(start, stop), whole.samples[:, start:stop])
@@ -76,7 +76,7 @@ def test_stretches_are_what_whole_reading_gives(format, logged, in_another_order
 @pytest.mark.parametrize("format", STAYING)
 def test_samples_stay_in_files_of_formats_that_allow_it(format, logged, in_another_order, tmp_path):
     path = leave(logged, tmp_path, format)
-    (long,) = read(path.name, tmp_path, in_another_order, longest=10.0, held=0).long
+    (long,) = read(path.name, tmp_path, in_another_order, max_duration=10.0, max_whole_file_size=0).long_recordings
     assert not any(isinstance(x, np.ndarray) for x in long.read.record.samples)
 
 
@@ -89,7 +89,7 @@ def test_a_matrix_stays_whichever_way_it_lies(shape, chunks, logged, tmp_path):
     wanted = RawDescription(
         tuple(RawChannel(n, i, "acceleration", unit="m/s²") for i, n in enumerate("abc")), kind="passage", rate=RATE
     )
-    (long,) = read("x.h5", tmp_path, wanted, longest=10.0, held=0).long
+    (long,) = read("x.h5", tmp_path, wanted, max_duration=10.0, max_whole_file_size=0).long_recordings
     assert np.array_equal(long.read(5000, 9001), logged.samples[:, 5000:9001])
 
 
@@ -97,8 +97,8 @@ def test_short_records_and_small_files_are_read_as_ever(logged, in_another_order
     path = write([logged], tmp_path / "x.h5", "hdf5")
     duration = N / RATE
     for longest, held in ((None, 0), (duration + 1.0, 0), (1.0, 10**9)):
-        result = read(path.name, tmp_path, in_another_order, longest=longest, held=held)
-        assert len(result.recordings) == 1 and result.long == ()
+        result = read(path.name, tmp_path, in_another_order, max_duration=longest, max_whole_file_size=held)
+        assert len(result.recordings) == 1 and result.long_recordings == ()
 
 
 @pytest.mark.parametrize("format", ["hdf5", "tdms", "parquet"])
@@ -114,15 +114,15 @@ def test_a_channel_that_is_dead_or_not_finite_costs_itself_only_and_says_the_sam
     )
     path = leave(spoiled, tmp_path, format)
     whole = read(path.name, tmp_path, three)
-    long = read(path.name, tmp_path, three, longest=10.0, held=0)
+    long = read(path.name, tmp_path, three, max_duration=10.0, max_whole_file_size=0)
     assert [str(e) for e in long.errors] == [str(e) for e in whole.errors] and len(whole.errors) == 2
-    assert [c.name for c in long.long[0].channels] == ["right"]
-    assert np.array_equal(long.long[0].read(0, N), whole.recordings[0].samples)
+    assert [c.name for c in long.long_recordings[0].channels] == ["right"]
+    assert np.array_equal(long.long_recordings[0].read(0, N), whole.recordings[0].samples)
 
 
 def test_a_file_that_changes_between_the_stretches_is_an_error_with_its_place(logged, in_another_order, tmp_path):
     path = write([logged], tmp_path / "x.wav", "wav")
-    (long,) = read(path.name, tmp_path, in_another_order, longest=10.0, held=0).long
+    (long,) = read(path.name, tmp_path, in_another_order, max_duration=10.0, max_whole_file_size=0).long_recordings
     long.read(0, 100)
     with path.open("ab") as file:
         file.write(b"more")
@@ -133,5 +133,5 @@ def test_a_file_that_changes_between_the_stretches_is_an_error_with_its_place(lo
 def test_a_hammer_test_is_never_long(logged, in_another_order, tmp_path):
     path = write([logged], tmp_path / "x.h5", "hdf5")
     hammer = RawDescription(in_another_order.channels, kind="hammer", rate=RATE)
-    result = read(path.name, tmp_path, hammer, longest=1.0, held=0)
+    result = read(path.name, tmp_path, hammer, max_duration=1.0, max_whole_file_size=0)
     assert isinstance(result.recordings[0], Recording) and not isinstance(result.recordings[0], LongRecording)

@@ -85,7 +85,7 @@ def test_a_rate_in_another_language_is_read_and_held_against_the_layout(word, tm
     text = f"{word}: 10000 Hz\nforce;acc\n{ROWS}"
     sound(tmp_path, "a.csv", text, rate=10000.0)
     (error,) = read("a.csv", tmp_path, replace(NAMED, rate=20000.0)).errors
-    assert error.reason == "wrong_rate" and "10000 Hz instead of 20000 Hz" in error.found
+    assert error.reason == "wrong_rate" and "10000 Hz instead of 20000 Hz" in error.problem
 
 
 STARTS = {
@@ -127,7 +127,7 @@ def test_a_table_shorter_than_its_head_promises_is_cut(word, tmp_path):
         (tmp_path / "a.csv").write_text(text.format(promised))
         (error,) = read("a.csv", tmp_path, NAMED).errors
         assert error.reason == "truncated"
-        assert error.found == f"has 50 of the {number} samples that its head promises"
+        assert error.problem == f"has 50 of the {number} samples that its head promises"
 
 
 def test_a_count_of_all_rows_does_not_cut_the_records_of_a_file(tmp_path):
@@ -148,7 +148,7 @@ def test_a_frequency_that_nobody_understood_is_no_licence_for_another_rate(line,
     text = f"{line}\nforce;acc\n{ROWS}"
     sound(tmp_path, "a.csv", text, replace(NAMED, rate=10000.0), rate=10000.0)
     (error,) = read("a.csv", tmp_path, replace(NAMED, rate=20000.0)).errors
-    assert error.reason == "wrong_rate" and line in error.found and "20000 Hz" in error.found
+    assert error.reason == "wrong_rate" and line in error.problem and "20000 Hz" in error.problem
     sound(tmp_path, "b.csv", f"rate: 20000\n{text}", replace(NAMED, rate=20000.0))
 
 
@@ -198,7 +198,7 @@ def test_a_unit_that_is_not_known_is_still_one_of_a_row_of_units(tmp_path):
     by_index = replace(NAMED, channels=tuple(replace(c, source=i) for i, c in enumerate(NAMED.channels)))
     (tmp_path / "a.csv").write_text(f"rate: 20000\nforce;acc\nN;furlong\n{ROWS}")
     (error,) = read("a.csv", tmp_path, by_index).errors
-    assert error.reason == "unit_unknown" and "furlong" in error.found
+    assert error.reason == "unit_unknown" and "furlong" in error.problem
 
 
 @pytest.mark.parametrize(("unit", "second"), [("s", 1.0), ("ms", 1e3), ("µs", 1e6), ("\u03bcs", 1e6), ("us", 1e6)])
@@ -217,7 +217,7 @@ def test_a_time_column_of_another_language_is_held_against_the_promised_rate(tit
     ignored = replace(NAMED, rate=20000.0, channels=(*NAMED.channels, RawChannel("time", name, "ignored")))
     for description in (ignored, replace(NAMED, rate=20000.0)):
         (error,) = read("a.csv", tmp_path, description).errors
-        assert error.reason == "wrong_rate" and "10000" in error.found
+        assert error.reason == "wrong_rate" and "10000" in error.problem
 
 
 @pytest.mark.parametrize("row", ["08:00:00.5;1,0;2,0", "1.0  2.0"])
@@ -257,7 +257,7 @@ def test_a_missing_value_is_counted_with_its_place_and_costs_its_channel_alone(c
     result = read("a.csv", tmp_path, replace(NAMED, kind="passage", rate=20000.0))
     (error,) = result.errors
     assert error.reason == "not_finite" and error.where == "record 1 of 1, channel 'rail'"
-    assert error.found == f"1 of 50 samples are missing or not finite, the first is sample {where}"
+    assert error.problem == f"1 of 50 samples are missing or not finite, the first is sample {where}"
     assert error.remedy.startswith("Export the record again from the logger; if it is so there too, check")
     np.testing.assert_allclose(result.recordings[0].samples, X.T[:1].round(4), atol=1e-12)
 

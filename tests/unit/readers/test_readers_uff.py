@@ -10,7 +10,7 @@ import pyuff
 from turnout.errors import ReadError
 from turnout.readers import read
 from turnout.readers.uff import read_frf
-from turnout.readers.uff_datasets import sets_of
+from turnout.readers.uff_datasets import read_datasets
 from turnout.readers.writing import write
 from turnout.records import RawChannel, RawDescription
 
@@ -32,10 +32,10 @@ def vendors(shared_data):
 
 @pytest.mark.parametrize("name", VENDORS)
 def test_every_set_of_a_vendor_file_is_what_pyuff_reads(name, vendors):
-    ours = sets_of((vendors / name).read_bytes())
+    ours = read_datasets((vendors / name).read_bytes())
     theirs = pyuff.UFF(str(vendors / name)).read_sets()
     theirs = theirs if isinstance(theirs, list) else [theirs]
-    assert [int(s.kind.rstrip("b")) for s in ours] == [s["type"] for s in theirs]
+    assert [int(s.dataset_type.rstrip("b")) for s in ours] == [s["type"] for s in theirs]
     for one, other in zip(ours, theirs):
         if other["type"] == 58:
             np.testing.assert_array_equal(one.data, other["data"])
@@ -150,7 +150,7 @@ def test_the_closing_delimiter_may_stand_on_a_line_of_its_own(ending, hammer_tes
     data = path.read_bytes()
     at = 0
     parts = []
-    for one in sets_of(data):
+    for one in read_datasets(data):
         end = data.find(b"    -1\n", one.offset + 13 * 80 + 301 * 8 - 100)
         parts.append(data[at:end] + ending)
         at = end

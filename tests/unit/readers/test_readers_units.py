@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from turnout.readers.interpret import settled_unit
+from turnout.readers.interpret import resolve_unit
 from turnout.units import conversion, to_si
 
 G = 9.80665  # m/s², by definition (3rd CGPM, 1901)
@@ -85,24 +85,24 @@ def test_a_lone_factor_of_zero_is_no_unit():
 
 
 def test_file_and_layout_must_agree_where_both_speak():
-    assert settled_unit("g", "g") == "g"
-    assert settled_unit("m/s^2", "m/s²") == "m/s²"
+    assert resolve_unit("g", "g") == "g"
+    assert resolve_unit("m/s^2", "m/s²") == "m/s²"
     for label in ("EU", "", " - ", "None", "[a.u.]", "1.0"):  # the file's label means nothing
-        assert settled_unit(label, "V") == "V"
-    assert settled_unit("count", "0.305 mV") == "0.305 mV"  # the layout says what a count is worth
-    assert settled_unit("g", "V!") == "V"
-    assert settled_unit("counts", "mV") == "mV"  # a step of the converter is a millivolt
-    assert settled_unit("count", "0.05 N") == "0.05 N"
+        assert resolve_unit(label, "V") == "V"
+    assert resolve_unit("count", "0.305 mV") == "0.305 mV"  # the layout says what a count is worth
+    assert resolve_unit("g", "V!") == "V"
+    assert resolve_unit("counts", "mV") == "mV"  # a step of the converter is a millivolt
+    assert resolve_unit("count", "0.05 N") == "0.05 N"
     for file_unit, layout_unit in (("mV", "V"), ("g", "m/s²"), ("N", "V"), ("daN", "N"), ("counts", "N")):
         with pytest.raises(ValueError, match=f"the file says '{file_unit}', the layout '{layout_unit}'"):
-            settled_unit(file_unit, layout_unit)
+            resolve_unit(file_unit, layout_unit)
     with pytest.raises(ValueError, match="neither the file nor the layout says the unit"):
-        settled_unit("", None)
+        resolve_unit("", None)
 
 
 def test_a_unit_of_the_file_that_nobody_knows_is_no_licence_for_the_layouts():
     with pytest.raises(ValueError) as caught:
-        settled_unit("tf", "kN")
+        resolve_unit("tf", "kN")
     said = "the file says 'tf', which is not known, the layout 'kN' ('kN!' would overrule the file)"
     assert str(caught.value) == said
-    assert settled_unit("tf", "kN!") == "kN"
+    assert resolve_unit("tf", "kN!") == "kN"

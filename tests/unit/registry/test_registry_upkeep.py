@@ -11,8 +11,8 @@ from registry_rows import Bench, hammer_result
 from turnout.errors import RegistryError
 from turnout.registry import compaction, database
 from turnout.registry.compaction import compact, rebuild
-from turnout.registry.database import in_order, open_registry, rebuild_database
-from turnout.registry.generation import FILE, load
+from turnout.registry.database import open_registry, rebuild_database, sort_by_needs
+from turnout.registry.generation import GENERATION_FILE, load
 from turnout.registry.integrity import check, vacuum
 
 ALL_MODES = "select * from modes order by model_id, band"
@@ -189,7 +189,7 @@ def strip_column(bench, table, file, column):
     older = file.with_name("older.parquet")
     duckdb.sql(f"copy (select * exclude ({column}) from read_parquet('{file}')) to '{older}' (format parquet)")
     older.replace(file)
-    path = bench.registry / FILE
+    path = bench.registry / GENERATION_FILE
     generation = json.loads(path.read_text())
     for entry in generation["files"]:
         if entry["path"].endswith(file.name):
@@ -202,7 +202,7 @@ def strip_column(bench, table, file, column):
 
 def test_a_column_that_changed_its_type_is_refused_before_anything_is_written(bench, hammer):
     bench.register(hammer())
-    path = bench.registry / FILE
+    path = bench.registry / GENERATION_FILE
     generation = json.loads(path.read_text())
     name = next(k for k in generation["schemas"] if k.startswith("modes:"))
     generation["schemas"][name]["n_impacts"] = "varchar"
@@ -214,7 +214,7 @@ def test_a_column_that_changed_its_type_is_refused_before_anything_is_written(be
 @pytest.mark.parametrize("content", ["{", "[]", "3", '{"format": 1}', '{"format": 1, "files": [{"rows": 2}]}'])
 def test_a_spoilt_generation_file_is_said(bench, hammer, content):
     bench.register(hammer())
-    (bench.registry / FILE).write_text(content)
+    (bench.registry / GENERATION_FILE).write_text(content)
     with pytest.raises(RegistryError, match="not a generation file"):
         bench.register(hammer(section="A2"))
 
@@ -233,7 +233,7 @@ def test_no_registry_is_said(tmp_path):
 )
 def test_views_that_cannot_be_ordered_are_refused(texts, said):
     with pytest.raises(RegistryError, match=said):
-        in_order(texts)
+        sort_by_needs(texts)
 
 
 def test_views_of_an_older_program_are_made_anew_though_there_is_no_new_row(bench, hammer, monkeypatch):

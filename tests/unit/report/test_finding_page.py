@@ -11,10 +11,10 @@ import pytest
 from jinja2 import Environment, PackageLoader
 
 from turnout.errors import SimulationError
-from turnout.report.finding_text import answer, check, facts, filed, parameters
+from turnout.report.finding_text import accepted_parameters, answer, check, facts, parameters
 from turnout.report.pages.finding import finding_page
-from turnout.report.panels.finding import Drawing, marked_place
-from turnout.stages.accept_finding import _refuse
+from turnout.report.panels.finding import TurnoutDrawing, marked_position
+from turnout.stages.accept_finding import _check_acceptable
 from turnout.stages.mismatch_text import headline
 
 SECTIONS = [
@@ -163,7 +163,7 @@ def test_of_two_effects_each_says_how_sure_it_is_and_what_else_it_may_be():
     sure = dict(facts(row))["How sure"]
     assert sure.startswith("probability 0.80") and "local pad 0.97, hanging sleeper 0.80" in sure
     with pytest.raises(SimulationError, match="hanging_sleeper may as well be local_ballast"):
-        _refuse(row, "t1", False)
+        _check_acceptable(row, "t1", False)
 
 
 @pytest.mark.parametrize(("delay", "said"), [(9.3e-4, "A2 lags by 0.93 ms"), (-9.3e-4, "A2 is early by 0.93 ms")])
@@ -205,12 +205,12 @@ def test_the_worst_comes_first_and_the_rest_is_folded():
 
 
 def test_the_arrow_points_at_the_place_or_the_sensor():
-    drawing = Drawing(SECTIONS)
+    drawing = TurnoutDrawing(SECTIONS)
     # ends lie 4 m beyond the sections, 20 pixels from the edges: -16 m at 20, 32.2 m at 900
     assert drawing.px(-16.0) == 20 and drawing.px(32.2) == pytest.approx(900)
-    assert marked_place(named(), SECTIONS) == (24.6, "24.6 m")
-    assert marked_place(finding("named", channel="A9"), SECTIONS) == (28.2, "sensor A9")
-    assert marked_place(finding("unknown"), SECTIONS) == (None, "")
+    assert marked_position(named(), SECTIONS) == (24.6, "24.6 m")
+    assert marked_position(finding("named", channel="A9"), SECTIONS) == (28.2, "sensor A9")
+    assert marked_position(finding("unknown"), SECTIONS) == (None, "")
 
 
 def test_what_was_accepted_is_shown_over_the_visits():
@@ -226,7 +226,7 @@ def test_what_was_accepted_is_shown_over_the_visits():
     text = page(finding("none"), parameters=rows)
     assert "hanging sleeper, gap: 3 visits" in text and "In the track file, estimated anew" in text
     nose = rows[-1] | {"term": "running_surface_kink", "parameter": "place", "value": 27.041, "value_low": 27.013}
-    assert filed([nose | {"value_high": 27.079}]) == [
+    assert accepted_parameters([nose | {"value_high": 27.079}]) == [
         {
             "effect": "running surface kink at 24.6 m",
             "name": "place",
@@ -234,7 +234,7 @@ def test_what_was_accepted_is_shown_over_the_visits():
             "interval": "27.01 m to 27.08 m",
         }
     ]
-    assert filed([nose | {"accepted": False}]) == []
+    assert accepted_parameters([nose | {"accepted": False}]) == []
 
 
 def test_why_nothing_can_be_said_stands_on_the_page():

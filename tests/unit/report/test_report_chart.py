@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from turnout.report.panels.hammer import coherence_panel, receptance_panel
-from turnout.report.svg import BOTTOM, LEFT, RIGHT, TOP, Axis, Chart, drawn, linear_ticks, log_ticks, time_ticks
+from turnout.report.svg import BOTTOM, LEFT, RIGHT, TOP, Axis, Chart, linear_ticks, log_ticks, reduce_points, time_ticks
 
 
 def chart(scale="linear"):
@@ -28,19 +28,19 @@ def test_the_geometric_mean_is_in_the_middle_of_a_logarithmic_axis():
 def test_a_missing_value_breaks_the_line_and_is_not_bridged():
     c = chart()
     c.line([10.0, 200.0, 400.0, 1000.0], [1.0, np.nan, 2.0, 3.0], "curve")
-    assert c.parts[0].count("M") == 2 and c.parts[0].count("L") == 1
+    assert c.elements[0].count("M") == 2 and c.elements[0].count("L") == 1
 
 
 def test_a_band_with_a_hole_is_drawn_in_two_pieces():
     c = chart()
     c.band([10, 200, 400, 600, 1000], [1, 1, np.nan, 1, 1], [2, 2, 2, 2, 2], "interval")
-    assert len(c.parts) == 2
+    assert len(c.elements) == 2
 
 
 def test_error_bars_span_low_to_high():
     c = chart()
     c.points([500.0], [2.0], "point", low=[1.0], high=[3.0])
-    bottom, top = (float(v) for v in re.search(r'M[\d.]+ ([\d.]+)V([\d.]+)"', c.parts[0]).groups())
+    bottom, top = (float(v) for v in re.search(r'M[\d.]+ ([\d.]+)V([\d.]+)"', c.elements[0]).groups())
     assert (bottom, top) == pytest.approx((float(c.py(1.0)), float(c.py(3.0))), abs=0.05)
 
 
@@ -98,7 +98,7 @@ def test_a_long_curve_keeps_every_peak_and_at_most_four_points_for_each_pixel():
     px = np.linspace(0.0, 99.99, 20_000)
     py = np.sin(px) + 0.01 * np.cos(7000.0 * px)
     py[[1234, 15_000]] = 5.0, -5.0
-    x, y = drawn(px, py)
+    x, y = reduce_points(px, py)
     assert len(x) <= 400 and {5.0, -5.0} <= set(y) and (np.diff(x) > 0).all()
     for pixel in range(100):
         before, after = py[np.floor(px) == pixel], y[np.floor(x) == pixel]
@@ -106,9 +106,9 @@ def test_a_long_curve_keeps_every_peak_and_at_most_four_points_for_each_pixel():
 
 
 def test_a_short_curve_and_one_that_turns_back_are_drawn_whole():
-    assert len(drawn(np.arange(10.0), np.arange(10.0))[0]) == 10
+    assert len(reduce_points(np.arange(10.0), np.arange(10.0))[0]) == 10
     back = np.concatenate([np.linspace(0, 1, 500), np.linspace(1, 0, 500)])
-    assert len(drawn(back, back)[0]) == 1000
+    assert len(reduce_points(back, back)[0]) == 1000
 
 
 @pytest.mark.parametrize(("decay", "said"), [(None, False), (0.0, False), (25.0, True)])

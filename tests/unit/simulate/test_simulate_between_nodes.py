@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from turnout.simulate.decay_rate import GRID, track_decay_rate
+from turnout.simulate.decay_rate import DISTANCES, track_decay_rate
 from turnout.simulate.force_laws import LinearLaw
 from turnout.simulate.frequency_response import receptance, receptance_gradient
 from turnout.simulate.infinite_track import floquet_receptance
@@ -84,7 +84,7 @@ def test_the_decay_rate_does_not_ask_for_the_mesh():
     0.3 %. The grid is laid so close that all of it lies in the accelerometer's element."""
     place, spacing = 0.3, 0.004
     found = track_decay_rate(assemble(simple_beam()), place, spacing, bands=np.array([5.0]))[0]
-    x = place + spacing * GRID
+    x = place + spacing * DISTANCES
     energy = np.array([influence(position, place) for position in x]) ** 2
     width = np.diff(np.concatenate([[x[0]], 0.5 * (x[1:] + x[:-1]), [x[-1] + 0.5 * (x[-1] - x[-2])]]))
     assert found == pytest.approx(4.343 / np.sum(energy / energy[0] * width), rel=0.01)

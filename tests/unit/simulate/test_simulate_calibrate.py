@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from turnout.simulate.calibration import PARAMETERS, Measured, calibrate
+from turnout.simulate.calibration import PARAMETERS, MeasuredReceptance, calibrate
 from turnout.simulate.frequency_response import receptance
 from turnout.simulate.matrices import assemble
 from turnout.simulate.track import uniform_track
@@ -23,7 +23,7 @@ def _asked(true, frequency, parameters):
     """Calibration of the plain track by receptances of a true one, heard at the support and in mid-span."""
     matrices, track = assemble(true), _track()
     given = [
-        Measured(frequency, h, 1e-4 * np.abs(h), PLACE, heard)
+        MeasuredReceptance(frequency, h, 1e-4 * np.abs(h), PLACE, heard)
         for heard in (PLACE, PLACE + 0.3)
         for h in [receptance(matrices, frequency, PLACE, heard)]
     ]

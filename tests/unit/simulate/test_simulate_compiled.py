@@ -24,7 +24,7 @@ def test_every_kernel_that_another_one_calls_is_behind_the_name_of_the_folder():
     with_kernels = {p.stem for p in HERE.glob("*.py") if "compiled import" in p.read_text()}
     assert len(with_kernels) >= 6
     called = {f"turnout.simulate.{name}" for name in with_kernels}
-    behind = closure(compiled.OUTERMOST)
+    behind = closure(compiled.FINGERPRINTED_MODULE)
     for name in with_kernels:
         assert called & imported_here(name) <= behind, f"{name} calls kernels that the folder does not depend on"
     assert {"turnout.simulate.force_laws", "turnout.simulate.compiled"} <= behind

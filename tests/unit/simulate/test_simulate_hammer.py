@@ -6,10 +6,12 @@ import pytest
 from turnout.errors import SimulationError
 from turnout.physics import TERMS, LiftingSleepers, LocalBallast, SensorGain, SensorPosition, SurfaceDip
 from turnout.simulate import Hammer, Sensor, prepare_hammer, simulate_hammer, uniform_track
-from turnout.simulate.links import on_stretch
+from turnout.simulate.links import terms_on_stretch
 
 TRACK, MASS, VELOCITY = uniform_track(30.0), 5.5, 1.2
-HAMMER = Hammer(MASS, VELOCITY, velocity_spread=0.0, place_spread=0.0, force=Sensor("hammer", 15.0, "hammer", "force"))
+HAMMER = Hammer(
+    MASS, VELOCITY, velocity_spread=0.0, position_spread=0.0, force=Sensor("hammer", 15.0, "hammer", "force")
+)
 SHORT = {"n_blows": 1, "duration": 0.05, "pretrigger": 0.005}
 
 
@@ -19,7 +21,7 @@ def blow(**options):
 
 def test_a_free_mass_gives_the_rail_at_most_twice_its_momentum_whatever_wheels_roll_on():
     """It bounces off a track at rest with at most the speed it came with; 1 % for the anti-alias filter."""
-    paths = tuple(term.example() for term in TERMS if term.kind == "path")
+    paths = tuple(term.example() for term in TERMS if term.effect_type == "path")
     found, bare = blow(terms=(SurfaceDip(15.0, -1e-3, 0.6), *paths)), blow()
     assert len(paths) >= 5
     assert 1.0 < found[0].sum() / 20e3 / (MASS * VELOCITY) < 2.02
@@ -57,7 +59,7 @@ def test_of_a_run_of_supports_a_stretch_keeps_what_lies_in_it():
     keep[40:60] = True
     terms = (LiftingSleepers(30, 45, 1.0), LiftingSleepers(10, 39, 1.0), LocalBallast(59, 0.3),
              LocalBallast(60, 0.3), SensorGain("A", 2.0))  # fmt: skip
-    kept = on_stretch(terms, keep)
+    kept = terms_on_stretch(terms, keep)
     assert [type(term) for term in kept] == [LiftingSleepers, LocalBallast, SensorGain]
     assert (kept[0].first, kept[0].last, kept[1].sleeper) == (0, 5, 19)
 

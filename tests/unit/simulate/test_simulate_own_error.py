@@ -10,7 +10,7 @@ from turnout.physics import TERMS, LocalBallast
 from turnout.simulate import Sensor, car, prepare_passage, uniform_track
 from turnout.simulate import discretization_error as module
 from turnout.simulate.discretization_error import PassageCase, end_error, numerical_error
-from turnout.simulate.links import COUNTED, moved
+from turnout.simulate.links import SUPPORT_FIELDS, shift_supports
 
 TRACK = uniform_track(24.0)
 TRUE = np.random.default_rng(3).normal(size=(1, 4096))
@@ -57,19 +57,19 @@ def placed(track, term):
     return sorted({round(float(track.support[name[1]]), 6) for part in parts for name, _ in part.ends})
 
 
-COUNTING = [term for term in TERMS if {f.name for f in fields(term)} & set(COUNTED)]
+COUNTING = [term for term in TERMS if {f.name for f in fields(term)} & set(SUPPORT_FIELDS)]
 
 
 @pytest.mark.parametrize("term", COUNTING, ids=lambda t: t.name)
 def test_terms_stay_where_they_are_on_a_longer_track(term):
-    example, longer = term.example(), module._lengthened(TRACK, 6.0)
-    assert placed(longer, moved(example, 10)) == placed(TRACK, example) != []
+    example, longer = term.example(), module._lengthen(TRACK, 6.0)
+    assert placed(longer, shift_supports(example, 10)) == placed(TRACK, example) != []
 
 
 def test_no_field_that_counts_supports_is_forgotten():
     """Numbers of supports are integers, as those of wheels, waves and seeds are."""
     whole = {f.name for term in TERMS for f in fields(term) if f.type in (int, "int")}
-    assert whole - {"wheel", "order", "seed"} == set(COUNTED)
+    assert whole - {"wheel", "order", "seed"} == set(SUPPORT_FIELDS)
 
 
 def test_the_ends_do_not_matter_to_a_term_in_the_middle():

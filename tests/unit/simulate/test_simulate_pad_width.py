@@ -8,7 +8,7 @@ import pytest
 from turnout.errors import SimulationError
 from turnout.simulate import uniform_track
 from turnout.simulate.frequency_response import receptance
-from turnout.simulate.matrices import assemble, linked, railed
+from turnout.simulate.matrices import add_rails, assemble, link_matrices
 
 WIDTH, F = 0.15, np.array([50.0, 200.0, 400.0, 600.0])
 IRREGULAR = np.array([0.0, 0.55, 1.2, 1.8, 2.3])
@@ -46,7 +46,7 @@ def pressed_evenly(track):
                 rail = tuple((("rail", j, k) if k else ("rail", j), weight) for k, weight in share.items())
                 link = replace(link, ends=(*rail, (("sleeper", j), -1.0)))
             links.append(link)
-    return railed(linked(track, links), track)
+    return add_rails(link_matrices(track, links), track)
 
 
 def test_a_pad_changes_the_receptance_by_its_width_and_not_by_the_mesh():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from turnout.physics import DryFriction
-from turnout.physics.dry_friction import SLIP
+from turnout.physics.dry_friction import SLIP_RATE
 from turnout.simulate import (
     Hammer,
     Sensor,
@@ -16,7 +16,7 @@ from turnout.simulate import (
     simulate_passage,
     uniform_track,
 )
-from turnout.simulate.calibration import Measured, calibrate
+from turnout.simulate.calibration import MeasuredReceptance, calibrate
 from turnout.simulate.decay_rate import track_decay_rate
 from turnout.simulate.discretization_error import PassageCase, end_error, numerical_error
 from turnout.simulate.frequency_response import receptance, receptance_gradient
@@ -24,7 +24,7 @@ from turnout.simulate.matrices import assemble
 from turnout.simulate.modal_calibration import with_section
 from turnout.simulate.rail import Rail
 from turnout.simulate.roughness import level, roughness
-from turnout.simulate.sensor import measured
+from turnout.simulate.sensor import record_signal
 
 RNG = np.random.default_rng(7)
 
@@ -34,18 +34,18 @@ def test_the_chain_of_a_sensor_does_what_each_stage_says():
     t = np.arange(n) / rate
     tone = lambda f: np.sin(2.0 * np.pi * f * t)  # noqa: E731
     bare = {"cutoff": None}
-    mounted = measured(Sensor("a", 0.0, mount_frequency=2e3, mount_quality=8.0, **bare), tone(2e3), rate, RNG)
+    mounted = record_signal(Sensor("a", 0.0, mount_frequency=2e3, mount_quality=8.0, **bare), tone(2e3), rate, RNG)
     assert np.ptp(mounted[4000:6000]) / 2 == pytest.approx(8.0, rel=0.02)
-    low = measured(Sensor("a", 0.0), tone(500.0) + tone(9.7e3), rate, RNG)
+    low = record_signal(Sensor("a", 0.0), tone(500.0) + tone(9.7e3), rate, RNG)
     inner = slice(1000, 7000)
     assert np.max(np.abs(low[inner] - tone(500.0)[inner])) < 0.02  # passes one, stops the other, no delay
-    clipped = measured(Sensor("a", 0.0, gain=2.0, limit=1.5, **bare), tone(100.0), rate, RNG)
+    clipped = record_signal(Sensor("a", 0.0, gain=2.0, limit=1.5, **bare), tone(100.0), rate, RNG)
     assert clipped.max() == 1.5 and clipped.min() == -1.5
-    stepped = measured(Sensor("a", 0.0, resolution=0.25, offset=0.1, **bare), tone(100.0), rate, RNG)
+    stepped = record_signal(Sensor("a", 0.0, resolution=0.25, offset=0.1, **bare), tone(100.0), rate, RNG)
     assert set(np.unique(np.round(stepped / 0.25, 9) % 1.0)) == {0.0}
-    noisy = measured(Sensor("a", 0.0, noise=0.3, **bare), np.zeros(n), rate, RNG)
+    noisy = record_signal(Sensor("a", 0.0, noise=0.3, **bare), np.zeros(n), rate, RNG)
     assert noisy.std() == pytest.approx(0.3, rel=0.03)
-    late = measured(Sensor("a", 0.0, delay=2e-3, **bare), np.exp(-(((t - 0.1) / 2e-3) ** 2)), rate, RNG)
+    late = record_signal(Sensor("a", 0.0, delay=2e-3, **bare), np.exp(-(((t - 0.1) / 2e-3) ** 2)), rate, RNG)
     assert t[np.argmax(late)] == pytest.approx(0.102, abs=1e-4)
 
 
@@ -85,9 +85,9 @@ def test_wheels_arrive_when_speed_and_distance_say(direction, front):
     _, truth = simulate_passage(
         uniform_track(36.0), car(half_pivot=3.0), 25.0, sensors, direction, lead=0.4, tail=0.1, truth=True
     )
-    first = np.argmin(np.abs(truth.wheel_place[0] - front))
+    first = np.argmin(np.abs(truth.wheel_position[0] - front))
     assert truth.time[first] == pytest.approx(0.4, abs=1e-4)
-    assert np.sign(np.diff(truth.wheel_place[0])[0]) == (1.0 if direction == "facing" else -1.0)
+    assert np.sign(np.diff(truth.wheel_position[0])[0]) == (1.0 if direction == "facing" else -1.0)
 
 
 def test_one_factorisation_serves_trains_and_speeds():
@@ -150,7 +150,7 @@ def test_calibration_finds_what_the_receptances_were_made_of_within_its_errors()
         for h, x in zip(exact, (-12.0, -11.7)):
             sd = 0.02 * np.abs(h)
             noise = sd * (rng.normal(size=sd.size) + 1j * rng.normal(size=sd.size))
-            given.append(Measured(frequency, h + noise, sd, -12.0, x))
+            given.append(MeasuredReceptance(frequency, h + noise, sd, -12.0, x))
         found = calibrate(turnout, "OT", given, model_sd=0.0)
         assert all(found.informed.values()) and found.reduced < 1.6
         scores += [np.log(found.values[name] / truth[name]) / found.sd[name] for name in truth]
@@ -165,7 +165,7 @@ def test_calibration_says_what_the_data_cannot_tell():
     made = assemble(turnout.track)
     frequency = np.arange(450.0, 800.0, 10.0)
     h = receptance(made, frequency, -12.0, -12.0)
-    found = calibrate(turnout, "OT", [Measured(frequency, h, 0.05 * np.abs(h), -12.0, -12.0)])
+    found = calibrate(turnout, "OT", [MeasuredReceptance(frequency, h, 0.05 * np.abs(h), -12.0, -12.0)])
     assert found.informed["pad_stiffness"] and not found.informed["ballast_stiffness"]
     (line,) = (line for line in str(found).splitlines() if line.split()[0] == "ballast_stiffness")
     assert "hardly told by these tests" in line
@@ -176,7 +176,7 @@ def test_what_lies_above_the_sampled_band_does_not_fold_into_it(tone):
     """1 kHz with twenty steps per sample: half the rate is 500 Hz, 54 dB is what a Hamming window stops."""
     time = (np.arange(20 * 4096) + 0.5) / 20e3
     heard = [
-        measured(Sensor("a", 0.0), np.sin(2.0 * np.pi * f * time), 1e3, RNG, substeps=20)[500:-500]
+        record_signal(Sensor("a", 0.0), np.sin(2.0 * np.pi * f * time), 1e3, RNG, substeps=20)[500:-500]
         for f in (100.0, tone)
     ]
     mean_over_a_step = np.sinc(100.0 / 1e3)
@@ -190,10 +190,10 @@ def test_the_decay_rate_of_a_winkler_beam_is_that_of_its_exponentials():
     beam = Rail(6.42e6, 60.21, 2.4e8, beam="euler")
     track = uniform_track(96.0, h, beam, layers=1, pad_stiffness=1e8 * h, pad_damping=10.0, elements_per_bay=1)
     found = track_decay_rate(assemble(track), 24.0, 0.6, bands=np.array([25.0]))[0]
-    from turnout.simulate.decay_rate import GRID
+    from turnout.simulate.decay_rate import DISTANCES
 
     beta = ((1e8 - 60.21 * (2 * np.pi * 25.0) ** 2) / (4 * 6.42e6)) ** 0.25
-    x = 0.6 * GRID
+    x = 0.6 * DISTANCES
     energy = (np.exp(-beta * x) * (np.cos(beta * x) + np.sin(beta * x))) ** 2
     width = np.diff(np.concatenate([[0.0], 0.5 * (x[1:] + x[:-1]), [x[-1] + 0.5 * (x[-1] - x[-2])]]))
     assert found == pytest.approx(4.343 / np.sum(energy * width), rel=0.01)
@@ -217,7 +217,7 @@ def test_friction_that_a_blow_cannot_overcome_is_a_dashpot():
     """Below slip F0 tanh(v/v0) is a damper of F0/v0: 20 kN over 2 mm/s, to the 1 % of (v/v0)²/3 at a sixth of v0."""
     track, sensors = uniform_track(24.0), [Sensor("A", 12.0), Sensor("B", 12.9)]
     stuck = np.array(track.pad_damping)
-    stuck[20] += 2e4 / SLIP
+    stuck[20] += 2e4 / SLIP_RATE
     cases = (track, (DryFriction(20, 2e4),)), (track.with_(pad_damping=stuck), ()), (track, ())
     once = {"sensors": sensors, "n_blows": 1, "duration": 0.05, "pretrigger": 0.005}
     shown = [simulate_hammer(t, 12.3, terms=terms, **once)[0].samples[1:] for t, terms in cases]

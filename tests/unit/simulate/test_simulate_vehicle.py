@@ -9,7 +9,7 @@ from turnout.errors import SimulationError
 from turnout.simulate import car, load_track, load_vehicle
 from turnout.simulate.parameters import REPOSITORY
 from turnout.simulate.ports import contact_ports
-from turnout.simulate.train import coupled
+from turnout.simulate.train import couple
 from turnout.simulate.vehicle import GRAVITY, Body, Suspension, Vehicle, lone_wheels
 
 AXLES = {
@@ -48,7 +48,7 @@ def test_the_ic3_has_97_tonnes_8_axles_and_two_shared_bogies():
     assert np.allclose(ic3.static_loads, ic3.static_loads[::-1], atol=0.0)
     assert len(ic3.blocks) == 2  # shared bogies couple all three cars
     two = load_vehicle("ic3", 0.0, units=2)
-    assert np.allclose(two.wheel_places[8:] - two.wheel_places[:8], 58.8, atol=0.0) and len(two.blocks) == 3
+    assert np.allclose(two.wheel_positions[8:] - two.wheel_positions[:8], 58.8, atol=0.0) and len(two.blocks) == 3
 
 
 def test_the_manchester_bounce_frequencies_follow_from_its_masses_and_springs():
@@ -82,24 +82,24 @@ def lopsided():
 
 @pytest.mark.parametrize("vehicle", [load_vehicle("intercity"), lopsided()], ids=["intercity", "lopsided"])
 def test_a_train_that_runs_the_other_way_round_has_its_wheels_loads_and_modes_in_reverse(vehicle):
-    turned = vehicle.turned()
-    last = vehicle.wheel_places[-1]
-    assert turned.wheel_places == pytest.approx(last - vehicle.wheel_places[::-1])
+    turned = vehicle.reverse()
+    last = vehicle.wheel_positions[-1]
+    assert turned.wheel_positions == pytest.approx(last - vehicle.wheel_positions[::-1])
     assert turned.static_loads == pytest.approx(vehicle.static_loads[::-1])
     assert turned.static_loads[0] != pytest.approx(vehicle.static_loads[0], rel=1e-3)  # the input breaks symmetry
     assert turned.overhang + vehicle.overhang + last == pytest.approx(vehicle.length)
     modes = [np.sort(eigh(v.matrices[2], v.matrices[0], eigvals_only=True)) for v in (vehicle, turned)]
     assert modes[0] == pytest.approx(modes[1], abs=1e-9 * modes[0][-1])
-    again = turned.turned()
-    assert [b.place for b in again.bodies] == pytest.approx([b.place for b in vehicle.bodies])
+    again = turned.reverse()
+    assert [b.position for b in again.bodies] == pytest.approx([b.position for b in vehicle.bodies])
     assert (again.suspensions, again.wheels, again.extra_links) == (
         vehicle.suspensions, vehicle.wheels, vehicle.extra_links,
     )  # fmt: skip
 
 
 def test_coupled_cars_keep_their_places_and_blocks():
-    pair = coupled("pair", [car(length=26.0, overhang=1.9), car(length=24.0, overhang=1.5)])
-    assert pair.wheel_places[4] == pytest.approx(26.0 - 1.9 + 1.5)
+    pair = couple("pair", [car(length=26.0, overhang=1.9), car(length=24.0, overhang=1.5)])
+    assert pair.wheel_positions[4] == pytest.approx(26.0 - 1.9 + 1.5)
     assert list(pair.blocks) == [0, 10, 20]
 
 
@@ -107,8 +107,8 @@ def test_wheels_of_a_composed_train_keep_their_radius_and_contact():
     """Four wheels of the locomotive, twenty of its coaches; the other way round the coaches come first."""
     train, locomotive, coach = (load_vehicle(name) for name in ("intercity", "locomotive", "coach"))
     assert locomotive.radius != coach.radius and locomotive.contact != coach.contact
-    assert train.each("radius") == (locomotive.radius,) * 4 + (coach.radius,) * 20
-    assert train.turned().each("radius") == (coach.radius,) * 20 + (locomotive.radius,) * 4
+    assert train.wheel_values("radius") == (locomotive.radius,) * 4 + (coach.radius,) * 20
+    assert train.reverse().wheel_values("radius") == (coach.radius,) * 20 + (locomotive.radius,) * 4
     laws = [law for *_, law in contact_ports(train, ((), ()), 0.0, 1)]
     assert laws == [locomotive.contact] * 8 + [coach.contact] * 40
     assert load_vehicle("wagon_four_axles", units=2).radius == load_vehicle("wagon_four_axles").radius
@@ -116,7 +116,7 @@ def test_wheels_of_a_composed_train_keep_their_radius_and_contact():
 
 def test_what_presses_the_wheels_of_a_vehicle_is_coupled_with_it():
     light, heavy = (lone_wheels(900.0, (0.0, 2.0), pressing=force, length=5.0) for force in (3e4, 7e4))
-    pair = coupled("pair", [light, heavy])
+    pair = couple("pair", [light, heavy])
     assert pair.static_loads == pytest.approx([*light.static_loads, *heavy.static_loads])
     with pytest.raises(SimulationError, match="radius of 3 wheels, the train has 4"):
         pair.with_(radius=(0.4, 0.4, 0.4))

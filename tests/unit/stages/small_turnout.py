@@ -96,7 +96,7 @@ def strike(folder, terms=None, labels=("A", "B"), day=DAY, blows=3, seed=1, turn
         place = PLACES[label]
         made = terms(stretch_of_track(track.track, place)) if terms else ()
         sensors = (Sensor("rail", place, "rail head at sleeper", noise=0.02),)
-        hammer = Hammer(force=Sensor("force", place, "hammer", "force", noise=1.0), place_spread=0.0)
+        hammer = Hammer(force=Sensor("force", place, "hammer", "force", noise=1.0), position_spread=0.0)
         recordings = simulate_hammer(
             track, place, hammer, sensors, blows, made, seed + k, 5000.0, 0.4, started_at=day,
         )  # fmt: skip

@@ -6,10 +6,10 @@ from turnout.config.parameters import Number, ParameterSet
 from turnout.errors import ConfigError, SimulationError
 from turnout.simulate import uniform_track
 from turnout.simulate.turnout_track import stretch_of_track
-from turnout.stages.accepted_effects import Accepted, accepted_of
+from turnout.stages.accepted_effects import AcceptedEffect, accepted_of
 
 TRACK = uniform_track(60.0)
-LIFTS = Accepted("lifting_sleepers", {"first": 12.0, "last": 55.8}, {"share": (1.0, None)})
+LIFTS = AcceptedEffect("lifting_sleepers", {"first": 12.0, "last": 55.8}, {"share": (1.0, None)})
 
 
 @pytest.mark.parametrize(("place", "half"), [(30.0, 30.0), (30.0, 12.0), (10.0, 6.0), (58.0, 5.0), (12.0, 0.7)])
@@ -27,7 +27,7 @@ def test_a_range_that_lies_elsewhere_is_left_out(place, half):
 
 
 def test_one_sleeper_beyond_the_end_is_left_out():
-    gap = Accepted("hanging_sleeper", {"sleeper": 30.0}, {"gap": (3e-4, None)})
+    gap = AcceptedEffect("hanging_sleeper", {"sleeper": 30.0}, {"gap": (3e-4, None)})
     assert gap.term(TRACK).sleeper == 50 and gap.term(stretch_of_track(TRACK, 10.0, 12.0)) is None
 
 

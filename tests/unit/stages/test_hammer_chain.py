@@ -16,7 +16,7 @@ from turnout.readers import read
 from turnout.readers.writing import write
 from turnout.registry.intake import Arrival, gather
 from turnout.stages.hammer import hammer_unit
-from turnout.workflow.guard import guarded
+from turnout.workflow.guard import compute_guarded
 from turnout.workflow.scan import scan
 
 DAY = date(2024, 5, 13)
@@ -227,7 +227,7 @@ def test_a_file_that_no_reader_foresaw_costs_itself_alone(tmp_path):
     folder = tmp_path / "tommerup_s1" / "hammer" / DAY.isoformat()
     (folder / "A7_3.csv").write_text("# rate: 20000,0\nforce;acc\n1;2\n3;4\n")
     unit = scan(turnout, tmp_path).units[0]
-    result = guarded(hammer_unit, unit, turnout, tmp_path, "key", "1", False)
+    result = compute_guarded(hammer_unit, unit, turnout, tmp_path, "key", "1", False)
     assert result.status == "partly" and len(result.tables["impacts"]) == 20
     assert {q["path"][-8:] for q in result.tables["quarantine"]} == {"A7_3.csv"}
 

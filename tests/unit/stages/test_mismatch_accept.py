@@ -16,8 +16,8 @@ from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.simulate import load_track, simulate_hammer
 from turnout.stages import mismatch
 from turnout.stages.accept_finding import accept
-from turnout.stages.accepted_effects import OF_A_WHEELSET, Accepted, accepted_of, described, terms_on
-from turnout.stages.accepted_effects_case import GuidedCase
+from turnout.stages.accepted_effects import WHEELSET_EFFECTS, AcceptedEffect, accepted_of, describe_term, terms_on
+from turnout.stages.accepted_effects_case import AcceptedEffectsCase
 from turnout.stages.mismatch_groups import Group
 from turnout.stages.mismatch_inputs import digest_of_model
 
@@ -120,12 +120,12 @@ def test_what_was_accepted_on_the_other_route_is_no_part_of_a_diagnosis(monkeypa
         raise SimulationError("that is all")
 
     monkeypatch.setattr(mismatch, "TrackCase", lambda *given: None)
-    monkeypatch.setattr(mismatch, "GuidedCase", guided)
+    monkeypatch.setattr(mismatch, "AcceptedEffectsCase", guided)
     turnout = SimpleNamespace(id="t1", raw="raw", settings={"mismatch": None})
-    standing = [Accepted("local_pad", {"sleeper": 18.0}, {}, route) for route in ("main", "", "diverging")]
+    standing = [AcceptedEffect("local_pad", {"sleeper": 18.0}, {}, route) for route in ("main", "", "diverging")]
     about = {"visit": "2026-07-25", "identity": "one", "notes": []}
     options = mismatch.Options(fits=tmp_path)
-    rows = mismatch._one(Group(("B",), "diverging", None), turnout, standing, about, options, (0, 1))
+    rows = mismatch._diagnose_group(Group(("B",), "diverging", None), turnout, standing, about, options, (0, 1))
     assert given == ["", "diverging"] and "that is all" in rows["quarantine"][0]["found"]
 
 
@@ -176,7 +176,7 @@ def test_a_track_that_extends_itself_is_refused(config):
         load_track("a", folder=config / "tracks")
 
 
-OF_TRACK_AND_SENSORS = [t for t in physics.TERMS if t.name not in ("roughness_level", *OF_A_WHEELSET)]
+OF_TRACK_AND_SENSORS = [t for t in physics.TERMS if t.name not in ("roughness_level", *WHEELSET_EFFECTS)]
 
 
 @pytest.mark.parametrize("term", OF_TRACK_AND_SENSORS, ids=lambda t: t.name)
@@ -185,7 +185,7 @@ def test_every_effect_comes_back_from_the_file_as_it_was_written(config, term):
     made = term.example()
     candidate = SimpleNamespace(family=term.name, parameters=term.parameters)
     track = own_track(config)
-    told = described(made, candidate, [0.1 * abs(getattr(made, p.name)) for p in term.parameters], track)
+    told = describe_term(made, candidate, [0.1 * abs(getattr(made, p.name)) for p in term.parameters], track)
     accept(finding(told), config, "t1", anyway=True)
     back = accepted_of(own(config).terms)[0].term(own(config).track)
     for name, value in vars(made).items():
@@ -209,7 +209,7 @@ def test_an_accepted_gap_is_simulated(config):
 
 def test_accepted_effects_are_simulated_and_estimated_anew_in_a_case(config):
     """With the term in the case, the prediction is the one with the term given; its column is the derivative."""
-    plan = small_plan((15.0,), passages=False, blows=(21.6, 24.0))
+    plan = small_plan((15.0,), passages=False, hammer_positions=(21.6, 24.0))
     case = TrackCase(measured_campaign(plan, seed=2), families=("local_ballast",))
     entry = {
         "term": "local_ballast",
@@ -219,10 +219,10 @@ def test_accepted_effects_are_simulated_and_estimated_anew_in_a_case(config):
     accept(finding(entry), config, "t1", anyway=True)
     accepted = accepted_of(own(config).terms)
     alone = dict(case.rail)
-    guided = GuidedCase(case, accepted)
+    guided = AcceptedEffectsCase(case, accepted)
     # receptances are linearised about the rail that blows give with the effect standing, not about the one without it
     assert case.rail == {name: guided.start_values[name] for name in alone} != alone
-    (own_nuisance,) = guided.own
+    (own_nuisance,) = guided.own_nuisances
     assert own_nuisance.mean == 0.5 and own_nuisance.sd == pytest.approx(0.25)
     assert len(guided.candidates) == len(case.candidates) - 1
     values = {n.name: n.mean for n in guided.nuisances}
@@ -248,14 +248,14 @@ def test_a_case_whose_errors_were_made_anew_is_guided_as_before():
     """Errors follow the wheels that a fit finds: the case inside is another, its observations are asked of that."""
     anew = SimpleNamespace(observations=("rough",))
     inner = SimpleNamespace(
-        nuisances=(), candidates=("a",), start_values={}, observations=("smooth",), renewed=lambda fit: anew
+        nuisances=(), candidates=("a",), start_values={}, observations=("smooth",), with_updated_errors=lambda fit: anew
     )
-    guided = GuidedCase(inner)
-    found = guided.renewed(None)
+    guided = AcceptedEffectsCase(inner)
+    found = guided.with_updated_errors(None)
     assert found.observations == ("rough",) and guided.observations == ("smooth",)
     assert found.watch is guided.watch and found.candidates == ("a",)
-    inner.renewed = lambda fit: inner
-    assert guided.renewed(None) is guided
+    inner.with_updated_errors = lambda fit: inner
+    assert guided.with_updated_errors(None) is guided
 
 
 def test_another_track_is_another_diagnosis(config):
@@ -283,11 +283,11 @@ def accepted_as(law, value, error):
 def test_an_accepted_limit_may_move_by_half_of_itself():
     """80 m/s²: beside 100,000, which stands for no limit, it would be free from 0 to anything."""
     inner = SimpleNamespace(
-        nuisances=(), candidates=(), start_values={}, track=lambda: "track", cheap_part=lambda: None
+        nuisances=(), candidates=(), start_values={}, track=lambda: "track", cheap_case=lambda: None
     )
-    (limit,) = GuidedCase(inner, (accepted_as(physics.Clipping, 80.0, 1.0),)).own
+    (limit,) = AcceptedEffectsCase(inner, (accepted_as(physics.Clipping, 80.0, 1.0),)).own_nuisances
     assert limit.sd == pytest.approx(40.0)
-    (gap,) = GuidedCase(inner, (accepted_as(physics.HangingSleeper, 1e-3, 1e-5),)).own
+    (gap,) = AcceptedEffectsCase(inner, (accepted_as(physics.HangingSleeper, 1e-3, 1e-5),)).own_nuisances
     assert gap.sd == pytest.approx(5e-4)
 
 
@@ -300,11 +300,11 @@ def test_the_derivative_by_an_accepted_gap_goes_to_the_side_where_the_simulation
         return [np.array([(1e3 * terms[0]["gap"]) ** 2])]
 
     inner = SimpleNamespace(
-        nuisances=(), candidates=(), start_values={}, track=lambda: "track", cheap_part=lambda: None, predict=predict,
+        nuisances=(), candidates=(), start_values={}, track=lambda: "track", cheap_case=lambda: None, predict=predict,
         nuisance_jacobian=lambda *_: [np.zeros((1, 0))],
     )  # fmt: skip
-    guided = GuidedCase(inner, (accepted_as(physics.HangingSleeper, 1e-3, 1e-5),))
-    (one,) = guided.own
+    guided = AcceptedEffectsCase(inner, (accepted_as(physics.HangingSleeper, 1e-3, 1e-5),))
+    (one,) = guided.own_nuisances
     values, seen = {one.name: 1e-3}, [SimpleNamespace(name="o")]
     (column,) = guided.nuisance_jacobian(values, (), seen, guided.predict(values, (), seen))
     assert column[0, 0] == pytest.approx(1e3 * (2.0 - 0.02 * 0.5), rel=1e-6)

@@ -3,7 +3,7 @@
 import pytest
 
 from turnout.errors import SimulationError
-from turnout.stages.mismatch_results import ALL, _visit
+from turnout.stages.mismatch_results import ALL_VISITS, _visit
 
 FOUND = {"2024-02-06": ["cold blows"], "2024-07-16": ["warm blows", "trains"]}
 
@@ -11,7 +11,7 @@ FOUND = {"2024-02-06": ["cold blows"], "2024-07-16": ["warm blows", "trains"]}
 def test_the_newest_one_of_them_or_all_together():
     assert _visit("t", FOUND, None, "raw") == ("2024-07-16", ["warm blows", "trains"])
     assert _visit("t", FOUND, "2024-02-06", "raw") == ("2024-02-06", ["cold blows"])
-    assert _visit("t", FOUND, ALL, "raw") == ("2024-07-16", ["cold blows", "warm blows", "trains"])
+    assert _visit("t", FOUND, ALL_VISITS, "raw") == ("2024-07-16", ["cold blows", "warm blows", "trains"])
 
 
 def test_a_visit_that_is_not_there_is_said_with_those_that_are():

@@ -102,11 +102,11 @@ def test_what_was_accepted_is_not_found_again_in_passages_either(soft):
 def test_the_simulated_file_holds_the_accepted_effect(soft):
     """The file that `turnout simulate` writes is the recording of the track with the term, and not the one without."""
     from turnout.readers import read
-    from turnout.stages.simulate import COMMON, write_hammer
+    from turnout.stages.simulate import REQUEST_DEFAULTS, write_hammer
 
     turnout = load_configuration("config").turnout("t1")
-    Results("work", "t1").keep(diagnose_turnout("t1"))
-    request = COMMON | {"track": None, "turnout": "t1", "section": "A", "seed": 1, "tests": 1, "blows": 1}
+    Results("work", "t1").save(diagnose_turnout("t1"))
+    request = REQUEST_DEFAULTS | {"track": None, "turnout": "t1", "section": "A", "seed": 1, "tests": 1, "blows": 1}
     request |= {"at": "2026-07-26T09:00:00", "config": "config"}
     recorded = []
     for name in ("before.h5", "after.h5"):
@@ -141,7 +141,7 @@ def test_a_spent_budget_keeps_what_is_done(soft):
 
 def test_a_spent_budget_shows_the_groups_that_are_done(soft, monkeypatch, capsys):
     """Two groups, of which the first was finished before."""
-    monkeypatch.setattr(mismatch_groups, "GAP", 0.1)
+    monkeypatch.setattr(mismatch_groups, "MAX_SECTION_GAP", 0.1)
     assert main(["diagnose", "--turnout", "t1", "--budget", "0"]) == 2
     assert "0 of 2 groups done" in capsys.readouterr().err and not (soft / "results").exists()
     (first,) = diagnose_turnout("t1", sections=("A",))["mismatch_findings"]

@@ -4,10 +4,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from turnout.mismatch.turnout.campaign import Passage
+from turnout.mismatch.turnout.campaign import PassageInput
 from turnout.simulate import load_vehicle
-from turnout.stages.mismatch_groups import formations, reserved, telling
-from turnout.stages.mismatch_inputs import _spoils
+from turnout.stages.mismatch_groups import reserved_names, select_passages, split_by_length
+from turnout.stages.mismatch_inputs import _is_unusable
 from turnout.stages.mismatch_trains import train_of
 
 
@@ -22,7 +22,7 @@ FLEET += [train(f"intercity {k}", "intercity", 24, 40.0 + k) for k in range(3)] 
 
 
 def test_every_type_is_there_and_short_trains_fill_up_from_the_extremes_of_speed():
-    chosen = telling(FLEET, most=8, axles=96)
+    chosen = select_passages(FLEET, max_passages=8, max_axles=96)
     assert {p.train for p in chosen} == {"ic3", "intercity", "freight"}
     assert sum(len(p.vehicle.wheels) for p in chosen) <= 96
     ic3 = [p.speed for p in chosen if p.train == "ic3"]
@@ -32,38 +32,38 @@ def test_every_type_is_there_and_short_trains_fill_up_from_the_extremes_of_speed
 def test_trains_of_one_type_and_two_lengths_are_two_trains():
     """The wheels of a type with one length keep its name."""
     lengths = {"a": ("ic3", 8), "b": ("ic3", 12), "c": ("ic3", 8), "d": ("freight", 40), "e": ("", 4), "f": ("", 8)}
-    fleet = [Passage(k, None, SimpleNamespace(wheels=range(n)), 30.0, kind) for k, (kind, n) in lengths.items()]
-    found = {p.name: p.train for p in formations(fleet)}
+    fleet = [PassageInput(k, None, SimpleNamespace(wheels=range(n)), 30.0, kind) for k, (kind, n) in lengths.items()]
+    found = {p.name: p.train for p in split_by_length(fleet)}
     assert found == {
         "a": "ic3, 8 axles", "b": "ic3, 12 axles", "c": "ic3, 8 axles", "d": "freight", "e": "", "f": "",
     }  # fmt: skip
 
 
 def test_one_long_train_is_better_than_none():
-    assert telling(FLEET[-1:], axles=8) == FLEET[-1:]
+    assert select_passages(FLEET[-1:], max_axles=8) == FLEET[-1:]
 
 
 def test_few_passages_keep_none_back_and_many_a_fifth_from_the_midst_of_the_speeds():
-    assert reserved(FLEET[:3], ()) == ()
-    assert reserved(FLEET[:5], ()) == ("ic3 2",)
-    assert reserved(FLEET[:9], ()) == ("ic3 2", "ic3 7")
+    assert reserved_names(FLEET[:3], ()) == ()
+    assert reserved_names(FLEET[:5], ()) == ("ic3 2",)
+    assert reserved_names(FLEET[:9], ()) == ("ic3 2", "ic3 7")
 
 
 def test_places_go_to_the_types_in_turn():
     """Not all to the first one, whose passages are as short as the other's."""
     fleet = [train(f"{kind} {k}", kind, 8, (30.0 if kind == "a" else 40.0) + k) for kind in "ab" for k in range(10)]
-    chosen = telling(fleet, most=8, axles=96)
+    chosen = select_passages(fleet, max_passages=8, max_axles=96)
     assert [p.name for p in chosen] == ["a 0", "a 1", "a 8", "a 9", "b 0", "b 1", "b 8", "b 9"]
 
 
 def test_the_only_passage_of_a_train_stays_for_the_fits():
     """Fits that never meet a train know nothing of its wheels; that of the nearest speed is kept back in its place."""
     fleet = [train(f"a {k}", "a", 8, 30.0 + k) for k in range(7)]
-    assert reserved([*fleet, train("b", "b", 8, 31.5)], ()) == ("a 1", "a 6")  # b would be the third
+    assert reserved_names([*fleet, train("b", "b", 8, 31.5)], ()) == ("a 1", "a 6")  # b would be the third
     two = [train("a 1", "a", 8, 30.0), train("a 2", "a", 8, 33.0)]
     others = [train(kind, kind, 8, 31.0 + k) for k, kind in enumerate("bc")]
-    assert reserved([*two, *others], ()) == ("a 2",)
-    assert reserved([train(kind, kind, 8, 30.0 + k) for k, kind in enumerate("abcde")], ()) == ("c",)
+    assert reserved_names([*two, *others], ()) == ("a 2",)
+    assert reserved_names([train(kind, kind, 8, 30.0 + k) for k, kind in enumerate("abcde")], ()) == ("c",)
 
 
 @pytest.mark.parametrize("turned", [False, True])
@@ -71,11 +71,11 @@ def test_a_train_that_runs_the_other_way_round_is_simulated_so(turned, repositor
     """Its locomotive pushes: axles, their order and loads are those of the reversed train, which is one of its own."""
     folder = repository / "config" / "vehicles"
     file = load_vehicle("intercity", 0.5, folder)
-    places = file.wheel_places[-1] - file.wheel_places[::-1] if turned else file.wheel_places
+    places = file.wheel_positions[-1] - file.wheel_positions[::-1] if turned else file.wheel_positions
     row = {"train_type": "intercity", "speed_kmh": 120.0, "n_axles": 24, "axle_times_s": 2.0 + places / 33.0}
     found = train_of(row, {}, folder)
     assert found.speed == pytest.approx(33.0)
-    assert found.vehicle.wheel_places == pytest.approx(places)
+    assert found.vehicle.wheel_positions == pytest.approx(places)
     assert found.vehicle.static_loads == pytest.approx(file.static_loads[:: -1 if turned else 1])
     assert (found.name, any("other way" in d for d in found.doubts)) == (
         ("intercity reversed", True) if turned else ("intercity", False)
@@ -88,4 +88,4 @@ def test_a_train_that_runs_the_other_way_round_is_simulated_so(turned, repositor
      ("no_train", None, False)],
 )  # fmt: skip
 def test_a_channel_that_cut_off_the_top_of_some_blows_is_used(reason, share, spoils):
-    assert _spoils({"reason_code": reason, "measured_value": share}) == spoils
+    assert _is_unusable({"reason_code": reason, "measured_value": share}) == spoils

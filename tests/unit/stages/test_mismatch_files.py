@@ -12,28 +12,34 @@ import small_turnout as small
 from turnout.config import load_configuration, with_raw
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.case import Nuisance
-from turnout.mismatch.turnout import HammerTest, Passage, TrackCase
-from turnout.mismatch.turnout.passage_observation import FEWEST, Rolling, observed, rolling_nuisances, rolling_of
+from turnout.mismatch.turnout import HammerInput, PassageInput, TrackCase
+from turnout.mismatch.turnout.passage_observation import (
+    MIN_SAMPLES,
+    AlignedPassage,
+    observation_of,
+    observe_passage,
+    passage_nuisances,
+)
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
-from turnout.mismatch.turnout.receptance_observation import pairs_of
+from turnout.mismatch.turnout.receptance_observation import pairs_of_test
 from turnout.mismatch.turnout.track_parameters import vehicle_with
-from turnout.readers import HELD, read
+from turnout.readers import MAX_WHOLE_FILE_SIZE, read
 from turnout.readers.writing import write
 from turnout.receptance import find_impacts
 from turnout.simulate import Sensor, load_vehicle
 from turnout.stages import mismatch, mismatch_inputs
 from turnout.stages.accept_finding import with_entry
-from turnout.stages.accepted_effects import Accepted
+from turnout.stages.accepted_effects import AcceptedEffect
 from turnout.stages.calibrate import calibrate_to_files
 from turnout.stages.common import number, rail_temperature
-from turnout.stages.mismatch_groups import _neighbours, groups, telling, unit_of
+from turnout.stages.mismatch_groups import _neighbouring_sections, groups, select_passages, unit_of
 from turnout.stages.mismatch_inputs import (
-    MOST_ALIKE,
-    Gathered,
+    MAX_SIMILAR_PASSAGES,
+    VisitInputs,
     _channels_of,
     _thin_out,
     digest_of_model,
-    gather,
+    gather_inputs,
     track_of,
 )
 from turnout.stages.mismatch_results import Results, diagnose_turnout
@@ -89,7 +95,7 @@ def test_bangs_that_are_twice_as_many_as_the_axles_are_no_second_unit(repository
     two are two units, also where they do not stand as the file has them. The notes' speed is believed, not 81 km/h."""
     folder = repository / "config/vehicles"
     said = {"speed": 25.0, "train_type": "ic3"}
-    one, two = (load_vehicle("ic3", 0.0, folder, units).wheel_places for units in (1, 2))
+    one, two = (load_vehicle("ic3", 0.0, folder, units).wheel_positions for units in (1, 2))
     bangs, stretched = np.sort(np.concatenate([one, one + 1.3])), two + 1.0 * np.sin(two)
     for places, axles, doubt in ((bangs, 8, True), (stretched, 16, False)):
         row = {"train_type": "ic3", "n_axles": 16, "speed_kmh": 81.0, "axle_times_s": places / 25.0}
@@ -107,8 +113,8 @@ def test_a_load_that_nobody_knows_is_as_open_as_from_empty_to_full(repository, k
     folder = repository / "config/vehicles"
     row = {"train_type": "freight", "n_axles": None} | {k: v for k, v in known.items() if k == "axle_load_t"}
     found = train(row, {k: v for k, v in known.items() if k == "load_share"}, repository)
-    passage = Passage("p", None, found.vehicle, found.speed, load_sd=found.load_sd)
-    load = next(n for n in rolling_nuisances(passage) if n.name == "load@p")
+    passage = PassageInput("p", None, found.vehicle, found.speed, load_sd=found.load_sd)
+    load = next(n for n in passage_nuisances(passage) if n.name == "load@p")
     if known:
         assert load == Nuisance("load@p", "-", 0.0, 0.05, "p")
         return
@@ -193,8 +199,8 @@ def test_a_route_that_the_track_has_not_is_said(folder):
     layout = folder / "config/layouts/small.yaml"
     layout.write_text(layout.read_text().replace("B: {panel: CP, track: main", "B: {panel: AS, track: diverging"))
     turnout = turnout_in(folder)
-    tests = [HammerTest(f"{k} x", small.PLACES[k], (), "force", "x", {}) for k in ("A", "B")]
-    found = Gathered(tests, {t.name: t.name[0] for t in tests})
+    tests = [HammerInput(f"{k} x", small.PLACES[k], (), "force", "x", {}) for k in ("A", "B")]
+    found = VisitInputs(tests, {t.name: t.name[0] for t in tests})
     made = list(groups(turnout, track_of(turnout)[0], found))
     assert [g.labels for g in made] == [("A",)]
     assert found.notes == ["sections B: the track's file has no route diverging; not used"]
@@ -208,7 +214,7 @@ def test_the_result_of_the_newer_recordings_is_accepted(tmp_path, monkeypatch):
     results.path.parent.mkdir(parents=True)
     results.path.write_text(encode({"mismatch_findings": [row("july", 7)]}))
     for month, name in ((5, "july"), (10, "other")):
-        monkeypatch.setattr(Results, "_registered", lambda self, month=month: [row("other", month)])
+        monkeypatch.setattr(Results, "_registry_rows", lambda self, month=month: [row("other", month)])
         assert results.finding()["finding_id"] == name
 
 
@@ -217,7 +223,7 @@ def test_corrugation_further_on_is_another_entry():
     both = with_entry(text, "  - term: rail_corrugation\n    start: 30\n    end: 34\n")
     assert both.count("rail_corrugation") == 2
     assert with_entry(both, "  - term: rail_corrugation\n    start: 30\n    end: 34\n").count("rail_corrugation") == 2
-    accepted = Accepted("rail_corrugation", {"start": 10.0, "end": 14.0}, {"sine": (1e-5, 1e-6)})
+    accepted = AcceptedEffect("rail_corrugation", {"start": 10.0, "end": 14.0}, {"sine": (1e-5, 1e-6)})
     assert accepted.is_of("rail_corrugation", {"place": 12.0, "wavelength": 0.3})
     assert not accepted.is_of("rail_corrugation", {"place": 32.0, "wavelength": 0.3})
 
@@ -228,7 +234,7 @@ WARM = {None: (25.0, None), "as warm": (25.0, 27.0), "warmer": (10.0, 25.0)}
 @pytest.mark.parametrize(("warmth", "offered"), [(None, False), ("as warm", False), ("warmer", True)])
 def test_warmth_is_a_cause_only_where_it_is_known_and_differs(warmth, offered):
     """A pad softer than its file is no pad that is warm: one temperature cannot tell the two."""
-    campaign = measured_campaign(small_plan((15.0,), passages=False, blows=(21.6, 24.0)), (), 3)
+    campaign = measured_campaign(small_plan((15.0,), passages=False, hammer_positions=(21.6, 24.0)), (), 3)
     tests = tuple(
         replace(t, conditions={} if w is None else {"rail_temperature": w})
         for t, w in zip(campaign.hammer, WARM[warmth])
@@ -249,9 +255,9 @@ def test_a_train_outside_its_recording_is_noted_and_the_blows_are_used(monkeypat
     def nowhere(*_):
         raise SimulationError("the train lies outside the recording")
 
-    monkeypatch.setattr("turnout.mismatch.turnout.passage_observation.rolling_of", nowhere)
-    case = TrackCase(measured_campaign(small_plan((15.0,), (40.0,), blows=(24.0,)), (), 5), families=())
-    assert not case.rollings and case.observations
+    monkeypatch.setattr("turnout.mismatch.turnout.passage_observation.observe_passage", nowhere)
+    case = TrackCase(measured_campaign(small_plan((15.0,), (40.0,), hammer_positions=(24.0,)), (), 5), families=())
+    assert not case.aligned_passages and case.observations
     assert any("outside the recording" in note for note in case.notes)
 
 
@@ -262,7 +268,7 @@ def test_loggers_too_slow_for_the_band_are_refused():
 
 def _tones_at(rate):
     """(data, what they should be) of a passage at 40 m/s whose sensors show tones, inside, away from its edges."""
-    passage = measured_campaign(small_plan((15.0,), (40.0,), blows=()), (), 5).passages[0]
+    passage = measured_campaign(small_plan((15.0,), (40.0,), hammer_positions=()), (), 5).passages[0]
     sensors = small_plan().sensors
     n = round(passage.recording.duration * rate)
 
@@ -271,37 +277,37 @@ def _tones_at(rate):
 
     samples = np.tile(tones((np.arange(n) + 0.5) / rate), (len(passage.recording.channels), 1))
     heard = replace(passage, recording=replace(passage.recording, samples=samples, rate=rate))
-    made, observation = rolling_of(heard, sensors, 0.9, passage.speed, 0.06)
+    made, observation = observe_passage(heard, sensors, 0.9, passage.speed, 0.06)
     data = observation.data.reshape(len(sensors), -1)
     inside = slice(data.shape[1] // 4, -data.shape[1] // 4)
     return data[:, inside], np.tile(tones(made.time), (len(sensors), 1))[:, inside]
 
 
 def test_a_note_of_this_group_is_not_cut_off_by_those_of_others():
-    from turnout.stages.mismatch_rows import _of_visit
+    from turnout.stages.mismatch_rows import _visit_notes
 
     notes = [f"passage {k}: load not known" for k in range(20)] + ["section C: elsewhere"]
     campaign = SimpleNamespace(passages=[SimpleNamespace(name="17")])
-    assert _of_visit({"notes": notes}, campaign)[:2] == ["passage 17: load not known", "section C: elsewhere"]
+    assert _visit_notes({"notes": notes}, campaign)[:2] == ["passage 17: load not known", "section C: elsewhere"]
 
 
 def test_notes_that_are_cut_off_are_counted():
-    from turnout.stages.mismatch_rows import NOTES_KEPT, _kept
+    from turnout.stages.mismatch_rows import MAX_NOTES, _first_notes
 
-    notes = [f"note {k}" for k in range(NOTES_KEPT + 3)]
-    assert _kept(notes) == [*notes[:NOTES_KEPT], "and 3 more"]
-    assert _kept(notes[:NOTES_KEPT]) == notes[:NOTES_KEPT]
+    notes = [f"note {k}" for k in range(MAX_NOTES + 3)]
+    assert _first_notes(notes) == [*notes[:MAX_NOTES], "and 3 more"]
+    assert _first_notes(notes[:MAX_NOTES]) == notes[:MAX_NOTES]
 
 
 def test_a_passage_of_the_fewest_samples_is_an_observation():
     """Fewer than those over which its amplitude is taken: then it is taken over all of them."""
-    rng, time = np.random.default_rng(0), np.arange(FEWEST) / 300.0
-    vehicle = SimpleNamespace(wheel_places=np.zeros(1), static_loads=[1e5])
-    passage = Passage("p", None, vehicle, 30.0, "x")
+    rng, time = np.random.default_rng(0), np.arange(MIN_SAMPLES) / 300.0
+    vehicle = SimpleNamespace(wheel_positions=np.zeros(1), static_loads=[1e5])
+    passage = PassageInput("p", None, vehicle, 30.0, "x")
     sensors = tuple(SimpleNamespace(name=f"S{k}", place=0.6 * k) for k in range(2))
-    data = rng.normal(size=(2, FEWEST))
-    found = observed(Rolling("p", passage, sensors, time, 0.04, 30.0), data, np.zeros(2), 0.06)
-    assert found.data.size == 2 * FEWEST and np.all(found.sigma > 0.02 * np.std(data, axis=1).min())
+    data = rng.normal(size=(2, MIN_SAMPLES))
+    found = observation_of(AlignedPassage("p", passage, sensors, time, 0.04, 30.0), data, np.zeros(2), 0.06)
+    assert found.data.size == 2 * MIN_SAMPLES and np.all(found.sigma > 0.02 * np.std(data, axis=1).min())
 
 
 def test_sections_that_are_asked_for_are_diagnosed_together():
@@ -309,8 +315,8 @@ def test_sections_that_are_asked_for_are_diagnosed_together():
     places = {"A": 2.0, "B": 15.0, "C": 40.0}
     sections = [SimpleNamespace(label=n, position=x, track="main") for n, x in places.items()]
     turnout = SimpleNamespace(sections=sections)
-    assert list(_neighbours(turnout, ())) == [("main", ("A",)), ("main", ("B",)), ("main", ("C",))]
-    assert list(_neighbours(turnout, ("A", "B"))) == [("main", ("A", "B"))]
+    assert list(_neighbouring_sections(turnout, ())) == [("main", ("A",)), ("main", ("B",)), ("main", ("C",))]
+    assert list(_neighbouring_sections(turnout, ("A", "B"))) == [("main", ("A", "B"))]
 
 
 def test_a_month_of_trains_keeps_the_extremes_of_speed_of_each():
@@ -319,12 +325,12 @@ def test_a_month_of_trains_keeps_the_extremes_of_speed_of_each():
     for k in range(200):
         vehicle, heard = SimpleNamespace(wheels=range(8)), SimpleNamespace(channels=())
         name = ("ic3", "freight")[k % 2]
-        new = Passage(f"{k}", heard, vehicle, float(rng.uniform(20.0, 45.0)), name, "facing", "main", {})
+        new = PassageInput(f"{k}", heard, vehicle, float(rng.uniform(20.0, 45.0)), name, "facing", "main", {})
         every.append(new)
         passages.append(new)
         _thin_out(passages)
-    assert len(passages) == 2 * MOST_ALIKE
-    assert {p.name for p in telling(passages)} == {p.name for p in telling(every)}
+    assert len(passages) == 2 * MAX_SIMILAR_PASSAGES
+    assert {p.name for p in select_passages(passages)} == {p.name for p in select_passages(every)}
 
 
 @pytest.fixture
@@ -350,13 +356,13 @@ def logged(folder):
 def gathered(folder, kind="passage"):
     turnout = turnout_in(folder)
     units = [u for u in scan(turnout, folder / "raw").units if u.kind == kind]
-    return gather(units, turnout, folder / "raw", track_of(turnout)[0], {})
+    return gather_inputs(units, turnout, folder / "raw", track_of(turnout)[0], {})
 
 
-@pytest.mark.parametrize("held", [HELD, 0])
+@pytest.mark.parametrize("held", [MAX_WHOLE_FILE_SIZE, 0])
 def test_a_logger_that_never_stops_gives_its_trains(logged, monkeypatch, held):
     """Both are used, each as its own; also of a file so large that it is not read as a whole."""
-    monkeypatch.setattr(mismatch_inputs, "read", partial(read, held=held))
+    monkeypatch.setattr(mismatch_inputs, "read", partial(read, max_whole_file_size=held))
     found = gathered(logged)
     assert [round(3.6 * p.speed, -1) for p in found.passages] == [80.0, 110.0], found.notes
     assert len({p.name for p in found.passages}) == 2 and not [n for n in found.notes if "trains in it" in n]
@@ -387,7 +393,7 @@ def test_blows_are_judged_as_the_hammer_stage_judges_them(folder, softest, used)
     for test in tests:
         judged = find_impacts(test.recordings, force, response, turnout.settings["receptance"])
         assert any(i.accepted for i in judged) is used
-        assert bool(pairs_of(test, [Sensor(response, test.place)], 0.03)) is used
+        assert bool(pairs_of_test(test, [Sensor(response, test.place)], 0.03)) is used
     assert tests
 
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from turnout.stages.mismatch_curves import Shown, best_shown
+from turnout.stages.mismatch_curves import ChannelComparison, best_comparison
 
 PLACES = {"A1": 2.0, "A2": 4.0, "A3": 6.0}
 
@@ -14,7 +14,7 @@ PLACES = {"A1": 2.0, "A2": 4.0, "A3": 6.0}
 def shown(recording, sensor, left=1.0, held_out=False):
     """A recording of ones, of which a model without the effect misses all, one with it the share ``left``."""
     ones, none = np.ones(8), np.zeros(8)
-    return Shown(recording, sensor, np.arange(8.0), ones, none, ones * (1.0 - left), none, ones, held_out)
+    return ChannelComparison(recording, sensor, np.arange(8.0), ones, none, ones * (1.0 - left), none, ones, held_out)
 
 
 def drawn(pool, where, named=True):
@@ -23,7 +23,7 @@ def drawn(pool, where, named=True):
     )
     base = SimpleNamespace(candidates=())
     fit = SimpleNamespace(candidates=(SimpleNamespace(where=where),)) if named else base
-    found = best_shown(pool, case, SimpleNamespace(base=base, fit=fit))
+    found = best_comparison(pool, case, SimpleNamespace(base=base, fit=fit))
     return found and (found.recording, found.sensor)
 
 

@@ -10,7 +10,7 @@ from tests.oracles.trend_views import connect_views
 
 from turnout.cli.main import main
 from turnout.config import load_configuration
-from turnout.config.acknowledgements import acknowledgement, read_acknowledgements
+from turnout.config.acknowledgements import acknowledgement_row, read_acknowledgements
 from turnout.registry.database import open_registry
 from turnout.registry.derived import publish
 from turnout.registry.register import register
@@ -116,7 +116,7 @@ def test_the_registry_takes_what_is_said_of_passing_trains(tmp_path):
         turnout="T1", section="A", band="amplitude", action="acknowledge", by="me", at="2026-06-02", reason="x"
     )
     register([], tmp_path / "registry", read=iter)
-    said = arrow_rows("acknowledgements", pd.DataFrame([acknowledgement(cells)]))
+    said = arrow_rows("acknowledgements", pd.DataFrame([acknowledgement_row(cells)]))
     publish(tmp_path / "registry", {"acknowledgements": said})
     with open_registry(tmp_path / "registry") as con:
         assert con.execute("select section_id, band from acknowledgements").fetchall() == [("T1/A", "amplitude")]
@@ -154,7 +154,7 @@ def test_no_file_means_that_nobody_has_said_anything(tmp_path):
 def test_a_bad_line_is_refused_with_its_place(tmp_path, line, complaint):
     path = tmp_path / "acknowledgements.csv"
     path.write_text(HEADER + "T1,A,ballast,acknowledge,me,2026-01-01,,seen\n" + line + "\n", encoding="utf-8")
-    rows, errors = read_acknowledgements(path, known=("T1",), variants=SECTIONS)
+    rows, errors = read_acknowledgements(path, turnout_ids=("T1",), variants=SECTIONS)
     assert len(rows) == 1 and len(errors) == 1
     assert "line 3" in str(errors[0]) and complaint.lower() in str(errors[0]).lower()
 
@@ -162,7 +162,7 @@ def test_a_bad_line_is_refused_with_its_place(tmp_path, line, complaint):
 def test_every_error_of_a_line_is_said(tmp_path):
     path = tmp_path / "acknowledgements.csv"
     path.write_text(HEADER + "T1,,ballst,suppres,me,1.1.2026,,x\n", encoding="utf-8")
-    _, errors = read_acknowledgements(path, known=("T1",), variants=SECTIONS)
+    _, errors = read_acknowledgements(path, turnout_ids=("T1",), variants=SECTIONS)
     assert [str(e).split(": ")[0] for e in errors] == [f"acknowledgements.csv, line 2, column {n}" for n in (12, 5, 23)]
 
 

@@ -218,7 +218,7 @@ def test_sections_that_fall_far_raise_no_alarm_in_a_sound_one(settings):
         charts = evaluate(modes(FLEET, seed, step(FLEET, which, -10.0, 80)), None, settings)
         opened = (charts.down_open | charts.up_open)[:8, 80:].any(axis=1)
         assert opened[which[0]].all() and not opened[~which[0]].any()
-        assert not charts.serving[which[0], 90:].any() and charts.serving[~which[0], 90:].all()
+        assert not charts.is_sibling[which[0], 90:].any() and charts.is_sibling[~which[0], 90:].all()
 
 
 def test_ballast_as_noisy_as_printed_in_the_paper_cannot_see(settings):

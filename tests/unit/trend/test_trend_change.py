@@ -5,8 +5,8 @@ import pytest
 import statsmodels.api as sm
 from scipy.integrate import trapezoid
 
-from turnout.trend.change_point import find_change, fits
-from turnout.trend.forecast import YEAR
+from turnout.trend.change_point import find_change, fit_onsets
+from turnout.trend.forecast import DAYS_PER_YEAR
 
 
 def irregular(rng, n, spacing):
@@ -22,7 +22,7 @@ def history(rng, time, kind, percent, since, phi, sigma=0.6):
     noise = rng.standard_normal(time.size)
     for i in range(1, time.size):
         noise[i] = share[i - 1] * noise[i - 1] + np.sqrt(1 - share[i - 1] ** 2) * noise[i]
-    years = (time - since) / YEAR
+    years = (time - since) / DAYS_PER_YEAR
     truth = percent * np.maximum(years, 0.0) if kind == "drift" else percent * (years >= 0)
     return truth + sigma * noise, truth[-1]
 
@@ -36,9 +36,9 @@ def test_every_onset_equals_generalised_least_squares(phi, warm):
     lag = np.abs(time[:, None] - time[None]) / np.median(np.diff(time))
     covariance = phi**lag if phi else np.eye(time.size)
     temperature = rng.normal(10.0, 9.0, time.size) if warm else None
-    for kind, found in fits(time, values, phi, pieces=3, temperature=temperature).items():
+    for kind, found in fit_onsets(time, values, phi, pieces=3, temperature=temperature).items():
         for j in range(0, found.onset.size, 7):
-            onset = time[-1] + YEAR * found.onset[j]
+            onset = time[-1] + DAYS_PER_YEAR * found.onset[j]
             ramp = np.maximum(time - onset, 0.0) / (time[-1] - onset)
             x = ramp if kind == "drift" else (time >= onset).astype(float)
             columns = np.column_stack([x, temperature]) if warm else x
@@ -53,9 +53,9 @@ def test_a_slope_known_beforehand_is_one_more_measurement_of_it():
     rng = np.random.default_rng(5)
     time, temperature = np.arange(20) * 35.0, rng.normal(10.0, 9.0, 20)
     values, known = rng.standard_normal(20), 700.0
-    found = fits(time, values, 0.0, pieces=1, temperature=temperature, known=known)["step"]
+    found = fit_onsets(time, values, 0.0, pieces=1, temperature=temperature, slope_weight=known)["step"]
     for j in range(18):
-        x = (time >= time[-1] + YEAR * found.onset[j]).astype(float)
+        x = (time >= time[-1] + DAYS_PER_YEAR * found.onset[j]).astype(float)
         warm = temperature - temperature.mean()
         rows = np.vstack([np.column_stack([np.ones(20), x, warm]), [0.0, 0.0, np.sqrt(known)]])
         oracle = sm.OLS(np.append(values, 0.0), rows).fit()
@@ -70,9 +70,9 @@ def test_the_best_step_is_where_ruptures_puts_it():
         for shift in (1.0, 4.0):
             time, values = np.arange(n) * 7.0, rng.standard_normal(n) - shift * (np.arange(n) >= 2 * n // 3)
             break_at = ruptures.KernelCPD(kernel="linear", min_size=2, jump=1).fit(values[:, None]).predict(n_bkps=1)[0]
-            step = fits(time, values, 0.0, pieces=1)["step"]
-            inner = step.onset < (time[-2] - time[-1]) / YEAR  # ruptures wants two values behind the break
-            best = time[-1] + YEAR * step.onset[inner][np.argmin(step.rss[inner])]
+            step = fit_onsets(time, values, 0.0, pieces=1)["step"]
+            inner = step.onset < (time[-2] - time[-1]) / DAYS_PER_YEAR  # ruptures wants two values behind the break
+            best = time[-1] + DAYS_PER_YEAR * step.onset[inner][np.argmin(step.rss[inner])]
             assert time[break_at - 1] < best < time[break_at]
 
 
@@ -129,7 +129,7 @@ def test_the_kind_is_named_where_it_can_be_told():
     for i in range(60):
         kind = ("step", "drift")[i % 2]
         values, _ = history(rng, time, kind, -1.5 if kind == "step" else -3.0, 360.0, 0.0)
-        right.append(find_change(time, values, 0.0).kind == kind)
+        right.append(find_change(time, values, 0.0).shape == kind)
     assert np.mean(right) >= 0.9
 
 
@@ -142,5 +142,5 @@ def test_too_few_or_constant_values_have_no_change(values):
 def test_a_change_without_scatter_is_found_exactly():
     time = np.arange(40.0) * 7.0
     found = find_change(time, -2.0 * (np.arange(40) >= 30), 0.0)
-    assert found.kind == "step" and time[29] <= found.earliest <= found.latest <= time[30]
+    assert found.shape == "step" and time[29] <= found.earliest <= found.latest <= time[30]
     assert (found.low, found.high) == pytest.approx((-2.0, -2.0), abs=1e-4)

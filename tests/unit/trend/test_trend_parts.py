@@ -6,12 +6,12 @@ import pytest
 import statsmodels.api as sm
 from scipy import stats
 
-from turnout.trend.baseline import fit_baseline, pooled_memory, spread_and_memory
+from turnout.trend.baseline import fit_baseline, pooled_autocorrelation, spread_and_autocorrelation
 from turnout.trend.cusum import cusum
-from turnout.trend.drift import discoveries, slopes
+from turnout.trend.drift import adjusted_p_values, slopes
 from turnout.trend.epochs import epochs_of
-from turnout.trend.forecast import crossing, forecast, line
-from turnout.trend.siblings import median_of_group, median_of_others
+from turnout.trend.forecast import crossing_interval, fit_line, forecast
+from turnout.trend.siblings import median_of_group, median_of_siblings
 
 
 def test_cusum_equals_a_plain_loop_with_resets_gaps_and_learning():
@@ -54,7 +54,7 @@ def test_median_of_others_equals_leaving_each_out(size):
     values = np.round(rng.standard_normal((3 * size, 20)), 1)
     mask = rng.random(values.shape) < 0.7
     group = np.repeat(np.arange(3), size)
-    median, others = median_of_others(values, mask, group)
+    median, others = median_of_siblings(values, mask, group)
     whole, count = median_of_group(values, mask, group)
     for c in range(3 * size):
         for i in range(20):
@@ -90,7 +90,7 @@ def test_baseline_equals_regression_with_a_level_for_each_epoch(settings):
     assert base.frequency[0] == pytest.approx(f0, rel=1e-12)
     assert base.slope[0] == pytest.approx(fit.params[2], rel=1e-9)
     assert base.slope_se[0] == pytest.approx(np.sqrt(scale * np.linalg.inv(known.T @ known)[2, 2]), rel=1e-9)
-    spread, _ = spread_and_memory(corrected, base.inside, epoch, base.freedom, time)
+    spread, _ = spread_and_autocorrelation(corrected, base.inside, epoch, base.freedom, time)
     assert spread[0] == pytest.approx(np.sqrt(np.sum(fit.resid[:-1] ** 2) / (50 - 3)), rel=1e-9)
 
 
@@ -116,8 +116,10 @@ def test_pooled_memory_is_unbiased_where_a_single_chart_is_not():
         noise[:, i] = phi * noise[:, i - 1] + np.sqrt(1 - phi**2) * noise[:, i]
     on = np.ones(noise.shape, bool)
     zero = np.zeros(noise.shape, int)
-    _, memory = spread_and_memory(noise, on, zero, np.full(n_chart, n - 1), np.arange(n)[None] * np.ones((n_chart, 1)))
-    pooled = pooled_memory(memory, np.zeros(n_chart, int))[0]
+    _, memory = spread_and_autocorrelation(
+        noise, on, zero, np.full(n_chart, n - 1), np.arange(n)[None] * np.ones((n_chart, 1))
+    )
+    pooled = pooled_autocorrelation(memory, np.zeros(n_chart, int))[0]
     # One chart scatters by sqrt((1 - phi^2)/n) = 0.13, 3000 by 0.0023; Marriott and Pope leave terms of 1/n^2, and
     # the ends at 0 and 0.9 bite in 0.1 % of the charts: 0.015 holds all.
     assert pooled == pytest.approx(phi, abs=0.015)
@@ -139,8 +141,8 @@ def test_pooled_memory_of_a_short_baseline_whose_temperature_slope_is_fitted_too
     residual = noise - noise @ np.linalg.pinv(design).T @ design.T
     time = np.arange(n)[None] * np.ones((n_chart, 1))
     on, zero = np.ones(noise.shape, bool), np.zeros(noise.shape, int)
-    _, memory = spread_and_memory(residual, on, zero, np.full(n_chart, n - 2), time)
-    assert pooled_memory(memory, np.zeros(n_chart, int))[0] == pytest.approx(phi, abs=within)
+    _, memory = spread_and_autocorrelation(residual, on, zero, np.full(n_chart, n - 2), time)
+    assert pooled_autocorrelation(memory, np.zeros(n_chart, int))[0] == pytest.approx(phi, abs=within)
 
 
 def events(rows):
@@ -188,15 +190,15 @@ def test_discoveries_equal_statsmodels():
     p[::7] = np.nan
     known = np.isfinite(p)
     expected = sm.stats.multipletests(p[known], method="fdr_bh")[1]
-    assert np.allclose(discoveries(p)[known], expected, atol=0.0, rtol=1e-12)
-    assert np.isnan(discoveries(p)[~known]).all()
+    assert np.allclose(adjusted_p_values(p)[known], expected, atol=0.0, rtol=1e-12)
+    assert np.isnan(adjusted_p_values(p)[~known]).all()
 
 
 def test_line_equals_generalised_least_squares():
     rng = np.random.default_rng(11)
     time, phi = np.sort(rng.choice(np.arange(400), 60, replace=False)) * 7.0, 0.5
     values = rng.standard_normal(60) - 0.01 * time
-    coefficient, covariance, rss, freedom = line(time, values, phi)
+    coefficient, covariance, rss, freedom = fit_line(time, values, phi)
     lag = np.abs(time[:, None] - time[None]) / np.median(np.diff(time))
     years = (time - time[-1]) / 365.25
     fit = sm.GLS(values, sm.add_constant(years), sigma=phi**lag).fit()
@@ -207,17 +209,17 @@ def test_line_equals_generalised_least_squares():
 
 def test_crossing_holds_exactly_the_times_that_fieller_admits():
     coefficient, covariance, freedom = np.array([-1.0, -0.8]), np.array([[0.02, 0.01], [0.01, 0.03]]), 30
-    low, high = crossing(coefficient, covariance, freedom, -5.0, 0.8)
+    low, high = crossing_interval(coefficient, covariance, freedom, -5.0, 0.8)
     q = stats.t.isf(0.1, freedom)
     for t in np.linspace(0, 40, 4001):
         error = np.sqrt(covariance[0, 0] + 2 * t * covariance[0, 1] + t * t * covariance[1, 1])
         admitted = abs(coefficient[0] + coefficient[1] * t + 5.0) <= q * error
         if abs(t - low) > 0.02 and abs(t - high) > 0.02:
             assert admitted == (low <= t <= high)
-    wide = crossing(np.array([0.0, -0.1]), np.array([[0.02, 0.0], [0.0, 0.04]]), 30, -5.0, 0.8)
+    wide = crossing_interval(np.array([0.0, -0.1]), np.array([[0.02, 0.0], [0.0, 0.04]]), 30, -5.0, 0.8)
     assert wide[0] > 0.0 and np.isnan(wide[1])  # the slope may be 0: no latest time
-    assert np.isnan(crossing(np.array([0.0, 0.5]), np.eye(2) * 1e-4, 30, -5.0, 0.8)).all()
-    assert crossing(np.array([-6.0, -0.1]), np.eye(2) * 1e-4, 30, -5.0, 0.8) == (0.0, 0.0)
+    assert np.isnan(crossing_interval(np.array([0.0, 0.5]), np.eye(2) * 1e-4, 30, -5.0, 0.8)).all()
+    assert crossing_interval(np.array([-6.0, -0.1]), np.eye(2) * 1e-4, 30, -5.0, 0.8) == (0.0, 0.0)
 
 
 def test_forecast_says_no_date_for_what_settles_and_none_for_what_stands(settings):

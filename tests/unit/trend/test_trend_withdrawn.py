@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 
-from turnout.trend.alarms import CHART, with_withdrawn
+from turnout.trend.alarms import ALARM_KEYS, with_withdrawn
 from turnout.trend.panel import days
 
 NEWEST = days(["2026-09-07"])[0]
@@ -11,7 +11,7 @@ NEWEST = days(["2026-09-07"])[0]
 
 def alarms(*rows, section="T1/A", direction="down"):
     """Rows (raised, closed, by whom) of one chart."""
-    chart = dict(zip(CHART, ("T1", section, "ballast", "hammer", direction)))
+    chart = dict(zip(ALARM_KEYS, ("T1", section, "ballast", "hammer", direction)))
     times = [
         chart
         | {

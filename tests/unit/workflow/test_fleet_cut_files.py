@@ -7,9 +7,9 @@ from length_fleet import CALLS
 
 from turnout.stages.trend import trend_job
 from turnout.workflow.launch import launch
-from turnout.workflow.nightly import _night
+from turnout.workflow.nightly import _report
 from turnout.workflow.plan import read_plan, write_plans
-from turnout.workflow.quality_gate import verdict
+from turnout.workflow.quality_gate import check_quality
 from turnout.workflow.retries import attempt, attempts, read_postponed
 from turnout.workflow.state import batch_paths
 
@@ -87,7 +87,7 @@ def test_a_plan_is_made_again_though_its_shard_was_not_asked_for(fleet, share):
 def test_a_run_that_cannot_plan_says_what_it_did_though_a_plan_is_cut(fleet):
     fleet.run()
     cut(fleet.plan, 0.5)
-    assert _night(1, set(), set(), "", fleet.folder / "work").units == 3
+    assert _report(1, set(), set(), "", fleet.folder / "work").units == 3
 
 
 def test_a_plan_that_is_whole_is_told_from_a_cut_one_at_every_byte(fleet):
@@ -119,10 +119,10 @@ def test_a_cut_verdict_judges_all_units_again(fleet, share):
     (fleet.folder / "config/config.yaml").write_text("fleet: {quarantine_units: 1}\n")
     fleet.run()
     output = fleet.folder / "work/verdict.json"
-    assert verdict([fleet.state], fleet.configuration, output).units == 3
-    assert verdict([fleet.state], fleet.configuration, output).units == 0
+    assert check_quality([fleet.state], fleet.configuration, output).units == 3
+    assert check_quality([fleet.state], fleet.configuration, output).units == 0
     cut(output, share)
-    assert verdict([fleet.state], fleet.configuration, output).units == 3
+    assert check_quality([fleet.state], fleet.configuration, output).units == 3
     assert len(json.loads(output.read_text())["judged"]) == 1
 
 

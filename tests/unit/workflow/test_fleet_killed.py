@@ -10,7 +10,7 @@ import pytest
 from length_fleet import Fleet, length
 
 from turnout.workflow.quality_gate import judge
-from turnout.workflow.retries import begun, noted, read_postponed
+from turnout.workflow.retries import mark_started, read_postponed, started_units
 from turnout.workflow.state import load_state
 from turnout.workflow.tasks import Stage
 
@@ -111,11 +111,11 @@ def test_one_that_ends_its_job_every_night_keeps_no_other_waiting_that_was_begun
     fleet.put("t2/2024-05-13/A_1.txt", "kills the job")
     child = os.fork()
     if child == 0:
-        with noted(fleet.state, UNITS[2], "then"), noted(fleet.state, UNITS[3], "then"):
-            with noted(fleet.state, UNITS[5], "then"):
+        with mark_started(fleet.state, UNITS[2], "then"), mark_started(fleet.state, UNITS[3], "then"):
+            with mark_started(fleet.state, UNITS[5], "then"):
                 os._exit(0)
     os.waitpid(child, 0)
-    assert set(begun(fleet.state)) == {UNITS[2], UNITS[3], UNITS[5]}
+    assert set(started_units(fleet.state)) == {UNITS[2], UNITS[3], UNITS[5]}
     for _ in range(2):
         assert night(fleet) < 0
     assert statuses(fleet) == dict.fromkeys([u for u in UNITS if u != UNITS[2]], "ok")
@@ -168,7 +168,7 @@ def test_what_a_machine_may_have_been_at_fault_for_is_tried_again_when_its_file_
 
 @pytest.mark.parametrize("cut", ["", "2026-11-22T02:00:00\nt1/ham"])
 def test_a_note_that_a_power_failure_cut_is_written_again(fleet, cut):
-    with noted(fleet.state, UNITS[1], "then"):
+    with mark_started(fleet.state, UNITS[1], "then"):
         (note,) = fleet.state.with_suffix("").glob("begun-*")
         name = note.name
     note.with_name(name).write_text(cut)
@@ -179,11 +179,11 @@ def test_a_note_that_a_power_failure_cut_is_written_again(fleet, cut):
 
 
 def test_a_note_that_was_cut_within_a_letter_is_none(fleet):
-    with noted(fleet.state, "t1/hammer/Ø/2024-05-13", "then"):
+    with mark_started(fleet.state, "t1/hammer/Ø/2024-05-13", "then"):
         (note,) = fleet.state.with_suffix("").glob("begun-*")
-        assert begun(fleet.state) == {"t1/hammer/Ø/2024-05-13": "then"}
+        assert started_units(fleet.state) == {"t1/hammer/Ø/2024-05-13": "then"}
         note.write_bytes(note.read_bytes()[: len(b"then\nt1/hammer/") + 1])
-        assert begun(fleet.state) == {}
+        assert started_units(fleet.state) == {}
 
 
 def test_where_a_job_is_killed_alone_its_processes_end_with_it(fleet, tmp_path):

@@ -9,12 +9,12 @@ import pytest
 from turnout.registry.register import register
 from turnout.workflow.batches import UnitResult, read_results, write_batch
 from turnout.workflow.nightly import nightly
-from turnout.workflow.run_report import why
+from turnout.workflow.run_report import failure_reason
 
 STATE = """
 from pathlib import Path
-from turnout.workflow.state import Known, State
-known = {{u: Known('', '', '1', s, 'b') for u, s in {known!r}.items()}}
+from turnout.workflow.state import UnitState, State
+known = {{u: UnitState('', '', '1', s, 'b') for u, s in {known!r}.items()}}
 State(known, ['b']).save(Path('work/hammer/00of01.json'))
 Path('work/plan').mkdir(parents=True, exist_ok=True)
 Path('work/plan/00of01.json').write_text({plan!r})
@@ -105,21 +105,21 @@ def test_the_verdicts_sentence_is_why(folder):
     Path("logs").mkdir()
     found = "INFO the registry is up to date, but 12 units computed, 9 with rows in quarantine"
     Path("logs/verdict.log").write_text(f"{found}\n{complaint}\nanother\n")
-    assert why() == f"{complaint} (and 1 more, see logs/verdict.log)"
+    assert failure_reason() == f"{complaint} (and 1 more, see logs/verdict.log)"
 
 
 def test_the_first_rule_that_failed_is_why_with_its_log(folder):
     write("run", ERROR.format(rule="passage", job=2) + ERROR.format(rule="register", job=4))
     write("then", ERROR.format(rule="verdict", job=1), later=5)
-    assert why() == "rule passage failed, see logs/passage.log (and 2 more)"
+    assert failure_reason() == "rule passage failed, see logs/passage.log (and 2 more)"
 
 
 def test_a_run_that_was_stopped_before_any_job_says_what_it_met(folder):
     sentence = "raw, raw root: 41 known files are gone, first t2/a.uff. Nothing was changed."
     write("run", f'ConfigError in file "/srv/t/Snakefile", line 11:\n{sentence}\n  File "/srv/t/Snakefile", line 11\n')
-    assert why() == sentence
+    assert failure_reason() == sentence
     log = Path(".snakemake/log/run.snakemake.log")
-    assert why(since=log.stat().st_mtime_ns + 1) == ""  # of an earlier run
+    assert failure_reason(since=log.stat().st_mtime_ns + 1) == ""  # of an earlier run
 
 
 def write(name, text, later=0):

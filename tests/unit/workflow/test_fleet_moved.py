@@ -7,7 +7,7 @@ from length_fleet import CALLS, Fleet, length
 
 from turnout.workflow.batches import read_results
 from turnout.workflow.duplicate_files import withdraw_moved
-from turnout.workflow.plan import Planned, read_plan, shard_of, write_plans
+from turnout.workflow.plan import PlannedUnit, read_plan, shard_of, write_plans
 from turnout.workflow.retries import read_postponed
 from turnout.workflow.shard import run_shard
 from turnout.workflow.state import batch_paths
@@ -126,7 +126,7 @@ def test_what_was_moved_is_withdrawn_though_the_job_was_killed_before_it_was_wri
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        patch.setattr("turnout.workflow.duplicate_files.withdrawn", killed)
+        patch.setattr("turnout.workflow.duplicate_files.withdrawal", killed)
         fleet.night(SHARDS)
     assert fleet.lengths()["t0/hammer/A/2024-05-13"] == [9]
     assert fleet.look_through() == 1
@@ -156,7 +156,9 @@ def visit_of(plan, configuration):
     newest = {p.unit.turnout: p.unit for p in sorted(read_plan(plan), key=lambda p: p.unit.label)}
     for unit in newest.values():
         own = configuration.turnout(unit.turnout).hashes["mismatch"]
-        yield Planned(replace(unit, kind="mismatch", label=unit.campaign, config_hash=own, section=None, campaign=None))
+        yield PlannedUnit(
+            replace(unit, kind="mismatch", label=unit.campaign, config_hash=own, section=None, campaign=None)
+        )
 
 
 def test_what_was_found_from_a_visit_that_was_moved_is_withdrawn_and_of_an_older_visit_stays(tmp_path):

@@ -12,7 +12,7 @@ from filelock import FileLock
 
 from turnout.errors import TurnoutError
 from turnout.workflow import nightly as module
-from turnout.workflow.nightly import TOO_LATE, Night, nightly
+from turnout.workflow.nightly import EXIT_TIME_LIMIT, NightReport, nightly
 
 
 @pytest.fixture(autouse=True)
@@ -33,7 +33,7 @@ def test_a_run_that_hangs_is_ended_and_said(tmp_path, monkeypatch):
     (tmp_path / "snakemake.py").write_text("import time\ntime.sleep(60)\n")
     monkeypatch.setattr(module.sys, "executable", sys.executable)
     night = nightly([], "profiles/default", limit=1.0, work=tmp_path / "work")
-    assert night.code == TOO_LATE and "stopped at the time limit" in str(night)
+    assert night.code == EXIT_TIME_LIMIT and "stopped at the time limit" in str(night)
 
 
 def test_what_was_computed_until_the_limit_is_published(tmp_path, monkeypatch):
@@ -49,7 +49,7 @@ def test_what_was_computed_until_the_limit_is_published(tmp_path, monkeypatch):
     began = time.monotonic()
     (tmp_path / "work").mkdir()
     code = module._run([], 6.0, tmp_path / "work")
-    assert code == TOO_LATE and module.GENERATION.exists() and time.monotonic() - began < 12.0
+    assert code == EXIT_TIME_LIMIT and module.GENERATION.exists() and time.monotonic() - began < 12.0
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
@@ -140,8 +140,8 @@ def test_the_three_turnouts_of_which_most_was_not_used_are_named(tmp_path, monke
     known = {f"{t}/hammer/B/{k}": "quarantined" for t, n in bad.items() for k in range(n)}
     known |= {"t4/hammer/A/2026-01-05": "ok", "t3/hammer/A/1": "ok"}
     (tmp_path / "snakemake.py").write_text(
-        "from pathlib import Path\nfrom turnout.workflow.state import Known, State\n"
-        f"known = {{u: Known('', '', '1', s, 'b') for u, s in {known!r}.items()}}\n"
+        "from pathlib import Path\nfrom turnout.workflow.state import UnitState, State\n"
+        f"known = {{u: UnitState('', '', '1', s, 'b') for u, s in {known!r}.items()}}\n"
         "State(known, ['b']).save(Path('work/hammer/00of01.json'))\n"
     )
     said = str(nightly([], "p"))
@@ -169,7 +169,7 @@ def test_another_number_of_shards_counts_no_unit_twice_and_still_sees_what_vanis
 
 
 def test_it_is_said_in_one_line():
-    said = str(Night(1, 100, 7, 2, 3))
+    said = str(NightReport(1, 100, 7, 2, 3))
     assert (
         said == "failed with exit code 1: 100 units known, 7 processed, 2 of these with rows in quarantine, 3 vanished"
     )
@@ -178,8 +178,8 @@ def test_it_is_said_in_one_line():
 def test_what_a_job_that_did_not_come_to_its_end_has_kept_is_counted(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "snakemake.py").write_text(
-        "from pathlib import Path\nfrom turnout.workflow.state import Known, State\n"
-        "known = {'t1/hammer/A/1': Known('', '', '1', 'ok', 'b')}\n"
+        "from pathlib import Path\nfrom turnout.workflow.state import UnitState, State\n"
+        "known = {'t1/hammer/A/1': UnitState('', '', '1', 'ok', 'b')}\n"
         "State(known, ['b']).save(Path('work/hammer/00of01.json'))\nraise SystemExit(1)\n"
     )
     night = nightly([], "profiles/default", work=tmp_path / "work")

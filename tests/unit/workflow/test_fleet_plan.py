@@ -125,7 +125,7 @@ def test_an_impossible_date_is_a_named_problem(fleet, name, found):
 def test_plan_says_what_is_new_and_what_changed(fleet, capsys, monkeypatch):
     from turnout.cli.main import main
     from turnout.fingerprint import fingerprint
-    from turnout.workflow.state import Known, State
+    from turnout.workflow.state import State, UnitState
     from turnout.workflow.tasks import stamp_of
 
     plans(fleet, shards=3)
@@ -133,7 +133,7 @@ def test_plan_says_what_is_new_and_what_changed(fleet, capsys, monkeypatch):
     monkeypatch.chdir(fleet)
     algo = fingerprint("turnout.stages.hammer")
     for plan in (fleet / "work/plan").glob("*.json"):
-        units = {unit_id(p.unit): Known(stamp_of(p), "", algo, "ok", "b") for p in read_plan(plan)}
+        units = {unit_id(p.unit): UnitState(stamp_of(p), "", algo, "ok", "b") for p in read_plan(plan)}
         (fleet / "elsewhere/hammer").mkdir(parents=True, exist_ok=True)
         State({u: k for u, k in units.items() if "/hammer/" in u}).save(fleet / "elsewhere/hammer" / plan.name)
 

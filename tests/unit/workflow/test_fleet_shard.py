@@ -16,7 +16,7 @@ from turnout.workflow.batches import read_batch, read_column, read_results
 from turnout.workflow.current_results import DamagedBatch, current_results
 from turnout.workflow.jobs import stage_job
 from turnout.workflow.plan import write_plans
-from turnout.workflow.quality_gate import judge, verdict
+from turnout.workflow.quality_gate import check_quality, judge
 from turnout.workflow.retries import read_postponed
 from turnout.workflow.state import State, batch_paths, load_state
 from turnout.workflow.tasks import Stage
@@ -296,12 +296,12 @@ def test_the_units_of_a_damaged_batch_are_computed_again(fleet, damage, caplog):
         first.unlink()
     output = fleet.folder / "work/verdict.json"
     with pytest.raises(TurnoutError, match=rf"{first} cannot be read"):
-        verdict([fleet.state], fleet.configuration, output)
+        check_quality([fleet.state], fleet.configuration, output)
     assert read_postponed(fleet.state) == (1, {})  # so that the job runs, whatever its plan says
     assert fleet.run().processed == 3
     assert str(first) in caplog.text and "3 units are computed again" in caplog.text
     assert fleet.lengths() == before and second in batch_paths([fleet.state])
-    verdict([fleet.state], fleet.configuration, output)
+    check_quality([fleet.state], fleet.configuration, output)
     assert fleet.run().processed == 0
 
 

@@ -7,14 +7,14 @@ import pytest
 from length_fleet import Fleet
 
 from turnout.errors import TurnoutError
-from turnout.workflow.quality_gate import judge, verdict
+from turnout.workflow.quality_gate import check_quality, judge
 
 
 def test_the_verdict_judges_what_is_new_over_the_fleet_and_each_line(tmp_path):
     fleet = Fleet(tmp_path, 10, "fleet: {quarantine_units: 5, quarantine_share: 0.3}\n")
     fleet.run()
     output = tmp_path / "work/verdict.json"
-    assert verdict([fleet.state], fleet.configuration, output).units == 10
+    assert check_quality([fleet.state], fleet.configuration, output).units == 10
     for i in (1, 3):  # both of line 1
         fleet.put(f"t{i}/2024-05-13/A_1.txt", "damaged")
     fleet.run()
@@ -25,14 +25,14 @@ def test_the_verdict_judges_what_is_new_over_the_fleet_and_each_line(tmp_path):
         fleet.put(f"t{i}/2024-05-13/A_1.txt", "good again")
     fleet.run()
     with pytest.raises(TurnoutError, match="2 of 5 new units of the fleet have rows in quarantine, 40 %, above"):
-        verdict([fleet.state], fleet.configuration, output)
+        check_quality([fleet.state], fleet.configuration, output)
     everything = judge([fleet.state], fleet.configuration)
     assert everything.complaints == (
         "2 of 5 new units of line 'line 1' have rows in quarantine, 40 %, above the limit of 30 %",
     )
     fleet.put("t3/2024-05-13/A_1.txt", "repaired")
     fleet.run()
-    assert verdict([fleet.state], fleet.configuration, output).quarantined == 1
+    assert check_quality([fleet.state], fleet.configuration, output).quarantined == 1
 
 
 def test_small_nights_add_up_until_they_can_be_judged(tmp_path):
@@ -42,9 +42,9 @@ def test_small_nights_add_up_until_they_can_be_judged(tmp_path):
         fleet.put(f"t0/2024-06-{night + 1:02d}/A_1.txt", "damaged")
         fleet.run()
         if night < 3:
-            assert verdict([fleet.state], fleet.configuration, output).units == night + 2
+            assert check_quality([fleet.state], fleet.configuration, output).units == night + 2
     with pytest.raises(TurnoutError, match="4 of 5 new units of the fleet have rows in quarantine"):
-        verdict([fleet.state], fleet.configuration, output)
+        check_quality([fleet.state], fleet.configuration, output)
 
 
 def test_a_run_over_some_turnouts_forgets_no_verdict_on_the_others(fleet):
@@ -55,11 +55,11 @@ def test_a_run_over_some_turnouts_forgets_no_verdict_on_the_others(fleet):
     shutil.copy(fleet.state, other)
     shutil.copytree(fleet.state.with_suffix(""), other.with_suffix(""))
     output = fleet.folder / "work/verdict.json"
-    assert verdict([fleet.state, other], fleet.configuration, output).units == 3
-    assert verdict([other], fleet.configuration, output).units == 0
-    assert verdict([fleet.state, other], fleet.configuration, output).units == 0
+    assert check_quality([fleet.state, other], fleet.configuration, output).units == 3
+    assert check_quality([other], fleet.configuration, output).units == 0
+    assert check_quality([fleet.state, other], fleet.configuration, output).units == 0
     shutil.rmtree(other.with_suffix(""))
-    verdict([fleet.state], fleet.configuration, output)
+    check_quality([fleet.state], fleet.configuration, output)
     assert len(json.loads(output.read_text())["judged"]) == 1  # of batches that are gone nothing is kept
 
 
@@ -79,7 +79,7 @@ class Nights(Fleet):
             self.put(f"t0/2024-06-{self.n:02d}/A_1.txt", f"good {self.n}" if text == "good" else text)
         self.run()
         try:
-            verdict([self.state], self.configuration, self.folder / "work/verdict.json")
+            check_quality([self.state], self.configuration, self.folder / "work/verdict.json")
         except TurnoutError as error:
             return str(error)
         return ""

@@ -12,8 +12,8 @@ def parts() -> dict[str, type]:
     >>> parts()["fleet"].__name__
     'FleetSettings'
     """
-    found = {}
+    classes = {}
     for module in sorted(m.name for m in pkgutil.iter_modules(__path__) if m.name != "setting"):
         name = "".join(word.capitalize() for word in module.split("_")) + "Settings"
-        found[module] = getattr(import_module(f"{__name__}.{module}"), name)
-    return found
+        classes[module] = getattr(import_module(f"{__name__}.{module}"), name)
+    return classes

@@ -78,52 +78,52 @@ class Candidate:
     starts: tuple[tuple[float, ...], ...]
     where: Mapping[str, object] = field(default_factory=dict)
     frame: str = ""
-    scanned: int = 1
+    n_scanned: int = 1
     start_from_base: bool = True
-    always: str = ""
-    least: float = 0.0
-    even: bool = False
-    twin: str = ""
-    twin_sd: float = 0.7
-    from_twin: Callable[[float], float] | None = None
+    prescreen_group: str = ""
+    smallest_reportable: float = 0.0
+    sign_ambiguous: bool = False
+    masking_parameter: str = ""
+    masking_sd: float = 0.7
+    from_masking: Callable[[float], float] | None = None
     promise: float | None = None
-    begin: Mapping[str, float] = field(default_factory=dict)
-    aside: float = 0.0
-    sounding: bool = False
-    loose: float = 0.0
+    start_nuisances: Mapping[str, float] = field(default_factory=dict)
+    external_evidence: float = 0.0
+    evidence_suffices: bool = False
+    model_error_share: float = 0.0
     exact: bool = False
-    told_by: str = ""
-    unopposed: tuple[str, ...] = ()
-    kin: str = ""
-    limit: str = ""
-    plain: tuple = ()
-    open_as: str = ""
-    whole: bool = False
-    leaves_nothing: bool = False
-    sized: int = 1
-    sure: float = 0.0
+    required_data_type: str = ""
+    must_not_oppose: tuple[str, ...] = ()
+    component: str = ""
+    limit_form: str = ""
+    simpler_form: tuple = ()
+    unbounded_form: str = ""
+    nonlinear_in_size: bool = False
+    must_reach_control_level: bool = False
+    n_size_parameters: int = 1
+    min_significance: float = 0.0
 
     @property
     def key(self):
         """Family and site in one word."""
-        place = ",".join(f"{k}={v}" for k, v in sorted(self.where.items()))
-        return f"{self.family}[{place}]" if place else self.family
+        position = ",".join(f"{k}={v}" for k, v in sorted(self.where.items()))
+        return f"{self.family}[{position}]" if position else self.family
 
     @property
     def part(self):
         """(component, position or sensor) that the effect changes."""
-        return self.kin, self.where.get("place", self.where.get("sensor"))
+        return self.component, self.where.get("place", self.where.get("sensor"))
 
     @property
     def neutral(self):
         """(n_parameter,) values at which the term vanishes."""
         return np.array([p.neutral for p in self.parameters])
 
-    def mirrored(self, values):
+    def mirror_image(self, values):
         """``values`` (n_parameter,) with the first parameter mirrored about neutral."""
-        found = np.array(values, dtype=float)
-        found[0] = 2.0 * self.parameters[0].neutral - found[0]
-        return found
+        image = np.array(values, dtype=float)
+        image[0] = 2.0 * self.parameters[0].neutral - image[0]
+        return image
 
     def term(self, values):
         """The term with parameters (n_parameter,)."""

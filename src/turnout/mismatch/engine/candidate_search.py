@@ -10,38 +10,38 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.engine.map_fit import Joint
+from turnout.mismatch.engine.map_fit import JointProblem
 
 
-def absorbed(case, fit):
+def masked_candidates(case, fit):
     """(gain [nats], candidate, start, values) of every candidate with a ``masking_parameter`` among the nuisances.
 
     The estimate of the masking parameter is the effect, drawn towards the prior. ``values`` are all nuisance parameters
     with the masking parameter back at its mean and the effect in its place.
     """
     index = {n.name: k for k, n in enumerate(case.nuisances)}
-    found = []
+    entries = []
     for candidate in case.candidates:
-        k = index.get(candidate.twin)
+        k = index.get(candidate.masking_parameter)
         if k is None:
             continue
-        twin = case.nuisances[k]
-        m, s = fit.values[twin.name] - twin.mean, float(np.sqrt(fit.covariance[k, k]))
-        opened = gain_when_opened(m, s, twin.sd, candidate.twin_sd)
-        if opened is None:
+        masking = case.nuisances[k]
+        m, s = fit.values[masking.name] - masking.mean, float(np.sqrt(fit.covariance[k, k]))
+        gain_and_size = gain_with_wide_prior(m, s, masking.sd, candidate.masking_sd)
+        if gain_and_size is None:
             continue
-        gain, size = opened
+        gain, size = gain_and_size
         shift = fit.covariance[: len(index), k] / s**2 * (size - m)
         values = {
             n.name: float(np.clip(fit.values[n.name] + d, *n.bounds)) for n, d in zip(case.nuisances, shift)
         }  # fmt: skip
         low, high = candidate.parameters[0].bounds
-        start = np.clip([(candidate.from_twin or np.exp)(size)], low, high)
-        found.append((gain - np.log(candidate.scanned), candidate, start, {**values, twin.name: twin.mean}))
-    return found
+        start = np.clip([(candidate.from_masking or np.exp)(size)], low, high)
+        entries.append((gain - np.log(candidate.n_scanned), candidate, start, {**values, masking.name: masking.mean}))
+    return entries
 
 
-def gain_when_opened(m, s, tau, wide):
+def gain_with_wide_prior(m, s, tau, wide_sd):
     r"""(gain [nats], estimate) when a prior N(0, τ²), under which the posterior is N(m, s²), becomes N(0, T²).
 
     .. math:: s'^{-2} = s^{-2} - \tau^{-2}, \quad m' = m\, s'^2 / s^2, \quad
@@ -49,29 +49,31 @@ def gain_when_opened(m, s, tau, wide):
 
     The estimate is that under the wide prior, :math:`m' T^2 / (s'^2 + T^2)`. None if the data add nothing to the prior.
 
-    >>> gain_when_opened(0.0, 0.1, 0.1, 0.7) is None
+    >>> gain_with_wide_prior(0.0, 0.1, 0.1, 0.7) is None
     True
     """
     if s >= 0.999 * tau:
         return None
-    own = 1.0 / (1.0 / s**2 - 1.0 / tau**2)
-    free = m * own / s**2
-    before, after = own + tau**2, own + wide**2
-    gain = 0.5 * np.log(before / after) + 0.5 * free**2 * (1.0 / before - 1.0 / after)
-    return float(gain), float(free * wide**2 / after)
+    data_variance = 1.0 / (1.0 / s**2 - 1.0 / tau**2)
+    data_mean = m * data_variance / s**2
+    narrow_variance, wide_variance = data_variance + tau**2, data_variance + wide_sd**2
+    gain = 0.5 * np.log(narrow_variance / wide_variance) + 0.5 * data_mean**2 * (
+        1.0 / narrow_variance - 1.0 / wide_variance
+    )
+    return float(gain), float(data_mean * wide_sd**2 / wide_variance)
 
 
-NEAR = 0.95  # m, one and a half sleeper bays: effects of two families that are closer count as one
+SAME_SITE_DISTANCE = 0.95  # m, one and a half sleeper bays: effects of two families that are closer count as one
 # m, two sleeper bays. A second effect of the same family that is closer is an error in the shape of the first.
-ALIKE = 1.5
+SAME_EFFECT_DISTANCE = 1.5
 # Share of the required promise of a second effect, if only the cheap observations promise it: others will add to it.
-CHEAP = 0.5
+CHEAP_PROMISE_SHARE = 0.5
 # Share of the leader's estimated gain. From the third candidate on, those that promise less are not refitted.
-HOPELESS = 0.1
+MIN_PROMISE_SHARE = 0.1
 
 
 @dataclass(frozen=True)
-class Entry:
+class RefitTask:
     """A ``candidate`` to refit from ``start`` (n_term,) and nuisance ``values``.
 
     ``cheap_gain`` is the gain from the cheap observations alone [nats]. A ``rival`` is refitted only if another effect
@@ -81,7 +83,7 @@ class Entry:
     candidate: object
     start: np.ndarray
     values: dict
-    promised: float = 0.0
+    cheap_gain: float = 0.0
     rival: bool = False
 
 
@@ -94,86 +96,94 @@ def shortlist(case, fit, settings, promising=()):
     families of the whole track, which the common parameters mask, and the ``promising`` ones (None: all). For the
     others the residual is small enough for columns.
     """
-    from turnout.mismatch.engine.hammer_prescreen import scout
+    from turnout.mismatch.engine.hammer_prescreen import prescreen
 
     candidates = [
-        c for c in (*case.candidates, *case.further(fit)) if not any(_same_place(c, k) for k in fit.candidates)
+        c
+        for c in (*case.candidates, *case.residual_candidates(fit))
+        if not any(_is_same_site(c, k) for k in fit.candidates)
     ]
-    if not case.frozen_jacobian:
-        return [Entry(c, np.asarray(s, dtype=float), {}) for c in candidates for s in c.starts]
-    scored, scouted = {}, {}
+    if not case.expensive:
+        return [RefitTask(c, np.asarray(s, dtype=float), {}) for c in candidates for s in c.starts]
+    by_family, prescreen_gains = {}, {}
     if fit.candidates and promising is not None:
-        promising = {*promising, *(c.family for c in case.candidates if c.always and c.scanned == 1)}
-    for found in scout(case, fit, settings, promising if fit.candidates else None):
-        if found.candidate in candidates:
-            entry = found.gain, found.candidate, found.psi, found.values
-            scouted[found.candidate.key] = found.gain
-            scored.setdefault(found.candidate.family, []).append(entry)
-    for entry in absorbed(case, fit):
+        promising = {*promising, *(c.family for c in case.candidates if c.prescreen_group and c.n_scanned == 1)}
+    for trial in prescreen(case, fit, settings, promising if fit.candidates else None):
+        if trial.candidate in candidates:
+            entry = trial.gain, trial.candidate, trial.psi, trial.values
+            prescreen_gains[trial.candidate.key] = trial.gain
+            by_family.setdefault(trial.candidate.family, []).append(entry)
+    for entry in masked_candidates(case, fit):
         if entry[1] in candidates:
-            scored.setdefault(entry[1].family, []).append(entry)
+            by_family.setdefault(entry[1].family, []).append(entry)
     projector, columns = Projector(case, fit), case.screen(fit)
-    for candidate, start in case.distant(fit):
+    for candidate, start in case.distant_starts(fit):
         if candidate in candidates:
-            entry = _from_afar(case, fit, projector, replace(candidate, starts=(start,), whole=True), candidate)
-            scored.setdefault(candidate.family, []).append(entry)
+            entry = _distant_entry(
+                case, fit, projector, replace(candidate, starts=(start,), nonlinear_in_size=True), candidate
+            )
+            by_family.setdefault(candidate.family, []).append(entry)
     for candidate in candidates:
         if candidate.promise is not None:
-            entry = candidate.promise, candidate, np.asarray(candidate.starts[0]), dict(candidate.begin)
-            scored.setdefault(candidate.family, []).append(entry)
+            entry = candidate.promise, candidate, np.asarray(candidate.starts[0]), dict(candidate.start_nuisances)
+            by_family.setdefault(candidate.family, []).append(entry)
             continue
         for k in range(len(candidate.starts)):
-            parts = columns.get((candidate.key, k))
-            if parts is None:
-                parts = _predicted(case, fit, candidate, k)
-            gain, share = projector.score(parts, candidate, k)
-            entry = 0.5 * gain - np.log(candidate.scanned), candidate, amplified(candidate, k, share), {}
-            scored.setdefault(candidate.family, []).append(entry)
-    found = [entry for entry in _promising(scored, settings) if entry[0] > _asked(entry, fit, scouted, settings)]
-    least = HOPELESS * max((entry[0] for entry in found), default=0.0)
-    chosen = [entry for rank, entry in enumerate(found) if rank < 2 or entry[0] > least]
-    found = [(e, False) for e in chosen] + [(e, True) for e in _kin(chosen, scored)]
-    found = [(_fitted_already(e, scored), rival) for e, rival in found]
-    return [Entry(*e[1:], scouted.get(e[1].key, 0.0), rival) for e, rival in found]
+            changes = columns.get((candidate.key, k))
+            if changes is None:
+                changes = _predicted_change(case, fit, candidate, k)
+            gain, share = projector.score(changes, candidate, k)
+            entry = 0.5 * gain - np.log(candidate.n_scanned), candidate, scaled_start(candidate, k, share), {}
+            by_family.setdefault(candidate.family, []).append(entry)
+    selected = [
+        entry
+        for entry in _most_promising(by_family, settings)
+        if entry[0] > _required_promise(entry, fit, prescreen_gains, settings)
+    ]
+    min_gain = MIN_PROMISE_SHARE * max((entry[0] for entry in selected), default=0.0)
+    chosen = [entry for rank, entry in enumerate(selected) if rank < 2 or entry[0] > min_gain]
+    selected = [(e, False) for e in chosen] + [(e, True) for e in _component_rivals(chosen, by_family)]
+    selected = [(_with_fitted_start(e, by_family), rival) for e, rival in selected]
+    return [RefitTask(*e[1:], prescreen_gains.get(e[1].key, 0.0), rival) for e, rival in selected]
 
 
-def _from_afar(case, fit, projector, at_start, candidate):
+def _distant_entry(case, fit, projector, at_start, candidate):
     """Entry of a ``candidate`` simulated ``at_start``, with its masking parameter at the mean: no change is small."""
-    back = {n.name: n.mean for n in case.nuisances if n.name == candidate.twin}
-    parts = _predicted(case, replace(fit, values={**fit.values, **back}), at_start, 0)
-    gain, _ = projector.score(parts, at_start, 0)
-    return 0.5 * gain - np.log(candidate.scanned), candidate, np.array(at_start.starts[0]), back
+    reset_values = {n.name: n.mean for n in case.nuisances if n.name == candidate.masking_parameter}
+    changes = _predicted_change(case, replace(fit, values={**fit.values, **reset_values}), at_start, 0)
+    gain, _ = projector.score(changes, at_start, 0)
+    return 0.5 * gain - np.log(candidate.n_scanned), candidate, np.array(at_start.starts[0]), reset_values
 
 
-def _asked(entry, fit, scouted, settings):
+def _required_promise(entry, fit, prescreen_gains, settings):
     """Promise from which an entry is refitted. Beside a first effect it must be that of a separate name. [nats]"""
     if not fit.candidates:
         return settings.promise
-    by_cheap = entry[0] == scouted.get(entry[1].key)
-    return settings.threshold * (CHEAP if by_cheap else 1.0)
+    is_cheap_gain = entry[0] == prescreen_gains.get(entry[1].key)
+    return settings.threshold * (CHEAP_PROMISE_SHARE if is_cheap_gain else 1.0)
 
 
-def _fitted_already(entry, scored):
+def _with_fitted_start(entry, by_family):
     """The entry, with start and nuisance parameters of the best fit of the same candidate, if there is one.
 
     A column is linear, and from it all nuisance parameters would have to return.
     """
-    made = [e for e in scored[entry[1].family] if e[1].key == entry[1].key and e[3]]
-    return max(made, key=lambda e: e[0], default=entry)
+    fitted = [e for e in by_family[entry[1].family] if e[1].key == entry[1].key and e[3]]
+    return max(fitted, key=lambda e: e[0], default=entry)
 
 
-def _kin(chosen, scored):
+def _component_rivals(chosen, by_family):
     """Best starts of other effects on the components of the first two chosen: columns hardly separate them."""
-    parts = [e[1].part for e in chosen if e[1].kin][:2]
-    known, best = {(entry[1].family, entry[1].part) for entry in chosen}, {}
-    for entry in sorted((e for entries in scored.values() for e in entries), key=lambda e: e[0]):
-        law = entry[1].family, entry[1].part
-        if entry[1].part in parts and law not in known:
-            best[law] = entry
-    return list(best.values())
+    sites = [e[1].part for e in chosen if e[1].component][:2]
+    chosen_effects, best_entries = {(entry[1].family, entry[1].part) for entry in chosen}, {}
+    for entry in sorted((e for entries in by_family.values() for e in entries), key=lambda e: e[0]):
+        effect = entry[1].family, entry[1].part
+        if entry[1].part in sites and effect not in chosen_effects:
+            best_entries[effect] = entry
+    return list(best_entries.values())
 
 
-def _same_place(candidate, accepted):
+def _is_same_site(candidate, accepted):
     """Whether a second effect at the position, sensor or train of an accepted one would only correct its shape.
 
     Not so for two exact effects, nor for an effect of all wheels beside one of a single wheel that is known by its
@@ -182,22 +192,22 @@ def _same_place(candidate, accepted):
     if candidate.key == accepted.key:
         return True
     a, b = candidate.where, accepted.where
-    of_one_wheel = {(c.sounding, "axle" in c.where) for c in (candidate, accepted)}
+    of_one_wheel = {(c.evidence_suffices, "axle" in c.where) for c in (candidate, accepted)}
     if (candidate.exact and accepted.exact) or of_one_wheel == {(True, True), (False, False)}:
         return False
-    reach = ALIKE if candidate.family == accepted.family else NEAR
-    near = "place" in a and "place" in b and abs(a["place"] - b["place"]) < reach
-    return near or any(k in a and a[k] == b.get(k) for k in ("sensor", "train"))
+    max_distance = SAME_EFFECT_DISTANCE if candidate.family == accepted.family else SAME_SITE_DISTANCE
+    is_near = "place" in a and "place" in b and abs(a["place"] - b["place"]) < max_distance
+    return is_near or any(k in a and a[k] == b.get(k) for k in ("sensor", "train"))
 
 
-def amplified(candidate, k, share):
+def scaled_start(candidate, k, share):
     """The start with its first parameter at ``share`` of the distance from neutral. The others define its shape."""
     start = np.array(candidate.starts[k], dtype=float)
     start[0] = candidate.neutral[0] + share * (start[0] - candidate.neutral[0])
     return start
 
 
-def _predicted(case, fit, candidate, k):
+def _predicted_change(case, fit, candidate, k):
     """Change of the prediction at a start. None if the effect cannot be simulated at this size."""
     try:
         new = case.predict(fit.values, (*fit.terms, candidate.term(candidate.starts[k])), case.observations)
@@ -206,9 +216,9 @@ def _predicted(case, fit, candidate, k):
     return [a - b for a, b in zip(new, fit.predictions)]
 
 
-def _promising(scored, settings):
+def _most_promising(by_family, settings):
     """The best start of each of the first ``refits`` families. Of the first three also their second best site."""
-    ranked = [sorted(entries, key=lambda e: -e[0]) for entries in scored.values()]
+    ranked = [sorted(entries, key=lambda e: -e[0]) for entries in by_family.values()]
     ranked.sort(key=lambda entries: -entries[0][0])
     chosen = []
     for rank, entries in enumerate(ranked[: settings.refits]):
@@ -222,42 +232,42 @@ class Projector:
     """Scores columns against the residual of ``fit`` with its nuisances projected out."""
 
     def __init__(self, case, fit):
-        self.joint, self.fit = Joint(case, fit.candidates), fit
-        self.scaled, self.right = self.joint.stacked(fit.jacobian, fit.white, fit.scale)
+        self.joint, self.fit = JointProblem(case, fit.candidates), fit
+        self.scaled, self.right = self.joint.stack(fit.jacobian, fit.white, fit.scale)
         self.scaled *= self.joint.sd
         self.normal = np.linalg.inv(self.scaled.T @ self.scaled + np.eye(self.scaled.shape[1]))
         theta = np.concatenate([[fit.values[n.name] for n in case.nuisances], fit.psi])
         self.pull = (self.joint.mean - theta) / self.joint.sd
         self.shift = self.normal @ (self.scaled.T @ self.right + self.pull)
 
-    def score(self, parts, candidate, start):
+    def score(self, changes, candidate, start):
         r"""(gain, share): best gain in chi-squared along a column, and how much of it, within the bounds.
 
         .. math:: g = \max_a\, 2a\,c^T P r - a^2 c^T P c, \quad P = I - J (J^T J + I)^{-1} J^T
 
         with the distance of the nuisances from their priors included. A column that nuisances imitate scores low.
         """
-        if parts is None:
+        if changes is None:
             return 0.0, 1.0
-        white = [o.whitened(p) if p.any() else p for o, p in zip(self.joint.observations, parts)]
-        weight = [np.sqrt(o.effective / self.fit.scale[o.kind]) for o in self.joint.observations]
+        white = [o.whiten(p) if p.any() else p for o, p in zip(self.joint.observations, changes)]
+        weight = [np.sqrt(o.effective / self.fit.scale[o.data_type]) for o in self.joint.observations]
         column = np.concatenate([w * p for w, p in zip(weight, white)])
         across = self.scaled.T @ column
         size = float(column @ column - across @ self.normal @ across)
         slope = float(column @ self.right - across @ self.shift)
         if size <= 1e-12 * float(column @ column) or size <= 0.0:
             return 0.0, 1.0
-        nearest = slope / size if not candidate.whole else 1.0
-        share = float(np.clip(nearest, 0.1, _furthest(candidate, candidate.starts[start])))
+        optimum = slope / size if not candidate.nonlinear_in_size else 1.0
+        share = float(np.clip(optimum, 0.1, _max_multiple(candidate, candidate.starts[start])))
         return 2.0 * share * slope - share**2 * size, share
 
 
-def _furthest(candidate, start):
+def _max_multiple(candidate, start):
     """Largest multiple of the distance from neutral to ``start`` within the bounds, at most 3."""
-    reach = 3.0
+    multiple = 3.0
     for p, s in list(zip(candidate.parameters, start))[:1]:
-        way = s - p.neutral
-        if way:
-            limit = p.bounds[1] if way > 0 else p.bounds[0]
-            reach = min(reach, abs(limit - p.neutral) / abs(way))
-    return max(reach, 0.1)
+        distance = s - p.neutral
+        if distance:
+            limit = p.bounds[1] if distance > 0 else p.bounds[0]
+            multiple = min(multiple, abs(limit - p.neutral) / abs(distance))
+    return max(multiple, 0.1)

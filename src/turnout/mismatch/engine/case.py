@@ -33,7 +33,7 @@ class Observation:
     data: np.ndarray
     sigma: np.ndarray
     effective: float = 1.0
-    kind: str = "response"
+    data_type: str = "response"
     covariates: Mapping[str, float] = field(default_factory=dict)
     cells: np.ndarray | None = None
     labels: Mapping[str, np.ndarray] = field(default_factory=dict)
@@ -58,20 +58,20 @@ class Observation:
         if self.modes is None or not self.modes.shape[1]:
             return None
         scaled = self.modes / self.sigma[:, None]
-        power, turn = np.linalg.eigh(scaled.T @ scaled)
-        keep = power > 1e-4
-        power = power[keep]
-        along = (scaled @ turn[:, keep] / np.sqrt(power)).astype(self.modes.dtype)
-        return along, 1.0 - 1.0 / np.sqrt(1.0 + power)
+        eigenvalues, eigenvectors = np.linalg.eigh(scaled.T @ scaled)
+        keep = eigenvalues > 1e-4
+        eigenvalues = eigenvalues[keep]
+        directions = (scaled @ eigenvectors[:, keep] / np.sqrt(eigenvalues)).astype(self.modes.dtype)
+        return directions, 1.0 - 1.0 / np.sqrt(1.0 + eigenvalues)
 
-    def whitened(self, values):
+    def whiten(self, values):
         r"""``values`` (n,) or (n, k) over the standard deviation of all random errors: :math:`C^{-1/2} x`,
         :math:`C = \mathrm{diag}(\sigma^2) + M M^T` with M the ``modes``.
 
         >>> o = Observation("a", "a", np.zeros(3), 2.0, modes=np.array([[2.0], [2.0], [2.0]]))
-        >>> [round(float(v), 3) for v in o.whitened(np.array([2.0, 2.0, 2.0]))]  # along the mode: over sqrt(1 + 3)
+        >>> [round(float(v), 3) for v in o.whiten(np.array([2.0, 2.0, 2.0]))]  # along the mode: over sqrt(1 + 3)
         [0.5, 0.5, 0.5]
-        >>> [round(float(v), 3) for v in o.whitened(np.array([2.0, -2.0, 0.0]))]  # across it: over sigma alone
+        >>> [round(float(v), 3) for v in o.whiten(np.array([2.0, -2.0, 0.0]))]  # across it: over sigma alone
         [1.0, -1.0, 0.0]
         """
         if isinstance(values, Whitened):
@@ -79,10 +79,10 @@ class Observation:
         scaled = values / (self.sigma if values.ndim == 1 else self.sigma[:, None])
         if self._subspace is None:
             return scaled
-        along, shrunk = self._subspace
-        inner = along.T @ scaled.astype(along.dtype)
-        inner *= (shrunk if values.ndim == 1 else shrunk[:, None]).astype(along.dtype)
-        return scaled - along @ inner
+        directions, shrinkage = self._subspace
+        projection = directions.T @ scaled.astype(directions.dtype)
+        projection *= (shrinkage if values.ndim == 1 else shrinkage[:, None]).astype(directions.dtype)
+        return scaled - directions @ projection
 
     @property
     def n_effective(self):
@@ -113,8 +113,8 @@ class Nuisance:
     owner: str | None = None
     bounds: tuple[float, float] = (-np.inf, np.inf)
     meaning: str = ""
-    trust: float = 3.0
-    bends: bool = True
+    max_step_sd: float = 3.0
+    can_mask: bool = True
 
 
 class Case:
@@ -149,15 +149,15 @@ class Case:
     reserved: tuple[Observation, ...] = ()
     nuisances: tuple[Nuisance, ...] = ()
     candidates: tuple[Candidate, ...] = ()
-    frozen_jacobian = False
+    expensive = False
     start_values: Mapping[str, float] = {}
     control_level: Mapping[str, float] = {}
     cell_level: Mapping[str, float] = {}
-    disturbed: tuple = ()
-    foreign: tuple = ()
-    measured = (-np.inf, np.inf)
+    disturbed_recordings: tuple = ()
+    mismatched_trains: tuple = ()
+    measured_range = (-np.inf, np.inf)
 
-    def cheap(self, observation):
+    def is_cheap(self, observation):
         """Whether derivatives of this observation cost next to nothing."""
         return False
 
@@ -165,7 +165,7 @@ class Case:
         """List of (n,) predictions, one per observation; ``values`` are nuisances, ``terms`` the effects."""
         raise NotImplementedError
 
-    def moved(self, values, terms, new, observations, predictions):
+    def predict_near(self, values, terms, new, observations, predictions):
         """Predictions with ``new`` terms, a small step from ``terms`` with known ``predictions``, for derivatives."""
         return self.predict(values, new, observations)
 
@@ -174,25 +174,25 @@ class Case:
 
         Nuisances of different owners are shifted together: one prediction serves them all.
         """
-        groups, seen = {}, {}
+        groups, last_rank = {}, {}
         for k, nuisance in enumerate(self.nuisances):
             if nuisance.owner is None:
                 groups[nuisance.name] = [k]
             else:
-                rank = seen[nuisance.owner] = seen.get(nuisance.owner, -1) + 1
+                rank = last_rank[nuisance.owner] = last_rank.get(nuisance.owner, -1) + 1
                 groups.setdefault(("own", rank), []).append(k)
-        found = [np.zeros((o.data.size, len(self.nuisances))) for o in observations]
+        jacobians = [np.zeros((o.data.size, len(self.nuisances))) for o in observations]
         for members in groups.values():
-            moved = dict(values)
+            shifted = dict(values)
             for k in members:
-                moved[self.nuisances[k].name] += 0.1 * self.nuisances[k].sd
-            predicted = self.predict(moved, terms, observations)
+                shifted[self.nuisances[k].name] += 0.1 * self.nuisances[k].sd
+            predicted = self.predict(shifted, terms, observations)
             for k in members:
                 nuisance = self.nuisances[k]
-                for o, new, old, jacobian in zip(observations, predicted, base, found):
+                for o, new, old, jacobian in zip(observations, predicted, base, jacobians):
                     if nuisance.owner in (None, o.name):
                         jacobian[:, k] = (new - old) / (0.1 * nuisance.sd)
-        return found
+        return jacobians
 
     def own_jacobian(self, values, terms, observation, predicted, names):
         """(n, n_name) derivatives of an observation by the nuisances that it owns."""
@@ -204,35 +204,35 @@ class Case:
         """Columns of candidates at their starts, (key, start) -> list of (n,) per observation. Others are predicted."""
         return {}
 
-    def further(self, fit):
+    def residual_candidates(self, fit):
         """Candidates that only the residual of ``fit`` suggests."""
         return ()
 
-    def distant(self, fit):
+    def distant_starts(self, fit):
         """(candidate, start) too far from neutral for a column: predicted, with the masking parameter at its mean."""
         return ()
 
-    def roughened(self):
+    def with_broad_errors(self):
         """The same case with large independent errors: its optimum has a wide basin."""
         return self
 
-    def struck(self):
+    def hammer_positions(self):
         """Condition -> position of the impacts [m], for hammer tests."""
         return {}
 
-    def renewed(self, fit):
+    def with_updated_errors(self, fit):
         """The same case with errors of its observations as the model of ``fit`` gives them. Itself if unchanged."""
         return self
 
-    def cheap_part(self):
+    def cheap_case(self):
         """A case of the cheap observations alone, with the same shared nuisances. None if there are none."""
         return None
 
-    def spaces(self, fit):
+    def residual_spaces(self, fit):
         """``ResidualSpace`` objects: subspaces of the observations to which a cause may be fixed. None by default."""
         return ()
 
-    def latent(self, fit):
+    def latent_covariates(self, fit):
         """Covariates of the latent force: name -> (n,), with "force". None if the case has no such view."""
         return None
 

@@ -5,12 +5,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 # Thresholds of gain. A weaker name that held-out recordings contradict is no evidence of any effect.
-WEAK = 2.0
+WEAK_GAIN = 2.0
 # nats, odds of 20 to 1: lead of the simpler form over one with an extra parameter that has no effect.
-EVEN = 3.0
+SIMPLER_FORM_LEAD = 3.0
 # Share of the gain. A held-out condition that loses more, and more than half a threshold, contradicts the name.
-TORN = 0.2
-VERDICTS = ("none", "named", "a_or_b", "unknown", "numerics")
+MAX_LOSS_SHARE = 0.2
+ANSWERS = ("none", "named", "a_or_b", "unknown", "numerics")
 
 
 @dataclass(frozen=True)
@@ -45,23 +45,23 @@ def posterior(scores, excess, settings):
     >>> max(p, key=p.get)
     'none'
     """
-    best = {}
+    best_gains = {}
     for score in scores:
-        best[score.family] = max(best.get(score.family, -np.inf), score.gain)
+        best_gains[score.family] = max(best_gains.get(score.family, -np.inf), score.gain)
     explained = max((s.explained for s in scores), default=0.0)
     unexplained = 1.0 - min(1.0, max(0.0, explained))
     unknown = settings.unknown_offset
     if excess > 1.0:
         unknown += 2.0 * settings.threshold * np.log(excess) * (0.2 + unexplained) / settings.explained
-    top = max([0.0, unknown, *best.values()])
-    logits = {"none": 0.0, "unknown": min(unknown, max([0.0, *best.values()]) + settings.threshold), **best}
-    prior = {"none": 0.5, "unknown": 0.1, **dict.fromkeys(best, 0.4 / max(1, len(best)))}
+    top = max([0.0, unknown, *best_gains.values()])
+    logits = {"none": 0.0, "unknown": min(unknown, max([0.0, *best_gains.values()]) + settings.threshold), **best_gains}
+    prior = {"none": 0.5, "unknown": 0.1, **dict.fromkeys(best_gains, 0.4 / max(1, len(best_gains)))}
     scaled = {n: prior[n] * np.exp(max(-700.0, (v - top) / settings.temperature)) for n, v in logits.items()}
     total = sum(scaled.values())
     return {name: float(v / total) for name, v in scaled.items()}
 
 
-def withdraw(probabilities):
+def swap_with_unknown(probabilities):
     """A test beyond the score rejects the best name: swap the probabilities of "unknown" and the likeliest name."""
     top = max(probabilities, key=probabilities.get)
     probabilities[top], probabilities["unknown"] = probabilities["unknown"], probabilities[top]
@@ -81,49 +81,51 @@ def calibrate(probabilities, chosen, certainty, settings):
     """
     raw = min(1.0 - 1e-3, max(1e-3, sum(probabilities.get(name, 0.0) for name in chosen)))
     odds = (1.0 - settings.softmax_share) * _logit(certainty) + settings.softmax_share * _logit(raw)
-    sure = float(1.0 / (1.0 + np.exp(-odds)))
-    rest = sum(v for name, v in probabilities.items() if name not in chosen)
+    probability = float(1.0 / (1.0 + np.exp(-odds)))
+    outside = sum(v for name, v in probabilities.items() if name not in chosen)
     inside = sum(probabilities.get(name, 0.0) for name in chosen)
     for name in probabilities:
-        among = name in chosen
-        total = inside if among else rest
+        is_chosen = name in chosen
+        total = inside if is_chosen else outside
         if total > 0.0:
-            probabilities[name] *= (sure if among else 1.0 - sure) / total
-    return sure
+            probabilities[name] *= (probability if is_chosen else 1.0 - probability) / total
+    return probability
 
 
 def _logit(p):
     return float(np.log(p / (1.0 - p)))
 
 
-def objected(worst, gain, settings):
+def is_contradicted(worst_gain, gain, settings):
     """Whether a held-out condition, with gain ``worst_gain``, contradicts a name that gains ``gain`` in all."""
-    return worst < -max(0.5 * settings.threshold, TORN * gain)
+    return worst_gain < -max(0.5 * settings.threshold, MAX_LOSS_SHARE * gain)
 
 
-def leading(scores, excess, settings):
+def likeliest(scores, excess, settings):
     """The likeliest of ``scores``. If it explains too little, the likeliest that other data support, if any."""
     ranked = sorted(scores, key=lambda s: -s.gain)
-    sure = [s for s in ranked if s.told_elsewhere(settings)]
-    return sure[0] if sure and ranked[0].faint(excess, settings) else ranked[0]
+    supported = [s for s in ranked if s.exemption_reason(settings)]
+    return supported[0] if supported and ranked[0].explains_too_little(excess, settings) else ranked[0]
 
 
-def opened(verdict, settings):
+def with_open_size(verdict, settings):
     """A name whose size has no upper limit becomes "a or b" with its ``unbounded_form``. Others stay.
 
     Example: a gap that no train closes looks like a sleeper without ballast.
     """
-    if verdict.answer != "named" or not verdict.scores[0].is_open:
+    if verdict.answer != "named" or not verdict.scores[0].is_unbounded:
         return verdict
-    names, probabilities = (verdict.names[0], verdict.scores[0].candidate.open_as), dict(verdict.posterior)
-    sure = calibrate(probabilities, names, settings.certainty("a_or_b"), settings)
+    names, probabilities = (verdict.names[0], verdict.scores[0].candidate.unbounded_form), dict(verdict.posterior)
+    probability = calibrate(probabilities, names, settings.certainty("a_or_b"), settings)
     reason = "; ".join(filter(None, [f"the size of {names[0]} is known from below alone", verdict.reason]))
     return replace(
-        verdict, answer="a_or_b", names=names, grade="", probability=sure, posterior=probabilities, reason=reason
+        verdict, answer="a_or_b", names=names, grade="", probability=probability, posterior=probabilities, reason=reason
     )
 
 
-def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, disturbed=False, foreign=()):
+def judge(
+    scores, excess, settings, consistent=True, structure=0.0, residual_excess=1.0, disturbed=False, mismatched_trains=()
+):
     """Verdict from scored candidates.
 
     Parameters
@@ -148,48 +150,59 @@ def judge(scores, excess, settings, consistent=True, structure=0.0, left=1.0, di
 
     def verdict(answer, names=(), grade="", reason="", cause=""):
         if answer == "unknown":
-            withdraw(probabilities)
-        sure = calibrate(probabilities, names or (answer,), settings.certainty(answer, cause == "clock"), settings)
-        return Verdict(answer, tuple(names), grade, sure, probabilities, tuple(ranked), reason, cause)
+            swap_with_unknown(probabilities)
+        probability = calibrate(
+            probabilities, names or (answer,), settings.certainty(answer, cause == "clock"), settings
+        )
+        return Verdict(answer, tuple(names), grade, probability, probabilities, tuple(ranked), reason, cause)
 
-    def no_name(but=""):
+    def no_name(addition=""):
         if excess > 1.0:
             return verdict("unknown", reason="above the level of controls, and no candidate helps")
         if disturbed:
             return verdict("unknown", reason="something shakes all sensors while no wheel is near", cause="clock")
-        if foreign:
-            said = f"most passages of {', '.join(foreign)} do not look like its vehicle file"
-            return verdict("unknown", reason=said, cause="train")
-        return verdict("none", reason=f"nothing above the thresholds{but}")
+        if mismatched_trains:
+            text = f"most passages of {', '.join(mismatched_trains)} do not look like its vehicle file"
+            return verdict("unknown", reason=text, cause="train")
+        return verdict("none", reason=f"nothing above the thresholds{addition}")
 
-    found = [s for s in ranked if s.gain > settings.threshold and s.material]
-    if not found:
+    passing = [s for s in ranked if s.gain > settings.threshold and s.is_reportable]
+    if not passing:
         return no_name()
-    best = leading(found, excess, settings)
-    ranked = [best, *(s for s in ranked if s is not best)]
-    faint = f"explains {best.explained:.0%} of the excess" if best.faint(excess, settings) else ""
-    if faint and not best.told_elsewhere(settings):
-        return verdict("unknown", reason=f"the best candidate {faint}")
-    if left > settings.leftover:
-        return verdict("unknown", reason=f"{best.family} leaves {left:.0f} times the level of controls")
-    weak = best.gain < WEAK * settings.threshold
-    torn = bool(best.alone) or objected(best.worst, best.gain, settings)
-    if (torn or not consistent) and weak and excess <= 1.0:
-        return no_name(f" but {best.family}, which does not hold elsewhere")
+    leader = likeliest(passing, excess, settings)
+    ranked = [leader, *(s for s in ranked if s is not leader)]
+    weak_explanation = (
+        f"explains {leader.explained:.0%} of the excess" if leader.explains_too_little(excess, settings) else ""
+    )
+    if weak_explanation and not leader.exemption_reason(settings):
+        return verdict("unknown", reason=f"the best candidate {weak_explanation}")
+    if residual_excess > settings.leftover:
+        return verdict("unknown", reason=f"{leader.family} leaves {residual_excess:.0f} times the level of controls")
+    is_weak = leader.gain < WEAK_GAIN * settings.threshold
+    contradicted = bool(leader.single_witness) or is_contradicted(leader.worst_gain, leader.gain, settings)
+    if (contradicted or not consistent) and is_weak and excess <= 1.0:
+        return no_name(f" but {leader.family}, which does not hold elsewhere")
     if not consistent:
-        return verdict("unknown", reason=f"{best.family} does not hold on conditions it was not fitted to")
-    if structure > settings.structure_left and left > 1.0:
-        return verdict("unknown", reason=f"a free law still explains {structure:.0%} of what {best.family} leaves")
-    if best.alone:
-        return verdict("unknown", reason=f"{best.family} hangs on {best.alone} alone, which others do not confirm")
-    if torn:
-        return verdict("unknown", reason=f"{best.family} makes one condition worse by {-best.worst:.0f} nats")
-    same = [s for s in found if s.is_limit_of(best) and s.explained >= settings.explained]
-    if same:  # ballast without stiffness equals a hanging sleeper
-        return verdict("a_or_b", (best.family, same[0].family), reason=f"{best.family} is at its limit")
-    rivals = [s for s in ranked if s is not best and s.material and best.gain - s.gain < settings.margin]
-    rivals = [s for s in rivals if not (best.is_plain_form_of(s) and best.gain - s.gain > EVEN)]
+        return verdict("unknown", reason=f"{leader.family} does not hold on conditions it was not fitted to")
+    if structure > settings.structure_left and residual_excess > 1.0:
+        return verdict("unknown", reason=f"a free law still explains {structure:.0%} of what {leader.family} leaves")
+    if leader.single_witness:
+        return verdict(
+            "unknown", reason=f"{leader.family} hangs on {leader.single_witness} alone, which others do not confirm"
+        )
+    if contradicted:
+        return verdict("unknown", reason=f"{leader.family} makes one condition worse by {-leader.worst_gain:.0f} nats")
+    limit_forms = [s for s in passing if s.is_limit_of(leader) and s.explained >= settings.explained]
+    if limit_forms:  # ballast without stiffness equals a hanging sleeper
+        return verdict("a_or_b", (leader.family, limit_forms[0].family), reason=f"{leader.family} is at its limit")
+    rivals = [s for s in ranked if s is not leader and s.is_reportable and leader.gain - s.gain < settings.margin]
+    rivals = [s for s in rivals if not (leader.is_simpler_form_of(s) and leader.gain - s.gain > SIMPLER_FORM_LEAD)]
     if rivals:
-        return verdict("a_or_b", (best.family, rivals[0].family), reason="within the margin of each other")
-    grade = "A" if left <= 1.0 else "B"
-    return verdict("named", (best.family,), grade, faint and f"{best.told_elsewhere(settings)}; it {faint}")
+        return verdict("a_or_b", (leader.family, rivals[0].family), reason="within the margin of each other")
+    grade = "A" if residual_excess <= 1.0 else "B"
+    return verdict(
+        "named",
+        (leader.family,),
+        grade,
+        weak_explanation and f"{leader.exemption_reason(settings)}; it {weak_explanation}",
+    )

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.engine.map_fit import Joint, fit_jointly
+from turnout.mismatch.engine.map_fit import JointProblem, fit_jointly
 
-SMALL = 0.02  # share of a size at which an effect is linear; effects with a threshold are taken at full size
-ENOUGH = 5.0  # nats, odds of 150 to 1: two effects are distinguished
+LINEAR_SHARE = 0.02  # share of a size at which an effect is linear; effects with a threshold are taken at full size
+MIN_EVIDENCE = 5.0  # nats, odds of 150 to 1: two effects are distinguished
 
 
 @dataclass(frozen=True)
@@ -20,21 +20,21 @@ class Distinguishability:
     """
 
     names: tuple[str, ...]
-    lost: np.ndarray
-    seen: np.ndarray
+    loss: np.ndarray
+    detectability: np.ndarray
 
-    def confused(self, name, enough=ENOUGH):
+    def confused_with(self, name, min_evidence=MIN_EVIDENCE):
         """Effects that cannot be distinguished from ``name``, with "none" if it cannot be detected at all."""
         row = self.names.index(name)
-        found = [] if self.seen[row] >= enough else ["none"]
-        return found + [n for k, n in enumerate(self.names) if k != row and self.lost[row, k] < enough]
+        confused_names = [] if self.detectability[row] >= min_evidence else ["none"]
+        return confused_names + [n for k, n in enumerate(self.names) if k != row and self.loss[row, k] < min_evidence]
 
     def __str__(self):
         width = max(len(n) for n in self.names)
         head = " " * width + "      none " + " ".join(f"{n[:9]:>9}" for n in self.names)
         lines = [head]
-        for name, seen, row in zip(self.names, self.seen, self.lost):
-            lines.append(f"{name:<{width}} {seen:>9.0f} " + " ".join(f"{min(v, 1e7):>9.0f}" for v in row))
+        for name, nats, row in zip(self.names, self.detectability, self.loss):
+            lines.append(f"{name:<{width}} {nats:>9.0f} " + " ".join(f"{min(v, 1e7):>9.0f}" for v in row))
         return "\n".join(lines)
 
 
@@ -54,22 +54,22 @@ def distinguishability(case, strengths=None):
         is taken, the first.
     """
     fit = fit_jointly(case, iterations=0)
-    joint = Joint(case)
+    joint = JointProblem(case)
     unit = dict.fromkeys(fit.scale, 1.0)
-    rows, _ = joint.stacked(fit.jacobian, fit.white, unit)
+    rows, _ = joint.stack(fit.jacobian, fit.white, unit)
     scaled = rows * joint.sd
     normal = np.linalg.inv(scaled.T @ scaled + np.eye(scaled.shape[1]))
     names, columns = [], []
-    for candidate in _one_of_each(case.candidates, strengths or {}):
+    for candidate in _one_per_family(case.candidates, strengths or {}):
         start = np.asarray((strengths or {}).get(candidate.key, candidate.starts[0]), dtype=float)
-        share = 1.0 if getattr(candidate.term(start), "kind", "port") == "port" else SMALL
-        weak = candidate.neutral + share * (start - candidate.neutral)
+        share = 1.0 if getattr(candidate.term(start), "effect_type", "port") == "port" else LINEAR_SHARE
+        values = candidate.neutral + share * (start - candidate.neutral)
         try:
-            new = case.predict(fit.values, (candidate.term(weak),), case.observations)
+            new = case.predict(fit.values, (candidate.term(values),), case.observations)
         except SimulationError:
             continue
-        change = [o.whitened(a - b) for o, a, b in zip(case.observations, new, fit.predictions)]
-        _, column = joint.stacked(fit.jacobian, change, unit)
+        change = [o.whiten(a - b) for o, a, b in zip(case.observations, new, fit.predictions)]
+        _, column = joint.stack(fit.jacobian, change, unit)
         names.append(candidate.family)
         columns.append(column / share)
     c = np.array(columns)
@@ -77,40 +77,40 @@ def distinguishability(case, strengths=None):
     gram = c @ c.T - across @ normal @ across.T
     size = np.maximum(np.diag(gram), 0.0)
     explained = np.where(size > 1e-9, gram**2 / np.maximum(size, 1e-9), 0.0)
-    lost = 0.5 * np.maximum(size[:, None] - explained, 0.0)
-    np.fill_diagonal(lost, 0.0)
-    return Distinguishability(tuple(names), lost, 0.5 * size)
+    loss = 0.5 * np.maximum(size[:, None] - explained, 0.0)
+    np.fill_diagonal(loss, 0.0)
+    return Distinguishability(tuple(names), loss, 0.5 * size)
 
 
-def _one_of_each(candidates, strengths):
+def _one_per_family(candidates, strengths):
     """The candidates with given strengths, and the middle site of every other family."""
-    found = {}
+    by_family = {}
     for candidate in candidates:
-        found.setdefault(candidate.family, []).append(candidate)
-    for members in found.values():
+        by_family.setdefault(candidate.family, []).append(candidate)
+    for members in by_family.values():
         chosen = [m for m in members if m.key in strengths]
         yield chosen[0] if chosen else members[len(members) // 2]
 
 
-def cheapest_addition(base, additions, enough=ENOUGH):
+def cheapest_addition(base, additions, min_evidence=MIN_EVIDENCE):
     """(name, pairs distinguished, nats gained) of the addition that resolves most pairs, the cheapest among equals.
 
     ``base`` is a Distinguishability, ``additions`` name -> (cost, Distinguishability of the plan with it).
     """
     ranked = []
-    for name, (cost, wider) in additions.items():
-        common = [n for n in base.names if n in wider.names]
-        won = resolved = 0.0
+    for name, (cost, extended) in additions.items():
+        common = [n for n in base.names if n in extended.names]
+        gained = resolved = 0.0
         for a in common:
             for b in common:
                 if a == b:
                     continue
-                before = base.lost[base.names.index(a), base.names.index(b)]
-                after = wider.lost[wider.names.index(a), wider.names.index(b)]
-                resolved += before < enough <= after
-                won += max(0.0, min(after, 50.0) - min(before, 50.0))
-            before, after = base.seen[base.names.index(a)], wider.seen[wider.names.index(a)]
-            resolved += before < enough <= after
-        ranked.append((-resolved, cost, name, won))
-    resolved, _, name, won = min(ranked)
-    return name, int(-resolved), float(won)
+                before = base.loss[base.names.index(a), base.names.index(b)]
+                after = extended.loss[extended.names.index(a), extended.names.index(b)]
+                resolved += before < min_evidence <= after
+                gained += max(0.0, min(after, 50.0) - min(before, 50.0))
+            before, after = base.detectability[base.names.index(a)], extended.detectability[extended.names.index(a)]
+            resolved += before < min_evidence <= after
+        ranked.append((-resolved, cost, name, gained))
+    resolved, _, name, gained = min(ranked)
+    return name, int(-resolved), float(gained)

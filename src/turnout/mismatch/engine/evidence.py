@@ -4,36 +4,36 @@ candidates.
 
 import numpy as np
 
-from turnout.mismatch.engine.cross_validation import held_out_score, mean_square_out, told_alone
-from turnout.mismatch.engine.decision import judge, leading, objected
+from turnout.mismatch.engine.cross_validation import held_out_score, single_type_estimate, weighted_mean_square
+from turnout.mismatch.engine.decision import is_contradicted, judge, likeliest
 from turnout.mismatch.engine.latent_force import latent_law
-from turnout.mismatch.engine.reserved_data import falls, fit_of_reserved
+from turnout.mismatch.engine.reserved_data import is_significantly_worse, reserved_fit
 from turnout.mismatch.engine.score import Score
 
-ODD = 3.0  # spreads of similar components: one in 370 intact ones is beyond
-FEWEST = 6  # similar components; fewer give no spread
+MAX_ORDINARY_SPREADS = 3.0  # spreads of similar components: one in 370 intact ones is beyond
+MIN_SIBLINGS = 6  # similar components; fewer give no spread
 
 
-def explained_of(case, fit, refit, settings):
+def explained_share(case, fit, refit, settings):
     """Share of the excess over the control level that ``refit`` removes, 1 if there is none.
 
     For a first effect without excess in any data type, the excess of the worst channel counts. Beside a name that
     excess may be the residual of the name, which a second effect need not explain.
     """
-    control = _control(case, fit, settings)
-    before, after = _excess(fit.level, control), _excess(refit.level, control)
+    control = _control_levels(case, fit, settings)
+    before, after = _total_excess(fit.level, control), _total_excess(refit.level, control)
     if before == 0.0 and not fit.candidates:
-        before, after = (max(0.0, loudest(case, f) - 1.0) for f in (fit, refit))
+        before, after = (max(0.0, worst_channel_excess(case, f) - 1.0) for f in (fit, refit))
     return 1.0 - after / before if before > 0.0 else 1.0
 
 
-def _control(case, fit, settings):
+def _control_levels(case, fit, settings):
     """Control level: data type -> weighted mean square of controls."""
-    return {kind: case.control_level.get(kind, settings.control_level) for kind in fit.level}
+    return {data_type: case.control_level.get(data_type, settings.control_level) for data_type in fit.level}
 
 
-def _excess(level, control):
-    return sum(max(0.0, level[kind] - control[kind]) for kind in level)
+def _total_excess(level, control):
+    return sum(max(0.0, level[data_type] - control[data_type]) for data_type in level)
 
 
 def score_of(case, fit, refit, candidate, settings):
@@ -43,120 +43,134 @@ def score_of(case, fit, refit, candidate, settings):
     first condition is predicted from the priors.
     """
     gain, by_condition = refit.evidence - fit.evidence, {}
-    if not case.frozen_jacobian:
-        mine, reference = held_out_score(case, refit), held_out_score(case, fit)
-        by_condition = {c: mine[c] - reference[c] for c in reference}
+    if not case.expensive:
+        with_candidate, without_candidate = held_out_score(case, refit), held_out_score(case, fit)
+        by_condition = {c: with_candidate[c] - without_candidate[c] for c in without_candidate}
         gain = sum(by_condition.values()) if by_condition else gain
-    explained = explained_of(case, fit, refit, settings)
-    worst = min(by_condition.values(), default=0.0)
-    gain += candidate.aside
-    usual = _usual(case, refit, candidate) or not _shown(case, fit, refit, candidate, settings)
-    return Score(candidate, gain - np.log(candidate.scanned), worst, explained, refit, by_condition, usual)
+    explained = explained_share(case, fit, refit, settings)
+    worst_gain = min(by_condition.values(), default=0.0)
+    gain += candidate.external_evidence
+    is_ordinary = _is_ordinary(case, refit, candidate) or not _is_supported(case, fit, refit, candidate, settings)
+    return Score(candidate, gain - np.log(candidate.n_scanned), worst_gain, explained, refit, by_condition, is_ordinary)
 
 
-def _shown(case, fit, refit, candidate, settings):
+def _is_supported(case, fit, refit, candidate, settings):
     """Whether the required observations, if any, fit better by a margin, and those that must not oppose do not."""
     gained = 0.5 * sum(
-        o.effective * float(np.sum(np.square(a)) - np.sum(np.square(b))) / fit.scale[o.kind]
+        o.effective * float(np.sum(np.square(a)) - np.sum(np.square(b))) / fit.scale[o.data_type]
         for o, a, b in zip(case.observations, fit.white, refit.white)
-        if o.kind == candidate.told_by
+        if o.data_type == candidate.required_data_type
     )
-    told = not candidate.told_by or gained > settings.margin
-    return told and not _opposed(case, fit, refit, candidate)
+    supported = not candidate.required_data_type or gained > settings.margin
+    return supported and not _is_opposed(case, fit, refit, candidate)
 
 
-def _opposed(case, fit, refit, candidate):
+def _is_opposed(case, fit, refit, candidate):
     """Whether observations that must not oppose a candidate contradict it.
 
     They do so if they put its masking parameter, with a prior as wide as the effect's, nearer to its value without the
     effect than to its value with it.
     """
-    kinds = {o.kind for o in case.observations if o.name in candidate.unopposed}
-    if not kinds or not fit.jacobian:
+    data_types = {o.data_type for o in case.observations if o.name in candidate.must_not_oppose}
+    if not data_types or not fit.jacobian:
         return False
     size = refit.psi[refit.part(candidate).start] - candidate.neutral[0]
-    mean = next(n.mean for n in case.nuisances if n.name == candidate.twin)
-    return any((told_alone(case, fit, k, candidate.twin, candidate.twin_sd) - mean) / size < 0.5 for k in kinds)
+    mean = next(n.mean for n in case.nuisances if n.name == candidate.masking_parameter)
+    return any(
+        (single_type_estimate(case, fit, k, candidate.masking_parameter, candidate.masking_sd) - mean) / size < 0.5
+        for k in data_types
+    )
 
 
-def _usual(case, refit, candidate):
+def _is_ordinary(case, refit, candidate):
     r"""Whether a component differs by no more than ``MAX_ORDINARY_SPREADS`` from similar ones, the effect included.
 
     .. math:: |\ln \psi| < 3 s, \quad s^2 = \overline{(v_j - ar v)^2} + \overline{\sigma_j^2}
 
     with :math:`v_j` the fitted logarithms of the other components and :math:`\sigma_j` their standard errors.
     """
-    if not candidate.twin or candidate.from_twin:
+    if not candidate.masking_parameter or candidate.from_masking:
         return False
-    stem = candidate.twin.rsplit("_", 1)[0]  # of pad_31; pad_stiffness is the common value
-    like = [k for k, n in enumerate(case.nuisances) if n.name.removeprefix(f"{stem}_").isdigit()]
-    like = [k for k in like if case.nuisances[k].name != candidate.twin]
+    stem = candidate.masking_parameter.rsplit("_", 1)[0]  # of pad_31; pad_stiffness is the common value
+    siblings = [k for k, n in enumerate(case.nuisances) if n.name.removeprefix(f"{stem}_").isdigit()]
+    siblings = [k for k in siblings if case.nuisances[k].name != candidate.masking_parameter]
     first = refit.psi[refit.part(candidate).start]
-    if len(like) < FEWEST or first <= 0.0:
+    if len(siblings) < MIN_SIBLINGS or first <= 0.0:
         return False
-    values = np.array([refit.values[case.nuisances[k].name] for k in like])
-    spread = np.sqrt(values.var() + np.mean(np.diag(refit.covariance)[like]))
-    return abs(float(np.log(first))) < ODD * spread
+    values = np.array([refit.values[case.nuisances[k].name] for k in siblings])
+    spread = np.sqrt(values.var() + np.mean(np.diag(refit.covariance)[siblings]))
+    return abs(float(np.log(first))) < MAX_ORDINARY_SPREADS * spread
 
 
-def over(case, fit, settings):
+def excess_ratio(case, fit, settings):
     """Weighted mean square over the control level, the largest of the data types."""
-    control = _control(case, fit, settings)
-    return max(fit.level[kind] / control[kind] for kind in fit.level)
+    control = _control_levels(case, fit, settings)
+    return max(fit.level[data_type] / control[data_type] for data_type in fit.level)
 
 
-def over_reserved(case, predictions, settings):
+def reserved_excess_ratio(case, predictions, settings):
     """The same for the reserved recordings with these ``predictions``; 0 if there are none."""
-    found = [0.0]
-    for kind in {o.kind for o in case.reserved}:
-        mine = [(o, p) for o, p in zip(case.reserved, predictions) if o.kind == kind]
-        found.append(mean_square_out(*zip(*mine)) / case.control_level.get(kind, settings.control_level))
-    return max(found)
+    ratios = [0.0]
+    for data_type in {o.data_type for o in case.reserved}:
+        pairs = [(o, p) for o, p in zip(case.reserved, predictions) if o.data_type == data_type]
+        ratios.append(weighted_mean_square(*zip(*pairs)) / case.control_level.get(data_type, settings.control_level))
+    return max(ratios)
 
 
-def heard(case, fit, settings):
+def worst_excess(case, fit, settings):
     """Largest excess ratio of ``fit``: of a data type, or of one channel of one recording."""
-    return max(over(case, fit, settings), loudest(case, fit))
+    return max(excess_ratio(case, fit, settings), worst_channel_excess(case, fit))
 
 
-def loudest(case, fit):
+def worst_channel_excess(case, fit):
     """Largest mean square of one channel in one recording over that of controls, for data types with such a level."""
-    found = [0.0]
+    ratios = [0.0]
     for o, white in zip(case.observations, fit.white):
-        if o.kind not in case.cell_level or o.cells is None or "sensor" not in o.labels:
+        if o.data_type not in case.cell_level or o.cells is None or "sensor" not in o.labels:
             continue
         inside = o.cells >= 0
         level, code = np.unique(o.labels["sensor"].astype(str), return_inverse=True)
         channel = code[o.cells[inside]]
         count = np.maximum(np.bincount(channel, minlength=level.size), 1)
         square = np.bincount(channel, np.asarray(white)[inside] ** 2, minlength=level.size)
-        found.append(float(np.max(square / count)) / case.cell_level[o.kind])
-    return max(found)
+        ratios.append(float(np.max(square / count)) / case.cell_level[o.data_type])
+    return max(ratios)
 
 
-def judged(case, fit, scored, settings):
+def assess(case, fit, scores, settings):
     """(Verdict on these candidates on top of ``fit``, the Score that it names or would name, or None)."""
-    excess = heard(case, fit, settings)
-    scored = tuple(s for s in scored if s.material)
-    if not scored:
-        return judge([], excess, settings, disturbed=bool(case.disturbed), foreign=case.foreign), None
-    best = leading(scored, excess, settings)
+    excess = worst_excess(case, fit, settings)
+    scores = tuple(s for s in scores if s.is_reportable)
+    if not scores:
+        return judge(
+            [], excess, settings, disturbed=bool(case.disturbed_recordings), mismatched_trains=case.mismatched_trains
+        ), None
+    leader = likeliest(scores, excess, settings)
     consistent, structure = True, 0.0
-    if best.gain > settings.threshold:
-        consistent = consistent_elsewhere(case, fit, best, settings)
-        structure = structure_left(case, best.fit)
-    left = over(case, best.fit, settings)
-    verdict = judge(scored, excess, settings, consistent, structure, left, bool(case.disturbed), case.foreign)
+    if leader.gain > settings.threshold:
+        consistent = predicts_reserved(case, fit, leader, settings)
+        structure = residual_structure(case, leader.fit)
+    residual_excess = excess_ratio(case, leader.fit, settings)
+    verdict = judge(
+        scores,
+        excess,
+        settings,
+        consistent,
+        structure,
+        residual_excess,
+        bool(case.disturbed_recordings),
+        case.mismatched_trains,
+    )
     return verdict, verdict.scores[0]
 
 
-def structure_left(case, fit):
+def residual_structure(case, fit):
     """Share of the residual of ``fit`` that a free force law of the state still explains."""
-    left = latent_of(case, fit)
-    return max(left.r2.values(), default=0.0) if left else 0.0
+    latent = latent_force_of(case, fit)
+    return max(latent.r2.values(), default=0.0) if latent else 0.0
 
 
-def consistent_elsewhere(case, base, best, settings):
+def predicts_reserved(case, base, score, settings):
     """Whether reserved conditions are predicted no worse than without the effect.
 
     Worse means: twice the mean square, or a lower fit that costs more evidence than one condition may lose
@@ -164,19 +178,21 @@ def consistent_elsewhere(case, base, best, settings):
     """
     if not case.reserved:
         return True
-    before, after = (fit_of_reserved(case, f)[0] for f in (base, best.fit))
+    before, after = (reserved_fit(case, f)[0] for f in (base, score.fit))
     if after is None or before is None:
         return before is None
-    squares = [mean_square_out(case.reserved, p) for p in (before, after)]
-    lost = 0.5 * sum(o.n_effective for o in case.reserved) * (squares[1] - squares[0])
-    fell = falls(case.reserved, before, after, settings.fall) and objected(-lost, best.gain, settings)
-    return squares[1] <= settings.withdrawn_ratio * squares[0] and not fell
+    squares = [weighted_mean_square(case.reserved, p) for p in (before, after)]
+    lost_evidence = 0.5 * sum(o.n_effective for o in case.reserved) * (squares[1] - squares[0])
+    has_fallen = is_significantly_worse(case.reserved, before, after, settings.fall) and is_contradicted(
+        -lost_evidence, score.gain, settings
+    )
+    return squares[1] <= settings.withdrawn_ratio * squares[0] and not has_fallen
 
 
-def latent_of(case, fit):
+def latent_force_of(case, fit):
     """``LatentForce`` that ``fit`` lacks. None if the case has no such view."""
-    seen = case.latent(fit)
-    if not seen:
+    latent_data = case.latent_covariates(fit)
+    if not latent_data:
         return None
-    covariates = {k: v for k, v in seen.items() if k not in ("force", "unit")}
-    return latent_law(seen["force"], covariates, seen.get("unit", "N"))
+    covariates = {k: v for k, v in latent_data.items() if k not in ("force", "unit")}
+    return latent_law(latent_data["force"], covariates, latent_data.get("unit", "N"))

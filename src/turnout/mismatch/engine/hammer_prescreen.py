@@ -10,16 +10,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.engine.candidate_search import Projector, amplified
-from turnout.mismatch.engine.map_fit import CHEAP_STEPS, fit_jointly
+from turnout.mismatch.engine.candidate_search import Projector, scaled_start
+from turnout.mismatch.engine.map_fit import MAX_CHEAP_STEPS, fit_jointly
 
-GLANCE, GLANCED = 4, 5  # steps of a trial fit; largest number of starts that are tried by trial fits
-BLIND = 0.999  # share of the prior standard deviation that remains: the data say nothing
-ENOUGH = 0.5  # nats; a step that gains less ends a fit of the prescreening
+TRIAL_STEPS, MAX_TRIAL_STARTS = 4, 5  # steps of a trial fit; largest number of starts that are tried by trial fits
+UNINFORMED_SD_SHARE = 0.999  # share of the prior standard deviation that remains: the data say nothing
+MIN_STEP_GAIN = 0.5  # nats; a step that gains less ends a fit of the prescreening
 
 
 @dataclass(frozen=True)
-class Found:
+class PrescreenFit:
     """A candidate fitted to the cheap observations.
 
     ``gain`` in evidence less the logarithm of the number of sites [nats]. ``psi`` its parameters. ``values`` of
@@ -34,61 +34,70 @@ class Found:
     before: float
 
 
-def scout(case, fit, settings, families=None):
+def prescreen(case, fit, settings, families=None):
     """Fits at the best site of every family, or of these ``families``, that the cheap observations show on top of
     ``fit``.
 
     [] without cheap observations.
     """
-    cheap = case.cheap_part()
-    if cheap is None or (families is not None and not families):
+    cheap_case = case.cheap_case()
+    if cheap_case is None or (families is not None and not families):
         return []
-    held, n = fit.candidates, fit.psi.size
-    rough = cheap.roughened()
-    first = fit_jointly(rough, held, fit.psi, iterations=CHEAP_STEPS, done=ENOUGH)
-    base = fit_jointly(cheap, held, first.psi, first.values, iterations=CHEAP_STEPS, done=ENOUGH)
-    entries = _ranked(case, rough, first, held) + _ranked(case, cheap, base, held)
-    found, glances = [], {}
+    accepted, n_psi = fit.candidates, fit.psi.size
+    broad_case = cheap_case.with_broad_errors()
+    broad_fit = fit_jointly(broad_case, accepted, fit.psi, iterations=MAX_CHEAP_STEPS, min_gain=MIN_STEP_GAIN)
+    base = fit_jointly(
+        cheap_case, accepted, broad_fit.psi, broad_fit.values, iterations=MAX_CHEAP_STEPS, min_gain=MIN_STEP_GAIN
+    )
+    entries = _column_entries(case, broad_case, broad_fit, accepted) + _column_entries(case, cheap_case, base, accepted)
+    prescreened, trial_gains = [], {}
     for family, members in _by_family(entries).items():
         if families is not None and family not in families:
             continue
-        best = None
-        for candidate, start in _likeliest(members, rough, first, held, settings, glances):
-            hopeless = first.cost - 2.0 * settings.promise if candidate.always else np.inf
-            refit = _fitted(rough, cheap, (*held, candidate), np.concatenate([first.psi, start]), hopeless)
+        top = None
+        for candidate, start in _likeliest_starts(members, broad_case, broad_fit, accepted, settings, trial_gains):
+            max_cost = broad_fit.cost - 2.0 * settings.promise if candidate.prescreen_group else np.inf
+            refit = _fit_candidates(
+                broad_case, cheap_case, (*accepted, candidate), np.concatenate([broad_fit.psi, start]), max_cost
+            )
             if refit is None:
                 continue
-            gain = refit.evidence - base.evidence - np.log(candidate.scanned)
-            if best is None or gain > best.gain:
+            gain = refit.evidence - base.evidence - np.log(candidate.n_scanned)
+            if top is None or gain > top.gain:
                 levels = (max(f.level.values()) for f in (refit, base))
-                best = Found(gain, candidate, refit.psi[n:], _seen(cheap, refit, candidate), *levels)
-        if best is not None:
-            found.append(best)
-    return sorted(found, key=lambda f: -f.gain)
+                top = PrescreenFit(
+                    gain, candidate, refit.psi[n_psi:], _informed_values(cheap_case, refit, candidate), *levels
+                )
+        if top is not None:
+            prescreened.append(top)
+    return sorted(prescreened, key=lambda f: -f.gain)
 
 
-def _seen(case, fit, candidate):
+def _informed_values(case, fit, candidate):
     """Values of the nuisances that the cheap observations determine, and of the masking parameter.
 
     They do not determine the masking parameter beside the candidate. Its value in the base fit must not come on top.
     """
     sd = np.sqrt(np.diag(fit.covariance))
-    known = {n.name: s < BLIND * n.sd or n.name == candidate.twin for n, s in zip(case.nuisances, sd)}
-    return {name: fit.values[name] for name, seen in known.items() if seen}
+    is_informed = {
+        n.name: s < UNINFORMED_SD_SHARE * n.sd or n.name == candidate.masking_parameter
+        for n, s in zip(case.nuisances, sd)
+    }
+    return {name: fit.values[name] for name, informed in is_informed.items() if informed}
 
 
-def _ranked(case, cheap, fit, held):
+def _column_entries(case, cheap_case, fit, accepted):
     """(nats, candidate, start) by the columns of every candidate that shows in the cheap observations."""
-    projector, columns, found = Projector(cheap, fit), cheap.screen(fit), []
-    known = {c.key for c in held}
+    projector, columns, ranked = Projector(cheap_case, fit), cheap_case.screen(fit), []
+    accepted_keys = {c.key for c in accepted}
     for candidate in case.candidates:
         for k in range(len(candidate.starts)):
-            parts = columns.get((candidate.key, k))
-            if candidate.key in known or parts is None or not any(p.any() for p in parts):
+            changes = columns.get((candidate.key, k))
+            if candidate.key in accepted_keys or changes is None or not any(p.any() for p in changes):
                 continue
-            gain, share = projector.score(parts, candidate, k)
-            found.append((0.5 * gain, candidate, amplified(candidate, k, share)))
-    return found
+            gain, share = projector.score(changes, candidate, k)
+            ranked.append((0.5 * gain, candidate, scaled_start(candidate, k, share)))
+    return ranked
 
 
 def _by_family(entries):
@@ -98,54 +107,71 @@ def _by_family(entries):
     return families
 
 
-def _likeliest(members, rough, first, held, settings, glances):
+def _likeliest_starts(members, broad_case, broad_fit, accepted, settings, trial_gains):
     """The most promising sites of a family, each with its best start.
 
     Families that the base model absorbs (``prescreen_group``) are tried at every site by a few steps of the broad fit.
     Families of one group share these ``trial_gains``. A family of the whole track is tried from its
     ``MAX_TRIAL_STARTS`` most promising starts.
     """
-    best = {}
+    best_starts = {}
     for gain, candidate, start in sorted(members, key=lambda m: m[0]):
-        best[candidate.key] = gain, candidate, start
-    alike = next(iter(best.values()))[1].always
-    if alike and len(best) == 1:
+        best_starts[candidate.key] = gain, candidate, start
+    group = next(iter(best_starts.values()))[1].prescreen_group
+    if group and len(best_starts) == 1:
         starts = {tuple(start): (candidate, start) for _, candidate, start in sorted(members, key=lambda m: m[0])}
-        tried = list(starts.values())[-GLANCED:]
-        return [max(tried, key=lambda m: _glance(rough, first, held, *m)) if tried[1:] else tried[0]]
-    if alike:
-        for _, c, s in best.values() if len(best) > 1 else ():
-            place = alike, tuple(sorted(c.where.items()))
-            if place not in glances:
-                glances[place] = _glance(rough, first, held, c, s)
-        ranked = sorted(best.values(), key=lambda m: -glances.get((alike, tuple(sorted(m[1].where.items()))), 0.0))
+        trials = list(starts.values())[-MAX_TRIAL_STARTS:]
+        return [
+            max(trials, key=lambda m: _trial_gain(broad_case, broad_fit, accepted, *m)) if trials[1:] else trials[0]
+        ]
+    if group:
+        for _, c, s in best_starts.values() if len(best_starts) > 1 else ():
+            site = group, tuple(sorted(c.where.items()))
+            if site not in trial_gains:
+                trial_gains[site] = _trial_gain(broad_case, broad_fit, accepted, c, s)
+        ranked = sorted(
+            best_starts.values(), key=lambda m: -trial_gains.get((group, tuple(sorted(m[1].where.items()))), 0.0)
+        )
         return [(c, s) for _, c, s in ranked[: settings.scouted_places]]
-    ranked = sorted(best.values(), key=lambda m: -m[0])[: settings.scouted_places]
+    ranked = sorted(best_starts.values(), key=lambda m: -m[0])[: settings.scouted_places]
     return [(c, s) for gain, c, s in ranked if gain > settings.promise]
 
 
-def _glance(rough, first, held, candidate, start):
+def _trial_gain(broad_case, broad_fit, accepted, candidate, start):
     """Gain in half the cost after a few steps of the broad fit from the priors."""
-    psi = np.concatenate([first.psi, start])
+    psi = np.concatenate([broad_fit.psi, start])
     try:
-        fit = fit_jointly(rough, (*held, candidate), psi, {n.name: n.mean for n in rough.nuisances}, iterations=GLANCE)
+        fit = fit_jointly(
+            broad_case,
+            (*accepted, candidate),
+            psi,
+            {n.name: n.mean for n in broad_case.nuisances},
+            iterations=TRIAL_STEPS,
+        )
     except SimulationError:
         return -np.inf
-    return 0.5 * (first.cost - fit.cost)
+    return 0.5 * (broad_fit.cost - fit.cost)
 
 
-def _fitted(rough, cheap, candidates, psi, hopeless):
+def _fit_candidates(broad_case, cheap_case, candidates, psi, max_cost):
     """Fit from the priors with the broad errors, then with the actual ones.
 
     None if the simulation fails, or if the broad fit costs more than ``max_cost``, the limit for candidates that were
     tried without any promise.
     """
     try:
-        first = fit_jointly(
-            rough, candidates, psi, {n.name: n.mean for n in rough.nuisances}, iterations=CHEAP_STEPS, done=ENOUGH
+        broad_fit = fit_jointly(
+            broad_case,
+            candidates,
+            psi,
+            {n.name: n.mean for n in broad_case.nuisances},
+            iterations=MAX_CHEAP_STEPS,
+            min_gain=MIN_STEP_GAIN,
         )
-        if first.cost > hopeless:
+        if broad_fit.cost > max_cost:
             return None
-        return fit_jointly(cheap, candidates, first.psi, first.values, iterations=CHEAP_STEPS, done=ENOUGH)
+        return fit_jointly(
+            cheap_case, candidates, broad_fit.psi, broad_fit.values, iterations=MAX_CHEAP_STEPS, min_gain=MIN_STEP_GAIN
+        )
     except SimulationError:
         return None

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-LEVELS = 24  # largest number of pieces of the free law; each needs at least 20 samples
+MAX_PIECES = 24  # largest number of pieces of the free law; each needs at least 20 samples
 
 
 @dataclass(frozen=True)
-class Latent:
+class LatentForce:
     """Missing force as a free function of covariates.
 
     ``r2`` covariate -> share of the force's variance that a free law explains on held-out samples. ``curves`` covariate
@@ -20,7 +20,7 @@ class Latent:
     unit: str = "N"
 
     @property
-    def best(self):
+    def best_covariate(self):
         """Covariate that explains most, "" if none explains anything."""
         name = max(self.r2, key=self.r2.get, default="")
         return name if name and self.r2[name] > 0.0 else ""
@@ -34,7 +34,7 @@ def latent_law(force, covariates, unit="N", blocks=10):
 
     >>> x = np.sin(np.arange(4000) * 0.1)
     >>> law = latent_law(x**3, {"displacement": x, "time": np.arange(4000.0)})
-    >>> law.best, law.r2["displacement"] > 0.95, law.r2["time"] < 0.3
+    >>> law.best_covariate, law.r2["displacement"] > 0.95, law.r2["time"] < 0.3
     ('displacement', True, True)
     """
     force = np.asarray(force, dtype=float)
@@ -43,17 +43,17 @@ def latent_law(force, covariates, unit="N", blocks=10):
     for name, x in covariates.items():
         x = np.asarray(x, dtype=float)
         good = np.isfinite(x) & np.isfinite(force)
-        levels = int(min(LEVELS, np.unique(x[good]).size, good.sum() // 20))
+        levels = int(min(MAX_PIECES, np.unique(x[good]).size, good.sum() // 20))
         if levels < 2:
             continue
         edges = np.quantile(x[good], np.linspace(0.0, 1.0, levels + 1)[1:-1])
         code = np.searchsorted(edges, x[good], side="right")
-        r2[name] = _left_out(force[good], code, block[good], levels)
+        r2[name] = _left_out_r2(force[good], code, block[good], levels)
         curves[name] = _curve(force[good], x[good], code, levels)
-    return Latent(r2, curves, unit)
+    return LatentForce(r2, curves, unit)
 
 
-def _left_out(force, code, block, levels):
+def _left_out_r2(force, code, block, levels):
     """Share of the variance on held-out blocks. Sums by block make every held-out mean a subtraction."""
     n_block = int(block.max()) + 1
     flat = block * levels + code

@@ -17,11 +17,11 @@ import numpy as np
 from turnout.mismatch.engine.candidate_search import Projector
 
 AMPLITUDES = np.concatenate([[0.0], np.geomspace(0.03, 3e4, 21)])
-NOISE = np.geomspace(1.0, 100.0, 25)
+NOISE_FACTORS = np.geomspace(1.0, 100.0, 25)
 
 
 @dataclass(frozen=True)
-class Space:
+class ResidualSpace:
     """Columns on some observations, and the subspaces of them.
 
     ``names`` of the observations. ``columns`` (n, k) on them one behind the other, in the unit of the data.
@@ -30,20 +30,20 @@ class Space:
 
     names: tuple[str, ...]
     columns: np.ndarray
-    parts: dict
+    combinations: dict
 
 
 @dataclass(frozen=True)
-class Witness:
+class SpaceEvidence:
     """Evidence [nats] that the residual is fixed to ``level`` of ``frame``; ``by_space`` nats by name of the space."""
 
     frame: str
     level: object
     nats: float
-    by: dict = field(default_factory=dict)
+    by_space: dict = field(default_factory=dict)
 
 
-def evidence(gram, inner, square, n, floor):
+def subspace_evidence(gram, inner, square, n, floor):
     r"""Gain in log likelihood of a residual by a random effect in a subspace, at least 0. [nats]
 
     With eigenvalues λ of :math:`B^T B` scaled to mean 1 and u the residual along the eigenvectors,
@@ -62,68 +62,75 @@ def evidence(gram, inner, square, n, floor):
     square : float
         :math:`r^T r`, of ``n`` samples.
     """
-    power, turn = np.linalg.eigh(gram)
-    keep = power > 1e-9 * max(power[-1], 1e-300)
-    power = power[keep]
-    along = (turn[:, keep].T @ inner) ** 2 / power
-    rest, k = max(square - float(along.sum()), 0.0), power.size
-    power = power / power.mean()
-    noise = floor * NOISE
-    variance = noise[:, None, None] + AMPLITUDES[:, None] * power
-    inside = np.sum(np.log(variance) + along / variance, axis=2)
-    with_it = -0.5 * ((n - k) * np.log(noise) + rest / noise + inside.T)
-    return max(0.0, float(with_it.max() - with_it[0].max()))
+    eigenvalues, eigenvectors = np.linalg.eigh(gram)
+    keep = eigenvalues > 1e-9 * max(eigenvalues[-1], 1e-300)
+    eigenvalues = eigenvalues[keep]
+    squared_projections = (eigenvectors[:, keep].T @ inner) ** 2 / eigenvalues
+    outside, k = max(square - float(squared_projections.sum()), 0.0), eigenvalues.size
+    eigenvalues = eigenvalues / eigenvalues.mean()
+    noise = floor * NOISE_FACTORS
+    variance = noise[:, None, None] + AMPLITUDES[:, None] * eigenvalues
+    inside = np.sum(np.log(variance) + squared_projections / variance, axis=2)
+    log_likelihood = -0.5 * ((n - k) * np.log(noise) + outside / noise + inside.T)
+    return max(0.0, float(log_likelihood.max() - log_likelihood[0].max()))
 
 
-def weigh(case, fit, floor):
+def weigh_spaces(case, fit, floor):
     """Evidence for each level, largest first, for the residual of ``fit``.
 
     ``floor`` by data type is the mean square of intact recordings. Columns are whitened. The nuisances are projected
     out of them under their priors, as they are out of the residual.
     """
-    projector, where, first = Projector(case, fit), {}, 0
+    projector, offsets, n_samples = Projector(case, fit), {}, 0
     for k, o in enumerate(case.observations):
-        where[o.name] = k, first
-        first += o.data.size
-    found = {}
-    for space in case.spaces(fit):
-        members = [(case.observations[where[name][0]], *where[name]) for name in space.names]
-        columns = _projected(projector, space.columns, members)
+        offsets[o.name] = k, n_samples
+        n_samples += o.data.size
+    by_level = {}
+    for space in case.residual_spaces(fit):
+        members = [(case.observations[offsets[name][0]], *offsets[name]) for name in space.names]
+        columns = _project_out(projector, space.columns, members)
         residual = np.concatenate([np.asarray(fit.white[k]) for _, k, _ in members])
-        one = members[0][0]
-        for key, nats in _weighed(space, columns, residual, floor[one.kind]):
-            found.setdefault(key, {})[space.names[0]] = one.effective * nats
-    witnesses = [Witness(*key, sum(by.values()), by) for key, by in found.items()]
+        first_member = members[0][0]
+        for key, nats in _level_evidence(space, columns, residual, floor[first_member.data_type]):
+            by_level.setdefault(key, {})[space.names[0]] = first_member.effective * nats
+    witnesses = [SpaceEvidence(*key, sum(by_space.values()), by_space) for key, by_space in by_level.items()]
     return sorted(witnesses, key=lambda w: -w.nats)
 
 
-def _projected(projector, columns, members):
+def _project_out(projector, columns, members):
     """(n, k) columns whitened, less what the nuisances can imitate of them under their priors."""
     white, rows, first = [], [], 0
     for o, _, start in members:
-        white.append(o.whitened(columns[first : first + o.data.size]))
+        white.append(o.whiten(columns[first : first + o.data.size]))
         rows.append(projector.scaled[start : start + o.data.size])
         first += o.data.size
     white, rows = np.concatenate(white), np.concatenate(rows)
     return white - rows @ (projector.normal @ (rows.T @ white))
 
 
-def _weighed(space, columns, residual, floor):
+def _level_evidence(space, columns, residual, floor):
     gram, inner, square = columns.T @ columns, columns.T @ residual, float(residual @ residual)
-    for key, part in space.parts.items():
-        if part is None:
-            yield key, evidence(gram, inner, square, residual.size, floor)
+    for key, combination in space.combinations.items():
+        if combination is None:
+            yield key, subspace_evidence(gram, inner, square, residual.size, floor)
         else:
-            yield key, evidence(part.T @ gram @ part, part.T @ inner, square, residual.size, floor)
+            yield (
+                key,
+                subspace_evidence(
+                    combination.T @ gram @ combination, combination.T @ inner, square, residual.size, floor
+                ),
+            )
 
 
-HEARD = 6.0  # nats that impacts must add before a channel is blamed: its fault shows in impacts, too
-AS_GOOD = 6.0  # nats within which positions are not distinguished: odds of 400 to 1, less the errors of the model
-EXPLAINS = 0.25  # share of the excess from which a rejected candidate counts as evidence for its site
+MIN_HAMMER_EVIDENCE = 6.0  # nats that impacts must add before a channel is blamed: its fault shows in impacts, too
+POSITION_MARGIN = (
+    6.0  # nats within which positions are not distinguished: odds of 400 to 1, less the errors of the model
+)
+MIN_EXPLAINED_SHARE = 0.25  # share of the excess from which a rejected candidate counts as evidence for its site
 
 
 @dataclass(frozen=True)
-class Whereabouts:
+class Location:
     """Location of a residual.
 
     ``frame`` and ``level`` with the largest evidence ``nats``. ``place`` with its interval ``low`` to ``high`` [m],
@@ -141,13 +148,13 @@ class Whereabouts:
     sensor: str | None = None
     train: str | None = None
     axle: int | None = None
-    others: dict = field(default_factory=dict)
-    measured: tuple = (float("-inf"), float("inf"))
+    next_best: dict = field(default_factory=dict)
+    measured_range: tuple = (float("-inf"), float("inf"))
 
     def __str__(self):
-        if self.place is not None and not self.measured[0] <= self.place <= self.measured[1]:
-            before = self.place < self.measured[0]
-            end = self.measured[0] if before else self.measured[1]
+        if self.place is not None and not self.measured_range[0] <= self.place <= self.measured_range[1]:
+            before = self.place < self.measured_range[0]
+            end = self.measured_range[0] if before else self.measured_range[1]
             return f"{'before' if before else 'beyond'} {end:.1f} m, how far cannot be told"
         if self.place is not None:
             return f"at {self.place:.1f} m, between {self.low:.1f} and {self.high:.1f} m"
@@ -164,59 +171,63 @@ class Whereabouts:
         )
 
 
-def whereabouts(case, fit, refused=None, cause=""):
+def locate(case, fit, leader=None, cause=""):
     """Location of the residual of ``fit``. ``leader`` is the Score of the best candidate that got no name, or None.
 
     If recordings that were not fitted are the ``cause`` of the verdict, they give the location. None if the case has no
     residual spaces, or none of them exceeds the level of intact recordings.
     """
     if cause == "clock":
-        names = ", ".join(d.name for d in case.disturbed)
-        return Whereabouts("clock", names, max(d.louder for d in case.disturbed))
+        names = ", ".join(d.name for d in case.disturbed_recordings)
+        return Location("clock", names, max(d.excess for d in case.disturbed_recordings))
     if cause == "train":
-        return Whereabouts("train", case.foreign[0], 0.0, train=case.foreign[0])
-    floor = {o.kind: case.control_level.get(o.kind, 1.0) for o in case.observations}
-    witnesses = sorted(_alone(case, weigh(case, fit, floor)), key=lambda w: -w.nats)
-    heard = refused is not None and refused.explained >= EXPLAINS
-    if heard and (not witnesses or refused.gain > witnesses[0].nats):
-        return replace(_of_candidate(refused), measured=case.measured)
-    return replace(_of_witnesses(witnesses), measured=case.measured) if witnesses else None
+        return Location("train", case.mismatched_trains[0], 0.0, train=case.mismatched_trains[0])
+    floor = {o.data_type: case.control_level.get(o.data_type, 1.0) for o in case.observations}
+    witnesses = sorted(_credible_evidence(case, weigh_spaces(case, fit, floor)), key=lambda w: -w.nats)
+    is_credible = leader is not None and leader.explained >= MIN_EXPLAINED_SHARE
+    if is_credible and (not witnesses or leader.gain > witnesses[0].nats):
+        return replace(_location_of_candidate(leader), measured_range=case.measured_range)
+    return replace(_location_of_evidence(witnesses), measured_range=case.measured_range) if witnesses else None
 
 
-def _alone(case, witnesses):
+def _credible_evidence(case, witnesses):
     """Evidence that counts: of a wheel, less that of wheels of other trains, which belongs to the rail; of a channel,
     only if impacts, if any, support it.
     """
-    blows = {o.name for o in case.observations if case.cheap(o)}
+    hammer_names = {o.name for o in case.observations if case.is_cheap(o)}
     for w in witnesses:
         nats = w.nats
         if w.frame == "wheel":
             nats -= max((v.nats for v in witnesses if v.frame == "wheel" and v.level[0] != w.level[0]), default=0.0)
-        if w.frame == "sensor" and blows and sum(w.by.get(name, 0.0) for name in blows) < HEARD:
+        if (
+            w.frame == "sensor"
+            and hammer_names
+            and sum(w.by_space.get(name, 0.0) for name in hammer_names) < MIN_HAMMER_EVIDENCE
+        ):
             continue
         if nats > 0.0:
             yield replace(w, nats=nats)
 
 
-def _of_candidate(score):
+def _location_of_candidate(score):
     where = score.candidate.where
-    place = where.get("place")
-    return Whereabouts(
-        score.candidate.frame, score.candidate.key, score.gain, place, place, place, where.get("sensor"),
+    position = where.get("place")
+    return Location(
+        score.candidate.frame, score.candidate.key, score.gain, position, position, position, where.get("sensor"),
         where.get("train"), where.get("axle"),
     )  # fmt: skip
 
 
-def _of_witnesses(witnesses):
-    best, others = witnesses[0], {}
+def _location_of_evidence(witnesses):
+    strongest, by_frame = witnesses[0], {}
     for w in witnesses:
-        others.setdefault(w.frame, w.nats)
-    told = {"others": {k: round(v, 1) for k, v in others.items() if k != best.frame}}
-    if best.frame == "place":
-        near = [w.level for w in witnesses if w.frame == "place" and best.nats - w.nats < AS_GOOD]
-        told |= {"place": best.level, "low": min(near), "high": max(near)}
-    elif best.frame == "wheel":
-        told |= {"train": best.level[0], "axle": best.level[1]}
-    elif best.frame in ("sensor", "train"):
-        told[best.frame] = best.level
-    return Whereabouts(best.frame, best.level, best.nats, **told)
+        by_frame.setdefault(w.frame, w.nats)
+    fields = {"next_best": {k: round(v, 1) for k, v in by_frame.items() if k != strongest.frame}}
+    if strongest.frame == "place":
+        positions = [w.level for w in witnesses if w.frame == "place" and strongest.nats - w.nats < POSITION_MARGIN]
+        fields |= {"place": strongest.level, "low": min(positions), "high": max(positions)}
+    elif strongest.frame == "wheel":
+        fields |= {"train": strongest.level[0], "axle": strongest.level[1]}
+    elif strongest.frame in ("sensor", "train"):
+        fields[strongest.frame] = strongest.level
+    return Location(strongest.frame, strongest.level, strongest.nats, **fields)

@@ -3,11 +3,11 @@
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.engine.map_fit import Joint
+from turnout.mismatch.engine.map_fit import JointProblem
 
-FITTED_STEPS = 8  # Gauss-Newton steps of a reserved recording's own nuisances
-SETTLED = 1.0  # decrease of minus twice the log posterior; a step that gains less is the last
-BLOCKS = 25  # stretches of a recording over which scatter is estimated
+MAX_STEPS = 8  # Gauss-Newton steps of a reserved recording's own nuisances
+MIN_COST_DECREASE = 1.0  # decrease of minus twice the log posterior; a step that gains less is the last
+N_BLOCKS = 25  # stretches of a recording over which scatter is estimated
 
 
 def fit_percent(observations, predictions, centre=True):
@@ -20,19 +20,19 @@ def fit_percent(observations, predictions, centre=True):
     """
     missed = total = 0.0
     for o, p in zip(observations, predictions):
-        middle = float(np.mean(o.data)) if centre else 0.0
+        mean = float(np.mean(o.data)) if centre else 0.0
         missed += o.effective * float(np.sum(((o.data - p) / o.sigma) ** 2))
-        total += o.effective * float(np.sum(((o.data - middle) / o.sigma) ** 2))
+        total += o.effective * float(np.sum(((o.data - mean) / o.sigma) ** 2))
     return round(100.0 * (1.0 - float(np.sqrt(missed / total))), 4)
 
 
-def fit_of_reserved(case, fit):
+def reserved_fit(case, fit):
     """(predictions of the reserved recordings, fit [%]) by a fitted model. (None, None) if the simulation fails."""
     try:
-        found = predict_reserved(case, fit, case.reserved)
+        predictions = predict_reserved(case, fit, case.reserved)
     except SimulationError:
         return None, None
-    return found, fit_percent(case.reserved, found)
+    return predictions, fit_percent(case.reserved, predictions)
 
 
 def gain_error(observations, before, after):
@@ -42,34 +42,37 @@ def gain_error(observations, before, after):
     gain :math:`d_i` of all stretches but one, :math:`\sqrt{(m - 1) / m \sum (d_i - \bar d)^2}`. Both fits lack the same
     roughness, and so do all sensors under one train. The gain is therefore more certain than either fit.
     """
-    sums = np.array([_squares(o, b, a) for o, b, a in zip(observations, before, after)]).transpose(1, 0, 2)
+    sums = np.array([_block_squares(o, b, a) for o, b, a in zip(observations, before, after)]).transpose(1, 0, 2)
     missed_before, missed_after, total = (np.sum(s) - s.ravel() for s in sums)
     gain = 100.0 * (np.sqrt(missed_before / total) - np.sqrt(missed_after / total))
     return float(np.sqrt((gain.size - 1) * np.var(gain)))
 
 
-def _squares(o, before, after):
+def _block_squares(o, before, after):
     """(3, N_BLOCKS) weighted sums of squares of the residuals ``before`` and ``after``, and of the recording."""
-    parts = (o.data - before, o.data - after, o.data - np.mean(o.data))
-    return [_stretches(o, (p / o.sigma) ** 2) for p in parts]
+    residuals = (o.data - before, o.data - after, o.data - np.mean(o.data))
+    return [_block_sums(o, (p / o.sigma) ** 2) for p in residuals]
 
 
-def _stretches(o, squares):
+def _block_sums(o, squares):
     """(N_BLOCKS,) sums of ``squares`` (n,) over stretches of the observation, each in all of its rows."""
-    together = squares.reshape(o.rows, -1).sum(axis=0)
-    return [o.effective * float(np.sum(b)) for b in np.array_split(together, BLOCKS)]
+    per_sample = squares.reshape(o.rows, -1).sum(axis=0)
+    return [o.effective * float(np.sum(b)) for b in np.array_split(per_sample, N_BLOCKS)]
 
 
-def falls(observations, before, after, points):
+def is_significantly_worse(observations, before, after, points):
     """Whether ``after`` fits worse than ``before`` by more than ``points`` of fit and than two standard errors.
 
     The standard error is that of the difference of weighted squares over ``N_BLOCKS`` stretches of each observation,
     each in all of its rows. One in six names that say nothing about these observations reaches one standard error.
     """
-    lost = (((o.data - a) ** 2 - (o.data - b) ** 2) / o.sigma**2 for o, b, a in zip(observations, before, after))
-    parts = [part for o, d in zip(observations, lost) for part in _stretches(o, d)]
-    error = np.std(parts, ddof=1) * np.sqrt(len(parts))
-    return sum(parts) > 2.0 * error and fit_percent(observations, after) < fit_percent(observations, before) - points
+    losses = (((o.data - a) ** 2 - (o.data - b) ** 2) / o.sigma**2 for o, b, a in zip(observations, before, after))
+    block_losses = [block_loss for o, d in zip(observations, losses) for block_loss in _block_sums(o, d)]
+    error = np.std(block_losses, ddof=1) * np.sqrt(len(block_losses))
+    return (
+        sum(block_losses) > 2.0 * error
+        and fit_percent(observations, after) < fit_percent(observations, before) - points
+    )
 
 
 def predict_reserved(case, fit, observations):
@@ -78,78 +81,78 @@ def predict_reserved(case, fit, observations):
     Any model gets the same freedom (speed, time and load of a passage), so that models stay comparable. SimulationError
     if the model cannot be simulated there.
     """
-    joint = Joint(case, fit.candidates, observations)
+    joint = JointProblem(case, fit.candidates, observations)
     theta = np.concatenate([[fit.values[n.name] for n in case.nuisances], fit.psi])
     owners = {o.name for o in observations}
-    own = np.array([n.owner in owners for n in case.nuisances] + [False] * fit.psi.size, dtype=bool)
+    is_owned = np.array([n.owner in owners for n in case.nuisances] + [False] * fit.psi.size, dtype=bool)
     predictions = joint.predict(theta)
-    if not own.any():
+    if not is_owned.any():
         return predictions
     residuals = joint.residuals(predictions)
     cost = joint.cost(theta, residuals)
-    for _ in range(FITTED_STEPS):
-        step = _own_step(case, joint, theta, fit.terms, predictions, residuals, own)
-        tried = (_moved(joint, theta, own, 0.5**h * step) for h in range(3))
-        found = next((f for f in tried if f is not None and f[3] < cost), None)
-        if found is None:
+    for _ in range(MAX_STEPS):
+        step = _owned_step(case, joint, theta, fit.terms, predictions, residuals, is_owned)
+        trials = (_try_step(joint, theta, is_owned, 0.5**h * step) for h in range(3))
+        improvement = next((f for f in trials if f is not None and f[3] < cost), None)
+        if improvement is None:
             break
-        gain = cost - found[3]
-        theta, predictions, residuals, cost = found
-        if gain < SETTLED:
+        gain = cost - improvement[3]
+        theta, predictions, residuals, cost = improvement
+        if gain < MIN_COST_DECREASE:
             break
     return predictions
 
 
-def _own_step(case, joint, theta, terms, predictions, residuals, own):
+def _owned_step(case, joint, theta, terms, predictions, residuals, is_owned):
     """Gauss-Newton step of the nuisances that the observations own, at most one prior standard deviation each."""
-    white = _own_columns(case, joint, theta, terms, predictions, own)
-    scale = {kind: max(1.0, v) for kind, v in joint.level(residuals).items()}
-    rows, right = joint.stacked(white, residuals, scale)
-    scaled = rows * joint.sd[own]
-    pull = (joint.mean[own] - theta[own]) / joint.sd[own]
-    step = np.linalg.solve(scaled.T @ scaled + np.eye(int(own.sum())), scaled.T @ right + pull)
-    return joint.sd[own] * np.clip(step, -1.0, 1.0)
+    white = _owned_columns(case, joint, theta, terms, predictions, is_owned)
+    scale = {data_type: max(1.0, v) for data_type, v in joint.level(residuals).items()}
+    rows, right = joint.stack(white, residuals, scale)
+    scaled = rows * joint.sd[is_owned]
+    pull = (joint.mean[is_owned] - theta[is_owned]) / joint.sd[is_owned]
+    step = np.linalg.solve(scaled.T @ scaled + np.eye(int(is_owned.sum())), scaled.T @ right + pull)
+    return joint.sd[is_owned] * np.clip(step, -1.0, 1.0)
 
 
-def _moved(joint, theta, own, step):
-    tried = theta.copy()
-    tried[own] += step
-    predictions = joint.tried(tried)
+def _try_step(joint, theta, is_owned, step):
+    trial = theta.copy()
+    trial[is_owned] += step
+    predictions = joint.predict_or_none(trial)
     if predictions is None:
         return None
     residuals = joint.residuals(predictions)
-    return tried, predictions, residuals, joint.cost(tried, residuals)
+    return trial, predictions, residuals, joint.cost(trial, residuals)
 
 
-def _own_columns(case, joint, theta, terms, predictions, own):
+def _owned_columns(case, joint, theta, terms, predictions, is_owned):
     """Whitened derivatives by the owned nuisances, for each observation by its own alone."""
-    values, found = joint.split(theta)[0], []
-    owned = [n for n, mine in zip(case.nuisances, own) if mine]
+    values, jacobians = joint.split(theta)[0], []
+    owned = [n for n, selected in zip(case.nuisances, is_owned) if selected]
     for o, p in zip(joint.observations, predictions):
         columns = np.zeros((o.data.size, len(owned)))
-        mine = [k for k, n in enumerate(owned) if n.owner == o.name]
-        if mine:
-            columns[:, mine] = case.own_jacobian(values, terms, o, p, [owned[k].name for k in mine])
-        found.append(o.whitened(columns))
-    return found
+        selected = [k for k, n in enumerate(owned) if n.owner == o.name]
+        if selected:
+            columns[:, selected] = case.own_jacobian(values, terms, o, p, [owned[k].name for k in selected])
+        jacobians.append(o.whiten(columns))
+    return jacobians
 
 
-def decoy(observations, predictions, reserved, reserved_predictions, n):
+def predict_with_decoy(observations, predictions, reserved, reserved_predictions, n):
     """Predictions of ``reserved`` by the base model and a filter of ``n`` free taps behind it.
 
     The taps (on the prediction delayed and advanced) are fitted to the ``observations`` of the reserved data types.
     They show what any n free numbers gain.
     """
-    kinds = {o.kind for o in reserved}
-    seen = [(o, p, np.sqrt(o.effective) / o.sigma) for o, p in zip(observations, predictions) if o.kind in kinds]
-    if not seen:
+    kinds = {o.data_type for o in reserved}
+    fitted = [(o, p, np.sqrt(o.effective) / o.sigma) for o, p in zip(observations, predictions) if o.data_type in kinds]
+    if not fitted:
         return list(reserved_predictions)
 
     def columns(p):
         shifts = [s for k in range(1, n + 1) for s in (k, -k)][:n]
         return np.column_stack([np.roll(p, s) for s in shifts])
 
-    rows = np.concatenate([columns(p) * weight[:, None] for _, p, weight in seen])
-    right = np.concatenate([(o.data - p) * weight for o, p, weight in seen])
-    taps = np.linalg.lstsq(rows, right, rcond=None)[0]
+    rows = np.concatenate([columns(p) * weight[:, None] for _, p, weight in fitted])
+    target = np.concatenate([(o.data - p) * weight for o, p, weight in fitted])
+    taps = np.linalg.lstsq(rows, target, rcond=None)[0]
     return [p + columns(p) @ taps for p in reserved_predictions]

@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import t as student
 
-FEWEST_CELLS = 8  # cells of a frame; fewer are not tested
-FEWEST = 3  # levels; of two none can be called the exception
-THIN = 0.5  # share of the median number of cells; the mean of a level with fewer scatters too much
+MIN_CELLS = 8  # cells of a frame; fewer are not tested
+MIN_LEVELS = 3  # levels; of two none can be called the exception
+MIN_CELL_SHARE = 0.5  # share of the median number of cells; the mean of a level with fewer scatters too much
 
 
 @dataclass(frozen=True)
-class Frame:
+class Attribution:
     """Residual energy of one frame.
 
     ``level`` stands out by ``effect`` [dB] over the others. ``p`` by Grubbs' test, ``q`` after Benjamini and Hochberg
@@ -40,7 +40,7 @@ def cell_energies(observations, residuals):
             continue
         inside = o.cells >= 0
         count = np.bincount(o.cells[inside])
-        total = np.bincount(o.cells[inside], (o.whitened(r) ** 2)[inside])
+        total = np.bincount(o.cells[inside], (o.whiten(r) ** 2)[inside])
         good = np.flatnonzero(count > 0)
         energy.append(np.log(np.maximum(total[good] / count[good], 1e-6)))
         for name in names:
@@ -78,40 +78,40 @@ def attribute(energy, labels):
     ----------
     Grubbs 1950, Sample criteria for testing outlying observations.
     """
-    energy, found = np.asarray(energy, dtype=float), []
+    energy, attributions = np.asarray(energy, dtype=float), []
     codes = {name: np.unique(values.astype(str), return_inverse=True)[1] for name, values in labels.items()}
     for name, values in labels.items():
         keep = np.array([level is not None for level in values], dtype=bool)
         _, first, code = np.unique(values[keep].astype(str), return_index=True, return_inverse=True)
-        if first.size < 2 or keep.sum() < FEWEST_CELLS:
+        if first.size < 2 or keep.sum() < MIN_CELLS:
             continue
-        e = _without_others(energy[keep], name, {k: c[keep] for k, c in codes.items()})
+        e = _without_other_frames(energy[keep], name, {k: c[keep] for k, c in codes.items()})
         count = np.bincount(code)
         mean = np.bincount(code, e) / count
-        seen = np.flatnonzero(count >= THIN * np.median(count))
-        top = seen[int(np.argmax(mean[seen]))]
+        comparable = np.flatnonzero(count >= MIN_CELL_SHARE * np.median(count))
+        top = comparable[int(np.argmax(mean[comparable]))]
         share = float(np.sum(count * (mean - e.mean()) ** 2) / max(np.sum((e - e.mean()) ** 2), 1e-12))
         effect = 10.0 / np.log(10.0) * (mean[top] - e[code != top].mean())
-        p = outlying(mean[seen])
-        found.append(Frame(name, values[keep][first[top]], float(effect), share, p, 1.0, int(keep.sum())))
-    corrected = benjamini_hochberg([f.p for f in found])
-    return sorted((replace(f, q=q) for f, q in zip(found, corrected)), key=lambda f: (f.q, -f.share))
+        p = outlier_p_value(mean[comparable])
+        attributions.append(Attribution(name, values[keep][first[top]], float(effect), share, p, 1.0, int(keep.sum())))
+    corrected = benjamini_hochberg([f.p for f in attributions])
+    return sorted((replace(f, q=q) for f, q in zip(attributions, corrected)), key=lambda f: (f.q, -f.share))
 
 
-def outlying(means):
+def outlier_p_value(means):
     """Probability that the largest of ``means`` (n,) stands out as much, or more, if all are alike.
 
-    >>> round(outlying(np.array([0.0, 0.1, -0.1, 3.0])), 3), outlying(np.array([0.0, 3.0]))
+    >>> round(outlier_p_value(np.array([0.0, 0.1, -0.1, 3.0])), 3), outlier_p_value(np.array([0.0, 3.0]))
     (0.003, 1.0)
     """
-    if means.size < FEWEST:
+    if means.size < MIN_LEVELS:
         return 1.0
-    rest = np.delete(means, int(np.argmax(means)))
-    spread = max(float(np.std(rest, ddof=1)), 1e-12) * np.sqrt(1.0 + 1.0 / rest.size)
-    return min(1.0, means.size * float(student.sf((means.max() - rest.mean()) / spread, rest.size - 1)))
+    remaining = np.delete(means, int(np.argmax(means)))
+    spread = max(float(np.std(remaining, ddof=1)), 1e-12) * np.sqrt(1.0 + 1.0 / remaining.size)
+    return min(1.0, means.size * float(student.sf((means.max() - remaining.mean()) / spread, remaining.size - 1)))
 
 
-def _without_others(e, name, codes):
+def _without_other_frames(e, name, codes):
     """Log energy less the level means of all other frames, in two sweeps.
 
     A frame is skipped if each of its levels lies within one level of this frame, as axles within trains: it would
@@ -119,15 +119,15 @@ def _without_others(e, name, codes):
     """
     e = e - e.mean()
     for _ in range(2):
-        for other, code in codes.items():
-            if other == name or _nested(code, codes[name]) or np.unique(code).size >= e.size // 2:
+        for other_name, code in codes.items():
+            if other_name == name or _is_nested(code, codes[name]) or np.unique(code).size >= e.size // 2:
                 continue
             count = np.bincount(code)
             e = e - (np.bincount(code, e) / np.maximum(count, 1))[code]
     return e
 
 
-def _nested(inner, outer):
+def _is_nested(inner, outer):
     pairs = np.unique(inner.astype(np.int64) * (outer.max() + 1) + outer)
     return pairs.size == np.unique(inner).size
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 # Standard error as a share of a size above which only a lower limit is known: 95 % reach beyond twice the size.
-NO_UPPER_END = 0.5
+MAX_BOUNDED_ERROR = 0.5
 
 
 @dataclass(frozen=True)
@@ -21,19 +21,19 @@ class Score:
 
     candidate: object
     gain: float
-    worst: float
+    worst_gain: float
     explained: float
     fit: object
     by_condition: dict = field(default_factory=dict)
-    usual: bool = False
-    alone: str = ""
-    apart: float = 0.0
+    is_ordinary: bool = False
+    single_witness: str = ""
+    unmasked_gain: float = 0.0
 
     @property
-    def own(self):
+    def estimates(self):
         """(values, standard errors) of its parameters; the first is the size of the effect."""
-        mine = self.fit.part(self.candidate)
-        return self.fit.psi[mine], self.fit.psi_se[mine]
+        psi_slice = self.fit.part(self.candidate)
+        return self.fit.psi[psi_slice], self.fit.psi_se[psi_slice]
 
     @property
     def family(self):
@@ -41,51 +41,57 @@ class Score:
         return self.candidate.family
 
     @property
-    def material(self):
+    def is_reportable(self):
         """Whether it is so large that somebody would act."""
-        if self.usual:
+        if self.is_ordinary:
             return False
-        known, sized = self.candidate.parameters, self.candidate.sized
-        size = np.linalg.norm(self.own[0][:sized] - self.candidate.neutral[:sized]) if known else np.inf
-        open_by = self.candidate.sure * float(self.own[1][0]) if self.candidate.sure else 0.0
-        return size - open_by >= self.candidate.least
+        parameters, n_size = self.candidate.parameters, self.candidate.n_size_parameters
+        size = np.linalg.norm(self.estimates[0][:n_size] - self.candidate.neutral[:n_size]) if parameters else np.inf
+        uncertainty = (
+            self.candidate.min_significance * float(self.estimates[1][0]) if self.candidate.min_significance else 0.0
+        )
+        return size - uncertainty >= self.candidate.smallest_reportable
 
-    def told_elsewhere(self, settings):
+    def exemption_reason(self, settings):
         """Reason, in words, why the residual of the fit does not count against it, "" if there is none.
 
         Either external evidence alone is enough, and the fit becomes worse by no more than a margin. Or conditions
         support it in which no earlier effect shows, whose shape may be the residual elsewhere.
         """
-        places = np.log(self.candidate.scanned)
-        told = self.candidate.aside - places
-        if self.candidate.sounding and told > settings.threshold and self.gain > told - settings.margin:
+        position_cost = np.log(self.candidate.n_scanned)
+        evidence = self.candidate.external_evidence - position_cost
+        if (
+            self.candidate.evidence_suffices
+            and evidence > settings.threshold
+            and self.gain > evidence - settings.margin
+        ):
             return "known by its blows"
-        apart = self.apart - places > settings.threshold
-        return "seen where the effect named before does not show" if apart else ""
+        is_unmasked = self.unmasked_gain - position_cost > settings.threshold
+        return "seen where the effect named before does not show" if is_unmasked else ""
 
-    def faint(self, excess, settings):
+    def explains_too_little(self, excess, settings):
         """Whether it explains too little of an ``excess`` over controls to be its cause."""
         return excess > 1.0 and self.explained < settings.explained
 
     @property
-    def is_open(self):
+    def is_unbounded(self):
         """Whether only a lower limit of its size is known, and beyond it is its ``unbounded_form``."""
-        if not self.candidate.open_as:
+        if not self.candidate.unbounded_form:
             return False
-        sizes, errors = self.own
-        return bool(errors[0] > NO_UPPER_END * abs(sizes[0] - self.candidate.neutral[0]))
+        sizes, errors = self.estimates
+        return bool(errors[0] > MAX_BOUNDED_ERROR * abs(sizes[0] - self.candidate.neutral[0]))
 
-    def is_limit_of(self, other):
+    def is_limit_of(self, rival):
         """Whether ``rival`` at the same site is at its bound, within a standard error, where it looks like this one."""
-        if getattr(other.candidate, "limit", "") != self.family or other.candidate.where != self.candidate.where:
+        if getattr(rival.candidate, "limit_form", "") != self.family or rival.candidate.where != self.candidate.where:
             return False
-        sizes, errors = other.own
-        return float(sizes[0] - errors[0]) <= other.candidate.parameters[0].bounds[0]
+        sizes, errors = rival.estimates
+        return float(sizes[0] - errors[0]) <= rival.candidate.parameters[0].bounds[0]
 
-    def is_plain_form_of(self, other):
+    def is_simpler_form_of(self, rival):
         """Whether ``rival`` at the same site is the same effect with one more parameter: the sizes agree."""
-        family, k = other.candidate.plain or ("", 0)
-        if family != self.family or other.candidate.where != self.candidate.where:
+        family, k = rival.candidate.simpler_form or ("", 0)
+        if family != self.family or rival.candidate.where != self.candidate.where:
             return False
-        (mine, error), (others, errors) = self.own, other.own
-        return abs(mine[0] - others[k]) <= 2.0 * np.hypot(error[0], errors[k])
+        (own_sizes, error), (rival_sizes, errors) = self.estimates, rival.estimates
+        return abs(own_sizes[0] - rival_sizes[k]) <= 2.0 * np.hypot(error[0], errors[k])

@@ -12,7 +12,7 @@ LOAD_SD = 0.05  # standard deviation of the sprung mass, as a share, where its l
 
 
 @dataclass(frozen=True)
-class HammerTest:
+class HammerInput:
     """A hammer test at the position ``place`` [m].
 
     ``force`` names the channel of the hammer; every channel of acceleration is a response. ``conditions`` hold values
@@ -26,11 +26,11 @@ class HammerTest:
     force: str = "hammer"
     visit: str = ""
     conditions: Mapping = field(default_factory=dict)
-    judged: ReceptanceSettings | None = None
+    impact_settings: ReceptanceSettings | None = None
 
 
 @dataclass(frozen=True)
-class Passage:
+class PassageInput:
     """One train passage.
 
     ``vehicle`` is a model of ``turnout.simulate``, ``speed`` [m/s] the recorded speed, ``train`` its type or number.
@@ -49,7 +49,7 @@ class Passage:
 
 
 @dataclass(frozen=True)
-class Campaign:
+class CampaignInput:
     """``turnout`` is a TurnoutTrack; ``sensors`` have names, positions and mountings.
 
     ``reserved`` names the tests and passages that no fit reads. They may confirm a named effect or withdraw it.
@@ -57,8 +57,8 @@ class Campaign:
 
     turnout: object
     sensors: tuple[Sensor, ...]
-    hammer: tuple[HammerTest, ...] = ()
-    passages: tuple[Passage, ...] = ()
+    hammer: tuple[HammerInput, ...] = ()
+    passages: tuple[PassageInput, ...] = ()
     reserved: tuple[str, ...] = ()
 
     def __post_init__(self):
@@ -72,8 +72,10 @@ class Campaign:
         for p in self.passages:
             n = len(p.vehicle.wheels)
             if p.train and lengths.setdefault(p.train, n) != n:
-                said = f"train {p.train!r} has {lengths[p.train]} and {n} wheels"
-                raise SimulationError(f"{said}: wheels are counted from the front, give each length a name of its own.")
+                message = f"train {p.train!r} has {lengths[p.train]} and {n} wheels"
+                raise SimulationError(
+                    f"{message}: wheels are counted from the front, give each length a name of its own."
+                )
         for name in self.reserved:
             if name not in names:
                 raise SimulationError(f"reserved {name!r} is no recording; there are {', '.join(names)}.")
@@ -83,6 +85,6 @@ class Campaign:
         names = {c.name for c in passage.recording.channels}
         return tuple(s for s in self.sensors if s.name in names)
 
-    def places(self):
+    def positions(self):
         """Positions of sensors and impacts [m]."""
         return [s.place for s in self.sensors] + [t.place for t in self.hammer]

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import binom, f
 
-AWAY = 12.0  # m from a wheel to the nearest sensor: vibration of the train has decayed there
-CAR = 26.0  # m, length of a car
-SHORTEST = 0.15  # s, shortest segment that is tested
+MIN_WHEEL_DISTANCE = 12.0  # m from a wheel to the nearest sensor: vibration of the train has decayed there
+CAR_LENGTH = 26.0  # m, length of a car
+MIN_QUIET_TIME = 0.15  # s, shortest segment that is tested
 BAND = (5.0, 100.0)  # Hz, of the level
-LOUDER = 3.0  # dB over the other passages; undisturbed ones differ by 1 dB
-CORRELATED = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0)  # variance factor of correlated lines of a Hann window
-DISTURBED = 1e-4  # probability by chance, over all segments
+MIN_EXCESS = 3.0  # dB over the other passages; undisturbed ones differ by 1 dB
+HANN_CORRELATION = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0)  # variance factor of correlated lines of a Hann window
+MAX_CHANCE = 1e-4  # probability by chance, over all segments
 
 
 @dataclass(frozen=True)
@@ -28,55 +28,58 @@ class Disturbance:
 
     name: str
     when: str
-    louder: float
+    excess: float
     p: float
 
 
-def disturbances(rollings, strange=None):
+def disturbances(passages, unmatched=None):
     """Disturbance of every passage in which another source shook the sensors; ``passages`` by name.
 
     ``unmatched`` passages do not match their vehicle file, maybe for that reason. Their trains may be longer by a car.
     """
-    found, segments = [], {"before": {}, "after": {}}
-    for made in (*rollings.values(), *(strange or {}).values()):
-        for when, (start, stop) in _quiet(made).items():
-            if when == "after" and made.name in (strange or {}):
-                start += CAR / made.speed
-            if stop - start >= SHORTEST:
-                segments[when][made.name] = _level(made, start, stop)
-    looked_at = sum(len(s) for s in segments.values() if len(s) > 2)
+    events, segments = [], {"before": {}, "after": {}}
+    for aligned in (*passages.values(), *(unmatched or {}).values()):
+        for when, (start, stop) in _quiet_segments(aligned).items():
+            if when == "after" and aligned.name in (unmatched or {}):
+                start += CAR_LENGTH / aligned.speed
+            if stop - start >= MIN_QUIET_TIME:
+                segments[when][aligned.name] = _level(aligned, start, stop)
+    n_segments = sum(len(s) for s in segments.values() if len(s) > 2)
     for when, levels in segments.items():
         for name in levels if len(levels) > 2 else ():
-            louder, p = louder_than(*_comparable(levels, name))
-            if louder > LOUDER and p * looked_at < DISTURBED:
-                found.append(Disturbance(name, when, louder, min(1.0, p * looked_at)))
-    return found
+            excess, p = excess_over(*_shared_levels(levels, name))
+            if excess > MIN_EXCESS and p * n_segments < MAX_CHANCE:
+                events.append(Disturbance(name, when, excess, min(1.0, p * n_segments)))
+    return events
 
 
-def _quiet(made):
+def _quiet_segments(aligned):
     """(start, stop) of the segments with every wheel far from every sensor [s]."""
-    train = np.ptp([s.place for s in made.sensors]) + made.passage.vehicle.wheel_places[-1]
-    away = AWAY / made.speed
-    end = made.passage.recording.duration
-    return {"before": (0.02, made.reference - away), "after": (made.reference + train / made.speed + away, end - 0.02)}
+    train = np.ptp([s.place for s in aligned.sensors]) + aligned.passage.vehicle.wheel_positions[-1]
+    clear_time = MIN_WHEEL_DISTANCE / aligned.speed
+    end = aligned.passage.recording.duration
+    return {
+        "before": (0.02, aligned.reference - clear_time),
+        "after": (aligned.reference + train / aligned.speed + clear_time, end - 0.02),
+    }
 
 
-def _comparable(levels, name):
+def _shared_levels(levels, name):
     """Level of a passage and those of the others, for the sensors that it shares; nan where another lacks one."""
-    own, freedom = levels[name]
-    rest = [level for other, level in levels.items() if other != name]
-    sensors = [s for s in own if any(s in power for power, _ in rest)]
-    others = [(np.array([power.get(s, np.nan) for s in sensors]), n) for power, n in rest]
-    return (np.array([own[s] for s in sensors]), freedom), others
+    own_levels, freedom = levels[name]
+    remaining = [level for passage, level in levels.items() if passage != name]
+    sensors = [s for s in own_levels if any(s in power for power, _ in remaining)]
+    reference = [(np.array([power.get(s, np.nan) for s in sensors]), n) for power, n in remaining]
+    return (np.array([own_levels[s] for s in sensors]), freedom), reference
 
 
-def _level(made, start, stop):
+def _level(aligned, start, stop):
     """Mean square in the band by sensor, and its degrees of freedom."""
-    recording = made.passage.recording
-    rows = [recording.index(s.name) for s in made.sensors]
+    recording = aligned.passage.recording
+    rows = [recording.index(s.name) for s in aligned.sensors]
     first, last = int(start * recording.rate), int(stop * recording.rate)
     level, freedom = band_level(recording.samples[rows][:, first:last], recording.rate)
-    return {s.name: float(v) for s, v in zip(made.sensors, level)}, freedom
+    return {s.name: float(v) for s, v in zip(aligned.sensors, level)}, freedom
 
 
 def band_level(samples, rate):
@@ -91,10 +94,10 @@ def band_level(samples, rate):
     grid = np.fft.rfftfreq(n, 1.0 / rate)
     inside = (grid >= BAND[0]) & (grid <= BAND[1])
     level = np.mean(np.abs(spectrum[:, inside]) ** 2, axis=1) / np.sum(window**2)
-    return level, 2.0 * inside.sum() / CORRELATED
+    return level, 2.0 * inside.sum() / HANN_CORRELATION
 
 
-def louder_than(level, others):
+def excess_over(level, reference):
     """(dB, probability) of the excess of a segment over others.
 
     The excess is the lower median over the sensors of the ratio to the median of the others. The probability is
@@ -103,9 +106,9 @@ def louder_than(level, others):
     power, freedom = level
     if power.size < 2:  # one channel alone may be noisy
         return 0.0, 1.0
-    usual = np.nanmedian([p for p, _ in others], axis=0)
+    usual = np.nanmedian([p for p, _ in reference], axis=0)
     ratio = np.sort(power / np.maximum(usual, 1e-300))
     rank = (ratio.size - 1) // 2
     middle = float(ratio[rank])
-    tail = float(f.sf(middle, freedom, np.median([n for _, n in others])))
+    tail = float(f.sf(middle, freedom, np.median([n for _, n in reference])))
     return 10.0 * float(np.log10(max(middle, 1e-300))), float(binom.sf(ratio.size - rank - 1, ratio.size, tail))

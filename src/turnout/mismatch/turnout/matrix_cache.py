@@ -7,17 +7,17 @@ import numpy as np
 
 from turnout.physics.term import PhysicsTerm
 from turnout.simulate.links import links_of
-from turnout.simulate.matrices import TrackMatrices, assemble, link_vector, linked, railed
+from turnout.simulate.matrices import TrackMatrices, add_rails, assemble, link_matrices, link_vector
 
-KEPT = 24  # templates, and rails and link sets per template
-VALUES = (  # field of a Track, quantity of the link, tag
+CACHE_SIZE = 24  # templates, and rails and link sets per template
+SUPPORT_FIELDS = (  # field of a Track, quantity of the link, tag
     ("pad_stiffness", "stiffness", "pad"),
     ("pad_damping", "damping", "pad"),
     ("ballast_stiffness", "stiffness", "ballast"),
     ("ballast_damping", "damping", "ballast"),
     ("sleeper_mass", "mass", "sleeper"),
 )
-_known = OrderedDict()
+_templates = OrderedDict()
 
 
 def matrices_of(track, terms=()):
@@ -33,16 +33,16 @@ def matrices_of(track, terms=()):
         track.support.tobytes(), track.elements_per_bay, track.pad_width, track.pad_loss_factor.tobytes(),
         track.ballast_loss_factor.tobytes(), extra, joins,
     )  # fmt: skip
-    return _remembered(_known, key, lambda: Skeleton(track, links)).filled(track, links)
+    return _cached(_templates, key, lambda: MatrixTemplate(track, links)).fill(track, links)
 
 
-def _remembered(known, key, compute):
+def _cached(cache, key, compute):
     """``compute()``, cached under ``key`` among the last ``CACHE_SIZE``."""
-    if key not in known:
-        known[key] = compute()
-        while len(known) > KEPT:
-            known.popitem(last=False)
-    return known[key]
+    if key not in cache:
+        cache[key] = compute()
+        while len(cache) > CACHE_SIZE:
+            cache.popitem(last=False)
+    return cache[key]
 
 
 class FixedLinks(PhysicsTerm):
@@ -56,56 +56,59 @@ class FixedLinks(PhysicsTerm):
         return self._links
 
 
-class Skeleton:
+class MatrixTemplate:
     """Matrices without the support values, which are 1 in it.
 
     So rounding errors do not depend on the track that came first.
     """
 
     def __init__(self, track, links):
-        nothing = [replace(k, stiffness=0.0, damping=0.0, mass=0.0, loss_factor=0.0) for k in links]
-        track = track.with_(**{name: np.ones(track.support.size) for name, *_ in VALUES})
-        self.base = linked(track, [*track.links(), *nothing])
-        own = [(j, link) for j in range(track.support.size) for link in track.support_links(j)]
-        self.places = {tag: self._spread([(j, k) for j, k in own if k.tag == tag]) for _, _, tag in VALUES}
-        self.railed, self.entries = OrderedDict(), OrderedDict()
+        zero_links = [replace(k, stiffness=0.0, damping=0.0, mass=0.0, loss_factor=0.0) for k in links]
+        track = track.with_(**{name: np.ones(track.support.size) for name, *_ in SUPPORT_FIELDS})
+        self.base = link_matrices(track, [*track.links(), *zero_links])
+        support_links = [(j, link) for j in range(track.support.size) for link in track.support_links(j)]
+        self.support_entries = {
+            tag: self._matrix_entries([(j, k) for j, k in support_links if k.tag == tag])
+            for _, _, tag in SUPPORT_FIELDS
+        }
+        self.rail_bases, self.link_entries = OrderedDict(), OrderedDict()
 
-    def _spread(self, owned):
+    def _matrix_entries(self, links):
         """Diagonal, row, product of weights and owner of every entry of ``links`` [(owner, link)]."""
-        found = []
-        for owner, link in owned:
+        entries = []
+        for owner, link in links:
             rows, weights = link_vector(link, self.base.index)
-            found += [
+            entries += [
                 (b - a, a, wa * wb, owner) for a, wa in zip(rows, weights) for b, wb in zip(rows, weights) if b >= a
             ]
-        return tuple(map(np.array, zip(*found)))
+        return tuple(map(np.array, zip(*entries)))
 
-    def _railed(self, track):
+    def _base_with_rail(self, track):
         """``base`` with the rail of ``track``, cached."""
         key = track.rail, track.stretches, track.end_length, track.end_damping
-        return _remembered(self.railed, key, lambda: railed(self.base, track))
+        return _cached(self.rail_bases, key, lambda: add_rails(self.base, track))
 
-    def _entries(self, links):
+    def _link_entries(self, links):
         """Matrix entries of ``links`` of terms, cached."""
-        return _remembered(self.entries, tuple(k.ends for k in links), lambda: self._spread(enumerate(links)))
+        return _cached(self.link_entries, tuple(k.ends for k in links), lambda: self._matrix_entries(enumerate(links)))
 
-    def filled(self, track, links):
+    def fill(self, track, links):
         """TrackMatrices with the values of ``track`` and of additional links."""
-        base = self._railed(track)
-        made = {what: getattr(base, what).copy() for what in ("stiffness", "damping", "mass")}
+        base = self._base_with_rail(track)
+        matrices = {what: getattr(base, what).copy() for what in ("stiffness", "damping", "mass")}
         hysteresis = base.hysteresis
-        for name, what, tag in VALUES:
-            diagonal, row, weight, support = self.places[tag]
-            np.add.at(made[what], (diagonal, row), weight * (getattr(track, name) - 1.0)[support])
+        for name, what, tag in SUPPORT_FIELDS:
+            diagonal, row, weight, support = self.support_entries[tag]
+            np.add.at(matrices[what], (diagonal, row), weight * (getattr(track, name) - 1.0)[support])
         if any(k.loss_factor for k in links) or track.pad_loss_factor.any() or track.ballast_loss_factor.any():
             return assemble(track, (FixedLinks(links),))  # hysteresis depends on the stiffness: assembled in full
         if links:
-            diagonal, row, weight, which = self._entries(links)
-            for what, matrix in made.items():
+            diagonal, row, weight, which = self._link_entries(links)
+            for what, matrix in matrices.items():
                 np.add.at(matrix, (diagonal, row), weight * np.array([getattr(k, what) for k in links])[which])
-        found = TrackMatrices(
-            made["mass"], made["damping"], made["stiffness"], hysteresis,
+        track_matrices = TrackMatrices(
+            matrices["mass"], matrices["damping"], matrices["stiffness"], hysteresis,
             base.node, base.node_index, base.index, base.rails, base.links,
         )  # fmt: skip
-        found.__dict__["elements"] = base.elements
-        return found
+        track_matrices.__dict__["elements"] = base.elements
+        return track_matrices

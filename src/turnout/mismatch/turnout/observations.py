@@ -8,12 +8,12 @@ import numpy as np
 from turnout.errors import SimulationError
 from turnout.mismatch.turnout import passage_alignment, passage_observation, receptance_observation
 from turnout.mismatch.turnout.disturbances import disturbances
-from turnout.mismatch.turnout.passage_alignment import aligned, seated
+from turnout.mismatch.turnout.passage_alignment import align_with_simulation, fit_surface
 from turnout.mismatch.turnout.wheel_roughness import wheel_modes
 from turnout.simulate.sensor import Sensor
 
-FAR = 8.0  # m from impact to sensor: beyond, the model error leaves 1/30 of the information
-TIMED = 0.25  # correlation above which the time of a train is certain; at wrong times: 0.10
+MAX_HAMMER_DISTANCE = 8.0  # m from impact to sensor: beyond, the model error leaves 1/30 of the information
+MIN_TIMED_CORRELATION = 0.25  # correlation above which the time of a train is certain; at wrong times: 0.10
 
 
 def hammer_observations(case):
@@ -22,15 +22,18 @@ def hammer_observations(case):
     Stores the pairs and notes in the case.
     """
     for test in case.campaign.hammer:
-        sensors = [*case.campaign.sensors, *_loose(test, case.campaign.sensors)]
-        sensors = [s for s in sensors if s.name not in case.ceilings and abs(s.place - test.place) <= FAR]
-        pairs = receptance_observation.pairs_of(test, sensors, case.settings.pair_tolerance)
+        sensors = [*case.campaign.sensors, *_loose_sensors(test, case.campaign.sensors)]
+        sensors = [
+            s for s in sensors if s.name not in case.saturated and abs(s.place - test.place) <= MAX_HAMMER_DISTANCE
+        ]
+        pairs = receptance_observation.pairs_of_test(test, sensors, case.settings.pair_tolerance)
         if not pairs:
             case.notes.append(
-                f"hammer test {test.name}: no channel within {FAR:g} m with {receptance_observation.FEWEST} sound blows"
+                f"hammer test {test.name}: no channel within {MAX_HAMMER_DISTANCE:g} m with "
+                f"{receptance_observation.MIN_IMPACTS} sound blows"
             )
         for pair, observation in pairs:
-            case.pairs[pair.name] = pair
+            case.frf_pairs[pair.name] = pair
             yield test.name, observation
 
 
@@ -41,88 +44,95 @@ def passage_observations(case):
     """
     if not case.campaign.passages:
         return
-    values = {n.name: 0.0 for n in case.listed()} | case.start_values
-    found = seated(case, values)
-    case.start_values, values = {**case.start_values, **found}, {**values, **found}
+    values = {n.name: 0.0 for n in case.all_nuisances()} | case.start_values
+    surface_values = fit_surface(case, values)
+    case.start_values, values = {**case.start_values, **surface_values}, {**values, **surface_values}
     for passage in case.campaign.passages:
         sensors = case.campaign.sensors_of(passage)
         if not sensors:
             case.notes.append(f"passage {passage.name}: none of the sensors recorded it")
             continue
         try:
-            reference, speed, likeness = aligned(case, values, passage)
+            reference, speed, correlation = align_with_simulation(case, values, passage)
         except SimulationError as error:
             case.notes.append(f"passage {passage.name}: cannot be simulated: {error}")
             continue
-        if likeness < passage_alignment.ALIKE:
-            case.unlike.append(passage)
+        if correlation < passage_alignment.MIN_CORRELATION:
+            case.unmatched.append(passage)
             case.notes.append(
-                f"passage {passage.name}: likeness {likeness:.2f} with the simulation of "
+                f"passage {passage.name}: likeness {correlation:.2f} with the simulation of "
                 f"{passage.train or 'its train'}; wrong vehicle file, wrong sensor places or another turnout"
             )
-            if likeness > TIMED:
-                case.strange[passage.name] = passage_observation.Rolling(
+            if correlation > MIN_TIMED_CORRELATION:
+                case.unmatched_aligned[passage.name] = passage_observation.AlignedPassage(
                     passage.name, passage, sensors, np.zeros(0), reference, speed
                 )
             continue
         try:
-            made, observation = passage_observation.rolling_of(
+            aligned, observation = passage_observation.observe_passage(
                 passage, sensors, reference, speed, case.settings.materiality
             )
         except SimulationError as error:
             case.notes.append(f"passage {passage.name}: {error}")
             continue
-        case.rollings[passage.name] = made
-        yield passage.name, with_errors(case, {**values, **dict.fromkeys(_own_of(passage), 0.0)}, made, observation)
+        case.aligned_passages[passage.name] = aligned
+        yield (
+            passage.name,
+            with_errors(case, {**values, **dict.fromkeys(_nuisance_names(passage), 0.0)}, aligned, observation),
+        )
 
 
-def with_errors(case, values, made, observation):
+def with_errors(case, values, aligned, observation):
     """The observation with the error modes of its passage: track and wheels as ``values`` give them."""
     modes = (
-        passage_observation.coupling_modes(made, observation.data).astype(np.float32),
-        wheel_modes(case, values, made, observation.sigma),
+        passage_observation.coupling_modes(aligned, observation.data).astype(np.float32),
+        wheel_modes(case, values, aligned, observation.sigma),
     )
     return replace(observation, modes=np.column_stack(modes))
 
 
-def undisturbed(case, found):
+def without_disturbed(case, recordings):
     """Recordings without the passages in which another source shakes the sensors.
 
     All of them where fewer than two would remain.
     """
-    case.disturbed = tuple(disturbances(case.rollings, case.strange))
-    shaken = {d.name: d for d in case.disturbed if d.name in case.rollings}
-    if len(found) - len(shaken) < 2:
-        return found
-    for name, d in shaken.items():
-        del case.rollings[name]
-        case.notes.append(f"passage {name}: not used, {d.louder:.0f} dB louder {d.when} its train than the others")
-    return [(name, o) for name, o in found if name not in shaken]
+    case.disturbed_recordings = tuple(disturbances(case.aligned_passages, case.unmatched_aligned))
+    disturbed = {d.name: d for d in case.disturbed_recordings if d.name in case.aligned_passages}
+    if len(recordings) - len(disturbed) < 2:
+        return recordings
+    for name, d in disturbed.items():
+        del case.aligned_passages[name]
+        case.notes.append(f"passage {name}: not used, {d.excess:.0f} dB louder {d.when} its train than the others")
+    return [(name, o) for name, o in recordings if name not in disturbed]
 
 
-def foreign(case):
+def mismatched_trains(case):
     """Trains of which more passages contradict their vehicle file than match it, from two passages on.
 
     Either another train came, or the trains of this type differ. Passages that were disturbed or could not be simulated
     do not count.
     """
-    unlike = Counter(p.train for p in case.unlike if p.train)
-    known = Counter(case.said(made)["train"] for made in case.rollings.values())
-    shaken = {d.name for d in case.disturbed}
-    left = {p.train for p in case.campaign.passages if p.name in shaken}
-    return tuple(t for t, n in unlike.items() if known and n + known[t] > 1 and n > known[t] and t not in left)
+    unmatched = Counter(p.train for p in case.unmatched if p.train)
+    matched = Counter(case.conditions_of(aligned)["train"] for aligned in case.aligned_passages.values())
+    disturbed_names = {d.name for d in case.disturbed_recordings}
+    disturbed_trains = {p.train for p in case.campaign.passages if p.name in disturbed_names}
+    return tuple(
+        t
+        for t, n in unmatched.items()
+        if matched and n + matched[t] > 1 and n > matched[t] and t not in disturbed_trains
+    )
 
 
-def _own_of(passage):
+def _nuisance_names(passage):
     """Names of the nuisances of a passage."""
-    return [n.name for n in passage_observation.rolling_nuisances(passage)]
+    return [n.name for n in passage_observation.passage_nuisances(passage)]
 
 
-def _loose(test, sensors):
+def _loose_sensors(test, sensors):
     """Accelerometers of a hammer test that are no installed sensors."""
-    known, found = {s.name for s in sensors}, {}
+    installed, accelerometers = {s.name for s in sensors}, {}
     for recording in test.recordings[:1]:
         for channel in recording.channels:
-            if channel.quantity == "acceleration" and channel.name not in known and channel.position is not None:
-                found[channel.name] = Sensor(channel.name, channel.position, channel.mounting)
-    return found.values()
+            if channel.quantity == "acceleration" and channel.name not in installed and channel.position is not None:
+                accelerometers[channel.name] = Sensor(channel.name, channel.position, channel.mounting)
+    return accelerometers.values()

@@ -8,20 +8,20 @@ where a few passages correlate best with the simulation below 30 Hz.
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.turnout.passage_band import band_limited, limited, read_at
-from turnout.mismatch.turnout.passage_model import LEAD
-from turnout.mismatch.turnout.running_surface import PLACES
+from turnout.mismatch.turnout.passage_band import band_signals, limit_band, read_at
+from turnout.mismatch.turnout.passage_model import LEAD_TIME
+from turnout.mismatch.turnout.running_surface import POSITION_FIELDS
 
 # Hz, end of the band of the rail's deflection under the axles; least correlation of a passage with its train.
 # The right train correlates by 0.8 with a dip of 1.5 mm, by 0.6 to 0.7 with a flat of 80 mm, a wrong one at most 0.6.
-ALIGNED, ALIKE = 30.0, 0.65  # [Hz], -
-STEP = 1.0 / 800.0  # s, sampling step of signals that are correlated
+ALIGNMENT_BAND_END, MIN_CORRELATION = 30.0, 0.65  # [Hz], -
+SAMPLE_STEP = 1.0 / 800.0  # s, sampling step of signals that are correlated
 
 
-def slow(recording, sensors):
+def low_pass(recording, sensors):
     """(n_sensor, n) signals of the sensors below ``ALIGNMENT_BAND_END``, every ``SAMPLE_STEP``."""
-    grid = np.arange(0.0, recording.duration, STEP)
-    return read_at(limited(recording, sensors, ALIGNED), recording.rate, grid)
+    grid = np.arange(0.0, recording.duration, SAMPLE_STEP)
+    return read_at(band_signals(recording, sensors, ALIGNMENT_BAND_END), recording.rate, grid)
 
 
 def align(passage, data, simulated, rate):
@@ -35,105 +35,107 @@ def align(passage, data, simulated, rate):
     or more are there: its fault is left to the fit. Failing that, samples are clipped at the largest value of the
     simulation. The impacts of a long flat are many times larger than any axle's response.
     """
-    low = band_limited(simulated, rate, high=ALIGNED)
-    best = _best(data, low, rate)
-    if best[0] < ALIKE:
+    low = limit_band(simulated, rate, high=ALIGNMENT_BAND_END)
+    best_fit = _best_alignment(data, low, rate)
+    if best_fit[0] < MIN_CORRELATION:
         top = np.max(np.abs(low), axis=1, keepdims=True)
-        best = max(best, _best(np.clip(data, -top, top), low, rate))
-    likeness, lag, stretch = best
-    return lag * STEP + LEAD, passage.speed * (1.0 + stretch), likeness
+        best_fit = max(best_fit, _best_alignment(np.clip(data, -top, top), low, rate))
+    correlation, lag, stretch = best_fit
+    return lag * SAMPLE_STEP + LEAD_TIME, passage.speed * (1.0 + stretch), correlation
 
 
-def _best(data, low, rate):
+def _best_alignment(data, low, rate):
     """(correlation, lag in steps, stretch) of the best alignment of the simulation ``low`` with ``data``."""
-    n_sensor, model_time = len(data), np.arange(0.0, low.shape[-1] / rate, STEP)
+    n_sensor, model_time = len(data), np.arange(0.0, low.shape[-1] / rate, SAMPLE_STEP)
     size = 1 << int(np.ceil(np.log2(data.shape[1] + model_time.size)))
     spectrum = np.fft.rfft(data, size)
     weight = 1.0 / np.maximum(np.sqrt(np.sum(data**2, axis=1)), 1e-12)
-    all_, but_one = [], []
+    all_sensors, without_worst = [], []
     for stretch in np.linspace(-0.015, 0.015, 13):
-        model = read_at(low, rate, LEAD + (model_time - LEAD) * (1.0 + stretch))
+        model = read_at(low, rate, LEAD_TIME + (model_time - LEAD_TIME) * (1.0 + stretch))
         norm = np.maximum(np.sqrt(np.sum(model**2, axis=1)), 1e-12)
         product = np.fft.irfft(spectrum * np.fft.rfft(model, size).conj(), size)
-        alike = (weight / norm)[:, None] * product
-        total, worst = alike.sum(axis=0), alike.min(axis=0)
-        all_.append(_likest(total / n_sensor, stretch))
-        but_one.append(_likest((total - worst) / max(n_sensor - 1, 1), stretch))
-    best = max(all_)
-    if best[0] < ALIKE and n_sensor >= 3:
-        best = max(but_one)
-    likeness, k, stretch = best
-    return likeness, k if k < size - model_time.size else k - size, stretch
+        correlations = (weight / norm)[:, None] * product
+        total, worst = correlations.sum(axis=0), correlations.min(axis=0)
+        all_sensors.append(_peak_alignment(total / n_sensor, stretch))
+        without_worst.append(_peak_alignment((total - worst) / max(n_sensor - 1, 1), stretch))
+    best_fit = max(all_sensors)
+    if best_fit[0] < MIN_CORRELATION and n_sensor >= 3:
+        best_fit = max(without_worst)
+    correlation, k, stretch = best_fit
+    return correlation, k if k < size - model_time.size else k - size, stretch
 
 
-def _likest(score, stretch):
+def _peak_alignment(score, stretch):
     """(correlation, lag in steps, stretch) at the largest score."""
     k = int(np.argmax(score))
     return float(score[k]), k, float(stretch)
 
 
-TRIED = 3  # passages used, those of the shortest trains; each is simulated 20 times a number, or more
-APART, FAR = 0.15, 2.0  # m between trial positions; largest deviation in prior standard deviations
-FACTORS = (-1.0, -0.5, 0.5, 1.0)  # trial changes of other numbers, in prior standard deviations
-FINER, AROUND = 4, 3  # subdivision of the position step in the second round; steps to each side
-SAMPLES = 20.0  # independent samples of a passage below 30 Hz, approximately; its weight against the prior
-HIGHEST = 0.999  # correlation is limited to this: beyond, it contains no information on the surface
+MAX_TRIAL_PASSAGES = 3  # passages used, those of the shortest trains; each is simulated 20 times a number, or more
+POSITION_STEP, MAX_DEVIATION = 0.15, 2.0  # m between trial positions; largest deviation in prior standard deviations
+TRIAL_FACTORS = (-1.0, -0.5, 0.5, 1.0)  # trial changes of other numbers, in prior standard deviations
+REFINEMENT, N_FINE_STEPS = 4, 3  # subdivision of the position step in the second round; steps to each side
+EFFECTIVE_SAMPLES = 20.0  # independent samples of a passage below 30 Hz, approximately; its weight against the prior
+MAX_CORRELATION = 0.999  # correlation is limited to this: beyond, it contains no information on the surface
 
 
-def seated(case, values):
+def fit_surface(case, values):
     """Nuisances of the running surface as a few passages have it, dict name -> value.
 
     {} where no number is uncertain.
     """
-    heard = [p for p in case.campaign.passages if case.campaign.sensors_of(p)]
-    heard = [p for p in heard if p.name not in case.campaign.reserved] or heard
-    passages = sorted(heard, key=lambda p: len(p.vehicle.wheels))[:TRIED]
-    known = {n.name: n for n in case.surface.nuisances()}
-    found = dict.fromkeys(known, 0.0)
-    best = _score(case, {**values, **found}, passages) if known else 0.0
-    for again in (False, True):
-        for u in sorted(case.surface.unsure, key=lambda u: u.field not in PLACES):
-            centre, prior = found[u.name], known[u.name]
-            for by in _moves(u.field, prior.sd, again):
-                moved = {**found, u.name: float(np.clip(centre + by, *prior.bounds))}
-                score = _score(case, {**values, **moved}, passages)
-                if score > best:
-                    best, found = score, moved
-    return found
+    recorded = [p for p in case.campaign.passages if case.campaign.sensors_of(p)]
+    recorded = [p for p in recorded if p.name not in case.campaign.reserved] or recorded
+    passages = sorted(recorded, key=lambda p: len(p.vehicle.wheels))[:MAX_TRIAL_PASSAGES]
+    priors = {n.name: n for n in case.surface.nuisances()}
+    surface_values = dict.fromkeys(priors, 0.0)
+    best_score = _log_posterior(case, {**values, **surface_values}, passages) if priors else 0.0
+    for refine in (False, True):
+        for u in sorted(case.surface.parameters, key=lambda u: u.field not in POSITION_FIELDS):
+            centre, prior = surface_values[u.name], priors[u.name]
+            for by in _trial_steps(u.field, prior.sd, refine):
+                trial = {**surface_values, u.name: float(np.clip(centre + by, *prior.bounds))}
+                score = _log_posterior(case, {**values, **trial}, passages)
+                if score > best_score:
+                    best_score, surface_values = score, trial
+    return surface_values
 
 
-def _moves(field, sd, again):
-    if field not in PLACES:
-        return [f * sd * (0.5 if again else 1.0) for f in FACTORS]
-    if again:
-        return [APART * k / FINER for k in range(-AROUND, AROUND + 1) if k]
-    step = min(APART, sd)
-    n = int(FAR * sd / step)
+def _trial_steps(field, sd, refine):
+    if field not in POSITION_FIELDS:
+        return [f * sd * (0.5 if refine else 1.0) for f in TRIAL_FACTORS]
+    if refine:
+        return [POSITION_STEP * k / REFINEMENT for k in range(-N_FINE_STEPS, N_FINE_STEPS + 1) if k]
+    step = min(POSITION_STEP, sd)
+    n = int(MAX_DEVIATION * sd / step)
     return [step * k for k in range(-n, n + 1) if k]
 
 
-def _score(case, values, passages):
+def _log_posterior(case, values, passages):
     """Twice the logarithm of likelihood and prior of numbers of the surface.
 
     The simulation explains the square of the correlation of each of the ``passages``. The prior is that of the track
     file.
     """
-    away = sum((values[u.name] / u.nuisance.sd) ** 2 for u in case.surface.unsure)
-    return -away - SAMPLES * sum(np.log(1.0 - min(_likeness(case, values, p), HIGHEST) ** 2) for p in passages)
+    penalty = sum((values[u.name] / u.nuisance.sd) ** 2 for u in case.surface.parameters)
+    return -penalty - EFFECTIVE_SAMPLES * sum(
+        np.log(1.0 - min(_correlation(case, values, p), MAX_CORRELATION) ** 2) for p in passages
+    )
 
 
-def _likeness(case, values, passage):
+def _correlation(case, values, passage):
     try:
-        return aligned(case, values, passage)[2]
+        return align_with_simulation(case, values, passage)[2]
     except SimulationError:
         return 0.0
 
 
-def aligned(case, values, passage):
+def align_with_simulation(case, values, passage):
     """``align`` of a passage with its simulation at ``values``; SimulationError if it cannot be simulated."""
     sensors, surfaces = case.campaign.sensors_of(passage), case.surface.surfaces(passage.route, values)
-    roll = case.roll(values, (), passage)
+    roll = case.passage_simulator(values, (), passage)
     signals = roll(passage, passage.vehicle, passage.speed, sensors, surfaces=surfaces)
-    if passage.name not in case.slow:
-        case.slow[passage.name] = slow(passage.recording, sensors)
-    return align(passage, case.slow[passage.name], signals, case.solver.rate)
+    if passage.name not in case.low_passed:
+        case.low_passed[passage.name] = low_pass(passage.recording, sensors)
+    return align(passage, case.low_passed[passage.name], signals, case.solver.rate)

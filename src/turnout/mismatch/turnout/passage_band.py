@@ -4,20 +4,20 @@ import numpy as np
 from scipy.fft import next_fast_len
 
 SHORTEST_WAVE = 0.3  # m, shortest modelled wave of the rail's roughness
-LOW, HIGH = 5.0, 112.0  # Hz, band in which the deterministic part dominates the roughness
-RATE = 1800.0  # Hz, of the simulation; errors 1 to 2 % of the waveform with Radau IIA
-FOLDS = (9, 6, 5)  # simulation steps per sample of an observation; the first that suffices is used
+BAND_LOW, BAND_HIGH = 5.0, 112.0  # Hz, band in which the deterministic part dominates the roughness
+SIMULATION_RATE = 1800.0  # Hz, of the simulation; errors 1 to 2 % of the waveform with Radau IIA
+RATE_DIVISORS = (9, 6, 5)  # simulation steps per sample of an observation; the first that suffices is used
 
 
-def band_limited(samples, rate, low=LOW, high=HIGH):
+def limit_band(samples, rate, low=BAND_LOW, high=BAND_HIGH):
     """Rows of ``samples`` between ``low`` and ``high`` [Hz], zero phase, cosine edges of a third."""
     n = samples.shape[-1]
     size = next_fast_len(n + round(rate * 0.75), real=True)  # the lower edge rings for half a second
-    passed = gate(np.fft.rfftfreq(size, 1.0 / rate), low, high)
+    passed = band_window(np.fft.rfftfreq(size, 1.0 / rate), low, high)
     return np.fft.irfft(np.fft.rfft(samples, size) * passed, size)[..., :n]
 
 
-def gate(frequency, low, high):
+def band_window(frequency, low, high):
     """Factor of ``limit_band`` at each frequency [Hz], 0 to 1."""
     f = np.asarray(frequency)
     passed = np.clip((f - 0.67 * low) / (0.33 * low), 0.0, 1.0) * np.clip((1.25 * high - f) / (0.25 * high), 0.0, 1.0)
@@ -27,15 +27,15 @@ def gate(frequency, low, high):
 def read_at(samples, rate, time):
     """Band-limited ``samples`` (..., n), sample k at (k + 1/2)/rate, read at ``time`` (m,), 0 outside."""
     n = samples.shape[-1]
-    place = np.asarray(time) * rate - 0.5
-    k = np.clip(np.floor(place).astype(int), 1, n - 3)
-    s = place - k
+    sample = np.asarray(time) * rate - 0.5
+    k = np.clip(np.floor(sample).astype(int), 1, n - 3)
+    s = sample - k
     a, b, c, d = (samples[..., k + i] for i in (-1, 0, 1, 2))
     value = b + 0.5 * s * (c - a + s * (2.0 * a - 5.0 * b + 4.0 * c - d + s * (3.0 * (b - c) + d - a)))
-    return np.where((place < 0.0) | (place > n - 1), 0.0, value)
+    return np.where((sample < 0.0) | (sample > n - 1), 0.0, value)
 
 
-def finer(samples, factor=4):
+def upsample(samples, factor=4):
     """Samples at a multiple of the rate by Fourier transform; sample k stays at (k + 1/2) of its own step."""
     n = samples.shape[-1]
     size = 2 * next_fast_len((n + 65) // 2, real=True)
@@ -48,16 +48,16 @@ def finer(samples, factor=4):
 
 def band_end(speed):
     """Upper end of the band of a passage [Hz]: its edge is 1.25 times this, at the shortest wave."""
-    return min(HIGH, speed / SHORTEST_WAVE / 1.25)
+    return min(BAND_HIGH, speed / SHORTEST_WAVE / 1.25)
 
 
-def clock_of(speed):
+def sample_rate_of(speed):
     """Sampling rate for the band of a passage at this speed, an integer fraction of ``SIMULATION_RATE`` [Hz]."""
-    enough = [RATE / fold for fold in FOLDS if RATE / fold > 2.4 * 1.25 * band_end(speed)]
-    return enough[0] if enough else RATE / FOLDS[-1]
+    enough = [SIMULATION_RATE / fold for fold in RATE_DIVISORS if SIMULATION_RATE / fold > 2.4 * 1.25 * band_end(speed)]
+    return enough[0] if enough else SIMULATION_RATE / RATE_DIVISORS[-1]
 
 
-def limited(recording, sensors, high):
+def band_signals(recording, sensors, high):
     """Rows of the ``sensors`` of a recording, in the band that ends at ``high`` [Hz]."""
     rows = [recording.index(s.name) for s in sensors]
-    return band_limited(recording.samples[rows], recording.rate, high=high)
+    return limit_band(recording.samples[rows], recording.rate, high=high)

@@ -5,26 +5,26 @@ from dataclasses import dataclass
 import numpy as np
 
 from turnout.mismatch.turnout.matrix_cache import matrices_of
-from turnout.mismatch.turnout.passage_band import RATE
+from turnout.mismatch.turnout.passage_band import SIMULATION_RATE
 from turnout.simulate.prepare import prepare
 from turnout.simulate.run import Drive, run
 
-ELEMENTS = 2  # per bay; differs by 0.2 to 0.5 % of the waveform below 112 Hz from 4 elements
-DECAY = 8.0  # exponent at which a force's effect along the rail is cut off in a step; error 3e-6
-LEAD = 0.25  # s before the first wheel reaches the first sensor
-EDGE = 0.08  # s of signal before the first and after the last wheel
+ELEMENTS_PER_BAY = 2  # per bay; differs by 0.2 to 0.5 % of the waveform below 112 Hz from 4 elements
+DECAY_EXPONENT = 8.0  # exponent at which a force's effect along the rail is cut off in a step; error 3e-6
+LEAD_TIME = 0.25  # s before the first wheel reaches the first sensor
+EDGE_TIME = 0.08  # s of signal before the first and after the last wheel
 
 
 @dataclass(frozen=True)
 class Track1D:
     """Settings of the simulation used in fits; ``elements`` per bay, None: as in the track file."""
 
-    rate: float = RATE
+    rate: float = SIMULATION_RATE
     scheme: str = "radau"
-    elements: int | None = ELEMENTS
+    elements: int | None = ELEMENTS_PER_BAY
 
 
-class Roll:
+class PassageSimulator:
     """Simulates passages on one track with one set of terms; they share one factorisation."""
 
     def __init__(self, turnout, track, terms, settings):
@@ -33,7 +33,7 @@ class Roll:
             track = track.with_(elements_per_bay=settings.elements)
         self.track = track
         matrices = matrices_of(track, self.terms)
-        self.prepared = prepare(track, 1.0 / settings.rate, settings.scheme, self.terms, DECAY, matrices)
+        self.prepared = prepare(track, 1.0 / settings.rate, settings.scheme, self.terms, DECAY_EXPONENT, matrices)
 
     def __call__(self, passage, vehicle, speed, sensors, probes=(), surfaces=None, described=None):
         """(n_sensor + n_probe, n) signals over ``surfaces``, by default those of the file.
@@ -43,16 +43,16 @@ class Roll:
         for term in self.terms:
             vehicle = term.vehicle(vehicle)
         sign = 1 if passage.direction == "facing" else -1
-        places = sign * np.array([s.place for s in described or sensors])
-        start = sign * (places.min() - speed * LEAD)
-        way = np.ptp(places) + float(vehicle.wheel_places[-1]) + speed * (LEAD + 2.0 * EDGE)
-        seats = [seat(s, self.terms).probe(self.track) for s in sensors]
+        positions = sign * np.array([s.place for s in described or sensors])
+        start = sign * (positions.min() - speed * LEAD_TIME)
+        distance = np.ptp(positions) + float(vehicle.wheel_positions[-1]) + speed * (LEAD_TIME + 2.0 * EDGE_TIME)
+        seats = [place_sensor(s, self.terms).probe(self.track) for s in sensors]
         drive = Drive(start, speed, sign, surfaces or self.turnout.surfaces(passage.route), path_step=0.01)
-        outcome = run(self.prepared, way / speed, [*seats, *probes], vehicle, drive, forces=False, tolerance=1e-3)
+        outcome = run(self.prepared, distance / speed, [*seats, *probes], vehicle, drive, forces=False, tolerance=1e-3)
         return outcome.signals
 
 
-def seat(sensor, terms):
+def place_sensor(sensor, terms):
     """The sensor at the position that the terms give."""
     for term in terms:
         sensor = term.sensor(sensor)

@@ -7,23 +7,25 @@ import numpy as np
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.case import Nuisance, Observation
 from turnout.mismatch.turnout.campaign import LOAD_SD
-from turnout.mismatch.turnout.passage_band import band_end, band_limited, clock_of, finer, limited, read_at
-from turnout.mismatch.turnout.passage_model import EDGE
+from turnout.mismatch.turnout.passage_band import band_end, band_signals, limit_band, read_at, sample_rate_of, upsample
+from turnout.mismatch.turnout.passage_model import EDGE_TIME
 
 # m, s, s: distance, margin and least time for a channel's noise. 4.2 m before a wheel there is noise alone, 1.4 m
 # before it the level is six times higher.
-CLEAR, MARGIN, SHORTEST_QUIET = 5.0, 0.02, 0.1
-BLURRED = 0.03  # s about a sample at the range, which is disturbed by clipping
-COUPLING = 0.7  # Hz, standard deviation of the lower corner of an amplifier without a data sheet
-FINE = 2500.0  # Hz, sampling rate at which cubic interpolation is right to 0.03 % at 112 Hz
-SLOWEST = 3.0  # samples per shortest period of the band; its edge ends at 1.25 times that: Nyquist needs 2.5
-FEWEST, AROUND = 20, 31  # least samples of a passage; samples over which its amplitude is taken
+CLEAR_DISTANCE, RECORD_MARGIN, MIN_QUIET_TIME = 5.0, 0.02, 0.1
+CLIPPING_BLUR = 0.03  # s about a sample at the range, which is disturbed by clipping
+COUPLING_CORNER_SD = 0.7  # Hz, standard deviation of the lower corner of an amplifier without a data sheet
+MIN_READ_RATE = 2500.0  # Hz, sampling rate at which cubic interpolation is right to 0.03 % at 112 Hz
+MIN_SAMPLES_PER_PERIOD = (
+    3.0  # samples per shortest period of the band; its edge ends at 1.25 times that: Nyquist needs 2.5
+)
+MIN_SAMPLES, AMPLITUDE_WINDOW = 20, 31  # least samples of a passage; samples over which its amplitude is taken
 SPEED_SD, TIME_SD = 0.004, 1.5e-3  # relative, s; errors of the alignment
-ASSUMED = 2.0  # bounds of an unknown load in prior standard deviations: a seventh beyond empty and full
+LOAD_BOUND_SDS = 2.0  # bounds of an unknown load in prior standard deviations: a seventh beyond empty and full
 
 
 @dataclass(frozen=True)
-class Rolling:
+class AlignedPassage:
     """One passage aligned with its simulation; its observation holds the sensors one after the other.
 
     ``time`` (n,) [s] counts from the start of the recording. At ``reference`` [s] the first wheel reaches the first
@@ -45,141 +47,145 @@ class Rolling:
     @property
     def clock(self):
         """Samples per second of the observation [Hz]."""
-        return clock_of(self.speed)
+        return sample_rate_of(self.speed)
 
-    def limited(self, samples, rate):
+    def limit_band(self, samples, rate):
         """Rows of ``samples`` within the band of the passage."""
-        return band_limited(samples, rate, high=self.high)
+        return limit_band(samples, rate, high=self.high)
 
-    def places(self):
+    def positions(self):
         """(n_wheel, n) position of every wheel [m]."""
         sign = 1.0 if self.passage.direction == "facing" else -1.0
         first = sign * min(sign * s.place for s in self.sensors)
-        way = self.speed * (self.time - self.reference)
-        return first + sign * (way[None, :] - self.passage.vehicle.wheel_places[:, None])
+        distance = self.speed * (self.time - self.reference)
+        return first + sign * (distance[None, :] - self.passage.vehicle.wheel_positions[:, None])
 
 
 def duration_of(passage, speed, sensors):
     """Time from the first wheel at the first sensor to the last wheel at the last sensor [s]."""
     places = [s.place for s in sensors]
-    return (np.ptp(places) + float(passage.vehicle.wheel_places[-1])) / speed
+    return (np.ptp(places) + float(passage.vehicle.wheel_positions[-1])) / speed
 
 
-def rolling_of(passage, sensors, reference, speed, tolerance):
+def observe_passage(passage, sensors, reference, speed, tolerance):
     """(AlignedPassage, Observation) of a passage."""
     recording = passage.recording
-    kept = limited(recording, sensors, band_end(speed))
-    stop = reference + duration_of(passage, speed, sensors) + EDGE
-    step = 1.0 / clock_of(speed)
-    time = np.arange(max(0.0, reference - EDGE), min(stop, recording.duration - 0.01), step)
-    if time.size < FEWEST:
+    signals = band_signals(recording, sensors, band_end(speed))
+    stop = reference + duration_of(passage, speed, sensors) + EDGE_TIME
+    step = 1.0 / sample_rate_of(speed)
+    time = np.arange(max(0.0, reference - EDGE_TIME), min(stop, recording.duration - 0.01), step)
+    if time.size < MIN_SAMPLES:
         raise SimulationError("the train lies outside the recording")
-    if recording.rate < SLOWEST * band_end(speed):
+    if recording.rate < MIN_SAMPLES_PER_PERIOD * band_end(speed):
         raise SimulationError(f"{recording.rate:g} samples per second are too few for {band_end(speed):.0f} Hz")
-    rolling = Rolling(passage.name, passage, tuple(sensors), time, reference, speed)
-    fold = max(1, int(np.ceil(FINE / recording.rate)))
-    kept, rate = finer(kept, fold) if fold > 1 else kept, fold * recording.rate
-    data = read_at(kept, rate, time)
+    aligned = AlignedPassage(passage.name, passage, tuple(sensors), time, reference, speed)
+    factor = max(1, int(np.ceil(MIN_READ_RATE / recording.rate)))
+    signals, rate = upsample(signals, factor) if factor > 1 else signals, factor * recording.rate
+    data = read_at(signals, rate, time)
     noise = np.zeros(len(sensors))
-    for start, end in _without_wheels(rolling):
-        if end - start >= SHORTEST_QUIET:
-            noise = np.std(read_at(kept, rate, np.arange(start, end, step)), axis=1)
+    for start, end in _wheel_free_times(aligned):
+        if end - start >= MIN_QUIET_TIME:
+            noise = np.std(read_at(signals, rate, np.arange(start, end, step)), axis=1)
             break
-    return rolling, observed(rolling, data, noise, tolerance, _topped(recording, sensors, time))
+    return aligned, observation_of(aligned, data, noise, tolerance, _clipped_samples(recording, sensors, time))
 
 
-def _without_wheels(rolling):
+def _wheel_free_times(aligned):
     """(start, end) [s] before and after the train, with no wheel within ``CLEAR_DISTANCE`` of a sensor."""
-    far, passage = CLEAR / rolling.speed, rolling.passage
-    behind = rolling.reference + duration_of(passage, rolling.speed, rolling.sensors) + far
-    return (MARGIN, rolling.reference - far), (behind, passage.recording.duration - MARGIN)
+    clear_time, passage = CLEAR_DISTANCE / aligned.speed, aligned.passage
+    end = aligned.reference + duration_of(passage, aligned.speed, aligned.sensors) + clear_time
+    return (RECORD_MARGIN, aligned.reference - clear_time), (end, passage.recording.duration - RECORD_MARGIN)
 
 
-def _topped(recording, sensors, time):
+def _clipped_samples(recording, sensors, time):
     """(n_sensor, n) whether the channel reached its range within ``CLIPPING_BLUR`` of each time.
 
     The samples that were cut off disturb the whole band there.
     """
-    found = np.zeros((len(sensors), time.size), dtype=bool)
-    for row, sensor in zip(found, sensors):
+    clipped = np.zeros((len(sensors), time.size), dtype=bool)
+    for row, sensor in zip(clipped, sensors):
         k = recording.index(sensor.name)
         limit = recording.channels[k].limit
         if limit is not None:
-            at = np.flatnonzero(np.abs(recording.samples[k]) >= 0.999 * limit) / recording.rate
-            row[:] = np.searchsorted(at, time - BLURRED) < np.searchsorted(at, time + BLURRED)
-    return found
+            clipped_times = np.flatnonzero(np.abs(recording.samples[k]) >= 0.999 * limit) / recording.rate
+            row[:] = np.searchsorted(clipped_times, time - CLIPPING_BLUR) < np.searchsorted(
+                clipped_times, time + CLIPPING_BLUR
+            )
+    return clipped
 
 
-def observed(rolling, data, noise, tolerance, topped=None):
+def observation_of(aligned, data, noise, tolerance, clipped=None):
     """Observation of (n_sensor, n) samples with ``noise`` (n_sensor,) and a materiality floor.
 
     ``clipped`` samples have an error as large as the largest sample of their channel.
     """
-    width = min(AROUND, data.shape[1])
-    wide = np.array([np.convolve(row**2, np.ones(width) / width, mode="same") for row in data])
+    width = min(AMPLITUDE_WINDOW, data.shape[1])
+    mean_square = np.array([np.convolve(row**2, np.ones(width) / width, mode="same") for row in data])
     floor = 0.02 * np.sqrt(np.mean(data**2, axis=1)) + 1e-9
-    sigma = np.sqrt((noise**2 + floor**2)[:, None] + tolerance**2 * wide)
-    if topped is not None and topped.any():
-        sigma = np.where(topped, np.hypot(sigma, np.max(np.abs(data), axis=1, keepdims=True)), sigma)
-    cells, labels = _cells(rolling)
-    passage = rolling.passage
+    sigma = np.sqrt((noise**2 + floor**2)[:, None] + tolerance**2 * mean_square)
+    if clipped is not None and clipped.any():
+        sigma = np.where(clipped, np.hypot(sigma, np.max(np.abs(data), axis=1, keepdims=True)), sigma)
+    cells, labels = _cells(aligned)
+    passage = aligned.passage
     temperature = passage.conditions.get("rail_temperature")
-    said = [passage.train, f"{passage.speed * 3.6:.0f} km/h"]
-    covariates = {"speed": rolling.speed, "load": float(np.mean(passage.vehicle.static_loads))}
+    condition_words = [passage.train, f"{passage.speed * 3.6:.0f} km/h"]
+    covariates = {"speed": aligned.speed, "load": float(np.mean(passage.vehicle.static_loads))}
     if temperature is not None:
-        said.append(f"{temperature:.0f} °C")
+        condition_words.append(f"{temperature:.0f} °C")
         covariates["temperature"] = float(temperature)
-    condition = " ".join(said)
+    condition = " ".join(condition_words)
     return Observation(
-        rolling.name, condition, data.ravel(), sigma.ravel(), 0.35, "passage", covariates, cells, labels, rows=len(data)
+        aligned.name, condition, data.ravel(), sigma.ravel(), 0.35, "passage", covariates, cells, labels, rows=len(data)
     )
 
 
-def coupling_modes(rolling, data):
+def coupling_modes(aligned, data):
     r"""(n_sensor * n_time, n_sensor) error modes of amplifiers whose lower corner frequency is uncertain.
 
     Well above its corner a high-pass adds :math:`-2 \pi f_c \int a\,dt`; f_c is known to ``COUPLING_CORNER_SD``.
     """
-    rows = data.reshape(len(rolling.sensors), -1)
-    velocity = np.cumsum(rows - rows.mean(axis=1, keepdims=True), axis=1) / rolling.clock
-    found = np.zeros((rows.size, rows.shape[0]))
-    for k, row in enumerate(2.0 * np.pi * COUPLING * (velocity - velocity.mean(axis=1, keepdims=True))):
-        found[k * row.size : (k + 1) * row.size, k] = row
-    return found
+    rows = data.reshape(len(aligned.sensors), -1)
+    velocity = np.cumsum(rows - rows.mean(axis=1, keepdims=True), axis=1) / aligned.clock
+    modes = np.zeros((rows.size, rows.shape[0]))
+    for k, row in enumerate(2.0 * np.pi * COUPLING_CORNER_SD * (velocity - velocity.mean(axis=1, keepdims=True))):
+        modes[k * row.size : (k + 1) * row.size, k] = row
+    return modes
 
 
-def _cells(rolling):
+def _cells(aligned):
     """Cells of one axle within 3 m of a sensor, one sleeper bay long.
 
     Their labels are what a cause may be bound to: sensor, train, wheel, position, condition.
     """
-    passage, place = rolling.passage, rolling.places()
+    passage, position = aligned.passage, aligned.positions()
     train, speed = passage.train or passage.name, f"{passage.speed * 3.6:.0f} km/h"
-    index, known, n = [], {}, rolling.time.size
-    for sensor in rolling.sensors:
-        distance = np.abs(place - sensor.place)
+    index, cell_index, n = [], {}, aligned.time.size
+    for sensor in aligned.sensors:
+        distance = np.abs(position - sensor.place)
         axle = np.argmin(distance, axis=0)
         near = distance[axle, np.arange(n)] < 3.0
-        bay = np.round(place[axle, np.arange(n)] / 0.6).astype(int)
+        bay = np.round(position[axle, np.arange(n)] / 0.6).astype(int)
         for a, b, inside in zip(axle, bay, near):
             key = (sensor.name, int(a), int(b)) if inside else None
-            index.append(-1 if key is None else known.setdefault(key, len(known)))
+            index.append(-1 if key is None else cell_index.setdefault(key, len(cell_index)))
     labels = {
-        "sensor": [name for name, _, _ in known],
-        "train": [train for _ in known],
-        "wheel": [f"{train}, axle {a + 1}" for _, a, _ in known],
-        "place": [f"{0.6 * b:.1f}" for _, _, b in known],
-        "condition": [speed for _ in known],
+        "sensor": [name for name, _, _ in cell_index],
+        "train": [train for _ in cell_index],
+        "wheel": [f"{train}, axle {a + 1}" for _, a, _ in cell_index],
+        "place": [f"{0.6 * b:.1f}" for _, _, b in cell_index],
+        "condition": [speed for _ in cell_index],
     }
     return np.array(index, dtype=np.int64), {k: np.array(v, dtype=object) for k, v in labels.items()}
 
 
-def rolling_nuisances(passage):
+def passage_nuisances(passage):
     """Time, speed and load of one passage. They are named after the passage, since all its sensors share them."""
-    reach = np.inf if passage.load_sd <= LOAD_SD else ASSUMED * passage.load_sd
-    parts = (
+    reach = np.inf if passage.load_sd <= LOAD_SD else LOAD_BOUND_SDS * passage.load_sd
+    priors = (
         ("time", "s", TIME_SD, np.inf),
         ("speed", "-", SPEED_SD, np.inf),
         ("load", "-", passage.load_sd, reach),
     )
-    return [Nuisance(f"{what}@{passage.name}", unit, 0.0, sd, passage.name, (-a, a)) for what, unit, sd, a in parts]
+    return [
+        Nuisance(f"{quantity}@{passage.name}", unit, 0.0, sd, passage.name, (-a, a)) for quantity, unit, sd, a in priors
+    ]

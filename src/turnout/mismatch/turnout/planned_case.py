@@ -9,23 +9,23 @@ import numpy as np
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.turnout import passage_band, passage_model, passage_observation, receptance_observation
-from turnout.mismatch.turnout.campaign import LOAD_SD, Campaign, HammerTest, Passage
-from turnout.mismatch.turnout.candidates.catalogue import library
+from turnout.mismatch.turnout.campaign import LOAD_SD, CampaignInput, HammerInput, PassageInput
+from turnout.mismatch.turnout.candidates.catalogue import list_candidates
 from turnout.mismatch.turnout.case import TrackCase
 from turnout.mismatch.turnout.wheel_roughness import wheel_modes
 from turnout.simulate.hammer import Hammer, simulate_hammer
 from turnout.simulate.passage import simulate_passage
 from turnout.simulate.sensor import Sensor
 from turnout.simulate.track import PER_SUPPORT, uniform_track
-from turnout.simulate.train import coupled
+from turnout.simulate.train import couple
 from turnout.simulate.turnout_track import TurnoutTrack
 from turnout.simulate.vehicle import car
 
-NOISE = 0.02  # standard deviation of a sensor's noise over its own rms
+NOISE_SHARE = 0.02  # standard deviation of a sensor's noise over its own rms
 
 
 @dataclass(frozen=True)
-class Planned:
+class PlannedRecording:
     """A planned passage or hammer test."""
 
     name: str
@@ -45,55 +45,59 @@ class PlannedCase(TrackCase):
 
     def __init__(self, plan, settings=None, families=None, solver=None):
         self.plan = plan
-        self._prepare(_Intended(plan), settings or MismatchSettings(), solver or passage_model.Track1D())
-        for k, (place, temperature) in enumerate(plan.blows):
-            test = Planned(f"blows {k + 1}", place=place, visit=f"{temperature:.0f} °C")
+        self._prepare(_PlannedInput(plan), settings or MismatchSettings(), solver or passage_model.Track1D())
+        for k, (position, temperature) in enumerate(plan.hammer_points):
+            test = PlannedRecording(f"blows {k + 1}", place=position, visit=f"{temperature:.0f} °C")
             for sensor in plan.sensors:
-                name, noted = f"{test.name}:{sensor.name}", {"rail_temperature": temperature}
+                name, conditions = f"{test.name}:{sensor.name}", {"rail_temperature": temperature}
                 ones = np.ones(receptance_observation.LINES.size)
-                self.pairs[name] = receptance_observation.Pair(
-                    name, test, sensor.name, sensor, receptance_observation.LINES, ones, noted
+                self.frf_pairs[name] = receptance_observation.FrfPair(
+                    name, test, sensor.name, sensor, receptance_observation.LINES, ones, conditions
                 )
         for k, train in enumerate(plan.trains):
-            noted = {} if train.temperature is None else {"rail_temperature": train.temperature}
-            passage = Planned(f"{train.name} {k + 1}", train.vehicle, train.speed, train.name, conditions=noted)
-            stop = passage_observation.duration_of(passage, train.speed, plan.sensors) + 0.45 + passage_model.EDGE
-            time = np.arange(0.45 - passage_model.EDGE, stop, 1.0 / passage_band.clock_of(train.speed))
-            self.rollings[passage.name] = passage_observation.Rolling(
+            conditions = {} if train.temperature is None else {"rail_temperature": train.temperature}
+            passage = PlannedRecording(
+                f"{train.name} {k + 1}", train.vehicle, train.speed, train.name, conditions=conditions
+            )
+            stop = passage_observation.duration_of(passage, train.speed, plan.sensors) + 0.45 + passage_model.EDGE_TIME
+            time = np.arange(0.45 - passage_model.EDGE_TIME, stop, 1.0 / passage_band.sample_rate_of(train.speed))
+            self.aligned_passages[passage.name] = passage_observation.AlignedPassage(
                 passage.name, passage, plan.sensors, time, 0.45, train.speed
             )
-        self.nuisances = tuple(self.listed())
-        self.observations = tuple(self._expected())
-        self.candidates, self.families = library(self, families), ()
+        self.nuisances = tuple(self.all_nuisances())
+        self.observations = tuple(self._predicted_observations())
+        self.candidates, self.families = list_candidates(self, families), ()
 
-    def highest(self, channel):
+    def raw_peak(self, channel):
         """Peak of a channel within the band; a planned campaign has no signals at the full rate. [m/s²]"""
-        return self.peak(channel)
+        return self.band_peak(channel)
 
-    def _expected(self):
+    def _predicted_observations(self):
         values = {n.name: n.mean for n in self.nuisances}
-        for pair in list(self.pairs.values()):
-            h = self._receptance(values, (), pair, self.blow_model(values, (), pair))
+        for pair in list(self.frf_pairs.values()):
+            h = self._predict_receptance(values, (), pair, self.pair_sensitivity(values, (), pair))
             h = h[: receptance_observation.LINES.size] + 1j * h[receptance_observation.LINES.size :]
-            self.pairs[pair.name] = pair = receptance_observation.sized(pair, np.abs(h))
-            yield receptance_observation.observed(pair, h, NOISE * np.abs(h), self.settings.pair_tolerance)
-        for made in self.rollings.values():
-            data = self.passage_of(values, (), made).reshape(len(made.sensors), -1)
-            planned = passage_observation.observed(made, data, NOISE * np.std(data, axis=1), self.settings.materiality)
-            yield replace(planned, modes=wheel_modes(self, values, made, planned.sigma))
+            self.frf_pairs[pair.name] = pair = receptance_observation.with_magnitude(pair, np.abs(h))
+            yield receptance_observation.observation_of(pair, h, NOISE_SHARE * np.abs(h), self.settings.pair_tolerance)
+        for aligned in self.aligned_passages.values():
+            data = self.predict_passage(values, (), aligned).reshape(len(aligned.sensors), -1)
+            observation = passage_observation.observation_of(
+                aligned, data, NOISE_SHARE * np.std(data, axis=1), self.settings.materiality
+            )
+            yield replace(observation, modes=wheel_modes(self, values, aligned, observation.sigma))
 
 
-class _Intended:
+class _PlannedInput:
     """The part of ``CampaignInput`` that ``TrackCase`` uses, for a plan."""
 
     def __init__(self, plan):
         self.turnout, self.sensors, self.hammer, self.reserved = plan.turnout, plan.sensors, (), ()
-        self.passages = tuple(Planned(t.name, t.vehicle, t.speed, t.name) for t in plan.trains)
-        self._blows = plan.blows
+        self.passages = tuple(PlannedRecording(t.name, t.vehicle, t.speed, t.name) for t in plan.trains)
+        self._hammer_points = plan.hammer_points
 
-    def places(self):
+    def positions(self):
         """Positions of sensors and impacts [m]."""
-        return [s.place for s in self.sensors] + [x for x, _ in self._blows]
+        return [s.place for s in self.sensors] + [x for x, _ in self._hammer_points]
 
 
 @dataclass(frozen=True)
@@ -117,18 +121,18 @@ class Plan:
 
     turnout: TurnoutTrack
     sensors: tuple[Sensor, ...]
-    blows: tuple[tuple[float, float], ...] = ()
+    hammer_points: tuple[tuple[float, float], ...] = ()
     trains: tuple[Train, ...] = ()
     reserved: tuple[str, ...] = ()
     roughness: float | None = -6.0
     scatter: float = 0.05
-    n_blows: int = 4
+    n_impacts: int = 4
     noise: float = 0.02
     rate: float = 10e3
     options: dict = field(default_factory=dict)
 
 
-def small_plan(temperatures=(5.0, 25.0), speeds=(28.0, 40.0), blows=(20.4, 24.0, 27.6), passages=True):
+def small_plan(temperatures=(5.0, 25.0), speeds=(28.0, 40.0), hammer_positions=(20.4, 24.0, 27.6), passages=True):
     """Three hammer points, eight passages of a light and a heavy car, four sensors on 48 m of track."""
     turnout = TurnoutTrack(uniform_track(48.0), {"main": ((),)})
     sensors = (Sensor("S1", 21.0), Sensor("S2", 23.4, "sleeper"), Sensor("S3", 24.6), Sensor("S4", 27.3))
@@ -138,23 +142,23 @@ def small_plan(temperatures=(5.0, 25.0), speeds=(28.0, 40.0), blows=(20.4, 24.0,
         Train(vehicle, vehicle.name, speed, t) for vehicle in (light, heavy) for speed in speeds for t in temperatures
     )
     reserved = ("light 2", "heavy 3") if passages and len(trains) == 8 else ()
-    points = tuple((x, t) for x in blows for t in temperatures)
-    return Plan(turnout, sensors, points, trains if passages else (), reserved)
+    hammer_points = tuple((x, t) for x in hammer_positions for t in temperatures)
+    return Plan(turnout, sensors, hammer_points, trains if passages else (), reserved)
 
 
 def turnout_plan(temperatures=(5.0, 25.0), speeds=(22.0, 25.0, 28.0, 32.0, 36.0)):
     """A whole turnout: eight hammer points, twenty passages of two coupled cars each, twelve sensors over 27 m."""
     turnout = TurnoutTrack(uniform_track(72.0), {"main": ((),)})
-    places = np.round(21.6 + 2.4 * np.arange(12) + 0.3 * (np.arange(12) % 3), 3)
-    sensors = tuple(Sensor(f"S{k + 1}", float(x), "rail" if k % 4 else "sleeper") for k, x in enumerate(places))
+    positions = np.round(21.6 + 2.4 * np.arange(12) + 0.3 * (np.arange(12) % 3), 3)
+    sensors = tuple(Sensor(f"S{k + 1}", float(x), "rail" if k % 4 else "sleeper") for k, x in enumerate(positions))
     light = car("light", body_mass=8000.0, half_pivot=5.0, length=15.5, overhang=1.5)
     heavy = car(
         "heavy", body_mass=34000.0, body_inertia=1.6e6, half_pivot=6.0, half_base=0.95, length=17.0, overhang=1.55
     )
-    pairs = [coupled(name, (vehicle, vehicle)) for name, vehicle in (("light", light), ("heavy", heavy))]
-    trains = tuple(Train(pair, pair.name, speed, t) for pair in pairs for speed in speeds for t in temperatures)
-    points = tuple((float(x), t) for x in np.round(22.8 + 3.6 * np.arange(8), 3) for t in temperatures)
-    return Plan(turnout, sensors, points, trains, ("light 3", "heavy 8"))
+    coupled_cars = [couple(name, (vehicle, vehicle)) for name, vehicle in (("light", light), ("heavy", heavy))]
+    trains = tuple(Train(pair, pair.name, speed, t) for pair in coupled_cars for speed in speeds for t in temperatures)
+    hammer_points = tuple((float(x), t) for x in np.round(22.8 + 3.6 * np.arange(8), 3) for t in temperatures)
+    return Plan(turnout, sensors, hammer_points, trains, ("light 3", "heavy 8"))
 
 
 def measured_campaign(plan, terms=(), seed=0):
@@ -163,19 +167,19 @@ def measured_campaign(plan, terms=(), seed=0):
     Supports scatter, the rail is rough, speeds and loads have errors, sensors have wrong gains and noise.
     """
     rng = np.random.default_rng([seed, 7])
-    true = _scattered(plan, rng)
+    true = _scatter_supports(plan, rng)
     gains = 1.0 + 0.01 * rng.normal(size=len(plan.sensors))
     sensors = tuple(replace(s, gain=s.gain * g, noise=plan.noise) for s, g in zip(plan.sensors, gains))
-    hammer = tuple(_test(plan, true, sensors, terms, k, seed) for k in range(len(plan.blows)))
+    hammer = tuple(_hammer_test(plan, true, sensors, terms, k, seed) for k in range(len(plan.hammer_points)))
     count, passages = {}, []
     for k, planned in enumerate(plan.trains):
         count[planned.name] = count.get(planned.name, 0) + 1
         name = f"{planned.name} {count[planned.name]}"
-        passages.append(_passage(plan, true, sensors, terms, planned, name, seed, k, rng))
-    return Campaign(plan.turnout, plan.sensors, hammer, tuple(passages), plan.reserved)
+        passages.append(_simulated_passage(plan, true, sensors, terms, planned, name, seed, k, rng))
+    return CampaignInput(plan.turnout, plan.sensors, hammer, tuple(passages), plan.reserved)
 
 
-def _scattered(plan, rng):
+def _scatter_supports(plan, rng):
     def scatter(track):
         values = {}
         for name in ("pad_stiffness", "ballast_stiffness"):
@@ -189,24 +193,24 @@ def _scattered(plan, rng):
     return replace(base, track=scatter(base.track), tracks={k: scatter(t) for k, t in base.tracks.items()})
 
 
-def _test(plan, true, sensors, terms, k, seed):
-    place, temperature = plan.blows[k]
-    noted = {"rail_temperature": temperature}
-    under = tuple(t.under(noted) for t in terms)
-    own = tuple(replace(s, noise=0.02) for s in sensors)
+def _hammer_test(plan, true, sensors, terms, k, seed):
+    position, temperature = plan.hammer_points[k]
+    conditions = {"rail_temperature": temperature}
+    under = tuple(t.under_conditions(conditions) for t in terms)
+    accelerometers = tuple(replace(s, noise=0.02) for s in sensors)
     recordings = simulate_hammer(
-        true, place, Hammer(place_spread=0.004), own, plan.n_blows, under, seed=1000 * seed + k,
-        half_length=200.0, conditions=noted,
+        true, position, Hammer(position_spread=0.004), accelerometers, plan.n_impacts, under, seed=1000 * seed + k,
+        half_length=200.0, conditions=conditions,
     )  # fmt: skip
     visit = f"{temperature:.0f} °C"
-    return HammerTest(f"blows {k + 1}", place, recordings, "hammer", visit, noted)
+    return HammerInput(f"blows {k + 1}", position, recordings, "hammer", visit, conditions)
 
 
-def _passage(plan, true, sensors, terms, planned, name, seed, k, rng):
-    noted = {} if planned.temperature is None else {"rail_temperature": planned.temperature}
+def _simulated_passage(plan, true, sensors, terms, planned, name, seed, k, rng):
+    conditions = {} if planned.temperature is None else {"rail_temperature": planned.temperature}
     loads = tuple(2.0 * load for load in planned.vehicle.static_loads)
-    said = {"axle_loads": loads, "train": planned.name, "name": name, **noted}
-    under = tuple(t.under(said) for t in terms)
+    term_conditions = {"axle_loads": loads, "train": planned.name, "name": name, **conditions}
+    under = tuple(t.under_conditions(term_conditions) for t in terms)
     vehicle = planned.vehicle
     bodies = tuple(replace(b, mass=b.mass * np.exp(0.02 * rng.normal())) for b in vehicle.bodies)
     speed = planned.speed * (1.0 + 0.003 * rng.normal())
@@ -215,4 +219,4 @@ def _passage(plan, true, sensors, terms, planned, name, seed, k, rng):
         roughness=plan.roughness, lead=0.45, tail=0.25, **plan.options,
     )  # fmt: skip
     recording = replace(recording, conditions={**recording.conditions, "record": k})
-    return Passage(name, recording, planned.vehicle, planned.speed, planned.name, conditions=noted)
+    return PassageInput(name, recording, planned.vehicle, planned.speed, planned.name, conditions=conditions)

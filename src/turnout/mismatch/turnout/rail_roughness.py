@@ -10,34 +10,34 @@ import numpy as np
 
 from turnout.mismatch.engine.case import Nuisance
 from turnout.mismatch.turnout import passage_band
-from turnout.mismatch.turnout.wave_response import Carrier
+from turnout.mismatch.turnout.wave_response import WaveTransfer
 from turnout.simulate.roughness import level
 from turnout.simulate.wheel_path import Sampled
 
-REACH = 3.0  # m before the first and behind the last sensor, from where a wheel still excites them
-LONGEST, SHORTEST = 3.0, passage_band.SHORTEST_WAVE  # m, of the free waves
-STEP = 0.02  # m, between samples of the path
+ROLLING_REACH = 3.0  # m before the first and behind the last sensor, from where a wheel still excites them
+LONGEST_WAVE, SHORTEST_WAVE = 3.0, passage_band.SHORTEST_WAVE  # m, of the free waves
+PATH_STEP = 0.02  # m, between samples of the path
 
 
 class Waves:
     """Cosines and sines over the range of the sensors; ``names`` of their amplitudes."""
 
-    def __init__(self, places, offset):
-        self.start, self.end = min(places) - REACH, max(places) + REACH
+    def __init__(self, positions, offset):
+        self.start, self.end = min(positions) - ROLLING_REACH, max(positions) + ROLLING_REACH
         self.length = 1.1 * (self.end - self.start)
-        orders = np.arange(int(np.ceil(self.length / LONGEST)), int(self.length / SHORTEST) + 1)
+        orders = np.arange(int(np.ceil(self.length / LONGEST_WAVE)), int(self.length / SHORTEST_WAVE) + 1)
         self.lengths = self.length / orders
         self.wavelength = np.repeat(self.lengths, 2)
-        self.quarter = np.tile([0.0, 0.5 * np.pi], orders.size)
+        self.phase_offset = np.tile([0.0, 0.5 * np.pi], orders.size)
         self.names = tuple(
-            f"{'cos' if q == 0.0 else 'sin'}_wave_{o}" for o, q in zip(np.repeat(orders, 2), self.quarter)
+            f"{'cos' if q == 0.0 else 'sin'}_wave_{o}" for o, q in zip(np.repeat(orders, 2), self.phase_offset)
         )
         # the limit curve is an upper limit for intact rails: with more, waves hide dips of half a millimetre
         self.sd = amplitude_sd(self.wavelength, self.length, offset)
 
     def nuisances(self):
         """One amplitude per wave [m]."""
-        return [Nuisance(n, "m", 0.0, float(sd), bends=False) for n, sd in zip(self.names, self.sd)]
+        return [Nuisance(n, "m", 0.0, float(sd), can_mask=False) for n, sd in zip(self.names, self.sd)]
 
     def fade(self, x):
         """(n,) 0 to 1: envelope that fades the waves at both ends."""
@@ -47,7 +47,7 @@ class Waves:
     def shapes(self, x):
         """(n_wave, n) waves at x, faded at both ends."""
         x = np.asarray(x, dtype=float)
-        return self.fade(x) * np.cos(2.0 * np.pi * x / self.wavelength[:, None] - self.quarter[:, None])
+        return self.fade(x) * np.cos(2.0 * np.pi * x / self.wavelength[:, None] - self.phase_offset[:, None])
 
     def amplitudes(self, values):
         """(n_wave,) of ``values``."""
@@ -58,12 +58,12 @@ class Waves:
         amplitude = self.amplitudes(values)
         if not amplitude.any():
             return ()
-        return (Sampled(self.start, STEP, amplitude @ self._sampled),)
+        return (Sampled(self.start, PATH_STEP, amplitude @ self._path_shapes),)
 
     @cached_property
-    def _sampled(self):
+    def _path_shapes(self):
         """(n_wave, n) waves every ``PATH_STEP``."""
-        return self.shapes(np.arange(self.start, self.end + STEP, STEP))
+        return self.shapes(np.arange(self.start, self.end + PATH_STEP, PATH_STEP))
 
 
 def amplitude_sd(wavelength, length, offset):
@@ -75,7 +75,7 @@ def amplitude_sd(wavelength, length, offset):
     return 1e-6 * 10.0 ** (level(wavelength, offset) / 20.0) * np.sqrt(1.0 / (length * width))
 
 
-def wave_columns(case, values, terms, made):
+def wave_columns(case, values, terms, aligned):
     """(n_sensor * n_time, n_wave) derivative of a passage by the amplitudes of the waves."""
-    carrier = Carrier(case, values, made, terms)
-    return carrier.signals(case.waves.lengths, case.waves.fade(carrier.node), carrier.train())
+    transfer = WaveTransfer(case, values, aligned, terms)
+    return transfer.signals(case.waves.lengths, case.waves.fade(transfer.node), transfer.train())

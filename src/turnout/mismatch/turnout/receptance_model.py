@@ -11,43 +11,45 @@ from scipy.sparse import csr_array, lil_array
 
 from turnout.mismatch.turnout import receptance_observation
 from turnout.mismatch.turnout.matrix_cache import FixedLinks, matrices_of
-from turnout.mismatch.turnout.receptance_observation import LINES, SHIFTED
-from turnout.mismatch.turnout.track_parameters import OWN
+from turnout.mismatch.turnout.receptance_observation import LINES, SHIFTED_LINES
+from turnout.mismatch.turnout.track_parameters import SUPPORT_PARAMETERS
 from turnout.physics.term import PhysicsTerm
 from turnout.simulate.frequency_response import responses
-from turnout.simulate.links import Link, left, links_of, ports_of
+from turnout.simulate.links import Link, links_of, ports_of, with_links
 from turnout.simulate.matrices import link_vector
 
-SWING = 1e-6  # m, motion under an impact, for the secant of a port
+TANGENT_MOTION = 1e-6  # m, motion under an impact, for the secant of a port
 # Sliding rate of a joint under an impact, free and stuck, and the friction force between both.
 # For impacts of 5 kN on a simulated track, friction of 0.3 to 8 kN fits best with 20, 13, 8, 3 and 1.5 mm/s.
-FREE, HELD, HOLDING = 0.021, 1.5e-3, 2e3  # [m/s, m/s, N]
-SHARE = 1e-3  # relative change of a support's value, for derivatives of links that follow it
+FREE_RATE, STUCK_RATE, STICKING_FORCE = 0.021, 1.5e-3, 2e3  # [m/s, m/s, N]
+RELATIVE_STEP = 1e-3  # relative change of a support's value, for derivatives of links that follow it
 
 
-def tangent(terms, track):
+def tangent_links(terms, track):
     """Links that replace the nonlinear ports of terms: secant stiffness over 1 µm, and damping at the sliding rate."""
-    found = []
+    links = []
     for port in ports_of(terms, track):
         law, d = port.law, -port.gap
-        k = (float(law.force(d + SWING, 0.0)) - float(law.force(d - SWING, 0.0))) / (2.0 * SWING)
-        rate = HELD + (FREE - HELD) * np.exp(-abs(_against(law, d, FREE)) / HOLDING)
-        c = _against(law, d, rate) / rate
-        found.append(Link(port.ends, k, c, tag="tangent"))
-    return found
+        k = (float(law.force(d + TANGENT_MOTION, 0.0)) - float(law.force(d - TANGENT_MOTION, 0.0))) / (
+            2.0 * TANGENT_MOTION
+        )
+        rate = STUCK_RATE + (FREE_RATE - STUCK_RATE) * np.exp(-abs(_friction_force(law, d, FREE_RATE)) / STICKING_FORCE)
+        c = _friction_force(law, d, rate) / rate
+        links.append(Link(port.ends, k, c, tag="tangent"))
+    return links
 
 
-def linear(track, terms):
+def linear_matrices(track, terms):
     """Matrices of a track with ``terms``, their ports replaced by ``tangent_links``."""
-    return matrices_of(track, (*terms, FixedLinks(tangent(terms, track))))
+    return matrices_of(track, (*terms, FixedLinks(tangent_links(terms, track))))
 
 
-def _against(law, d, rate):
+def _friction_force(law, d, rate):
     """Half the change of a port's force when its rate reverses [N]."""
     return 0.5 * (float(law.force(d, rate)) - float(law.force(d, -rate)))
 
 
-def _own_shear(track, terms):
+def _file_shear_share(track, terms):
     """Share of the file's value in the shear flexibility of the rail; ``terms`` add the rest."""
     if track.rail.beam == "euler":
         return 0.0
@@ -57,57 +59,57 @@ def _own_shear(track, terms):
     return changed.rail.shear_stiffness / track.rail.shear_stiffness
 
 
-class BlowModel:
+class ReceptanceModel:
     """Receptances of one track with terms at given conditions on ``LINES``."""
 
     def __init__(self, track, terms):
         self.track, self.terms = track, terms
-        self.matrices = linear(track, terms)
-        self.own_shear = _own_shear(track, terms)
-        self.by_place, self.weight = {}, {}
+        self.matrices = linear_matrices(track, terms)
+        self.file_shear_share = _file_shear_share(track, terms)
+        self.by_position, self.weight = {}, {}
 
-    def solve(self, places):
+    def solve(self, positions):
         """Compute and keep the displacements under unit forces at these positions, with one factorisation."""
-        new = [p for p in dict.fromkeys(places) if p not in self.by_place]
+        new = [p for p in dict.fromkeys(positions) if p not in self.by_position]
         if new:
-            found = responses(self.matrices, SHIFTED, new)
-            self.by_place |= {p: found[:, k] for k, p in enumerate(new)}
+            displacements = responses(self.matrices, SHIFTED_LINES, new)
+            self.by_position |= {p: displacements[:, k] for k, p in enumerate(new)}
 
-    def displacement(self, place):
+    def displacement(self, position):
         """(n_line, n) displacement of all degrees of freedom under a unit force at a position."""
-        self.solve([place])
-        return self.by_place[place]
+        self.solve([position])
+        return self.by_position[position]
 
-    def moved(self, excited, measured):
+    def nodal_motion(self, excited, measured):
         """(n_line,) displacement at one position under a unit force at another, from nodal motion alone. [m/N]"""
         if measured not in self.weight:
             self.weight[measured] = self.matrices.weights(measured)
         rows, weights = self.weight[measured]
         return self.displacement(excited)[:, rows] @ weights
 
-    def place_of(self, sensor):
+    def position_of(self, sensor):
         """Position of a sensor on the model."""
         return sensor.probe(self.track).place
 
     def receptance(self, excited, measured):
         """(n_line,) complex [m/N]."""
-        h = self.moved(excited, measured)
+        h = self.nodal_motion(excited, measured)
         return h if isinstance(measured, tuple) else h + self.matrices.compliance(float(excited), float(measured))
 
-    def seat_gradient(self, excited, measured, way=0.01):
+    def seat_gradient(self, excited, measured, step=0.01):
         """Derivative by the position of the sensor on the rail, (n_line,) [1/N]; 0 on a sleeper."""
         if isinstance(measured, tuple):
             return np.zeros(LINES.size, dtype=complex)
-        return (self.receptance(excited, measured + way) - self.receptance(excited, measured - way)) / (2.0 * way)
+        return (self.receptance(excited, measured + step) - self.receptance(excited, measured - step)) / (2.0 * step)
 
     @cached_property
     def rows(self):
         """Rows of the rail and of the sleeper at every support, each (n_support,)."""
         index, supports = self.matrices.index, range(self.track.support.size)
-        return tuple(np.array([index[kind, j] for j in supports]) for kind in ("rail", "sleeper"))
+        return tuple(np.array([index[layer, j] for j in supports]) for layer in ("rail", "sleeper"))
 
     @cached_property
-    def following(self):
+    def following_links(self):
         """Links of the terms that depend on a value of their support.
 
         List of (field, support, rows, weights, (k, c, m) per logarithm of the value). Soft ballast has a share of the
@@ -115,19 +117,23 @@ class BlowModel:
         """
         if not self.terms:
             return []
-        found, known = [], self.links(self.terms)
-        for field in dict.fromkeys(o.field for o in OWN):
-            moved = self.links(self.terms, self.track.with_(**{field: getattr(self.track, field) * (1.0 + SHARE)}))
-            for a, b in zip(known, moved):
-                change = tuple((getattr(b, w) - getattr(a, w)) / SHARE for w in ("stiffness", "damping", "mass"))
+        links, before = [], self.links(self.terms)
+        for field in dict.fromkeys(o.field for o in SUPPORT_PARAMETERS):
+            after = self.links(
+                self.terms, self.track.with_(**{field: getattr(self.track, field) * (1.0 + RELATIVE_STEP)})
+            )
+            for a, b in zip(before, after):
+                change = tuple(
+                    (getattr(b, name) - getattr(a, name)) / RELATIVE_STEP for name in ("stiffness", "damping", "mass")
+                )
                 if any(change):
-                    found.append((field, a.ends[0][0][1], *link_vector(a, self.matrices.index), change))
-        return found
+                    links.append((field, a.ends[0][0][1], *link_vector(a, self.matrices.index), change))
+        return links
 
     def links(self, terms, track=None):
         """Links of ``terms`` on this track or another, followed by the tangents of their ports."""
         track = track or self.track
-        return [*links_of(terms, track), *tangent(terms, track)]
+        return [*links_of(terms, track), *tangent_links(terms, track)]
 
 
 class AddedLinks:
@@ -137,7 +143,7 @@ class AddedLinks:
     """
 
     def __init__(self, case, fit, chosen):
-        self.case, self.fit, self.chosen, self.known = case, fit, chosen, {}
+        self.case, self.fit, self.chosen, self.link_responses = case, fit, chosen, {}
 
     def changes(self, pair):
         r"""(key, start) -> (n,) change of the observation of a pair.
@@ -149,80 +155,85 @@ class AddedLinks:
         case, fit, chosen = self.case, self.fit, self.chosen
         if not chosen:
             return {}
-        heard = case.blow_model(fit.values, fit.terms, pair)
-        said = tuple(sorted(pair.conditions.items()))
-        if said not in self.known:
-            self.known[said] = _answers(heard.model, pair.conditions, chosen)
-        ends, index, answer, owner = self.known[said]
-        u, v = (x.T for x in heard.motion(ends, pair))
+        sensitivity = case.pair_sensitivity(fit.values, fit.terms, pair)
+        conditions = tuple(sorted(pair.conditions.items()))
+        if conditions not in self.link_responses:
+            self.link_responses[conditions] = _link_responses(sensitivity.model, pair.conditions, chosen)
+        ends, index, response, owner = self.link_responses[conditions]
+        u, v = (x.T for x in sensitivity.motion(ends, pair))
         change = np.zeros((receptance_observation.LINES.size, len(chosen)), dtype=complex)
-        np.add.at(change.T, owner, -(answer * (u * v)[:, index]).T)
-        columns = receptance_observation.split(
-            receptance_observation.scaled(pair, change, case.chain(fit.values, fit.terms, pair))
+        np.add.at(change.T, owner, -(response * (u * v)[:, index]).T)
+        columns = receptance_observation.split_complex(
+            receptance_observation.scale_lines(pair, change, case.channel_response(fit.values, fit.terms, pair))
         )
         return {(c.key, k): column for (c, k), column in zip(chosen, columns.T)}
 
 
-def _answers(model, conditions, chosen):
+def _link_responses(model, conditions, chosen):
     """(ends (n_end, n), end of each link, z / (1 + z g) of each (n_line, n_link), candidate of each link)."""
-    omega, known, index, impedance, owner = 2.0 * np.pi * receptance_observation.SHIFTED, {}, [], [], []
-    track = left(model.track, links_of(model.terms, model.track))
+    omega, end_index, index, impedance, owner = 2.0 * np.pi * receptance_observation.SHIFTED_LINES, {}, [], [], []
+    track = with_links(model.track, links_of(model.terms, model.track))
     for i, (c, k) in enumerate(chosen):
-        for ends, z in _impedances(track, c, c.term(c.starts[k]).under(conditions), omega):
-            index.append(known.setdefault(ends, len(known)))
+        for ends, z in _impedances(track, c, c.term(c.starts[k]).under_conditions(conditions), omega):
+            index.append(end_index.setdefault(ends, len(end_index)))
             impedance.append(z)
             owner.append(i)
-    weights = lil_array((len(known), model.matrices.n))
-    own = np.empty((omega.size, len(known)), dtype=complex)
-    for ends, k in known.items():
-        pushed = sum(weight * model.displacement(name) for name, weight in ends)
-        own[:, k] = sum(weight * pushed[:, model.matrices.index[name]] for name, weight in ends)
+    weights = lil_array((len(end_index), model.matrices.n))
+    end_receptance = np.empty((omega.size, len(end_index)), dtype=complex)
+    for ends, k in end_index.items():
+        motion = sum(weight * model.displacement(name) for name, weight in ends)
+        end_receptance[:, k] = sum(weight * motion[:, model.matrices.index[name]] for name, weight in ends)
         for name, weight in ends:
             weights[k, model.matrices.index[name]] += weight
     index, z = np.array(index, dtype=int), np.array(impedance).reshape(-1, omega.size).T
-    return weights.tocsr(), index, z / (1.0 + z * own[:, index]), np.array(owner, dtype=int)
+    return weights.tocsr(), index, z / (1.0 + z * end_receptance[:, index]), np.array(owner, dtype=int)
 
 
 def _impedances(track, candidate, term, omega):
     """(ends, impedance (n_line,)) of every link that a term adds."""
     if candidate.family == "attached_resonator":
         return [
-            (((("rail", candidate.where["sleeper"]), 1.0),), term.dynamic_stiffness(receptance_observation.SHIFTED))
+            (
+                ((("rail", candidate.where["sleeper"]), 1.0),),
+                term.dynamic_stiffness(receptance_observation.SHIFTED_LINES),
+            )
         ]
-    links = [*term.links(track), *tangent((term,), track)]
+    links = [*term.links(track), *tangent_links((term,), track)]
     return [(tuple(m.ends), m.stiffness + 1j * omega * m.damping - omega**2 * m.mass) for m in links]
 
 
-WHAT = ("stiffness", "damping", "mass")
+LINK_VALUES = ("stiffness", "damping", "mass")
 
 
-def moved(case, values, terms, new, observations, predictions):
+def predict_near(case, values, terms, new, observations, predictions):
     """Predictions of a track case with ``new`` terms, a small step from ``terms``.
 
     Passages are simulated. Receptances follow the links where these differ by their values alone.
     """
-    found, heard_by, known = [], case.blow_models(values, terms), {}
-    anew = any(a != b and b.kind == "channel" for a, b in zip(terms, new))
+    predicted, sensitivity_of, differences = [], case.pair_sensitivities(values, terms), {}
+    channel_changed = any(a != b and b.effect_type == "channel" for a, b in zip(terms, new))
     for o, old in zip(observations, predictions):
-        if o.name in case.pairs and not anew:
-            pair = case.pairs[o.name]
-            heard, said = heard_by(pair), tuple(sorted(pair.conditions.items()))
-            if said not in known:
-                known[said] = nudged(heard.model, receptance_observation.shown(new, pair.conditions))
-            if known[said] is not None:
-                change = changed(heard, pair, *known[said])
-                found.append(
+        if o.name in case.frf_pairs and not channel_changed:
+            pair = case.frf_pairs[o.name]
+            sensitivity, conditions = sensitivity_of(pair), tuple(sorted(pair.conditions.items()))
+            if conditions not in differences:
+                differences[conditions] = changed_links(
+                    sensitivity.model, receptance_observation.track_terms(new, pair.conditions)
+                )
+            if differences[conditions] is not None:
+                change = receptance_change(sensitivity, pair, *differences[conditions])
+                predicted.append(
                     old
-                    + receptance_observation.split(
-                        receptance_observation.scaled(pair, change, case.chain(values, terms, pair))
+                    + receptance_observation.split_complex(
+                        receptance_observation.scale_lines(pair, change, case.channel_response(values, terms, pair))
                     )
                 )
                 continue
-        found += case.predict(values, new, [o])
-    return found
+        predicted += case.predict(values, new, [o])
+    return predicted
 
 
-def nudged(model, terms):
+def changed_links(model, terms):
     """Ends (n_link, n) and impedances (n_link, n_line) by which links of ``terms`` differ from those of the model.
 
     None where more than values differ: another rail, or a link that the model has not.
@@ -234,8 +245,10 @@ def nudged(model, terms):
     if [k.ends for k in old] != [k.ends for k in new] or any(k.loss_factor for k in (*old, *new)):
         return None
     differs = [(a, b) for a, b in zip(old, new) if a != b]
-    values = np.array([[getattr(b, w) - getattr(a, w) for w in WHAT] for a, b in differs]).reshape(-1, 3)
-    omega = 2.0 * np.pi * receptance_observation.SHIFTED
+    values = np.array([[getattr(b, name) - getattr(a, name) for name in LINK_VALUES] for a, b in differs]).reshape(
+        -1, 3
+    )
+    omega = 2.0 * np.pi * receptance_observation.SHIFTED_LINES
     impedance = values @ np.array([np.ones(omega.size), 1j * omega, -(omega**2)])
     vectors = [link_vector(a, model.matrices.index) for a, _ in differs]
     first = np.cumsum([0, *(rows.size for rows, _ in vectors)])
@@ -244,10 +257,10 @@ def nudged(model, terms):
     return csr_array((weights, rows, first), shape=(len(differs), model.matrices.n)), impedance
 
 
-def changed(heard, pair, ends, impedance):
+def receptance_change(sensitivity, pair, ends, impedance):
     r"""(n_line,) complex change of a pair's receptance [m/N] by links whose impedance changes by z.
 
     It is :math:`-\sum z\,u_w v_w` with u and v the motion of their ends under unit forces at impact and sensor.
     """
-    u, v = heard.motion(ends, pair)
+    u, v = sensitivity.motion(ends, pair)
     return -np.sum(impedance * u * v, axis=0)

@@ -9,26 +9,26 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_array
 
-from turnout.mismatch.turnout.receptance_observation import LINES, SHIFTED
-from turnout.mismatch.turnout.track_parameters import COMMON, OWN, cast_elements
+from turnout.mismatch.turnout.receptance_observation import LINES, SHIFTED_LINES
+from turnout.mismatch.turnout.track_parameters import COMMON_PARAMETERS, SUPPORT_PARAMETERS, casting_elements
 from turnout.simulate.compiled import kernel
 from turnout.simulate.rail import element_mass
 
 
 @kernel
-def by_rail(moved, pairs, row, length, weights):
+def rail_derivatives(displacements, pairs, row, length, weights):
     """(n_pair, n_line, 2) derivatives of receptances by the logarithms of bending and shear stiffness of the rail.
 
     ``displacements`` (n_place, n_line, n) are those under unit forces, ``pairs`` (2, n_pair) the positions of impact
     and sensor, ``row`` (n_node,) the row of a node's deflection, ``length`` (n_element,). ``weights`` (3, n_element)
     are those of bending, of shear, and of shear by the shear stiffness alone.
     """
-    n_place, n_line, n_element = moved.shape[0], moved.shape[1], length.size
-    found = np.zeros((pairs.shape[1], n_line, 2), dtype=np.complex128)
+    n_place, n_line, n_element = displacements.shape[0], displacements.shape[1], length.size
+    derivatives = np.zeros((pairs.shape[1], n_line, 2), dtype=np.complex128)
     bent, skew = np.zeros((2, n_place, n_element)), np.zeros((2, n_place, n_element))
     for line in range(n_line):
         for k in range(n_place):
-            u = moved[k, line]
+            u = displacements[k, line]
             for e in range(n_element):
                 first, second = row[e], row[e + 1]
                 b = u[second + 1] - u[first + 1]
@@ -46,16 +46,16 @@ def by_rail(moved, pairs, row, length, weights):
                 imag += bend * (b_p[e] * c_q[e] + c_p[e] * b_q[e]) + shear * y
                 shear_real += alone * x
                 shear_imag += alone * y
-            found[k, line, 0], found[k, line, 1] = -complex(real, imag), -complex(shear_real, shear_imag)
-    return found
+            derivatives[k, line, 0], derivatives[k, line, 1] = -complex(real, imag), -complex(shear_real, shear_imag)
+    return derivatives
 
 
-FIELDS = [o.field for o in OWN]
-OMEGA = 2.0 * np.pi * SHIFTED
+FIELDS = [o.field for o in SUPPORT_PARAMETERS]
+OMEGA = 2.0 * np.pi * SHIFTED_LINES
 FACTOR = {"stiffness": -1.0 + 0j * OMEGA, "damping": -1j * OMEGA, "mass": OMEGA**2 + 0j}
 
 
-class Heard:
+class ReceptanceSensitivity:
     """Receptances of one ``model`` (``ReceptanceModel``) and their derivatives.
 
     ``pairs`` are (position of the impact, ``FrfPair.seat``); ``seats`` maps the latter to the position of the sensor.
@@ -66,7 +66,7 @@ class Heard:
         self.model, self.seats, self.zone = model, seats, zone
         self.row = {pair: k for k, pair in enumerate(dict.fromkeys(pairs))}
 
-    def _of(self, pair):
+    def _row_of(self, pair):
         return self.row[pair.test.place, pair.seat]
 
     def receptance(self, pair):
@@ -79,27 +79,27 @@ class Heard:
 
     def rail_gradient(self, pair):
         """Derivatives by the logarithms of the uncertain rail values (``rail_sds``), (n_line, n)."""
-        return np.concatenate([self._by_rail[self._of(pair)], self._by_castings[self._of(pair)]], axis=-1)
+        return np.concatenate([self._by_rail[self._row_of(pair)], self._by_castings[self._row_of(pair)]], axis=-1)
 
     def gradient(self, pair):
         """Derivatives by the logarithms of common and support values, (n_line, n) in order of ``track_value_names``."""
-        return self._by_supports[self._of(pair)]
+        return self._by_supports[self._row_of(pair)]
 
     def motion(self, ends, pair):
         """((n_link, n_line), the same) motion of ``ends`` (n_link, n) under unit forces at impact and sensor."""
-        return tuple(ends @ self._moved[place].T for place in self._places[1][:, self._of(pair)])
+        return tuple(ends @ self._displacements[position].T for position in self._positions[1][:, self._row_of(pair)])
 
     @cached_property
-    def _places(self):
+    def _positions(self):
         """Index of the position of every impact and sensor, and (2, n_pair) indices of each pair."""
-        ends = [(place, self.seats[seat]) for place, seat in self.row]
-        index = {place: k for k, place in enumerate(dict.fromkeys(p for pair in ends for p in pair))}
+        ends = [(position, self.seats[seat]) for position, seat in self.row]
+        index = {position: k for k, position in enumerate(dict.fromkeys(p for pair in ends for p in pair))}
         return index, np.array([[index[p] for p in pair] for pair in ends]).T
 
     @cached_property
-    def _moved(self):
+    def _displacements(self):
         """(n_place, n_line, n) displacement of all degrees of freedom under unit forces at the positions."""
-        return np.array([self.model.displacement(place) for place in self._places[0]])
+        return np.array([self.model.displacement(position) for position in self._positions[0]])
 
     @cached_property
     def _by_rail(self):
@@ -114,8 +114,8 @@ class Heard:
         matrices = self.model.matrices
         h, p, ei, _ = matrices.elements
         sheared = 12.0 * ei / (h * (1.0 + p) ** 2)
-        weights = np.array([ei / h, sheared, self.model.own_shear * sheared * p])
-        return by_rail(self._moved, self._places[1], matrices.node_index, h, weights)
+        weights = np.array([ei / h, sheared, self.model.file_shear_share * sheared * p])
+        return rail_derivatives(self._displacements, self._positions[1], matrices.node_index, h, weights)
 
     @cached_property
     def _by_castings(self):
@@ -124,79 +124,88 @@ class Heard:
         The same sums over the elements that it covers, and :math:`\omega^2 \sum_e u^T M_e v` with their masses. Each
         element counts by the share of the casting in its flexibility and mass.
         """
-        matrices, (first, second) = self.model.matrices, self._places[1]
+        matrices, (first, second) = self.model.matrices, self._positions[1]
         h, p, ei, _ = matrices.elements
         row = matrices.node_index
-        found = [np.zeros((len(self.row), OMEGA.size, 0), dtype=complex)]
-        for c, (e, share) in zip(self.zone.castings, cast_elements(self.zone, matrices.node)):
-            yields, weighs = self._part_of(c.piece, e, share)
-            ends = [self._moved[..., row[e + side] + k] for side in (0, 1) for k in (0, 1)]
-            w, turn = ends[::2], ends[1::2]
-            bent, skew = turn[1] - turn[0], (w[1] - w[0]) / h[e] - 0.5 * (turn[0] + turn[1])
-            sheared = yields * 12.0 * ei[e] / (h[e] * (1.0 + p[e]) ** 2)
-            bending = -(bent[first] * bent[second]) @ (yields * ei[e] / h[e]) - (skew[first] * skew[second]) @ sheared
+        derivatives = [np.zeros((len(self.row), OMEGA.size, 0), dtype=complex)]
+        for c, (e, share) in zip(self.zone.castings, casting_elements(self.zone, matrices.node)):
+            flexibility_share, mass_share = self._casting_shares(c.piece, e, share)
+            ends = [self._displacements[..., row[e + side] + k] for side in (0, 1) for k in (0, 1)]
+            w, rotation = ends[::2], ends[1::2]
+            bent, skew = rotation[1] - rotation[0], (w[1] - w[0]) / h[e] - 0.5 * (rotation[0] + rotation[1])
+            sheared = flexibility_share * 12.0 * ei[e] / (h[e] * (1.0 + p[e]) ** 2)
+            bending = (
+                -(bent[first] * bent[second]) @ (flexibility_share * ei[e] / h[e])
+                - (skew[first] * skew[second]) @ sheared
+            )
             u = np.stack(ends, axis=-1)
             mass = [
-                w_k * element_mass(replace(matrices.rails[k], rotary_inertia=0.0), h[k]) for w_k, k in zip(weighs, e)
+                w_k * element_mass(replace(matrices.rails[k], rotary_inertia=0.0), h[k])
+                for w_k, k in zip(mass_share, e)
             ]
-            pressed = np.einsum("pfei,eij->pfej", u, np.reshape(mass, (-1, 4, 4)))
-            found += [bending[..., None], (OMEGA**2 * np.sum(u[first] * pressed[second], axis=(2, 3)))[..., None]]
-        return np.concatenate(found, axis=-1)
+            inertia = np.einsum("pfei,eij->pfej", u, np.reshape(mass, (-1, 4, 4)))
+            derivatives += [bending[..., None], (OMEGA**2 * np.sum(u[first] * inertia[second], axis=(2, 3)))[..., None]]
+        return np.concatenate(derivatives, axis=-1)
 
-    def _part_of(self, piece, elements, shares):
+    def _casting_shares(self, piece, elements, shares):
         """(2, n) share of a piece in flexibility and mass of the elements, of whose length it covers ``shares``.
 
         It is 0 where a term has replaced the rail.
         """
-        matrices, track, parts = self.model.matrices, self.model.track, np.zeros((2, elements.size))
-        own = track.rail_between(0.5 * (piece.start + piece.end))
+        matrices, track, casting_shares = self.model.matrices, self.model.track, np.zeros((2, elements.size))
+        piece_rail = track.rail_at(0.5 * (piece.start + piece.end))
         for k, (e, share) in enumerate(zip(elements, shares)):
-            there, filed = matrices.rails[e], track.rail_over(*matrices.node[e : e + 2].tolist())
-            if (there.bending_stiffness, there.mass) == (filed.bending_stiffness, filed.mass):
-                parts[:, k] = share * there.bending_stiffness / own.bending_stiffness, share * own.mass / there.mass
-        return parts
+            rail, file_rail = matrices.rails[e], track.element_rail(*matrices.node[e : e + 2].tolist())
+            if (rail.bending_stiffness, rail.mass) == (file_rail.bending_stiffness, file_rail.mass):
+                casting_shares[:, k] = (
+                    share * rail.bending_stiffness / piece_rail.bending_stiffness,
+                    share * piece_rail.mass / rail.mass,
+                )
+        return casting_shares
 
     @cached_property
     def _by_supports(self):
         """(n_pair, n_line, n) derivatives by all common and support values."""
         zone, track = self.zone, self.model.track
         inside, n = slice(zone.first, zone.last + 1), zone.last + 1 - zone.first
-        first, second = self._places[1]
-        pad, sleeper = (u[first] * u[second] for u in self._at_supports(self._moved))
+        first, second = self._positions[1]
+        pad, sleeper = (u[first] * u[second] for u in self._at_supports(self._displacements))
         product = {"pad": pad, "ballast": sleeper, "sleeper": sleeper}
-        found = np.empty((len(self.row), LINES.size, len(COMMON) + n * len(OWN)), dtype=complex)
-        for k, o in enumerate(OWN):
-            value, factor = getattr(track, o.field), FACTOR[o.what]
-            found[..., _COMMON_OF[o.field]] = (product[o.link] @ value) * factor
-            start, by = len(COMMON) + k * n, factor[:, None] * value[inside]
-            np.multiply(product[o.link][..., inside], by, out=found[..., start : start + n])
-        if self.model.following:
-            found += self._followed(found.shape, n)
-        return found
+        derivatives = np.empty(
+            (len(self.row), LINES.size, len(COMMON_PARAMETERS) + n * len(SUPPORT_PARAMETERS)), dtype=complex
+        )
+        for k, o in enumerate(SUPPORT_PARAMETERS):
+            value, factor = getattr(track, o.field), FACTOR[o.quantity]
+            derivatives[..., _COMMON_OF[o.field]] = (product[o.link] @ value) * factor
+            start, scale = len(COMMON_PARAMETERS) + k * n, factor[:, None] * value[inside]
+            np.multiply(product[o.link][..., inside], scale, out=derivatives[..., start : start + n])
+        if self.model.following_links:
+            derivatives += self._following_gradient(derivatives.shape, n)
+        return derivatives
 
     def _at_supports(self, u):
         """Compression of every pad and motion of every sleeper, each (..., n_support)."""
         rail, sleeper = self.model.rows
         return u[..., rail] - u[..., sleeper], u[..., sleeper]
 
-    def _followed(self, shape, n):
+    def _following_gradient(self, shape, n):
         """Contribution of those links of terms that depend on a value of their support."""
-        fields, supports, rows, weights, changes = zip(*self.model.following)
+        fields, supports, rows, weights, changes = zip(*self.model.following_links)
         first = np.cumsum([0, *(r.size for r in rows)])
         ends = csr_array((np.concatenate(weights), np.concatenate(rows), first), (len(rows), self.model.matrices.n))
         impedance = np.array(changes) @ np.array([FACTOR["stiffness"], FACTOR["damping"], FACTOR["mass"]])
-        moved = (ends @ self._moved.reshape(-1, ends.shape[1]).T).reshape(len(fields), -1, LINES.size)
-        first, second = self._places[1]
-        each = moved[:, first] * moved[:, second] * impedance[:, None]
-        common = [(e, _COMMON_OF[field]) for e, field in enumerate(fields)]
-        own = [
-            (e, len(COMMON) + FIELDS.index(field) * n + support - self.zone.first)
+        end_motion = (ends @ self._displacements.reshape(-1, ends.shape[1]).T).reshape(len(fields), -1, LINES.size)
+        first, second = self._positions[1]
+        products = end_motion[:, first] * end_motion[:, second] * impedance[:, None]
+        common_columns = [(e, _COMMON_OF[field]) for e, field in enumerate(fields)]
+        support_columns = [
+            (e, len(COMMON_PARAMETERS) + FIELDS.index(field) * n + support - self.zone.first)
             for e, (field, support) in enumerate(zip(fields, supports))
             if self.zone.first <= support <= self.zone.last
         ]
-        entry, column = np.array([*common, *own]).T
+        entry, column = np.array([*common_columns, *support_columns]).T
         sums = csr_array((np.ones(entry.size), (entry, column)), (len(fields), shape[-1]))
-        return (sums.T @ each.reshape(len(fields), -1)).T.reshape(shape)
+        return (sums.T @ products.reshape(len(fields), -1)).T.reshape(shape)
 
 
-_COMMON_OF = {name: k for k, (name, *_) in enumerate(COMMON)}
+_COMMON_OF = {name: k for k, (name, *_) in enumerate(COMMON_PARAMETERS)}

@@ -8,11 +8,11 @@ from operator import itemgetter
 import numpy as np
 
 from turnout.mismatch.engine.case import Nuisance
-from turnout.simulate.track import PER_SUPPORT, SAME, RailStretch
+from turnout.simulate.track import NODE_TOLERANCE, PER_SUPPORT, RailStretch
 
 # Common logarithmic factor on a value of all supports: field, tag of its links, quantity of the link, prior sd.
 # Priors: spread of published values, Knothe and Grassie 1993, tables 1 to 3.
-COMMON = (
+COMMON_PARAMETERS = (
     ("pad_stiffness", "pad", "stiffness", 0.25),
     ("pad_damping", "pad", "damping", 0.5),
     ("ballast_stiffness", "ballast", "stiffness", 0.25),
@@ -22,7 +22,7 @@ COMMON = (
 
 
 @dataclass(frozen=True)
-class Own:
+class SupportParameter:
     """A value that every support of the zone has of its own.
 
     ``field`` of the track, short ``tag``, the ``link`` it belongs to and the ``quantity`` of that. ``sd`` is the
@@ -32,31 +32,31 @@ class Own:
     field: str
     tag: str
     link: str
-    what: str
+    quantity: str
     sd: float
 
 
 # Scatter from support to support: Oscarsson 2002. Dampers were never measured singly; sleepers are cast alike.
-OWN = (
-    Own("pad_stiffness", "pad", "pad", "stiffness", 0.10),
-    Own("ballast_stiffness", "ballast", "ballast", "stiffness", 0.10),
-    Own("pad_damping", "pad_damper", "pad", "damping", 0.15),
-    Own("ballast_damping", "ballast_damper", "ballast", "damping", 0.15),
-    Own("sleeper_mass", "sleeper", "sleeper", "mass", 0.03),
+SUPPORT_PARAMETERS = (
+    SupportParameter("pad_stiffness", "pad", "pad", "stiffness", 0.10),
+    SupportParameter("ballast_stiffness", "ballast", "ballast", "stiffness", 0.10),
+    SupportParameter("pad_damping", "pad_damper", "pad", "damping", 0.15),
+    SupportParameter("ballast_damping", "ballast_damper", "ballast", "damping", 0.15),
+    SupportParameter("sleeper_mass", "sleeper", "sleeper", "mass", 0.03),
 )
 # Prior sd of ln stiffness of the rail: wear and rolling tolerances. Published shear coefficients of 60E1 are 0.34 to
 # 0.41; 14 controls of another simulator, checked against closed forms, needed 0.12 ± 0.02 less (95 %).
-RAIL = (("rail_bending", 0.015), ("rail_shear", 0.12))
+RAIL_SDS = (("rail_bending", 0.015), ("rail_shear", 0.12))
 # The same for a piece of other rail, inner and at an end: the file has one section for a casting that varies.
-CAST = (("cast_bending", 0.10, 0.30), ("cast_mass", 0.10, 0.30))
-SHORT = 0.02  # m; shorter pieces between two ends are ignored
-RAMP = 0.3  # m, over which the section of a casting grows at its ends
+CASTING_SDS = (("cast_bending", 0.10, 0.30), ("cast_mass", 0.10, 0.30))
+MIN_PIECE_LENGTH = 0.02  # m; shorter pieces between two ends are ignored
+SECTION_RAMP = 0.3  # m, over which the section of a casting grows at its ends
 RAIL_STEP = 0.05  # of logarithms of rail values; derivatives by pads err by 8 % over 0.12
 WHEELS_SD = 0.06  # sd of ln unsprung mass: reprofiling takes 10 %; 42 wheelsets of another simulator: 0.054
 SEAT_SD = 0.02  # m, standard deviation of the position of a sensor
-REACH = 1.9  # m beyond sensors and impacts; supports there have values of their own
-ASKED = 0.7  # m, the same for effects; the outermost supports absorb deviations of those beyond
-MARGIN = 18.0  # m of track modelled beyond sensors and impacts
+SUPPORT_REACH = 1.9  # m beyond sensors and impacts; supports there have values of their own
+EFFECT_REACH = 0.7  # m, the same for effects; the outermost supports absorb deviations of those beyond
+TRACK_MARGIN = 18.0  # m of track modelled beyond sensors and impacts
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Casting:
     ``inner``: not at an end of the stretch.
     """
 
-    of: RailStretch
+    stretch: RailStretch
     piece: RailStretch
     inner: bool
 
@@ -81,7 +81,7 @@ class Zone:
     turnout: object
     first: int
     last: int
-    asked: range
+    effect_supports: range
     castings: tuple = ()
 
     @property
@@ -90,12 +90,12 @@ class Zone:
         return range(self.first, self.last + 1)
 
 
-def zone_of(turnout, places):
+def zone_of(turnout, positions):
     """The relevant part of a turnout, with absorbing ends as they are."""
-    low, high = min(places), max(places)
+    low, high = min(positions), max(positions)
 
     def cut(track):
-        keep = (track.support >= low - MARGIN) & (track.support <= high + MARGIN)
+        keep = (track.support >= low - TRACK_MARGIN) & (track.support <= high + TRACK_MARGIN)
         values = {name: getattr(track, name)[keep] for name in PER_SUPPORT}
         section = tuple(s for s, k in zip(track.section, keep) if k)
         return replace(track, support=track.support[keep], section=section, **values)
@@ -103,9 +103,15 @@ def zone_of(turnout, places):
     tracks = {name: cut(track) for name, track in turnout.tracks.items()}
     smaller = replace(turnout, track=cut(turnout.track), tracks=tracks)
     support = smaller.track.support
-    inside, asked = (np.flatnonzero((support >= low - r) & (support <= high + r)) for r in (REACH, ASKED))
-    castings = castings_of(smaller.track_of("main"), low - REACH, high + REACH)  # receptances are modelled on it
-    return Zone(smaller, int(inside[0]), int(inside[-1]), range(int(asked[0]), int(asked[-1]) + 1), castings)
+    inside, effect_supports = (
+        np.flatnonzero((support >= low - r) & (support <= high + r)) for r in (SUPPORT_REACH, EFFECT_REACH)
+    )
+    castings = castings_of(
+        smaller.track_of("main"), low - SUPPORT_REACH, high + SUPPORT_REACH
+    )  # receptances are modelled on it
+    return Zone(
+        smaller, int(inside[0]), int(inside[-1]), range(int(effect_supports[0]), int(effect_supports[-1]) + 1), castings
+    )
 
 
 def castings_of(track, low, high):
@@ -114,35 +120,35 @@ def castings_of(track, low, high):
     Cuts are at all ends, at ``SECTION_RAMP`` from them, where a section grows from that of the rail, and every metre or
     so.
     """
-    cuts = {x for s in track.stretches for x in (s.start - RAMP, s.start, s.end, s.end + RAMP)}
+    cuts = {x for s in track.stretches for x in (s.start - SECTION_RAMP, s.start, s.end, s.end + SECTION_RAMP)}
     for s in track.stretches:
-        if s.end - s.start > 2.0 * RAMP:
-            cuts |= set(np.linspace(s.start + RAMP, s.end - RAMP, 1 + max(1, round(s.end - s.start))))
-    found = []
+        if s.end - s.start > 2.0 * SECTION_RAMP:
+            cuts |= set(np.linspace(s.start + SECTION_RAMP, s.end - SECTION_RAMP, 1 + max(1, round(s.end - s.start))))
+    castings = []
     for start, end in pairwise(sorted(cuts)):
         middle = 0.5 * (start + end)
-        near = [s for s in track.stretches if s.start - RAMP < middle < s.end + RAMP]
-        if near and end - start > SHORT and end > low and start < high:
-            of = next((s for s in reversed(near) if s.start <= middle < s.end), near[-1])
-            inner = of.start + RAMP < middle < of.end - RAMP
-            found.append(Casting(of, RailStretch(float(start), float(end), track.rail_between(middle)), inner))
-    return tuple(found)
+        near = [s for s in track.stretches if s.start - SECTION_RAMP < middle < s.end + SECTION_RAMP]
+        if near and end - start > MIN_PIECE_LENGTH and end > low and start < high:
+            stretch = next((s for s in reversed(near) if s.start <= middle < s.end), near[-1])
+            inner = stretch.start + SECTION_RAMP < middle < stretch.end - SECTION_RAMP
+            castings.append(Casting(stretch, RailStretch(float(start), float(end), track.rail_at(middle)), inner))
+    return tuple(castings)
 
 
-def rail_spreads(zone):
+def rail_sds(zone):
     """{name: standard deviation} of uncertain rail values: its stiffness, stiffness and mass of castings."""
-    cast = [(f"{name}_{k}", sds[not c.inner]) for k, c in enumerate(zone.castings) for name, *sds in CAST]
-    return dict([*RAIL, *cast])
+    cast = [(f"{name}_{k}", sds[not c.inner]) for k, c in enumerate(zone.castings) for name, *sds in CASTING_SDS]
+    return dict([*RAIL_SDS, *cast])
 
 
-def cast_elements(zone, node):
+def casting_elements(zone, node):
     """[((n,) elements, (n,) shares of their length)] that each casting covers; nodes (n_element + 1,) [m]."""
-    length, found = np.diff(node), []
+    length, elements = np.diff(node), []
     for c in zone.castings:
         covered = np.minimum(node[1:], c.piece.end) - np.maximum(node[:-1], c.piece.start)
-        inside = np.flatnonzero(covered > SAME)
-        found.append((inside, covered[inside] / length[inside]))
-    return found
+        inside = np.flatnonzero(covered > NODE_TOLERANCE)
+        elements.append((inside, covered[inside] / length[inside]))
+    return elements
 
 
 def with_rail(zone, values):
@@ -157,36 +163,42 @@ def with_rail(zone, values):
             mass=rail.mass * mass,
         )
 
-    def stiffened(track):
-        own = [replace(s, rail=changed(s.rail)) for s in track.stretches]
+    def with_factors(track):
+        stretches = [replace(s, rail=changed(s.rail)) for s in track.stretches]
         for k, c in enumerate(zone.castings):
-            if c.of in track.stretches:
-                own.append(replace(c.piece, rail=changed(c.piece.rail, *(factor[f"{name}_{k}"] for name, *_ in CAST))))
-        return track.with_(rail=changed(track.rail), stretches=tuple(own))
+            if c.stretch in track.stretches:
+                stretches.append(
+                    replace(c.piece, rail=changed(c.piece.rail, *(factor[f"{name}_{k}"] for name, *_ in CASTING_SDS)))
+                )
+        return track.with_(rail=changed(track.rail), stretches=tuple(stretches))
 
-    tracks = {name: stiffened(track) for name, track in zone.turnout.tracks.items()}
-    return replace(zone, turnout=replace(zone.turnout, track=stiffened(zone.turnout.track), tracks=tracks))
+    tracks = {name: with_factors(track) for name, track in zone.turnout.tracks.items()}
+    return replace(zone, turnout=replace(zone.turnout, track=with_factors(zone.turnout.track), tracks=tracks))
 
 
-def near_rail(values, names):
+def rail_on_grid(values, names):
     """Rail values rounded to a grid of ``RAIL_STEP``: models are made there and linear from there to ``values``."""
     return {name: RAIL_STEP * round(values[name] / RAIL_STEP) for name in names}
 
 
 def track_nuisances(zone, trains):
     """Nuisances of track and vehicles, all as logarithms of a factor on the value of the file."""
-    found = [Nuisance(name, "-", 0.0, sd, bounds=(-2.0, 2.0), meaning=f"ln {name}") for name, _, _, sd in COMMON]
-    for own in OWN:
-        steps = steps_of(getattr(zone.turnout.track, own.field))
+    nuisances = [
+        Nuisance(name, "-", 0.0, sd, bounds=(-2.0, 2.0), meaning=f"ln {name}") for name, _, _, sd in COMMON_PARAMETERS
+    ]
+    for parameter in SUPPORT_PARAMETERS:
+        steps = steps_of(getattr(zone.turnout.track, parameter.field))
         for j in zone.supports:
-            sd = float(np.hypot(own.sd, steps[j]))
-            meaning, most = f"ln {own.field} of {j}", 6.0 * sd
-            found.append(Nuisance(f"{own.tag}_{j}", "-", 0.0, sd, bounds=(-most, most), meaning=meaning))
-    for name, sd in rail_spreads(zone).items():
-        found.append(Nuisance(name, "-", 0.0, sd, bounds=(-6.0 * sd, 6.0 * sd), meaning=f"ln {name} of the rail"))
+            sd = float(np.hypot(parameter.sd, steps[j]))
+            meaning, most = f"ln {parameter.field} of {j}", 6.0 * sd
+            nuisances.append(Nuisance(f"{parameter.tag}_{j}", "-", 0.0, sd, bounds=(-most, most), meaning=meaning))
+    for name, sd in rail_sds(zone).items():
+        nuisances.append(Nuisance(name, "-", 0.0, sd, bounds=(-6.0 * sd, 6.0 * sd), meaning=f"ln {name} of the rail"))
     for train in trains:
-        found.append(Nuisance(f"wheels_{train}", "-", 0.0, WHEELS_SD, bounds=(-0.5, 0.5), meaning="ln unsprung mass"))
-    return found
+        nuisances.append(
+            Nuisance(f"wheels_{train}", "-", 0.0, WHEELS_SD, bounds=(-0.5, 0.5), meaning="ln unsprung mass")
+        )
+    return nuisances
 
 
 def steps_of(values):
@@ -202,26 +214,28 @@ def steps_of(values):
 
 def track_with(track, zone, values):
     """The track with the factors of ``values`` on its supports."""
-    changes = {name: getattr(track, name) * np.exp(values[name]) for name, *_ in COMMON}
-    for own in OWN:
+    changes = {name: getattr(track, name) * np.exp(values[name]) for name, *_ in COMMON_PARAMETERS}
+    for parameter in SUPPORT_PARAMETERS:
         for j in zone.supports:
-            changes[own.field][j] *= np.exp(values[f"{own.tag}_{j}"])
+            changes[parameter.field][j] *= np.exp(values[f"{parameter.tag}_{j}"])
     return track.with_(**changes)
 
 
-def inner_names(zone):
+def track_value_names(zone):
     """Names of all values that ``track_with`` reads, first among the nuisances of a case."""
     return _names_of(zone.supports)
 
 
 @lru_cache(maxsize=8)
 def _names_of(supports):
-    return [n for n, *_ in COMMON] + [f"{own.tag}_{j}" for own in OWN for j in supports]
+    return [n for n, *_ in COMMON_PARAMETERS] + [
+        f"{parameter.tag}_{j}" for parameter in SUPPORT_PARAMETERS for j in supports
+    ]
 
 
-def inner_values(zone, values):
+def track_value_key(zone, values):
     """All values that ``track_with`` reads as bytes: a cache key."""
-    return np.array(itemgetter(*inner_names(zone))(values)).tobytes()
+    return np.array(itemgetter(*track_value_names(zone))(values)).tobytes()
 
 
 def vehicle_with(vehicle, values, train, load):

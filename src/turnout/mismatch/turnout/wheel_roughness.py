@@ -12,89 +12,96 @@ rail and how deep it falls depend on its profile, new or hollow worn (Palsson an
 import numpy as np
 from scipy.linalg import eigh
 
-from turnout.mismatch.engine.candidate_search import absorbed
+from turnout.mismatch.engine.candidate_search import masked_candidates
 from turnout.mismatch.turnout.rail_roughness import amplitude_sd
-from turnout.mismatch.turnout.wave_response import Carrier
+from turnout.mismatch.turnout.wave_response import WaveTransfer
 
-DEPTH, LENGTH = 0.2, 0.15  # relative sd of depth and length of a component from wheel to wheel
-PLACE = 0.03  # m, sd of its position from wheel to wheel
-SHARP = 0.5  # sd of its shape, as a share of the difference between powers 1.5 and 2
-FAR = 1.0  # m to either side of the deepest point
-LEAST = 1e-6  # m; shallower components are ignored
+DEPTH_SD, LENGTH_SD = 0.2, 0.15  # relative sd of depth and length of a component from wheel to wheel
+POSITION_SD = 0.03  # m, sd of its position from wheel to wheel
+SHARPNESS_SD = 0.5  # sd of its shape, as a share of the difference between powers 1.5 and 2
+MAX_NOSE_LENGTH = 1.0  # m to either side of the deepest point
+MIN_DEPTH = 1e-6  # m; shallower components are ignored
 
 
-def profile_modes(case, values, made, carrier):
+def profile_modes(case, values, aligned, transfer):
     """(n_sensor * n_time, n_mode) signals of one standard deviation of each wheel's path over each component."""
-    way = carrier.course
-    paths = [path for part in _parts(case, values, made) for path in _otherwise(part, way)]
+    grid = transfer.fine_grid
+    paths = [path for component in _components(case, values, aligned) for path in _deviations(component, grid)]
     if not paths:
-        return np.zeros((len(made.sensors) * made.time.size, 0))
-    return np.concatenate([carrier.alone(w, np.array(paths)) for w in range(carrier.behind.size)], axis=1)
+        return np.zeros((len(aligned.sensors) * aligned.time.size, 0))
+    return np.concatenate(
+        [transfer.wheel_response(w, np.array(paths)) for w in range(transfer.wheel_delays.size)], axis=1
+    )
 
 
-def _parts(case, values, made):
+def _components(case, values, aligned):
     """Components of a passage's route except waves, which are the same for all wheels."""
-    parts = [part for parts in case.surface.surfaces(made.passage.route, values) for part in parts]
-    return [part for part in parts if not hasattr(part, "wavelength")]
+    components = [
+        component for components in case.surface.surfaces(aligned.passage.route, values) for component in components
+    ]
+    return [component for component in components if not hasattr(component, "wavelength")]
 
 
-def _otherwise(part, way):
+def _deviations(component, grid):
     """Standard deviations of a surface component at ``grid`` (n,) [m]: deeper, further, longer, sharper.
 
     A height step between its ends is the same for all wheels.
     """
-    ends = getattr(part, "places", way)[0], getattr(part, "places", way)[-1]
-    inside = (way >= ends[0]) & (way <= ends[1])
-    dip = np.where(inside, part(way, 0) - np.interp(way, ends, part(np.array(ends), 0)), 0.0)
+    ends = getattr(component, "places", grid)[0], getattr(component, "places", grid)[-1]
+    inside = (grid >= ends[0]) & (grid <= ends[1])
+    dip = np.where(inside, component(grid, 0) - np.interp(grid, ends, component(np.array(ends), 0)), 0.0)
     deepest = np.max(np.abs(dip))
-    if deepest < LEAST:
+    if deepest < MIN_DEPTH:
         return []
-    slope = np.gradient(dip, way)
-    from_middle = np.clip(way - way[np.argmax(np.abs(dip))], -FAR, FAR)
+    slope = np.gradient(dip, grid)
+    from_middle = np.clip(grid - grid[np.argmax(np.abs(dip))], -MAX_NOSE_LENGTH, MAX_NOSE_LENGTH)
     share = np.abs(dip) / deepest
     sharper = np.sign(dip) * deepest * (share**0.75 - share)
-    return [DEPTH * dip, PLACE * slope, LENGTH * from_middle * slope, SHARP * sharper]
+    return [DEPTH_SD * dip, POSITION_SD * slope, LENGTH_SD * from_middle * slope, SHARPNESS_SD * sharper]
 
 
-TURNED = 1.5e-5  # m, first three harmonics of wheels in service (Johansson 2006, Vehicle System Dynamics 44)
+OUT_OF_ROUND_SD = 1.5e-5  # m, first three harmonics of wheels in service (Johansson 2006, Vehicle System Dynamics 44)
 WHEEL_LEVEL = -2.0  # dB over the limit curve of rails: disc-braked wheels
-KEPT = 0.02  # share of a sample's own variance below which a mode is left out
-FAINT = 0.1  # of that: single waves below this are left out before they are combined
-BEYOND = 6.0  # m beyond the free waves; lightly damped track carries a wheel's noise that far
+MIN_MODE_VARIANCE = 0.02  # share of a sample's own variance below which a mode is left out
+FAINT_SHARE = 0.1  # of that: single waves below this are left out before they are combined
+ROUGHNESS_MARGIN = 6.0  # m beyond the free waves; lightly damped track carries a wheel's noise that far
 
 
-def wheel_modes(case, values, made, sigma):
+def wheel_modes(case, values, aligned, sigma):
     """(n_sensor * n_time, n_mode) signals of one standard deviation of the roughness and profile of all wheels.
 
     ``sigma`` (n,) is the error of the observation. In single precision: a long train over many sensors has a thousand
     modes of ten thousand samples each.
     """
     waves, scale = case.waves, sigma[:, None].astype(np.float32)
-    radii, carrier = made.passage.vehicle.each("radius"), Carrier(case, values, made, beyond=BEYOND)
-    treads = {radius: _amplitudes(waves, radius) for radius in radii}
-    modes = [profile_modes(case, values, made, carrier).astype(np.float32)]
-    for envelope, rail in zip(_stretches(waves, carrier.node), (0.0, waves.sd[::2], waves.sd[::2])):
-        spectra = carrier.spectra(waves.lengths, envelope)
+    radii, transfer = (
+        aligned.passage.vehicle.wheel_values("radius"),
+        WaveTransfer(case, values, aligned, beyond=ROUGHNESS_MARGIN),
+    )
+    treads = {radius: _wave_sds(waves, radius) for radius in radii}
+    modes = [profile_modes(case, values, aligned, transfer).astype(np.float32)]
+    for envelope, rail in zip(_envelopes(waves, transfer.node), (0.0, waves.sd[::2], waves.sd[::2])):
+        spectra = transfer.spectra(waves.lengths, envelope)
         for w, radius in enumerate(radii):
             sd = np.hypot(treads[radius], rail)
-            columns = (carrier.shown(spectra, carrier.wheel(w)) * np.repeat(sd, 2)).astype(np.float32)
-            modes.append(columns[:, np.sum((columns / scale) ** 2, axis=0) > FAINT * KEPT])
+            columns = (transfer.signals_from(spectra, transfer.wheel(w)) * np.repeat(sd, 2)).astype(np.float32)
+            modes.append(columns[:, np.sum((columns / scale) ** 2, axis=0) > FAINT_SHARE * MIN_MODE_VARIANCE])
     modes = np.concatenate(modes, axis=1)
     scaled = modes / scale
-    power, turn = eigh(scaled.T @ scaled, driver="evd", overwrite_a=True)  # scipy's: half the time of numpy's
-    return modes @ turn[:, power > KEPT]
+    power, vectors = eigh(scaled.T @ scaled, driver="evd", overwrite_a=True)  # scipy's: half the time of numpy's
+    return modes @ vectors[:, power > MIN_MODE_VARIANCE]
 
 
-def _amplitudes(waves, radius):
+def _wave_sds(waves, radius):
     """(n_length,) standard deviation of the waves of a wheel [m]."""
     sd, circumference = amplitude_sd(waves.lengths, waves.length, WHEEL_LEVEL), 2.0 * np.pi * radius
     # out of round: the variance of an harmonic is spread over the waves up to half an order beside it
-    turned = np.clip(np.round(circumference / waves.lengths), 1, 99) <= 3
-    sd[turned] = np.maximum(sd[turned], TURNED * np.sqrt(circumference / waves.length))
+    is_out_of_round = np.clip(np.round(circumference / waves.lengths), 1, 99) <= 3
+    sd[is_out_of_round] = np.maximum(sd[is_out_of_round], OUT_OF_ROUND_SD * np.sqrt(circumference / waves.length))
     return sd
 
 
-def _stretches(waves, node):
+def _envelopes(waves, node):
     """Envelopes (n_node,) of the region with free rail waves, of that before and of that behind it.
 
     In the latter two the roughness of the rail is an error of each wheel as well.
@@ -104,20 +111,22 @@ def _stretches(waves, node):
     return inside.astype(float), outside * ahead, outside * ~ahead
 
 
-def heavier(case, fit):
+def log_mass_ratios(case, fit):
     """Logarithm of each train's unsprung mass in ``fit`` over that of the file, dict train -> float.
 
     Where it is a nuisance, the value is that without its narrow prior in the base model.
     """
-    wheels = [(c.where["train"], start) for _, c, start, _ in absorbed(case, fit) if c.family == "unsprung_mass"]
-    opened = {train: float(np.log(start[0])) for train, start in wheels}
-    found = {}
-    for made in case.rollings.values():
-        said = case.said(made)
-        file = vehicle = made.passage.vehicle
+    wheels = [
+        (c.where["train"], start) for _, c, start, _ in masked_candidates(case, fit) if c.family == "unsprung_mass"
+    ]
+    open_values = {train: float(np.log(start[0])) for train, start in wheels}
+    log_ratios = {}
+    for aligned in case.aligned_passages.values():
+        conditions = case.conditions_of(aligned)
+        file = vehicle = aligned.passage.vehicle
         for term in fit.terms:
-            vehicle = term.under(said).vehicle(vehicle)
-        wheel, train = file.wheels[0], said["train"]
-        known = opened.get(train, fit.values[f"wheels_{train}"])
-        found[train] = known + float(np.log(vehicle.bodies[wheel].mass / file.bodies[wheel].mass))
-    return found
+            vehicle = term.under_conditions(conditions).vehicle(vehicle)
+        wheel, train = file.wheels[0], conditions["train"]
+        nuisance_value = open_values.get(train, fit.values[f"wheels_{train}"])
+        log_ratios[train] = nuisance_value + float(np.log(vehicle.bodies[wheel].mass / file.bodies[wheel].mass))
+    return log_ratios

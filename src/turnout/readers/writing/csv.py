@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from turnout.readers.writing.encode import iso, noted
+from turnout.readers.writing.encode import iso_text, plain_conditions
 
 
 def write_raw(records, path, decimal_comma=False):
@@ -12,8 +12,8 @@ def write_raw(records, path, decimal_comma=False):
     lengths = {len(record.samples[0]) for record in records}
     head = [f"# rate: {first.rate!r} Hz", f"# n_records: {len(records)}"]
     head += [f"# n_samples: {lengths.pop()}"] if len(lengths) == 1 else []
-    head += [f"# started_at_{k}: {iso(r.started_at)}" for k, r in enumerate(records) if r.started_at is not None]
-    head += [f"# {key}: {value}" for key, value in noted(first.conditions).items()]
+    head += [f"# started_at_{k}: {iso_text(r.started_at)}" for k, r in enumerate(records) if r.started_at is not None]
+    head += [f"# {key}: {value}" for key, value in plain_conditions(first.conditions).items()]
     names = [f"{name} [{unit}]" for name, unit in zip(first.names, first.units)]
     head.append(separator.join(["record", *names]))
     digits = "%.9g" if first.samples[0].dtype == np.float32 else "%.17g"

@@ -17,10 +17,10 @@ def raw_records(recordings, description, dtype):
     first = recordings[0]
     if any(r.channels != first.channels or r.rate != first.rate for r in recordings):
         raise ValueError("recordings of one file must have the same channels and rate")
-    return [_raw(recording, description, dtype) for recording in recordings]
+    return [_raw_record(recording, description, dtype) for recording in recordings]
 
 
-def _raw(recording, description, dtype):
+def _raw_record(recording, description, dtype):
     if description is None:
         columns = [(c.name, SI[c.quantity], x) for c, x in zip(recording.channels, recording.samples)]
         zone = "UTC"
@@ -43,18 +43,20 @@ def _raw(recording, description, dtype):
 def _column(recording, channel):
     """(name, unit, raw numbers) of one channel of the description."""
     unit = (channel.unit or SI[channel.quantity]).removesuffix("!")
-    convert = to_si(channel.quantity, unit, channel.sensitivity, channel.sensitivity_unit)
-    samples = (recording.signal(channel.name) * (-1 if channel.sign < 0 else 1) - convert.offset) / convert.scale
+    conversion_to_si = to_si(channel.quantity, unit, channel.sensitivity, channel.sensitivity_unit)
+    samples = (
+        recording.signal(channel.name) * (-1 if channel.sign < 0 else 1) - conversion_to_si.offset
+    ) / conversion_to_si.scale
     label = "count" if unit[:1].isdigit() else unit
     return (channel.source if isinstance(channel.source, str) else channel.name), label, samples
 
 
-def iso(moment):
+def iso_text(moment):
     """ISO 8601 text with the offset of the time zone, "" for None."""
     return "" if moment is None else moment.isoformat()
 
 
-def noted(conditions):
+def plain_conditions(conditions):
     """Conditions as plain numbers and text."""
     return {k: float(v) if isinstance(v, (int, float, np.number)) else str(v) for k, v in conditions.items()}
 

@@ -2,7 +2,7 @@
 
 import h5py
 
-from turnout.readers.writing.encode import attributes, fixed_text, iso, noted
+from turnout.readers.writing.encode import attributes, fixed_text, iso_text, plain_conditions
 
 
 def write_raw(records, path):
@@ -12,9 +12,9 @@ def write_raw(records, path):
         file.attrs["n_records"] = len(records)
         for k, record in enumerate(records):
             group = file.create_group(f"record_{k:03d}", track_order=True)
-            group.attrs.update(attributes(noted(record.conditions)))
+            group.attrs.update(attributes(plain_conditions(record.conditions)))
             if record.started_at is not None:
-                group.attrs["started_at"] = fixed_text(iso(record.started_at))
+                group.attrs["started_at"] = fixed_text(iso_text(record.started_at))
             for name, unit, samples in zip(record.names, record.units, record.samples):
                 dataset = group.create_dataset(name, data=samples, chunks=(len(samples),), fletcher32=True)
                 dataset.attrs["unit"] = fixed_text(unit)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from turnout.readers.writing.encode import noted
+from turnout.readers.writing.encode import plain_conditions
 
 END = "***End_of_Header***"
 
@@ -13,7 +13,7 @@ def write_raw(records, path, decimal_comma=False):
     head = ["LabVIEW Measurement", "Writer_Version\t2", "Reader_Version\t2", "Separator\tTab"]
     head += [f"Decimal_Separator\t{',' if decimal_comma else '.'}", "Multi_Headings\tYes", "X_Columns\tNo"]
     head += ["Time_Pref\tAbsolute", f"Records\t{len(records)}"]
-    head += [f"{key}\t{value}" for key, value in noted(first.conditions).items()]
+    head += [f"{key}\t{value}" for key, value in plain_conditions(first.conditions).items()]
     digits = "%.9g" if first.samples[0].dtype == np.float32 else "%.17g"
     with path.open("w", encoding="utf-8", newline="") as file:
         file.write("\n".join([*head, END, "", ""]))

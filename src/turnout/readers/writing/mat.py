@@ -8,9 +8,9 @@ from turnout.readers.writing.named import variables
 
 def write_raw(records, path):
     """Write text as cell arrays, one cell per channel or record. Compression, as in MATLAB, adds checksums."""
-    named = {k: _cells(v) for k, v in variables(records).items()}
+    metadata = {k: _cells(v) for k, v in variables(records).items()}
     samples = {f"record_{k:03d}": np.column_stack(record.samples) for k, record in enumerate(records)}
-    scipy.io.savemat(path, {**named, **samples}, appendmat=False, do_compression=True, oned_as="row")
+    scipy.io.savemat(path, {**metadata, **samples}, appendmat=False, do_compression=True, oned_as="row")
 
 
 def _cells(value):

@@ -32,7 +32,7 @@ def _cell(file, name, texts):
     cell.attrs["MATLAB_class"] = np.bytes_("cell")
     for i, text in enumerate(texts):
         letters = np.array([ord(c) for c in text], dtype="uint16")[:, None]
-        one = references.create_dataset(f"{name}_{i}", data=letters)
-        one.attrs["MATLAB_class"] = np.bytes_("char")
-        one.attrs["MATLAB_int_decode"] = np.int32(2)
-        cell[i, 0] = one.ref
+        letters_dataset = references.create_dataset(f"{name}_{i}", data=letters)
+        letters_dataset.attrs["MATLAB_class"] = np.bytes_("char")
+        letters_dataset.attrs["MATLAB_int_decode"] = np.int32(2)
+        cell[i, 0] = letters_dataset.ref

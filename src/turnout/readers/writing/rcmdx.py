@@ -8,7 +8,7 @@ from datetime import UTC, datetime, timedelta
 import h5py
 import numpy as np
 
-from turnout.readers.writing.encode import attributes, noted
+from turnout.readers.writing.encode import attributes, plain_conditions
 
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 CHANNEL = {
@@ -41,10 +41,10 @@ def _session(platform, record, start, station):
     name = start.strftime("%Y%m%d_%H%M%S.") + f"{start.microsecond // 1000:03d}"
     session = platform.create_group(name)
     times = {"StartTime": stamps[0], "EndTime": stamps[-1]}
-    session.attrs.update(attributes({"Element": "SESSION", **times, **noted(record.conditions)}))
+    session.attrs.update(attributes({"Element": "SESSION", **times, **plain_conditions(record.conditions)}))
     system = session.create_group(f"{station}.VIBRATION")
-    known = {"Element": "MEASURINGSYSTEM", "Family": "VIBRATION", "Revision": "1", "InstanceVersion": "1"}
-    system.attrs.update(attributes(known))
+    system_attributes = {"Element": "MEASURINGSYSTEM", "Family": "VIBRATION", "Revision": "1", "InstanceVersion": "1"}
+    system.attrs.update(attributes(system_attributes))
     source = system.create_group(f"{system.name.rpartition('/')[2]}.SAMPLES", track_order=True)
     source.attrs.update(attributes({"Element": "DATASOURCE"}))
     source.create_dataset("timestamp", data=stamps, chunks=stamps.shape, compression="gzip", fletcher32=True)

@@ -3,7 +3,7 @@
 import numpy as np
 from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
 
-from turnout.readers.writing.encode import noted
+from turnout.readers.writing.encode import plain_conditions
 
 
 def write_raw(records, path):
@@ -12,7 +12,7 @@ def write_raw(records, path):
         for k, record in enumerate(records):
             root = RootObject(properties={"n_records": len(records)})
             name = f"record_{k:03d}"
-            group = GroupObject(name, properties=noted(record.conditions))
+            group = GroupObject(name, properties=plain_conditions(record.conditions))
             start = {} if record.started_at is None else {"wf_start_time": _utc(record.started_at)}
             channels = [
                 ChannelObject(

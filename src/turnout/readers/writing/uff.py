@@ -6,7 +6,7 @@ that is truncated between two sets would otherwise look complete.
 
 import numpy as np
 
-from turnout.readers.writing.encode import noted
+from turnout.readers.writing.encode import plain_conditions
 
 DATA_TYPES = {"N": 13, "m/s²": 12, "g": 12, "m/s": 11, "m": 8, "Pa": 15}
 
@@ -30,7 +30,7 @@ def _head(record, i, k, n, binary, double, n_bytes):
     """The opening delimiter and records 1 to 11."""
     name, unit = record.names[i], record.units[i]
     start = "NONE" if record.started_at is None else record.started_at.strftime("%d-%b-%y %H:%M:%S")
-    notes = "; ".join(f"{key}={value}" for key, value in noted(record.conditions).items()) or "NONE"
+    notes = "; ".join(f"{key}={value}" for key, value in plain_conditions(record.conditions).items()) or "NONE"
     first = f"    58b     1     2          11{n_bytes:12d}     0     0           0           0" if binary else "    58"
     lines = [
         "    -1",
@@ -52,6 +52,6 @@ def _head(record, i, k, n, binary, double, n_bytes):
 
 def _text(samples, double):
     """Numbers as text in the Fortran format 6E13.5 or 4E20.12."""
-    one, per_line = ("%20.12e", 4) if double else ("%13.5e", 6)
+    number_format, per_line = ("%20.12e", 4) if double else ("%13.5e", 6)
     lines = [samples[a : a + per_line] for a in range(0, len(samples), per_line)]
-    return "".join((one * len(line) + "\n") % tuple(line) for line in lines).encode()
+    return "".join((number_format * len(line) + "\n") % tuple(line) for line in lines).encode()

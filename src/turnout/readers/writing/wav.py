@@ -5,7 +5,7 @@ import json
 import numpy as np
 import soundfile
 
-from turnout.readers.writing.encode import iso, noted
+from turnout.readers.writing.encode import iso_text, plain_conditions
 
 
 def write_raw(records, path, subtype=None, full_scale=1.0):
@@ -23,7 +23,7 @@ def write_raw(records, path, subtype=None, full_scale=1.0):
         steps = np.clip(np.rint(samples * 2.0 ** (bits - 1)), -(2.0 ** (bits - 1)), 2.0 ** (bits - 1) - 1)
         samples = steps.astype("int32") << (32 - bits)
     rate = round(record.rate)
-    notes = {"channels": record.names, "started_at": iso(record.started_at), **noted(record.conditions)}
+    notes = {"channels": record.names, "started_at": iso_text(record.started_at), **plain_conditions(record.conditions)}
     notes["units"] = record.units if full_scale == 1.0 else ["count"] * len(record.names)
     if rate != record.rate:
         notes["rate"] = record.rate

@@ -1,10 +1,10 @@
 """Render the page of a turnout's findings: the answer first, the evidence below."""
 
-from turnout.report.finding_text import answer, check, facts, filed, parameters, rivals, title
+from turnout.report.finding_text import accepted_parameters, answer, check, facts, parameters, rivals, title
 from turnout.report.formatting import day
-from turnout.report.panels.finding import curve_panel, fit_panel, history_of_parameter, place_panel
+from turnout.report.panels.finding import curve_panel, fit_panel, history_of_parameter, position_panel
 
-GRAVITY = ("named", "a_or_b", "unknown", "numerics", "none")
+SEVERITY_ORDER = ("named", "a_or_b", "unknown", "numerics", "none")
 BADGES = {"named": "inspect", "a_or_b": "plan", "unknown": "plan", "numerics": "learning", "none": "ok"}
 
 
@@ -20,7 +20,7 @@ def finding_page(turnout, rows, template, shared):
         turnout=turnout,
         visit=first["visit"] if first else "",
         newest=day(max((f["found_at_utc"] for f in findings), default=None)),
-        drawing=place_panel(rows["sections"], findings, first) if findings else "",
+        drawing=position_panel(rows["sections"], findings, first) if findings else "",
         findings=[_finding(f, rows, k) for k, f in enumerate(findings)],
         silent=[q for q in rows["quarantine"] if q["stage"] == "mismatch"],
         notes=list(dict.fromkeys(n for f in findings for n in (f["notes"] or "").splitlines())),
@@ -29,14 +29,14 @@ def finding_page(turnout, rows, template, shared):
 
 
 def _order(finding):
-    return GRAVITY.index(finding["verdict"]), -(finding["probability"] or 0.0), finding["place_low_m"] or 0.0
+    return SEVERITY_ORDER.index(finding["verdict"]), -(finding["probability"] or 0.0), finding["place_low_m"] or 0.0
 
 
 def _finding(finding, rows, number):
     curves = [c for c in rows["mismatch_curves"] if c["finding_id"] == finding["finding_id"]]
     named = finding["verdict"] in ("named", "a_or_b")
     changed = ("what was left out" if named else "what was refused") if finding["term_json"] is not None else ""
-    drawn = [(c["curve"], curve_panel(c, changed)) for c in sorted(curves, key=lambda c: c["curve_no"])]
+    drawings = [(c["curve"], curve_panel(c, changed)) for c in sorted(curves, key=lambda c: c["curve_no"])]
     return {
         "number": number,
         "id": finding["finding_id"][:12],
@@ -50,26 +50,26 @@ def _finding(finding, rows, number):
         "facts": facts(finding),
         "check": check(finding),
         "parameters": parameters(finding),
-        "filed": filed(_of(rows, finding)),
+        "filed": accepted_parameters(_parameters_of(rows, finding)),
         "rivals": rivals(finding),
-        "wide": "".join(svg for curve, svg in drawn if curve == "waveform"),
-        "panels": "".join([*(svg for curve, svg in drawn if curve != "waveform"), fit_panel(finding)]),
+        "wide": "".join(svg for curve, svg in drawings if curve == "waveform"),
+        "panels": "".join([*(svg for curve, svg in drawings if curve != "waveform"), fit_panel(finding)]),
         "history": "".join(_histories(rows, finding)),
     }
 
 
-def _of(rows, finding):
+def _parameters_of(rows, finding):
     return [p for p in rows["mismatch_parameters"] if p["finding_id"] == finding["finding_id"]]
 
 
 def _histories(rows, finding):
     """A chart for each parameter of this finding that earlier visits have estimated, too."""
-    for own in _of(rows, finding):
-        same = [p for p in rows["mismatch_parameters"] if _same(p, own)]
+    for parameter in _parameters_of(rows, finding):
+        same = [p for p in rows["mismatch_parameters"] if _is_same_parameter(p, parameter)]
         yield history_of_parameter(sorted(same, key=lambda p: p["found_at_utc"]))
 
 
-def _same(a, b):
+def _is_same_parameter(a, b):
     near = a["position_m"] == b["position_m"] or (
         None not in (a["position_m"], b["position_m"]) and abs(a["position_m"] - b["position_m"]) < 0.35
     )

@@ -14,7 +14,7 @@ STATES = {
     "suppressed": "suppressed",
     "ok": "ok",
 }
-LISTED = ("inspect this week", "plan", "learning", "cannot tell")
+LISTED_STATES = ("inspect this week", "plan", "learning", "cannot tell")
 
 
 def fleet_page(source, template, shared):
@@ -26,13 +26,13 @@ def fleet_page(source, template, shared):
         states.setdefault(row["turnout_id"], {})[row["state"]] = row["n"]
         counts[row["state"]] += row["n"]
     listed = source.listed()
-    shown = counts | {state: listed.get(state, 0) for state in LISTED}
+    totals = counts | {state: listed.get(state, 0) for state in LISTED_STATES}
     return template.render(
         n_turnouts=len(turnouts),
         n_sections=sum(t["n_sections"] for t in turnouts),
         today=source.day.split("'")[1][:10],
         latest=day(max((t["latest"] for t in turnouts if t["latest"]), default=None)),
-        count={key: shown.get(state, 0) for state, key in STATES.items()},
+        count={key: totals.get(state, 0) for state, key in STATES.items()},
         n_quarantined=sum(r["rows"] for r in reasons),
         worklist=[_work(w) for w in worklist],
         n_more=worklist[0]["n_in_all"] - len(worklist) if worklist else 0,
@@ -59,10 +59,10 @@ def _work(row):
 
 
 def _line(turnout, states):
-    place = (turnout["line"], None if turnout["km"] is None else f"{turnout['km']:.3f}")
+    position = (turnout["line"], None if turnout["km"] is None else f"{turnout['km']:.3f}")
     return turnout | {
         "name": turnout["name"] or "",
-        "place": ", ".join(p for p in place if p),
+        "place": ", ".join(p for p in position if p),
         "latest": day(turnout["latest"]),
         "states": ", ".join(f"{states[s]} {s}" for s in STATES if s in states) or "–",
     }

@@ -15,7 +15,7 @@ from turnout.report.panels.history import history_panel
 from turnout.report.trains import trains_part
 
 BANDS = ("ballast", "railpad")
-SHOWN = 5  # earlier unused tests that are listed per section
+MAX_UNUSED_SHOWN = 5  # earlier unused tests that are listed per section
 TRACKS = {"main": "main track", "diverging": "diverging track", "both": "both tracks"}
 PANELS = {
     "OT": "open track",
@@ -36,24 +36,24 @@ def turnout_page(rows, turnout, template, shared):
     states = _worst_states(rows["chart_states"])
     return template.render(
         turnout=turnout,
-        place=_place(turnout),
+        place=_position_words(turnout),
         latest=day(max((m["measured_at_utc"] for m in models.values()), default=None)),
         diagram=diagram(rows["sections"], states) if rows["sections"] else "",
         findings=[line_of(w) for w in rows["worklist"]],
         mismatches=[m["sentence"] for m in rows["mismatches"]],
-        summary=[_summary(s, models.get(s["section_id"]), _of(rows, "modes", s)) for s in rows["sections"]],
+        summary=[_summary(s, models.get(s["section_id"]), _rows_of(rows, "modes", s)) for s in rows["sections"]],
         sections=[_section(rows, s, models, states) for s in rows["sections"]],
         part=trains_part(rows, rows["sections"]),
         quarantine=rows["quarantine"],
-        unshown=_unshown(rows["quarantine"]),
+        unshown=_hidden_counts(rows["quarantine"]),
         events=[_event(e) for e in rows["events"]],
         **shared,
     )
 
 
-def _of(rows, kind, section):
+def _rows_of(rows, table, section):
     """Rows of one table that belong to one section."""
-    return [r for r in rows[kind] if r["section_id"] == section["section_id"]]
+    return [r for r in rows[table] if r["section_id"] == section["section_id"]]
 
 
 def line_of(work):
@@ -62,12 +62,12 @@ def line_of(work):
     return {"state": work["state"], "badge": badge(work["state"]), "words": of + work["sentence"]}
 
 
-def _place(turnout):
-    parts = [
+def _position_words(turnout):
+    words = [
         f"line {turnout['line']}," if turnout["line"] else "",
         "" if turnout["km"] is None else f"km {turnout['km']:.3f};",
     ]
-    return " ".join(p for p in parts if p)
+    return " ".join(p for p in words if p)
 
 
 def _latest(modes, band, model):
@@ -90,10 +90,10 @@ def _summary(section, model, modes):
 
 def _section(rows, section, models, states):
     key = section["section_id"]
-    model, modes = models.get(key), _of(rows, "modes", section)
-    own = (r for r in _of(rows, "receptances", section) if model and r["model_id"] == model["model_id"])
-    receptance = next(own, None)  # a test with too few impacts has none
-    charts, events = _of(rows, "charts", section), [e for e in rows["events"] if e["section_id"] in (None, key)]
+    model, modes = models.get(key), _rows_of(rows, "modes", section)
+    receptances = (r for r in _rows_of(rows, "receptances", section) if model and r["model_id"] == model["model_id"])
+    receptance = next(receptances, None)  # a test with too few impacts has none
+    charts, events = _rows_of(rows, "charts", section), [e for e in rows["events"] if e["section_id"] in (None, key)]
     history = "".join(
         history_panel(
             band,
@@ -113,22 +113,26 @@ def _section(rows, section, models, states):
         "history": history or f"<p>{'No model yet' if model else 'Not measured yet, or nothing could be read'}.</p>",
         "panels": _panels(rows, section, model, receptance, modes) if receptance else "",
         "detail": model["detail"] if model else "",
-        "unused": _unused(_of(rows, "unused", section)),
+        "unused": _unused_tests(_rows_of(rows, "unused", section)),
     }
 
 
-def _unshown(quarantine):
+def _hidden_counts(quarantine):
     """(reason, number of its rows that are not shown), for reasons with more rows than are shown."""
-    shown = Counter((q["kind"], q["reason_code"]) for q in quarantine)
+    n_shown = Counter((q["kind"], q["reason_code"]) for q in quarantine)
     more = {(q["kind"], q["reason_code"]): q["n_alike"] for q in quarantine}
-    return [(reason, more[kind, reason] - n) for (kind, reason), n in shown.items() if more[kind, reason] > n]
+    return [
+        (reason, more[test_type, reason] - n)
+        for (test_type, reason), n in n_shown.items()
+        if more[test_type, reason] > n
+    ]
 
 
-def _unused(tests):
+def _unused_tests(tests):
     """Earlier tests of a section that gave no model, the newest first; they are not in its history."""
-    said = [f"{day(t['measured_at_utc'])} ({_reason(t)})" for t in tests[:SHOWN]]
-    more = len(tests) - SHOWN
-    return ", ".join(said) + (f" and {more} before" if more > 0 else "")
+    entries = [f"{day(t['measured_at_utc'])} ({_reason(t)})" for t in tests[:MAX_UNUSED_SHOWN]]
+    more = len(tests) - MAX_UNUSED_SHOWN
+    return ", ".join(entries) + (f" and {more} before" if more > 0 else "")
 
 
 def _reason(test):
@@ -144,7 +148,7 @@ def _panels(rows, section, model, receptance, modes):
             coherence_panel(receptance),
             decay_panel(receptance, model),
             stabilisation_panel(receptance, current),
-            impacts_panel(_of(rows, "impacts", section)),
+            impacts_panel(_rows_of(rows, "impacts", section)),
         ]
     )
 
@@ -154,8 +158,8 @@ def _worst_states(charts):
     worst: dict[str, str] = {}
     for chart in charts:
         if chart["state"] in order:
-            known = worst.get(chart["section_id"], "ok")
-            worst[chart["section_id"]] = min(known, chart["state"], key=order.index)
+            worst_so_far = worst.get(chart["section_id"], "ok")
+            worst[chart["section_id"]] = min(worst_so_far, chart["state"], key=order.index)
     return worst
 
 

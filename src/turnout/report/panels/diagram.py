@@ -29,7 +29,7 @@ def diagram(sections, states, width=920, height=200):
         return main + spread * share**1.6
 
     curve = " ".join(f"L{px(m):.1f} {py(m, True):.1f}" for m in _steps(toe, high))
-    parts = [
+    elements = [
         f'<svg class="diagram" viewBox="0 0 {width} {height}" width="{width}" height="{height}">'
         '<defs><pattern id="hatch" width="6" height="6" patternUnits="userSpaceOnUse" '
         'patternTransform="rotate(45)"><rect width="6" height="6" class="hatch-ground"/>'
@@ -38,12 +38,14 @@ def diagram(sections, states, width=920, height=200):
         f'<path class="rail" d="M{px(toe):.1f} {main} {curve}"/>'
     ]
     for section, lift in zip(sections, _lifts(sections, px)):
-        parts.append(_place(section, states, px, py, lift))
-    parts.append(f'<text class="label" x="24" y="{height - 8}">facing direction →, metres from the switch toe</text>')
-    return "".join(parts) + "</svg>"
+        elements.append(_section_marker(section, states, px, py, lift))
+    elements.append(
+        f'<text class="label" x="24" y="{height - 8}">facing direction →, metres from the switch toe</text>'
+    )
+    return "".join(elements) + "</svg>"
 
 
-def _place(section, states, px, py, lift):
+def _section_marker(section, states, px, py, lift):
     diverging = section["track"] == "diverging"
     x, y = px(section["position_m"] or 0.0), py(section["position_m"] or 0.0, diverging)
     state = states.get(section["section_id"], "not measured")
@@ -62,14 +64,14 @@ def _metres(section):
     return "" if section["position_m"] is None else f"{section['position_m']:.0f} m"
 
 
-def _lifts(sections, px, needed=42, height=26):
+def _lifts(sections, px, min_distance=42, height=26):
     """Vertical shift of each label [px]: where labels are closer than ``min_distance``, every second one is shifted."""
     lifts: list[int] = []
     last: dict[bool, tuple[float, int]] = {}
     for section in sections:
         diverging, x = section["track"] == "diverging", px(section["position_m"] or 0.0)
         before, lifted = last.get(diverging, (-1e9, 0))
-        lift = height if x - before < needed and not lifted else 0
+        lift = height if x - before < min_distance and not lifted else 0
         lifts.append(lift)
         last[diverging] = (x, lift)
     return lifts

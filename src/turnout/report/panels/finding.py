@@ -12,7 +12,7 @@ TITLES = {
     "receptance": "Receptance",
     "latent": "The missing force",
 }
-WIDE = 944  # px, width of a waveform panel
+WIDE_WIDTH = 944  # px, width of a waveform panel
 
 
 def curve_panel(row, changed="what was left out"):
@@ -23,8 +23,8 @@ def curve_panel(row, changed="what was left out"):
     names = ["measured", "before"] + (["after"] if changed else [])
     values = {name: np.asarray(row[name], dtype=float) for name in names}
     log = row["curve"] != "waveform"
-    chart = Chart(_across(row, x, log), _up(row, values, log), _title(row),
-                  width=WIDE if row["curve"] == "waveform" else 462, height=250)  # fmt: skip
+    chart = Chart(_x_axis(row, x, log), _y_axis(row, values, log), _title(row),
+                  width=WIDE_WIDTH if row["curve"] == "waveform" else 462, height=250)  # fmt: skip
     words = {"measured": "measured", "before": "simulated before", "after": f"simulated with {changed}"}
     for name in names:
         chart.line(x, values[name], f"curve-{name}", words[name])
@@ -37,20 +37,20 @@ def _title(row):
     return f"{TITLES[row['curve']]}: {label}"
 
 
-def _across(row, x, log):
-    return Axis(float(x.min()), float(x.max()), _named(row), "log" if log else "linear")
+def _x_axis(row, x, log):
+    return Axis(float(x.min()), float(x.max()), _x_label(row), "log" if log else "linear")
 
 
-def _up(row, values, log):
+def _y_axis(row, values, log):
     """Vertical axis that contains the measured values, and the simulated ones within a limit."""
-    every = np.concatenate([v[np.isfinite(v)] for v in values.values()])
+    finite = np.concatenate([v[np.isfinite(v)] for v in values.values()])
     label = {"waveform": "acceleration", "spectrum": "PSD", "receptance": "receptance"}[row["curve"]]
     if log:
-        every = every[every > 0.0]
+        finite = finite[finite > 0.0]
         top = float(values["measured"].max())
-        low = max(float(every.min()), 1e-5 * top)
-        return Axis(low / 1.3, float(every.max()) * 3.0, f"{label} [{row['y_unit']}]", "log")
-    reach = float(np.max(np.abs(every))) * 1.25
+        low = max(float(finite.min()), 1e-5 * top)
+        return Axis(low / 1.3, float(finite.max()) * 3.0, f"{label} [{row['y_unit']}]", "log")
+    reach = float(np.max(np.abs(finite))) * 1.25
     return Axis(-reach, reach, f"{label} [{row['y_unit']}]")
 
 
@@ -62,7 +62,7 @@ def _key(chart, names, words):
         x += (6.2 * len(words[name]) + 16) / (chart.width - 76)
 
 
-def _named(row):
+def _x_label(row):
     """Quantity and unit of the horizontal axis."""
     return f"{row['x_label']} [{row['x_unit']}]" if row["x_unit"] else row["x_label"]
 
@@ -73,7 +73,7 @@ def _latent(row):
     low, high = np.asarray(row["before"], dtype=float), np.asarray(row["after"], dtype=float)
     pad = 0.1 * float(np.ptp(np.concatenate([low, high]))) or 1.0
     chart = Chart(
-        Axis(float(x.min()), float(x.max()), _named(row)),
+        Axis(float(x.min()), float(x.max()), _x_label(row)),
         Axis(float(low.min()) - pad, float(high.max()) + pad, f"force [{row['y_unit']}]"),
         row["label"][:1].upper() + row["label"][1:],
         height=250,
@@ -104,7 +104,7 @@ def fit_panel(finding):
     for k, (_, value, style) in enumerate(entries, start=1):
         top, zero = float(chart.py(max(value, low))), float(chart.py(0.0))
         x = float(chart.px(k))
-        chart.parts.append(
+        chart.elements.append(
             f'<rect class="{style}" x="{x - 26:.1f}" y="{min(top, zero):.1f}" width="52" '
             f'height="{abs(zero - top):.1f}"/><text class="place" x="{x:.1f}" y="{min(top, zero) - 5:.1f}" '
             f'text-anchor="middle">{value:.0f} %</text>'
@@ -148,16 +148,16 @@ WIDTH, HEIGHT = 920, 210
 MAIN, SPREAD = 92.0, 58.0
 
 
-class Drawing:
+class TurnoutDrawing:
     """Drawing of a turnout with positions [m] mapped to pixels; the diverging track begins at the switch toe."""
 
     toe = 0.0  # origin of positions
 
     def __init__(self, sections):
         self.branches = any(s["track"] == "diverging" for s in sections)
-        shown = [s["position_m"] or 0.0 for s in sections] + [self.toe] * self.branches
-        self.low, self.high = min(shown) - 4.0, max(shown) + 4.0
-        self.parts: list[str] = []
+        positions = [s["position_m"] or 0.0 for s in sections] + [self.toe] * self.branches
+        self.low, self.high = min(positions) - 4.0, max(positions) + 4.0
+        self.elements: list[str] = []
 
     def px(self, metres):
         """Horizontal pixel of a position."""
@@ -172,9 +172,9 @@ class Drawing:
         """Draw the main track, and the diverging one where it is measured."""
         steps = [self.toe + (self.high - self.toe) * k / 24 for k in range(25)]
         curve = " ".join(f"L{self.px(m):.1f} {self.py(m, True):.1f}" for m in steps)
-        self.parts.append(f'<path class="rail" d="M{self.px(self.low):.1f} {MAIN}H{self.px(self.high):.1f}"/>')
+        self.elements.append(f'<path class="rail" d="M{self.px(self.low):.1f} {MAIN}H{self.px(self.high):.1f}"/>')
         if self.branches:
-            self.parts.append(f'<path class="rail" d="M{self.px(self.toe):.1f} {MAIN} {curve}"/>')
+            self.elements.append(f'<path class="rail" d="M{self.px(self.toe):.1f} {MAIN} {curve}"/>')
 
     def stretch(self, finding):
         """Draw the part of the track that a group covers, in the colour of its verdict."""
@@ -184,7 +184,7 @@ class Drawing:
         path = "L".join(f"{self.px(m):.1f} {self.py(m, diverging):.1f}" for m in steps)
         words = escape(f"{finding['sections']}: {finding['verdict'].replace('_', ' ')}")
         style = STYLES[finding["verdict"]]
-        self.parts.append(f'<path class="stretch {style}" d="M{path}"><title>{words}</title></path>')
+        self.elements.append(f'<path class="stretch {style}" d="M{path}"><title>{words}</title></path>')
 
     def sensor(self, section, row, unnamed=False):
         """Draw a measured section with its label, or ``unnamed``; labels alternate between two rows."""
@@ -192,17 +192,17 @@ class Drawing:
         x, y = self.px(section["position_m"] or 0.0), self.py(section["position_m"] or 0.0, diverging)
         side = 24 + 13 * (row % 2) if diverging else -16 - 13 * (row % 2)
         label = escape(section["label"])
-        self.parts.append(f'<circle class="seat" cx="{x:.1f}" cy="{y:.1f}" r="4.5"><title>{label}</title></circle>')
+        self.elements.append(f'<circle class="seat" cx="{x:.1f}" cy="{y:.1f}" r="4.5"><title>{label}</title></circle>')
         if not unnamed:
             text = f'<text class="tick" x="{x:.1f}" y="{y + side:.1f}" text-anchor="middle">{label}</text>'
-            self.parts.append(text)
+            self.elements.append(text)
 
-    def mark(self, place, diverging, words):
+    def mark(self, position, diverging, words):
         """Draw an arrow to a position, with words at its tail."""
-        x, y = self.px(place), self.py(place, diverging)
+        x, y = self.px(position), self.py(position, diverging)
         anchor = "end" if x > WIDTH - 260 else "start"
         beside = x - 10 if anchor == "end" else x + 10
-        self.parts.append(
+        self.elements.append(
             f'<path class="arrow" d="M{x:.1f} {y - 62:.1f}V{y - 12:.1f}"/>'
             f'<path class="arrowhead" d="M{x - 6:.1f} {y - 18:.1f}L{x:.1f} {y - 6:.1f}L{x + 6:.1f} {y - 18:.1f}Z"/>'
             f'<text class="mark" x="{beside:.1f}" y="{y - 56:.1f}" text-anchor="{anchor}">{escape(words)}</text>'
@@ -213,39 +213,39 @@ class Drawing:
         legend = f'<text class="label" x="24" y="{HEIGHT - 6}">facing direction →, metres from the switch toe</text>'
         return (
             f'<svg class="diagram" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" role="img" '
-            f'aria-label="The turnout and what was found">{"".join(self.parts)}{legend}</svg>'
+            f'aria-label="The turnout and what was found">{"".join(self.elements)}{legend}</svg>'
         )
 
 
-def place_panel(sections, findings, marked=None):
+def position_panel(sections, findings, marked=None):
     """SVG of ``sections`` (rows) with the verdicts of ``findings``; ``marked`` is the finding that gets the arrow."""
-    drawing = Drawing(sections)
+    drawing = TurnoutDrawing(sections)
     drawing.rails()
     for finding in findings:
         drawing.stretch(finding)
-    place, words = marked_place(marked, sections) if marked is not None else (None, "")
+    position, words = marked_position(marked, sections) if marked is not None else (None, "")
     ordered = sorted(sections, key=lambda s: (s["track"] == "diverging", s["position_m"] or 0.0))
     for row, section in enumerate(ordered):
-        hidden = place is not None and marked is not None and _under(section, place, marked["route"])
+        hidden = position is not None and marked is not None and _is_under_arrow(section, position, marked["route"])
         drawing.sensor(section, row, hidden)
         words += f" ({section['label']})" if hidden and section["label"] not in words else ""
-    if place is not None and marked is not None:
-        drawing.mark(place, marked["route"] == "diverging", words)
+    if position is not None and marked is not None:
+        drawing.mark(position, marked["route"] == "diverging", words)
     return drawing.svg()
 
 
-def _under(section, place, route):
+def _is_under_arrow(section, position, route):
     """Whether the arrow would lie on the section's label."""
     same = (section["track"] == "diverging") == (route == "diverging")
-    return same and abs((section["position_m"] or 0.0) - place) < 0.5
+    return same and abs((section["position_m"] or 0.0) - position) < 0.5
 
 
-def marked_place(finding, sections):
+def marked_position(finding, sections):
     """(position [m] or None, words) of the arrow: that of the effect, or of its sensor."""
     if finding["position_m"] is not None:
         return finding["position_m"], f"{finding['position_m']:.1f} m"
     if finding["channel"]:
-        seats = {s["label"]: s["position_m"] for s in sections}
+        positions = {s["label"]: s["position_m"] for s in sections}
         middle = 0.5 * (finding["place_low_m"] + finding["place_high_m"])
-        return seats.get(finding["channel"], middle), f"sensor {finding['channel']}"
+        return positions.get(finding["channel"], middle), f"sensor {finding['channel']}"
     return None, ""

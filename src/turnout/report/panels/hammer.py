@@ -6,7 +6,7 @@ import numpy as np
 
 from turnout.report.svg import Axis, Chart
 
-SPAN = (30.0, 1600.0)  # Hz, frequency axis of the panels
+FREQUENCY_RANGE = (30.0, 1600.0)  # Hz, frequency axis of the panels
 
 
 def receptance_panel(row, modes):
@@ -15,16 +15,16 @@ def receptance_panel(row, modes):
     ``row`` is one row of ``receptances``, ``modes`` the rows of ``modes`` of the same model.
     """
     frequency = np.asarray(row["frequency_hz"], dtype=float)
-    inside = (frequency >= SPAN[0]) & (frequency <= SPAN[1])
+    inside = (frequency >= FREQUENCY_RANGE[0]) & (frequency <= FREQUENCY_RANGE[1])
     h1 = np.hypot(row["h1_real_m_n"], row["h1_imag_m_n"])
     h2 = np.asarray(row["h2_abs_m_n"], dtype=float)
-    shown = np.concatenate([h1[inside], h2[inside]])
-    shown = shown[np.isfinite(shown) & (shown > 0)]
-    if not shown.size:
+    magnitudes = np.concatenate([h1[inside], h2[inside]])
+    magnitudes = magnitudes[np.isfinite(magnitudes) & (magnitudes > 0)]
+    if not magnitudes.size:
         return ""
     chart = Chart(
-        Axis(*SPAN, "frequency [Hz]", "log"),
-        Axis(np.quantile(shown, 0.005) / 1.5, shown.max() * 1.6, "receptance [m/N]", "log"),
+        Axis(*FREQUENCY_RANGE, "frequency [Hz]", "log"),
+        Axis(np.quantile(magnitudes, 0.005) / 1.5, magnitudes.max() * 1.6, "receptance [m/N]", "log"),
         f"Receptance, H1 with H1-H2 bracket, n = {row['n_impacts']} impacts{_window(row)}",
     )
     passed = np.asarray(row["passed"], dtype=bool)
@@ -41,7 +41,7 @@ def coherence_panel(row):
     """Coherence with its 95 % limits and the required level of the gate."""
     frequency = np.asarray(row["frequency_hz"], dtype=float)
     chart = Chart(
-        Axis(*SPAN, "frequency [Hz]", "log"),
+        Axis(*FREQUENCY_RANGE, "frequency [Hz]", "log"),
         Axis(0.0, 1.02, "coherence"),
         f"Coherence, 95 % limits, n = {row['n_impacts']}; gate: {row['gate']}",
         height=190,
@@ -50,7 +50,7 @@ def coherence_panel(row):
     chart.band(frequency, row["coherence_low"], row["coherence_high"], "interval", "95 % limits")
     chart.line(frequency, row["coherence"], "curve", "coherence")
     if required := row.get("gate_required"):
-        chart.line(SPAN, [required] * 2, "limit", f"required {required:g}")
+        chart.line(FREQUENCY_RANGE, [required] * 2, "limit", f"required {required:g}")
     return chart.svg()
 
 
@@ -71,7 +71,7 @@ def _grey_out(chart, frequency, passed, row):
 
 
 # Maximum points of a decay curve of 30 ms: ten per period at 1 kHz.
-DRAWN = 300
+MAX_DECAY_POINTS = 300
 
 
 def decay_panel(row, model):
@@ -84,12 +84,12 @@ def decay_panel(row, model):
     measured = np.asarray(row["decay_ms2"], dtype=float)
     predicted = np.asarray(row["decay_model_ms2"], dtype=float)
     n = min(len(measured), len(predicted), int(0.03 * row["decay_rate_hz"]))
-    step = max(1, n // DRAWN)
+    step = max(1, n // MAX_DECAY_POINTS)
     measured, predicted, n = measured[:n:step], predicted[:n:step], len(measured[:n:step])
     time = 1e3 * step * np.arange(n) / row["decay_rate_hz"]
     largest = 1.1 * float(np.max(np.abs(measured[:n])))
     fit, null = model["hammer_fit_pct"], model["hammer_fit_null_pct"]
-    score = f"fit left out {fit:.0f} % (null {null:.0f} %)" if _known(fit) and _known(null) else ""
+    score = f"fit left out {fit:.0f} % (null {null:.0f} %)" if _is_number(fit) and _is_number(null) else ""
     chart = Chart(
         Axis(0.0, float(time[-1]), "time after contact [ms]"),
         Axis(-largest, largest, "acceleration [m/s²]"),
@@ -102,7 +102,7 @@ def decay_panel(row, model):
     return chart.svg()
 
 
-def _known(value):
+def _is_number(value):
     return value is not None and np.isfinite(value)
 
 
@@ -154,5 +154,5 @@ def impacts_panel(rows):
 
 
 def _words(row, peak):
-    said = "used" if row["status"] == "accepted" else f"rejected: {row['reason']}. {row['detail'] or ''}"
-    return f"test {row['test']}, record {row['record'] + 1}: {peak:.1f} kN, {said}"
+    result = "used" if row["status"] == "accepted" else f"rejected: {row['reason']}. {row['detail'] or ''}"
+    return f"test {row['test']}, record {row['record'] + 1}: {peak:.1f} kN, {result}"

@@ -44,14 +44,14 @@ def history_panel(band, modes, charts, events, width=462):
         f"{m['damping_ratio']:.4f}, n = {m['n_impacts']}, {_temperature(m['rail_temperature_c'])}"
         for m, e in zip(modes, error)
     ]
-    alarmed = _alarmed(modes, charts)
+    alarmed = _is_in_alarm(modes, charts)
     for style, chosen in (("point", False), ("alarm", True)):
         some = np.flatnonzero(alarmed == chosen)
         chart.points(time[some], frequency[some], style, 3.0, low[some], high[some], [labels[i] for i in some])
     return chart.svg()
 
 
-def _alarmed(modes, charts):
+def _is_in_alarm(modes, charts):
     """Whether the campaign of each value is in alarm: the last one that began before it, for one may last two days."""
     rows = sorted(charts, key=lambda c: c["measured_at_utc"])
     began = np.array([_seconds(c["measured_at_utc"]) for c in rows])

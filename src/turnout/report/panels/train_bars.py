@@ -9,7 +9,7 @@ from turnout.report.svg import LEFT, TOP, Axis, Chart
 
 WIDTH = 952
 # Light to dark, distinct in print and for colour-blind readers.
-KEY = "○ others held fixed, 95 %, magenta: random models"
+LEGEND = "○ others held fixed, 95 %, magenta: random models"
 COLOURS = ("#c6dbef", "#6baed6", "#2171b5", "#08306b", "#fdd0a2", "#fd8d3c", "#d94801", "#7f2704")
 
 
@@ -33,22 +33,30 @@ def train_bars(factor, rows, sections):
     most = Counter[str]()
     for row in rows:
         most[row["class"]] += row["n_passages"]
-    drawn = {c for c, _ in most.most_common(len(COLOURS))}
-    names = [c for _, c in classes if c in drawn]
-    shown = [s for s in sections if any(r["section_id"] == s["section_id"] for r in rows)]
+    drawn_classes = {c for c, _ in most.most_common(len(COLOURS))}
+    names = [c for _, c in classes if c in drawn_classes]
+    sections_shown = [s for s in sections if any(r["section_id"] == s["section_id"] for r in rows)]
     at = {(r["section_id"], r["class"]): r for r in rows}
-    n = sum(r["n_passages"] for r in rows if r["section_id"] == shown[0]["section_id"])
+    n = sum(r["n_passages"] for r in rows if r["section_id"] == sections_shown[0]["section_id"])
     ends = [e for r in rows for e in (_low(r), _high(r))]
-    title = f"{rows[0]['score']} by {factor}: bar: mean, thin line: ± spread, {KEY}{_left(len(classes) - len(names))}"
+    title = (
+        f"{rows[0]['score']} by {factor}: bar: mean, thin line: ± spread, {LEGEND}{_undrawn(len(classes) - len(names))}"
+    )
     chart = Chart(
-        Axis(0.5, len(shown) + 0.5, f"section ({n} passages at {shown[0]['label']})", "names", _labels(shown)),
+        Axis(
+            0.5,
+            len(sections_shown) + 0.5,
+            f"section ({n} passages at {sections_shown[0]['label']})",
+            "names",
+            _labels(sections_shown),
+        ),
         Axis(min(0.0, max(min(ends), -60.0)) - 2.0, max(ends) * 1.25 + 4.0, f"{rows[0]['score']} [%]"),
         title,
         WIDTH,
         230,
     )
     width = 0.8 / len(names)
-    for k, section in enumerate(shown, start=1):
+    for k, section in enumerate(sections_shown, start=1):
         for j, name in enumerate(names):
             if row := at.get((section["section_id"], name)):
                 _bar(chart, k - 0.4 + (j + 0.5) * width, width, COLOURS[j], row)
@@ -56,7 +64,7 @@ def train_bars(factor, rows, sections):
     return chart.svg()
 
 
-def _left(n):
+def _undrawn(n):
     """Number of classes that are not drawn, in words."""
     return f"; {n} class{'es' * (n > 1)} with fewer passages {'are' if n > 1 else 'is'} not drawn" if n else ""
 
@@ -75,14 +83,14 @@ def _high(row):
 
 def _bar(chart, x, width, colour, row):
     """Draw one bar with its spread, its null, and the mean with the other factors held fixed."""
-    left, right = (float(chart.px(x + side * 0.45 * width)) for side in (-1, 1))
+    x_0, x_1 = (float(chart.px(x + side * 0.45 * width)) for side in (-1, 1))
     top, zero = float(chart.py(row["score_pct"])), float(chart.py(0.0))
     words = f"{row['class']}: {row['score_pct']:.1f} %, n = {row['n']}"
     if row["score_sd_pct"] is not None:
         words += f", spread {row['score_sd_pct']:.1f}"
     words += f"; others held fixed {row['adjusted_pct']:.1f}"
-    chart.parts.append(
-        f'<rect x="{left:.1f}" y="{min(top, zero):.1f}" width="{right - left:.1f}" height="{abs(zero - top):.1f}" '
+    chart.elements.append(
+        f'<rect x="{x_0:.1f}" y="{min(top, zero):.1f}" width="{x_1 - x_0:.1f}" height="{abs(zero - top):.1f}" '
         f'fill="{colour}"><title>{escape(words)}</title></rect>'
     )
     if row["score_sd_pct"] is not None:
@@ -100,6 +108,6 @@ def _key(chart, names):
     """Draw the legend: the colours of the classes."""
     x, y = float(LEFT + 8), TOP + 6
     for colour, name in zip(COLOURS, names):
-        chart.parts.append(f'<rect x="{x:.0f}" y="{y}" width="10" height="10" fill="{colour}" stroke="#65727f"/>')
-        chart.parts.append(f'<text x="{x + 14:.0f}" y="{y + 9}">{escape(name)}</text>')
+        chart.elements.append(f'<rect x="{x:.0f}" y="{y}" width="10" height="10" fill="{colour}" stroke="#65727f"/>')
+        chart.elements.append(f'<text x="{x + 14:.0f}" y="{y + 9}">{escape(name)}</text>')
         x += 30 + 6.2 * len(name)

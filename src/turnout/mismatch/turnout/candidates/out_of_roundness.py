@@ -23,70 +23,75 @@ import numpy as np
 
 from turnout import physics
 from turnout.mismatch.engine.candidate import Candidate
-from turnout.mismatch.turnout.candidates.short_corrugation import HIGHEST, SHORTEST, TRANSFER, carried_energy
+from turnout.mismatch.turnout.candidates.short_corrugation import (
+    MAX_FREQUENCY_SHARE,
+    MIN_WAVELENGTH,
+    RESPONSE_ERROR,
+    response_energy,
+)
 from turnout.mismatch.turnout.passage_band import SHORTEST_WAVE
-from turnout.mismatch.turnout.wave_response import Carrier
+from turnout.mismatch.turnout.wave_response import WaveTransfer
 
 WAVELENGTHS = np.geomspace(SHORTEST_WAVE, 1.0, 100)  # m; over 10 m neighbours differ by a third of a period
-FINER = np.linspace(0.985, 1.015, 13)  # of the wavelength, for its refinement
+FINE_FACTORS = np.linspace(0.985, 1.015, 13)  # of the wavelength, for its refinement
 AMPLITUDES = np.geomspace(1e-5, 4e-4, 5)  # m, prior sd of cosine and sine
-TURNS = 12.0  # distinguishable angles per passage
+ANGLES_PER_PASSAGE = 12.0  # distinguishable angles per passage
 
 
-def polygons(case, fit):
+def polygon_candidates(case, fit):
     """The likeliest polygonal wheel as a candidate, () where a round one is likelier."""
-    found = [s for train in case.trains for s in of_train(case, fit, train)]
-    if not found:
+    wheel_fits = [s for train in case.trains for s in wheel_evidence(case, fit, train)]
+    if not wheel_fits:
         return ()
-    nats, train, wheel, wavelength, _ = max(found, key=lambda f: f[0])
+    nats, train, wheel, wavelength, _ = max(wheel_fits, key=lambda f: f[0])
     if nats <= 0.0:
         return ()
-    closer = of_train(case, fit, train, wavelength * FINER)
-    _, _, _, wavelength, parts = next(f for f in closer if f[2] == wheel)
-    return (_candidate(case, train, wheel, wavelength, parts, nats, len(found)),)
+    refined = wheel_evidence(case, fit, train, wavelength * FINE_FACTORS)
+    _, _, _, wavelength, amplitudes = next(f for f in refined if f[2] == wheel)
+    return (_candidate(case, train, wheel, wavelength, amplitudes, nats, len(wheel_fits)),)
 
 
-def of_train(case, fit, train, wavelengths=WAVELENGTHS):
+def wheel_evidence(case, fit, train, wavelengths=WAVELENGTHS):
     """(nats, train, wheel, wavelength, [(recording, cosine, sine)]) of each wheel, 0 first."""
-    members = [(o, w) for o, w in zip(case.observations, fit.white) if o.name in case.rollings]
-    members = [(o, w) for o, w in members if case.said(case.rollings[o.name])["train"] == train]
+    members = [(o, w) for o, w in zip(case.observations, fit.white) if o.name in case.aligned_passages]
+    members = [(o, w) for o, w in members if case.conditions_of(case.aligned_passages[o.name])["train"] == train]
     if not members:
         return
-    n_wheel = len(case.rollings[members[0][0].name].passage.vehicle.wheels)
-    parts = [_slopes(case, fit, o, white, n_wheel, wavelengths) for o, white in members]
+    n_wheel = len(case.aligned_passages[members[0][0].name].passage.vehicle.wheels)
+    statistics = [_slopes(case, fit, o, white, n_wheel, wavelengths) for o, white in members]
     for wheel in range(n_wheel):
-        nats = sum(_evidence(slope[wheel], size) for slope, size in parts)  # (n_amplitude, n_wavelength)
+        nats = sum(_passage_evidence(slope[wheel], size) for slope, size in statistics)  # (n_amplitude, n_wavelength)
         a, k = np.unravel_index(int(np.argmax(nats)), nats.shape)
         prior = np.eye(2) / AMPLITUDES[a] ** 2
-        best = [np.linalg.solve(size[k] + prior, slope[wheel][k]) for slope, size in parts]
-        together = float(_log_mean(nats))
-        yield together, train, wheel, float(wavelengths[k]), [(o.name, *b) for (o, _), b in zip(members, best)]
+        amplitudes = [np.linalg.solve(size[k] + prior, slope[wheel][k]) for slope, size in statistics]
+        total_nats = float(_log_mean(nats))
+        yield total_nats, train, wheel, float(wavelengths[k]), [(o.name, *b) for (o, _), b in zip(members, amplitudes)]
 
 
 def _slopes(case, fit, o, white, n_wheel, wavelengths):
     """(n_wheel, n_wavelength, 2) slopes and (n_wavelength, 2, 2) sizes of one passage."""
-    made = case.rollings[o.name]
-    carrier = Carrier(case, fit.values, made, fit.terms)
-    spectra = carrier.spectra(wavelengths, np.ones(carrier.node.size))
-    weight = o.effective / fit.scale[o.kind]
-    twice = o.whitened(np.asarray(white) * o.sigma) / o.sigma  # the whitening is symmetric: columns need not pass it
+    aligned = case.aligned_passages[o.name]
+    transfer = WaveTransfer(case, fit.values, aligned, fit.terms)
+    spectra = transfer.spectra(wavelengths, np.ones(transfer.node.size))
+    weight = o.effective / fit.scale[o.data_type]
+    rewhitened = o.whiten(np.asarray(white) * o.sigma) / o.sigma  # the whitening is symmetric: columns need not pass it
     slopes = []
     for wheel in range(n_wheel):
-        columns = carrier.shown(spectra, carrier.wheel(wheel))
-        slopes.append(weight * (columns.T @ twice).reshape(-1, 2))
+        columns = transfer.signals_from(spectra, transfer.wheel(wheel))
+        slopes.append(weight * (columns.T @ rewhitened).reshape(-1, 2))
         if wheel == 0:
-            seen = o.whitened(columns).reshape(o.data.size, -1, 2)
-    return np.array(slopes), weight * np.einsum("nki,nkj->kij", seen, seen)
+            whitened = o.whiten(columns).reshape(o.data.size, -1, 2)
+    return np.array(slopes), weight * np.einsum("nki,nkj->kij", whitened, whitened)
 
 
-def _evidence(slope, size):
+def _passage_evidence(slope, size):
     """(n_amplitude, n_wavelength) nats of one passage."""
-    found = []
+    nats = []
     for a in AMPLITUDES:
         inside = size + np.eye(2) / a**2
         along = np.einsum("ki,ki->k", slope, np.linalg.solve(inside, slope[..., None])[..., 0])
-        found.append(0.5 * along - 0.5 * np.linalg.slogdet(a**2 * inside)[1])
-    return np.array(found)
+        nats.append(0.5 * along - 0.5 * np.linalg.slogdet(a**2 * inside)[1])
+    return np.array(nats)
 
 
 def _log_mean(nats):
@@ -94,142 +99,156 @@ def _log_mean(nats):
     return top + np.log(np.mean(np.exp(nats - top)))
 
 
-def _candidate(case, train, wheel, wavelength, parts, nats, scanned):
-    passage = next(case.rollings[name].passage for name, *_ in parts)
-    order = max(1, round(2.0 * np.pi * passage.vehicle.each("radius")[wheel] / wavelength))
+def _candidate(case, train, wheel, wavelength, amplitudes, nats, scanned):
+    passage = next(case.aligned_passages[name].passage for name, *_ in amplitudes)
+    order = max(1, round(2.0 * np.pi * passage.vehicle.wheel_values("radius")[wheel] / wavelength))
     radius = order * wavelength / (2.0 * np.pi)
     middle = np.mean([s.place for s in case.campaign.sensors])  # a wave a little longer then fits there at least
-    phases = [(name, np.arctan2(s, c) * radius / order) for name, c, s in parts]
+    phases = [(name, np.arctan2(s, c) * radius / order) for name, c, s in amplitudes]
     phases = tuple((name, float(x + wavelength * np.round((middle - x) / wavelength))) for name, x in phases)
-    amplitude = float(np.clip(np.median([np.hypot(c, s) for _, c, s in parts]), 0.0, 9e-4))
+    amplitude = float(np.clip(np.median([np.hypot(c, s) for _, c, s in amplitudes]), 0.0, 9e-4))
 
     def make(p):
         return physics.OutOfRound(wheel, order=order, radius=radius, train=train, phases=phases, **p)
 
     return Candidate(
         "out_of_round", physics.OutOfRound.parameters, make, ((amplitude, 0.0, 0.0),),
-        {"train": train, "axle": wheel + 1}, "wheel", scanned * TURNS ** len(phases), least=2e-5,
-        promise=float(nats - np.log(scanned)),
+        {"train": train, "axle": wheel + 1}, "wheel", scanned * ANGLES_PER_PASSAGE ** len(phases),
+        smallest_reportable=2e-5, promise=float(nats - np.log(scanned)),
     )  # fmt: skip
 
 
-REACH = 1.2  # m from wheel to sensor; axles of a bogie are at least 1.8 m apart
-STEP, NEAR, FAR = 0.04, 0.2, 0.6  # of ln wavelength: bin width, nearest and farthest bins of the background
-TELL_APART = 0.16  # of ln wavelength: resolution of 2.4 m of rail at 0.2 m
-SPREAD, ONE = 0.5, 0.8  # sd of z: between wheels (twice that in another simulator), of one spectrum
-LOUD = 2.5  # prior sd of z of a polygonal wheel
-WHEELS = 3  # least wheels of a train, for a median
-LEAST = 2e-5  # m, smallest reported amplitude
+WHEEL_REACH = 1.2  # m from wheel to sensor; axles of a bogie are at least 1.8 m apart
+BIN_WIDTH, NEAR_OFFSET, FAR_OFFSET = (
+    0.04,
+    0.2,
+    0.6,
+)  # of ln wavelength: bin width, nearest and farthest bins of the background
+RESOLUTION = 0.16  # of ln wavelength: resolution of 2.4 m of rail at 0.2 m
+WHEEL_SD, SENSOR_SD = 0.5, 0.8  # sd of z: between wheels (twice that in another simulator), of one spectrum
+POLYGON_SD = 2.5  # prior sd of z of a polygonal wheel
+MIN_WHEELS = 3  # least wheels of a train, for a median
+MIN_AMPLITUDE = 2e-5  # m, smallest reported amplitude
 
 
 @dataclass(frozen=True)
-class Slots:
+class WheelSpectra:
     """Spectra of one passage while each wheel passes each sensor.
 
     ``level`` (n_sensor, n_wheel, n_bin) is the logarithm of the power, nan where it was not recorded; ``width``
     (n_bin,) lines per bin, ``size`` of the transform, ``window`` (n,) of the samples.
     """
 
-    made: object
+    aligned: object
     level: np.ndarray
     width: np.ndarray
     size: int
     window: np.ndarray
 
 
-def short_polygons(case, fit):
+def short_polygon_candidates(case, fit):
     """The likeliest wheel with short waves as a candidate, () where all may be round."""
-    mades = sorted(case.fitted(), key=lambda m: m.speed)
-    if not mades:
+    passages = sorted(case.fitted_passages(), key=lambda m: m.speed)
+    if not passages:
         return ()
-    lengths = wavelengths(mades)
-    tried = np.flatnonzero((lengths < SHORTEST_WAVE) & (lengths > lengths.min(initial=np.inf) * np.exp(FAR)))
-    if not tried.size:
+    lengths = bin_wavelengths(passages)
+    bins = np.flatnonzero((lengths < SHORTEST_WAVE) & (lengths > lengths.min(initial=np.inf) * np.exp(FAR_OFFSET)))
+    if not bins.size:
         return ()
-    found, n = [], 0
+    wheel_fits, n = [], 0
     for train in case.trains:
-        seen = [slots_of(m, lengths) for m in mades if case.said(m)["train"] == train]
-        if seen and seen[0].level.shape[1] >= WHEELS:
-            z, apart = louder(seen, tried, lengths)
+        spectra = [wheel_spectra(m, lengths) for m in passages if case.conditions_of(m)["train"] == train]
+        if spectra and spectra[0].level.shape[1] >= MIN_WHEELS:
+            z, n_slots = wheel_excess(spectra, bins, lengths)
             n += z.shape[0]
             w, k = np.unravel_index(int(np.argmax(z)), z.shape)
-            if apart and _holds([louder(half, tried, lengths)[0][w, k] for half in (seen[::2], seen[1::2]) if half]):
-                found.append((evidence(z[w, k], apart), train, int(w), int(tried[k]), seen))
-    if not found:
+            if n_slots and _is_repeatable(
+                [wheel_excess(half, bins, lengths)[0][w, k] for half in (spectra[::2], spectra[1::2]) if half]
+            ):
+                wheel_fits.append((polygon_evidence(z[w, k], n_slots), train, int(w), int(bins[k]), spectra))
+    if not wheel_fits:
         return ()
-    nats, train, wheel, k, seen = max(found, key=lambda f: f[0])
-    scanned = n * max(1.0, float(np.ptp(np.log(lengths[tried]))) / TELL_APART)
+    nats, train, wheel, k, spectra = max(wheel_fits, key=lambda f: f[0])
+    scanned = n * max(1.0, float(np.ptp(np.log(lengths[bins]))) / RESOLUTION)
     if nats < np.log(scanned):
         return ()
-    return (_short_candidate(case, fit, train, wheel, lengths, k, nats, scanned, seen),)
+    return (_short_candidate(case, fit, train, wheel, lengths, k, nats, scanned, spectra),)
 
 
-def _holds(levels):
+def _is_repeatable(levels):
     """Whether either half of a train's passages shows at least half the level of the other."""
     return min(levels) > 0.5 * max(levels)
 
 
-def wavelengths(mades):
+def bin_wavelengths(passages):
     """(n,) centres of the bins, longest first; those at both ends serve as background. [m]"""
-    shortest = max([SHORTEST * np.exp(-FAR), *(m.speed / (HIGHEST * m.passage.recording.rate) for m in mades)])
-    longest = SHORTEST_WAVE * np.exp(FAR)
-    return longest * np.exp(-np.arange(0.0, np.log(longest / shortest), STEP))
+    shortest = max(
+        [
+            MIN_WAVELENGTH * np.exp(-FAR_OFFSET),
+            *(m.speed / (MAX_FREQUENCY_SHARE * m.passage.recording.rate) for m in passages),
+        ]
+    )
+    longest = SHORTEST_WAVE * np.exp(FAR_OFFSET)
+    return longest * np.exp(-np.arange(0.0, np.log(longest / shortest), BIN_WIDTH))
 
 
-def slots_of(made, lengths):
+def wheel_spectra(aligned, lengths):
     """``WheelSpectra`` of a passage."""
-    recording, speed = made.passage.recording, made.speed
-    n = round(2.0 * REACH / speed * recording.rate)
+    recording, speed = aligned.passage.recording, aligned.speed
+    n = round(2.0 * WHEEL_REACH / speed * recording.rate)
     window, size = np.hanning(n), 1 << int(np.ceil(np.log2(8 * n)))
     frequency = np.arange(size // 2 + 1) * recording.rate / size
-    edges = np.searchsorted(frequency, speed / lengths[:, None] * np.exp([-0.5 * STEP, 0.5 * STEP]))
+    edges = np.searchsorted(frequency, speed / lengths[:, None] * np.exp([-0.5 * BIN_WIDTH, 0.5 * BIN_WIDTH]))
     edges[:, 1] = np.maximum(edges[:, 1], edges[:, 0] + 1)
-    sign = 1.0 if made.passage.direction == "facing" else -1.0
-    first = sign * min(sign * s.place for s in made.sensors)
-    behind = made.passage.vehicle.wheel_places
-    level = np.full((len(made.sensors), behind.size, lengths.size), np.nan)
-    for row, sensor in zip(level, made.sensors):
+    sign = 1.0 if aligned.passage.direction == "facing" else -1.0
+    first = sign * min(sign * s.place for s in aligned.sensors)
+    behind = aligned.passage.vehicle.wheel_positions
+    level = np.full((len(aligned.sensors), behind.size, lengths.size), np.nan)
+    for row, sensor in zip(level, aligned.sensors):
         samples = recording.samples[recording.index(sensor.name)]
-        for slot, back in zip(row, behind):
-            k = round((made.reference + (sign * (sensor.place - first) + back) / speed) * recording.rate) - n // 2
-            part = samples[max(k, 0) : k + n]
-            if part.size == n and np.ptp(part) > 0.0:
-                power = np.abs(np.fft.rfft((part - part.mean()) * window, size)) ** 2
-                slot[:] = [np.log(power[a:b].mean()) for a, b in edges]
-    return Slots(made, level, np.diff(edges, axis=1)[:, 0], size, window)
+        for spectrum, delay_distance in zip(row, behind):
+            k = (
+                round((aligned.reference + (sign * (sensor.place - first) + delay_distance) / speed) * recording.rate)
+                - n // 2
+            )
+            segment = samples[max(k, 0) : k + n]
+            if segment.size == n and np.ptp(segment) > 0.0:
+                power = np.abs(np.fft.rfft((segment - segment.mean()) * window, size)) ** 2
+                spectrum[:] = [np.log(power[a:b].mean()) for a, b in edges]
+    return WheelSpectra(aligned, level, np.diff(edges, axis=1)[:, 0], size, window)
 
 
-def _usual(level, k, lengths):
+def _background(level, k, lengths):
     """(n_sensor, n_wheel) background level of bin k from the bins around it, mean of both sides."""
     away = np.log(lengths[k] / lengths)
-    sides = [(away > NEAR) & (away < FAR), (-away > NEAR) & (-away < FAR)]
+    sides = [(away > NEAR_OFFSET) & (away < FAR_OFFSET), (-away > NEAR_OFFSET) & (-away < FAR_OFFSET)]
     return np.mean([np.median(level[..., side], axis=-1) for side in sides], axis=0)
 
 
-def louder(slots, tried, lengths):
+def wheel_excess(spectra, bins, lengths):
     """(n_wheel, n_tried) mean of z over sensors and passages, and the number of spectra per wheel."""
-    above = [np.stack([s.level[..., k] - _usual(s.level, k, lengths) for k in tried], axis=-1) for s in slots]
-    heard = [a - np.nanmedian(a, axis=1, keepdims=True) for a in above if not np.isnan(a).all()]
-    z = np.concatenate([*heard, np.full((0, *above[0].shape[1:]), np.nan)])
+    excess = [np.stack([s.level[..., k] - _background(s.level, k, lengths) for k in bins], axis=-1) for s in spectra]
+    centred = [a - np.nanmedian(a, axis=1, keepdims=True) for a in excess if not np.isnan(a).all()]
+    z = np.concatenate([*centred, np.full((0, *excess[0].shape[1:]), np.nan)])
     if not z.size:
-        return np.full(above[0].shape[1:], -np.inf), 0
+        return np.full(excess[0].shape[1:], -np.inf), 0
     return np.nan_to_num(np.nanmean(z, axis=0), nan=-np.inf), z.shape[0]
 
 
-def evidence(z, slots):
+def polygon_evidence(z, n_slots):
     """Nats for a polygonal wheel over a round one, from its mean z over so many spectra."""
-    spread = SPREAD**2 + ONE**2 / slots
-    wide = spread + LOUD**2
+    spread = WHEEL_SD**2 + SENSOR_SD**2 / n_slots
+    wide = spread + POLYGON_SD**2
     z = max(float(z), 0.0)
     return 0.5 * np.log(spread / wide) + 0.5 * z**2 * (1.0 / spread - 1.0 / wide)
 
 
-def _short_candidate(case, fit, train, wheel, lengths, k, nats, scanned, seen):
-    radius = seen[0].made.passage.vehicle.each("radius")[wheel]
+def _short_candidate(case, fit, train, wheel, lengths, k, nats, scanned, spectra):
+    radius = spectra[0].aligned.passage.vehicle.wheel_values("radius")[wheel]
     order = round(2.0 * np.pi * radius / lengths[k])
-    sizes = np.concatenate([_amplitudes(case, fit, s, wheel, lengths, k) for s in seen])
+    sizes = np.concatenate([_amplitudes(case, fit, s, wheel, lengths, k) for s in spectra])
     amplitude = float(np.clip(np.median(sizes), 1e-6, 9e-4))
-    error = amplitude * float(np.hypot(TRANSFER, np.std(np.log(sizes)) / np.sqrt(sizes.size)))
+    error = amplitude * float(np.hypot(RESPONSE_ERROR, np.std(np.log(sizes)) / np.sqrt(sizes.size)))
     parameters = tuple(
         replace(p, prior=(amplitude, error)) for p in physics.OutOfRound.parameters if p.name == "cosine"
     )  # fmt: skip
@@ -239,22 +258,22 @@ def _short_candidate(case, fit, train, wheel, lengths, k, nats, scanned, seen):
 
     return Candidate(
         "out_of_round", parameters, make, ((amplitude,),), {"train": train, "axle": wheel + 1}, "wheel", scanned,
-        promise=float(nats - np.log(scanned)), aside=float(nats), least=LEAST,
+        promise=float(nats - np.log(scanned)), external_evidence=float(nats), smallest_reportable=MIN_AMPLITUDE,
     )  # fmt: skip
 
 
-def _amplitudes(case, fit, slots, wheel, lengths, k):
+def _amplitudes(case, fit, spectra, wheel, lengths, k):
     r"""(n,) amplitude of the wheel's wave [m] from each sensor, by its energy over the background:
 
     .. math:: \sum_f |Y|^2 = \tfrac{N}{2} f_s \int y^2 h^2 dt, \quad
               \int y^2 h^2 dt = \tfrac12 a^2 |F|^2 \omega^4 \int |G(x)|^2 h(x)^2 dx / v
     """
-    made, about = slots.made, np.flatnonzero(np.abs(np.log(lengths / lengths[k])) < NEAR)
-    over = np.exp(slots.level[:, wheel, about]) - np.exp(_usual(slots.level, k, lengths)[:, wheel, None])
-    energy = 2.0 * np.sum(over * slots.width[about], axis=1) / (slots.size * made.passage.recording.rate)
-    node, gain = carried_energy(case, fit, made, lengths[k])
-    away = np.array([s.place for s in made.sensors])[:, None] - node
-    window = np.where(np.abs(away) < REACH, np.cos(0.5 * np.pi * away / REACH) ** 2, 0.0)
-    one = 0.5 / made.speed * np.trapezoid(gain * window**2, node, axis=1)
-    heard = np.isfinite(energy) & (energy > 0.0)
-    return np.sqrt(energy[heard] / one[heard]) if heard.any() else np.array([1e-6])
+    aligned, near = spectra.aligned, np.flatnonzero(np.abs(np.log(lengths / lengths[k])) < NEAR_OFFSET)
+    excess = np.exp(spectra.level[:, wheel, near]) - np.exp(_background(spectra.level, k, lengths)[:, wheel, None])
+    energy = 2.0 * np.sum(excess * spectra.width[near], axis=1) / (spectra.size * aligned.passage.recording.rate)
+    node, gain = response_energy(case, fit, aligned, lengths[k])
+    distance = np.array([s.place for s in aligned.sensors])[:, None] - node
+    window = np.where(np.abs(distance) < WHEEL_REACH, np.cos(0.5 * np.pi * distance / WHEEL_REACH) ** 2, 0.0)
+    unit_energy = 0.5 / aligned.speed * np.trapezoid(gain * window**2, node, axis=1)
+    is_valid = np.isfinite(energy) & (energy > 0.0)
+    return np.sqrt(energy[is_valid] / unit_energy[is_valid]) if is_valid.any() else np.array([1e-6])

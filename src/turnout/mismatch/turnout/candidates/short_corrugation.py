@@ -21,26 +21,26 @@ from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.turnout import passage_band, passage_model
 from turnout.mismatch.turnout.matrix_cache import matrices_of
 from turnout.mismatch.turnout.track_parameters import track_with
-from turnout.mismatch.turnout.wave_response import carried, wheel_and_contact
+from turnout.mismatch.turnout.wave_response import rail_receptances, wheel_and_contact_receptance
 
-SHORTEST, WIDTH = 0.05, 0.05  # m; bin width in ln wavelength, the resolution of 5 m of rail at 0.2 m
-LINE = 2  # bins to either side over which a line spreads
-AWAY, AROUND = 2, 6  # bins, nearest and farthest of the background
-HIGHEST = 0.35  # highest frequency over the sampling rate: above, the anti-alias filter may act
-SPREAD = 0.8  # sd of z of one sensor on intact rail: 0.62 and 1.0 in two simulators
-LOUD = 2.0  # prior sd of z of corrugation
-TRAINS = 2  # least trains, to distinguish the rail from wheels
-SPEEDS = 1.25  # least ratio of fastest to slowest passage, to distinguish a wavelength from a frequency
-HEARD = 2.0  # m; closer sensors measure the same rail
-REACHES = (1.0, 1.8, 3.2, 5.0)  # m, half the length of the stretch
+MIN_WAVELENGTH, BIN_WIDTH = 0.05, 0.05  # m; bin width in ln wavelength, the resolution of 5 m of rail at 0.2 m
+LINE_BINS = 2  # bins to either side over which a line spreads
+BACKGROUND_GAP, BACKGROUND_REACH = 2, 6  # bins, nearest and farthest of the background
+MAX_FREQUENCY_SHARE = 0.35  # highest frequency over the sampling rate: above, the anti-alias filter may act
+SENSOR_SD = 0.8  # sd of z of one sensor on intact rail: 0.62 and 1.0 in two simulators
+CORRUGATION_SD = 2.0  # prior sd of z of corrugation
+MIN_TRAINS = 2  # least trains, to distinguish the rail from wheels
+MIN_SPEED_RATIO = 1.25  # least ratio of fastest to slowest passage, to distinguish a wavelength from a frequency
+INDEPENDENT_DISTANCE = 2.0  # m; closer sensors measure the same rail
+HALF_LENGTHS = (1.0, 1.8, 3.2, 5.0)  # m, half the length of the stretch
 AMPLITUDES = np.geomspace(2e-6, 3e-4, 60)  # m, tested
-TRANSFER = 0.15  # relative error of the response at one frequency
-STRIDE = 2  # every second node is used
-LEAST = 1e-5  # m, smallest reported amplitude: EN 13231-3 allows it on a ground rail for waves up to 0.3 m
+RESPONSE_ERROR = 0.15  # relative error of the response at one frequency
+NODE_STRIDE = 2  # every second node is used
+MIN_AMPLITUDE = 1e-5  # m, smallest reported amplitude: EN 13231-3 allows it on a ground rail for waves up to 0.3 m
 
 
 @dataclass(frozen=True)
-class Loud:
+class BandPower:
     """Power of one passage in bins of the wavelength.
 
     ``power`` and its ``background`` (n_recorded, n_bin) are means of the squared spectrum. ``recorded`` (n_sensor,)
@@ -51,155 +51,165 @@ class Loud:
     train: str
     speed: float
     power: np.ndarray
-    usual: np.ndarray
-    alive: np.ndarray
+    background: np.ndarray
+    recorded: np.ndarray
 
     @property
-    def above(self):
+    def excess(self):
         """(n_recorded, n_bin) logarithm of the power over its background."""
-        return np.log(self.power / self.usual)
+        return np.log(self.power / self.background)
 
 
-def bins(mades):
+def bin_wavelengths(passages):
     """(n,) wavelengths that every passage covers, longest first [m]."""
-    shortest = max([SHORTEST, *(m.speed / (HIGHEST * m.passage.recording.rate) for m in mades)])
-    longest = passage_band.SHORTEST_WAVE * np.exp(WIDTH * (AROUND + 1))  # the first bins are background alone
-    return longest * np.exp(-np.arange(0.0, np.log(longest / shortest), WIDTH))
+    shortest = max([MIN_WAVELENGTH, *(m.speed / (MAX_FREQUENCY_SHARE * m.passage.recording.rate) for m in passages)])
+    longest = passage_band.SHORTEST_WAVE * np.exp(
+        BIN_WIDTH * (BACKGROUND_REACH + 1)
+    )  # the first bins are background alone
+    return longest * np.exp(-np.arange(0.0, np.log(longest / shortest), BIN_WIDTH))
 
 
-def loud_of(case, made, wavelengths):
+def band_power(case, aligned, wavelengths):
     """``BandPower`` of a passage."""
-    recording = made.passage.recording
-    rows = [recording.index(s.name) for s in made.sensors]
-    first, last = (round(t * recording.rate) for t in (made.time[0], made.time[-1]))
+    recording = aligned.passage.recording
+    rows = [recording.index(s.name) for s in aligned.sensors]
+    first, last = (round(t * recording.rate) for t in (aligned.time[0], aligned.time[-1]))
     samples = recording.samples[rows][:, max(first, 0) : last]
-    edge = 2.0 * passage_model.EDGE * recording.rate / samples.shape[1]
+    edge = 2.0 * passage_model.EDGE_TIME * recording.rate / samples.shape[1]
     n = 1 << int(np.ceil(np.log2(4 * samples.shape[1])))  # finer lines than bins
     power = np.abs(np.fft.rfft(samples * tukey(samples.shape[1], min(edge, 1.0)), n)) ** 2
     frequency = np.arange(power.shape[1]) * recording.rate / n
-    edges = np.searchsorted(frequency, made.speed / wavelengths[:, None] * np.exp([-0.5 * WIDTH, 0.5 * WIDTH]))
+    edges = np.searchsorted(
+        frequency, aligned.speed / wavelengths[:, None] * np.exp([-0.5 * BIN_WIDTH, 0.5 * BIN_WIDTH])
+    )
     alive = np.any(samples != samples[:, :1], axis=1)
     power = power[alive]
     total = np.column_stack([power[:, a : max(b, a + 1)].mean(axis=1) for a, b in edges])
     level = np.log(total)
     near = np.abs(np.subtract.outer(np.arange(wavelengths.size), np.arange(wavelengths.size)))
-    near = (near >= AWAY) & (near <= AROUND)
+    near = (near >= BACKGROUND_GAP) & (near <= BACKGROUND_REACH)
     usual = np.exp(np.column_stack([np.median(level[:, row], axis=1) for row in near]))
-    return Loud(made.name, made.passage.train, made.speed, total, usual, alive)
+    return BandPower(aligned.name, aligned.passage.train, aligned.speed, total, usual, alive)
 
 
-def groups(passages):
+def passage_groups(passages):
     """Passages of each train, the slower and the faster ones: corrugation must show in all groups."""
     trains = sorted({p.train for p in passages})
     middle = np.sqrt(min(p.speed for p in passages) * max(p.speed for p in passages))
-    found = [[p for p in passages if p.train == t] for t in trains]
-    return [*found, [p for p in passages if p.speed < middle], [p for p in passages if p.speed >= middle]]
+    by_train = [[p for p in passages if p.train == t] for t in trains]
+    return [*by_train, [p for p in passages if p.speed < middle], [p for p in passages if p.speed >= middle]]
 
 
-def evidence(passages, apart):
+def corrugation_evidence(passages, n_sensors):
     """(n_bin,) nats for a line that all trains show at all speeds, over roughness alone.
 
     ``n_sensors`` is the number of sensors on different rail.
     """
-    z = np.min([np.mean([p.above.mean(axis=0) for p in group], axis=0) for group in groups(passages)], axis=0)
-    z, spread = np.maximum(z, 0.0), SPREAD**2 / apart
-    wide = spread + LOUD**2
+    z = np.min([np.mean([p.excess.mean(axis=0) for p in group], axis=0) for group in passage_groups(passages)], axis=0)
+    z, spread = np.maximum(z, 0.0), SENSOR_SD**2 / n_sensors
+    wide = spread + CORRUGATION_SD**2
     return 0.5 * np.log(spread / wide) + 0.5 * z**2 * (1.0 / spread - 1.0 / wide)
 
 
-def short_waves(case, fit):
+def short_corrugation_candidates(case, fit):
     """The likeliest short corrugation as a candidate, () where intact rail is likelier or the data cannot tell."""
-    mades = sorted((m for m in case.fitted() if m.passage.train), key=lambda m: m.speed)
-    if any(c.family == "rail_corrugation" for c in fit.candidates) or not _telling(mades):
+    passages = sorted((m for m in case.fitted_passages() if m.passage.train), key=lambda m: m.speed)
+    if any(c.family == "rail_corrugation" for c in fit.candidates) or not _can_distinguish(passages):
         return ()
-    wavelengths = bins(mades)
-    if wavelengths.size <= 2 * AROUND:
+    wavelengths = bin_wavelengths(passages)
+    if wavelengths.size <= 2 * BACKGROUND_REACH:
         return ()
-    seen = [loud_of(case, m, wavelengths) for m in mades]
-    if not all(len(p.power) for p in seen):
+    band_powers = [band_power(case, m, wavelengths) for m in passages]
+    if not all(len(p.power) for p in band_powers):
         return ()
-    nats = evidence(seen, _apart(case))
-    nats[_known(case, wavelengths)] = -np.inf
+    nats = corrugation_evidence(band_powers, _n_independent_sensors(case))
+    nats[_is_in_file(case, wavelengths)] = -np.inf
     k = int(np.argmax(nats))
-    if wavelengths[k] >= passage_band.SHORTEST_WAVE or nats[k] < np.log(nats.size) or not _holds(seen, k):
+    if (
+        wavelengths[k] >= passage_band.SHORTEST_WAVE
+        or nats[k] < np.log(nats.size)
+        or not _is_repeatable(band_powers, k)
+    ):
         return ()
-    return (_candidate(case, fit, wavelengths, k, float(nats[k]), seen),)
+    return (_candidate(case, fit, wavelengths, k, float(nats[k]), band_powers),)
 
 
-def _telling(mades):
+def _can_distinguish(passages):
     """Whether trains and speeds differ enough to distinguish the rail from wheels and from frequencies."""
-    speeds = [m.speed for m in mades]
-    return len({m.passage.train for m in mades}) >= TRAINS and max(speeds) > SPEEDS * min(speeds)
+    speeds = [m.speed for m in passages]
+    return len({m.passage.train for m in passages}) >= MIN_TRAINS and max(speeds) > MIN_SPEED_RATIO * min(speeds)
 
 
-def _apart(case):
+def _n_independent_sensors(case):
     """Effective number of sensors on different rail."""
-    places = sorted(s.place for s in case.campaign.sensors)
-    return 1.0 + float(np.sum(np.minimum(np.diff(places) / HEARD, 1.0)))
+    positions = sorted(s.place for s in case.campaign.sensors)
+    return 1.0 + float(np.sum(np.minimum(np.diff(positions) / INDEPENDENT_DISTANCE, 1.0)))
 
 
-def _known(case, wavelengths):
+def _is_in_file(case, wavelengths):
     """(n_bin,) whether the track's file has corrugation of about that length."""
-    parts = [p for m in case.rollings.values() for s in case.zone.turnout.surfaces(m.passage.route) for p in s]
-    known = np.array([p.wavelength for p in parts if hasattr(p, "wavelength")])
-    return np.any(np.abs(np.log(wavelengths[:, None] / known)) < (LINE + 0.5) * WIDTH, axis=1)
+    components = [
+        p for m in case.aligned_passages.values() for s in case.zone.turnout.surfaces(m.passage.route) for p in s
+    ]
+    lengths = np.array([p.wavelength for p in components if hasattr(p, "wavelength")])
+    return np.any(np.abs(np.log(wavelengths[:, None] / lengths)) < (LINE_BINS + 0.5) * BIN_WIDTH, axis=1)
 
 
-def _holds(seen, k):
+def _is_repeatable(band_powers, k):
     """Whether the line repeats: passages in order of speed are split into two halves.
 
     Either half must show at least half the level of the other.
     """
-    levels = [np.mean([p.above[:, k].mean() for p in half]) for half in (seen[::2], seen[1::2])]
+    levels = [np.mean([p.excess[:, k].mean() for p in half]) for half in (band_powers[::2], band_powers[1::2])]
     return min(levels) > 0.5 * max(levels)
 
 
-def _candidate(case, fit, wavelengths, k, nats, seen):
-    about = _about(k)
-    over = np.mean([(p.power[:, about] / p.usual[:, about]).mean(axis=0) - 1.0 for p in seen], axis=0)
-    weight = np.maximum(over, 0.0)
-    length = float(np.exp(weight @ np.log(wavelengths[about]) / weight.sum()))
-    middle, reach, amplitude, error = _sized(case, fit, length, about, seen)
+def _candidate(case, fit, wavelengths, k, nats, band_powers):
+    line = _line_bins(k)
+    excess = np.mean([(p.power[:, line] / p.background[:, line]).mean(axis=0) - 1.0 for p in band_powers], axis=0)
+    weight = np.maximum(excess, 0.0)
+    length = float(np.exp(weight @ np.log(wavelengths[line]) / weight.sum()))
+    middle, reach, amplitude, error = _fit_stretch(case, fit, length, line, band_powers)
     a, b = middle - reach, middle + reach
-    priors = {"sine": (amplitude, error), "wavelength": (length, 0.5 * WIDTH * length)}
+    priors = {"sine": (amplitude, error), "wavelength": (length, 0.5 * BIN_WIDTH * length)}
     parameters = tuple(replace(p, prior=priors[p.name]) for p in physics.RailCorrugation.parameters if p.name in priors)
     where = {"wavelength": round(length, 3), "place": round(float(middle), 2)}
     return Candidate(
         "rail_corrugation", parameters, lambda p: physics.RailCorrugation(a, b, **p), ((amplitude, length),), where,
         "wavelength", int(np.count_nonzero(wavelengths < passage_band.SHORTEST_WAVE)),
-        promise=nats - float(np.log(wavelengths.size)), aside=nats, least=LEAST,
+        promise=nats - float(np.log(wavelengths.size)), external_evidence=nats, smallest_reportable=MIN_AMPLITUDE,
     )  # fmt: skip
 
 
-def _about(k):
+def _line_bins(k):
     """Bins over which a line spreads: a stretch of 3 m is some 10 % wide at 0.3 m."""
-    return slice(max(k - LINE, 0), k + LINE + 1)
+    return slice(max(k - LINE_BINS, 0), k + LINE_BINS + 1)
 
 
-def _sized(case, fit, length, about, seen):
+def _fit_stretch(case, fit, length, line, band_powers):
     """(middle, half the stretch, amplitude, its standard error) [m] of waves of this length.
 
     These explain the power of each sensor in each passage best.
     """
-    places = [s.place for s in case.campaign.sensors]
-    middles = np.arange(min(places), max(places) + 0.1, 0.5)
-    shapes = [(m, r) for m in middles for r in REACHES]
-    found = np.zeros((len(shapes), AMPLITUDES.size))
-    for p in seen:
-        unit = _unit_energy(case, fit, case.rollings[p.name], length, shapes)  # (n_shape, n_sensor)
-        expected = AMPLITUDES[:, None, None] ** 2 * unit[:, p.alive] + p.usual[:, about].sum(axis=1)
-        found += np.sum((np.log(p.power[:, about].sum(axis=1)) - np.log(expected)) ** 2, axis=2).T
-    n = sum(len(p.power) for p in seen)
-    best, size = np.unravel_index(int(np.argmin(found)), found.shape)
-    spread = found[best, size] / n
-    posterior = np.exp(-0.5 * (found - found[best, size]) / max(spread, SPREAD**2))
+    positions = [s.place for s in case.campaign.sensors]
+    middles = np.arange(min(positions), max(positions) + 0.1, 0.5)
+    shapes = [(m, r) for m in middles for r in HALF_LENGTHS]
+    misfit = np.zeros((len(shapes), AMPLITUDES.size))
+    for p in band_powers:
+        unit = _unit_energy(case, fit, case.aligned_passages[p.name], length, shapes)  # (n_shape, n_sensor)
+        expected = AMPLITUDES[:, None, None] ** 2 * unit[:, p.recorded] + p.background[:, line].sum(axis=1)
+        misfit += np.sum((np.log(p.power[:, line].sum(axis=1)) - np.log(expected)) ** 2, axis=2).T
+    n = sum(len(p.power) for p in band_powers)
+    best_shape, size = np.unravel_index(int(np.argmin(misfit)), misfit.shape)
+    spread = misfit[best_shape, size] / n
+    posterior = np.exp(-0.5 * (misfit - misfit[best_shape, size]) / max(spread, SENSOR_SD**2))
     posterior = posterior.sum(axis=0) / posterior.sum()
     mean = float(posterior @ np.log(AMPLITUDES))
-    error = float(np.sqrt(posterior @ (np.log(AMPLITUDES) - mean) ** 2 + TRANSFER**2))
-    return *shapes[best], float(np.exp(mean)), error * float(np.exp(mean))
+    error = float(np.sqrt(posterior @ (np.log(AMPLITUDES) - mean) ** 2 + RESPONSE_ERROR**2))
+    return *shapes[best_shape], float(np.exp(mean)), error * float(np.exp(mean))
 
 
-def _unit_energy(case, fit, made, length, shapes):
+def _unit_energy(case, fit, aligned, length, shapes):
     r"""(n_shape, n_sensor) power, as in ``BandPower``, of waves one metre high.
 
     The force of the wheel at v/λ is carried to the sensor from the position of the wheel:
@@ -207,20 +217,24 @@ def _unit_energy(case, fit, made, length, shapes):
     .. math:: \int y^2 dt = \tfrac12 \sum_w |F|^2 \int |G(x)|^2 e(x)^2 \, dx / v, \quad
               F = 1 / (A_{wheel} + A_{contact} + A_{rail})
     """
-    node, gain = carried_energy(case, fit, made, length)
+    node, gain = response_energy(case, fit, aligned, length)
     inside = np.array([np.abs(node - m) <= r for m, r in shapes])
-    energy = 0.5 * len(made.passage.vehicle.wheels) / made.speed * np.trapezoid(inside[:, None] * gain, node, axis=2)
-    return energy * made.passage.recording.rate**2 / (2.0 * WIDTH * made.speed / length)  # Parseval, half at f < 0
+    energy = (
+        0.5 * len(aligned.passage.vehicle.wheels) / aligned.speed * np.trapezoid(inside[:, None] * gain, node, axis=2)
+    )
+    return (
+        energy * aligned.passage.recording.rate**2 / (2.0 * BIN_WIDTH * aligned.speed / length)
+    )  # Parseval, half at f < 0
 
 
-def carried_energy(case, fit, made, length):
+def response_energy(case, fit, aligned, length):
     """Nodes (n,) [m], and squared acceleration (n_sensor, n) [1/s^4] at each sensor for one wheel at the node.
 
     The wheel rolls over a wave of this length, one metre high.
     """
-    track = track_with(case.track(made.passage.route), case.zone, fit.values)
-    matrices, frequency = matrices_of(track), np.array([made.speed / length])
-    near = np.flatnonzero((matrices.node >= case.waves.start) & (matrices.node <= case.waves.end))[::STRIDE]
-    h, met = carried(matrices, frequency, near, [s.probe(track).place for s in made.sensors])
-    force = 1.0 / np.abs(wheel_and_contact(made.passage.vehicle, frequency)[:, None] + met)[0]
+    track = track_with(case.track(aligned.passage.route), case.zone, fit.values)
+    matrices, frequency = matrices_of(track), np.array([aligned.speed / length])
+    near = np.flatnonzero((matrices.node >= case.waves.start) & (matrices.node <= case.waves.end))[::NODE_STRIDE]
+    h, mean_receptance = rail_receptances(matrices, frequency, near, [s.probe(track).place for s in aligned.sensors])
+    force = 1.0 / np.abs(wheel_and_contact_receptance(aligned.passage.vehicle, frequency)[:, None] + mean_receptance)[0]
     return matrices.node[near], ((2.0 * np.pi * frequency) ** 2 * force * np.abs(h[0])) ** 2
