@@ -15,9 +15,9 @@ from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.demo.hammer import hammer_test as demonstration_test
 from turnout.demo.hammer import simulated_response
 from turnout.demo.scenario import SECTIONS
+from turnout.hammer_test import find_impacts, receptance_of
 from turnout.modal import compare_tests, cramer_rao_bound, era, identify, modal_parameters
 from turnout.modal.least_squares import drift_columns
-from turnout.receptance import find_impacts, receptance_of
 from turnout.records import Channel, Recording
 
 SETTINGS = IdentifySettings(null_draws=10)

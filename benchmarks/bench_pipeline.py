@@ -10,12 +10,12 @@ import numpy as np
 from benchmarks.bar import Bar, stopwatch
 from benchmarks.published.response import paper_response
 from turnout.config import load_configuration, with_raw
+from turnout.demo.fleet import EXTENSION
 from turnout.demo.hammer import hammer_test
-from turnout.demo.make import EXTENSION
 from turnout.demo.scenario import SECTIONS
 from turnout.readers import read
 from turnout.readers.writing import write
-from turnout.registry.register import register
+from turnout.registry.job import register
 from turnout.stages.hammer import hammer_unit
 from turnout.workflow.batches import UnitResult, read_results, write_batch
 from turnout.workflow.scan import scan, unit_id

@@ -7,7 +7,7 @@ import numpy as np
 from benchmarks import hammer_blows as blows
 from benchmarks.bar import Bar, stopwatch
 from turnout.config.settings.receptance import ReceptanceSettings
-from turnout.receptance import find_impacts, receptance_of
+from turnout.hammer_test import find_impacts, receptance_of
 from turnout.records import Recording
 from turnout.signal.coherence import coherence_limits, lower_coherence_limit
 from turnout.signal.filters import force_pulse

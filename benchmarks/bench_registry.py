@@ -18,14 +18,14 @@ from benchmarks.registry_race import race
 from benchmarks.registry_results import hammer_batches, passage_batches
 from turnout.registry.database import open_registry
 from turnout.registry.documentation import views
-from turnout.registry.register import register
+from turnout.registry.job import register
 from turnout.workflow.batches import read_results
 
 SHARE = float(os.environ.get("TURNOUT_BENCH_SHARE", "1"))
 QUICK = ("one section, all its campaigns", "network ranked by 90-day slope")
 OLDER = "1.5.5"
 REGISTER = (
-    "import sys, glob, time, resource; from turnout.registry.register import register;"
+    "import sys, glob, time, resource; from turnout.registry.job import register;"
     "from turnout.workflow.batches import read_results; b = sorted(glob.glob(sys.argv[1] + '/*.parquet'));"
     "t = time.process_time(); d = register(b, sys.argv[2], read=read_results); c = time.process_time() - t;"
     "print(c, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6, d.n_units, d.n_refused)"

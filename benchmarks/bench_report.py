@@ -10,8 +10,8 @@ from benchmarks import bench_pipeline
 from benchmarks.bar import Bar, stopwatch
 from turnout.config import load_configuration, with_raw
 from turnout.registry.database import open_registry
-from turnout.registry.register import register
-from turnout.report.write import write_pages
+from turnout.registry.job import register
+from turnout.report.site import write_pages
 from turnout.workflow.batches import read_results, write_batch
 from turnout.workflow.configuration_rows import configuration_rows
 from turnout.workflow.scan import scan

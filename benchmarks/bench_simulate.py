@@ -19,7 +19,7 @@ from turnout.simulate.frequency_response import receptance
 from turnout.simulate.infinite_track import floquet_receptance, winkler_receptance
 from turnout.simulate.matrices import assemble
 from turnout.simulate.passage import prepare_passage
-from turnout.simulate.prepare import prepare
+from turnout.simulate.preparation import prepare
 from turnout.simulate.rail import Rail
 from turnout.simulate.run import Drive, Probe, run
 from turnout.simulate.wheel_path import Kink

@@ -17,7 +17,7 @@ rule register:
         mem_mb=4000,
         runtime=60,
     params:
-        code=fingerprint("turnout.registry.register"),
+        code=fingerprint("turnout.registry.job"),
         again=attempts("register"),
         stages=STAGES,
         shards=RUN.every_shard,

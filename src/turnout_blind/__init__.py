@@ -1,4 +1,5 @@
-"""The blind proof: an independent generator of measuring campaigns with concealed effects, their seals, and the scores.
+"""The blind proof: generate measuring campaigns with concealed effects, seal their truths, and score the diagnosis.
 
-Nothing here imports turnout.simulate, turnout.physics or turnout.mismatch: what diagnoses must not be what conceals.
+Nothing here imports turnout.simulate, turnout.physics or turnout.mismatch. The generator is independent of the
+diagnosis.
 """

@@ -1,4 +1,4 @@
-"""A revealed set kept small: seals, truths and findings without the recordings, which their seeds make again."""
+"""Store a revealed set in one small file: seals, truths and findings. Seeds reproduce the recordings."""
 
 import gzip
 import json
@@ -15,9 +15,9 @@ KEPT = "set.json.gz"
 
 
 def keep(out, folder, truth=None):
-    """Write ``folder``/set.json.gz: commit, the truths as they were sealed, and rows, run and tool where diagnosed.
+    """Write ``folder``/set.json.gz: the commit, the sealed truths, and the findings where the set was diagnosed.
 
-    ``truth`` is the folder of truths, by default those revealed in ``out``; all seals are verified first.
+    ``truth`` is the folder of truths, by default those revealed in ``out``. All seals are verified first.
     """
     out, folder = Path(out), Path(folder)
     truth = out / "revealed" if truth is None else Path(truth)
@@ -37,15 +37,15 @@ def keep(out, folder, truth=None):
 
 
 def kept(folder):
-    """What ``keep`` wrote."""
+    """Content of an archive, as ``write_archive`` wrote it."""
     return json.loads(gzip.decompress((Path(folder) / KEPT).read_bytes()))
 
 
 def verify_kept(held, effects=None):
-    """Truths by case after every check that needs no recording; BlindError at the first that fails.
+    """Truths by case, after every check that needs no recording. BlindError at the first check that fails.
 
-    Seals of set and truths; ids, strata, effects and seeds as the plan of the set's seed gives them; place and size of
-    every effect as the case's own seed draws them.
+    Checked are the seals of set and truths, and the ids, strata, effects and seeds of the plan. Position and size of
+    every effect must be those that the seed of the case draws.
     """
     sealed, about = json.loads(held["commit"]), json.loads(held["set"])
     effects = effects or load_effects()
@@ -67,14 +67,14 @@ def verify_kept(held, effects=None):
 
 
 def verify_recordings(held, case, folder):
-    """BlindError where the files of a case made again below ``folder``/``case`` are not those that were sealed."""
+    """BlindError if the files of a regenerated case below ``folder``/``case`` differ from the sealed ones."""
     _same(
         Path(folder) / case, "files", files_of(Path(folder) / case), json.loads(held["commit"])["cases"][case]["files"]
     )
 
 
 def plan_of(held, case):
-    """``CasePlan`` of a kept case."""
+    """``CasePlan`` of an archived case."""
     truth = json.loads(held["truths"][case])
     return CasePlan(
         truth["stratum"], tuple((e["kind"], e["rung"]) for e in truth["effects"]), tuple(truth["seed"]), _panel(truth)
@@ -82,7 +82,7 @@ def plan_of(held, case):
 
 
 def _panel(told):
-    """Panel of a set or a case; older ones had none but plain track."""
+    """Panel of a set or a case. Older sets had plain track only."""
     return told.get("panel", PLAIN)
 
 

@@ -1,4 +1,7 @@
-"""One case as a measuring campaign leaves it: config/, raw/ with recordings and notes. Truth is not written here."""
+"""Write one case as a measuring campaign leaves it: config/, and raw/ with recordings and notes.
+
+The truth is returned and not written here.
+"""
 
 import csv
 import os
@@ -13,7 +16,7 @@ from turnout_blind.record import BETWEEN, CAMPAIGNS, FIRST_PASSAGE, N_BLOWS, ham
 from turnout_blind.site import draw_site
 from turnout_blind.visibility import visible
 
-STAMP = 1_700_000_000  # of every file [s]
+STAMP = 1_700_000_000  # modification time of every file [s since 1970]
 
 
 def make_case(folder, case, plan, effects):
@@ -39,7 +42,7 @@ def make_case(folder, case, plan, effects):
 
 
 def stage(plan, effects):
-    """(generator of random numbers, site, world with the effects in it, what was concealed) of a plan."""
+    """(random generator, site, world with the effects in it, list of ``ConcealedEffect``) of a plan."""
     rng = np.random.default_rng(list(plan.seed))
     options = {"panel": plan.panel}
     for kind, _ in plan.effects:
@@ -54,7 +57,7 @@ def stage(plan, effects):
 
 
 def draw_decoys(rng, site):
-    """Harmless things that are to be seen: (what the recorder takes up, what the truth says of them)."""
+    """Visible but harmless disturbances: (what is added to the recordings, their description in the truth)."""
     hum = str(rng.choice(site.names()))
     line, level = float(rng.choice([50.0, 16.7])), float(rng.uniform(0.02, 0.1))
     loud = str(rng.choice([n for n in site.names() if n != hum]))
@@ -78,7 +81,7 @@ def _raw(folder, site, world, rng, decoys):
         for point in site.blows:
             section = f"S{site.sensors.index(point) + 1}"
             write(hammer_test(site, world, c, point, rng, decoys), day / f"{section}_1.npz", "npz", single=True)
-    speeds = [p.speed * (1.0 + 0.005 * float(rng.normal())) for p in site.passages]  # as a wayside device says
+    speeds = [p.speed * (1.0 + 0.005 * float(rng.normal())) for p in site.passages]  # as read by a wayside device
     for k, plan in enumerate(site.passages):
         recording = passage(site, world, k, rng, decoys)
         noted = {**recording.conditions, "train_type": plan.train, "speed": round(speeds[k], 3)}
@@ -88,7 +91,7 @@ def _raw(folder, site, world, rng, decoys):
 
 
 def _notes(folder, site, speeds, rng):
-    """campaigns.csv and trains.csv, with the errors that such notes have; one train in eight lacks its speed."""
+    """Write campaigns.csv and trains.csv with realistic errors of such notes. One train in eight has no speed."""
     rows = [["campaign", "started_at_utc", "rail_temperature_c", "hammer_id", "tip", "operator"]]
     for when, t in zip(CAMPAIGNS, site.temperatures):
         noted = f"{t + float(rng.normal()) * 0.7:.1f}"
@@ -113,6 +116,6 @@ def _table(path, rows):
 
 
 def _stamp(folder):
-    """All files of the same age."""
+    """Give all files the same modification time."""
     for path in sorted(Path(folder).rglob("*")):
         os.utime(path, (STAMP, STAMP))

@@ -1,4 +1,4 @@
-"""Let the frozen tool diagnose every case of a set, in processes that cannot read the truth."""
+"""Run the unchanged tool on every case of a set, in processes that cannot read the truth."""
 
 import json
 import os
@@ -13,24 +13,24 @@ from turnout_blind.isolation import Hidden
 from turnout_blind.limited_process import limited, run
 from turnout_blind.seal import BlindError, digest, digest_of_folder, read_commit
 
-# Run in a copy of the case, which holds config/ and raw/. {python}, {case}, {folder} (the copy), {work} (a folder of
-# the case's own) and {out} (a JSON file of rows) are filled in; without {out} the rows are the JSON that it prints.
+# Runs in a copy of the case, which holds config/ and raw/. Filled in are {python}, {case}, {folder} (the copy), {work}
+# (a folder for this case) and {out} (a JSON file of rows). Without {out} the rows are the JSON that the tool prints.
 COMMAND = "{python} -m turnout.cli.main diagnose --turnout {case} --visit all --work {work} --json"
-WALL, CPU = 1800.0, 900.0  # budget of a case: seconds of the clock and of the processor
+WALL, CPU = 1800.0, 900.0  # budget of a case: wall clock and CPU time [s]
 
 
 def diagnose_set(
     out, truth, command=COMMAND, only=None, timeout=WALL, workers=1, say=print, cpu=CPU, again=False, progress=None,
     label=None,
 ):  # fmt: skip
-    """Write ``out``/findings/<case>.json and ``out``/diagnosis.json; returns the latter's content.
+    """Write ``out``/findings/<case>.json and ``out``/diagnosis.json; returns the content of diagnosis.json.
 
-    A case that has its run is not run again (but a failed one if ``again``), unless the tool has changed: then
-    BlindError; so it is for another command, and once the set is open. A case on which the tool fails, or that exceeds
-    ``timeout`` seconds of the clock or ``cpu`` of the processor, has no rows and the end of what was said; it never
-    stops the others, and the scorer counts it as silence. ``only``: these cases; ``workers`` of them at a time;
-    ``progress`` wraps the cases as they end. With a ``label`` it is an ablation: another command on the same cases,
-    kept below ``out``/ablations/<label>.
+    A case that has run is not run again; with ``again`` failed ones are. BlindError if the tool or the command has
+    changed, or if the set is revealed already. A case fails if the tool fails, or exceeds ``timeout`` [s] of wall clock
+    or ``cpu`` [s]. It then has no rows, only the last line of output. A failure never stops the other cases, and the
+    scorer counts it as no answer. ``only`` lists the cases to run, ``workers`` is the number at a time, and
+    ``progress`` wraps the finished cases. With a ``label`` it is an ablation: another command on the same cases, stored
+    below ``out``/ablations/<label>.
     """
     out, sealed = Path(out).resolve(), read_commit(out)
     tool, home = Path(turnout.__file__).parent, home_of(out, label)
@@ -51,7 +51,7 @@ def diagnose_set(
     with Hidden(truth, [*_generators(), *([open_truth] if open_truth.exists() else [])]) as hidden:
         held |= {"isolation": hidden.how, "canary": hidden.canary}
         waiting = [case for case in sorted(only or sealed["cases"]) if _waits(held["cases"].get(case), again)]
-        with ThreadPoolExecutor(workers) as pool:  # threads: each waits for a process, none can bring down the others
+        with ThreadPoolExecutor(workers) as pool:  # threads suffice: each waits for a process of its own
             jobs = {pool.submit(_guarded, hidden, (out, home), case, command, timeout, cpu): case for case in waiting}
             try:
                 for job in (progress or (lambda done, total: done))(as_completed(jobs), len(jobs)):
@@ -72,25 +72,25 @@ def _waits(run, again):
 
 
 def _write(record, held):
-    """All or nothing: an interrupted write leaves the former file."""
+    """Replace the file at once: an interrupted write leaves the former file."""
     part = record.with_suffix(".part")
     part.write_text(json.dumps(held, indent=1, sort_keys=True) + "\n")
     os.replace(part, record)
 
 
 def _generators():
-    """Every copy of this package that an import could find."""
+    """Folders of every copy of this package that an import could find."""
     here = {Path(__file__).parent, *(Path(p or ".").resolve() / "turnout_blind" for p in sys.path)}
     return sorted(folder for folder in here if folder.is_dir())
 
 
 def home_of(out, label=None):
-    """Where findings lie: of the tool, or of an ablation of it."""
+    """Folder of the findings: of the tool, or of an ablation of it."""
     return Path(out) if label is None else Path(out) / "ablations" / label
 
 
 def _guarded(hidden, folders, case, command, timeout, cpu):
-    """Whatever goes wrong with a case is that case's result."""
+    """``_diagnose_case``, with any error turned into the result of that case."""
     try:
         return _diagnose(hidden, *folders, case, command, timeout, cpu)
     except Exception as error:
@@ -100,7 +100,7 @@ def _guarded(hidden, folders, case, command, timeout, cpu):
 def _diagnose(hidden, out, home, case, command, timeout, cpu):
     rows, work, folder = home / "findings" / f"{case}.json", home / "work" / case, home / "copies" / case
     shutil.rmtree(folder, ignore_errors=True)
-    shutil.copytree(out / "cases" / case, folder)  # what the tool writes beside its files breaks no seal
+    shutil.copytree(out / "cases" / case, folder)  # files that the tool writes break no seal
     rows.unlink(missing_ok=True)
     named = {"python": sys.executable, "case": case, "folder": folder, "out": rows, "work": work / "tool"}
     try:
@@ -128,7 +128,7 @@ def _result(status, code, cpu, wall, said, rows):
 
 
 def _are_rows(path):
-    """Whether the file holds a list of objects with a verdict, one at least: no rows are no answer."""
+    """Whether the file holds a list of objects with a verdict, at least one."""
     try:
         found = json.loads(path.read_text())
     except (OSError, ValueError):
@@ -137,7 +137,7 @@ def _are_rows(path):
 
 
 def printed(text):
-    """Rows of the last JSON object or array that begins a line of ``text``, None where there is none.
+    """Rows of the last JSON object or array that begins a line of ``text``, or None.
 
     >>> printed('reading\\n[{"verdict": "none"}]\\npage: results/pages/T1.html')
     [{'verdict': 'none'}]

@@ -1,7 +1,7 @@
-"""What an effect is: a file in ``effects/``, or one of your own in a folder given to `turnout blind make --effects`.
+"""Definition of an effect that can be concealed: a file in ``effects/``, or in a folder given to `--effects`.
 
-The file defines ``EFFECT``, an ``Effect``. Nothing else has to know of it: the plan gives it cases, the seal hides
-them, the scorer counts every name for it as wrong unless ``score/names.py`` or ``--names`` says which one is right.
+The file defines ``EFFECT``, an ``Effect``. No other file needs a change: the plan gives it cases and the seal hides
+them. The scorer counts every name for it as wrong, unless ``score/names.py`` or ``--names`` lists right ones.
 """
 
 from collections.abc import Callable, Mapping
@@ -17,8 +17,10 @@ STRATA = ("single", "outside", "unidentifiable")
 
 @dataclass(frozen=True)
 class Drawn:
-    """One concealed effect: ``where`` ({"position", "sleeper", "sensor", "train", "axle"} as far as it has them) and
-    ``parameters``, in SI units."""
+    """One concealed effect in SI units: where it is and its ``parameters``.
+
+    ``where`` holds those of "position", "sleeper", "sensor", "train" and "axle" that apply.
+    """
 
     kind: str
     locked_to: str
@@ -29,10 +31,11 @@ class Drawn:
 
 @dataclass(frozen=True)
 class Effect:
-    """``draw(rng, site, severity)`` -> (where, parameters); ``act(world, site, where, parameters)`` changes the world.
+    """A type of effect: ``draw(rng, site, severity)`` -> (where, parameters), ``act(world, site, where, parameters)``.
 
-    ``ladder`` holds severities from hidden to obvious, one per rung. ``site`` are options of ``draw_site`` that the
-    effect needs, such as one temperature. ``stratum`` is one of ``STRATA``, ``locked_to`` one of ``LOCKS``.
+    ``act`` changes the world. ``ladder`` holds severities from hidden to obvious, one per rung. ``site`` holds options
+    of ``draw_site`` that the effect needs, such as one temperature. ``stratum`` is one of ``STRATA``, ``locked_to`` one
+    of ``LOCKS``.
     """
 
     kind: str
@@ -48,13 +51,13 @@ class Effect:
             raise ValueError(f"effect {self.kind!r}: locked to {self.locked_to!r} or stratum {self.stratum!r} unknown")
 
     def concealed(self, rng, site, rung):
-        """A drawn effect at ``rung`` of the ladder, counted from 0."""
+        """A ``ConcealedEffect`` at ``rung`` of the ladder, counted from 0."""
         where, parameters = self.draw(rng, site, self.ladder[rung])
         return Drawn(self.kind, self.locked_to, where, parameters, rung)
 
 
 def load_effects(*folders):
-    """Effects by kind from the package's folder and ``folders``; ValueError names the file that has none.
+    """Effects by kind from this package and from ``folders``. ValueError names a file without an effect.
 
     >>> from turnout_blind.effect import load_effects
     >>> sorted(load_effects())[:3]
@@ -76,12 +79,12 @@ def load_effects(*folders):
 
 
 def sign(rng):
-    """+1 or -1."""
+    """+1 or -1 with equal probability."""
     return 1.0 if rng.random() < 0.5 else -1.0
 
 
 def sleeper_near(rng, site):
-    """(index, place) of a sleeper among the sensors, drawn evenly."""
+    """{"sleeper": index, "position": [m]} of a sleeper between the sensors, drawn uniformly."""
     low, high = min(site.sensors) - 0.35, max(site.sensors) + 0.35
     inside = np.flatnonzero((site.world.place > low) & (site.world.place < high))
     j = int(rng.choice(inside))
@@ -89,11 +92,11 @@ def sleeper_near(rng, site):
 
 
 def any_sensor(rng, site):
-    """{"sensor": name} drawn evenly."""
+    """{"sensor": name}, drawn uniformly."""
     return {"sensor": str(rng.choice(site.names()))}
 
 
 def any_axle(rng, site):
-    """{"train", "axle"} drawn evenly over the trains; axles from 1."""
+    """{"train", "axle"}, the train drawn uniformly and then one of its axles, counted from 1."""
     train = str(rng.choice(sorted(site.trains)))
     return {"train": train, "axle": int(rng.integers(1, site.trains[train].axles().size + 1))}

@@ -1,4 +1,4 @@
-"""The rail on a staggered grid of finite differences, with sponges at its ends."""
+"""The rail on a staggered finite-difference grid, with absorbing layers (sponges) at its ends."""
 
 from dataclasses import dataclass
 
@@ -19,9 +19,9 @@ class Rail:
 
 @dataclass(frozen=True)
 class Grid:
-    """``n`` nodes ``step`` [m] apart from ``start`` [m]; rotations and shear forces lie half a step on.
+    """``n`` nodes from ``start`` [m], ``step`` [m] apart. Rotations and shear forces lie between the nodes.
 
-    ``sponge`` [m] at each end damps what would come back, at up to ``sponge_rate`` [1/s].
+    A ``sponge`` [m] at each end damps reflections, with a rate of up to ``sponge_rate`` [1/s].
     """
 
     start: float = -24.0
@@ -32,11 +32,11 @@ class Grid:
 
     @property
     def end(self):
-        """Place of the last node [m]."""
+        """Position of the last node [m]."""
         return self.start + (self.n - 1) * self.step
 
     def rates(self, shift=0.0):
-        """(n,) damping rate of nodes, or of what lies ``shift`` steps beside them [1/s]; cubic into the sponge."""
+        """(n,) damping rate at the nodes, or ``shift`` steps beside them [1/s]. It grows cubically into the sponge."""
         place = self.step * (np.arange(self.n) + shift)
         edge = np.minimum(place, (self.n - 1) * self.step - place)
         depth = np.clip(1.0 - edge / self.sponge, 0.0, 1.0) if self.sponge else np.zeros(self.n)
@@ -56,7 +56,7 @@ def stable_step(grid, rail):
 
 
 def spread(grid, places):
-    """(first node, (n, 4) weights) of the cubic B-spline about each of ``places`` [m]: a load 4 steps wide.
+    """(first node, (n, 4) weights) of the cubic B-spline at each of ``positions`` [m]: a load 4 steps wide.
 
     >>> first, weights = spread(Grid(start=0.0, n=101), [5.05])
     >>> int(first[0]), round(float(weights[0].sum()), 12), round(float(weights[0] @ np.arange(4)), 12)
@@ -78,7 +78,7 @@ def spread(grid, places):
 
 
 def read(grid, places):
-    """(first node, (n, 4) weights) of the cubic through the four nodes about each of ``places`` [m]."""
+    """(first node, (n, 4) weights) of the cubic through the four nodes about each of ``positions`` [m]."""
     place = (np.atleast_1d(np.asarray(places, dtype=float)) - grid.start) / grid.step
     node = np.floor(place).astype(np.int64)
     s = place - node
@@ -95,11 +95,12 @@ def read(grid, places):
 
 
 def lost_compliance(grid, rail):
-    r"""Compliance that a point load loses by being spread over four steps and read so too [m/N].
+    r"""Compliance that a point load loses because it is spread over four steps, as is the response [m/N].
 
     .. math:: l = \frac{E|\xi - \xi'|}{2\,\kappa G A}, \qquad E|\xi - \xi'| = 0.6556\,h
 
-    with two places drawn from the B-spline: shear bends the rail like a rope, :math:`|x| / 2 \kappa GA`; bending
-    loses an order of h more and is left out. 0.6556 by quadrature of the spline of order seven, their convolution.
+    with two positions drawn from the B-spline. In shear the rail deflects like a rope, :math:`|x| / 2 \kappa GA`. The
+    loss in bending is of higher order in h and neglected. 0.6556 is the quadrature of the spline of order seven, the
+    convolution of both.
     """
     return 0.6556 * grid.step / (2.0 * rail.shear)

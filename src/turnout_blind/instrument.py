@@ -1,4 +1,4 @@
-"""The instrument chain: mounting, coupling, anti-alias filter, decimation, drift, noise, range and 16 bits."""
+"""The measurement chain: mounting, coupling, anti-alias filter, decimation, drift, noise, range and 16 bits."""
 
 from dataclasses import dataclass
 
@@ -10,8 +10,11 @@ BITS = 16
 
 @dataclass(frozen=True)
 class Chain:
-    """One channel. ``gain`` relative, ``mount`` [Hz] and its ``quality``, ``coupling`` corner [Hz] of the amplifier,
-    ``noise`` rms and ``drift`` (random walk after one second) in the unit of the quantity, ``full_scale`` too."""
+    """One channel. ``gain`` is relative; ``mount`` [Hz] is the mounting resonance and ``quality`` its quality factor.
+
+    ``coupling`` [Hz] is the corner of the amplifier. ``noise`` (rms), ``drift`` (random walk after one second) and
+    ``full_scale`` are in the unit of the quantity.
+    """
 
     name: str
     full_scale: float
@@ -24,20 +27,23 @@ class Chain:
 
     @property
     def step(self):
-        """One step of the converter."""
+        """Resolution of the converter."""
         return 2.0 * self.full_scale / 2**BITS
 
 
 def mounting(samples, rate, frequency, quality):
-    """What a seismic sensor of that resonance shows: second-order low-pass with gain 1 at low frequency."""
+    """Output of a seismic sensor with that resonance: a second-order low-pass with gain 1 at low frequency."""
     omega = 2.0 * np.pi * frequency
     b, a = signal.bilinear([omega**2], [1.0, omega / quality, omega**2], rate)
     return signal.lfilter(b, a, samples)
 
 
 def amplified(chain, samples, rate, faults=()):
-    """What the amplifier gives of the true ``samples`` at ``rate`` [Hz]: the mounting rings before it, so that what
-    saturates shows no more than its limit. ``faults`` are functions (signal, rate) -> signal."""
+    """Output of the amplifier for the true ``samples`` at ``rate`` [Hz].
+
+    The mounting comes before the ``faults``, so that a saturated channel never exceeds its limit. ``faults`` are
+    functions (signal, rate) -> signal.
+    """
     x = np.asarray(samples, dtype=float)
     if chain.mount:
         x = mounting(x, rate, chain.mount, chain.quality)
@@ -47,7 +53,7 @@ def amplified(chain, samples, rate, faults=()):
 
 
 def digitised(chain, samples, rate, down, rng, faults=()):
-    """(n // down,) numbers that the logger keeps of the true ``samples`` at ``rate`` [Hz], through ``faults``."""
+    """(n // decimation,) recorded values of the true ``samples`` at ``rate`` [Hz], with ``faults``."""
     x = amplified(chain, samples, rate, faults)
     if chain.coupling:
         x = signal.sosfilt(signal.butter(1, chain.coupling, "high", fs=rate, output="sos"), x)

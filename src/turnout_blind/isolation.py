@@ -1,4 +1,4 @@
-"""Run a command that cannot read some folders, and try that it really cannot."""
+"""Run a command that cannot read some folders, and test that it really cannot."""
 
 import os
 import shlex
@@ -12,9 +12,9 @@ CANARY = "canary.txt"
 
 
 def hidden_command(command, folders):
-    """``command`` (list) in mount and user namespaces in which each of ``folders`` is an empty read-only one.
+    """``command`` (list) in mount and user namespaces in which each of ``folders`` is empty and read-only.
 
-    The second pair of namespaces locks the mounts of the first, so that nothing inside can take them off.
+    The second pair of namespaces locks the mounts of the first, so that no process inside can unmount them.
     """
     mounts = " && ".join(f"mount -t tmpfs -o ro,size=4k none {shlex.quote(str(f))}" for f in folders)
     inner = f"{mounts} && exec unshare --user --map-root-user --mount {shlex.join(command)}"
@@ -22,7 +22,7 @@ def hidden_command(command, folders):
 
 
 def method():
-    """ "unshare" where namespaces can be made, "modes" for an ordinary user elsewhere, "" where neither hides."""
+    """ "unshare" where namespaces are allowed, else "modes" for an ordinary user, else "" (nothing can hide)."""
     if shutil.which("unshare"):
         tried = subprocess.run(hidden_command(["true"], ["/mnt"]), capture_output=True)
         if tried.returncode == 0:
@@ -31,10 +31,10 @@ def method():
 
 
 class Hidden:
-    """``with Hidden(truth, more) as hidden: hidden.run(command)``: runs commands that cannot read ``truth``.
+    """``with HiddenFolders(truth, more_folders) as hidden: hidden.run(command)``: ``command`` cannot read ``truth``.
 
-    ``more`` are folders hidden as well (the generator's code) where the method can. On entry a canary is written into
-    ``truth`` and reading it is tried inside: BlindError if that succeeds, or if nothing here can hide a folder.
+    ``more_folders`` (the code of the generator) are hidden as well where the method allows it. On entry a canary file
+    is written into ``truth``, and reading it is tried inside. BlindError if that succeeds, or if no method works.
     """
 
     def __init__(self, truth, more=()):
@@ -66,12 +66,12 @@ class Hidden:
         (self.truth / CANARY).unlink(missing_ok=True)
 
     def _try(self, command):
-        """True if the command, run inside, showed anything."""
+        """True if the command, run inside, printed anything."""
         done = self.run(command, capture_output=True, text=True)
         return bool(done.stdout.strip())
 
     def inside(self, command):
-        """``command`` (list) as it has to be run to be inside."""
+        """``command`` (list), wrapped so that it runs inside."""
         return hidden_command(command, [self.truth, *self.more]) if self.how == "unshare" else list(command)
 
     def run(self, command, **options):

@@ -1,4 +1,4 @@
-"""One process under a budget: it ends, one way or another, and what it said and cost is known."""
+"""Run one process with limits of wall clock and CPU time, and return its output and cost."""
 
 import os
 import shlex
@@ -8,13 +8,16 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-LOOK = 0.2  # between two looks at a running process [s]
-TOLD = 300  # letters kept of what it said last
+LOOK = 0.2  # interval at which a running process is polled [s]
+TOLD = 300  # length to which the last line of output is cut [characters]
 
 
 @dataclass(frozen=True)
 class Ran:
-    """``code`` as the shell has it (negative: a signal), words ``out`` and ``err``, ``spent``: why it was stopped."""
+    """Exit ``code`` (negative: a signal), output ``out`` and ``err``, ``cpu`` and ``wall`` [s].
+
+    ``stop_reason`` says why the process was stopped, "" if it was not.
+    """
 
     code: int
     out: str
@@ -25,21 +28,21 @@ class Ran:
 
     @property
     def last_words(self):
-        """The last line it said, or why it was stopped."""
+        """Last line of output, or why the process was stopped."""
         return self.spent or next(reversed((self.out + self.err).strip().splitlines()), "")[:TOLD]
 
 
 def limited(command, cpu):
-    """``command`` (list) that the system ends after ``cpu`` seconds of its processor [s], by a signal of its own."""
+    """``command`` (list) with a limit of ``cpu`` [s], after which the system ends it by a signal."""
     soft = int(cpu)
     return ["sh", "-c", f"ulimit -S -t {soft}; ulimit -H -t {soft + 5}; exec {shlex.join(map(str, command))}"]
 
 
 def run(command, folder, logs, wall, cpu):
-    """``Ran`` of ``command`` (list) in ``folder``; its words go to files in ``logs``.
+    """``ProcessResult`` of ``command`` (list) in ``folder``; its output goes to files in ``logs``.
 
-    It is killed with all its children after ``wall`` seconds of the clock, and by the system after ``cpu`` seconds of
-    the processor. CPU time is that of the process and of the children it has waited for.
+    It is killed with all its children after ``wall`` [s] of wall clock, and by the system after ``cpu`` [s] of CPU time.
+    CPU time is that of the process and of the children it has waited for.
     """
     logs = Path(logs)
     logs.mkdir(parents=True, exist_ok=True)
@@ -48,14 +51,14 @@ def run(command, folder, logs, wall, cpu):
         process = subprocess.Popen(command, stdout=out, stderr=err, cwd=folder, start_new_session=True)
         try:
             status, usage, late = _until(process.pid, began + wall)
-        except BaseException:  # interrupted: nothing is left running
+        except BaseException:  # interrupted: leave no process running
             _kill(process.pid)
             os.wait4(process.pid, 0)
             raise
     process.returncode = code = os.waitstatus_to_exitcode(status)
     used = usage.ru_utime + usage.ru_stime
     spent = f"no answer within {wall:.0f} s of the clock" if late else ""
-    # the system counts in ticks, what is reported is exact: they differ where the machine is shared
+    # the system counts in ticks and may stop a process before its exact CPU time reaches the limit
     if not spent and (code == -signal.SIGXCPU or (code == -signal.SIGKILL and used >= 0.8 * cpu)):
         spent = f"no answer within {cpu:.0f} s of the processor"
     words = [(logs / name).read_text(encoding="utf-8", errors="replace") for name in ("out.txt", "err.txt")]
@@ -76,7 +79,7 @@ def _until(pid, deadline):
 
 
 def _kill(pid):
-    """The process and whatever it started: it leads a session of its own."""
+    """Kill the process and its children: it leads a session of its own."""
     try:
         os.killpg(pid, signal.SIGKILL)
     except ProcessLookupError:

@@ -1,4 +1,4 @@
-"""Make a blind set: campaigns in one folder, sealed truths in another; an interrupted one goes on where it stopped."""
+"""Make a blind set: campaigns in one folder, sealed truths in another. An interrupted run can be continued."""
 
 import json
 import os
@@ -26,24 +26,24 @@ def make_set(
     out, truth : path
         Folders; ``truth`` must not lie inside ``out``, which is what the tool is given.
     seed : int, "tool" or None
-        The same seed gives the same recordings and seals, also of a set that was lost; None draws one. "tool": that of
-        the tool as it is installed, by the hash of its sources. Such a set exists no earlier than the tool that it
-        examines and no other tool is let in; nobody chose it, and everybody can make it.
+        The same seed gives the same recordings and seals. None draws one. "tool" derives it from the hash of the
+        sources of the installed tool. Such a set exists no earlier than the tool that it examines, and no other tool
+        may diagnose it. Nobody chose it, and everybody can make it.
     full : bool
-        All strata, or the fast tier of 40.
+        All strata, or the fast tier of 40 cases.
     folders : iterable of path
-        Folders with effects of your own, one per file.
+        Folders with further effects, one per file.
     only, limit : iterable of str, int
-        Kinds to keep beside the controls; the first so many cases of the shuffled set.
+        Kinds of effects beside the controls; number of cases taken from the start of the shuffled set.
     panel : str
-        Where all cases lie, one of ``turnout_blind.site.PANELS``.
+        Panel of all cases, one of ``turnout_blind.site.PANELS``.
     workers : int
-        Processes.
+        Number of processes.
     progress : callable or None
-        (iterable of cases as they end, their number) -> iterable.
+        (iterable of finished cases, their number) -> iterable.
 
-    Errors: BlindError where ``truth`` lies inside ``out``, where ``out`` holds a whole set already, or where an
-    interrupted set was begun otherwise or by other sources.
+    Errors: BlindError if ``truth`` lies inside ``out``, if ``out`` holds a complete set already, or if an interrupted
+    set was started with other options or other sources.
     """
     out, truth = Path(out).resolve(), Path(truth).resolve()
     if truth.is_relative_to(out):
@@ -71,7 +71,7 @@ def make_set(
 
 
 def _begun(truth, seed, full, folders, only, limit, panel):
-    """set.json: what an interrupted set was begun with, or written now."""
+    """Content of set.json: seed and options of an interrupted set, or written now."""
     wanted = {"full": full, "effects": sorted(map(str, folders)), "only": sorted(only or ()), "limit": limit}
     wanted |= {
         "panel": panel,
@@ -96,7 +96,7 @@ def _made(job):
 
 
 def _make(job):
-    """A case: built aside, its truth written, then put in its place, so that a half-made one is never taken for one."""
+    """Make a case in a temporary folder, write its truth, then move it: an incomplete case is never taken for one."""
     cases, truth, case, plan, folders, seed = job
     aside = cases.parent / "unfinished"
     shutil.rmtree(aside / case, ignore_errors=True)

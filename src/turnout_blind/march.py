@@ -1,8 +1,8 @@
-"""Explicit leapfrog march of rail, supports, riders, wheels and hammer; compiled.
+"""Explicit leapfrog time integration of rail, supports, attached masses, wheels and hammer; compiled.
 
-Forces and moments of the rail live at whole steps and nodes, its velocities at half steps (Yee 1966, for a
-Timoshenko beam). Every support, contact and body is taken explicitly: at 1/60000 s the stiffest, a wheel on 12 kg of
-rail, turns by 0.2 rad a step. Damping forces use the velocity half a step back.
+Forces and moments of the rail are taken at whole time steps, velocities at half steps (Yee 1966, for a Timoshenko
+beam). Every support, contact and body is explicit. At 1/60000 s the stiffest, a wheel on 12 kg of rail, advances by
+0.2 rad a step. Damping forces use the velocity half a step earlier.
 """
 
 import numba
@@ -13,7 +13,7 @@ STEP = 1.0 / 60000.0
 
 
 def _of(value, i):
-    """``value`` of the ``i``-th node: a rail of one profile is marched with constants."""
+    """``value`` at the ``i``-th node. For a uniform rail ``value`` is a constant."""
     return value[i] if isinstance(value, np.ndarray) else value
 
 
@@ -117,7 +117,7 @@ def _path(wheels, i, x):
 
 @numba.njit(cache=True)
 def hertz(stiffness, local, approach, guess):
-    """Contact force [N] of F = k max(0, approach - local F)^1.5 by Newton from ``guess``; 0 when apart."""
+    """Contact force [N] of F = k max(0, approach - local F)^1.5 by Newton's method from ``guess``; 0 without contact."""
     if approach <= 0.0:
         return 0.0
     force = guess
@@ -169,7 +169,7 @@ def _wheel_forces(wheels, roll, grid_start, h, n, t, w, f, z, contact, stencil):
 
 @numba.njit(cache=True)
 def _car_step(cars, wheels, dt, z, zv, b, bv, contact):
-    """``b``: per car body bounce, body pitch, and bounce and pitch of two bogies."""
+    """Advance the cars. ``b`` holds per car: bounce and pitch of the body, and bounce and pitch of two bogies."""
     for c in range(cars.body.size):
         o = 6 * c
         body = pitch = 0.0
@@ -201,9 +201,10 @@ def _car_step(cars, wheels, dt, z, zv, b, bv, contact):
 
 @numba.njit(cache=True)
 def march(n_step, dt, grid_start, beam, supports, riders, cars, wheels, roll, blow, first, weights, every):
-    """Velocities (n_step, n_sensor) [m/s] half a step behind each whole one, forces of hammer and wheels, last state.
+    """(velocities (n_step, n_sensor) [m/s], hammer force, wheel forces, last state).
 
-    Forces of the wheels are kept every ``every`` steps. The state is (w, v, turn, q, moment, sleeper place, speed).
+    Velocities are those half a step after each whole step. Wheel forces are stored every ``every`` steps. The state is
+    (w, v, turn, q, moment, sleeper displacement, sleeper velocity).
     """
     n = beam.rate.size
     w, v, q, moment, f = np.zeros(n), np.zeros(n), np.zeros(n - 1), np.zeros(n), np.zeros(n)

@@ -1,4 +1,4 @@
-"""What the march is given: rail, supports, what hangs on them, what rolls over them, and blows."""
+"""Inputs of the time integration: rail, supports, attached masses, cars, wheels, their motion, and the hammer."""
 
 from typing import NamedTuple
 
@@ -6,8 +6,11 @@ import numpy as np
 
 
 class Beam(NamedTuple):
-    """Rail on its grid: constants, or arrays where its profile changes (``bending`` and ``mass`` of nodes, ``shear``
-    and ``rotary`` of what lies between), and damping rates of nodes and of the rotations between them [1/s]."""
+    """Rail on its grid: constants, or arrays where its section changes.
+
+    ``bending`` and ``mass`` belong to nodes, ``shear`` and ``rotary`` to the intervals between them. ``rate`` and
+    ``rate_between`` [1/s] are damping rates of the nodes and of the rotations between them.
+    """
 
     step: float
     bending: object
@@ -19,11 +22,14 @@ class Beam(NamedTuple):
 
 
 class Supports(NamedTuple):
-    """(n,) each; ``first`` and ``weights`` (n, 4) on the grid. ``lift`` pad stiffness in uplift over that in
-    compression, ``gap`` [m] under the sleeper (below 0: none, ballast holds both ways), ``seated`` share of its bed
-    that has no gap, ``close`` [m] over which the gap closes, ``hardening`` [1/m], ``drift`` [1/s] of ballast
-    stiffness; ``shear`` and ``shear_damping`` to the next sleeper; branches: share of pad stiffness and rate [1/s] of
-    Maxwell elements."""
+    """Supports, (n,) each; ``first`` and ``weights`` (n, 4) are their nodes on the grid.
+
+    ``lift``: pad stiffness in uplift over that in compression. ``gap`` [m] under the sleeper; below 0 there is none and
+    the ballast acts in both directions. ``seated``: share of the bed without a gap. ``close`` [m]: compression over
+    which the gap closes. ``hardening`` [1/m] and ``drift`` [1/s] of the ballast stiffness. ``shear`` and
+    ``shear_damping`` act between neighbouring sleepers. ``branch_share`` (of the pad stiffness) and ``branch_rate``
+    [1/s] describe Maxwell elements.
+    """
 
     first: np.ndarray
     weights: np.ndarray
@@ -45,7 +51,7 @@ class Supports(NamedTuple):
 
 
 class Riders(NamedTuple):
-    """Masses hung on the rail by a spring, with stops ``play`` [m] away on both sides of stiffness ``stop``."""
+    """Masses attached to the rail by a spring, with stops of stiffness ``stop`` at ``play`` [m] on both sides."""
 
     first: np.ndarray
     weights: np.ndarray
@@ -72,8 +78,11 @@ class Cars(NamedTuple):
 
 
 class Wheels(NamedTuple):
-    """(4 n_car,) mass, static load [N], place behind the first [m]; ``path`` (n, m) under each from ``path_start``
-    on, ``path_step`` apart [m]; ``stiffness`` of Hertz [N/m^1.5], ``local`` compliance of the rail [m/N]."""
+    """(4 n_car,) mass, static load [N] and distance behind the first wheel [m].
+
+    ``path`` (n, m) is the surface under each wheel, from ``path_start`` in steps of ``path_step`` [m]. ``stiffness`` is
+    the Hertz constant [N/m^1.5], ``local`` a compliance of the rail [m/N].
+    """
 
     mass: np.ndarray
     load: np.ndarray
@@ -86,7 +95,11 @@ class Wheels(NamedTuple):
 
 
 class Roll(NamedTuple):
-    """Place of the first wheel at time 0 [m], speed [m/s]; wheels take hold of the rail between two places [m]."""
+    """Position of the first wheel at time 0 [m] and speed [m/s].
+
+    A wheel engages the rail gradually from ``engage_start`` to ``engage_end`` and releases it from ``release_start`` to
+    ``release_end`` [m].
+    """
 
     start: float
     speed: float
@@ -97,7 +110,7 @@ class Roll(NamedTuple):
 
 
 class Blow(NamedTuple):
-    """Hammer: ``mass`` 0 for none; ``velocities`` and ``times`` of its blows, tip k d^1.5 (1 + loss d')."""
+    """Hammer with ``velocities`` and ``times`` of its impacts and tip force k d^1.5 (1 + loss d'). ``mass`` 0: none."""
 
     first: int
     weights: np.ndarray

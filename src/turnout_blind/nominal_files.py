@@ -1,4 +1,4 @@
-"""The owner's files: layout, track, vehicles and table of turnouts, with nominal values and no effect in them."""
+"""Write the files of the owner: layout, track, vehicles and table of turnouts, with nominal values and no effect."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ RAIL = (("youngs_modulus", 210.0, "GPa"), ("second_moment", 3037.0, "cm⁴"), ("
 
 
 def write_configuration(folder, turnout, site):
-    """Write config/ of one site below ``folder``, in the project's own formats."""
+    """Write config/ of one site below ``folder``, in the formats of the project."""
     folder = Path(folder)
     for name in ("layouts", "tracks", "vehicles"):
         (folder / name).mkdir(parents=True, exist_ok=True)
@@ -56,7 +56,7 @@ def _value(value, unit, prior=None):
 
 
 def track(site):
-    """Nominal rail and supports; two zones of their own values."""
+    """Nominal rail, and supports of two zones."""
     lines = ["name: site", "layers: 2", "elements_per_bay: 4", "sources:", f'  register: "{SOURCE}"']
     lines += ["extent:", f"  from: {_value(-45.0, 'm')}", f"  to: {_value(57.0, 'm')}"]
     lines += [f"spacing: {_value(0.6, 'm', 0.03)}", "absorbing_end:"]
@@ -76,7 +76,7 @@ def track(site):
 
 
 def _casting(crossing):
-    """The crossing as a stretch of another rail, without the ramps at its ends."""
+    """The crossing casting as a stretch of another rail, without the ramps at its ends."""
     factors = {"second_moment": crossing.bending, "area": crossing.mass, "mass": crossing.mass}
     start, end = crossing.ends
     lines = ["stretches:", f"  - from: {_value(start, 'm')}", f"    to: {_value(end, 'm')}", "    rail:"]
@@ -85,7 +85,7 @@ def _casting(crossing):
 
 
 def _nose(c):
-    """Where wheels pass from wing to nose, by an estimate that says so."""
+    """The nose of the crossing, with priors as wide as an estimate deserves."""
     place, share = _value(c.nose, "m", round(0.05 / c.nose, 4)), _value(c.share, "-", 0.2)
     depth, length = _value(1e3 * c.depth, "mm", 0.4), _value(c.length, "m", 0.2)
     return f"{{kind: kink, place: {place}, depth: {depth}, length: {length}, share: {share}}}"

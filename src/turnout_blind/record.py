@@ -1,4 +1,4 @@
-"""What the recorders would hold: hammer tests and passages of a site in a given world."""
+"""Simulated recordings: hammer tests and passages of a site in a given world."""
 
 from datetime import datetime, timedelta
 
@@ -19,12 +19,12 @@ FIRST_PASSAGE, BETWEEN = datetime(2024, 7, 16, 11, 0), timedelta(minutes=30)
 
 
 def sensor_places(site, world):
-    """True places of the sensors [m]."""
+    """True positions of the sensors [m]."""
     return [x + world.sensor_shift.get(c.name, 0.0) for x, c in zip(site.sensors, site.chains)]
 
 
 def channels(site):
-    """Channels as the owner describes them."""
+    """Channels of the sensors as the owner describes them."""
     return tuple(
         Channel(c.name, "acceleration", x, "rail web", limit=c.full_scale, resolution=c.step)
         for x, c in zip(site.sensors, site.chains)
@@ -32,7 +32,7 @@ def channels(site):
 
 
 def hammer_test(site, world, campaign, point, rng, decoys):
-    """Recordings, one per blow, of a test at ``point`` [m] in campaign 0 or 1."""
+    """Recordings, one per impact, of a hammer test at ``position`` [m] in campaign 0 or 1."""
     force = Channel("force", "force", point, "hammer", limit=site.force.full_scale, resolution=site.force.step)
     made, start = [], CAMPAIGNS[campaign] + timedelta(minutes=20 * site.blows.index(point))
     for k in range(N_BLOWS):
@@ -47,7 +47,7 @@ def hammer_test(site, world, campaign, point, rng, decoys):
 
 
 def _blow(site, world, temperature, point, rng, bad):
-    """(force, accelerations) of one blow: beside the mark, a little off the rail's middle, now and then bad."""
+    """(force, accelerations) of one impact: beside the mark, slightly off centre, and with the given ``fault``."""
     speed = 0.95 * float(np.exp(0.12 * rng.normal()))
     beside = float(np.clip(0.008 * rng.normal(), -0.02, 0.02))
     times, speeds = [PRETRIGGER], [speed]
@@ -64,8 +64,10 @@ def _blow(site, world, temperature, point, rng, bad):
 
 
 def _torsion(force, share, site):
-    """Acceleration by torsion of the rail under an off-centre blow: one mode of 60 kg near 460 Hz, which a vertical
-    beam cannot have."""
+    """Acceleration by torsion of the rail under an off-centre impact: one mode of 60 kg near 460 Hz.
+
+    A beam model of vertical motion cannot have it.
+    """
     omega, zeta = 2.0 * np.pi * 460.0, 0.06
     b, a = signal.bilinear([1.0, 0.0, 0.0], [1.0, 2.0 * zeta * omega, omega**2], RATE)
     return share * signal.lfilter(b, a, force) / 60.0
@@ -104,5 +106,5 @@ def passage_motion(site, world, k, rng):
 
 
 def lead_of(world, places, speed):
-    """Time until the first wheel is at the first sensor when it starts where it takes hold of the rail [s]."""
+    """Time from the start until the first wheel reaches the first sensor [s]; it starts where it engages the rail."""
     return (min(places) - world.grid.start - 0.25 * RAMP) / speed

@@ -1,4 +1,4 @@
-"""Open the envelopes: verify every seal, then put the truths beside the findings."""
+"""Reveal a set: verify every seal, then put the truths beside the findings."""
 
 import json
 import shutil
@@ -9,9 +9,9 @@ from turnout_blind.seal import BlindError, digest, read_commit, verify
 
 
 def reveal(out, truth):
-    """Copy the truths to ``out``/revealed after verifying all seals and that findings exist; returns the truths.
+    """Copy the truths to ``out``/revealed, after verifying all seals and that findings exist; returns the truths.
 
-    Errors: BlindError where a seal is broken, or where nothing has been diagnosed yet.
+    Errors: BlindError if a seal is broken, or if nothing has been diagnosed yet.
     """
     out, truth = Path(out), Path(truth)
     truths = verify(out, truth)
@@ -28,9 +28,9 @@ def reveal(out, truth):
 
 
 def revealed(out, label=None):
-    """(truths, rows by case, diagnosis) of a revealed set, seals verified again; rows None where the tool failed.
+    """(truths, rows by case, diagnosis) of a revealed set, with its seals verified again.
 
-    ``label`` reads the findings of an ablation.
+    Rows are None where the tool failed. ``label`` selects the findings of an ablation.
     """
     out = Path(out)
     if not (out / "revealed").exists():
@@ -39,7 +39,7 @@ def revealed(out, label=None):
 
 
 def findings(out, label=None):
-    """(rows by case, diagnosis) of a set; BlindError where they are not what the tool wrote under this commit."""
+    """(rows by case, diagnosis) of a set; BlindError if they are not what the tool wrote under this commit."""
     home = home_of(out, label)
     record = home / "diagnosis.json"
     held = json.loads(record.read_text())

@@ -1,15 +1,15 @@
-"""Random roughness by superposed waves: of a rail along its length, of a wheel round its tread."""
+"""Random roughness as a sum of waves: of a rail along its length, and of a wheel round its tread."""
 
 import numpy as np
 
 SHORTEST, LONGEST = 0.02, 3.0  # wavelengths [m]
 TREAD = 8192  # points round a wheel, a third of a millimetre apart
-PATCH = 0.006  # half length of the contact patch [m]: it rides over waves not much longer
-SLOPE = 18.0  # dB per decade of wavelength, as measured spectra of ground rail in service fall
+PATCH = 0.006  # half length of the contact patch [m], which filters short waves
+SLOPE = 18.0  # level per decade of wavelength [dB], as in measured spectra of ground rail in service
 
 
 def level(wavelength, at_10_cm):
-    """Third-octave level [dB re 1 µm] of waves of ``wavelength`` [m], given that at 10 cm.
+    """Third-octave level [dB re 1 µm] at ``wavelength`` [m], given the level at 10 cm.
 
     >>> level(0.1, 2.0), level(1.0, 2.0)
     (2.0, 20.0)
@@ -18,14 +18,14 @@ def level(wavelength, at_10_cm):
 
 
 def patch_share(wavelength):
-    """Share of a wave's variance that lifts a wheel: exp(-(2 pi a / wavelength)^2), Remington's filter in short."""
+    """Share of the variance that moves a wheel: exp(-(2 pi a / wavelength)^2), an approximation of Remington's filter."""
     return np.exp(-((2.0 * np.pi * PATCH / np.asarray(wavelength)) ** 2))
 
 
 def rail_roughness(rng, at_10_cm, waves=420):
-    """A function of place [m] giving dips [m]: ``waves`` cosines of random phase, evenly in the logarithm.
+    """A function of position [m] that gives dips [m]: ``waves`` cosines of random phase.
 
-    Each third of an octave carries the variance that its level says, so its cosines share it.
+    Wavelengths are uniform in the logarithm. The cosines of each third octave share the variance of its level.
     """
     edges = np.geomspace(SHORTEST, LONGEST, waves + 1)
     length = np.exp(rng.uniform(np.log(edges[:-1]), np.log(edges[1:])))
@@ -46,8 +46,10 @@ def rail_roughness(rng, at_10_cm, waves=420):
 
 
 def wheel_roughness(rng, at_10_cm, radius, orders=130):
-    """A function of place [m] and phase [rad]: harmonics of the circumference, the first three as turned wheels have
-    them (10 to 30 µm), the others at the level of roughness."""
+    """A function of position [m] and phase [rad] that gives dips [m]: harmonics of the circumference.
+
+    The first three are as in turned wheels (10 to 30 µm), the others follow the roughness level.
+    """
     order = np.arange(1, orders + 1)
     length = 2.0 * np.pi * radius / order
     width = np.log2((order + 0.5) / (order - 0.5)) * 3.0

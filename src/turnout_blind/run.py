@@ -1,4 +1,4 @@
-"""Runs of the march: a given world under blows or under a train; raw rail accelerations at the step's rate."""
+"""Simulate a given world under hammer impacts or under a train: rail accelerations at the rate of the time step."""
 
 import numpy as np
 
@@ -8,21 +8,21 @@ from turnout_blind.march_inputs import Blow, Roll
 from turnout_blind.vehicle import cars_of, no_train, wheels_of
 
 PATH_STEP = 5e-3
-RAMP = 4.0  # a wheel takes hold of the rail over this length [m]
-MARGIN = 1.0  # and never comes nearer to the ends of the grid [m]
+RAMP = 4.0  # length over which a wheel engages the rail gradually [m]
+MARGIN = 1.0  # smallest distance of a wheel in contact from the ends of the grid [m]
 STILL = Blow(1, np.zeros(4), 0.0, 0.0, 0.0, np.zeros(0), np.zeros(0))
 REST = Roll(0.0, 0.0, 0.0, 1.0, 2.0, 3.0)
 
 
 def accelerations(velocity, dt):
-    """(n_sensor, n) [m/s²] from velocities half a step behind each whole one; sample k is that of time k dt."""
+    """(n_sensor, n) accelerations [m/s²] from velocities half a step after each whole step; sample k is at k dt."""
     return np.diff(velocity, axis=0, prepend=0.0).T / dt
 
 
 def strike(world, places, at, times, velocities, duration, temperature=None, mass=5.5, tip=1.5e9, loss=0.1, dt=STEP):
-    """(force (n,) [N], accelerations (n_sensor, n) [m/s²], last state) of blows of a hammer ``at`` a place [m].
+    """(force (n,) [N], accelerations (n_sensor, n) [m/s²], last state) of hammer impacts at ``hammer_position`` [m].
 
-    ``tip`` is the constant of k d^1.5 (1 + loss d') [N/m^1.5, s/m]; a second time is a bounce.
+    ``tip`` and ``loss`` are the constants of k d^1.5 (1 + loss d') [N/m^1.5, s/m]. A second time is a double hit.
     """
     first, weights = read(world.grid, at)
     blow = Blow(int(first[0]), weights[0], mass, tip, loss, np.asarray(times, float), np.asarray(velocities, float))
@@ -36,7 +36,7 @@ def strike(world, places, at, times, velocities, duration, temperature=None, mas
 
 
 def paths(world, train, roughness, phase):
-    """(n_wheel, m) dips that each wheel meets along the grid [m], from the grid's start on."""
+    """(n_wheel, m) dips that each wheel meets along the grid [m], from the start of the grid."""
     x = np.arange(world.grid.start, world.grid.end, PATH_STEP)
     rail = sum((make(x) for make in world.surface), np.zeros(x.size))
     made = np.tile(rail, (train.axles().size, 1))
@@ -51,8 +51,9 @@ def paths(world, train, roughness, phase):
 def roll(world, train, speed, places, duration, lead, temperature=None, roughness=None, phase=0.0, grown=0.0, dt=STEP):
     """(accelerations (n_sensor, n) [m/s²], wheel forces (n_wheel, m) [N], last state) of a passage.
 
-    The first wheel is at the first of ``places`` [m] after ``lead`` seconds. ``roughness`` is (wheel, places) ->
-    dips; ``phase`` [rad] turns all wheels.
+    The first wheel reaches the first of ``sensor_positions`` [m] after ``lead`` [s]. ``roughness`` is a function
+    (wheel, positions) -> dips. ``phase`` [rad] is the rotation of all wheels at the start. ``n_passages`` before this
+    one have worn the supports.
     """
     local = lost_compliance(world.grid, world.rail)
     path = paths(world, train, roughness, phase)

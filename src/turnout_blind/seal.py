@@ -1,4 +1,4 @@
-"""Seals: SHA-256 of every truth with its nonce and of every file of a set, and their verification."""
+"""Seal and verify a set: SHA-256 of every truth with its nonce, and of every file."""
 
 import hashlib
 import json
@@ -10,7 +10,7 @@ COMMIT, SET, FORMAT = "commit.json", "set.json", 1
 
 
 class BlindError(TurnoutError):
-    """A blind set is not what its seals say, or cannot be kept blind."""
+    """A blind set does not match its seals, or cannot be kept blind."""
 
     def __init__(self, path, where, found, remedy):
         super().__init__(f"{path}, {where}: {found}. {remedy}.")
@@ -26,7 +26,7 @@ def digest(data):
 
 
 def digest_of_folder(folder, pattern="*"):
-    """SHA-256 over names and contents of all files below ``folder`` that match, in order of name; caches left out."""
+    """SHA-256 over names and contents of all matching files below ``folder``, sorted by name, without caches."""
     whole = hashlib.sha256()
     for path in sorted(Path(folder).rglob(pattern)):
         if path.is_file() and "__pycache__" not in path.parts:
@@ -35,13 +35,15 @@ def digest_of_folder(folder, pattern="*"):
 
 
 def seed_for(tool_sha256):
-    """Seed of the set that examines this very tool: it exists no earlier than the tool, and nobody chose it."""
+    """Seed of the set for this version of the tool: it exists no earlier than the tool, and nobody chose it."""
     return int(digest(f"turnout blind {tool_sha256}".encode())[:15], 16)
 
 
 def write_truth(folder, name, content, seed):
-    """Write ``content`` with a nonce of 16 bytes, which follows from the set's ``seed``, as ``name``.json; returns the
-    SHA-256 of the file."""
+    """Write ``content`` as ``name``.json with a nonce of 16 bytes; returns the SHA-256 of the file.
+
+    The nonce follows from the ``seed`` of the set.
+    """
     nonce = digest(f"nonce {seed} {name}".encode())[:32]
     data = json.dumps({**content, "nonce": nonce}, indent=1, sort_keys=True).encode() + b"\n"
     Path(folder).mkdir(parents=True, exist_ok=True)
@@ -50,15 +52,18 @@ def write_truth(folder, name, content, seed):
 
 
 def files_of(case):
-    """{path below the case: SHA-256} of all its files."""
+    """{path below the case: SHA-256} of all files of a case."""
     return {
         p.relative_to(case).as_posix(): digest(p.read_bytes()) for p in sorted(Path(case).rglob("*")) if p.is_file()
     }
 
 
 def commit(out, truths, examines=None):
-    """Write commit.json: ``truths`` are {case: SHA-256 of its truth, "set": of set.json}; ``examines`` the hash of the
-    tool that the set was made for, None where for any; returns its own SHA-256."""
+    """Write commit.json; returns its SHA-256.
+
+    ``truths`` is {case: SHA-256 of its truth, "set": SHA-256 of set.json}. ``examines`` is the hash of the tool that
+    the set was made for, None for any tool.
+    """
     out = Path(out)
     package = Path(__file__).parent
     cases = {c: {"truth_sha256": truths[c], "files": files_of(out / "cases" / c)} for c in sorted(truths) if c != "set"}
@@ -83,7 +88,7 @@ def read_commit(out):
 
 
 def verify(out, truth):
-    """Truths by case; BlindError at the first truth or recording that its seal does not fit."""
+    """Truths by case; BlindError at the first truth or recording that does not match its seal."""
     out, truth, sealed = Path(out), Path(truth), read_commit(out)
     _fits(truth / SET, sealed["set_sha256"])
     found = {}

@@ -1,4 +1,4 @@
-"""One monitored site: what its owner believes (nominal) and what there really is before any effect (truth)."""
+"""One monitored site: what its owner assumes (nominal), and what there really is before any effect (truth)."""
 
 from dataclasses import dataclass, field, replace
 
@@ -21,7 +21,7 @@ RANGES = {
     "ballast_damping": (4e4, 9e4),
 }
 SCATTER = {"pad": 0.08, "pad_damping": 0.15, "mass": 0.02, "ballast": 0.10, "ballast_damping": 0.15}
-RAIL_DAMPING = 4000.0  # [N s/m²], loss factor 0.010 at 1040 Hz: Thompson 2009, Railway Noise and Vibration, takes 0.02
+RAIL_DAMPING = 4000.0  # [N s/m²], loss factor 0.010 at 1040 Hz; Thompson 2009, Railway Noise and Vibration: 0.02
 PLAIN, CROSSING = PANELS = ("plain", "crossing")
 COMMON = {"pad": 0.08, "pad_damping": 0.2, "mass": 0.02, "ballast": 0.08, "ballast_damping": 0.2}
 
@@ -38,9 +38,12 @@ class Planned:
 
 @dataclass
 class Site:
-    """``nominal`` values of the two ``zones`` [(from, to)] as the owner has them; ``trains`` as in his files,
-    ``true_trains`` as they run; ``chains`` one per sensor; ``temperatures`` of the two campaigns [°C]; ``crossing`` as
-    his drawings have it, None on plain track."""
+    """A site with its nominal values and its true ``world``.
+
+    ``nominal`` holds the values of the two ``zones`` [(from, to)]; ``trains`` are as filed, ``true_trains`` as they
+    run. ``sensors`` and ``hammer_positions`` are nominal positions [m]; ``chains`` has one entry per sensor.
+    ``temperatures`` are those of the two campaigns [°C]. ``crossing`` is as drawn, None on plain track.
+    """
 
     zones: tuple
     nominal: tuple
@@ -63,8 +66,11 @@ class Site:
 
 
 def draw_site(rng, same_temperature=None, one_speed=None, panel=PLAIN):
-    """A site of its own kind; ``same_temperature`` of both campaigns or not (None: one in four), ``one_speed`` for
-    all trains or not (None: one in ten); ``panel`` of ``PANELS``."""
+    """Draw a site.
+
+    ``same_temperature`` in both campaigns or not (None: in one case of four), ``one_speed`` for all trains or not
+    (None: in one case of ten), ``panel`` of ``PANELS``.
+    """
     one_speed = bool(rng.random() < 0.1) if one_speed is None else one_speed
     boundary = float(rng.choice([3.9, 4.5, 5.7, 6.9]))
     zones = ((-45.0, boundary), (boundary, 57.0))
@@ -92,14 +98,14 @@ def draw_site(rng, same_temperature=None, one_speed=None, panel=PLAIN):
 
 
 def with_crossing(rng, site):
-    """The site with bearers from its boundary on and a crossing behind that."""
+    """The site with bearers from the zone boundary on, and a crossing behind it."""
     (west, east), boundary = site.nominal, site.zones[1][0]
     factor, true = bearers(rng)
     site.nominal = west, {**east, "mass": round(factor * east["mass"])}
     site.world.mass[site.world.place > boundary - 0.3] *= true
     there, site.crossing = draw_crossing(rng, boundary)
     cast_in(rng, site.world, there, site.trains)
-    site.chains = tuple(replace(c, full_scale=5.0 * c.full_scale) for c in site.chains)  # a nose strikes hard
+    site.chains = tuple(replace(c, full_scale=5.0 * c.full_scale) for c in site.chains)  # impacts at the nose are hard
     return site
 
 
@@ -126,7 +132,7 @@ def _trains():
 
 
 def _driven(train, rng):
-    """The train that runs: masses, springs, dampers, wheels and axle places as they are."""
+    """The true train: masses, springs, dampers, wheels and axle positions with their deviations from the file."""
 
     def car(c):
         spread = {"body": 0.03, "bogie": 0.03, "wheelset": 0.02, "primary": 0.1, "secondary": 0.1}
@@ -173,7 +179,7 @@ def _world(rng, zones, nominal):
 
 
 def _roughness(rng, trains):
-    """Functions: "rail" of place; (train, axle) of place and phase."""
+    """Functions that give dips: "rail" of position; (train, axle) of position and phase."""
     found = {"rail": rail_roughness(rng, float(rng.uniform(-3.0, 4.0)))}
     for train in trains.values():
         level = float(rng.uniform(-8.0, -1.0))

@@ -1,4 +1,4 @@
-"""Which cases a set has: controls, singles over the ladder, doubles, outside the library, not identifiable."""
+"""Plan the cases of a set: controls, single effects, doubles, outside the library, not identifiable."""
 
 import hashlib
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from turnout_blind.site import PLAIN
 
 FULL = {"control": 60, "single": 1, "double": 20, "outside": 20, "unidentifiable": 16}
 FAST = {"control": 10, "single": 17, "double": 3, "outside": 5, "unidentifiable": 5}
-# Doubles: two of these that do not mask one another, from the upper half of their ladders.
+# A double has two of these effects that do not mask one another, from the upper half of their ladders.
 PAIRS = ("void", "ballast", "pad", "pad_temperature", "rail_shear", "dip", "flat", "unsprung_mass", "gain",
          "time_offset", "mount_resonance", "position")  # fmt: skip
 MASKING = ({"void", "ballast"}, {"time_offset", "position"}, {"time_offset", "mount_resonance"})
@@ -17,8 +17,7 @@ MASKING = ({"void", "ballast"}, {"time_offset", "position"}, {"time_offset", "mo
 
 @dataclass(frozen=True)
 class CasePlan:
-    """``stratum`` and ``effects`` ((kind, rung), ...) of one case; ``seed`` of its own generator; ``panel`` it lies
-    in."""
+    """``stratum`` and ``effects`` ((kind, rung), ...) of one case, ``seed`` of its random generator, and ``panel``."""
 
     stratum: str
     effects: tuple
@@ -29,8 +28,8 @@ class CasePlan:
 def plan_cases(seed, effects, full=True, only=None, panel=PLAIN):
     """Plans of a whole set in shuffled order.
 
-    A full set gives every single effect each rung of its ladder; the fast tier one rung each. ``only``: kinds to
-    keep beside the controls. ``panel``: where all of them lie.
+    A full set has every single effect at each rung of its ladder; the fast tier has one rung each. ``only`` lists the
+    kinds beside the controls. ``panel`` is that of all cases.
 
     >>> from turnout_blind.effect import load_effects
     >>> plans = plan_cases(7, load_effects(), full=False)
@@ -69,7 +68,7 @@ def _pair(rng, effects):
 
 
 def case_id(seed, k):
-    """Name of the ``k``-th case: eight hex digits that say nothing.
+    """Name of the ``k``-th case: eight hex digits that tell nothing of its content.
 
     >>> len(case_id(1, 0))
     9

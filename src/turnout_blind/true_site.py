@@ -1,4 +1,4 @@
-"""What there really is at one site: rail, supports, riders, trains, surfaces. Effects change it."""
+"""The true state of one site: rail, supports, attached masses, surfaces, sensors. Effects change it."""
 
 from dataclasses import dataclass, field, replace
 
@@ -17,15 +17,15 @@ def _none():
 
 @dataclass
 class World:
-    """Arrays (n_support,) unless said otherwise; SI units. An effect writes into a ``copy()``.
+    """The true track, wheels and sensors: arrays (n_support,) unless noted, SI units. An effect changes a ``copy()``.
 
-    ``pad`` is the stiffness at ``reference`` temperature; ``softening`` (a function of kelvin above it) multiplies it.
-    ``profile`` is None, or (bending, mass) of every node of the grid as factors on the rail's own, where a crossing is
-    cast into it. ``surface`` is a list of functions of place [m] giving dips of the rail [m]; ``treads`` maps (train,
-    axle from 1) to functions of place and the phase of the passage; ``riders`` holds (place, mass, stiffness, damping,
-    play, stop);
-    ``channels`` maps a sensor to functions (signal, rate, kind, rng) -> signal; ``passage_noise`` is a list of
-    functions (time, sensor places, k, rng) -> accelerations (n_sensor, n) from another source.
+    ``pad`` is the stiffness at the ``reference`` temperature; ``softening``, a function of kelvin above it, multiplies
+    it. ``profile`` is None, or at a crossing (bending, mass) of every node as factors on the values of the rail.
+    ``surface`` is a list of functions of position [m] that give dips of the rail [m]. ``treads`` maps (train, axle from
+    1) to functions of position, phase and radius. ``attached_masses`` holds (position, mass, stiffness, damping, play,
+    stop). ``channels`` maps a sensor to functions (recording type, rng) -> (function (signal, rate) -> signal).
+    ``passage_noise`` is a list of functions (time, sensor positions, k, rng) -> accelerations (n_sensor, n) of another
+    source.
     """
 
     grid: Grid
@@ -66,7 +66,7 @@ class World:
                 setattr(self, name, np.full(n, value))
 
     def copy(self):
-        """A world whose arrays and lists can be changed without changing this one."""
+        """A copy whose arrays and lists can be changed without changing this world."""
         held = {}
         for name, value in self.__dict__.items():
             if isinstance(value, np.ndarray):
@@ -78,11 +78,11 @@ class World:
         return replace(self, **held)
 
     def nearest(self, place):
-        """Index of the support nearest to ``place`` [m]."""
+        """Index of the support nearest to ``position`` [m]."""
         return int(np.argmin(np.abs(self.place - place)))
 
     def beam(self):
-        """Arguments of the march for the rail."""
+        """Inputs of the march: the rail."""
         g, r = self.grid, self.rail
         loss, rates = r.damping / r.mass, (g.rates(), g.rates(0.5)[:-1])
         if self.profile is None:
@@ -95,8 +95,7 @@ class World:
         )  # fmt: skip
 
     def supports(self, temperature=None, grown=0.0):
-        """Arguments of the march for pads, sleepers and ballast at a rail ``temperature`` [°C]; ``grown`` passages
-        have worn what wears."""
+        """Inputs of the march: pads, sleepers and ballast at a rail ``temperature`` [°C] after ``n_passages``."""
         first, weights = spread(self.grid, self.place)
         soft = 1.0
         if self.softening is not None and temperature is not None:
@@ -113,7 +112,7 @@ class World:
         )  # fmt: skip
 
     def hung(self):
-        """Arguments of the march for what hangs on the rail."""
+        """Inputs of the march: masses attached to the rail."""
         table = np.array(self.riders, dtype=float).reshape(-1, 6)
         first, weights = spread(self.grid, table[:, 0])
         return Riders(first, weights.reshape(-1, 4), *(np.ascontiguousarray(c) for c in table.T[1:]))
@@ -130,7 +129,7 @@ def uniform_world(
     rail=None,
     sponge=12.0,
 ):
-    """A world of equal supports every ``SPACING`` [m] about 0, for the verification of the physics."""
+    """A world of equal supports every ``SPACING`` [m] about 0, for the verification of the simulation."""
     rail = rail or Rail()
     grid = Grid(-0.5 * length, round(length / step) + 1, step, sponge)
     half = int(0.5 * length / SPACING) - 1

@@ -1,4 +1,4 @@
-"""Trains: cars of a body on two bogies of two wheelsets, one rail's half of them."""
+"""Trains of cars with a body on two bogies of two wheelsets; simulated is the half on one rail."""
 
 from dataclasses import dataclass
 
@@ -34,7 +34,7 @@ class Car:
 
 @dataclass(frozen=True)
 class Train:
-    """``name`` of its vehicle file; ``cars`` from the front; wheels of ``radius`` [m] and Hertz ``contact``."""
+    """``name`` of the vehicle file, ``cars`` from the front, wheel ``radius`` [m] and Hertz constant ``contact``."""
 
     name: str
     cars: tuple
@@ -42,7 +42,7 @@ class Train:
     contact: float = 9.3e10
 
     def axles(self):
-        """Places of the axles behind the front end [m]."""
+        """Distances of the axles from the front end [m]."""
         found, front = [], 0.0
         for car in self.cars:
             for pivot in (-0.5, 0.5):
@@ -58,7 +58,7 @@ class Train:
 
 
 def cars_of(train):
-    """Arguments of the march: half of every car."""
+    """Inputs of the march: half of every car."""
 
     def of(make):
         return np.array([float(make(c)) for c in train.cars])
@@ -72,7 +72,7 @@ def cars_of(train):
 
 
 def wheels_of(train, path, path_start, path_step, local, factor=1.0):
-    """Arguments of the march: wheels with unsprung mass times ``factor`` and their paths (n_wheel, m) [m]."""
+    """Inputs of the march: wheels with unsprung mass times ``factor``, and their paths (n_wheel, m) [m]."""
     mass = np.repeat([0.5 * factor * c.wheelset for c in train.cars], 4)
     sprung = np.repeat([0.125 * c.body + 0.25 * c.bogie for c in train.cars], 4)
     axles = train.axles()
@@ -81,7 +81,7 @@ def wheels_of(train, path, path_start, path_step, local, factor=1.0):
 
 
 def no_train():
-    """Arguments of the march where nothing rolls."""
+    """Inputs of the march without a train."""
     none = np.zeros(0)
     return Cars(*([none] * 10)), Wheels(none, none, none, none, 0.0, np.zeros((0, 8)), 0.0, 1.0)
 

@@ -1,4 +1,4 @@
-"""How much of the recordings a concealed effect makes up: the same site with and without it."""
+"""Share of the recordings that a concealed effect makes up, by simulation of the site with and without it."""
 
 import numpy as np
 
@@ -11,13 +11,13 @@ HAMMER_BAND, PASSAGE_BAND = (30.0, 800.0), (5.0, 800.0)  # [Hz]
 
 
 def visible(site, world, seed):
-    r"""{"hammer_pct", "passage_pct"}: the share of the response that an effect makes up, the largest of the sensors.
+    r"""{"hammer_pct", "passage_pct"}: share of the response that an effect makes up, largest over the sensors.
 
     .. math:: 100\, \|y - y_0\| / \|y\|
 
-    with :math:`y_0` of the same rails, wheels and blows without the effect, below 800 Hz and without noise. It is
-    the most that the fit can lose by leaving the effect out and no refit helping. One blow per place, and the first
-    passage of each train.
+    with :math:`y_0` of the same rails, wheels and impacts without the effect, below 800 Hz and without noise. The fit
+    cannot lose more than this if the effect is left out, even without a refit. Used are one impact per position and the
+    first passage of each train.
     """
     pairs = [_blow(site, w, seed) for w in (site.world, world)]
     hammer = _difference(*pairs, HAMMER_BAND, 3)
@@ -31,7 +31,7 @@ def visible(site, world, seed):
 
 
 def _shown(site, world, a, kind, seed):
-    """The motion as the sensors show it, faults included, noise not."""
+    """Signals of the sensors under the motion ``a``, with faults and without noise."""
     rows = []
     for i, chain in enumerate(site.chains):
         faults = [fault(kind, np.random.default_rng(seed)) for fault in world.channels.get(chain.name, ())]
@@ -40,7 +40,7 @@ def _shown(site, world, a, kind, seed):
 
 
 def _blow(site, world, seed):
-    """Responses to a blow at each place, at the warmer campaign's temperature, one behind the other."""
+    """Responses to one impact at each position, at the temperature of the second campaign, concatenated."""
     rows = []
     for point in site.blows:
         warm = site.temperatures[1]
@@ -58,5 +58,5 @@ def _difference(before, after, band, down):
     inside = (f >= band[0]) & (f <= band[1])
     a, b = (np.fft.rfft(x)[:, inside] for x in (before, after))
     missed, whole = np.linalg.norm(b - a, axis=1), np.linalg.norm(b, axis=1)
-    heard = whole > 0.0  # a channel that was unplugged shows nothing of the effect
+    heard = whole > 0.0  # an unplugged channel shows nothing of the effect
     return float(np.max(100.0 * missed[heard] / whole[heard], initial=0.0))

@@ -7,7 +7,7 @@ MISSING = {
     "turnout/mismatch/engine/decision.py Score.family",
     "turnout/passage/wheel_basis.py WheelBasis.n_column",
     "turnout/passage/wheel_basis.py WheelBasis.n_sample",
-    "turnout/passage/envelope.py Levels.n_bin",
+    "turnout/passage/train_detection.py Levels.n_bin",
     "turnout/passage/result.py Passage.n_axle",
     "turnout/passage/result.py Passage.times",
     "turnout/passage/result.py Passage.audible_sensors",

@@ -6,7 +6,7 @@ import pytest
 
 LOWEST = {"content", "errors", "files", "records", "threads", "units"}
 FLOOR = {"config", "readers", "signal", "registry", "fingerprint"}
-PARTS = {"receptance", "modal", "passage", "simulate"}
+PARTS = {"hammer_test", "modal", "passage", "simulate"}
 ALLOWED = {
     "content": set(),
     "errors": set(),
@@ -27,6 +27,7 @@ ALLOWED["report"] = set(ALLOWED) | {"report"}
 ALLOWED["demo"] = set(ALLOWED) | {"demo"}
 ALLOWED["cli"] = set(ALLOWED) | {"cli"}
 OPENS_FILES = LOWEST | {
+    "former_names",
     "config",
     "readers",
     "registry",

@@ -8,7 +8,7 @@ from turnout.errors import REASONS
 from turnout.registry import documentation
 from turnout.registry.database import open_registry, view_files
 from turnout.registry.documentation import views
-from turnout.registry.register import register
+from turnout.registry.job import register
 from turnout.registry.schema import ARROW_TYPES, FILLED_BY_REGISTER, key, sort_order, tables, time_column
 from turnout.registry.staging import CHILDREN
 from turnout.registry.supersede import KINDS, LARGE_TABLES

@@ -11,9 +11,9 @@ import pytest
 from scipy.signal import fftconvolve
 
 from turnout.config.settings.receptance import ReceptanceSettings
-from turnout.receptance import find_impacts, frf, receptance_of
-from turnout.receptance.contact import band_edges
-from turnout.receptance.dynamic_stiffness import dynamic_stiffness
+from turnout.hammer_test import find_impacts, frf, receptance_of
+from turnout.hammer_test.contact import band_edges
+from turnout.hammer_test.dynamic_stiffness import dynamic_stiffness
 from turnout.records import Channel, Recording
 from turnout.signal import coherence, filters, spectra
 from turnout.signal.filters import force_pulse

@@ -8,7 +8,7 @@ import pytest
 
 from turnout.cli.main import build_parser
 from turnout.registry.database import open_registry
-from turnout.registry.register import register
+from turnout.registry.job import register
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]

@@ -11,7 +11,7 @@ from turnout.config.parameters import UNITS
 from turnout.physics import TERMS, PhysicsTerm
 from turnout.physics.term import EFFECT_TYPES
 from turnout.simulate import Sensor, car, simulate_hammer, simulate_passage, uniform_track
-from turnout.simulate.prepare import prepare
+from turnout.simulate.preparation import prepare
 from turnout.simulate.run import run
 from turnout.simulate.sensor import record_signal
 from turnout.simulate.turnout_track import TurnoutTrack

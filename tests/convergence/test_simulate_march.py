@@ -9,7 +9,7 @@ from turnout.simulate.force_laws import GapLaw, LinearLaw, Port
 from turnout.simulate.frequency_response import responses
 from turnout.simulate.links import Link
 from turnout.simulate.matrices import assemble
-from turnout.simulate.prepare import prepare
+from turnout.simulate.preparation import prepare
 from turnout.simulate.run import Drive, Probe, run
 from turnout.simulate.track import uniform_track
 from turnout.simulate.vehicle import car, lone_wheels

@@ -35,8 +35,9 @@ ASKED = (HERE / "asked.txt").read_text(encoding="utf-8")
 class Recording:
     """Where the results of one run of the program go, and how the program is started."""
 
-    def __init__(self, out, src, only):
-        self.out, self.src, self.only = Path(out).resolve(), Path(src).resolve(), only
+    def __init__(self, out, src, tier):
+        self.out, self.src = Path(out).resolve(), Path(src).resolve()
+        self.places = self.out / f"run_{tier}"
         self.files, self.repository = self.out / "files", self.src.parent
         where = f"{HERE / 'pinned'}{os.pathsep}{self.src}"
         self.environment = os.environ | {
@@ -72,7 +73,12 @@ class Recording:
         path = self.files / name
         path.parent.mkdir(parents=True, exist_ok=True)
         if isinstance(content, str):
-            for place, word in ((self.out, "<out>"), (self.src, "<src>"), (self.repository, "<repository>")):
+            for place, word in (
+                (self.places, "<run>"),
+                (self.out, "<out>"),
+                (self.src, "<src>"),
+                (self.repository, "<repository>"),
+            ):
                 content = content.replace(str(place), word)
             content = content.encode()
         path.write_bytes(content)
@@ -87,7 +93,7 @@ class Recording:
 
     def place(self, name):
         """A working copy of the inputs ``name``."""
-        folder = self.out / "run" / name
+        folder = self.places / name
         shutil.rmtree(folder, ignore_errors=True)
         shutil.rmtree(self.files / name, ignore_errors=True)
         return Path(shutil.copytree(INPUTS / name, folder))
@@ -128,7 +134,7 @@ def fleet(rec):
     for k, line in enumerate(filter(None, ASKED.splitlines())):
         words = [_file(folder, word) for word in shlex.split(line)]
         rec.command(words, folder, f"fleet/asked/{k + 1:02d} {re.sub(r'[^a-z0-9]+', '_', line.lower())[:40]}.txt")
-    rec.keep_files(folder, "a8.svg", "fleet/asked")
+    rec.keep_files(folder, "ot.svg", "fleet/asked")
     with duckdb.connect() as con:  # exports have no order
         for path in sorted((folder / "exported").iterdir()):
             rec.keep(f"fleet/exported/{path.name}.tsv", _rows(con, f"'{path}'"))
@@ -166,9 +172,9 @@ def helps(rec):
         rec.command([*words.split(), "--help"], rec.out, f"help/{words.replace(' ', '_') or 'turnout'}.txt")
     for path in sorted((rec.src / "turnout").glob("**/effects_page.py")):
         module = ".".join(path.relative_to(rec.src).with_suffix("").parts)
-        (rec.out / "run/docs").mkdir(parents=True, exist_ok=True)
-        rec.run(["-m", module, rec.out / "run/docs"], rec.out)
-        rec.keep_files(rec.out / "run/docs", "*.md", "help")
+        (rec.places / "docs").mkdir(parents=True, exist_ok=True)
+        rec.run(["-m", module, rec.places / "docs"], rec.out)
+        rec.keep_files(rec.places / "docs", "*.md", "help")
 
 
 def small(rec):
@@ -182,7 +188,9 @@ def demo(rec):
     folder = rec.place("demo")
     rec.workflow(folder, "demo")
     words = "calibrate --track tommerup --section A7 --modes ballast=99.6/0.292 railpad=616.4/0.066"
-    rec.command(words.split(), folder, "demo/calibrate.txt")
+    rec.command(words.split(), folder, "demo/calibrate_modes.txt")
+    words = "calibrate --turnout tommerup_s2 --section A8 {raw/tommerup_s2/hammer/*/A8_*:0}"
+    rec.command([_file(folder, word) for word in words.split()], folder, "demo/calibrate_tests.txt")
 
 
 def blind(case):
@@ -207,7 +215,7 @@ def items(tier):
 
 def record(args):
     """Record a tier and write its list of hashes."""
-    rec = Recording(args.out, args.src, args.only)
+    rec = Recording(args.out, args.src, args.tier)
     chosen = {name: job for name, job in items(args.tier).items() if not args.only or name in args.only}
     for name, job in chosen.items():
         before = _cpu()
@@ -220,7 +228,7 @@ def record(args):
     (rec.out / f"{args.tier}.sha256").write_text("\n".join(sorted(lines)) + "\n")
     print(f"{rec.out}/{args.tier}.sha256: {len(lines)} files, {_cpu():.0f} CPU s in all")
     if not args.keep_run:
-        shutil.rmtree(rec.out / "run", ignore_errors=True)
+        shutil.rmtree(rec.places, ignore_errors=True)
 
 
 def _cpu():

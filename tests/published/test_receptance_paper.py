@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from benchmarks.published import synthetic, tables
 
-from turnout.receptance import bands_passed, find_impacts, receptance_of
+from turnout.hammer_test import bands_passed, find_impacts, receptance_of
 from turnout.records import Channel, Recording
 
 CHANNELS = Channel("hammer", "force"), Channel("rail", "acceleration", mounting="rail head at sleeper")

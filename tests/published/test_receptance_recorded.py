@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from turnout.config.settings.receptance import ReceptanceSettings
-from turnout.receptance import find_impacts, receptance_of
+from turnout.hammer_test import find_impacts, receptance_of
 from turnout.records import Channel, Recording
 
 BAD = {0: "overload", 2: "double_hit"}

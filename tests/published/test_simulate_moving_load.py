@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.signal import butter, sosfiltfilt
 
 from turnout.simulate.force_laws import LinearLaw, PowerLaw
-from turnout.simulate.prepare import prepare
+from turnout.simulate.preparation import prepare
 from turnout.simulate.rail import Rail
 from turnout.simulate.run import Drive, Probe, run
 from turnout.simulate.track import Track, uniform_track

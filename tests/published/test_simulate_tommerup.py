@@ -4,8 +4,8 @@ import pytest
 
 from turnout.config.settings.identify import IdentifySettings
 from turnout.config.settings.receptance import ReceptanceSettings
+from turnout.hammer_test import find_impacts, receptance_of
 from turnout.modal import identify
-from turnout.receptance import find_impacts, receptance_of
 from turnout.simulate import load_track, simulate_hammer
 
 # Location: ballast f_n ± [Hz], zeta; railpad f_n ±, zeta (None: the paper has no high model there).

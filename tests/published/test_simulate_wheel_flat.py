@@ -6,7 +6,7 @@ from scipy.signal import welch
 
 from turnout.simulate.force_laws import LinearLaw, PowerLaw
 from turnout.simulate.infinite_track import winkler_receptance
-from turnout.simulate.prepare import prepare
+from turnout.simulate.preparation import prepare
 from turnout.simulate.rail import Rail
 from turnout.simulate.roughness import roughness
 from turnout.simulate.run import Drive, Probe, run

@@ -10,7 +10,7 @@ import toy_fleet as toy
 
 from turnout.config import load_configuration
 from turnout.registry.database import open_registry
-from turnout.registry.register import register
+from turnout.registry.job import register
 from turnout.workflow.batches import read_results
 from turnout.workflow.configuration_rows import configuration_rows, fleet_hash
 from turnout.workflow.plan import write_plans

@@ -25,7 +25,7 @@ def run(args):
     """Make the fleet, run the pipeline, print the results."""
     import os
 
-    from turnout.demo.make import make_fleet, run_pipeline
+    from turnout.demo.fleet import make_fleet, run_pipeline
     from turnout.demo.scenario import campaign_days
     from turnout.demo.summary import print_summary
     from turnout.errors import ConfigError

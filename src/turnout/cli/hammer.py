@@ -79,7 +79,7 @@ def _check_figure(path, tests):
 
 def _draw(path, rows, test):
     from turnout.report.hammer_figure import hammer_figure
-    from turnout.report.write import replace_page
+    from turnout.report.site import replace_page
 
     drawing = hammer_figure(rows, test.unit, test.turnout)
     if not drawing:

@@ -20,7 +20,7 @@ def run(args):
     """Fetch, run, compare."""
     from pathlib import Path
 
-    from turnout.demo.make import run_pipeline
+    from turnout.demo.fleet import run_pipeline
     from turnout.demo.others import fetch_all
     from turnout.demo.published_modes import beam_modes
     from turnout.report.beams import write_beams

@@ -11,7 +11,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 from scipy.linalg import eigh
 from scipy.sparse.linalg import LinearOperator, eigsh, svds
 
-from turnout.modal.poles import modal_parameters
+from turnout.modal.state_space import modal_parameters
 
 
 def hankel_rows(n_sample: int, decay_time: float | None = None) -> int:

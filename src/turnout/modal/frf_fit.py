@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from turnout.modal.poles import continuous_pole
+from turnout.modal.state_space import continuous_pole
 
 POLYNOMIAL_TERMS = 3  # coefficients of the polynomial in frequency that stands for modes outside the band
 MIN_SINGLE_CONTRAST = 30.0  # dB over the residual from which on one mode is enough for a peak

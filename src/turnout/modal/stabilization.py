@@ -11,7 +11,7 @@ from turnout.modal.era import subspaces
 from turnout.modal.least_squares import linearise
 from turnout.modal.mixed_effects import fit_common
 from turnout.modal.mode_tests import mode_chi_squared
-from turnout.modal.poles import continuous_pole, modal_parameters
+from turnout.modal.state_space import continuous_pole, modal_parameters
 
 MAX_POLE_RADIUS = 1.002  # factor per sample by which an oscillation may grow: a hum may seem to grow this much
 

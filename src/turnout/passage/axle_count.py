@@ -1,6 +1,10 @@
 """Count the axles of a train.
 
 The count whose positions fit a known train is taken, else the one with the largest contrast.
+
+Match a known train to the envelopes of one or two sensors.
+
+Its comb must explain more than any other's, and no other shape of its vehicles may explain much more.
 """
 
 from __future__ import annotations
@@ -8,13 +12,137 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy import stats
 
-from turnout.passage.axle_positions import fit_axle_positions
-from turnout.passage.comb_search import KMH_PER_MS, SPEED_STEP, motions_at_all_speeds
+from turnout.passage.axles import AxleFinding, fit_axle_positions
+from turnout.passage.comb import CORRELATION_LENGTH, evidence, explained_share, fit_shape, profiles_at
+from turnout.passage.comb_search import (
+    KMH_PER_MS,
+    SPEED_STEP,
+    FittedRow,
+    likeliest_rows,
+    motion_at_middle,
+    motions_at_all_speeds,
+)
 from turnout.passage.kinematics import Motion
 from turnout.passage.sensor_stack import axle_counts, template_counts
-from turnout.passage.template_match import match_template
-from turnout.passage.train_type import UNKNOWN, find_type, unknown_evidence
+from turnout.passage.train_type import UNKNOWN, TypeFinding, find_type, unknown_evidence
+
+MIN_EVIDENCE = 10.0  # nat, least log Bayes factor of a comb against no train
+# Largest gain by another shape of the vehicles, as a share of the evidence, less what free numbers gain by chance.
+# Simulated trains with a template gain 0.08 at most, similar trains without one at least 0.22.
+MAX_SHAPE_GAIN = 0.14
+RELATIVE_SPEEDS = np.linspace(-0.012, 0.012, 49)  # relative speeds around the best one
+BEND_STEP = 0.2  # m, step of the train's middle against its ends between accelerations
+STEADY_ACCELERATION, STEADY_SHARE = (
+    0.02,
+    0.8,
+)  # m/s², sd of a steady train; share of trains that pass a turnout at a steady speed
+
+
+def match_template(envelopes, motions, patterns, settings):
+    """(motion, AxleFinding, TypeFinding) of the train of ``patterns`` in the envelopes, None where none is certain.
+
+    Parameters
+    ----------
+    envelopes : SensorEnvelopes
+        Of one sensor or more.
+    motions : sequence of Motion
+        Candidates, in order of their speed.
+    patterns : sequence of Pattern
+        Known trains; their rows are tried with one vehicle type per group, then vehicle by vehicle.
+    settings : PassageSettings
+        Least probability of a type, prior of trains without template, limit of the acceleration.
+    """
+    rows_by_type = likeliest_rows(envelopes, motions, tuple(patterns)) if patterns else {}
+    if not rows_by_type:
+        return None
+    likeliest = max(rows_by_type.values(), key=lambda f: f.evidence)
+    # here a train without template explains no more than noise; its shape is tested below
+    log_posterior = {
+        name: f.evidence + np.log((1 - settings.unknown_prior) / len(rows_by_type)) for name, f in rows_by_type.items()
+    }
+    log_posterior[UNKNOWN] = MIN_EVIDENCE + np.log(settings.unknown_prior)
+    highest = max(log_posterior.values())
+    total = sum(np.exp(value - highest) for value in log_posterior.values())
+    posterior = {name: float(np.exp(value - highest) / total) for name, value in sorted(log_posterior.items())}
+    if posterior[likeliest.pattern.type] < settings.type_probability or likeliest.evidence < MIN_EVIDENCE:
+        return None
+    profiles = profiles_at(envelopes, [likeliest.motion])
+    shape, share_before, share_after = fit_shape(profiles, likeliest.vehicles, likeliest.comb.offsets, likeliest.start)
+    n, length = len(envelopes.positions), float(profiles.length[0])
+    n_free = sum(len(positions) for positions in {v.name: v.axles for v in likeliest.vehicles}.values())
+    gain = (
+        evidence(share_after, length, n)
+        - evidence(share_before, length, n)
+        - 0.5 * n_free * np.log(n * length / CORRELATION_LENGTH)
+    )
+    if gain > MAX_SHAPE_GAIN * likeliest.evidence:
+        return None
+    speed, speed_se, acceleration, acceleration_se, fitted = estimate_speed(envelopes, likeliest, settings)
+    offsets = fitted.comb.offsets
+    half_duration = 0.5 * offsets[-1] / speed
+    residual = float(np.std(shape - likeliest.comb.offsets))
+    # the axles' residuals may be systematic: they move a straight line through the axles by that much
+    speed_se = float(np.hypot(speed_se, speed * residual / np.sqrt(np.sum((offsets - offsets.mean()) ** 2))))
+    train_type = TypeFinding(
+        likeliest.pattern.type,
+        posterior[likeliest.pattern.type],
+        posterior,
+        likeliest.vehicles,
+        offsets,
+        residual,
+        speed - acceleration * half_duration,
+        float(np.hypot(speed_se, acceleration_se * half_duration)),
+        acceleration,
+        acceleration_se,
+        speed,
+        speed_se,
+    )
+    origin = float(profiles_at(envelopes, [fitted.motion]).origin[0])
+    axles = AxleFinding(origin + fitted.start + offsets, np.ones(offsets.size), 1.0 / (1.0 - likeliest.share), "comb")
+    return fitted.motion, axles, train_type
+
+
+def estimate_speed(envelopes, fitted: FittedRow, settings):
+    """(speed halfway [m/s], its standard error, acceleration [m/s²], its standard error, the likeliest fit).
+
+    Posterior means of both, from the comb's evidence. Most trains pass a turnout at a steady speed: 0.8 of the prior of
+    the acceleration is 0 ± 0.02 m/s², the remainder 0 ± a quarter of the limit.
+    """
+    duration = fitted.comb.offsets[-1] / fitted.motion.speed
+    step = 16.0 * BEND_STEP / duration**2
+    max_acceleration = max(min(settings.acceleration_limit, 6.0 * step), step)
+    accelerations = np.linspace(-max_acceleration, max_acceleration, 13)
+    middle = motion_at_middle(envelopes, fitted)
+    speeds = middle.speed * (1.0 + RELATIVE_SPEEDS)
+    motions = [replace(middle, speed=v, acceleration=a) for a in accelerations for v in speeds]
+    profiles = profiles_at(envelopes, motions)
+    share, starts = explained_share(profiles, fitted.comb, np.arange(len(motions)))
+    # sensors record the same wheels: their residuals are not independent, so they count as one
+    log_posterior = evidence(share.max(axis=1), profiles.length, 1).reshape(13, -1)
+    edges = np.append(
+        accelerations - 0.5 * (accelerations[1] - accelerations[0]),
+        accelerations[-1] + 0.5 * (accelerations[1] - accelerations[0]),
+    )
+    steady = np.diff(stats.norm.cdf(edges / STEADY_ACCELERATION))
+    unsteady = np.diff(stats.norm.cdf(edges / (0.25 * settings.acceleration_limit)))
+    log_posterior = log_posterior + np.log(STEADY_SHARE * steady + (1 - STEADY_SHARE) * unsteady + 1e-12)[:, None]
+    weight = np.exp(log_posterior - log_posterior.max())
+    weight /= weight.sum()
+    by_speed, by_acceleration = weight.sum(axis=0), weight.sum(axis=1)
+    speed, acceleration = float(by_speed @ speeds), float(by_acceleration @ accelerations)
+    # the grid is no finer: add a twelfth of its step squared
+    speed_se = np.sqrt(by_speed @ (speeds - speed) ** 2 + (speeds[1] - speeds[0]) ** 2 / 12)
+    acceleration_se = np.sqrt(
+        by_acceleration @ (accelerations - acceleration) ** 2
+        + min(STEADY_ACCELERATION, accelerations[1] - accelerations[0]) ** 2
+    )
+    k = int(np.argmax(log_posterior))  # index over all motions
+    start = float(starts[int(np.argmax(share[k]))])
+    likeliest = replace(fitted, motion=motions[k], start=start, share=float(share[k].max()))
+    return speed, float(speed_se), acceleration, float(acceleration_se), likeliest
+
 
 MAX_COMB_SENSORS, MIN_PEAK_SENSORS = 3, 3  # most sensors of a search by comb, least sensors of one by peaks
 TYPICAL_SPEED = 25.0  # m/s, prior where only the bogies show the speed; sd is a factor of 1.8

@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 from scipy import signal
 
-from turnout.passage.axle_features import GRID_STEP, along_train
+from turnout.passage.axles import GRID_STEP, along_train
 
 TIME_STEP = 0.001  # s, bins of the slow acceleration
 MAX_AMPLITUDE_ERROR = 0.3  # relative standard error of an amplitude; above it the logarithm has no normal error

@@ -10,13 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from turnout.passage.axle_count import match_template
 from turnout.passage.comb import COMB_STEP, LEAD_LENGTH, Comb, profiles_at, teeth_of
 from turnout.passage.comb_search import motions_at_all_speeds
-from turnout.passage.envelope import Levels
-from turnout.passage.second_train import without_train
-from turnout.passage.sensor_stack import SensorEnvelopes
-from turnout.passage.slowness import correlation_at, pair_correlations, stack_correlations
-from turnout.passage.template_match import match_template
+from turnout.passage.kinematics import correlation_at, pair_correlations, stack_correlations
+from turnout.passage.sensor_stack import Levels, SensorEnvelopes, without_train
 
 MIN_SENSORS = 3  # sensors: the median of two is the mean, which contains the wheels of both
 # m: largest distance between a sensor and the nose, and of the nose outside the row of sensors. The sensors of a

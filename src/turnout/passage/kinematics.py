@@ -1,10 +1,14 @@
-"""Describe the motion of a train past the sensors: constant acceleration, in either direction."""
+"""Describe the motion of a train past the sensors: constant acceleration, in either direction.
+
+Estimate speed and direction from the levels of two or more sensors, before any axle is known.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import fft, ndimage
 
 
 @dataclass(frozen=True)
@@ -49,3 +53,111 @@ class Motion:
         """The same motion relative to an axle ``distance`` metres behind the first."""
         start = float(self.time(distance))
         return replace(self, speed=float(self.speed_at(start)), start=start)
+
+
+KMH_PER_MS = 3.6  # km/h per m/s
+
+
+@dataclass(frozen=True)
+class Scan:
+    """Correlation of all sensors after shifts by distance times slowness, over signed slowness. [s/m]
+
+    ``correlation`` (n,) is the mean correlation coefficient over pairs of sensors, weighted by distance up to 3 m.
+    """
+
+    slowness: np.ndarray
+    correlation: np.ndarray
+
+    def peaks(self, n: int = 3, min_distance: float = 0.04) -> list[tuple[float, float]]:
+        """The ``n`` best (slowness, correlation), at least ``min_distance`` (relative) from each other."""
+        peaks, remaining = [], self.correlation.copy()
+        for _ in range(n):
+            k = int(np.argmax(remaining))
+            if not np.isfinite(remaining[k]):
+                break
+            peaks.append((self._refined_peak(k), float(self.correlation[k])))
+            remaining[np.abs(self.slowness - self.slowness[k]) < min_distance * abs(self.slowness[k])] = -np.inf
+        return peaks
+
+    def _refined_peak(self, k: int) -> float:
+        if not 0 < k < len(self.slowness) - 1:
+            return float(self.slowness[k])
+        low, mid, high = self.correlation[k - 1 : k + 2]
+        curve = low - 2 * mid + high
+        shift = 0.5 * (low - high) / curve if curve < 0 else 0.0
+        step = 0.5 * (self.slowness[k + 1] - self.slowness[k - 1])
+        return float(self.slowness[k] + np.clip(shift, -1, 1) * step)
+
+
+def slowness_grid(settings, relative: float = 0.008) -> np.ndarray:
+    """Signed slownesses between the slowest and the fastest train, with relative steps ``relative``. [s/m]"""
+    slow, fast = KMH_PER_MS / settings.speed_minimum, KMH_PER_MS / settings.speed_maximum
+    positive = np.geomspace(fast, slow, int(np.log(slow / fast) / relative) + 2)
+    return np.concatenate([-positive[::-1], positive])
+
+
+def scan_slowness(values, step: float, positions, settings) -> Scan:
+    """Slant stack of levels (n_sensor, n_bin) of sensors at ``positions`` [m].
+
+    Bogies are not resolved, so that there are no false maxima.
+    """
+    slowness = slowness_grid(settings)
+    return Scan(slowness, correlation_at(slowness, values, step, positions))
+
+
+def correlation_at(slowness, values, step: float, positions) -> np.ndarray:
+    """(n,) correlation of all sensors at each slowness [s/m]; at 0 that of simultaneous records."""
+    positions = np.asarray(positions, dtype=float)
+    # as wide as the grid at the slow end, where a passage is long
+    width = np.clip(0.008 * np.ptp(positions) * KMH_PER_MS / 20.0, 0.02, 0.1)
+    values, step = coarsen(values, step, 0.005)
+    return stack_correlations(
+        pair_correlations(values, step, width), step, positions, np.asarray(slowness, dtype=float)
+    )
+
+
+def refine_slowness(correlations, step: float, positions, near: float, reach: float = 0.03) -> tuple[float, float]:
+    """Best slowness within ``reach`` (relative) of ``near`` and its correlation, from fine ``pair_correlations``."""
+    positions = np.asarray(positions, dtype=float)
+    span = max(np.ptp(positions), 0.1)
+    n = int(np.clip(2 * reach * abs(near) * span / (0.5 * step), 21, 601)) | 1
+    slowness = near * np.linspace(1 - reach, 1 + reach, n)
+    return Scan(slowness, stack_correlations(correlations, step, positions, slowness)).peaks(1)[0]
+
+
+def coarsen(values, step: float, max_step: float):
+    """(levels, step) averaged over as many bins as fit into ``max_step`` [s]."""
+    values, k = np.atleast_2d(values), max(int(max_step / step + 1e-9), 1)
+    n = values.shape[1] // k
+    return values[:, : n * k].reshape(len(values), n, k).mean(axis=2), k * step
+
+
+def pair_correlations(values, step, width) -> dict:
+    """(i, j) -> (n_lag,) correlation coefficient of sensors i and j over the lag [bins], negative ones at the end."""
+    smooth = ndimage.uniform_filter1d(np.atleast_2d(values), max(round(width / step), 1), axis=1)
+    n = fft.next_fast_len(2 * smooth.shape[1], real=True)
+    centred = smooth - smooth.mean(axis=1, keepdims=True)
+    centred /= np.maximum(np.linalg.norm(centred, axis=1, keepdims=True), 1e-12)
+    spectra = fft.rfft(centred, n, axis=1)
+    correlations = {}
+    for i in range(len(spectra) - 1):
+        for j, row in enumerate(fft.irfft(spectra[i + 1 :] * spectra[i].conj(), n, axis=1), i + 1):
+            correlations[i, j] = row
+    return correlations
+
+
+def stack_correlations(correlations, step, positions, slowness) -> np.ndarray:
+    """(n,) mean correlation coefficient of the pairs after the shifts of each slowness, weighted by distance to 3 m."""
+    total, weight = np.zeros(len(slowness)), 0.0
+    for (i, j), correlation in correlations.items():
+        distance = positions[j] - positions[i]
+        if not abs(distance) >= 0.05:
+            continue
+        n = correlation.size
+        lag = slowness * distance / step
+        whole = np.floor(lag).astype(int)
+        fraction = lag - whole
+        w = min(abs(distance), 3.0)
+        total += w * ((1 - fraction) * correlation[whole % n] + fraction * correlation[(whole + 1) % n])
+        weight += w
+    return total / weight if weight else np.full(len(slowness), -np.inf)

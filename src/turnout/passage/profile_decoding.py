@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy import ndimage, signal
 
-from turnout.passage.axle_features import GRID_STEP, AxleFinding
 from turnout.passage.axle_patterns import Pattern
+from turnout.passage.axles import GRID_STEP, AxleFinding
 
 POSITION_SLACK = 0.35  # m, largest deviation of an axle from its position behind the previous one
 MIN_HEIGHT = 0.3  # of a typical peak: least height of an axle, and largest height of a peak that is no axle

@@ -1,12 +1,18 @@
-"""Compute features along the train from all sensors: levels, deflection, and both combined."""
+"""Compute features along the train from all sensors: levels, deflection, and both combined.
+
+Detect a second train at the same time: a coherent source that passes the sensors at another speed or direction.
+
+Compute the level of each channel in a few bands on a coarse time grid, in which axles are sought.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import fft, ndimage
 
-from turnout.passage.axle_features import (
+from turnout.passage.axles import (
     GRID_STEP,
     AxleFinding,
     along_train,
@@ -15,9 +21,94 @@ from turnout.passage.axle_features import (
     level_feature,
     scale_profile,
 )
-from turnout.passage.envelope import Levels
-from turnout.passage.kinematics import Motion
+from turnout.passage.kinematics import Motion, correlation_at, slowness_grid
 from turnout.passage.profile_decoding import decode_profile
+from turnout.records import Rejection
+
+# Hz. Between ballast and railpad resonance the rail's vibration decays fastest along the track, above them slowest.
+# Three bands, each with its own logarithm, so that no resonance masks the position of the wheel.
+BANDS = ((30.0, 120.0), (120.0, 400.0), (400.0, 900.0))
+
+
+@dataclass(frozen=True)
+class Levels:
+    """``values`` (n_channel, n_bin): mean over the bands of ln(power above the quiet level), 0 where quiet.
+
+    ``step`` [s] between bins; bin k covers [k, k + 1) steps from the start of the recording. ``scatter`` (n_channel,)
+    is the standard deviation of the quiet values. ``loud_power`` (n_channel,) is the power that a tenth of the 50 ms
+    blocks exceed, mean over the bands in logarithms. [(m/s²)²] ``amplitude`` (n_channel, n_bin) is the mean over the
+    bands of the root of the power, each band over its own root mean square.
+    """
+
+    values: np.ndarray
+    step: float
+    scatter: np.ndarray
+    loud_power: np.ndarray
+    amplitude: np.ndarray
+
+    @property
+    def n_bin(self) -> int:
+        return self.values.shape[1]
+
+
+def band_powers(samples, rate: float, step: float, bands=BANDS) -> np.ndarray:
+    """(n_channel, n_band, n_bin) mean square of the band-passed samples in each bin. [(m/s²)²]
+
+    One transform per channel. Each band has cosine edges of relative width 0.2. It is transformed back at four samples
+    per bin, or more where the band needs it. There is no delay, and the cost is a third of that of filters.
+    """
+    samples = np.atleast_2d(samples)
+    per_bin = max(round(step * rate), 1)
+    n_bin = samples.shape[1] // per_bin
+    length = fft.next_fast_len(n_bin, real=True)
+    top = min(max(high for _, high in bands) * 1.2, 0.45 * rate)
+    points = min(max(int(np.ceil(2.0 * top * per_bin / rate)), 4), per_bin)
+    frequency = np.arange(length * points // 2 + 1) * rate / (length * per_bin)
+    windows = [_edges(frequency, low, min(high, 0.4 * rate)) * (points / per_bin) for low, high in bands]
+    powers = np.empty((samples.shape[0], len(bands), n_bin))
+    for i, row in enumerate(samples):
+        spectrum = fft.rfft(row[: n_bin * per_bin], length * per_bin)[: frequency.size]
+        for k, window in enumerate(windows):
+            band_signal = fft.irfft(spectrum * window, length * points).reshape(length, points)[:n_bin]
+            powers[i, k] = np.einsum("np,np->n", band_signal, band_signal) / points
+    return powers
+
+
+def _edges(frequency, low, high, width=0.2):
+    """Window that is 1 between ``low`` and ``high`` and falls to 0 over ``width`` of either edge."""
+    rise = np.clip((frequency / low - 1 + width) / width, 0, 1)
+    fall = np.clip((1 + width - frequency / high) / width, 0, 1)
+    return np.sin(0.5 * np.pi * rise) ** 2 * np.sin(0.5 * np.pi * fall) ** 2
+
+
+def levels(samples, rate: float, step: float, bands=BANDS) -> Levels:
+    """Levels of all channels; the quiet level of a band is the median of the quietest fifth of 50 ms blocks.
+
+    A bin is the whole number of samples next to ``step``; the ``step`` of the result is its exact length.
+    """
+    step = max(round(step * rate), 1) / rate
+    powers = band_powers(samples, rate, step, bands)
+    quiet_power = quiet_level(powers, max(round(0.05 / step), 1))[..., None]
+    values = np.log1p(powers / quiet_power).mean(axis=1)
+    quiet = values < np.quantile(values, 0.2, axis=1, keepdims=True)
+    centre = np.array([np.median(v[q]) for v, q in zip(values, quiet)])
+    scatter = np.array([1.4826 * np.median(np.abs(v[q] - c)) for v, q, c in zip(values, quiet, centre)])
+    block = max(round(0.05 / step), 1)
+    n = max(values.shape[1] // block, 1)
+    blocks = powers[..., : n * block].reshape(*powers.shape[:2], n, -1).mean(axis=-1)
+    loud_power = np.exp(np.log(np.maximum(np.quantile(blocks, 0.9, axis=-1), 1e-300)).mean(axis=1))
+    mean_power = np.maximum(powers.mean(axis=-1, keepdims=True), np.finfo(float).tiny)
+    amplitude = np.sqrt(powers / mean_power).mean(axis=1)
+    return Levels(values - centre[:, None], step, np.maximum(scatter, 0.05), loud_power, amplitude)
+
+
+def quiet_level(powers, block: int) -> np.ndarray:
+    """(...,) level of the quietest fifth of blocks of bins; never zero."""
+    n = max(powers.shape[-1] // block, 1)
+    blocks = powers[..., : n * block].reshape(*powers.shape[:-1], n, -1).mean(axis=-1)
+    level = np.quantile(blocks, 0.1, axis=-1)
+    # 27 dB below the loud parts is quiet: vibration from distant wheels says nothing about axles
+    return np.maximum(level, 2e-3 * np.quantile(blocks, 0.98, axis=-1) + np.finfo(float).tiny)
 
 
 @dataclass(frozen=True)
@@ -142,3 +233,72 @@ def axle_counts(envelopes: SensorEnvelopes, motion: Motion, settings) -> list[Ax
         threshold = float(np.clip(settings.axle_level * noise, 0.12, 0.5))
         candidates += axle_candidates(profile, start, settings.axle_spacing_minimum, threshold, feature)
     return sorted(candidates, key=lambda c: -c.contrast)
+
+
+SECOND_TRAIN_TEXT = "another train at about"  # beginning of a finding's text
+MIN_CORRELATION = 0.25  # least correlation of the residual between sensors
+MIN_LEVEL_SHARE = 0.1  # least level of the second train along its own motion, in half of the sensors, over the first's
+
+
+def second_train(envelopes, passage, settings):
+    """Finding "two_trains" where the residual of the known motion moves coherently in another way.
+
+    The common level of all sensors along the known train is subtracted from each: the lower median. A second train
+    stays in the residual, since at every sensor it is elsewhere along the first. An impact at a fixed position, as at
+    the crossing's nose, stays too, at the sensors beside it or at all at one moment. So half of the sensors must
+    record the second train at a tenth of the first one's level, each at its own time. Needs three sensors, else there
+    is no finding.
+    """
+    if len(envelopes.positions) < 3:
+        return []
+    residual = without_train(envelopes, passage.motion)
+    slowness = slowness_grid(settings)
+    correlations = correlation_at(np.append(slowness, 0.0), residual, envelopes.levels.step, envelopes.positions)
+    correlation, simultaneous = correlations[:-1], float(correlations[-1])
+    own_slowness = passage.motion.direction / passage.motion.speed
+    is_other = np.abs(slowness - own_slowness) > 0.15 * abs(own_slowness)
+    own_correlation = correlation[~is_other].max(initial=0.0)
+    peak = int(np.argmax(np.where(is_other, correlation, -np.inf)))
+    strength = float(correlation[peak])
+    if strength < MIN_CORRELATION or strength < 1.2 * own_correlation or strength < simultaneous:
+        return []
+    direction = 1 if slowness[peak] > 0 else -1
+    second = Motion(1.0 / abs(slowness[peak]), 0.0, 0.0, direction)
+    first_level = _shared_level(envelopes, np.clip(_smooth_levels(envelopes), 0.0, None), passage.motion)
+    if _shared_level(envelopes, residual, second) < MIN_LEVEL_SHARE * first_level:
+        return []
+    speed = 3.6 / slowness[peak]
+    direction = "facing" if speed > 0 else "trailing"
+    return [
+        Rejection("two_trains", strength, MIN_CORRELATION, f"{SECOND_TRAIN_TEXT} {abs(speed):.0f} km/h, {direction}")
+    ]
+
+
+def _smooth_levels(envelopes):
+    """Levels, smoothed over 20 ms."""
+    return ndimage.uniform_filter1d(envelopes.levels.values, max(round(0.02 / envelopes.levels.step), 1), axis=1)
+
+
+def _shared_level(envelopes, values, motion) -> float:
+    """Sum over the time of the lower median over the sensors, each shifted by the motion. [s]"""
+    step, end = envelopes.levels.step, values.shape[1] * envelopes.levels.step
+    offsets = [motion.distance(t) - motion.direction * x for t in (0.0, end) for x in envelopes.positions]
+    rows = np.sort(along_train(values, step, envelopes.positions, motion, min(offsets), max(offsets)), axis=0)
+    return float(rows[(len(rows) - 1) // 2].sum() * GRID_STEP / motion.speed)
+
+
+def without_train(envelopes, motion) -> np.ndarray:
+    """(n_sensor, n_bin) levels above the sensors' common level along the train, smoothed over 20 ms, at least 0."""
+    step, positions = envelopes.levels.step, envelopes.positions
+    values = _smooth_levels(envelopes)
+    extent = [motion.distance(t) - motion.direction * x for t in (envelopes.begin, envelopes.end) for x in positions]
+    start, stop = min(extent) - 15.0, max(extent) + 15.0
+    rows = np.sort(along_train(values, step, positions, motion, start, stop), axis=0)
+    shared = rows[(len(rows) - 1) // 2]
+    offsets = start + np.arange(shared.size) * GRID_STEP
+    centres = (np.arange(values.shape[1]) + 0.5) * step
+    residuals = [
+        row - np.interp(motion.distance(centres) - motion.direction * x, offsets, shared, left=0.0, right=0.0)
+        for row, x in zip(values, positions)
+    ]
+    return np.clip(residuals, 0.0, None)

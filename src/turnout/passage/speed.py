@@ -9,9 +9,9 @@ from itertools import combinations
 
 import numpy as np
 
+from turnout.passage.channel_checks import half_shifts
 from turnout.passage.kinematics import Motion
 from turnout.passage.result import SpeedFinding
-from turnout.passage.sensor_consistency import half_shifts
 
 
 def slowness_from_sensors(times, positions, direction: int, position_error: float, limit: float):

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 from scipy import ndimage
 
-from turnout.passage.envelope import levels
-from turnout.passage.sensor_stack import SensorEnvelopes
+from turnout.passage.sensor_stack import SensorEnvelopes, levels
 
 QUIET_BLOCK = 0.05  # s over which a level is averaged
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from turnout.report.site import page_environment, replace_page, shared_by_pages
 from turnout.report.svg import Axis, Chart
-from turnout.report.write import page_environment, replace_page, shared_by_pages
 
 NAME = "beams_of_others"
 COLUMNS = (

@@ -8,7 +8,7 @@ from jinja2 import Environment, PackageLoader
 from turnout import __version__
 from turnout.config import load_configuration
 from turnout.report.pages.finding import finding_page
-from turnout.report.write import replace_page
+from turnout.report.site import replace_page
 
 NEWEST_SQL = """
     select f.* from findings_current f

@@ -6,7 +6,7 @@ from math import floor
 import numpy as np
 
 from turnout.errors import REASONS
-from turnout.receptance.dynamic_stiffness import dynamic_stiffness
+from turnout.hammer_test.dynamic_stiffness import dynamic_stiffness
 from turnout.report.formatting import with_interval
 from turnout.report.pages.turnout import BANDS, PANELS
 

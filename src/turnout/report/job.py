@@ -6,7 +6,7 @@ from concurrent.futures import ProcessPoolExecutor
 from turnout.errors import RegistryError
 from turnout.registry.database import open_registry
 from turnout.report.finding_pages import write_finding_pages
-from turnout.report.write import AT_ONCE, write_pages, write_turnouts
+from turnout.report.site import AT_ONCE, write_pages, write_turnouts
 
 
 def report_job(registry, pages, turnouts=None, log=None, threads=1, day=None) -> int:

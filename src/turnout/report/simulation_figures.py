@@ -44,7 +44,7 @@ def _receptances():
     import matplotlib.pyplot as plt
 
     from turnout.config.settings.receptance import ReceptanceSettings
-    from turnout.receptance import find_impacts, receptance_of
+    from turnout.hammer_test import find_impacts, receptance_of
     from turnout.simulate import load_track, simulate_hammer
     from turnout.simulate.frequency_response import receptance
     from turnout.simulate.hammer import resolve_location

@@ -9,7 +9,7 @@ from turnout.errors import SimulationError
 from turnout.records import Recording
 from turnout.simulate.force_laws import PowerLaw
 from turnout.simulate.links import terms_on_stretch
-from turnout.simulate.prepare import prepare
+from turnout.simulate.preparation import prepare
 from turnout.simulate.run import Drive, run
 from turnout.simulate.sensor import Sensor, actual_sensor, mean_of, record_signal
 from turnout.simulate.turnout_track import TurnoutTrack, stretch_of_track, supports_within

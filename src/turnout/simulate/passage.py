@@ -6,7 +6,7 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.records import Recording
-from turnout.simulate.prepare import prepare
+from turnout.simulate.preparation import prepare
 from turnout.simulate.run import Drive, run
 from turnout.simulate.sensor import actual_sensor, mean_of, record_signal
 from turnout.simulate.turnout_track import TurnoutTrack

@@ -9,9 +9,9 @@ from turnout.config.load import load_configuration
 from turnout.config.settings.identify import IdentifySettings
 from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.errors import ConfigError, ReadError, SimulationError
+from turnout.hammer_test import find_impacts, receptance_of
 from turnout.modal import identify
 from turnout.readers import read
-from turnout.receptance import find_impacts, receptance_of
 from turnout.records import RawChannel, RawDescription, Recording
 from turnout.simulate import load_track
 from turnout.simulate.calibration import MeasuredReceptance, calibrate

@@ -11,8 +11,8 @@ import numpy as np
 from turnout.config.filename_pattern import compile_pattern
 from turnout.config.turnout import TurnoutConfig
 from turnout.errors import ReadError
+from turnout.hammer_test import find_impacts, receptance_of
 from turnout.modal import identify
-from turnout.receptance import find_impacts, receptance_of
 from turnout.records import ModalModel, Rejection, Unit
 from turnout.registry.ids import content_id
 from turnout.stages.common import (

@@ -16,7 +16,7 @@ from turnout.content import sha256_of
 from turnout.errors import ReadError, SimulationError, TurnoutError
 from turnout.mismatch.turnout import HammerInput, PassageInput
 from turnout.passage.channel_checks import without_pulses
-from turnout.passage.second_train import SECOND_TRAIN_TEXT
+from turnout.passage.sensor_stack import SECOND_TRAIN_TEXT
 from turnout.readers import read
 from turnout.records import LongRecording, Recording, Unit
 from turnout.simulate import load_track

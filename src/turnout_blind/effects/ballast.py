@@ -1,16 +1,16 @@
-"""Ballast softer or stiffer under one sleeper, a third as much (in logarithms) under its neighbour on one side."""
+"""Ballast softer or stiffer under one sleeper, and a third as much (in logarithms) under one neighbour."""
 
 from turnout_blind.effect import Effect, sign, sleeper_near
 
 
 def draw(rng, site, ratio):
-    """Factor on stiffness; stiffer ballast goes half as far."""
+    """Factor on stiffness. For stiffer ballast the logarithm of the factor is 0.6 times that for softer."""
     factor = ratio if rng.random() < 0.65 else ratio**-0.6
     return sleeper_near(rng, site), {"factor": float(factor), "side": sign(rng)}
 
 
 def act(world, site, where, p):
-    """Stiffness by the factor, damping by its root."""
+    """Multiply stiffness by the factor and damping by its square root."""
     for j, share in ((where["sleeper"], 1.0), (where["sleeper"] + int(p["side"]), 0.33)):
         world.ballast[j] *= p["factor"] ** share
         world.ballast_damping[j] *= p["factor"] ** (0.5 * share)

@@ -1,19 +1,19 @@
-"""A bad pad so far from all sensors that neither blow nor train brings news of it: nothing at all shows the same."""
+"""A bad pad too far from all sensors to be observed: no effect at all gives the same recordings."""
 
 from turnout_blind.effect import Effect
 
-AWAY = 13.0  # from the nearest sensor [m]
+AWAY = 13.0  # distance of the sleeper from the nearest sensor [m]
 
 
 def draw(rng, site, factor):
-    """Factor on stiffness, before the first sensor or behind the last."""
+    """Factor on the stiffness of a pad before the first sensor or behind the last."""
     before = rng.random() < 0.5
     j = site.world.nearest(min(site.sensors) - AWAY if before else max(site.sensors) + AWAY)
     return {"sleeper": j, "position": float(site.world.place[j])}, {"factor": float(factor)}
 
 
 def act(world, site, where, p):
-    """Stiffness by the factor, damping by its root."""
+    """Multiply stiffness by the factor and damping by its square root."""
     world.pad[where["sleeper"]] *= p["factor"]
     world.pad_damping[where["sleeper"]] *= p["factor"] ** 0.5
 

@@ -1,4 +1,4 @@
-"""Fastenings that hold the rail down hardly at all: pads of three sleepers act in compression, not in uplift."""
+"""Fastenings that barely hold the rail down: the pads of three sleepers act in compression and hardly in uplift."""
 
 from turnout_blind.effect import Effect, sleeper_near
 
@@ -9,7 +9,7 @@ def draw(rng, site, lift):
 
 
 def act(world, site, where, p):
-    """Piecewise linear pads."""
+    """Give three pads another stiffness in uplift."""
     world.lift[where["sleeper"] - 1 : where["sleeper"] + 2] = p["lift"]
 
 

@@ -1,15 +1,15 @@
-"""A sleeper that hangs so high that no train closes the gap: no ballast at all would show the same."""
+"""A sleeper with a gap that no train closes: missing ballast would give the same recordings."""
 
 from turnout_blind.effect import Effect, sleeper_near
 
 
 def draw(rng, site, gap):
-    """Gap beyond every deflection."""
+    """A gap larger than every deflection."""
     return sleeper_near(rng, site), {"gap": float(gap)}
 
 
 def act(world, site, where, p):
-    """No reaction."""
+    """Open the gap: the ballast never reacts."""
     world.gap[where["sleeper"]], world.close[where["sleeper"]] = p["gap"], 0.2 * p["gap"]
 
 

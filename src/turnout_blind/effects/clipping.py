@@ -1,4 +1,4 @@
-"""An amplifier that saturates softly, one side before the other; its limit counts in peaks of the rail's motion."""
+"""An amplifier that saturates softly and unsymmetrically, at a limit relative to the peak acceleration of the rail."""
 
 import numpy as np
 
@@ -8,7 +8,10 @@ from turnout_blind.run import strike
 
 
 def peak(site, sensor):
-    """Largest acceleration of the rail at a sensor [m/s²] in an ordinary blow at each place and the fastest passage."""
+    """Largest acceleration of the rail at a sensor [m/s²], of impacts at all hammer positions and the fastest passage.
+
+    The impacts have the usual velocity.
+    """
     i, places = site.names().index(sensor), sensor_places(site, site.world)
     blows = [strike(site.world, places, x, [0.0], [0.95], 0.03, tip=site.tip)[1][i] for x in site.blows]
     fastest = max(range(len(site.passages)), key=lambda k: site.passages[k].speed)
@@ -17,13 +20,13 @@ def peak(site, sensor):
 
 
 def draw(rng, site, share):
-    """Largest value shown, the mean of both sides, to four digits: the peak has the round-off of the libraries."""
+    """Limit as the mean of both sides. Four digits, since the peak has the round-off of the libraries."""
     where = any_sensor(rng, site)
     return where, {"limit": float(f"{share * peak(site, where['sensor']):.4g}"), "share": float(share)}
 
 
 def act(world, site, where, p):
-    """8 % more upward, 8 % less downward; follows up to 80 % of that, then bends over."""
+    """Add a limit 8 % higher upward and 8 % lower downward. The channel is linear up to 80 % of its limit."""
 
     def fault(kind, rng):
         def bent(x, rate):

@@ -1,4 +1,4 @@
-"""All channels of the passages' logger too sensitive alike: heavier trains would show the same."""
+"""A common gain error of all channels in passages: heavier trains would give the same recordings."""
 
 from turnout_blind.effect import Effect
 
@@ -9,7 +9,7 @@ def draw(rng, site, change):
 
 
 def act(world, site, where, p):
-    """Only when trains pass: the hammer tests have a logger of their own."""
+    """Multiply all channels in passages only: hammer tests have another logger."""
 
     def fault(kind, rng):
         return lambda x, rate: p["gain"] * x if kind == "passage" else x

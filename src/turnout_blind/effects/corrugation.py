@@ -1,4 +1,4 @@
-"""Corrugation over a stretch: sharper crests than a sine, its strength swelling along the stretch."""
+"""Corrugation over a stretch of rail: crests sharper than a sine, amplitude largest in the middle of the stretch."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ def draw(rng, site, amplitude):
 
 
 def act(world, site, where, p):
-    """A surface more."""
+    """Add the waves to the rail surface."""
 
     def dips(x):
         way = np.asarray(x) - where["position"]

@@ -1,4 +1,4 @@
-"""A V-shaped dip of the rail's surface, lopsided, its point rounded over 3 cm by wear; deeper from train to train."""
+"""A V-shaped, unsymmetric dip of the rail surface, its point rounded over 3 cm by wear."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from turnout_blind.effect import Effect
 
 
 def shape(x, place, depth, length, share):
-    """Dip [m]: slopes of unequal length that meet in a rounded point."""
+    """Depth of the dip at ``x`` [m]: two slopes of unequal length that meet in a rounded point."""
     way = np.asarray(x) - place
     reach = np.where(way < 0.0, share * length, (1.0 - share) * length)
     rounded = np.sqrt(way**2 + 0.015**2) - 0.015
@@ -14,14 +14,14 @@ def shape(x, place, depth, length, share):
 
 
 def draw(rng, site, depth):
-    """Place among the sensors, depth, length, share of the length before the point."""
+    """Position between the sensors, depth, length, and share of the length before the point."""
     place = float(rng.uniform(min(site.sensors) - 0.5, max(site.sensors) + 0.5))
     more = {"length": float(rng.uniform(0.3, 1.0)), "share": float(rng.uniform(0.35, 0.65))}
     return {"position": place}, {"depth": float(depth), **more}
 
 
 def act(world, site, where, p):
-    """A surface more."""
+    """Add the dip to the rail surface."""
     world.surface.append(lambda x: shape(x, where["position"], p["depth"], p["length"], p["share"]))
 
 

@@ -1,15 +1,15 @@
-"""Wet ballast that loses stiffness while the train is above it and has partly recovered before the next."""
+"""Wet ballast that loses stiffness during a passage and recovers partly before the next."""
 
 from turnout_blind.effect import Effect, sleeper_near
 
 
 def draw(rng, site, loss):
-    """Share of stiffness lost per second of a record, factor from passage to passage."""
+    """Share of stiffness lost per second of a record, and factor from passage to passage."""
     return sleeper_near(rng, site), {"loss": float(loss), "factor": float(rng.uniform(0.85, 0.95))}
 
 
 def act(world, site, where, p):
-    """Three sleepers."""
+    """Change three sleepers."""
     for j in range(where["sleeper"] - 1, where["sleeper"] + 2):
         world.drift[j] = -p["loss"]
         world.wear_per_passage[j] = (0.0, p["factor"])

@@ -1,4 +1,4 @@
-"""A flat on one wheel, its edges rounded by rolling: half again as long as the chord."""
+"""A flat on one wheel, its edges rounded by rolling: 1.5 times as long as its chord."""
 
 import numpy as np
 
@@ -6,12 +6,12 @@ from turnout_blind.effect import Effect, any_axle
 
 
 def draw(rng, site, length):
-    """Chord of the fresh flat and where on the tread it lies."""
+    """Chord of the fresh flat and its angle on the tread."""
     return any_axle(rng, site), {"length": float(length), "angle": float(rng.uniform(0.0, 2.0 * np.pi))}
 
 
 def act(world, site, where, p):
-    """Depth l^2 / 16 R, cosine-shaped, once a turn."""
+    """Add a cosine-shaped dip of depth l^2 / 16 R to the tread."""
 
     def tread(x, phase, radius):
         depth, half = p["length"] ** 2 / (16.0 * radius), 0.75 * p["length"]

@@ -1,15 +1,15 @@
-"""A sensor whose sensitivity is not the one in the file."""
+"""A sensor whose sensitivity differs from the one in its file."""
 
 from turnout_blind.effect import Effect, any_sensor
 
 
 def draw(rng, site, change):
-    """Factor on what it shows."""
+    """Factor on the signal."""
     return any_sensor(rng, site), {"gain": float(1.0 + change if rng.random() < 0.5 else 1.0 / (1.0 + change))}
 
 
 def act(world, site, where, p):
-    """In hammer tests and passages alike."""
+    """Multiply the channel, in hammer tests and passages."""
 
     def fault(kind, rng):
         return lambda x, rate: p["gain"] * x

@@ -1,4 +1,4 @@
-"""A guard rail's block that has worked loose and rattles between two stops on the rail, steel on steel."""
+"""A loose block of a guard rail that rattles between two stops on the rail, steel on steel."""
 
 import numpy as np
 
@@ -8,14 +8,14 @@ STOP = 8e8  # stiffness of the stops [N/m]
 
 
 def draw(rng, site, level):
-    """Mass and play: a bolt's head in a wide hole moves little, a length of guard rail in a narrow one much."""
+    """Mass and play, from the head of a bolt in a wide hole to a length of guard rail in a narrow one."""
     mass, play = level
     place = float(rng.uniform(min(site.sensors), max(site.sensors)))
     return {"position": place}, {"mass": float(mass), "play": float(play * np.exp(0.2 * rng.normal()))}
 
 
 def act(world, site, where, p):
-    """A soft spring (6 Hz) carries it, the stops catch it."""
+    """Attach the mass by a soft spring (6 Hz) and stops."""
     k = p["mass"] * (2.0 * np.pi * 6.0) ** 2
     world.riders.append((where["position"], p["mass"], k, 0.1 * k / 40.0, p["play"], STOP))
 

@@ -1,4 +1,4 @@
-"""Ballast that stiffens with the square of its compression's size under five sleepers, as stones interlock."""
+"""Ballast that stiffens with compression under five sleepers: a quadratic term in the force, as stones interlock."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from turnout_blind.effect import Effect, sleeper_near
 
 
 def draw(rng, site, rate):
-    """Relative gain of stiffness per metre."""
+    """Relative increase of secant stiffness per metre of compression."""
     return sleeper_near(rng, site), {"rate": float(rate)}
 
 

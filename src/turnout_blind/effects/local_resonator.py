@@ -1,4 +1,4 @@
-"""A mass on a spring under the rail, such as a loose heating rod or stretcher bar; nobody told the model."""
+"""A mass on a spring under the rail, such as a loose heating rod or stretcher bar, unknown to the model."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ def draw(rng, site, mass):
 
 
 def act(world, site, where, p):
-    """Hung on the rail."""
+    """Attach the mass to the rail."""
     omega = 2.0 * np.pi * p["frequency"]
     k, c = p["mass"] * omega**2, 2.0 * p["damping"] * p["mass"] * omega
     world.riders.append((where["position"], p["mass"], k, c, 1.0, 0.0))

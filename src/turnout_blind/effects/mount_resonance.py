@@ -1,6 +1,6 @@
-"""A sensor on a loose mount: it resonates, with play-free but weak contact, above and below its resonance.
+"""A sensor on a weak mount without play, which adds a resonance.
 
-It yields beside the mount that every sensor has (2.5 to 4.5 kHz): at 5 kHz both together are a good mount still.
+It comes in series with the mount of every sensor (2.5 to 4.5 kHz). At 5 kHz both together are still a good mount.
 """
 
 import numpy as np
@@ -10,12 +10,12 @@ from turnout_blind.instrument import mounting
 
 
 def draw(rng, site, frequency):
-    """Frequency and quality of the mount."""
+    """Frequency and quality factor of the mount."""
     return any_sensor(rng, site), {"frequency": float(frequency), "quality": float(rng.uniform(4.0, 14.0))}
 
 
 def act(world, site, where, p):
-    """In hammer tests and passages alike."""
+    """Filter the channel, in hammer tests and passages."""
 
     def fault(kind, rng):
         return lambda x, rate: mounting(x, rate, p["frequency"], p["quality"])

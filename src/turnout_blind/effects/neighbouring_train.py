@@ -1,4 +1,4 @@
-"""A train on the other track during some of the passages: ground-borne waves that no wheel of ours explains."""
+"""A train on the other track during some passages: ground-borne waves that no wheel of the passing train explains."""
 
 import numpy as np
 from scipy import signal
@@ -7,13 +7,13 @@ from turnout_blind.effect import Effect
 
 
 def draw(rng, site, level):
-    """Which passages, and how strong [m/s²]."""
+    """Indices of the passages, level [m/s²] and centre frequency [Hz]."""
     hit = sorted(int(k) for k in rng.choice(len(site.passages), 3, replace=False))
     return {}, {"level": float(level), "passages": hit, "centre": float(rng.uniform(18.0, 45.0))}
 
 
 def act(world, site, where, p):
-    """Narrow noise that swells and fades, late at far sensors by 250 m/s."""
+    """Add narrow-band noise that rises and falls and reaches the sensors with 250 m/s."""
 
     def source(time, places, k, rng):
         if k not in p["passages"]:

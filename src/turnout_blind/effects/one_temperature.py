@@ -1,4 +1,4 @@
-"""Pads that soften with temperature, in campaigns of one temperature: nothing can tell them from soft pads."""
+"""Pads that soften with temperature, in campaigns at one temperature: they cannot be distinguished from soft pads."""
 
 import numpy as np
 
@@ -6,12 +6,12 @@ from turnout_blind.effect import Effect
 
 
 def draw(rng, site, coefficient):
-    """Relative loss per kelvin."""
+    """Relative loss of stiffness per kelvin."""
     return {}, {"coefficient": float(coefficient)}
 
 
 def act(world, site, where, p):
-    """As with two temperatures."""
+    """Soften the pads as ``pad_temperature`` does."""
     before, rate = world.softening, p["coefficient"]
     world.softening = lambda kelvin: before(kelvin) * float(np.exp(-rate * kelvin))
 

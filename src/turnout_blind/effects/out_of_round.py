@@ -1,12 +1,14 @@
-"""A polygonal wheel. Polygons grow where vehicle and track resonate, at a fixed frequency of passing; severe ones reach
-1 mm from peak to peak (Nielsen and Johansson 2000; Tao, Wen, Jin and Yang 2020, section on fixed frequencies).
+"""A polygonal wheel.
+
+Polygons grow at a fixed passing frequency, where vehicle and track resonate. Severe ones reach 1 mm peak to peak
+(Nielsen and Johansson 2000; Tao, Wen, Jin and Yang 2020, section on fixed frequencies).
 """
 
 import numpy as np
 
 from turnout_blind.effect import Effect, any_axle
 
-GROWS_AT = (60.0, 110.0)  # frequency of passing at the train's mean speed [Hz]
+GROWS_AT = (60.0, 110.0)  # passing frequency at the mean speed of the train [Hz]
 
 
 def draw(rng, site, amplitude):
@@ -18,7 +20,7 @@ def draw(rng, site, amplitude):
 
 
 def act(world, site, where, p):
-    """A wave round the tread."""
+    """Add a wave round the tread."""
 
     def tread(x, phase, radius):
         return p["amplitude"] * np.cos(p["order"] * (np.asarray(x) / radius + phase + p["angle"]))

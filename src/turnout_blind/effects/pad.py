@@ -1,15 +1,15 @@
-"""A worn, missing or wrongly replaced pad at one sleeper."""
+"""A worn, missing or wrongly replaced pad at one sleeper: its stiffness changes."""
 
 from turnout_blind.effect import Effect, sleeper_near
 
 
 def draw(rng, site, ratio):
-    """Factor on stiffness, either way."""
+    """Factor on stiffness, below or above 1."""
     return sleeper_near(rng, site), {"factor": float(ratio if rng.random() < 0.6 else 1.0 / ratio)}
 
 
 def act(world, site, where, p):
-    """Stiffness by the factor, damping by its root."""
+    """Multiply stiffness by the factor and damping by its square root."""
     world.pad[where["sleeper"]] *= p["factor"]
     world.pad_damping[where["sleeper"]] *= p["factor"] ** 0.5
 

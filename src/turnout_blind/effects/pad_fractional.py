@@ -1,4 +1,4 @@
-"""Pads whose stiffness rises with frequency as a power law: four Maxwell branches an octave pair apart stand for it."""
+"""Pads whose stiffness rises with frequency as a power law, approximated by four Maxwell branches two octaves apart."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ def draw(rng, site, order):
 
 
 def act(world, site, where, p):
-    """Branch b brings what the power law gains over its factor of four in frequency; half of the dashpot goes."""
+    """Give branch b the increase of the power law over its factor of four in frequency, and halve the dashpots."""
     knees = 4.0 ** (p["order"] * np.arange(1, RATES.size + 1))
     world.branch_share = np.diff(np.concatenate([[1.0], knees]))
     world.branch_rate = RATES.copy()

@@ -1,4 +1,4 @@
-"""A sensor that sits elsewhere than its description says."""
+"""A sensor at another position than its description says."""
 
 import numpy as np
 
@@ -6,12 +6,12 @@ from turnout_blind.effect import Effect, any_sensor, sign
 
 
 def draw(rng, site, shift):
-    """Shift along the rail."""
+    """Shift along the rail [m]."""
     return any_sensor(rng, site), {"shift": float(shift) * sign(rng)}
 
 
 def act(world, site, where, p):
-    """True place minus described place."""
+    """Add to true position minus described position."""
     world.sensor_shift[where["sensor"]] = world.sensor_shift.get(where["sensor"], 0.0) + p["shift"]
 
 

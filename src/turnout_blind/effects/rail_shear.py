@@ -1,4 +1,4 @@
-"""A rail that gives more in shear than its description says."""
+"""A rail with lower shear stiffness than its description says."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ def draw(rng, site, factor):
 
 
 def act(world, site, where, p):
-    """Shear stiffness by the factor."""
+    """Multiply the shear stiffness by the factor."""
     world.rail = replace(world.rail, shear=world.rail.shear * p["factor"])
 
 

@@ -1,4 +1,4 @@
-"""A channel on another logger whose clock lags by a constant, with a jitter of 2 % from record to record."""
+"""A channel on another logger whose clock lags by a constant delay, with 2 % jitter from record to record."""
 
 import numpy as np
 
@@ -6,18 +6,18 @@ from turnout_blind.effect import Effect, any_sensor, sign
 
 
 def shifted(x, rate, delay):
-    """``x`` (n,) as shown ``delay`` [s] later, by linear interpolation; at 60 kHz it is right to 1e-3 at 1 kHz."""
+    """``x`` (n,) delayed by ``delay`` [s], by linear interpolation. At 60 kHz the error is 1e-3 at 1 kHz."""
     time = np.arange(x.size) / rate
     return np.interp(time - delay, time, x, left=0.0, right=0.0)
 
 
 def draw(rng, site, delay):
-    """Lag of the channel."""
+    """Delay of the channel [s]."""
     return any_sensor(rng, site), {"delay": float(delay) * sign(rng)}
 
 
 def act(world, site, where, p):
-    """In hammer tests and passages alike."""
+    """Delay the channel, in hammer tests and passages."""
 
     def fault(kind, rng):
         delay = p["delay"] * (1.0 + 0.02 * float(rng.normal()))

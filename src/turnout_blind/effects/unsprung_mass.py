@@ -1,6 +1,6 @@
-"""Wheelsets of one train heavier than its vehicle file says: brake discs left out, then a motor hung on the axle.
+"""Wheelsets of one train heavier than its vehicle file says: brake discs, or a motor carried by the axle.
 
-A driven axle counts 1.7 t or 4.2 t as its motor is carried (class 86, Bjork 1970): a wrong sheet is wrong by a factor.
+A driven axle counts 1.7 t or 4.2 t, depending on how its motor is carried (class 86, Bjork 1970).
 """
 
 from turnout_blind.effect import Effect
@@ -12,7 +12,7 @@ def draw(rng, site, factor):
 
 
 def act(world, site, where, p):
-    """Factor on the unsprung mass."""
+    """Multiply the unsprung mass by the factor."""
     world.wheel_mass[where["train"]] = world.wheel_mass.get(where["train"], 1.0) * p["factor"]
 
 

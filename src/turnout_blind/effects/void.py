@@ -1,21 +1,22 @@
-"""A sleeper that hangs: first over a part of its bed, then over all of it. The gap closes softly, stone after stone.
+"""A hanging sleeper: first over a part of its bed, then over all of it. The gap closes gradually, stone by stone.
 
-A gap of any size shows in a blow once nothing bears the unloaded sleeper; voids grow from partial ones (Kaewunruen and
-Remennikov 2008, Dynamic properties of railway track), so that low rungs keep a share of the ballast's stiffness.
+A complete gap of any size shows in hammer tests, since nothing supports the unloaded sleeper. Voids grow from partial
+ones (Kaewunruen and Remennikov 2008, Dynamic properties of railway track). Low rungs therefore keep a share of the
+ballast stiffness.
 """
 
 from turnout_blind.effect import Effect, sleeper_near
 
 
 def draw(rng, site, level):
-    """Gap, share of the bed that still bears, the length over which the gap closes, its growth per passage."""
+    """Gap, share of the bed that still bears, compression over which the gap closes, and growth per passage."""
     gap, seated = level
     close = float(gap * rng.uniform(0.1, 0.4))
     return sleeper_near(rng, site), {"gap": float(gap), "seated": float(seated), "close": close, "growth": 0.02}
 
 
 def act(world, site, where, p):
-    """Beside the share that bears, ballast reacts only below the gap."""
+    """Open the gap: beside the share that bears, ballast reacts only when the gap is closed."""
     j = where["sleeper"]
     world.gap[j], world.seated[j], world.close[j] = p["gap"], p["seated"], p["close"]
     world.wear_per_passage[j] = (p["gap"] * p["growth"], 1.0)

@@ -106,7 +106,7 @@ def test_it_is_the_same_wherever_the_package_lies(package, tmp_path, monkeypatch
 def test_the_hammer_chain_stands_on_its_parts():
     fp.clear_caches()
     found = fp.closure("turnout.stages.hammer")
-    assert {"turnout.receptance", "turnout.modal", "turnout.readers.uff", "turnout.signal.spectra"} <= found
+    assert {"turnout.hammer_test", "turnout.modal", "turnout.readers.uff", "turnout.signal.spectra"} <= found
     assert not {
         m for m in found if m.startswith(("turnout.report", "turnout.trend", "turnout.workflow", "turnout.cli.main"))
     }

@@ -6,10 +6,10 @@ from benchmarks.published import hammer_test, published_model
 
 from turnout.config.settings.identify import IdentifySettings
 from turnout.config.settings.receptance import ReceptanceSettings
+from turnout.hammer_test import find_impacts, receptance_of
 from turnout.modal import identify
 from turnout.modal.bands import passed_share, residues_of_receptance
-from turnout.modal.poles import continuous_pole
-from turnout.receptance import find_impacts, receptance_of
+from turnout.modal.state_space import continuous_pole
 from turnout.records import Channel, Receptance, Recording
 
 SETTINGS = IdentifySettings(null_draws=10)

@@ -7,9 +7,8 @@ import pytest
 from benchmarks.passage_truth import IC3, PATTERNS, RATE, rolling, sensors_for, struck_train
 
 from turnout.passage.analysis import analyse
-from turnout.passage.kinematics import Motion
-from turnout.passage.sensor_consistency import inconsistent_positions
-from turnout.passage.slowness import scan_slowness
+from turnout.passage.channel_checks import inconsistent_positions
+from turnout.passage.kinematics import Motion, scan_slowness
 from turnout.passage.speed import slowness_from_sensors
 from turnout.stages.passage_context import known_patterns
 

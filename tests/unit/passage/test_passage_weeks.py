@@ -11,7 +11,7 @@ from turnout.config import load_configuration, with_raw
 from turnout.readers.writing import write
 from turnout.records import Channel
 from turnout.registry.database import open_registry
-from turnout.registry.register import register
+from turnout.registry.job import register
 from turnout.stages.passage import PassageContext, SectionModel, passage_unit
 from turnout.workflow.batches import UnitResult, read_results, write_batch
 from turnout.workflow.scan import scan

@@ -9,7 +9,7 @@ from turnout.errors import SimulationError
 from turnout.physics import HangingSleeper, ZenerPad
 from turnout.simulate.frequency_response import receptance
 from turnout.simulate.matrices import assemble
-from turnout.simulate.prepare import prepare
+from turnout.simulate.preparation import prepare
 from turnout.simulate.run import Drive, run
 from turnout.simulate.track import uniform_track
 from turnout.simulate.vehicle import car, lone_wheels

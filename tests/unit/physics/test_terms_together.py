@@ -17,7 +17,7 @@ from turnout.physics import (
 from turnout.simulate.frequency_response import receptance
 from turnout.simulate.links import links_of, ports_of
 from turnout.simulate.matrices import assemble
-from turnout.simulate.prepare import prepare
+from turnout.simulate.preparation import prepare
 from turnout.simulate.run import Drive, run
 from turnout.simulate.track import uniform_track
 from turnout.simulate.vehicle import lone_wheels

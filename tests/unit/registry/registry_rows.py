@@ -5,7 +5,7 @@ from pathlib import Path
 
 from turnout.registry.database import open_registry
 from turnout.registry.ids import content_id
-from turnout.registry.register import register
+from turnout.registry.job import register
 from turnout.workflow.batches import UnitResult, read_results, write_batch
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from turnout.cli.main import main
-from turnout.registry.register import register
+from turnout.registry.job import register
 
 
 @pytest.mark.parametrize("asof", ["2026-03-01T09:00+02:00", "2026-03-01T09:00+00:00"])

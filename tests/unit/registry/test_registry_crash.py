@@ -17,11 +17,11 @@ from turnout.registry import registration
 from turnout.registry.database import is_behind, rebuild_database
 from turnout.registry.generation import load
 from turnout.registry.integrity import check, vacuum
-from turnout.registry.register import register
+from turnout.registry.job import register
 from turnout.workflow.batches import read_results
 
 REGISTER = (
-    "import sys; from turnout.registry.register import register; from turnout.workflow.batches import read_results;"
+    "import sys; from turnout.registry.job import register; from turnout.workflow.batches import read_results;"
     "print('ready', flush=True); register(sys.argv[2:], sys.argv[1], read=read_results)"
 )
 

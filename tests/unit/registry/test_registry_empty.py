@@ -9,7 +9,7 @@ from turnout.cli.main import main
 from turnout.errors import REASONS
 from turnout.registry.database import open_registry, view_columns
 from turnout.registry.documentation import views
-from turnout.registry.register import register
+from turnout.registry.job import register
 
 # DuckDB writes its storage version behind the magic bytes of the main header; 64 was written by all of 0.9.2 to 1.2.
 MAGIC, OLDEST_READ_BY_1_2 = b"DUCK", 64 + 3

@@ -12,7 +12,7 @@ from turnout.errors import RegistryError
 from turnout.registry.batch_stream import chunks
 from turnout.registry.database import open_registry
 from turnout.registry.derived import publish
-from turnout.registry.register import register
+from turnout.registry.job import register
 from turnout.registry.schema import arrow_schema, create_table, tables
 from turnout.registry.staging import connect
 from turnout.workflow.batches import UnitResult
@@ -222,7 +222,7 @@ def test_a_derived_table_with_a_bad_row_is_refused_whole(tmp_path, rows, said):
 @pytest.mark.parametrize("size", [1, 1024])
 def test_an_id_that_two_units_give_is_one_passage_and_a_quarantine_row(bench, monkeypatch, size):
     """In the same chunk of units or in another one: the second is left out by name, and all else is registered."""
-    monkeypatch.setattr("turnout.registry.register.chunks", partial(chunks, size=size))
+    monkeypatch.setattr("turnout.registry.job.chunks", partial(chunks, size=size))
     passage = {"turnout_id": "t1", "passage_id": "p", "recording_id": "r", "passed_at_utc": "2026-01-05T10:00:00"}
     passage |= {"status": "accepted", "n_axles": 8, "track": "main", "axle_load_source": "unavailable"}
     fit = {"passage_id": "p", "section_id": "t1/A1", "channel": "A1", "model_id": "m", "turnout_id": "t1"}

@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 import duckdb
 import pytest
 
-from turnout.registry.register import register
+from turnout.registry.job import register
 from turnout.workflow.batches import read_results, write_batch
 
 
@@ -72,7 +72,7 @@ def test_files_do_not_depend_on_the_number_of_threads(tmp_path, hammer, hashes):
         code = (
             "from functools import partial; import turnout.registry.staging as s; real = s.connect;"
             f"import turnout.registry.registration as r; r.connect = partial(real, threads={threads});"
-            "from turnout.registry.register import register; from turnout.workflow.batches import read_results;"
+            "from turnout.registry.job import register; from turnout.workflow.batches import read_results;"
             f"register([{str(batch)!r}], {str(tmp_path / str(threads))!r}, read=read_results)"
         )
         subprocess.run([sys.executable, "-c", code], check=True)
@@ -180,7 +180,7 @@ def test_a_section_that_the_layout_names_no_more_is_known_to_have_left_it(bench,
 def test_two_registrations_at_once_give_the_union(tmp_path, hammer):
     (tmp_path / "work").mkdir()
     code = (
-        "import sys; from turnout.registry.register import register; from turnout.workflow.batches import read_results;"
+        "import sys; from turnout.registry.job import register; from turnout.workflow.batches import read_results;"
         "[register([b], sys.argv[1], read=read_results) for b in sys.argv[2:]]"
     )
     writers = []

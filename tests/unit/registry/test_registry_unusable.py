@@ -5,10 +5,10 @@ from registry_rows import hammer_result, quarantined_result
 
 from turnout.cli.main import main
 from turnout.registry.database import open_registry
-from turnout.registry.register import register
+from turnout.registry.job import register
 from turnout.report.pages.fleet import fleet_page
+from turnout.report.site import write_pages
 from turnout.report.source import FleetSource
-from turnout.report.write import write_pages
 from turnout.workflow.batches import UnitResult
 
 LIST = "select turnout_id, sections, source, state, sentence from worklist(timestamp '2027-01-01') where band = 'all'"

@@ -14,11 +14,11 @@ from turnout.config import load_configuration, with_raw
 from turnout.demo.hammer import hammer_test
 from turnout.readers.writing import write
 from turnout.registry.database import open_registry
-from turnout.registry.register import register
+from turnout.registry.job import register
 from turnout.report.job import report_job
 from turnout.report.pages.turnout import line_of
 from turnout.report.panels.diagram import diagram
-from turnout.report.write import write_pages
+from turnout.report.site import write_pages
 from turnout.stages.hammer import hammer_unit
 from turnout.workflow.batches import UnitResult, read_results, write_batch
 from turnout.workflow.configuration_rows import configuration_rows

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from turnout.report.pages.turnout import turnout_page
+from turnout.report.site import page_environment, replace_page, shared_by_pages
 from turnout.report.source import ROWS
 from turnout.report.trains import ROWS as OF_TRAINS
-from turnout.report.write import page_environment, replace_page, shared_by_pages
 
 SECTION = {"section_id": "t/A7", "turnout_id": "t", "label": "A7", "panel": "CP", "track": "main", "position_m": 21.4}
 REJECTED = {

@@ -10,7 +10,7 @@ from turnout.simulate.force_laws import LinearLaw
 from turnout.simulate.frequency_response import receptance, receptance_gradient
 from turnout.simulate.infinite_track import floquet_receptance
 from turnout.simulate.matrices import assemble
-from turnout.simulate.prepare import prepare
+from turnout.simulate.preparation import prepare
 from turnout.simulate.rail import Rail
 from turnout.simulate.run import Drive, Probe, run
 from turnout.simulate.track import Track, uniform_track

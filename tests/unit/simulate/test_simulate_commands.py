@@ -7,8 +7,8 @@ import pytest
 
 from turnout.cli.main import main
 from turnout.config.settings.receptance import ReceptanceSettings
+from turnout.hammer_test import find_impacts
 from turnout.readers import read
-from turnout.receptance import find_impacts
 from turnout.records import RawChannel, RawDescription
 from turnout.simulate.calibration import Calibration
 

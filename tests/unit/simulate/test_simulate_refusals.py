@@ -18,7 +18,7 @@ from turnout.simulate import (
 from turnout.simulate.force_laws import PowerLaw, TableLaw
 from turnout.simulate.links import Link
 from turnout.simulate.matrices import assemble
-from turnout.simulate.prepare import prepare
+from turnout.simulate.preparation import prepare
 from turnout.simulate.run import Drive, Probe, run
 from turnout.simulate.track import Track
 from turnout.simulate.turnout_track import TurnoutTrack

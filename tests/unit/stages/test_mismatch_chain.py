@@ -266,7 +266,7 @@ def test_a_turnout_without_a_track_is_said(soft, capsys):
 
 def test_the_rows_fit_the_registry(soft, tmp_path):
     from turnout.registry.database import open_registry
-    from turnout.registry.register import register
+    from turnout.registry.job import register
     from turnout.workflow.batches import UnitResult, read_results, write_batch
 
     tables = diagnose_turnout("t1")
@@ -284,7 +284,7 @@ def test_the_rows_fit_the_registry(soft, tmp_path):
 
 
 def test_a_finding_of_the_fleet_is_accepted_from_the_registry(soft, tmp_path):
-    from turnout.registry.register import register
+    from turnout.registry.job import register
     from turnout.workflow.batches import UnitResult, read_results, write_batch
 
     tables = diagnose_turnout("t1")

@@ -11,6 +11,7 @@ import small_turnout as small
 
 from turnout.config import load_configuration, with_raw
 from turnout.errors import SimulationError
+from turnout.hammer_test import find_impacts
 from turnout.mismatch.engine.case import Nuisance
 from turnout.mismatch.turnout import HammerInput, PassageInput, TrackCase
 from turnout.mismatch.turnout.passage_observation import (
@@ -25,7 +26,6 @@ from turnout.mismatch.turnout.receptance_observation import pairs_of_test
 from turnout.mismatch.turnout.track_parameters import vehicle_with
 from turnout.readers import MAX_WHOLE_FILE_SIZE, read
 from turnout.readers.writing import write
-from turnout.receptance import find_impacts
 from turnout.simulate import Sensor, load_vehicle
 from turnout.stages import mismatch, mismatch_inputs
 from turnout.stages.accept_finding import with_entry

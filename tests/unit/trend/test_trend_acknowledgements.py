@@ -13,7 +13,7 @@ from turnout.config import load_configuration
 from turnout.config.acknowledgements import acknowledgement_row, read_acknowledgements
 from turnout.registry.database import open_registry
 from turnout.registry.derived import publish
-from turnout.registry.register import register
+from turnout.registry.job import register
 from turnout.trend.tables import arrow_rows
 
 SECTIONS = {"T1": SimpleNamespace(tree={"sections": {"A": None}})}

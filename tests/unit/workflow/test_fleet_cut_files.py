@@ -128,7 +128,7 @@ def test_a_cut_verdict_judges_all_units_again(fleet, share):
 
 @pytest.mark.parametrize("share", PARTS)
 def test_a_cut_state_of_the_trend_writes_every_year_again(fleet, share, monkeypatch):
-    from turnout.registry.register import register
+    from turnout.registry.job import register
 
     root, state = fleet.folder / "registry", fleet.folder / "work/trend.json"
     register([], root, read=iter)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from turnout.registry.register import register
+from turnout.registry.job import register
 from turnout.workflow.batches import UnitResult, read_results, write_batch
 from turnout.workflow.nightly import nightly
 from turnout.workflow.run_report import failure_reason

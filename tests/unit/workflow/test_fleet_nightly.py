@@ -124,7 +124,7 @@ def test_a_profile_that_is_not_there_is_said_before_anything_begins(tmp_path, mo
 
 def test_the_three_turnouts_of_which_most_was_not_used_are_named(tmp_path, monkeypatch):
     """Quarantine from the states, rejected tests from the registry; the units of one turnout come from both."""
-    from turnout.registry.register import register
+    from turnout.registry.job import register
     from turnout.workflow.batches import UnitResult, read_results, write_batch
 
     monkeypatch.chdir(tmp_path)

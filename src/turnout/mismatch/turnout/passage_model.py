@@ -6,7 +6,7 @@ import numpy as np
 
 from turnout.mismatch.turnout.matrix_cache import matrices_of
 from turnout.mismatch.turnout.passage_band import SIMULATION_RATE
-from turnout.simulate.prepare import prepare
+from turnout.simulate.preparation import prepare
 from turnout.simulate.run import Drive, run
 
 ELEMENTS_PER_BAY = 2  # per bay; differs by 0.2 to 0.5 % of the waveform below 112 Hz from 4 elements

@@ -5,8 +5,8 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
+from turnout.hammer_test import find_impacts
 from turnout.mismatch.engine.case import Observation
-from turnout.receptance import find_impacts
 
 LINES = np.unique(np.round(np.geomspace(35.0, 900.0, 44) / 2.0) * 2.0)  # [Hz]
 # 1/s: records are weighted by exp(-DECAY_RATE t), so that ringing at their end is not truncated. Models are evaluated

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from turnout.receptance import find_impacts
+from turnout.hammer_test import find_impacts
 
 MIN_IMPACTS = 3  # accepted impacts of a test, at least, to estimate its level and scatter
 SCATTER_FLOOR = 0.02  # ln, least scatter of peaks: sampling, ringing mountings, impacts beside the mark

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from turnout.receptance import find_impacts, receptance_of
+from turnout.hammer_test import find_impacts, receptance_of
 
 RATE = 20_000.0
 

@@ -8,8 +8,8 @@ test's medians: weak, out of range, noisy.
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from turnout.receptance.contact import crossing
-from turnout.receptance.segmentation import MAD_TO_SD
+from turnout.hammer_test.contact import crossing
+from turnout.hammer_test.segmentation import MAD_TO_SD
 from turnout.records import Rejection
 
 # Steps: a parabola one step deep over m equal samples falls by 9 steps within as many samples again, and 1 by rounding.
@@ -129,7 +129,7 @@ def top_share(force, contact, polarity=1):
 
     Examples
     --------
-    >>> from turnout.receptance.contact import Contact
+    >>> from turnout.hammer_test.contact import Contact
     >>> x = np.sin(np.pi * np.arange(61) / 60)
     >>> about = Contact(1, 59, 30, 1.0, 40.0, 0.0, 0.0, 0.0, 0.0)
     >>> print(f"{top_share(x, about):.2f} {top_share(np.minimum(x, 0.9), about):.2f}")

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from turnout.receptance.agreement import pairwise_coherence, response_gain
-from turnout.receptance.impact_quality import rail_code, top_share
+from turnout.hammer_test.agreement import pairwise_coherence, response_gain
+from turnout.hammer_test.impact_quality import rail_code, top_share
 from turnout.signal.filters import FAMILIES, force_pulse
 
 RATE = 20_000.0

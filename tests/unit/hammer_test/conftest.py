@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import fftconvolve
 
 from turnout.config.settings.receptance import ReceptanceSettings
-from turnout.receptance import find_impacts
+from turnout.hammer_test import find_impacts
 from turnout.records import Channel, Recording
 from turnout.signal.filters import force_pulse
 

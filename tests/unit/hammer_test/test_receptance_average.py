@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from turnout.config.settings.receptance import ReceptanceSettings
-from turnout.receptance import bands_passed, find_impacts, frf, gate_rejections, receptance_of
+from turnout.hammer_test import bands_passed, find_impacts, frf, gate_rejections, receptance_of
 from turnout.signal.spectra import correct_poles
 
 RATE = 20_000.0

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from turnout.receptance.contact import further_contacts
+from turnout.hammer_test.contact import further_contacts
 from turnout.records import Rejection
 
 # s, end of a record over which its remaining amplitude is taken: a period of the slowest mode.

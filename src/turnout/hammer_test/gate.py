@@ -56,7 +56,7 @@ def gate_rejections(
 
     Examples
     --------
-    >>> from turnout.receptance import receptance_of
+    >>> from turnout.hammer_test import receptance_of
     >>> gate_rejections(receptance_of([]))[0].detail
     '0 accepted impacts, a coherence needs 3'
     """

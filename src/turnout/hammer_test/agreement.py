@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.fft import next_fast_len, rfft, rfftfreq
 
-from turnout.receptance.segmentation import MAD_TO_SD
+from turnout.hammer_test.segmentation import MAD_TO_SD
 from turnout.records import Rejection
 
 # Least number of impacts from which the spread of a test is estimated.

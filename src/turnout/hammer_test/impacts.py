@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from turnout.config.settings.receptance import ReceptanceSettings
-from turnout.receptance.agreement import judge_agreement
-from turnout.receptance.contact import band_edges, measure_contact
-from turnout.receptance.free_decay import judge_decay, judge_second_contact
-from turnout.receptance.impact_quality import is_repeated, judge_against_median, judge_repeats, judge_tops, overload
-from turnout.receptance.segmentation import cut_impacts
+from turnout.hammer_test.agreement import judge_agreement
+from turnout.hammer_test.contact import band_edges, measure_contact
+from turnout.hammer_test.free_decay import judge_decay, judge_second_contact
+from turnout.hammer_test.impact_quality import is_repeated, judge_against_median, judge_repeats, judge_tops, overload
+from turnout.hammer_test.segmentation import cut_impacts
 from turnout.records import Impact, Recording, Rejection
 
 # N, largest peak force: far above any hammer, and below newtons that were read as kilonewtons.
