@@ -12,10 +12,10 @@ ROOT = Path(__file__).parent
 def fingerprint(*modules: str) -> str:
     """16 hexadecimal characters over the syntax trees of ``modules`` and of all that they import from this package.
 
-    Imports inside functions count. A package counts if it is itself imported from, and
-    ``import_module(f"turnout.readers.{name}")`` counts as every module of ``turnout.readers``. Data files (CSV, SQL) in
-    the folder of an imported module count by their bytes. A folder without modules (templates, SQL) counts for the
-    modules that name it in a string. ValueError for a module that does not exist.
+    Imports inside functions count. Those under ``if TYPE_CHECKING:`` never run and do not count. A package counts if it
+    is itself imported from, and ``import_module(f"turnout.readers.{name}")`` counts as every module of
+    ``turnout.readers``. Data files (CSV, SQL) in the folder of an imported module count by their bytes. A folder
+    without modules (templates, SQL) counts for the modules that name it in a string. ValueError for a module that does not exist.
 
     >>> fingerprint("turnout.errors") == fingerprint("turnout.errors")
     True
@@ -65,6 +65,9 @@ def _digest_and_imports(name: str) -> tuple[str, tuple[str, ...]]:
     if path is None:
         raise ValueError(f"no module {name} in the package {PACKAGE}")
     tree = ast.parse(path.read_text(encoding="utf-8"))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.If) and _is_type_checking(node.test):
+            node.body = [ast.Pass()]
     nodes = list(ast.walk(tree))
     imported = _imports(nodes, name, path.name == "__init__.py")
     for node in nodes:
@@ -96,6 +99,11 @@ def _data_in_folder(folder: Path) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
 def _has_docstring(node) -> bool:
     first = node.body[0] if node.body else None
     return isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant) and isinstance(first.value.value, str)
+
+
+def _is_type_checking(test: ast.expr) -> bool:
+    """Whether a condition is ``TYPE_CHECKING`` or ``typing.TYPE_CHECKING``."""
+    return "TYPE_CHECKING" in (getattr(test, "id", None), getattr(test, "attr", None))
 
 
 def _imports(nodes: list[ast.AST], name: str, is_package: bool) -> list[str]:
