@@ -15,7 +15,8 @@ def fingerprint(*modules: str) -> str:
     Imports inside functions count. Those under ``if TYPE_CHECKING:`` never run and do not count. A package counts if it
     is itself imported from, and ``import_module(f"turnout.readers.{name}")`` counts as every module of
     ``turnout.readers``. Data files (CSV, SQL) in the folder of an imported module count by their bytes. A folder
-    without modules (templates, SQL) counts for the modules that name it in a string. ValueError for a module that does not exist.
+    without modules (templates, SQL) counts for the modules that name it in a string. ValueError for a
+    module that does not exist.
 
     >>> fingerprint("turnout.errors") == fingerprint("turnout.errors")
     True
