@@ -12,7 +12,7 @@ from turnout.registry.job import register
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-HELP = sorted((ROOT / "src" / "turnout" / "commands").glob("*.py"))
+HELP = sorted((ROOT / "src" / "turnout" / "cli").glob("*.py"))
 FENCED = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 QUERY = re.compile(r'(?:turnout query|-c) "((?:from|select) [^"]*)"')
 INLINE = re.compile(r"`((?:from|select) (?!turnout\.)[^`]*)`")
